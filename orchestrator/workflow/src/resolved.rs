@@ -1,0 +1,135 @@
+//! A workflow with every name looked up, every parameter checked and in SI, every file hashed: all that
+//! the planner and the engine need, and nothing of YAML.
+
+use camino::Utf8PathBuf;
+use serde::{Deserialize, Serialize};
+
+/// A plugin library as found on the search path or by path.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PluginId {
+    /// Name in its manifest.
+    pub name: String,
+    /// Version in its manifest.
+    pub version: String,
+    /// The library.
+    pub path: Utf8PathBuf,
+    /// BLAKE3 of the library's bytes, hex.
+    pub hash: String,
+}
+
+/// A file that a parameter names, whose content is part of the key.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputFile {
+    /// JSON pointer of the parameter, e.g. `/scene/tool/stl/file`.
+    pub pointer: String,
+    /// Absolute path.
+    pub path: Utf8PathBuf,
+    /// BLAKE3 of its bytes, hex.
+    pub hash: String,
+}
+
+/// One wire of a step.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ResolvedInput {
+    /// Port of the receiving plugin.
+    pub port: String,
+    /// Step whose artifact arrives. Fan-out: dimensions that both steps have are matched by index,
+    /// dimensions that only the giving step has are gathered (all items, in order), dimensions that only
+    /// the receiving step has repeat the same artifact.
+    pub from: String,
+}
+
+/// One dimension of a fan-out.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Dimension {
+    /// Name in `for_each`, for labels.
+    pub name: String,
+    /// The step whose collection is fanned over; identifies the dimension.
+    pub over: String,
+}
+
+/// What a step may use.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Resources {
+    /// Cores; the engine gives the step this many threads.
+    pub cores: u32,
+    /// Bytes.
+    pub memory: u64,
+    /// Wall-clock limit (s); 0: none.
+    pub time_limit: f64,
+}
+
+/// One step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResolvedStep {
+    /// Name in the workflow.
+    pub name: String,
+    /// Role of its plugin.
+    pub role: String,
+    /// Its plugin.
+    pub plugin: PluginId,
+    /// Components that its parameters name (elements, materials), in order of their JSON pointer.
+    pub components: Vec<PluginId>,
+    /// Resolved `with` block: SI numbers, defaults filled in, keys sorted.
+    pub parameters: serde_json::Value,
+    /// Files that parameters name.
+    pub files: Vec<InputFile>,
+    /// Wires, in the order of the plugin's ports.
+    pub inputs: Vec<ResolvedInput>,
+    /// All fan-out dimensions, outermost first: those of the collections it fans over, then its own.
+    pub dimensions: Vec<Dimension>,
+    /// Kind of its artifact.
+    pub output_kind: String,
+    /// Whether its artifact is a collection.
+    pub collection: bool,
+    /// Budget.
+    pub resources: Resources,
+    /// How often a failed step is tried again.
+    pub retries: u32,
+}
+
+/// A stated expectation on a result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Expectation {
+    /// Step.
+    pub step: String,
+    /// Result name.
+    pub result: String,
+    /// Expected value (SI), if stated.
+    pub value: Option<f64>,
+    /// Allowed absolute deviation from `value` (SI).
+    pub tolerance: Option<f64>,
+    /// Lower bound (SI).
+    pub minimum: Option<f64>,
+    /// Upper bound (SI).
+    pub maximum: Option<f64>,
+    /// Where the expectation comes from.
+    pub source: Option<String>,
+}
+
+/// What happens to independent branches when a step fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FailurePolicy {
+    /// Independent branches finish.
+    KeepGoing,
+    /// Running steps are stopped.
+    FailFast,
+}
+
+/// A workflow ready to plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResolvedWorkflow {
+    /// Name.
+    pub name: String,
+    /// Its file, absolute.
+    pub file: Utf8PathBuf,
+    /// Free text.
+    pub description: Option<String>,
+    /// Steps in topological order (ties in the order of the file).
+    pub steps: Vec<ResolvedStep>,
+    /// Expectations.
+    pub expectations: Vec<Expectation>,
+    /// Failure policy.
+    pub on_failure: FailurePolicy,
+}

@@ -1,0 +1,37 @@
+//! A material file: a law (a material plugin with its parameters) and the sheet's thickness and mass.
+
+use crate::units::{ArealMass, Length};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A material file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Version of the material format: 1.
+    pub plyflow_material: u32,
+    /// Name, used in reports.
+    pub name: String,
+    /// Where the numbers come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// Material plugin: name or path of a library.
+    pub plugin: String,
+    /// Thickness of the sheet.
+    pub thickness: Length,
+    /// Mass per area.
+    pub areal_mass: ArealMass,
+    /// The plugin's parameters, checked against its manifest.
+    #[serde(default)]
+    pub with: serde_json::Map<String, serde_json::Value>,
+}
+
+/// A material where a scene names one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum MaterialEntry {
+    /// Path of a material file, relative to the scene file.
+    File(String),
+    /// The material itself.
+    Inline(Box<Material>),
+}

@@ -1,0 +1,214 @@
+//! A scene: tool, sheets from the tool upwards, process and friction. What is formed, not how it
+//! is computed (element, mesh and step sizes are parameters of the step).
+//!
+//! Coordinates: x along the tool, y across, z up; the machine bed is the plane z = 0 and the tool
+//! stands on it, centred at x = y = 0.
+
+use crate::material::MaterialEntry;
+use crate::units::{Angle, Length, Number, Pressure, Time};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A scene file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Version of the scene format: 1.
+    pub plyflow_scene: u32,
+    /// Name, used in reports.
+    pub name: String,
+    /// Free text.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// The rigid tool.
+    pub tool: Tool,
+    /// Sheets in the order of the stack, the one nearest the tool first.
+    pub sheets: Vec<Sheet>,
+    /// Coulomb coefficients by pair of surfaces.
+    pub friction: Friction,
+    /// The forming process.
+    pub process: Process,
+}
+
+/// The rigid tool: one of the parametric generators or an STL file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Tool {
+    /// U-shaped spar with two joggles.
+    JoggleSpar(JoggleSpar),
+    /// A block with a flat top that lies just above the bed.
+    Flat(FlatTool),
+    /// Half a sphere on the bed.
+    Hemisphere(HemisphereTool),
+    /// A triangulated surface.
+    Stl(StlTool),
+}
+
+/// The spar of thesis chapter 5: a male tool of trapezoidal section whose height steps twice along its
+/// length (two ramps in z), the ramps slanted in plan so that they are asymmetric about the width.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JoggleSpar {
+    /// Length along x.
+    pub length: Length,
+    /// Width of the top face between the theoretical corners.
+    pub top_width: Length,
+    /// Height of the top face at the low end.
+    pub height: Length,
+    /// Angle of the side walls from the vertical.
+    pub draft: Angle,
+    /// Radius of the fillets between top and sides.
+    pub fillet: Length,
+    /// The joggles, in order of `start`.
+    pub joggles: Vec<Joggle>,
+    /// Largest edge of the triangulation.
+    pub facet_size: Length,
+}
+
+/// One ramp of the top face.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Joggle {
+    /// x (from the tool's centre) where the ramp begins, on the centre line y = 0.
+    pub start: Length,
+    /// Length of the ramp along x.
+    pub length: Length,
+    /// Change of height over the ramp, positive upwards with growing x.
+    pub rise: Length,
+    /// Slant in plan: the ramp begins at x = start + y tan(skew).
+    pub skew: Angle,
+    /// How far the ramp also steps each side wall outwards (y < 0 side, y > 0 side), positive outwards.
+    pub side_step: [Length; 2],
+    /// Radius of the fillets where the ramp begins and ends.
+    pub fillet: Length,
+}
+
+/// A flat block.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlatTool {
+    /// Length along x.
+    pub length: Length,
+    /// Width along y.
+    pub width: Length,
+    /// Height of the flat top above the bed.
+    pub height: Length,
+    /// Radius of the rounding between top and bed; at most the height.
+    pub fillet: Length,
+    /// Largest edge of the triangulation.
+    pub facet_size: Length,
+}
+
+/// Half a sphere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HemisphereTool {
+    /// Radius.
+    pub radius: Length,
+    /// Largest edge of the triangulation.
+    pub facet_size: Length,
+}
+
+/// A tool from an STL file (binary or ASCII).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StlTool {
+    /// Path, relative to the scene file.
+    pub file: String,
+    /// Length of one unit of the file, e.g. `1 mm`.
+    pub unit: Length,
+    /// Moves the file's origin, after scaling.
+    #[serde(default)]
+    pub translate: [Length; 3],
+}
+
+/// What a sheet is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SheetKind {
+    /// Fabric ply with the given outline.
+    Ply,
+    /// Film clamped in the frame.
+    Diaphragm,
+}
+
+/// One sheet of the stack.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sheet {
+    /// Name of its body in artifacts.
+    pub name: String,
+    /// Ply or diaphragm.
+    pub kind: SheetKind,
+    /// A material file (path relative to the scene file) or the material itself.
+    pub material: MaterialEntry,
+    /// Plies: length along x before forming.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<Length>,
+    /// Plies: width along y before forming.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width: Option<Length>,
+    /// Plies: position of the centre over the tool.
+    #[serde(default)]
+    pub centre: [Length; 2],
+    /// Plies: direction of fibre family 1 from x, counter-clockwise seen from above.
+    #[serde(default)]
+    pub fibre_1: Angle,
+    /// Plies: direction of fibre family 2; the stitch lies between family 1 and 2, so that positive
+    /// shear stretches it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fibre_2: Option<Angle>,
+}
+
+/// Coulomb friction coefficients.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Friction {
+    /// Tool (and machine bed) against diaphragm.
+    pub tool_diaphragm: Number,
+    /// Tool against fabric.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_fabric: Option<Number>,
+    /// Fabric against diaphragm.
+    pub fabric_diaphragm: Number,
+    /// Fabric against fabric.
+    pub fabric_fabric: Number,
+    /// Diaphragm against diaphragm.
+    pub diaphragm_diaphragm: Number,
+}
+
+/// The process.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Process {
+    /// Double-diaphragm forming.
+    DoubleDiaphragm(DoubleDiaphragm),
+}
+
+/// Double-diaphragm forming: the frame is lowered with the bag under vacuum until the lower film meets
+/// the bed, then the air under it is drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DoubleDiaphragm {
+    /// Length of the frame's opening along x.
+    pub frame_length: Length,
+    /// Width of the frame's opening along y.
+    pub frame_width: Length,
+    /// Height of the lower film over the tool's highest point at the start.
+    pub clearance: Length,
+    /// Vacuum in the bag: pressure of the surroundings over that between the films.
+    pub bag_pressure: Pressure,
+    /// Pressure drawn under the lower film at the end.
+    pub forming_pressure: Pressure,
+    /// Simulated duration of evacuating the bag.
+    pub bagging_time: Time,
+    /// Simulated duration of lowering the frame.
+    pub lowering_time: Time,
+    /// Simulated duration of drawing the air.
+    pub drawing_time: Time,
+    /// Simulated duration at full pressure, for the motion to die out.
+    pub settling_time: Time,
+    /// Distance around the plies beyond which the two films are taken as joined (they stick under the bag
+    /// pressure; their seal lies at the frame).
+    pub film_joint_margin: Length,
+}

@@ -1,0 +1,1 @@
+//! plyflow-conformance

@@ -1,0 +1,1 @@
+//! plyflow-e2e
