@@ -1,1 +1,3 @@
 //! plyflow-model
+
+pub mod job;
