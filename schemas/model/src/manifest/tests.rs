@@ -1,0 +1,104 @@
+use super::*;
+
+const DETECTION: &str = r#"{
+  "name": "defect-detection", "version": "0.1.0", "vendor": "Plyflow", "kind": "step",
+  "role": "defect-detection", "summary": "One sentence.",
+  "parameters": {
+    "over_shear_positive": {"type": "quantity", "dimension": "angle", "default": "8 deg",
+                            "minimum": "0 deg", "maximum": "90 deg", "doc": "Limit."},
+    "smoothing": {"type": "integer", "default": 3, "minimum": 0, "doc": "Passes."},
+    "mode": {"type": "choice", "values": ["a", "b"], "default": "a", "doc": "Mode."},
+    "elements": {"type": "map", "of": {"type": "element"}, "doc": "By sheet."},
+    "element": {"type": "element", "required": true, "doc": "Element."}
+  },
+  "inputs": {"formed": {"kind": "forming", "doc": "Run."}},
+  "output": {"kind": "defects"},
+  "results": {"flagged_area": {"unit": "m2", "doc": "Area."}, "length": {"unit": "m"}}
+}"#;
+
+#[test]
+fn the_manual_s_example_is_read() {
+    let m = Manifest::parse(DETECTION).unwrap();
+    assert_eq!(m.kind, PluginKind::Step);
+    assert!(m.inputs["formed"].required && !m.inputs["formed"].many);
+    let Shape::Quantity(Dimension::Angle, bounds) = &m.parameters["over_shear_positive"].shape
+    else {
+        panic!("no angle")
+    };
+    assert_eq!(bounds.broken_by(2.0).as_deref(), Some("at most 90 deg"));
+    assert_eq!(bounds.broken_by(1.0), None);
+}
+
+#[test]
+fn writing_and_reading_a_manifest_keeps_it() {
+    let m = Manifest::parse(DETECTION).unwrap();
+    let again = Manifest::parse(&serde_json::to_string(&m).unwrap()).unwrap();
+    assert_eq!(m, again);
+    assert_eq!(
+        m.parameters.get_index(2).unwrap().0,
+        "mode",
+        "order is kept"
+    );
+}
+
+#[test]
+fn results_with_a_run_time_suffix_are_found_by_their_stem() {
+    let m = Manifest::parse(DETECTION).unwrap();
+    assert_eq!(m.result("length.AW1").unwrap().unit, "m");
+    assert!(m.result("width.AW1").is_none());
+}
+
+#[test]
+fn slips_in_a_manifest_are_refused() {
+    for (from, to, says) in [
+        ("\"summary\"", "\"sumary\"", "sumary"),
+        (
+            "\"dimension\": \"angle\"",
+            "\"dimension\": \"angel\"",
+            "angel",
+        ),
+        ("\"dimension\": \"angle\", ", "", "needs `dimension`"),
+        (
+            "\"maximum\": \"90 deg\"",
+            "\"maximum\": 90",
+            "must be an angle",
+        ),
+        (
+            "\"maximum\": \"90 deg\"",
+            "\"maximum\": \"90 mm\"",
+            "is a length",
+        ),
+        (
+            "\"type\": \"integer\"",
+            "\"type\": \"int\"",
+            "unknown parameter type `int`",
+        ),
+        (
+            "\"type\": \"integer\", \"default\": 3",
+            "\"type\": \"boolean\", \"default\": true",
+            "no meaning",
+        ),
+        ("\"output\": {\"kind\": \"defects\"},", "", "needs `output`"),
+        ("\"unit\": \"m2\"", "\"unit\": \"qm\"", "qm"),
+    ] {
+        let text = DETECTION.replacen(from, to, 1);
+        assert_ne!(text, DETECTION, "{from}");
+        let error = Manifest::parse(&text).unwrap_err().to_string();
+        assert!(error.contains(says), "{error} should say {says}");
+    }
+}
+
+#[test]
+fn parameters_become_json_schema() {
+    let schema = schema::parameters(&Manifest::parse(DETECTION).unwrap());
+    assert_eq!(schema["additionalProperties"], false);
+    assert_eq!(schema["required"], serde_json::json!(["element"]));
+    assert_eq!(
+        schema["properties"]["over_shear_positive"]["x-dimension"],
+        "angle"
+    );
+    assert_eq!(
+        schema["properties"]["mode"]["enum"],
+        serde_json::json!(["a", "b"])
+    );
+}
