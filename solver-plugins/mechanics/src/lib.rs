@@ -1,1 +1,101 @@
-//! plyflow-mechanics
+//! Explicit dynamics of stacked sheets.
+//!
+//! One page of how it fits together:
+//!
+//! - [`mesh`]: quad meshes (graded grids, adjacency, node patches);
+//! - [`component`]: instances of element formulations and materials behind the C ABI;
+//! - [`sheet`]: a meshed sheet cut into batches of [`LANES`] elements, and its node patches;
+//! - [`contact`]: node-to-surface contact between neighbouring sheets of the stack, and of sheet nodes
+//!   with rigid surfaces;
+//! - [`model`]: nodes, sheets, contacts and loads; one central-difference step;
+//! - [`energy`]: the ledger that says where the work went;
+//! - [`history`]: smooth ramps and cubic interpolation in time.
+//!
+//! All quantities are SI. Results are identical for any number of threads: parallel passes write to their
+//! own slots, and every sum runs in a fixed order.
+
+pub mod component;
+pub mod contact;
+pub mod energy;
+pub mod history;
+pub mod mesh;
+pub mod model;
+pub mod sheet;
+
+/// Elements per batch.
+pub const LANES: usize = 32;
+
+/// Why a model cannot be built or cannot go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MechanicsError {
+    /// A component refused its parameters or failed.
+    #[error("{what}: {reason}")]
+    Component {
+        /// Which component, for which sheet.
+        what: String,
+        /// Its own text.
+        reason: String,
+    },
+    /// Input that makes no model.
+    #[error("{0}")]
+    Input(String),
+    /// The simulation left the range where its numbers mean anything.
+    #[error(
+        "the run became unstable at t = {time:.6} s (cycle {cycle}): {what}. \
+         Likely cause: {cause}. What to try: {remedy}"
+    )]
+    Unstable {
+        /// Simulated time (s).
+        time: f64,
+        /// Cycle.
+        cycle: u64,
+        /// Which node or element, and what was seen.
+        what: String,
+        /// Likely cause.
+        cause: String,
+        /// What to change.
+        remedy: String,
+    },
+}
+
+/// Three-vectors as plain arrays.
+pub mod vec3 {
+    /// A point or vector.
+    pub type V = [f64; 3];
+    /// a + b.
+    #[inline(always)]
+    pub fn add(a: V, b: V) -> V {
+        [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+    }
+    /// a - b.
+    #[inline(always)]
+    pub fn sub(a: V, b: V) -> V {
+        [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+    }
+    /// s a.
+    #[inline(always)]
+    pub fn scale(a: V, s: f64) -> V {
+        [a[0] * s, a[1] * s, a[2] * s]
+    }
+    /// a . b.
+    #[inline(always)]
+    pub fn dot(a: V, b: V) -> f64 {
+        a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    }
+    /// a x b.
+    #[inline(always)]
+    pub fn cross(a: V, b: V) -> V {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    }
+    /// |a|.
+    #[inline(always)]
+    pub fn norm(a: V) -> f64 {
+        dot(a, a).sqrt()
+    }
+    /// a / |a|; zero stays zero.
+    #[inline(always)]
+    pub fn unit(a: V) -> V {
+        let n = norm(a);
+        if n > 0.0 { scale(a, 1.0 / n) } else { a }
+    }
+}

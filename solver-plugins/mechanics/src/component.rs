@@ -1,0 +1,173 @@
+//! Instances of components behind the C ABI.
+
+use crate::MechanicsError;
+use plyflow_abi::*;
+use plyflow_sdk::{ElementSizes, MaterialRef};
+use std::ffi::c_void;
+use std::sync::Arc;
+
+/// A material made from its parameters.
+pub struct MaterialInstance {
+    reference: MaterialRef,
+    functions: *const pf_material_functions,
+    instance: *mut c_void,
+}
+
+// The contract of plyflow.h: instances do not change after create; functions are static.
+unsafe impl Send for MaterialInstance {}
+unsafe impl Sync for MaterialInstance {}
+
+impl MaterialInstance {
+    /// Makes an instance. `parameters` is JSON with SI numbers; `what` names it in errors.
+    ///
+    /// # Errors
+    /// The component's own text when it refuses.
+    ///
+    /// # Safety
+    /// `component` must hold a valid material table that outlives the instance.
+    pub unsafe fn create(
+        component: &pf_component,
+        parameters: &str,
+        what: &str,
+    ) -> Result<Arc<Self>, MechanicsError> {
+        let fail = |reason: String| MechanicsError::Component { what: what.to_owned(), reason };
+        if component.kind != PF_KIND_MATERIAL {
+            return Err(fail("is not a material".into()));
+        }
+        let functions: *const pf_material_functions = component.functions.cast();
+        let mut instance = std::ptr::null_mut();
+        let mut error = pf_error::default();
+        let create = unsafe { (*functions).create };
+        let code = unsafe { create(pf_str::new(parameters), &raw mut instance, &raw mut error) };
+        if code != PF_OK {
+            return Err(fail(error.get()));
+        }
+        let raw = pf_material { functions, instance };
+        let reference = unsafe { MaterialRef::new(raw) }.map_err(fail)?;
+        Ok(Arc::new(Self { reference, functions, instance }))
+    }
+
+    /// The material as elements see it.
+    pub fn reference(&self) -> &MaterialRef {
+        &self.reference
+    }
+}
+
+impl Drop for MaterialInstance {
+    fn drop(&mut self) {
+        unsafe { ((*self.functions).destroy)(self.instance) };
+    }
+}
+
+/// An element formulation made for a material.
+pub struct ElementInstance {
+    functions: *const pf_element_functions,
+    instance: *mut c_void,
+    /// Its sizes.
+    pub sizes: ElementSizes,
+    /// Its material.
+    pub material: Arc<MaterialInstance>,
+}
+
+unsafe impl Send for ElementInstance {}
+unsafe impl Sync for ElementInstance {}
+
+impl ElementInstance {
+    /// Makes an instance for `material`.
+    ///
+    /// # Errors
+    /// The component's own text, or sizes that the solver cannot serve.
+    ///
+    /// # Safety
+    /// `component` must hold a valid element table that outlives the instance.
+    pub unsafe fn create(
+        component: &pf_component,
+        parameters: &str,
+        material: Arc<MaterialInstance>,
+        what: &str,
+    ) -> Result<Self, MechanicsError> {
+        let fail = |reason: String| MechanicsError::Component { what: what.to_owned(), reason };
+        if component.kind != PF_KIND_ELEMENT {
+            return Err(fail("is not an element formulation".into()));
+        }
+        let functions: *const pf_element_functions = component.functions.cast();
+        let mut instance = std::ptr::null_mut();
+        let mut error = pf_error::default();
+        let raw: *const pf_material = material.reference.raw();
+        let code = unsafe {
+            ((*functions).create)(
+                pf_str::new(parameters),
+                raw,
+                &raw mut instance,
+                &raw mut error,
+            )
+        };
+        if code != PF_OK {
+            return Err(fail(error.get()));
+        }
+        let mut s = pf_element_sizes {
+            size: size_of::<pf_element_sizes>() as u64,
+            ..Default::default()
+        };
+        let code = unsafe { ((*functions).sizes)(instance, &raw mut s) };
+        let sizes = ElementSizes {
+            nodes: s.nodes as usize,
+            dofs_per_node: s.dofs_per_node as usize,
+            constants: s.constants as usize,
+            history: s.history as usize,
+            material_points: s.material_points as usize,
+            fields: s.fields as usize,
+            patch_nodes: s.patch_nodes as usize,
+            patch_constants: s.patch_constants as usize,
+            patch_history: s.patch_history as usize,
+            patch_fields: s.patch_fields as usize,
+        };
+        let made = Self { functions, instance, sizes, material };
+        if code != PF_OK || sizes.nodes != 4 {
+            return Err(fail(format!("has {} nodes; this solver takes quads", sizes.nodes)));
+        }
+        if sizes.dofs_per_node != 3 {
+            return Err(fail(format!(
+                "has {} degrees of freedom per node; this solver carries the 3 translations",
+                sizes.dofs_per_node
+            )));
+        }
+        let patches = unsafe {
+            (*functions).patch_initialise.is_some() && (*functions).patch_forces.is_some()
+        };
+        if sizes.patch_nodes > 0 && !patches {
+            return Err(fail("declares patch nodes but has no patch functions".into()));
+        }
+        Ok(made)
+    }
+
+    pub(crate) fn initialise(&self, batch: &pf_element_batch) -> i32 {
+        unsafe { ((*self.functions).initialise)(self.instance, batch) }
+    }
+
+    #[inline]
+    pub(crate) fn forces(&self, batch: &pf_element_batch) -> i32 {
+        unsafe { ((*self.functions).forces)(self.instance, batch) }
+    }
+
+    pub(crate) fn patch_initialise(&self, batch: &pf_patch_batch) -> i32 {
+        match unsafe { (*self.functions).patch_initialise } {
+            Some(f) => unsafe { f(self.instance, batch) },
+            None => PF_OK,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn patch_forces(&self, batch: &pf_patch_batch) -> i32 {
+        match unsafe { (*self.functions).patch_forces } {
+            Some(f) => unsafe { f(self.instance, batch) },
+            None => PF_OK,
+        }
+    }
+}
+
+impl Drop for ElementInstance {
+    fn drop(&mut self) {
+        unsafe { ((*self.functions).destroy)(self.instance) };
+    }
+}

@@ -1,0 +1,145 @@
+//! Sheet nodes on a rigid surface that does not move.
+
+use super::{ContactEnergy, coulomb};
+use crate::vec3::{V, add, dot, scale, sub};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A rigid surface as a signed distance field.
+pub trait RigidSurface: Send + Sync {
+    /// Signed distance (m, positive outside) and its gradient at a point. Far from the surface the
+    /// distance may be any positive lower bound of the true one.
+    fn distance(&self, point: V) -> (f64, V);
+}
+
+/// The plane z = `height`, solid below.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    /// Height (m).
+    pub height: f64,
+}
+
+impl RigidSurface for Plane {
+    fn distance(&self, point: V) -> (f64, V) {
+        (point[2] - self.height, [0.0, 0.0, 1.0])
+    }
+}
+
+/// One node that may touch the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidItem {
+    /// Model node.
+    pub node: u32,
+    /// Steps to sleep: the node cannot reach the surface before.
+    sleep: u32,
+    /// Distance that it keeps from the surface (m).
+    pub offset: f64,
+    /// Normal stiffness (N/m).
+    pub stiffness: f64,
+    /// Damping (N s/m).
+    pub damping: f64,
+    /// Friction force held by the slip spring (N).
+    pub slip: V,
+    /// Force on the node in the last step (N).
+    pub force: V,
+    /// Normal part of it (N).
+    pub normal_force: f64,
+    /// Penetration (m), 0 when apart.
+    pub penetration: f64,
+    energy: ContactEnergy,
+}
+
+impl RigidItem {
+    /// A node at rest; stiffness and damping are set by the model.
+    pub fn new(node: u32, offset: f64) -> Self {
+        Self {
+            node,
+            sleep: 0,
+            offset,
+            stiffness: 0.0,
+            damping: 0.0,
+            slip: [0.0; 3],
+            force: [0.0; 3],
+            normal_force: 0.0,
+            penetration: 0.0,
+            energy: ContactEnergy::default(),
+        }
+    }
+}
+
+/// Nodes on one rigid surface.
+pub struct RigidContact {
+    /// Name of the pair, for reports.
+    pub name: String,
+    /// The surface.
+    pub surface: Arc<dyn RigidSurface>,
+    /// Coulomb coefficient.
+    pub friction: f64,
+    /// Elastic-slip stiffness over normal stiffness.
+    pub slip_factor: f64,
+    /// The nodes.
+    pub items: Vec<RigidItem>,
+}
+
+impl RigidContact {
+    /// Computes the force of every item from positions (m) and velocities (m/s). `reach` (m): twice the
+    /// furthest that any node moves in a step.
+    pub fn compute(&mut self, x: &[V], v: &[V], dt: f64, reach: f64) -> ContactEnergy {
+        let (surface, friction, slip_factor) =
+            (self.surface.as_ref(), self.friction, self.slip_factor);
+        self.items.par_iter_mut().with_min_len(512).for_each(|item| {
+            if item.sleep > 0 {
+                item.sleep -= 1;
+                return;
+            }
+            let n = item.node as usize;
+            let (distance, gradient) = surface.distance(x[n]);
+            let gap = distance - item.offset;
+            if gap > 0.0 {
+                *item = RigidItem {
+                    offset: item.offset,
+                    stiffness: item.stiffness,
+                    damping: item.damping,
+                    ..RigidItem::new(item.node, item.offset)
+                };
+                item.sleep = (gap / reach).min(200.0) as u32;
+                return;
+            }
+            touch(item, gap, gradient, v[n], dt, friction, slip_factor);
+        });
+        let mut total = ContactEnergy::default();
+        for item in &self.items {
+            total.stored += item.energy.stored;
+            total.friction += item.energy.friction;
+            total.damping += item.energy.damping;
+        }
+        total
+    }
+}
+
+fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, dt: f64, friction: f64, slip_factor: f64) {
+    let vn = dot(v, g);
+    let spring = -item.stiffness * gap;
+    let damper = (-item.damping * vn).max(-spring);
+    let normal = spring + damper;
+    // The gradient of a distance field is a unit vector up to the error of its interpolation.
+    let n = scale(g, 1.0 / dot(g, g).max(1e-12).sqrt());
+    let slip_stiffness = slip_factor * item.stiffness;
+    let mut loss = 0.0;
+    if friction > 0.0 {
+        let vt = sub(v, scale(n, dot(v, n)));
+        let held = sub(item.slip, scale(n, dot(item.slip, n)));
+        let trial = sub(held, scale(vt, slip_stiffness * dt));
+        (item.slip, loss) = coulomb(trial, friction * normal, slip_stiffness);
+    }
+    item.force = add(scale(g, normal), item.slip);
+    item.normal_force = normal;
+    item.penetration = -gap;
+    let slip_energy =
+        if friction > 0.0 { 0.5 * dot(item.slip, item.slip) / slip_stiffness } else { 0.0 };
+    item.energy = ContactEnergy {
+        stored: 0.5 * item.stiffness * gap * gap + slip_energy,
+        friction: loss,
+        damping: -damper * vn * dt,
+    };
+}

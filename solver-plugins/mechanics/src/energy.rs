@@ -1,0 +1,65 @@
+//! The energy ledger.
+
+/// Where the work is (J). Sums run in a fixed order.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Ledger {
+    /// Kinetic.
+    pub kinetic: f64,
+    /// Stored in membranes.
+    pub membrane: f64,
+    /// Stored in bending.
+    pub bending: f64,
+    /// Hourglass control.
+    pub hourglass: f64,
+    /// Stored in contact springs (normal and elastic slip).
+    pub contact: f64,
+    /// Lost to friction.
+    pub friction: f64,
+    /// Lost to damping (mass-proportional and of normal approach).
+    pub damping: f64,
+    /// Done by pressure and by driven nodes.
+    pub external: f64,
+}
+
+impl Ledger {
+    /// Internal energy: membrane, bending, hourglass.
+    pub fn internal(&self) -> f64 {
+        self.membrane + self.bending + self.hourglass
+    }
+
+    /// What does not add up: everything stored and lost, less the external work (J).
+    pub fn drift(&self) -> f64 {
+        self.kinetic + self.internal() + self.contact + self.friction + self.damping
+            - self.external
+    }
+}
+
+/// Health of a run, judged over its whole history.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EnergyHealth {
+    /// Largest |drift| over the largest |external work| so far.
+    pub peak_drift_ratio: f64,
+    /// Largest kinetic over internal, while internal is above 5 % of its largest value.
+    pub peak_kinetic_ratio: f64,
+    /// Hourglass over internal at the end.
+    pub hourglass_ratio: f64,
+}
+
+/// Judges a history of ledgers. The kinetic ratio is not taken while the internal energy is below 5 % of
+/// its largest value: at the very start both are nought and the ratio says nothing.
+pub fn judge(history: &[Ledger]) -> EnergyHealth {
+    let peak = |f: &dyn Fn(&Ledger) -> f64| history.iter().map(f).fold(0.0, f64::max);
+    let peak_work = peak(&|l| l.external.abs().max(l.internal()));
+    let peak_internal = peak(&Ledger::internal);
+    let kinetic = history
+        .iter()
+        .filter(|l| l.internal() > 0.05 * peak_internal)
+        .map(|l| l.kinetic / l.internal())
+        .fold(0.0, f64::max);
+    let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
+    EnergyHealth {
+        peak_drift_ratio: ratio(peak(&|l| l.drift().abs()), peak_work),
+        peak_kinetic_ratio: kinetic,
+        hourglass_ratio: history.last().map_or(0.0, |l| ratio(l.hourglass, l.internal())),
+    }
+}

@@ -1,0 +1,72 @@
+//! Smooth histories.
+
+/// Rises from 0 at `t <= start` to 1 at `t >= start + duration` with zero velocity and acceleration at
+/// both ends: 10 s^3 - 15 s^4 + 6 s^5.
+pub fn smooth_step(t: f64, start: f64, duration: f64) -> f64 {
+    if duration <= 0.0 {
+        return if t >= start { 1.0 } else { 0.0 };
+    }
+    let s = ((t - start) / duration).clamp(0.0, 1.0);
+    s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
+}
+
+/// Where `t` lies among increasing `times`: index k and local coordinate s in 0..1 of the piece [k, k+1];
+/// outside, the nearest end. `times` has at least two entries.
+pub fn locate(times: &[f64], t: f64) -> (usize, f64) {
+    let k = times.partition_point(|x| *x <= t).saturating_sub(1).min(times.len() - 2);
+    let s = ((t - times[k]) / (times[k + 1] - times[k])).clamp(0.0, 1.0);
+    (k, s)
+}
+
+/// Weights of cubic Hermite interpolation on a piece of length `h` (s): of the two values and the two
+/// slopes.
+pub fn hermite(s: f64, h: f64) -> [f64; 4] {
+    let (s2, s3) = (s * s, s * s * s);
+    [
+        2.0 * s3 - 3.0 * s2 + 1.0,
+        -2.0 * s3 + 3.0 * s2,
+        h * (s3 - 2.0 * s2 + s),
+        h * (s3 - s2),
+    ]
+}
+
+/// Linear interpolation of `values` at `times`.
+pub fn linear(times: &[f64], values: &[f64], t: f64) -> f64 {
+    if times.len() < 2 {
+        return values.first().copied().unwrap_or(0.0);
+    }
+    let (k, s) = locate(times, t);
+    values[k] + (values[k + 1] - values[k]) * s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smooth_step_has_no_velocity_or_acceleration_at_its_ends() {
+        let f = |t| smooth_step(t, 1.0, 2.0);
+        let h = 1e-4;
+        for t in [1.0, 3.0] {
+            assert!((f(t + h) - f(t - h)).abs() / (2.0 * h) < 1e-6);
+            assert!((f(t + h) - 2.0 * f(t) + f(t - h)).abs() / (h * h) < 1e-2);
+        }
+        assert_eq!((f(0.0), f(2.0), f(4.0)), (0.0, 0.5, 1.0));
+    }
+
+    #[test]
+    fn hermite_reproduces_a_cubic_exactly() {
+        let f = |t: f64| 1.0 - 2.0 * t + 0.5 * t * t + 3.0 * t * t * t;
+        let d = |t: f64| -2.0 + t + 9.0 * t * t;
+        let times = [0.0, 0.4, 1.0];
+        for t in [0.0, 0.1, 0.39, 0.41, 0.77, 1.0] {
+            let (k, s) = locate(&times, t);
+            let w = hermite(s, times[k + 1] - times[k]);
+            let v = w[0] * f(times[k])
+                + w[1] * f(times[k + 1])
+                + w[2] * d(times[k])
+                + w[3] * d(times[k + 1]);
+            assert!((v - f(t)).abs() < 1e-12);
+        }
+    }
+}

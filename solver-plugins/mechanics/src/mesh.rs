@@ -1,0 +1,221 @@
+//! Quad meshes of flat sheets.
+
+use crate::vec3::{cross, norm, scale, sub};
+
+/// No neighbour: the edge is on the boundary.
+pub const NONE: u32 = u32::MAX;
+
+/// A mesh of quads.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct QuadMesh {
+    /// `[n]` points (m).
+    pub points: Vec<[f64; 3]>,
+    /// `[m]` cells, nodes counter-clockwise seen from above.
+    pub cells: Vec<[u32; 4]>,
+}
+
+/// A node with the elements around it: the support of a curvature.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Patch {
+    /// Centre first, then the other nodes of the surrounding cells in increasing order.
+    pub nodes: Vec<u32>,
+    /// Undeformed area that the patch speaks for (m2).
+    pub area: f64,
+}
+
+/// Grid lines from `lo` to `hi`: spacing `size` on `[fine_lo, fine_hi]`, growing outwards by `growth` per
+/// cell (geometric, stretched to end exactly at `lo` and `hi`). All in metres.
+pub fn graded_axis(
+    lo: f64,
+    hi: f64,
+    fine_lo: f64,
+    fine_hi: f64,
+    size: f64,
+    growth: f64,
+) -> Vec<f64> {
+    let fine_cells = ((fine_hi - fine_lo) / size).round().max(1.0) as usize;
+    let h = (fine_hi - fine_lo) / fine_cells as f64;
+    let outward = |length: f64| -> Vec<f64> {
+        if length <= 0.5 * h {
+            return Vec::new();
+        }
+        let mut widths = Vec::new();
+        let (mut sum, mut w) = (0.0, h);
+        while sum < length {
+            w *= growth;
+            widths.push(w);
+            sum += w;
+        }
+        let factor = length / sum;
+        widths.iter().map(|w| w * factor).collect()
+    };
+    let mut xs: Vec<f64> = Vec::new();
+    let mut x = fine_lo;
+    let left = outward(fine_lo - lo);
+    for w in &left {
+        x -= w;
+        xs.push(x);
+    }
+    xs.reverse();
+    if let Some(first) = xs.first_mut() {
+        *first = lo;
+    }
+    for i in 0..=fine_cells {
+        xs.push(fine_lo + h * i as f64);
+    }
+    x = fine_hi;
+    let right = outward(hi - fine_hi);
+    for w in &right {
+        x += w;
+        xs.push(x);
+    }
+    if !right.is_empty() {
+        *xs.last_mut().expect("not empty") = hi;
+    }
+    xs
+}
+
+/// Evenly spaced grid lines from `lo` to `hi` with a spacing near `size` (m).
+pub fn even_axis(lo: f64, hi: f64, size: f64) -> Vec<f64> {
+    let n = ((hi - lo) / size).round().max(1.0) as usize;
+    (0..=n).map(|i| lo + (hi - lo) * i as f64 / n as f64).collect()
+}
+
+impl QuadMesh {
+    /// A structured grid in the plane z = 0; node (i, j) has the index j * xs.len() + i.
+    pub fn grid(xs: &[f64], ys: &[f64]) -> Self {
+        let points = ys.iter().flat_map(|y| xs.iter().map(|x| [*x, *y, 0.0])).collect();
+        let nx = xs.len() as u32;
+        let cells = (0..ys.len() as u32 - 1)
+            .flat_map(|j| {
+                (0..nx - 1).map(move |i| {
+                    let a = j * nx + i;
+                    [a, a + 1, a + nx + 1, a + nx]
+                })
+            })
+            .collect();
+        Self { points, cells }
+    }
+
+    /// `[m]` area of each cell (m2).
+    pub fn areas(&self) -> Vec<f64> {
+        self.cells.iter().map(|c| norm(area_vector(c.map(|n| self.points[n as usize])))).collect()
+    }
+
+    /// `[m][4]` the cell across edge e (from node e to node e+1), or [`NONE`].
+    pub fn neighbours(&self) -> Vec<[u32; 4]> {
+        let mut edges: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(self.cells.len() * 4);
+        for (c, nodes) in self.cells.iter().enumerate() {
+            for e in 0..4 {
+                let (a, b) = (nodes[e], nodes[(e + 1) % 4]);
+                edges.push((a.min(b), a.max(b), c as u32, e as u8));
+            }
+        }
+        edges.sort_unstable();
+        let mut result = vec![[NONE; 4]; self.cells.len()];
+        for pair in edges.windows(2) {
+            let ((a, b, c, e), (a2, b2, c2, e2)) = (pair[0], pair[1]);
+            if (a, b) == (a2, b2) {
+                result[c as usize][e as usize] = c2;
+                result[c2 as usize][e2 as usize] = c;
+            }
+        }
+        result
+    }
+
+    /// `[n]` whether a node lies on the boundary.
+    pub fn on_boundary(&self) -> Vec<bool> {
+        let mut flags = vec![false; self.points.len()];
+        for (cell, near) in self.cells.iter().zip(self.neighbours()) {
+            for e in 0..4 {
+                if near[e] == NONE {
+                    flags[cell[e] as usize] = true;
+                    flags[cell[(e + 1) % 4] as usize] = true;
+                }
+            }
+        }
+        flags
+    }
+
+    /// `[n]` cells around each node, in increasing order.
+    pub fn cells_of_nodes(&self) -> Vec<Vec<u32>> {
+        let mut around = vec![Vec::new(); self.points.len()];
+        for (c, nodes) in self.cells.iter().enumerate() {
+            for n in nodes {
+                around[*n as usize].push(c as u32);
+            }
+        }
+        around
+    }
+
+    /// One patch per interior node. The area of a boundary node goes in equal parts to the interior nodes
+    /// that share a cell with it, so that the patches' areas add up to the mesh's wherever it is at least
+    /// two cells wide.
+    pub fn patches(&self) -> Vec<Patch> {
+        let around = self.cells_of_nodes();
+        let areas = self.areas();
+        let boundary = self.on_boundary();
+        let share = |n: usize| around[n].iter().map(|c| areas[*c as usize] / 4.0).sum::<f64>();
+        let mut area: Vec<f64> = (0..self.points.len()).map(share).collect();
+        let ring = |n: usize| -> Vec<u32> {
+            let mut nodes: Vec<u32> =
+                around[n].iter().flat_map(|c| self.cells[*c as usize]).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            nodes.retain(|m| *m as usize != n);
+            nodes
+        };
+        for n in (0..self.points.len()).filter(|n| boundary[*n]) {
+            let inner: Vec<u32> =
+                ring(n).into_iter().filter(|m| !boundary[*m as usize]).collect();
+            for m in &inner {
+                area[*m as usize] += area[n] / inner.len() as f64;
+            }
+        }
+        (0..self.points.len())
+            .filter(|n| !boundary[*n] && !around[*n].is_empty())
+            .map(|n| {
+                let mut nodes = vec![n as u32];
+                nodes.extend(ring(n));
+                Patch { nodes, area: area[n] }
+            })
+            .collect()
+    }
+}
+
+/// Area vector of a quad: half the cross product of its diagonals (m2).
+#[inline(always)]
+pub fn area_vector(p: [[f64; 3]; 4]) -> [f64; 3] {
+    scale(cross(sub(p[2], p[0]), sub(p[3], p[1])), 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn graded_axis_reaches_both_ends_and_never_jumps() {
+        let xs = graded_axis(-0.9, 0.9, -0.35, 0.36, 0.008, 1.2);
+        assert_eq!((xs[0], *xs.last().unwrap()), (-0.9, 0.9));
+        let w: Vec<f64> = xs.windows(2).map(|p| p[1] - p[0]).collect();
+        assert!(w.iter().all(|w| *w > 0.0));
+        assert!(w.windows(2).all(|p| p[0] / p[1] < 1.3 && p[1] / p[0] < 1.3));
+    }
+
+    #[test]
+    fn patch_areas_add_up_to_the_mesh_area() {
+        let mesh = QuadMesh::grid(&even_axis(0.0, 0.3, 0.01), &even_axis(0.0, 0.2, 0.013));
+        let total: f64 = mesh.patches().iter().map(|p| p.area).sum();
+        assert!((total - 0.06).abs() < 1e-12);
+        assert!(mesh.patches().iter().all(|p| p.nodes.len() == 9));
+    }
+
+    #[test]
+    fn neighbours_are_mutual_and_missing_on_the_boundary() {
+        let mesh = QuadMesh::grid(&even_axis(0.0, 3.0, 1.0), &even_axis(0.0, 2.0, 1.0));
+        let near = mesh.neighbours();
+        assert_eq!(near[0], [NONE, 1, 3, NONE]);
+        assert_eq!(near[4], [1, 5, NONE, 3]);
+        assert_eq!(mesh.on_boundary().iter().filter(|b| !**b).count(), 2);
+    }
+}

@@ -1,0 +1,195 @@
+//! A meshed sheet, cut into batches for its element formulation.
+
+use crate::LANES;
+use crate::component::ElementInstance;
+use crate::mesh::Patch;
+use plyflow_abi::*;
+
+/// One cache line of doubles; keeps batch arrays 64-byte aligned.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Default)]
+struct Line([f64; 8]);
+
+/// A zeroed, 64-byte aligned array of doubles whose length is a multiple of 8.
+#[derive(Clone, Default)]
+pub struct Aligned(Vec<Line>);
+
+impl Aligned {
+    /// `n` zeros, rounded up to a multiple of 8.
+    pub fn zeros(n: usize) -> Self {
+        Self(vec![Line::default(); n.div_ceil(8)])
+    }
+}
+
+impl std::ops::Deref for Aligned {
+    type Target = [f64];
+    fn deref(&self) -> &[f64] {
+        // Line is repr(C) over [f64; 8].
+        unsafe { std::slice::from_raw_parts(self.0.as_ptr().cast(), self.0.len() * 8) }
+    }
+}
+
+impl std::ops::DerefMut for Aligned {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        unsafe { std::slice::from_raw_parts_mut(self.0.as_mut_ptr().cast(), self.0.len() * 8) }
+    }
+}
+
+/// What presses on a cell from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pressed {
+    /// Nothing.
+    No,
+    /// The cavity, from below.
+    Below,
+    /// The surroundings, from above.
+    Above,
+    /// Both (films joined into one surface).
+    Both,
+}
+
+/// What a sheet is made of, before it becomes part of a model.
+pub struct SheetSpec {
+    /// Name of its body.
+    pub name: String,
+    /// Model node of each mesh node.
+    pub nodes: Vec<u32>,
+    /// `[m]` cells in mesh-local node numbers.
+    pub cells: Vec<[u32; 4]>,
+    /// Node patches in mesh-local numbers (used when the element has a patch part).
+    pub patches: Vec<Patch>,
+    /// Direction of material axis e1 in the undeformed plane.
+    pub axis: [f64; 3],
+    /// `[m]` how many layers a cell stands for (2 where two films are joined).
+    pub layers: Vec<f64>,
+    /// `[m]` what presses on it.
+    pub pressed: Vec<Pressed>,
+    /// Least areal mass (kg/m2) by explicit mass scaling; 0: none.
+    pub least_areal_mass: f64,
+    /// The element formulation with its material.
+    pub element: ElementInstance,
+}
+
+/// A sheet inside a model.
+pub struct Sheet {
+    /// Name of its body.
+    pub name: String,
+    /// Model node of each mesh node.
+    pub nodes: Vec<u32>,
+    /// Its cells in the model's numbering: first and one past the last.
+    pub cell_range: (usize, usize),
+    /// Its batches: first and one past the last.
+    pub batch_range: (usize, usize),
+    /// Its patch batches.
+    pub patch_range: (usize, usize),
+    /// The element formulation.
+    pub element: ElementInstance,
+    /// Thickness (m).
+    pub thickness: f64,
+    /// Mass by mass scaling (kg).
+    pub added_mass: f64,
+}
+
+/// [`LANES`] elements of one sheet.
+pub struct Batch {
+    /// Index of the sheet.
+    pub sheet: u32,
+    /// Elements that count; the rest repeat the last.
+    pub count: u32,
+    /// Model nodes by lane.
+    pub nodes: [[u32; 4]; LANES],
+    /// Layers by lane.
+    pub layers: [f64; LANES],
+    /// Whether any lane stands for more than one layer.
+    pub layered: bool,
+    /// Mass scaling factor by lane.
+    pub mass_factor: [f64; LANES],
+    /// `[4][LANES]` element masses before scaling (kg).
+    pub mass: Aligned,
+    /// `[constants][LANES]`.
+    pub constants: Aligned,
+    /// `[history][LANES]`.
+    pub history: Aligned,
+    /// `[points * membrane_history][LANES]`.
+    pub material_history: Aligned,
+    /// `[fields][LANES]`; empty unless fields were asked for.
+    pub fields: Aligned,
+    /// Status of the last call.
+    pub status: i32,
+}
+
+/// [`LANES`] node patches of one sheet.
+pub struct PatchBatch {
+    /// Index of the sheet.
+    pub sheet: u32,
+    /// Patches that count.
+    pub count: u32,
+    /// `[LANES][patch_nodes]` model nodes; unused slots repeat the centre.
+    pub nodes: Vec<u32>,
+    /// Mesh-local centre nodes of the lanes.
+    pub centres: Vec<u32>,
+    /// `[patch_constants][LANES]`.
+    pub constants: Aligned,
+    /// `[patch_history + bending_history][LANES]`.
+    pub history: Aligned,
+    /// `[patch_fields][LANES]`; empty unless asked for.
+    pub fields: Aligned,
+    /// `[patch_nodes][3][LANES]` (N).
+    pub force: Aligned,
+    /// `[LANES]` (J).
+    pub energy: Aligned,
+    /// Status of the last call.
+    pub status: i32,
+}
+
+/// A batch view with everything null.
+pub(crate) fn empty_element_batch(
+    sheet: &Sheet,
+    dt: f64,
+    position: &[f64],
+) -> pf_element_batch {
+    let null = std::ptr::null_mut();
+    pf_element_batch {
+        size: size_of::<pf_element_batch>() as u64,
+        lanes: LANES as u32,
+        reserved: 0,
+        dt,
+        position: position.as_ptr(),
+        velocity: null,
+        spin: null,
+        axis: null,
+        constants: null,
+        history: null,
+        material_history: null,
+        force: null,
+        moment: null,
+        energy: null,
+        fields: null,
+        mass: null,
+        inertia: null,
+        critical_step: null,
+        material: sheet.element.material.reference().raw(),
+    }
+}
+
+/// A patch batch view with everything null.
+pub(crate) fn empty_patch_batch(sheet: &Sheet, dt: f64, position: &[f64]) -> pf_patch_batch {
+    let null = std::ptr::null_mut();
+    pf_patch_batch {
+        size: size_of::<pf_patch_batch>() as u64,
+        lanes: LANES as u32,
+        reserved: 0,
+        dt,
+        position: position.as_ptr(),
+        count: null,
+        area: null,
+        axis: null,
+        constants: null,
+        history: null,
+        force: null,
+        energy: null,
+        fields: null,
+        stiffness: null,
+        material: sheet.element.material.reference().raw(),
+    }
+}
