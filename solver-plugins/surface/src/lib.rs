@@ -1,1 +1,18 @@
-//! plyflow-surface
+//! Geometry of meshed surfaces that several steps share: exact closest point and signed distance,
+//! curvature, ridge lines, location in an undeformed quad mesh. All lengths in m. Everything is
+//! deterministic: ties go to the lowest index.
+
+mod closest;
+mod conformity;
+mod curvature;
+mod locate;
+mod ridge;
+mod topology;
+pub mod vector;
+
+pub use closest::{Closest, Feature, Surface};
+pub use conformity::{NodalDistance, foot_height, nodal_distances};
+pub use curvature::{Curvature, curvatures};
+pub use locate::{Location, QuadLocator};
+pub use ridge::{Ridge, ridge_line};
+pub use topology::{Topology, triangles};

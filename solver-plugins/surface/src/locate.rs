@@ -1,0 +1,161 @@
+//! Location of points in an undeformed quad mesh, seen from above.
+
+use crate::vector::Vec3;
+
+/// A place in a quad mesh: a cell and the bilinear weights of its nodes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Location {
+    /// The cell.
+    pub cell: usize,
+    /// Its nodes.
+    pub nodes: [u32; 4],
+    /// Their weights; the sum is 1.
+    pub weights: [f64; 4],
+}
+
+impl Location {
+    /// The weighted sum of the nodes' values.
+    pub fn interpolate(&self, values: &[Vec3]) -> Vec3 {
+        let mut sum = [0.0; 3];
+        for (&node, &w) in self.nodes.iter().zip(&self.weights) {
+            for d in 0..3 {
+                sum[d] += w * values[node as usize][d];
+            }
+        }
+        sum
+    }
+}
+
+/// Finds cells of a quad mesh by x and y. Cells may be of any convex shape and of very different sizes
+/// (graded films).
+#[derive(Debug, Clone)]
+pub struct QuadLocator {
+    corners: Vec<[[f64; 2]; 4]>,
+    nodes: Vec<[u32; 4]>,
+    low: [f64; 2],
+    bin: [f64; 2],
+    bins: [usize; 2],
+    lists: Vec<Vec<u32>>,
+}
+
+impl QuadLocator {
+    /// `points`: `[n]` (m, z is not looked at); `cells`: `[m * 4]`. `None` when there is no cell.
+    ///
+    /// # Panics
+    /// When a cell names a point that is not there.
+    pub fn new(points: &[Vec3], cells: &[u32]) -> Option<Self> {
+        let nodes: Vec<[u32; 4]> = cells
+            .chunks_exact(4)
+            .map(|c| [c[0], c[1], c[2], c[3]])
+            .collect();
+        if nodes.is_empty() {
+            return None;
+        }
+        let xy = |i: u32| [points[i as usize][0], points[i as usize][1]];
+        let corners: Vec<[[f64; 2]; 4]> = nodes.iter().map(|c| c.map(xy)).collect();
+        let (low, high) = bounds(corners.iter().flatten());
+        let side = (corners.len() as f64).sqrt().ceil() as usize;
+        let bins = [side, side];
+        let bin = [0, 1].map(|d| ((high[d] - low[d]) / side as f64).max(f64::MIN_POSITIVE));
+        let mut locator = Self {
+            corners,
+            nodes,
+            low,
+            bin,
+            bins,
+            lists: vec![Vec::new(); side * side],
+        };
+        for c in 0..locator.corners.len() {
+            let (a, b) = bounds(locator.corners[c].iter());
+            let (a, b) = (locator.bin_of(a), locator.bin_of(b));
+            for j in a[1]..=b[1] {
+                for i in a[0]..=b[0] {
+                    locator.lists[j * side + i].push(c as u32);
+                }
+            }
+        }
+        Some(locator)
+    }
+
+    fn bin_of(&self, p: [f64; 2]) -> [usize; 2] {
+        [0, 1].map(|d| {
+            let at = ((p[d] - self.low[d]) / self.bin[d]).floor().max(0.0);
+            (at as usize).min(self.bins[d] - 1)
+        })
+    }
+
+    /// The cell that holds (x, y), or holds it up to `tolerance` (m) outside of its sides; then the weights
+    /// are those of the nearest place inside. `None` when there is no such cell.
+    pub fn locate(&self, x: f64, y: f64, tolerance: f64) -> Option<Location> {
+        let a = self.bin_of([x - tolerance, y - tolerance]);
+        let b = self.bin_of([x + tolerance, y + tolerance]);
+        let mut best: Option<(f64, Location)> = None;
+        for j in a[1]..=b[1] {
+            for i in a[0]..=b[0] {
+                for &c in &self.lists[j * self.bins[0] + i] {
+                    let (miss, location) = self.within(c as usize, [x, y]);
+                    if miss <= tolerance && best.as_ref().is_none_or(|(m, _)| miss < *m) {
+                        best = Some((miss, location));
+                    }
+                }
+            }
+        }
+        best.map(|(_, location)| location)
+    }
+
+    /// Inverse of the bilinear map by Newton's method, and how far outside of the cell the point lies (m).
+    fn within(&self, cell: usize, p: [f64; 2]) -> (f64, Location) {
+        let q = &self.corners[cell];
+        let (mut s, mut t) = (0.5, 0.5);
+        for _ in 0..25 {
+            let w = weights(s, t);
+            let mut r = p;
+            let (mut ds, mut dt) = ([0.0; 2], [0.0; 2]);
+            for d in 0..2 {
+                r[d] -= (0..4).map(|i| w[i] * q[i][d]).sum::<f64>();
+                ds[d] = (1.0 - t) * (q[1][d] - q[0][d]) + t * (q[2][d] - q[3][d]);
+                dt[d] = (1.0 - s) * (q[3][d] - q[0][d]) + s * (q[2][d] - q[1][d]);
+            }
+            let determinant = ds[0] * dt[1] - ds[1] * dt[0];
+            if determinant == 0.0 {
+                break;
+            }
+            let step = [
+                (r[0] * dt[1] - r[1] * dt[0]) / determinant,
+                (ds[0] * r[1] - ds[1] * r[0]) / determinant,
+            ];
+            // Far outside the map folds over; there the point only has to be seen as outside.
+            s = (s + step[0]).clamp(-10.0, 11.0);
+            t = (t + step[1]).clamp(-10.0, 11.0);
+            if step[0].abs() + step[1].abs() < 1e-14 {
+                break;
+            }
+        }
+        let w = weights(s.clamp(0.0, 1.0), t.clamp(0.0, 1.0));
+        let inside = [0, 1].map(|d| (0..4).map(|i| w[i] * q[i][d]).sum::<f64>());
+        let miss = (p[0] - inside[0]).hypot(p[1] - inside[1]);
+        (
+            miss,
+            Location {
+                cell,
+                nodes: self.nodes[cell],
+                weights: w,
+            },
+        )
+    }
+}
+
+fn weights(s: f64, t: f64) -> [f64; 4] {
+    [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
+}
+
+fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> ([f64; 2], [f64; 2]) {
+    let mut range = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for p in points {
+        for d in 0..2 {
+            range.0[d] = range.0[d].min(p[d]);
+            range.1[d] = range.1[d].max(p[d]);
+        }
+    }
+    range
+}
