@@ -2,7 +2,7 @@
 
 /// The candidate nearest to `given` by edit distance (insertions, deletions, substitutions and swaps of
 /// neighbours, capitals ignored), when near enough to be meant: at most a third of its length, and at
-/// least one edit is always allowed. Ties go to the first candidate.
+/// least one edit is always allowed. Ties go to the one that also agrees in capitals, then to the first.
 pub fn nearest<'a, I>(given: &str, candidates: I) -> Option<&'a str>
 where
     I: IntoIterator<Item = &'a str>,
@@ -12,13 +12,16 @@ where
         return None;
     }
     let fold = |s: &str| s.to_lowercase().replace(['-', ' '], "_");
-    let given = fold(given);
-    let limit = (given.chars().count() / 3).max(1);
+    let folded = fold(given);
+    let limit = (folded.chars().count() / 3).max(1);
     candidates
         .into_iter()
-        .map(|c| (strsim::damerau_levenshtein(&given, &fold(c)), c))
-        .filter(|(d, _)| *d <= limit)
-        .min_by_key(|(d, _)| *d)
+        .map(|c| {
+            let distance = strsim::damerau_levenshtein(&folded, &fold(c));
+            ((distance, strsim::damerau_levenshtein(given, c)), c)
+        })
+        .filter(|((distance, _), _)| *distance <= limit)
+        .min_by_key(|(distances, _)| *distances)
         .map(|(_, c)| c)
 }
 

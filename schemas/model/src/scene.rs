@@ -49,16 +49,20 @@ pub enum Tool {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JoggleSpar {
-    /// Length along x.
+    /// Length along x, measured at the foot on the bed.
     pub length: Length,
-    /// Width of the top face between the theoretical corners.
+    /// Width of the top face between the theoretical corners, before the first joggle.
     pub top_width: Length,
-    /// Height of the top face at the low end.
+    /// Height of the top face over the bed before the first joggle.
     pub height: Length,
-    /// Angle of the side walls from the vertical.
+    /// Angle of the side and end walls from the vertical.
     pub draft: Angle,
-    /// Radius of the fillets between top and sides.
+    /// Smallest radius of the fillets between top and walls.
     pub fillet: Length,
+    /// Radius in plan of the vertical edges between side and end walls, at the top. Twice the fillet
+    /// unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corner: Option<Length>,
     /// The joggles, in order of `start`.
     pub joggles: Vec<Joggle>,
     /// Largest edge of the triangulation.
@@ -71,7 +75,7 @@ pub struct JoggleSpar {
 pub struct Joggle {
     /// x (from the tool's centre) where the ramp begins, on the centre line y = 0.
     pub start: Length,
-    /// Length of the ramp along x.
+    /// Length of the ramp along x, its fillets included.
     pub length: Length,
     /// Change of height over the ramp, positive upwards with growing x.
     pub rise: Length,
