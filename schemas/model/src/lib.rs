@@ -1,11 +1,15 @@
 //! The words of the domain, typed and without I/O: units, material, scene, workflow and the manifest of
 //! a plugin. Everything else in the repository depends on this crate and it depends on nothing of it.
 
+pub mod canonical;
 pub mod manifest;
 pub mod material;
 pub mod nearest;
 pub mod scene;
+pub mod schema;
 pub mod units;
+pub mod workflow;
 
+pub use canonical::canonical;
 pub use manifest::Manifest;
 pub use units::{Dimension, UnitError, parse_quantity};

@@ -4,11 +4,15 @@ use crate::units::{ArealMass, Length};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Version of the material format that this crate reads.
+pub const VERSION: u32 = 1;
+
 /// A material file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
     /// Version of the material format: 1.
+    #[schemars(extend("const" = 1))]
     pub plyflow_material: u32,
     /// Name, used in reports.
     pub name: String,
@@ -18,8 +22,10 @@ pub struct Material {
     /// Material plugin: name or path of a library.
     pub plugin: String,
     /// Thickness of the sheet.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub thickness: Length,
     /// Mass per area.
+    #[schemars(extend("x-exclusive-minimum" = "0 g/m2"))]
     pub areal_mass: ArealMass,
     /// The plugin's parameters, checked against its manifest.
     #[serde(default)]

@@ -9,11 +9,15 @@ use crate::units::{Angle, Length, Number, Pressure, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Version of the scene format that this crate reads.
+pub const VERSION: u32 = 1;
+
 /// A scene file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Version of the scene format: 1.
+    #[schemars(extend("const" = 1))]
     pub plyflow_scene: u32,
     /// Name, used in reports.
     pub name: String,
@@ -50,14 +54,19 @@ pub enum Tool {
 #[serde(deny_unknown_fields)]
 pub struct JoggleSpar {
     /// Length along x, measured at the foot on the bed.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub length: Length,
     /// Width of the top face between the theoretical corners, before the first joggle.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub top_width: Length,
     /// Height of the top face over the bed before the first joggle.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub height: Length,
     /// Angle of the side and end walls from the vertical.
+    #[schemars(extend("x-minimum" = "0 deg", "x-maximum" = "60 deg"))]
     pub draft: Angle,
     /// Smallest radius of the fillets between top and walls.
+    #[schemars(extend("x-minimum" = "0 mm"))]
     pub fillet: Length,
     /// Radius in plan of the vertical edges between side and end walls, at the top. Twice the fillet
     /// unless given.
@@ -66,6 +75,7 @@ pub struct JoggleSpar {
     /// The joggles, in order of `start`.
     pub joggles: Vec<Joggle>,
     /// Largest edge of the triangulation.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub facet_size: Length,
 }
 
@@ -76,14 +86,17 @@ pub struct Joggle {
     /// x (from the tool's centre) where the ramp begins, on the centre line y = 0.
     pub start: Length,
     /// Length of the ramp along x, its fillets included.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub length: Length,
     /// Change of height over the ramp, positive upwards with growing x.
     pub rise: Length,
     /// Slant in plan: the ramp begins at x = start + y tan(skew).
+    #[schemars(extend("x-minimum" = "-60 deg", "x-maximum" = "60 deg"))]
     pub skew: Angle,
     /// How far the ramp also steps each side wall outwards (y < 0 side, y > 0 side), positive outwards.
     pub side_step: [Length; 2],
     /// Radius of the fillets where the ramp begins and ends.
+    #[schemars(extend("x-minimum" = "0 mm"))]
     pub fillet: Length,
 }
 
@@ -92,14 +105,19 @@ pub struct Joggle {
 #[serde(deny_unknown_fields)]
 pub struct FlatTool {
     /// Length along x.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub length: Length,
     /// Width along y.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub width: Length,
     /// Height of the flat top above the bed.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub height: Length,
     /// Radius of the rounding between top and bed; at most the height.
+    #[schemars(extend("x-minimum" = "0 mm"))]
     pub fillet: Length,
     /// Largest edge of the triangulation.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub facet_size: Length,
 }
 
@@ -108,8 +126,10 @@ pub struct FlatTool {
 #[serde(deny_unknown_fields)]
 pub struct HemisphereTool {
     /// Radius.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub radius: Length,
     /// Largest edge of the triangulation.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub facet_size: Length,
 }
 
@@ -120,6 +140,7 @@ pub struct StlTool {
     /// Path, relative to the scene file.
     pub file: String,
     /// Length of one unit of the file, e.g. `1 mm`.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub unit: Length,
     /// Moves the file's origin, after scaling.
     #[serde(default)]
@@ -148,9 +169,11 @@ pub struct Sheet {
     pub material: MaterialEntry,
     /// Plies: length along x before forming.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub length: Option<Length>,
     /// Plies: width along y before forming.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub width: Option<Length>,
     /// Plies: position of the centre over the tool.
     #[serde(default)]
@@ -169,15 +192,20 @@ pub struct Sheet {
 #[serde(deny_unknown_fields)]
 pub struct Friction {
     /// Tool (and machine bed) against diaphragm.
+    #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub tool_diaphragm: Number,
     /// Tool against fabric.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub tool_fabric: Option<Number>,
     /// Fabric against diaphragm.
+    #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub fabric_diaphragm: Number,
     /// Fabric against fabric.
+    #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub fabric_fabric: Number,
     /// Diaphragm against diaphragm.
+    #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub diaphragm_diaphragm: Number,
 }
 
@@ -195,24 +223,34 @@ pub enum Process {
 #[serde(deny_unknown_fields)]
 pub struct DoubleDiaphragm {
     /// Length of the frame's opening along x.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub frame_length: Length,
     /// Width of the frame's opening along y.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub frame_width: Length,
     /// Height of the lower film over the tool's highest point at the start.
+    #[schemars(extend("x-minimum" = "0 mm"))]
     pub clearance: Length,
     /// Vacuum in the bag: pressure of the surroundings over that between the films.
+    #[schemars(extend("x-minimum" = "0 Pa"))]
     pub bag_pressure: Pressure,
     /// Pressure drawn under the lower film at the end.
+    #[schemars(extend("x-minimum" = "0 Pa"))]
     pub forming_pressure: Pressure,
     /// Simulated duration of evacuating the bag.
+    #[schemars(extend("x-minimum" = "0 s"))]
     pub bagging_time: Time,
     /// Simulated duration of lowering the frame.
+    #[schemars(extend("x-exclusive-minimum" = "0 s"))]
     pub lowering_time: Time,
     /// Simulated duration of drawing the air.
+    #[schemars(extend("x-minimum" = "0 s"))]
     pub drawing_time: Time,
     /// Simulated duration at full pressure, for the motion to die out.
+    #[schemars(extend("x-minimum" = "0 s"))]
     pub settling_time: Time,
     /// Distance around the plies beyond which the two films are taken as joined (they stick under the bag
     /// pressure; their seal lies at the frame).
+    #[schemars(extend("x-minimum" = "0 mm"))]
     pub film_joint_margin: Length,
 }

@@ -1,0 +1,257 @@
+//! A workflow file: steps, what they receive, what is expected of their results.
+
+use crate::units::Time;
+use indexmap::IndexMap;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
+/// Version of the workflow format that this crate reads.
+pub const VERSION: u32 = 1;
+
+/// A workflow file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Workflow {
+    /// Version of the workflow format: 1.
+    #[schemars(extend("const" = 1))]
+    pub plyflow: u32,
+    /// Name, used in reports.
+    pub name: String,
+    /// Free text.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// What happens to independent branches when a step fails.
+    #[serde(default)]
+    pub on_failure: OnFailure,
+    /// Further folders to search for plugins, relative to this file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plugins: Vec<String>,
+    /// The steps by name, in any order.
+    pub steps: IndexMap<String, Step>,
+    /// What is expected of results.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub expect: Vec<Expect>,
+}
+
+/// Failure policy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnFailure {
+    /// Independent branches finish.
+    #[default]
+    KeepGoing,
+    /// Running steps are stopped.
+    FailFast,
+}
+
+/// One step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Step {
+    /// Step plugin: its name on the search path, or the path of a library.
+    pub plugin: String,
+    /// Parameters of the plugin, checked against its manifest.
+    #[serde(default)]
+    pub with: serde_json::Map<String, serde_json::Value>,
+    /// Where the inputs come from: port -> step. One step name alone is enough when the plugin has
+    /// exactly one required port.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<From>,
+    /// Runs the step once per item: a free name -> the step whose collection is fanned over. Several
+    /// entries make the product.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub for_each: IndexMap<String, String>,
+    /// What the step may use.
+    #[serde(default)]
+    pub resources: Resources,
+    /// How often a failed step is tried again.
+    #[serde(default)]
+    #[schemars(extend("maximum" = 100))]
+    pub retries: u32,
+}
+
+/// Wires of a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum From {
+    /// A step for the only port.
+    One(String),
+    /// Port -> step or steps.
+    Ports(IndexMap<String, Sources>),
+}
+
+/// What arrives at one port.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Sources {
+    /// One step.
+    One(String),
+    /// Several, for ports that take many.
+    Many(Vec<String>),
+}
+
+/// What a step may use.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Resources {
+    /// Cores; 1 when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 1, "maximum" = 4096))]
+    pub cores: Option<u32>,
+    /// Memory, such as `4 GiB`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Memory>,
+    /// Wall-clock limit, such as `30 min`; none when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-exclusive-minimum" = "0 s"))]
+    pub time_limit: Option<Time>,
+}
+
+/// A stated expectation on a result: a value (with a tolerance), a bound, or both.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Expect {
+    /// Step.
+    pub step: String,
+    /// Name of the result.
+    pub result: String,
+    /// Expected value, with the unit of the result.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<ResultValue>,
+    /// Allowed absolute deviation from `value`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<ResultValue>,
+    /// Lower bound.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minimum: Option<ResultValue>,
+    /// Upper bound.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub maximum: Option<ResultValue>,
+    /// Where the expectation comes from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+}
+
+/// A value of a result: a plain number when the result has no unit, else text with a unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ResultValue {
+    /// Dimensionless.
+    Number(f64),
+    /// With a unit.
+    Quantity(String),
+}
+
+/// An amount of memory in bytes, written `4 GiB` or `500 MB`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Memory(
+    /// Bytes.
+    pub u64,
+);
+
+impl Memory {
+    const UNITS: [(&str, u64); 9] = [
+        ("B", 1),
+        ("kB", 1_000),
+        ("MB", 1_000_000),
+        ("GB", 1_000_000_000),
+        ("TB", 1_000_000_000_000),
+        ("KiB", 1 << 10),
+        ("MiB", 1 << 20),
+        ("GiB", 1 << 30),
+        ("TiB", 1 << 40),
+    ];
+}
+
+impl std::str::FromStr for Memory {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let split = text
+            .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+            .unwrap_or(text.len());
+        let (number, unit) = text.split_at(split);
+        let wrong =
+            || format!("`{text}` is no amount of memory; expected one such as `4 GiB` or `500 MB`");
+        let number: f64 = number.parse().map_err(|_| wrong())?;
+        let unit = unit.trim();
+        let Some((_, factor)) = Memory::UNITS.iter().find(|(name, _)| *name == unit) else {
+            let names = Memory::UNITS.iter().map(|(name, _)| *name);
+            return Err(match crate::nearest::nearest(unit, names) {
+                Some(n) => format!("{} (did you mean `{n}`?)", wrong()),
+                None => wrong(),
+            });
+        };
+        let bytes = number * *factor as f64;
+        // Above 2^53 bytes the product is no longer exact, and no machine has that much.
+        if bytes > 0.0 && bytes < 9e15 {
+            Ok(Memory(bytes.round() as u64))
+        } else {
+            Err(wrong())
+        }
+    }
+}
+
+impl Serialize for Memory {
+    fn serialize<S: serde::Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        s.collect_str(&format_args!("{} B", self.0))
+    }
+}
+
+impl<'de> Deserialize<'de> for Memory {
+    fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        String::deserialize(d)?
+            .parse()
+            .map_err(serde::de::Error::custom)
+    }
+}
+
+impl JsonSchema for Memory {
+    fn schema_name() -> Cow<'static, str> {
+        "Memory".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "type": "string",
+            "pattern": r"^\s*[0-9]+\.?[0-9]*\s*([kMGT]|[KMGT]i)?B\s*$",
+            "description": "An amount of memory, such as `4 GiB` or `500 MB`.",
+            "examples": ["4 GiB", "500 MB"],
+            "x-format": "memory",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_read_in_binary_and_decimal_units() {
+        assert_eq!("4 GiB".parse(), Ok(Memory(4 << 30)));
+        assert_eq!("1.5 kB".parse(), Ok(Memory(1500)));
+        for wrong in ["4", "4 gb", "GiB", "-1 GB", "0 B", "4 GiBs", ""] {
+            assert!(wrong.parse::<Memory>().is_err(), "{wrong}");
+        }
+        assert!("4 gib".parse::<Memory>().unwrap_err().contains("`GiB`"));
+    }
+
+    #[test]
+    fn the_manual_s_steps_are_read() {
+        let w: Workflow = serde_json::from_value(serde_json::json!({
+            "plyflow": 1, "name": "w", "on_failure": "fail-fast",
+            "steps": {
+                "a": {"plugin": "x", "with": {"n": 1}, "resources": {"cores": 2, "memory": "4 GiB", "time_limit": "30 min"}},
+                "b": {"plugin": "y", "from": "a"},
+                "c": {"plugin": "z", "from": {"p": "a", "q": ["a", "b"]}, "for_each": {"zone": "b"}}
+            },
+            "expect": [{"step": "c", "result": "r", "value": "68 mm", "tolerance": "7 mm"}]
+        }))
+        .unwrap();
+        assert_eq!(w.steps["a"].resources.time_limit, Some(Time(1800.0)));
+        assert_eq!(w.steps["b"].from, Some(From::One("a".into())));
+        assert_eq!(w.steps.keys().collect::<Vec<_>>(), ["a", "b", "c"]);
+    }
+}
