@@ -16,3 +16,6 @@ pub use curvature::{Curvature, curvatures};
 pub use locate::{Location, QuadLocator};
 pub use ridge::{Ridge, ridge_line};
 pub use topology::{Topology, triangles};
+
+#[cfg(feature = "memory-host")]
+pub mod memory_host;

@@ -93,20 +93,22 @@ impl Walk<'_> {
         path
     }
 
-    /// The most curved node of the ring that lies ahead, within 45 degrees of the heading: wider,
-    /// and the line would turn along the rim at the end of a region.
+    /// The most curved node of the ring that lies ahead, within 45 degrees of the heading: wider, and the
+    /// line would turn along the rim at the end of a region. Irregular meshes may have none there; then
+    /// the second ring is asked.
     fn next(&self, at: u32, heading: Vec3, visited: &[u32]) -> Option<u32> {
         let strength = |i: u32| self.curvature[i as usize].max.abs();
-        self.topology
-            .ring(at as usize)
-            .iter()
-            .copied()
-            .filter(|&i| self.inside[i as usize] && !visited.contains(&i))
-            .filter(|&i| {
-                let way = sub(self.points[i as usize], self.points[at as usize]);
-                dot(way, heading) > 0.7 * norm(way)
-            })
-            .reduce(|a, b| if strength(b) > strength(a) { b } else { a })
+        (1..=2).find_map(|rings| {
+            self.topology
+                .rings(at as usize, rings)
+                .into_iter()
+                .filter(|i| self.inside[*i as usize] && !visited.contains(i))
+                .filter(|&i| {
+                    let way = sub(self.points[i as usize], self.points[at as usize]);
+                    dot(way, heading) > 0.7 * norm(way)
+                })
+                .reduce(|a, b| if strength(b) > strength(a) { b } else { a })
+        })
     }
 }
 

@@ -1,0 +1,134 @@
+//! The criteria of thesis 5.2.2 on one ply.
+
+use plyflow_surface::vector::Vec3;
+use plyflow_surface::{Surface, Topology, curvatures, nodal_distances};
+use serde::{Deserialize, Serialize};
+
+/// When a place counts as a defect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Thresholds {
+    /// Cells above this shear angle are flagged (rad).
+    pub over_shear_positive: f64,
+    /// Cells below this shear angle are flagged (rad).
+    pub over_shear_negative: f64,
+    /// Nodes above this distance do not conform (m).
+    pub distance_threshold: f64,
+    /// Nodes whose closest point is nearer to the tool's foot are not judged (m).
+    pub foot_margin: f64,
+}
+
+/// A formed ply.
+#[derive(Debug, Clone, Copy)]
+pub struct Ply<'a> {
+    /// Its mesh of quads.
+    pub topology: &'a Topology,
+    /// `[nodes]` flat positions (m).
+    pub undeformed: &'a [Vec3],
+    /// `[nodes]` positions to judge (m).
+    pub formed: &'a [Vec3],
+    /// `[cells]` (rad).
+    pub shear_angle: &'a [f64],
+    /// Distance of the mid-plane from the tool when all sheets lie on it (m).
+    pub offset: f64,
+}
+
+/// What was found on a ply.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// `[nodes]` (m).
+    pub nodal_distance: Vec<f64>,
+    /// `[nodes]` principal curvature of largest magnitude (1/m).
+    pub curvature_max: Vec<f64>,
+    /// `[cells]`.
+    pub over_shear: Vec<bool>,
+    /// `[nodes]`.
+    pub poor_conformity: Vec<bool>,
+    /// `[cells]`: over-sheared, or with a node that does not conform.
+    pub flag: Vec<bool>,
+    /// Summary.
+    pub summary: Summary,
+}
+
+/// The numbers of a ply.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Summary {
+    /// Undeformed area of flagged cells (m2).
+    pub flagged_area: f64,
+    /// Undeformed area of over-sheared cells (m2).
+    pub over_shear_area: f64,
+    /// Undeformed area of cells with a node that does not conform (m2).
+    pub poor_conformity_area: f64,
+    /// Smallest shear angle (rad).
+    pub shear_min: f64,
+    /// Largest shear angle (rad).
+    pub shear_max: f64,
+    /// Largest distance of a judged node (m); zero when none is judged.
+    pub distance_max: f64,
+}
+
+/// Judges a ply against the tool.
+pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detection {
+    let t = thresholds;
+    let distances = nodal_distances(tool, ply.formed, ply.offset, t.foot_margin);
+    let poor_conformity: Vec<bool> = distances
+        .iter()
+        .map(|d| d.judged && d.value > t.distance_threshold)
+        .collect();
+    let over_shear: Vec<bool> = ply
+        .shear_angle
+        .iter()
+        .map(|&g| g > t.over_shear_positive || g < t.over_shear_negative)
+        .collect();
+    let poor: Vec<bool> = (0..ply.topology.cells())
+        .map(|c| {
+            ply.topology
+                .cell(c)
+                .iter()
+                .any(|&i| poor_conformity[i as usize])
+        })
+        .collect();
+    let flag: Vec<bool> = over_shear
+        .iter()
+        .zip(&poor)
+        .map(|(&a, &b)| a || b)
+        .collect();
+    let areas = ply.topology.cell_areas(ply.undeformed);
+    let area = |chosen: &[bool]| {
+        areas
+            .iter()
+            .zip(chosen)
+            .filter(|(_, c)| **c)
+            .map(|(a, _)| a)
+            .sum()
+    };
+    let judged = distances.iter().filter(|d| d.judged).map(|d| d.value);
+    let summary = Summary {
+        flagged_area: area(&flag),
+        over_shear_area: area(&over_shear),
+        poor_conformity_area: area(&poor),
+        shear_min: ply
+            .shear_angle
+            .iter()
+            .copied()
+            .reduce(f64::min)
+            .unwrap_or(0.0),
+        shear_max: ply
+            .shear_angle
+            .iter()
+            .copied()
+            .reduce(f64::max)
+            .unwrap_or(0.0),
+        distance_max: judged.reduce(f64::max).unwrap_or(0.0),
+    };
+    Detection {
+        nodal_distance: distances.iter().map(|d| d.value).collect(),
+        curvature_max: curvatures(ply.topology, ply.formed)
+            .iter()
+            .map(|k| k.max)
+            .collect(),
+        over_shear,
+        poor_conformity,
+        flag,
+        summary,
+    }
+}

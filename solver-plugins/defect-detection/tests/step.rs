@@ -1,0 +1,206 @@
+//! The step on formed plies whose defects are known.
+
+use plyflow_defect_detection::DefectDetection;
+use plyflow_sdk::On;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
+use plyflow_surface::vector::Vec3;
+use serde_json::json;
+
+const HEIGHT: f64 = 0.060;
+const OFFSET: f64 = 0.00028;
+
+fn quads(n: [usize; 2], size: [f64; 2], z: f64) -> (Vec<Vec3>, Vec<u32>) {
+    let mut points = Vec::new();
+    for j in 0..=n[1] {
+        for i in 0..=n[0] {
+            let at = |d: usize, i: usize| size[d] * (i as f64 / n[d] as f64 - 0.5);
+            points.push([at(0, i), at(1, j), z]);
+        }
+    }
+    let at = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
+    let mut cells = Vec::new();
+    for j in 0..n[1] {
+        for i in 0..n[0] {
+            cells.extend([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    (points, cells)
+}
+
+/// A block 300 x 200 mm, 60 mm high, open below, with upright walls.
+fn tool() -> MemoryBody {
+    let (mut points, quads) = quads([6, 4], [0.300, 0.200], HEIGHT);
+    let mut cells: Vec<u32> = quads
+        .chunks_exact(4)
+        .flat_map(|c| [c[0], c[1], c[2], c[0], c[2], c[3]])
+        .collect();
+    let rim: Vec<u32> = (0..7)
+        .chain([13, 20, 27, 34])
+        .chain((28..34).rev())
+        .chain([21, 14, 7])
+        .collect();
+    let base = points.len() as u32;
+    for &i in &rim {
+        let [x, y, _] = points[i as usize];
+        points.push([x, y, 0.0]);
+    }
+    let n = rim.len();
+    for k in 0..n {
+        let (a, b) = (rim[k], rim[(k + 1) % n]);
+        let (c, d) = (base + k as u32, base + ((k + 1) % n) as u32);
+        cells.extend([a, c, d, a, d, b]);
+    }
+    MemoryBody {
+        name: "tool".into(),
+        points,
+        nodes_per_cell: 3,
+        cells,
+        ..Default::default()
+    }
+}
+
+/// One ply 200 x 100 mm with 10 mm cells, formed to `z` above the top, with the given shear in each cell.
+fn formed(z: impl Fn(f64, f64) -> f64, shear: impl Fn(usize) -> f64) -> MemoryArtifact {
+    let (points, cells) = quads([20, 10], [0.200, 0.100], 0.2);
+    let lifted: Vec<Vec3> = points
+        .iter()
+        .map(|p| [p[0], p[1], HEIGHT + z(p[0], p[1])])
+        .collect();
+    let angles = |on: f64| (0..200).map(|c| on * shear(c)).collect();
+    let field = |values| MemoryField {
+        name: "shear_angle".into(),
+        on: On::Cells,
+        components: 1,
+        values,
+    };
+    let ply = MemoryBody {
+        name: "ply_1".into(),
+        nodes_per_cell: 4,
+        cells,
+        frames: vec![points.clone(), lifted],
+        points,
+        fields: vec![vec![field(angles(0.0))], vec![field(angles(1.0))]],
+        ..Default::default()
+    };
+    MemoryArtifact {
+        kind: "forming".into(),
+        attributes: json!({"sheets": [{"name": "film", "kind": "diaphragm", "offset": 0.00004},
+                                      {"name": "ply_1", "kind": "ply", "offset": OFFSET}]}),
+        times: vec![0.0, 1.0],
+        bodies: vec![tool(), ply],
+        ..Default::default()
+    }
+}
+
+fn detect(input: &MemoryArtifact) -> MemoryArtifact {
+    run::<DefectDetection>(json!({}), &[MemoryInput::new("formed", input)], &[]).unwrap()
+}
+
+#[test]
+fn flat_ply_on_a_flat_tool_has_no_defect() {
+    let found = detect(&formed(|_, _| OFFSET, |_| 0.01));
+    assert_eq!(found.kind, "defects");
+    for name in ["flagged_area", "over_shear_area", "poor_conformity_area"] {
+        assert_eq!(found.result(name), 0.0, "{name}");
+    }
+    assert!(found.result("distance_max").abs() < 1e-12);
+    assert!(found.body("ply_1").last("flag").iter().all(|&f| f == 0.0));
+}
+
+#[test]
+fn blank_that_hangs_over_the_rim_onto_the_bed_has_no_poor_conformity() {
+    // The block is 300 mm long: moved by 100 mm, the ply's last 50 mm lie past it, half-way down and on
+    // the bed.
+    let mut input = formed(|_, _| OFFSET, |_| 0.0);
+    for p in &mut input.bodies[1].frames[1] {
+        p[0] += 0.101;
+        if p[0] > 0.155 {
+            p[2] = 0.0005;
+        }
+    }
+    let found = detect(&input);
+    assert_eq!(found.result("poor_conformity_area"), 0.0);
+    let distances = found.body("ply_1").last("nodal_distance");
+    assert!(
+        distances.iter().any(|&d| d > 0.03),
+        "the distance itself is still reported"
+    );
+}
+
+#[test]
+fn shear_beyond_the_asymmetric_limits_is_flagged_with_its_undeformed_area() {
+    let degrees = [9.0, 8.1, 7.9, -49.0, -51.0, 0.0];
+    let found = detect(&formed(
+        |_, _| OFFSET,
+        |c| f64::to_radians(*degrees.get(c).unwrap_or(&0.0)),
+    ));
+    let flags = found.body("ply_1").last("over_shear");
+    assert_eq!(&flags[..6], &[1.0, 1.0, 0.0, 0.0, 1.0, 0.0]);
+    assert!((found.result("over_shear_area") - 3.0e-4).abs() < 1e-12);
+    assert_eq!(
+        found.result("flagged_area"),
+        found.result("over_shear_area")
+    );
+    assert!((found.result("shear_max") - 9f64.to_radians()).abs() < 1e-12);
+    assert!((found.result("shear_min") + 51f64.to_radians()).abs() < 1e-12);
+    assert_eq!(found.body("ply_1").last("undeformed").len(), 3 * 231);
+}
+
+#[test]
+fn a_blister_above_the_threshold_is_poor_conformity_and_below_it_is_not() {
+    let blister = |height: f64| {
+        move |x: f64, y: f64| {
+            if x.hypot(y) < 0.011 {
+                OFFSET + height
+            } else {
+                OFFSET
+            }
+        }
+    };
+    let flat = detect(&formed(blister(0.0009), |_| 0.0));
+    assert_eq!(flat.result("flagged_area"), 0.0);
+    let found = detect(&formed(blister(0.0011), |_| 0.0));
+    // Five nodes: the middle one and its edge neighbours; they touch twelve cells of 100 mm2.
+    assert_eq!(
+        found
+            .body("ply_1")
+            .last("poor_conformity")
+            .iter()
+            .sum::<f64>(),
+        5.0
+    );
+    assert!((found.result("poor_conformity_area") - 12.0e-4).abs() < 1e-12);
+    assert!((found.result("distance_max") - 0.0011).abs() < 1e-12);
+    let curvature = found.body("ply_1").last("curvature_max");
+    assert!(
+        curvature.iter().any(|k| *k < -5.0),
+        "the blister's crest bends away from its normal"
+    );
+    let ply = &found.attributes["plies"][0];
+    assert_eq!(ply["name"], "ply_1");
+    assert!(
+        (found.attributes["thresholds"]["over_shear_positive"]
+            .as_f64()
+            .unwrap()
+            - 0.13963)
+            .abs()
+            < 1e-4
+    );
+}
+
+#[test]
+fn a_run_without_plies_or_frames_says_so() {
+    let mut input = formed(|_, _| OFFSET, |_| 0.0);
+    input.attributes = json!({"sheets": []});
+    let error =
+        run::<DefectDetection>(json!({}), &[MemoryInput::new("formed", &input)], &[]).unwrap_err();
+    assert!(error.contains("no sheet of kind 'ply'"), "{error}");
+    let mut input = formed(|_, _| OFFSET, |_| 0.0);
+    input.bodies.remove(0);
+    let error =
+        run::<DefectDetection>(json!({}), &[MemoryInput::new("formed", &input)], &[]).unwrap_err();
+    assert!(
+        error.contains("no body 'tool'") && error.contains("ply_1"),
+        "{error}"
+    );
+}
