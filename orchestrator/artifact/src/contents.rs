@@ -1,0 +1,99 @@
+//! What an artifact holds, as told by the attribute `contents` of `/plyflow`: everything that a reader
+//! needs before it touches an array.
+
+use crate::h5::DType;
+use serde::{Deserialize, Serialize};
+
+/// Version of the data model (`schemas/data-model.md`) that this crate reads and writes.
+pub const DATA_MODEL: i64 = 1;
+
+/// Where the values of a field sit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum On {
+    /// One row per point.
+    Points,
+    /// One row per cell.
+    Cells,
+}
+
+/// A field of a body; it has values in every frame.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FieldInfo {
+    /// Name.
+    pub name: String,
+    /// On points or cells.
+    pub on: On,
+    /// Values per point or cell.
+    pub components: u32,
+    /// SI unit.
+    pub unit: String,
+}
+
+/// A body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BodyInfo {
+    /// Name.
+    pub name: String,
+    /// Number of points.
+    pub points: u64,
+    /// Number of cells.
+    pub cells: u64,
+    /// 3 (triangles) or 4 (quads).
+    pub nodes_per_cell: u32,
+    /// Whether each frame has points of its own; else the reference holds in all frames.
+    pub moving: bool,
+    /// What the writing plugin said of the body: a JSON object.
+    pub attributes: serde_json::Value,
+    /// Fields in the order of the first frame.
+    pub fields: Vec<FieldInfo>,
+}
+
+/// A free array under `/data`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ArrayInfo {
+    /// Path below `/data`, e.g. `history/time`.
+    pub path: String,
+    /// Type of an element.
+    pub dtype: DType,
+    /// Shape, row-major.
+    pub shape: Vec<u64>,
+    /// SI unit.
+    pub unit: String,
+}
+
+/// A named number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NamedValue {
+    /// Name.
+    pub name: String,
+    /// Value (SI).
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Bodies and arrays of an artifact.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Contents {
+    /// Bodies in the order of definition.
+    pub bodies: Vec<BodyInfo>,
+    /// Number of frames.
+    pub frames: u64,
+    /// Arrays in the order of writing.
+    pub arrays: Vec<ArrayInfo>,
+}
+
+impl Contents {
+    /// The body of that name.
+    #[must_use]
+    pub fn body(&self, name: &str) -> Option<&BodyInfo> {
+        self.bodies.iter().find(|b| b.name == name)
+    }
+
+    /// The array at that path.
+    #[must_use]
+    pub fn array(&self, path: &str) -> Option<&ArrayInfo> {
+        self.arrays.iter().find(|a| a.path == path)
+    }
+}

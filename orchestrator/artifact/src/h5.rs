@@ -1,0 +1,571 @@
+//! A thin safe layer over the HDF5 C library: only what an artifact needs.
+//!
+//! HDF5 is not thread-safe here: every call takes the library's one lock. Handles close themselves.
+//! No object times are tracked and every group keeps the order of creation (VTK iterates in it), so the
+//! bytes of a file depend only on the calls that made it.
+
+use crate::error::{ArtifactError, ErrorKind, Result};
+use hdf5_sys::h5::{H5dont_atexit, H5open, hsize_t};
+use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Aget_type, H5Aopen, H5Aread, H5Awrite};
+use hdf5_sys::h5d::{H5D_fill_time_t, H5Dclose, H5Dcreate2, H5Dopen2, H5Dread, H5Dset_extent, H5Dwrite};
+use hdf5_sys::h5e::{H5E_DEFAULT, H5E_direction_t, H5E_error2_t, H5Eset_auto2, H5Ewalk2};
+use hdf5_sys::h5f::{H5F_ACC_RDONLY, H5F_ACC_TRUNC, H5F_libver_t, H5Fclose, H5Fcreate, H5Fopen};
+use hdf5_sys::h5g::{H5Gclose, H5Gcreate2, H5Gopen2};
+use hdf5_sys::h5i::hid_t;
+use hdf5_sys::h5l::{H5Lcreate_soft, H5Lexists};
+use hdf5_sys::h5p::*;
+use hdf5_sys::h5s::{
+    H5S_class_t, H5S_seloper_t, H5Sclose, H5Screate, H5Screate_simple, H5Sselect_hyperslab,
+};
+use hdf5_sys::h5t::{
+    H5T_C_S1, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT,
+    H5T_NATIVE_INT64, H5T_NATIVE_UINT8, H5T_NATIVE_UINT32, H5T_STD_I64LE, H5T_STD_U8LE,
+    H5T_STD_U32LE, H5T_cset_t, H5T_str_t, H5Tclose, H5Tcopy, H5Tget_size, H5Tset_cset,
+    H5Tset_size, H5Tset_strpad,
+};
+use std::ffi::{CStr, CString, c_uint, c_void};
+use std::path::Path;
+use std::sync::Once;
+
+const DEFAULT: hid_t = 0;
+
+/// Type of an element, in the file (little-endian) and in memory (native).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DType {
+    /// Double.
+    F64,
+    /// Single.
+    F32,
+    /// Signed 64-bit.
+    I64,
+    /// Unsigned 32-bit.
+    U32,
+    /// Unsigned byte.
+    U8,
+}
+
+impl DType {
+    /// Bytes of one element.
+    #[must_use]
+    pub fn size(self) -> usize {
+        match self {
+            Self::F64 | Self::I64 => 8,
+            Self::F32 | Self::U32 => 4,
+            Self::U8 => 1,
+        }
+    }
+
+    fn memory(self) -> hid_t {
+        match self {
+            Self::F64 => *H5T_NATIVE_DOUBLE,
+            Self::F32 => *H5T_NATIVE_FLOAT,
+            Self::I64 => *H5T_NATIVE_INT64,
+            Self::U32 => *H5T_NATIVE_UINT32,
+            Self::U8 => *H5T_NATIVE_UINT8,
+        }
+    }
+
+    fn file(self) -> hid_t {
+        match self {
+            Self::F64 => *H5T_IEEE_F64LE,
+            Self::F32 => *H5T_IEEE_F32LE,
+            Self::I64 => *H5T_STD_I64LE,
+            Self::U32 => *H5T_STD_U32LE,
+            Self::U8 => *H5T_STD_U8LE,
+        }
+    }
+}
+
+static INIT: Once = Once::new();
+
+/// Runs `f` alone in the library, which is started on first use.
+fn locked<T>(f: impl FnOnce() -> T) -> T {
+    let _guard = hdf5_sys::LOCK.lock();
+    INIT.call_once(|| unsafe {
+        // Handles may outlive `main`; the library must not close them behind our back.
+        H5dont_atexit();
+        H5open();
+        H5Eset_auto2(H5E_DEFAULT, None, std::ptr::null_mut());
+    });
+    f()
+}
+
+/// The innermost description on the library's error stack.
+fn last_error() -> String {
+    unsafe extern "C" fn visit(_: c_uint, e: *const H5E_error2_t, out: *mut c_void) -> i32 {
+        let out = unsafe { &mut *out.cast::<String>() };
+        let text = unsafe { (*e).desc };
+        if out.is_empty() && !text.is_null() {
+            *out = unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned();
+        }
+        0
+    }
+    let mut text = String::new();
+    unsafe {
+        H5Ewalk2(
+            H5E_DEFAULT,
+            H5E_direction_t::H5E_WALK_UPWARD,
+            Some(visit),
+            (&raw mut text).cast(),
+        );
+    }
+    text
+}
+
+fn checked(code: impl Into<i64>, what: impl FnOnce() -> String) -> Result<i64> {
+    let code = code.into();
+    if code >= 0 {
+        return Ok(code);
+    }
+    let message = format!("{} (HDF5: {})", what(), last_error());
+    Err(ArtifactError::new(ErrorKind::Io, message))
+}
+
+fn c_name(name: &str) -> Result<CString> {
+    CString::new(name).map_err(|_| {
+        ArtifactError::new(ErrorKind::BadValue, format!("the name {name:?} holds a zero byte"))
+    })
+}
+
+/// Closes a handle of one class when dropped.
+#[derive(Debug)]
+struct Handle(hid_t, unsafe fn(hid_t) -> i32);
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        locked(|| unsafe { (self.1)(self.0) });
+    }
+}
+
+macro_rules! closer {
+    ($name:ident, $f:ident) => {
+        unsafe fn $name(id: hid_t) -> i32 {
+            unsafe { $f(id) }
+        }
+    };
+}
+closer!(close_file, H5Fclose);
+closer!(close_group, H5Gclose);
+closer!(close_dataset, H5Dclose);
+closer!(close_space, H5Sclose);
+closer!(close_type, H5Tclose);
+closer!(close_attribute, H5Aclose);
+closer!(close_plist, H5Pclose);
+
+fn plist(class: hid_t) -> Result<Handle> {
+    let id = locked(|| unsafe { H5Pcreate(class) });
+    checked(id, || "making a property list".into())?;
+    Ok(Handle(id, close_plist))
+}
+
+fn space(shape: &[u64], growing: bool) -> Result<Handle> {
+    let id = locked(|| unsafe {
+        if shape.is_empty() {
+            H5Screate(H5S_class_t::H5S_SCALAR)
+        } else if growing {
+            let mut most = shape.to_vec();
+            most[0] = hsize_t::MAX; // H5S_UNLIMITED
+            H5Screate_simple(shape.len() as i32, shape.as_ptr(), most.as_ptr())
+        } else {
+            H5Screate_simple(shape.len() as i32, shape.as_ptr(), std::ptr::null())
+        }
+    });
+    checked(id, || format!("making a space of shape {shape:?}"))?;
+    Ok(Handle(id, close_space))
+}
+
+fn text_type(bytes: usize, ascii: bool) -> Result<Handle> {
+    locked(|| unsafe {
+        let id = checked(H5Tcopy(*H5T_C_S1), || "making a text type".into())?;
+        let t = Handle(id, close_type);
+        let set = if ascii { H5T_cset_t::H5T_CSET_ASCII } else { H5T_cset_t::H5T_CSET_UTF8 };
+        // HDF5 has no text of no bytes; one padding byte stands for it.
+        checked(H5Tset_size(t.0, bytes.max(1)), || format!("a text of {bytes} bytes"))?;
+        checked(H5Tset_strpad(t.0, H5T_str_t::H5T_STR_NULLPAD), || "text padding".into())?;
+        checked(H5Tset_cset(t.0, set), || "text encoding".into())?;
+        Ok(t)
+    })
+}
+
+/// An open file.
+#[derive(Debug)]
+pub(crate) struct File(Handle);
+
+/// An open group.
+#[derive(Debug)]
+pub(crate) struct Group(Handle);
+
+/// An open dataset and its rank and row size.
+#[derive(Debug)]
+pub(crate) struct Dataset {
+    handle: Handle,
+    shape: Vec<u64>,
+    dtype: DType,
+}
+
+/// What attributes can be written to.
+pub(crate) trait Location {
+    fn id(&self) -> hid_t;
+
+    /// Writes a text of fixed length.
+    fn write_text(&self, name: &str, text: &str, ascii: bool) -> Result<()> {
+        let t = text_type(text.len(), ascii)?;
+        // The buffer is what the type says, also for the empty text.
+        let padded;
+        let bytes = if text.is_empty() {
+            padded = [0u8];
+            &padded[..]
+        } else {
+            text.as_bytes()
+        };
+        self.write_raw(name, t.0, t.0, &[], bytes.as_ptr().cast())
+    }
+
+    /// Writes integers; an empty shape makes one value.
+    fn write_i64(&self, name: &str, shape: &[u64], values: &[i64]) -> Result<()> {
+        let t = DType::I64;
+        self.write_raw(name, t.file(), t.memory(), shape, values.as_ptr().cast())
+    }
+
+    #[doc(hidden)]
+    fn write_raw(
+        &self,
+        name: &str,
+        file: hid_t,
+        memory: hid_t,
+        shape: &[u64],
+        data: *const c_void,
+    ) -> Result<()> {
+        let c = c_name(name)?;
+        let s = space(shape, false)?;
+        locked(|| unsafe {
+            let id = H5Acreate2(self.id(), c.as_ptr(), file, s.0, DEFAULT, DEFAULT);
+            checked(id, || format!("making the attribute '{name}'"))?;
+            let a = Handle(id, close_attribute);
+            checked(H5Awrite(a.0, memory, data), || format!("writing the attribute '{name}'"))?;
+            Ok(())
+        })
+    }
+
+    /// A text attribute, or `None` if there is none of that name.
+    fn read_text(&self, name: &str) -> Result<Option<String>> {
+        let c = c_name(name)?;
+        locked(|| unsafe {
+            let id = H5Aopen(self.id(), c.as_ptr(), DEFAULT);
+            if id < 0 {
+                return Ok(None);
+            }
+            let a = Handle(id, close_attribute);
+            let what = || format!("reading the attribute '{name}'");
+            let t = Handle(checked(H5Aget_type(a.0), what)?, close_type);
+            let mut bytes = vec![0u8; H5Tget_size(t.0)];
+            checked(H5Aread(a.0, t.0, bytes.as_mut_ptr().cast()), what)?;
+            let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
+            bytes.truncate(end);
+            String::from_utf8(bytes).map(Some).map_err(|_| {
+                ArtifactError::new(
+                    ErrorKind::NotAnArtifact,
+                    format!("the attribute '{name}' is not UTF-8"),
+                )
+            })
+        })
+    }
+
+    /// An integer attribute, or `None` if there is none of that name.
+    fn read_integer(&self, name: &str) -> Result<Option<i64>> {
+        let c = c_name(name)?;
+        locked(|| unsafe {
+            let id = H5Aopen(self.id(), c.as_ptr(), DEFAULT);
+            if id < 0 {
+                return Ok(None);
+            }
+            let a = Handle(id, close_attribute);
+            let mut value = 0i64;
+            checked(H5Aread(a.0, DType::I64.memory(), (&raw mut value).cast()), || {
+                format!("reading the attribute '{name}'")
+            })?;
+            Ok(Some(value))
+        })
+    }
+}
+
+impl Location for File {
+    fn id(&self) -> hid_t {
+        self.0.0
+    }
+}
+impl Location for Group {
+    fn id(&self) -> hid_t {
+        self.0.0
+    }
+}
+impl Location for Dataset {
+    fn id(&self) -> hid_t {
+        self.handle.0
+    }
+}
+
+impl File {
+    /// Makes a new file, replacing one that is there. Format of HDF5 1.10: what VTK 9.4 reads.
+    pub(crate) fn create(path: &Path) -> Result<Self> {
+        let access = plist(*H5P_CLS_FILE_ACCESS)?;
+        let creation = plist(*H5P_CLS_FILE_CREATE)?;
+        let c = c_path(path)?;
+        locked(|| unsafe {
+            let v110 = H5F_libver_t::H5F_LIBVER_V110;
+            H5Pset_libver_bounds(access.0, v110, v110);
+            // Nobody else opens a temporary name; some cluster file systems have no locks.
+            H5Pset_file_locking(access.0, 0, 1);
+            H5Pset_link_creation_order(creation.0, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
+            H5Pset_obj_track_times(creation.0, 0);
+            let id = H5Fcreate(c.as_ptr(), H5F_ACC_TRUNC, creation.0, access.0);
+            checked(id, || format!("making the artifact {}", path.display()))?;
+            Ok(Self(Handle(id, close_file)))
+        })
+    }
+
+    /// Opens a file for reading.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        let access = plist(*H5P_CLS_FILE_ACCESS)?;
+        let c = c_path(path)?;
+        locked(|| unsafe {
+            H5Pset_file_locking(access.0, 0, 1);
+            let id = H5Fopen(c.as_ptr(), H5F_ACC_RDONLY, access.0);
+            checked(id, || format!("opening the artifact {}", path.display()))?;
+            Ok(Self(Handle(id, close_file)))
+        })
+    }
+
+    /// Closes the file; every other handle of it must be gone.
+    pub(crate) fn close(self) -> Result<()> {
+        let id = self.0.0;
+        std::mem::forget(self);
+        locked(|| checked(unsafe { H5Fclose(id) }, || "closing the artifact".into()))?;
+        Ok(())
+    }
+
+    /// Makes a group; groups on the way must exist.
+    pub(crate) fn create_group(&self, path: &str) -> Result<Group> {
+        let creation = plist(*H5P_CLS_GROUP_CREATE)?;
+        let c = c_name(path)?;
+        locked(|| unsafe {
+            H5Pset_link_creation_order(creation.0, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
+            H5Pset_obj_track_times(creation.0, 0);
+            let id = H5Gcreate2(self.id(), c.as_ptr(), DEFAULT, creation.0, DEFAULT);
+            checked(id, || format!("making the group {path}"))?;
+            Ok(Group(Handle(id, close_group)))
+        })
+    }
+
+    /// Opens a group.
+    pub(crate) fn open_group(&self, path: &str) -> Result<Group> {
+        let c = c_name(path)?;
+        locked(|| unsafe {
+            let id = H5Gopen2(self.id(), c.as_ptr(), DEFAULT);
+            checked(id, || format!("opening the group {path}"))?;
+            Ok(Group(Handle(id, close_group)))
+        })
+    }
+
+    /// Whether a link of that path exists; links on the way must exist.
+    pub(crate) fn exists(&self, path: &str) -> bool {
+        let Ok(c) = c_name(path) else { return false };
+        locked(|| unsafe { H5Lexists(self.id(), c.as_ptr(), DEFAULT) > 0 })
+    }
+
+    /// A link from `path` to `target` (a path in this file).
+    pub(crate) fn soft_link(&self, target: &str, path: &str) -> Result<()> {
+        let (t, p) = (c_name(target)?, c_name(path)?);
+        locked(|| unsafe {
+            let code = H5Lcreate_soft(t.as_ptr(), self.id(), p.as_ptr(), DEFAULT, DEFAULT);
+            checked(code, || format!("linking {path} to {target}"))?;
+            Ok(())
+        })
+    }
+
+    /// Makes a dataset of fixed shape (contiguous) and writes it.
+    ///
+    /// `data` holds the product of `shape` elements of `dtype`.
+    pub(crate) fn write(
+        &self,
+        path: &str,
+        dtype: DType,
+        shape: &[u64],
+        data: &[u8],
+    ) -> Result<Dataset> {
+        let d = self.create_dataset(path, dtype, shape, None)?;
+        if !data.is_empty() {
+            locked(|| unsafe {
+                let code =
+                    H5Dwrite(d.id(), dtype.memory(), DEFAULT, DEFAULT, DEFAULT, data.as_ptr().cast());
+                checked(code, || format!("writing {path}"))
+            })?;
+        }
+        Ok(d)
+    }
+
+    /// Makes a dataset that starts with no rows, grows along its first axis and is stored in chunks of
+    /// `chunk` rows. `row` is the shape of one row.
+    pub(crate) fn growing(
+        &self,
+        path: &str,
+        dtype: DType,
+        row: &[u64],
+        chunk: u64,
+    ) -> Result<Dataset> {
+        let mut shape = vec![0];
+        shape.extend_from_slice(row);
+        self.create_dataset(path, dtype, &shape, Some(chunk.max(1)))
+    }
+
+    fn create_dataset(
+        &self,
+        path: &str,
+        dtype: DType,
+        shape: &[u64],
+        chunk: Option<u64>,
+    ) -> Result<Dataset> {
+        let (c, s) = (c_name(path)?, space(shape, chunk.is_some())?);
+        let creation = plist(*H5P_CLS_DATASET_CREATE)?;
+        let access = plist(*H5P_CLS_DATASET_ACCESS)?;
+        locked(|| unsafe {
+            H5Pset_obj_track_times(creation.0, 0);
+            H5Pset_fill_time(creation.0, H5D_fill_time_t::H5D_FILL_TIME_NEVER);
+            if let Some(rows) = chunk {
+                let mut dims = shape.to_vec();
+                dims[0] = rows;
+                H5Pset_chunk(creation.0, dims.len() as i32, dims.as_ptr());
+                // Whole chunks are written at once, so a cache would only hold memory.
+                H5Pset_chunk_cache(access.0, 1, 0, 1.0);
+            }
+            let id = H5Dcreate2(
+                self.id(),
+                c.as_ptr(),
+                dtype.file(),
+                s.0,
+                DEFAULT,
+                creation.0,
+                access.0,
+            );
+            checked(id, || format!("making the dataset {path}"))?;
+            let handle = Handle(id, close_dataset);
+            Ok(Dataset { handle, shape: shape.to_vec(), dtype })
+        })
+    }
+
+    /// Opens a dataset whose type and shape are known.
+    pub(crate) fn open_dataset(&self, path: &str, dtype: DType, shape: &[u64]) -> Result<Dataset> {
+        let c = c_name(path)?;
+        locked(|| unsafe {
+            let id = H5Dopen2(self.id(), c.as_ptr(), DEFAULT);
+            checked(id, || format!("opening the dataset {path}"))?;
+            let handle = Handle(id, close_dataset);
+            Ok(Dataset { handle, shape: shape.to_vec(), dtype })
+        })
+    }
+}
+
+impl Dataset {
+    /// Appends whole rows.
+    pub(crate) fn append(&mut self, data: &[u8]) -> Result<()> {
+        let row: u64 = self.shape[1..].iter().product::<u64>() * self.dtype.size() as u64;
+        if data.is_empty() || row == 0 {
+            return Ok(());
+        }
+        let (first, rows) = (self.shape[0], data.len() as u64 / row);
+        self.shape[0] += rows;
+        locked(|| unsafe {
+            checked(H5Dset_extent(self.id(), self.shape.as_ptr()), || "growing a dataset".into())
+        })?;
+        self.slab(first, rows, |d, t, memory, file| unsafe {
+            H5Dwrite(d, t, memory, file, DEFAULT, data.as_ptr().cast())
+        })
+    }
+
+    /// Reads rows `first .. first + rows` as `dtype` into `buffer` (of the right length).
+    pub(crate) fn read_rows(
+        &self,
+        first: u64,
+        rows: u64,
+        dtype: DType,
+        buffer: &mut [u8],
+    ) -> Result<()> {
+        if buffer.is_empty() {
+            return Ok(());
+        }
+        let wanted = rows * self.shape[1..].iter().product::<u64>() * dtype.size() as u64;
+        debug_assert_eq!(buffer.len() as u64, wanted);
+        self.slab(first, rows, |d, _, memory, file| unsafe {
+            H5Dread(d, dtype.memory(), memory, file, DEFAULT, buffer.as_mut_ptr().cast())
+        })
+    }
+
+    /// Reads everything as `dtype` into `buffer` (of the right length).
+    pub(crate) fn read_all(&self, dtype: DType, buffer: &mut [u8]) -> Result<()> {
+        if buffer.is_empty() {
+            return Ok(());
+        }
+        locked(|| unsafe {
+            let to = buffer.as_mut_ptr().cast();
+            let code = H5Dread(self.id(), dtype.memory(), DEFAULT, DEFAULT, DEFAULT, to);
+            checked(code, || "reading a dataset".into())
+        })?;
+        Ok(())
+    }
+
+    fn slab(
+        &self,
+        first: u64,
+        rows: u64,
+        f: impl FnOnce(hid_t, hid_t, hid_t, hid_t) -> i32,
+    ) -> Result<()> {
+        let mut start = vec![0; self.shape.len()];
+        let mut count = self.shape.clone();
+        (start[0], count[0]) = (first, rows);
+        let (memory, file) = (space(&count, false)?, space(&self.shape, false)?);
+        locked(|| unsafe {
+            let null = std::ptr::null();
+            let code = H5Sselect_hyperslab(
+                file.0,
+                H5S_seloper_t::H5S_SELECT_SET,
+                start.as_ptr(),
+                null,
+                count.as_ptr(),
+                null,
+            );
+            checked(code, || format!("selecting rows {first} to {}", first + rows))?;
+            checked(f(self.id(), self.dtype.memory(), memory.0, file.0), || {
+                format!("rows {first} to {} of a dataset", first + rows)
+            })
+        })?;
+        Ok(())
+    }
+}
+
+fn c_path(path: &Path) -> Result<CString> {
+    let text = path.to_str().ok_or_else(|| {
+        ArtifactError::new(ErrorKind::Io, format!("the path {} is not UTF-8", path.display()))
+    })?;
+    c_name(text)
+}
+
+/// The bytes of a slice of plain numbers.
+pub(crate) fn bytes<T: Plain>(values: &[T]) -> &[u8] {
+    // Plain types have no padding and no invalid bytes.
+    unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
+}
+
+/// The bytes of a slice of plain numbers, to read into.
+pub(crate) fn bytes_mut<T: Plain>(values: &mut [T]) -> &mut [u8] {
+    // Any bytes make a plain number.
+    unsafe { std::slice::from_raw_parts_mut(values.as_mut_ptr().cast(), size_of_val(values)) }
+}
+
+/// Numbers that are just bytes.
+pub(crate) trait Plain: Copy {}
+impl Plain for f64 {}
+impl Plain for f32 {}
+impl Plain for i64 {}
+impl Plain for u32 {}
+impl Plain for u8 {}
