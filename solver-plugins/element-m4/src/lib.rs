@@ -1,1 +1,4 @@
-//! plyflow-element-m4
+//! The plugin `m4`: exports [`plyflow_kernels::m4::M4`], where the mechanics stand. They live in a
+//! library of their own so that tests and benches can link several components at once.
+
+plyflow_sdk::export_element!(plyflow_kernels::m4::M4);

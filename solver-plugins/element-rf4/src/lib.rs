@@ -1,1 +1,1 @@
-//! plyflow-element-rf4
+//! The plugin `rf4`: a four-node rotation-free shell.

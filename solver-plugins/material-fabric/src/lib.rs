@@ -1,1 +1,4 @@
-//! plyflow-material-fabric
+//! The plugin `material-fabric`: exports [`plyflow_kernels::fabric::Fabric`], where the mechanics stand. They live in a
+//! library of their own so that tests and benches can link several components at once.
+
+plyflow_sdk::export_material!(plyflow_kernels::fabric::Fabric);

@@ -1,0 +1,114 @@
+//! The thesis' hypoelastic form (eqs 3.10-3.23) in the metric.
+//!
+//! Each family carries its fibre stress and a shear stress in its own frame [fibre, in-plane unit
+//! normal to the other's direction]; increments are added frame by frame, and the two frames are
+//! superposed. With h = h0 / J (incompressible) the Kirchhoff resultants are `h0 sigma`, so
+//!
+//! `S11 = (N1 - 2 T1 s / c) / C11`, `S22 = (N2 - 2 T2 s / c) / C22`, `S12 = (T1 + T2) / (c l1 l2)`,
+//!
+//! c = cos g. Increments, from the strain increments in the frames: `dN_i = k dl_i / l_i` and
+//! `dT_i = d[F_norm cos g / 2] +- d/dg(F_norm cos g / 2) tan g (dl2/l2 - dl1/l1)`: eq. 3.21 read as
+//! stress over angle (not as a modulus), and half of it for each frame because both add theirs.
+//! The frames turn with the fibres, so what eqs 3.10-3.17 do by polar decomposition needs no
+//! rotation here. Strain increments are taken at mid-step; the sine is clamped to 0.985 (80 deg).
+
+use super::{Fabric, LEAST, tangents};
+use crate::{Lanes, WIDTH, dispatch};
+
+/// Rows: C11 - 1, C22 - 1, C12 before; N1, N2, T1, T2 (N/m); F_norm cos g / 2 (N/m) before; work
+/// (J/m2); largest shear angle of the stitch and its sine.
+pub(super) const HISTORY: usize = 11;
+const SINE_LIMIT: f64 = 0.985;
+
+dispatch!(pub(super) fn membrane(
+    f: &Fabric,
+    n: usize,
+    metric: &[f64],
+    history: &mut [f64],
+    stress: &mut [f64],
+    energy: &mut [f64],
+    stiffness: &mut [f64],
+) = membrane_kernel);
+
+#[inline(always)]
+fn membrane_kernel<V: Lanes>(
+    f: &Fabric,
+    n: usize,
+    metric: &[f64],
+    history: &mut [f64],
+    stress: &mut [f64],
+    energy: &mut [f64],
+    stiffness: &mut [f64],
+) {
+    let (half, one, two) = (V::splat(0.5), V::splat(1.0), V::splat(2.0));
+    let (least, end) = (V::splat(LEAST), V::splat(SINE_LIMIT));
+    let sine = |c12: V, r: V| (c12 * r).max(-end).min(end);
+    for c in (0..n).step_by(WIDTH) {
+        let row = |h: &[f64], r: usize| V::load(h, r * n + c);
+        let raw: [V; 3] = [row(metric, 0), row(metric, 1), row(metric, 2)];
+        let (c11, c22) = (raw[0].max(least), raw[1].max(least));
+        let (p11, p22) = (
+            (row(history, 0) + one).max(least),
+            (row(history, 1) + one).max(least),
+        );
+        let (l1, l2, o1, o2) = (c11.sqrt(), c22.sqrt(), p11.sqrt(), p22.sqrt());
+        let (r1, r2) = (one / l1, one / l2);
+        let s = sine(raw[2], r1 * r2);
+        let before = sine(row(history, 2), one / (o1 * o2));
+        let cosine = (one - s * s).sqrt();
+        // Increments of the fibres' logarithmic strains and of the angle at mid-step.
+        let e1 = two * (l1 - o1) / (l1 + o1);
+        let e2 = two * (l2 - o2) / (l2 + o2);
+        let ratio = s / cosine;
+        let middle = half * (ratio + before / (one - before * before).sqrt());
+        let (tension, compression) = (V::splat(f.tension), V::splat(f.compression));
+        let k1 = V::select(l1.lt(one), compression, tension);
+        let k2 = V::select(l2.lt(one), compression, tension);
+        let (n1, n2) = (row(history, 3), row(history, 4));
+        let (m1, m2) = (n1 + k1 * e1, n2 + k2 * e2);
+        // Shear stress of each frame.
+        let (response, g, gs) = f.shear.with_stitch(s, row(history, 9), row(history, 10));
+        let q = half * response.force * cosine;
+        let (_, yarn) = f.shear.slopes(s);
+        let modulus = half * (yarn * cosine - response.force * s / cosine) * cosine;
+        let lean = modulus * middle * (e2 - e1);
+        let dq = q - row(history, 7);
+        let (t1, t2) = (row(history, 5), row(history, 6));
+        let (u1, u2) = (t1 + dq + lean, t2 + dq - lean);
+        // Work: the stress at mid-step over the increments; the frames' shear strains are
+        // dg +- tan g (de2 - de1).
+        let dg = (s - before) / (half * (cosine + (one - before * before).sqrt()));
+        let turn = middle * (e2 - e1);
+        let work = row(history, 8)
+            + half * ((n1 + m1) * e1 + (n2 + m2) * e2)
+            + half * ((t1 + u1) * (dg + turn) + (t2 + u2) * (dg - turn));
+        for (r, v) in [
+            (0, raw[0] - one),
+            (1, raw[1] - one),
+            (2, raw[2]),
+            (3, m1),
+            (4, m2),
+            (5, u1),
+            (6, u2),
+            (7, q),
+            (8, work),
+            (9, g),
+            (10, gs),
+        ] {
+            v.store(history, r * n + c);
+        }
+        let (i1, i2) = (r1 * r1, r2 * r2);
+        ((m1 - two * u1 * ratio) * i1).store(stress, c);
+        ((m2 - two * u2 * ratio) * i2).store(stress, n + c);
+        ((u1 + u2) * r1 * r2 / cosine).store(stress, 2 * n + c);
+        work.store(energy, c);
+        if !stiffness.is_empty() {
+            // d(N / C) / dE = (k - 2 N) / C^2; the frames' shear as in the energy form.
+            let a1 = (tension + two * m1.abs()) * i1 * i1;
+            let a2 = (tension + two * m2.abs()) * i2 * i2;
+            let (largest, soft) = tangents(f, s, i1, i2, a1, a2, response.force.abs());
+            largest.store(stiffness, c);
+            soft.store(stiffness, n + c);
+        }
+    }
+}

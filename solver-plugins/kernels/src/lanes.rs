@@ -1,0 +1,402 @@
+//! Eight f64 lanes: one trait, one type per instruction set.
+//!
+//! A kernel is written once, generic over [`Lanes`], and instantiated by [`crate::dispatch!`] for
+//! AVX-512, for AVX2 and for any machine. Only IEEE operations with one rounding are offered (no
+//! fused multiply-add), so all three give the same bits.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Lanes in one value; batches are a multiple of it.
+pub const WIDTH: usize = 8;
+
+/// Eight f64 values treated alike.
+pub trait Lanes:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// One truth value per lane.
+    type Mask: Copy;
+    /// The same value in every lane.
+    fn splat(x: f64) -> Self;
+    /// `from[at..at + 8]`.
+    fn load(from: &[f64], at: usize) -> Self;
+    /// Writes `to[at..at + 8]`.
+    fn store(self, to: &mut [f64], at: usize);
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Magnitude.
+    fn abs(self) -> Self;
+    /// `if self < other { self } else { other }`.
+    fn min(self, other: Self) -> Self;
+    /// `if self > other { self } else { other }`.
+    fn max(self, other: Self) -> Self;
+    /// `self < other`, lane by lane.
+    fn lt(self, other: Self) -> Self::Mask;
+    /// `if mask { yes } else { no }`, lane by lane.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Magnitude of `self` with the sign of `sign`.
+    fn copysign(self, sign: Self) -> Self;
+    /// 2^n for `self` = 1.5 * 2^52 + n, n whole and from -1022 to 1023.
+    fn power_of_two(self) -> Self;
+}
+
+/// Any machine.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+pub struct Portable([f64; WIDTH]);
+
+macro_rules! portable_operator {
+    ($trait:ident, $name:ident, $op:tt) => {
+        impl $trait for Portable {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(mut self, other: Self) -> Self {
+                for l in 0..WIDTH {
+                    self.0[l] $op other.0[l];
+                }
+                self
+            }
+        }
+    };
+}
+portable_operator!(Add, add, +=);
+portable_operator!(Sub, sub, -=);
+portable_operator!(Mul, mul, *=);
+portable_operator!(Div, div, /=);
+
+impl Portable {
+    #[inline(always)]
+    fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self(self.0.map(f))
+    }
+
+    #[inline(always)]
+    fn zip(mut self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        for l in 0..WIDTH {
+            self.0[l] = f(self.0[l], other.0[l]);
+        }
+        self
+    }
+}
+
+impl Neg for Portable {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|x| -x)
+    }
+}
+
+impl Lanes for Portable {
+    type Mask = [bool; WIDTH];
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self([x; WIDTH])
+    }
+    #[inline(always)]
+    fn load(from: &[f64], at: usize) -> Self {
+        let mut v = [0.0; WIDTH];
+        v.copy_from_slice(&from[at..at + WIDTH]);
+        Self(v)
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64], at: usize) {
+        to[at..at + WIDTH].copy_from_slice(&self.0);
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.map(f64::sqrt)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.map(f64::abs)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> Self::Mask {
+        core::array::from_fn(|l| self.0[l] < other.0[l])
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self(core::array::from_fn(|l| {
+            if mask[l] { yes.0[l] } else { no.0[l] }
+        }))
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        self.zip(sign, f64::copysign)
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        self.map(|x| f64::from_bits((x.to_bits() << 52).wrapping_add(1023 << 52)))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{Add, Div, Lanes, Mul, Neg, Sub, WIDTH};
+    use core::arch::x86_64::*;
+
+    // SAFETY of this module: values of these types are made only inside functions that
+    // `dispatch!` enters after it has found the instruction set on the machine.
+
+    /// AVX-512 (F and DQ).
+    #[derive(Clone, Copy)]
+    pub struct Avx512(__m512d);
+
+    /// AVX2: two registers.
+    #[derive(Clone, Copy)]
+    pub struct Avx2(__m256d, __m256d);
+
+    macro_rules! operator {
+        ($trait:ident, $name:ident, $wide:ident, $half:ident) => {
+            impl $trait for Avx512 {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, o: Self) -> Self {
+                    unsafe { Self($wide(self.0, o.0)) }
+                }
+            }
+            impl $trait for Avx2 {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, o: Self) -> Self {
+                    unsafe { Self($half(self.0, o.0), $half(self.1, o.1)) }
+                }
+            }
+        };
+    }
+    operator!(Add, add, _mm512_add_pd, _mm256_add_pd);
+    operator!(Sub, sub, _mm512_sub_pd, _mm256_sub_pd);
+    operator!(Mul, mul, _mm512_mul_pd, _mm256_mul_pd);
+    operator!(Div, div, _mm512_div_pd, _mm256_div_pd);
+
+    impl Neg for Avx512 {
+        type Output = Self;
+        #[inline(always)]
+        fn neg(self) -> Self {
+            unsafe { Self(_mm512_xor_pd(self.0, _mm512_set1_pd(-0.0))) }
+        }
+    }
+
+    impl Neg for Avx2 {
+        type Output = Self;
+        #[inline(always)]
+        fn neg(self) -> Self {
+            unsafe {
+                let s = _mm256_set1_pd(-0.0);
+                Self(_mm256_xor_pd(self.0, s), _mm256_xor_pd(self.1, s))
+            }
+        }
+    }
+
+    impl Lanes for Avx512 {
+        type Mask = __mmask8;
+        #[inline(always)]
+        fn splat(x: f64) -> Self {
+            unsafe { Self(_mm512_set1_pd(x)) }
+        }
+        #[inline(always)]
+        fn load(from: &[f64], at: usize) -> Self {
+            let p = from[at..at + WIDTH].as_ptr();
+            unsafe { Self(_mm512_loadu_pd(p)) }
+        }
+        #[inline(always)]
+        fn store(self, to: &mut [f64], at: usize) {
+            let p = to[at..at + WIDTH].as_mut_ptr();
+            unsafe { _mm512_storeu_pd(p, self.0) }
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            unsafe { Self(_mm512_sqrt_pd(self.0)) }
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            unsafe { Self(_mm512_andnot_pd(_mm512_set1_pd(-0.0), self.0)) }
+        }
+        #[inline(always)]
+        fn min(self, o: Self) -> Self {
+            unsafe { Self(_mm512_min_pd(self.0, o.0)) }
+        }
+        #[inline(always)]
+        fn max(self, o: Self) -> Self {
+            unsafe { Self(_mm512_max_pd(self.0, o.0)) }
+        }
+        #[inline(always)]
+        fn lt(self, o: Self) -> Self::Mask {
+            unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, o.0) }
+        }
+        #[inline(always)]
+        fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+            unsafe { Self(_mm512_mask_blend_pd(mask, no.0, yes.0)) }
+        }
+        #[inline(always)]
+        fn copysign(self, sign: Self) -> Self {
+            unsafe {
+                let s = _mm512_set1_pd(-0.0);
+                Self(_mm512_or_pd(
+                    _mm512_and_pd(s, sign.0),
+                    _mm512_andnot_pd(s, self.0),
+                ))
+            }
+        }
+        #[inline(always)]
+        fn power_of_two(self) -> Self {
+            unsafe {
+                let n = _mm512_slli_epi64::<52>(_mm512_castpd_si512(self.0));
+                let one = _mm512_castpd_si512(_mm512_set1_pd(1.0));
+                Self(_mm512_castsi512_pd(_mm512_add_epi64(n, one)))
+            }
+        }
+    }
+
+    impl Lanes for Avx2 {
+        type Mask = (__m256d, __m256d);
+        #[inline(always)]
+        fn splat(x: f64) -> Self {
+            unsafe { Self(_mm256_set1_pd(x), _mm256_set1_pd(x)) }
+        }
+        #[inline(always)]
+        fn load(from: &[f64], at: usize) -> Self {
+            let p = from[at..at + WIDTH].as_ptr();
+            unsafe { Self(_mm256_loadu_pd(p), _mm256_loadu_pd(p.add(4))) }
+        }
+        #[inline(always)]
+        fn store(self, to: &mut [f64], at: usize) {
+            let p = to[at..at + WIDTH].as_mut_ptr();
+            unsafe {
+                _mm256_storeu_pd(p, self.0);
+                _mm256_storeu_pd(p.add(4), self.1);
+            }
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            unsafe {
+                let s = _mm256_set1_pd(-0.0);
+                Self(_mm256_andnot_pd(s, self.0), _mm256_andnot_pd(s, self.1))
+            }
+        }
+        #[inline(always)]
+        fn min(self, o: Self) -> Self {
+            unsafe { Self(_mm256_min_pd(self.0, o.0), _mm256_min_pd(self.1, o.1)) }
+        }
+        #[inline(always)]
+        fn max(self, o: Self) -> Self {
+            unsafe { Self(_mm256_max_pd(self.0, o.0), _mm256_max_pd(self.1, o.1)) }
+        }
+        #[inline(always)]
+        fn lt(self, o: Self) -> Self::Mask {
+            unsafe {
+                (
+                    _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, o.0),
+                    _mm256_cmp_pd::<_CMP_LT_OQ>(self.1, o.1),
+                )
+            }
+        }
+        #[inline(always)]
+        fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+            unsafe {
+                Self(
+                    _mm256_blendv_pd(no.0, yes.0, mask.0),
+                    _mm256_blendv_pd(no.1, yes.1, mask.1),
+                )
+            }
+        }
+        #[inline(always)]
+        fn copysign(self, sign: Self) -> Self {
+            unsafe {
+                let s = _mm256_set1_pd(-0.0);
+                Self(
+                    _mm256_or_pd(_mm256_and_pd(s, sign.0), _mm256_andnot_pd(s, self.0)),
+                    _mm256_or_pd(_mm256_and_pd(s, sign.1), _mm256_andnot_pd(s, self.1)),
+                )
+            }
+        }
+        #[inline(always)]
+        fn power_of_two(self) -> Self {
+            unsafe {
+                let one = _mm256_castpd_si256(_mm256_set1_pd(1.0));
+                let a = _mm256_slli_epi64::<52>(_mm256_castpd_si256(self.0));
+                let b = _mm256_slli_epi64::<52>(_mm256_castpd_si256(self.1));
+                Self(
+                    _mm256_castsi256_pd(_mm256_add_epi64(a, one)),
+                    _mm256_castsi256_pd(_mm256_add_epi64(b, one)),
+                )
+            }
+        }
+    }
+}
+
+/// Instruction set that [`crate::dispatch!`] picks.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Level {
+    /// AVX-512 F and DQ.
+    Avx512,
+    /// AVX2.
+    Avx2,
+    /// Anything else.
+    Portable,
+}
+
+/// The best instruction set of this machine (the standard library caches the answer).
+#[inline]
+pub fn level() -> Level {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            return Level::Avx512;
+        }
+        if is_x86_feature_detected!("avx2") {
+            return Level::Avx2;
+        }
+    }
+    Level::Portable
+}
+
+/// `dispatch!(fn name(arg: Type, ..) -> Ret = kernel);` defines `name`, which runs
+/// `kernel::<V>(arg, ..)` (generic over [`Lanes`], `#[inline(always)]`) with the widest lanes of
+/// the machine.
+#[macro_export]
+macro_rules! dispatch {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident) => {
+        $(#[$meta])*
+        $vis fn $name($($arg: $ty),*) $(-> $ret)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512dq")]
+                fn wide($($arg: $ty),*) $(-> $ret)? {
+                    $kernel::<$crate::Avx512>($($arg),*)
+                }
+                #[target_feature(enable = "avx2")]
+                fn half($($arg: $ty),*) $(-> $ret)? {
+                    $kernel::<$crate::Avx2>($($arg),*)
+                }
+                match $crate::level() {
+                    // SAFETY: `level` has found the instruction set on this machine.
+                    $crate::Level::Avx512 => return unsafe { wide($($arg),*) },
+                    $crate::Level::Avx2 => return unsafe { half($($arg),*) },
+                    $crate::Level::Portable => {}
+                }
+            }
+            $kernel::<$crate::Portable>($($arg),*)
+        }
+    };
+}

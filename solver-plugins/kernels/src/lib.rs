@@ -1,0 +1,17 @@
+//! What Plyflow's own component plugins are made of: the element formulations [`m4`],
+//! the materials [`fabric`] and [`marlow`], and the lane arithmetic under them ([`Lanes`],
+//! [`dispatch!`], [`exp`], [`asin`]).
+//!
+//! The plugin crates `element-*` and `material-*` only export these types: a library may be linked
+//! together with others, the exported symbol of a plugin may not. A stranger's plugin needs none
+//! of this; the contract is `plyflow.h` alone.
+
+pub mod fabric;
+mod functions;
+mod lanes;
+pub mod m4;
+pub mod marlow;
+pub mod quad;
+
+pub use functions::{asin, exp, polynomial};
+pub use lanes::*;

@@ -1,0 +1,321 @@
+//! Components behind their C tables, as the solver meets them, and batches that are easy to fill.
+#![allow(dead_code)]
+
+use plyflow_kernels::{fabric::Fabric, marlow::Marlow};
+use plyflow_sdk::abi::*;
+use plyflow_sdk::{Element, Material, MaterialRef, element_table, material_table};
+use std::ffi::c_void;
+use std::sync::OnceLock;
+
+pub const LANES: usize = 8;
+
+/// NCF FCIM359 (thesis tables 3.1, 3.2) with the form put in.
+pub fn ncf(form: &str, extra: &str) -> String {
+    format!(
+        r#"{{"form":"{form}","fibre_modulus":3e9,"compression_factor":1.0,
+        "shear":{{"coefficients":[0,112.19,94.73,137.06,-65.56,29.56],"limit":1.0471975511965976}},
+        "stitch":{{"angles":[0.06,0.5,0.75],"forces":[0,880,0]}},
+        "bending":{{"positive":{{"linear":1.9457e-4,"asymptote":0.03139,"scale":4.0}},
+                    "negative":{{"linear":1.0279e-4,"asymptote":0.03619,"scale":6.5}},
+                    "positive_face":"up","families":"opposite"}},
+        "thickness":4e-4,"areal_mass":0.44{extra}}}"#
+    )
+}
+
+/// Woven 38616.
+pub fn woven(form: &str) -> String {
+    format!(
+        r#"{{"form":"{form}","fibre_modulus":3e9,
+        "shear":{{"coefficients":[0,37.35,-322.61,1458.51,-3539.56,4727.84,-3275.20,930.53]}},
+        "bending":{{"positive":{{"linear":1.549e-5,"asymptote":0.00757,"scale":20.0}}}},
+        "thickness":3e-4,"areal_mass":0.21}}"#
+    )
+}
+
+/// StretchLon HT-350.
+pub const FILM: &str = r#"{"uniaxial":{"amplitude":6.364e6,"growth":0.4451,"decay":7.545},
+    "limit":5.0,"thickness":8e-5,"areal_mass":0.08}"#;
+
+pub struct Mat(pub MaterialRef);
+
+fn make<M: Material>(table: &'static pf_material_functions, json: &str) -> Result<Mat, String> {
+    let mut instance: *mut c_void = std::ptr::null_mut();
+    let mut error = pf_error::default();
+    let code = unsafe { (table.create)(pf_str::new(json), &raw mut instance, &raw mut error) };
+    if code != PF_OK {
+        let text: Vec<u8> = error
+            .text
+            .iter()
+            .take_while(|c| **c != 0)
+            .map(|c| *c as u8)
+            .collect();
+        return Err(String::from_utf8_lossy(&text).into_owned());
+    }
+    // Leaked on purpose: the process is a test.
+    unsafe {
+        MaterialRef::new(pf_material {
+            functions: table,
+            instance,
+        })
+    }
+    .map(Mat)
+}
+
+pub fn fabric(json: &str) -> Result<Mat, String> {
+    static TABLE: OnceLock<pf_material_functions> = OnceLock::new();
+    make::<Fabric>(TABLE.get_or_init(material_table::<Fabric>), json)
+}
+
+pub fn film(json: &str) -> Result<Mat, String> {
+    static TABLE: OnceLock<pf_material_functions> = OnceLock::new();
+    make::<Marlow>(TABLE.get_or_init(material_table::<Marlow>), json)
+}
+
+/// One state of a membrane point, in every lane.
+pub struct Point {
+    pub history: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answer {
+    pub stress: [f64; 3],
+    pub energy: f64,
+    pub stiffness: [f64; 2],
+}
+
+impl Point {
+    pub fn new(m: &Mat) -> Self {
+        Self {
+            history: vec![0.0; m.0.sizes().membrane_history * LANES],
+        }
+    }
+
+    pub fn at(&mut self, m: &Mat, metric: [f64; 3]) -> Answer {
+        let rows: Vec<f64> = metric.iter().flat_map(|x| [*x; LANES]).collect();
+        let mut stress = [0.0; 3 * LANES];
+        let mut energy = [0.0; LANES];
+        let mut stiffness = [0.0; 2 * LANES];
+        let code = m.0.membrane(&mut plyflow_sdk::MembraneBatch {
+            lanes: LANES,
+            dt: 1e-6,
+            metric: &rows,
+            history: &mut self.history,
+            stress: &mut stress,
+            energy: &mut energy,
+            stiffness: Some(&mut stiffness),
+        });
+        assert_eq!(code, PF_OK);
+        Answer {
+            stress: [stress[0], stress[LANES], stress[2 * LANES]],
+            energy: energy[0],
+            stiffness: [stiffness[0], stiffness[LANES]],
+        }
+    }
+
+    /// The same state without keeping its history.
+    pub fn peek(&self, m: &Mat, metric: [f64; 3]) -> Answer {
+        Point {
+            history: self.history.clone(),
+        }
+        .at(m, metric)
+    }
+}
+
+pub struct Moments {
+    pub moment: [f64; 3],
+    pub energy: f64,
+    pub tangent: [f64; 3],
+}
+
+pub fn bend(m: &Mat, metric: [f64; 3], curvature: [f64; 3]) -> Moments {
+    let rows = |v: [f64; 3]| -> Vec<f64> { v.iter().flat_map(|x| [*x; LANES]).collect() };
+    let mut history = vec![0.0; m.0.sizes().bending_history * LANES];
+    let (mut moment, mut tangent) = ([0.0; 3 * LANES], [0.0; 3 * LANES]);
+    let mut energy = [0.0; LANES];
+    let code = m.0.bending(&mut plyflow_sdk::BendingBatch {
+        lanes: LANES,
+        dt: 0.0,
+        metric: &rows(metric),
+        curvature: &rows(curvature),
+        history: &mut history,
+        moment: &mut moment,
+        energy: &mut energy,
+        tangent: Some(&mut tangent),
+    });
+    assert_eq!(code, PF_OK);
+    Moments {
+        moment: [moment[0], moment[LANES], moment[2 * LANES]],
+        energy: energy[0],
+        tangent: [tangent[0], tangent[LANES], tangent[2 * LANES]],
+    }
+}
+
+/// An element formulation behind its C table.
+pub struct El {
+    table: pf_element_functions,
+    instance: *mut c_void,
+    material: pf_material,
+    pub sizes: pf_element_sizes,
+    membrane_history: usize,
+    bending_history: usize,
+}
+
+pub struct Elements {
+    pub constants: Vec<f64>,
+    pub material_history: Vec<f64>,
+    pub mass: Vec<f64>,
+    pub step: Vec<f64>,
+    pub lanes: usize,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Forces {
+    pub force: Vec<f64>,
+    pub energy: Vec<f64>,
+    pub fields: Vec<f64>,
+    pub step: Vec<f64>,
+}
+
+impl El {
+    pub fn new<E: Element>(json: &str, m: &Mat) -> Result<Self, String> {
+        let table = element_table::<E>();
+        let mut instance: *mut c_void = std::ptr::null_mut();
+        let mut error = pf_error::default();
+        let material = *m.0.raw();
+        let code = unsafe {
+            (table.create)(
+                pf_str::new(json),
+                &raw const material,
+                &raw mut instance,
+                &raw mut error,
+            )
+        };
+        if code != PF_OK {
+            let text: Vec<u8> = error
+                .text
+                .iter()
+                .take_while(|c| **c != 0)
+                .map(|c| *c as u8)
+                .collect();
+            return Err(String::from_utf8_lossy(&text).into_owned());
+        }
+        let mut sizes = pf_element_sizes::default();
+        assert_eq!(unsafe { (table.sizes)(instance, &raw mut sizes) }, PF_OK);
+        Ok(Self {
+            table,
+            instance,
+            material,
+            sizes,
+            membrane_history: m.0.sizes().membrane_history,
+            bending_history: m.0.sizes().bending_history,
+        })
+    }
+
+    fn batch(&self, lanes: usize) -> pf_element_batch {
+        pf_element_batch {
+            size: size_of::<pf_element_batch>() as u64,
+            lanes: lanes as u32,
+            reserved: 0,
+            dt: 1e-6,
+            position: std::ptr::null(),
+            velocity: std::ptr::null(),
+            spin: std::ptr::null(),
+            axis: std::ptr::null(),
+            constants: std::ptr::null_mut(),
+            history: std::ptr::null_mut(),
+            material_history: std::ptr::null_mut(),
+            force: std::ptr::null_mut(),
+            moment: std::ptr::null_mut(),
+            energy: std::ptr::null_mut(),
+            fields: std::ptr::null_mut(),
+            mass: std::ptr::null_mut(),
+            inertia: std::ptr::null_mut(),
+            critical_step: std::ptr::null_mut(),
+            material: &raw const self.material,
+        }
+    }
+
+    /// `position[lane][node]`, `axis[lane]`.
+    pub fn initialise(&self, position: &[[[f64; 3]; 4]], axis: &[[f64; 3]]) -> Elements {
+        let n = position.len();
+        let p = rows(position);
+        let a: Vec<f64> = (0..3)
+            .flat_map(|k| axis.iter().map(move |v| v[k]))
+            .collect();
+        let mut e = Elements {
+            constants: vec![0.0; self.sizes.constants as usize * n],
+            material_history: vec![
+                0.0;
+                self.sizes.material_points as usize * self.membrane_history * n
+            ],
+            mass: vec![0.0; 4 * n],
+            step: vec![0.0; n],
+            lanes: n,
+        };
+        let b = pf_element_batch {
+            position: p.as_ptr(),
+            axis: a.as_ptr(),
+            constants: e.constants.as_mut_ptr(),
+            mass: e.mass.as_mut_ptr(),
+            critical_step: e.step.as_mut_ptr(),
+            ..self.batch(n)
+        };
+        assert_eq!(
+            unsafe { (self.table.initialise)(self.instance, &raw const b) },
+            PF_OK
+        );
+        e
+    }
+
+    pub fn forces(&self, e: &mut Elements, position: &[[[f64; 3]; 4]]) -> Forces {
+        let n = e.lanes;
+        let p = rows(position);
+        let v = vec![0.0; 12 * n];
+        let mut f = Forces {
+            force: vec![f64::NAN; 12 * n],
+            energy: vec![f64::NAN; 3 * n],
+            fields: vec![f64::NAN; self.sizes.fields as usize * n],
+            step: vec![f64::NAN; n],
+        };
+        let b = pf_element_batch {
+            position: p.as_ptr(),
+            velocity: v.as_ptr(),
+            constants: e.constants.as_mut_ptr(),
+            material_history: e.material_history.as_mut_ptr(),
+            force: f.force.as_mut_ptr(),
+            energy: f.energy.as_mut_ptr(),
+            fields: f.fields.as_mut_ptr(),
+            critical_step: f.step.as_mut_ptr(),
+            ..self.batch(n)
+        };
+        assert_eq!(
+            unsafe { (self.table.forces)(self.instance, &raw const b) },
+            PF_OK
+        );
+        f
+    }
+}
+
+/// `[lane][node][3]` to `[node][3][lanes]`.
+pub fn rows(position: &[[[f64; 3]; 4]]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(12 * position.len());
+    for i in 0..4 {
+        for k in 0..3 {
+            out.extend(position.iter().map(|x| x[i][k]));
+        }
+    }
+    out
+}
+
+/// A small deterministic generator: uniform in [-1, 1).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        ((self.0 >> 11) as f64) / (1u64 << 52) as f64 - 1.0
+    }
+}
