@@ -1,0 +1,280 @@
+//! From flagged cells to zones, all in the undeformed plane.
+
+use serde::{Deserialize, Serialize};
+
+/// How zones are drawn.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Settings {
+    /// Factor on both sides of a box, about its centre.
+    pub scale: f64,
+    /// Largest gap inside a defect (m).
+    pub join_distance: f64,
+    /// Smallest flagged area of a defect on its most affected ply (m2).
+    pub minimum_area: f64,
+    /// Smallest side of a zone before clipping (m).
+    pub minimum_size: f64,
+    /// Covered part of the blank above which there is a warning.
+    pub maximum_fraction: f64,
+    /// Zones drawn by hand, `[x0, y0, x1, y1]` (m).
+    pub boxes: Vec<Vec<f64>>,
+}
+
+/// A flagged cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlaggedCell {
+    /// Index of its ply.
+    pub ply: usize,
+    /// The box around it (m).
+    pub bounds: Rectangle,
+    /// Undeformed area (m2).
+    pub area: f64,
+}
+
+/// `[x0, y0, x1, y1]` (m).
+pub type Rectangle = [f64; 4];
+
+/// A zone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Zone {
+    /// A, B, .. from left to right.
+    pub name: String,
+    /// Scaled and clipped.
+    #[serde(rename = "box")]
+    pub bounds: Rectangle,
+    /// Around the flagged cells.
+    pub defect_box: Rectangle,
+    /// Left, right, bottom, top: whether the side lies on the edge of the blank.
+    pub free_sides: [bool; 4],
+    /// Indices of the plies with flagged cells in it.
+    #[serde(skip)]
+    pub plies: Vec<usize>,
+    /// Undeformed flagged area in it, summed over the plies (m2).
+    pub flagged_area: f64,
+}
+
+/// Why no zones could be drawn.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ExtractError {
+    /// A hand-drawn box is not one.
+    #[error(
+        "box {index} of `boxes` is {given:?}; expected four lengths [x0, y0, x1, y1] with x0 < x1 and y0 < y1"
+    )]
+    Form {
+        /// Position in the list.
+        index: usize,
+        /// As given (m).
+        given: Vec<f64>,
+    },
+    /// A hand-drawn box misses the blank.
+    #[error("box {index} of `boxes`, {given:?} m, lies outside of the blank {blank:?} m; move it")]
+    Outside {
+        /// Position in the list.
+        index: usize,
+        /// As given (m).
+        given: Vec<f64>,
+        /// The blank (m).
+        blank: Rectangle,
+    },
+}
+
+/// Draws the zones of a `blank` (the box around all plies). Without flagged cells and boxes there are none.
+///
+/// # Errors
+/// When a hand-drawn box is not a box or lies off the blank.
+pub fn extract(
+    cells: &[FlaggedCell],
+    blank: Rectangle,
+    settings: &Settings,
+) -> Result<Vec<Zone>, ExtractError> {
+    let mut zones = if settings.boxes.is_empty() {
+        let defects = defects(cells, settings);
+        let mut zones: Vec<(Rectangle, Rectangle)> = defects
+            .iter()
+            .map(|&d| (d, grown(d, blank, settings)))
+            .collect();
+        merge(&mut zones, blank, settings);
+        zones.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.1[1].total_cmp(&b.1[1])));
+        zones
+    } else {
+        drawn(blank, settings)?
+    };
+    let describe = |(i, (defect_box, bounds)): (usize, (Rectangle, Rectangle))| {
+        let inside = |c: &&FlaggedCell| overlap(c.bounds, bounds);
+        let mut plies: Vec<usize> = cells.iter().filter(inside).map(|c| c.ply).collect();
+        plies.sort_unstable();
+        plies.dedup();
+        let edges = [(0, 0), (2, 2), (1, 1), (3, 3)];
+        Zone {
+            name: name(i),
+            bounds,
+            defect_box,
+            free_sides: edges.map(|(a, b)| bounds[a] == blank[b]),
+            plies,
+            flagged_area: cells.iter().filter(inside).map(|c| c.area).sum(),
+        }
+    };
+    Ok(zones.drain(..).enumerate().map(describe).collect())
+}
+
+/// Area of a box (m2).
+pub fn area(b: Rectangle) -> f64 {
+    (b[2] - b[0]) * (b[3] - b[1])
+}
+
+/// A .. Z, AA, AB, ..
+fn name(index: usize) -> String {
+    let letter = char::from(b'A' + (index % 26) as u8);
+    match index / 26 {
+        0 => letter.to_string(),
+        more => format!("{}{letter}", name(more - 1)),
+    }
+}
+
+/// Boxes around connected sets of flagged cells that are large enough on some ply.
+fn defects(cells: &[FlaggedCell], settings: &Settings) -> Vec<Rectangle> {
+    let set = connected(cells, settings.join_distance);
+    let plies = cells.iter().map(|c| c.ply + 1).max().unwrap_or(0);
+    let mut found = Vec::new();
+    for root in 0..cells.len() {
+        if set[root] != root {
+            continue;
+        }
+        let mut areas = vec![0.0; plies];
+        let mut bounds = cells[root].bounds;
+        for (c, _) in cells.iter().zip(&set).filter(|(_, s)| **s == root) {
+            areas[c.ply] += c.area;
+            bounds = hull(bounds, c.bounds);
+        }
+        // A little slack: areas of cells are sums of rounded numbers.
+        if areas
+            .iter()
+            .any(|a| *a >= settings.minimum_area * (1.0 - 1e-9))
+        {
+            found.push(bounds);
+        }
+    }
+    found
+}
+
+/// For every cell the lowest index of its connected set.
+fn connected(cells: &[FlaggedCell], gap: f64) -> Vec<usize> {
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    // Sweep along x: only cells whose x ranges come within the gap are compared. The slack lets cells that
+    // touch count as touching however their coordinates were rounded.
+    let gap = gap + 1e-9;
+    let mut order: Vec<usize> = (0..cells.len()).collect();
+    order.sort_by(|&a, &b| {
+        cells[a].bounds[0]
+            .total_cmp(&cells[b].bounds[0])
+            .then(a.cmp(&b))
+    });
+    let widest = cells
+        .iter()
+        .map(|c| c.bounds[2] - c.bounds[0])
+        .fold(0.0, f64::max);
+    let mut parent: Vec<usize> = (0..cells.len()).collect();
+    for (k, &i) in order.iter().enumerate() {
+        let a = cells[i].bounds;
+        for &j in &order[k + 1..] {
+            let b = cells[j].bounds;
+            if b[0] > a[0] + widest + gap {
+                break;
+            }
+            if b[0] <= a[2] + gap && b[1] <= a[3] + gap && a[1] <= b[3] + gap {
+                let (p, q) = (root(&mut parent, i), root(&mut parent, j));
+                parent[p.max(q)] = p.min(q);
+            }
+        }
+    }
+    (0..cells.len()).map(|i| root(&mut parent, i)).collect()
+}
+
+/// A defect's box scaled, brought to the smallest size, clipped, and its sides near the blank's edge moved
+/// onto it.
+fn grown(defect: Rectangle, blank: Rectangle, s: &Settings) -> Rectangle {
+    let mut b = [0.0; 4];
+    for d in 0..2 {
+        let centre = 0.5 * (defect[d] + defect[d + 2]);
+        let half = 0.5 * ((defect[d + 2] - defect[d]) * s.scale).max(s.minimum_size);
+        b[d] = centre - half;
+        b[d + 2] = centre + half;
+        if b[d] < blank[d] + s.join_distance {
+            b[d] = blank[d];
+        }
+        if b[d + 2] > blank[d + 2] - s.join_distance {
+            b[d + 2] = blank[d + 2];
+        }
+    }
+    b
+}
+
+/// Replaces overlapping zones by one around both of their defects, until none overlap.
+fn merge(zones: &mut Vec<(Rectangle, Rectangle)>, blank: Rectangle, settings: &Settings) {
+    let first_pair = |zones: &[(Rectangle, Rectangle)]| {
+        (0..zones.len()).find_map(|i| {
+            (i + 1..zones.len())
+                .find(|&j| overlap(zones[i].1, zones[j].1))
+                .map(|j| (i, j))
+        })
+    };
+    while let Some((i, j)) = first_pair(zones) {
+        let (a, b) = (zones[i], zones.remove(j));
+        let defect = hull(a.0, b.0);
+        // The hull of the old boxes: a zone never loses what it had.
+        zones[i] = (defect, hull(grown(defect, blank, settings), hull(a.1, b.1)));
+    }
+}
+
+fn drawn(
+    blank: Rectangle,
+    settings: &Settings,
+) -> Result<Vec<(Rectangle, Rectangle)>, ExtractError> {
+    (settings.boxes.iter().enumerate())
+        .map(|(index, given)| {
+            let b = match given[..] {
+                [x0, y0, x1, y1] if x0 < x1 && y0 < y1 => [x0, y0, x1, y1],
+                _ => {
+                    return Err(ExtractError::Form {
+                        index,
+                        given: given.clone(),
+                    });
+                }
+            };
+            let clipped = [
+                b[0].max(blank[0]),
+                b[1].max(blank[1]),
+                b[2].min(blank[2]),
+                b[3].min(blank[3]),
+            ];
+            if clipped[0] < clipped[2] && clipped[1] < clipped[3] {
+                Ok((b, clipped))
+            } else {
+                Err(ExtractError::Outside {
+                    index,
+                    given: given.clone(),
+                    blank,
+                })
+            }
+        })
+        .collect()
+}
+
+fn hull(a: Rectangle, b: Rectangle) -> Rectangle {
+    [
+        a[0].min(b[0]),
+        a[1].min(b[1]),
+        a[2].max(b[2]),
+        a[3].max(b[3]),
+    ]
+}
+
+/// Whether two boxes share area.
+fn overlap(a: Rectangle, b: Rectangle) -> bool {
+    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
+}

@@ -1,0 +1,232 @@
+//! Zones from flags that are known.
+
+use plyflow_sdk::On;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
+use plyflow_surface::vector::Vec3;
+use plyflow_zone_extraction::{FlaggedCell, Settings, ZoneExtraction, extract};
+use serde_json::{Value, json};
+
+const BLANK: [f64; 4] = [-0.240, -0.150, 0.240, 0.150];
+
+fn settings() -> Settings {
+    Settings {
+        scale: 1.15,
+        join_distance: 0.010,
+        minimum_area: 200e-6,
+        minimum_size: 0.040,
+        maximum_fraction: 0.6,
+        boxes: Vec::new(),
+    }
+}
+
+/// Cells of 10 mm that fill a box.
+fn patch(ply: usize, b: [f64; 4]) -> Vec<FlaggedCell> {
+    let count = |d: usize| ((b[d + 2] - b[d]) / 0.010).round() as usize;
+    let mut cells = Vec::new();
+    for j in 0..count(1) {
+        for i in 0..count(0) {
+            let (x, y) = (b[0] + 0.010 * i as f64, b[1] + 0.010 * j as f64);
+            cells.push(FlaggedCell {
+                ply,
+                bounds: [x, y, x + 0.010, y + 0.010],
+                area: 1e-4,
+            });
+        }
+    }
+    cells
+}
+
+fn close(a: [f64; 4], b: [f64; 4]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9)
+}
+
+#[test]
+fn a_box_grows_by_the_scale_about_its_centre() {
+    let zones = extract(
+        &patch(0, [-0.050, -0.040, 0.050, 0.040]),
+        BLANK,
+        &settings(),
+    )
+    .unwrap();
+    assert_eq!(zones.len(), 1);
+    assert!(
+        close(zones[0].bounds, [-0.0575, -0.046, 0.0575, 0.046]),
+        "{zones:?}"
+    );
+    assert!(close(zones[0].defect_box, [-0.050, -0.040, 0.050, 0.040]));
+    assert_eq!(zones[0].free_sides, [false; 4]);
+    assert!((zones[0].flagged_area - 80e-4).abs() < 1e-12);
+}
+
+#[test]
+fn zones_are_named_from_left_to_right_whatever_the_order_of_the_cells() {
+    let mut cells = patch(0, [0.100, -0.020, 0.150, 0.020]);
+    cells.extend(patch(1, [-0.200, 0.000, -0.150, 0.050]));
+    cells.extend(patch(0, [-0.030, -0.100, 0.000, -0.060]));
+    let zones = extract(&cells, BLANK, &settings()).unwrap();
+    let names: Vec<&str> = zones.iter().map(|z| z.name.as_str()).collect();
+    assert_eq!(names, ["A", "B", "C"]);
+    assert_eq!(zones[0].plies, [1]);
+    cells.reverse();
+    assert_eq!(extract(&cells, BLANK, &settings()).unwrap(), zones);
+}
+
+#[test]
+fn defects_on_different_plies_within_the_join_distance_are_one() {
+    let mut cells = patch(0, [-0.050, -0.040, -0.010, 0.040]);
+    cells.extend(patch(1, [0.000, -0.040, 0.050, 0.040]));
+    let zones = extract(&cells, BLANK, &settings()).unwrap();
+    assert_eq!(zones.len(), 1, "a gap of 10 mm");
+    assert_eq!(zones[0].plies, [0, 1]);
+    let apart = Settings {
+        join_distance: 0.005,
+        scale: 1.0,
+        minimum_size: 0.0,
+        ..settings()
+    };
+    assert_eq!(extract(&cells, BLANK, &apart).unwrap().len(), 2);
+}
+
+#[test]
+fn scaled_boxes_that_overlap_are_merged_until_none_do() {
+    // Three in a row: the first two overlap, and only their union reaches the third.
+    let mut cells = patch(0, [-0.150, -0.020, -0.060, 0.020]);
+    cells.extend(patch(0, [-0.048, -0.020, 0.042, 0.020]));
+    cells.extend(patch(0, [0.056, -0.020, 0.076, 0.020]));
+    let s = Settings {
+        minimum_size: 0.0,
+        ..settings()
+    };
+    let zones = extract(&cells, BLANK, &s).unwrap();
+    assert_eq!(zones.len(), 1, "{zones:?}");
+    assert!(close(zones[0].defect_box, [-0.150, -0.020, 0.076, 0.020]));
+}
+
+#[test]
+fn sides_past_or_near_the_blank_s_edge_lie_on_it_and_are_free() {
+    let zones = extract(
+        &patch(0, [-0.240, 0.080, -0.200, 0.140]),
+        BLANK,
+        &settings(),
+    )
+    .unwrap();
+    assert_eq!(zones[0].bounds[0], BLANK[0]);
+    assert_eq!(zones[0].bounds[3], BLANK[3]);
+    assert_eq!(zones[0].free_sides, [true, false, false, true]);
+}
+
+#[test]
+fn specks_get_no_zone_even_when_both_plies_have_them() {
+    let mut cells = patch(0, [0.0, 0.0, 0.010, 0.010]);
+    cells.extend(patch(1, [0.0, 0.0, 0.010, 0.010]));
+    assert!(extract(&cells, BLANK, &settings()).unwrap().is_empty());
+    cells.extend(patch(1, [0.010, 0.0, 0.020, 0.010]));
+    let zones = extract(&cells, BLANK, &settings()).unwrap();
+    assert!(
+        (zones[0].bounds[2] - zones[0].bounds[0] - 0.040).abs() < 1e-12,
+        "smallest size"
+    );
+}
+
+#[test]
+fn drawn_boxes_are_taken_as_they_are_and_bad_ones_are_named() {
+    let with = |boxes: Vec<Vec<f64>>| Settings {
+        boxes,
+        ..settings()
+    };
+    let cells = patch(0, [0.0, 0.0, 0.050, 0.050]);
+    let zones = extract(
+        &cells,
+        BLANK,
+        &with(vec![vec![0.1, -0.2, 0.2, 0.1], vec![-0.1, 0.0, 0.02, 0.02]]),
+    )
+    .unwrap();
+    assert!(close(zones[0].bounds, [0.1, -0.150, 0.2, 0.1]));
+    assert_eq!((zones[0].flagged_area, zones[0].plies.len()), (0.0, 0));
+    assert!((zones[1].flagged_area - 4e-4).abs() < 1e-12);
+    let error = extract(&cells, BLANK, &with(vec![vec![0.1, 0.2]]))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("box 0") && error.contains("[0.1, 0.2]"),
+        "{error}"
+    );
+    let error = extract(&cells, BLANK, &with(vec![vec![1.0, 0.0, 2.0, 0.1]]))
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("outside of the blank"), "{error}");
+}
+
+fn artifact(flag: impl Fn(usize) -> bool) -> MemoryArtifact {
+    let mut points: Vec<Vec3> = Vec::new();
+    for j in 0..=30 {
+        for i in 0..=48 {
+            points.push([-0.240 + 0.010 * i as f64, -0.150 + 0.010 * j as f64, 0.1]);
+        }
+    }
+    let at = |i: usize, j: usize| (j * 49 + i) as u32;
+    let cells: Vec<u32> = (0..30 * 48)
+        .flat_map(|c| {
+            let (i, j) = (c % 48, c / 48);
+            [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]
+        })
+        .collect();
+    let flags = (0..30 * 48).map(|c| f64::from(u8::from(flag(c)))).collect();
+    let field = |name: &str, on, components, values| MemoryField {
+        name: name.into(),
+        on,
+        components,
+        values,
+    };
+    let body = MemoryBody {
+        name: "ply_2".into(),
+        fields: vec![vec![
+            field("flag", On::Cells, 1, flags),
+            field("undeformed", On::Points, 3, points.as_flattened().to_vec()),
+        ]],
+        frames: vec![points.clone()],
+        points,
+        nodes_per_cell: 4,
+        cells,
+        ..Default::default()
+    };
+    MemoryArtifact {
+        kind: "defects".into(),
+        times: vec![1.0],
+        bodies: vec![body],
+        ..Default::default()
+    }
+}
+
+#[test]
+fn nothing_flagged_is_a_valid_empty_collection() {
+    let input = artifact(|_| false);
+    let out =
+        run::<ZoneExtraction>(json!({}), &[MemoryInput::new("defects", &input)], &[]).unwrap();
+    assert_eq!(out.collection, Some(vec![]));
+    assert_eq!(
+        (out.result("zone_count"), out.result("ply_fraction")),
+        (0.0, 0.0)
+    );
+    assert_eq!(out.attributes["zones"], json!([]));
+}
+
+#[test]
+fn artifact_follows_the_data_model_and_warns_when_zones_cover_too_much() {
+    let input = artifact(|c| c % 48 < 4 && c / 48 < 5);
+    let out =
+        run::<ZoneExtraction>(json!({}), &[MemoryInput::new("defects", &input)], &[]).unwrap();
+    assert_eq!(out.collection, Some(vec!["A".to_owned()]));
+    let zone = &out.attributes["zones"][0];
+    assert_eq!(zone["free_sides"], json!([true, false, true, false]));
+    assert_eq!(zone["plies"], json!(["ply_2"]));
+    let number = |v: &Value| v.as_f64().unwrap();
+    assert!((number(&zone["box"][2]) + 0.197).abs() < 1e-9, "{zone}");
+    assert!((number(&zone["flagged_area"]) - 20e-4).abs() < 1e-12);
+    assert!((out.result("ply_fraction") - 0.043 * 0.05375 / 0.144).abs() < 1e-9);
+    assert!(out.log.is_empty());
+    let all = artifact(|_| true);
+    let out = run::<ZoneExtraction>(json!({}), &[MemoryInput::new("defects", &all)], &[]).unwrap();
+    assert!((out.result("ply_fraction") - 1.0).abs() < 1e-12);
+    assert!(out.log[0].contains("100 %"), "{:?}", out.log);
+}
