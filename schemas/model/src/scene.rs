@@ -65,7 +65,8 @@ pub struct JoggleSpar {
     /// Angle of the side and end walls from the vertical.
     #[schemars(extend("x-minimum" = "0 deg", "x-maximum" = "60 deg"))]
     pub draft: Angle,
-    /// Smallest radius of the fillets between top and walls.
+    /// Radius of the fillets between top and walls, in the section square to the edge. Where a slanted ramp
+    /// runs into this edge both bend the surface: there it is sharper than either, by up to 1 + sin(skew).
     #[schemars(extend("x-minimum" = "0 mm"))]
     pub fillet: Length,
     /// Radius in plan of the vertical edges between side and end walls, at the top. Twice the fillet
@@ -95,7 +96,8 @@ pub struct Joggle {
     pub skew: Angle,
     /// How far the ramp also steps each side wall outwards (y < 0 side, y > 0 side), positive outwards.
     pub side_step: [Length; 2],
-    /// Radius of the fillets where the ramp begins and ends.
+    /// Radius of the fillets where the ramp begins and ends, in the section square to it; on an edge that also
+    /// steps sideways, of the step and rise together.
     #[schemars(extend("x-minimum" = "0 mm"))]
     pub fillet: Length,
 }

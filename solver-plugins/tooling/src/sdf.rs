@@ -1,0 +1,340 @@
+//! Signed distance to a tool on a regular grid, smooth enough for a penalty force.
+//!
+//! Exact distances at the nodes of the grid are turned into coefficients of a tricubic B-spline by the local
+//! quasi-interpolation c(i) = (8 d(i) - d(i-1) - d(i+1)) / 6 along each axis (de Boor, A Practical Guide
+//! to Splines, XII), which reproduces cubics. The field is twice continuously differentiable and the
+//! returned gradient is that of the returned distance, to the rounding of single precision.
+
+use crate::mesh::ToolMesh;
+use crate::tree::SurfaceTree;
+use crate::vector::V3;
+use rayon::prelude::*;
+
+/// Cells along each side of a block of the early-out map.
+const BLOCK: usize = 4;
+
+/// Signed distance to a tool, positive outside, with its gradient.
+///
+/// Facets on the bed do not count: walls that end there go on below it (the bed is a plane of its own). So
+/// distances are meant for z >= 0, and right for both sides of a wall down to z = 0.
+#[derive(Debug, Clone)]
+pub struct SignedDistanceGrid {
+    spacing: f64,
+    reach: f64,
+    /// Position of node (0, 0, 0).
+    origin: V3,
+    /// Nodes along x, y, z.
+    nodes: [usize; 3],
+    /// Box in which queries are interpolated.
+    box_low: V3,
+    box_high: V3,
+    /// Box of the tool.
+    tool_low: V3,
+    tool_high: V3,
+    /// B-spline coefficients (m), z fastest.
+    coefficients: Vec<f32>,
+    blocks: [usize; 3],
+    /// For each block of cells a bound of the distance in it: lower where positive, upper where negative
+    /// (inside), 0 where the sign changes. z fastest.
+    bounds: Vec<f32>,
+}
+
+impl SignedDistanceGrid {
+    /// Samples the surface at `spacing` (m). Distances up to `reach` (m) outside the tool are resolved:
+    /// beyond, queries give a lower bound. Runs on the current rayon pool; the result does not depend on
+    /// its threads.
+    ///
+    /// # Panics
+    /// If the mesh has no facets, or `spacing` or `reach` is not a positive number.
+    pub fn build(mesh: &ToolMesh, spacing: f64, reach: f64) -> Self {
+        assert!(!mesh.triangles.is_empty(), "the tool has no facets");
+        assert!(
+            spacing > 0.0 && spacing.is_finite(),
+            "spacing must be positive, not {spacing}"
+        );
+        assert!(
+            reach > 0.0 && reach.is_finite(),
+            "reach must be positive, not {reach}"
+        );
+        let [tool_low, tool_high] = mesh.bounds();
+        let box_low = tool_low.map(|v| v - reach);
+        let box_high = tool_high.map(|v| v + reach);
+        // A cell needs a node more on each side for its spline, and one more for the coefficients.
+        let origin = box_low.map(|v| v - 2.0 * spacing);
+        let nodes: [usize; 3] =
+            std::array::from_fn(|k| ((box_high[k] - box_low[k]) / spacing).ceil() as usize + 6);
+        let tree = SurfaceTree::new(&mesh.without_bottom(reach + 8.0 * spacing));
+        let samples = sample(&tree, origin, spacing, nodes);
+        let blocks = nodes.map(|n| (n - 1).div_ceil(BLOCK));
+        let bounds = block_bounds(&samples, nodes, blocks, spacing);
+        let coefficients = spline_coefficients(samples, nodes);
+        Self {
+            spacing,
+            reach,
+            origin,
+            nodes,
+            box_low,
+            box_high,
+            tool_low,
+            tool_high,
+            coefficients,
+            blocks,
+            bounds,
+        }
+    }
+
+    /// Distance between the nodes of the grid (m).
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Distance outside the tool up to which queries are resolved (m).
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        4 * (self.coefficients.len() + self.bounds.len())
+    }
+
+    /// Signed distance (m) and its gradient (dimensionless, nearly unit length) at a point.
+    ///
+    /// Further than [`reach`](Self::reach) from the tool's box the result is the distance to that box: a
+    /// lower bound of the distance to the tool.
+    #[inline]
+    pub fn distance_and_gradient(&self, p: [f64; 3]) -> (f64, [f64; 3]) {
+        match self.cell(p) {
+            Some((cell, part)) => self.interpolate(cell, part),
+            None => self.distance_to_box(p),
+        }
+    }
+
+    /// As [`distance_and_gradient`](Self::distance_and_gradient) for points closer than `limit` (at most
+    /// `reach`) or inside; `None` for the others, mostly without interpolation.
+    #[inline]
+    pub fn within(&self, p: [f64; 3], limit: f64) -> Option<(f64, [f64; 3])> {
+        debug_assert!(
+            limit <= self.reach,
+            "limit {limit} exceeds the reach {}",
+            self.reach
+        );
+        let (cell, part) = self.cell(p)?;
+        let b = cell.map(|c| c / BLOCK);
+        let bound = self.bounds[(b[0] * self.blocks[1] + b[1]) * self.blocks[2] + b[2]];
+        if f64::from(bound) >= limit {
+            return None;
+        }
+        let found = self.interpolate(cell, part);
+        (found.0 < limit).then_some(found)
+    }
+
+    /// [`within`](Self::within) for many points. Where a point is not closer than `limit` its distance is
+    /// infinite and its gradient zero. The caller owns the outputs.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn within_many(
+        &self,
+        points: &[[f64; 3]],
+        limit: f64,
+        distances: &mut [f64],
+        gradients: &mut [[f64; 3]],
+    ) {
+        assert_eq!(points.len(), distances.len(), "one distance per point");
+        assert_eq!(points.len(), gradients.len(), "one gradient per point");
+        for ((p, d), g) in points.iter().zip(distances).zip(gradients) {
+            (*d, *g) = self.within(*p, limit).unwrap_or((f64::INFINITY, [0.0; 3]));
+        }
+    }
+
+    /// Cell that holds the point and the place in it, 0..1 along each axis.
+    #[inline]
+    fn cell(&self, p: V3) -> Option<([usize; 3], [f32; 3])> {
+        let inverse = 1.0 / self.spacing;
+        let mut cell = [0; 3];
+        let mut part = [0.0; 3];
+        for k in 0..3 {
+            // Also false for NaN.
+            if !(p[k] >= self.box_low[k] && p[k] <= self.box_high[k]) {
+                return None;
+            }
+            let s = (p[k] - self.origin[k]) * inverse;
+            cell[k] = s as usize;
+            part[k] = (s - cell[k] as f64) as f32;
+        }
+        Some((cell, part))
+    }
+
+    #[inline]
+    fn interpolate(&self, cell: [usize; 3], part: [f32; 3]) -> (f64, V3) {
+        let [wx, wy, wz] = part.map(weights);
+        let [dx, dy, dz] = part.map(slopes);
+        let stride = [self.nodes[1] * self.nodes[2], self.nodes[2]];
+        let base = (cell[0] - 1) * stride[0] + (cell[1] - 1) * stride[1] + cell[2] - 1;
+        // Sums over x and y of rows along z: value, slope along x, slope along y.
+        let (mut v, mut vx, mut vy) = ([0f32; 4], [0f32; 4], [0f32; 4]);
+        for a in 0..4 {
+            let (mut r, mut ry) = ([0f32; 4], [0f32; 4]);
+            for b in 0..4 {
+                let from = base + a * stride[0] + b * stride[1];
+                let row: &[f32; 4] = self.coefficients[from..from + 4].try_into().unwrap();
+                for c in 0..4 {
+                    r[c] += wy[b] * row[c];
+                    ry[c] += dy[b] * row[c];
+                }
+            }
+            for c in 0..4 {
+                v[c] += wx[a] * r[c];
+                vx[c] += dx[a] * r[c];
+                vy[c] += wx[a] * ry[c];
+            }
+        }
+        let dot = |u: [f32; 4], w: [f32; 4]| {
+            f64::from((u[0] * w[0] + u[1] * w[1]) + (u[2] * w[2] + u[3] * w[3]))
+        };
+        let inverse = 1.0 / self.spacing;
+        (
+            dot(v, wz),
+            [
+                dot(vx, wz) * inverse,
+                dot(vy, wz) * inverse,
+                dot(v, dz) * inverse,
+            ],
+        )
+    }
+
+    fn distance_to_box(&self, p: V3) -> (f64, V3) {
+        let away: V3 = std::array::from_fn(|k| {
+            if p[k] < self.tool_low[k] {
+                p[k] - self.tool_low[k]
+            } else if p[k] > self.tool_high[k] {
+                p[k] - self.tool_high[k]
+            } else {
+                0.0
+            }
+        });
+        let d = crate::vector::norm(away);
+        (
+            d,
+            if d > 0.0 {
+                away.map(|v| v / d)
+            } else {
+                [0.0; 3]
+            },
+        )
+    }
+}
+
+/// Weights of the uniform cubic B-spline at place `t` in a cell.
+#[inline]
+fn weights(t: f32) -> [f32; 4] {
+    let s = 1.0 - t;
+    let (t2, s2) = (t * t, s * s);
+    const SIXTH: f32 = 1.0 / 6.0;
+    [
+        SIXTH * s * s2,
+        SIXTH * (4.0 - 3.0 * t2 * (2.0 - t)),
+        SIXTH * (4.0 - 3.0 * s2 * (2.0 - s)),
+        SIXTH * t * t2,
+    ]
+}
+
+/// Their derivatives.
+#[inline]
+fn slopes(t: f32) -> [f32; 4] {
+    let s = 1.0 - t;
+    [
+        -0.5 * s * s,
+        0.5 * t * (3.0 * t - 4.0),
+        0.5 * s * (4.0 - 3.0 * s),
+        0.5 * t * t,
+    ]
+}
+
+/// Exact distances at all nodes, z fastest.
+fn sample(tree: &SurfaceTree, origin: V3, spacing: f64, nodes: [usize; 3]) -> Vec<f32> {
+    let mut samples = vec![0f32; nodes.iter().product()];
+    samples
+        .par_chunks_mut(nodes[1] * nodes[2])
+        .enumerate()
+        .for_each(|(i, slab)| {
+            let x = origin[0] + i as f64 * spacing;
+            // The last facet found is nearly always close to the next: the search starts there.
+            let mut hint = 0;
+            for j in 0..nodes[1] {
+                let y = origin[1] + j as f64 * spacing;
+                for l in 0..nodes[2] {
+                    // Up and down by turns, so that the next node is a neighbour.
+                    let k = if j % 2 == 0 { l } else { nodes[2] - 1 - l };
+                    let p = [x, y, origin[2] + k as f64 * spacing];
+                    let (closest, place) = tree.closest_from(p, hint);
+                    hint = place;
+                    slab[j * nodes[2] + k] = closest.signed_distance as f32;
+                }
+            }
+        });
+    samples
+}
+
+fn block_bounds(samples: &[f32], nodes: [usize; 3], blocks: [usize; 3], spacing: f64) -> Vec<f32> {
+    // No point of a cell is further than this from a node, and distance changes no faster than place; the
+    // spline may differ a little, which one more tenth of a cell covers.
+    let margin = (spacing * (0.5 * 3f64.sqrt() + 0.1)) as f32;
+    let mut bounds = vec![0f32; blocks.iter().product()];
+    bounds
+        .par_chunks_mut(blocks[1] * blocks[2])
+        .enumerate()
+        .for_each(|(bx, slab)| {
+            for (at, bound) in slab.iter_mut().enumerate() {
+                let b = [bx, at / blocks[2], at % blocks[2]];
+                let range: [_; 3] =
+                    std::array::from_fn(|k| b[k] * BLOCK..((b[k] + 1) * BLOCK + 1).min(nodes[k]));
+                let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+                for i in range[0].clone() {
+                    for j in range[1].clone() {
+                        for k in range[2].clone() {
+                            let d = samples[(i * nodes[1] + j) * nodes[2] + k];
+                            (low, high) = (low.min(d), high.max(d));
+                        }
+                    }
+                }
+                *bound = if low > margin {
+                    low - margin
+                } else if high < -margin {
+                    high + margin
+                } else {
+                    0.0
+                };
+            }
+        });
+    bounds
+}
+
+/// Quasi-interpolation along each axis in turn; the outermost nodes keep their samples (no query uses
+/// coefficients that depend on that).
+fn spline_coefficients(mut from: Vec<f32>, nodes: [usize; 3]) -> Vec<f32> {
+    let slab = nodes[1] * nodes[2];
+    for axis in 0..3 {
+        let stride = [slab, nodes[2], 1][axis];
+        let mut to = from.clone();
+        to.par_chunks_mut(slab).enumerate().for_each(|(i, out)| {
+            for (at, c) in out.iter_mut().enumerate() {
+                let index = [i, at / nodes[2], at % nodes[2]][axis];
+                if index > 0 && index + 1 < nodes[axis] {
+                    let k = i * slab + at;
+                    let (d, sides) = (
+                        f64::from(from[k]),
+                        f64::from(from[k - stride]) + f64::from(from[k + stride]),
+                    );
+                    *c = ((8.0 * d - sides) / 6.0) as f32;
+                }
+            }
+        });
+        from = to;
+    }
+    from
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,214 @@
+use super::*;
+use crate::hemisphere::hemisphere;
+use crate::vector::{add, scale, sub, unit};
+use plyflow_model::scene::{FlatTool, Tool};
+use plyflow_model::units::Length;
+
+/// A number in 0..1 from a counter (SplitMix64).
+fn random(n: u64) -> f64 {
+    let mut z = n
+        .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        .wrapping_add(0x1234_5678_9ABC_DEF1);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Points within `band` of the surface above the bed, with their exact distances.
+fn points_near(mesh: &ToolMesh, band: f64, count: usize) -> Vec<(V3, f64)> {
+    let tree = SurfaceTree::new(&mesh.without_bottom(0.1));
+    let mut found = Vec::new();
+    let mut n = 0;
+    while found.len() < count {
+        n += 1;
+        let t = (random(4 * n) * mesh.triangles.len() as f64) as usize;
+        let [a, b, c] = mesh.corners(t);
+        let (mut u, mut v) = (random(4 * n + 1), random(4 * n + 2));
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        let on = add(a, add(scale(sub(b, a), u), scale(sub(c, a), v)));
+        let out = (2.0 * random(4 * n + 3) - 1.0) * band;
+        let p = add(on, scale(unit(mesh.area_normal(t)), out));
+        let exact = tree.closest(p).signed_distance;
+        if p[2] >= 0.0 && exact.abs() <= band {
+            found.push((p, exact));
+        }
+    }
+    found
+}
+
+fn spar() -> ToolMesh {
+    crate::spar::joggle_spar(&crate::spar::tests::demo()).unwrap()
+}
+
+/// Largest error and its 99 % quantile.
+fn errors(grid: &SignedDistanceGrid, points: &[(V3, f64)]) -> [f64; 2] {
+    let mut e: Vec<f64> = points
+        .iter()
+        .map(|&(p, d)| (grid.distance_and_gradient(p).0 - d).abs())
+        .collect();
+    e.sort_by(f64::total_cmp);
+    [e[e.len() - 1], e[e.len() * 99 / 100]]
+}
+
+#[test]
+fn distance_error_stays_within_the_stated_bounds_in_a_2_mm_band_of_the_spar() {
+    let mesh = spar();
+    let points = points_near(&mesh, 2e-3, 20_000);
+    for (h, largest, most) in [
+        (2e-3, 0.04e-3, 0.02e-3),
+        (3e-3, 0.06e-3, 0.03e-3),
+        (4e-3, 0.1e-3, 0.05e-3),
+    ] {
+        let grid = SignedDistanceGrid::build(&mesh, h, 6e-3);
+        let [max, p99] = errors(&grid, &points);
+        println!(
+            "h {} mm: max {:.4} mm, 99 % {:.4} mm",
+            h * 1e3,
+            max * 1e3,
+            p99 * 1e3
+        );
+        assert!(max < largest && p99 < most, "h {h}: {max} {p99}");
+    }
+}
+
+#[test]
+fn gradient_is_the_derivative_of_the_distance() {
+    let mesh = spar();
+    let grid = SignedDistanceGrid::build(&mesh, 4e-3, 6e-3);
+    let d = 2e-4;
+    for (p, _) in points_near(&mesh, 4e-3, 2000) {
+        let (_, g) = grid.distance_and_gradient(p);
+        for k in 0..3 {
+            let at = |s: f64| {
+                let mut q = p;
+                q[k] += s * d;
+                grid.distance_and_gradient(q).0
+            };
+            // Fourth order; single precision leaves about 1e-8 m in the distance.
+            let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * d);
+            assert!(
+                (slope - g[k]).abs() < 3e-4,
+                "at {p:?} axis {k}: {slope} against {}",
+                g[k]
+            );
+        }
+    }
+}
+
+#[test]
+fn gradient_is_continuous_across_cell_faces() {
+    let mesh = spar();
+    let grid = SignedDistanceGrid::build(&mesh, 4e-3, 6e-3);
+    for (p, _) in points_near(&mesh, 2e-3, 1000) {
+        for k in 0..3 {
+            let mut q = p;
+            q[k] = grid.origin[k] + ((p[k] - grid.origin[k]) / grid.spacing).round() * grid.spacing;
+            let (mut a, mut b) = (q, q);
+            (a[k], b[k]) = (q[k] - 1e-9, q[k] + 1e-9);
+            let (da, ga) = grid.distance_and_gradient(a);
+            let (db, gb) = grid.distance_and_gradient(b);
+            assert!((da - db).abs() < 2e-8, "{da} {db}");
+            assert!(crate::vector::norm(sub(ga, gb)) < 2e-5, "{ga:?} {gb:?}");
+        }
+    }
+}
+
+#[test]
+fn walls_are_right_on_both_sides_down_to_the_bed() {
+    // A vertical wall at x = 60 mm: the bottom must not count.
+    let tool = Tool::Flat(FlatTool {
+        length: Length(0.12),
+        width: Length(0.12),
+        height: Length(0.04),
+        fillet: Length(0.008),
+        facet_size: Length(0.005),
+    });
+    let grid = SignedDistanceGrid::build(&crate::build(&tool).unwrap(), 2e-3, 6e-3);
+    for z in [0.0, 1e-4, 1e-3, 5e-3] {
+        for out in [-4e-3, -1e-3, 0.0, 1e-3, 4e-3] {
+            let (d, g) = grid.distance_and_gradient([0.06 + out, 0.01, z]);
+            assert!((d - out).abs() < 1e-6, "z {z}: {d} against {out}");
+            assert!(
+                (g[0] - 1.0).abs() < 1e-4 && g[2].abs() < 1e-4,
+                "z {z}: {g:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn far_points_are_left_out_and_near_points_are_not() {
+    let mesh = hemisphere(0.05, 0.004).unwrap();
+    let grid = SignedDistanceGrid::build(&mesh, 3e-3, 6e-3);
+    let tree = SurfaceTree::new(&mesh.without_bottom(0.1));
+    let limit = 4e-3;
+    let (mut near, mut far) = (0, 0);
+    for n in 0..20_000 {
+        let p: V3 = std::array::from_fn(|k| {
+            let r = random(3 * n + k as u64);
+            if k == 2 { 0.08 * r } else { 0.16 * (r - 0.5) }
+        });
+        let exact = tree.closest(p).signed_distance;
+        match grid.within(p, limit) {
+            Some((d, _)) => {
+                near += 1;
+                assert!(exact < limit + 1e-4 && d < limit, "{p:?} {exact} {d}");
+                assert!(
+                    exact < -0.02 || (d - exact).abs() < 1e-4,
+                    "{p:?} {exact} {d}"
+                );
+            }
+            None => {
+                far += 1;
+                assert!(exact > limit - 1e-4, "{p:?} {exact}");
+            }
+        }
+        let (d, _) = grid.distance_and_gradient(p);
+        assert!(
+            d <= exact.max(-0.02) + 1e-4,
+            "not a lower bound at {p:?}: {d} for {exact}"
+        );
+    }
+    assert!(near > 1000 && far > 1000, "{near} {far}");
+    let (d, g) = grid.distance_and_gradient([0.0, 0.0, 1.05]);
+    assert!((d - 1.0).abs() < 1e-12 && g == [0.0, 0.0, 1.0]);
+    assert_eq!(grid.within([f64::NAN, 0.0, 0.0], limit), None);
+}
+
+#[test]
+fn many_points_give_the_same_as_one_by_one() {
+    let mesh = hemisphere(0.05, 0.006).unwrap();
+    let grid = SignedDistanceGrid::build(&mesh, 3e-3, 6e-3);
+    let points: Vec<V3> = (0..500)
+        .map(|n| {
+            std::array::from_fn(|k| {
+                0.06 * (random(3 * n + k as u64) - if k == 2 { 0.0 } else { 0.5 })
+            })
+        })
+        .collect();
+    let (mut d, mut g) = (vec![0.0; 500], vec![[0.0; 3]; 500]);
+    grid.within_many(&points, 5e-3, &mut d, &mut g);
+    for (i, p) in points.iter().enumerate() {
+        assert_eq!(
+            grid.within(*p, 5e-3).unwrap_or((f64::INFINITY, [0.0; 3])),
+            (d[i], g[i])
+        );
+    }
+}
+
+#[test]
+fn grid_is_the_same_bytes_for_any_number_of_threads() {
+    let mesh = hemisphere(0.05, 0.006).unwrap();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let grid = pool.install(|| SignedDistanceGrid::build(&mesh, 4e-3, 6e-3));
+        (grid.coefficients, grid.bounds)
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(3));
+}
