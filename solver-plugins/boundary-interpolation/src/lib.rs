@@ -1,1 +1,267 @@
-//! plyflow-boundary-interpolation
+//! Step plugin `boundary-interpolation`: the fine meshes of a zone, and the motion of their cut edges from a
+//! coarse forming run.
+
+mod cut;
+mod grid;
+mod spline;
+
+pub use cut::Placed;
+pub use grid::{Grid, Rectangle, film_grid, ply_grid};
+pub use spline::{linear, spline_slopes};
+
+use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
+use plyflow_surface::vector::{Vec3, distance};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// The step.
+pub struct BoundaryInterpolation;
+
+export_step!(BoundaryInterpolation);
+
+#[derive(Deserialize)]
+struct Parameters {
+    element_size: f64,
+    film_element_size: Option<f64>,
+    film_margin: f64,
+}
+
+#[derive(Deserialize)]
+struct Sheet {
+    name: String,
+    kind: String,
+    outline: Option<Vec<[f64; 2]>>,
+}
+
+/// A sheet of the zone with its motion.
+struct Driven {
+    attributes: Value,
+    name: String,
+    fine: Placed,
+    /// `[f][k][3]` (m).
+    position: Vec<f64>,
+    error: f64,
+}
+
+/// First frame and undeformed mesh may differ by this (m) before the step warns.
+const START_TOLERANCE: f64 = 1e-4;
+
+impl Step for BoundaryInterpolation {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let p: Parameters = host.parameters()?;
+        let zone = own_zone(host)?;
+        let bounds: Rectangle = serde_json::from_value(zone["box"].clone())
+            .map_err(|e| format!("box of zone {}: {e}", zone["name"]))?;
+        let input = host.input("formed")?;
+        let attributes: Value = host.attributes(&input)?;
+        let meshes = host.meshes(&input)?;
+        if meshes.times.len() < 2 {
+            let n = meshes.times.len();
+            return Err(
+                format!("'{}' has {n} frames; a motion needs at least 2", input.step).into(),
+            );
+        }
+        let listed = attributes["sheets"].as_array().cloned().unwrap_or_default();
+        let mut sheets = Vec::new();
+        for (i, sheet) in listed.iter().enumerate() {
+            host.check_cancelled()?;
+            let fraction = i as f64 / listed.len() as f64;
+            host.progress(&Progress {
+                fraction,
+                phase: "reading the coarse motion",
+                ..Default::default()
+            });
+            sheets.extend(drive(host, &input, &meshes, sheet, bounds, &p)?);
+        }
+        if sheets.is_empty() {
+            return Err(format!(
+                "no sheet of '{}' reaches into zone {} at {bounds:?} m",
+                input.step, zone["name"]
+            )
+            .into());
+        }
+        write(host, &meshes.times, &sheets)?;
+        write_histories(host, &input, &meshes.times)?;
+        let error = sheets.iter().map(|s| s.error).fold(0.0, f64::max);
+        host.write_attributes(&json!({
+            "zone": zone,
+            "scene": attributes["scene"],
+            "frames": meshes.times.len(),
+            "element_size": p.element_size,
+            "film_element_size": p.film_element_size.unwrap_or(p.element_size),
+            "sheets": sheets.iter().map(|s| &s.attributes).collect::<Vec<_>>(),
+            "interpolation_error": error,
+        }))?;
+        let count = |get: fn(&Driven) -> usize| sheets.iter().map(get).sum::<usize>() as f64;
+        host.result("interpolation_error", error, "m")?;
+        host.result("elements", count(|s| s.fine.grid.cells.len() / 4), "1")?;
+        host.result("driven_nodes", count(|s| s.fine.driven_nodes.len()), "1")
+    }
+}
+
+/// The zone at the step's own place in the fan-out.
+fn own_zone(host: &Host) -> Result<Value, StepError> {
+    let input = host.input("zones")?;
+    let attributes: Value = host.attributes(&input)?;
+    let zones = attributes["zones"].as_array().cloned().unwrap_or_default();
+    let index = match host.item()?.last() {
+        Some(&i) => i as usize,
+        None if zones.len() == 1 => 0,
+        None => {
+            return Err(format!(
+                "'{}' holds {} zones and this step is not fanned out over them; give it `for_each`",
+                input.step,
+                zones.len()
+            )
+            .into());
+        }
+    };
+    zones.get(index).cloned().ok_or_else(|| {
+        format!(
+            "zone {index} is asked for, but '{}' holds {}",
+            input.step,
+            zones.len()
+        )
+        .into()
+    })
+}
+
+/// The part of a sheet in the zone and its motion; `None` when the sheet does not reach into it.
+fn drive(
+    host: &Host,
+    input: &Input,
+    meshes: &Meshes,
+    attributes: &Value,
+    zone: Rectangle,
+    p: &Parameters,
+) -> Result<Option<Driven>, StepError> {
+    let sheet: Sheet = serde_json::from_value(attributes.clone())
+        .map_err(|e| format!("attribute `sheets` of '{}': {e}", input.step))?;
+    let body = meshes.body(&sheet.name)?;
+    if body.nodes_per_cell != 4 {
+        let n = body.nodes_per_cell;
+        return Err(format!(
+            "sheet '{}' has cells of {n} nodes; quads are expected",
+            sheet.name
+        )
+        .into());
+    }
+    let (points, cells) = host.mesh(input, body)?;
+    let grid = if sheet.kind == "ply" {
+        let outline = sheet.outline.unwrap_or_else(|| corners(around(&points)));
+        ply_grid(zone, &outline, p.element_size)
+    } else {
+        let size = p.film_element_size.unwrap_or(p.element_size);
+        film_grid(zone, around(&points), p.film_margin, size)
+    };
+    let Some(grid) = grid else { return Ok(None) };
+    let fine =
+        Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
+    let (mut position, mut error, mut start) = (Vec::new(), 0.0f64, 0.0f64);
+    for frame in 0..meshes.times.len() {
+        let coarse = host.frame_points(input, body, frame)?;
+        let driven = fine.positions(&coarse);
+        error = error.max(fine.error(&driven, &coarse));
+        if frame == 0 {
+            let moved = |(&n, &d): (&u32, &Vec3)| distance(fine.points[n as usize], d);
+            start = fine
+                .driven_nodes
+                .iter()
+                .zip(&driven)
+                .map(moved)
+                .fold(0.0, f64::max);
+        }
+        position.extend(driven.into_iter().flatten());
+    }
+    if start > START_TOLERANCE {
+        let name = &sheet.name;
+        let text = format!(
+            "sheet '{name}': the first frame lies {:.2} mm from the undeformed mesh; the local run starts with a jump",
+            1e3 * start
+        );
+        host.log(Log::Warn, &text);
+    }
+    Ok(Some(Driven {
+        attributes: attributes.clone(),
+        name: sheet.name,
+        fine,
+        position,
+        error,
+    }))
+}
+
+fn around(points: &[Vec3]) -> Rectangle {
+    let none = [
+        f64::INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    points.iter().fold(none, |b, p| {
+        [
+            b[0].min(p[0]),
+            b[1].min(p[1]),
+            b[2].max(p[0]),
+            b[3].max(p[1]),
+        ]
+    })
+}
+
+fn corners(b: Rectangle) -> Vec<[f64; 2]> {
+    vec![[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]
+}
+
+fn write(host: &Host, times: &[f64], sheets: &[Driven]) -> Result<(), StepError> {
+    host.write_f64("time", &[times.len()], "s", times)?;
+    for s in sheets {
+        let (k, f) = (s.fine.driven_nodes.len(), times.len());
+        host.define_mesh(&s.name, &s.fine.points, 4, &s.fine.grid.cells, &json!({}))?;
+        host.write_u32(
+            &format!("{}/driven_nodes", s.name),
+            &[k],
+            &s.fine.driven_nodes,
+        )?;
+        host.write_f64(
+            &format!("{}/position", s.name),
+            &[f, k, 3],
+            "m",
+            &s.position,
+        )?;
+        let velocity = spline_slopes(times, &s.position, 3 * k);
+        host.write_f64(
+            &format!("{}/velocity", s.name),
+            &[f, k, 3],
+            "m/s",
+            &velocity,
+        )?;
+    }
+    Ok(())
+}
+
+/// Process histories at the frames; those that the coarse run does not have are left out.
+fn write_histories(host: &Host, input: &Input, times: &[f64]) -> Result<(), StepError> {
+    let histories = [
+        ("cavity_pressure", "Pa"),
+        ("bag_pressure", "Pa"),
+        ("frame_height", "m"),
+    ];
+    for (name, unit) in histories {
+        let path = format!("history/{name}");
+        if host.array_info(input, &path).is_none() {
+            continue;
+        }
+        let (t, _) = host.array_f64(input, "history/time")?;
+        let (values, _) = host.array_f64(input, &path)?;
+        if t.is_empty() || t.len() != values.len() {
+            let (a, b) = (t.len(), values.len());
+            return Err(
+                format!("'{}': history/time has {a} values, {path} {b}", input.step).into(),
+            );
+        }
+        let at_frames: Vec<f64> = times.iter().map(|&at| linear(&t, &values, at)).collect();
+        host.write_f64(name, &[times.len()], unit, &at_frames)?;
+    }
+    Ok(())
+}

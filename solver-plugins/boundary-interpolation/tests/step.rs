@@ -1,0 +1,358 @@
+//! The step on a coarse motion that is known, and the splines and meshes it is made of.
+
+use plyflow_boundary_interpolation::{
+    BoundaryInterpolation, film_grid, linear, ply_grid, spline_slopes,
+};
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
+use plyflow_surface::vector::Vec3;
+use serde_json::{Value, json};
+
+#[test]
+fn spline_gives_back_any_cubic_that_starts_at_rest() {
+    let times = [0.0, 0.1, 0.35, 0.4, 1.0, 1.3];
+    let f = |t: f64| [1.0 + 2.0 * t * t - 0.7 * t * t * t, -3.0 * t * t];
+    let g = |t: f64| [4.0 * t - 2.1 * t * t, -6.0 * t];
+    let values: Vec<f64> = times.iter().flat_map(|&t| f(t)).collect();
+    for (s, e) in spline_slopes(&times, &values, 2)
+        .iter()
+        .zip(times.iter().flat_map(|&t| g(t)))
+    {
+        assert!((s - e).abs() < 1e-12, "{s} {e}");
+    }
+    for n in [2, 3] {
+        let slopes = spline_slopes(&times[..n], &values[..2 * n], 2);
+        assert!(
+            (slopes[2 * n - 1] - g(times[n - 1])[1]).abs() < 1e-12,
+            "{n} frames"
+        );
+    }
+    assert_eq!(spline_slopes(&[0.5], &[3.0], 1), [0.0]);
+}
+
+#[test]
+fn hermite_pieces_join_without_a_jump_in_acceleration() {
+    let times: Vec<f64> = (0..20)
+        .map(|i| 0.05 * i as f64 + 0.01 * ((i * 7) % 5) as f64)
+        .collect();
+    let x: Vec<f64> = times.iter().map(|t| (9.0 * t).sin() + t * t).collect();
+    let v = spline_slopes(&times, &x, 1);
+    assert_eq!(v[0], 0.0);
+    // Second derivative of the Hermite piece at its ends.
+    let ends = |i: usize| {
+        let h = times[i + 1] - times[i];
+        let d = (x[i + 1] - x[i]) / h;
+        (
+            (6.0 * d - 4.0 * v[i] - 2.0 * v[i + 1]) / h,
+            (-6.0 * d + 2.0 * v[i] + 4.0 * v[i + 1]) / h,
+        )
+    };
+    for i in 0..18 {
+        assert!(
+            (ends(i).1 - ends(i + 1).0).abs() < 1e-8,
+            "at {}",
+            times[i + 1]
+        );
+    }
+}
+
+#[test]
+fn error_of_the_spline_s_velocity_falls_with_the_third_power_of_the_frame_spacing() {
+    let error = |n: usize| {
+        let times: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
+        let x: Vec<f64> = times.iter().map(|t| (4.0 * t).cos()).collect();
+        let v = spline_slopes(&times, &x, 1);
+        times
+            .iter()
+            .zip(v)
+            .map(|(t, v)| (v + 4.0 * (4.0 * t).sin()).abs())
+            .fold(0.0, f64::max)
+    };
+    let order = (error(25) / error(50)).log2();
+    assert!(order > 2.7, "{order}");
+    assert!(error(100) < 1e-4);
+}
+
+#[test]
+fn histories_are_linear_between_and_constant_beyond_their_times() {
+    let (t, v) = ([0.0, 1.0, 3.0], [5.0, 7.0, 3.0]);
+    assert_eq!(
+        [-1.0, 0.5, 2.0, 9.0].map(|at| linear(&t, &v, at)),
+        [5.0, 6.0, 5.0, 3.0]
+    );
+}
+
+fn rectangle(b: [f64; 4]) -> Vec<[f64; 2]> {
+    vec![[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]
+}
+
+#[test]
+fn a_cut_that_lies_on_the_ply_s_edge_stays_free() {
+    let ply = rectangle([-0.24, -0.15, 0.24, 0.15]);
+    let grid = ply_grid([-0.24, 0.05, -0.14, 0.15], &ply, 0.003).unwrap();
+    assert_eq!(
+        grid.cuts.clone().map(|c| c.is_some()),
+        [false, true, true, false]
+    );
+    // 100 / 3 mm needs 34 cells.
+    assert_eq!(
+        (grid.points.len(), grid.cells.len()),
+        (35 * 35, 4 * 34 * 34)
+    );
+    assert_eq!(grid.driven_nodes().len(), 35 + 34);
+    let whole = ply_grid([-0.3, -0.2, 0.3, 0.2], &ply, 0.01).unwrap();
+    assert!(whole.driven_nodes().is_empty());
+    assert_eq!(whole.bounds, [-0.24, -0.15, 0.24, 0.15]);
+    assert!(
+        ply_grid([0.239, -0.1, 0.3, 0.1], &ply, 0.003).is_none(),
+        "less than a cell"
+    );
+}
+
+#[test]
+fn a_smaller_ply_has_its_own_edges_and_a_slanted_one_keeps_cells_inside() {
+    let small = ply_grid(
+        [0.0, 0.0, 0.1, 0.1],
+        &rectangle([0.03, -0.1, 0.08, 0.05]),
+        0.005,
+    )
+    .unwrap();
+    assert_eq!(small.bounds, [0.03, 0.0, 0.08, 0.05]);
+    assert_eq!(
+        small.cuts.clone().map(|c| c.is_some()),
+        [false, false, true, false]
+    );
+    let triangle = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]];
+    let grid = ply_grid([-1.0, -1.0, 1.0, 1.0], &triangle, 0.01).unwrap();
+    assert!(
+        (40..=55).contains(&(grid.cells.len() / 4)),
+        "{}",
+        grid.cells.len() / 4
+    );
+    assert!(grid.cells.iter().all(|&i| (i as usize) < grid.points.len()));
+}
+
+#[test]
+fn films_reach_past_the_zone_but_not_past_themselves_and_are_cut_all_around() {
+    let film = [-0.9, -0.75, 0.9, 0.75];
+    let grid = film_grid([-0.24, 0.05, -0.14, 0.15], film, 0.02, 0.01).unwrap();
+    let expected = [-0.26, 0.03, -0.12, 0.17];
+    assert!(
+        grid.bounds
+            .iter()
+            .zip(expected)
+            .all(|(a, b)| (a - b).abs() < 1e-12)
+    );
+    assert!(grid.cuts.iter().all(Option::is_some));
+    assert_eq!(grid.driven_nodes().len(), 4 * 14);
+    assert_eq!(
+        film_grid([0.0, 0.0, 0.895, 0.1], film, 0.02, 0.01)
+            .unwrap()
+            .bounds[2],
+        0.9
+    );
+}
+
+const TIMES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
+
+/// A place that starts at (x, y, z) moves as a cubic in time and bilinearly in space.
+fn motion(p: Vec3, t: f64) -> Vec3 {
+    let s = t * t * (3.0 - 2.0 * t);
+    [
+        p[0] + 0.1 * s * p[1],
+        p[1] - 0.05 * s,
+        p[2] - s * (0.05 + 2.0 * p[0] * p[1]),
+    ]
+}
+
+fn coarse(bend: f64) -> MemoryArtifact {
+    let sheet = |name: &str, half: [f64; 2], n: [usize; 2], z: f64| {
+        let mut points = Vec::new();
+        for j in 0..=n[1] {
+            for i in 0..=n[0] {
+                let at = |d: usize, i: usize| half[d] * (2.0 * i as f64 / n[d] as f64 - 1.0);
+                points.push([at(0, i), at(1, j), z]);
+            }
+        }
+        let node = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
+        let mut cells = Vec::new();
+        for j in 0..n[1] {
+            for i in 0..n[0] {
+                cells.extend([
+                    node(i, j),
+                    node(i + 1, j),
+                    node(i + 1, j + 1),
+                    node(i, j + 1),
+                ]);
+            }
+        }
+        let at = |t: f64| {
+            let moved = |p: &Vec3| {
+                let [x, y, z] = motion(*p, t);
+                [x, y, z + bend * t * p[1] * p[1]]
+            };
+            points.iter().map(moved).collect::<Vec<Vec3>>()
+        };
+        let frames = TIMES.map(at).to_vec();
+        MemoryBody {
+            name: name.into(),
+            points,
+            nodes_per_cell: 4,
+            cells,
+            frames,
+            ..Default::default()
+        }
+    };
+    let outline = rectangle([-0.24, -0.15, 0.24, 0.15]);
+    let history = |v: [f64; 3]| (vec![3], v.to_vec());
+    MemoryArtifact {
+        kind: "forming".into(),
+        attributes: json!({"scene": "s", "sheets": [
+            {"name": "film_low", "kind": "diaphragm", "thickness": 0.00008, "offset": 0.00004},
+            {"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": 0.00028, "outline": outline}]}),
+        arrays: [
+            ("history/time".to_owned(), history([0.0, 0.5, 1.0])),
+            (
+                "history/cavity_pressure".to_owned(),
+                history([1e5, 1e5, 0.0]),
+            ),
+            ("history/bag_pressure".to_owned(), history([0.0, 1e5, 1e5])),
+        ]
+        .into(),
+        times: TIMES.to_vec(),
+        bodies: vec![
+            sheet("film_low", [0.9, 0.75], [37, 31], 0.100),
+            sheet("ply_1", [0.24, 0.15], [48, 30], 0.101),
+        ],
+        ..Default::default()
+    }
+}
+
+fn zones() -> MemoryArtifact {
+    let zone =
+        |name: &str, b: [f64; 4]| json!({"name": name, "box": b, "free_sides": vec![false; 4]});
+    MemoryArtifact {
+        kind: "zones".into(),
+        attributes: json!({"zones": [zone("A", [-0.24, -0.15, -0.1, -0.02]), zone("B", [0.0, 0.0, 0.1, 0.1])]}),
+        ..Default::default()
+    }
+}
+
+fn interpolate(
+    formed: &MemoryArtifact,
+    parameters: Value,
+    item: &[u64],
+) -> Result<MemoryArtifact, String> {
+    let zones = zones();
+    let inputs = [
+        MemoryInput::new("formed", formed),
+        MemoryInput::new("zones", &zones),
+    ];
+    run::<BoundaryInterpolation>(parameters, &inputs, item)
+}
+
+#[test]
+fn driven_nodes_follow_the_coarse_motion_in_place_and_velocity() {
+    let out = interpolate(&coarse(0.0), json!({"element_size": 0.004}), &[0, 1]).unwrap();
+    assert_eq!(out.attributes["zone"]["name"], "B");
+    let body = out.body("ply_1");
+    assert!(
+        body.points.iter().all(|p| (p[2] - 0.101).abs() < 1e-12),
+        "its place in the stack"
+    );
+    let (shape, nodes) = &out.arrays["ply_1/driven_nodes"];
+    let k = shape[0];
+    assert_eq!(k, 4 * 25);
+    let (shape, position) = &out.arrays["ply_1/position"];
+    let (_, velocity) = &out.arrays["ply_1/velocity"];
+    assert_eq!(shape, &[6, k, 3]);
+    for (f, &t) in TIMES.iter().enumerate() {
+        for (i, &node) in nodes.iter().enumerate() {
+            let start = body.points[node as usize];
+            let expected = motion(start, t);
+            let rate = {
+                let h = 1e-6;
+                let (a, b) = (motion(start, t - h), motion(start, t + h));
+                [0, 1, 2].map(|d| (b[d] - a[d]) / (2.0 * h))
+            };
+            for d in 0..3 {
+                let at = (f * k + i) * 3 + d;
+                assert!((position[at] - expected[d]).abs() < 1e-12);
+                assert!(
+                    (velocity[at] - rate[d]).abs() < 1e-8,
+                    "{} {}",
+                    velocity[at],
+                    rate[d]
+                );
+            }
+        }
+    }
+    assert!(
+        out.result("interpolation_error") < 1e-12,
+        "straight lines stay straight in this motion"
+    );
+    let pressures = out.arrays["cavity_pressure"]
+        .1
+        .iter()
+        .zip([1e5, 1e5, 1e5, 8e4, 4e4, 0.0]);
+    assert!(
+        pressures.clone().count() == 6 && pressures.into_iter().all(|(a, b)| (a - b).abs() < 1e-6)
+    );
+    assert!(!out.arrays.contains_key("frame_height"));
+    assert_eq!(out.attributes["sheets"].as_array().unwrap().len(), 2);
+    assert!(out.log.is_empty(), "{:?}", out.log);
+}
+
+#[test]
+fn a_cut_on_the_blank_s_corner_leaves_two_sides_free() {
+    let out = interpolate(&coarse(0.0), json!({"element_size": 0.01}), &[0]).unwrap();
+    assert_eq!(out.arrays["ply_1/driven_nodes"].0, [14 + 14]);
+    // The film: 180 x 170 mm.
+    assert_eq!(out.arrays["film_low/driven_nodes"].0, [2 * (18 + 17)]);
+    assert_eq!(out.result("elements"), (14 * 13 + 18 * 17) as f64);
+}
+
+#[test]
+fn interpolation_error_is_that_of_the_kinks_that_fine_edges_cut_off() {
+    // A parabola z = 4 y2 on the film's nodes every 1.5 m / 31: slopes change by 0.39 at each. Fine cells of
+    // 6.25 mm put no node at most of these kinks; the miss is slope change * a b / (a + b).
+    let out = interpolate(&coarse(4.0), json!({"element_size": 0.00625}), &[1]).unwrap();
+    let worst = 8.0 * (1.5 / 31.0) * 0.00625 / 4.0;
+    let error = out.result("interpolation_error");
+    assert!(error > 0.5 * worst && error <= worst, "{error} {worst}");
+    let fine = interpolate(
+        &coarse(4.0),
+        json!({"element_size": 0.001, "film_element_size": 0.001}),
+        &[1],
+    )
+    .unwrap();
+    assert!(fine.result("interpolation_error") < 0.5 * error);
+}
+
+#[test]
+fn a_missing_zone_and_a_still_run_are_named() {
+    let error = interpolate(&coarse(0.0), json!({"element_size": 0.01}), &[7]).unwrap_err();
+    assert!(
+        error.contains("zone 7") && error.contains("holds 2"),
+        "{error}"
+    );
+    let error = interpolate(&coarse(0.0), json!({"element_size": 0.01}), &[]).unwrap_err();
+    assert!(error.contains("for_each"), "{error}");
+    let mut still = coarse(0.0);
+    still.times.truncate(1);
+    let error = interpolate(&still, json!({"element_size": 0.01}), &[0]).unwrap_err();
+    assert!(error.contains("1 frames"), "{error}");
+}
+
+#[test]
+fn a_first_frame_that_is_not_the_undeformed_state_brings_a_warning() {
+    let mut late = coarse(0.0);
+    for body in &mut late.bodies {
+        body.frames[0].iter_mut().for_each(|p| p[2] -= 0.002);
+    }
+    let out = interpolate(&late, json!({"element_size": 0.01}), &[1]).unwrap();
+    assert!(
+        out.log.iter().any(|l| l.contains("2.00 mm")),
+        "{:?}",
+        out.log
+    );
+}
