@@ -1,4 +1,20 @@
 //! YAML -> resolved workflow. Every error has file, line, column, the value, what was expected and the
 //! nearest valid name; all errors of a pass are reported together.
 
+mod catalog;
+mod check;
+mod diagnostics;
+mod expect;
+mod graph;
+mod load;
+mod parameters;
 pub mod resolved;
+mod scene;
+mod wires;
+mod yaml;
+
+pub use catalog::{Catalog, CatalogEntry, CatalogError};
+pub use diagnostics::{Diagnostic, Diagnostics, Severity};
+pub use graph::{dependencies, graph, to_dot, to_mermaid};
+pub use load::{load, plugin_search_folders};
+pub use resolved::ResolvedWorkflow;

@@ -261,6 +261,22 @@ pub enum UnitError {
 }
 
 impl UnitError {
+    /// What is wrong, without what was expected: "`5` has no unit".
+    pub fn reason(&self) -> String {
+        match self {
+            UnitError::BadNumber { text, .. } => format!("`{text}` does not begin with a number"),
+            UnitError::MissingUnit { text, .. } => format!("`{text}` has no unit"),
+            UnitError::UnknownUnit { text, unit, .. } if text == unit => {
+                format!("unknown unit `{unit}`")
+            }
+            UnitError::UnknownUnit { text, unit, .. } => {
+                format!("unknown unit `{unit}` in `{text}`")
+            }
+            UnitError::WrongDimension { text, got, .. } => format!("`{text}` is {got}"),
+            UnitError::TooLarge { .. } => self.to_string(),
+        }
+    }
+
     /// What to write instead, in one line.
     pub fn help(&self) -> String {
         let write = |d: Option<Dimension>| {

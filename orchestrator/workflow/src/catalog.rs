@@ -1,0 +1,52 @@
+//! What the workflow needs to know of plugins; the plugin host implements it.
+
+use crate::resolved::PluginId;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::manifest::{Manifest, PluginKind};
+
+/// A plugin that was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CatalogEntry {
+    /// Its library.
+    pub id: PluginId,
+    /// What it says about itself.
+    pub manifest: Manifest,
+}
+
+/// Why a plugin was not found.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CatalogError {
+    /// No plugin of that name, no library at that path.
+    #[error("no plugin `{name}` was found")]
+    NotFound {
+        /// Name or path as given.
+        name: String,
+        /// Folders (or the path) that were looked at.
+        searched: Vec<Utf8PathBuf>,
+    },
+    /// There is a library, but it cannot be used.
+    #[error("the plugin library {path} cannot be used: {reason}")]
+    Broken {
+        /// The library.
+        path: Utf8PathBuf,
+        /// Why: ABI version, manifest, missing symbol.
+        reason: String,
+    },
+}
+
+/// Finds plugins.
+pub trait Catalog {
+    /// Finds a plugin by name (on the search path) or by path (when it contains a slash or the library
+    /// suffix), relative paths starting from `relative_to`.
+    ///
+    /// # Errors
+    /// See [`CatalogError`].
+    fn find(
+        &self,
+        name_or_path: &str,
+        relative_to: &Utf8Path,
+    ) -> Result<CatalogEntry, CatalogError>;
+
+    /// Names of all plugins of a kind on the search path, for suggestions.
+    fn names(&self, kind: PluginKind) -> Vec<String>;
+}

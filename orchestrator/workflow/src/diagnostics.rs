@@ -1,0 +1,315 @@
+//! Errors with their place: collected in one pass, shown as text with source lines, or as JSON.
+
+use crate::yaml::Span;
+use camino::{Utf8Path, Utf8PathBuf};
+use serde::Serialize;
+use std::fmt;
+use std::sync::Arc;
+
+/// How bad it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The workflow cannot run.
+    Error,
+    /// It can, but probably means something else.
+    Warning,
+}
+
+/// One finding.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnostic {
+    /// File, as the user named it or as the workflow names it.
+    pub file: Utf8PathBuf,
+    /// Line, from 1; 0 when the file could not be read.
+    pub line: usize,
+    /// Column in characters, from 1; 0 when the file could not be read.
+    pub column: usize,
+    /// How bad it is.
+    pub severity: Severity,
+    /// What is wrong.
+    pub message: String,
+    /// What was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub given: Option<String>,
+    /// What was expected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected: Option<String>,
+    /// What to do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub help: Option<String>,
+    #[serde(skip)]
+    span: Span,
+    #[serde(skip)]
+    text: Option<Arc<String>>,
+}
+
+/// All findings of a pass, by file and place.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Diagnostics {
+    /// The findings.
+    pub items: Vec<Diagnostic>,
+}
+
+impl std::error::Error for Diagnostics {}
+
+impl fmt::Display for Diagnostics {
+    /// One line each: `file:line:column: message; expected ..; help`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, d) in self.items.iter().enumerate() {
+            if i > 0 {
+                writeln!(f)?;
+            }
+            write!(f, "{}:{}:{}: {}", d.file, d.line, d.column, d.message)?;
+            if let Some(expected) = &d.expected {
+                write!(f, "; expected {expected}")?;
+            }
+            if let Some(help) = &d.help {
+                write!(f, "; {help}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Diagnostics {
+    /// Whether any finding is an error.
+    pub fn has_errors(&self) -> bool {
+        self.items.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    /// `[{file, line, column, severity, message, given, expected, help}]`.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::to_value(&self.items).unwrap_or_default()
+    }
+
+    /// Text for people: each finding with its source line, a caret and a remedy, then a count.
+    pub fn render(&self, colour: bool) -> String {
+        let theme = if colour {
+            miette::GraphicalTheme::unicode()
+        } else {
+            miette::GraphicalTheme::unicode_nocolor()
+        };
+        let handler = miette::GraphicalReportHandler::new_themed(theme)
+            .with_width(110)
+            .with_context_lines(1);
+        let mut out = String::new();
+        for d in &self.items {
+            if handler.render_report(&mut out, &Report::of(d)).is_err() {
+                out += &format!("{}:{}:{}: {}\n", d.file, d.line, d.column, d.message);
+            }
+        }
+        let count = |severity, word: &str| {
+            let n = self.items.iter().filter(|d| d.severity == severity).count();
+            (n > 0).then(|| format!("{n} {word}{}", if n == 1 { "" } else { "s" }))
+        };
+        let counts: Vec<String> = [
+            count(Severity::Error, "error"),
+            count(Severity::Warning, "warning"),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        if !counts.is_empty() {
+            out += &format!("\n{}\n", counts.join(", "));
+        }
+        out
+    }
+}
+
+/// A finding as miette wants it.
+#[derive(Debug)]
+struct Report<'a> {
+    finding: &'a Diagnostic,
+    source: Option<miette::NamedSource<Arc<String>>>,
+}
+
+impl<'a> Report<'a> {
+    fn of(finding: &'a Diagnostic) -> Self {
+        let source = finding
+            .text
+            .clone()
+            .map(|text| miette::NamedSource::new(finding.file.as_str(), text));
+        Report { finding, source }
+    }
+}
+
+impl std::error::Error for Report<'_> {}
+
+impl fmt::Display for Report<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.source.is_none() {
+            write!(f, "{}: ", self.finding.file)?;
+        }
+        f.write_str(&self.finding.message)
+    }
+}
+
+impl miette::Diagnostic for Report<'_> {
+    fn severity(&self) -> Option<miette::Severity> {
+        Some(match self.finding.severity {
+            Severity::Error => miette::Severity::Error,
+            Severity::Warning => miette::Severity::Warning,
+        })
+    }
+
+    fn help<'b>(&'b self) -> Option<Box<dyn fmt::Display + 'b>> {
+        self.finding
+            .help
+            .as_ref()
+            .map(|h| Box::new(h) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn miette::SourceCode> {
+        self.source.as_ref().map(|s| s as &dyn miette::SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = miette::LabeledSpan> + '_>> {
+        self.source.as_ref()?;
+        let label = match &self.finding.expected {
+            Some(expected) => format!("expected {expected}"),
+            None => "here".into(),
+        };
+        let span = self.finding.span.clone();
+        Some(Box::new(std::iter::once(miette::LabeledSpan::new(
+            Some(label),
+            span.start,
+            span.len().max(1),
+        ))))
+    }
+}
+
+/// A file that findings point into.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Name for messages.
+    pub name: Utf8PathBuf,
+    /// Folder that relative paths in it start from, absolute.
+    pub folder: Utf8PathBuf,
+    /// Its text.
+    pub text: Arc<String>,
+}
+
+/// Collects findings.
+#[derive(Debug, Default)]
+pub struct Problems {
+    items: Vec<Diagnostic>,
+}
+
+impl Problems {
+    /// Adds a finding at a place and returns it, to say more about it.
+    pub fn add(
+        &mut self,
+        source: &Source,
+        span: &Span,
+        message: impl Into<String>,
+    ) -> &mut Diagnostic {
+        let (line, column) = line_column(&source.text, span.start);
+        self.push(Diagnostic {
+            file: source.name.clone(),
+            line,
+            column,
+            severity: Severity::Error,
+            message: message.into(),
+            given: None,
+            expected: None,
+            help: None,
+            span: span.clone(),
+            text: Some(source.text.clone()),
+        })
+    }
+
+    /// Adds a finding about a file that cannot be read as a whole.
+    pub fn add_unreadable(&mut self, file: &Utf8Path, message: String) -> &mut Diagnostic {
+        self.push(Diagnostic {
+            file: file.to_owned(),
+            line: 0,
+            column: 0,
+            severity: Severity::Error,
+            message,
+            given: None,
+            expected: None,
+            help: None,
+            span: 0..0,
+            text: None,
+        })
+    }
+
+    fn push(&mut self, d: Diagnostic) -> &mut Diagnostic {
+        let i = self.items.len();
+        self.items.push(d);
+        &mut self.items[i]
+    }
+
+    /// How many so far; to learn whether a part added any.
+    pub fn count(&self) -> usize {
+        self.items.len()
+    }
+
+    /// Sorted by file (in the order of first mention) and place; the same finding is listed once, though
+    /// several steps may read the same file.
+    pub fn finish(self) -> Diagnostics {
+        let mut files: Vec<Utf8PathBuf> = Vec::new();
+        for d in &self.items {
+            if !files.contains(&d.file) {
+                files.push(d.file.clone());
+            }
+        }
+        let rank = |d: &Diagnostic| files.iter().position(|f| *f == d.file);
+        let mut items = self.items;
+        items.sort_by_key(|d| (rank(d), d.line, d.column));
+        let mut kept: Vec<Diagnostic> = Vec::new();
+        for d in items {
+            if !kept.contains(&d) {
+                kept.push(d);
+            }
+        }
+        Diagnostics { items: kept }
+    }
+}
+
+impl Diagnostic {
+    /// States what was given.
+    pub fn given(&mut self, text: impl Into<String>) -> &mut Self {
+        self.given = Some(text.into());
+        self
+    }
+
+    /// States what was expected.
+    pub fn expected(&mut self, text: impl Into<String>) -> &mut Self {
+        self.expected = Some(text.into());
+        self
+    }
+
+    /// States the remedy.
+    pub fn help(&mut self, text: impl Into<String>) -> &mut Self {
+        self.help = Some(text.into());
+        self
+    }
+
+    /// Suggests the nearest of `names`, or lists them when they are few.
+    pub fn suggest<'a>(
+        &mut self,
+        given: &str,
+        names: impl IntoIterator<Item = &'a str>,
+    ) -> &mut Self {
+        let names: Vec<&str> = names.into_iter().collect();
+        if self.expected.is_none() && !names.is_empty() && names.len() <= 12 {
+            self.expected = Some(plyflow_model::manifest::one_of(names.iter().copied()));
+        }
+        if let Some(nearest) = plyflow_model::nearest::nearest(given, names) {
+            self.help = Some(format!("did you mean `{nearest}`?"));
+        }
+        self
+    }
+}
+
+/// Line and column (characters), both from 1.
+fn line_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text[..offset.min(text.len())];
+    let start = before.rfind('\n').map_or(0, |i| i + 1);
+    (
+        before.matches('\n').count() + 1,
+        before[start..].chars().count() + 1,
+    )
+}

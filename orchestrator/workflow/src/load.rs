@@ -1,0 +1,244 @@
+//! A workflow file -> [`ResolvedWorkflow`], or everything that is wrong with it.
+
+use crate::catalog::{Catalog, CatalogEntry};
+use crate::check::Checker;
+use crate::diagnostics::{Diagnostics, Problems, Source};
+use crate::expect;
+use crate::parameters::{Place, Resolver, absolute, find};
+use crate::resolved::{FailurePolicy, ResolvedStep, ResolvedWorkflow, Resources};
+use crate::scene::is_word;
+use crate::wires::{self, Wiring};
+use crate::yaml::{Entry, Node};
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::manifest::PluginKind;
+use plyflow_model::units::{Dimension, parse_quantity};
+use plyflow_model::{canonical, schema};
+use serde_json::Value;
+use std::sync::LazyLock;
+
+static WORKFLOW: LazyLock<Value> = LazyLock::new(schema::workflow);
+
+/// One step while it is being resolved.
+pub(crate) struct Draft<'n> {
+    /// Its entry in `steps`.
+    pub entry: &'n Entry,
+    /// Its plugin, if it was found.
+    pub plugin: Option<CatalogEntry>,
+}
+
+impl Draft<'_> {
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.entry.key
+    }
+}
+
+/// Reads a workflow file, looks every name up, checks every parameter, and hashes every file.
+///
+/// # Errors
+/// All findings of one pass, each with its place.
+pub fn load(path: &Utf8Path, catalog: &dyn Catalog) -> Result<ResolvedWorkflow, Diagnostics> {
+    let mut problems = Problems::default();
+    match load_into(path, catalog, &mut problems) {
+        Some(workflow) if problems.count() == 0 => Ok(workflow),
+        _ => Err(problems.finish()),
+    }
+}
+
+fn load_into(
+    path: &Utf8Path,
+    catalog: &dyn Catalog,
+    problems: &mut Problems,
+) -> Option<ResolvedWorkflow> {
+    let (source, root) = open(path, problems)?;
+    Checker::new(&WORKFLOW, &source, problems).check(&root, "the workflow");
+    plugin_folders(&root, &source, problems);
+    let drafts = drafts(&root, &source, catalog, problems);
+    let wiring = wires::connect(&drafts, &source, problems);
+    let expectations = expect::expectations(&root, &drafts, &source, problems);
+    let mut steps: Vec<Option<ResolvedStep>> = drafts
+        .iter()
+        .enumerate()
+        .map(|(i, draft)| step(draft, &wiring, i, &source, catalog, problems))
+        .collect();
+    if problems.count() > 0 {
+        return None;
+    }
+    let steps = wiring
+        .order
+        .iter()
+        .map(|&i| steps[i].take())
+        .collect::<Option<Vec<_>>>()?;
+    let on_failure = match root.get("on_failure").and_then(Node::text) {
+        Some("fail-fast") => FailurePolicy::FailFast,
+        _ => FailurePolicy::KeepGoing,
+    };
+    Some(ResolvedWorkflow {
+        name: root.get("name")?.text()?.to_owned(),
+        file: absolute(&source.folder, path.file_name()?),
+        description: root
+            .get("description")
+            .and_then(Node::text)
+            .map(str::to_owned),
+        steps,
+        expectations,
+        on_failure,
+    })
+}
+
+/// Reads and parses the workflow file.
+fn open(path: &Utf8Path, problems: &mut Problems) -> Option<(Source, Node)> {
+    let full = match camino::absolute_utf8(path) {
+        Ok(full) => absolute(&full, "."),
+        Err(e) => {
+            problems.add_unreadable(path, format!("cannot read the workflow: {e}"));
+            return None;
+        }
+    };
+    match std::fs::read(&full) {
+        Ok(bytes) => crate::scene::parse(problems, full, bytes),
+        Err(e) => {
+            let why = match e.kind() {
+                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+                _ => e.to_string(),
+            };
+            let d = problems.add_unreadable(path, format!("cannot read the workflow: {why}"));
+            d.help(
+                "give the path of a workflow file, such as `workflows/joggle-spar/workflow.yaml`",
+            );
+            None
+        }
+    }
+}
+
+/// The folders that `plugins:` of a workflow file adds to the search path, absolute; none when the file
+/// cannot be read (which [`load`] then reports).
+pub fn plugin_search_folders(path: &Utf8Path) -> Vec<Utf8PathBuf> {
+    let Some((source, root)) = open(path, &mut Problems::default()) else {
+        return Vec::new();
+    };
+    let folders = root.get("plugins").map_or(&[][..], Node::items);
+    folders
+        .iter()
+        .filter_map(Node::text)
+        .map(|t| absolute(&source.folder, t))
+        .collect()
+}
+
+fn plugin_folders(root: &Node, source: &Source, problems: &mut Problems) {
+    for folder in root.get("plugins").map_or(&[][..], Node::items) {
+        let Some(text) = folder.text() else { continue };
+        let path = absolute(&source.folder, text);
+        if !path.is_dir() {
+            let d = problems.add(source, &folder.span, format!("there is no folder `{text}`"));
+            d.given(text).expected(format!(
+                "a folder; the path is relative to {}",
+                source.folder
+            ));
+        }
+    }
+}
+
+fn drafts<'n>(
+    root: &'n Node,
+    source: &Source,
+    catalog: &dyn Catalog,
+    problems: &mut Problems,
+) -> Vec<Draft<'n>> {
+    let Some(steps) = root.entry("steps") else {
+        return Vec::new();
+    };
+    if matches!(&steps.value.kind, crate::yaml::Kind::Map(e) if e.is_empty()) {
+        let d = problems.add(source, &steps.key_span, "the workflow has no steps");
+        d.expected("at least one step");
+    }
+    let mut drafts: Vec<Draft<'n>> = Vec::new();
+    for entry in steps.value.entries() {
+        // A repeated step has been reported as a repeated key.
+        if drafts.iter().any(|d| d.name() == entry.key) {
+            continue;
+        }
+        if !is_word(&entry.key) {
+            let message = format!("`{}` cannot name a step", entry.key);
+            let d = problems.add(source, &entry.key_span, message);
+            d.given(entry.key.clone())
+                .expected("letters, digits, `_` and `-`, at most 64");
+        }
+        let plugin = entry.value.get("plugin").and_then(|node| {
+            find(
+                catalog,
+                problems,
+                source,
+                node.text()?,
+                &node.span,
+                PluginKind::Step,
+            )
+        });
+        drafts.push(Draft { entry, plugin });
+    }
+    drafts
+}
+
+fn step(
+    draft: &Draft<'_>,
+    wiring: &Wiring,
+    index: usize,
+    source: &Source,
+    catalog: &dyn Catalog,
+    problems: &mut Problems,
+) -> Option<ResolvedStep> {
+    let plugin = draft.plugin.as_ref()?;
+    let manifest = &plugin.manifest;
+    let node = &draft.entry.value;
+    let with = node.entry("with");
+    let place = Place {
+        source,
+        pointer: String::new(),
+        what: "with".into(),
+        key: with.map_or(&draft.entry.key_span, |e| &e.key_span).clone(),
+    };
+    let mut resolver = Resolver::new(catalog, problems);
+    let owner = format!("`{}`", manifest.name);
+    // The schema check has spoken about a `with` that is no mapping.
+    let block = with
+        .map(|e| &e.value)
+        .filter(|n| matches!(n.kind, crate::yaml::Kind::Map(_)));
+    let parameters = canonical(resolver.mapping(block, &manifest.parameters, &owner, &place));
+    let components = resolver.components_in_order();
+    let output = manifest.output.as_ref()?;
+    Some(ResolvedStep {
+        name: draft.name().to_owned(),
+        role: manifest.role.clone(),
+        plugin: plugin.id.clone(),
+        components,
+        parameters,
+        files: resolver.files,
+        inputs: wiring.inputs[index].clone(),
+        dimensions: wiring.dimensions[index].clone(),
+        output_kind: output.kind.clone(),
+        collection: output.collection,
+        resources: resources(node.get("resources")),
+        retries: node.get("retries").and_then(whole).unwrap_or(0),
+    })
+}
+
+fn whole(node: &Node) -> Option<u32> {
+    node.to_json().as_u64().and_then(|n| u32::try_from(n).ok())
+}
+
+/// The budget; wrong values have been reported by the schema check.
+fn resources(node: Option<&Node>) -> Resources {
+    let get = |name: &str| node.and_then(|n| n.get(name));
+    let memory = get("memory")
+        .and_then(Node::text)
+        .and_then(|t| t.parse::<plyflow_model::workflow::Memory>().ok());
+    let time_limit = get("time_limit")
+        .and_then(Node::text)
+        .and_then(|t| parse_quantity(t, Dimension::Time).ok());
+    Resources {
+        cores: get("cores").and_then(whole).unwrap_or(1),
+        // 0: not stated.
+        memory: memory.map_or(0, |m| m.0),
+        time_limit: time_limit.unwrap_or(0.0),
+    }
+}

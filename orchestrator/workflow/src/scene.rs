@@ -1,0 +1,333 @@
+//! Scenes: a file or a mapping -> canonical JSON with its materials inside.
+
+use crate::check::{Checker, repeated_keys};
+use crate::diagnostics::{Problems, Source};
+use crate::parameters::{Place, Resolver, absolute, unreadable};
+use crate::yaml::{Kind, Node, Span};
+use camino::Utf8PathBuf;
+use plyflow_model::manifest::PluginKind;
+use plyflow_model::units::{Dimension, parse_quantity};
+use plyflow_model::{material::Material, scene::Scene, schema};
+use serde_json::{Value, json};
+use std::sync::{Arc, LazyLock};
+
+static SCENE: LazyLock<Value> = LazyLock::new(schema::scene);
+static MATERIAL: LazyLock<Value> = LazyLock::new(schema::material);
+
+/// Reads a YAML file named in another one; repeated keys are reported. `None` when that failed (and is
+/// reported).
+pub fn read(
+    problems: &mut Problems,
+    from: &Source,
+    span: &Span,
+    given: &str,
+) -> Option<(Source, Node)> {
+    let path = absolute(&from.folder, given);
+    let bytes = match std::fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(e) => {
+            unreadable(problems, from, span, given, &path, &e);
+            return None;
+        }
+    };
+    parse(problems, path, bytes)
+}
+
+/// Parses the bytes of a file.
+pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Option<(Source, Node)> {
+    let Ok(text) = String::from_utf8(bytes) else {
+        problems.add_unreadable(&path, "the file is not text in UTF-8".into());
+        return None;
+    };
+    let folder = path
+        .parent()
+        .map_or_else(Utf8PathBuf::new, |p| p.to_owned());
+    let source = Source {
+        name: path,
+        folder,
+        text: Arc::new(text),
+    };
+    match crate::yaml::parse(&source.text) {
+        Ok(node) => {
+            repeated_keys(&node, &source, problems);
+            Some((source, node))
+        }
+        Err(e) => {
+            let d = problems.add(
+                &source,
+                &e.span,
+                format!("this is no valid YAML: {}", e.message),
+            );
+            d.help("check indentation, brackets, quotes and colons at and above this line");
+            None
+        }
+    }
+}
+
+/// Resolves a parameter of type `scene`.
+pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+    match &node.kind {
+        Kind::Text(file) => {
+            let (source, scene) = read(resolver.problems, at.source, &node.span, file)?;
+            let place = Place {
+                source: &source,
+                key: scene.span.clone(),
+                ..at.clone()
+            };
+            scene_value(resolver, &scene, &place)
+        }
+        Kind::Map(_) => scene_value(resolver, node, at),
+        _ => {
+            let message = format!("`{}` is {}", at.what, node.describe());
+            let d = resolver.problems.add(at.source, &node.span, message);
+            d.given(node.describe())
+                .expected("the path of a scene file, or a scene");
+            None
+        }
+    }
+}
+
+fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+    let before = resolver.problems.count();
+    Checker::new(&SCENE, at.source, resolver.problems).check(node, "the scene");
+    rules(node, at.source, resolver.problems);
+    let tool = stl_file(resolver, node, at);
+    let materials = materials(resolver, node, at);
+    if resolver.problems.count() > before {
+        return None;
+    }
+    let mut scene = node.to_json();
+    if let Some(path) = tool {
+        scene["tool"]["stl"]["file"] = json!(path);
+    }
+    for (i, material) in materials.into_iter().enumerate() {
+        scene["sheets"][i]["material"] = material?;
+    }
+    match serde_json::from_value::<Scene>(scene).and_then(|mut scene| {
+        // Prose does not matter to any result.
+        scene.description = None;
+        serde_json::to_value(scene)
+    }) {
+        Ok(value) => Some(value),
+        Err(e) => {
+            // The schema is made from the types, so that only what it cannot say comes here.
+            resolver
+                .problems
+                .add(at.source, &at.key, format!("the scene cannot be read: {e}"));
+            None
+        }
+    }
+}
+
+fn stl_file(resolver: &mut Resolver<'_>, scene: &Node, at: &Place<'_>) -> Option<Utf8PathBuf> {
+    let entry = scene.get("tool")?.get("stl")?.entry("file")?;
+    let text = entry.value.text()?;
+    let place = at.below("tool/stl/file", "file".into(), &entry.key_span);
+    let place = Place {
+        pointer: format!("{}/tool/stl/file", at.pointer),
+        ..place
+    };
+    resolver.file(text, &entry.value, &place)
+}
+
+/// The resolved material of every sheet; `None` where it is wrong.
+fn materials(resolver: &mut Resolver<'_>, scene: &Node, at: &Place<'_>) -> Vec<Option<Value>> {
+    let sheets = scene.get("sheets").map_or(&[][..], Node::items);
+    let mut all = Vec::new();
+    for (i, sheet) in sheets.iter().enumerate() {
+        let Some(entry) = sheet.entry("material") else {
+            all.push(None);
+            continue;
+        };
+        let place = Place {
+            source: at.source,
+            pointer: format!("{}/sheets/{i}/material", at.pointer),
+            what: "material".into(),
+            key: entry.key_span.clone(),
+        };
+        all.push(match &entry.value.kind {
+            Kind::Text(file) => read(resolver.problems, at.source, &entry.value.span, file)
+                .and_then(|(source, node)| {
+                    let place = Place {
+                        source: &source,
+                        key: node.span.clone(),
+                        ..place
+                    };
+                    let before = resolver.problems.count();
+                    Checker::new(&MATERIAL, &source, resolver.problems)
+                        .check(&node, "the material");
+                    let sound = resolver.problems.count() == before;
+                    material_value(resolver, &node, &place, sound)
+                }),
+            // The scene's schema has looked at a material that is written inside it.
+            Kind::Map(_) => material_value(resolver, &entry.value, &place, true),
+            _ => None,
+        });
+    }
+    all
+}
+
+/// The material with its parameters checked against its plugin, as JSON with SI numbers.
+fn material_value(
+    resolver: &mut Resolver<'_>,
+    node: &Node,
+    at: &Place<'_>,
+    sound: bool,
+) -> Option<Value> {
+    let plugin = node.get("plugin")?;
+    let name = plugin.text()?;
+    let with = node.entry("with");
+    let resolved = resolver.plugin_with(name, &plugin.span, with, PluginKind::Material, at)?;
+    if !sound {
+        return None;
+    }
+    let mut value = node.to_json();
+    value["plugin"] = resolved["plugin"].clone();
+    value["with"] = resolved["with"].clone();
+    let mut material: Material = serde_json::from_value(value).ok()?;
+    material.source = None;
+    serde_json::to_value(material).ok()
+}
+
+/// Rules that types and bounds cannot say. Works on the tree, so that a wrong type elsewhere does not hide
+/// a broken rule.
+fn rules(scene: &Node, source: &Source, problems: &mut Problems) {
+    sheet_rules(scene, source, problems);
+    let Some(tool) = scene.get("tool") else {
+        return;
+    };
+    if let Some(flat) = tool.get("flat") {
+        at_most(flat, "fillet", "height", 1.0, source, problems);
+    }
+    if let Some(spar) = tool.get("joggle_spar") {
+        at_most(spar, "fillet", "height", 1.0, source, problems);
+        // Both top edges are rounded.
+        at_most(spar, "fillet", "top_width", 0.5, source, problems);
+        joggle_rules(spar, source, problems);
+    }
+}
+
+fn sheet_rules(scene: &Node, source: &Source, problems: &mut Problems) {
+    let Some(entry) = scene.entry("sheets") else {
+        return;
+    };
+    if matches!(&entry.value.kind, Kind::List(items) if items.is_empty()) {
+        let d = problems.add(source, &entry.key_span, "the scene has no sheet");
+        d.expected("at least one sheet")
+            .help("list plies and diaphragms from the tool upwards");
+    }
+    let mut names: Vec<&str> = vec!["tool"];
+    for sheet in entry.value.items() {
+        if let Some(node) = sheet.get("name") {
+            let name = node.text().unwrap_or_default();
+            if names.contains(&name) {
+                let d = problems.add(source, &node.span, format!("the name `{name}` is taken"));
+                d.given(name)
+                    .expected("a name of its own for every sheet, other than `tool`");
+            } else if !is_word(name) {
+                let d = problems.add(source, &node.span, format!("`{name}` cannot name a body"));
+                d.given(name).expected("letters, digits, `_` and `-`");
+            }
+            names.push(name);
+        }
+        if sheet.get("kind").and_then(Node::text) == Some("ply") {
+            for wanted in ["length", "width", "fibre_2"] {
+                if sheet.get(wanted).is_none() && matches!(sheet.kind, Kind::Map(_)) {
+                    let at = sheet.entry("kind").map_or(&sheet.span, |e| &e.value.span);
+                    let d = problems.add(source, at, format!("a ply needs `{wanted}`"));
+                    let example = if wanted == "fibre_2" {
+                        "45 deg"
+                    } else {
+                        "300 mm"
+                    };
+                    d.expected(format!("`{wanted}: {example}`, say"));
+                }
+            }
+        }
+    }
+}
+
+fn joggle_rules(spar: &Node, source: &Source, problems: &mut Problems) {
+    let length = |n: &Node, name: &str| {
+        n.get(name)
+            .and_then(Node::text)
+            .and_then(|t| parse_quantity(t, Dimension::Length).ok())
+    };
+    let Some(joggles) = spar.get("joggles") else {
+        return;
+    };
+    let mut last_end = f64::NEG_INFINITY;
+    for joggle in joggles.items() {
+        let (Some(start), Some(ramp)) = (length(joggle, "start"), length(joggle, "length")) else {
+            continue;
+        };
+        let Some(node) = joggle.get("start") else {
+            continue;
+        };
+        if start < last_end {
+            let d = problems.add(
+                source,
+                &node.span,
+                "this joggle begins before the one above ends",
+            );
+            d.given(node.describe())
+                .expected("joggles in order of `start`, without overlap");
+        }
+        last_end = last_end.max(start + ramp);
+        if let Some(total) = length(spar, "length")
+            && start.abs().max((start + ramp).abs()) > total / 2.0
+        {
+            let d = problems.add(source, &node.span, "this joggle reaches beyond the tool");
+            d.given(node.describe())
+                .expected(format!("a ramp within ±{} m", total / 2.0));
+            d.help("`start` counts from the tool's centre");
+        }
+    }
+}
+
+/// Checks `small <= factor * large` for two lengths of a mapping.
+fn at_most(
+    node: &Node,
+    small: &str,
+    large: &str,
+    factor: f64,
+    source: &Source,
+    problems: &mut Problems,
+) {
+    let read = |name: &str| {
+        let node = node.get(name)?;
+        parse_quantity(node.text()?, Dimension::Length)
+            .ok()
+            .map(|v| (v, node))
+    };
+    let (Some((a, place)), Some((b, limit))) = (read(small), read(large)) else {
+        return;
+    };
+    if a > factor * b {
+        let bound = if factor == 1.0 {
+            String::new()
+        } else {
+            format!("{factor} x ")
+        };
+        let d = problems.add(
+            source,
+            &place.span,
+            format!("`{small}` is {}", place.describe()),
+        );
+        d.given(place.describe());
+        d.expected(format!(
+            "at most {bound}`{large}` ({})",
+            limit.text().unwrap_or_default()
+        ));
+    }
+}
+
+/// Names that can stand in artifacts, labels and file names.
+pub fn is_word(name: &str) -> bool {
+    !name.is_empty()
+        && name.len() <= 64
+        && name.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_')
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+}
