@@ -29,7 +29,10 @@ pub struct ArtifactError {
 
 impl ArtifactError {
     pub(crate) fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
-        Self { kind, message: message.into() }
+        Self {
+            kind,
+            message: message.into(),
+        }
     }
 }
 

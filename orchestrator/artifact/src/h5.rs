@@ -7,7 +7,9 @@
 use crate::error::{ArtifactError, ErrorKind, Result};
 use hdf5_sys::h5::{H5dont_atexit, H5open, hsize_t};
 use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Aget_type, H5Aopen, H5Aread, H5Awrite};
-use hdf5_sys::h5d::{H5D_fill_time_t, H5Dclose, H5Dcreate2, H5Dopen2, H5Dread, H5Dset_extent, H5Dwrite};
+use hdf5_sys::h5d::{
+    H5D_fill_time_t, H5Dclose, H5Dcreate2, H5Dopen2, H5Dread, H5Dset_extent, H5Dwrite,
+};
 use hdf5_sys::h5e::{H5E_DEFAULT, H5E_direction_t, H5E_error2_t, H5Eset_auto2, H5Ewalk2};
 use hdf5_sys::h5f::{H5F_ACC_RDONLY, H5F_ACC_TRUNC, H5F_libver_t, H5Fclose, H5Fcreate, H5Fopen};
 use hdf5_sys::h5g::{H5Gclose, H5Gcreate2, H5Gopen2};
@@ -20,8 +22,8 @@ use hdf5_sys::h5s::{
 use hdf5_sys::h5t::{
     H5T_C_S1, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT,
     H5T_NATIVE_INT64, H5T_NATIVE_UINT8, H5T_NATIVE_UINT32, H5T_STD_I64LE, H5T_STD_U8LE,
-    H5T_STD_U32LE, H5T_cset_t, H5T_str_t, H5Tclose, H5Tcopy, H5Tget_size, H5Tset_cset,
-    H5Tset_size, H5Tset_strpad,
+    H5T_STD_U32LE, H5T_cset_t, H5T_str_t, H5Tclose, H5Tcopy, H5Tget_size, H5Tset_cset, H5Tset_size,
+    H5Tset_strpad,
 };
 use std::ffi::{CStr, CString, c_uint, c_void};
 use std::path::Path;
@@ -97,7 +99,9 @@ fn last_error() -> String {
         let out = unsafe { &mut *out.cast::<String>() };
         let text = unsafe { (*e).desc };
         if out.is_empty() && !text.is_null() {
-            *out = unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned();
+            *out = unsafe { CStr::from_ptr(text) }
+                .to_string_lossy()
+                .into_owned();
         }
         0
     }
@@ -124,7 +128,10 @@ fn checked(code: impl Into<i64>, what: impl FnOnce() -> String) -> Result<i64> {
 
 fn c_name(name: &str) -> Result<CString> {
     CString::new(name).map_err(|_| {
-        ArtifactError::new(ErrorKind::BadValue, format!("the name {name:?} holds a zero byte"))
+        ArtifactError::new(
+            ErrorKind::BadValue,
+            format!("the name {name:?} holds a zero byte"),
+        )
     })
 }
 
@@ -153,8 +160,9 @@ closer!(close_type, H5Tclose);
 closer!(close_attribute, H5Aclose);
 closer!(close_plist, H5Pclose);
 
-fn plist(class: hid_t) -> Result<Handle> {
-    let id = locked(|| unsafe { H5Pcreate(class) });
+fn plist(class: &'static hid_t) -> Result<Handle> {
+    // The class has its number only once the library has started.
+    let id = locked(|| unsafe { H5Pcreate(*class) });
     checked(id, || "making a property list".into())?;
     Ok(Handle(id, close_plist))
 }
@@ -179,10 +187,18 @@ fn text_type(bytes: usize, ascii: bool) -> Result<Handle> {
     locked(|| unsafe {
         let id = checked(H5Tcopy(*H5T_C_S1), || "making a text type".into())?;
         let t = Handle(id, close_type);
-        let set = if ascii { H5T_cset_t::H5T_CSET_ASCII } else { H5T_cset_t::H5T_CSET_UTF8 };
+        let set = if ascii {
+            H5T_cset_t::H5T_CSET_ASCII
+        } else {
+            H5T_cset_t::H5T_CSET_UTF8
+        };
         // HDF5 has no text of no bytes; one padding byte stands for it.
-        checked(H5Tset_size(t.0, bytes.max(1)), || format!("a text of {bytes} bytes"))?;
-        checked(H5Tset_strpad(t.0, H5T_str_t::H5T_STR_NULLPAD), || "text padding".into())?;
+        checked(H5Tset_size(t.0, bytes.max(1)), || {
+            format!("a text of {bytes} bytes")
+        })?;
+        checked(H5Tset_strpad(t.0, H5T_str_t::H5T_STR_NULLPAD), || {
+            "text padding".into()
+        })?;
         checked(H5Tset_cset(t.0, set), || "text encoding".into())?;
         Ok(t)
     })
@@ -243,7 +259,9 @@ pub(crate) trait Location {
             let id = H5Acreate2(self.id(), c.as_ptr(), file, s.0, DEFAULT, DEFAULT);
             checked(id, || format!("making the attribute '{name}'"))?;
             let a = Handle(id, close_attribute);
-            checked(H5Awrite(a.0, memory, data), || format!("writing the attribute '{name}'"))?;
+            checked(H5Awrite(a.0, memory, data), || {
+                format!("writing the attribute '{name}'")
+            })?;
             Ok(())
         })
     }
@@ -282,9 +300,10 @@ pub(crate) trait Location {
             }
             let a = Handle(id, close_attribute);
             let mut value = 0i64;
-            checked(H5Aread(a.0, DType::I64.memory(), (&raw mut value).cast()), || {
-                format!("reading the attribute '{name}'")
-            })?;
+            checked(
+                H5Aread(a.0, DType::I64.memory(), (&raw mut value).cast()),
+                || format!("reading the attribute '{name}'"),
+            )?;
             Ok(Some(value))
         })
     }
@@ -309,8 +328,8 @@ impl Location for Dataset {
 impl File {
     /// Makes a new file, replacing one that is there. Format of HDF5 1.10: what VTK 9.4 reads.
     pub(crate) fn create(path: &Path) -> Result<Self> {
-        let access = plist(*H5P_CLS_FILE_ACCESS)?;
-        let creation = plist(*H5P_CLS_FILE_CREATE)?;
+        let access = plist(H5P_CLS_FILE_ACCESS)?;
+        let creation = plist(H5P_CLS_FILE_CREATE)?;
         let c = c_path(path)?;
         locked(|| unsafe {
             let v110 = H5F_libver_t::H5F_LIBVER_V110;
@@ -327,7 +346,7 @@ impl File {
 
     /// Opens a file for reading.
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        let access = plist(*H5P_CLS_FILE_ACCESS)?;
+        let access = plist(H5P_CLS_FILE_ACCESS)?;
         let c = c_path(path)?;
         locked(|| unsafe {
             H5Pset_file_locking(access.0, 0, 1);
@@ -347,7 +366,7 @@ impl File {
 
     /// Makes a group; groups on the way must exist.
     pub(crate) fn create_group(&self, path: &str) -> Result<Group> {
-        let creation = plist(*H5P_CLS_GROUP_CREATE)?;
+        let creation = plist(H5P_CLS_GROUP_CREATE)?;
         let c = c_name(path)?;
         locked(|| unsafe {
             H5Pset_link_creation_order(creation.0, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
@@ -356,6 +375,15 @@ impl File {
             checked(id, || format!("making the group {path}"))?;
             Ok(Group(Handle(id, close_group)))
         })
+    }
+
+    /// Makes a group unless it is there.
+    pub(crate) fn ensure_group(&self, path: &str) -> Result<Group> {
+        if self.exists(path) {
+            self.open_group(path)
+        } else {
+            self.create_group(path)
+        }
     }
 
     /// Opens a group.
@@ -397,8 +425,14 @@ impl File {
         let d = self.create_dataset(path, dtype, shape, None)?;
         if !data.is_empty() {
             locked(|| unsafe {
-                let code =
-                    H5Dwrite(d.id(), dtype.memory(), DEFAULT, DEFAULT, DEFAULT, data.as_ptr().cast());
+                let code = H5Dwrite(
+                    d.id(),
+                    dtype.memory(),
+                    DEFAULT,
+                    DEFAULT,
+                    DEFAULT,
+                    data.as_ptr().cast(),
+                );
                 checked(code, || format!("writing {path}"))
             })?;
         }
@@ -427,8 +461,8 @@ impl File {
         chunk: Option<u64>,
     ) -> Result<Dataset> {
         let (c, s) = (c_name(path)?, space(shape, chunk.is_some())?);
-        let creation = plist(*H5P_CLS_DATASET_CREATE)?;
-        let access = plist(*H5P_CLS_DATASET_ACCESS)?;
+        let creation = plist(H5P_CLS_DATASET_CREATE)?;
+        let access = plist(H5P_CLS_DATASET_ACCESS)?;
         locked(|| unsafe {
             H5Pset_obj_track_times(creation.0, 0);
             H5Pset_fill_time(creation.0, H5D_fill_time_t::H5D_FILL_TIME_NEVER);
@@ -450,7 +484,11 @@ impl File {
             );
             checked(id, || format!("making the dataset {path}"))?;
             let handle = Handle(id, close_dataset);
-            Ok(Dataset { handle, shape: shape.to_vec(), dtype })
+            Ok(Dataset {
+                handle,
+                shape: shape.to_vec(),
+                dtype,
+            })
         })
     }
 
@@ -461,7 +499,11 @@ impl File {
             let id = H5Dopen2(self.id(), c.as_ptr(), DEFAULT);
             checked(id, || format!("opening the dataset {path}"))?;
             let handle = Handle(id, close_dataset);
-            Ok(Dataset { handle, shape: shape.to_vec(), dtype })
+            Ok(Dataset {
+                handle,
+                shape: shape.to_vec(),
+                dtype,
+            })
         })
     }
 }
@@ -476,7 +518,9 @@ impl Dataset {
         let (first, rows) = (self.shape[0], data.len() as u64 / row);
         self.shape[0] += rows;
         locked(|| unsafe {
-            checked(H5Dset_extent(self.id(), self.shape.as_ptr()), || "growing a dataset".into())
+            checked(H5Dset_extent(self.id(), self.shape.as_ptr()), || {
+                "growing a dataset".into()
+            })
         })?;
         self.slab(first, rows, |d, t, memory, file| unsafe {
             H5Dwrite(d, t, memory, file, DEFAULT, data.as_ptr().cast())
@@ -497,7 +541,14 @@ impl Dataset {
         let wanted = rows * self.shape[1..].iter().product::<u64>() * dtype.size() as u64;
         debug_assert_eq!(buffer.len() as u64, wanted);
         self.slab(first, rows, |d, _, memory, file| unsafe {
-            H5Dread(d, dtype.memory(), memory, file, DEFAULT, buffer.as_mut_ptr().cast())
+            H5Dread(
+                d,
+                dtype.memory(),
+                memory,
+                file,
+                DEFAULT,
+                buffer.as_mut_ptr().cast(),
+            )
         })
     }
 
@@ -534,7 +585,9 @@ impl Dataset {
                 count.as_ptr(),
                 null,
             );
-            checked(code, || format!("selecting rows {first} to {}", first + rows))?;
+            checked(code, || {
+                format!("selecting rows {first} to {}", first + rows)
+            })?;
             checked(f(self.id(), self.dtype.memory(), memory.0, file.0), || {
                 format!("rows {first} to {} of a dataset", first + rows)
             })
@@ -545,7 +598,10 @@ impl Dataset {
 
 fn c_path(path: &Path) -> Result<CString> {
     let text = path.to_str().ok_or_else(|| {
-        ArtifactError::new(ErrorKind::Io, format!("the path {} is not UTF-8", path.display()))
+        ArtifactError::new(
+            ErrorKind::Io,
+            format!("the path {} is not UTF-8", path.display()),
+        )
     })?;
     c_name(text)
 }

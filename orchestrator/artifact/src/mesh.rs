@@ -49,7 +49,12 @@ impl BodyWriter {
         file.soft_link(&root, &format!("/VTKHDF/Assembly/{}", info.name))?;
         let (n, m, k) = (info.points, info.cells, u64::from(info.nodes_per_cell));
         let one = |name: &str, value: u64| {
-            file.write(&format!("{root}/{name}"), DType::I64, &[1], bytes(&[value as i64]))
+            file.write(
+                &format!("{root}/{name}"),
+                DType::I64,
+                &[1],
+                bytes(&[value as i64]),
+            )
         };
         one("NumberOfPoints", n)?;
         one("NumberOfCells", m)?;
@@ -58,9 +63,19 @@ impl BodyWriter {
         let path = format!("{root}/Connectivity");
         file.write(&path, DType::I64, &[m * k], bytes(&connectivity))?;
         let offsets: Vec<i64> = (0..=m).map(|i| (i * k) as i64).collect();
-        file.write(&format!("{root}/Offsets"), DType::I64, &[m + 1], bytes(&offsets))?;
+        file.write(
+            &format!("{root}/Offsets"),
+            DType::I64,
+            &[m + 1],
+            bytes(&offsets),
+        )?;
         let vtk = if k == 3 { VTK_TRIANGLE } else { VTK_QUAD };
-        file.write(&format!("{root}/Types"), DType::U8, &[m], &vec![vtk; m as usize])?;
+        file.write(
+            &format!("{root}/Types"),
+            DType::U8,
+            &[m],
+            &vec![vtk; m as usize],
+        )?;
         file.create_group(&format!("{root}/PointData"))?;
         file.create_group(&format!("{root}/CellData"))?;
         Ok(Self {
@@ -90,7 +105,9 @@ impl BodyWriter {
             ));
         }
         if self.in_frame {
-            return bad_order(format!("frame {frame}: points of body '{name}' were given before"));
+            return bad_order(format!(
+                "frame {frame}: points of body '{name}' were given before"
+            ));
         }
         if let Some(i) = points.iter().position(|x| !x.is_finite()) {
             return bad_value(format!(
@@ -112,7 +129,10 @@ impl BodyWriter {
             self.info.moving = true;
         }
         self.in_frame = true;
-        self.points.as_mut().expect("made above").append(bytes(points))
+        self.points
+            .as_mut()
+            .expect("made above")
+            .append(bytes(points))
     }
 
     pub(crate) fn field(
@@ -122,7 +142,10 @@ impl BodyWriter {
         field: FieldInfo,
         values: &[f64],
     ) -> Result<()> {
-        let what = format!("frame {frame}: body '{}': field '{}'", self.info.name, field.name);
+        let what = format!(
+            "frame {frame}: body '{}': field '{}'",
+            self.info.name, field.name
+        );
         let count = self.rows(field.on) * u64::from(field.components);
         if field.components == 0 || values.len() as u64 != count {
             return bad_shape(format!(
@@ -132,7 +155,11 @@ impl BodyWriter {
                 values.len()
             ));
         }
-        let known = self.info.fields.iter().position(|f| f.name == field.name && f.on == field.on);
+        let known = self
+            .info
+            .fields
+            .iter()
+            .position(|f| f.name == field.name && f.on == field.on);
         let index = match known {
             Some(i) if self.info.fields[i] != field => {
                 let before = &self.info.fields[i];
@@ -179,11 +206,20 @@ impl BodyWriter {
         let rows = self.rows(field.on);
         let components = u64::from(field.components);
         let row: &[u64] = if components == 1 { &[] } else { &[components] };
-        let path = format!("/VTKHDF/{}/{}/{}", self.info.name, group(field.on), field.name);
+        let path = format!(
+            "/VTKHDF/{}/{}/{}",
+            self.info.name,
+            group(field.on),
+            field.name
+        );
         let data = file.growing(&path, DType::F32, row, rows)?;
         data.write_text("unit", &field.unit, false)?;
         let count = (rows * components) as usize;
-        self.fields.push(FieldWriter { data, count, in_frame: false });
+        self.fields.push(FieldWriter {
+            data,
+            count,
+            in_frame: false,
+        });
         self.info.fields.push(field);
         Ok(self.fields.len() - 1)
     }
@@ -191,7 +227,9 @@ impl BodyWriter {
     pub(crate) fn end_frame(&mut self, file: &File, frame: u64) -> Result<()> {
         let name = self.info.name.clone();
         if self.info.moving && !self.in_frame {
-            return bad_order(format!("frame {frame}: points of body '{name}' are missing"));
+            return bad_order(format!(
+                "frame {frame}: points of body '{name}' are missing"
+            ));
         }
         for (info, field) in self.info.fields.iter().zip(&mut self.fields) {
             if !field.in_frame {
@@ -210,14 +248,14 @@ impl BodyWriter {
     }
 
     fn write_reference(&mut self, file: &File) -> Result<()> {
-        let Some(points) = self.reference.take() else { return Ok(()) };
+        let Some(points) = self.reference.take() else {
+            return Ok(());
+        };
         let name = &self.info.name;
         let shape = [self.info.points, 3];
         let path = if self.info.moving {
             for group in ["/plyflow", "/plyflow/reference"] {
-                if !file.exists(group) {
-                    file.create_group(group)?;
-                }
+                file.ensure_group(group)?;
             }
             format!("/plyflow/reference/{name}")
         } else {
@@ -244,11 +282,26 @@ impl BodyWriter {
         file.write(&format!("{steps}/Values"), DType::F64, &[s], bytes(times))?;
         let put = |name: &str, shape: &[u64], stride: u64, first: i64| {
             let values: Vec<i64> = (0..s).map(|i| first + (i * stride) as i64).collect();
-            file.write(&format!("{steps}/{name}"), DType::I64, shape, bytes(&values)).map(drop)
+            file.write(
+                &format!("{steps}/{name}"),
+                DType::I64,
+                shape,
+                bytes(&values),
+            )
+            .map(drop)
         };
         put("PartOffsets", &[s], 0, 0)?;
         put("NumberOfParts", &[s], 0, 1)?;
-        put("PointOffsets", &[s], if self.info.moving { self.info.points } else { 0 }, 0)?;
+        put(
+            "PointOffsets",
+            &[s],
+            if self.info.moving {
+                self.info.points
+            } else {
+                0
+            },
+            0,
+        )?;
         put("CellOffsets", &[s, 1], 0, 0)?;
         put("ConnectivityIdOffsets", &[s, 1], 0, 0)?;
         for on in [On::Points, On::Cells] {

@@ -46,7 +46,9 @@ impl Artifact {
             None => return Err(broken("it has no data model version".into())),
         }
         let text = |name: &str| {
-            group.read_text(name)?.ok_or_else(|| broken(format!("it has no '{name}'")))
+            group
+                .read_text(name)?
+                .ok_or_else(|| broken(format!("it has no '{name}'")))
         };
         let parse = |name: &str, e: serde_json::Error| broken(format!("'{name}': {e}"));
         let contents: Contents =
@@ -65,7 +67,17 @@ impl Artifact {
             (text("kind")?, text("attributes")?, text("provenance")?);
         drop(group);
         let path = path.to_owned();
-        Ok(Self { path, file, kind, attributes, results, collection, contents, provenance, times })
+        Ok(Self {
+            path,
+            file,
+            kind,
+            attributes,
+            results,
+            collection,
+            contents,
+            provenance,
+            times,
+        })
     }
 
     /// Artifact kind, e.g. `forming`.
@@ -116,7 +128,12 @@ impl Artifact {
     /// Lists the names there are.
     pub fn body(&self, name: &str) -> Result<&BodyInfo> {
         let Some(body) = self.contents.body(name) else {
-            let names: Vec<&str> = self.contents.bodies.iter().map(|b| b.name.as_str()).collect();
+            let names: Vec<&str> = self
+                .contents
+                .bodies
+                .iter()
+                .map(|b| b.name.as_str())
+                .collect();
             return not_found(format!(
                 "{} has no body '{name}'; there are: {}",
                 self.path.display(),
@@ -132,7 +149,12 @@ impl Artifact {
     /// Lists the arrays there are.
     pub fn array_info(&self, path: &str) -> Result<&ArrayInfo> {
         let Some(info) = self.contents.array(path) else {
-            let names: Vec<&str> = self.contents.arrays.iter().map(|a| a.path.as_str()).collect();
+            let names: Vec<&str> = self
+                .contents
+                .arrays
+                .iter()
+                .map(|a| a.path.as_str())
+                .collect();
             return not_found(format!(
                 "{} has no array '{path}'; there are: {}",
                 self.path.display(),
@@ -157,12 +179,19 @@ impl Artifact {
                 buffer.len()
             ));
         }
-        let d = self.file.open_dataset(&format!("/data/{path}"), info.dtype, &info.shape)?;
+        let d = self
+            .file
+            .open_dataset(&format!("/data/{path}"), info.dtype, &info.shape)?;
         d.read_all(dtype, buffer)
     }
 
     fn array<T: Plain + Default>(&self, path: &str, dtype: DType) -> Result<(Vec<T>, Vec<usize>)> {
-        let shape: Vec<usize> = self.array_info(path)?.shape.iter().map(|n| *n as usize).collect();
+        let shape: Vec<usize> = self
+            .array_info(path)?
+            .shape
+            .iter()
+            .map(|n| *n as usize)
+            .collect();
         let mut data = vec![T::default(); shape.iter().product()];
         self.read_array(path, dtype, bytes_mut(&mut data))?;
         Ok((data, shape))
@@ -240,8 +269,11 @@ impl Artifact {
         if points.len() as u64 != 3 * n {
             return bad_shape(format!("body '{body}' has {n} points"));
         }
-        let (rows, first) =
-            if b.moving { (n * self.contents.frames, n * frame) } else { (n, 0) };
+        let (rows, first) = if b.moving {
+            (n * self.contents.frames, n * frame)
+        } else {
+            (n, 0)
+        };
         let path = format!("/VTKHDF/{body}/Points");
         let d = self.file.open_dataset(&path, DType::F64, &[rows, 3])?;
         d.read_rows(first, n, DType::F64, bytes_mut(points))

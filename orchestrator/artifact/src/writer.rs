@@ -2,7 +2,7 @@
 
 use crate::contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, NamedValue, On};
 use crate::error::{ArtifactError, ErrorKind, Result, bad_order, bad_shape, bad_value};
-use crate::h5::{DType, Dataset, File, Location, bytes};
+use crate::h5::{DType, Dataset, File, Location, bytes, bytes_mut};
 use crate::mesh::BodyWriter;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -73,7 +73,9 @@ impl ArtifactWriter {
         if self.attributes.is_some() {
             return bad_order("the attributes were written before; write them once, all together");
         }
-        self.attributes = Some(json_object("attributes", json)?.to_string());
+        json_object("attributes", json)?;
+        // Kept as given: what a JSON library makes of it may change with its version.
+        self.attributes = Some(json.to_owned());
         Ok(())
     }
 
@@ -102,7 +104,9 @@ impl ArtifactWriter {
                 shape.len()
             ));
         }
-        let size = shape.iter().try_fold(dtype.size() as u64, |a, n| a.checked_mul(*n));
+        let size = shape
+            .iter()
+            .try_fold(dtype.size() as u64, |a, n| a.checked_mul(*n));
         if size != Some(data.len() as u64) {
             return bad_shape(format!(
                 "the array '{path}' of shape {shape:?} was given {} bytes",
@@ -112,9 +116,15 @@ impl ArtifactWriter {
         check_array(path, dtype, data)?;
         self.make_groups(path)?;
         let file = self.file()?;
-        file.write(&format!("/data/{path}"), dtype, shape, data)?.write_text("unit", unit, false)?;
+        file.write(&format!("/data/{path}"), dtype, shape, data)?
+            .write_text("unit", unit, false)?;
         let (path, unit, shape) = (path.to_owned(), unit.to_owned(), shape.to_vec());
-        self.arrays.push(ArrayInfo { path, dtype, shape, unit });
+        self.arrays.push(ArrayInfo {
+            path,
+            dtype,
+            shape,
+            unit,
+        });
         Ok(())
     }
 
@@ -127,9 +137,15 @@ impl ArtifactWriter {
                 continue;
             }
             if self.arrays.iter().any(|a| a.path == group) {
-                return bad_order(format!("'{group}' is an array; '{path}' cannot lie under it"));
+                return bad_order(format!(
+                    "'{group}' is an array; '{path}' cannot lie under it"
+                ));
             }
-            let full = if end == 0 { "/data".to_owned() } else { format!("/data/{group}") };
+            let full = if end == 0 {
+                "/data".to_owned()
+            } else {
+                format!("/data/{group}")
+            };
             self.file()?.create_group(&full)?;
             self.groups.insert(group.to_owned());
         }
@@ -152,7 +168,9 @@ impl ArtifactWriter {
     ) -> Result<()> {
         check_name("body name", name)?;
         if matches!(name, "Assembly" | "Steps") {
-            return bad_value(format!("a body cannot be named '{name}': VTK uses that name itself"));
+            return bad_value(format!(
+                "a body cannot be named '{name}': VTK uses that name itself"
+            ));
         }
         if self.frame_open || self.frames > 0 {
             return bad_order(format!(
@@ -162,7 +180,11 @@ impl ArtifactWriter {
         if self.bodies.iter().any(|b| b.info.name == name) {
             return bad_order(format!("the body '{name}' was defined before"));
         }
-        let text = if attributes_json.trim().is_empty() { "{}" } else { attributes_json };
+        let text = if attributes_json.trim().is_empty() {
+            "{}"
+        } else {
+            attributes_json
+        };
         let attributes = json_object("body attributes", text)?;
         check_mesh(name, points, k, cells)?;
         let info = BodyInfo {
@@ -217,12 +239,18 @@ impl ArtifactWriter {
         }
         let names = || {
             let names: Vec<&str> = self.bodies.iter().map(|b| b.info.name.as_str()).collect();
-            format!("there is no body '{name}'; defined are: {}", names.join(", "))
+            format!(
+                "there is no body '{name}'; defined are: {}",
+                names.join(", ")
+            )
         };
         let Some(i) = self.bodies.iter().position(|b| b.info.name == name) else {
             return Err(ArtifactError::new(ErrorKind::NotFound, names()));
         };
-        Ok((self.file.as_ref().expect("a body has a file"), &mut self.bodies[i]))
+        Ok((
+            self.file.as_ref().expect("a body has a file"),
+            &mut self.bodies[i],
+        ))
     }
 
     /// Points `[n][3]` (m) of a body in the open frame.
@@ -253,7 +281,17 @@ impl ArtifactWriter {
         let frame = self.frames;
         let (file, body) = self.open_body(body)?;
         let unit = unit.to_owned();
-        body.field(file, frame, FieldInfo { name: name.to_owned(), on, components, unit }, values)
+        body.field(
+            file,
+            frame,
+            FieldInfo {
+                name: name.to_owned(),
+                on,
+                components,
+                unit,
+            },
+            values,
+        )
     }
 
     /// Ends the open frame.
@@ -269,10 +307,13 @@ impl ArtifactWriter {
             body.end_frame(file, self.frames)?;
         }
         if self.times.is_none() {
-            file.create_group("/plyflow")?;
+            file.ensure_group("/plyflow")?;
             self.times = Some(file.growing("/plyflow/times", DType::F64, &[], 64)?);
         }
-        self.times.as_mut().expect("made above").append(bytes(&[self.last_time]))?;
+        self.times
+            .as_mut()
+            .expect("made above")
+            .append(bytes(&[self.last_time]))?;
         self.frames += 1;
         self.frame_open = false;
         Ok(())
@@ -287,7 +328,11 @@ impl ArtifactWriter {
         if self.results.iter().any(|r| r.name == name) {
             return bad_order(format!("the result '{name}' was reported before"));
         }
-        self.results.push(NamedValue { name: name.to_owned(), value, unit: unit.to_owned() });
+        self.results.push(NamedValue {
+            name: name.to_owned(),
+            value,
+            unit: unit.to_owned(),
+        });
         Ok(())
     }
 
@@ -301,7 +346,9 @@ impl ArtifactWriter {
         }
         let mut seen = BTreeSet::new();
         if let Some(twice) = labels.iter().find(|l| !seen.insert(l.as_str())) {
-            return bad_value(format!("two items of the collection have the label '{twice}'"));
+            return bad_value(format!(
+                "two items of the collection have the label '{twice}'"
+            ));
         }
         self.collection = Some(labels);
         Ok(())
@@ -327,7 +374,7 @@ impl ArtifactWriter {
         }
         self.file()?;
         let file = self.file.take().expect("made above");
-        let times = self.read_times(&file)?;
+        let times = self.read_times()?;
         let bodies = std::mem::take(&mut self.bodies);
         if let Some(first) = bodies.first() {
             if !times.is_empty() {
@@ -343,19 +390,22 @@ impl ArtifactWriter {
                 file.soft_link(&path, "/VTKHDF/Steps")?;
             }
         }
-        let mut contents =
-            Contents { bodies: Vec::new(), frames: self.frames, arrays: self.arrays };
+        let mut contents = Contents {
+            bodies: Vec::new(),
+            frames: self.frames,
+            arrays: self.arrays,
+        };
         for body in bodies {
             contents.bodies.push(body.finish(&file, &times)?);
         }
-        let group = if file.exists("/plyflow") {
-            file.open_group("/plyflow")?
-        } else {
-            file.create_group("/plyflow")?
-        };
+        let group = file.ensure_group("/plyflow")?;
         group.write_i64("data_model", &[], &[DATA_MODEL])?;
         group.write_text("kind", &self.kind, false)?;
-        group.write_text("attributes", self.attributes.as_deref().unwrap_or("{}"), false)?;
+        group.write_text(
+            "attributes",
+            self.attributes.as_deref().unwrap_or("{}"),
+            false,
+        )?;
         group.write_text("results", &json(&self.results)?, false)?;
         if let Some(labels) = &self.collection {
             group.write_text("collection", &json(labels)?, false)?;
@@ -370,10 +420,12 @@ impl ArtifactWriter {
         Ok(size.len())
     }
 
-    fn read_times(&mut self, _file: &File) -> Result<Vec<f64>> {
-        let Some(d) = self.times.take() else { return Ok(Vec::new()) };
+    fn read_times(&mut self) -> Result<Vec<f64>> {
+        let Some(d) = self.times.take() else {
+            return Ok(Vec::new());
+        };
         let mut times = vec![0.0; self.frames as usize];
-        d.read_all(DType::F64, crate::h5::bytes_mut(&mut times))?;
+        d.read_all(DType::F64, bytes_mut(&mut times))?;
         Ok(times)
     }
 }
@@ -399,15 +451,22 @@ pub fn check_result(name: &str, value: f64) -> Result<()> {
         return bad_value("a result needs a name");
     }
     if !value.is_finite() {
-        return bad_value(format!("the result '{name}' is {value}; results are finite numbers"));
+        return bad_value(format!(
+            "the result '{name}' is {value}; results are finite numbers"
+        ));
     }
     Ok(())
 }
 
 /// Names go into HDF5 paths and VTK assemblies: a letter or `_`, then letters, digits and `_ - .`
 pub(crate) fn check_name(what: &str, name: &str) -> Result<()> {
-    let first = name.chars().next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
-    let rest = name.chars().all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
+    let first = name
+        .chars()
+        .next()
+        .is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
+    let rest = name
+        .chars()
+        .all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
     if first && rest {
         return Ok(());
     }
@@ -418,13 +477,22 @@ pub(crate) fn check_name(what: &str, name: &str) -> Result<()> {
 
 fn check_mesh(name: &str, points: &[f64], k: u32, cells: &[u32]) -> Result<()> {
     if !matches!(k, 3 | 4) {
-        return bad_shape(format!("body '{name}': {k} nodes per cell; 3 or 4 are allowed"));
+        return bad_shape(format!(
+            "body '{name}': {k} nodes per cell; 3 or 4 are allowed"
+        ));
     }
     if points.len() % 3 != 0 || cells.len() % k as usize != 0 {
-        return bad_shape(format!("body '{name}': points are [n][3] and cells [m][{k}]"));
+        return bad_shape(format!(
+            "body '{name}': points are [n][3] and cells [m][{k}]"
+        ));
     }
     if let Some(i) = points.iter().position(|x| !x.is_finite()) {
-        return bad_value(format!("body '{name}': coordinate {} of point {} is {}", i % 3, i / 3, points[i]));
+        return bad_value(format!(
+            "body '{name}': coordinate {} of point {} is {}",
+            i % 3,
+            i / 3,
+            points[i]
+        ));
     }
     let n = points.len() / 3;
     if let Some(i) = cells.iter().position(|c| *c as usize >= n) {
