@@ -1,1 +1,4 @@
-//! The plugin `rf4`: a four-node rotation-free shell.
+//! The plugin `rf4`: exports [`plyflow_kernels::rf4::Rf4`], where the mechanics stand. They live in a
+//! library of their own so that tests and benches can link several components at once.
+
+plyflow_sdk::export_element!(plyflow_kernels::rf4::Rf4);

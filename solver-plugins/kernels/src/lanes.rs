@@ -5,6 +5,7 @@
 //! fused multiply-add), so all three give the same bits.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
+use core::sync::atomic::{AtomicU8, Ordering};
 
 /// Lanes in one value; batches are a multiple of it.
 pub const WIDTH: usize = 8;
@@ -345,20 +346,40 @@ mod x86 {
     }
 }
 
-/// Instruction set that [`crate::dispatch!`] picks.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// Instruction set that [`crate::dispatch!`] picks, the widest last.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Level {
-    /// AVX-512 F and DQ.
-    Avx512,
+    /// Any machine.
+    Portable,
     /// AVX2.
     Avx2,
-    /// Anything else.
-    Portable,
+    /// AVX-512 F and DQ.
+    Avx512,
 }
 
-/// The best instruction set of this machine (the standard library caches the answer).
+const LEVELS: [Level; 3] = [Level::Portable, Level::Avx2, Level::Avx512];
+/// Index into `LEVELS`; 255 until the machine was asked.
+static LEVEL: AtomicU8 = AtomicU8::new(255);
+
+/// The instruction set in use: the best of this machine, unless [`limit_level`] said less.
 #[inline]
 pub fn level() -> Level {
+    match LEVELS.get(LEVEL.load(Ordering::Relaxed) as usize) {
+        Some(level) => *level,
+        None => limit_level(Level::Avx512),
+    }
+}
+
+/// Uses no wider instruction set than `most` in this process, and returns what is used: for
+/// benches, and for tests that compare the sets.
+#[cold]
+pub fn limit_level(most: Level) -> Level {
+    let level = best_level().min(most);
+    LEVEL.store(level as u8, Ordering::Relaxed);
+    level
+}
+
+fn best_level() -> Level {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {

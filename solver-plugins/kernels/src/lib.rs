@@ -1,4 +1,4 @@
-//! What Plyflow's own component plugins are made of: the element formulations [`m4`],
+//! What Plyflow's own component plugins are made of: the element formulations [`m4`] and [`rf4`],
 //! the materials [`fabric`] and [`marlow`], and the lane arithmetic under them ([`Lanes`],
 //! [`dispatch!`], [`exp`], [`asin`]).
 //!
@@ -12,6 +12,7 @@ mod lanes;
 pub mod m4;
 pub mod marlow;
 pub mod quad;
+pub mod rf4;
 
 pub use functions::{asin, exp, polynomial};
 pub use lanes::*;

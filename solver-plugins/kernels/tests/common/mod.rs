@@ -3,7 +3,7 @@
 
 use plyflow_kernels::{fabric::Fabric, marlow::Marlow};
 use plyflow_sdk::abi::*;
-use plyflow_sdk::{Element, Material, MaterialRef, element_table, material_table};
+use plyflow_sdk::{Element, MaterialRef, element_table, material_table};
 use std::ffi::c_void;
 use std::sync::OnceLock;
 
@@ -38,7 +38,7 @@ pub const FILM: &str = r#"{"uniaxial":{"amplitude":6.364e6,"growth":0.4451,"deca
 
 pub struct Mat(pub MaterialRef);
 
-fn make<M: Material>(table: &'static pf_material_functions, json: &str) -> Result<Mat, String> {
+fn make(table: &'static pf_material_functions, json: &str) -> Result<Mat, String> {
     let mut instance: *mut c_void = std::ptr::null_mut();
     let mut error = pf_error::default();
     let code = unsafe { (table.create)(pf_str::new(json), &raw mut instance, &raw mut error) };
@@ -63,12 +63,12 @@ fn make<M: Material>(table: &'static pf_material_functions, json: &str) -> Resul
 
 pub fn fabric(json: &str) -> Result<Mat, String> {
     static TABLE: OnceLock<pf_material_functions> = OnceLock::new();
-    make::<Fabric>(TABLE.get_or_init(material_table::<Fabric>), json)
+    make(TABLE.get_or_init(material_table::<Fabric>), json)
 }
 
 pub fn film(json: &str) -> Result<Mat, String> {
     static TABLE: OnceLock<pf_material_functions> = OnceLock::new();
-    make::<Marlow>(TABLE.get_or_init(material_table::<Marlow>), json)
+    make(TABLE.get_or_init(material_table::<Marlow>), json)
 }
 
 /// One state of a membrane point, in every lane.
@@ -267,6 +267,30 @@ impl El {
         e
     }
 
+    /// Forces and energies alone, into buffers of the caller.
+    pub fn forces_into(
+        &self,
+        e: &mut Elements,
+        position: &[f64],
+        velocity: &[f64],
+        force: &mut [f64],
+        energy: &mut [f64],
+    ) {
+        let b = pf_element_batch {
+            position: position.as_ptr(),
+            velocity: velocity.as_ptr(),
+            constants: e.constants.as_mut_ptr(),
+            material_history: e.material_history.as_mut_ptr(),
+            force: force.as_mut_ptr(),
+            energy: energy.as_mut_ptr(),
+            ..self.batch(e.lanes)
+        };
+        assert_eq!(
+            unsafe { (self.table.forces)(self.instance, &raw const b) },
+            PF_OK
+        );
+    }
+
     pub fn forces(&self, e: &mut Elements, position: &[[[f64; 3]; 4]]) -> Forces {
         let n = e.lanes;
         let p = rows(position);
@@ -293,6 +317,134 @@ impl El {
             PF_OK
         );
         f
+    }
+}
+
+/// Patches of `lanes` lanes.
+pub struct Patches {
+    pub constants: Vec<f64>,
+    pub history: Vec<f64>,
+    pub stiffness: Vec<f64>,
+    pub lanes: usize,
+    nodes: usize,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct PatchForces {
+    /// `[node][3][lanes]`
+    pub force: Vec<f64>,
+    pub energy: Vec<f64>,
+    pub fields: Vec<f64>,
+    pub stiffness: Vec<f64>,
+}
+
+impl El {
+    fn patch_batch(&self, lanes: usize) -> pf_patch_batch {
+        pf_patch_batch {
+            size: size_of::<pf_patch_batch>() as u64,
+            lanes: lanes as u32,
+            reserved: 0,
+            dt: 1e-6,
+            position: std::ptr::null(),
+            count: std::ptr::null(),
+            area: std::ptr::null(),
+            axis: std::ptr::null(),
+            constants: std::ptr::null_mut(),
+            history: std::ptr::null_mut(),
+            force: std::ptr::null_mut(),
+            energy: std::ptr::null_mut(),
+            fields: std::ptr::null_mut(),
+            stiffness: std::ptr::null_mut(),
+            material: &raw const self.material,
+        }
+    }
+
+    /// `[lane][node][3]`, unused slots on the centre, to `[node][3][lanes]`.
+    pub fn patch_rows(&self, patches: &[Vec<[f64; 3]>]) -> Vec<f64> {
+        let mut out = Vec::new();
+        for i in 0..self.sizes.patch_nodes as usize {
+            for k in 0..3 {
+                out.extend(patches.iter().map(|x| x.get(i).unwrap_or(&x[0])[k]));
+            }
+        }
+        out
+    }
+
+    pub fn initialise_patches(
+        &self,
+        patches: &[Vec<[f64; 3]>],
+        axis: [f64; 3],
+        area: f64,
+    ) -> Patches {
+        let n = patches.len();
+        let nodes = self.sizes.patch_nodes as usize;
+        let position = self.patch_rows(patches);
+        let count: Vec<f64> = patches.iter().map(|x| x.len() as f64).collect();
+        let area = vec![area; n];
+        let axis: Vec<f64> = axis.iter().flat_map(|a| vec![*a; n]).collect();
+        let mut p = Patches {
+            constants: vec![f64::NAN; self.sizes.patch_constants as usize * n],
+            history: vec![0.0; (self.sizes.patch_history as usize + self.bending_history) * n],
+            stiffness: vec![f64::NAN; nodes * n],
+            lanes: n,
+            nodes,
+        };
+        let b = pf_patch_batch {
+            position: position.as_ptr(),
+            count: count.as_ptr(),
+            area: area.as_ptr(),
+            axis: axis.as_ptr(),
+            constants: p.constants.as_mut_ptr(),
+            stiffness: p.stiffness.as_mut_ptr(),
+            ..self.patch_batch(n)
+        };
+        let f = self.table.patch_initialise.unwrap();
+        assert_eq!(unsafe { f(self.instance, &raw const b) }, PF_OK);
+        p
+    }
+
+    pub fn patch_forces(&self, p: &mut Patches, patches: &[Vec<[f64; 3]>]) -> PatchForces {
+        let n = p.lanes;
+        let position = self.patch_rows(patches);
+        let mut f = PatchForces {
+            force: vec![f64::NAN; 3 * p.nodes * n],
+            energy: vec![f64::NAN; n],
+            fields: vec![f64::NAN; self.sizes.patch_fields as usize * n],
+            stiffness: vec![f64::NAN; p.nodes * n],
+        };
+        let b = pf_patch_batch {
+            position: position.as_ptr(),
+            constants: p.constants.as_mut_ptr(),
+            history: p.history.as_mut_ptr(),
+            force: f.force.as_mut_ptr(),
+            energy: f.energy.as_mut_ptr(),
+            fields: f.fields.as_mut_ptr(),
+            stiffness: f.stiffness.as_mut_ptr(),
+            ..self.patch_batch(n)
+        };
+        let call = self.table.patch_forces.unwrap();
+        assert_eq!(unsafe { call(self.instance, &raw const b) }, PF_OK);
+        f
+    }
+
+    /// Forces and energies alone, into buffers of the caller.
+    pub fn patch_forces_into(
+        &self,
+        p: &mut Patches,
+        position: &[f64],
+        force: &mut [f64],
+        energy: &mut [f64],
+    ) {
+        let b = pf_patch_batch {
+            position: position.as_ptr(),
+            constants: p.constants.as_mut_ptr(),
+            history: p.history.as_mut_ptr(),
+            force: force.as_mut_ptr(),
+            energy: energy.as_mut_ptr(),
+            ..self.patch_batch(p.lanes)
+        };
+        let call = self.table.patch_forces.unwrap();
+        assert_eq!(unsafe { call(self.instance, &raw const b) }, PF_OK);
     }
 }
 

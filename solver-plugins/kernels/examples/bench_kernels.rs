@@ -1,0 +1,140 @@
+//! Element-steps per second of one core, through the C tables, on data that a forming run would
+//! have: `cargo run --release -p plyflow-kernels --example bench_kernels`. One JSON row per case.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use common::{El, FILM, Mat, fabric, film, ncf, woven};
+use plyflow_kernels::{Level, limit_level, m4::M4, rf4::Rf4};
+use plyflow_sdk::Element;
+use std::time::Instant;
+
+const LANES: usize = 64;
+/// As many elements as a coarse ply has: the data stay in the second-level cache.
+const BATCHES: usize = 40;
+
+fn main() {
+    for level in [Level::Avx512, Level::Avx2, Level::Portable] {
+        if limit_level(level) == level {
+            cases();
+        }
+    }
+}
+
+fn cases() {
+    let ncf = |form: &str| fabric(&ncf(form, "")).expect("the material is valid");
+    elements::<M4>("m4", "ncf fibre-energy", &ncf("fibre-energy"));
+    elements::<M4>(
+        "m4",
+        "woven fibre-energy",
+        &fabric(&woven("fibre-energy")).expect("valid"),
+    );
+    elements::<M4>("m4", "ncf hypoelastic", &ncf("hypoelastic"));
+    elements::<M4>("m4", "film", &film(FILM).expect("valid"));
+    patches("ncf fibre-energy", &ncf("fibre-energy"));
+}
+
+fn row(element: &str, material: &str, what: &str, rate: f64) {
+    println!(
+        r#"{{"element":"{element}","material":"{material}","part":"{what}","lanes":"{:?}","million_per_second":{:.1}}}"#,
+        plyflow_kernels::level(),
+        rate * 1e-6
+    );
+}
+
+fn best(mut work: impl FnMut(), count: usize) -> f64 {
+    let mut fastest = f64::INFINITY;
+    for _ in 0..15 {
+        let start = Instant::now();
+        for _ in 0..20 {
+            work();
+        }
+        fastest = fastest.min(start.elapsed().as_secs_f64());
+    }
+    (20 * count) as f64 / fastest
+}
+
+fn elements<E: Element>(element: &str, name: &str, material: &Mat) -> f64 {
+    let e = El::new::<E>("{}", material).expect("the element is valid");
+    let mut r = common::Random(7);
+    let mut data = Vec::new();
+    for _ in 0..BATCHES {
+        let quad = |r: &mut common::Random, z: f64| {
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+                .map(|[x, y]: [f64; 2]| [x + 0.1 * r.next(), y + 0.1 * r.next(), z * r.next()])
+                .map(|p| p.map(|c| 0.005 * c))
+        };
+        let reference: Vec<_> = (0..LANES).map(|_| quad(&mut r, 0.0)).collect();
+        let moved: Vec<_> = reference
+            .iter()
+            .map(|q| q.map(|[x, y, z]| [x + 0.2 * y, y * 1.01, z + 5e-4 * r.next()]))
+            .collect();
+        let batch = e.initialise(&reference, &[[0.8, 0.6, 0.0]; LANES]);
+        let (n, f) = (LANES, common::rows(&moved));
+        data.push((
+            batch,
+            f,
+            vec![0.0; 12 * n],
+            vec![0.0; 3 * n],
+            vec![0.0; 12 * n],
+        ));
+    }
+    let rate = best(
+        || {
+            for (batch, position, force, energy, velocity) in &mut data {
+                e.forces_into(batch, position, velocity, force, energy);
+            }
+        },
+        LANES * BATCHES,
+    );
+    row(element, name, "element", rate);
+    rate
+}
+
+/// Patches of a structured mesh, and what elements and patches together make of a shell.
+fn patches(name: &str, material: &Mat) {
+    let e = El::new::<Rf4>("{}", material).expect("the element is valid");
+    let ring = [
+        [0, 0],
+        [1, 0],
+        [1, 1],
+        [0, 1],
+        [-1, 1],
+        [-1, 0],
+        [-1, -1],
+        [0, -1],
+        [1, -1],
+    ];
+    let mut r = common::Random(9);
+    let mut data = Vec::new();
+    for _ in 0..BATCHES {
+        let mut patch = |z: f64| -> Vec<Vec<[f64; 3]>> {
+            (0..LANES)
+                .map(|_| {
+                    ring.map(|[i, j]| [0.005 * i as f64, 0.005 * j as f64, z * r.next()])
+                        .into()
+                })
+                .collect()
+        };
+        let (reference, moved) = (patch(0.0), patch(1e-4));
+        let p = e.initialise_patches(&reference, [0.8, 0.6, 0.0], 2.5e-5);
+        let rows = e.patch_rows(&moved);
+        data.push((p, rows.clone(), rows, vec![0.0; LANES]));
+    }
+    let rate = best(
+        || {
+            for (p, position, force, energy) in &mut data {
+                e.patch_forces_into(p, position, force, energy);
+            }
+        },
+        LANES * BATCHES,
+    );
+    row("rf4", name, "patch", rate);
+    let membrane = elements::<Rf4>("rf4", name, material);
+    row(
+        "rf4",
+        name,
+        "element + patch",
+        1.0 / (1.0 / rate + 1.0 / membrane),
+    );
+}

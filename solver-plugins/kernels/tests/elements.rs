@@ -1,0 +1,704 @@
+//! Element formulations through their C tables: gradients, invariance, exactness, bounds.
+
+mod common;
+use common::*;
+use plyflow_kernels::{Level, limit_level, m4::M4, rf4::Rf4};
+
+type Quad = [[f64; 3]; 4];
+type Patch = Vec<[f64; 3]>;
+
+const SIZE: f64 = 0.005;
+
+fn ply() -> Mat {
+    fabric(&ncf("fibre-energy", "")).unwrap()
+}
+
+/// A distorted flat quadrilateral of about 5 mm.
+fn flat(r: &mut Random, distortion: f64) -> Quad {
+    [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]: [f64; 2]| {
+        [
+            SIZE * (x + distortion * r.next()),
+            SIZE * (y + distortion * r.next()),
+            0.0,
+        ]
+    })
+}
+
+fn rotation(r: &mut Random) -> [[f64; 3]; 3] {
+    let mut q = [r.next(), r.next(), r.next(), r.next()];
+    let l = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    q = q.map(|x| x / l);
+    let [w, x, y, z] = q;
+    [
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+        ],
+        [
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+        ],
+        [
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ],
+    ]
+}
+
+fn turned(m: &[[f64; 3]; 3], x: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| (0..3).map(|j| m[i][j] * x[j]).sum::<f64>() + 0.1 * i as f64)
+}
+
+/// The quad stretched, sheared and warped at random.
+fn deformed(r: &mut Random, q: &Quad, strain: f64, warp: f64) -> Quad {
+    let f: [[f64; 2]; 2] = [
+        [1.0 + strain * r.next(), strain * r.next()],
+        [strain * r.next(), 1.0 + strain * r.next()],
+    ];
+    let m = rotation(r);
+    q.map(|[x, y, _]| {
+        let bump = warp * SIZE;
+        let p = [
+            f[0][0] * x + f[0][1] * y + bump * r.next(),
+            f[1][0] * x + f[1][1] * y + bump * r.next(),
+            bump * r.next(),
+        ];
+        turned(&m, p)
+    })
+}
+
+const AXIS: [f64; 3] = [0.8, 0.6, 0.0];
+
+fn total(f: &Forces, n: usize, lane: usize) -> f64 {
+    (0..3).map(|r| f.energy[r * n + lane]).sum()
+}
+
+#[test]
+fn forces_are_the_gradient_of_the_energies_in_random_states_of_m4() {
+    let mut r = Random(11);
+    for material in [ply(), film(FILM).unwrap()] {
+        let e = El::new::<M4>("{}", &material).unwrap();
+        for _ in 0..20 {
+            let reference: Vec<Quad> = (0..8).map(|_| flat(&mut r, 0.2)).collect();
+            let mut batch = e.initialise(&reference, &[AXIS; 8]);
+            let moved: Vec<Quad> = reference
+                .iter()
+                .map(|q| deformed(&mut r, q, 0.1, 0.1))
+                .collect();
+            let f = e.forces(&mut batch, &moved);
+            for i in 0..4 {
+                for k in 0..3 {
+                    let h = 1e-8;
+                    let mut at = |s: f64| {
+                        let mut x = moved.clone();
+                        x.iter_mut().for_each(|q| q[i][k] += s * h);
+                        e.forces(&mut batch, &x)
+                    };
+                    let (p, q) = (at(1.0), at(-1.0));
+                    for l in 0..8 {
+                        let d = (total(&p, 8, l) - total(&q, 8, l)) / (2.0 * h);
+                        let scale = (0..12).fold(0.0f64, |m, j| m.max(f.force[j * 8 + l].abs()));
+                        let got = f.force[(3 * i + k) * 8 + l];
+                        assert!(
+                            (d - got).abs() < 1e-4 * scale,
+                            "node {i}, {k}: {got} N, dW {d}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_balance_and_rigid_motion_gives_none_in_m4() {
+    let mut r = Random(12);
+    let m = ply();
+    let e = El::new::<M4>("{}", &m).unwrap();
+    let reference: Vec<Quad> = (0..8).map(|_| flat(&mut r, 0.25)).collect();
+    let mut batch = e.initialise(&reference, &[AXIS; 8]);
+    let turn = rotation(&mut r);
+    let rigid: Vec<Quad> = reference
+        .iter()
+        .map(|q| q.map(|x| turned(&turn, x)))
+        .collect();
+    let f = e.forces(&mut batch, &rigid);
+    assert!(f.force.iter().all(|x| x.abs() < 1e-7), "{:?}", f.force);
+    assert!(f.energy.iter().all(|x| x.abs() < 1e-14), "{:?}", f.energy);
+    let moved: Vec<Quad> = reference
+        .iter()
+        .map(|q| deformed(&mut r, q, 0.1, 0.1))
+        .collect();
+    let f = e.forces(&mut batch, &moved);
+    let g = e.forces(
+        &mut batch,
+        &moved
+            .iter()
+            .map(|q| q.map(|x| turned(&turn, x)))
+            .collect::<Vec<_>>(),
+    );
+    for l in 0..8 {
+        for k in 0..3 {
+            let sum: f64 = (0..4).map(|i| f.force[(3 * i + k) * 8 + l]).sum();
+            assert!(sum.abs() < 1e-8, "net force {sum} N");
+            let torque: f64 = (0..4)
+                .map(|i| {
+                    let (a, b) = ((k + 1) % 3, (k + 2) % 3);
+                    moved[l][i][a] * f.force[(3 * i + b) * 8 + l]
+                        - moved[l][i][b] * f.force[(3 * i + a) * 8 + l]
+                })
+                .sum();
+            assert!(torque.abs() < 1e-9, "net moment {torque} N m");
+        }
+        let (a, b) = (total(&f, 8, l), total(&g, 8, l));
+        assert!((a - b).abs() < 1e-9 * a, "energy {a} J, turned {b} J");
+    }
+}
+
+#[test]
+fn patch_of_distorted_elements_carries_a_uniform_strain_exactly() {
+    // 3 x 3 distorted elements under an affine map: inner nodes feel no force, no hourglass energy.
+    let mut r = Random(13);
+    for material in [ply(), film(FILM).unwrap()] {
+        let e = El::new::<M4>("{}", &material).unwrap();
+        let mut node = [[[0.0; 3]; 4]; 4];
+        for (j, row) in node.iter_mut().enumerate() {
+            for (i, x) in row.iter_mut().enumerate() {
+                let inner = (1..3).contains(&i) && (1..3).contains(&j);
+                let d = if inner { 0.25 } else { 0.0 };
+                *x = [
+                    SIZE * (i as f64 + d * r.next()),
+                    SIZE * (j as f64 + d * r.next()),
+                    0.0,
+                ];
+            }
+        }
+        let ids: Vec<[[usize; 2]; 4]> = (0..9)
+            .map(|c| {
+                let (i, j) = (c % 3, c / 3);
+                [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]]
+            })
+            .collect();
+        let quads = |f: &dyn Fn([f64; 3]) -> [f64; 3]| -> Vec<Quad> {
+            (0..16)
+                .map(|l| ids[l.min(8)].map(|[i, j]| f(node[j][i])))
+                .collect()
+        };
+        let mut batch = e.initialise(&quads(&|x| x), &[AXIS; 16]);
+        let f = e.forces(
+            &mut batch,
+            &quads(&|[x, y, _]| [1.03 * x + 0.08 * y, 0.05 * x + 0.98 * y, 0.1 * x - 0.2 * y]),
+        );
+        let mut sum = [[[0.0; 3]; 4]; 4];
+        let mut largest = 0.0f64;
+        for l in 0..9 {
+            for (i, [a, b]) in ids[l].iter().enumerate() {
+                for k in 0..3 {
+                    let x = f.force[(3 * i + k) * 16 + l];
+                    sum[*b][*a][k] += x;
+                    largest = largest.max(x.abs());
+                }
+            }
+            assert!(
+                f.energy[2 * 16 + l].abs() < 1e-18,
+                "hourglass energy {}",
+                f.energy[32 + l]
+            );
+        }
+        for row in &sum[1..3] {
+            for x in &row[1..3] {
+                assert!(
+                    x.iter().all(|c| c.abs() < 1e-10 * largest),
+                    "{x:?} of {largest} N"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn picture_frame_of_one_element_needs_the_measured_force() {
+    // Fibres along the sides: the work of the nodal forces over the angle is F_norm cos g per area.
+    let m = fabric(&woven("fibre-energy")).unwrap();
+    let e = El::new::<M4>("{}", &m).unwrap();
+    let square = [
+        [0.0, 0.0, 0.0],
+        [SIZE, 0.0, 0.0],
+        [SIZE, SIZE, 0.0],
+        [0.0, SIZE, 0.0],
+    ];
+    let mut batch = e.initialise(&[square; 8], &[[1.0, 0.0, 0.0]; 8]);
+    for (degrees, want) in [(8.0f64, 1.78), (50.0, 8.33), (60.0, 23.4), (-50.0, -8.33)] {
+        let g = degrees.to_radians();
+        let d = [SIZE * g.sin(), SIZE * g.cos(), 0.0];
+        let x = [[0.0; 3], square[1], [SIZE + d[0], d[1], 0.0], d];
+        let f = e.forces(&mut batch, &[x; 8]);
+        // d(position)/dg of nodes 3 and 4.
+        let (dx, dy) = (SIZE * g.cos(), -SIZE * g.sin());
+        let work: f64 = [2, 3]
+            .iter()
+            .map(|i| f.force[3 * i * 8] * dx + f.force[(3 * i + 1) * 8] * dy)
+            .sum();
+        let normalised = work / (SIZE * SIZE * g.cos());
+        assert!(
+            (normalised - want).abs() < 0.003 * f64::abs(want),
+            "{degrees}: {normalised} N/m"
+        );
+        assert!((f.fields[0] - g).abs() < 1e-12);
+    }
+}
+
+/// Largest frequency (1/s) of an element with its masses, by differences and power iteration.
+fn exact_frequency(e: &El, batch: &mut Elements, x: &Quad, mass: f64) -> f64 {
+    let h = 1e-9;
+    let mut k = [[0.0; 12]; 12];
+    for c in 0..12 {
+        let mut at = |s: f64| {
+            let mut y = *x;
+            y[c / 3][c % 3] += s * h;
+            e.forces(batch, &[y; 8]).force
+        };
+        let (p, q) = (at(1.0), at(-1.0));
+        for (row, i) in k.iter_mut().zip(0..) {
+            row[c] = (p[i * 8] - q[i * 8]) / (2.0 * h);
+        }
+    }
+    let shift: f64 = 0.2 * k.iter().flatten().map(|x| x.abs()).sum::<f64>();
+    let mut v: [f64; 12] = std::array::from_fn(|i| 1.0 + 0.1 * (i * i % 7) as f64);
+    let mut value = 0.0;
+    for _ in 0..3000 {
+        let w: [f64; 12] = std::array::from_fn(|i| {
+            (0..12)
+                .map(|j| 0.5 * (k[i][j] + k[j][i]) * v[j])
+                .sum::<f64>()
+                + shift * v[i]
+        });
+        value = w.iter().map(|x| x * x).sum::<f64>().sqrt();
+        v = w.map(|x| x / value);
+    }
+    ((value - shift) / mass).sqrt()
+}
+
+#[test]
+fn critical_step_bounds_the_exact_one_on_random_stretched_and_skewed_elements() {
+    let mut r = Random(14);
+    let mut slack: Vec<f64> = Vec::new();
+    for (material, strain) in [(ply(), 0.3), (film(FILM).unwrap(), 0.6)] {
+        let e = El::new::<M4>("{}", &material).unwrap();
+        for _ in 0..40 {
+            let mut q = flat(&mut r, 0.25);
+            // Up to 1:4, and sheared by up to 30 degrees.
+            let (long, skew) = (1.0 + 3.0 * r.next().abs(), 0.57 * r.next());
+            q.iter_mut()
+                .for_each(|x| *x = [long * x[0] + skew * x[1], x[1], 0.0]);
+            let mut batch = e.initialise(&[q; 8], &[AXIS; 8]);
+            let x = deformed(&mut r, &q, strain, 0.05);
+            let f = e.forces(&mut batch, &[x; 8]);
+            let mass = batch.mass[0];
+            let exact = 2.0 / exact_frequency(&e, &mut batch, &x, mass);
+            assert!(
+                f.step[0] <= 1.0001 * exact,
+                "step {} s, exact {exact} s",
+                f.step[0]
+            );
+            slack.push(f.step[0] / exact);
+        }
+    }
+    let mean = slack.iter().sum::<f64>() / slack.len() as f64;
+    assert!(
+        mean > 0.4,
+        "the bound gives away too much: {mean} of the exact step"
+    );
+}
+
+#[test]
+fn critical_step_is_nearly_exact_for_an_undeformed_square() {
+    let m = ply();
+    let e = El::new::<M4>("{}", &m).unwrap();
+    let q = [
+        [0.0, 0.0, 0.0],
+        [SIZE, 0.0, 0.0],
+        [SIZE, SIZE, 0.0],
+        [0.0, SIZE, 0.0],
+    ];
+    let mut batch = e.initialise(&[q; 8], &[[1.0, 0.0, 0.0]; 8]);
+    let mass = batch.mass[0];
+    let exact = 2.0 / exact_frequency(&e, &mut batch, &q, mass);
+    let step = batch.step[0];
+    assert!(
+        step <= exact * 1.0001 && step > 0.95 * exact,
+        "{step} s, exact {exact} s"
+    );
+    assert!((4.0 * mass - 0.44 * SIZE * SIZE).abs() < 1e-15);
+}
+
+#[test]
+fn a_lane_does_not_depend_on_its_neighbours_nor_on_the_batch() {
+    let mut r = Random(15);
+    let m = ply();
+    let e = El::new::<M4>("{}", &m).unwrap();
+    let reference: Vec<Quad> = (0..64).map(|_| flat(&mut r, 0.2)).collect();
+    let moved: Vec<Quad> = reference
+        .iter()
+        .map(|q| deformed(&mut r, q, 0.3, 0.1))
+        .collect();
+    let mut all = e.initialise(&reference, &[AXIS; 64]);
+    let whole = e.forces(&mut all, &moved);
+    for cut in [8, 16, 24] {
+        for start in (0..=64 - cut).step_by(cut) {
+            // Also in another order of lanes.
+            let take =
+                |v: &[Quad]| -> Vec<Quad> { v[start..start + cut].iter().rev().copied().collect() };
+            let mut part = e.initialise(&take(&reference), &vec![AXIS; cut]);
+            let f = e.forces(&mut part, &take(&moved));
+            for l in 0..cut {
+                let from = start + cut - 1 - l;
+                for row in 0..12 {
+                    assert_eq!(
+                        f.force[row * cut + l].to_bits(),
+                        whole.force[row * 64 + from].to_bits()
+                    );
+                }
+                assert_eq!(f.step[l].to_bits(), whole.step[from].to_bits());
+            }
+        }
+    }
+}
+
+/// A 3 x 3 patch, centre first, distorted in the plane.
+fn grid(r: &mut Random, distortion: f64) -> Patch {
+    let ring = [
+        [1, 0],
+        [1, 1],
+        [0, 1],
+        [-1, 1],
+        [-1, 0],
+        [-1, -1],
+        [0, -1],
+        [1, -1],
+    ];
+    let mut x = vec![[0.0; 3]];
+    x.extend(ring.map(|[i, j]: [i32; 2]| {
+        [
+            SIZE * (i as f64 + distortion * r.next()),
+            SIZE * (j as f64 + distortion * r.next()),
+            0.0,
+        ]
+    }));
+    x
+}
+
+fn wavy(r: &mut Random, p: &Patch) -> Patch {
+    let m = rotation(r);
+    let k = [30.0 * r.next(), 30.0 * r.next(), 30.0 * r.next()];
+    let shear = 0.4 * r.next();
+    p.iter()
+        .map(|[x, y, _]| {
+            let z = 0.5 * k[0] * x * x + 0.5 * k[1] * y * y + k[2] * x * y + 0.02 * SIZE * r.next();
+            turned(&m, [x + shear * y, *y, z + 0.3 * x])
+        })
+        .collect()
+}
+
+#[test]
+fn bending_forces_are_the_gradient_of_the_bending_energy() {
+    let mut r = Random(21);
+    let m = ply();
+    let e = El::new::<Rf4>("{}", &m).unwrap();
+    for round in 0..10 {
+        // Full patches, and ones of 7 and 5 nodes.
+        let cut = [9, 7, 5][round % 3];
+        let reference: Vec<Patch> = (0..8).map(|_| grid(&mut r, 0.2)[..cut].to_vec()).collect();
+        let mut p = e.initialise_patches(&reference, AXIS, SIZE * SIZE);
+        let moved: Vec<Patch> = reference.iter().map(|x| wavy(&mut r, x)).collect();
+        let f = e.patch_forces(&mut p, &moved);
+        assert!(f.energy.iter().all(|w| *w > 0.0));
+        for i in 0..cut {
+            for k in 0..3 {
+                let h = 1e-8;
+                let mut at = |s: f64| {
+                    let mut x = moved.clone();
+                    x.iter_mut().for_each(|q| q[i][k] += s * h);
+                    e.patch_forces(&mut p, &x).energy
+                };
+                let (a, b) = (at(1.0), at(-1.0));
+                for l in 0..8 {
+                    let d = (a[l] - b[l]) / (2.0 * h);
+                    let scale = (0..36).fold(0.0f64, |m, j| m.max(f.force[j * 8 + l].abs()));
+                    let got = f.force[(3 * i + k) * 8 + l];
+                    assert!(
+                        (d - got).abs() < 2e-5 * scale,
+                        "node {i}: {got} N, dW {d} of {scale}"
+                    );
+                }
+            }
+        }
+        assert!(
+            f.force[3 * cut * 8..].iter().all(|x| *x == 0.0),
+            "unused slots carry force"
+        );
+    }
+}
+
+#[test]
+fn quadratic_surfaces_give_their_curvature_exactly_on_distorted_patches() {
+    let mut r = Random(22);
+    let m = ply();
+    let e = El::new::<Rf4>("{}", &m).unwrap();
+    let (c, s) = (AXIS[0], AXIS[1]);
+    for _ in 0..20 {
+        let reference: Vec<Patch> = (0..8).map(|_| grid(&mut r, 0.25)).collect();
+        let mut p = e.initialise_patches(&reference, AXIS, SIZE * SIZE);
+        let k = [40.0 * r.next(), 40.0 * r.next(), 40.0 * r.next()];
+        let moved: Vec<Patch> = reference
+            .iter()
+            .map(|x| {
+                x.iter()
+                    .map(|[x, y, _]| {
+                        let (u, v) = (c * x + s * y, c * y - s * x);
+                        [
+                            *x,
+                            *y,
+                            0.5 * k[0] * u * u + 0.5 * k[1] * v * v + k[2] * u * v,
+                        ]
+                    })
+                    .collect()
+            })
+            .collect();
+        let f = e.patch_forces(&mut p, &moved);
+        for l in 0..8 {
+            for a in 0..2 {
+                let got = f.fields[a * 8 + l];
+                assert!(
+                    (got - k[a]).abs() < 1e-7,
+                    "curvature_{} {got}, not {}",
+                    a + 1,
+                    k[a]
+                );
+            }
+        }
+        let want = SIZE * SIZE * bend(&m, [1.0, 1.0, 0.0], k).energy;
+        assert!(
+            f.energy.iter().all(|w| (w - want).abs() < 1e-6 * want),
+            "{:?}, {want}",
+            f.energy
+        );
+    }
+}
+
+#[test]
+fn pure_bending_of_a_strip_returns_the_voce_moment_for_each_family_and_sign() {
+    // Rolled on a cylinder along a fibre family; moment = virtual work of the nodal forces over the
+    // curvature, per area.
+    let m = ply();
+    let e = El::new::<Rf4>("{}", &m).unwrap();
+    let voce = |k: f64, [a, b, c]: [f64; 3]| a * k + b * (1.0 - (-k / c).exp());
+    let (plus, minus) = ([1.9457e-4, 0.03139, 4.0], [1.0279e-4, 0.03619, 6.5]);
+    // 2 mm, as the thesis' coupons.
+    let two: Patch = grid(&mut Random(1), 0.0)
+        .iter()
+        .map(|x| x.map(|c| 0.4 * c))
+        .collect();
+    let reference = vec![two; 8];
+    for (axis, family) in [([1.0, 0.0, 0.0], 1), ([0.0, 1.0, 0.0], 2)] {
+        let mut p = e.initialise_patches(&reference, axis, SIZE * SIZE);
+        for k in [2.0, 10.0, 25.0, 50.0, -2.0, -10.0, -25.0, -50.0f64] {
+            let rolled = |k: f64| -> Vec<Patch> {
+                let roll = |[x, y, _]: [f64; 3]| [(k * x).sin() / k, y, (1.0 - (k * x).cos()) / k];
+                vec![reference[0].iter().map(|x| roll(*x)).collect(); 8]
+            };
+            let f = e.patch_forces(&mut p, &rolled(k)).force;
+            let h = 1e-4;
+            let (a, b) = (&rolled(k + h)[0], &rolled(k - h)[0]);
+            let work: f64 = (0..9)
+                .flat_map(|i| (0..3).map(move |c| (i, c)))
+                .map(|(i, c)| f[(3 * i + c) * 8] * (a[i][c] - b[i][c]) / (2.0 * h))
+                .sum();
+            let moment = work / (SIZE * SIZE);
+            let law = if (k > 0.0) == (family == 1) {
+                plus
+            } else {
+                minus
+            };
+            let want = voce(k.abs(), law).copysign(k);
+            // At 50 1/m an element turns by 0.1 rad: its work over the roll is 0.3 % short.
+            assert!(
+                (moment - want).abs() < 0.004 * want.abs(),
+                "{family}, {k}: {moment}, {want}"
+            );
+        }
+    }
+}
+
+#[test]
+fn flat_and_rigidly_turned_patches_carry_no_force() {
+    let mut r = Random(23);
+    let m = ply();
+    let e = El::new::<Rf4>("{}", &m).unwrap();
+    let reference: Vec<Patch> = (0..8).map(|_| grid(&mut r, 0.25)).collect();
+    let mut p = e.initialise_patches(&reference, AXIS, SIZE * SIZE);
+    let turn = rotation(&mut r);
+    let stretched: Vec<Patch> = reference
+        .iter()
+        .map(|q| {
+            q.iter()
+                .map(|[x, y, _]| turned(&turn, [1.02 * x + 0.3 * y, *y, 0.0]))
+                .collect()
+        })
+        .collect();
+    let f = e.patch_forces(&mut p, &stretched);
+    assert!(f.force.iter().all(|x| x.abs() < 1e-9), "{:?}", f.force);
+    let moved: Vec<Patch> = reference.iter().map(|x| wavy(&mut r, x)).collect();
+    let f = e.patch_forces(&mut p, &moved);
+    for l in 0..8 {
+        for k in 0..3 {
+            let sum: f64 = (0..12).map(|i| f.force[(3 * i + k) * 8 + l]).sum();
+            assert!(sum.abs() < 1e-12, "net force {sum} N");
+            let (a, b) = ((k + 1) % 3, (k + 2) % 3);
+            let torque: f64 = (0..9)
+                .map(|i| {
+                    moved[l][i][a] * f.force[(3 * i + b) * 8 + l]
+                        - moved[l][i][b] * f.force[(3 * i + a) * 8 + l]
+                })
+                .sum();
+            assert!(torque.abs() < 1e-12, "net moment {torque} N m");
+        }
+    }
+}
+
+#[test]
+fn patch_stiffness_bounds_the_rows_of_the_exact_one() {
+    let mut r = Random(24);
+    let m = ply();
+    let e = El::new::<Rf4>("{}", &m).unwrap();
+    for _ in 0..10 {
+        let reference: Vec<Patch> = vec![grid(&mut r, 0.2); 8];
+        let mut p = e.initialise_patches(&reference, AXIS, SIZE * SIZE);
+        let moved: Vec<Patch> = vec![wavy(&mut r, &reference[0]); 8];
+        let f = e.patch_forces(&mut p, &moved);
+        let h = 1e-8;
+        // Blocks K_IJ by differences; their Frobenius norm bounds the spectral one by sqrt(3), so
+        // the row sums of Frobenius norms may exceed the bound by that at most.
+        let mut rows = [0.0; 9];
+        for j in 0..9 {
+            let mut block = [0.0f64; 9];
+            for c in 0..3 {
+                let mut at = |s: f64| {
+                    let mut x = moved.clone();
+                    x.iter_mut().for_each(|q| q[j][c] += s * h);
+                    e.patch_forces(&mut p, &x).force
+                };
+                let (a, b) = (at(1.0), at(-1.0));
+                for i in 0..9 {
+                    for k in 0..3 {
+                        let d = (a[(3 * i + k) * 8] - b[(3 * i + k) * 8]) / (2.0 * h);
+                        block[i] += d * d;
+                    }
+                }
+            }
+            (0..9).for_each(|i| rows[i] += block[i].sqrt());
+        }
+        for i in 0..9 {
+            let bound = f.stiffness[i * 8];
+            assert!(
+                bound * 3f64.sqrt() > rows[i],
+                "node {i}: bound {bound}, exact {}",
+                rows[i]
+            );
+            assert!(
+                bound < 20.0 * rows[i],
+                "node {i}: bound {bound} is useless, {}",
+                rows[i]
+            );
+        }
+    }
+}
+
+#[test]
+fn extreme_positions_give_finite_forces() {
+    let m = ply();
+    let e = El::new::<Rf4>("{}", &m).unwrap();
+    let q = flat(&mut Random(3), 0.1);
+    let mut batch = e.initialise(&[q; 8], &[AXIS; 8]);
+    let mut p = e.initialise_patches(&vec![grid(&mut Random(3), 0.1); 8], AXIS, 1e-5);
+    let patch = grid(&mut Random(3), 0.1);
+    for scale in [0.0, 1e-9, 1e3] {
+        let f = e.forces(&mut batch, &[q.map(|x| x.map(|c| c * scale)); 8]);
+        assert!(
+            f.force.iter().chain(&f.energy).all(|x| x.is_finite()),
+            "scale {scale}: {f:?}"
+        );
+        assert!(f.step.iter().all(|x| *x >= 0.0), "{:?}", f.step);
+        let x = vec![
+            patch
+                .iter()
+                .map(|x| x.map(|c| c * scale))
+                .collect::<Patch>();
+            8
+        ];
+        let f = e.patch_forces(&mut p, &x);
+        assert!(
+            f.force.iter().chain(&f.energy).all(|x| x.is_finite()),
+            "scale {scale}: {f:?}"
+        );
+    }
+    // Folded flat: all nodes on a line.
+    let line = q.map(|x| [x[0], 0.0, 0.0]);
+    let f = e.forces(&mut batch, &[line; 8]);
+    assert!(
+        f.force.iter().chain(&f.energy).all(|x| x.is_finite()),
+        "{f:?}"
+    );
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    let run = |level: Level| {
+        limit_level(level);
+        let mut bits: Vec<u64> = Vec::new();
+        let mut r = Random(31);
+        for m in [
+            ply(),
+            fabric(&ncf("hypoelastic", "")).unwrap(),
+            film(FILM).unwrap(),
+        ] {
+            let e = El::new::<Rf4>("{}", &m).unwrap();
+            let reference: Vec<Quad> = (0..24).map(|_| flat(&mut r, 0.2)).collect();
+            let mut batch = e.initialise(&reference, &[AXIS; 24]);
+            let patches: Vec<Patch> = (0..24).map(|_| grid(&mut r, 0.2)).collect();
+            let mut p = e.initialise_patches(&patches, AXIS, 1e-5);
+            for _ in 0..5 {
+                let moved: Vec<Quad> = reference
+                    .iter()
+                    .map(|q| deformed(&mut r, q, 0.4, 0.1))
+                    .collect();
+                let f = e.forces(&mut batch, &moved);
+                let bent: Vec<Patch> = patches.iter().map(|x| wavy(&mut r, x)).collect();
+                let g = e.patch_forces(&mut p, &bent);
+                for v in [f.force, f.energy, f.step, g.force, g.energy, g.stiffness] {
+                    bits.extend(v.iter().map(|x| x.to_bits()));
+                }
+            }
+        }
+        bits
+    };
+    let (wide, half, plain) = (run(Level::Avx512), run(Level::Avx2), run(Level::Portable));
+    limit_level(Level::Avx512);
+    assert!(wide == half && half == plain, "instruction sets differ");
+}
+
+#[test]
+fn wrong_element_parameters_are_refused_with_the_reason() {
+    let m = ply();
+    for (json, word) in [
+        (r#"{"hourglas":1}"#, "hourglas"),
+        (r#"{"hourglass":-1}"#, "hourglass"),
+        (r#"{"hourglass_floor":"3000 N/m"}"#, "m4"),
+    ] {
+        let text = El::new::<M4>(json, &m).err().unwrap();
+        assert!(text.contains(word), "'{text}' does not name '{word}'");
+    }
+}
