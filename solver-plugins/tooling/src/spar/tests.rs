@@ -1,6 +1,7 @@
 use super::*;
 use crate::sweep::Sweep;
 use crate::vector::{V3, add, cross, dot, scale, sub, unit};
+use plyflow_model::scene::{Scene, Tool};
 use plyflow_model::units::{Angle, Length};
 
 const MM: f64 = 1e-3;
@@ -11,26 +12,15 @@ fn mm(v: f64) -> Length {
 
 /// The spar of `workflows/joggle-spar`.
 pub(crate) fn demo() -> JoggleSpar {
-    let joggle = |start: f64, rise: f64, skew: f64, sides: [f64; 2]| Joggle {
-        start: mm(start),
-        length: mm(30.0),
-        rise: mm(rise),
-        skew: Angle(skew.to_radians()),
-        side_step: sides.map(mm),
-        fillet: mm(14.0),
-    };
-    JoggleSpar {
-        length: mm(620.0),
-        top_width: mm(130.0),
-        height: mm(100.0),
-        draft: Angle(8f64.to_radians()),
-        fillet: mm(14.0),
-        corner: Some(mm(40.0)),
-        joggles: vec![
-            joggle(-115.0, 10.0, 20.0, [6.0, 0.0]),
-            joggle(75.0, -10.0, 15.0, [0.0, 6.0]),
-        ],
-        facet_size: mm(8.0),
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../workflows/joggle-spar/scene.yaml"
+    );
+    let text = std::fs::read_to_string(path).unwrap();
+    let scene: Scene = serde_saphyr::from_str(&text).unwrap();
+    match scene.tool {
+        Tool::JoggleSpar(spar) => spar,
+        other => panic!("not a joggle spar: {other:?}"),
     }
 }
 
@@ -146,9 +136,9 @@ fn top_rises_by_each_joggle_and_walls_step_outwards() {
     let sweep = spar_sweep(&demo()).unwrap();
     let z = |x: f64, y: f64| sweep.deform([x * MM, y * MM, sweep.height])[2] / MM;
     for y in [-50.0, 0.0, 50.0] {
-        assert!((z(-200.0, y) - 100.0).abs() < 1e-9);
-        assert!((z(0.0, y) - 110.0).abs() < 1e-9);
-        assert!((z(200.0, y) - 100.0).abs() < 1e-9);
+        assert!((z(-200.0, y) - 110.0).abs() < 1e-9);
+        assert!((z(0.0, y) - 120.0).abs() < 1e-9);
+        assert!((z(200.0, y) - 110.0).abs() < 1e-9);
     }
     // The ramp starts later at y > 0: asymmetric about the width.
     assert!(z(-100.0, -50.0) > z(-100.0, 50.0) + 4.0);
@@ -174,7 +164,7 @@ fn spar_is_closed_stands_on_the_bed_and_has_the_stated_length() {
     assert!(mesh.is_watertight());
     let [lo, hi] = mesh.bounds();
     assert!(
-        lo[2].abs() < 1e-12 && (hi[2] - 0.110).abs() < 1e-9,
+        lo[2].abs() < 1e-12 && (hi[2] - 0.120).abs() < 1e-9,
         "{lo:?} {hi:?}"
     );
     assert!(
@@ -189,7 +179,7 @@ fn spar_is_closed_stands_on_the_bed_and_has_the_stated_length() {
     // Between the boxes of the narrowest and the widest section.
     let volume = mesh.volume();
     assert!(
-        volume > 0.55 * 0.130 * 0.100 && volume < 0.62 * 0.170 * 0.110,
+        volume > 0.55 * 0.130 * 0.110 && volume < 0.62 * 0.176 * 0.120,
         "{volume}"
     );
     let up = (0..mesh.triangles.len()).all(|t| {
