@@ -102,15 +102,7 @@ impl<'a> Checker<'a> {
         View(maps)
     }
 
-    fn optional(&self, schema: &View<'a>) -> bool {
-        schema.takes("null")
-            || matches!(schema.get("anyOf"), Some(Value::Array(b)) if b.iter().any(|b| b["type"] == "null"))
-    }
-
     fn value(&mut self, node: &Node, schema: &View<'a>, what: &str, key: &Span) {
-        if node.kind == Kind::Null && self.optional(schema) {
-            return;
-        }
         let schema = &self.choose(schema.clone(), node);
         if let Some(dimension) = schema.text("x-dimension") {
             self.quantity(node, schema, dimension, what, key);
@@ -357,7 +349,16 @@ impl<'a> Checker<'a> {
             _ => Vec::new(),
         };
         let other = schema.get("additionalProperties");
+        let required: Vec<&str> = match schema.get("required") {
+            Some(Value::Array(names)) => names.iter().filter_map(Value::as_str).collect(),
+            _ => Vec::new(),
+        };
         for entry in node.entries() {
+            let named = properties.iter().any(|p| p.0 == entry.key);
+            // `with:` with nothing behind it is as good as no `with`.
+            if named && entry.value.kind == Kind::Null && !required.contains(&entry.key.as_str()) {
+                continue;
+            }
             let known = properties.iter().find(|p| p.0 == entry.key).map(|p| p.1);
             match (known, other) {
                 (Some(schema), _) | (None, Some(schema @ Value::Object(_))) => {
@@ -375,8 +376,7 @@ impl<'a> Checker<'a> {
                 _ => {}
             }
         }
-        let required = schema.get("required").and_then(Value::as_array);
-        for name in required.into_iter().flatten().filter_map(Value::as_str) {
+        for name in required {
             if node.entry(name).is_none() {
                 let d =
                     self.problems

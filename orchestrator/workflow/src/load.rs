@@ -236,7 +236,8 @@ fn resources(node: Option<&Node>) -> Resources {
         .and_then(Node::text)
         .and_then(|t| parse_quantity(t, Dimension::Time).ok());
     Resources {
-        cores: get("cores").and_then(whole).unwrap_or(1),
+        // 0: not stated, the engine deals out what is free.
+        cores: get("cores").and_then(whole).unwrap_or(0),
         // 0: not stated.
         memory: memory.map_or(0, |m| m.0),
         time_limit: time_limit.unwrap_or(0.0),

@@ -51,7 +51,7 @@ pub struct Dimension {
 /// What a step may use.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Resources {
-    /// Cores; the engine gives the step this many threads.
+    /// Cores; the engine gives the step this many threads. 0: not stated, it gets a share of what is free.
     pub cores: u32,
     /// Bytes.
     pub memory: u64,

@@ -4,7 +4,7 @@ use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
 use crate::parameters::{Place, Resolver, absolute, unreadable};
 use crate::yaml::{Kind, Node, Span};
-use camino::Utf8PathBuf;
+use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::manifest::PluginKind;
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_model::{material::Material, scene::Scene, schema};
@@ -36,7 +36,7 @@ pub fn read(
 /// Parses the bytes of a file.
 pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Option<(Source, Node)> {
     let Ok(text) = String::from_utf8(bytes) else {
-        problems.add_unreadable(&path, "the file is not text in UTF-8".into());
+        problems.add_unreadable(&shown(&path), "the file is not text in UTF-8".into());
         return None;
     };
     let folder = path
@@ -62,6 +62,15 @@ pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Opti
             None
         }
     }
+}
+
+/// The path as messages show it: relative when it lies below the current folder.
+fn shown(path: &Utf8Path) -> Utf8PathBuf {
+    let here = std::env::current_dir()
+        .ok()
+        .and_then(|d| Utf8PathBuf::from_path_buf(d).ok());
+    here.and_then(|here| path.strip_prefix(here).ok().map(Utf8Path::to_owned))
+        .unwrap_or_else(|| path.to_owned())
 }
 
 /// Resolves a parameter of type `scene`.

@@ -96,7 +96,7 @@ impl Node {
         }
     }
 
-    /// Without places.
+    /// Without places; keys without a value are left out, as if they were not there.
     pub fn to_json(&self) -> Value {
         match &self.kind {
             Kind::Null => Value::Null,
@@ -107,6 +107,7 @@ impl Node {
             Kind::Map(entries) => Value::Object(
                 entries
                     .iter()
+                    .filter(|e| e.value.kind != Kind::Null)
                     .map(|e| (e.key.clone(), e.value.to_json()))
                     .collect::<Map<String, Value>>(),
             ),
@@ -172,10 +173,14 @@ pub fn parse(text: &str) -> Result<Node, SyntaxError> {
         if let Some(i) = message.rfind(" at line ") {
             message.truncate(i);
         }
-        SyntaxError {
-            message,
-            span: e.location().map_or(0..0, |l| span(text, &l)),
+        let mut span = e.location().map_or(0..0, |l| span(text, &l));
+        // The library points at the scalar before a forbidden tab, which may be lines above it.
+        if message.contains("found a tab")
+            && let Some(i) = text[span.start..].find('\t')
+        {
+            span = span.start + i..span.start + i + 1;
         }
+        SyntaxError { message, span }
     })?;
     Ok(raw.locate(text))
 }

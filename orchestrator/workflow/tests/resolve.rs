@@ -1,0 +1,309 @@
+//! What a sound workflow resolves to.
+
+mod common;
+
+use common::{Study, step};
+use plyflow_workflow::resolved::{Dimension, ResolvedInput, ResolvedWorkflow};
+use serde_json::json;
+
+fn sound() -> (Study, ResolvedWorkflow) {
+    let study = Study::sound();
+    let workflow = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    (study, workflow)
+}
+
+#[test]
+fn the_main_workflow_is_resolved_in_topological_order() {
+    let (study, w) = sound();
+    let names: Vec<&str> = w.steps.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "coarse",
+            "defects",
+            "zones",
+            "boundary",
+            "local",
+            "comparison"
+        ]
+    );
+    assert_eq!(w.file, study.path("workflow.yaml"));
+    assert_eq!(w.name, "joggle-spar");
+    let coarse = step(&w, "coarse");
+    assert_eq!(coarse.resources.cores, 2);
+    assert_eq!(coarse.resources.memory, 4 << 30);
+    assert_eq!(coarse.resources.time_limit, 1800.0);
+    assert_eq!((coarse.retries, step(&w, "zones").retries), (1, 0));
+    assert!(step(&w, "zones").collection);
+}
+
+#[test]
+fn parameters_are_si_with_defaults_and_components_with_theirs() {
+    let (_study, w) = sound();
+    let p = &step(&w, "coarse").parameters;
+    assert_eq!(p["element_size"], json!(0.008));
+    assert_eq!(
+        p["element"],
+        json!({"plugin": "m4", "with": {"hourglass": 0.05}})
+    );
+    assert_eq!(p["write_curvature"], json!(false));
+    assert!(
+        p.get("label").is_none(),
+        "neither given nor with a default: absent"
+    );
+    assert_eq!(
+        step(&w, "defects").parameters["over_shear_positive"],
+        json!(8f64.to_radians())
+    );
+    let names: Vec<&str> = step(&w, "coarse")
+        .components
+        .iter()
+        .map(|c| c.name.as_str())
+        .collect();
+    assert_eq!(names, ["m4", "material-marlow", "material-fabric"]);
+}
+
+#[test]
+fn a_scene_has_its_materials_inside_and_reads_back_as_its_type() {
+    let (_study, w) = sound();
+    let scene = &step(&w, "coarse").parameters["scene"];
+    let ply = &scene["sheets"][1];
+    assert_eq!(
+        ply["material"]["with"],
+        json!({"fibre_modulus": 3e9, "shear": 112.19})
+    );
+    assert_eq!(ply["material"]["thickness"], json!("0.0004 m"));
+    assert_eq!(ply["length"], json!("0.48 m"));
+    assert!(
+        ply["material"].get("source").is_none(),
+        "prose does not enter"
+    );
+    let typed: plyflow_model::scene::Scene = serde_json::from_value(scene.clone()).unwrap();
+    assert_eq!(typed.friction.tool_diaphragm.0, 0.51);
+    assert_eq!(serde_json::to_value(&typed).unwrap(), *scene);
+}
+
+#[test]
+fn wires_follow_the_order_of_ports_and_fan_outs_their_collections() {
+    let (_study, w) = sound();
+    let wire = |port: &str, from: &str| ResolvedInput {
+        port: port.into(),
+        from: from.into(),
+    };
+    assert_eq!(
+        step(&w, "comparison").inputs,
+        [
+            wire("global", "coarse"),
+            wire("zones", "zones"),
+            wire("defects", "defects"),
+            wire("local", "local")
+        ]
+    );
+    assert_eq!(step(&w, "defects").inputs, [wire("formed", "coarse")]);
+    let zone = [Dimension {
+        name: "zone".into(),
+        over: "zones".into(),
+    }];
+    assert_eq!(step(&w, "local").dimensions, zone);
+    assert!(step(&w, "comparison").dimensions.is_empty());
+}
+
+#[test]
+fn a_collection_that_is_fanned_out_itself_gives_nested_dimensions() {
+    let study = Study::sound();
+    let text = r#"plyflow: 1
+name: nested
+steps:
+  inner: {plugin: zone-extraction, for_each: {z: zones}, from: {defects: fine-defects}}
+  leaf: {plugin: boundary-interpolation, for_each: {i: inner, z: zones}, from: {formed: fine, zones: inner}}
+  pair: {plugin: boundary-interpolation, for_each: {a: zones, b: others}, from: {formed: coarse, zones: others}}
+  fine-defects: {plugin: defect-detection, for_each: {z: zones}, from: fine}
+  fine: {plugin: forming-explicit, for_each: {z: zones}, with: {element: rf4}}
+  others: {plugin: zone-extraction, from: defects}
+  zones: {plugin: zone-extraction, from: defects}
+  defects: {plugin: defect-detection, from: coarse}
+  coarse: {plugin: forming-explicit, with: {element: m4}}
+"#;
+    study.write("workflow.yaml", text);
+    let w = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let overs = |name: &str| -> Vec<String> {
+        step(&w, name)
+            .dimensions
+            .iter()
+            .map(|d| d.over.clone())
+            .collect()
+    };
+    assert_eq!(overs("inner"), ["zones"]);
+    assert_eq!(overs("leaf"), ["zones", "inner"]);
+    assert_eq!(overs("pair"), ["zones", "others"]);
+    let names: Vec<&str> = w.steps.iter().map(|s| s.name.as_str()).collect();
+    // Of the steps that are ready, the first in the file goes first.
+    assert_eq!(
+        names,
+        [
+            "coarse",
+            "defects",
+            "others",
+            "zones",
+            "pair",
+            "fine",
+            "fine-defects",
+            "inner",
+            "leaf"
+        ]
+    );
+}
+
+#[test]
+fn expectations_are_in_si() {
+    let (_study, w) = sound();
+    assert_eq!(w.expectations.len(), 3);
+    let wrinkle = &w.expectations[2];
+    assert_eq!(
+        (wrinkle.value, wrinkle.tolerance),
+        (Some(0.068), Some(0.007))
+    );
+    assert_eq!(w.expectations[0].minimum, Some(1.0));
+    assert_eq!(w.expectations[0].source.as_deref(), Some("thesis 5.5.2"));
+}
+
+#[test]
+fn reformatted_yaml_resolves_to_the_same_value() {
+    let (study, w) = sound();
+    // Flow style, other order, other units, quotes, comments, an anchor: the same meaning.
+    study.mutate("workflow.yaml", "      element: m4\n      element_size: 8 mm\n", "      element_size: '0.8 cm'   # the same\n      element: {with: {hourglass: 0.050}, plugin: m4}\n");
+    study.mutate(
+        "workflow.yaml",
+        "      damping: 0.1\n",
+        "      damping: 1e-1\n",
+    );
+    study.mutate("workflow.yaml", "      over_shear_positive: 8 deg\n", "");
+    study.mutate(
+        "scene.yaml",
+        "name: spar\n",
+        "description: |\n  Prose\n  only.\nname: 'spar'\n",
+    );
+    study.mutate("scene.yaml", "length: 620 mm", "length: 0.62 m");
+    study.mutate("scene.yaml", "bag_pressure: 1 bar", "bag_pressure: 1e5 Pa");
+    study.mutate(
+        "scene.yaml",
+        "fabric_diaphragm: 0.40",
+        "fabric_diaphragm: 0.4",
+    );
+    study.mutate(
+        "materials/fabric.yaml",
+        "source: thesis 3.2\n",
+        "source: elsewhere\n",
+    );
+    study.mutate("materials/fabric.yaml", "  shear: 112.19 N/m\n", "");
+    study.mutate("materials/fabric.yaml", "440 g/m2", "0.44 kg/m^2");
+    let again = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let text = |w: &ResolvedWorkflow| serde_json::to_string(&w.steps).unwrap();
+    assert_eq!(text(&w), text(&again));
+}
+
+#[test]
+fn a_changed_value_changes_only_the_step_that_uses_it() {
+    let (study, w) = sound();
+    study.mutate("workflow.yaml", "8 deg", "9 deg");
+    let again = study.load().unwrap();
+    let changed: Vec<&str> = w
+        .steps
+        .iter()
+        .zip(&again.steps)
+        .filter(|(a, b)| a != b)
+        .map(|(a, _)| a.name.as_str())
+        .collect();
+    assert_eq!(changed, ["defects"]);
+}
+
+#[test]
+fn files_of_a_scene_are_absolute_and_hashed() {
+    let study = Study::sound();
+    study.write("tool.stl", "solid\nendsolid\n");
+    let scene = study.read("scene.yaml");
+    let (start, end) = (
+        scene.find("  joggle_spar:").unwrap(),
+        scene.find("sheets:").unwrap(),
+    );
+    let stl = "  stl: {file: ./materials/../tool.stl, unit: 1 mm}\n";
+    study.write(
+        "scene.yaml",
+        &format!("{}{stl}{}", &scene[..start], &scene[end..]),
+    );
+    let w = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let coarse = step(&w, "coarse");
+    assert_eq!(coarse.files.len(), 1);
+    assert_eq!(coarse.files[0].pointer, "/scene/tool/stl/file");
+    assert_eq!(coarse.files[0].path, study.path("tool.stl"));
+    assert_eq!(
+        coarse.files[0].hash,
+        blake3::hash(b"solid\nendsolid\n").to_hex().to_string()
+    );
+    assert_eq!(
+        coarse.parameters["scene"]["tool"]["stl"]["file"],
+        json!(study.path("tool.stl"))
+    );
+}
+
+#[test]
+fn a_scene_and_its_materials_may_stand_in_the_workflow() {
+    let study = Study::sound();
+    let indent = |text: &str, by: usize| -> String {
+        text.lines()
+            .map(|l| format!("{}{l}\n", " ".repeat(by)))
+            .collect()
+    };
+    let film = format!("material:\n{}", indent(common::FILM, 6));
+    let scene = common::SCENE.replace("material: film.yaml\n", &film);
+    study.mutate(
+        "workflow.yaml",
+        "      scene: scene.yaml\n",
+        &format!("      scene:\n{}", indent(&scene, 8)),
+    );
+    let w = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    assert_eq!(
+        step(&w, "coarse").parameters["scene"],
+        step(&w, "local").parameters["scene"]
+    );
+}
+
+#[test]
+fn further_plugin_folders_are_absolute() {
+    let study = Study::sound();
+    study.mutate("workflow.yaml", "steps:", "plugins: [./materials]\nsteps:");
+    study.load().unwrap();
+    let folders = plyflow_workflow::plugin_search_folders(&study.path("workflow.yaml"));
+    assert_eq!(folders, [study.path("materials")]);
+}
+
+#[test]
+fn graphs_name_every_step_and_wire() {
+    let (_study, w) = sound();
+    let dot = plyflow_workflow::to_dot(&w);
+    assert!(
+        dot.contains("\"coarse\" -> \"defects\" [label=\"formed\"];"),
+        "{dot}"
+    );
+    assert!(
+        dot.contains("\"zones\" -> \"local\" [style=dashed];"),
+        "{dot}"
+    );
+    assert!(
+        dot.contains("local x N (from zones)\\nforming-explicit"),
+        "{dot}"
+    );
+    let mermaid = plyflow_workflow::to_mermaid(&w);
+    assert!(mermaid.contains("s0 -->|\"formed\"| s1"), "{mermaid}");
+    assert_eq!(plyflow_workflow::graph(&w).node_count(), 6);
+}
