@@ -1,1 +1,319 @@
-//! plyflow-comparison
+//! Step plugin `comparison`: measures wrinkles, bridging and shear in the local runs, and in the global run
+//! and a reference at the same places, with what each cost.
+
+mod measure;
+mod models;
+mod table;
+
+pub use measure::{Defect, Kind, Ply, Settings, measure, quantiles};
+pub use models::{Model, Role, Zone};
+pub use table::{Entry, defect_table};
+
+use plyflow_sdk::{Host, Log, On, Progress, Step, StepError, export_step};
+use plyflow_surface::QuadLocator;
+use serde_json::{Value, json};
+
+/// The step.
+pub struct Comparison;
+
+export_step!(Comparison);
+
+/// Shear angles are told at these quantiles.
+const QUANTILES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];
+
+impl Step for Comparison {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let settings: Settings = host.parameters()?;
+        let attributes: Value = host.attributes(&host.input("zones")?)?;
+        let zones: Vec<Zone> = serde_json::from_value(attributes["zones"].clone())
+            .map_err(|e| format!("attribute `zones`: {e}"))?;
+        host.progress(&Progress {
+            phase: "reading",
+            ..Default::default()
+        });
+        let models = models::read_models(host, &zones, &settings)?;
+        host.progress(&Progress {
+            fraction: 0.5,
+            phase: "measuring",
+            ..Default::default()
+        });
+        let table = defect_table(&models, &zones, &settings);
+        for e in table.iter().filter(|e| e.touches_cut) {
+            let zone = &zones[e.zone].name;
+            let text = format!(
+                "{} reaches the cut of zone {zone}: the zone is too small for it; raise `scale`",
+                e.id
+            );
+            host.log(Log::Warn, &text);
+        }
+        if zones.is_empty() {
+            host.log(
+                Log::Info,
+                "there is no zone: nothing was refined, the global run stands alone",
+            );
+        }
+        write_attributes(host, &models, &zones, &table)?;
+        write_bodies(host, &models, &table)?;
+        write_results(host, &models, &zones, &table)?;
+        write_reference_errors(host, &models, &table)?;
+        write_costs(host, &models)
+    }
+}
+
+fn write_attributes(
+    host: &Host,
+    models: &[Model],
+    zones: &[Zone],
+    table: &[Entry],
+) -> Result<(), StepError> {
+    let list: Vec<Value> = (models.iter())
+        .map(|m| {
+            json!({"name": m.name, "role": m.role, "zone": m.zone.map(|z| &zones[z].name),
+                   "element_size": m.element_size, "elements": m.elements, "element_cycles": m.element_cycles})
+        })
+        .collect();
+    let mut shear = Vec::new();
+    for m in models {
+        for p in &m.plies {
+            let [min, max] = range(&p.shear_angle);
+            let quantiles = quantiles(&p.shear_angle, &QUANTILES);
+            shear.push(json!({"model": m.name, "ply": p.name, "min": min, "max": max, "quantiles": quantiles}));
+        }
+    }
+    let defects: Vec<Value> = table.iter().map(|e| e.to_json(models, zones)).collect();
+    host.write_attributes(&json!({
+        "zones": zones.iter().map(|z| &z.name).collect::<Vec<_>>(),
+        "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES,
+    }))
+}
+
+fn range(values: &[f64]) -> [f64; 2] {
+    values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| {
+            [a.min(v), b.max(v)]
+        })
+}
+
+/// One body per ply of a local run, named `local_A_<ply>`, formed, with what was measured at its nodes.
+fn write_bodies(host: &Host, models: &[Model], table: &[Entry]) -> Result<(), StepError> {
+    let local: Vec<(usize, &Model)> = models
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| m.role == Role::Local)
+        .collect();
+    let name = |m: &Model, p: &Ply| format!("{}_{}", m.name.replace('.', "_"), p.name);
+    for (_, m) in &local {
+        for p in &m.plies {
+            let cells: Vec<u32> = (0..p.topology.cells())
+                .flat_map(|c| p.topology.cell(c))
+                .copied()
+                .collect();
+            let about = json!({"model": m.name, "ply": p.name});
+            host.define_mesh(&name(m, p), &p.formed, 4, &cells, &about)?;
+        }
+    }
+    if local.iter().all(|(_, m)| m.plies.is_empty()) {
+        return Ok(());
+    }
+    host.begin_frame(0.0)?;
+    for (index, m) in &local {
+        for p in &m.plies {
+            let body = name(m, p);
+            let field = |what: &str, unit: &str, values: Vec<f64>| {
+                host.write_field(&body, On::Points, what, 1, unit, &values)
+            };
+            host.write_points(&body, &p.formed)?;
+            field(
+                "nodal_distance",
+                "m",
+                p.distance.iter().map(|d| d.value).collect(),
+            )?;
+            field(
+                "curvature_max",
+                "1/m",
+                p.curvature.iter().map(|k| k.max).collect(),
+            )?;
+            let mut kind = vec![0.0; p.formed.len()];
+            for e in table
+                .iter()
+                .filter(|e| e.model == *index && e.ply == p.name)
+            {
+                let value = if e.defect.kind == Kind::Wrinkle {
+                    1.0
+                } else {
+                    2.0
+                };
+                e.defect
+                    .nodes
+                    .iter()
+                    .for_each(|&i| kind[i as usize] = value);
+            }
+            field("defect", "1", kind)?;
+            host.write_field(
+                &body,
+                On::Points,
+                "undeformed",
+                3,
+                "m",
+                p.undeformed.as_flattened(),
+            )?;
+            host.write_field(&body, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
+        }
+    }
+    host.end_frame()
+}
+
+fn write_results(
+    host: &Host,
+    models: &[Model],
+    zones: &[Zone],
+    table: &[Entry],
+) -> Result<(), StepError> {
+    let local: Vec<&Entry> = table
+        .iter()
+        .filter(|e| models[e.model].role == Role::Local)
+        .collect();
+    let count = |kind| local.iter().filter(|e| e.defect.kind == kind).count() as f64;
+    host.result("zone_count", zones.len() as f64, "1")?;
+    host.result("wrinkle_count", count(Kind::Wrinkle), "1")?;
+    host.result("bridging_count", count(Kind::Bridging), "1")?;
+    let angles = (models.iter().filter(|m| m.role != Role::Reference))
+        .flat_map(|m| m.plies.iter().flat_map(|p| p.shear_angle.iter().copied()));
+    let [min, max] = range(&angles.collect::<Vec<_>>());
+    if min <= max {
+        host.result("shear_max", max, "rad")?;
+        host.result("shear_min", min, "rad")?;
+    }
+    for e in &local {
+        match e.defect.kind {
+            Kind::Wrinkle => {
+                host.result(&format!("wrinkle_length.{}", e.id), e.defect.length, "m")?;
+                host.result(
+                    &format!("wrinkle_amplitude.{}", e.id),
+                    e.defect.amplitude,
+                    "m",
+                )?;
+            }
+            Kind::Bridging => {
+                host.result(&format!("bridging_area.{}", e.id), e.defect.area, "m2")?
+            }
+        }
+    }
+    Ok(())
+}
+
+fn write_reference_errors(host: &Host, models: &[Model], table: &[Entry]) -> Result<(), StepError> {
+    let Some((index, reference)) = models
+        .iter()
+        .enumerate()
+        .find(|(_, m)| m.role == Role::Reference)
+    else {
+        return Ok(());
+    };
+    let mut errors: [Vec<f64>; 2] = Default::default();
+    for e in table.iter().filter(|e| e.model == index) {
+        let twin = table
+            .iter()
+            .find(|l| l.id == e.id && models[l.model].role == Role::Local);
+        let wrinkle = e.defect.kind == Kind::Wrinkle;
+        let value = |d: &Defect| if wrinkle { d.length } else { d.area };
+        let (name, unit) = if wrinkle {
+            ("wrinkle_length", "m")
+        } else {
+            ("bridging_area", "m2")
+        };
+        host.result(
+            &format!("reference_{name}.{}", e.id),
+            value(&e.defect),
+            unit,
+        )?;
+        if let Some(twin) = twin {
+            let (ours, theirs) = (value(&twin.defect), value(&e.defect));
+            errors[usize::from(!wrinkle)].push((ours - theirs).abs() / theirs);
+        }
+    }
+    for (name, errors) in ["wrinkle_length_error", "bridging_area_error"]
+        .iter()
+        .zip(&errors)
+    {
+        if !errors.is_empty() {
+            host.result(name, errors.iter().sum::<f64>() / errors.len() as f64, "1")?;
+        }
+    }
+    for m in models.iter().filter(|m| m.role != Role::Reference) {
+        if let Some(error) = distance_error(m, reference) {
+            host.result(&format!("distance_error.{}", m.name), error, "m")?;
+        }
+    }
+    Ok(())
+}
+
+/// Root mean square difference of the nodal distances of two models (m), at the nodes of the first, with
+/// those of the second interpolated in the undeformed plane; `None` when they share no judged place.
+fn distance_error(model: &Model, reference: &Model) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for p in &model.plies {
+        let Some(r) = reference.plies.iter().find(|r| r.name == p.name) else {
+            continue;
+        };
+        let cells: Vec<u32> = (0..r.topology.cells())
+            .flat_map(|c| r.topology.cell(c))
+            .copied()
+            .collect();
+        let Some(locator) = QuadLocator::new(&r.undeformed, &cells) else {
+            continue;
+        };
+        for (at, d) in p
+            .undeformed
+            .iter()
+            .zip(&p.distance)
+            .filter(|(_, d)| d.judged)
+        {
+            let Some(place) = locator.locate(at[0], at[1], 1e-6) else {
+                continue;
+            };
+            let nodes = place.nodes.map(|i| r.distance[i as usize]);
+            if nodes.iter().all(|n| n.judged) {
+                let theirs: f64 = nodes
+                    .iter()
+                    .zip(place.weights)
+                    .map(|(n, w)| w * n.value)
+                    .sum();
+                sum += (d.value - theirs).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    (count > 0.0).then(|| (sum / count).sqrt())
+}
+
+fn write_costs(host: &Host, models: &[Model]) -> Result<(), StepError> {
+    let (mut wall, mut cpu) = (0.0, 0.0);
+    for m in models {
+        let c = &m.input.cost;
+        host.measured(
+            &format!("cost.{}.wall_seconds", m.name),
+            c.wall_seconds,
+            "s",
+        )?;
+        host.measured(&format!("cost.{}.cpu_seconds", m.name), c.cpu_seconds, "s")?;
+        host.measured(&format!("peak_memory.{}", m.name), c.peak_memory, "1")?;
+        if m.role != Role::Reference {
+            wall += c.wall_seconds;
+            cpu += c.cpu_seconds;
+        }
+    }
+    host.measured("cost.total.wall_seconds", wall, "s")?;
+    host.measured("cost.total.cpu_seconds", cpu, "s")?;
+    let reference = models.iter().find(|m| m.role == Role::Reference);
+    if let Some(full) = reference
+        .map(|m| m.input.cost.cpu_seconds)
+        .filter(|&s| s > 0.0)
+    {
+        host.measured("cost_saving", 1.0 - cpu / full, "1")?;
+    }
+    Ok(())
+}

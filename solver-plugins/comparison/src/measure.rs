@@ -1,0 +1,237 @@
+//! Wrinkles and bridging of one formed ply.
+
+use plyflow_surface::vector::{Vec3, sub};
+use plyflow_surface::{
+    Curvature, NodalDistance, Surface, Topology, curvatures, nodal_distances, ridge_line,
+};
+use serde::Deserialize;
+use std::f64::consts::PI;
+
+/// What counts as a defect.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct Settings {
+    /// Distance above which a ply stands off the tool (m).
+    pub distance_threshold: f64,
+    /// Curvature of a crest above which it is a wrinkle's (1/m).
+    pub curvature_threshold: f64,
+    /// Nodes nearer to the tool's foot are not judged (m).
+    pub foot_margin: f64,
+    /// Shorter ridges are no wrinkles (m).
+    pub minimum_wrinkle_length: f64,
+    /// Smaller areas are no bridging (m2).
+    pub minimum_bridging_area: f64,
+}
+
+/// A formed ply of one model.
+#[derive(Debug, Clone)]
+pub struct Ply {
+    /// Name of the sheet.
+    pub name: String,
+    /// Mesh of quads.
+    pub topology: Topology,
+    /// `[nodes]` (m).
+    pub undeformed: Vec<Vec3>,
+    /// `[nodes]` (m).
+    pub formed: Vec<Vec3>,
+    /// `[cells]` (rad).
+    pub shear_angle: Vec<f64>,
+    /// `[nodes]`.
+    pub distance: Vec<NodalDistance>,
+    /// `[nodes]`.
+    pub curvature: Vec<Curvature>,
+}
+
+impl Ply {
+    /// Takes distances and curvatures of a ply whose mid-plane lies `offset` (m) from the tool when all sheets
+    /// lie on it.
+    pub fn new(
+        name: String,
+        topology: Topology,
+        undeformed: Vec<Vec3>,
+        formed: Vec<Vec3>,
+        shear_angle: Vec<f64>,
+        tool: &Surface,
+        offset: f64,
+        foot_margin: f64,
+    ) -> Self {
+        let distance = nodal_distances(tool, &formed, offset, foot_margin);
+        let curvature = curvatures(&topology, &formed);
+        Self {
+            name,
+            topology,
+            undeformed,
+            formed,
+            shear_angle,
+            distance,
+            curvature,
+        }
+    }
+}
+
+/// Kinds of defect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// A crest, curved beyond the threshold, that stands off the tool, with its flanks.
+    Wrinkle,
+    /// Standing off the tool without such a crest.
+    Bridging,
+}
+
+/// A defect of a ply.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Defect {
+    /// Which kind.
+    pub kind: Kind,
+    /// Its nodes, ascending.
+    pub nodes: Vec<u32>,
+    /// Wrinkles: length of the ridge over the surface (m); bridging: 0.
+    pub length: f64,
+    /// Largest distance from the tool (m).
+    pub amplitude: f64,
+    /// Undeformed area (m2).
+    pub area: f64,
+    /// Centre in the undeformed plane (m).
+    pub centre: [f64; 2],
+    /// Largest magnitude of the principal curvatures (1/m).
+    pub curvature_max: f64,
+    /// Wrinkles: direction of the ridge in the undeformed plane, from x, in (-pi/2, pi/2] (rad).
+    pub direction: f64,
+    /// Shear angles of the cells it touches (rad).
+    pub shear: [f64; 2],
+}
+
+/// Wrinkles (longest first), then bridging (largest first), among the nodes `inside` (`[nodes]`).
+///
+/// A wrinkle is a connected set of nodes that stand off the tool by more than the distance threshold and whose
+/// principal curvature of largest magnitude is that of a crest beyond the curvature threshold; its length
+/// is that of its ridge. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
+/// curvature reaches: pi sqrt(amplitude / (2 curvature)) along the surface. What else stands off the tool
+/// is bridging.
+pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
+    let n = ply.topology.nodes();
+    let off: Vec<bool> = (0..n)
+        .map(|i| {
+            let d = ply.distance[i];
+            inside[i] && d.judged && d.value > settings.distance_threshold
+        })
+        .collect();
+    let crest: Vec<bool> = (0..n)
+        .map(|i| off[i] && ply.curvature[i].max < -settings.curvature_threshold)
+        .collect();
+    let mut wrinkles = Vec::new();
+    for nodes in ply.topology.node_components(&crest) {
+        let ridge = ridge_line(
+            &ply.topology,
+            &ply.formed,
+            &ply.curvature,
+            &nodes,
+            settings.curvature_threshold,
+        );
+        if let Some(ridge) = ridge.filter(|r| r.length >= settings.minimum_wrinkle_length) {
+            wrinkles.push((nodes, ridge));
+        }
+    }
+    let mut owner = vec![usize::MAX; n];
+    let mut nearest = vec![f64::INFINITY; n];
+    for (w, (nodes, _)) in wrinkles.iter().enumerate() {
+        let reach = PI * (amplitude(ply, nodes) / (2.0 * curvature(ply, nodes))).sqrt();
+        let lengths = ply.topology.path_lengths(&ply.formed, nodes, &off, reach);
+        for i in 0..n {
+            if lengths[i] < nearest[i] {
+                nearest[i] = lengths[i];
+                owner[i] = w;
+            }
+        }
+    }
+    let areas = ply.topology.node_areas(&ply.undeformed);
+    let mut found = Vec::new();
+    for (w, (_, ridge)) in wrinkles.iter().enumerate() {
+        let nodes = (0..n as u32).filter(|&i| owner[i as usize] == w).collect();
+        let ends = [ridge.nodes[0], ridge.nodes[ridge.nodes.len() - 1]]
+            .map(|i| ply.undeformed[i as usize]);
+        let mut defect = describe(ply, Kind::Wrinkle, nodes, &areas);
+        defect.length = ridge.length;
+        defect.direction = direction(sub(ends[1], ends[0]));
+        found.push(defect);
+    }
+    found.sort_by(|a, b| b.length.total_cmp(&a.length));
+    let rest: Vec<bool> = (0..n).map(|i| off[i] && owner[i] == usize::MAX).collect();
+    let mut bridging: Vec<Defect> = (ply.topology.node_components(&rest).into_iter())
+        .map(|nodes| describe(ply, Kind::Bridging, nodes, &areas))
+        .filter(|d| d.area >= settings.minimum_bridging_area)
+        .collect();
+    bridging.sort_by(|a, b| b.area.total_cmp(&a.area));
+    found.extend(bridging);
+    found
+}
+
+fn amplitude(ply: &Ply, nodes: &[u32]) -> f64 {
+    nodes
+        .iter()
+        .map(|&i| ply.distance[i as usize].value)
+        .fold(0.0, f64::max)
+}
+
+fn curvature(ply: &Ply, nodes: &[u32]) -> f64 {
+    nodes
+        .iter()
+        .map(|&i| ply.curvature[i as usize].max.abs())
+        .fold(0.0, f64::max)
+}
+
+fn direction(v: Vec3) -> f64 {
+    let angle = v[1].atan2(v[0]);
+    if angle > PI / 2.0 {
+        angle - PI
+    } else if angle <= -PI / 2.0 {
+        angle + PI
+    } else {
+        angle
+    }
+}
+
+fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, areas: &[f64]) -> Defect {
+    let area: f64 = nodes.iter().map(|&i| areas[i as usize]).sum();
+    let mean = |d: usize| {
+        nodes
+            .iter()
+            .map(|&i| areas[i as usize] * ply.undeformed[i as usize][d])
+            .sum::<f64>()
+            / area
+    };
+    let mut shear = [f64::INFINITY, f64::NEG_INFINITY];
+    for &i in &nodes {
+        for &c in ply.topology.cells_of(i as usize) {
+            let g = ply.shear_angle[c as usize];
+            shear = [shear[0].min(g), shear[1].max(g)];
+        }
+    }
+    Defect {
+        kind,
+        length: 0.0,
+        amplitude: amplitude(ply, &nodes),
+        area,
+        centre: [mean(0), mean(1)],
+        curvature_max: curvature(ply, &nodes),
+        direction: 0.0,
+        shear,
+        nodes,
+    }
+}
+
+/// Quantiles of `values` at `at` (0..1), linear between the ordered values; zeros when there are none.
+pub fn quantiles(values: &[f64], at: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return vec![0.0; at.len()];
+    };
+    at.iter()
+        .map(|q| {
+            let place = q * last as f64;
+            let low = (place.floor() as usize).min(last);
+            let high = (low + 1).min(last);
+            sorted[low] + (place - low as f64) * (sorted[high] - sorted[low])
+        })
+        .collect()
+}

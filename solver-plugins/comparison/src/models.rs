@@ -1,0 +1,211 @@
+//! Reading the models that are compared.
+
+use crate::measure::{Ply, Settings};
+use plyflow_sdk::{Host, Input, StepError};
+use plyflow_surface::{Surface, Topology, triangles};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// A zone, as its step wrote it.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Zone {
+    /// A, B, ..
+    pub name: String,
+    /// `[x0, y0, x1, y1]` (m).
+    #[serde(rename = "box")]
+    pub bounds: [f64; 4],
+    /// Left, right, bottom, top.
+    pub free_sides: [bool; 4],
+}
+
+/// Which part a model plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Coarse run of the whole scene.
+    Global,
+    /// Fine run of a zone.
+    Local,
+    /// Fine run of the whole scene.
+    Reference,
+}
+
+/// A formed model.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// `global`, `local.A`, `reference`.
+    pub name: String,
+    /// Its part.
+    pub role: Role,
+    /// Local models: index of the zone.
+    pub zone: Option<usize>,
+    /// (m).
+    pub element_size: f64,
+    /// Cells of all sheets.
+    pub elements: usize,
+    /// Cells times cycles, over all sheets.
+    pub element_cycles: f64,
+    /// Plies in the order of the stack.
+    pub plies: Vec<Ply>,
+    /// Where it came from, for its cost.
+    pub input: Input,
+}
+
+#[derive(Deserialize)]
+struct Formed {
+    sheets: Vec<Sheet>,
+    #[serde(default)]
+    element_size: f64,
+    #[serde(default)]
+    element_cycles: f64,
+    #[serde(default)]
+    zone: Value,
+}
+
+#[derive(Deserialize)]
+struct Sheet {
+    name: String,
+    kind: String,
+    offset: f64,
+}
+
+/// Global, local and reference models in that order, local ones in the order of their zones.
+///
+/// # Errors
+/// When an input lacks something, or a local run belongs to no zone or to one that another has.
+pub fn read_models(
+    host: &Host,
+    zones: &[Zone],
+    settings: &Settings,
+) -> Result<Vec<Model>, StepError> {
+    let global = host.input("global")?;
+    let tool = read_tool(host, &global)?;
+    let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
+    let mut local = Vec::new();
+    for input in host.inputs_of("local")? {
+        host.check_cancelled()?;
+        let zone = zone_of(host, &input, zones)?;
+        if local.iter().any(|m: &Model| m.zone == Some(zone)) {
+            return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
+        }
+        // A local run may leave its tool out; it is the global one's.
+        let own = host.meshes(&input)?.body("tool").is_ok();
+        let own = if own {
+            Some(read_tool(host, &input)?)
+        } else {
+            None
+        };
+        local.push(read(
+            host,
+            input,
+            Role::Local,
+            Some((zone, &zones[zone])),
+            own.as_ref().unwrap_or(&tool),
+            settings,
+        )?);
+    }
+    local.sort_by_key(|m| m.zone);
+    models.extend(local);
+    for input in host.inputs_of("reference")? {
+        let tool = read_tool(host, &input)?;
+        models.push(read(host, input, Role::Reference, None, &tool, settings)?);
+    }
+    Ok(models)
+}
+
+/// The zone that a local run names, or else the one at its place in the fan-out.
+fn zone_of(host: &Host, input: &Input, zones: &[Zone]) -> Result<usize, StepError> {
+    let formed: Formed = host.attributes(input)?;
+    let named = formed.zone["name"].as_str();
+    let index = match named {
+        Some(name) => zones.iter().position(|z| z.name == name),
+        None => input
+            .item
+            .last()
+            .map(|&i| i as usize)
+            .filter(|&i| i < zones.len()),
+    };
+    index.ok_or_else(|| {
+        let names: Vec<&str> = zones.iter().map(|z| z.name.as_str()).collect();
+        let what = named.map_or("names no zone".to_owned(), |n| format!("is of zone '{n}'"));
+        format!(
+            "local run '{}' {:?} {what}; the zones are: {}",
+            input.step,
+            input.item,
+            names.join(", ")
+        )
+        .into()
+    })
+}
+
+fn read_tool(host: &Host, input: &Input) -> Result<Surface, StepError> {
+    let meshes = host.meshes(input)?;
+    let body = meshes.body("tool")?;
+    let (points, cells) = host.mesh(input, body)?;
+    let tool = Surface::new(&points, &triangles(body.nodes_per_cell, &cells));
+    tool.ok_or_else(|| {
+        format!(
+            "body 'tool' of '{}' has no triangle with an area",
+            input.step
+        )
+        .into()
+    })
+}
+
+fn read(
+    host: &Host,
+    input: Input,
+    role: Role,
+    zone: Option<(usize, &Zone)>,
+    tool: &Surface,
+    settings: &Settings,
+) -> Result<Model, StepError> {
+    let formed: Formed = host.attributes(&input)?;
+    let meshes = host.meshes(&input)?;
+    let Some(frame) = meshes.times.len().checked_sub(1) else {
+        return Err(format!("'{}' has no frame", input.step).into());
+    };
+    let mut plies = Vec::new();
+    for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
+        let body = meshes.body(&sheet.name)?;
+        if body.nodes_per_cell != 4 {
+            let (ply, n) = (&sheet.name, body.nodes_per_cell);
+            let what = format!(
+                "ply '{ply}' of '{}' has cells of {n} nodes; quads are expected",
+                input.step
+            );
+            return Err(what.into());
+        }
+        let (undeformed, cells) = host.mesh(&input, body)?;
+        plies.push(Ply::new(
+            sheet.name.clone(),
+            Topology::new(undeformed.len(), 4, &cells),
+            undeformed,
+            host.frame_points(&input, body, frame)?,
+            host.frame_field(&input, body, frame, "shear_angle")?,
+            tool,
+            sheet.offset,
+            settings.foot_margin,
+        ));
+    }
+    let name = match (role, zone) {
+        (Role::Local, Some((_, zone))) => format!("local.{}", zone.name),
+        (Role::Reference, _) => "reference".to_owned(),
+        _ => "global".to_owned(),
+    };
+    Ok(Model {
+        name,
+        role,
+        zone: zone.map(|(i, _)| i),
+        element_size: formed.element_size,
+        elements: meshes
+            .bodies
+            .iter()
+            .filter(|b| b.name != "tool")
+            .map(|b| b.cells)
+            .sum(),
+        element_cycles: formed.element_cycles,
+        plies,
+        input,
+    })
+}

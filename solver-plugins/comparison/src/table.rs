@@ -1,0 +1,167 @@
+//! The table of defects: numbering, and which defect of one model is which of another.
+
+use crate::measure::{Defect, Kind, Settings, measure};
+use crate::models::{Model, Role, Zone};
+use serde_json::{Value, json};
+
+/// A defect with its place in the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// "AW1": zone, W (wrinkle) or B (bridging), number.
+    pub id: String,
+    /// Index of the model.
+    pub model: usize,
+    /// Index of the zone.
+    pub zone: usize,
+    /// Name of the ply.
+    pub ply: String,
+    /// Local models: whether it reaches the zone's cut, so that its zone is too small.
+    pub touches_cut: bool,
+    /// What was measured.
+    pub defect: Defect,
+}
+
+impl Entry {
+    /// As in the data model.
+    pub fn to_json(&self, models: &[Model], zones: &[Zone]) -> Value {
+        let d = &self.defect;
+        json!({
+            "id": self.id,
+            "model": models[self.model].name,
+            "zone": zones[self.zone].name,
+            "ply": self.ply,
+            "type": if d.kind == Kind::Wrinkle { "wrinkle" } else { "bridging" },
+            "length": d.length,
+            "amplitude": d.amplitude,
+            "area": d.area,
+            "centre": d.centre,
+            "curvature_max": d.curvature_max,
+            "radius": if d.curvature_max > 0.0 { json!(1.0 / d.curvature_max) } else { Value::Null },
+            "direction": d.direction,
+            "shear_min": d.shear[0],
+            "shear_max": d.shear[1],
+            "touches_cut": self.touches_cut,
+        })
+    }
+}
+
+/// Two defects are the same when their centres lie within this (m) or within half of the longer ridge.
+const SAME_DEFECT: f64 = 0.015;
+
+/// All defects: first those of the local models, numbered in their zone from the uppermost ply down, wrinkles
+/// by length and bridging by area; then those of the other models in the same boxes, which take the id
+/// of the local defect that they are, or the next free number.
+pub fn defect_table(models: &[Model], zones: &[Zone], settings: &Settings) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = Vec::new();
+    let local = models
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| m.role == Role::Local);
+    for (m, model) in local {
+        let zone = model.zone.unwrap_or(0);
+        let found = entries_of(models, m, zones, zone, settings);
+        number(&mut entries, found, &[], zones);
+    }
+    let locals = entries.clone();
+    for (m, _) in models
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| m.role != Role::Local)
+    {
+        for zone in 0..zones.len() {
+            let found = entries_of(models, m, zones, zone, settings);
+            number(&mut entries, found, &locals, zones);
+        }
+    }
+    entries
+}
+
+fn entries_of(
+    models: &[Model],
+    m: usize,
+    zones: &[Zone],
+    zone: usize,
+    settings: &Settings,
+) -> Vec<Entry> {
+    let model = &models[m];
+    let z = &zones[zone];
+    let mut found = Vec::new();
+    // The stack is listed from the tool upwards.
+    for ply in model.plies.iter().rev() {
+        let within = |p: &[f64; 3]| {
+            p[0] >= z.bounds[0] && p[1] >= z.bounds[1] && p[0] <= z.bounds[2] && p[1] <= z.bounds[3]
+        };
+        let inside: Vec<bool> = match model.role {
+            Role::Local => vec![true; ply.undeformed.len()],
+            _ => ply.undeformed.iter().map(within).collect(),
+        };
+        for defect in measure(ply, &inside, settings) {
+            let near = |side: usize| {
+                let (d, level) = (side / 2, z.bounds[side / 2 + 2 * (side % 2)]);
+                !z.free_sides[side]
+                    && defect.nodes.iter().any(|&i| {
+                        (ply.undeformed[i as usize][d] - level).abs() < 1.01 * model.element_size
+                    })
+            };
+            let touches_cut = model.role == Role::Local && (0..4).any(near);
+            let id = String::new();
+            found.push(Entry {
+                id,
+                model: m,
+                zone,
+                ply: ply.name.clone(),
+                touches_cut,
+                defect,
+            });
+        }
+    }
+    found
+}
+
+/// Gives ids to the entries of one model and zone, and appends them.
+fn number(entries: &mut Vec<Entry>, found: Vec<Entry>, locals: &[Entry], zones: &[Zone]) {
+    let mut taken: Vec<String> = Vec::new();
+    let count = |zone: usize, kind: Kind| {
+        locals
+            .iter()
+            .filter(|l| l.zone == zone && l.defect.kind == kind)
+            .count()
+    };
+    let mut next = [0, 0];
+    for mut entry in found {
+        let twin = twin(&entry, locals, &taken);
+        entry.id = twin.unwrap_or_else(|| {
+            let kind = entry.defect.kind;
+            let next = &mut next[usize::from(kind == Kind::Bridging)];
+            *next += 1;
+            let letter = if kind == Kind::Wrinkle { 'W' } else { 'B' };
+            format!(
+                "{}{letter}{}",
+                zones[entry.zone].name,
+                count(entry.zone, kind) + *next
+            )
+        });
+        taken.push(entry.id.clone());
+        entries.push(entry);
+    }
+}
+
+/// The id of the nearest local defect of the same zone, ply and kind that is not taken yet.
+fn twin(entry: &Entry, locals: &[Entry], taken: &[String]) -> Option<String> {
+    let apart = |l: &Entry| {
+        let (a, b) = (l.defect.centre, entry.defect.centre);
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    };
+    let reach = |l: &Entry| SAME_DEFECT.max(0.5 * l.defect.length.max(entry.defect.length));
+    locals
+        .iter()
+        .filter(|l| {
+            l.zone == entry.zone
+                && l.ply == entry.ply
+                && l.defect.kind == entry.defect.kind
+                && !taken.contains(&l.id)
+                && apart(l) <= reach(l)
+        })
+        .min_by(|a, b| apart(a).total_cmp(&apart(b)))
+        .map(|l| l.id.clone())
+}

@@ -1,0 +1,390 @@
+//! The comparison of models whose wrinkles and bridging are known.
+
+use plyflow_comparison::{Comparison, quantiles};
+use plyflow_sdk::On;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
+use plyflow_surface::vector::Vec3;
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+
+const TOP: f64 = 0.060;
+const OFFSET: f64 = 0.00028;
+const ZONE: [f64; 4] = [-0.080, -0.050, 0.080, 0.050];
+
+/// Height of the ply over the tool; wrinkle: 3 mm high, 14 mm wide, along the diagonal through (-35, 0) mm, of
+/// half length 30 mm; bridging: 2 mm high, 50 mm wide, round, at (40, 0) mm.
+fn height(size: f64) -> impl Fn(f64, f64) -> f64 {
+    move |x, y| {
+        let (u, v) = (x + 0.035, y);
+        let (along, across) = ((u + v) / 2f64.sqrt(), (v - u) / 2f64.sqrt());
+        let fade = if along.abs() < 0.030 {
+            (0.5 * PI * along / 0.030).cos()
+        } else {
+            0.0
+        };
+        let wave = if across.abs() < 0.007 {
+            0.5 * (1.0 + (PI * across / 0.007).cos())
+        } else {
+            0.0
+        };
+        let r = (x - 0.040).hypot(y);
+        let blister = if r < 0.025 {
+            0.001 * (1.0 + (PI * r / 0.025).cos())
+        } else {
+            0.0
+        };
+        size * (0.003 * wave * fade + blister)
+    }
+}
+
+fn ply(name: &str, b: [f64; 4], size: f64, up: f64, f: impl Fn(f64, f64) -> f64) -> MemoryBody {
+    let n = [0, 1].map(|d| ((b[d + 2] - b[d]) / size).round() as usize);
+    let mut points: Vec<Vec3> = Vec::new();
+    for j in 0..=n[1] {
+        for i in 0..=n[0] {
+            points.push([b[0] + size * i as f64, b[1] + size * j as f64, 0.2]);
+        }
+    }
+    let node = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
+    let mut cells = Vec::new();
+    for j in 0..n[1] {
+        for i in 0..n[0] {
+            cells.extend([
+                node(i, j),
+                node(i + 1, j),
+                node(i + 1, j + 1),
+                node(i, j + 1),
+            ]);
+        }
+    }
+    let formed = points
+        .iter()
+        .map(|p| [p[0], p[1], TOP + up + f(p[0], p[1])])
+        .collect();
+    // Shear grows along x from -0.1 to 0.1 rad over the zone.
+    let shear = cells
+        .chunks_exact(4)
+        .map(|c| points[c[0] as usize][0] / 0.8)
+        .collect();
+    MemoryBody {
+        name: name.into(),
+        nodes_per_cell: 4,
+        cells,
+        frames: vec![formed],
+        points,
+        fields: vec![vec![MemoryField {
+            name: "shear_angle".into(),
+            on: On::Cells,
+            components: 1,
+            values: shear,
+        }]],
+        ..Default::default()
+    }
+}
+
+fn formed(bodies: Vec<MemoryBody>, size: f64, zone: Value) -> MemoryArtifact {
+    let tool = MemoryBody {
+        name: "tool".into(),
+        points: vec![
+            [-0.5, -0.5, TOP],
+            [0.5, -0.5, TOP],
+            [0.5, 0.5, TOP],
+            [-0.5, 0.5, TOP],
+        ],
+        nodes_per_cell: 3,
+        cells: vec![0, 1, 2, 0, 2, 3],
+        ..Default::default()
+    };
+    let sheets: Vec<Value> = (bodies.iter().enumerate())
+        .map(|(i, b)| json!({"name": b.name, "kind": "ply", "offset": OFFSET + 0.0004 * i as f64}))
+        .collect();
+    let elements: usize = bodies.iter().map(|b| b.cells.len() / 4).sum();
+    MemoryArtifact {
+        kind: "forming".into(),
+        attributes: json!({"sheets": sheets, "element_size": size, "element_cycles": 1000.0 * elements as f64, "zone": zone}),
+        times: vec![1.0],
+        bodies: std::iter::once(tool).chain(bodies).collect(),
+        ..Default::default()
+    }
+}
+
+fn zones(list: Value) -> MemoryArtifact {
+    MemoryArtifact {
+        kind: "zones".into(),
+        attributes: json!({"zones": list}),
+        ..Default::default()
+    }
+}
+
+fn zone_a() -> Value {
+    json!({"name": "A", "box": ZONE, "free_sides": vec![false; 4], "plies": ["ply_1"]})
+}
+
+const BLANK: [f64; 4] = [-0.240, -0.150, 0.240, 0.150];
+
+fn global() -> MemoryArtifact {
+    formed(
+        vec![ply("ply_1", BLANK, 0.010, OFFSET, |_, _| 0.0)],
+        0.010,
+        Value::Null,
+    )
+}
+
+fn local(up: f64) -> MemoryArtifact {
+    formed(
+        vec![ply("ply_1", ZONE, 0.00125, OFFSET, height(up))],
+        0.00125,
+        zone_a(),
+    )
+}
+
+fn compare(inputs: &[MemoryInput<'_>]) -> MemoryArtifact {
+    run::<Comparison>(json!({}), inputs, &[]).unwrap()
+}
+
+/// Length of the wrinkle's crest where its curvature exceeds 150 1/m.
+fn crest_length() -> f64 {
+    let peak = 0.0015 * (PI / 0.007f64).powi(2);
+    let half = 0.060 / PI * (150.0 / peak).acos();
+    let z = |s: f64| 0.003 * (PI * s / 0.060).cos();
+    (0..1000)
+        .map(|i| {
+            let at = |i: f64| half * (i / 500.0 - 1.0);
+            let (a, b) = (at(f64::from(i)), at(f64::from(i + 1)));
+            (b - a).hypot(z(b) - z(a))
+        })
+        .sum()
+}
+
+#[test]
+fn a_wrinkle_and_a_bridge_are_told_apart_and_measured() {
+    let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
+    let out = compare(&[
+        MemoryInput {
+            cost: [10.0, 12.0, 1e8],
+            ..MemoryInput::new("global", &global)
+        },
+        MemoryInput::new("zones", &zones),
+        MemoryInput {
+            cost: [30.0, 50.0, 2e8],
+            item: &[0],
+            ..MemoryInput::new("local", &local)
+        },
+    ]);
+    assert_eq!(
+        (out.result("wrinkle_count"), out.result("bridging_count")),
+        (1.0, 1.0)
+    );
+    let length = out.result("wrinkle_length.AW1");
+    // Short of the crest by up to one cell's diagonal (1.8 mm) at each end.
+    let short = crest_length() - length;
+    assert!(
+        (-0.001..0.0036).contains(&short),
+        "{length} {}",
+        crest_length()
+    );
+    assert!((out.result("wrinkle_amplitude.AW1") - 0.003).abs() < 1e-5);
+    // 1 mm (1 + cos) exceeds 1 mm for r < 12.5 mm: 491 mm2.
+    let area = out.result("bridging_area.AB1");
+    assert!((area * 1e6 / 490.9 - 1.0).abs() < 0.05, "{area}");
+    let defects = out.attributes["defects"].as_array().unwrap();
+    assert_eq!(
+        defects.len(),
+        2,
+        "the flanks of the wrinkle are no bridging, the flat global run has none"
+    );
+    let wrinkle = &defects[0];
+    assert_eq!(
+        (&wrinkle["id"], &wrinkle["model"], &wrinkle["ply"]),
+        (&json!("AW1"), &json!("local.A"), &json!("ply_1"))
+    );
+    let number = |v: &Value| v.as_f64().unwrap();
+    assert!((number(&wrinkle["direction"]) - PI / 4.0).abs() < 0.05);
+    assert!(
+        (number(&wrinkle["radius"]) * 302.0 - 1.0).abs() < 0.06,
+        "{wrinkle}"
+    );
+    assert!((number(&wrinkle["centre"][0]) + 0.035).abs() < 0.001);
+    let bridge = &defects[1];
+    assert!(
+        (number(&bridge["shear_max"]) - 0.0525 / 0.8).abs() < 0.003,
+        "{bridge}"
+    );
+    assert_eq!(bridge["touches_cut"], false);
+    // Measured numbers are not in the artifact proper.
+    assert_eq!(out.measured["cost.local.A.cpu_seconds"], (50.0, "s".into()));
+    assert_eq!(out.measured["cost.total.wall_seconds"], (40.0, "s".into()));
+    assert!(
+        !out.measured.contains_key("cost_saving")
+            && !out.results.keys().any(|k| k.contains("cost"))
+    );
+    let body = out.body("local_A_ply_1");
+    assert_eq!(
+        body.last("defect").iter().fold(0.0, |a: f64, &b| a.max(b)),
+        2.0
+    );
+    let model = &out.attributes["models"][1];
+    assert_eq!(
+        (&model["role"], &model["zone"], &model["elements"]),
+        (&json!("local"), &json!("A"), &json!(128 * 80))
+    );
+}
+
+#[test]
+fn the_reference_takes_the_ids_of_the_same_defects_and_errors_are_relative_to_it() {
+    let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
+    // The reference's wrinkle and blister are 20 % higher; it covers the whole blank, so its defects must be
+    // looked for in the zone's box.
+    let reference = formed(
+        vec![ply(
+            "ply_1",
+            [-0.12, -0.08, 0.12, 0.08],
+            0.00125,
+            OFFSET,
+            height(1.2),
+        )],
+        0.00125,
+        Value::Null,
+    );
+    let out = compare(&[
+        MemoryInput {
+            cost: [10.0, 10.0, 0.0],
+            ..MemoryInput::new("global", &global)
+        },
+        MemoryInput::new("zones", &zones),
+        MemoryInput {
+            cost: [10.0, 10.0, 0.0],
+            ..MemoryInput::new("local", &local)
+        },
+        MemoryInput {
+            cost: [100.0, 100.0, 0.0],
+            ..MemoryInput::new("reference", &reference)
+        },
+    ]);
+    let (ours, theirs) = (
+        out.result("bridging_area.AB1"),
+        out.result("reference_bridging_area.AB1"),
+    );
+    assert!(theirs > ours);
+    assert!((out.result("bridging_area_error") - (theirs - ours) / theirs).abs() < 1e-12);
+    assert!(out.result("reference_wrinkle_length.AW1") > out.result("wrinkle_length.AW1"));
+    assert!((out.measured["cost_saving"].0 - 0.8).abs() < 1e-12);
+    assert!(out.result("distance_error.local.A") < out.result("distance_error.global"));
+    assert!(out.result("distance_error.local.A") > 1e-5);
+    assert_eq!(
+        out.result("wrinkle_count"),
+        1.0,
+        "the reference is not counted"
+    );
+}
+
+#[test]
+fn defects_of_the_upper_ply_come_first_and_each_ply_is_counted() {
+    let bodies = vec![
+        ply("ply_1", ZONE, 0.002, OFFSET, height(1.0)),
+        ply("ply_2", ZONE, 0.002, OFFSET + 0.0004, height(1.1)),
+    ];
+    let both = formed(bodies, 0.002, zone_a());
+    let (global, zones) = (global(), zones(json!([zone_a()])));
+    let out = compare(&[
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &both),
+    ]);
+    assert_eq!(
+        (out.result("wrinkle_count"), out.result("bridging_count")),
+        (2.0, 2.0)
+    );
+    assert!((out.result("wrinkle_amplitude.AW1") - 0.0033).abs() < 1e-4);
+    assert!((out.result("wrinkle_amplitude.AW2") - 0.0030).abs() < 1e-4);
+    assert_eq!(out.attributes["defects"][0]["ply"], "ply_2");
+}
+
+#[test]
+fn a_defect_that_reaches_the_cut_is_marked_and_one_at_a_free_side_is_not() {
+    let ridge = |_: f64, y: f64| {
+        if y.abs() < 0.007 {
+            0.0015 * (1.0 + (PI * y / 0.007).cos())
+        } else {
+            0.0
+        }
+    };
+    let through = formed(
+        vec![ply("ply_1", ZONE, 0.002, OFFSET, ridge)],
+        0.002,
+        zone_a(),
+    );
+    let global = global();
+    let marked = |free: bool| {
+        let zones = zones(json!([{"name": "A", "box": ZONE, "free_sides": vec![free; 4]}]));
+        let out = compare(&[
+            MemoryInput::new("global", &global),
+            MemoryInput::new("zones", &zones),
+            MemoryInput::new("local", &through),
+        ]);
+        assert!((out.result("wrinkle_length.AW1") - 0.160).abs() < 1e-6);
+        let marked = out.attributes["defects"][0]["touches_cut"]
+            .as_bool()
+            .unwrap();
+        assert_eq!(
+            out.log
+                .iter()
+                .any(|l| l.contains("AW1 reaches the cut of zone A")),
+            marked
+        );
+        marked
+    };
+    assert!(marked(false));
+    assert!(!marked(true));
+}
+
+#[test]
+fn without_zones_the_artifact_says_so_and_holds_the_global_run_alone() {
+    let (global, zones) = (global(), zones(json!([])));
+    let out = compare(&[
+        MemoryInput {
+            cost: [1.0, 2.0, 0.0],
+            ..MemoryInput::new("global", &global)
+        },
+        MemoryInput::new("zones", &zones),
+    ]);
+    for name in ["zone_count", "wrinkle_count", "bridging_count"] {
+        assert_eq!(out.result(name), 0.0, "{name}");
+    }
+    assert_eq!(out.attributes["defects"], json!([]));
+    assert_eq!(out.attributes["models"].as_array().unwrap().len(), 1);
+    assert!(out.bodies.is_empty() && out.times.is_empty());
+    assert!((out.result("shear_max") - 0.230 / 0.8).abs() < 1e-9);
+    assert_eq!(out.measured["cost.total.cpu_seconds"].0, 2.0);
+}
+
+#[test]
+fn a_local_run_of_no_zone_or_of_a_taken_one_is_refused() {
+    let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
+    let twice = [
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        MemoryInput::new("local", &local),
+    ];
+    let error = run::<Comparison>(json!({}), &twice, &[]).unwrap_err();
+    assert!(error.contains("two local runs belong to zone A"), "{error}");
+    let mut lost = local.clone();
+    lost.attributes["zone"]["name"] = json!("Q");
+    let inputs = [twice[0], twice[1], MemoryInput::new("local", &lost)];
+    let error = run::<Comparison>(json!({}), &inputs, &[]).unwrap_err();
+    assert!(
+        error.contains("zone 'Q'") && error.contains("the zones are: A"),
+        "{error}"
+    );
+}
+
+#[test]
+fn quantiles_are_linear_between_ordered_values() {
+    let values = [4.0, 1.0, 3.0, 2.0, 5.0];
+    assert_eq!(
+        quantiles(&values, &[0.0, 0.25, 0.5, 0.875, 1.0]),
+        [1.0, 2.0, 3.0, 4.5, 5.0]
+    );
+    assert_eq!(quantiles(&[], &[0.5]), [0.0]);
+}
