@@ -1,1 +1,21 @@
-//! plyflow-plugin-host
+//! Finds plugins, loads them and runs one step in this process. The only user of dlopen.
+//!
+//! - [`PluginCatalog`] knows the plugins on a search path. It never loads a library into its own process:
+//!   manifests are read by a child, once per version of a library.
+//! - [`worker_main`] is the body of `plyflow step-worker`: it reads a job, runs it ([`run_job`]) and
+//!   talks in messages on standard output.
+//! - [`describe_main`] is the body of `plyflow step-worker --describe LIBRARY`.
+
+mod catalog;
+mod describe;
+mod emitter;
+mod host;
+mod load;
+mod process;
+mod services;
+mod worker;
+
+pub use catalog::{Describer, PluginCatalog};
+pub use describe::{Description, describe, describe_main};
+pub use load::{LoadError, Plugin};
+pub use worker::{run_job, worker_main};

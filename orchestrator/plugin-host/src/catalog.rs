@@ -1,0 +1,414 @@
+//! The plugins on a search path.
+
+use crate::describe::{Description, describe};
+use crate::load::Plugin;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::Manifest;
+use plyflow_model::manifest::PluginKind;
+use plyflow_workflow::resolved::PluginId;
+use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::os::unix::fs::MetadataExt;
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+
+/// Ending of a library's file name.
+const SUFFIX: &str = ".so";
+
+/// Version of the cache file.
+const CACHE_VERSION: u32 = 1;
+
+/// How the manifest of an unknown library is read.
+#[derive(Debug, Clone)]
+pub enum Describer {
+    /// By a child: `program arguments.. LIBRARY` prints a [`Description`]. A library that crashes takes
+    /// down only the child.
+    Child {
+        /// The program, usually `plyflow` itself.
+        program: Utf8PathBuf,
+        /// Its arguments before the library, e.g. `step-worker --describe`.
+        arguments: Vec<String>,
+    },
+    /// In this process: only for tests and for workers, which may die.
+    InProcess,
+}
+
+/// What tells one version of a library file from another, without reading it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+struct Stamp {
+    size: u64,
+    modified: i64,
+    modified_ns: i64,
+    changed: i64,
+    changed_ns: i64,
+    inode: u64,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Known {
+    stamp: Stamp,
+    /// BLAKE3 of the file, hex.
+    hash: String,
+    description: Description,
+}
+
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct CacheFile {
+    version: u32,
+    libraries: BTreeMap<Utf8PathBuf, Known>,
+}
+
+#[derive(Debug, Default)]
+struct Cache {
+    libraries: BTreeMap<Utf8PathBuf, Known>,
+    changed: bool,
+}
+
+/// Finds plugins in folders and by path. Manifests and hashes are kept in a cache file, so that a run
+/// looks at a library only when its file has changed.
+#[derive(Debug)]
+pub struct PluginCatalog {
+    folders: Vec<Utf8PathBuf>,
+    cache_file: Option<Utf8PathBuf>,
+    describer: Describer,
+    cache: Mutex<Cache>,
+    scanned: OnceLock<Vec<Found>>,
+}
+
+/// A library in a folder of the search path.
+#[derive(Debug, Clone)]
+enum Found {
+    Plugin(Box<CatalogEntry>),
+    Broken { path: Utf8PathBuf, reason: String },
+}
+
+impl PluginCatalog {
+    /// A catalog over `folders` (searched in order; the first plugin of a name wins). Nothing is read
+    /// before it is needed. A `cache_file` that is absent or damaged counts as empty.
+    #[must_use]
+    pub fn new(
+        folders: Vec<Utf8PathBuf>,
+        cache_file: Option<Utf8PathBuf>,
+        describer: Describer,
+    ) -> Self {
+        let libraries = cache_file
+            .as_ref()
+            .and_then(|path| std::fs::read(path).ok())
+            .and_then(|bytes| serde_json::from_slice::<CacheFile>(&bytes).ok())
+            .filter(|cache| cache.version == CACHE_VERSION)
+            .map(|cache| cache.libraries)
+            .unwrap_or_default();
+        let cache = Mutex::new(Cache {
+            libraries,
+            changed: false,
+        });
+        Self {
+            folders,
+            cache_file,
+            describer,
+            cache,
+            scanned: OnceLock::new(),
+        }
+    }
+
+    /// The folders that are searched.
+    #[must_use]
+    pub fn folders(&self) -> &[Utf8PathBuf] {
+        &self.folders
+    }
+
+    /// All plugins on the search path, in its order; of two of a name only the first.
+    #[must_use]
+    pub fn plugins(&self) -> Vec<CatalogEntry> {
+        let mut entries: Vec<CatalogEntry> = Vec::new();
+        for found in self.scan() {
+            if let Found::Plugin(entry) = found {
+                let same = |e: &CatalogEntry| {
+                    e.id.name == entry.id.name && e.manifest.kind == entry.manifest.kind
+                };
+                if !entries.iter().any(same) {
+                    entries.push((**entry).clone());
+                }
+            }
+        }
+        entries
+    }
+
+    /// Libraries on the search path that are plugins but cannot be used, with the reason.
+    #[must_use]
+    pub fn broken(&self) -> Vec<(Utf8PathBuf, String)> {
+        let broken = |found: &Found| match found {
+            Found::Broken { path, reason } => Some((path.clone(), reason.clone())),
+            Found::Plugin(_) => None,
+        };
+        self.scan().iter().filter_map(broken).collect()
+    }
+
+    fn scan(&self) -> &[Found] {
+        self.scanned.get_or_init(|| {
+            let mut found = Vec::new();
+            for path in self.folders.iter().flat_map(|folder| libraries(folder)) {
+                match self.look(&path) {
+                    Ok(Some(entry)) => found.push(Found::Plugin(Box::new(entry))),
+                    Ok(None) => {}
+                    Err(reason) => found.push(Found::Broken { path, reason }),
+                }
+            }
+            self.save();
+            found
+        })
+    }
+
+    fn cache(&self) -> MutexGuard<'_, Cache> {
+        self.cache.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What a library is: a plugin, none (`None`), or broken.
+    fn look(&self, path: &Utf8Path) -> Result<Option<CatalogEntry>, String> {
+        let stamp = stamp(path).map_err(|e| e.to_string())?;
+        let known = self
+            .cache()
+            .libraries
+            .get(path)
+            .filter(|k| k.stamp == stamp)
+            .cloned();
+        let known = match known {
+            Some(known) => known,
+            None => {
+                let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+                let hash = blake3::hash(&bytes).to_hex().to_string();
+                let description = self.describe(path);
+                let known = Known {
+                    stamp,
+                    hash,
+                    description,
+                };
+                // A broken library may only lack something that is installed later: ask again.
+                if !matches!(known.description, Description::Broken(_)) {
+                    let mut cache = self.cache();
+                    cache.libraries.insert(path.to_owned(), known.clone());
+                    cache.changed = true;
+                }
+                known
+            }
+        };
+        match known.description {
+            Description::Foreign(_) => Ok(None),
+            Description::Broken(reason) => Err(reason),
+            Description::Plugin(text) => {
+                let manifest: Manifest = serde_json::from_str(&text).map_err(|e| {
+                    format!("its manifest does not follow schemas/manifest.md: {e}")
+                })?;
+                let id = PluginId {
+                    name: manifest.name.clone(),
+                    version: manifest.version.clone(),
+                    path: path.to_owned(),
+                    hash: known.hash,
+                };
+                Ok(Some(CatalogEntry { id, manifest }))
+            }
+        }
+    }
+
+    fn describe(&self, path: &Utf8Path) -> Description {
+        let Describer::Child { program, arguments } = &self.describer else {
+            return describe(path);
+        };
+        let output = Command::new(program)
+            .args(arguments)
+            .arg(path)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .output();
+        let output = match output {
+            Ok(output) => output,
+            Err(e) => return Description::Broken(format!("{program} cannot be started: {e}")),
+        };
+        if let Ok(description) = serde_json::from_slice(&output.stdout) {
+            return description;
+        }
+        let end = match (output.status.signal(), output.status.code()) {
+            (Some(signal), _) => format!("killed by signal {signal}"),
+            (None, Some(code)) => format!("ended with code {code}"),
+            (None, None) => "ended".to_owned(),
+        };
+        Description::Broken(format!(
+            "loading it ended the process that tried ({end}): its initialisers or `plyflow_plugin` \
+             crash"
+        ))
+    }
+
+    /// Writes the cache file if something changed. A cache that cannot be written only costs time.
+    fn save(&self) {
+        let Some(path) = &self.cache_file else { return };
+        let mut cache = self.cache();
+        if !cache.changed {
+            return;
+        }
+        cache.libraries.retain(|path, _| path.exists());
+        let libraries = std::mem::take(&mut cache.libraries);
+        let file = CacheFile {
+            version: CACHE_VERSION,
+            libraries,
+        };
+        let temporary = Utf8PathBuf::from(format!("{path}.{}", std::process::id()));
+        let written = path
+            .parent()
+            .map_or(Ok(()), std::fs::create_dir_all)
+            .and_then(|()| std::fs::write(&temporary, serde_json::to_vec(&file)?))
+            .and_then(|()| std::fs::rename(&temporary, path));
+        if written.is_err() {
+            let _ = std::fs::remove_file(&temporary);
+        }
+        cache.libraries = file.libraries;
+        cache.changed = false;
+    }
+}
+
+impl Catalog for PluginCatalog {
+    fn find(
+        &self,
+        name_or_path: &str,
+        relative_to: &Utf8Path,
+    ) -> Result<CatalogEntry, CatalogError> {
+        let not_found = |searched| CatalogError::NotFound {
+            name: name_or_path.into(),
+            searched,
+        };
+        if is_path(name_or_path) {
+            let path = relative_to.join(name_or_path);
+            let Ok(path) = path.canonicalize_utf8() else {
+                return Err(not_found(vec![path]));
+            };
+            let found = self.look(&path);
+            self.save();
+            return match found {
+                Ok(Some(entry)) => Ok(entry),
+                Ok(None) => Err(CatalogError::Broken {
+                    path,
+                    reason: "it is not a Plyflow plugin: it does not export `plyflow_plugin`"
+                        .into(),
+                }),
+                Err(reason) => Err(CatalogError::Broken { path, reason }),
+            };
+        }
+        for found in self.scan() {
+            match found {
+                Found::Plugin(entry) if entry.id.name == name_or_path => {
+                    return Ok((**entry).clone());
+                }
+                Found::Broken { path, reason } if named_like(path, name_or_path) => {
+                    return Err(CatalogError::Broken {
+                        path: path.clone(),
+                        reason: reason.clone(),
+                    });
+                }
+                _ => {}
+            }
+        }
+        Err(not_found(self.folders.clone()))
+    }
+
+    fn names(&self, kind: PluginKind) -> Vec<String> {
+        let mut names: Vec<String> = self
+            .plugins()
+            .into_iter()
+            .filter(|e| e.manifest.kind == kind)
+            .map(|e| e.id.name)
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+/// Whether a plugin is named by its path.
+fn is_path(name: &str) -> bool {
+    name.contains('/') || name.ends_with(SUFFIX)
+}
+
+/// Whether a library's file name says that it is the plugin of that name.
+fn named_like(path: &Utf8Path, name: &str) -> bool {
+    let stem = path.file_stem().unwrap_or("");
+    let stem = stem.strip_prefix("lib").unwrap_or(stem);
+    let name = name.replace('-', "_");
+    stem == name
+        || stem
+            .strip_suffix(&name)
+            .is_some_and(|rest| rest.ends_with('_'))
+}
+
+/// Library files of a folder, sorted by name; none if the folder cannot be read.
+fn libraries(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
+    let folder = folder
+        .canonicalize_utf8()
+        .unwrap_or_else(|_| folder.to_owned());
+    let Ok(entries) = folder.read_dir_utf8() else {
+        return Vec::new();
+    };
+    let mut paths: Vec<Utf8PathBuf> = entries
+        .flatten()
+        .map(camino::Utf8DirEntry::into_path)
+        .filter(|p| p.as_str().ends_with(SUFFIX) && p.is_file())
+        .collect();
+    paths.sort();
+    paths
+}
+
+fn stamp(path: &Utf8Path) -> std::io::Result<Stamp> {
+    let m = std::fs::metadata(path)?;
+    Ok(Stamp {
+        size: m.size(),
+        modified: m.mtime(),
+        modified_ns: m.mtime_nsec(),
+        changed: m.ctime(),
+        changed_ns: m.ctime_nsec(),
+        inode: m.ino(),
+    })
+}
+
+/// A component by name on a search path, or by path: loads the libraries whose file names fit. Only in a
+/// worker, which may die.
+pub(crate) fn find_component_library(
+    folders: &[Utf8PathBuf],
+    kind: PluginKind,
+    name: &str,
+) -> Result<Plugin, String> {
+    if is_path(name) {
+        let plugin = Plugin::load(Utf8Path::new(name)).map_err(|e| e.to_string())?;
+        if plugin.manifest.kind == kind {
+            return Ok(plugin);
+        }
+        return Err(format!(
+            "{name} is of kind {}, not {kind}",
+            plugin.manifest.kind
+        ));
+    }
+    let mut broken = Vec::new();
+    for path in folders
+        .iter()
+        .flat_map(|f| libraries(f))
+        .filter(|p| named_like(p, name))
+    {
+        match Plugin::load(&path) {
+            Ok(p) if p.manifest.kind == kind && p.manifest.name == name => return Ok(p),
+            Ok(_) => {}
+            Err(e) if e.foreign => {}
+            Err(e) => broken.push(e.to_string()),
+        }
+    }
+    if !broken.is_empty() {
+        return Err(broken.join("; "));
+    }
+    let folders: Vec<&str> = folders.iter().map(|f| f.as_str()).collect();
+    Err(format!(
+        "there is no {kind} '{name}'; searched: {}",
+        if folders.is_empty() {
+            "no folder".into()
+        } else {
+            folders.join(", ")
+        }
+    ))
+}

@@ -1,0 +1,40 @@
+//! Reading the manifest of a library, in a process that the library may take down with it.
+
+use crate::load::Plugin;
+use camino::Utf8Path;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+
+/// What is said of a library: one JSON line on the standard output of the describing process.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Description {
+    /// A plugin: the text of its manifest.
+    Plugin(String),
+    /// A library that is no plugin.
+    Foreign(String),
+    /// A plugin that cannot be used, and why.
+    Broken(String),
+}
+
+/// Loads a library into this process and describes it.
+#[must_use]
+pub fn describe(path: &Utf8Path) -> Description {
+    match Plugin::load(path) {
+        Ok(plugin) => Description::Plugin(plugin.manifest_text.to_owned()),
+        Err(e) if e.foreign => Description::Foreign(e.reason),
+        Err(e) => Description::Broken(e.reason),
+    }
+}
+
+/// The body of `plyflow step-worker --describe LIBRARY`: prints a [`Description`] and returns the exit
+/// code (0 when it could be printed).
+#[must_use]
+pub fn describe_main(path: &Utf8Path) -> i32 {
+    let mut out = crate::process::private_stdout();
+    let line = serde_json::to_string(&describe(path)).expect("texts are JSON");
+    match writeln!(out, "{line}").and_then(|()| out.flush()) {
+        Ok(()) => 0,
+        Err(_) => 1,
+    }
+}

@@ -1,0 +1,87 @@
+//! What a worker needs of the operating system: signals, standard output, costs.
+
+use std::fs::File;
+use std::os::fd::FromRawFd;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static CANCELLED: AtomicBool = AtomicBool::new(false);
+
+/// Whether this process was asked to stop (SIGTERM).
+pub(crate) fn cancelled() -> bool {
+    CANCELLED.load(Ordering::Relaxed)
+}
+
+extern "C" fn on_terminate(_: libc::c_int) {
+    CANCELLED.store(true, Ordering::Relaxed);
+}
+
+/// Makes this process a worker: SIGTERM asks the step to stop, Ctrl-C is left to the engine (which sends
+/// SIGTERM), and the process dies when the thread that started it ends.
+pub(crate) fn become_worker() {
+    unsafe {
+        let mut action: libc::sigaction = std::mem::zeroed();
+        action.sa_sigaction = on_terminate as *const () as usize;
+        action.sa_flags = libc::SA_RESTART;
+        libc::sigaction(libc::SIGTERM, &raw const action, std::ptr::null_mut());
+        libc::signal(libc::SIGINT, libc::SIG_IGN);
+        #[cfg(target_os = "linux")]
+        libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL as libc::c_ulong);
+    }
+}
+
+/// Limits the memory that this process may use for data; 0: no limit.
+pub(crate) fn limit_memory(bytes: u64) {
+    if bytes > 0 {
+        let limit = libc::rlimit {
+            rlim_cur: bytes,
+            rlim_max: bytes,
+        };
+        unsafe { libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) };
+    }
+}
+
+/// Number of threads for libraries that read it from the environment (OpenMP, Rayon).
+///
+/// Call before any other thread exists.
+pub(crate) fn announce_threads(threads: u32) {
+    for name in ["OMP_NUM_THREADS", "RAYON_NUM_THREADS"] {
+        unsafe { std::env::set_var(name, threads.to_string()) };
+    }
+}
+
+/// The standard output for messages alone: what a plugin prints goes to standard error.
+pub(crate) fn private_stdout() -> File {
+    unsafe {
+        let fd = libc::fcntl(1, libc::F_DUPFD_CLOEXEC, 3);
+        if fd < 0 {
+            return File::from_raw_fd(1);
+        }
+        libc::dup2(2, 1);
+        File::from_raw_fd(fd)
+    }
+}
+
+/// User and system time of this process (s).
+pub(crate) fn cpu_seconds() -> f64 {
+    let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+    unsafe { libc::getrusage(libc::RUSAGE_SELF, &raw mut usage) };
+    let seconds = |t: libc::timeval| t.tv_sec as f64 + t.tv_usec as f64 * 1e-6;
+    seconds(usage.ru_utime) + seconds(usage.ru_stime)
+}
+
+/// Largest resident set of this program (bytes). Not from getrusage: its value survives exec, so a
+/// worker would report the size of the engine that started it.
+pub(crate) fn peak_memory() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok());
+    kib.unwrap_or(0) * 1024
+}
+
+/// Name of the machine.
+pub(crate) fn host_name() -> String {
+    let mut buffer = [0u8; 256];
+    unsafe { libc::gethostname(buffer.as_mut_ptr().cast(), buffer.len() - 1) };
+    let end = buffer.iter().position(|b| *b == 0).unwrap_or(0);
+    String::from_utf8_lossy(&buffer[..end]).into_owned()
+}

@@ -1,0 +1,201 @@
+//! Running one step in this process.
+
+use crate::emitter::Emitter;
+use crate::host::HostState;
+use crate::load::Plugin;
+use crate::{process, services};
+use camino::Utf8Path;
+use plyflow_abi::*;
+use plyflow_model::job::{Cost, FailureKind, JOB_VERSION, Job, LogLevel, Message, Record};
+use plyflow_model::manifest::PluginKind;
+use std::io::{Read, Write};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// Why a step failed: the class and the text for the user.
+type Failure = (FailureKind, String);
+
+/// The body of `plyflow step-worker JOB`: reads a [`Job`] from the file (`-`: standard input), runs it
+/// and talks in [`Message`]s on standard output. What the plugin prints goes to standard error.
+///
+/// Returns the exit code: 0 when the artifact is whole, 1 when the step failed, 2 when there is no job.
+#[must_use]
+pub fn worker_main(source: &str) -> i32 {
+    process::become_worker();
+    let mut out = process::private_stdout();
+    let mut document = String::new();
+    let read = if source == "-" {
+        std::io::stdin().lock().read_to_string(&mut document)
+    } else {
+        std::fs::File::open(source).and_then(|mut f| f.read_to_string(&mut document))
+    };
+    let job = read
+        .map_err(|e| e.to_string())
+        .and_then(|_| serde_json::from_str::<Job>(&document).map_err(|e| e.to_string()));
+    drop(document);
+    match job {
+        Ok(job) => {
+            process::announce_threads(job.threads.max(1));
+            process::limit_memory(job.memory_limit);
+            run_job(&job, &mut out)
+        }
+        Err(e) => {
+            let message = format!("the job {source} cannot be read: {e}");
+            Emitter::new(&mut out).send(&Message::Failed {
+                kind: FailureKind::Load,
+                message,
+            });
+            2
+        }
+    }
+}
+
+/// Runs a step in this process: loads the plugin, calls it, writes artifact and record under the names
+/// that the job gives, and ends the stream of messages with `done` or `failed`. After a failure neither
+/// file is left behind.
+///
+/// Returns the exit code: 0 or 1.
+#[must_use]
+pub fn run_job(job: &Job, events: &mut (dyn Write + Send)) -> i32 {
+    let emitter = Emitter::new(events);
+    let outcome = run(job, &emitter);
+    if job.scratch.exists() {
+        if let Err(e) = std::fs::remove_dir_all(&job.scratch) {
+            let text = format!(
+                "the scratch folder {} could not be removed: {e}",
+                job.scratch
+            );
+            emitter.log(LogLevel::Debug, &text);
+        }
+    }
+    match outcome {
+        Ok(record) => {
+            emitter.send(&Message::Done {
+                record: Box::new(record),
+            });
+            0
+        }
+        Err((kind, message)) => {
+            let _ = std::fs::remove_file(&job.artifact);
+            let _ = std::fs::remove_file(&job.record);
+            emitter.send(&Message::Failed { kind, message });
+            1
+        }
+    }
+}
+
+fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
+    let started = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default()
+        .as_secs_f64();
+    let plugin = load(job)?;
+    let malformed = |text: String| (FailureKind::Malformed, text);
+    let state = HostState::new(job, &plugin, emitter).map_err(|e| malformed(e.message))?;
+    let clock = Instant::now();
+    let table = services::table(&state);
+    let functions = plugin.functions().cast::<pf_step_functions>();
+    let code = unsafe { ((*functions).run)(&raw const table) };
+    let wall_seconds = clock.elapsed().as_secs_f64();
+
+    let mut output = state.output();
+    judge(job, code, &mut output)?;
+    let writer = output.writer.take().expect("only taken here");
+    let labels = writer.labels().map(<[String]>::to_vec);
+    if job.collection && labels.is_none() {
+        return Err(malformed(format!(
+            "the manifest of '{}' declares a collection, but the step declared none: call \
+             `collection`, with no items if there are none",
+            job.plugin.name
+        )));
+    }
+    let bytes = writer
+        .finish(&job.provenance)
+        .map_err(|e| malformed(e.message))?;
+    let record = Record {
+        version: JOB_VERSION,
+        step: job.step.clone(),
+        item: job.item.clone(),
+        key: job.key.clone(),
+        kind: job.output_kind.clone(),
+        bytes,
+        cost: Cost {
+            wall_seconds,
+            cpu_seconds: process::cpu_seconds(),
+            peak_memory: process::peak_memory(),
+            threads: job.threads.max(1),
+        },
+        results: std::mem::take(&mut output.results),
+        collection: labels,
+        warnings: emitter.warnings(),
+        host: process::host_name(),
+        started,
+    };
+    write_record(&job.record, &record).map_err(|e| {
+        (
+            FailureKind::Error,
+            format!("the record {} cannot be written: {e}", job.record),
+        )
+    })?;
+    Ok(record)
+}
+
+fn load(job: &Job) -> Result<Plugin, Failure> {
+    let failed = |text: String| (FailureKind::Load, text);
+    if job.version != JOB_VERSION {
+        return Err(failed(format!(
+            "the job is of version {}, this program runs version {JOB_VERSION}: engine and worker \
+             must be the same release",
+            job.version
+        )));
+    }
+    let plugin = Plugin::load(&job.plugin.path).map_err(|e| failed(e.to_string()))?;
+    if plugin.manifest.kind != PluginKind::Step {
+        return Err(failed(format!(
+            "{}: the plugin '{}' is of kind {}; a step needs kind step",
+            plugin.path, plugin.manifest.name, plugin.manifest.kind
+        )));
+    }
+    Ok(plugin)
+}
+
+/// Turns the plugin's status, its text and the host's reasons into one verdict.
+fn judge(job: &Job, code: i32, output: &mut crate::host::Output) -> Result<(), Failure> {
+    let said = output.failure.take();
+    let because = |detail: Option<String>| match detail {
+        Some(d) => format!(": {d}"),
+        None => String::new(),
+    };
+    let name = &job.plugin.name;
+    if let Some(refused) = output.refused.take() {
+        // A write was refused: that is the cause, whatever the plugin made of it.
+        let text = match (code, said) {
+            (PF_OK, _) => format!(
+                "{refused} (the host refused this write; the plugin '{name}' did not heed it)"
+            ),
+            (_, Some(said)) if !said.contains(&refused) => format!("{said}: {refused}"),
+            (_, Some(said)) => said,
+            (_, None) => refused,
+        };
+        return Err((FailureKind::Malformed, text));
+    }
+    match code {
+        PF_OK => Ok(()),
+        PF_CANCELLED => Err((FailureKind::Cancelled, "the step was stopped".into())),
+        PF_PANIC => {
+            let text = said.unwrap_or_else(|| format!("the plugin '{name}' panicked"));
+            Err((FailureKind::Panic, text))
+        }
+        code => {
+            let text = said.unwrap_or_else(|| {
+                format!("the plugin '{name}' returned status {code} without saying why")
+            });
+            Err((FailureKind::Error, text + &because(output.detail.take())))
+        }
+    }
+}
+
+fn write_record(path: &Utf8Path, record: &Record) -> std::io::Result<()> {
+    let mut text = serde_json::to_string_pretty(record)?;
+    text.push('\n');
+    std::fs::write(path, text)
+}
