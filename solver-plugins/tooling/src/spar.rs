@@ -159,8 +159,7 @@ fn joggle(i: usize, j: &Joggle) -> Result<JoggleShape, ToolError> {
     })
 }
 
-/// The level top must remain, joggles must lie between the corners and one after the other, and the fillets
-/// must end above the bed.
+/// The level top must remain and the fillets must end above the bed.
 fn check_fit(spar: &JoggleSpar, sweep: &Sweep) -> Result<(), ToolError> {
     let setback = sweep.setback();
     if sweep.half_width <= sweep.corner.max(setback) * 1.05 {
@@ -200,6 +199,11 @@ fn check_fit(spar: &JoggleSpar, sweep: &Sweep) -> Result<(), ToolError> {
             "raise the tool or take a smaller fillet",
         ));
     }
+    check_places(sweep, lowest)
+}
+
+/// Joggles must lie between the rounded ends, one after the other.
+fn check_places(sweep: &Sweep, lowest: f64) -> Result<(), ToolError> {
     let tallest = sweep.height + (lowest - sweep.height).abs() + total_rise(sweep);
     let foot = sweep.half_width + tallest * sweep.draft.tan();
     let [low, high] = [sweep.ends[0] + sweep.corner, sweep.ends[1] - sweep.corner];

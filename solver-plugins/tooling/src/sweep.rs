@@ -212,29 +212,34 @@ impl Sweep {
             }
             ring = next;
         }
-        let mut bottom = vec![vec![u32::MAX; grid.across + 1]; grid.lines.len()];
-        for (o, &p) in outline.iter().zip(&ring) {
-            bottom[o.line][o.place] = p;
-        }
-        for line in &mut bottom {
-            let ends = [line[0], line[grid.across]].map(|p| mesh.points[p as usize]);
-            for (j, place) in line.iter_mut().enumerate() {
-                if *place == u32::MAX {
-                    let w = j as f64 / grid.across as f64;
-                    let at = |k: usize| ends[0][k] + w * (ends[1][k] - ends[0][k]);
-                    *place = mesh.push([at(0), at(1), 0.0]);
-                }
+        mesh_bottom(mesh, grid, &outline, &ring);
+    }
+}
+
+/// The bottom on z = 0 inside the outline's last ring, in the lines of the top.
+fn mesh_bottom(mesh: &mut ToolMesh, grid: &TopGrid, outline: &[OutlinePoint], ring: &[u32]) {
+    let mut bottom = vec![vec![u32::MAX; grid.across + 1]; grid.lines.len()];
+    for (o, &p) in outline.iter().zip(ring) {
+        bottom[o.line][o.place] = p;
+    }
+    for line in &mut bottom {
+        let ends = [line[0], line[grid.across]].map(|p| mesh.points[p as usize]);
+        for (j, place) in line.iter_mut().enumerate() {
+            if *place == u32::MAX {
+                let w = j as f64 / grid.across as f64;
+                let at = |k: usize| ends[0][k] + w * (ends[1][k] - ends[0][k]);
+                *place = mesh.push([at(0), at(1), 0.0]);
             }
         }
-        for i in 0..bottom.len() - 1 {
-            for j in 0..grid.across {
-                mesh.quad(
-                    bottom[i][j],
-                    bottom[i][j + 1],
-                    bottom[i + 1][j + 1],
-                    bottom[i + 1][j],
-                );
-            }
+    }
+    for i in 0..bottom.len() - 1 {
+        for j in 0..grid.across {
+            mesh.quad(
+                bottom[i][j],
+                bottom[i][j + 1],
+                bottom[i + 1][j + 1],
+                bottom[i + 1][j],
+            );
         }
     }
 }

@@ -74,6 +74,56 @@ fn distance_error_stays_within_the_stated_bounds_in_a_2_mm_band_of_the_spar() {
 }
 
 #[test]
+fn gradient_points_from_the_surface_with_nearly_unit_length() {
+    let mesh = spar();
+    let tree = SurfaceTree::new(&mesh.without_bottom(0.1));
+    let grid = SignedDistanceGrid::build(&mesh, 3e-3, 6e-3);
+    let (mut length, mut angle): (f64, f64) = (0.0, 0.0);
+    for (p, d) in points_near(&mesh, 2e-3, 20_000) {
+        let (_, g) = grid.distance_and_gradient(p);
+        length = length.max((crate::vector::norm(g) - 1.0).abs());
+        // Closer than this the direction to a facet says nothing of the surface between its edges.
+        if d.abs() > 1e-3 {
+            let away = scale(sub(p, tree.closest(p).point), 1.0 / d);
+            angle = angle.max(crate::vector::norm(sub(g, away)));
+        }
+    }
+    println!("gradient: length within {length:.4} of 1, direction within {angle:.4} rad");
+    assert!(length < 0.04 && angle < 0.12, "{length} {angle}");
+}
+
+#[test]
+fn distance_to_a_hemisphere_approaches_the_closed_form() {
+    // Fine facets: where the surface is smooth the spline adds less than they do.
+    let mesh = hemisphere(0.03, 0.001).unwrap();
+    let error = |h: f64| {
+        let grid = SignedDistanceGrid::build(&mesh, h, 4e-3);
+        (0..4000)
+            .map(|n| {
+                let (u, turn) = (
+                    0.2 + 0.8 * random(3 * n),
+                    std::f64::consts::TAU * random(3 * n + 1),
+                );
+                let out = 4e-3 * (random(3 * n + 2) - 0.5);
+                let (r, s) = (0.03 + out, (1.0 - u * u).sqrt());
+                let p = [r * s * turn.cos(), r * s * turn.sin(), r * u];
+                (grid.distance_and_gradient(p).0 - out).abs()
+            })
+            .fold(0.0, f64::max)
+    };
+    let (coarse, fine) = (error(4e-3), error(2e-3));
+    println!(
+        "sphere: {:.5} mm at 4 mm, {:.5} mm at 2 mm",
+        coarse * 1e3,
+        fine * 1e3
+    );
+    assert!(
+        coarse < 8e-6 && fine < 5e-6 && fine < coarse,
+        "{coarse} {fine}"
+    );
+}
+
+#[test]
 fn gradient_is_the_derivative_of_the_distance() {
     let mesh = spar();
     let grid = SignedDistanceGrid::build(&mesh, 4e-3, 6e-3);
