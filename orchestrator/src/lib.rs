@@ -1,1 +1,10 @@
-//! plyflow
+//! Plyflow: runs forming studies. A workflow is planned ([`plan`]), decided on and driven ([`engine`]),
+//! each step in a process of its own ([`worker`]), with its artifacts in a [`store`].
+
+pub mod cli;
+pub mod engine;
+pub mod exit;
+pub mod plan;
+pub mod progress;
+pub mod store;
+pub mod worker;

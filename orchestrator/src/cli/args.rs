@@ -1,0 +1,320 @@
+//! The words of the command line.
+
+use crate::exit;
+use camino::Utf8PathBuf;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Runs composite-forming studies that are written as one YAML workflow.
+#[derive(Debug, Parser)]
+#[command(name = "plyflow", version, after_help = exit::HELP, max_term_width = 110)]
+pub struct Cli {
+    /// The command.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What can be asked.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a workflow: what is not yet in the store, and only that
+    #[command(after_help = RUN_EXAMPLES)]
+    Run(RunArgs),
+    /// Show what a run would do with each step, and why
+    #[command(after_help = PLAN_EXAMPLES)]
+    Plan(PlanArgs),
+    /// Check a workflow and everything it names, without running anything
+    #[command(after_help = "Examples:\n  plyflow validate workflow.yaml\n  plyflow validate workflow.yaml --format json   # for editors")]
+    Validate(ValidateArgs),
+    /// Draw the steps and their connections
+    #[command(after_help = "Examples:\n  plyflow graph workflow.yaml | dot -Tsvg > graph.svg\n  plyflow graph workflow.yaml --format mermaid   # for Markdown")]
+    Graph(GraphArgs),
+    /// Say why a step would run again: which part of its key changed, from what to what
+    #[command(after_help = "Examples:\n  plyflow explain workflow.yaml detect\n  plyflow explain workflow.yaml 'local[A]'")]
+    Explain(ExplainArgs),
+    /// Print the named numbers of the last run, with the values that the workflow expects
+    #[command(after_help = "Examples:\n  plyflow results workflow.yaml\n  plyflow results workflow.yaml --format csv > results.csv\n  plyflow results workflow.yaml --check      # exit code 5 when an expectation is missed")]
+    Results(ResultsArgs),
+    /// Write the HTML report of what the store has
+    Report(ReportArgs),
+    /// List the plugins that can be found, or the parameters of one
+    #[command(after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --plugins ./build ./build/libmine.so")]
+    Plugins(PluginsArgs),
+    /// Show what an artifact holds
+    #[command(after_help = "Examples:\n  plyflow inspect result.h5\n  plyflow inspect 'local[A]' --workflow workflow.yaml")]
+    Inspect(InspectArgs),
+    /// Print the JSON Schema of a file format, for editors
+    #[command(after_help = "Examples:\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json")]
+    Schema(SchemaArgs),
+    /// Remove artifacts that no workflow's last run uses, or all of a store
+    #[command(after_help = "Examples:\n  plyflow clean workflow.yaml --dry-run\n  plyflow clean workflow.yaml\n  plyflow clean workflow.yaml --all")]
+    Clean(CleanArgs),
+    /// Print completions for a shell
+    #[command(after_help = "Example:\n  plyflow completions bash > ~/.local/share/bash-completion/completions/plyflow")]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+const RUN_EXAMPLES: &str = "\
+Examples:
+  plyflow run workflow.yaml                    # again: nothing runs
+  plyflow run workflow.yaml --jobs 8
+  plyflow run workflow.yaml --until zones      # that step and what it needs
+  plyflow run workflow.yaml --set detect.over_shear_positive='9 deg'
+
+A run that was stopped or killed resumes with the same command.";
+
+const PLAN_EXAMPLES: &str = "\
+Examples:
+  plyflow plan workflow.yaml
+  plyflow plan workflow.yaml --set coarse.element=m4 --format json";
+
+/// A workflow and where things are.
+#[derive(Debug, Args)]
+pub struct Workflow {
+    /// The workflow file
+    pub workflow: Utf8PathBuf,
+    #[command(flatten)]
+    /// Where things are.
+    pub places: Places,
+    /// Use another value for a parameter, written as in YAML; may be repeated
+    #[arg(long = "set", value_name = "STEP.PARAMETER=VALUE")]
+    pub set: Vec<String>,
+}
+
+/// Where things are.
+#[derive(Debug, Args, Default)]
+pub struct Places {
+    /// Folder for artifacts and journals [default: .plyflow beside the workflow]
+    #[arg(long, value_name = "DIR")]
+    pub store: Option<Utf8PathBuf>,
+    /// Look for plugins here first; may be repeated
+    #[arg(long, value_name = "DIR")]
+    pub plugins: Vec<Utf8PathBuf>,
+}
+
+/// `run`
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// Cores that the steps share [default: all of this machine]
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub jobs: Option<u32>,
+    /// Memory that the steps share, for steps that state theirs: 8GiB [default: nine tenths of this machine]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// After a failure finish what does not depend on it
+    #[arg(long, conflicts_with = "fail_fast")]
+    pub keep_going: bool,
+    /// After a failure stop everything
+    #[arg(long)]
+    pub fail_fast: bool,
+    /// Run only this step and what it needs; may be repeated
+    #[arg(long, value_name = "STEP")]
+    pub until: Vec<String>,
+    /// Run this step again even if the store has it; may be repeated
+    #[arg(long, value_name = "STEP")]
+    pub force: Vec<String>,
+    /// Show nothing but failures
+    #[arg(long, short)]
+    pub quiet: bool,
+    /// How events are shown
+    #[arg(long, value_enum, default_value = "text")]
+    pub log_format: LogFormat,
+    /// Do not write the HTML report
+    #[arg(long)]
+    pub no_report: bool,
+    /// End with code 5 when an expectation is missed
+    #[arg(long)]
+    pub check: bool,
+}
+
+/// How events are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// Bars on a terminal, lines elsewhere
+    Text,
+    /// One JSON object a line, on standard error
+    Json,
+}
+
+/// Form of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people
+    Table,
+    /// For programs
+    Json,
+    /// For spreadsheets
+    Csv,
+}
+
+/// Form of an answer that has no CSV.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TextOrJson {
+    /// For people
+    Text,
+    /// For programs
+    Json,
+}
+
+/// `plan`
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// Only this step and what it needs; may be repeated
+    #[arg(long, value_name = "STEP")]
+    pub until: Vec<String>,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `validate`
+#[derive(Debug, Args)]
+pub struct ValidateArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `graph`
+#[derive(Debug, Args)]
+pub struct GraphArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// Form
+    #[arg(long, value_enum, default_value = "dot")]
+    pub format: GraphFormat,
+}
+
+/// Form of a graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum GraphFormat {
+    /// Graphviz
+    Dot,
+    /// Mermaid
+    Mermaid,
+}
+
+/// `explain`
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// A step, or one of its items: local[A]
+    pub step: String,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `results`
+#[derive(Debug, Args)]
+pub struct ResultsArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// Form
+    #[arg(long, value_enum, default_value = "table")]
+    pub format: Format,
+    /// Only this step; may be repeated
+    #[arg(long, value_name = "STEP")]
+    pub step: Vec<String>,
+    /// End with code 5 when an expectation is missed
+    #[arg(long)]
+    pub check: bool,
+}
+
+/// `report`
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// Where to write it [default: report.html beside the workflow]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<Utf8PathBuf>,
+}
+
+/// `plugins`
+#[derive(Debug, Args)]
+pub struct PluginsArgs {
+    /// A plugin by name or path: show its parameters, inputs and results
+    pub name: Option<String>,
+    /// Also look where this workflow says
+    #[arg(long, value_name = "FILE")]
+    pub workflow: Option<Utf8PathBuf>,
+    #[command(flatten)]
+    /// Where things are.
+    pub places: Places,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `inspect`
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    /// An artifact file, or with --workflow a step or one of its items: local[A]
+    pub artifact: String,
+    /// The workflow whose step is meant
+    #[arg(long, value_name = "FILE")]
+    pub workflow: Option<Utf8PathBuf>,
+    #[command(flatten)]
+    /// Where things are.
+    pub places: Places,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `schema`
+#[derive(Debug, Args)]
+pub struct SchemaArgs {
+    /// Which
+    #[arg(value_enum, default_value = "workflow")]
+    pub which: SchemaKind,
+    #[command(flatten)]
+    /// Where things are.
+    pub places: Places,
+}
+
+/// A file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SchemaKind {
+    /// Workflows, with the parameters of the plugins that are found
+    Workflow,
+    /// Workflows, without plugins: the same on every machine
+    PlainWorkflow,
+    /// Scenes
+    Scene,
+    /// Materials
+    Material,
+}
+
+/// `clean`
+#[derive(Debug, Args)]
+pub struct CleanArgs {
+    /// The workflow beside whose file the store lies
+    pub workflow: Option<Utf8PathBuf>,
+    #[command(flatten)]
+    /// Where things are.
+    pub places: Places,
+    /// Remove the whole store: artifacts, journals, logs
+    #[arg(long)]
+    pub all: bool,
+    /// Say what would go, remove nothing
+    #[arg(long, short = 'n')]
+    pub dry_run: bool,
+}

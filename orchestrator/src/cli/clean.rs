@@ -1,0 +1,60 @@
+//! `clean`: makes room in a store.
+
+use super::args::CleanArgs;
+use super::open::store_root;
+use super::table::bytes;
+use super::{Done, Stop, print};
+use crate::exit;
+use crate::store::{Journal, Lock, LockError, Store};
+use std::collections::BTreeSet;
+
+/// Turns a lock that is not to be had into an exit code.
+pub fn locked(e: LockError) -> Stop {
+    match e {
+        LockError::Held { .. } => Stop::new(exit::LOCKED, e),
+        LockError::Io { .. } => Stop::new(exit::INTERNAL, e),
+    }
+}
+
+/// `plyflow clean`.
+///
+/// # Errors
+/// [`exit::LOCKED`] while a run uses the store.
+pub fn clean(args: &CleanArgs) -> Done {
+    let root = store_root(&args.places, args.workflow.as_deref());
+    if !root.is_dir() {
+        return print(&format!("there is no store {root}; nothing to remove\n"));
+    }
+    let store = Store::new(root);
+    let _lock = Lock::exclusive(&store.lock(), &format!("the store {}", store.root()))
+        .map_err(locked)?;
+    let failed = || Stop::machine(format!("cleaning {}", store.root()));
+    let mut used = BTreeSet::new();
+    if !args.all {
+        for run in store.runs().map_err(failed())? {
+            let journal = Journal::read(&run.journal()).map_err(failed())?;
+            used.extend(journal.last_keys());
+        }
+    }
+    let (mut count, mut size) = (0u64, 0u64);
+    for key in store.keys().map_err(failed())?.into_iter().filter(|k| !used.contains(k)) {
+        count += 1;
+        size += store.size(&key).unwrap_or(0);
+        if !args.dry_run {
+            store.remove(&key).map_err(failed())?;
+        }
+    }
+    let verb = if args.dry_run { "would remove" } else { "removed" };
+    if args.all && !args.dry_run {
+        // Only what a store is made of: `--store` may name a folder that holds other things too.
+        for folder in ["artifacts", "runs"] {
+            match std::fs::remove_dir_all(store.root().join(folder)) {
+                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(failed()(e)),
+                _ => {}
+            }
+        }
+        let _ = std::fs::remove_file(store.root().join("plugins.json"));
+    }
+    let s = if count == 1 { "" } else { "s" };
+    print(&format!("{verb} {count} artifact{s}, {}\n", bytes(size)))
+}

@@ -1,0 +1,137 @@
+//! `inspect`: what an artifact holds.
+
+use super::args::{InspectArgs, Places, TextOrJson, Workflow};
+use super::explain::instances_named;
+use super::open::open;
+use super::table::{bytes, number, table};
+use super::{Done, Stop, print};
+use crate::engine::core::State;
+use crate::exit;
+use crate::progress::duration_text;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_artifact::Artifact;
+use plyflow_model::job::Record;
+use serde_json::{Value, json};
+
+/// `plyflow inspect`.
+///
+/// # Errors
+/// [`exit::USAGE`] when there is no such artifact.
+pub fn inspect(args: &InspectArgs) -> Done {
+    let path = locate(args)?;
+    let artifact = Artifact::open(path.as_std_path()).map_err(|e| Stop::new(exit::USAGE, e))?;
+    let beside = path.with_extension("record.json");
+    let record: Option<Record> =
+        std::fs::read(beside).ok().and_then(|text| serde_json::from_slice(&text).ok());
+    let parsed = |text: &str| serde_json::from_str::<Value>(text).unwrap_or_default();
+    if args.format == TextOrJson::Json {
+        let all = json!({
+            "path": path,
+            "kind": artifact.kind(),
+            "attributes": parsed(artifact.attributes()),
+            "results": artifact.results(),
+            "collection": artifact.collection(),
+            "contents": artifact.contents(),
+            "times": artifact.times(),
+            "provenance": parsed(artifact.provenance()),
+            "record": record,
+        });
+        return print(&format!("{all:#}\n"));
+    }
+    print(&text(&path, &artifact, record.as_ref(), &parsed(artifact.provenance())))
+}
+
+fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
+    let Some(file) = &args.workflow else {
+        let path = Utf8Path::new(&args.artifact);
+        if path.is_file() {
+            return Ok(path.to_owned());
+        }
+        let text = format!(
+            "there is no file {path}; for the artifact of a step: plyflow inspect STEP --workflow FILE"
+        );
+        return Err(Stop::new(exit::USAGE, text));
+    };
+    let places =
+        Places { store: args.places.store.clone(), plugins: args.places.plugins.clone() };
+    let opened = open(&Workflow { workflow: file.clone(), places, set: Vec::new() })?;
+    let session = opened.look()?;
+    let ids = instances_named(&opened, &session, &args.artifact)?;
+    let labels: Vec<String> = ids.iter().map(|id| session.core.label(*id)).collect();
+    let [id] = ids[..] else {
+        let text = format!("'{}' has several items: {}", args.artifact, labels.join(", "));
+        return Err(Stop::new(exit::USAGE, text));
+    };
+    let instance = &session.core.instances()[id];
+    match (instance.state, instance.key) {
+        (State::Done { .. }, Some(key)) => Ok(opened.store.artifact(&key)),
+        _ => Err(Stop::new(
+            exit::USAGE,
+            format!("{} has no artifact yet; start with: plyflow run {file}", labels[0]),
+        )),
+    }
+}
+
+fn text(path: &Utf8Path, artifact: &Artifact, record: Option<&Record>, made: &Value) -> String {
+    let word = |v: &Value| v.as_str().unwrap_or_default().to_owned();
+    let mut out = format!("{path}\nkind      {}\n", artifact.kind());
+    out += &format!("step      {} {}\n", word(&made["step"]), made["item"]);
+    let plugin = &made["plugin"];
+    out += &format!("plugin    {} {}\n", word(&plugin["name"]), word(&plugin["version"]));
+    if let Some(r) = record {
+        let c = &r.cost;
+        out += &format!(
+            "cost      {} wall, {} cpu, {} threads, {} memory on {}\n",
+            duration_text(c.wall_seconds),
+            duration_text(c.cpu_seconds),
+            c.threads,
+            bytes(c.peak_memory),
+            r.host
+        );
+        out += &format!("size      {}\n", bytes(r.bytes));
+        for warning in &r.warnings {
+            out += &format!("warning   {warning}\n");
+        }
+    }
+    if let Some(labels) = artifact.collection() {
+        out += &format!("items     {}: {}\n", labels.len(), labels.join(", "));
+    }
+    let contents = artifact.contents();
+    if contents.frames > 0 {
+        let (first, last) = (artifact.times().first(), artifact.times().last());
+        let span = |t: Option<&f64>| t.map_or(String::new(), |t| number(*t));
+        out += &format!("frames    {} from {} s to {} s\n", contents.frames, span(first), span(last));
+    }
+    out += &bodies(artifact);
+    if !contents.arrays.is_empty() {
+        let rows: Vec<Vec<String>> = contents
+            .arrays
+            .iter()
+            .map(|a| vec![a.path.clone(), format!("{:?}", a.dtype), format!("{:?}", a.shape), a.unit.clone()])
+            .collect();
+        out += &format!("\n{}", table(&["array", "type", "shape", "unit"], &rows, &[]));
+    }
+    if !artifact.results().is_empty() {
+        let rows: Vec<Vec<String>> = artifact
+            .results()
+            .iter()
+            .map(|r| vec![r.name.clone(), number(r.value), r.unit.clone()])
+            .collect();
+        out += &format!("\n{}", table(&["result", "value", "unit"], &rows, &[1]));
+    }
+    out
+}
+
+fn bodies(artifact: &Artifact) -> String {
+    let bodies = &artifact.contents().bodies;
+    if bodies.is_empty() {
+        return String::new();
+    }
+    let line = |b: &plyflow_artifact::BodyInfo| {
+        let fields: Vec<String> =
+            b.fields.iter().map(|f| format!("{} [{}]", f.name, f.unit)).collect();
+        vec![b.name.clone(), b.points.to_string(), b.cells.to_string(), fields.join(", ")]
+    };
+    let rows: Vec<Vec<String>> = bodies.iter().map(line).collect();
+    format!("\n{}", table(&["body", "points", "cells", "fields"], &rows, &[1, 2]))
+}

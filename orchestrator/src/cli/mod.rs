@@ -1,0 +1,100 @@
+//! The command line: what can be asked, and what each command answers.
+
+mod args;
+mod clean;
+mod explain;
+mod inspect;
+mod open;
+mod plan;
+mod plugins;
+mod results;
+mod run;
+mod table;
+
+pub use args::Cli;
+
+use crate::exit;
+use args::Command;
+use clap::{CommandFactory, Parser};
+use std::fmt::Display;
+
+/// An end of a command that is not success: what to say and the exit code.
+#[derive(Debug)]
+pub struct Stop {
+    /// One of [`exit`].
+    pub code: u8,
+    /// For the user; empty when all has been said.
+    pub text: String,
+}
+
+impl Stop {
+    /// A stop with a text.
+    pub fn new(code: u8, text: impl Display) -> Self {
+        Self { code, text: text.to_string() }
+    }
+
+    /// A stop after everything has been said.
+    pub fn silent(code: u8) -> Self {
+        Self { code, text: String::new() }
+    }
+
+    /// Wraps an error of the machine with what was being done.
+    pub fn machine<E: Display>(what: impl Display) -> impl FnOnce(E) -> Self {
+        move |e| Self::new(exit::INTERNAL, format!("{what}: {e}"))
+    }
+}
+
+/// What a command ends with.
+pub type Done = Result<(), Stop>;
+
+/// Runs the command line of this process and returns the exit code.
+pub fn main() -> u8 {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            let _ = e.print();
+            return if e.use_stderr() { exit::USAGE } else { exit::OK };
+        }
+    };
+    match dispatch(cli.command) {
+        Ok(()) => exit::OK,
+        Err(stop) => {
+            if !stop.text.is_empty() {
+                eprintln!("plyflow: {}", stop.text);
+            }
+            stop.code
+        }
+    }
+}
+
+fn dispatch(command: Command) -> Done {
+    match command {
+        Command::Run(a) => run::run(&a),
+        Command::Plan(a) => plan::plan(&a),
+        Command::Validate(a) => plan::validate(&a),
+        Command::Graph(a) => plan::graph(&a),
+        Command::Explain(a) => explain::explain(&a),
+        Command::Results(a) => results::results(&a),
+        Command::Report(a) => run::report(&a),
+        Command::Plugins(a) => plugins::plugins(&a),
+        Command::Inspect(a) => inspect::inspect(&a),
+        Command::Schema(a) => plugins::schema(&a),
+        Command::Clean(a) => clean::clean(&a),
+        Command::Completions { shell } => {
+            let mut command = Cli::command();
+            clap_complete::generate(shell, &mut command, "plyflow", &mut std::io::stdout());
+            Ok(())
+        }
+    }
+}
+
+/// Prints to standard output; a reader that has gone away (`| head`) ends the command quietly.
+pub fn print(text: &str) -> Done {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Err(Stop::silent(exit::OK)),
+        Err(e) => Err(Stop::machine("standard output")(e)),
+        Ok(()) => Ok(()),
+    }
+}

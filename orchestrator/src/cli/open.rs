@@ -1,0 +1,181 @@
+//! Opens what most commands need: the plugins, the workflow, the store.
+
+use super::Stop;
+use super::args::{Places, Workflow};
+use crate::engine::core::Limits;
+use crate::engine::{Options, Session};
+use crate::exit;
+use crate::plan::Graph;
+use crate::progress::Quiet;
+use crate::store::Store;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_plugin_host::{Describer, PluginCatalog};
+use plyflow_workflow::resolved::ResolvedWorkflow;
+use std::io::IsTerminal;
+
+/// A workflow that is ready to plan, and where its things are.
+pub struct Opened {
+    /// The workflow.
+    pub workflow: ResolvedWorkflow,
+    /// Its steps as a graph.
+    pub graph: Graph,
+    /// Its store.
+    pub store: Store,
+    /// Where plugins are looked for.
+    pub search_path: Vec<Utf8PathBuf>,
+}
+
+/// This program.
+///
+/// # Errors
+/// When the system does not tell.
+pub fn program() -> Result<Utf8PathBuf, Stop> {
+    let path = std::env::current_exe().map_err(Stop::machine("finding this program"))?;
+    Utf8PathBuf::from_path_buf(path)
+        .map_err(|p| Stop::new(exit::INTERNAL, format!("the path {} is not UTF-8", p.display())))
+}
+
+fn absolute(path: &Utf8Path) -> Utf8PathBuf {
+    camino::absolute_utf8(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// The folders where plugins are looked for, in order: the command line, the workflow, the environment,
+/// beside this program.
+///
+/// # Errors
+/// When this program cannot be found.
+pub fn search_path(
+    places: &Places,
+    workflow: Option<&Utf8Path>,
+) -> Result<Vec<Utf8PathBuf>, Stop> {
+    let mut folders: Vec<Utf8PathBuf> = places.plugins.iter().map(|p| absolute(p)).collect();
+    for given in &folders {
+        if !given.is_dir() {
+            return Err(Stop::new(exit::USAGE, format!("--plugins {given}: there is no such folder")));
+        }
+    }
+    if let Some(file) = workflow {
+        folders.extend(plyflow_workflow::plugin_search_folders(file));
+    }
+    if let Some(list) = std::env::var_os("PLYFLOW_PLUGINS") {
+        let given = std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty());
+        folders.extend(given.filter_map(|p| Utf8PathBuf::from_path_buf(p).ok()).map(|p| absolute(&p)));
+    }
+    if let Some(beside) = program()?.parent() {
+        folders.push(beside.join("plugins"));
+        folders.push(beside.to_owned());
+        if let Some(prefix) = beside.parent() {
+            folders.push(prefix.join("lib/plyflow"));
+        }
+    }
+    let mut seen = Vec::new();
+    folders.retain(|f| {
+        let new = f.is_dir() && !seen.contains(f);
+        seen.push(f.clone());
+        new
+    });
+    Ok(folders)
+}
+
+/// The store of a workflow file.
+pub fn store_root(places: &Places, workflow: Option<&Utf8Path>) -> Utf8PathBuf {
+    match (&places.store, workflow) {
+        (Some(given), _) => absolute(given),
+        (None, Some(file)) => {
+            absolute(file).parent().map_or_else(|| ".".into(), Utf8Path::to_owned).join(".plyflow")
+        }
+        (None, None) => absolute(Utf8Path::new(".plyflow")),
+    }
+}
+
+/// The plugins on a search path. What is known of them is kept in the store, if there is one.
+///
+/// # Errors
+/// When this program cannot be found.
+pub fn catalog(folders: Vec<Utf8PathBuf>, store: &Utf8Path) -> Result<PluginCatalog, Stop> {
+    let describer = Describer::Child {
+        program: program()?,
+        arguments: vec!["step-worker".into(), "--describe".into()],
+    };
+    Ok(PluginCatalog::new(folders, Some(store.join("plugins.json")), describer))
+}
+
+/// Reads and checks a workflow; says everything that is wrong with it.
+///
+/// # Errors
+/// [`exit::INVALID`] with the findings shown, or [`exit::USAGE`] when there is no such file.
+pub fn open(args: &Workflow) -> Result<Opened, Stop> {
+    match load(args)? {
+        Ok(opened) => Ok(opened),
+        Err(findings) => {
+            eprint!("{}", findings.render(std::io::stderr().is_terminal()));
+            Err(Stop::silent(exit::INVALID))
+        }
+    }
+}
+
+/// As [`open`], with the findings given back.
+///
+/// # Errors
+/// When the file does not exist or an override is not understood.
+pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnostics>, Stop> {
+    let file = &args.workflow;
+    if !file.is_file() {
+        let text = format!("there is no workflow file {file}");
+        return Err(Stop::new(exit::USAGE, text));
+    }
+    let search_path = search_path(&args.places, Some(file))?;
+    let root = store_root(&args.places, Some(file));
+    let catalog = catalog(search_path.clone(), &root)?;
+    let workflow = match plyflow_workflow::load(file, &catalog) {
+        Ok(workflow) => workflow,
+        Err(findings) => return Ok(Err(findings)),
+    };
+    let graph = Graph::new(&workflow).map_err(|e| Stop::new(exit::INVALID, e))?;
+    Ok(Ok(Opened { workflow, graph, store: Store::new(root), search_path }))
+}
+
+impl Opened {
+    /// A session that has looked at the store and will not run anything.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn look(&self) -> Result<Session<'_>, Stop> {
+        let limits = Limits { cores: cores(), memory: 0, policy: self.workflow.on_failure };
+        let options =
+            Options { limits, search_path: self.search_path.clone(), force: Vec::new() };
+        let mut session = Session::new(&self.workflow, &self.graph, &self.store, options, false)
+            .map_err(Stop::machine(format!("reading the store {}", self.store.root())))?;
+        session.look(&mut Quiet);
+        Ok(session)
+    }
+
+    /// Wants only these steps and what they need.
+    ///
+    /// # Errors
+    /// When a name is none of the steps; says which there are.
+    pub fn restrict(&mut self, names: &[String]) -> Result<(), Stop> {
+        self.step_indices(names)?;
+        self.graph.restrict(names).map_err(|e| Stop::new(exit::USAGE, e))
+    }
+
+    /// Indices of steps by name.
+    ///
+    /// # Errors
+    /// When a name is none of the steps; says which there are.
+    pub fn step_indices(&self, names: &[String]) -> Result<Vec<usize>, Stop> {
+        let find = |name: &String| {
+            self.graph.find(name).ok_or_else(|| {
+                let all: Vec<&str> = self.graph.steps.iter().map(|s| s.name.as_str()).collect();
+                let text = format!("there is no step '{name}'; the steps are: {}", all.join(", "));
+                Stop::new(exit::USAGE, text)
+            })
+        };
+        names.iter().map(find).collect()
+    }
+}
+
+/// Cores of this machine that this process may use.
+pub fn cores() -> u32 {
+    std::thread::available_parallelism().map_or(1, |n| n.get() as u32)
+}

@@ -1,0 +1,207 @@
+//! `plan`, `validate`, `graph`: what would be done.
+
+use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs};
+use super::open::{self, open};
+use super::table::table;
+use super::{Done, Stop, print};
+use crate::engine::core::{Id, State};
+use crate::engine::{Session, input_keys};
+use crate::exit;
+use crate::plan::{Change, changes};
+use serde_json::json;
+use std::io::IsTerminal;
+
+/// What a run would do with an instance, or with the hidden ones of a step.
+pub struct Prospect {
+    /// Label: `coarse`, `local[A]`, or `local x N (from zones)`.
+    pub label: String,
+    /// `cached`, `run` or `unknown`.
+    pub fate: &'static str,
+    /// Why.
+    pub reason: String,
+}
+
+/// `plyflow plan`.
+///
+/// # Errors
+/// See [`Stop`].
+pub fn plan(args: &PlanArgs) -> Done {
+    let mut opened = open(&args.workflow)?;
+    opened.restrict(&args.until)?;
+    let session = opened.look()?;
+    let found = prospects(&session);
+    if args.format == TextOrJson::Json {
+        let list: Vec<_> = found
+            .iter()
+            .map(|p| json!({"step": p.label, "state": p.fate, "reason": p.reason}))
+            .collect();
+        return print(&format!("{:#}\n", json!(list)));
+    }
+    let rows: Vec<Vec<String>> = found
+        .iter()
+        .map(|p| vec![p.label.clone(), p.fate.to_owned(), p.reason.clone()])
+        .collect();
+    let count = |fate| found.iter().filter(|p| p.fate == fate).count();
+    let sum = format!(
+        "{} to run, {} cached, {} unknown\n",
+        count("run"),
+        count("cached"),
+        count("unknown")
+    );
+    print(&(table(&["step", "state", "reason"], &rows, &[]) + &sum))
+}
+
+/// What a run would do, step by step in the order of the workflow.
+pub fn prospects(session: &Session<'_>) -> Vec<Prospect> {
+    let core = &session.core;
+    let mut by_step: Vec<Vec<Id>> = vec![Vec::new(); core.graph().steps.len()];
+    for (id, instance) in core.instances().iter().enumerate() {
+        by_step[instance.step].push(id);
+    }
+    let mut found = Vec::new();
+    for (step, plan) in core.graph().steps.iter().enumerate() {
+        if !plan.wanted {
+            continue;
+        }
+        by_step[step].sort_by(|a, b| core.instances()[*a].item.cmp(&core.instances()[*b].item));
+        found.extend(by_step[step].iter().map(|id| prospect(session, *id)));
+        let hidden = core.hidden_by(step);
+        if !hidden.is_empty() {
+            let from: Vec<String> = hidden.iter().map(|id| core.label(*id)).collect();
+            found.push(Prospect {
+                label: format!("{} x N (from {})", plan.name, from.join(", ")),
+                fate: "unknown",
+                reason: format!("how many is known when {} is done", from.join(", ")),
+            });
+        } else if by_step[step].is_empty() {
+            found.push(Prospect {
+                label: format!("{} x 0", plan.name),
+                fate: "cached",
+                reason: "the collection it fans out over is empty".into(),
+            });
+        }
+    }
+    found
+}
+
+fn prospect(session: &Session<'_>, id: Id) -> Prospect {
+    let core = &session.core;
+    let instance = &core.instances()[id];
+    let (fate, reason) = match instance.state {
+        State::Done { .. } => {
+            ("cached", instance.key.map(|k| format!("key {}", k.short())).unwrap_or_default())
+        }
+        State::Unkeyed => ("unknown", waits_for(session, id)),
+        _ => ("run", why(session, id)),
+    };
+    Prospect { label: core.label(id), fate, reason }
+}
+
+fn waits_for(session: &Session<'_>, id: Id) -> String {
+    let core = &session.core;
+    let step = &core.graph().steps[core.instances()[id].step];
+    let mut names: Vec<&str> =
+        step.wires.iter().map(|w| core.graph().steps[w.from].name.as_str()).collect();
+    names.retain(|n| {
+        session.workflow.steps.iter().zip(&core.graph().steps).enumerate().any(|(at, (w, _))| {
+            w.name == *n && !core.hidden_by(at).is_empty()
+        })
+    });
+    names.dedup();
+    if names.is_empty() {
+        return "an input is not known yet".into();
+    }
+    format!("gathers {}, whose number is not known yet", names.join(", "))
+}
+
+/// Why an instance must run, in one line.
+fn why(session: &Session<'_>, id: Id) -> String {
+    match difference(session, id) {
+        Difference::Never => "has not run before".into(),
+        Difference::Gone => "its artifact is not in the store any more".into(),
+        Difference::Changed(list) => {
+            let mut own: Vec<String> = list
+                .iter()
+                .filter(|c| !c.part.starts_with("input "))
+                .map(|c| format!("{}: {} -> {}", c.part, or_none(&c.old), or_none(&c.new)))
+                .collect();
+            let inputs: Vec<&str> =
+                list.iter().filter_map(|c| c.part.strip_prefix("input ")).collect();
+            match inputs.len() {
+                0 => {}
+                1 => own.push(format!("input {} changed", inputs[0])),
+                n => own.push(format!("{n} inputs changed")),
+            }
+            own.join("; ")
+        }
+    }
+}
+
+pub(super) fn or_none(text: &str) -> &str {
+    if text.is_empty() { "(none)" } else { text }
+}
+
+/// How an instance differs from the last run.
+pub enum Difference {
+    /// The journal knows no earlier key.
+    Never,
+    /// The key is the same; only the artifact is missing.
+    Gone,
+    /// These parts of the key.
+    Changed(Vec<Change>),
+}
+
+/// Compares an instance with what the last run knew of it.
+pub fn difference(session: &Session<'_>, id: Id) -> Difference {
+    let core = &session.core;
+    let instance = &core.instances()[id];
+    let step = &core.graph().steps[instance.step];
+    let Some(last) = session.journal.last(&step.name, &instance.item) else {
+        return Difference::Never;
+    };
+    if Some(last) == instance.key {
+        return Difference::Gone;
+    }
+    let Some((ingredients, inputs)) = session.journal.detail(&last) else {
+        return Difference::Never;
+    };
+    let now = input_keys(core, id);
+    Difference::Changed(changes((&ingredients, &inputs), (&step.recipe.ingredients, &now)))
+}
+
+/// `plyflow validate`.
+///
+/// # Errors
+/// [`exit::INVALID`] when there are findings.
+pub fn validate(args: &ValidateArgs) -> Done {
+    let outcome = open::load(&args.workflow)?;
+    let json = args.format == TextOrJson::Json;
+    match outcome {
+        Ok(_) if json => print("[]\n"),
+        Ok(o) => {
+            let n = o.workflow.steps.len();
+            let s = if n == 1 { "" } else { "s" };
+            print(&format!("{}: {n} step{s}, no errors\n", args.workflow.workflow))
+        }
+        Err(findings) => {
+            if json {
+                print(&format!("{:#}\n", findings.to_json()))?;
+            } else {
+                eprint!("{}", findings.render(std::io::stderr().is_terminal()));
+            }
+            Err(Stop::silent(exit::INVALID))
+        }
+    }
+}
+
+/// `plyflow graph`.
+///
+/// # Errors
+/// See [`Stop`].
+pub fn graph(args: &GraphArgs) -> Done {
+    let opened = open(&args.workflow)?;
+    print(&match args.format {
+        GraphFormat::Dot => plyflow_workflow::to_dot(&opened.workflow),
+        GraphFormat::Mermaid => plyflow_workflow::to_mermaid(&opened.workflow),
+    })
+}

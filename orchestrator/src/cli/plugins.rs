@@ -1,0 +1,168 @@
+//! `plugins` and `schema`: what can be written into files.
+
+use super::args::{PluginsArgs, SchemaArgs, SchemaKind, TextOrJson};
+use super::open::{catalog, search_path, store_root};
+use super::table::table;
+use super::{Done, Stop, print};
+use crate::exit;
+use camino::Utf8Path;
+use plyflow_model::schema;
+use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
+use serde_json::{Value, json};
+
+/// `plyflow plugins`.
+///
+/// # Errors
+/// [`exit::USAGE`] when the named plugin is not found or broken.
+pub fn plugins(args: &PluginsArgs) -> Done {
+    let file = args.workflow.as_deref();
+    let folders = search_path(&args.places, file)?;
+    let catalog = catalog(folders, &store_root(&args.places, file))?;
+    let Some(name) = &args.name else {
+        return list(&catalog.plugins(), &catalog.broken(), args.format);
+    };
+    let here = Utf8Path::new(".");
+    let entry = catalog.find(name, here).map_err(|e| {
+        let more = match &e {
+            CatalogError::NotFound { searched, .. } => {
+                let folders: Vec<&str> = searched.iter().map(|f| f.as_str()).collect();
+                format!("; searched: {}", folders.join(", "))
+            }
+            CatalogError::Broken { .. } => String::new(),
+        };
+        Stop::new(exit::USAGE, format!("{e}{more}"))
+    })?;
+    show(&entry, args.format)
+}
+
+fn list(
+    entries: &[CatalogEntry],
+    broken: &[(camino::Utf8PathBuf, String)],
+    format: TextOrJson,
+) -> Done {
+    if format == TextOrJson::Json {
+        let all: Vec<Value> = entries.iter().map(as_json).collect();
+        let bad: Vec<Value> =
+            broken.iter().map(|(p, r)| json!({"path": p, "reason": r})).collect();
+        return print(&format!("{:#}\n", json!({"plugins": all, "broken": bad})));
+    }
+    let line = |e: &CatalogEntry| {
+        vec![
+            e.id.name.clone(),
+            if e.manifest.role == e.manifest.kind.name() {
+                e.manifest.kind.to_string()
+            } else {
+                format!("{} ({})", e.manifest.kind, e.manifest.role)
+            },
+            e.id.version.clone(),
+            e.manifest.summary.clone(),
+            e.id.path.to_string(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = entries.iter().map(line).collect();
+    let mut out = table(&["plugin", "kind", "version", "summary", "library"], &rows, &[]);
+    for (path, reason) in broken {
+        out += &format!("broken: {path}: {reason}\n");
+    }
+    print(&out)
+}
+
+fn as_json(e: &CatalogEntry) -> Value {
+    json!({"path": e.id.path, "hash": e.id.hash, "manifest": e.manifest})
+}
+
+fn show(e: &CatalogEntry, format: TextOrJson) -> Done {
+    if format == TextOrJson::Json {
+        return print(&format!("{:#}\n", as_json(e)));
+    }
+    let m = &e.manifest;
+    let mut out = format!(
+        "{} {} ({}, role {}) by {}\n{}\n{}\nblake3 {}\n",
+        e.id.name, e.id.version, m.kind, m.role, m.vendor, m.summary, e.id.path, e.id.hash
+    );
+    let manifest = serde_json::to_value(m).unwrap_or_default();
+    if let Some(parameters) = manifest["parameters"].as_object().filter(|p| !p.is_empty()) {
+        out += "\nparameters (`with:`)\n";
+        for (name, declaration) in parameters {
+            parameter(name, declaration, 1, &mut out);
+        }
+    }
+    if !m.inputs.is_empty() {
+        out += "\ninputs (`from:`)\n";
+        for (port, input) in &m.inputs {
+            let need = if input.required { "" } else { ", optional" };
+            let many = if input.many { ", several" } else { "" };
+            out += &format!("  {port}: {}{need}{many}\n      {}\n", input.kind, input.doc);
+        }
+    }
+    if let Some(output) = &m.output {
+        let collection = if output.collection { ", a collection (`for_each`)" } else { "" };
+        out += &format!("\noutput: {}{collection}\n", output.kind);
+    }
+    if !m.results.is_empty() {
+        out += "\nresults\n";
+        for (name, r) in &m.results {
+            out += &format!("  {name} [{}]\n      {}\n", r.unit, r.doc);
+        }
+    }
+    if !m.fields.is_empty() {
+        out += "\nfields\n";
+        for f in &m.fields {
+            out += &format!("  {} [{}]  {}\n", f.name, f.unit, f.doc);
+        }
+    }
+    print(&out)
+}
+
+/// One parameter and, indented, what it is made of.
+fn parameter(name: &str, d: &Value, depth: usize, out: &mut String) {
+    let pad = "  ".repeat(depth);
+    let word = |key: &str| d.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned));
+    let mut facts = vec![word("type").unwrap_or_default()];
+    for (key, label) in [
+        ("dimension", ""),
+        ("values", "one of "),
+        ("default", "default "),
+        ("minimum", "at least "),
+        ("exclusive_minimum", "more than "),
+        ("maximum", "at most "),
+    ] {
+        if let Some(text) = word(key) {
+            facts.push(format!("{label}{text}"));
+        }
+    }
+    if d.get("required") == Some(&Value::Bool(true)) {
+        facts.push("required".into());
+    }
+    *out += &format!("{pad}{name}: {}\n", facts.join(", "));
+    if let Some(doc) = word("doc").filter(|t| !t.is_empty()) {
+        *out += &format!("{pad}    {doc}\n");
+    }
+    if let Some(of) = d.get("of") {
+        parameter("of", of, depth + 1, out);
+    }
+    if let Some(fields) = d.get("fields").and_then(Value::as_object) {
+        for (name, field) in fields {
+            parameter(name, field, depth + 1, out);
+        }
+    }
+}
+
+/// `plyflow schema`.
+///
+/// # Errors
+/// See [`Stop`].
+pub fn schema(args: &SchemaArgs) -> Done {
+    let text = match args.which {
+        SchemaKind::PlainWorkflow => schema::workflow(),
+        SchemaKind::Scene => schema::scene(),
+        SchemaKind::Material => schema::material(),
+        SchemaKind::Workflow => {
+            let folders = search_path(&args.places, None)?;
+            let catalog = catalog(folders, &store_root(&args.places, None))?;
+            let manifests: Vec<_> = catalog.plugins().into_iter().map(|e| e.manifest).collect();
+            schema::workflow_with(&manifests)
+        }
+    };
+    print(&format!("{text:#}\n"))
+}

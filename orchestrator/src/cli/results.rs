@@ -1,0 +1,301 @@
+//! `results`: the named numbers of what the store has, beside what the workflow expects.
+
+use super::args::{Format, ResultsArgs};
+use super::open::open;
+use super::table::{bytes, number, table};
+use super::{Done, Stop, print};
+use crate::engine::Session;
+use crate::engine::core::{Id, State};
+use crate::exit;
+use crate::progress::duration_text;
+use plyflow_model::job::Record;
+use plyflow_workflow::resolved::Expectation;
+use serde_json::json;
+
+/// One number, or one expectation without a number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Step.
+    pub step: String,
+    /// Labels of its item.
+    pub item: Vec<String>,
+    /// Name of the number.
+    pub name: String,
+    /// Value (SI); absent when the step did not report it.
+    pub value: Option<f64>,
+    /// Unit.
+    pub unit: String,
+    /// Whether it depends on the machine.
+    pub measured: bool,
+    /// What is expected of it.
+    pub expected: Option<Expectation>,
+}
+
+impl Row {
+    /// `ok` or `missed` when something is expected.
+    pub fn verdict(&self) -> Option<&'static str> {
+        let e = self.expected.as_ref()?;
+        let Some(value) = self.value else { return Some("missed") };
+        let near = e.value.is_none_or(|x| {
+            // Without a tolerance the same number is meant, up to rounding in its text.
+            (value - x).abs() <= e.tolerance.unwrap_or(1e-9 * x.abs())
+        });
+        let inside = e.minimum.is_none_or(|m| value >= m) && e.maximum.is_none_or(|m| value <= m);
+        Some(if near && inside { "ok" } else { "missed" })
+    }
+}
+
+/// What the expectation says, in words.
+fn expectation_text(e: &Expectation) -> String {
+    let mut parts = Vec::new();
+    if let Some(v) = e.value {
+        match e.tolerance {
+            Some(t) => parts.push(format!("{} +- {}", number(v), number(t))),
+            None => parts.push(number(v)),
+        }
+    }
+    if let Some(m) = e.minimum {
+        parts.push(format!(">= {}", number(m)));
+    }
+    if let Some(m) = e.maximum {
+        parts.push(format!("<= {}", number(m)));
+    }
+    parts.join(", ")
+}
+
+/// Records of all instances that the store has, in the order of the workflow.
+pub fn records(session: &Session<'_>) -> Vec<(Id, Record)> {
+    let core = &session.core;
+    let mut ids: Vec<Id> = (0..core.instances().len())
+        .filter(|id| matches!(core.instances()[*id].state, State::Done { .. }))
+        .collect();
+    ids.sort_by_key(|id| (core.instances()[*id].step, core.instances()[*id].item.clone()));
+    let read = |id: Id| Some((id, session.store.read_record(&core.instances()[id].key?)?));
+    ids.into_iter().filter_map(read).collect()
+}
+
+/// All numbers and expectations.
+pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
+    let core = &session.core;
+    let expectations = &session.workflow.expectations;
+    let mut met = vec![false; expectations.len()];
+    let mut rows = Vec::new();
+    for (id, record) in records {
+        let step = &core.graph().steps[core.instances()[*id].step].name;
+        for result in &record.results {
+            let at = expectations.iter().position(|e| e.step == *step && e.result == result.name);
+            if let Some(at) = at {
+                met[at] = true;
+            }
+            rows.push(Row {
+                step: step.clone(),
+                item: core.item_labels(*id),
+                name: result.name.clone(),
+                value: Some(result.value),
+                unit: result.unit.clone(),
+                measured: result.measured,
+                expected: at.map(|at| expectations[at].clone()),
+            });
+        }
+    }
+    for (e, _) in expectations.iter().zip(met).filter(|(_, met)| !met) {
+        rows.push(Row {
+            step: e.step.clone(),
+            item: vec![],
+            name: e.result.clone(),
+            value: None,
+            unit: String::new(),
+            measured: false,
+            expected: Some(e.clone()),
+        });
+    }
+    rows
+}
+
+/// A table of numbers.
+pub fn results_table(rows: &[Row]) -> String {
+    let line = |r: &Row| {
+        let place = if r.item.is_empty() {
+            r.step.clone()
+        } else {
+            format!("{}[{}]", r.step, r.item.join(","))
+        };
+        let name = if r.measured { format!("{} (measured)", r.name) } else { r.name.clone() };
+        vec![
+            place,
+            name,
+            r.value.map_or("(absent)".into(), number),
+            if r.unit == "1" { String::new() } else { r.unit.clone() },
+            r.expected.as_ref().map(expectation_text).unwrap_or_default(),
+            r.verdict().unwrap_or_default().to_owned(),
+        ]
+    };
+    let lines: Vec<Vec<String>> = rows.iter().map(line).collect();
+    table(&["step", "result", "value", "unit", "expected", "verdict"], &lines, &[2])
+}
+
+/// A table of what the steps cost.
+pub fn cost_table(session: &Session<'_>, records: &[(Id, Record)]) -> String {
+    let line = |(id, r): &(Id, Record)| {
+        vec![
+            session.core.label(*id),
+            duration_text(r.cost.wall_seconds),
+            duration_text(r.cost.cpu_seconds),
+            r.cost.threads.to_string(),
+            bytes(r.cost.peak_memory),
+            bytes(r.bytes),
+        ]
+    };
+    let lines: Vec<Vec<String>> = records.iter().map(line).collect();
+    table(&["step", "wall", "cpu", "threads", "memory", "artifact"], &lines, &[1, 2, 3, 4, 5])
+}
+
+fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> serde_json::Value {
+    let results: Vec<_> = rows
+        .iter()
+        .map(|r| {
+            let e = r.expected.as_ref();
+            json!({
+                "step": r.step, "item": r.item, "result": r.name, "value": r.value, "unit": r.unit,
+                "measured": r.measured, "verdict": r.verdict(),
+                "expected": e.map(|e| json!({"value": e.value, "tolerance": e.tolerance,
+                    "minimum": e.minimum, "maximum": e.maximum, "source": e.source})),
+            })
+        })
+        .collect();
+    let costs: Vec<_> = records
+        .iter()
+        .map(|(id, r)| {
+            let instance = &session.core.instances()[*id];
+            json!({
+                "step": session.core.graph().steps[instance.step].name,
+                "item": session.core.item_labels(*id), "key": r.key, "kind": r.kind,
+                "artifact": instance.key.map(|k| session.store.artifact(&k)),
+                "bytes": r.bytes, "cost": r.cost, "host": r.host, "warnings": r.warnings,
+            })
+        })
+        .collect();
+    json!({"workflow": session.workflow.name, "results": results, "steps": costs})
+}
+
+fn as_csv(rows: &[Row]) -> String {
+    let mut out = String::from("step,item,result,value,unit,measured,expected,tolerance,minimum,maximum,verdict,source\n");
+    let text = |t: &str| {
+        if t.contains([',', '"', '\n']) { format!("\"{}\"", t.replace('"', "\"\"")) } else { t.to_owned() }
+    };
+    let value = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
+    for r in rows {
+        let e = r.expected.as_ref();
+        let cells = [
+            text(&r.step),
+            text(&r.item.join("/")),
+            text(&r.name),
+            value(r.value),
+            text(&r.unit),
+            r.measured.to_string(),
+            value(e.and_then(|e| e.value)),
+            value(e.and_then(|e| e.tolerance)),
+            value(e.and_then(|e| e.minimum)),
+            value(e.and_then(|e| e.maximum)),
+            r.verdict().unwrap_or_default().to_owned(),
+            text(e.and_then(|e| e.source.as_deref()).unwrap_or_default()),
+        ];
+        out += &(cells.join(",") + "\n");
+    }
+    out
+}
+
+/// `plyflow results`.
+///
+/// # Errors
+/// [`exit::EXPECTATION`] with `--check` when one is missed.
+pub fn results(args: &ResultsArgs) -> Done {
+    let opened = open(&args.workflow)?;
+    opened.step_indices(&args.step)?;
+    let session = opened.look()?;
+    let mut records = records(&session);
+    let mut rows = rows(&session, &records);
+    if !args.step.is_empty() {
+        rows.retain(|r| args.step.contains(&r.step));
+        records.retain(|(id, _)| {
+            let step = session.core.instances()[*id].step;
+            args.step.contains(&session.core.graph().steps[step].name)
+        });
+    }
+    match args.format {
+        Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records)))?,
+        Format::Csv => print(&as_csv(&rows))?,
+        Format::Table if records.is_empty() => {
+            let file = &args.workflow.workflow;
+            print(&format!("nothing has been run yet; start with: plyflow run {file}\n"))?;
+        }
+        Format::Table => {
+            let text = format!("{}\n{}", results_table(&rows), cost_table(&session, &records));
+            print(&text)?;
+        }
+    }
+    if args.check { check(&rows) } else { Ok(()) }
+}
+
+/// Ends with the code for missed expectations if there are any.
+///
+/// # Errors
+/// [`exit::EXPECTATION`].
+pub fn check(rows: &[Row]) -> Done {
+    let missed: Vec<String> = rows
+        .iter()
+        .filter(|r| r.verdict() == Some("missed"))
+        .map(|r| format!("{}.{}", r.step, r.name))
+        .collect();
+    if missed.is_empty() {
+        return Ok(());
+    }
+    let text = format!("{} expectations missed: {}", missed.len(), missed.join(", "));
+    Err(Stop::new(exit::EXPECTATION, text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(value: Option<f64>, e: Expectation) -> Row {
+        Row {
+            step: "s".into(),
+            item: vec![],
+            name: "n".into(),
+            value,
+            unit: "m".into(),
+            measured: false,
+            expected: Some(e),
+        }
+    }
+
+    fn expectation() -> Expectation {
+        Expectation {
+            step: "s".into(),
+            result: "n".into(),
+            value: None,
+            tolerance: None,
+            minimum: None,
+            maximum: None,
+            source: None,
+        }
+    }
+
+    #[test]
+    fn a_number_outside_its_bound_or_tolerance_is_missed() {
+        let near = Expectation { value: Some(1.0), tolerance: Some(0.1), ..expectation() };
+        assert_eq!(row(Some(1.05), near.clone()).verdict(), Some("ok"));
+        assert_eq!(row(Some(1.2), near.clone()).verdict(), Some("missed"));
+        assert_eq!(row(None, near).verdict(), Some("missed"));
+        let bound = Expectation { minimum: Some(0.0), maximum: Some(2.0), ..expectation() };
+        assert_eq!(row(Some(2.0), bound.clone()).verdict(), Some("ok"));
+        assert_eq!(row(Some(-0.1), bound).verdict(), Some("missed"));
+    }
+
+    #[test]
+    fn not_a_number_never_meets_an_expectation() {
+        let near = Expectation { value: Some(1.0), tolerance: Some(0.1), ..expectation() };
+        assert_eq!(row(Some(f64::NAN), near).verdict(), Some("missed"));
+    }
+}

@@ -1,0 +1,72 @@
+//! Plain tables.
+
+/// Columns padded to their widest cell; columns listed in `right` are aligned to the right.
+pub fn table(head: &[&str], rows: &[Vec<String>], right: &[usize]) -> String {
+    let width = |at: usize| {
+        let cells = rows.iter().filter_map(|r| r.get(at)).map(|c| c.chars().count());
+        cells.chain([head[at].chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..head.len()).map(width).collect();
+    let mut out = String::new();
+    let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
+    for row in std::iter::once(&head).chain(rows) {
+        let mut line = String::new();
+        for (at, width) in widths.iter().enumerate() {
+            let cell = row.get(at).map_or("", String::as_str);
+            let pad = " ".repeat(width - cell.chars().count());
+            line += &if right.contains(&at) { pad + cell } else { cell.to_owned() + &pad };
+            line += "  ";
+        }
+        out += line.trim_end();
+        out.push('\n');
+    }
+    out
+}
+
+/// A number as people read it: six significant digits, no trailing zeros.
+pub fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let size = value.abs().log10().floor();
+    if (-4.0..9.0).contains(&size) {
+        let digits = (5.0 - size).clamp(0.0, 12.0) as usize;
+        let text = format!("{value:.digits$}");
+        if text.contains('.') {
+            return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+        }
+        return text;
+    }
+    format!("{value:.5e}")
+}
+
+/// A size in bytes as people read it.
+pub fn bytes(n: u64) -> String {
+    let units = ["B", "KiB", "MiB", "GiB", "TiB"];
+    let (mut value, mut unit) = (n as f64, 0);
+    while value >= 1024.0 && unit + 1 < units.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{n} B") } else { format!("{value:.1} {}", units[unit]) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up_whatever_the_cells() {
+        let rows = vec![vec!["a".into(), "1".into()], vec!["bcd".into(), "22".into()]];
+        assert_eq!(table(&["x", "n"], &rows, &[1]), "x     n\na     1\nbcd  22\n");
+    }
+
+    #[test]
+    fn numbers_keep_six_digits_at_any_size() {
+        assert_eq!(number(0.139_626_340_2), "0.139626");
+        assert_eq!(number(12.5), "12.5");
+        assert_eq!(number(1234567.0), "1234567");
+        assert_eq!(number(-3.0e-9), "-3.00000e-9");
+        assert_eq!(number(0.0), "0");
+    }
+}

@@ -1,0 +1,533 @@
+//! Decides what happens next: (state, event) -> (state, effects). No I/O, no clock, no processes.
+
+use crate::plan::{Extent, Graph, Key, Walk, instance_key, walk};
+use plyflow_workflow::resolved::FailurePolicy;
+use std::collections::{BTreeSet, HashMap, VecDeque};
+
+/// Number of an instance, in the order of discovery.
+pub type Id = usize;
+
+/// Where an instance stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// An input's key or a fan-out is not known yet, so neither is its own key.
+    Unkeyed,
+    /// Its key is known; whether the store has it is being looked up.
+    Looking,
+    /// Not in the store; waits for its inputs.
+    Waiting,
+    /// Waits for cores and memory.
+    Ready,
+    /// Runs with so many threads.
+    Running(u32),
+    /// Its artifact is in the store.
+    Done {
+        /// Found, not run.
+        cached: bool,
+    },
+    /// Its last attempt failed.
+    Failed,
+    /// Not run because of that instance.
+    Skipped(Id),
+    /// Not run, or stopped, because the run is being stopped.
+    Stopped,
+}
+
+impl State {
+    /// Nothing further will happen to it.
+    pub fn is_final(self) -> bool {
+        matches!(self, Self::Done { .. } | Self::Failed | Self::Skipped(_) | Self::Stopped)
+    }
+}
+
+/// One step for one item.
+#[derive(Debug)]
+pub struct Instance {
+    /// Index of its step.
+    pub step: usize,
+    /// Index path.
+    pub item: Vec<u64>,
+    /// Where it stands.
+    pub state: State,
+    /// Its key, once known.
+    pub key: Option<Key>,
+    /// Wires and the instances that arrive on them, in order, once known.
+    pub inputs: Vec<(usize, Id)>,
+    /// Labels of its artifact's items, once done, when it is a collection.
+    pub labels: Option<Vec<String>>,
+    /// Attempts begun.
+    pub attempts: u32,
+    pending: usize,
+    on_key: Vec<Id>,
+    on_done: Vec<Id>,
+}
+
+/// What happened.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Event {
+    /// Answer to [`Effect::Look`]: whether the store has the artifact, with the labels of a collection.
+    Looked {
+        /// Which.
+        id: Id,
+        /// `Some` when it is there.
+        found: Option<Output>,
+    },
+    /// An instance ran and its artifact is in the store.
+    Finished {
+        /// Which.
+        id: Id,
+        /// What it made.
+        output: Output,
+    },
+    /// An attempt failed.
+    Failed {
+        /// Which.
+        id: Id,
+    },
+    /// A running instance was stopped on request.
+    Cancelled {
+        /// Which.
+        id: Id,
+    },
+    /// The user wants the run to stop.
+    Interrupt,
+}
+
+/// What the core must know of an artifact.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Output {
+    /// Labels of a collection's items.
+    pub labels: Option<Vec<String>>,
+}
+
+/// What is to be done.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Effect {
+    /// Look the key up in the store and answer with [`Event::Looked`].
+    Look(Id),
+    /// Run it and answer with `Finished`, `Failed` or `Cancelled`.
+    Start {
+        /// Which.
+        id: Id,
+        /// With how many threads.
+        threads: u32,
+        /// 1 for the first attempt.
+        attempt: u32,
+    },
+    /// Stop it; the answer is still awaited.
+    Cancel(Id),
+    /// It will not run because `cause` did not succeed.
+    Skip {
+        /// Which.
+        id: Id,
+        /// The instance that failed.
+        cause: Id,
+    },
+}
+
+/// What the run may use and how it meets failure.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Cores.
+    pub cores: u32,
+    /// Bytes; 0: not limited.
+    pub memory: u64,
+    /// What a failure does to the rest.
+    pub policy: FailurePolicy,
+}
+
+/// The state of a run.
+pub struct Core<'g> {
+    graph: &'g Graph,
+    limits: Limits,
+    instances: Vec<Instance>,
+    by_item: Vec<HashMap<Vec<u64>, Id>>,
+    ready: BTreeSet<(usize, Vec<u64>, Id)>,
+    running: usize,
+    looking: usize,
+    open: usize,
+    free_cores: u32,
+    used_memory: u64,
+    stopping: bool,
+    agenda: VecDeque<Id>,
+    effects: Vec<Effect>,
+}
+
+impl<'g> Core<'g> {
+    /// A run that has not begun.
+    pub fn new(graph: &'g Graph, limits: Limits) -> Self {
+        Self {
+            graph,
+            limits,
+            instances: Vec::new(),
+            by_item: vec![HashMap::new(); graph.steps.len()],
+            ready: BTreeSet::new(),
+            running: 0,
+            looking: 0,
+            open: 0,
+            free_cores: limits.cores.max(1),
+            used_memory: 0,
+            stopping: false,
+            agenda: VecDeque::new(),
+            effects: Vec::new(),
+        }
+    }
+
+    /// Begins: the instances that are known from the workflow alone.
+    pub fn start(&mut self) -> Vec<Effect> {
+        for step in 0..self.graph.steps.len() {
+            self.discover(step, None);
+        }
+        self.settle()
+    }
+
+    /// Takes one event.
+    pub fn handle(&mut self, event: Event) -> Vec<Effect> {
+        match event {
+            Event::Looked { id, found } => {
+                self.looking -= 1;
+                match found {
+                    Some(output) => self.done(id, output, true),
+                    None => self.missing(id),
+                }
+            }
+            Event::Finished { id, output } => {
+                self.release(id);
+                self.done(id, output, false);
+            }
+            Event::Failed { id } => {
+                self.release(id);
+                self.failed(id);
+            }
+            Event::Cancelled { id } => {
+                self.release(id);
+                self.finish(id, State::Stopped);
+            }
+            Event::Interrupt => self.stop(),
+        }
+        self.settle()
+    }
+
+    /// Whether nothing is running or can run any more.
+    pub fn is_finished(&self) -> bool {
+        self.running == 0 && (self.stopping || self.open == 0)
+    }
+
+    /// Whether the run is being stopped.
+    pub fn is_stopping(&self) -> bool {
+        self.stopping
+    }
+
+    /// All instances found so far.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// The graph.
+    pub fn graph(&self) -> &'g Graph {
+        self.graph
+    }
+
+    /// Those collections whose size is not known and hide instances of a step.
+    pub fn hidden_by(&self, step: usize) -> Vec<Id> {
+        let all = vec![None; self.graph.steps[step].dimensions.len()];
+        self.walk(step, &all).unknown
+    }
+
+    /// Name for people: the step, and the labels of its item: `local[A]`.
+    pub fn label(&self, id: Id) -> String {
+        let instance = &self.instances[id];
+        let step = &self.graph.steps[instance.step];
+        if step.dimensions.is_empty() {
+            return step.name.clone();
+        }
+        format!("{}[{}]", step.name, self.item_labels(id).join(","))
+    }
+
+    /// The labels of the item of an instance, outermost first.
+    pub fn item_labels(&self, id: Id) -> Vec<String> {
+        let instance = &self.instances[id];
+        let step = &self.graph.steps[instance.step];
+        let one = |(at, d): (usize, &crate::plan::DimensionPlan)| {
+            let owner: Vec<u64> = d.prefix.iter().map(|p| instance.item[*p]).collect();
+            let index = instance.item[at];
+            let labels = self.by_item[d.over].get(&owner).and_then(|o| {
+                self.instances[*o].labels.as_ref()?.get(index as usize).cloned()
+            });
+            labels.unwrap_or_else(|| index.to_string())
+        };
+        step.dimensions.iter().enumerate().map(one).collect()
+    }
+
+    fn walk(&self, step: usize, fixed: &[Option<u64>]) -> Walk {
+        walk(self.graph, step, fixed, |over, owner| {
+            // Outer collections are walked first, so the owner has been discovered.
+            let id = self.by_item[over][owner];
+            let instance = &self.instances[id];
+            match (instance.state, &instance.labels) {
+                (State::Done { .. }, Some(labels)) => Extent::Items(labels.len() as u64),
+                _ => Extent::Unknown(id),
+            }
+        })
+    }
+
+    /// Finds new instances of `step`; only those below `owner` when a collection has just become known.
+    fn discover(&mut self, step: usize, owner: Option<Id>) {
+        let plan = &self.graph.steps[step];
+        if !plan.wanted {
+            return;
+        }
+        let mut fixed = vec![None; plan.dimensions.len()];
+        if let Some(owner) = owner {
+            let (over, item) = (self.instances[owner].step, &self.instances[owner].item);
+            for d in plan.dimensions.iter().filter(|d| d.over == over) {
+                for (at, index) in d.prefix.iter().zip(item) {
+                    fixed[*at] = Some(*index);
+                }
+            }
+        }
+        for item in self.walk(step, &fixed).known {
+            let id = self.instances.len();
+            if self.by_item[step].contains_key(&item) {
+                continue;
+            }
+            self.by_item[step].insert(item.clone(), id);
+            self.instances.push(Instance {
+                step,
+                item,
+                state: State::Unkeyed,
+                key: None,
+                inputs: Vec::new(),
+                labels: None,
+                attempts: 0,
+                pending: 0,
+                on_key: Vec::new(),
+                on_done: Vec::new(),
+            });
+            self.open += 1;
+            self.agenda.push_back(id);
+        }
+    }
+
+    /// Works off the agenda, then fills the free cores.
+    fn settle(&mut self) -> Vec<Effect> {
+        while let Some(id) = self.agenda.pop_front() {
+            match self.instances[id].state {
+                State::Unkeyed => self.try_key(id),
+                State::Waiting => self.try_ready(id),
+                _ => {}
+            }
+        }
+        self.schedule();
+        std::mem::take(&mut self.effects)
+    }
+
+    /// Computes the key when every input's key is known; else registers what to wait for.
+    fn try_key(&mut self, id: Id) {
+        let graph = self.graph;
+        let plan = &graph.steps[self.instances[id].step];
+        let mut inputs = Vec::with_capacity(plan.wires.len());
+        let (mut want_done, mut want_key) = (Vec::new(), Vec::new());
+        for (at, wire) in plan.wires.iter().enumerate() {
+            let item = &self.instances[id].item;
+            let fixed: Vec<_> = wire.matched.iter().map(|m| m.map(|p| item[p])).collect();
+            let found = self.walk(wire.from, &fixed);
+            want_done.extend(found.unknown);
+            for path in found.known {
+                let giver = self.by_item[wire.from][&path];
+                if self.instances[giver].key.is_none() {
+                    want_key.push(giver);
+                }
+                inputs.push((at, giver));
+            }
+        }
+        if want_done.is_empty() && want_key.is_empty() {
+            let key = instance_key(
+                &plan.recipe.digest,
+                &self.instances[id].item,
+                inputs.iter().filter_map(|(wire, giver)| {
+                    let wire = &plan.wires[*wire];
+                    let giver = &self.instances[*giver];
+                    let step = graph.steps[wire.from].name.as_str();
+                    Some((wire.port.as_str(), step, giver.item.as_slice(), giver.key.as_ref()?))
+                }),
+            );
+            let instance = &mut self.instances[id];
+            instance.key = Some(key);
+            instance.inputs = inputs;
+            instance.state = State::Looking;
+            self.looking += 1;
+            self.effects.push(Effect::Look(id));
+            let waiters = std::mem::take(&mut self.instances[id].on_key);
+            self.wake(&waiters);
+        } else {
+            self.wait_for(id, &want_done, &want_key);
+        }
+    }
+
+    fn wait_for(&mut self, id: Id, want_done: &[Id], want_key: &[Id]) {
+        self.instances[id].pending = want_done.len() + want_key.len();
+        for giver in want_done.iter().chain(want_key) {
+            if let Some(cause) = self.cause(*giver) {
+                return self.skip(id, cause);
+            }
+        }
+        for giver in want_done {
+            self.instances[*giver].on_done.push(id);
+        }
+        for giver in want_key {
+            self.instances[*giver].on_key.push(id);
+        }
+    }
+
+    /// The failure behind an instance that will never be done.
+    fn cause(&self, id: Id) -> Option<Id> {
+        match self.instances[id].state {
+            State::Failed | State::Stopped => Some(id),
+            State::Skipped(cause) => Some(cause),
+            _ => None,
+        }
+    }
+
+    fn wake(&mut self, waiters: &[Id]) {
+        for waiter in waiters {
+            let w = &mut self.instances[*waiter];
+            w.pending = w.pending.saturating_sub(1);
+            if w.pending == 0 && !w.state.is_final() {
+                self.agenda.push_back(*waiter);
+            }
+        }
+    }
+
+    fn missing(&mut self, id: Id) {
+        self.instances[id].state = State::Waiting;
+        self.agenda.push_back(id);
+    }
+
+    fn try_ready(&mut self, id: Id) {
+        let mut open: Vec<Id> = self.instances[id].inputs.iter().map(|(_, g)| *g).collect();
+        open.retain(|g| !matches!(self.instances[*g].state, State::Done { .. }));
+        if open.is_empty() {
+            self.instances[id].state = State::Ready;
+            let instance = &self.instances[id];
+            self.ready.insert((instance.step, instance.item.clone(), id));
+        } else {
+            self.wait_for(id, &open, &[]);
+        }
+    }
+
+    fn done(&mut self, id: Id, output: Output, cached: bool) {
+        self.instances[id].labels = output.labels;
+        self.finish(id, State::Done { cached });
+        let step = self.instances[id].step;
+        for fanned in &self.graph.steps[step].fanned_by {
+            self.discover(*fanned, Some(id));
+        }
+        let waiters = std::mem::take(&mut self.instances[id].on_done);
+        self.wake(&waiters);
+    }
+
+    fn failed(&mut self, id: Id) {
+        let allowed = self.graph.steps[self.instances[id].step].retries + 1;
+        if self.instances[id].attempts < allowed && !self.stopping {
+            return self.missing(id);
+        }
+        self.finish(id, State::Failed);
+        self.skip_waiters(id, id);
+        if self.limits.policy == FailurePolicy::FailFast {
+            self.stop();
+        }
+    }
+
+    fn skip(&mut self, id: Id, cause: Id) {
+        if self.instances[id].state.is_final() {
+            return;
+        }
+        self.finish(id, State::Skipped(cause));
+        self.effects.push(Effect::Skip { id, cause });
+        self.skip_waiters(id, cause);
+    }
+
+    fn skip_waiters(&mut self, from: Id, cause: Id) {
+        let mut stack = vec![from];
+        while let Some(at) = stack.pop() {
+            let instance = &mut self.instances[at];
+            let mut waiters = std::mem::take(&mut instance.on_done);
+            waiters.append(&mut instance.on_key);
+            for waiter in waiters {
+                // One that the store has in spite of the failure is done and stays so; one whose lookup
+                // is under way comes back when it is missing.
+                if matches!(self.instances[waiter].state, State::Unkeyed | State::Waiting) {
+                    self.finish(waiter, State::Skipped(cause));
+                    self.effects.push(Effect::Skip { id: waiter, cause });
+                    stack.push(waiter);
+                }
+            }
+        }
+    }
+
+    fn finish(&mut self, id: Id, state: State) {
+        debug_assert!(!self.instances[id].state.is_final());
+        self.instances[id].state = state;
+        self.open -= 1;
+    }
+
+    fn stop(&mut self) {
+        self.stopping = true;
+        self.ready.clear();
+        for (id, instance) in self.instances.iter().enumerate() {
+            if matches!(instance.state, State::Running(_)) {
+                self.effects.push(Effect::Cancel(id));
+            }
+        }
+    }
+
+    fn release(&mut self, id: Id) {
+        if let State::Running(threads) = self.instances[id].state {
+            self.running -= 1;
+            self.free_cores += threads;
+            self.used_memory -= self.graph.steps[self.instances[id].step].memory;
+        }
+    }
+
+    /// Starts what fits, in order of the workflow; a smaller one may overtake one that does not fit.
+    fn schedule(&mut self) {
+        // While lookups are open more may become ready: shares of cores are dealt when all are known.
+        if self.stopping || self.looking > 0 {
+            return;
+        }
+        let mut started = Vec::new();
+        for entry in &self.ready {
+            if self.free_cores == 0 {
+                break;
+            }
+            let plan = &self.graph.steps[entry.0];
+            let rest = (self.ready.len() - started.len()) as u32;
+            let threads = match plan.cores {
+                0 => (self.free_cores / rest).max(1),
+                stated => stated.min(self.limits.cores.max(1)),
+            };
+            let memory = self.used_memory.saturating_add(plan.memory);
+            let fits = self.limits.memory == 0 || memory <= self.limits.memory || self.running == 0;
+            if threads > self.free_cores || !fits {
+                continue;
+            }
+            self.free_cores -= threads;
+            self.used_memory = memory;
+            self.running += 1;
+            let instance = &mut self.instances[entry.2];
+            instance.state = State::Running(threads);
+            instance.attempts += 1;
+            let attempt = instance.attempts;
+            self.effects.push(Effect::Start { id: entry.2, threads, attempt });
+            started.push(entry.clone());
+        }
+        for entry in started {
+            self.ready.remove(&entry);
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "core_tests.rs"]
+mod tests;

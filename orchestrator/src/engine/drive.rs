@@ -1,0 +1,509 @@
+//! Acts on what the core decides: looks into the store, hands jobs to an executor, commits artifacts,
+//! keeps the journal.
+
+use super::core::{Core, Effect, Event, Id, Limits, Output, State};
+use super::executor::{Executor, Outcome, Report, Task};
+use crate::plan::{Graph, InputKey, Key};
+use crate::store::{Journal, Known, RunFolder, Store};
+use camino::Utf8PathBuf;
+use plyflow_model::job::{
+    Cost, DATA_MODEL_VERSION, FailureKind, JOB_VERSION, Job, JobInput, LibraryRef, LogLevel,
+    Message, Progress, Record,
+};
+use plyflow_workflow::resolved::ResolvedWorkflow;
+use std::collections::{HashMap, VecDeque};
+use std::io;
+use std::time::Duration;
+
+/// How long to wait for reports before looking at the journal and the display again.
+const BEAT: Duration = Duration::from_millis(200);
+
+/// What a session works with.
+pub struct Options {
+    /// Cores, memory, policy.
+    pub limits: Limits,
+    /// Folders searched for components.
+    pub search_path: Vec<Utf8PathBuf>,
+    /// Run again even what the store has (for steps named here).
+    pub force: Vec<usize>,
+}
+
+/// Something to show.
+#[derive(Debug)]
+pub enum Update<'a> {
+    /// Found in the store.
+    Cached,
+    /// A worker is being started.
+    Started {
+        /// Threads it may use.
+        threads: u32,
+        /// 1 for the first attempt.
+        attempt: u32,
+    },
+    /// How far it is.
+    Progress(&'a Progress),
+    /// It says something.
+    Log {
+        /// Level.
+        level: LogLevel,
+        /// Text.
+        text: &'a str,
+    },
+    /// Its artifact is in the store.
+    Finished(&'a Record),
+    /// An attempt failed.
+    Failed {
+        /// What the user reads.
+        reason: &'a str,
+        /// Whether it is tried again.
+        again: bool,
+    },
+    /// It was stopped because the run is being stopped.
+    Stopped,
+    /// It will not run because another instance failed.
+    Skipped {
+        /// That instance.
+        cause: Id,
+    },
+}
+
+/// Shows a run.
+pub trait Observer {
+    /// Something happened to instance `id`.
+    fn update(&mut self, core: &Core<'_>, id: Id, update: &Update<'_>);
+    /// Time has passed.
+    fn tick(&mut self) {}
+    /// Nothing more comes.
+    fn end(&mut self) {}
+}
+
+/// An instance that failed for good.
+#[derive(Debug, Clone)]
+pub struct Failure {
+    /// Its label.
+    pub label: String,
+    /// What the user reads.
+    pub reason: String,
+    /// Log of its worker, when it wrote one.
+    pub log: Option<Utf8PathBuf>,
+}
+
+/// How a run ended.
+#[derive(Debug, Default)]
+pub struct Summary {
+    /// Instances that ran.
+    pub executed: usize,
+    /// Instances found in the store.
+    pub cached: usize,
+    /// Instances that failed, the first first.
+    pub failures: Vec<Failure>,
+    /// Instances not run because another failed or the run was stopped.
+    pub skipped: usize,
+    /// Whether the user stopped it.
+    pub interrupted: bool,
+}
+
+/// A workflow, its store and where its instances stand.
+pub struct Session<'a> {
+    /// The workflow.
+    pub workflow: &'a ResolvedWorkflow,
+    /// The store.
+    pub store: &'a Store,
+    /// The decisions.
+    pub core: Core<'a>,
+    /// The journal.
+    pub journal: Journal,
+    folder: RunFolder,
+    options: Options,
+    writing: bool,
+    costs: HashMap<Id, Cost>,
+    pending: VecDeque<Effect>,
+    jobs: HashMap<Id, (Utf8PathBuf, Utf8PathBuf)>,
+    serial: u64,
+    summary: Summary,
+}
+
+impl<'a> Session<'a> {
+    /// A session that looks (`writing` false: another may hold the lock) or runs (`writing`: the caller
+    /// holds the run's lock).
+    ///
+    /// # Errors
+    /// When the journal cannot be read or written.
+    pub fn new(
+        workflow: &'a ResolvedWorkflow,
+        graph: &'a Graph,
+        store: &'a Store,
+        options: Options,
+        writing: bool,
+    ) -> io::Result<Self> {
+        let folder = store.run(&workflow.name);
+        let journal = if writing {
+            folder.prepare()?;
+            Journal::open(&folder.journal())?
+        } else {
+            Journal::read(&folder.journal())?
+        };
+        Ok(Self {
+            workflow,
+            store,
+            core: Core::new(graph, options.limits),
+            journal,
+            folder,
+            options,
+            writing,
+            costs: HashMap::new(),
+            pending: VecDeque::new(),
+            jobs: HashMap::new(),
+            serial: 0,
+            summary: Summary::default(),
+        })
+    }
+
+    /// Looks up all that can be keyed without running anything.
+    pub fn look(&mut self, observer: &mut dyn Observer) {
+        let effects = self.core.start();
+        self.take(effects, observer);
+    }
+
+    /// The folder of this run.
+    pub fn folder(&self) -> &RunFolder {
+        &self.folder
+    }
+
+    /// Runs what [`Session::look`] found missing, and all that follows. `interrupts` counts the user's
+    /// wishes to stop: one asks the workers, two kill them.
+    ///
+    /// # Errors
+    /// When the store or the executor is broken; failures of steps are in the summary.
+    pub fn execute(
+        mut self,
+        executor: &mut dyn Executor,
+        observer: &mut dyn Observer,
+        interrupts: &dyn Fn() -> u32,
+    ) -> io::Result<(Self, Summary)> {
+        if !self.pending.is_empty() {
+            self.journal.started();
+        }
+        let (mut reports, mut heard) = (Vec::new(), 0);
+        loop {
+            while let Some(effect) = self.pending.pop_front() {
+                match effect {
+                    Effect::Start { id, threads, attempt } => {
+                        observer.update(&self.core, id, &Update::Started { threads, attempt });
+                        let task = self.task(id, threads);
+                        executor.submit(task);
+                    }
+                    Effect::Cancel(id) => executor.cancel(id, false),
+                    Effect::Look(_) | Effect::Skip { .. } => {}
+                }
+            }
+            self.journal.tick()?;
+            if self.core.is_finished() {
+                break;
+            }
+            executor.wait(Some(BEAT), &mut reports)?;
+            for report in reports.drain(..) {
+                self.heed(report, observer);
+            }
+            observer.tick();
+            let wishes = interrupts();
+            if wishes > heard {
+                self.interrupt(heard == 0, executor, observer);
+                heard = wishes;
+            }
+        }
+        self.finish(observer)
+    }
+
+    fn finish(mut self, observer: &mut dyn Observer) -> io::Result<(Self, Summary)> {
+        observer.end();
+        let mut summary = std::mem::take(&mut self.summary);
+        summary.skipped = self
+            .core
+            .instances()
+            .iter()
+            .filter(|i| {
+                !matches!(i.state, State::Done { .. } | State::Failed)
+            })
+            .count();
+        if summary.executed + summary.failures.len() > 0 {
+            self.journal.ended(summary.executed as u64, summary.failures.len() as u64);
+        }
+        self.journal.flush()?;
+        // Left empty by all workers that ended well; what a killed one left is worthless.
+        let _ = std::fs::remove_dir_all(self.folder.tmp());
+        Ok((self, summary))
+    }
+
+    fn interrupt(&mut self, first: bool, executor: &mut dyn Executor, observer: &mut dyn Observer) {
+        self.summary.interrupted = true;
+        if first {
+            let effects = self.core.handle(Event::Interrupt);
+            return self.take(effects, observer);
+        }
+        for (id, instance) in self.core.instances().iter().enumerate() {
+            if matches!(instance.state, State::Running(_)) {
+                executor.cancel(id, true);
+            }
+        }
+    }
+
+    /// Answers lookups at once; leaves the other effects for [`Session::execute`].
+    fn take(&mut self, effects: Vec<Effect>, observer: &mut dyn Observer) {
+        let mut queue = VecDeque::from(effects);
+        while let Some(effect) = queue.pop_front() {
+            match effect {
+                Effect::Look(id) => {
+                    let found = self.find(id);
+                    let cached = found.is_some();
+                    queue.extend(self.core.handle(Event::Looked { id, found }));
+                    if cached {
+                        self.summary.cached += 1;
+                        observer.update(&self.core, id, &Update::Cached);
+                    }
+                }
+                Effect::Skip { id, cause } => {
+                    observer.update(&self.core, id, &Update::Skipped { cause });
+                }
+                other => self.pending.push_back(other),
+            }
+        }
+    }
+
+    /// Whether the store has the artifact of an instance, whole.
+    fn find(&mut self, id: Id) -> Option<Output> {
+        let instance = &self.core.instances()[id];
+        let (key, step) = (instance.key?, instance.step);
+        if self.options.force.contains(&step) {
+            return None;
+        }
+        let bytes = self.store.size(&key)?;
+        let known = match self.journal.known(&key) {
+            Some(known) if known.bytes == bytes => known.clone(),
+            _ => {
+                let record = self.store.read_record(&key).filter(|r| r.bytes == bytes)?;
+                Known { bytes, labels: record.collection }
+            }
+        };
+        if self.core.graph().steps[step].collection && known.labels.is_none() {
+            return None;
+        }
+        let labels = known.labels.clone();
+        self.note(id, known);
+        Some(Output { labels })
+    }
+
+    fn note(&mut self, id: Id, artifact: Known) {
+        if !self.writing {
+            return;
+        }
+        let instance = &self.core.instances()[id];
+        let step = &self.core.graph().steps[instance.step];
+        if let Some(key) = instance.key {
+            let who = (step.name.as_str(), instance.item.as_slice());
+            self.journal.used(who, key, &step.recipe, artifact, || input_keys(&self.core, id));
+        }
+    }
+
+    /// What an instance cost, when it is done.
+    pub fn cost(&mut self, id: Id) -> Cost {
+        if let Some(cost) = self.costs.get(&id) {
+            return *cost;
+        }
+        let key = self.core.instances()[id].key;
+        let cost = key.and_then(|k| self.store.read_record(&k)).map(|r| r.cost).unwrap_or_default();
+        self.costs.insert(id, cost);
+        cost
+    }
+
+    fn task(&mut self, id: Id, threads: u32) -> Task {
+        let givers = self.core.instances()[id].inputs.clone();
+        let step = &self.workflow.steps[self.core.instances()[id].step];
+        let mut inputs = Vec::with_capacity(givers.len());
+        for (wire, giver) in givers {
+            let cost = self.cost(giver);
+            let given = &self.core.instances()[giver];
+            let from = &self.workflow.steps[given.step];
+            inputs.push(JobInput {
+                port: step.inputs[wire].port.clone(),
+                step: from.name.clone(),
+                kind: from.output_kind.clone(),
+                item: given.item.clone(),
+                artifact: given.key.map(|k| self.store.artifact(&k)).unwrap_or_default(),
+                cost,
+            });
+        }
+        self.serial += 1;
+        let tmp = self.folder.tmp().join(format!("{}-{}", std::process::id(), self.serial));
+        let place = |end: &str| Utf8PathBuf::from(format!("{tmp}{end}"));
+        let (artifact, record) = (place(".h5"), place(".record.json"));
+        self.jobs.insert(id, (artifact.clone(), record.clone()));
+        let instance = &self.core.instances()[id];
+        let library =
+            |p: &plyflow_workflow::resolved::PluginId| LibraryRef { name: p.name.clone(), path: p.path.clone() };
+        let job = Job {
+            version: JOB_VERSION,
+            step: step.name.clone(),
+            item: instance.item.clone(),
+            key: instance.key.map(|k| k.hex()).unwrap_or_default(),
+            plugin: library(&step.plugin),
+            components: step.components.iter().map(library).collect(),
+            search_path: self.options.search_path.clone(),
+            parameters: step.parameters.clone(),
+            inputs,
+            output_kind: step.output_kind.clone(),
+            collection: step.collection,
+            threads,
+            memory_limit: step.resources.memory,
+            artifact,
+            record,
+            scratch: place(".scratch"),
+            provenance: self.provenance(id),
+        };
+        let log = self.folder.log(&self.core.label(id));
+        // A log of an earlier attempt must not pass for this one's.
+        let _ = std::fs::remove_file(&log);
+        Task { id, job, time_limit: step.resources.time_limit, log }
+    }
+
+    /// What the artifact says about its own making; only what its key also holds.
+    fn provenance(&self, id: Id) -> serde_json::Value {
+        let instance = &self.core.instances()[id];
+        let made_by = &self.core.graph().steps[instance.step].recipe.ingredients;
+        let inputs: Vec<_> = input_keys(&self.core, id)
+            .into_iter()
+            .map(|i| serde_json::json!({"port": i.port, "step": i.step, "item": i.item, "key": i.key.hex()}))
+            .collect();
+        serde_json::json!({
+            "step": made_by.step,
+            "item": instance.item,
+            "plugin": made_by.plugin,
+            "components": made_by.components,
+            "parameters": made_by.parameters,
+            "files": made_by.files,
+            "inputs": inputs,
+            "key": instance.key.map(|k| k.hex()),
+            "data_model": DATA_MODEL_VERSION,
+        })
+    }
+
+    fn heed(&mut self, report: Report, observer: &mut dyn Observer) {
+        match report {
+            Report::Message { id, message } => match &message {
+                Message::Progress(p) => observer.update(&self.core, id, &Update::Progress(p)),
+                Message::Log { level, text } => {
+                    observer.update(&self.core, id, &Update::Log { level: *level, text });
+                }
+                Message::Done { .. } | Message::Failed { .. } => {}
+            },
+            Report::Ended { id, outcome: Outcome::Done(record) } => {
+                match self.accept(id, &record) {
+                    Ok(known) => self.succeed(id, &record, known, observer),
+                    Err(reason) => self.fail(id, &reason, observer),
+                }
+            }
+            Report::Ended { id, outcome: Outcome::Cancelled } => {
+                let effects = self.core.handle(Event::Cancelled { id });
+                observer.update(&self.core, id, &Update::Stopped);
+                self.take(effects, observer);
+            }
+            Report::Ended { id, outcome } => self.fail(id, &reason_text(&outcome), observer),
+        }
+    }
+
+    /// Checks what the worker left and makes it visible.
+    fn accept(&mut self, id: Id, record: &Record) -> Result<Known, String> {
+        let instance = &self.core.instances()[id];
+        let key: Key = instance.key.ok_or("the instance has no key")?;
+        let (artifact, beside) = self.jobs.remove(&id).ok_or("the instance was not started")?;
+        let step = &self.core.graph().steps[instance.step];
+        if step.collection && record.collection.is_none() {
+            return Err(format!(
+                "malformed artifact: plugin '{}' did not declare its collection, though its manifest promises one",
+                step.recipe.ingredients.plugin.name
+            ));
+        }
+        let size = std::fs::metadata(&artifact).map_err(|e| format!("no artifact: {e}"))?.len();
+        if size != record.bytes {
+            return Err(format!(
+                "malformed artifact: it has {size} bytes and its record says {}",
+                record.bytes
+            ));
+        }
+        self.store.commit(&key, &artifact, &beside).map_err(|e| {
+            format!("the artifact cannot be put into the store {}: {e}", self.store.root())
+        })?;
+        Ok(Known { bytes: size, labels: record.collection.clone() })
+    }
+
+    fn succeed(&mut self, id: Id, record: &Record, known: Known, observer: &mut dyn Observer) {
+        self.summary.executed += 1;
+        self.costs.insert(id, record.cost);
+        let output = Output { labels: known.labels.clone() };
+        self.note(id, known);
+        let effects = self.core.handle(Event::Finished { id, output });
+        observer.update(&self.core, id, &Update::Finished(record));
+        self.take(effects, observer);
+    }
+
+    fn fail(&mut self, id: Id, reason: &str, observer: &mut dyn Observer) {
+        if let Some((artifact, record)) = self.jobs.remove(&id) {
+            let _ = std::fs::remove_file(artifact);
+            let _ = std::fs::remove_file(record);
+        }
+        let effects = self.core.handle(Event::Failed { id });
+        let again = self.core.instances()[id].state != State::Failed;
+        observer.update(&self.core, id, &Update::Failed { reason, again });
+        if !again {
+            let label = self.core.label(id);
+            let log = Some(self.folder.log(&label)).filter(|l| l.exists());
+            self.summary.failures.push(Failure { label, reason: reason.to_owned(), log });
+        }
+        self.take(effects, observer);
+    }
+}
+
+/// The inputs of an instance as they are in its key.
+pub fn input_keys(core: &Core<'_>, id: Id) -> Vec<InputKey> {
+    let instance = &core.instances()[id];
+    let wires = &core.graph().steps[instance.step].wires;
+    let one = |(wire, giver): &(usize, Id)| {
+        let given = &core.instances()[*giver];
+        Some(InputKey {
+            port: wires[*wire].port.clone(),
+            step: core.graph().steps[given.step].name.clone(),
+            item: given.item.clone(),
+            key: given.key?,
+        })
+    };
+    instance.inputs.iter().filter_map(one).collect()
+}
+
+fn reason_text(outcome: &Outcome) -> String {
+    match outcome {
+        Outcome::Done(_) => "done".into(),
+        Outcome::Failed { kind: FailureKind::Panic, message } => format!("the plugin panicked: {message}"),
+        Outcome::Failed { kind: FailureKind::Malformed, message } => {
+            format!("malformed artifact: {message}")
+        }
+        Outcome::Failed { message, .. } => message.clone(),
+        Outcome::Signal(name) => {
+            let hint = match name.as_str() {
+                "SIGSEGV" | "SIGBUS" | "SIGILL" | "SIGFPE" | "SIGABRT" => {
+                    "; the defect is in the plugin or a library it uses"
+                }
+                "SIGKILL" => "; perhaps the machine ran out of memory",
+                _ => "",
+            };
+            format!("the worker crashed: {name}{hint}")
+        }
+        Outcome::Silent(code) => {
+            format!("the worker ended with status {code} without saying how it went")
+        }
+        Outcome::TimedOut(limit) => format!(
+            "stopped at its time limit of {limit} s; raise `resources: {{time: ..}}` of the step if it needs longer"
+        ),
+        Outcome::Cancelled => "stopped".into(),
+        Outcome::NotStarted(text) => format!("the worker could not be started: {text}"),
+    }
+}

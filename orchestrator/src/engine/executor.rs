@@ -1,0 +1,77 @@
+//! Where jobs run. The engine hands over self-contained jobs and hears back in reports; it never assumes
+//! that a job is a child process or even on this machine.
+
+use plyflow_model::job::{FailureKind, Job, Message, Record};
+use std::io;
+use std::time::Duration;
+
+/// A job for an executor.
+#[derive(Debug)]
+pub struct Task {
+    /// The engine's number of the instance.
+    pub id: usize,
+    /// The job.
+    pub job: Job,
+    /// Wall-clock limit (s); 0: none.
+    pub time_limit: f64,
+    /// Where the worker's log goes; made only when there is something to write.
+    pub log: camino::Utf8PathBuf,
+}
+
+/// How a job ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// Artifact and record are whole under their temporary names.
+    Done(Box<Record>),
+    /// The worker said what failed.
+    Failed {
+        /// Why.
+        kind: FailureKind,
+        /// Text for the user.
+        message: String,
+    },
+    /// The worker was killed by a signal, by name: `SIGSEGV`.
+    Signal(String),
+    /// The worker ended with this status without saying how it went.
+    Silent(i32),
+    /// It was stopped at its time limit (s).
+    TimedOut(f64),
+    /// It was stopped on request.
+    Cancelled,
+    /// It could not be started.
+    NotStarted(String),
+}
+
+/// What an executor reports.
+#[derive(Debug)]
+pub enum Report {
+    /// A line from the worker (progress or log).
+    Message {
+        /// Which.
+        id: usize,
+        /// The line.
+        message: Message,
+    },
+    /// The job ended; nothing more comes from it.
+    Ended {
+        /// Which.
+        id: usize,
+        /// How.
+        outcome: Outcome,
+    },
+}
+
+/// A place where jobs run.
+pub trait Executor {
+    /// Takes a job. A job that cannot be started is reported as [`Outcome::NotStarted`].
+    fn submit(&mut self, task: Task);
+
+    /// Waits until something can be reported, the timeout passes or the user interrupts; appends to `out`.
+    ///
+    /// # Errors
+    /// When the executor itself is broken; jobs' troubles are reports.
+    fn wait(&mut self, timeout: Option<Duration>, out: &mut Vec<Report>) -> io::Result<()>;
+
+    /// Asks a job to stop; `now`: without grace. Its end is still reported.
+    fn cancel(&mut self, id: usize, now: bool);
+}

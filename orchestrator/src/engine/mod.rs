@@ -1,0 +1,10 @@
+//! The engine: [`core`] decides, [`drive`](mod@drive) acts, an [`Executor`] runs jobs somewhere.
+
+pub mod core;
+mod drive;
+mod executor;
+mod local;
+
+pub use drive::{Failure, Observer, Options, Session, Summary, Update, input_keys};
+pub use executor::{Executor, Outcome, Report, Task};
+pub use local::Local;

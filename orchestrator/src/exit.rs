@@ -1,0 +1,30 @@
+//! The exit codes of `plyflow`. Stable: scripts may rely on them. `docs/exit-codes.md` explains them.
+
+/// All went well.
+pub const OK: u8 = 0;
+/// Something in Plyflow or the machine failed (store not writable, executor broken).
+pub const INTERNAL: u8 = 1;
+/// The command line is wrong, or a file it names does not exist.
+pub const USAGE: u8 = 2;
+/// The workflow, scene or material file has errors; nothing was run.
+pub const INVALID: u8 = 3;
+/// At least one step failed; the rest ran as the failure policy says.
+pub const STEP_FAILED: u8 = 4;
+/// A stated expectation was missed (only with `--check`).
+pub const EXPECTATION: u8 = 5;
+/// Another process runs this workflow.
+pub const LOCKED: u8 = 6;
+/// Stopped by the user (Ctrl-C) or SIGTERM.
+pub const INTERRUPTED: u8 = 130;
+
+/// All codes with their meaning, for `--help`.
+pub const HELP: &str = "\
+Exit codes:
+    0  all went well
+    1  Plyflow or the machine failed (disk full, store not writable)
+    2  wrong command line
+    3  the workflow has errors; nothing was run
+    4  a step failed
+    5  an expectation was missed (with --check)
+    6  another process is running this workflow
+  130  stopped by Ctrl-C; the same command resumes";

@@ -1,0 +1,67 @@
+//! One line per event, for files and pipes.
+
+use super::{duration_text, progress_text};
+use crate::engine::core::{Core, Id};
+use crate::engine::{Observer, Update};
+use plyflow_model::job::LogLevel;
+use std::collections::HashMap;
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+/// Progress of a step is told at most this often.
+const PACE: Duration = Duration::from_secs(10);
+
+/// Writes to standard error.
+#[derive(Default)]
+pub struct Lines {
+    running: HashMap<Id, (Instant, Instant)>,
+}
+
+fn say(text: &str) {
+    // A closed standard error must not stop a run.
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+impl Observer for Lines {
+    fn update(&mut self, core: &Core<'_>, id: Id, update: &Update<'_>) {
+        match update {
+            Update::Cached => {}
+            Update::Started { threads, attempt } => {
+                let now = Instant::now();
+                self.running.insert(id, (now, now));
+                let s = if *threads == 1 { "" } else { "s" };
+                let again =
+                    if *attempt > 1 { format!(", attempt {attempt}") } else { String::new() };
+                say(&format!("start    {} ({threads} thread{s}{again})", core.label(id)));
+            }
+            Update::Progress(p) => {
+                if let Some((begun, told)) = self.running.get_mut(&id)
+                    && told.elapsed() >= PACE
+                {
+                    *told = Instant::now();
+                    let text = progress_text(p, begun.elapsed());
+                    let percent = 100.0 * p.fraction;
+                    say(&format!("         {} {percent:.0} %: {text}", core.label(id)));
+                }
+            }
+            Update::Log { level, text } if *level <= LogLevel::Warn => {
+                let word = if *level == LogLevel::Error { "error   " } else { "warning " };
+                say(&format!("{word} {}: {text}", core.label(id)));
+            }
+            Update::Log { .. } => {}
+            Update::Finished(record) => {
+                self.running.remove(&id);
+                let wall = duration_text(record.cost.wall_seconds);
+                say(&format!("finish   {} in {wall}", core.label(id)));
+            }
+            Update::Failed { reason, again } => {
+                let next = if *again { " (trying again)" } else { "" };
+                say(&format!("FAILED   {}: {reason}{next}", core.label(id)));
+            }
+            Update::Stopped => say(&format!("stopped  {}", core.label(id))),
+            Update::Skipped { cause } => {
+                say(&format!("skip     {} because {} failed", core.label(id), core.label(*cause)));
+            }
+        }
+    }
+}

@@ -1,0 +1,110 @@
+use super::*;
+use crate::plan::tests::step;
+
+fn at(folder: &tempfile::TempDir) -> Utf8PathBuf {
+    Utf8PathBuf::from_path_buf(folder.path().join("journal")).unwrap()
+}
+
+fn recipe(speed: f64) -> Recipe {
+    let mut s = step("s", &[], &[]);
+    s.parameters = serde_json::json!({ "speed": speed });
+    Recipe::of(&s)
+}
+
+fn key(n: u8) -> Key {
+    Key([n; 32])
+}
+
+fn note(j: &mut Journal, item: u64, n: u8) {
+    let made = Known { bytes: 10 + u64::from(n), labels: Some(vec!["A".into()]) };
+    let input = InputKey { port: "p".into(), step: "up".into(), item: vec![], key: key(200) };
+    j.used(("s", &[item]), key(n), &recipe(f64::from(n)), made, || vec![input]);
+}
+
+#[test]
+fn what_was_noted_is_read_again_with_its_ingredients() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    note(&mut j, 0, 1);
+    note(&mut j, 1, 2);
+    j.flush().unwrap();
+    let j = Journal::read(&at(&folder)).unwrap();
+    assert_eq!(j.last("s", &[1]), Some(key(2)));
+    assert_eq!(j.known(&key(1)).unwrap().bytes, 11);
+    let (ingredients, inputs) = j.detail(&key(2)).unwrap();
+    assert_eq!(ingredients.parameters["speed"], 2.0);
+    assert_eq!(inputs[0].key, key(200));
+}
+
+#[test]
+fn a_repeated_run_writes_nothing_and_a_return_to_an_old_key_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let size = || std::fs::metadata(at(&folder)).unwrap().len();
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    note(&mut j, 0, 1);
+    note(&mut j, 0, 2);
+    j.flush().unwrap();
+    let before = size();
+    note(&mut j, 0, 2);
+    j.flush().unwrap();
+    assert_eq!(size(), before);
+    note(&mut j, 0, 1);
+    j.flush().unwrap();
+    assert!(size() > before);
+    assert_eq!(Journal::read(&at(&folder)).unwrap().last("s", &[0]), Some(key(1)));
+}
+
+#[test]
+fn a_journal_cut_anywhere_keeps_its_whole_records_and_can_be_continued() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    note(&mut j, 0, 1);
+    j.flush().unwrap();
+    let first = std::fs::metadata(at(&folder)).unwrap().len() as usize;
+    note(&mut j, 1, 2);
+    j.flush().unwrap();
+    let whole = std::fs::read(at(&folder)).unwrap();
+    for cut in 0..whole.len() {
+        std::fs::write(at(&folder), &whole[..cut]).unwrap();
+        let mut j = Journal::open(&at(&folder)).unwrap();
+        assert_eq!(j.last("s", &[0]).is_some(), cut >= first, "cut at {cut}");
+        assert_eq!(j.last("s", &[1]), None, "cut at {cut}");
+        note(&mut j, 2, 3);
+        j.flush().unwrap();
+        let j = Journal::read(&at(&folder)).unwrap();
+        assert_eq!(j.last("s", &[2]), Some(key(3)), "cut at {cut}");
+        assert!(j.detail(&key(3)).is_some(), "cut at {cut}");
+    }
+}
+
+#[test]
+fn a_flipped_byte_ends_the_journal_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    note(&mut j, 0, 1);
+    j.flush().unwrap();
+    let mut bytes = std::fs::read(at(&folder)).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(at(&folder), bytes).unwrap();
+    assert_eq!(Journal::read(&at(&folder)).unwrap().last("s", &[0]), None);
+}
+
+#[test]
+fn a_long_history_is_shed_and_the_last_state_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    for round in 0..1200u64 {
+        note(&mut j, 0, (round % 2) as u8 + 1);
+    }
+    j.flush().unwrap();
+    let before = std::fs::metadata(at(&folder)).unwrap().len();
+    drop(j);
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    note(&mut j, 1, 9);
+    j.flush().unwrap();
+    assert!(std::fs::metadata(at(&folder)).unwrap().len() < before / 10);
+    let j = Journal::read(&at(&folder)).unwrap();
+    assert_eq!((j.last("s", &[0]), j.last("s", &[1])), (Some(key(2)), Some(key(9))));
+    assert!(j.detail(&key(2)).is_some());
+}

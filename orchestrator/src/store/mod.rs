@@ -1,0 +1,236 @@
+//! Where a workflow's artifacts and journals lie.
+//!
+//! ```text
+//! .plyflow/
+//!   lock                           shared by runs, exclusive for `clean`
+//!   artifacts/ab/ab12...ef.h5      an artifact under its content key: whole or absent
+//!   artifacts/ab/ab12...ef.record.json   what it cost and found; there before the artifact is
+//!   runs/<workflow>/lock           held while a run is on; the kernel frees it whatever happens
+//!   runs/<workflow>/journal        one append-only file
+//!   runs/<workflow>/logs/          logs of workers that had something to say
+//!   runs/<workflow>/tmp/           artifacts being written
+//! ```
+
+mod journal;
+mod lock;
+
+pub use journal::{Detail, Journal, Known};
+pub use lock::{Lock, LockError};
+
+use crate::plan::Key;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::job::Record;
+use std::cell::RefCell;
+use std::{fs, io};
+
+/// A store.
+#[derive(Debug)]
+pub struct Store {
+    root: Utf8PathBuf,
+    shards: RefCell<[bool; 256]>,
+}
+
+/// Files of one run.
+#[derive(Debug, Clone)]
+pub struct RunFolder {
+    /// `runs/<workflow>`.
+    pub root: Utf8PathBuf,
+}
+
+impl RunFolder {
+    /// Its lock.
+    pub fn lock(&self) -> Utf8PathBuf {
+        self.root.join("lock")
+    }
+
+    /// Its journal.
+    pub fn journal(&self) -> Utf8PathBuf {
+        self.root.join("journal")
+    }
+
+    /// Temporary files.
+    pub fn tmp(&self) -> Utf8PathBuf {
+        self.root.join("tmp")
+    }
+
+    /// Log of an instance by its label.
+    pub fn log(&self, label: &str) -> Utf8PathBuf {
+        self.root.join("logs").join(format!("{}.log", safe_name(label)))
+    }
+
+    /// Makes the folder and clears what a killed run left in `tmp`. Call only under the lock.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn prepare(&self) -> io::Result<()> {
+        match fs::remove_dir_all(self.tmp()) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+            _ => {}
+        }
+        fs::create_dir_all(self.tmp())
+    }
+}
+
+/// A name that is safe as a file name and still tells names apart.
+fn safe_name(name: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.[],".contains(c);
+    if !name.is_empty() && !name.starts_with('.') && name.chars().all(plain) && name.len() < 120 {
+        return name.to_owned();
+    }
+    let kept: String = name.chars().map(|c| if plain(c) { c } else { '_' }).take(60).collect();
+    let hash = blake3::hash(name.as_bytes()).to_hex();
+    format!("{}-{}", kept.trim_start_matches('.'), &hash[..8])
+}
+
+impl Store {
+    /// A store at `root`; nothing is made yet.
+    pub fn new(root: Utf8PathBuf) -> Self {
+        Self { root, shards: RefCell::new([false; 256]) }
+    }
+
+    /// Its folder.
+    pub fn root(&self) -> &Utf8Path {
+        &self.root
+    }
+
+    /// The folder of a workflow's runs.
+    pub fn run(&self, workflow: &str) -> RunFolder {
+        RunFolder { root: self.root.join("runs").join(safe_name(workflow)) }
+    }
+
+    /// Folders of all runs.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn runs(&self) -> io::Result<Vec<RunFolder>> {
+        let mut found = Vec::new();
+        for path in list(&self.root.join("runs"))? {
+            found.push(RunFolder { root: path });
+        }
+        Ok(found)
+    }
+
+    /// The lock that runs share and `clean` takes alone.
+    pub fn lock(&self) -> Utf8PathBuf {
+        self.root.join("lock")
+    }
+
+    /// Where the artifact of a key lies, if it does.
+    pub fn artifact(&self, key: &Key) -> Utf8PathBuf {
+        self.file(key, ".h5")
+    }
+
+    /// Where its record lies.
+    pub fn record(&self, key: &Key) -> Utf8PathBuf {
+        self.file(key, ".record.json")
+    }
+
+    fn file(&self, key: &Key, end: &str) -> Utf8PathBuf {
+        let hex = key.hex();
+        let root = self.root.as_str();
+        Utf8PathBuf::from(format!("{root}/artifacts/{}/{hex}{end}", &hex[..2]))
+    }
+
+    /// Size of the artifact of a key, if it is there.
+    pub fn size(&self, key: &Key) -> Option<u64> {
+        let found = rustix::fs::stat(self.artifact(key).as_std_path()).ok()?;
+        u64::try_from(found.st_size).ok()
+    }
+
+    /// The record of a key, if it can be read.
+    pub fn read_record(&self, key: &Key) -> Option<Record> {
+        serde_json::from_slice(&fs::read(self.record(key)).ok()?).ok()
+    }
+
+    /// Makes a finished artifact visible: the record first, so that a visible artifact has one.
+    ///
+    /// # Errors
+    /// When a file is missing or cannot be renamed.
+    pub fn commit(&self, key: &Key, artifact: &Utf8Path, record: &Utf8Path) -> io::Result<()> {
+        let shard = usize::from(key.0[0]);
+        if !self.shards.borrow()[shard] {
+            let target = self.artifact(key);
+            fs::create_dir_all(target.parent().unwrap_or(&self.root))?;
+            self.shards.borrow_mut()[shard] = true;
+        }
+        fs::rename(record, self.record(key))?;
+        fs::rename(artifact, self.artifact(key))
+    }
+
+    /// Keys of all artifacts, sorted.
+    ///
+    /// # Errors
+    /// When a folder cannot be read.
+    pub fn keys(&self) -> io::Result<Vec<Key>> {
+        let mut keys = Vec::new();
+        for shard in list(&self.root.join("artifacts"))? {
+            for file in list(&shard)? {
+                if file.extension() == Some("h5")
+                    && let Some(key) = file.file_stem().and_then(Key::from_hex)
+                {
+                    keys.push(key);
+                }
+            }
+        }
+        keys.sort_unstable();
+        Ok(keys)
+    }
+
+    /// Removes an artifact and its record; the artifact first, so that none is left without a record.
+    ///
+    /// # Errors
+    /// When a file cannot be removed.
+    pub fn remove(&self, key: &Key) -> io::Result<()> {
+        fs::remove_file(self.artifact(key))?;
+        match fs::remove_file(self.record(key)) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
+            other => other,
+        }
+    }
+}
+
+fn list(folder: &Utf8Path) -> io::Result<Vec<Utf8PathBuf>> {
+    let mut found = Vec::new();
+    match folder.read_dir_utf8() {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(found),
+        Err(e) => return Err(e),
+        Ok(entries) => {
+            for entry in entries {
+                found.push(entry?.into_path());
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_are_not_file_names_stay_apart() {
+        assert_eq!(safe_name("local[A,0]"), "local[A,0]");
+        assert_ne!(safe_name("a/b"), safe_name("a:b"));
+        assert!(!safe_name("../../etc").contains('/'));
+        assert!(!safe_name("..").starts_with('.'));
+    }
+
+    #[test]
+    fn an_artifact_becomes_visible_with_its_record() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
+        let store = Store::new(root.clone());
+        let key = Key([7; 32]);
+        let (a, r) = (root.join("a"), root.join("r"));
+        fs::write(&a, "artifact").unwrap();
+        assert!(store.commit(&key, &a, &r).is_err(), "a missing record must stop the commit");
+        assert_eq!(store.size(&key), None);
+        fs::write(&r, "{}").unwrap();
+        store.commit(&key, &a, &r).unwrap();
+        assert_eq!(store.size(&key), Some(8));
+        assert_eq!(store.keys().unwrap(), [key]);
+        store.remove(&key).unwrap();
+        assert!(store.keys().unwrap().is_empty());
+    }
+}
