@@ -48,6 +48,9 @@ impl Entry {
 /// Two defects are the same when their centres lie within this (m) or within half of the longer ridge.
 const SAME_DEFECT: f64 = 0.015;
 
+/// Nodes on the side of a zone lie in it, however their places were rounded (m).
+const ROUNDING: f64 = 1e-6;
+
 /// All defects: first those of the local models, numbered in their zone from the uppermost ply down, wrinkles
 /// by length and bridging by area; then those of the other models in the same boxes, which take the id
 /// of the local defect that they are, or the next free number.
@@ -89,7 +92,7 @@ fn entries_of(
     // The stack is listed from the tool upwards.
     for ply in model.plies.iter().rev() {
         let within = |p: &[f64; 3]| {
-            p[0] >= z.bounds[0] && p[1] >= z.bounds[1] && p[0] <= z.bounds[2] && p[1] <= z.bounds[3]
+            (0..2).all(|d| p[d] > z.bounds[d] - ROUNDING && p[d] < z.bounds[d + 2] + ROUNDING)
         };
         let inside: Vec<bool> = match model.role {
             Role::Local => vec![true; ply.undeformed.len()],

@@ -73,7 +73,12 @@ fn read(host: &Host) -> Result<(Vec<String>, Vec<FlaggedCell>, Rectangle), StepE
     for body in &meshes.bodies {
         let (points, nodes) = host.mesh(&input, body)?;
         let flat = host.frame_field(&input, body, frame, "undeformed")?;
-        let flat: Vec<Vec3> = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+        // Fields are kept in single precision: back to 0.1 um, so that an edge at 240 mm is one.
+        let tidy = |v: &f64| (v * 1e7).round() / 1e7;
+        let flat: Vec<Vec3> = flat
+            .chunks_exact(3)
+            .map(|p| [tidy(&p[0]), tidy(&p[1]), tidy(&p[2])])
+            .collect();
         let flags = host.frame_field(&input, body, frame, "flag")?;
         let topology = Topology::new(points.len(), body.nodes_per_cell, &nodes);
         let around = |nodes: &mut dyn Iterator<Item = usize>| {

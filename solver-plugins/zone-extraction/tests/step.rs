@@ -182,7 +182,16 @@ fn artifact(flag: impl Fn(usize) -> bool) -> MemoryArtifact {
         name: "ply_2".into(),
         fields: vec![vec![
             field("flag", On::Cells, 1, flags),
-            field("undeformed", On::Points, 3, points.as_flattened().to_vec()),
+            field(
+                "undeformed",
+                On::Points,
+                3,
+                points
+                    .as_flattened()
+                    .iter()
+                    .map(|v| f64::from(*v as f32))
+                    .collect(),
+            ),
         ]],
         frames: vec![points.clone()],
         points,
@@ -219,6 +228,10 @@ fn artifact_follows_the_data_model_and_warns_when_zones_cover_too_much() {
     assert_eq!(out.collection, Some(vec!["A".to_owned()]));
     let zone = &out.attributes["zones"][0];
     assert_eq!(zone["free_sides"], json!([true, false, true, false]));
+    assert_eq!(
+        zone["box"][0], -0.240,
+        "fields in single precision do not show"
+    );
     assert_eq!(zone["plies"], json!(["ply_2"]));
     let number = |v: &Value| v.as_f64().unwrap();
     assert!((number(&zone["box"][2]) + 0.197).abs() < 1e-9, "{zone}");
