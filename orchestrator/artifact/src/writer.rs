@@ -376,19 +376,8 @@ impl ArtifactWriter {
         let file = self.file.take().expect("made above");
         let times = self.read_times()?;
         let bodies = std::mem::take(&mut self.bodies);
-        if let Some(first) = bodies.first() {
-            if !times.is_empty() {
-                // VTK 9.7 forgets the number of steps of the blocks of a composite file when it reads
-                // again, and takes it from `/VTKHDF/Steps`. That link leads to the first body, which
-                // carries the number and the times besides its own `Steps`: as a child of the root it
-                // must be a valid block, and the assembly does not list it.
-                let path = format!("/VTKHDF/{}", first.info.name);
-                let group = file.open_group(&path)?;
-                group.write_i64("NSteps", &[], &[times.len() as i64])?;
-                let n = [times.len() as u64];
-                drop(file.write(&format!("{path}/Values"), DType::F64, &n, bytes(&times))?);
-                file.soft_link(&path, "/VTKHDF/Steps")?;
-            }
+        if let (Some(first), false) = (bodies.first(), times.is_empty()) {
+            link_steps(&file, &first.info.name, &times)?;
         }
         let mut contents = Contents {
             bodies: Vec::new(),
@@ -428,6 +417,22 @@ impl ArtifactWriter {
         d.read_all(DType::F64, bytes_mut(&mut times))?;
         Ok(times)
     }
+}
+
+/// VTK 9.7 forgets the number of steps of the blocks of a composite file when it reads again, and takes it
+/// from `/VTKHDF/Steps`. That link leads to the first body, which carries the number and the times besides
+/// its own `Steps`: as a child of the root it must be a valid block, and the assembly does not list it.
+fn link_steps(file: &File, first: &str, times: &[f64]) -> Result<()> {
+    let path = format!("/VTKHDF/{first}");
+    file.open_group(&path)?
+        .write_i64("NSteps", &[], &[times.len() as i64])?;
+    file.write(
+        &format!("{path}/Values"),
+        DType::F64,
+        &[times.len() as u64],
+        bytes(times),
+    )?;
+    file.soft_link(&path, "/VTKHDF/Steps")
 }
 
 fn json(value: &impl serde::Serialize) -> Result<String> {
@@ -481,7 +486,7 @@ fn check_mesh(name: &str, points: &[f64], k: u32, cells: &[u32]) -> Result<()> {
             "body '{name}': {k} nodes per cell; 3 or 4 are allowed"
         ));
     }
-    if points.len() % 3 != 0 || cells.len() % k as usize != 0 {
+    if !points.len().is_multiple_of(3) || !cells.len().is_multiple_of(k as usize) {
         return bad_shape(format!(
             "body '{name}': points are [n][3] and cells [m][{k}]"
         ));

@@ -64,7 +64,10 @@ unsafe impl Send for pf_str {}
 impl pf_str {
     /// A view of `text`, valid as long as `text` lives.
     pub const fn new(text: &str) -> Self {
-        Self { data: text.as_ptr().cast(), len: text.len() as u64 }
+        Self {
+            data: text.as_ptr().cast(),
+            len: text.len() as u64,
+        }
     }
 
     /// The text behind the view.
@@ -172,16 +175,8 @@ pub struct pf_services {
     ) -> i32,
     pub frame_begin: unsafe extern "C" fn(*mut c_void, f64) -> i32,
     pub frame_points: unsafe extern "C" fn(*mut c_void, pf_str, *const f64, u64) -> i32,
-    pub frame_field: unsafe extern "C" fn(
-        *mut c_void,
-        pf_str,
-        u32,
-        pf_str,
-        u32,
-        pf_str,
-        *const f64,
-        u64,
-    ) -> i32,
+    pub frame_field:
+        unsafe extern "C" fn(*mut c_void, pf_str, u32, pf_str, u32, pf_str, *const f64, u64) -> i32,
     pub frame_end: unsafe extern "C" fn(*mut c_void) -> i32,
     pub result: unsafe extern "C" fn(*mut c_void, pf_str, f64, pf_str, u32) -> i32,
     pub collection: unsafe extern "C" fn(*mut c_void, u64, pf_str) -> i32,
@@ -203,7 +198,9 @@ pub struct pf_error {
 
 impl Default for pf_error {
     fn default() -> Self {
-        Self { text: [0; PF_ERROR_TEXT] }
+        Self {
+            text: [0; PF_ERROR_TEXT],
+        }
     }
 }
 
@@ -214,15 +211,23 @@ impl pf_error {
         while !text.is_char_boundary(end) {
             end -= 1;
         }
-        for (slot, byte) in self.text.iter_mut().zip(text.as_bytes()[..end].iter().chain([&0u8])) {
+        for (slot, byte) in self
+            .text
+            .iter_mut()
+            .zip(text.as_bytes()[..end].iter().chain([&0u8]))
+        {
             *slot = *byte as c_char;
         }
     }
 
     /// The text up to its NUL.
     pub fn get(&self) -> String {
-        let bytes: Vec<u8> =
-            self.text.iter().take_while(|c| **c != 0).map(|c| *c as u8).collect();
+        let bytes: Vec<u8> = self
+            .text
+            .iter()
+            .take_while(|c| **c != 0)
+            .map(|c| *c as u8)
+            .collect();
         String::from_utf8_lossy(&bytes).into_owned()
     }
 }

@@ -1,1 +1,78 @@
-//! plyflow-faults
+//! Small plugins for tests (`plugins/`, built as examples): well-behaved ones and ones that fail in every
+//! known way. `cargo build -p plyflow-faults --examples` builds them.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// Folder of the plugin libraries of this build profile. Builds them on the first call.
+///
+/// # Panics
+/// When they cannot be built.
+#[must_use]
+pub fn folder() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let exe = std::env::current_exe().expect("a test has a path");
+        let in_deps = exe.parent().is_some_and(|p| p.ends_with("deps"));
+        let profile = exe
+            .ancestors()
+            .nth(if in_deps { 2 } else { 1 })
+            .expect("a profile folder");
+        let target = profile.parent().expect("a target folder");
+        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .env("CARGO_TARGET_DIR", target);
+        cargo.args([
+            "build",
+            "--quiet",
+            "--package",
+            "plyflow-faults",
+            "--examples",
+        ]);
+        if profile.ends_with("release") {
+            cargo.arg("--release");
+        }
+        let status = cargo.status().expect("cargo starts");
+        assert!(status.success(), "the test plugins do not build");
+        gather(&profile.join("examples"), &profile.join("test-plugins"))
+    })
+}
+
+/// Cargo keeps copies with a hash in their names beside the libraries: gathers those without.
+fn gather(from: &Path, to: &Path) -> PathBuf {
+    std::fs::create_dir_all(to).expect("a folder for the test plugins");
+    for entry in std::fs::read_dir(from)
+        .expect("a folder of examples")
+        .flatten()
+    {
+        let name = entry.file_name();
+        let Some(text) = name.to_str() else { continue };
+        if !text.starts_with("lib") || !text.ends_with(".so") || text.contains('-') {
+            continue;
+        }
+        // Another test process may do the same: never a moment without the library.
+        let temporary = to.join(format!(".{text}.{}", std::process::id()));
+        let _ = std::fs::remove_file(&temporary);
+        std::fs::hard_link(entry.path(), &temporary).expect("a link to the library");
+        std::fs::rename(&temporary, to.join(&name)).expect("the library in its place");
+        let _ = std::fs::remove_file(&temporary);
+    }
+    to.to_owned()
+}
+
+/// The library of a test plugin, by the name in its manifest.
+///
+/// # Panics
+/// When there is none of that name.
+#[must_use]
+pub fn library(name: &str) -> PathBuf {
+    let path = folder().join(format!("lib{}.so", name.replace('-', "_")));
+    assert!(
+        path.is_file(),
+        "there is no test plugin {name} at {}",
+        path.display()
+    );
+    path
+}
