@@ -9,9 +9,9 @@ use plyflow_kernels::{Level, limit_level, m4::M4, rf4::Rf4};
 use plyflow_sdk::Element;
 use std::time::Instant;
 
-const LANES: usize = 64;
+const LANES: usize = 32;
 /// As many elements as a coarse ply has: the data stay in the second-level cache.
-const BATCHES: usize = 40;
+const BATCHES: usize = 80;
 
 fn main() {
     for level in [Level::Avx512, Level::Avx2, Level::Portable] {

@@ -146,23 +146,31 @@ fn membrane_kernel<V: Lanes>(
         (shear.force * rr).store(stress, 2 * n + c);
         (half * (k1 * d1 * d1 + k2 * d2 * d2) + shear.energy).store(energy, c);
         if !stiffness.is_empty() {
-            let (largest, soft) =
-                tangents(f, s, i1, i2, k1 * i1 * r1, k2 * i2 * r2, shear.force.abs());
+            let (largest, soft) = tangents(
+                f,
+                s,
+                i1,
+                i2,
+                tension * i1 * r1,
+                tension * i2 * r2,
+                shear.force.abs(),
+            );
             largest.store(stiffness, c);
             soft.store(stiffness, n + c);
         }
     }
 }
 
-/// Bound of the largest eigenvalue of dS/dE, and the shear tangent of the yarns dS12 / d(2 E12)
-/// (positive also while the stitch softens). `a1`, `a2` are the fibre tangents k / l^3. The shear
-/// part is F' (ds/dE)^2 + F d2s/dE2, each factor by its Frobenius norm.
+/// Bounds of the largest eigenvalue of dS/dE and of the shear tangent dS12 / d(2 E12); both are
+/// positive also while the stitch softens, and count compressed fibres as stretched ones. `a1`, `a2`
+/// are the fibre tangents k / l^3. The shear part is F' (ds/dE)^2 + F d2s/dE2, each factor by its
+/// Frobenius norm.
 #[inline(always)]
 fn tangents<V: Lanes>(f: &Fabric, s: V, i1: V, i2: V, a1: V, a2: V, force: V) -> (V, V) {
-    let (slope, yarn) = f.shear.slopes(s);
+    let slope = f.shear.slopes(s).0;
     let two = V::splat(2.0);
     let gradient = s * s * (i1 * i1 + i2 * i2) + two * i1 * i2;
     let widest = i1.max(i2);
     let largest = a1.max(a2) + slope * gradient + V::splat(8.0) * force * widest * widest;
-    (largest, yarn * i1 * i2)
+    (largest, slope * i1 * i2)
 }

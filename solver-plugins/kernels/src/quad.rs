@@ -174,7 +174,8 @@ pub fn initialise(batch: &mut ElementBatch<'_>, material: &MaterialRef, hourglas
     if let Some(step) = batch.critical_step.as_deref_mut() {
         let zeros = vec![0.0; material.sizes().membrane_history * n];
         let mut history = zeros;
-        let mut scratch = Scratch::new();
+        let mut scratch = Scratch::<MAX_LANES>::new();
+        let mut scratch = scratch.view();
         metric_of(batch.position, batch.constants, n, &mut scratch);
         if material_call(material, &mut history, n, 0.0, &mut scratch, true) != PF_OK {
             step.fill(0.0);
@@ -184,31 +185,53 @@ pub fn initialise(batch: &mut ElementBatch<'_>, material: &MaterialRef, hourglas
     }
 }
 
-/// What one batch needs between the material call and the forces.
+/// What one batch of at most `N` lanes needs between the material call and the forces. Rows of n
+/// lanes lie one after the other from the start of each field.
 #[repr(align(64))]
-struct Scratch {
+struct Scratch<const N: usize> {
     /// g1, g2: `[2][3][lanes]`.
-    g: [f64; 6 * MAX_LANES],
-    metric: [f64; 3 * MAX_LANES],
-    stress: [f64; 3 * MAX_LANES],
-    energy: [f64; MAX_LANES],
-    stiffness: [f64; 2 * MAX_LANES],
+    g: [[f64; N]; 6],
+    metric: [[f64; N]; 3],
+    stress: [[f64; N]; 3],
+    energy: [f64; N],
+    stiffness: [[f64; N]; 2],
     /// |q|, |q . n|
-    mode: [f64; 2 * MAX_LANES],
+    mode: [[f64; N]; 2],
 }
 
-impl Scratch {
+impl<const N: usize> Scratch<N> {
     #[inline(always)]
     fn new() -> Self {
         Self {
-            g: [0.0; 6 * MAX_LANES],
-            metric: [0.0; 3 * MAX_LANES],
-            stress: [0.0; 3 * MAX_LANES],
-            energy: [0.0; MAX_LANES],
-            stiffness: [0.0; 2 * MAX_LANES],
-            mode: [0.0; 2 * MAX_LANES],
+            g: [[0.0; N]; 6],
+            metric: [[0.0; N]; 3],
+            stress: [[0.0; N]; 3],
+            energy: [0.0; N],
+            stiffness: [[0.0; N]; 2],
+            mode: [[0.0; N]; 2],
         }
     }
+
+    fn view(&mut self) -> View<'_> {
+        View {
+            g: self.g.as_flattened_mut(),
+            metric: self.metric.as_flattened_mut(),
+            stress: self.stress.as_flattened_mut(),
+            energy: &mut self.energy,
+            stiffness: self.stiffness.as_flattened_mut(),
+            mode: self.mode.as_flattened_mut(),
+        }
+    }
+}
+
+/// A [`Scratch`] of any size.
+struct View<'a> {
+    g: &'a mut [f64],
+    metric: &'a mut [f64],
+    stress: &'a mut [f64],
+    energy: &'a mut [f64],
+    stiffness: &'a mut [f64],
+    mode: &'a mut [f64],
 }
 
 fn material_call(
@@ -216,7 +239,7 @@ fn material_call(
     history: &mut [f64],
     n: usize,
     dt: f64,
-    s: &mut Scratch,
+    s: &mut View<'_>,
     stiffness: bool,
 ) -> i32 {
     material.membrane(&mut MembraneBatch {
@@ -237,8 +260,16 @@ fn material_call(
 /// Internal forces, energies and, when asked for, fields and critical steps of a batch. The row of
 /// bending energy is set to zero.
 pub fn forces(batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
+    // Zeroing the scratch costs as much as it is large.
+    match batch.lanes {
+        ..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
+        ..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
+        _ => forces_with(batch, material, Scratch::<MAX_LANES>::new().view()),
+    }
+}
+
+fn forces_with(batch: &mut ElementBatch<'_>, material: &MaterialRef, mut s: View<'_>) -> i32 {
     let n = batch.lanes;
-    let mut s = Scratch::new();
     metric_of(batch.position, batch.constants, n, &mut s);
     let wanted = batch.critical_step.is_some();
     let code = material_call(
@@ -264,23 +295,23 @@ pub fn forces(batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
         critical_step_of(batch.constants, n, material.sizes().areal_mass, &s, step);
     }
     if let Some(fields) = batch.fields.as_deref_mut() {
-        fields_of(n, &s.metric, fields);
+        fields_of(n, s.metric, fields);
     }
     PF_OK
 }
 
-dispatch!(fn metric_of(position: &[f64], constants: &[f64], n: usize, s: &mut Scratch) = metric_kernel);
+dispatch!(fn metric_of(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) = metric_kernel);
 dispatch!(fn forces_of(
     position: &[f64],
     constants: &[f64],
     n: usize,
-    s: &mut Scratch,
+    s: &mut View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
 ) = forces_kernel);
 
 #[inline(always)]
-fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut Scratch) {
+fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) {
     for c in (0..n).step_by(WIDTH) {
         let b = |r: usize| V::load(constants, r * n + c);
         let (b11, b21, b12, b22) = (b(0), b(1), b(2), b(3));
@@ -290,15 +321,15 @@ fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mu
             let d24 = V::load(position, (3 + k) * n + c) - V::load(position, (9 + k) * n + c);
             let g1 = b11 * d13 + b21 * d24;
             let g2 = b12 * d13 + b22 * d24;
-            g1.store(&mut s.g, k * n + c);
-            g2.store(&mut s.g, (3 + k) * n + c);
+            g1.store(s.g, k * n + c);
+            g2.store(s.g, (3 + k) * n + c);
             c11 = c11 + g1 * g1;
             c22 = c22 + g2 * g2;
             c12 = c12 + g1 * g2;
         }
-        c11.store(&mut s.metric, c);
-        c22.store(&mut s.metric, n + c);
-        c12.store(&mut s.metric, 2 * n + c);
+        c11.store(s.metric, c);
+        c22.store(s.metric, n + c);
+        c12.store(s.metric, 2 * n + c);
     }
 }
 
@@ -307,7 +338,7 @@ fn forces_kernel<V: Lanes>(
     position: &[f64],
     constants: &[f64],
     n: usize,
-    s: &mut Scratch,
+    s: &mut View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
 ) {
@@ -317,18 +348,18 @@ fn forces_kernel<V: Lanes>(
         let (b11, b21, b12, b22) = (b(0), b(1), b(2), b(3));
         let (h1, h2, area, plane, normal) = (b(4), b(5), b(6), b(7), b(8));
         let g1: [V; 3] = [
-            V::load(&s.g, c),
-            V::load(&s.g, n + c),
-            V::load(&s.g, 2 * n + c),
+            V::load(s.g, c),
+            V::load(s.g, n + c),
+            V::load(s.g, 2 * n + c),
         ];
         let g2: [V; 3] = [
-            V::load(&s.g, 3 * n + c),
-            V::load(&s.g, 4 * n + c),
-            V::load(&s.g, 5 * n + c),
+            V::load(s.g, 3 * n + c),
+            V::load(s.g, 4 * n + c),
+            V::load(s.g, 5 * n + c),
         ];
-        let c11 = V::load(&s.metric, c);
-        let c22 = V::load(&s.metric, n + c);
-        let c12 = V::load(&s.metric, 2 * n + c);
+        let c11 = V::load(s.metric, c);
+        let c22 = V::load(s.metric, n + c);
+        let c12 = V::load(s.metric, 2 * n + c);
         // Dual vectors g^a and the normal; the floor keeps a collapsed element finite.
         let det = (c11 * c22 - c12 * c12).max(V::splat(1e-12));
         let inverse = V::splat(1.0) / det;
@@ -353,9 +384,9 @@ fn forces_kernel<V: Lanes>(
         // q . g^a, with g^1 = (C22 g1 - C12 g2) / det and g^2 = (C11 g2 - C12 g1) / det.
         let w1 = lift * (c22 * q1 - c12 * q2) * inverse;
         let w2 = lift * (c11 * q2 - c12 * q1) * inverse;
-        let s11 = V::load(&s.stress, c) * area;
-        let s22 = V::load(&s.stress, n + c) * area;
-        let s12 = V::load(&s.stress, 2 * n + c) * area;
+        let s11 = V::load(s.stress, c) * area;
+        let s22 = V::load(s.stress, n + c) * area;
+        let s12 = V::load(s.stress, 2 * n + c) * area;
         for k in 0..3 {
             let f = plane * q[k] - lift * nn[k];
             let t1 = s11 * g1[k] + s12 * g2[k] - h1 * f + w1 * nn[k];
@@ -367,18 +398,24 @@ fn forces_kernel<V: Lanes>(
             (f - u).store(force, (6 + k) * n + c);
             (-(w + f)).store(force, (9 + k) * n + c);
         }
-        (V::load(&s.energy, c) * area).store(energy, c);
+        (V::load(s.energy, c) * area).store(energy, c);
         V::splat(0.0).store(energy, n + c);
         (half * (plane * qq - softer * (qn * qn))).store(energy, 2 * n + c);
-        qq.sqrt().store(&mut s.mode, c);
-        qn.abs().store(&mut s.mode, n + c);
+        qq.sqrt().store(s.mode, c);
+        qn.abs().store(s.mode, n + c);
     }
 }
 
-/// A bound of 2 / omega_max with a quarter of the element's mass on each node: the tangent is
+/// A bound of 2 / omega_max with a quarter of the element's mass on each node: the stiffness is
 /// `A (B^T D B + geometric)` plus the hourglass part, and each factor is replaced by its largest
-/// eigenvalue; exact for an undeformed square pulled along its largest tangent.
-fn critical_step_of(constants: &[f64], n: usize, areal_mass: f64, s: &Scratch, step: &mut [f64]) {
+/// eigenvalue; nearly exact for an undeformed square pulled along its largest tangent.
+///
+/// For the material part, a change dg of the columns gives the strain dE with `|dE|^2 <= c |dg|^2`,
+/// c the largest eigenvalue of C; but also `dE11^2 + dE22^2 <= max(C11, C22) |dg|^2` and
+/// `4 dE12^2 <= (C11 + C22) |dg|^2`. With the shear tangent G and a positive semi-definite D the
+/// second pair gives `(sqrt(D max(C11, C22)) + sqrt(G (C11 + C22)))^2`, which does not grow when a
+/// fabric with stiff fibres shears; the smaller bound counts.
+fn critical_step_of(constants: &[f64], n: usize, areal_mass: f64, s: &View<'_>, step: &mut [f64]) {
     for l in 0..n {
         let b = |r: usize| constants[r * n + l];
         // B^T B: both directions, each with the two independent values twice.
@@ -389,7 +426,11 @@ fn critical_step_of(constants: &[f64], n: usize, areal_mass: f64, s: &Scratch, s
         let metric = [s.metric[l], s.metric[n + l], s.metric[2 * n + l]];
         let stretch = largest(metric[0], metric[1], metric[2]);
         let stress = largest(s.stress[l], s.stress[n + l], s.stress[2 * n + l]).max(0.0);
-        let membrane = b(6) * (s.stiffness[l] * stretch + stress) * gradient;
+        let (tangent, shear) = (s.stiffness[l].max(0.0), s.stiffness[n + l].max(0.0));
+        let along = (tangent * metric[0].max(metric[1])).sqrt();
+        let across = (shear * (metric[0] + metric[1])).sqrt();
+        let material = (tangent * stretch).min((along + across).powi(2));
+        let membrane = b(6) * (material + stress) * gradient;
         // The mode vector h - h1 B1 - h2 B2 has the length below because h and B are orthogonal.
         let mode = 4.0 + b(4) * b(4) * b11 + b(5) * b(5) * b22 + 2.0 * b(4) * b(5) * b12;
         let narrow = (metric[0] + metric[1] - stretch).max(1e-6).sqrt();

@@ -90,7 +90,8 @@ impl Element for Rf4 {
             }
         }
         if let Some(stiffness) = batch.stiffness.as_deref_mut() {
-            let mut s = Scratch::new();
+            let mut s = Scratch::<MAX_LANES>::new();
+            let mut s = s.view();
             derivatives(batch.position, batch.constants, n, &mut s);
             let mut history = vec![0.0; material.sizes().bending_history * n];
             if bend(material, &mut history, n, 0.0, &mut s, true) != PF_OK {
@@ -101,28 +102,35 @@ impl Element for Rf4 {
     }
 
     fn patch_forces(&self, batch: &mut PatchBatch<'_>, material: &MaterialRef) -> i32 {
-        let n = batch.lanes;
-        let mut s = Scratch::new();
-        derivatives(batch.position, batch.constants, n, &mut s);
-        let wanted = batch.stiffness.is_some();
-        let code = bend(material, batch.history, n, batch.dt, &mut s, wanted);
-        if code != PF_OK {
-            return code;
+        match batch.lanes {
+            ..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
+            ..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
+            _ => forces_with(batch, material, Scratch::<MAX_LANES>::new().view()),
         }
-        forces(batch.constants, n, &s, batch.force, batch.energy);
-        if let Some(stiffness) = batch.stiffness.as_deref_mut() {
-            row_sums(batch.constants, n, &s, stiffness);
-        }
-        if let Some(fields) = batch.fields.as_deref_mut() {
-            for l in 0..n {
-                for a in 0..2 {
-                    let stretch = s.metric[a * n + l].max(f64::MIN_POSITIVE);
-                    fields[a * n + l] = s.curvature[a * n + l] / stretch;
-                }
+    }
+}
+
+fn forces_with(batch: &mut PatchBatch<'_>, material: &MaterialRef, mut s: View<'_>) -> i32 {
+    let n = batch.lanes;
+    derivatives(batch.position, batch.constants, n, &mut s);
+    let wanted = batch.stiffness.is_some();
+    let code = bend(material, batch.history, n, batch.dt, &mut s, wanted);
+    if code != PF_OK {
+        return code;
+    }
+    forces(batch.constants, n, &s, batch.force, batch.energy);
+    if let Some(stiffness) = batch.stiffness.as_deref_mut() {
+        row_sums(batch.constants, n, &s, stiffness);
+    }
+    if let Some(fields) = batch.fields.as_deref_mut() {
+        for l in 0..n {
+            for a in 0..2 {
+                let stretch = s.metric[a * n + l].max(f64::MIN_POSITIVE);
+                fields[a * n + l] = s.curvature[a * n + l] / stretch;
             }
         }
-        PF_OK
     }
+    PF_OK
 }
 
 type V3 = [f64; 3];
@@ -231,33 +239,57 @@ fn fit(x: &[V3], axis: V3) -> [[f64; TERMS]; PATCH_NODES - 1] {
     weights
 }
 
-/// What one batch needs between the material call and the forces.
+/// What one batch of at most `N` lanes needs between the material call and the forces. Rows of n
+/// lanes lie one after the other from the start of each field.
 #[repr(align(64))]
-struct Scratch {
+struct Scratch<const N: usize> {
     /// x,11 x,22 x,12: `[3][3][lanes]`.
-    second: [f64; 9 * MAX_LANES],
+    second: [[f64; N]; 9],
     /// a^1, a^2, n: `[3][3][lanes]`.
-    dual: [f64; 9 * MAX_LANES],
-    metric: [f64; 3 * MAX_LANES],
-    curvature: [f64; 3 * MAX_LANES],
-    moment: [f64; 3 * MAX_LANES],
-    energy: [f64; MAX_LANES],
-    tangent: [f64; 3 * MAX_LANES],
+    dual: [[f64; N]; 9],
+    metric: [[f64; N]; 3],
+    curvature: [[f64; N]; 3],
+    moment: [[f64; N]; 3],
+    energy: [f64; N],
+    tangent: [[f64; N]; 3],
 }
 
-impl Scratch {
+impl<const N: usize> Scratch<N> {
     #[inline(always)]
     fn new() -> Self {
         Self {
-            second: [0.0; 9 * MAX_LANES],
-            dual: [0.0; 9 * MAX_LANES],
-            metric: [0.0; 3 * MAX_LANES],
-            curvature: [0.0; 3 * MAX_LANES],
-            moment: [0.0; 3 * MAX_LANES],
-            energy: [0.0; MAX_LANES],
-            tangent: [0.0; 3 * MAX_LANES],
+            second: [[0.0; N]; 9],
+            dual: [[0.0; N]; 9],
+            metric: [[0.0; N]; 3],
+            curvature: [[0.0; N]; 3],
+            moment: [[0.0; N]; 3],
+            energy: [0.0; N],
+            tangent: [[0.0; N]; 3],
         }
     }
+
+    fn view(&mut self) -> View<'_> {
+        View {
+            second: self.second.as_flattened_mut(),
+            dual: self.dual.as_flattened_mut(),
+            metric: self.metric.as_flattened_mut(),
+            curvature: self.curvature.as_flattened_mut(),
+            moment: self.moment.as_flattened_mut(),
+            energy: &mut self.energy,
+            tangent: self.tangent.as_flattened_mut(),
+        }
+    }
+}
+
+/// A [`Scratch`] of any size.
+struct View<'a> {
+    second: &'a mut [f64],
+    dual: &'a mut [f64],
+    metric: &'a mut [f64],
+    curvature: &'a mut [f64],
+    moment: &'a mut [f64],
+    energy: &'a mut [f64],
+    tangent: &'a mut [f64],
 }
 
 fn bend(
@@ -265,7 +297,7 @@ fn bend(
     history: &mut [f64],
     n: usize,
     dt: f64,
-    s: &mut Scratch,
+    s: &mut View<'_>,
     tangent: bool,
 ) -> i32 {
     material.bending(&mut BendingBatch {
@@ -284,11 +316,11 @@ fn bend(
     })
 }
 
-dispatch!(fn derivatives(position: &[f64], constants: &[f64], n: usize, s: &mut Scratch) = derivatives_kernel);
+dispatch!(fn derivatives(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) = derivatives_kernel);
 dispatch!(fn forces(
     constants: &[f64],
     n: usize,
-    s: &Scratch,
+    s: &View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
 ) = forces_kernel);
@@ -303,7 +335,7 @@ fn used(constants: &[f64], n: usize, c: usize) -> usize {
 }
 
 #[inline(always)]
-fn derivatives_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut Scratch) {
+fn derivatives_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) {
     for c in (0..n).step_by(WIDTH) {
         let centre: [V; 3] = [
             V::load(position, c),
@@ -335,18 +367,18 @@ fn derivatives_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s
             (a1[0] * a2[1] - a1[1] * a2[0]) * root,
         ];
         for k in 0..3 {
-            ((c22 * a1[k] - c12 * a2[k]) * inverse).store(&mut s.dual, k * n + c);
-            ((c11 * a2[k] - c12 * a1[k]) * inverse).store(&mut s.dual, (3 + k) * n + c);
-            normal[k].store(&mut s.dual, (6 + k) * n + c);
+            ((c22 * a1[k] - c12 * a2[k]) * inverse).store(s.dual, k * n + c);
+            ((c11 * a2[k] - c12 * a1[k]) * inverse).store(s.dual, (3 + k) * n + c);
+            normal[k].store(s.dual, (6 + k) * n + c);
             for t in 0..3 {
-                x[2 + t][k].store(&mut s.second, (3 * t + k) * n + c);
+                x[2 + t][k].store(s.second, (3 * t + k) * n + c);
             }
         }
         for (r, v) in [c11, c22, c12].into_iter().enumerate() {
-            v.store(&mut s.metric, r * n + c);
+            v.store(s.metric, r * n + c);
         }
         for t in 0..3 {
-            dot(&normal, &x[2 + t]).store(&mut s.curvature, t * n + c);
+            dot(&normal, &x[2 + t]).store(s.curvature, t * n + c);
         }
     }
 }
@@ -355,25 +387,25 @@ fn derivatives_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s
 fn forces_kernel<V: Lanes>(
     constants: &[f64],
     n: usize,
-    s: &Scratch,
+    s: &View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
 ) {
     let zero = V::splat(0.0);
     for c in (0..n).step_by(WIDTH) {
         let area = V::load(constants, c);
-        let m11 = V::load(&s.moment, c) * area;
-        let m22 = V::load(&s.moment, n + c) * area;
-        let m12 = V::load(&s.moment, 2 * n + c) * area * V::splat(2.0);
+        let m11 = V::load(s.moment, c) * area;
+        let m22 = V::load(s.moment, n + c) * area;
+        let m12 = V::load(s.moment, 2 * n + c) * area * V::splat(2.0);
         let row = |from: &[f64], r: usize| V::load(from, r * n + c);
         let (mut p1, mut p2) = (zero, zero);
         for k in 0..3 {
             let v =
-                m11 * row(&s.second, k) + m22 * row(&s.second, 3 + k) + m12 * row(&s.second, 6 + k);
-            p1 = p1 + v * row(&s.dual, k);
-            p2 = p2 + v * row(&s.dual, 3 + k);
+                m11 * row(s.second, k) + m22 * row(s.second, 3 + k) + m12 * row(s.second, 6 + k);
+            p1 = p1 + v * row(s.dual, k);
+            p2 = p2 + v * row(s.dual, 3 + k);
         }
-        let normal = [row(&s.dual, 6), row(&s.dual, 7), row(&s.dual, 8)];
+        let normal = [row(s.dual, 6), row(s.dual, 7), row(s.dual, 8)];
         let mut sum = zero;
         let used = used(constants, n, c).min(PATCH_NODES);
         for i in 1..used {
@@ -390,26 +422,22 @@ fn forces_kernel<V: Lanes>(
                 zero.store(force, (3 * i + k) * n + c);
             }
         }
-        (V::load(&s.energy, c) * area).store(energy, c);
+        (V::load(s.energy, c) * area).store(energy, c);
     }
 }
 
 /// For each node a bound of the sum over the patch of the norms of the 3 x 3 blocks of the second
 /// derivative of the energy: the tangent part `dM/dk dk dk` with each derivative as it is, and the
 /// geometric part `M d2k` by norms.
-fn row_sums(constants: &[f64], n: usize, s: &Scratch, stiffness: &mut [f64]) {
+fn row_sums(constants: &[f64], n: usize, s: &View<'_>, stiffness: &mut [f64]) {
     for l in 0..n {
         let area = constants[l];
         let count = (constants[n + l] as usize).clamp(1, PATCH_NODES);
         let three =
             |from: &[f64], r: usize| -> V3 { core::array::from_fn(|k| from[(3 * r + k) * n + l]) };
         let dot = |a: V3, b: V3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let dual = [three(&s.dual, 0), three(&s.dual, 1)];
-        let second = [
-            three(&s.second, 0),
-            three(&s.second, 1),
-            three(&s.second, 2),
-        ];
+        let dual = [three(s.dual, 0), three(s.dual, 1)];
+        let second = [three(s.second, 0), three(s.second, 1), three(s.second, 2)];
         let dual_length = dual.map(|a| dot(a, a).sqrt());
         let mut w = [[0.0; TERMS]; PATCH_NODES];
         for i in 1..count {

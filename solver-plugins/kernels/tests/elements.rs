@@ -309,9 +309,34 @@ fn critical_step_bounds_the_exact_one_on_random_stretched_and_skewed_elements() 
     }
     let mean = slack.iter().sum::<f64>() / slack.len() as f64;
     assert!(
-        mean > 0.4,
+        mean > 0.5,
         "the bound gives away too much: {mean} of the exact step"
     );
+}
+
+#[test]
+fn critical_step_stays_near_the_exact_one_while_a_ply_shears() {
+    let m = ply();
+    let e = El::new::<M4>("{}", &m).unwrap();
+    let q = [
+        [0.0, 0.0, 0.0],
+        [SIZE, 0.0, 0.0],
+        [SIZE, SIZE, 0.0],
+        [0.0, SIZE, 0.0],
+    ];
+    let mut batch = e.initialise(&[q; 8], &[[1.0, 0.0, 0.0]; 8]);
+    let mass = batch.mass[0];
+    for degrees in [-50.0f64, -30.0, -10.0, 10.0, 24.0] {
+        let g = degrees.to_radians();
+        let d = [SIZE * g.sin(), SIZE * g.cos(), 0.0];
+        let x = [q[0], q[1], [SIZE + d[0], d[1], 0.0], d];
+        let step = e.forces(&mut batch, &[x; 8]).step[0];
+        let exact = 2.0 / exact_frequency(&e, &mut batch, &x, mass);
+        assert!(
+            step <= exact * 1.0001 && step > 0.9 * exact,
+            "{degrees}: {step} s, exact {exact} s"
+        );
+    }
 }
 
 #[test]
@@ -651,6 +676,71 @@ fn extreme_positions_give_finite_forces() {
     assert!(
         f.force.iter().chain(&f.energy).all(|x| x.is_finite()),
         "{f:?}"
+    );
+}
+
+#[test]
+fn hourglass_control_holds_a_ply_corner_against_the_friction_of_one_bar() {
+    // 14 N on each node of a 12 mm element, all in the hourglass mode (numerics: bag under 1 bar).
+    // Solved by relaxation; the corner may move by a fifth of the element.
+    let m = ply();
+    let side = 0.012;
+    let q = [
+        [0.0, 0.0, 0.0],
+        [side, 0.0, 0.0],
+        [side, side, 0.0],
+        [0.0, side, 0.0],
+    ];
+    let moved = |json: &str| -> f64 {
+        let e = El::new::<M4>(json, &m).unwrap();
+        let mut batch = e.initialise(&[q; 8], &[[0.5f64.sqrt(), 0.5f64.sqrt(), 0.0]; 8]);
+        let mut x = q;
+        for _ in 0..20_000 {
+            let f = e.forces(&mut batch, &[x; 8]).force;
+            for i in 0..4 {
+                let push = if i % 2 == 0 { 14.0 } else { -14.0 };
+                for k in 0..2 {
+                    let load = if k == 0 { push } else { 0.0 };
+                    x[i][k] += 1e-7 * (load - f[(3 * i + k) * 8]);
+                }
+            }
+        }
+        (0..4)
+            .map(|i| (x[i][0] - q[i][0]).abs())
+            .fold(0.0, f64::max)
+    };
+    let held = moved("{}");
+    assert!(
+        held < 0.2 * side,
+        "a corner moved by {held} m with the default control"
+    );
+    let soft = moved(r#"{"hourglass_floor":50,"hourglass":0.2}"#);
+    assert!(
+        soft > 0.5 * side,
+        "a weak control lets it move by {soft} m only"
+    );
+}
+
+#[test]
+fn warping_is_nearly_free_in_a_membrane() {
+    let m = ply();
+    let e = El::new::<M4>("{}", &m).unwrap();
+    let q = [
+        [0.0, 0.0, 0.0],
+        [SIZE, 0.0, 0.0],
+        [SIZE, SIZE, 0.0],
+        [0.0, SIZE, 0.0],
+    ];
+    let mut batch = e.initialise(&[q; 8], &[AXIS; 8]);
+    let lift = 1e-4;
+    let mut x = q;
+    (0..4).for_each(|i| x[i][2] = if i % 2 == 0 { lift } else { -lift });
+    let f = e.forces(&mut batch, &[x; 8]);
+    // q = 4 lift, force on a node = k_n q, k_n = 0.01 * 3000 N/m.
+    let normal = f.force[2 * 8];
+    assert!(
+        (normal - 30.0 * 4.0 * lift).abs() < 1e-3 * normal,
+        "{normal} N"
     );
 }
 

@@ -134,6 +134,54 @@ fn energy_output_is_the_work_done_when_the_stitch_fails() {
 }
 
 #[test]
+fn hypoelastic_agrees_with_the_energy_form_when_fibres_stretch_while_they_shear() {
+    let energy = fabric(&ncf("fibre-energy", "")).unwrap();
+    let hypo = fabric(&ncf("hypoelastic", "")).unwrap();
+    for to in [0.45, -0.7] {
+        let (mut p, mut q) = (Point::new(&energy), Point::new(&hypo));
+        for i in 1..=2000 {
+            let t = i as f64 / 2000.0;
+            let c = metric(1.0 + 0.004 * t, 1.0 - 0.002 * t, to * t);
+            let (a, b) = (p.at(&energy, c), q.at(&hypo, c));
+            if i % 200 == 0 {
+                let scale = a.stress.iter().fold(0.0f64, |m, s| m.max(s.abs()));
+                for k in 0..3 {
+                    let d = (a.stress[k] - b.stress[k]).abs();
+                    assert!(
+                        d < 0.01 * scale,
+                        "{t}: {:?} against {:?}",
+                        a.stress,
+                        b.stress
+                    );
+                }
+                assert!((a.energy - b.energy).abs() < 0.01 * a.energy, "{a:?} {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hypoelastic_returns_to_rest_after_a_closed_path_within_a_thousandth() {
+    let m = fabric(&woven("hypoelastic")).unwrap();
+    let mut p = Point::new(&m);
+    let (mut top, mut last) = (0.0f64, [0.0; 3]);
+    for i in 0..=4000 {
+        let t = std::f64::consts::TAU * i as f64 / 4000.0;
+        let c = metric(
+            1.0 + 0.003 * t.sin(),
+            1.0 + 0.003 * (1.0 - t.cos()),
+            0.6 * t.sin(),
+        );
+        last = p.at(&m, c).stress;
+        top = last.iter().fold(top, |m, s| m.max(s.abs()));
+    }
+    assert!(
+        last.iter().all(|s| s.abs() < 1e-3 * top),
+        "left {last:?} of {top} N/m"
+    );
+}
+
+#[test]
 fn stitch_unloads_along_the_secant_after_its_peak() {
     let m = fabric(&ncf("fibre-energy", "")).unwrap();
     let mut p = Point::new(&m);
