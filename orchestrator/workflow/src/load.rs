@@ -4,6 +4,7 @@ use crate::catalog::{Catalog, CatalogEntry};
 use crate::check::Checker;
 use crate::diagnostics::{Diagnostics, Problems, Source};
 use crate::expect;
+use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
 use crate::resolved::{FailurePolicy, ResolvedStep, ResolvedWorkflow, Resources};
 use crate::scene::is_word;
@@ -38,8 +39,20 @@ impl Draft<'_> {
 /// # Errors
 /// All findings of one pass, each with its place.
 pub fn load(path: &Utf8Path, catalog: &dyn Catalog) -> Result<ResolvedWorkflow, Diagnostics> {
+    load_with(path, catalog, &[])
+}
+
+/// As [`load`], with parameters from the command line in place of the file's.
+///
+/// # Errors
+/// As [`load`]; what is wrong with an overriding value is found at the name of its step.
+pub fn load_with(
+    path: &Utf8Path,
+    catalog: &dyn Catalog,
+    overrides: &[Override],
+) -> Result<ResolvedWorkflow, Diagnostics> {
     let mut problems = Problems::default();
-    match load_into(path, catalog, &mut problems) {
+    match load_into(path, catalog, overrides, &mut problems) {
         Some(workflow) if problems.count() == 0 => Ok(workflow),
         _ => Err(problems.finish()),
     }
@@ -48,9 +61,11 @@ pub fn load(path: &Utf8Path, catalog: &dyn Catalog) -> Result<ResolvedWorkflow, 
 fn load_into(
     path: &Utf8Path,
     catalog: &dyn Catalog,
+    overrides: &[Override],
     problems: &mut Problems,
 ) -> Option<ResolvedWorkflow> {
-    let (source, root) = open(path, problems)?;
+    let (source, mut root) = open(path, problems)?;
+    overrides::apply(&mut root, overrides, &source, problems);
     Checker::new(&WORKFLOW, &source, problems).check(&root, "the workflow");
     plugin_folders(&root, &source, problems);
     let drafts = drafts(&root, &source, catalog, problems);

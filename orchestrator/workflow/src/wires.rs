@@ -265,6 +265,12 @@ impl Reader<'_, '_> {
             return fans;
         };
         for entry in node.entries() {
+            if !crate::scene::is_word(&entry.key) {
+                let message = format!("`{}` cannot name the items of a fan-out", entry.key);
+                let d = self.problems.add(self.source, &entry.key_span, message);
+                d.given(entry.key.clone())
+                    .expected("letters, digits, `_` and `-`");
+            }
             let span = &entry.value.span;
             let Some(over) = self.step(&entry.value) else {
                 continue;

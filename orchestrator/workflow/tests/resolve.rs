@@ -307,3 +307,32 @@ fn graphs_name_every_step_and_wire() {
     assert!(mermaid.contains("s0 -->|\"formed\"| s1"), "{mermaid}");
     assert_eq!(plyflow_workflow::graph(&w).node_count(), 6);
 }
+
+#[test]
+fn line_ends_and_a_byte_order_mark_of_windows_change_nothing() {
+    let (study, w) = sound();
+    for name in [
+        "workflow.yaml",
+        "scene.yaml",
+        "materials/fabric.yaml",
+        "film.yaml",
+    ] {
+        study.write(
+            name,
+            &format!("\u{feff}{}", study.read(name).replace('\n', "\r\n")),
+        );
+    }
+    let again = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    assert_eq!(w.steps, again.steps);
+    // Places are right, too.
+    let line = study.mutate("scene.yaml", "620 mm", "620");
+    let found = study.load().unwrap_err();
+    assert_eq!(
+        (found.items[0].line, found.items[0].column),
+        (line, 13),
+        "{}",
+        found.render(false)
+    );
+}

@@ -251,6 +251,11 @@ pub struct DoubleDiaphragm {
     /// Simulated duration at full pressure, for the motion to die out.
     #[schemars(extend("x-minimum" = "0 s"))]
     pub settling_time: Time,
+    /// Strain by which the frame stretches the films before the bag is evacuated. Slack films have nothing to
+    /// carry the in-plane compression of a stack under vacuum.
+    #[serde(default)]
+    #[schemars(extend("x-minimum" = 0, "x-maximum" = 0.2))]
+    pub film_pre_stretch: Number,
     /// Distance around the plies beyond which the two films are taken as joined (they stick under the bag
     /// pressure; their seal lies at the frame).
     #[schemars(extend("x-minimum" = "0 mm"))]

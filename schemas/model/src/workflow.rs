@@ -95,7 +95,7 @@ pub enum Sources {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Resources {
-    /// Cores; 1 when not given.
+    /// Cores; a share of what is free when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 4096))]
     pub cores: Option<u32>,

@@ -18,3 +18,25 @@ fn checked_in_schemas_are_those_of_the_types() {
         );
     }
 }
+
+#[test]
+fn a_schema_with_plugins_ties_parameters_and_ports_to_the_plugin_s_name() {
+    let manifest = plyflow_model::Manifest::parse(
+        r#"{"name": "detect", "version": "1", "kind": "step", "role": "r", "summary": "s",
+            "parameters": {"limit": {"type": "quantity", "dimension": "angle", "required": true}},
+            "inputs": {"formed": {"kind": "forming"}}, "output": {"kind": "defects"}}"#,
+    )
+    .unwrap();
+    let schema = plyflow_model::schema::workflow_with(&[manifest]);
+    let step = &schema["$defs"]["Step"];
+    assert_eq!(
+        step["properties"]["plugin"]["anyOf"][0]["enum"],
+        serde_json::json!(["detect"])
+    );
+    let tie = &step["allOf"][0];
+    assert_eq!(tie["if"]["properties"]["plugin"]["const"], "detect");
+    let then = &tie["then"]["properties"];
+    assert_eq!(then["with"]["required"], serde_json::json!(["limit"]));
+    assert_eq!(then["with"]["properties"]["limit"]["x-dimension"], "angle");
+    assert_eq!(then["from"]["anyOf"][1]["additionalProperties"], false);
+}
