@@ -254,7 +254,7 @@ pub struct DoubleDiaphragm {
     /// Strain by which the frame stretches the films before the bag is evacuated. Slack films have nothing to
     /// carry the in-plane compression of a stack under vacuum.
     #[serde(default)]
-    #[schemars(extend("x-minimum" = 0, "x-maximum" = 0.2))]
+    #[schemars(extend("minimum" = 0, "maximum" = 0.2))]
     pub film_pre_stretch: Number,
     /// Distance around the plies beyond which the two films are taken as joined (they stick under the bag
     /// pressure; their seal lies at the frame).

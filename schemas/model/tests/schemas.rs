@@ -40,3 +40,35 @@ fn a_schema_with_plugins_ties_parameters_and_ports_to_the_plugin_s_name() {
     assert_eq!(then["with"]["properties"]["limit"]["x-dimension"], "angle");
     assert_eq!(then["from"]["anyOf"][1]["additionalProperties"], false);
 }
+
+/// Calls `see` with every mapping of a JSON value.
+fn walk(
+    value: &serde_json::Value,
+    see: &mut impl FnMut(&serde_json::Map<String, serde_json::Value>),
+) {
+    match value {
+        serde_json::Value::Object(map) => {
+            see(map);
+            map.values().for_each(|v| walk(v, see));
+        }
+        serde_json::Value::Array(items) => items.iter().for_each(|v| walk(v, see)),
+        _ => {}
+    }
+}
+
+#[test]
+fn bounds_of_quantities_have_units_and_bounds_of_numbers_have_none() {
+    let mut seen = 0;
+    for (name, schema) in plyflow_model::schema::all() {
+        walk(&schema, &mut |map| {
+            for key in ["x-minimum", "x-maximum", "x-exclusive-minimum"] {
+                // A number here would bound nothing: plain numbers have `minimum` and `maximum`.
+                if let Some(bound) = map.get(key) {
+                    assert!(bound.is_string(), "{name}: {key} {bound} of {map:?}");
+                    seen += 1;
+                }
+            }
+        });
+    }
+    assert!(seen > 10);
+}
