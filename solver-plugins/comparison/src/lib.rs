@@ -5,7 +5,7 @@ mod measure;
 mod models;
 mod table;
 
-pub use measure::{Defect, Kind, Ply, Settings, measure, quantiles};
+pub use measure::{Defect, Kind, Ply, Settings, Tool, measure, quantiles};
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 

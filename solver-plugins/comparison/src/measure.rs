@@ -3,6 +3,7 @@
 use plyflow_surface::vector::{Vec3, sub};
 use plyflow_surface::{
     Curvature, NodalDistance, Surface, Topology, curvatures, nodal_distances, ridge_line,
+    tool_crests,
 };
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -12,7 +13,7 @@ use std::f64::consts::PI;
 pub struct Settings {
     /// Distance above which a ply stands off the tool (m).
     pub distance_threshold: f64,
-    /// Curvature of a crest above which it is a wrinkle's (1/m).
+    /// Curvature of a crest, beyond that of the tool beneath it, above which it is a wrinkle's (1/m).
     pub curvature_threshold: f64,
     /// Nodes nearer to the tool's foot are not judged (m).
     pub foot_margin: f64,
@@ -39,6 +40,23 @@ pub struct Ply {
     pub distance: Vec<NodalDistance>,
     /// `[nodes]`.
     pub curvature: Vec<Curvature>,
+    /// `[nodes]` crest curvature of the tool at the closest point (1/m, zero or negative).
+    pub tool_crest: Vec<f64>,
+}
+
+/// A tool and its own crests.
+#[derive(Debug, Clone)]
+pub struct Tool {
+    surface: Surface,
+    crests: Vec<f64>,
+}
+
+impl Tool {
+    /// Takes the curvatures of a tool's surface.
+    pub fn new(surface: Surface) -> Self {
+        let crests = tool_crests(&surface);
+        Self { surface, crests }
+    }
 }
 
 impl Ply {
@@ -50,12 +68,13 @@ impl Ply {
         undeformed: Vec<Vec3>,
         formed: Vec<Vec3>,
         shear_angle: Vec<f64>,
-        tool: &Surface,
+        tool: &Tool,
         offset: f64,
         foot_margin: f64,
     ) -> Self {
-        let distance = nodal_distances(tool, &formed, offset, foot_margin);
+        let distance = nodal_distances(&tool.surface, &formed, offset, foot_margin);
         let curvature = curvatures(&topology, &formed);
+        let tool_crest = distance.iter().map(|d| tool.crests[d.triangle]).collect();
         Self {
             name,
             topology,
@@ -64,6 +83,7 @@ impl Ply {
             shear_angle,
             distance,
             curvature,
+            tool_crest,
         }
     }
 }
@@ -103,7 +123,8 @@ pub struct Defect {
 /// Wrinkles (longest first), then bridging (largest first), among the nodes `inside` (`[nodes]`).
 ///
 /// A wrinkle is a connected set of nodes that stand off the tool by more than the distance threshold and whose
-/// principal curvature of largest magnitude is that of a crest beyond the curvature threshold; its length
+/// principal curvature of largest magnitude is that of a crest, beyond the tool's own there by more than the
+/// curvature threshold; its length
 /// is that of its ridge. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
 /// curvature reaches: pi sqrt(amplitude / (2 curvature)) along the surface. What else stands off the tool
 /// is bridging.
@@ -115,18 +136,17 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
             inside[i] && d.judged && d.value > settings.distance_threshold
         })
         .collect();
+    let limit = |i: usize| ply.tool_crest[i] - settings.curvature_threshold;
     let crest: Vec<bool> = (0..n)
-        .map(|i| off[i] && ply.curvature[i].max < -settings.curvature_threshold)
+        .map(|i| off[i] && ply.curvature[i].max < limit(i))
         .collect();
     let mut wrinkles = Vec::new();
     for nodes in ply.topology.node_components(&crest) {
-        let ridge = ridge_line(
-            &ply.topology,
-            &ply.formed,
-            &ply.curvature,
-            &nodes,
-            settings.curvature_threshold,
-        );
+        let bound = nodes
+            .iter()
+            .map(|&i| -limit(i as usize))
+            .fold(f64::INFINITY, f64::min);
+        let ridge = ridge_line(&ply.topology, &ply.formed, &ply.curvature, &nodes, bound);
         if let Some(ridge) = ridge.filter(|r| r.length >= settings.minimum_wrinkle_length) {
             wrinkles.push((nodes, ridge));
         }

@@ -1,6 +1,6 @@
 //! Reading the models that are compared.
 
-use crate::measure::{Ply, Settings};
+use crate::measure::{Ply, Settings, Tool};
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::{Surface, Topology, triangles};
 use serde::{Deserialize, Serialize};
@@ -138,12 +138,12 @@ fn zone_of(host: &Host, input: &Input, zones: &[Zone]) -> Result<usize, StepErro
     })
 }
 
-fn read_tool(host: &Host, input: &Input) -> Result<Surface, StepError> {
+fn read_tool(host: &Host, input: &Input) -> Result<Tool, StepError> {
     let meshes = host.meshes(input)?;
     let body = meshes.body("tool")?;
     let (points, cells) = host.mesh(input, body)?;
     let tool = Surface::new(&points, &triangles(body.nodes_per_cell, &cells));
-    tool.ok_or_else(|| {
+    tool.map(Tool::new).ok_or_else(|| {
         format!(
             "body 'tool' of '{}' has no triangle with an area",
             input.step
@@ -157,7 +157,7 @@ fn read(
     input: Input,
     role: Role,
     zone: Option<(usize, &Zone)>,
-    tool: &Surface,
+    tool: &Tool,
     settings: &Settings,
 ) -> Result<Model, StepError> {
     let formed: Formed = host.attributes(&input)?;

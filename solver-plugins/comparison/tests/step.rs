@@ -142,10 +142,10 @@ fn compare(inputs: &[MemoryInput<'_>]) -> MemoryArtifact {
     run::<Comparison>(json!({}), inputs, &[]).unwrap()
 }
 
-/// Length of the wrinkle's crest where its curvature exceeds 150 1/m.
+/// Length of the wrinkle's crest where its curvature exceeds 100 1/m.
 fn crest_length() -> f64 {
     let peak = 0.0015 * (PI / 0.007f64).powi(2);
-    let half = 0.060 / PI * (150.0 / peak).acos();
+    let half = 0.060 / PI * (100.0 / peak).acos();
     let z = |s: f64| 0.003 * (PI * s / 0.060).cos();
     (0..1000)
         .map(|i| {
@@ -376,6 +376,69 @@ fn a_local_run_of_no_zone_or_of_a_taken_one_is_refused() {
     assert!(
         error.contains("zone 'Q'") && error.contains("the zones are: A"),
         "{error}"
+    );
+}
+
+#[test]
+fn a_ply_that_stands_off_a_fillet_as_curved_as_the_tool_is_bridging_and_not_a_wrinkle() {
+    // Half a cylinder of 10 mm radius; the ply 2 mm above it has 83 1/m, the threshold is 50 1/m.
+    let arc = |r: f64, n: usize, columns: usize| {
+        let mut points: Vec<Vec3> = Vec::new();
+        for j in 0..=n {
+            for i in 0..=columns {
+                let a = PI * (1.0 - j as f64 / n as f64);
+                points.push([0.002 * i as f64 - 0.030, r * a.cos(), r * a.sin()]);
+            }
+        }
+        let node = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
+        let mut cells = Vec::new();
+        for j in 0..n {
+            for i in 0..columns {
+                cells.extend([
+                    node(i, j),
+                    node(i + 1, j),
+                    node(i + 1, j + 1),
+                    node(i, j + 1),
+                ]);
+            }
+        }
+        (points, cells)
+    };
+    let (points, cells) = arc(0.010, 24, 30);
+    let split = cells
+        .chunks_exact(4)
+        .flat_map(|c| [c[0], c[1], c[2], c[0], c[2], c[3]])
+        .collect();
+    let (off, off_cells) = arc(0.012, 18, 30);
+    let mut run_off = local(1.0);
+    run_off.bodies[0].points = points;
+    run_off.bodies[0].cells = split;
+    let sheet = &mut run_off.bodies[1];
+    sheet.points = (0..off.len())
+        .map(|k| [off[k][0], 0.0022 * ((k / 31) as f64 - 9.0), 0.2])
+        .collect();
+    sheet.frames = vec![off];
+    sheet.fields[0][0].values = vec![0.0; off_cells.len() / 4];
+    sheet.cells = off_cells;
+    let (global, zones) = (global(), zones(json!([zone_a()])));
+    let inputs = [
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &run_off),
+    ];
+    let out = run::<Comparison>(json!({"curvature_threshold": 50.0}), &inputs, &[]).unwrap();
+    assert_eq!(
+        (out.result("wrinkle_count"), out.result("bridging_count")),
+        (0.0, 1.0)
+    );
+    let sharpest = out
+        .body("local_A_ply_1")
+        .last("curvature_max")
+        .iter()
+        .fold(0.0, |a: f64, &b| a.min(b));
+    assert!(
+        sharpest < -80.0,
+        "the ply is curved beyond the threshold: {sharpest}"
     );
 }
 

@@ -2,6 +2,8 @@
 //! offset.
 
 use crate::closest::Surface;
+use crate::curvature::curvatures;
+use crate::topology::Topology;
 use crate::vector::Vec3;
 
 /// Distance of a node from the tool.
@@ -13,6 +15,8 @@ pub struct NodalDistance {
     /// Whether the tool is there to conform to. Not so past the tool's free edge, and where the closest point
     /// lies at the tool's foot: there the blank hangs between tool and machine bed.
     pub judged: bool,
+    /// The tool's triangle that holds the closest point (index into [`Surface::triangles`]).
+    pub triangle: usize,
 }
 
 /// Height above the tool's lowest point below which closest points count as its foot (m): `margin`, but never
@@ -41,7 +45,21 @@ pub fn nodal_distances(
             NodalDistance {
                 value: closest.signed_distance - offset,
                 judged: !closest.on_free_edge && !at_foot,
+                triangle: closest.triangle,
             }
         })
+        .collect()
+}
+
+/// How sharply the tool itself is crested at each of its triangles (1/m, zero or negative): the most negative
+/// principal curvature of its corners. What lies on a fillet of radius r is curved by -1/r without being
+/// a wrinkle.
+pub fn tool_crests(tool: &Surface) -> Vec<f64> {
+    let topology = Topology::new(tool.points().len(), 3, tool.triangles().as_flattened());
+    let found = curvatures(&topology, tool.points());
+    let crest = |i: &u32| found[*i as usize].max.min(found[*i as usize].min).min(0.0);
+    tool.triangles()
+        .iter()
+        .map(|t| t.iter().map(crest).fold(0.0, f64::min))
         .collect()
 }

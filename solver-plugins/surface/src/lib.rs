@@ -11,7 +11,7 @@ mod topology;
 pub mod vector;
 
 pub use closest::{Closest, Feature, Surface};
-pub use conformity::{NodalDistance, foot_height, nodal_distances};
+pub use conformity::{NodalDistance, foot_height, nodal_distances, tool_crests};
 pub use curvature::{Curvature, curvatures};
 pub use locate::{Location, QuadLocator};
 pub use ridge::{Ridge, ridge_line};

@@ -2,7 +2,7 @@
 
 use plyflow_model::scene::Tool;
 use plyflow_surface::vector::{add, cross, norm, scale, sub, unit};
-use plyflow_surface::{Surface, nodal_distances};
+use plyflow_surface::{Surface, nodal_distances, tool_crests};
 
 fn spar() -> plyflow_tooling::ToolMesh {
     let tool: Tool = serde_json::from_value(serde_json::json!({"joggle_spar": {
@@ -51,4 +51,26 @@ fn all_facets_of_the_spar_have_pseudo_normals_outward() {
         assert!(found.signed_distance > 0.0, "{p:?}");
         assert!((norm(found.normal) - 1.0).abs() < 1e-9);
     }
+}
+
+#[test]
+fn crests_of_the_spar_are_its_fillets_and_its_flats_have_none() {
+    let mesh = spar();
+    let tool = Surface::new(&mesh.points, &mesh.triangles).unwrap();
+    let crests = tool_crests(&tool);
+    let (low, high) = tool.bounds();
+    let (mut sharpest, mut flat) = (0.0f64, 0);
+    for (t, &crest) in tool.triangles().iter().zip(&crests) {
+        let z = t.map(|i| mesh.points[i as usize][2]);
+        // The rim at the bed has no neighbours below it: the fit is one-sided there.
+        if z.iter().all(|&z| z > low[2] + 0.02) {
+            sharpest = sharpest.min(crest);
+        }
+        if z.iter().all(|&z| (z - high[2]).abs() < 1e-9) {
+            flat += usize::from(crest.abs() < 1.0);
+        }
+    }
+    // The tool says of itself: 14 mm fillets, nowhere sharper than 10 mm.
+    assert!((-110.0..-65.0).contains(&sharpest), "{sharpest}");
+    assert!(flat > 10, "{flat}");
 }
