@@ -296,8 +296,7 @@ fn membrane_kernel<V: Lanes>(
         (factor * c12 * square).store(stress, 2 * n + c);
         (h * u).store(energy, c);
         if !stiffness.is_empty() {
-            // dS/dE = 4 h (U'' a (x) a + U' d2(1/det)/dC2), a = dI1/dC; Frobenius norms. U'' counts
-            // where it is positive.
+            // dS/dE = 4 h (U'' a (x) a + U' d2(1/det)/dC2), a = dI1/dC. U'' counts where it is positive.
             let a11 = one - c22 * square;
             let a22 = one - c11 * square;
             let a12 = c12 * square;
@@ -310,7 +309,12 @@ fn membrane_kernel<V: Lanes>(
             )
             .max(zero);
             let cc = c11 * c11 + c22 * c22 + two * c12 * c12;
-            let hessian = two * cc * square * inverse + square;
+            // d2(1/det) = [(C^-1 : X)^2 + C^-1 X C^-1 : X] / det, bounded by the Frobenius and the
+            // spectral norm of C^-1 (in two dimensions those of C over det); exact at rest.
+            let half = V::splat(0.5);
+            let apart = half * (c11 - c22);
+            let widest = half * (c11 + c22) + (apart * apart + c12 * c12).sqrt();
+            let hessian = (cc + widest * widest) * square * inverse;
             let four = V::splat(4.0) * h;
             (four * (second * aa + rate * hessian)).store(stiffness, c);
             // dS12 / d(2 E12) = 2 h U' / det^2 where C12 = 0; never below that at rest.

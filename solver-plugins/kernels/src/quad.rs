@@ -262,8 +262,8 @@ fn material_call(
 pub fn forces(batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
     // Zeroing the scratch costs as much as it is large.
     match batch.lanes {
-        ..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
-        ..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
+        0..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
+        17..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
         _ => forces_with(batch, material, Scratch::<MAX_LANES>::new().view()),
     }
 }

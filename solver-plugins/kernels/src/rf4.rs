@@ -103,8 +103,8 @@ impl Element for Rf4 {
 
     fn patch_forces(&self, batch: &mut PatchBatch<'_>, material: &MaterialRef) -> i32 {
         match batch.lanes {
-            ..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
-            ..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
+            0..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
+            17..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
             _ => forces_with(batch, material, Scratch::<MAX_LANES>::new().view()),
         }
     }

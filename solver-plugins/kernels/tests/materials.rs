@@ -391,6 +391,20 @@ fn reported_tangent_bounds_the_largest_eigenvalue_in_random_states() {
 }
 
 #[test]
+fn reported_tangent_is_exact_for_undeformed_sheets() {
+    for m in [fabric(&woven("fibre-energy")).unwrap(), film(FILM).unwrap()] {
+        let p = Point::new(&m);
+        // A state next to rest, because the film's U'' has a kink there.
+        let c = [1.0 + 1e-6, 1.0 + 1e-6, 0.0];
+        let (bound, exact) = (p.peek(&m, c).stiffness[0], largest_tangent(&m, &p, c));
+        assert!(
+            bound > 0.999 * exact && bound < 1.01 * exact,
+            "bound {bound}, exact {exact}"
+        );
+    }
+}
+
+#[test]
 fn shear_stiffness_stays_positive_while_the_stitch_softens() {
     for form in ["fibre-energy", "hypoelastic"] {
         let m = fabric(&ncf(form, "")).unwrap();

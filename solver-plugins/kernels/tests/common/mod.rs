@@ -471,3 +471,110 @@ impl Random {
         ((self.0 >> 11) as f64) / (1u64 << 52) as f64 - 1.0
     }
 }
+
+pub type Quad = [[f64; 3]; 4];
+pub type Patch = Vec<[f64; 3]>;
+
+pub const SIZE: f64 = 0.005;
+
+pub fn ply() -> Mat {
+    fabric(&ncf("fibre-energy", "")).unwrap()
+}
+
+/// A distorted flat quadrilateral of about 5 mm.
+pub fn flat(r: &mut Random, distortion: f64) -> Quad {
+    [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]: [f64; 2]| {
+        [
+            SIZE * (x + distortion * r.next()),
+            SIZE * (y + distortion * r.next()),
+            0.0,
+        ]
+    })
+}
+
+pub fn rotation(r: &mut Random) -> [[f64; 3]; 3] {
+    let mut q = [r.next(), r.next(), r.next(), r.next()];
+    let l = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    q = q.map(|x| x / l);
+    let [w, x, y, z] = q;
+    [
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y - w * z),
+            2.0 * (x * z + w * y),
+        ],
+        [
+            2.0 * (x * y + w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z - w * x),
+        ],
+        [
+            2.0 * (x * z - w * y),
+            2.0 * (y * z + w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ],
+    ]
+}
+
+pub fn turned(m: &[[f64; 3]; 3], x: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| (0..3).map(|j| m[i][j] * x[j]).sum::<f64>() + 0.1 * i as f64)
+}
+
+/// The quad stretched, sheared and warped at random.
+pub fn deformed(r: &mut Random, q: &Quad, strain: f64, warp: f64) -> Quad {
+    let f: [[f64; 2]; 2] = [
+        [1.0 + strain * r.next(), strain * r.next()],
+        [strain * r.next(), 1.0 + strain * r.next()],
+    ];
+    let m = rotation(r);
+    q.map(|[x, y, _]| {
+        let bump = warp * SIZE;
+        let p = [
+            f[0][0] * x + f[0][1] * y + bump * r.next(),
+            f[1][0] * x + f[1][1] * y + bump * r.next(),
+            bump * r.next(),
+        ];
+        turned(&m, p)
+    })
+}
+
+pub const AXIS: [f64; 3] = [0.8, 0.6, 0.0];
+
+pub fn total(f: &Forces, n: usize, lane: usize) -> f64 {
+    (0..3).map(|r| f.energy[r * n + lane]).sum()
+}
+
+/// A 3 x 3 patch, centre first, distorted in the plane.
+pub fn grid(r: &mut Random, distortion: f64) -> Patch {
+    let ring = [
+        [1, 0],
+        [1, 1],
+        [0, 1],
+        [-1, 1],
+        [-1, 0],
+        [-1, -1],
+        [0, -1],
+        [1, -1],
+    ];
+    let mut x = vec![[0.0; 3]];
+    x.extend(ring.map(|[i, j]: [i32; 2]| {
+        [
+            SIZE * (i as f64 + distortion * r.next()),
+            SIZE * (j as f64 + distortion * r.next()),
+            0.0,
+        ]
+    }));
+    x
+}
+
+pub fn wavy(r: &mut Random, p: &Patch) -> Patch {
+    let m = rotation(r);
+    let k = [30.0 * r.next(), 30.0 * r.next(), 30.0 * r.next()];
+    let shear = 0.4 * r.next();
+    p.iter()
+        .map(|[x, y, _]| {
+            let z = 0.5 * k[0] * x * x + 0.5 * k[1] * y * y + k[2] * x * y + 0.02 * SIZE * r.next();
+            turned(&m, [x + shear * y, *y, z + 0.3 * x])
+        })
+        .collect()
+}
