@@ -1,1 +1,28 @@
-//! plyflow-forming-explicit
+//! Step plugin `forming-explicit`: explicit dynamic forming of a stack of sheets over a rigid tool. A
+//! global run meshes the scene itself; with a `boundary` input it is a local run of one zone.
+
+pub mod assembly;
+mod global;
+mod local;
+mod output;
+pub mod parameters;
+pub mod process;
+pub mod run;
+
+pub use global::build_global;
+pub use local::{LocalInput, build_local};
+
+use plyflow_sdk::{Host, Step, StepError};
+
+/// The step.
+pub struct FormingExplicit;
+
+impl Step for FormingExplicit {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        output::run(host)
+    }
+}
+
+plyflow_sdk::export_step!(FormingExplicit);

@@ -1,6 +1,6 @@
 //! Sheet nodes on a rigid surface that does not move.
 
-use super::{ContactEnergy, coulomb};
+use super::{ContactEnergy, coulomb, normal_force};
 use crate::vec3::{V, add, dot, scale, sub};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -38,6 +38,9 @@ pub struct RigidItem {
     pub stiffness: f64,
     /// Damping (N s/m).
     pub damping: f64,
+    /// Multiplier: the steady part of the normal force (N).
+    pub multiplier: f64,
+    work: f64,
     /// Friction force held by the slip spring (N).
     pub slip: V,
     /// Force on the node in the last step (N).
@@ -58,6 +61,8 @@ impl RigidItem {
             offset,
             stiffness: 0.0,
             damping: 0.0,
+            multiplier: 0.0,
+            work: 0.0,
             slip: [0.0; 3],
             force: [0.0; 3],
             normal_force: 0.0,
@@ -77,6 +82,8 @@ pub struct RigidContact {
     pub friction: f64,
     /// Elastic-slip stiffness over normal stiffness.
     pub slip_factor: f64,
+    /// Share of the penalty force that a step adds to the multiplier.
+    pub augmentation: f64,
     /// The nodes.
     pub items: Vec<RigidItem>,
 }
@@ -85,8 +92,13 @@ impl RigidContact {
     /// Computes the force of every item from positions (m) and velocities (m/s). `reach` (m): twice the
     /// furthest that any node moves in a step.
     pub fn compute(&mut self, x: &[V], v: &[V], dt: f64, reach: f64) -> ContactEnergy {
-        let (surface, friction, slip_factor) =
-            (self.surface.as_ref(), self.friction, self.slip_factor);
+        let surface = self.surface.as_ref();
+        let law = Law {
+            dt,
+            friction: self.friction,
+            slip_factor: self.slip_factor,
+            augmentation: self.augmentation,
+        };
         self.items.par_iter_mut().with_min_len(512).for_each(|item| {
             if item.sleep > 0 {
                 item.sleep -= 1;
@@ -95,17 +107,16 @@ impl RigidContact {
             let n = item.node as usize;
             let (distance, gradient) = surface.distance(x[n]);
             let gap = distance - item.offset;
-            if gap > 0.0 {
+            if gap <= 0.0 || item.multiplier > 0.0 {
+                touch(item, gap, gradient, v[n], &law);
+            } else {
                 *item = RigidItem {
-                    offset: item.offset,
                     stiffness: item.stiffness,
                     damping: item.damping,
                     ..RigidItem::new(item.node, item.offset)
                 };
                 item.sleep = (gap / reach).min(200.0) as u32;
-                return;
             }
-            touch(item, gap, gradient, v[n], dt, friction, slip_factor);
         });
         let mut total = ContactEnergy::default();
         for item in &self.items {
@@ -117,29 +128,38 @@ impl RigidContact {
     }
 }
 
-fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, dt: f64, friction: f64, slip_factor: f64) {
+struct Law {
+    dt: f64,
+    friction: f64,
+    slip_factor: f64,
+    augmentation: f64,
+}
+
+/// Force of an item in touch, or so lately that it still has a multiplier.
+fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) {
+    let (k, c) = (item.stiffness, item.damping);
     let vn = dot(v, g);
-    let spring = -item.stiffness * gap;
-    let damper = (-item.damping * vn).max(-spring);
-    let normal = spring + damper;
+    let (held, work) = (item.multiplier, item.work);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, held, work);
     // The gradient of a distance field is a unit vector up to the error of its interpolation.
     let n = scale(g, 1.0 / dot(g, g).max(1e-12).sqrt());
-    let slip_stiffness = slip_factor * item.stiffness;
-    let mut loss = 0.0;
-    if friction > 0.0 {
+    let slip_stiffness = law.slip_factor * k;
+    let (mut loss, mut slip_energy) = (0.0, 0.0);
+    if law.friction > 0.0 {
         let vt = sub(v, scale(n, dot(v, n)));
-        let held = sub(item.slip, scale(n, dot(item.slip, n)));
-        let trial = sub(held, scale(vt, slip_stiffness * dt));
-        (item.slip, loss) = coulomb(trial, friction * normal, slip_stiffness);
+        let rest = sub(item.slip, scale(n, dot(item.slip, n)));
+        let trial = sub(rest, scale(vt, slip_stiffness * law.dt));
+        (item.slip, loss) = coulomb(trial, law.friction * normal.force, slip_stiffness);
+        slip_energy = 0.5 * dot(item.slip, item.slip) / slip_stiffness;
     }
-    item.force = add(scale(g, normal), item.slip);
-    item.normal_force = normal;
-    item.penetration = -gap;
-    let slip_energy =
-        if friction > 0.0 { 0.5 * dot(item.slip, item.slip) / slip_stiffness } else { 0.0 };
+    item.force = add(scale(g, normal.force), item.slip);
+    item.normal_force = normal.force;
+    item.multiplier = normal.multiplier;
+    item.work = normal.work;
+    item.penetration = (-gap).max(0.0);
     item.energy = ContactEnergy {
-        stored: 0.5 * item.stiffness * gap * gap + slip_energy,
+        stored: normal.stored + slip_energy,
         friction: loss,
-        damping: -damper * vn * dt,
+        damping: normal.loss,
     };
 }

@@ -1,12 +1,14 @@
 //! Nodes of one sheet (slaves) on the surface of another (master).
 //!
-//! The slave is projected along the master's interpolated nodal normal: x_s = X(xi, eta) + g N(xi, eta).
-//! So the line of the normal force runs through both points and angular momentum is kept; and the normal is
-//! continuous from cell to cell, so that a flat stack under pressure stays silent.
+//! The gap is the distance to the closest point of the master surface (its cells are bilinear), less the
+//! offset. The normal force is the exact gradient of k gap^2 / 2: it acts along the line between the two points
+//! and on the master's nodes by their shape functions, so it conserves energy, momentum and angular momentum.
+//! A force along an interpolated normal is smoother to look at but is no gradient: two flat sheets under
+//! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
-use super::{ContactEnergy, coulomb};
+use super::{ContactEnergy, coulomb, normal_force};
 use crate::mesh::NONE;
-use crate::vec3::{V, add, cross, dot, norm, scale, sub};
+use crate::vec3::{V, add, dot, scale, sub};
 use rayon::prelude::*;
 
 /// One slave node.
@@ -25,6 +27,9 @@ pub struct SlaveItem {
     pub stiffness: f64,
     /// Damping (N s/m).
     pub damping: f64,
+    /// Multiplier: the steady part of the normal force (N).
+    pub multiplier: f64,
+    work: f64,
     /// Friction force held by the slip spring (N).
     pub slip: V,
     /// Force on the slave (N); minus this, by the weights, on the cell's nodes.
@@ -49,6 +54,8 @@ impl SlaveItem {
             xi,
             stiffness: 0.0,
             damping: 0.0,
+            multiplier: 0.0,
+            work: 0.0,
             slip: [0.0; 3],
             force: [0.0; 3],
             weights: shape(xi),
@@ -60,6 +67,8 @@ impl SlaveItem {
 
     fn part(&mut self) {
         self.active = false;
+        self.multiplier = 0.0;
+        self.work = 0.0;
         self.slip = [0.0; 3];
         self.force = [0.0; 3];
         self.normal_force = 0.0;
@@ -80,6 +89,8 @@ pub struct SheetContact {
     pub friction: f64,
     /// Elastic-slip stiffness over normal stiffness.
     pub slip_factor: f64,
+    /// Share of the penalty force that a step adds to the multiplier.
+    pub augmentation: f64,
     /// The slaves.
     pub items: Vec<SlaveItem>,
 }
@@ -116,41 +127,72 @@ pub struct Surface<'a> {
     pub normals: &'a [V],
 }
 
-struct Projection {
+/// Closest point of a cell to a slave.
+#[derive(Clone, Copy)]
+struct Closest {
+    cell: u32,
+    xi: [f64; 2],
     weights: [f64; 4],
-    gap: f64,
-    normal: V,
+    /// From the closest point to the slave (m).
+    arm: V,
+    distance2: f64,
+    /// Half the cell's shorter middle line (m).
+    half: f64,
 }
 
-/// One Newton step of the projection; gives the increment of xi and what is found at the old xi.
+/// How far a cell goes on past a free rim, in half cells: a node that sits on the rim would else balance on an
+/// edge, slide off and get under the sheet.
+const RIM: f64 = 0.5;
+
+/// Closest point of one cell to `p` by Newton steps from `xi`, kept inside the cell.
 #[inline(always)]
-fn newton(s: &Surface<'_>, cell: u32, xi: [f64; 2], p: V) -> ([f64; 2], Projection) {
-    let nodes = s.cells[cell as usize];
-    let x = nodes.map(|n| s.x[n as usize]);
-    let m = nodes.map(|n| s.normals[n as usize]);
-    let w = shape(xi);
-    let (a, b) = (0.25 * (1.0 - xi[1]), 0.25 * (1.0 + xi[1]));
-    let wx = [-a, a, b, -b];
-    let (c, d) = (0.25 * (1.0 - xi[0]), 0.25 * (1.0 + xi[0]));
-    let wy = [-c, -d, d, c];
-    let normal = combine(w, &m);
-    let r = sub(p, combine(w, &x));
-    let g0 = dot(r, normal) / dot(normal, normal);
-    let t1 = add(combine(wx, &x), scale(combine(wx, &m), g0));
-    let t2 = add(combine(wy, &x), scale(combine(wy, &m), g0));
-    // [t1 t2 normal] [dxi deta g] = r by Cramer's rule.
-    let t12 = cross(t1, t2);
-    let det = dot(t12, normal);
-    let inv = if det.abs() > 0.0 { 1.0 / det } else { 0.0 };
-    let dxi = dot(cross(r, t2), normal) * inv;
-    let deta = dot(cross(t1, r), normal) * inv;
-    let g = dot(t12, r) * inv;
-    let size = norm(normal);
-    let unit = scale(normal, 1.0 / size);
-    ([dxi, deta], Projection { weights: w, gap: g * size, normal: unit })
+fn closest(s: &Surface<'_>, cell: u32, mut xi: [f64; 2], p: V, iterations: u32) -> Closest {
+    let x = s.cells[cell as usize].map(|n| s.x[n as usize]);
+    let mut half = 0.0;
+    let [south, east, north, west] = s.neighbours[cell as usize];
+    let end = |near: u32| if near == NONE { 1.0 + RIM } else { 1.0 };
+    let (low, high) = ([-end(west), -end(south)], [end(east), end(north)]);
+    for _ in 0..iterations {
+        let (a, b) = (0.25 * (1.0 - xi[1]), 0.25 * (1.0 + xi[1]));
+        let (c, d) = (0.25 * (1.0 - xi[0]), 0.25 * (1.0 + xi[0]));
+        let t1 = combine([-a, a, b, -b], &x);
+        let t2 = combine([-c, -d, d, c], &x);
+        let r = sub(p, combine(shape(xi), &x));
+        let (g11, g22, g12) = (dot(t1, t1), dot(t2, t2), dot(t1, t2));
+        let (r1, r2) = (dot(r, t1), dot(r, t2));
+        let det = (g11 * g22 - g12 * g12).max(1e-12 * g11 * g22);
+        let next = [
+            xi[0] + (r1 * g22 - r2 * g12) / det,
+            xi[1] + (r2 * g11 - r1 * g12) / det,
+        ];
+        let held = [next[0].clamp(low[0], high[0]), next[1].clamp(low[1], high[1])];
+        // Held at one side of the cell, the best place along that side is another one.
+        let along = |k: usize, other: f64| {
+            let (gkk, rk) = if k == 0 { (g11, r1) } else { (g22, r2) };
+            (xi[k] + (rk - g12 * other) / gkk).clamp(low[k], high[k])
+        };
+        let out = [next[0] != held[0], next[1] != held[1]];
+        xi = match out {
+            [false, false] => held,
+            [true, false] => [held[0], along(1, held[0] - xi[0])],
+            [false, true] => [along(0, held[1] - xi[1]), held[1]],
+            [true, true] => {
+                // In a corner's range: take the side that is overshot more, slide along it.
+                if (next[0] - held[0]).abs() > (next[1] - held[1]).abs() {
+                    [held[0], along(1, held[0] - xi[0])]
+                } else {
+                    [along(0, held[1] - xi[1]), held[1]]
+                }
+            }
+        };
+        half = g11.min(g22).sqrt();
+    }
+    let weights = shape(xi);
+    let arm = sub(p, combine(weights, &x));
+    Closest { cell, xi, weights, arm, distance2: dot(arm, arm), half }
 }
 
-/// Where a walk over an edge enters the neighbour.
+/// Where a walk over an edge enters the neighbour, coming from place `xi`.
 fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
     match neighbours[to as usize].iter().position(|n| *n == from) {
         Some(0) => [0.0, -1.0],
@@ -160,43 +202,52 @@ fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
     }
 }
 
-/// Follows the slave over the surface; `None` when it is off the edge.
+/// The closest point of the surface near where the slave was: of its cell, and of the cells across those
+/// sides that the point lies on or so near that a concave fold could make the neighbour closer.
 #[inline]
-fn track(s: &Surface<'_>, item: &mut SlaveItem, p: V, iterations: u32) -> Option<Projection> {
-    let mut left = iterations;
-    let mut hops = 0;
-    loop {
-        let (d, found) = newton(s, item.cell, item.xi, p);
-        // Far outside the cell the bilinear map means nothing: limit the reach of a step.
-        item.xi = [
-            (item.xi[0] + d[0].clamp(-2.0, 2.0)).clamp(-3.0, 3.0),
-            (item.xi[1] + d[1].clamp(-2.0, 2.0)).clamp(-3.0, 3.0),
-        ];
-        left = left.saturating_sub(1);
-        let over = [-item.xi[1] - 1.0, item.xi[0] - 1.0, item.xi[1] - 1.0, -item.xi[0] - 1.0];
-        let edge = (1..4).fold(0, |e, k| if over[k] > over[e] { k } else { e });
-        if over[edge] > 1e-9 {
-            let near = s.neighbours[item.cell as usize][edge];
-            if near == NONE || hops == 12 {
-                return None;
+fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Closest {
+    let mut best = closest(s, item.cell, item.xi, p, iterations);
+    for _ in 0..12 {
+        let near = s.neighbours[best.cell as usize];
+        let band = 1.0 - (best.distance2.sqrt() / best.half).min(0.5);
+        let here = best;
+        for k in 0..2 {
+            let place = here.xi[k];
+            if place.abs() < band {
+                continue;
             }
-            item.xi = entry(s.neighbours, item.cell, near);
-            item.cell = near;
-            hops += 1;
-            left = 3;
-            continue;
+            // Sides 0: eta = -1, 1: xi = 1, 2: eta = 1, 3: xi = -1.
+            let edge = match (k, place > 0.0) {
+                (0, true) => 1,
+                (0, false) => 3,
+                (_, true) => 2,
+                (_, false) => 0,
+            };
+            if near[edge] != NONE {
+                let start = entry(s.neighbours, here.cell, near[edge]);
+                let other = closest(s, near[edge], start, p, 3);
+                if other.distance2 < best.distance2 {
+                    best = other;
+                }
+            }
         }
-        if left == 0 {
-            return Some(found);
+        if best.cell == here.cell {
+            break;
         }
     }
+    best
 }
 
 impl SheetContact {
     /// Computes the force of every slave. `reach` (m): twice the furthest that any node moves in a step.
     pub fn compute(&mut self, s: &Surface<'_>, v: &[V], dt: f64, reach: f64) -> ContactEnergy {
         let (side, offset) = (self.side, self.offset);
-        let (friction, slip_factor) = (self.friction, self.slip_factor);
+        let law = Law {
+            dt,
+            friction: self.friction,
+            slip_factor: self.slip_factor,
+            augmentation: self.augmentation,
+        };
         self.items.par_iter_mut().with_min_len(256).for_each(|item| {
             if item.cell == NONE {
                 return;
@@ -207,24 +258,31 @@ impl SheetContact {
             }
             let n = item.node as usize;
             // In touch, the place moves by far less than a cell in a step: one iteration follows it.
-            let iterations = if item.active { 1 } else { 3 };
-            let Some(found) = track(s, item, s.x[n], iterations) else {
+            let found = track(s, item, s.x[n], if item.active { 1 } else { 3 });
+            (item.cell, item.xi) = (found.cell, found.xi);
+            let nodes = s.cells[found.cell as usize];
+            let up = combine(found.weights, &nodes.map(|n| s.normals[n as usize]));
+            let distance = found.distance2.sqrt();
+            let height = side * dot(found.arm, up);
+            // On its own side, the gap is the distance; a slave whose mid-surface has just passed through
+            // the master's has a negative one. Anything else lies beside the rim, or beyond a fold.
+            let (gap, n) = if height > 0.5 * distance {
+                (distance - offset, scale(found.arm, 1.0 / distance))
+            } else if item.active && height < -0.5 * distance && height > -offset {
+                (height - offset, scale(up, side))
+            } else {
                 item.part();
-                item.sleep = 8;
                 return;
             };
-            let gap = side * found.gap - offset;
-            if gap > 0.0 {
+            // A slave that comes from beside cannot be deep inside at once: it has got behind the rim.
+            let behind = !item.active && gap < -0.5 * offset;
+            let apart = gap > 0.0 && item.multiplier == 0.0;
+            if behind || apart {
                 item.part();
-                item.sleep = (gap / reach).min(50.0) as u32;
-                return;
+                item.sleep = (gap.max(0.0) / reach).min(50.0) as u32;
+            } else {
+                touch(item, s, v, gap, n, &found, &law);
             }
-            // Far behind the master: that is no contact of a thin stack but the other side of a fold.
-            if gap < -20.0 * offset {
-                item.part();
-                return;
-            }
-            touch(item, s, v, gap, &found, side, dt, friction, slip_factor);
         });
         let mut total = ContactEnergy::default();
         for item in &self.items {
@@ -248,40 +306,46 @@ impl SheetContact {
     }
 }
 
+struct Law {
+    dt: f64,
+    friction: f64,
+    slip_factor: f64,
+    augmentation: f64,
+}
+
+/// Force of a slave in touch, or so lately that it still has a multiplier.
 #[inline]
 fn touch(
     item: &mut SlaveItem,
     s: &Surface<'_>,
     v: &[V],
     gap: f64,
-    found: &Projection,
-    side: f64,
-    dt: f64,
-    friction: f64,
-    slip_factor: f64,
+    n: V,
+    found: &Closest,
+    law: &Law,
 ) {
-    let nodes = s.cells[item.cell as usize];
+    let nodes = s.cells[found.cell as usize];
     let master_v = combine(found.weights, &nodes.map(|n| v[n as usize]));
-    let n = scale(found.normal, side);
     let rel = sub(v[item.node as usize], master_v);
     let vn = dot(rel, n);
-    let spring = -item.stiffness * gap;
-    let damper = (-item.damping * vn).max(-spring);
-    let normal = spring + damper;
-    let slip_stiffness = slip_factor * item.stiffness;
+    let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, held, work);
+    let slip_stiffness = law.slip_factor * k;
     let vt = sub(rel, scale(n, vn));
-    let held = sub(item.slip, scale(n, dot(item.slip, n)));
-    let trial = sub(held, scale(vt, slip_stiffness * dt));
-    let (slip, loss) = coulomb(trial, friction * normal, slip_stiffness);
+    let rest = sub(item.slip, scale(n, dot(item.slip, n)));
+    let trial = sub(rest, scale(vt, slip_stiffness * law.dt));
+    let (slip, loss) = coulomb(trial, law.friction * normal.force, slip_stiffness);
     item.active = true;
     item.slip = slip;
-    item.force = add(scale(n, normal), slip);
+    item.force = add(scale(n, normal.force), slip);
     item.weights = found.weights;
-    item.normal_force = normal;
-    item.penetration = -gap;
+    item.normal_force = normal.force;
+    item.multiplier = normal.multiplier;
+    item.work = normal.work;
+    item.penetration = (-gap).max(0.0);
     item.energy = ContactEnergy {
-        stored: 0.5 * item.stiffness * gap * gap + 0.5 * dot(slip, slip) / slip_stiffness,
+        stored: normal.stored + 0.5 * dot(slip, slip) / slip_stiffness,
         friction: loss,
-        damping: -damper * vn * dt,
+        damping: normal.loss,
     };
 }

@@ -1,0 +1,329 @@
+//! What global and local runs share: checking the stack, making components, stacking the contacts.
+
+use crate::parameters::{ComponentChoice, Parameters};
+use plyflow_abi::pf_component;
+use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+use plyflow_mechanics::contact::{
+    ContactSettings, Plane, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
+};
+use plyflow_mechanics::mesh::NONE;
+use plyflow_mechanics::model::{Model, StepSettings};
+use plyflow_mechanics::vec3::V;
+use plyflow_model::material::{Material, MaterialEntry};
+use plyflow_model::scene::{DoubleDiaphragm, Process, Scene, Sheet, SheetKind};
+use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
+use std::sync::Arc;
+
+/// Finds components: the host, or a test.
+pub trait Components {
+    /// The element formulation of that name.
+    ///
+    /// # Errors
+    /// When there is none.
+    fn element(&self, name: &str) -> Result<pf_component, String>;
+    /// The material of that name.
+    ///
+    /// # Errors
+    /// When there is none.
+    fn material(&self, name: &str) -> Result<pf_component, String>;
+}
+
+/// The tool as the contact sees it.
+pub struct ToolSurface(pub SignedDistanceGrid);
+
+impl RigidSurface for ToolSurface {
+    fn distance(&self, point: V) -> (f64, V) {
+        self.0.distance_and_gradient(point)
+    }
+}
+
+/// A sheet of the stack with what the contacts and the output need.
+#[derive(Debug, Clone)]
+pub struct StackSheet {
+    /// The scene's words.
+    pub scene: Sheet,
+    /// Its material.
+    pub material: Material,
+    /// Thickness (m).
+    pub thickness: f64,
+    /// Distance of its mid-plane from the tool surface when the stack is compact (m).
+    pub offset: f64,
+}
+
+/// The stack of a scene, bottom to top, with offsets.
+///
+/// # Errors
+/// When it is no double-diaphragm stack: film, plies, film.
+pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
+    let n = scene.sheets.len();
+    let kinds: Vec<SheetKind> = scene.sheets.iter().map(|s| s.kind).collect();
+    let inner_plies = n >= 3 && kinds[1..n - 1].iter().all(|k| *k == SheetKind::Ply);
+    let outer_films = n >= 3
+        && kinds[0] == SheetKind::Diaphragm
+        && kinds[n - 1] == SheetKind::Diaphragm;
+    if !(inner_plies && outer_films) {
+        return Err(format!(
+            "the sheets of scene '{}' must be, from the tool upwards: one diaphragm, one or more \
+             plies, one diaphragm",
+            scene.name
+        ));
+    }
+    let mut below = 0.0;
+    scene
+        .sheets
+        .iter()
+        .map(|sheet| {
+            let MaterialEntry::Inline(material) = &sheet.material else {
+                return Err(format!("the material of sheet '{}' was not read in", sheet.name));
+            };
+            let thickness = material.thickness.si();
+            let offset = below + 0.5 * thickness;
+            below += thickness;
+            Ok(StackSheet {
+                scene: sheet.clone(),
+                material: (**material).clone(),
+                thickness,
+                offset,
+            })
+        })
+        .collect()
+}
+
+/// The process of the scene.
+pub fn process(scene: &Scene) -> &DoubleDiaphragm {
+    let Process::DoubleDiaphragm(p) = &scene.process;
+    p
+}
+
+/// Makes the element of a sheet with its material.
+///
+/// # Errors
+/// The component's own text.
+pub fn element(
+    components: &dyn Components,
+    sheet: &StackSheet,
+    choice: &ComponentChoice,
+) -> Result<ElementInstance, String> {
+    let mut with = serde_json::Value::Object(sheet.material.with.clone());
+    with["thickness"] = sheet.thickness.into();
+    with["areal_mass"] = sheet.material.areal_mass.si().into();
+    let what = format!("material '{}' of sheet '{}'", sheet.material.name, sheet.scene.name);
+    let found = components.material(&sheet.material.plugin)?;
+    let material = unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }
+        .map_err(|e| e.to_string())?;
+    let what = format!("element '{}' of sheet '{}'", choice.plugin, sheet.scene.name);
+    let found = components.element(&choice.plugin)?;
+    let parameters = if choice.with.is_null() { "{}".into() } else { choice.with.to_string() };
+    unsafe { ElementInstance::create(&found, &parameters, material, &what) }
+        .map_err(|e| e.to_string())
+}
+
+/// Direction of material axis e1 in the undeformed plane. Family 2 lies 90 degrees counter-clockwise from
+/// e1 = family 1; when the scene states it the other way round, the families change names so that the stitch
+/// still lies between e1 and e2.
+pub fn axis(sheet: &Sheet) -> V {
+    let first = sheet.fibre_1.si();
+    let second = sheet.fibre_2.map_or(first + std::f64::consts::FRAC_PI_2, |a| a.si());
+    let turn = (second - first).sin();
+    let e1 = if turn >= 0.0 { first } else { second };
+    [e1.cos(), e1.sin(), 0.0]
+}
+
+/// Settings of the time integration.
+pub fn step_settings(p: &Parameters) -> StepSettings {
+    StepSettings { target_step: p.time_step, safety: p.step_safety, damping: p.damping }
+}
+
+/// A sheet placed in a model, as the contacts see it.
+pub struct Placed {
+    /// Index in [`Model::sheets`].
+    pub index: usize,
+    /// Model nodes that may be slaves (not driven, not shared with the master).
+    pub slaves: Vec<u32>,
+}
+
+/// Sets up all contacts of the stack. `placed` is in stack order (first and last are the films);
+/// `tool` may be absent (a scene whose zone lies off the tool).
+pub fn add_contacts(
+    model: &mut Model,
+    stack: &[StackSheet],
+    placed: &[Placed],
+    scene: &Scene,
+    p: &Parameters,
+    tool: Arc<dyn RigidSurface>,
+) {
+    let settings = ContactSettings {
+        stiffness_factor: p.contact_stiffness,
+        slip_factor: p.slip_stiffness,
+        damping_ratio: p.contact_damping,
+        augmentation: p.contact_augmentation,
+    };
+    let friction = &scene.friction;
+    let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: f64, k: usize, offset: f64| {
+        RigidContact {
+            name,
+            surface,
+            friction: mu,
+            slip_factor: p.slip_stiffness,
+            augmentation: p.contact_augmentation,
+            items: placed[k].slaves.iter().map(|n| RigidItem::new(*n, offset)).collect(),
+        }
+    };
+    let bottom = &stack[0];
+    let mu = friction.tool_diaphragm.0;
+    let bed: Arc<dyn RigidSurface> = Arc::new(Plane { height: 0.0 });
+    let name = |what: &str, k: usize| format!("{what}/{}", stack[k].scene.name);
+    model.rigid_contacts.push(rigid(name("tool", 0), tool.clone(), mu, 0, bottom.offset));
+    model.rigid_contacts.push(rigid(name("bed", 0), bed, mu, 0, bottom.offset));
+    let top = placed.len() - 1;
+    for k in 1..top {
+        // The chords of the film's elements cut through convex fillets; the plies' own nodes must stay
+        // outside the tool all the same. Their friction is that with the film.
+        model.rigid_contacts.push(rigid(name("tool", k), tool.clone(), 0.0, k, stack[k].offset));
+    }
+    let mut pair = |slave: usize, master: usize, side: f64, mu: f64| {
+        let offset = 0.5 * (stack[slave].thickness + stack[master].thickness);
+        let items = locate(model, placed[master].index, &placed[slave].slaves);
+        let name = format!("{}/{}", stack[master].scene.name, stack[slave].scene.name);
+        model.sheet_contacts.push(SheetContact {
+            name,
+            side,
+            offset,
+            friction: mu,
+            slip_factor: p.slip_stiffness,
+            augmentation: p.contact_augmentation,
+            items,
+        });
+    };
+    for k in 1..top {
+        let mu = if k == 1 { friction.fabric_diaphragm.0 } else { friction.fabric_fabric.0 };
+        pair(k, k - 1, 1.0, mu);
+    }
+    if top > 1 {
+        pair(top - 1, top, -1.0, friction.fabric_diaphragm.0);
+    }
+    pair(top, 0, 1.0, friction.diaphragm_diaphragm.0);
+    model.set_contact_stiffness(&settings);
+}
+
+/// Places slaves on the master in the undeformed plane. A slave beyond the master's edge gets the nearest
+/// cell: it is in touch once it slides onto it.
+fn locate(model: &Model, master: usize, slaves: &[u32]) -> Vec<SlaveItem> {
+    let (c0, c1) = model.sheets[master].cell_range;
+    if c0 == c1 {
+        return slaves.iter().map(|n| SlaveItem::new(*n, NONE, [0.0; 2])).collect();
+    }
+    let cells = &model.cells[c0..c1];
+    let centre = |c: usize| -> [f64; 2] {
+        let p = cells[c].map(|n| model.x[n as usize]);
+        [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]))
+    };
+    let bins = Bins::new((0..cells.len()).map(centre).collect());
+    slaves
+        .iter()
+        .map(|n| {
+            let p = model.x[*n as usize];
+            let inside = bins.near(p).iter().find_map(|c| {
+                let corners = cells[*c as usize].map(|n| model.x[n as usize]);
+                let xi = inverse_bilinear(corners, p)?;
+                (xi[0].abs() <= 1.0 + 1e-9 && xi[1].abs() <= 1.0 + 1e-9).then_some((*c, xi))
+            });
+            let (cell, xi) = inside.unwrap_or_else(|| (bins.nearest(p), [0.0; 2]));
+            SlaveItem::new(*n, cell + c0 as u32, xi)
+        })
+        .collect()
+}
+
+/// Local coordinates of a point in the plane of a quad seen from above.
+pub fn inverse_bilinear(q: [V; 4], p: V) -> Option<[f64; 2]> {
+    let mut xi = [0.0f64; 2];
+    for _ in 0..20 {
+        let w = plyflow_mechanics::contact::shape(xi);
+        let (a, b) = (0.25 * (1.0 - xi[1]), 0.25 * (1.0 + xi[1]));
+        let (c, d) = (0.25 * (1.0 - xi[0]), 0.25 * (1.0 + xi[0]));
+        let (wx, wy) = ([-a, a, b, -b], [-c, -d, d, c]);
+        let sum = |w: [f64; 4], k: usize| (0..4).map(|i| w[i] * q[i][k]).sum::<f64>();
+        let r = [p[0] - sum(w, 0), p[1] - sum(w, 1)];
+        let (j11, j12, j21, j22) = (sum(wx, 0), sum(wy, 0), sum(wx, 1), sum(wy, 1));
+        let det = j11 * j22 - j12 * j21;
+        if det.abs() < 1e-300 {
+            return None;
+        }
+        let step = [(r[0] * j22 - r[1] * j12) / det, (j11 * r[1] - j21 * r[0]) / det];
+        xi = [xi[0] + step[0], xi[1] + step[1]];
+        if step[0].abs() + step[1].abs() < 1e-13 {
+            return Some(xi);
+        }
+    }
+    Some(xi)
+}
+
+/// Cell centres sorted into square bins.
+struct Bins {
+    centres: Vec<[f64; 2]>,
+    lo: [f64; 2],
+    size: f64,
+    shape: [usize; 2],
+    cells: Vec<Vec<u32>>,
+}
+
+impl Bins {
+    fn new(centres: Vec<[f64; 2]>) -> Self {
+        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
+        for c in &centres {
+            for k in 0..2 {
+                lo[k] = lo[k].min(c[k]);
+                hi[k] = hi[k].max(c[k]);
+            }
+        }
+        let area = ((hi[0] - lo[0]) * (hi[1] - lo[1])).max(1e-12);
+        // About four cells a bin.
+        let size = 2.0 * (area / centres.len() as f64).sqrt();
+        let shape = [0, 1].map(|k| ((hi[k] - lo[k]) / size) as usize + 1);
+        let mut bins =
+            Self { centres, lo, size, shape, cells: vec![Vec::new(); shape[0] * shape[1]] };
+        for c in 0..bins.centres.len() {
+            let [i, j] = bins.bin(bins.centres[c]);
+            bins.cells[j * bins.shape[0] + i].push(c as u32);
+        }
+        bins
+    }
+
+    fn bin(&self, p: [f64; 2]) -> [usize; 2] {
+        [0, 1].map(|k| {
+            let i = ((p[k] - self.lo[k]) / self.size).max(0.0) as usize;
+            i.min(self.shape[k] - 1)
+        })
+    }
+
+    fn near(&self, p: V) -> Vec<u32> {
+        let [i, j] = self.bin([p[0], p[1]]);
+        let mut found = Vec::new();
+        for b in j.saturating_sub(1)..(j + 2).min(self.shape[1]) {
+            for a in i.saturating_sub(1)..(i + 2).min(self.shape[0]) {
+                found.extend_from_slice(&self.cells[b * self.shape[0] + a]);
+            }
+        }
+        // A graded mesh has cells larger than a bin: then look at all.
+        if found.is_empty() { (0..self.centres.len() as u32).collect() } else { found }
+    }
+
+    fn nearest(&self, p: V) -> u32 {
+        let d = |c: u32| {
+            let q = self.centres[c as usize];
+            (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2)
+        };
+        (0..self.centres.len() as u32).min_by(|a, b| d(*a).total_cmp(&d(*b))).unwrap_or(NONE)
+    }
+}
+
+/// Tool mesh and its distance field.
+///
+/// # Errors
+/// When the tool cannot be built.
+pub fn tool(scene: &Scene, spacing: f64) -> Result<(ToolMesh, SignedDistanceGrid), String> {
+    let mesh = plyflow_tooling::build(&scene.tool).map_err(|e| e.to_string())?;
+    // Contact acts at distances of the stack's thickness; a few cells around it are plenty.
+    let grid = SignedDistanceGrid::build(&mesh, spacing, (4.0 * spacing).max(0.01));
+    Ok((mesh, grid))
+}

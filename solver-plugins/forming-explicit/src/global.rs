@@ -1,0 +1,290 @@
+//! The model of a whole scene.
+
+use crate::assembly::{self, Components, Placed, StackSheet, ToolSurface};
+use crate::parameters::Parameters;
+use crate::process::{Cycle, FrameDrive, Load};
+use crate::run::{Body, Forming};
+use plyflow_mechanics::mesh::{QuadMesh, even_axis, graded_axis};
+use plyflow_mechanics::model::Model;
+use plyflow_mechanics::sheet::{Pressed, SheetSpec};
+use plyflow_mechanics::vec3::V;
+use plyflow_model::scene::DoubleDiaphragm;
+use plyflow_tooling::ToolMesh;
+use std::sync::Arc;
+
+/// Extent in the plane: x0, y0, x1, y1 (m).
+type Box2 = [f64; 4];
+
+fn union(a: Box2, b: Box2) -> Box2 {
+    [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
+}
+
+fn grown(b: Box2, by: f64) -> Box2 {
+    [b[0] - by, b[1] - by, b[2] + by, b[3] + by]
+}
+
+fn inside(b: Box2, x: f64, y: f64) -> bool {
+    x > b[0] && x < b[2] && y > b[1] && y < b[3]
+}
+
+/// Outline of a ply before forming.
+///
+/// # Errors
+/// When the scene gives no size.
+pub fn ply_box(sheet: &StackSheet) -> Result<Box2, String> {
+    let s = &sheet.scene;
+    let (Some(l), Some(w)) = (s.length, s.width) else {
+        return Err(format!("ply '{}' needs length and width", s.name));
+    };
+    let [cx, cy] = s.centre.map(|c| c.si());
+    let (hl, hw) = (0.5 * l.si(), 0.5 * w.si());
+    Ok([cx - hl, cy - hw, cx + hl, cy + hw])
+}
+
+/// Places of everything before meshing.
+struct Layout {
+    tool_top: f64,
+    bottom_z: f64,
+    plies: Vec<Box2>,
+    all_plies: Box2,
+    joint: Box2,
+    film: QuadMesh,
+    film_size: f64,
+}
+
+fn layout(
+    stack: &[StackSheet],
+    process: &DoubleDiaphragm,
+    p: &Parameters,
+    tool: &ToolMesh,
+) -> Result<Layout, String> {
+    let [lo, hi] = tool.bounds();
+    let plies: Vec<Box2> =
+        stack[1..stack.len() - 1].iter().map(ply_box).collect::<Result<_, _>>()?;
+    let all_plies = plies.iter().copied().reduce(union).ok_or("the scene has no ply")?;
+    let film_size = p.film_size();
+    if film_size < 0.999 * p.element_size {
+        return Err(format!(
+            "diaphragm_element_size ({film_size} m) is below element_size ({} m): the plies' nodes \
+             carry the films, so the films' elements must not be finer",
+            p.element_size
+        ));
+    }
+    // At least three cells of free film around the plies, so that the step at their edge has room.
+    let joint = grown(all_plies, process.film_joint_margin.si().max(3.0 * film_size));
+    let fine = union(grown(joint, film_size), grown([lo[0], lo[1], hi[0], hi[1]], 0.03));
+    let (hl, hw) = (0.5 * process.frame_length.si(), 0.5 * process.frame_width.si());
+    if fine[0] < -hl || fine[2] > hl || fine[1] < -hw || fine[3] > hw {
+        return Err(format!(
+            "the frame ({} x {} m) is too small for the tool and the plies, which need {:.3} x \
+             {:.3} m",
+            2.0 * hl,
+            2.0 * hw,
+            2.0 * fine[2].max(-fine[0]),
+            2.0 * fine[3].max(-fine[1])
+        ));
+    }
+    let xs = graded_axis(-hl, hl, fine[0], fine[2], film_size, p.diaphragm_growth);
+    let ys = graded_axis(-hw, hw, fine[1], fine[3], film_size, p.diaphragm_growth);
+    let tool_top = hi[2];
+    Ok(Layout {
+        tool_top,
+        bottom_z: tool_top + process.clearance.si() + stack[0].offset,
+        plies,
+        all_plies,
+        joint,
+        film: QuadMesh::grid(&xs, &ys),
+        film_size,
+    })
+}
+
+/// Points and sheets of the model as they grow.
+#[derive(Default)]
+struct Parts {
+    points: Vec<V>,
+    specs: Vec<SheetSpec>,
+    bodies: Vec<Body>,
+    placed: Vec<Placed>,
+}
+
+fn bottom_film(
+    parts: &mut Parts,
+    at: &Layout,
+    stack: &[StackSheet],
+    p: &Parameters,
+    components: &dyn Components,
+) -> Result<Vec<u32>, String> {
+    let mesh = &at.film;
+    let joined: Vec<bool> = mesh.cells.iter().map(|c| is_joined(at, c)).collect();
+    parts.points.extend(mesh.points.iter().map(|q| [q[0], q[1], at.bottom_z]));
+    let boundary = mesh.on_boundary();
+    let nodes: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    let frame: Vec<u32> = nodes.iter().copied().filter(|n| boundary[*n as usize]).collect();
+    let spec = SheetSpec {
+        name: stack[0].scene.name.clone(),
+        nodes: nodes.clone(),
+        cells: mesh.cells.clone(),
+        patches: mesh.patches(),
+        axis: assembly::axis(&stack[0].scene),
+        layers: joined.iter().map(|j| if *j { 2.0 } else { 1.0 }).collect(),
+        pressed: joined.iter().map(|j| if *j { Pressed::Both } else { Pressed::Below }).collect(),
+        least_areal_mass: p.least_areal_mass,
+        element: assembly::element(components, &stack[0], &p.diaphragm_element)?,
+    };
+    parts.placed.push(Placed {
+        index: 0,
+        slaves: nodes.into_iter().filter(|n| !boundary[*n as usize]).collect(),
+    });
+    parts.bodies.push(Body::new(&stack[0], 0, spec.cells.clone()));
+    parts.specs.push(spec);
+    Ok(frame)
+}
+
+fn is_joined(at: &Layout, cell: &[u32; 4]) -> bool {
+    let p = cell.map(|n| at.film.points[n as usize]);
+    let c = [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]));
+    !inside(at.joint, c[0], c[1])
+}
+
+fn ply(
+    parts: &mut Parts,
+    at: &Layout,
+    k: usize,
+    sheet: &StackSheet,
+    bottom: &StackSheet,
+    p: &Parameters,
+    components: &dyn Components,
+) -> Result<(), String> {
+    let b = at.plies[k - 1];
+    let mesh = QuadMesh::grid(
+        &even_axis(b[0], b[2], p.element_size),
+        &even_axis(b[1], b[3], p.element_size),
+    );
+    let z = at.bottom_z + sheet.offset - bottom.offset;
+    let first = parts.points.len() as u32;
+    parts.points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
+    let nodes: Vec<u32> = (first..parts.points.len() as u32).collect();
+    let spec = SheetSpec {
+        name: sheet.scene.name.clone(),
+        nodes: nodes.clone(),
+        layers: vec![1.0; mesh.cells.len()],
+        pressed: vec![Pressed::No; mesh.cells.len()],
+        patches: mesh.patches(),
+        cells: mesh.cells,
+        axis: assembly::axis(&sheet.scene),
+        least_areal_mass: p.least_areal_mass,
+        element: assembly::element(components, sheet, &p.element)?,
+    };
+    parts.bodies.push(Body::new(sheet, k, spec.cells.clone()));
+    parts.placed.push(Placed { index: k, slaves: nodes });
+    parts.specs.push(spec);
+    Ok(())
+}
+
+/// The top film where it is not joined to the bottom film; its outline shares the bottom film's nodes.
+/// It starts laid over the plies and down onto the bottom film beside them: a gap that the vacuum would have
+/// to close would close with a bang.
+fn top_film(
+    parts: &mut Parts,
+    at: &Layout,
+    stack: &[StackSheet],
+    p: &Parameters,
+    components: &dyn Components,
+) -> Result<(), String> {
+    let last = stack.len() - 1;
+    let (bottom, top) = (&stack[0], &stack[last]);
+    let mesh = &at.film;
+    let free: Vec<[u32; 4]> = mesh.cells.iter().filter(|c| !is_joined(at, c)).copied().collect();
+    let mut shared = vec![false; mesh.points.len()];
+    for cell in mesh.cells.iter().filter(|c| is_joined(at, c)) {
+        for n in cell {
+            shared[*n as usize] = true;
+        }
+    }
+    let high = at.bottom_z + top.offset - bottom.offset;
+    let low = at.bottom_z + 0.5 * (bottom.thickness + top.thickness);
+    let over = grown(at.all_plies, 1.01 * at.film_size);
+    let mut local = vec![u32::MAX; mesh.points.len()];
+    let (mut nodes, mut slaves) = (Vec::new(), Vec::new());
+    let mut cells = Vec::with_capacity(free.len());
+    for cell in &free {
+        cells.push(cell.map(|n| {
+            let i = n as usize;
+            if local[i] == u32::MAX {
+                local[i] = nodes.len() as u32;
+                if shared[i] {
+                    nodes.push(n);
+                } else {
+                    let q = mesh.points[i];
+                    let z = if inside(over, q[0], q[1]) { high } else { low };
+                    slaves.push(parts.points.len() as u32);
+                    nodes.push(parts.points.len() as u32);
+                    parts.points.push([q[0], q[1], z]);
+                }
+            }
+            local[i]
+        }));
+    }
+    let plan = QuadMesh {
+        points: nodes.iter().map(|n| parts.points[*n as usize]).collect(),
+        cells: cells.clone(),
+    };
+    let spec = SheetSpec {
+        name: top.scene.name.clone(),
+        nodes,
+        layers: vec![1.0; cells.len()],
+        pressed: vec![Pressed::Above; cells.len()],
+        patches: plan.patches(),
+        cells,
+        axis: assembly::axis(&top.scene),
+        least_areal_mass: p.least_areal_mass,
+        element: assembly::element(components, top, &p.diaphragm_element)?,
+    };
+    parts.bodies.push(Body::new(top, last, spec.cells.clone()));
+    parts.placed.push(Placed { index: last, slaves });
+    parts.specs.push(spec);
+    Ok(())
+}
+
+/// Builds the model of a whole scene.
+///
+/// # Errors
+/// A text for the user: what of the scene or the parameters makes no model.
+pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Forming, String> {
+    let scene = &p.scene;
+    let stack = assembly::stack(scene)?;
+    let process = assembly::process(scene);
+    let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
+    let at = layout(&stack, process, p, &tool)?;
+    let mut parts = Parts::default();
+    let frame = bottom_film(&mut parts, &at, &stack, p, components)?;
+    for k in 1..stack.len() - 1 {
+        ply(&mut parts, &at, k, &stack[k], &stack[0], p, components)?;
+    }
+    top_film(&mut parts, &at, &stack, p, components)?;
+    let cycle = Cycle::new(process, [at.bottom_z, stack[0].offset]);
+    let plan = frame.iter().map(|n| [0, 1].map(|k| parts.points[*n as usize][k])).collect();
+    let reference = parts.points.clone();
+    let mut model = Model::new(parts.points, parts.specs, assembly::step_settings(p))
+        .map_err(|e| e.to_string())?;
+    assembly::add_contacts(
+        &mut model,
+        &stack,
+        &parts.placed,
+        scene,
+        p,
+        Arc::new(ToolSurface(grid)),
+    );
+    model.set_driven(frame, Box::new(FrameDrive { plan, cycle: cycle.clone() }));
+    debug_assert!(at.tool_top > 0.0);
+    Ok(Forming {
+        model,
+        load: Load::Process { cycle, tool_volume: tool.volume(), sealed_volume: None },
+        stack,
+        bodies: parts.bodies,
+        reference,
+        tool,
+        zone: None,
+        element_size: p.element_size,
+    })
+}

@@ -1,0 +1,360 @@
+//! The step behind the host: inputs, frames, attributes, results.
+
+use crate::assembly::Components;
+use crate::local::{LocalInput, LocalSheet};
+use crate::parameters::Parameters;
+use crate::run::{Body, Forming, Observer, Outcome};
+use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
+use plyflow_mechanics::energy::Ledger;
+use plyflow_mechanics::vec3::V;
+use plyflow_model::scene::SheetKind;
+use plyflow_sdk::{Host, Input, Log, On, Progress, StepError};
+use serde_json::json;
+use std::time::Instant;
+
+struct HostComponents<'a>(&'a Host);
+
+impl Components for HostComponents<'_> {
+    fn element(&self, name: &str) -> Result<pf_component, String> {
+        self.0.component(PF_KIND_ELEMENT, name).map_err(|e| format!("{e:?}"))
+    }
+    fn material(&self, name: &str) -> Result<pf_component, String> {
+        self.0.component(PF_KIND_MATERIAL, name).map_err(|e| format!("{e:?}"))
+    }
+}
+
+/// One field of an element formulation.
+struct ElementField {
+    name: String,
+    unit: String,
+    patch: bool,
+    row: usize,
+}
+
+fn element_fields(manifest: &str) -> Vec<ElementField> {
+    let value: serde_json::Value = serde_json::from_str(manifest).unwrap_or_default();
+    let (mut cells, mut patches) = (0, 0);
+    value["fields"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .map(|f| {
+            let patch = f["patch"].as_bool().unwrap_or(false);
+            let count = if patch { &mut patches } else { &mut cells };
+            *count += 1;
+            ElementField {
+                name: f["name"].as_str().unwrap_or_default().into(),
+                unit: f["unit"].as_str().unwrap_or("1").into(),
+                patch,
+                row: *count - 1,
+            }
+        })
+        .collect()
+}
+
+struct Writer<'a> {
+    host: &'a Host,
+    fields: Vec<Vec<ElementField>>,
+    started: Instant,
+    shown: Instant,
+    cycle_shown: u64,
+}
+
+impl Observer for Writer<'_> {
+    fn frame(&mut self, forming: &Forming, time: f64) -> Result<(), StepError> {
+        self.host.begin_frame(time)?;
+        for (body, fields) in forming.bodies.iter().zip(&self.fields) {
+            self.host.write_points(&body.name, &forming.points(body))?;
+            for f in fields {
+                let (on, values) = if f.patch {
+                    (On::Points, forming.model.patch_field(body.sheet, f.row))
+                } else {
+                    (On::Cells, forming.model.cell_field(body.sheet, f.row))
+                };
+                self.host.write_field(&body.name, on, &f.name, 1, &f.unit, &values)?;
+            }
+            let pressure = forming.contact_pressure(body);
+            self.host.write_field(
+                &body.name,
+                On::Points,
+                "contact_pressure",
+                1,
+                "Pa",
+                &pressure,
+            )?;
+        }
+        self.host.end_frame()
+    }
+
+    fn tick(&mut self, forming: &Forming, e: &Ledger, end: f64) -> Result<(), StepError> {
+        self.host.check_cancelled()?;
+        let elapsed = self.shown.elapsed().as_secs_f64();
+        if elapsed > 0.2 {
+            let cycle = forming.model.cycle;
+            self.host.progress(&Progress {
+                fraction: forming.model.time / end,
+                simulated_time: forming.model.time,
+                rate: (cycle - self.cycle_shown) as f64 / elapsed,
+                energy_ratio: if e.internal() > 0.0 { e.kinetic / e.internal() } else { -1.0 },
+                phase: forming.load.cycle().phase(forming.model.time),
+            });
+            self.shown = Instant::now();
+            self.cycle_shown = cycle;
+        }
+        Ok(())
+    }
+}
+
+/// Runs the step.
+///
+/// # Errors
+/// Whatever stops it, as a text for the user.
+pub fn run(host: &Host) -> Result<(), StepError> {
+    let p: Parameters = host.parameters()?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(host.threads())
+        .build()
+        .map_err(|e| format!("starting {} threads: {e}", host.threads()))?;
+    pool.install(|| form(host, &p))
+}
+
+fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
+    host.progress(&Progress { phase: "building the model", ..Progress::default() });
+    let components = HostComponents(host);
+    let boundary = host.inputs_of("boundary")?;
+    let mut forming = match boundary.first() {
+        None => crate::build_global(p, &components)?,
+        Some(input) => crate::build_local(p, read_boundary(host, input)?, &components)?,
+    };
+    let mut fields = Vec::new();
+    for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
+        let film = sheet.scene.kind == SheetKind::Diaphragm;
+        let choice = if film { &p.diaphragm_element } else { &p.element };
+        let found = host.component(PF_KIND_ELEMENT, &choice.plugin)?;
+        let manifest = unsafe { found.manifest.as_str() }.unwrap_or("{}");
+        let mut list = element_fields(manifest);
+        if film {
+            list.retain(|f| f.name == "principal_stretch");
+        } else {
+            list.retain(|f| f.name != "principal_stretch");
+        }
+        fields.push(list);
+        define(host, &forming, body)?;
+    }
+    let tool_cells: Vec<u32> = forming.tool.triangles.iter().flatten().copied().collect();
+    host.define_mesh("tool", &forming.tool.points, 3, &tool_cells, &json!({"rigid": true}))?;
+    let started = Instant::now();
+    let mut writer = Writer { host, fields, started, shown: started, cycle_shown: 0 };
+    let outcome =
+        forming.run(p.frames, p.time_step, p.step_safety, p.kinetic_bound, &mut writer)?;
+    let seconds = writer.started.elapsed().as_secs_f64();
+    write_history(host, &outcome)?;
+    write_summary(host, p, &forming, &outcome, seconds)
+}
+
+fn define(host: &Host, forming: &Forming, body: &Body) -> Result<(), StepError> {
+    let cells: Vec<u32> = body.cells.iter().flatten().copied().collect();
+    let sheet = &forming.stack[body.sheet];
+    let attributes = json!({
+        "kind": sheet.scene.kind, "thickness": sheet.thickness, "offset": sheet.offset,
+    });
+    host.define_mesh(&body.name, &forming.reference_points(body), 4, &cells, &attributes)
+}
+
+fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
+    let attributes: serde_json::Value = host.attributes(input)?;
+    let meshes = host.meshes(input)?;
+    let series = |name: &str| host.array_f64(input, name).map(|(v, _)| v);
+    let time = series("time")?;
+    let mut sheets = Vec::new();
+    for body in &meshes.bodies {
+        let (points, cells) = host.mesh(input, body)?;
+        let (driven, _) = host.array_u32(input, &format!("{}/driven_nodes", body.name))?;
+        let vectors = |what: &str| -> Result<Vec<Vec<V>>, StepError> {
+            let path = format!("{}/{what}", body.name);
+            let (v, shape) = host.array_f64(input, &path)?;
+            if shape != [time.len(), driven.len(), 3] {
+                return Err(format!(
+                    "'{path}' has shape {shape:?}, expected [{}, {}, 3]",
+                    time.len(),
+                    driven.len()
+                )
+                .into());
+            }
+            let row = 3 * driven.len();
+            Ok((0..time.len())
+                .map(|f| {
+                    let frame = &v[f * row..(f + 1) * row];
+                    frame.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+                })
+                .collect())
+        };
+        sheets.push(LocalSheet {
+            name: body.name.clone(),
+            points,
+            cells: cells.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect(),
+            position: vectors("position")?,
+            velocity: vectors("velocity")?,
+            driven,
+        });
+    }
+    Ok(LocalInput {
+        cavity: series("cavity_pressure")?,
+        bag: series("bag_pressure")?,
+        frame: series("frame_height")?,
+        time,
+        sheets,
+        zone: attributes["zone"].clone(),
+        element_size: attributes["element_size"].as_f64().unwrap_or(0.0),
+    })
+}
+
+fn write_history(host: &Host, outcome: &Outcome) -> Result<(), StepError> {
+    type Column = (&'static str, &'static str, fn(&crate::run::HistoryRow) -> f64);
+    let columns: [Column; 13] = [
+        ("time", "s", |r| r.time),
+        ("kinetic", "J", |r| r.ledger.kinetic),
+        ("membrane", "J", |r| r.ledger.membrane),
+        ("bending", "J", |r| r.ledger.bending),
+        ("hourglass", "J", |r| r.ledger.hourglass),
+        ("contact", "J", |r| r.ledger.contact),
+        ("friction", "J", |r| r.ledger.friction),
+        ("damping", "J", |r| r.ledger.damping),
+        ("external", "J", |r| r.ledger.external),
+        ("drift", "J", |r| r.ledger.drift()),
+        ("cavity_pressure", "Pa", |r| r.cavity),
+        ("bag_pressure", "Pa", |r| r.bag),
+        ("frame_height", "m", |r| r.frame),
+    ];
+    for (name, unit, value) in columns {
+        let data: Vec<f64> = outcome.history.iter().map(value).collect();
+        host.write_f64(&format!("history/{name}"), &[data.len()], unit, &data)?;
+    }
+    Ok(())
+}
+
+fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value> {
+    let sheets = forming.bodies.iter().zip(&forming.stack);
+    sheets
+        .map(|(body, s)| {
+            let film = s.scene.kind == SheetKind::Diaphragm;
+            let choice = if film { &p.diaphragm_element } else { &p.element };
+            let mut value = json!({
+                "name": body.name,
+                "kind": s.scene.kind,
+                "material": s.material.name,
+                "thickness": s.thickness,
+                "offset": s.offset,
+                "areal_mass": s.material.areal_mass.si(),
+                "added_mass": forming.model.sheets[body.sheet].added_mass,
+                "element": choice.plugin,
+            });
+            if let Ok(b) = crate::global::ply_box(s) {
+                value["fibre_1"] = s.scene.fibre_1.si().into();
+                value["fibre_2"] = s
+                    .scene
+                    .fibre_2
+                    .map_or(s.scene.fibre_1.si() + std::f64::consts::FRAC_PI_2, |a| a.si())
+                    .into();
+                value["outline"] =
+                    json!([[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]);
+            }
+            value
+        })
+        .collect()
+}
+
+fn write_summary(
+    host: &Host,
+    p: &Parameters,
+    forming: &Forming,
+    outcome: &Outcome,
+    seconds: f64,
+) -> Result<(), StepError> {
+    let h = &outcome.health;
+    let m = &forming.model;
+    let penetrations = forming.penetrations();
+    let elements = m.element_count();
+    let element_cycles = elements as f64 * outcome.cycles as f64;
+    let penetration: serde_json::Map<String, serde_json::Value> = penetrations
+        .iter()
+        .map(|(name, max, q)| (name.clone(), json!({"max": max, "q999": q})))
+        .collect();
+    host.write_attributes(&json!({
+        "scene": p.scene.name,
+        "sheets": sheet_attributes(forming, p),
+        "element_size": forming.element_size,
+        "zone": forming.zone,
+        "time_step": outcome.smallest_step,
+        "cycles": outcome.cycles,
+        "element_cycles": element_cycles,
+        "elements": elements,
+        "energy": {
+            "peak_drift_ratio": h.peak_drift_ratio,
+            "peak_kinetic_ratio": h.peak_kinetic_ratio,
+            "kinetic_bound_kept": h.peak_kinetic_ratio <= p.kinetic_bound,
+            "hourglass_ratio": h.hourglass_ratio,
+        },
+        "penetration": penetration,
+        "warnings": outcome.warnings,
+    }))?;
+    for w in &outcome.warnings {
+        host.log(Log::Warn, w);
+    }
+    let worst = |f: fn(&(String, f64, f64)) -> f64| penetrations.iter().map(f).fold(0.0, f64::max);
+    host.result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
+    host.result("drift_ratio", h.peak_drift_ratio, "1")?;
+    host.result("hourglass_ratio", h.hourglass_ratio, "1")?;
+    host.result("penetration_max", worst(|x| x.1), "m")?;
+    host.result("penetration_q999", worst(|x| x.2), "m")?;
+    let (lo, hi, strain) = ply_extremes(forming);
+    host.result("shear_max", hi, "rad")?;
+    host.result("shear_min", lo, "rad")?;
+    host.result("fibre_strain_max", strain, "1")?;
+    host.result("elements", elements as f64, "1")?;
+    host.result("cycles", outcome.cycles as f64, "1")?;
+    host.result("time_step", outcome.smallest_step, "s")?;
+    host.result("added_mass", m.sheets.iter().map(|s| s.added_mass).sum(), "kg")?;
+    host.measured("element_cycle_rate", element_cycles / seconds.max(1e-9), "1/s")
+}
+
+/// Smallest and largest shear angle (rad) and largest fibre strain by size, over the plies' elements, from
+/// the stretch of each cell's sides and diagonals in its material axes.
+fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
+    let (mut lo, mut hi, mut strain) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
+    for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
+        if sheet.scene.kind != SheetKind::Ply {
+            continue;
+        }
+        let axis = crate::assembly::axis(&sheet.scene);
+        let (now, then) = (forming.points(body), forming.reference_points(body));
+        for cell in &body.cells {
+            let (g, e) = cell_strain(
+                cell.map(|n| then[n as usize]),
+                cell.map(|n| now[n as usize]),
+                axis,
+            );
+            lo = lo.min(g);
+            hi = hi.max(g);
+            strain = strain.max(e);
+        }
+    }
+    if lo > hi { (0.0, 0.0, 0.0) } else { (lo, hi, strain) }
+}
+
+/// Shear angle (rad) and largest fibre strain by size at the centre of a cell.
+fn cell_strain(then: [V; 4], now: [V; 4], axis: V) -> (f64, f64) {
+    use plyflow_mechanics::vec3::{add, dot, norm, scale, sub};
+    let mid = |p: &[V; 4]| (sub(p[2], p[0]), sub(p[3], p[1]));
+    let ((a, b), (d, e)) = (mid(&then), mid(&now));
+    let det = a[0] * b[1] - a[1] * b[0];
+    let map = |u: V| {
+        let s = (u[0] * b[1] - u[1] * b[0]) / det;
+        let t = (a[0] * u[1] - a[1] * u[0]) / det;
+        add(scale(d, s), scale(e, t))
+    };
+    let (f1, f2) = (map(axis), map([-axis[1], axis[0], 0.0]));
+    let (l1, l2) = (norm(f1), norm(f2));
+    let g = (dot(f1, f2) / (l1 * l2)).clamp(-1.0, 1.0).asin();
+    (g, (l1 - 1.0).abs().max((l2 - 1.0).abs()))
+}

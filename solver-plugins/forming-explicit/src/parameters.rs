@@ -1,0 +1,61 @@
+//! The resolved parameters.
+
+use plyflow_model::scene::Scene;
+use serde::Deserialize;
+
+/// A component choice as the host resolves it.
+#[derive(Debug, Clone, Deserialize)]
+pub struct ComponentChoice {
+    /// Name or path of the plugin.
+    pub plugin: String,
+    /// Its resolved parameters.
+    #[serde(default)]
+    pub with: serde_json::Value,
+}
+
+/// Parameters of the step, SI.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Parameters {
+    /// The scene.
+    pub scene: Scene,
+    /// Element of the plies.
+    pub element: ComponentChoice,
+    /// Element of the diaphragms.
+    pub diaphragm_element: ComponentChoice,
+    /// Ply element edge (m).
+    pub element_size: f64,
+    /// Diaphragm element edge (m).
+    #[serde(default)]
+    pub diaphragm_element_size: Option<f64>,
+    /// Ratio of neighbouring diaphragm elements.
+    pub diaphragm_growth: f64,
+    /// Wanted step (s).
+    pub time_step: f64,
+    /// Share of the critical step.
+    pub step_safety: f64,
+    /// Least areal mass (kg/m2).
+    pub least_areal_mass: f64,
+    /// Mass-proportional damping (1/s).
+    pub damping: f64,
+    /// Contact stiffness factor.
+    pub contact_stiffness: f64,
+    /// Slip stiffness factor.
+    pub slip_stiffness: f64,
+    /// Contact damping ratio.
+    pub contact_damping: f64,
+    /// Contact augmentation.
+    pub contact_augmentation: f64,
+    /// Frames besides the start.
+    pub frames: usize,
+    /// Spacing of the signed-distance grid (m).
+    pub tool_grid: f64,
+    /// Kinetic bound.
+    pub kinetic_bound: f64,
+}
+
+impl Parameters {
+    /// Edge of the diaphragms' elements (m).
+    pub fn film_size(&self) -> f64 {
+        self.diaphragm_element_size.unwrap_or(self.element_size)
+    }
+}

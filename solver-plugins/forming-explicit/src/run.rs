@@ -1,0 +1,258 @@
+//! The time loop: frames, ledger, step control, health.
+
+use crate::assembly::StackSheet;
+use crate::process::Load;
+use plyflow_mechanics::energy::{EnergyHealth, Ledger, judge};
+use plyflow_mechanics::model::Model;
+use plyflow_mechanics::vec3::{V, norm};
+use plyflow_tooling::ToolMesh;
+
+/// Ledger entries per frame.
+const LEDGER_PER_FRAME: u64 = 10;
+
+/// A sheet as a body of the artifact.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Name.
+    pub name: String,
+    /// Index in [`Model::sheets`].
+    pub sheet: usize,
+    /// `[m]` cells in mesh-local numbers.
+    pub cells: Vec<[u32; 4]>,
+}
+
+impl Body {
+    /// The body of stack sheet `sheet`, number `index` of the model.
+    pub fn new(sheet: &StackSheet, index: usize, cells: Vec<[u32; 4]>) -> Self {
+        Self { name: sheet.scene.name.clone(), sheet: index, cells }
+    }
+}
+
+/// A forming run, ready to go.
+pub struct Forming {
+    /// The model.
+    pub model: Model,
+    /// Its loads.
+    pub load: Load,
+    /// The stack, bottom to top.
+    pub stack: Vec<StackSheet>,
+    /// Bodies of the artifact, bottom to top.
+    pub bodies: Vec<Body>,
+    /// `[n]` points at the start (m).
+    pub reference: Vec<V>,
+    /// The tool.
+    pub tool: ToolMesh,
+    /// The zone of a local run.
+    pub zone: Option<serde_json::Value>,
+    /// Edge of the plies' elements (m).
+    pub element_size: f64,
+}
+
+/// One line of the history.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HistoryRow {
+    /// Time (s).
+    pub time: f64,
+    /// Energies (J).
+    pub ledger: Ledger,
+    /// Cavity pressure (Pa).
+    pub cavity: f64,
+    /// Bag pressure (Pa).
+    pub bag: f64,
+    /// Frame height (m).
+    pub frame: f64,
+}
+
+/// What came of a run.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The history.
+    pub history: Vec<HistoryRow>,
+    /// Its health.
+    pub health: EnergyHealth,
+    /// Steps done.
+    pub cycles: u64,
+    /// Smallest step used (s).
+    pub smallest_step: f64,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Who follows a run.
+pub trait Observer {
+    /// A frame, with the model's fields of that moment.
+    ///
+    /// # Errors
+    /// Stops the run.
+    fn frame(&mut self, forming: &Forming, time: f64) -> Result<(), plyflow_sdk::StepError>;
+    /// Called often; may stop the run.
+    ///
+    /// # Errors
+    /// Stops the run.
+    fn tick(
+        &mut self,
+        forming: &Forming,
+        energies: &Ledger,
+        end: f64,
+    ) -> Result<(), plyflow_sdk::StepError>;
+}
+
+impl Forming {
+    /// Positions (m) of a body's points now.
+    pub fn points(&self, body: &Body) -> Vec<V> {
+        let nodes = &self.model.sheets[body.sheet].nodes;
+        nodes.iter().map(|n| self.model.x[*n as usize]).collect()
+    }
+
+    /// Reference points (m) of a body.
+    pub fn reference_points(&self, body: &Body) -> Vec<V> {
+        let nodes = &self.model.sheets[body.sheet].nodes;
+        nodes.iter().map(|n| self.reference[*n as usize]).collect()
+    }
+
+    fn row(&self, ledger: Ledger) -> HistoryRow {
+        let m = &self.model;
+        HistoryRow {
+            time: m.time,
+            ledger,
+            cavity: m.pressures.below,
+            bag: m.pressures.above,
+            frame: self.load.frame_height(m.time),
+        }
+    }
+
+    /// Runs to the end of the process with `frames` frames after the first. The step is a whole fraction
+    /// of the time between frames, chosen anew at each frame from the elements' critical step.
+    ///
+    /// # Errors
+    /// When the run becomes unstable, a component fails, or the observer stops it.
+    pub fn run(
+        &mut self,
+        frames: usize,
+        target_step: f64,
+        safety: f64,
+        kinetic_bound: f64,
+        observer: &mut dyn Observer,
+    ) -> Result<Outcome, plyflow_sdk::StepError> {
+        let end = self.load.cycle().duration();
+        let interval = end / frames as f64;
+        let mut history = Vec::with_capacity(frames * LEDGER_PER_FRAME as usize + 1);
+        let mut smallest_step = f64::INFINITY;
+        for frame in 0..frames {
+            let critical = self.model.critical_step().map_err(|e| e.to_string())?;
+            let wanted = target_step.min(safety * critical);
+            let steps = (interval / wanted).ceil().max(1.0) as u64;
+            if wanted < 0.02 * target_step {
+                return Err(format!(
+                    "the critical step has fallen to {critical:.3e} s at t = {:.5} s, below 2 % of \
+                     the wanted step: an element has collapsed. Try a larger hourglass stiffness, \
+                     a finer mesh or more friction-free sliding",
+                    self.model.time
+                )
+                .into());
+            }
+            self.model.dt = interval / steps as f64;
+            smallest_step = smallest_step.min(self.model.dt);
+            let start = interval * frame as f64;
+            for k in 0..steps {
+                // Times from the count, not from a sum: frames fall on the same instants in every run.
+                self.model.time = start + self.model.dt * k as f64;
+                self.load.apply(&mut self.model);
+                self.model.step(k == 0).map_err(|e| e.to_string())?;
+                if k == 0 {
+                    // Fields belong to the positions before the step; its motion is far below output
+                    // precision.
+                    observer.frame(self, start)?;
+                }
+                if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
+                    let energies = self.model.energies();
+                    history.push(self.row(energies));
+                    observer.tick(self, &energies, end)?;
+                }
+            }
+        }
+        self.model.time = end;
+        self.load.apply(&mut self.model);
+        self.model.step(true).map_err(|e| e.to_string())?;
+        observer.frame(self, end)?;
+        history.push(self.row(self.model.energies()));
+        let ledgers: Vec<Ledger> = history.iter().map(|r| r.ledger).collect();
+        let health = judge(&ledgers);
+        let warnings = warnings(&health, kinetic_bound);
+        Ok(Outcome { history, health, cycles: self.model.cycle, smallest_step, warnings })
+    }
+
+    /// Pressure (Pa) on the face of each of a body's points that looks to the tool.
+    pub fn contact_pressure(&self, body: &Body) -> Vec<f64> {
+        let m = &self.model;
+        let mut force = vec![0.0; m.x.len()];
+        for c in m.rigid_contacts.iter() {
+            for i in &c.items {
+                force[i.node as usize] += i.normal_force;
+            }
+        }
+        for c in &m.sheet_contacts {
+            for i in c.items.iter().filter(|i| i.active) {
+                if c.side > 0.0 {
+                    force[i.node as usize] += i.normal_force;
+                } else {
+                    for (w, n) in i.weights.iter().zip(m.cells[i.cell as usize]) {
+                        force[n as usize] += w * i.normal_force;
+                    }
+                }
+            }
+        }
+        m.sheets[body.sheet]
+            .nodes
+            .iter()
+            .map(|n| force[*n as usize] / norm(m.area[*n as usize]).max(1e-12))
+            .collect()
+    }
+
+    /// Penetrations (m) of the nodes in contact by pair: name, largest, 99.9 % quantile.
+    pub fn penetrations(&self) -> Vec<(String, f64, f64)> {
+        let judge = |name: &str, mut depths: Vec<f64>| {
+            depths.sort_by(f64::total_cmp);
+            let at = (0.999 * depths.len() as f64) as usize;
+            let max = depths.last().copied().unwrap_or(0.0);
+            let q = depths.get(at.min(depths.len().saturating_sub(1))).copied().unwrap_or(0.0);
+            (name.to_owned(), max, q)
+        };
+        let m = &self.model;
+        let rigid = m.rigid_contacts.iter().map(|c| {
+            let depths = c.items.iter().map(|i| i.penetration).filter(|p| *p > 0.0).collect();
+            judge(&c.name, depths)
+        });
+        let sheets = m.sheet_contacts.iter().map(|c| {
+            let depths =
+                c.items.iter().filter(|i| i.active).map(|i| i.penetration).collect();
+            judge(&c.name, depths)
+        });
+        rigid.chain(sheets).collect()
+    }
+}
+
+fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {
+    let mut list = Vec::new();
+    if h.peak_kinetic_ratio > kinetic_bound {
+        list.push(format!(
+            "kinetic energy reached {:.1} % of internal energy (bound {:.1} %): the run is not \
+             quasi-static. Use longer process times or less mass scaling",
+            100.0 * h.peak_kinetic_ratio,
+            100.0 * kinetic_bound
+        ));
+    }
+    if h.peak_drift_ratio > 0.05 {
+        list.push(format!(
+            "{:.1} % of the external work is unaccounted for: reduce time_step or step_safety",
+            100.0 * h.peak_drift_ratio
+        ));
+    }
+    if h.hourglass_ratio > 0.05 {
+        list.push(format!(
+            "hourglass energy is {:.1} % of internal energy: refine the mesh",
+            100.0 * h.hourglass_ratio
+        ));
+    }
+    list
+}
