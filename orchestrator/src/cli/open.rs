@@ -127,12 +127,20 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
     let search_path = search_path(&args.places, Some(file))?;
     let root = store_root(&args.places, Some(file));
     let catalog = catalog(search_path.clone(), &root)?;
-    let workflow = match plyflow_workflow::load(file, &catalog) {
+    let overrides = overrides(&args.set)?;
+    let workflow = match plyflow_workflow::load_with(file, &catalog, &overrides) {
         Ok(workflow) => workflow,
         Err(findings) => return Ok(Err(findings)),
     };
     let graph = Graph::new(&workflow).map_err(|e| Stop::new(exit::INVALID, e))?;
     Ok(Ok(Opened { workflow, graph, store: Store::new(root), search_path }))
+}
+
+fn overrides(set: &[String]) -> Result<Vec<plyflow_workflow::Override>, Stop> {
+    let one = |text: &String| {
+        text.parse().map_err(|e| Stop::new(exit::USAGE, format!("--set {text}: {e}")))
+    };
+    set.iter().map(one).collect()
 }
 
 impl Opened {

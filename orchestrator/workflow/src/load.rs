@@ -1,6 +1,6 @@
 //! A workflow file -> [`ResolvedWorkflow`], or everything that is wrong with it.
 
-use crate::catalog::{Catalog, CatalogEntry};
+use crate::catalog::{Catalog, CatalogEntry, Plugins};
 use crate::check::Checker;
 use crate::diagnostics::{Diagnostics, Problems, Source};
 use crate::expect;
@@ -15,6 +15,8 @@ use plyflow_model::manifest::PluginKind;
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_model::{canonical, schema};
 use serde_json::Value;
+use std::collections::HashSet;
+use std::rc::Rc;
 use std::sync::LazyLock;
 
 static WORKFLOW: LazyLock<Value> = LazyLock::new(schema::workflow);
@@ -24,7 +26,7 @@ pub(crate) struct Draft<'n> {
     /// Its entry in `steps`.
     pub entry: &'n Entry,
     /// Its plugin, if it was found.
-    pub plugin: Option<CatalogEntry>,
+    pub plugin: Option<Rc<CatalogEntry>>,
 }
 
 impl Draft<'_> {
@@ -68,6 +70,7 @@ fn load_into(
     overrides::apply(&mut root, overrides, &source, problems);
     Checker::new(&WORKFLOW, &source, problems).check(&root, "the workflow");
     plugin_folders(&root, &source, problems);
+    let catalog = &Plugins::new(catalog);
     let drafts = drafts(&root, &source, catalog, problems);
     let wiring = wires::connect(&drafts, &source, problems);
     let expectations = expect::expectations(&root, &drafts, &source, problems);
@@ -157,7 +160,7 @@ fn plugin_folders(root: &Node, source: &Source, problems: &mut Problems) {
 fn drafts<'n>(
     root: &'n Node,
     source: &Source,
-    catalog: &dyn Catalog,
+    catalog: &Plugins<'_>,
     problems: &mut Problems,
 ) -> Vec<Draft<'n>> {
     let Some(steps) = root.entry("steps") else {
@@ -168,9 +171,10 @@ fn drafts<'n>(
         d.expected("at least one step");
     }
     let mut drafts: Vec<Draft<'n>> = Vec::new();
+    let mut seen = HashSet::new();
     for entry in steps.value.entries() {
         // A repeated step has been reported as a repeated key.
-        if drafts.iter().any(|d| d.name() == entry.key) {
+        if !seen.insert(entry.key.as_str()) {
             continue;
         }
         if !is_word(&entry.key) {
@@ -199,7 +203,7 @@ fn step(
     wiring: &Wiring,
     index: usize,
     source: &Source,
-    catalog: &dyn Catalog,
+    catalog: &Plugins<'_>,
     problems: &mut Problems,
 ) -> Option<ResolvedStep> {
     let plugin = draft.plugin.as_ref()?;
