@@ -93,13 +93,14 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
         .map(|(&a, &b)| a || b)
         .collect();
     let areas = ply.topology.cell_areas(ply.undeformed);
+    // A fold: the sum of nothing is -0 in Rust.
     let area = |chosen: &[bool]| {
         areas
             .iter()
             .zip(chosen)
             .filter(|(_, c)| **c)
             .map(|(a, _)| a)
-            .sum()
+            .fold(0.0, |sum, a| sum + a)
     };
     let judged = distances.iter().filter(|d| d.judged).map(|d| d.value);
     let summary = Summary {

@@ -101,7 +101,11 @@ fn flat_ply_on_a_flat_tool_has_no_defect() {
     let found = detect(&formed(|_, _| OFFSET, |_| 0.01));
     assert_eq!(found.kind, "defects");
     for name in ["flagged_area", "over_shear_area", "poor_conformity_area"] {
-        assert_eq!(found.result(name), 0.0, "{name}");
+        assert_eq!(
+            found.result(name).to_bits(),
+            0,
+            "{name}: zero, and not minus zero"
+        );
     }
     assert!(found.result("distance_max").abs() < 1e-12);
     assert!(found.body("ply_1").last("flag").iter().all(|&f| f == 0.0));

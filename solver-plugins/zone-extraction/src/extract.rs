@@ -110,7 +110,8 @@ pub fn extract(
             defect_box,
             free_sides: edges.map(|(a, b)| bounds[a] == blank[b]),
             plies,
-            flagged_area: cells.iter().filter(inside).map(|c| c.area).sum(),
+            // A fold: the sum of nothing is -0 in Rust.
+            flagged_area: cells.iter().filter(inside).fold(0.0, |sum, c| sum + c.area),
         }
     };
     Ok(zones.drain(..).enumerate().map(describe).collect())
@@ -202,8 +203,8 @@ fn grown(defect: Rectangle, blank: Rectangle, s: &Settings) -> Rectangle {
     for d in 0..2 {
         let centre = 0.5 * (defect[d] + defect[d + 2]);
         let half = 0.5 * ((defect[d + 2] - defect[d]) * s.scale).max(s.minimum_size);
-        b[d] = centre - half;
-        b[d + 2] = centre + half;
+        b[d] = tidy(centre - half);
+        b[d + 2] = tidy(centre + half);
         if b[d] < blank[d] + s.join_distance {
             b[d] = blank[d];
         }
@@ -212,6 +213,11 @@ fn grown(defect: Rectangle, blank: Rectangle, s: &Settings) -> Rectangle {
         }
     }
     b
+}
+
+/// To 0.1 um, so that people can read it.
+pub(crate) fn tidy(length: f64) -> f64 {
+    (length * 1e7).round() / 1e7
 }
 
 /// Replaces overlapping zones by one around both of their defects, until none overlap.

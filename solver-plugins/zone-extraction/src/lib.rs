@@ -4,6 +4,7 @@ mod extract;
 
 pub use extract::{ExtractError, FlaggedCell, Rectangle, Settings, Zone, area, extract};
 
+use extract::tidy;
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use plyflow_surface::Topology;
 use plyflow_surface::vector::Vec3;
@@ -21,7 +22,8 @@ impl Step for ZoneExtraction {
         let settings: Settings = host.parameters()?;
         let (plies, cells, blank) = read(host)?;
         let zones = extract(&cells, blank, &settings)?;
-        let fraction = zones.iter().map(|z| area(z.bounds)).sum::<f64>() / area(blank);
+        let covered = zones.iter().fold(0.0, |sum, z| sum + area(z.bounds));
+        let fraction = covered / area(blank);
         if fraction > settings.maximum_fraction {
             host.log(
                 Log::Warn,
@@ -74,10 +76,9 @@ fn read(host: &Host) -> Result<(Vec<String>, Vec<FlaggedCell>, Rectangle), StepE
         let (points, nodes) = host.mesh(&input, body)?;
         let flat = host.frame_field(&input, body, frame, "undeformed")?;
         // Fields are kept in single precision: back to 0.1 um, so that an edge at 240 mm is one.
-        let tidy = |v: &f64| (v * 1e7).round() / 1e7;
         let flat: Vec<Vec3> = flat
             .chunks_exact(3)
-            .map(|p| [tidy(&p[0]), tidy(&p[1]), tidy(&p[2])])
+            .map(|p| [tidy(p[0]), tidy(p[1]), tidy(p[2])])
             .collect();
         let flags = host.frame_field(&input, body, frame, "flag")?;
         let topology = Topology::new(points.len(), body.nodes_per_cell, &nodes);
