@@ -3,6 +3,9 @@
 use crate::resolved::PluginId;
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::manifest::{Manifest, PluginKind};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
 
 /// A plugin that was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,4 +52,38 @@ pub trait Catalog {
 
     /// Names of all plugins of a kind on the search path, for suggestions.
     fn names(&self, kind: PluginKind) -> Vec<String>;
+}
+
+/// A catalog that is asked once per name and folder: ten thousand steps share a handful of plugins.
+pub(crate) struct Plugins<'a> {
+    catalog: &'a dyn Catalog,
+    known: RefCell<HashMap<(String, Utf8PathBuf), Answer>>,
+}
+
+/// What a catalog said.
+type Answer = Result<Rc<CatalogEntry>, CatalogError>;
+
+impl<'a> Plugins<'a> {
+    /// Nothing is known yet.
+    pub fn new(catalog: &'a dyn Catalog) -> Self {
+        Plugins {
+            catalog,
+            known: RefCell::default(),
+        }
+    }
+
+    /// See [`Catalog::find`].
+    pub fn find(&self, name_or_path: &str, relative_to: &Utf8Path) -> Answer {
+        let key = (name_or_path.to_owned(), relative_to.to_owned());
+        let mut known = self.known.borrow_mut();
+        let answer = known
+            .entry(key)
+            .or_insert_with(|| self.catalog.find(name_or_path, relative_to).map(Rc::new));
+        answer.clone()
+    }
+
+    /// See [`Catalog::names`].
+    pub fn names(&self, kind: PluginKind) -> Vec<String> {
+        self.catalog.names(kind)
+    }
 }

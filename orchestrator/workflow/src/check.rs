@@ -12,6 +12,7 @@ use crate::yaml::{Kind, Node, Span};
 use plyflow_model::manifest::one_of;
 use plyflow_model::units::{Dimension, parse_quantity};
 use serde_json::{Map, Value};
+use std::collections::HashMap;
 
 /// Checks a tree.
 pub struct Checker<'a> {
@@ -393,9 +394,20 @@ impl<'a> Checker<'a> {
 
 /// Reports every repeated key of a tree.
 pub fn repeated_keys(node: &Node, source: &Source, problems: &mut Problems) {
-    for (i, entry) in node.entries().iter().enumerate() {
-        if let Some(first) = node.entries()[..i].iter().find(|e| e.key == entry.key) {
-            let line = source.text[..first.key_span.start].matches('\n').count() + 1;
+    let entries = node.entries();
+    let mut places: HashMap<&str, &Span> = HashMap::new();
+    for (i, entry) in entries.iter().enumerate() {
+        // Most mappings are small; only a long one is worth a table.
+        let first = if entries.len() <= 16 {
+            entries[..i]
+                .iter()
+                .find(|e| e.key == entry.key)
+                .map(|e| &e.key_span)
+        } else {
+            places.insert(&entry.key, &entry.key_span)
+        };
+        if let Some(first) = first {
+            let line = source.text[..first.start].matches('\n').count() + 1;
             let d = problems.add(
                 source,
                 &entry.key_span,

@@ -1,7 +1,7 @@
 //! A `with` block against the declarations of a manifest: SI numbers, defaults filled in, files hashed,
 //! components looked up. Everything wrong is reported where it stands.
 
-use crate::catalog::{Catalog, CatalogEntry, CatalogError};
+use crate::catalog::{CatalogEntry, CatalogError, Plugins};
 use crate::check::{choice, out_of_bounds, quantity};
 use crate::diagnostics::{Problems, Source};
 use crate::resolved::{InputFile, PluginId};
@@ -10,11 +10,12 @@ use camino::{Utf8Path, Utf8PathBuf};
 use indexmap::IndexMap;
 use plyflow_model::manifest::{Bounds, Declaration, PluginKind, Shape};
 use serde_json::{Map, Value, json};
+use std::rc::Rc;
 
 /// Resolves the parameters of one step.
-pub struct Resolver<'a> {
+pub(crate) struct Resolver<'a> {
     /// Finds components.
-    pub catalog: &'a dyn Catalog,
+    pub catalog: &'a Plugins<'a>,
     /// Where findings go.
     pub problems: &'a mut Problems,
     /// Components met so far, with the JSON pointer of the parameter that names them.
@@ -26,7 +27,7 @@ pub struct Resolver<'a> {
 /// Where a value is: its file, its JSON pointer in the step's parameters, its name for messages, and the
 /// place of its key, to point at when the value has no extent.
 #[derive(Clone)]
-pub struct Place<'s> {
+pub(crate) struct Place<'s> {
     /// The file.
     pub source: &'s Source,
     /// JSON pointer.
@@ -52,7 +53,7 @@ impl<'s> Place<'s> {
 
 impl<'a> Resolver<'a> {
     /// For one step.
-    pub fn new(catalog: &'a dyn Catalog, problems: &'a mut Problems) -> Self {
+    pub fn new(catalog: &'a Plugins<'a>, problems: &'a mut Problems) -> Self {
         Resolver {
             catalog,
             problems,
@@ -369,14 +370,14 @@ pub fn unreadable(
 }
 
 /// Finds a plugin of a kind or reports why there is none.
-pub fn find(
-    catalog: &dyn Catalog,
+pub(crate) fn find(
+    catalog: &Plugins<'_>,
     problems: &mut Problems,
     source: &Source,
     name: &str,
     span: &Span,
     kind: PluginKind,
-) -> Option<CatalogEntry> {
+) -> Option<Rc<CatalogEntry>> {
     let article = if kind == PluginKind::Element {
         "an"
     } else {

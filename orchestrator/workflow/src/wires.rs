@@ -8,7 +8,7 @@ use crate::yaml::{Kind, Node, Span};
 use petgraph::graph::{DiGraph, NodeIndex};
 use plyflow_model::manifest::{InputPort, Manifest};
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
 
 /// All wires of a workflow; indices are positions in the file.
 pub(crate) struct Wiring {
@@ -20,6 +20,9 @@ pub(crate) struct Wiring {
     pub order: Vec<usize>,
 }
 
+/// How many steps a remedy names at most.
+const NAMED: usize = 8;
+
 /// A wire as it stands in the file.
 struct Wire {
     port: String,
@@ -30,8 +33,14 @@ struct Wire {
 
 /// Reads `from` and `for_each` of all steps; everything wrong is reported.
 pub(crate) fn connect(drafts: &[Draft<'_>], source: &Source, problems: &mut Problems) -> Wiring {
+    let index = drafts
+        .iter()
+        .enumerate()
+        .map(|(i, d)| (d.name(), i))
+        .collect();
     let mut reader = Reader {
         drafts,
+        index,
         source,
         problems,
         wires: Vec::new(),
@@ -53,7 +62,11 @@ pub(crate) fn connect(drafts: &[Draft<'_>], source: &Source, problems: &mut Prob
     let dimensions = dimensions(drafts, &fans, &order);
     gathered(drafts, &wires, &dimensions, source, problems);
     let inputs = (0..drafts.len())
-        .map(|to| in_order_of_ports(&drafts[to], to, &wires, drafts))
+        .map(|to| {
+            let start = wires.partition_point(|w| w.to < to);
+            let end = wires.partition_point(|w| w.to <= to);
+            in_order_of_ports(&drafts[to], &wires[start..end], drafts)
+        })
         .collect();
     Wiring {
         inputs,
@@ -64,15 +77,18 @@ pub(crate) fn connect(drafts: &[Draft<'_>], source: &Source, problems: &mut Prob
 
 struct Reader<'a, 'n> {
     drafts: &'a [Draft<'n>],
+    /// Step name -> its position.
+    index: HashMap<&'a str, usize>,
     source: &'a Source,
     problems: &'a mut Problems,
+    /// By receiving step, in the order of the file.
     wires: Vec<Wire>,
 }
 
 impl Reader<'_, '_> {
     fn step(&mut self, node: &Node) -> Option<usize> {
         let name = node.text()?;
-        let found = self.drafts.iter().position(|d| d.name() == name);
+        let found = self.index.get(name).copied();
         if found.is_none() {
             let d = self.problems.add(
                 self.source,
@@ -148,6 +164,7 @@ impl Reader<'_, '_> {
         let givers: Vec<&str> = (0..self.drafts.len())
             .filter(|&i| i != to && kind(&self.drafts[i]).is_some_and(|k| port.accepts(k)))
             .map(|i| self.drafts[i].name())
+            .take(NAMED)
             .collect();
         let d = self.problems.add(self.source, at, message);
         d.expected(format!(
@@ -222,7 +239,9 @@ impl Reader<'_, '_> {
         if self
             .wires
             .iter()
-            .any(|w| w.to == to && w.from == from && w.port == name && !name.is_empty())
+            .rev()
+            .take_while(|w| w.to == to)
+            .any(|w| w.from == from && w.port == name && !name.is_empty())
         {
             let message = format!("`{}` is wired to `{name}` twice", self.drafts[from].name());
             self.problems
@@ -242,6 +261,7 @@ impl Reader<'_, '_> {
                 .iter()
                 .filter(|d| kind(d) == Some(port.kind.as_str()))
                 .map(|d| d.name())
+                .take(NAMED)
                 .collect();
             let d = self.problems.add(self.source, &giver.span, message);
             d.given(format!("`{given}` from `{step}`"))
@@ -341,8 +361,11 @@ fn order(
     for _ in drafts {
         graph.add_node(());
     }
+    let mut known = HashSet::new();
     for (from, to, _) in edges {
-        graph.update_edge(NodeIndex::new(*from), NodeIndex::new(*to), ());
+        if known.insert((from, to)) {
+            graph.add_edge(NodeIndex::new(*from), NodeIndex::new(*to), ());
+        }
     }
     let mut cyclic = false;
     for component in petgraph::algo::tarjan_scc(&graph) {
@@ -498,9 +521,9 @@ fn gathered(
     }
 }
 
+/// The wires of one step.
 fn in_order_of_ports(
     draft: &Draft<'_>,
-    to: usize,
     wires: &[Wire],
     drafts: &[Draft<'_>],
 ) -> Vec<ResolvedInput> {
@@ -512,7 +535,7 @@ fn in_order_of_ports(
         .flat_map(|port| {
             wires
                 .iter()
-                .filter(move |w| w.to == to && w.port == *port)
+                .filter(move |w| w.port == *port)
                 .map(move |w| ResolvedInput {
                     port: port.clone(),
                     from: drafts[w.from].name().to_owned(),
