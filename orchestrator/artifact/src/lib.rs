@@ -10,6 +10,7 @@ mod error;
 mod h5;
 mod mesh;
 mod reader;
+mod small;
 mod writer;
 
 pub use contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, NamedValue, On};

@@ -2,8 +2,9 @@
 
 use crate::contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, NamedValue, On};
 use crate::error::{ArtifactError, ErrorKind, Result, bad_shape, not_found};
-use crate::h5::{DType, File, Location, Plain, bytes_mut};
+use crate::h5::{DType, File, Group, Location, Plain, bytes_mut};
 use crate::mesh::group;
+use crate::small;
 use std::path::{Path, PathBuf};
 
 /// An artifact open for reading. Its description is read when it is opened, arrays when they are asked
@@ -11,7 +12,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Artifact {
     path: PathBuf,
-    file: File,
+    /// Absent when the artifact has attributes alone.
+    file: Option<File>,
     kind: String,
     attributes: String,
     results: Vec<NamedValue>,
@@ -19,6 +21,44 @@ pub struct Artifact {
     contents: Contents,
     provenance: String,
     times: Vec<f64>,
+}
+
+/// Where the attributes of `/plyflow` come from.
+enum Source {
+    Small(Vec<(String, small::Value)>),
+    Library(Group),
+}
+
+impl Source {
+    fn text(&self, name: &str) -> Result<Option<String>> {
+        match self {
+            Self::Library(group) => group.read_text(name),
+            Self::Small(all) => Ok(all.iter().find_map(|(n, v)| match v {
+                small::Value::Text(t) if n == name => Some(t.clone()),
+                _ => None,
+            })),
+        }
+    }
+
+    fn integer(&self, name: &str) -> Result<Option<i64>> {
+        match self {
+            Self::Library(group) => group.read_integer(name),
+            Self::Small(all) => Ok(all.iter().find_map(|(n, v)| match v {
+                small::Value::Integer(i) if n == name => Some(*i),
+                _ => None,
+            })),
+        }
+    }
+}
+
+/// Attributes of a file that needs no library; `None` for every other file.
+fn read_small(path: &Path) -> Option<Vec<(String, small::Value)>> {
+    /// Larger ones hold arrays or texts that only the library reads.
+    const LARGEST: u64 = 1 << 20;
+    if std::fs::metadata(path).ok()?.len() > LARGEST {
+        return None;
+    }
+    small::read(&std::fs::read(path).ok()?)
 }
 
 impl Artifact {
@@ -34,9 +74,15 @@ impl Artifact {
             let text = format!("{} is not a Plyflow artifact: {what}", path.display());
             ArtifactError::new(ErrorKind::NotAnArtifact, text)
         };
-        let file = File::open(path).map_err(|e| broken(e.message))?;
-        let group = file.open_group("/plyflow").map_err(|e| broken(e.message))?;
-        match group.read_integer("data_model")? {
+        let (file, source) = match read_small(path) {
+            Some(attributes) => (None, Source::Small(attributes)),
+            None => {
+                let file = File::open(path).map_err(|e| broken(e.message))?;
+                let group = file.open_group("/plyflow").map_err(|e| broken(e.message))?;
+                (Some(file), Source::Library(group))
+            }
+        };
+        match source.integer("data_model")? {
             Some(DATA_MODEL) => {}
             Some(other) => {
                 return Err(broken(format!(
@@ -46,26 +92,26 @@ impl Artifact {
             None => return Err(broken("it has no data model version".into())),
         }
         let text = |name: &str| {
-            group
-                .read_text(name)?
+            source
+                .text(name)?
                 .ok_or_else(|| broken(format!("it has no '{name}'")))
         };
         let parse = |name: &str, e: serde_json::Error| broken(format!("'{name}': {e}"));
         let contents: Contents =
             serde_json::from_str(&text("contents")?).map_err(|e| parse("contents", e))?;
         let results = serde_json::from_str(&text("results")?).map_err(|e| parse("results", e))?;
-        let collection = match group.read_text("collection")? {
+        let collection = match source.text("collection")? {
             Some(t) => Some(serde_json::from_str(&t).map_err(|e| parse("collection", e))?),
             None => None,
         };
         let mut times = vec![0.0; contents.frames as usize];
-        if contents.frames > 0 {
+        if let (Some(file), true) = (&file, contents.frames > 0) {
             let d = file.open_dataset("/plyflow/times", DType::F64, &[contents.frames])?;
             d.read_rows(0, contents.frames, DType::F64, bytes_mut(&mut times))?;
         }
         let (kind, attributes, provenance) =
             (text("kind")?, text("attributes")?, text("provenance")?);
-        drop(group);
+        drop(source);
         let path = path.to_owned();
         Ok(Self {
             path,
@@ -77,6 +123,16 @@ impl Artifact {
             contents,
             provenance,
             times,
+        })
+    }
+
+    fn file(&self) -> Result<&File> {
+        // An artifact without a file lists no body and no array, so nobody comes here.
+        self.file.as_ref().ok_or_else(|| {
+            ArtifactError::new(
+                ErrorKind::NotFound,
+                "the artifact holds no arrays and no bodies",
+            )
         })
     }
 
@@ -180,7 +236,7 @@ impl Artifact {
             ));
         }
         let d = self
-            .file
+            .file()?
             .open_dataset(&format!("/data/{path}"), info.dtype, &info.shape)?;
         d.read_all(dtype, buffer)
     }
@@ -228,10 +284,10 @@ impl Artifact {
         } else {
             format!("/VTKHDF/{body}/Points")
         };
-        let d = self.file.open_dataset(&path, DType::F64, &[n, 3])?;
+        let d = self.file()?.open_dataset(&path, DType::F64, &[n, 3])?;
         d.read_all(DType::F64, bytes_mut(points))?;
         let path = format!("/VTKHDF/{body}/Connectivity");
-        let d = self.file.open_dataset(&path, DType::I64, &[ids])?;
+        let d = self.file()?.open_dataset(&path, DType::I64, &[ids])?;
         d.read_all(DType::U32, bytes_mut(cells))
     }
 
@@ -275,7 +331,7 @@ impl Artifact {
             (n, 0)
         };
         let path = format!("/VTKHDF/{body}/Points");
-        let d = self.file.open_dataset(&path, DType::F64, &[rows, 3])?;
+        let d = self.file()?.open_dataset(&path, DType::F64, &[rows, 3])?;
         d.read_rows(first, n, DType::F64, bytes_mut(points))
     }
 
@@ -331,7 +387,7 @@ impl Artifact {
             shape.push(components);
         }
         let path = format!("/VTKHDF/{body}/{}/{name}", group(on));
-        let d = self.file.open_dataset(&path, DType::F32, &shape)?;
+        let d = self.file()?.open_dataset(&path, DType::F32, &shape)?;
         d.read_rows(rows * frame, rows, DType::F64, bytes_mut(values))
     }
 

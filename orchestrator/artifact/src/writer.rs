@@ -4,6 +4,7 @@ use crate::contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, Name
 use crate::error::{ArtifactError, ErrorKind, Result, bad_order, bad_shape, bad_value};
 use crate::h5::{DType, Dataset, File, Location, bytes, bytes_mut};
 use crate::mesh::BodyWriter;
+use crate::small;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -372,41 +373,66 @@ impl ArtifactWriter {
                 self.frames, self.last_time
             ));
         }
-        self.file()?;
-        let file = self.file.take().expect("made above");
         let times = self.read_times()?;
         let bodies = std::mem::take(&mut self.bodies);
-        if let (Some(first), false) = (bodies.first(), times.is_empty()) {
-            link_steps(&file, &first.info.name, &times)?;
-        }
         let mut contents = Contents {
             bodies: Vec::new(),
             frames: self.frames,
-            arrays: self.arrays,
+            arrays: std::mem::take(&mut self.arrays),
         };
-        for body in bodies {
-            contents.bodies.push(body.finish(&file, &times)?);
+        if let Some(file) = &self.file {
+            if let (Some(first), false) = (bodies.first(), times.is_empty()) {
+                link_steps(file, &first.info.name, &times)?;
+            }
+            for body in bodies {
+                contents.bodies.push(body.finish(file, &times)?);
+            }
         }
-        let group = file.ensure_group("/plyflow")?;
-        group.write_i64("data_model", &[], &[DATA_MODEL])?;
-        group.write_text("kind", &self.kind, false)?;
-        group.write_text(
-            "attributes",
-            self.attributes.as_deref().unwrap_or("{}"),
-            false,
-        )?;
-        group.write_text("results", &json(&self.results)?, false)?;
-        if let Some(labels) = &self.collection {
-            group.write_text("collection", &json(labels)?, false)?;
+        let attributes = self.description(&contents, provenance)?;
+        if self.file.is_none() {
+            if let Some(bytes) = small::write(&attributes) {
+                std::fs::write(&self.path, &bytes).map_err(|e| {
+                    let text = format!("writing the artifact {}: {e}", self.path.display());
+                    ArtifactError::new(ErrorKind::Io, text)
+                })?;
+                return Ok(bytes.len() as u64);
+            }
         }
-        group.write_text("contents", &json(&contents)?, false)?;
-        group.write_text("provenance", &provenance.to_string(), false)?;
+        let group = self.file()?.ensure_group("/plyflow")?;
+        for (name, value) in attributes {
+            match value {
+                small::Value::Text(text) => group.write_text(name, &text, false)?,
+                small::Value::Integer(i) => group.write_i64(name, &[], &[i])?,
+            }
+        }
         drop(group);
-        file.close()?;
+        self.file.take().expect("made above").close()?;
         let size = std::fs::metadata(&self.path).map_err(|e| {
             ArtifactError::new(ErrorKind::Io, format!("{}: {e}", self.path.display()))
         })?;
         Ok(size.len())
+    }
+
+    /// The attributes of `/plyflow`.
+    fn description(
+        &mut self,
+        contents: &Contents,
+        provenance: &Value,
+    ) -> Result<Vec<(&'static str, small::Value)>> {
+        let text = |t: String| small::Value::Text(t);
+        let attributes = self.attributes.take().unwrap_or_else(|| "{}".to_owned());
+        let mut all = vec![
+            ("data_model", small::Value::Integer(DATA_MODEL)),
+            ("kind", text(self.kind.clone())),
+            ("attributes", text(attributes)),
+            ("results", text(json(&self.results)?)),
+        ];
+        if let Some(labels) = &self.collection {
+            all.push(("collection", text(json(labels)?)));
+        }
+        all.push(("contents", text(json(contents)?)));
+        all.push(("provenance", text(provenance.to_string())));
+        Ok(all)
     }
 
     fn read_times(&mut self) -> Result<Vec<f64>> {
