@@ -1,0 +1,440 @@
+//! `plyflow run` from outside: caching, fan-out, failures, kills, locks.
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+/// The program of this build profile; built on the first call.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let plugins = plyflow_faults::folder();
+        let profile = plugins.parent().expect("a profile folder");
+        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
+        cargo.env(
+            "CARGO_TARGET_DIR",
+            profile.parent().expect("a target folder"),
+        );
+        cargo.args(["build", "--quiet", "--package", "plyflow"]);
+        if profile.ends_with("release") {
+            cargo.arg("--release");
+        }
+        assert!(
+            cargo.status().expect("cargo starts").success(),
+            "plyflow does not build"
+        );
+        profile.join("plyflow")
+    })
+}
+
+/// A folder with a workflow in it.
+struct Study {
+    folder: tempfile::TempDir,
+}
+
+impl Study {
+    fn new(workflow: &str) -> Self {
+        let study = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        study.write(workflow);
+        study
+    }
+
+    fn write(&self, workflow: &str) {
+        let text = format!("plyflow: 1\nname: study\n{workflow}");
+        std::fs::write(self.folder.path().join("workflow.yaml"), text).unwrap();
+    }
+
+    fn command(&self, words: &[&str]) -> Command {
+        let mut command = Command::new(program());
+        command.arg(words[0]).arg("workflow.yaml").args(&words[1..]);
+        command
+            .current_dir(self.folder.path())
+            .env("PLYFLOW_PLUGINS", plyflow_faults::folder());
+        command
+    }
+
+    fn call(&self, words: &[&str]) -> Output {
+        self.command(words).output().unwrap()
+    }
+
+    /// Runs and returns (exit code, steps executed, cached, failed).
+    fn run(&self, more: &[&str]) -> (i32, [u64; 3]) {
+        let mut words = vec!["run", "--log-format", "json", "--no-report"];
+        words.extend(more);
+        let output = self.call(&words);
+        let text = String::from_utf8(output.stderr).unwrap();
+        let end = text
+            .lines()
+            .filter_map(|l| serde_json::from_str::<Value>(l).ok())
+            .find(|l| l["event"] == "end")
+            .unwrap_or_else(|| panic!("no end: {text}"));
+        let n = |key: &str| end[key].as_u64().unwrap();
+        (
+            output.status.code().unwrap(),
+            [n("executed"), n("cached"), n("failed")],
+        )
+    }
+
+    fn results(&self) -> Value {
+        let output = self.call(&["results", "--format", "json"]);
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    fn value(&self, step: &str, result: &str) -> f64 {
+        let all = self.results();
+        let list = all["results"].as_array().unwrap();
+        let found = list
+            .iter()
+            .find(|r| r["step"] == step && r["result"] == result);
+        found.unwrap_or_else(|| panic!("no {step}.{result} in {all}"))["value"]
+            .as_f64()
+            .unwrap()
+    }
+
+    /// All artifacts: file name -> bytes.
+    fn artifacts(&self) -> BTreeMap<String, Vec<u8>> {
+        let mut found = BTreeMap::new();
+        let root = self.folder.path().join(".plyflow/artifacts");
+        for shard in std::fs::read_dir(root).into_iter().flatten().flatten() {
+            for file in std::fs::read_dir(shard.path()).unwrap().flatten() {
+                let name = file.file_name().into_string().unwrap();
+                if name.ends_with(".h5") {
+                    found.insert(name, std::fs::read(file.path()).unwrap());
+                }
+            }
+        }
+        found
+    }
+
+    fn start(&self) -> Child {
+        let mut command = self.command(&["run", "--log-format", "json", "--no-report"]);
+        command
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap()
+    }
+}
+
+/// Waits for a condition; a machine under load may take long, so the limit is generous.
+fn until(what: &str, mut condition: impl FnMut() -> bool) {
+    let begun = Instant::now();
+    while !condition() {
+        assert!(
+            begun.elapsed() < Duration::from_secs(60),
+            "waited too long for {what}"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Workers whose engine is or was `parent`.
+fn workers_of(parent: u32) -> usize {
+    let mark = format!("--parent\0{parent}\0");
+    let processes = std::fs::read_dir("/proc").unwrap().flatten();
+    let lines = processes.filter_map(|p| std::fs::read(p.path().join("cmdline")).ok());
+    lines
+        .filter(|l| String::from_utf8_lossy(l).contains(&mark))
+        .count()
+}
+
+fn signal(child: &Child, number: i32) {
+    assert_eq!(unsafe { libc::kill(child.id() as i32, number) }, 0);
+}
+
+const FAN_OUT: &str = "
+steps:
+  first: {plugin: trivial, with: {value: 2}}
+  zones: {plugin: split, with: {items: 3}, from: {in: first}}
+  local: {plugin: trivial, with: {value: 5}, for_each: {zone: zones}, from: {in: [zones, first]}}
+  all: {plugin: sum, from: {in: [local, first]}}
+";
+
+#[test]
+fn a_second_run_does_nothing_and_neither_does_a_change_of_form() {
+    let study = Study::new(FAN_OUT);
+    assert_eq!(study.run(&[]), (0, [6, 0, 0]));
+    assert_eq!(study.value("all", "sum"), 17.0);
+    assert_eq!(study.run(&[]), (0, [0, 6, 0]));
+    let first = "first:\n    # two\n    with:\n      'value':   2.0\n    plugin: \"trivial\"";
+    study.write(&FAN_OUT.replace("first: {plugin: trivial, with: {value: 2}}", first));
+    assert_eq!(study.run(&[]), (0, [0, 6, 0]));
+}
+
+#[test]
+fn a_changed_value_runs_only_what_depends_on_it_and_plan_says_so_before() {
+    let study = Study::new(FAN_OUT);
+    study.run(&[]);
+    study.write(&FAN_OUT.replace("value: 5", "value: 6"));
+    let plan = study.call(&["plan", "--format", "json"]);
+    let plan: Value = serde_json::from_slice(&plan.stdout).unwrap();
+    let states: Vec<String> = plan
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| {
+            format!(
+                "{} {}",
+                p["step"].as_str().unwrap(),
+                p["state"].as_str().unwrap()
+            )
+        })
+        .collect();
+    let expected = [
+        "first cached",
+        "zones cached",
+        "local[item-0] run",
+        "local[item-1] run",
+        "local[item-2] run",
+        "all run",
+    ];
+    assert_eq!(states, expected);
+    let explained = String::from_utf8(study.call(&["explain", "local[item-1]"]).stdout).unwrap();
+    assert!(explained.contains("parameter /value"), "{explained}");
+    assert!(
+        explained.contains("old: 5.0") && explained.contains("new: 6.0"),
+        "{explained}"
+    );
+    assert_eq!(study.run(&[]), (0, [4, 2, 0]));
+    assert_eq!(study.value("all", "sum"), 20.0);
+    // And back: everything is still there.
+    study.write(FAN_OUT);
+    assert_eq!(study.run(&[]), (0, [0, 6, 0]));
+}
+
+#[test]
+fn an_unknown_fan_out_is_planned_as_such() {
+    let study = Study::new(FAN_OUT);
+    let text = String::from_utf8(study.call(&["plan"]).stdout).unwrap();
+    assert!(text.contains("local x N (from zones)  unknown"), "{text}");
+}
+
+#[test]
+fn an_empty_collection_leaves_no_local_runs_and_the_run_goes_on() {
+    let study = Study::new(&FAN_OUT.replace("items: 3", "items: 0"));
+    assert_eq!(study.run(&[]), (0, [3, 0, 0]));
+    assert_eq!(study.value("all", "sum"), 2.0);
+}
+
+#[test]
+fn each_way_to_fail_fails_its_step_alone_with_its_cause_and_log() {
+    let study = Study::new(
+        "
+steps:
+  good: {plugin: trivial}
+  crash: {plugin: segfault}
+  panic: {plugin: panic}
+  error: {plugin: error, retries: 1}
+  nan: {plugin: nan-field}
+  stuck: {plugin: hang, resources: {time_limit: 500 ms}}
+  after: {plugin: sum, from: {in: [good, crash]}}
+  other: {plugin: sum, from: {in: good}}
+",
+    );
+    let output = study.call(&["run"]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(4), "{text}");
+    let failed = |step: &str, cause: &str| {
+        let line = text
+            .lines()
+            .filter(|l| l.starts_with("FAILED"))
+            .find(|l| l.contains(step));
+        assert!(line.is_some_and(|l| l.contains(cause)), "{step}: {text}");
+    };
+    failed(" crash:", "SIGSEGV");
+    failed(" panic:", "panicked");
+    failed(" nan:", "malformed");
+    failed(" stuck:", "time limit of 0.5 s");
+    assert_eq!(
+        text.lines()
+            .filter(|l| l.starts_with("start    error"))
+            .count(),
+        2,
+        "{text}"
+    );
+    assert!(
+        text.contains("skip     after because crash failed"),
+        "{text}"
+    );
+    assert!(text.contains("finish   other"), "{text}");
+    let last = text
+        .rfind("first failure:")
+        .expect("the first failure is told");
+    assert!(text[last..].contains("log: "), "{text}");
+    assert_eq!(study.artifacts().len(), 2);
+    // A log is written only by those that had something to say.
+    let logs = study.folder.path().join(".plyflow/runs/study/logs");
+    assert!(logs.join("crash.log").exists() && !logs.join("good.log").exists());
+}
+
+#[test]
+fn errors_in_the_workflow_and_on_the_command_line_have_codes_of_their_own() {
+    let study =
+        Study::new("steps:\n  a: {plugin: wrong-abi}\n  b: {plugin: trivial, with: {valve: 1}}\n");
+    let output = study.call(&["run"]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(
+        text.contains("workflow.yaml:4") && text.contains("workflow.yaml:5"),
+        "{text}"
+    );
+    assert!(text.contains("did you mean `value`"), "{text}");
+    let study = Study::new(FAN_OUT);
+    assert_eq!(
+        study.call(&["run", "--until", "nothing"]).status.code(),
+        Some(2)
+    );
+    assert_eq!(
+        study.call(&["run", "--set", "first=1"]).status.code(),
+        Some(2)
+    );
+    std::fs::remove_file(study.folder.path().join("workflow.yaml")).unwrap();
+    assert_eq!(study.call(&["run"]).status.code(), Some(2));
+}
+
+#[test]
+fn until_and_set_choose_what_runs_and_with_what() {
+    let study = Study::new(FAN_OUT);
+    assert_eq!(study.run(&["--until", "zones"]), (0, [2, 0, 0]));
+    assert_eq!(study.run(&["--set", "local.value=7"]), (0, [4, 2, 0]));
+    assert_eq!(study.run(&[]), (0, [4, 2, 0]));
+    assert_eq!(study.value("all", "sum"), 17.0);
+}
+
+#[test]
+fn a_missed_expectation_is_code_5_only_when_asked() {
+    let study = Study::new(&format!(
+        "{FAN_OUT}expect:\n  - {{step: all, result: sum, value: 18, tolerance: 0.5, source: made up}}\n"
+    ));
+    assert_eq!(study.run(&[]).0, 0);
+    assert_eq!(study.run(&["--check"]).0, 5);
+    assert_eq!(study.call(&["results", "--check"]).status.code(), Some(5));
+}
+
+const SLOW: &str = "
+steps:
+  first: {plugin: trivial, with: {value: 2}}
+  second: {plugin: sum, from: {in: first}}
+  slow: {plugin: sleep, with: {seconds: 30}, from: {in: second}}
+";
+
+#[test]
+fn a_second_engine_on_the_same_workflow_is_refused_and_told_by_whom() {
+    let study = Study::new(SLOW);
+    let mut first = study.start();
+    until("the slow step", || {
+        workers_of(first.id()) == 1 && study.artifacts().len() == 2
+    });
+    let output = study.call(&["run"]);
+    assert_eq!(output.status.code(), Some(6));
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains(&format!("process {}", first.id())), "{text}");
+    // Looking is allowed.
+    assert_eq!(study.call(&["plan"]).status.code(), Some(0));
+    first.kill().unwrap();
+    first.wait().unwrap();
+}
+
+#[test]
+fn a_killed_engine_leaves_no_worker_and_the_same_command_resumes() {
+    let study = Study::new(SLOW);
+    let mut engine = study.start();
+    until("the slow step", || {
+        workers_of(engine.id()) == 1 && study.artifacts().len() == 2
+    });
+    engine.kill().unwrap();
+    engine.wait().unwrap();
+    until("the worker's end", || workers_of(engine.id()) == 0);
+    study.write(&SLOW.replace("seconds: 30", "seconds: 0"));
+    assert_eq!(study.run(&[]), (0, [1, 2, 0]));
+    let tmp = study.folder.path().join(".plyflow/runs/study/tmp");
+    assert!(!tmp.exists(), "temporary files are left");
+}
+
+#[test]
+fn ctrl_c_stops_the_worker_keeps_what_is_done_and_says_how_to_resume() {
+    let study = Study::new(SLOW);
+    let mut command = study.command(&["run"]);
+    let engine = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    until("the slow step", || {
+        workers_of(engine.id()) == 1 && study.artifacts().len() == 2
+    });
+    signal(&engine, libc::SIGINT);
+    let id = engine.id();
+    let output = engine.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("To go on: plyflow run"), "{text}");
+    assert_eq!(workers_of(id), 0);
+    study.write(&SLOW.replace("seconds: 30", "seconds: 0"));
+    assert_eq!(study.run(&[]), (0, [1, 2, 0]));
+}
+
+#[test]
+fn kills_at_many_moments_end_in_the_same_bytes_as_an_undisturbed_run() {
+    let workflow = FAN_OUT.replace("items: 3", "items: 12");
+    let calm = Study::new(&workflow);
+    assert_eq!(calm.run(&["--jobs", "1"]).0, 0);
+    let expected = calm.artifacts();
+    let begun = Instant::now();
+    Study::new(&workflow).run(&[]);
+    let whole = begun.elapsed();
+    for moment in 1..=10 {
+        let study = Study::new(&workflow);
+        let mut engine = study.start();
+        std::thread::sleep(whole * moment / 11);
+        let _ = engine.kill();
+        engine.wait().unwrap();
+        // Whatever is visible is whole.
+        for (name, bytes) in study.artifacts() {
+            assert!(
+                expected.get(&name) == Some(&bytes),
+                "{name} after a kill at {moment}/11"
+            );
+        }
+        let (code, [_, _, failed]) = study.run(&["--jobs", "2"]);
+        assert_eq!((code, failed), (0, 0));
+        assert!(
+            study.artifacts() == expected,
+            "other bytes after a kill at {moment}/11"
+        );
+    }
+}
+
+#[test]
+fn clean_keeps_what_the_last_run_uses() {
+    let study = Study::new(FAN_OUT);
+    study.run(&[]);
+    study.run(&["--set", "local.value=7"]);
+    assert_eq!(study.artifacts().len(), 10);
+    assert_eq!(study.call(&["clean"]).status.code(), Some(0));
+    assert_eq!(study.artifacts().len(), 6);
+    assert_eq!(study.run(&["--set", "local.value=7"]), (0, [0, 6, 0]));
+    study.call(&["clean", "--all"]);
+    assert!(study.artifacts().is_empty());
+}
+
+#[test]
+fn a_damaged_artifact_is_made_again() {
+    let study = Study::new(FAN_OUT);
+    study.run(&[]);
+    let name = study.artifacts().keys().next().unwrap().clone();
+    let path = study
+        .folder
+        .path()
+        .join(".plyflow/artifacts")
+        .join(&name[..2])
+        .join(&name);
+    std::fs::write(&path, "").unwrap();
+    assert_eq!(study.run(&[]), (0, [1, 5, 0]));
+}
