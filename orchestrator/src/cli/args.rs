@@ -23,33 +23,51 @@ pub enum Command {
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(PlanArgs),
     /// Check a workflow and everything it names, without running anything
-    #[command(after_help = "Examples:\n  plyflow validate workflow.yaml\n  plyflow validate workflow.yaml --format json   # for editors")]
+    #[command(
+        after_help = "Examples:\n  plyflow validate workflow.yaml\n  plyflow validate workflow.yaml --format json   # for editors"
+    )]
     Validate(ValidateArgs),
     /// Draw the steps and their connections
-    #[command(after_help = "Examples:\n  plyflow graph workflow.yaml | dot -Tsvg > graph.svg\n  plyflow graph workflow.yaml --format mermaid   # for Markdown")]
+    #[command(
+        after_help = "Examples:\n  plyflow graph workflow.yaml | dot -Tsvg > graph.svg\n  plyflow graph workflow.yaml --format mermaid   # for Markdown"
+    )]
     Graph(GraphArgs),
     /// Say why a step would run again: which part of its key changed, from what to what
-    #[command(after_help = "Examples:\n  plyflow explain workflow.yaml detect\n  plyflow explain workflow.yaml 'local[A]'")]
+    #[command(
+        after_help = "Examples:\n  plyflow explain workflow.yaml detect\n  plyflow explain workflow.yaml 'local[A]'"
+    )]
     Explain(ExplainArgs),
     /// Print the named numbers of the last run, with the values that the workflow expects
-    #[command(after_help = "Examples:\n  plyflow results workflow.yaml\n  plyflow results workflow.yaml --format csv > results.csv\n  plyflow results workflow.yaml --check      # exit code 5 when an expectation is missed")]
+    #[command(
+        after_help = "Examples:\n  plyflow results workflow.yaml\n  plyflow results workflow.yaml --format csv > results.csv\n  plyflow results workflow.yaml --check      # exit code 5 when an expectation is missed"
+    )]
     Results(ResultsArgs),
     /// Write the HTML report of what the store has
     Report(ReportArgs),
     /// List the plugins that can be found, or the parameters of one
-    #[command(after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --plugins ./build ./build/libmine.so")]
+    #[command(
+        after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --plugins ./build ./build/libmine.so"
+    )]
     Plugins(PluginsArgs),
     /// Show what an artifact holds
-    #[command(after_help = "Examples:\n  plyflow inspect result.h5\n  plyflow inspect 'local[A]' --workflow workflow.yaml")]
+    #[command(
+        after_help = "Examples:\n  plyflow inspect result.h5\n  plyflow inspect 'local[A]' --workflow workflow.yaml"
+    )]
     Inspect(InspectArgs),
     /// Print the JSON Schema of a file format, for editors
-    #[command(after_help = "Examples:\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json")]
+    #[command(
+        after_help = "Examples:\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
+    )]
     Schema(SchemaArgs),
     /// Remove artifacts that no workflow's last run uses, or all of a store
-    #[command(after_help = "Examples:\n  plyflow clean workflow.yaml --dry-run\n  plyflow clean workflow.yaml\n  plyflow clean workflow.yaml --all")]
+    #[command(
+        after_help = "Examples:\n  plyflow clean workflow.yaml --dry-run\n  plyflow clean workflow.yaml\n  plyflow clean workflow.yaml --all"
+    )]
     Clean(CleanArgs),
     /// Print completions for a shell
-    #[command(after_help = "Example:\n  plyflow completions bash > ~/.local/share/bash-completion/completions/plyflow")]
+    #[command(
+        after_help = "Example:\n  plyflow completions bash > ~/.local/share/bash-completion/completions/plyflow"
+    )]
     Completions {
         /// The shell
         shell: clap_complete::Shell,

@@ -26,8 +26,8 @@ pub fn clean(args: &CleanArgs) -> Done {
         return print(&format!("there is no store {root}; nothing to remove\n"));
     }
     let store = Store::new(root);
-    let _lock = Lock::exclusive(&store.lock(), &format!("the store {}", store.root()))
-        .map_err(locked)?;
+    let _lock =
+        Lock::exclusive(&store.lock(), &format!("the store {}", store.root())).map_err(locked)?;
     let failed = || Stop::machine(format!("cleaning {}", store.root()));
     let mut used = BTreeSet::new();
     if !args.all {
@@ -37,14 +37,23 @@ pub fn clean(args: &CleanArgs) -> Done {
         }
     }
     let (mut count, mut size) = (0u64, 0u64);
-    for key in store.keys().map_err(failed())?.into_iter().filter(|k| !used.contains(k)) {
+    for key in store
+        .keys()
+        .map_err(failed())?
+        .into_iter()
+        .filter(|k| !used.contains(k))
+    {
         count += 1;
         size += store.size(&key).unwrap_or(0);
         if !args.dry_run {
             store.remove(&key).map_err(failed())?;
         }
     }
-    let verb = if args.dry_run { "would remove" } else { "removed" };
+    let verb = if args.dry_run {
+        "would remove"
+    } else {
+        "removed"
+    };
     if args.all && !args.dry_run {
         // Only what a store is made of: `--store` may name a folder that holds other things too.
         for folder in ["artifacts", "runs"] {

@@ -13,18 +13,27 @@ use serde_json::json;
 ///
 /// # Errors
 /// When there is none; says what there is.
-pub fn instances_named(opened: &Opened, session: &Session<'_>, word: &str) -> Result<Vec<Id>, Stop> {
+pub fn instances_named(
+    opened: &Opened,
+    session: &Session<'_>,
+    word: &str,
+) -> Result<Vec<Id>, Stop> {
     let core = &session.core;
     let step = word.split('[').next().unwrap_or(word);
     let index = opened.step_indices(&[step.to_owned()])?[0];
-    let all: Vec<Id> =
-        (0..core.instances().len()).filter(|id| core.instances()[*id].step == index).collect();
+    let all: Vec<Id> = (0..core.instances().len())
+        .filter(|id| core.instances()[*id].step == index)
+        .collect();
     if step == word {
         return Ok(all);
     }
     let labels: Vec<String> = all.iter().map(|id| core.label(*id)).collect();
     let by_index = |id: &Id| {
-        let path: Vec<String> = core.instances()[*id].item.iter().map(u64::to_string).collect();
+        let path: Vec<String> = core.instances()[*id]
+            .item
+            .iter()
+            .map(u64::to_string)
+            .collect();
         word == format!("{step}[{}]", path.join(","))
     };
     let by_label = labels.iter().position(|l| l == word);
@@ -32,7 +41,9 @@ pub fn instances_named(opened: &Opened, session: &Session<'_>, word: &str) -> Re
         Some(at) => Ok(vec![all[at]]),
         None if labels.is_empty() => Err(Stop::new(
             exit::USAGE,
-            format!("the items of '{step}' are not known before the collection it fans out over is made"),
+            format!(
+                "the items of '{step}' are not known before the collection it fans out over is made"
+            ),
         )),
         None => {
             let text = format!("there is no '{word}'; there are: {}", labels.join(", "));
@@ -58,10 +69,15 @@ pub fn explain(args: &ExplainArgs) -> Done {
         out += &as_text(&session, *id);
     }
     if ids.is_empty() {
-        let hidden = session.core.hidden_by(opened.step_indices(&[args.step.clone()])?[0]);
+        let hidden = session
+            .core
+            .hidden_by(opened.step_indices(&[args.step.clone()])?[0]);
         let from: Vec<String> = hidden.iter().map(|id| session.core.label(*id)).collect();
         out = match from.len() {
-            0 => format!("{}: no items; the collection it fans out over is empty\n", args.step),
+            0 => format!(
+                "{}: no items; the collection it fans out over is empty\n",
+                args.step
+            ),
             _ => format!("{}: unknown until {} is done\n", args.step, from.join(", ")),
         };
     }
@@ -97,21 +113,33 @@ fn as_text(session: &Session<'_>, id: Id) -> String {
     match instance.state {
         State::Done { .. } => return format!("{label}: cached; key {key}\n"),
         State::Unkeyed => {
-            return format!("{label}: unknown; an input is not known before earlier steps have run\n");
+            return format!(
+                "{label}: unknown; an input is not known before earlier steps have run\n"
+            );
         }
         _ => {}
     }
     match difference(session, id) {
         Difference::Never => format!("{label}: will run; it has not run before (key {key})\n"),
         Difference::Gone => {
-            format!("{label}: will run; nothing changed, but its artifact {key} is not in the store\n")
+            format!(
+                "{label}: will run; nothing changed, but its artifact {key} is not in the store\n"
+            )
         }
         Difference::Changed(list) => {
             let mut out = format!("{label}: will run; what changed since the last run:\n");
             for c in list {
-                out += &format!("  {}\n    old: {}\n    new: {}\n", c.part, or_none(&c.old), or_none(&c.new));
+                out += &format!(
+                    "  {}\n    old: {}\n    new: {}\n",
+                    c.part,
+                    or_none(&c.old),
+                    or_none(&c.new)
+                );
                 if let Some((_, from)) = c.part.split_once(" from ") {
-                    out += &format!("    why: plyflow explain {} '{from}'\n", session.workflow.file);
+                    out += &format!(
+                        "    why: plyflow explain {} '{from}'\n",
+                        session.workflow.file
+                    );
                 }
             }
             out

@@ -21,8 +21,9 @@ pub fn inspect(args: &InspectArgs) -> Done {
     let path = locate(args)?;
     let artifact = Artifact::open(path.as_std_path()).map_err(|e| Stop::new(exit::USAGE, e))?;
     let beside = path.with_extension("record.json");
-    let record: Option<Record> =
-        std::fs::read(beside).ok().and_then(|text| serde_json::from_slice(&text).ok());
+    let record: Option<Record> = std::fs::read(beside)
+        .ok()
+        .and_then(|text| serde_json::from_slice(&text).ok());
     let parsed = |text: &str| serde_json::from_str::<Value>(text).unwrap_or_default();
     if args.format == TextOrJson::Json {
         let all = json!({
@@ -38,7 +39,12 @@ pub fn inspect(args: &InspectArgs) -> Done {
         });
         return print(&format!("{all:#}\n"));
     }
-    print(&text(&path, &artifact, record.as_ref(), &parsed(artifact.provenance())))
+    print(&text(
+        &path,
+        &artifact,
+        record.as_ref(),
+        &parsed(artifact.provenance()),
+    ))
 }
 
 fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
@@ -52,14 +58,24 @@ fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
         );
         return Err(Stop::new(exit::USAGE, text));
     };
-    let places =
-        Places { store: args.places.store.clone(), plugins: args.places.plugins.clone() };
-    let opened = open(&Workflow { workflow: file.clone(), places, set: Vec::new() })?;
+    let places = Places {
+        store: args.places.store.clone(),
+        plugins: args.places.plugins.clone(),
+    };
+    let opened = open(&Workflow {
+        workflow: file.clone(),
+        places,
+        set: Vec::new(),
+    })?;
     let session = opened.look()?;
     let ids = instances_named(&opened, &session, &args.artifact)?;
     let labels: Vec<String> = ids.iter().map(|id| session.core.label(*id)).collect();
     let [id] = ids[..] else {
-        let text = format!("'{}' has several items: {}", args.artifact, labels.join(", "));
+        let text = format!(
+            "'{}' has several items: {}",
+            args.artifact,
+            labels.join(", ")
+        );
         return Err(Stop::new(exit::USAGE, text));
     };
     let instance = &session.core.instances()[id];
@@ -67,7 +83,10 @@ fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
         (State::Done { .. }, Some(key)) => Ok(opened.store.artifact(&key)),
         _ => Err(Stop::new(
             exit::USAGE,
-            format!("{} has no artifact yet; start with: plyflow run {file}", labels[0]),
+            format!(
+                "{} has no artifact yet; start with: plyflow run {file}",
+                labels[0]
+            ),
         )),
     }
 }
@@ -77,7 +96,11 @@ fn text(path: &Utf8Path, artifact: &Artifact, record: Option<&Record>, made: &Va
     let mut out = format!("{path}\nkind      {}\n", artifact.kind());
     out += &format!("step      {} {}\n", word(&made["step"]), made["item"]);
     let plugin = &made["plugin"];
-    out += &format!("plugin    {} {}\n", word(&plugin["name"]), word(&plugin["version"]));
+    out += &format!(
+        "plugin    {} {}\n",
+        word(&plugin["name"]),
+        word(&plugin["version"])
+    );
     if let Some(r) = record {
         let c = &r.cost;
         out += &format!(
@@ -100,16 +123,31 @@ fn text(path: &Utf8Path, artifact: &Artifact, record: Option<&Record>, made: &Va
     if contents.frames > 0 {
         let (first, last) = (artifact.times().first(), artifact.times().last());
         let span = |t: Option<&f64>| t.map_or(String::new(), |t| number(*t));
-        out += &format!("frames    {} from {} s to {} s\n", contents.frames, span(first), span(last));
+        out += &format!(
+            "frames    {} from {} s to {} s\n",
+            contents.frames,
+            span(first),
+            span(last)
+        );
     }
     out += &bodies(artifact);
     if !contents.arrays.is_empty() {
         let rows: Vec<Vec<String>> = contents
             .arrays
             .iter()
-            .map(|a| vec![a.path.clone(), format!("{:?}", a.dtype), format!("{:?}", a.shape), a.unit.clone()])
+            .map(|a| {
+                vec![
+                    a.path.clone(),
+                    format!("{:?}", a.dtype),
+                    format!("{:?}", a.shape),
+                    a.unit.clone(),
+                ]
+            })
             .collect();
-        out += &format!("\n{}", table(&["array", "type", "shape", "unit"], &rows, &[]));
+        out += &format!(
+            "\n{}",
+            table(&["array", "type", "shape", "unit"], &rows, &[])
+        );
     }
     if !artifact.results().is_empty() {
         let rows: Vec<Vec<String>> = artifact
@@ -128,10 +166,21 @@ fn bodies(artifact: &Artifact) -> String {
         return String::new();
     }
     let line = |b: &plyflow_artifact::BodyInfo| {
-        let fields: Vec<String> =
-            b.fields.iter().map(|f| format!("{} [{}]", f.name, f.unit)).collect();
-        vec![b.name.clone(), b.points.to_string(), b.cells.to_string(), fields.join(", ")]
+        let fields: Vec<String> = b
+            .fields
+            .iter()
+            .map(|f| format!("{} [{}]", f.name, f.unit))
+            .collect();
+        vec![
+            b.name.clone(),
+            b.points.to_string(),
+            b.cells.to_string(),
+            fields.join(", "),
+        ]
     };
     let rows: Vec<Vec<String>> = bodies.iter().map(line).collect();
-    format!("\n{}", table(&["body", "points", "cells", "fields"], &rows, &[1, 2]))
+    format!(
+        "\n{}",
+        table(&["body", "points", "cells", "fields"], &rows, &[1, 2])
+    )
 }

@@ -30,12 +30,18 @@ pub struct Stop {
 impl Stop {
     /// A stop with a text.
     pub fn new(code: u8, text: impl Display) -> Self {
-        Self { code, text: text.to_string() }
+        Self {
+            code,
+            text: text.to_string(),
+        }
     }
 
     /// A stop after everything has been said.
     pub fn silent(code: u8) -> Self {
-        Self { code, text: String::new() }
+        Self {
+            code,
+            text: String::new(),
+        }
     }
 
     /// Wraps an error of the machine with what was being done.
@@ -53,7 +59,11 @@ pub fn main() -> u8 {
         Ok(cli) => cli,
         Err(e) => {
             let _ = e.print();
-            return if e.use_stderr() { exit::USAGE } else { exit::OK };
+            return if e.use_stderr() {
+                exit::USAGE
+            } else {
+                exit::OK
+            };
         }
     };
     match dispatch(cli.command) {

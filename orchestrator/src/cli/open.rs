@@ -31,8 +31,12 @@ pub struct Opened {
 /// When the system does not tell.
 pub fn program() -> Result<Utf8PathBuf, Stop> {
     let path = std::env::current_exe().map_err(Stop::machine("finding this program"))?;
-    Utf8PathBuf::from_path_buf(path)
-        .map_err(|p| Stop::new(exit::INTERNAL, format!("the path {} is not UTF-8", p.display())))
+    Utf8PathBuf::from_path_buf(path).map_err(|p| {
+        Stop::new(
+            exit::INTERNAL,
+            format!("the path {} is not UTF-8", p.display()),
+        )
+    })
 }
 
 fn absolute(path: &Utf8Path) -> Utf8PathBuf {
@@ -44,14 +48,14 @@ fn absolute(path: &Utf8Path) -> Utf8PathBuf {
 ///
 /// # Errors
 /// When this program cannot be found.
-pub fn search_path(
-    places: &Places,
-    workflow: Option<&Utf8Path>,
-) -> Result<Vec<Utf8PathBuf>, Stop> {
+pub fn search_path(places: &Places, workflow: Option<&Utf8Path>) -> Result<Vec<Utf8PathBuf>, Stop> {
     let mut folders: Vec<Utf8PathBuf> = places.plugins.iter().map(|p| absolute(p)).collect();
     for given in &folders {
         if !given.is_dir() {
-            return Err(Stop::new(exit::USAGE, format!("--plugins {given}: there is no such folder")));
+            return Err(Stop::new(
+                exit::USAGE,
+                format!("--plugins {given}: there is no such folder"),
+            ));
         }
     }
     if let Some(file) = workflow {
@@ -59,7 +63,11 @@ pub fn search_path(
     }
     if let Some(list) = std::env::var_os("PLYFLOW_PLUGINS") {
         let given = std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty());
-        folders.extend(given.filter_map(|p| Utf8PathBuf::from_path_buf(p).ok()).map(|p| absolute(&p)));
+        folders.extend(
+            given
+                .filter_map(|p| Utf8PathBuf::from_path_buf(p).ok())
+                .map(|p| absolute(&p)),
+        );
     }
     if let Some(beside) = program()?.parent() {
         folders.push(beside.join("plugins"));
@@ -81,9 +89,10 @@ pub fn search_path(
 pub fn store_root(places: &Places, workflow: Option<&Utf8Path>) -> Utf8PathBuf {
     match (&places.store, workflow) {
         (Some(given), _) => absolute(given),
-        (None, Some(file)) => {
-            absolute(file).parent().map_or_else(|| ".".into(), Utf8Path::to_owned).join(".plyflow")
-        }
+        (None, Some(file)) => absolute(file)
+            .parent()
+            .map_or_else(|| ".".into(), Utf8Path::to_owned)
+            .join(".plyflow"),
         (None, None) => absolute(Utf8Path::new(".plyflow")),
     }
 }
@@ -97,7 +106,11 @@ pub fn catalog(folders: Vec<Utf8PathBuf>, store: &Utf8Path) -> Result<PluginCata
         program: program()?,
         arguments: vec!["step-worker".into(), "--describe".into()],
     };
-    Ok(PluginCatalog::new(folders, Some(store.join("plugins.json")), describer))
+    Ok(PluginCatalog::new(
+        folders,
+        Some(store.join("plugins.json")),
+        describer,
+    ))
 }
 
 /// Reads and checks a workflow; says everything that is wrong with it.
@@ -133,12 +146,18 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
         Err(findings) => return Ok(Err(findings)),
     };
     let graph = Graph::new(&workflow).map_err(|e| Stop::new(exit::INVALID, e))?;
-    Ok(Ok(Opened { workflow, graph, store: Store::new(root), search_path }))
+    Ok(Ok(Opened {
+        workflow,
+        graph,
+        store: Store::new(root),
+        search_path,
+    }))
 }
 
 fn overrides(set: &[String]) -> Result<Vec<plyflow_workflow::Override>, Stop> {
     let one = |text: &String| {
-        text.parse().map_err(|e| Stop::new(exit::USAGE, format!("--set {text}: {e}")))
+        text.parse()
+            .map_err(|e| Stop::new(exit::USAGE, format!("--set {text}: {e}")))
     };
     set.iter().map(one).collect()
 }
@@ -149,11 +168,20 @@ impl Opened {
     /// # Errors
     /// When the journal cannot be read.
     pub fn look(&self) -> Result<Session<'_>, Stop> {
-        let limits = Limits { cores: cores(), memory: 0, policy: self.workflow.on_failure };
-        let options =
-            Options { limits, search_path: self.search_path.clone(), force: Vec::new() };
-        let mut session = Session::new(&self.workflow, &self.graph, &self.store, options, false)
-            .map_err(Stop::machine(format!("reading the store {}", self.store.root())))?;
+        let limits = Limits {
+            cores: cores(),
+            memory: 0,
+            policy: self.workflow.on_failure,
+        };
+        let options = Options {
+            limits,
+            search_path: self.search_path.clone(),
+            force: Vec::new(),
+        };
+        let mut session =
+            Session::new(&self.workflow, &self.graph, &self.store, options, false).map_err(
+                Stop::machine(format!("reading the store {}", self.store.root())),
+            )?;
         session.look(&mut Quiet);
         Ok(session)
     }
@@ -164,7 +192,9 @@ impl Opened {
     /// When a name is none of the steps; says which there are.
     pub fn restrict(&mut self, names: &[String]) -> Result<(), Stop> {
         self.step_indices(names)?;
-        self.graph.restrict(names).map_err(|e| Stop::new(exit::USAGE, e))
+        self.graph
+            .restrict(names)
+            .map_err(|e| Stop::new(exit::USAGE, e))
     }
 
     /// Indices of steps by name.
@@ -175,7 +205,10 @@ impl Opened {
         let find = |name: &String| {
             self.graph.find(name).ok_or_else(|| {
                 let all: Vec<&str> = self.graph.steps.iter().map(|s| s.name.as_str()).collect();
-                let text = format!("there is no step '{name}'; the steps are: {}", all.join(", "));
+                let text = format!(
+                    "there is no step '{name}'; the steps are: {}",
+                    all.join(", ")
+                );
                 Stop::new(exit::USAGE, text)
             })
         };

@@ -88,30 +88,48 @@ fn prospect(session: &Session<'_>, id: Id) -> Prospect {
     let core = &session.core;
     let instance = &core.instances()[id];
     let (fate, reason) = match instance.state {
-        State::Done { .. } => {
-            ("cached", instance.key.map(|k| format!("key {}", k.short())).unwrap_or_default())
-        }
+        State::Done { .. } => (
+            "cached",
+            instance
+                .key
+                .map(|k| format!("key {}", k.short()))
+                .unwrap_or_default(),
+        ),
         State::Unkeyed => ("unknown", waits_for(session, id)),
         _ => ("run", why(session, id)),
     };
-    Prospect { label: core.label(id), fate, reason }
+    Prospect {
+        label: core.label(id),
+        fate,
+        reason,
+    }
 }
 
 fn waits_for(session: &Session<'_>, id: Id) -> String {
     let core = &session.core;
     let step = &core.graph().steps[core.instances()[id].step];
-    let mut names: Vec<&str> =
-        step.wires.iter().map(|w| core.graph().steps[w.from].name.as_str()).collect();
+    let mut names: Vec<&str> = step
+        .wires
+        .iter()
+        .map(|w| core.graph().steps[w.from].name.as_str())
+        .collect();
     names.retain(|n| {
-        session.workflow.steps.iter().zip(&core.graph().steps).enumerate().any(|(at, (w, _))| {
-            w.name == *n && !core.hidden_by(at).is_empty()
-        })
+        session
+            .workflow
+            .steps
+            .iter()
+            .zip(&core.graph().steps)
+            .enumerate()
+            .any(|(at, (w, _))| w.name == *n && !core.hidden_by(at).is_empty())
     });
     names.dedup();
     if names.is_empty() {
         return "an input is not known yet".into();
     }
-    format!("gathers {}, whose number is not known yet", names.join(", "))
+    format!(
+        "gathers {}, whose number is not known yet",
+        names.join(", ")
+    )
 }
 
 /// Why an instance must run, in one line.
@@ -125,8 +143,10 @@ fn why(session: &Session<'_>, id: Id) -> String {
                 .filter(|c| !c.part.starts_with("input "))
                 .map(|c| format!("{}: {} -> {}", c.part, or_none(&c.old), or_none(&c.new)))
                 .collect();
-            let inputs: Vec<&str> =
-                list.iter().filter_map(|c| c.part.strip_prefix("input ")).collect();
+            let inputs: Vec<&str> = list
+                .iter()
+                .filter_map(|c| c.part.strip_prefix("input "))
+                .collect();
             match inputs.len() {
                 0 => {}
                 1 => own.push(format!("input {} changed", inputs[0])),
@@ -166,7 +186,10 @@ pub fn difference(session: &Session<'_>, id: Id) -> Difference {
         return Difference::Never;
     };
     let now = input_keys(core, id);
-    Difference::Changed(changes((&ingredients, &inputs), (&step.recipe.ingredients, &now)))
+    Difference::Changed(changes(
+        (&ingredients, &inputs),
+        (&step.recipe.ingredients, &now),
+    ))
 }
 
 /// `plyflow validate`.
@@ -181,7 +204,10 @@ pub fn validate(args: &ValidateArgs) -> Done {
         Ok(o) => {
             let n = o.workflow.steps.len();
             let s = if n == 1 { "" } else { "s" };
-            print(&format!("{}: {n} step{s}, no errors\n", args.workflow.workflow))
+            print(&format!(
+                "{}: {n} step{s}, no errors\n",
+                args.workflow.workflow
+            ))
         }
         Err(findings) => {
             if json {

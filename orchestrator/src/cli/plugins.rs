@@ -42,8 +42,10 @@ fn list(
 ) -> Done {
     if format == TextOrJson::Json {
         let all: Vec<Value> = entries.iter().map(as_json).collect();
-        let bad: Vec<Value> =
-            broken.iter().map(|(p, r)| json!({"path": p, "reason": r})).collect();
+        let bad: Vec<Value> = broken
+            .iter()
+            .map(|(p, r)| json!({"path": p, "reason": r}))
+            .collect();
         return print(&format!("{:#}\n", json!({"plugins": all, "broken": bad})));
     }
     let line = |e: &CatalogEntry| {
@@ -60,7 +62,11 @@ fn list(
         ]
     };
     let rows: Vec<Vec<String>> = entries.iter().map(line).collect();
-    let mut out = table(&["plugin", "kind", "version", "summary", "library"], &rows, &[]);
+    let mut out = table(
+        &["plugin", "kind", "version", "summary", "library"],
+        &rows,
+        &[],
+    );
     for (path, reason) in broken {
         out += &format!("broken: {path}: {reason}\n");
     }
@@ -92,11 +98,18 @@ fn show(e: &CatalogEntry, format: TextOrJson) -> Done {
         for (port, input) in &m.inputs {
             let need = if input.required { "" } else { ", optional" };
             let many = if input.many { ", several" } else { "" };
-            out += &format!("  {port}: {}{need}{many}\n      {}\n", input.kind, input.doc);
+            out += &format!(
+                "  {port}: {}{need}{many}\n      {}\n",
+                input.kind, input.doc
+            );
         }
     }
     if let Some(output) = &m.output {
-        let collection = if output.collection { ", a collection (`for_each`)" } else { "" };
+        let collection = if output.collection {
+            ", a collection (`for_each`)"
+        } else {
+            ""
+        };
         out += &format!("\noutput: {}{collection}\n", output.kind);
     }
     if !m.results.is_empty() {
@@ -117,7 +130,10 @@ fn show(e: &CatalogEntry, format: TextOrJson) -> Done {
 /// One parameter and, indented, what it is made of.
 fn parameter(name: &str, d: &Value, depth: usize, out: &mut String) {
     let pad = "  ".repeat(depth);
-    let word = |key: &str| d.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned));
+    let word = |key: &str| {
+        d.get(key)
+            .map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned))
+    };
     let mut facts = vec![word("type").unwrap_or_default()];
     for (key, label) in [
         ("dimension", ""),

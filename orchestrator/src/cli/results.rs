@@ -35,7 +35,9 @@ impl Row {
     /// `ok` or `missed` when something is expected.
     pub fn verdict(&self) -> Option<&'static str> {
         let e = self.expected.as_ref()?;
-        let Some(value) = self.value else { return Some("missed") };
+        let Some(value) = self.value else {
+            return Some("missed");
+        };
         let near = e.value.is_none_or(|x| {
             // Without a tolerance the same number is meant, up to rounding in its text.
             (value - x).abs() <= e.tolerance.unwrap_or(1e-9 * x.abs())
@@ -69,7 +71,12 @@ pub fn records(session: &Session<'_>) -> Vec<(Id, Record)> {
     let mut ids: Vec<Id> = (0..core.instances().len())
         .filter(|id| matches!(core.instances()[*id].state, State::Done { .. }))
         .collect();
-    ids.sort_by_key(|id| (core.instances()[*id].step, core.instances()[*id].item.clone()));
+    ids.sort_by_key(|id| {
+        (
+            core.instances()[*id].step,
+            core.instances()[*id].item.clone(),
+        )
+    });
     let read = |id: Id| Some((id, session.store.read_record(&core.instances()[id].key?)?));
     ids.into_iter().filter_map(read).collect()
 }
@@ -83,7 +90,9 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
     for (id, record) in records {
         let step = &core.graph().steps[core.instances()[*id].step].name;
         for result in &record.results {
-            let at = expectations.iter().position(|e| e.step == *step && e.result == result.name);
+            let at = expectations
+                .iter()
+                .position(|e| e.step == *step && e.result == result.name);
             if let Some(at) = at {
                 met[at] = true;
             }
@@ -120,18 +129,33 @@ pub fn results_table(rows: &[Row]) -> String {
         } else {
             format!("{}[{}]", r.step, r.item.join(","))
         };
-        let name = if r.measured { format!("{} (measured)", r.name) } else { r.name.clone() };
+        let name = if r.measured {
+            format!("{} (measured)", r.name)
+        } else {
+            r.name.clone()
+        };
         vec![
             place,
             name,
             r.value.map_or("(absent)".into(), number),
-            if r.unit == "1" { String::new() } else { r.unit.clone() },
-            r.expected.as_ref().map(expectation_text).unwrap_or_default(),
+            if r.unit == "1" {
+                String::new()
+            } else {
+                r.unit.clone()
+            },
+            r.expected
+                .as_ref()
+                .map(expectation_text)
+                .unwrap_or_default(),
             r.verdict().unwrap_or_default().to_owned(),
         ]
     };
     let lines: Vec<Vec<String>> = rows.iter().map(line).collect();
-    table(&["step", "result", "value", "unit", "expected", "verdict"], &lines, &[2])
+    table(
+        &["step", "result", "value", "unit", "expected", "verdict"],
+        &lines,
+        &[2],
+    )
 }
 
 /// A table of what the steps cost.
@@ -147,7 +171,11 @@ pub fn cost_table(session: &Session<'_>, records: &[(Id, Record)]) -> String {
         ]
     };
     let lines: Vec<Vec<String>> = records.iter().map(line).collect();
-    table(&["step", "wall", "cpu", "threads", "memory", "artifact"], &lines, &[1, 2, 3, 4, 5])
+    table(
+        &["step", "wall", "cpu", "threads", "memory", "artifact"],
+        &lines,
+        &[1, 2, 3, 4, 5],
+    )
 }
 
 fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> serde_json::Value {
@@ -179,9 +207,15 @@ fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> ser
 }
 
 fn as_csv(rows: &[Row]) -> String {
-    let mut out = String::from("step,item,result,value,unit,measured,expected,tolerance,minimum,maximum,verdict,source\n");
+    let mut out = String::from(
+        "step,item,result,value,unit,measured,expected,tolerance,minimum,maximum,verdict,source\n",
+    );
     let text = |t: &str| {
-        if t.contains([',', '"', '\n']) { format!("\"{}\"", t.replace('"', "\"\"")) } else { t.to_owned() }
+        if t.contains([',', '"', '\n']) {
+            format!("\"{}\"", t.replace('"', "\"\""))
+        } else {
+            t.to_owned()
+        }
     };
     let value = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
     for r in rows {
@@ -227,10 +261,16 @@ pub fn results(args: &ResultsArgs) -> Done {
         Format::Csv => print(&as_csv(&rows))?,
         Format::Table if records.is_empty() => {
             let file = &args.workflow.workflow;
-            print(&format!("nothing has been run yet; start with: plyflow run {file}\n"))?;
+            print(&format!(
+                "nothing has been run yet; start with: plyflow run {file}\n"
+            ))?;
         }
         Format::Table => {
-            let text = format!("{}\n{}", results_table(&rows), cost_table(&session, &records));
+            let text = format!(
+                "{}\n{}",
+                results_table(&rows),
+                cost_table(&session, &records)
+            );
             print(&text)?;
         }
     }
@@ -250,7 +290,11 @@ pub fn check(rows: &[Row]) -> Done {
     if missed.is_empty() {
         return Ok(());
     }
-    let text = format!("{} expectations missed: {}", missed.len(), missed.join(", "));
+    let text = format!(
+        "{} expectations missed: {}",
+        missed.len(),
+        missed.join(", ")
+    );
     Err(Stop::new(exit::EXPECTATION, text))
 }
 
@@ -284,18 +328,30 @@ mod tests {
 
     #[test]
     fn a_number_outside_its_bound_or_tolerance_is_missed() {
-        let near = Expectation { value: Some(1.0), tolerance: Some(0.1), ..expectation() };
+        let near = Expectation {
+            value: Some(1.0),
+            tolerance: Some(0.1),
+            ..expectation()
+        };
         assert_eq!(row(Some(1.05), near.clone()).verdict(), Some("ok"));
         assert_eq!(row(Some(1.2), near.clone()).verdict(), Some("missed"));
         assert_eq!(row(None, near).verdict(), Some("missed"));
-        let bound = Expectation { minimum: Some(0.0), maximum: Some(2.0), ..expectation() };
+        let bound = Expectation {
+            minimum: Some(0.0),
+            maximum: Some(2.0),
+            ..expectation()
+        };
         assert_eq!(row(Some(2.0), bound.clone()).verdict(), Some("ok"));
         assert_eq!(row(Some(-0.1), bound).verdict(), Some("missed"));
     }
 
     #[test]
     fn not_a_number_never_meets_an_expectation() {
-        let near = Expectation { value: Some(1.0), tolerance: Some(0.1), ..expectation() };
+        let near = Expectation {
+            value: Some(1.0),
+            tolerance: Some(0.1),
+            ..expectation()
+        };
         assert_eq!(row(Some(f64::NAN), near).verdict(), Some("missed"));
     }
 }

@@ -37,7 +37,10 @@ impl Interrupts {
         for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
             signal_hook::low_level::pipe::register(signal, write.try_clone()?)?;
         }
-        Ok(Self { wake, heard: Arc::default() })
+        Ok(Self {
+            wake,
+            heard: Arc::default(),
+        })
     }
 
     fn poll_end(&self) -> std::io::Result<OwnedFd> {
@@ -67,14 +70,22 @@ pub fn run(args: &RunArgs) -> Done {
     opened.restrict(&args.until)?;
     let options = options(args, &opened)?;
     let folder = opened.store.run(&opened.workflow.name);
-    let _store = Lock::shared(&opened.store.lock(), &format!("the store {}", opened.store.root()))
-        .map_err(locked)?;
+    let _store = Lock::shared(
+        &opened.store.lock(),
+        &format!("the store {}", opened.store.root()),
+    )
+    .map_err(locked)?;
     let what = format!("the workflow '{}'", opened.workflow.name);
     let _run = Lock::exclusive(&folder.lock(), &what).map_err(locked)?;
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
-    let mut session =
-        Session::new(&opened.workflow, &opened.graph, &opened.store, options, true)
-            .map_err(machine())?;
+    let mut session = Session::new(
+        &opened.workflow,
+        &opened.graph,
+        &opened.store,
+        options,
+        true,
+    )
+    .map_err(machine())?;
     let mut observer = observer(args);
     session.look(observer.as_mut());
     let interrupts = Interrupts::listen().map_err(machine())?;
@@ -101,7 +112,11 @@ fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
         }
     };
     Ok(Options {
-        limits: Limits { cores: args.jobs.unwrap_or_else(cores), memory, policy },
+        limits: Limits {
+            cores: args.jobs.unwrap_or_else(cores),
+            memory,
+            policy,
+        },
         search_path: opened.search_path.clone(),
         force: opened.step_indices(&args.force)?,
     })
@@ -168,13 +183,23 @@ fn tell(
     begun: Instant,
 ) -> Done {
     let wall = duration_text(begun.elapsed().as_secs_f64());
-    let mut parts = vec![format!("{} run", summary.executed), format!("{} cached", summary.cached)];
-    for (n, word) in [(summary.failures.len(), "failed"), (summary.skipped, "not run")] {
+    let mut parts = vec![
+        format!("{} run", summary.executed),
+        format!("{} cached", summary.cached),
+    ];
+    for (n, word) in [
+        (summary.failures.len(), "failed"),
+        (summary.skipped, "not run"),
+    ] {
         if n > 0 {
             parts.push(format!("{n} {word}"));
         }
     }
-    let line = format!("{}: {} in {wall}\n", session.workflow.name, parts.join(", "));
+    let line = format!(
+        "{}: {} in {wall}\n",
+        session.workflow.name,
+        parts.join(", ")
+    );
     if args.log_format == LogFormat::Json {
         let line = serde_json::json!({
             "event": "end", "executed": summary.executed, "cached": summary.cached,
@@ -187,7 +212,9 @@ fn tell(
     print(&line)?;
     if summary.interrupted {
         let file = &opened.workflow.file;
-        print(&format!("stopped; what is finished is kept. To go on: plyflow run {file}\n"))?;
+        print(&format!(
+            "stopped; what is finished is kept. To go on: plyflow run {file}\n"
+        ))?;
     }
     Ok(())
 }
@@ -196,9 +223,17 @@ fn tell(
 fn failure_text(first: &Failure, summary: &Summary) -> String {
     let mut out = String::new();
     for other in summary.failures.iter().skip(1).take(20) {
-        out += &format!("also failed: {}: {}\n", other.label, first_line(&other.reason));
+        out += &format!(
+            "also failed: {}: {}\n",
+            other.label,
+            first_line(&other.reason)
+        );
     }
-    out += &format!("\nfirst failure: {}\n  {}\n", first.label, first.reason.replace('\n', "\n  "));
+    out += &format!(
+        "\nfirst failure: {}\n  {}\n",
+        first.label,
+        first.reason.replace('\n', "\n  ")
+    );
     if let Some(log) = &first.log {
         let bytes = std::fs::read(log).unwrap_or_default();
         let text = String::from_utf8_lossy(&bytes);
@@ -223,5 +258,8 @@ fn first_line(text: &str) -> &str {
 pub fn report(args: &ReportArgs) -> Done {
     let opened = open(&args.workflow)?;
     let _session = opened.look()?;
-    Err(Stop::new(exit::INTERNAL, format!("no report writer for {}", opened.workflow.name)))
+    Err(Stop::new(
+        exit::INTERNAL,
+        format!("no report writer for {}", opened.workflow.name),
+    ))
 }

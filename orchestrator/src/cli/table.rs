@@ -3,7 +3,10 @@
 /// Columns padded to their widest cell; columns listed in `right` are aligned to the right.
 pub fn table(head: &[&str], rows: &[Vec<String>], right: &[usize]) -> String {
     let width = |at: usize| {
-        let cells = rows.iter().filter_map(|r| r.get(at)).map(|c| c.chars().count());
+        let cells = rows
+            .iter()
+            .filter_map(|r| r.get(at))
+            .map(|c| c.chars().count());
         cells.chain([head[at].chars().count()]).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..head.len()).map(width).collect();
@@ -14,7 +17,11 @@ pub fn table(head: &[&str], rows: &[Vec<String>], right: &[usize]) -> String {
         for (at, width) in widths.iter().enumerate() {
             let cell = row.get(at).map_or("", String::as_str);
             let pad = " ".repeat(width - cell.chars().count());
-            line += &if right.contains(&at) { pad + cell } else { cell.to_owned() + &pad };
+            line += &if right.contains(&at) {
+                pad + cell
+            } else {
+                cell.to_owned() + &pad
+            };
             line += "  ";
         }
         out += line.trim_end();
@@ -48,7 +55,11 @@ pub fn bytes(n: u64) -> String {
         value /= 1024.0;
         unit += 1;
     }
-    if unit == 0 { format!("{n} B") } else { format!("{value:.1} {}", units[unit]) }
+    if unit == 0 {
+        format!("{n} B")
+    } else {
+        format!("{value:.1} {}", units[unit])
+    }
 }
 
 #[cfg(test)]
@@ -57,8 +68,14 @@ mod tests {
 
     #[test]
     fn columns_line_up_whatever_the_cells() {
-        let rows = vec![vec!["a".into(), "1".into()], vec!["bcd".into(), "22".into()]];
-        assert_eq!(table(&["x", "n"], &rows, &[1]), "x     n\na     1\nbcd  22\n");
+        let rows = vec![
+            vec!["a".into(), "1".into()],
+            vec!["bcd".into(), "22".into()],
+        ];
+        assert_eq!(
+            table(&["x", "n"], &rows, &[1]),
+            "x     n\na     1\nbcd  22\n"
+        );
     }
 
     #[test]

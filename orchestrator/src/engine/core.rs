@@ -36,7 +36,10 @@ pub enum State {
 impl State {
     /// Nothing further will happen to it.
     pub fn is_final(self) -> bool {
-        matches!(self, Self::Done { .. } | Self::Failed | Self::Skipped(_) | Self::Stopped)
+        matches!(
+            self,
+            Self::Done { .. } | Self::Failed | Self::Skipped(_) | Self::Stopped
+        )
     }
 }
 
@@ -252,7 +255,11 @@ impl<'g> Core<'g> {
             let owner: Vec<u64> = d.prefix.iter().map(|p| instance.item[*p]).collect();
             let index = instance.item[at];
             let labels = self.by_item[d.over].get(&owner).and_then(|o| {
-                self.instances[*o].labels.as_ref()?.get(index as usize).cloned()
+                self.instances[*o]
+                    .labels
+                    .as_ref()?
+                    .get(index as usize)
+                    .cloned()
             });
             labels.unwrap_or_else(|| index.to_string())
         };
@@ -349,7 +356,12 @@ impl<'g> Core<'g> {
                     let wire = &plan.wires[*wire];
                     let giver = &self.instances[*giver];
                     let step = graph.steps[wire.from].name.as_str();
-                    Some((wire.port.as_str(), step, giver.item.as_slice(), giver.key.as_ref()?))
+                    Some((
+                        wire.port.as_str(),
+                        step,
+                        giver.item.as_slice(),
+                        giver.key.as_ref()?,
+                    ))
                 }),
             );
             let instance = &mut self.instances[id];
@@ -410,7 +422,8 @@ impl<'g> Core<'g> {
         if open.is_empty() {
             self.instances[id].state = State::Ready;
             let instance = &self.instances[id];
-            self.ready.insert((instance.step, instance.item.clone(), id));
+            self.ready
+                .insert((instance.step, instance.item.clone(), id));
         } else {
             self.wait_for(id, &open, &[]);
         }
@@ -457,7 +470,10 @@ impl<'g> Core<'g> {
             for waiter in waiters {
                 // One that the store has in spite of the failure is done and stays so; one whose lookup
                 // is under way comes back when it is missing.
-                if matches!(self.instances[waiter].state, State::Unkeyed | State::Waiting) {
+                if matches!(
+                    self.instances[waiter].state,
+                    State::Unkeyed | State::Waiting
+                ) {
                     self.finish(waiter, State::Skipped(cause));
                     self.effects.push(Effect::Skip { id: waiter, cause });
                     stack.push(waiter);
@@ -519,7 +535,11 @@ impl<'g> Core<'g> {
             instance.state = State::Running(threads);
             instance.attempts += 1;
             let attempt = instance.attempts;
-            self.effects.push(Effect::Start { id: entry.2, threads, attempt });
+            self.effects.push(Effect::Start {
+                id: entry.2,
+                threads,
+                attempt,
+            });
             started.push(entry.clone());
         }
         for entry in started {

@@ -26,9 +26,16 @@ struct Script {
 fn play(steps: Vec<ResolvedStep>, script: &Script) -> Play {
     let w = workflow(steps);
     let graph = Graph::new(&w).unwrap();
-    let policy =
-        if script.fail_fast { FailurePolicy::FailFast } else { FailurePolicy::KeepGoing };
-    let limits = Limits { cores: script.cores.max(1), memory: 0, policy };
+    let policy = if script.fail_fast {
+        FailurePolicy::FailFast
+    } else {
+        FailurePolicy::KeepGoing
+    };
+    let limits = Limits {
+        cores: script.cores.max(1),
+        memory: 0,
+        policy,
+    };
     let mut core = Core::new(&graph, limits);
     let mut p = Play {
         order: vec![],
@@ -44,7 +51,10 @@ fn play(steps: Vec<ResolvedStep>, script: &Script) -> Play {
         let event = match queue.pop_front() {
             Some(Effect::Look(id)) => {
                 let label = core.label(id);
-                let found = script.cache.contains(&label).then(|| output(script, &label));
+                let found = script
+                    .cache
+                    .contains(&label)
+                    .then(|| output(script, &label));
                 if found.is_some() {
                     p.cached.push(label);
                 }
@@ -75,7 +85,10 @@ fn play(steps: Vec<ResolvedStep>, script: &Script) -> Play {
                     if attempt <= script.fails.get(&label).copied().unwrap_or(0) {
                         Event::Failed { id }
                     } else {
-                        Event::Finished { id, output: output(script, &label) }
+                        Event::Finished {
+                            id,
+                            output: output(script, &label),
+                        }
                     }
                 }
                 None => break,
@@ -89,7 +102,13 @@ fn play(steps: Vec<ResolvedStep>, script: &Script) -> Play {
 
 fn output(script: &Script, label: &str) -> Output {
     let n = script.items.get(label).copied().unwrap_or(0);
-    Output { labels: Some((0..n).map(|i| ["A", "B", "C", "D"][i as usize].to_owned()).collect()) }
+    Output {
+        labels: Some(
+            (0..n)
+                .map(|i| ["A", "B", "C", "D"][i as usize].to_owned())
+                .collect(),
+        ),
+    }
 }
 
 fn items(of: &[(&str, u64)]) -> HashMap<String, u64> {
@@ -101,7 +120,11 @@ fn forming() -> Vec<ResolvedStep> {
     vec![
         step("coarse", &[], &[]),
         step("zones", &[], &[("formed", "coarse")]),
-        step("boundary", &["zones"], &[("zones", "zones"), ("formed", "coarse")]),
+        step(
+            "boundary",
+            &["zones"],
+            &[("zones", "zones"), ("formed", "coarse")],
+        ),
         step("fine", &["zones"], &[("boundary", "boundary")]),
         step("compare", &[], &[("global", "coarse"), ("local", "fine")]),
     ]
@@ -109,10 +132,20 @@ fn forming() -> Vec<ResolvedStep> {
 
 #[test]
 fn each_zone_gets_its_own_chain_and_the_comparison_gathers_them_all() {
-    let script = Script { items: items(&[("zones", 2)]), ..Default::default() };
+    let script = Script {
+        items: items(&[("zones", 2)]),
+        ..Default::default()
+    };
     let p = play(forming(), &script);
-    let expected =
-        ["coarse", "zones", "boundary[A]", "boundary[B]", "fine[A]", "fine[B]", "compare"];
+    let expected = [
+        "coarse",
+        "zones",
+        "boundary[A]",
+        "boundary[B]",
+        "fine[A]",
+        "fine[B]",
+        "compare",
+    ];
     assert_eq!(p.order, expected);
 }
 
@@ -151,7 +184,10 @@ fn two_fan_outs_meeting_in_one_step_give_every_pair() {
         step("x", &["a"], &[]),
         step("pair", &["a", "b"], &[("x", "x"), ("b", "b")]),
     ];
-    let script = Script { items: items(&[("a", 2), ("b", 2)]), ..Default::default() };
+    let script = Script {
+        items: items(&[("a", 2), ("b", 2)]),
+        ..Default::default()
+    };
     let p = play(steps, &script);
     let mut pairs: Vec<&String> = p.order.iter().filter(|o| o.starts_with("pair")).collect();
     pairs.sort();
@@ -174,7 +210,10 @@ fn a_failure_skips_what_depends_on_it_and_keeps_other_branches() {
 
 #[test]
 fn a_failed_collection_skips_the_gathering_step_though_no_items_ever_appear() {
-    let script = Script { fails: [("zones".to_owned(), 9)].into(), ..Default::default() };
+    let script = Script {
+        fails: [("zones".to_owned(), 9)].into(),
+        ..Default::default()
+    };
     let p = play(forming(), &script);
     assert_eq!(p.order, ["coarse", "zones"]);
     assert_eq!(p.skipped, [("compare".to_owned(), "zones".to_owned())]);
@@ -182,7 +221,11 @@ fn a_failed_collection_skips_the_gathering_step_though_no_items_ever_appear() {
 
 #[test]
 fn fail_fast_cancels_what_runs_and_starts_nothing_more() {
-    let steps = vec![step("a", &[], &[]), step("b", &[], &[]), step("c", &[], &[])];
+    let steps = vec![
+        step("a", &[], &[]),
+        step("b", &[], &[]),
+        step("c", &[], &[]),
+    ];
     let script = Script {
         cores: 2,
         fail_fast: true,
@@ -190,14 +233,20 @@ fn fail_fast_cancels_what_runs_and_starts_nothing_more() {
         ..Default::default()
     };
     let p = play(steps, &script);
-    assert_eq!((p.order, p.cancelled), (vec!["a".to_owned(), "b".to_owned()], 1));
+    assert_eq!(
+        (p.order, p.cancelled),
+        (vec!["a".to_owned(), "b".to_owned()], 1)
+    );
 }
 
 #[test]
 fn a_step_is_tried_again_as_often_as_it_says() {
     let mut a = step("a", &[], &[]);
     a.retries = 2;
-    let fails = |n| Script { fails: [("a".to_owned(), n)].into(), ..Default::default() };
+    let fails = |n| Script {
+        fails: [("a".to_owned(), n)].into(),
+        ..Default::default()
+    };
     let again = step("b", &[], &[("in", "a")]);
     let p = play(vec![a.clone(), again.clone()], &fails(2));
     assert_eq!(p.order, ["a", "a", "a", "b"]);
@@ -208,17 +257,28 @@ fn a_step_is_tried_again_as_often_as_it_says() {
 #[test]
 fn what_the_store_has_is_not_run_even_when_its_input_must_run() {
     let steps = vec![step("a", &[], &[]), step("b", &[], &[("in", "a")])];
-    let script = Script { cache: vec!["b".into()], ..Default::default() };
+    let script = Script {
+        cache: vec!["b".into()],
+        ..Default::default()
+    };
     let p = play(steps, &script);
-    assert_eq!((p.order, p.cached), (vec!["a".to_owned()], vec!["b".to_owned()]));
+    assert_eq!(
+        (p.order, p.cached),
+        (vec!["a".to_owned()], vec!["b".to_owned()])
+    );
 }
 
 #[test]
 fn cores_are_never_given_twice() {
-    let mut steps: Vec<ResolvedStep> =
-        (0..6).map(|i| step(&format!("s{i}"), &[], &[])).collect();
+    let mut steps: Vec<ResolvedStep> = (0..6).map(|i| step(&format!("s{i}"), &[], &[])).collect();
     steps[3].resources.cores = 2;
-    let p = play(steps, &Script { cores: 2, ..Default::default() });
+    let p = play(
+        steps,
+        &Script {
+            cores: 2,
+            ..Default::default()
+        },
+    );
     assert_eq!((p.order.len(), p.most_at_once), (6, 2));
 }
 
@@ -234,13 +294,21 @@ fn a_step_without_stated_cores_gets_all_when_alone_and_a_share_when_not() {
             .collect();
         let w = workflow(steps);
         let graph = Graph::new(&w).unwrap();
-        let limits = Limits { cores: 4, memory: 0, policy: FailurePolicy::KeepGoing };
+        let limits = Limits {
+            cores: 4,
+            memory: 0,
+            policy: FailurePolicy::KeepGoing,
+        };
         let mut core = Core::new(&graph, limits);
         let mut found = vec![];
         for effect in core.start() {
-            let Effect::Look(id) = effect else { panic!("{effect:?}") };
+            let Effect::Look(id) = effect else {
+                panic!("{effect:?}")
+            };
             for e in core.handle(Event::Looked { id, found: None }) {
-                let Effect::Start { threads, .. } = e else { panic!("{e:?}") };
+                let Effect::Start { threads, .. } = e else {
+                    panic!("{e:?}")
+                };
                 found.push(threads);
             }
         }
@@ -253,8 +321,11 @@ fn a_step_without_stated_cores_gets_all_when_alone_and_a_share_when_not() {
 
 #[test]
 fn an_interrupt_cancels_what_runs_and_ends() {
-    let script =
-        Script { items: items(&[("zones", 4)]), interrupt_after: Some(3), ..Default::default() };
+    let script = Script {
+        items: items(&[("zones", 4)]),
+        interrupt_after: Some(3),
+        ..Default::default()
+    };
     let p = play(forming(), &script);
     assert_eq!((p.order.len(), p.cancelled), (3, 1));
 }

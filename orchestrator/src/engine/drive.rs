@@ -188,7 +188,11 @@ impl<'a> Session<'a> {
         loop {
             while let Some(effect) = self.pending.pop_front() {
                 match effect {
-                    Effect::Start { id, threads, attempt } => {
+                    Effect::Start {
+                        id,
+                        threads,
+                        attempt,
+                    } => {
                         observer.update(&self.core, id, &Update::Started { threads, attempt });
                         let task = self.task(id, threads);
                         executor.submit(task);
@@ -222,12 +226,11 @@ impl<'a> Session<'a> {
             .core
             .instances()
             .iter()
-            .filter(|i| {
-                !matches!(i.state, State::Done { .. } | State::Failed)
-            })
+            .filter(|i| !matches!(i.state, State::Done { .. } | State::Failed))
             .count();
         if summary.executed + summary.failures.len() > 0 {
-            self.journal.ended(summary.executed as u64, summary.failures.len() as u64);
+            self.journal
+                .ended(summary.executed as u64, summary.failures.len() as u64);
         }
         self.journal.flush()?;
         // Left empty by all workers that ended well; what a killed one left is worthless.
@@ -282,7 +285,10 @@ impl<'a> Session<'a> {
             Some(known) if known.bytes == bytes => known.clone(),
             _ => {
                 let record = self.store.read_record(&key).filter(|r| r.bytes == bytes)?;
-                Known { bytes, labels: record.collection }
+                Known {
+                    bytes,
+                    labels: record.collection,
+                }
             }
         };
         if self.core.graph().steps[step].collection && known.labels.is_none() {
@@ -301,7 +307,9 @@ impl<'a> Session<'a> {
         let step = &self.core.graph().steps[instance.step];
         if let Some(key) = instance.key {
             let who = (step.name.as_str(), instance.item.as_slice());
-            self.journal.used(who, key, &step.recipe, artifact, || input_keys(&self.core, id));
+            self.journal.used(who, key, &step.recipe, artifact, || {
+                input_keys(&self.core, id)
+            });
         }
     }
 
@@ -311,7 +319,10 @@ impl<'a> Session<'a> {
             return *cost;
         }
         let key = self.core.instances()[id].key;
-        let cost = key.and_then(|k| self.store.read_record(&k)).map(|r| r.cost).unwrap_or_default();
+        let cost = key
+            .and_then(|k| self.store.read_record(&k))
+            .map(|r| r.cost)
+            .unwrap_or_default();
         self.costs.insert(id, cost);
         cost
     }
@@ -329,18 +340,26 @@ impl<'a> Session<'a> {
                 step: from.name.clone(),
                 kind: from.output_kind.clone(),
                 item: given.item.clone(),
-                artifact: given.key.map(|k| self.store.artifact(&k)).unwrap_or_default(),
+                artifact: given
+                    .key
+                    .map(|k| self.store.artifact(&k))
+                    .unwrap_or_default(),
                 cost,
             });
         }
         self.serial += 1;
-        let tmp = self.folder.tmp().join(format!("{}-{}", std::process::id(), self.serial));
+        let tmp = self
+            .folder
+            .tmp()
+            .join(format!("{}-{}", std::process::id(), self.serial));
         let place = |end: &str| Utf8PathBuf::from(format!("{tmp}{end}"));
         let (artifact, record) = (place(".h5"), place(".record.json"));
         self.jobs.insert(id, (artifact.clone(), record.clone()));
         let instance = &self.core.instances()[id];
-        let library =
-            |p: &plyflow_workflow::resolved::PluginId| LibraryRef { name: p.name.clone(), path: p.path.clone() };
+        let library = |p: &plyflow_workflow::resolved::PluginId| LibraryRef {
+            name: p.name.clone(),
+            path: p.path.clone(),
+        };
         let job = Job {
             version: JOB_VERSION,
             step: step.name.clone(),
@@ -363,7 +382,12 @@ impl<'a> Session<'a> {
         let log = self.folder.log(&self.core.label(id));
         // A log of an earlier attempt must not pass for this one's.
         let _ = std::fs::remove_file(&log);
-        Task { id, job, time_limit: step.resources.time_limit, log }
+        Task {
+            id,
+            job,
+            time_limit: step.resources.time_limit,
+            log,
+        }
     }
 
     /// What the artifact says about its own making; only what its key also holds.
@@ -392,17 +416,28 @@ impl<'a> Session<'a> {
             Report::Message { id, message } => match &message {
                 Message::Progress(p) => observer.update(&self.core, id, &Update::Progress(p)),
                 Message::Log { level, text } => {
-                    observer.update(&self.core, id, &Update::Log { level: *level, text });
+                    observer.update(
+                        &self.core,
+                        id,
+                        &Update::Log {
+                            level: *level,
+                            text,
+                        },
+                    );
                 }
                 Message::Done { .. } | Message::Failed { .. } => {}
             },
-            Report::Ended { id, outcome: Outcome::Done(record) } => {
-                match self.accept(id, &record) {
-                    Ok(known) => self.succeed(id, &record, known, observer),
-                    Err(reason) => self.fail(id, &reason, observer),
-                }
-            }
-            Report::Ended { id, outcome: Outcome::Cancelled } => {
+            Report::Ended {
+                id,
+                outcome: Outcome::Done(record),
+            } => match self.accept(id, &record) {
+                Ok(known) => self.succeed(id, &record, known, observer),
+                Err(reason) => self.fail(id, &reason, observer),
+            },
+            Report::Ended {
+                id,
+                outcome: Outcome::Cancelled,
+            } => {
                 let effects = self.core.handle(Event::Cancelled { id });
                 observer.update(&self.core, id, &Update::Stopped);
                 self.take(effects, observer);
@@ -415,7 +450,10 @@ impl<'a> Session<'a> {
     fn accept(&mut self, id: Id, record: &Record) -> Result<Known, String> {
         let instance = &self.core.instances()[id];
         let key: Key = instance.key.ok_or("the instance has no key")?;
-        let (artifact, beside) = self.jobs.remove(&id).ok_or("the instance was not started")?;
+        let (artifact, beside) = self
+            .jobs
+            .remove(&id)
+            .ok_or("the instance was not started")?;
         let step = &self.core.graph().steps[instance.step];
         if step.collection && record.collection.is_none() {
             return Err(format!(
@@ -423,7 +461,9 @@ impl<'a> Session<'a> {
                 step.recipe.ingredients.plugin.name
             ));
         }
-        let size = std::fs::metadata(&artifact).map_err(|e| format!("no artifact: {e}"))?.len();
+        let size = std::fs::metadata(&artifact)
+            .map_err(|e| format!("no artifact: {e}"))?
+            .len();
         if size != record.bytes {
             return Err(format!(
                 "malformed artifact: it has {size} bytes and its record says {}",
@@ -431,15 +471,23 @@ impl<'a> Session<'a> {
             ));
         }
         self.store.commit(&key, &artifact, &beside).map_err(|e| {
-            format!("the artifact cannot be put into the store {}: {e}", self.store.root())
+            format!(
+                "the artifact cannot be put into the store {}: {e}",
+                self.store.root()
+            )
         })?;
-        Ok(Known { bytes: size, labels: record.collection.clone() })
+        Ok(Known {
+            bytes: size,
+            labels: record.collection.clone(),
+        })
     }
 
     fn succeed(&mut self, id: Id, record: &Record, known: Known, observer: &mut dyn Observer) {
         self.summary.executed += 1;
         self.costs.insert(id, record.cost);
-        let output = Output { labels: known.labels.clone() };
+        let output = Output {
+            labels: known.labels.clone(),
+        };
         self.note(id, known);
         let effects = self.core.handle(Event::Finished { id, output });
         observer.update(&self.core, id, &Update::Finished(record));
@@ -457,7 +505,11 @@ impl<'a> Session<'a> {
         if !again {
             let label = self.core.label(id);
             let log = Some(self.folder.log(&label)).filter(|l| l.exists());
-            self.summary.failures.push(Failure { label, reason: reason.to_owned(), log });
+            self.summary.failures.push(Failure {
+                label,
+                reason: reason.to_owned(),
+                log,
+            });
         }
         self.take(effects, observer);
     }
@@ -482,8 +534,14 @@ pub fn input_keys(core: &Core<'_>, id: Id) -> Vec<InputKey> {
 fn reason_text(outcome: &Outcome) -> String {
     match outcome {
         Outcome::Done(_) => "done".into(),
-        Outcome::Failed { kind: FailureKind::Panic, message } => format!("the plugin panicked: {message}"),
-        Outcome::Failed { kind: FailureKind::Malformed, message } => {
+        Outcome::Failed {
+            kind: FailureKind::Panic,
+            message,
+        } => format!("the plugin panicked: {message}"),
+        Outcome::Failed {
+            kind: FailureKind::Malformed,
+            message,
+        } => {
             format!("malformed artifact: {message}")
         }
         Outcome::Failed { message, .. } => message.clone(),

@@ -74,7 +74,12 @@ impl Log {
 impl Local {
     /// Workers are started as `program step-worker -`. `wake`: when it becomes readable, waiting ends.
     pub fn new(program: Utf8PathBuf, wake: Option<OwnedFd>) -> Self {
-        Self { program, workers: BTreeMap::new(), queued: Vec::new(), wake }
+        Self {
+            program,
+            workers: BTreeMap::new(),
+            queued: Vec::new(),
+            wake,
+        }
     }
 
     fn spawn(&self, task: &Task) -> io::Result<(Child, OwnedFd)> {
@@ -95,8 +100,10 @@ impl Local {
             .spawn()?;
         let pid = Pid::from_child(&process);
         let exit = rustix::process::pidfd_open(pid, PidfdFlags::empty())?;
-        for pipe in [process.stdout.as_ref().map(AsFd::as_fd), process.stderr.as_ref().map(AsFd::as_fd)]
-        {
+        for pipe in [
+            process.stdout.as_ref().map(AsFd::as_fd),
+            process.stderr.as_ref().map(AsFd::as_fd),
+        ] {
             if let Some(pipe) = pipe {
                 rustix::fs::fcntl_setfl(pipe, OFlags::NONBLOCK)?;
             }
@@ -149,12 +156,20 @@ impl Local {
 
     /// Time until the next time limit or the end of a grace.
     fn next_deadline(&self, now: Instant) -> Option<Duration> {
-        let all = self.workers.values().flat_map(|w| [w.deadline, w.kill_at]).flatten();
+        let all = self
+            .workers
+            .values()
+            .flat_map(|w| [w.deadline, w.kill_at])
+            .flatten();
         all.min().map(|at| at.saturating_duration_since(now))
     }
 
     fn enforce_deadlines(&mut self) {
-        if self.workers.values().all(|w| w.deadline.is_none() && w.kill_at.is_none()) {
+        if self
+            .workers
+            .values()
+            .all(|w| w.deadline.is_none() && w.kill_at.is_none())
+        {
             return;
         }
         let now = Instant::now();
@@ -179,7 +194,10 @@ impl Executor for Local {
             Ok(started) => started,
             Err(e) => {
                 let outcome = Outcome::NotStarted(format!("{}: {e}", self.program));
-                return self.queued.push(Report::Ended { id: task.id, outcome });
+                return self.queued.push(Report::Ended {
+                    id: task.id,
+                    outcome,
+                });
             }
         };
         let limit = Some(task.time_limit).filter(|s| *s > 0.0);
@@ -193,7 +211,10 @@ impl Executor for Local {
             exit,
             line: Vec::new(),
             verdict: None,
-            log: Log { path: task.log, file: None },
+            log: Log {
+                path: task.log,
+                file: None,
+            },
             time_limit: task.time_limit,
             deadline,
             kill_at: None,
@@ -213,7 +234,9 @@ impl Executor for Local {
             (a, b) => a.or(b),
         };
         for (id, [exited, said, complained]) in self.poll(timeout)? {
-            let Some(worker) = self.workers.get_mut(&id) else { continue };
+            let Some(worker) = self.workers.get_mut(&id) else {
+                continue;
+            };
             if said || exited {
                 worker.read_stdout(id, out);
             }
@@ -281,7 +304,8 @@ impl Worker {
                 Ok(m @ (Message::Done { .. } | Message::Failed { .. })) => self.verdict = Some(m),
                 Ok(message) => {
                     if let Message::Log { level, text } = &message {
-                        self.log.write(format!("{} {text}\n", level_name(*level)).as_bytes());
+                        self.log
+                            .write(format!("{} {text}\n", level_name(*level)).as_bytes());
                     }
                     out.push(Report::Message { id, message });
                 }
@@ -293,7 +317,9 @@ impl Worker {
         }
         self.line.drain(..start);
         if self.line.len() > LONGEST_LINE {
-            self.log.write(b"(a line longer than 64 MiB on the worker's standard output was dropped)\n");
+            self.log.write(
+                b"(a line longer than 64 MiB on the worker's standard output was dropped)\n",
+            );
             self.line.clear();
         }
     }
@@ -335,10 +361,19 @@ impl Worker {
             (Some(Message::Done { record }), _) if status.success() => Outcome::Done(record),
             (_, Some(Stop::TimedOut)) => Outcome::TimedOut(self.time_limit),
             (_, Some(Stop::Cancelled)) => Outcome::Cancelled,
-            (Some(Message::Failed { kind: FailureKind::Cancelled, .. }), None) => {
+            (
+                Some(Message::Failed {
+                    kind: FailureKind::Cancelled,
+                    ..
+                }),
+                None,
+            ) => {
                 // Someone else sent it SIGTERM: a scheduler, an administrator.
                 let message = "the worker was told to stop from outside".into();
-                Outcome::Failed { kind: FailureKind::Cancelled, message }
+                Outcome::Failed {
+                    kind: FailureKind::Cancelled,
+                    message,
+                }
             }
             (Some(Message::Failed { kind, message }), None) => Outcome::Failed { kind, message },
             (_, None) => match status.signal() {

@@ -109,6 +109,9 @@ mod tests {
     fn an_empty_collection_gives_no_instances_and_nothing_unknown() {
         let w = workflow(vec![step("a", &[], &[]), step("b", &["a"], &[])]);
         let graph = Graph::new(&w).unwrap();
-        assert_eq!(walk(&graph, 1, &[None], |_, _| Extent::Items(0)), Walk::default());
+        assert_eq!(
+            walk(&graph, 1, &[None], |_, _| Extent::Items(0)),
+            Walk::default()
+        );
     }
 }

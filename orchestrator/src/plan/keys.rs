@@ -23,7 +23,9 @@ impl Key {
 
     /// Reads 64 hex digits.
     pub fn from_hex(text: &str) -> Option<Self> {
-        blake3::Hash::from_hex(text).ok().map(|h| Self(*h.as_bytes()))
+        blake3::Hash::from_hex(text)
+            .ok()
+            .map(|h| Self(*h.as_bytes()))
     }
 }
 
@@ -105,7 +107,10 @@ impl Recipe {
             data_model: DATA_MODEL_VERSION,
         };
         let digest = digest_of(&ingredients);
-        Self { digest, ingredients }
+        Self {
+            digest,
+            ingredients,
+        }
     }
 }
 
@@ -252,16 +257,29 @@ mod tests {
             instance_key(&r, item, inputs.iter().copied())
         };
         let base = key(&[0], &[("p", "s", &[0], &a), ("p", "s", &[1], &b)]);
-        assert_ne!(base, key(&[1], &[("p", "s", &[0], &a), ("p", "s", &[1], &b)]));
-        assert_ne!(base, key(&[0], &[("p", "s", &[0], &b), ("p", "s", &[1], &a)]));
-        assert_ne!(base, key(&[0], &[("q", "s", &[0], &a), ("p", "s", &[1], &b)]));
+        assert_ne!(
+            base,
+            key(&[1], &[("p", "s", &[0], &a), ("p", "s", &[1], &b)])
+        );
+        assert_ne!(
+            base,
+            key(&[0], &[("p", "s", &[0], &b), ("p", "s", &[1], &a)])
+        );
+        assert_ne!(
+            base,
+            key(&[0], &[("q", "s", &[0], &a), ("p", "s", &[1], &b)])
+        );
         assert_ne!(base, key(&[0], &[("p", "s", &[0], &a)]));
-        assert_eq!(base, key(&[0], &[("p", "s", &[0], &a), ("p", "s", &[1], &b)]));
+        assert_eq!(
+            base,
+            key(&[0], &[("p", "s", &[0], &a), ("p", "s", &[1], &b)])
+        );
     }
 
     #[test]
     fn canonical_json_sorts_keys_at_every_depth() {
-        let a: Value = serde_json::from_str(r#"{"b": [1, {"d": 2, "c": 3.5}], "a": null}"#).unwrap();
+        let a: Value =
+            serde_json::from_str(r#"{"b": [1, {"d": 2, "c": 3.5}], "a": null}"#).unwrap();
         assert_eq!(canonical_json(&a), r#"{"a":null,"b":[1,{"c":3.5,"d":2}]}"#);
     }
 }

@@ -109,23 +109,41 @@ impl Graph {
                     other: name.to_owned(),
                 })
             };
-            let own: Vec<usize> =
-                step.dimensions.iter().map(|d| find(&d.over)).collect::<Result<_, _>>()?;
+            let own: Vec<usize> = step
+                .dimensions
+                .iter()
+                .map(|d| find(&d.over))
+                .collect::<Result<_, _>>()?;
             let position = |over: usize| own.iter().position(|o| *o == over);
             let mut dimensions = Vec::with_capacity(own.len());
             for over in &own {
                 let prefix = steps[*over].dimensions.iter().map(|d| position(d.over));
-                let prefix = prefix.collect::<Option<Vec<_>>>().ok_or_else(|| {
-                    PlanError::Nesting { step: step.name.clone(), over: steps[*over].name.clone() }
-                })?;
-                dimensions.push(DimensionPlan { over: *over, prefix });
+                let prefix =
+                    prefix
+                        .collect::<Option<Vec<_>>>()
+                        .ok_or_else(|| PlanError::Nesting {
+                            step: step.name.clone(),
+                            over: steps[*over].name.clone(),
+                        })?;
+                dimensions.push(DimensionPlan {
+                    over: *over,
+                    prefix,
+                });
                 edges.update_edge(NodeIndex::new(*over), NodeIndex::new(at), ());
             }
             let mut wires = Vec::with_capacity(step.inputs.len());
             for input in &step.inputs {
                 let from = find(&input.from)?;
-                let matched = steps[from].dimensions.iter().map(|d| position(d.over)).collect();
-                wires.push(WirePlan { port: input.port.clone(), from, matched });
+                let matched = steps[from]
+                    .dimensions
+                    .iter()
+                    .map(|d| position(d.over))
+                    .collect();
+                wires.push(WirePlan {
+                    port: input.port.clone(),
+                    from,
+                    matched,
+                });
                 edges.update_edge(NodeIndex::new(from), NodeIndex::new(at), ());
             }
             for over in own {
@@ -164,11 +182,16 @@ impl Graph {
         let mut wanted = BTreeSet::new();
         let mut stack = Vec::new();
         for name in names {
-            stack.push(self.find(name).ok_or_else(|| PlanError::NoStep(name.clone()))?);
+            stack.push(
+                self.find(name)
+                    .ok_or_else(|| PlanError::NoStep(name.clone()))?,
+            );
         }
         while let Some(at) = stack.pop() {
             if wanted.insert(at) {
-                let up = self.edges.neighbors_directed(NodeIndex::new(at), Direction::Incoming);
+                let up = self
+                    .edges
+                    .neighbors_directed(NodeIndex::new(at), Direction::Incoming);
                 stack.extend(up.map(NodeIndex::index));
             }
         }
@@ -200,15 +223,25 @@ pub(crate) mod tests {
             files: vec![],
             inputs: wires
                 .iter()
-                .map(|(p, f)| ResolvedInput { port: (*p).into(), from: (*f).into() })
+                .map(|(p, f)| ResolvedInput {
+                    port: (*p).into(),
+                    from: (*f).into(),
+                })
                 .collect(),
             dimensions: dims
                 .iter()
-                .map(|d| Dimension { name: (*d).into(), over: (*d).into() })
+                .map(|d| Dimension {
+                    name: (*d).into(),
+                    over: (*d).into(),
+                })
                 .collect(),
             output_kind: "any".into(),
             collection: true,
-            resources: Resources { cores: 1, memory: 0, time_limit: 0.0 },
+            resources: Resources {
+                cores: 1,
+                memory: 0,
+                time_limit: 0.0,
+            },
             retries: 0,
         }
     }
@@ -236,13 +269,26 @@ pub(crate) mod tests {
         g.restrict(&["c".into()]).unwrap();
         let wanted: Vec<bool> = g.steps.iter().map(|s| s.wanted).collect();
         assert_eq!(wanted, [true, true, true, false]);
-        assert_eq!(g.restrict(&["x".into()]), Err(PlanError::NoStep("x".into())));
+        assert_eq!(
+            g.restrict(&["x".into()]),
+            Err(PlanError::NoStep("x".into()))
+        );
     }
 
     #[test]
     fn a_nested_collection_needs_its_outer_dimension_in_the_step() {
-        let w = workflow(vec![step("a", &[], &[]), step("b", &["a"], &[]), step("c", &["b"], &[])]);
+        let w = workflow(vec![
+            step("a", &[], &[]),
+            step("b", &["a"], &[]),
+            step("c", &["b"], &[]),
+        ]);
         let error = Graph::new(&w).unwrap_err();
-        assert_eq!(error, PlanError::Nesting { step: "c".into(), over: "b".into() });
+        assert_eq!(
+            error,
+            PlanError::Nesting {
+                step: "c".into(),
+                over: "b".into()
+            }
+        );
     }
 }

@@ -15,14 +15,16 @@ pub struct Change {
 }
 
 /// All parts that differ, in the order plugin, components, parameters, files, inputs.
-pub fn changes(
-    old: (&Ingredients, &[InputKey]),
-    new: (&Ingredients, &[InputKey]),
-) -> Vec<Change> {
+pub fn changes(old: (&Ingredients, &[InputKey]), new: (&Ingredients, &[InputKey])) -> Vec<Change> {
     let mut found = Vec::new();
     let (o, n) = (old.0, new.0);
     push(&mut found, "step name", &o.step, &n.step);
-    push(&mut found, "plugin", &binary_text(&o.plugin), &binary_text(&n.plugin));
+    push(
+        &mut found,
+        "plugin",
+        &binary_text(&o.plugin),
+        &binary_text(&n.plugin),
+    );
     for at in 0..o.components.len().max(n.components.len()) {
         let (a, b) = (o.components.get(at), n.components.get(at));
         let name = b.or(a).map_or("", |c| c.name.as_str());
@@ -31,19 +33,33 @@ pub fn changes(
     }
     compare_values(&mut found, "", Some(&o.parameters), Some(&n.parameters));
     compare_files(&mut found, &o.files, &n.files);
-    push(&mut found, "data model", &o.data_model.to_string(), &n.data_model.to_string());
+    push(
+        &mut found,
+        "data model",
+        &o.data_model.to_string(),
+        &n.data_model.to_string(),
+    );
     compare_inputs(&mut found, old.1, new.1);
     found
 }
 
 fn push(found: &mut Vec<Change>, part: &str, old: &str, new: &str) {
     if old != new {
-        found.push(Change { part: part.into(), old: old.into(), new: new.into() });
+        found.push(Change {
+            part: part.into(),
+            old: old.into(),
+            new: new.into(),
+        });
     }
 }
 
 fn binary_text(b: &Binary) -> String {
-    format!("{} {} ({})", b.name, b.version, b.hash.get(..12).unwrap_or(&b.hash))
+    format!(
+        "{} {} ({})",
+        b.name,
+        b.version,
+        b.hash.get(..12).unwrap_or(&b.hash)
+    )
 }
 
 fn compare_values(found: &mut Vec<Change>, at: &str, old: Option<&Value>, new: Option<&Value>) {
@@ -70,13 +86,21 @@ fn compare_values(found: &mut Vec<Change>, at: &str, old: Option<&Value>, new: O
 
 fn compare_files(found: &mut Vec<Change>, old: &[(String, String)], new: &[(String, String)]) {
     let hash = |list: &[(String, String)], p: &str| {
-        list.iter().find(|(q, _)| q == p).map(|(_, h)| h.clone()).unwrap_or_default()
+        list.iter()
+            .find(|(q, _)| q == p)
+            .map(|(_, h)| h.clone())
+            .unwrap_or_default()
     };
     let mut pointers: Vec<&String> = old.iter().chain(new).map(|(p, _)| p).collect();
     pointers.sort_unstable();
     pointers.dedup();
     for p in pointers {
-        push(found, &format!("content of the file at {p}"), &hash(old, p), &hash(new, p));
+        push(
+            found,
+            &format!("content of the file at {p}"),
+            &hash(old, p),
+            &hash(new, p),
+        );
     }
 }
 
@@ -122,11 +146,29 @@ mod tests {
         let mut b = a.clone();
         b.parameters["limits"]["shear"] = json!(0.157);
         b.parameters["list"] = json!([1, 2, 3]);
-        let input = |k| InputKey { port: "p".into(), step: "up".into(), item: vec![1], key: k };
+        let input = |k| InputKey {
+            port: "p".into(),
+            step: "up".into(),
+            item: vec![1],
+            key: k,
+        };
         let (old, new) = (Recipe::of(&a).ingredients, Recipe::of(&b).ingredients);
-        let found = changes((&old, &[input(Key([1; 32]))]), (&new, &[input(Key([2; 32]))]));
+        let found = changes(
+            (&old, &[input(Key([1; 32]))]),
+            (&new, &[input(Key([2; 32]))]),
+        );
         let parts: Vec<&str> = found.iter().map(|c| c.part.as_str()).collect();
-        assert_eq!(parts, ["parameter /limits/shear", "parameter /list", "input p from up[1]"]);
-        assert_eq!((found[0].old.as_str(), found[0].new.as_str()), ("0.139", "0.157"));
+        assert_eq!(
+            parts,
+            [
+                "parameter /limits/shear",
+                "parameter /list",
+                "input p from up[1]"
+            ]
+        );
+        assert_eq!(
+            (found[0].old.as_str(), found[0].new.as_str()),
+            ("0.139", "0.157")
+        );
     }
 }

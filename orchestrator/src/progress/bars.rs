@@ -41,7 +41,14 @@ impl Default for Bars {
         total.set_style(style("{prefix:>24} [{bar:24}] {pos}/{len} {msg}"));
         total.set_prefix("steps");
         let running = HashMap::new();
-        Self { all, total, running, told: Instant::now(), done: 0, known: 0 }
+        Self {
+            all,
+            total,
+            running,
+            told: Instant::now(),
+            done: 0,
+            known: 0,
+        }
     }
 }
 
@@ -68,10 +75,15 @@ impl Bars {
             return;
         }
         self.known = core.instances().len() as u64;
-        let final_ = core.instances().iter().filter(|i| i.state.is_final()).count();
+        let final_ = core
+            .instances()
+            .iter()
+            .filter(|i| i.state.is_final())
+            .count();
         self.done = final_ as u64;
         let waits = core.instances().iter().any(|i| i.state == State::Unkeyed);
-        self.total.set_message(if waits { "known so far" } else { "" });
+        self.total
+            .set_message(if waits { "known so far" } else { "" });
         self.show_total();
     }
 }
@@ -82,7 +94,14 @@ impl Observer for Bars {
             Update::Cached => {}
             Update::Started { .. } => {
                 let label = core.label(id);
-                self.running.insert(id, Running { label, begun: Instant::now(), bar: None });
+                self.running.insert(
+                    id,
+                    Running {
+                        label,
+                        begun: Instant::now(),
+                        bar: None,
+                    },
+                );
             }
             Update::Progress(p) => {
                 if let Some(running) = self.running.get(&id)

@@ -30,9 +30,15 @@ impl Observer for Lines {
                 let now = Instant::now();
                 self.running.insert(id, (now, now));
                 let s = if *threads == 1 { "" } else { "s" };
-                let again =
-                    if *attempt > 1 { format!(", attempt {attempt}") } else { String::new() };
-                say(&format!("start    {} ({threads} thread{s}{again})", core.label(id)));
+                let again = if *attempt > 1 {
+                    format!(", attempt {attempt}")
+                } else {
+                    String::new()
+                };
+                say(&format!(
+                    "start    {} ({threads} thread{s}{again})",
+                    core.label(id)
+                ));
             }
             Update::Progress(p) => {
                 if let Some((begun, told)) = self.running.get_mut(&id)
@@ -41,11 +47,18 @@ impl Observer for Lines {
                     *told = Instant::now();
                     let text = progress_text(p, begun.elapsed());
                     let percent = 100.0 * p.fraction;
-                    say(&format!("         {} {percent:.0} %: {text}", core.label(id)));
+                    say(&format!(
+                        "         {} {percent:.0} %: {text}",
+                        core.label(id)
+                    ));
                 }
             }
             Update::Log { level, text } if *level <= LogLevel::Warn => {
-                let word = if *level == LogLevel::Error { "error   " } else { "warning " };
+                let word = if *level == LogLevel::Error {
+                    "error   "
+                } else {
+                    "warning "
+                };
                 say(&format!("{word} {}: {text}", core.label(id)));
             }
             Update::Log { .. } => {}
@@ -60,7 +73,11 @@ impl Observer for Lines {
             }
             Update::Stopped => say(&format!("stopped  {}", core.label(id))),
             Update::Skipped { cause } => {
-                say(&format!("skip     {} because {} failed", core.label(id), core.label(*cause)));
+                say(&format!(
+                    "skip     {} because {} failed",
+                    core.label(id),
+                    core.label(*cause)
+                ));
             }
         }
     }

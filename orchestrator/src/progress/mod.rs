@@ -68,8 +68,14 @@ mod tests {
 
     #[test]
     fn a_progress_line_says_only_what_the_step_has() {
-        let mut p = Progress { fraction: 0.25, ..Default::default() };
-        assert_eq!(progress_text(&p, Duration::from_secs(20)), "1 min 00 s left");
+        let mut p = Progress {
+            fraction: 0.25,
+            ..Default::default()
+        };
+        assert_eq!(
+            progress_text(&p, Duration::from_secs(20)),
+            "1 min 00 s left"
+        );
         p.simulated_time = Some(0.5);
         p.energy_ratio = Some(0.0123);
         let text = progress_text(&p, Duration::from_secs(1));

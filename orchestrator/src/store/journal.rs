@@ -22,7 +22,12 @@ const FLUSH: Duration = Duration::from_millis(200);
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 enum Entry {
     /// An artifact is in the store.
-    Made { key: Key, slot: u64, bytes: u64, labels: Option<Vec<String>> },
+    Made {
+        key: Key,
+        slot: u64,
+        bytes: u64,
+        labels: Option<Vec<String>>,
+    },
     /// A slot uses this known artifact again.
     Use { key: Key, slot: u64 },
     /// The ingredients of a recipe, as JSON.
@@ -108,8 +113,12 @@ impl Journal {
     /// When the file cannot be read or written.
     pub fn open(path: &Utf8Path) -> io::Result<Self> {
         let mut options = File::options();
-        let mut file =
-            options.read(true).write(true).create(true).truncate(false).open(path)?;
+        let mut file = options
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         let length = bytes.len();
@@ -151,7 +160,9 @@ impl Journal {
         while let Some(head) = bytes.get(at..at + HEAD) {
             let length = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
             let start = at + HEAD;
-            let Some(payload) = bytes.get(start..start + length) else { break };
+            let Some(payload) = bytes.get(start..start + length) else {
+                break;
+            };
             if checksum(payload) != head[4..] || !journal.take(payload, start..start + length) {
                 break;
             }
@@ -168,14 +179,22 @@ impl Journal {
             self.cold.push(range);
         } else {
             match postcard::from_bytes(payload) {
-                Ok(Entry::Made { key, slot, bytes, labels }) => {
+                Ok(Entry::Made {
+                    key,
+                    slot,
+                    bytes,
+                    labels,
+                }) => {
                     self.known.insert(key, Known { bytes, labels });
                     self.last.insert(slot, key);
                 }
                 Ok(Entry::Use { key, slot }) => {
                     self.last.insert(slot, key);
                 }
-                Ok(Entry::Recipe { digest, ingredients }) => {
+                Ok(Entry::Recipe {
+                    digest,
+                    ingredients,
+                }) => {
                     self.recipes.insert(digest, ingredients);
                 }
                 Ok(_) => {}
@@ -188,7 +207,9 @@ impl Journal {
 
     fn push(&mut self, entry: &Entry) {
         // Serialising into memory cannot fail: every type here has a known length.
-        let Ok(payload) = postcard::to_stdvec(entry) else { return };
+        let Ok(payload) = postcard::to_stdvec(entry) else {
+            return;
+        };
         let start = self.bytes.len() + HEAD;
         let mut head = [0u8; HEAD];
         head[..4].copy_from_slice(&(payload.len() as u32).to_le_bytes());
@@ -247,17 +268,32 @@ impl Journal {
         }
         if !self.recipes.contains_key(&recipe.digest) {
             let ingredients = serde_json::to_string(&recipe.ingredients).unwrap_or_default();
-            self.push(&Entry::Recipe { digest: recipe.digest, ingredients });
+            self.push(&Entry::Recipe {
+                digest: recipe.digest,
+                ingredients,
+            });
         }
-        self.push(&Entry::Detail(Detail { key, recipe: recipe.digest, inputs: inputs() }));
-        self.push(&Entry::Made { key, slot, bytes: artifact.bytes, labels: artifact.labels });
+        self.push(&Entry::Detail(Detail {
+            key,
+            recipe: recipe.digest,
+            inputs: inputs(),
+        }));
+        self.push(&Entry::Made {
+            key,
+            slot,
+            bytes: artifact.bytes,
+            labels: artifact.labels,
+        });
     }
 
     /// Notes that steps begin to be started.
     pub fn started(&mut self) {
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         let seconds = now.map_or(0, |d| d.as_secs());
-        self.push(&Entry::Started { pid: std::process::id(), seconds });
+        self.push(&Entry::Started {
+            pid: std::process::id(),
+            seconds,
+        });
     }
 
     /// Notes the end of a run that started steps.
@@ -270,7 +306,9 @@ impl Journal {
     /// # Errors
     /// When the file cannot be written.
     pub fn tick(&mut self) -> io::Result<()> {
-        let Some(file) = &mut self.file else { return Ok(()) };
+        let Some(file) = &mut self.file else {
+            return Ok(());
+        };
         if !self.buffer.is_empty() {
             file.write_all(&self.buffer)?;
             self.buffer.clear();
@@ -317,11 +355,19 @@ impl Journal {
                 fresh.recipes.contains_key(&detail.recipe),
                 self.recipes.get(&detail.recipe).cloned(),
             ) {
-                fresh.push(&Entry::Recipe { digest: detail.recipe, ingredients });
+                fresh.push(&Entry::Recipe {
+                    digest: detail.recipe,
+                    ingredients,
+                });
             }
             fresh.push(&Entry::Detail(detail));
             let Known { bytes, labels } = known.clone();
-            fresh.push(&Entry::Made { key, slot, bytes, labels });
+            fresh.push(&Entry::Made {
+                key,
+                slot,
+                bytes,
+                labels,
+            });
         }
         fresh.file = Some(file);
         fresh.tick()?;

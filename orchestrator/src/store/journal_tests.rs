@@ -16,9 +16,19 @@ fn key(n: u8) -> Key {
 }
 
 fn note(j: &mut Journal, item: u64, n: u8) {
-    let made = Known { bytes: 10 + u64::from(n), labels: Some(vec!["A".into()]) };
-    let input = InputKey { port: "p".into(), step: "up".into(), item: vec![], key: key(200) };
-    j.used(("s", &[item]), key(n), &recipe(f64::from(n)), made, || vec![input]);
+    let made = Known {
+        bytes: 10 + u64::from(n),
+        labels: Some(vec!["A".into()]),
+    };
+    let input = InputKey {
+        port: "p".into(),
+        step: "up".into(),
+        item: vec![],
+        key: key(200),
+    };
+    j.used(("s", &[item]), key(n), &recipe(f64::from(n)), made, || {
+        vec![input]
+    });
 }
 
 #[test]
@@ -51,7 +61,10 @@ fn a_repeated_run_writes_nothing_and_a_return_to_an_old_key_is_noted() {
     note(&mut j, 0, 1);
     j.flush().unwrap();
     assert!(size() > before);
-    assert_eq!(Journal::read(&at(&folder)).unwrap().last("s", &[0]), Some(key(1)));
+    assert_eq!(
+        Journal::read(&at(&folder)).unwrap().last("s", &[0]),
+        Some(key(1))
+    );
 }
 
 #[test]
@@ -105,6 +118,9 @@ fn a_long_history_is_shed_and_the_last_state_is_kept() {
     j.flush().unwrap();
     assert!(std::fs::metadata(at(&folder)).unwrap().len() < before / 10);
     let j = Journal::read(&at(&folder)).unwrap();
-    assert_eq!((j.last("s", &[0]), j.last("s", &[1])), (Some(key(2)), Some(key(9))));
+    assert_eq!(
+        (j.last("s", &[0]), j.last("s", &[1])),
+        (Some(key(2)), Some(key(9)))
+    );
     assert!(j.detail(&key(2)).is_some());
 }

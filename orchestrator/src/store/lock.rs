@@ -51,7 +51,10 @@ impl Lock {
     }
 
     fn take(path: &Utf8Path, what: &str, alone: bool) -> Result<Self, LockError> {
-        let failed = |source| LockError::Io { path: path.to_owned(), source };
+        let failed = |source| LockError::Io {
+            path: path.to_owned(),
+            source,
+        };
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
         }
@@ -63,14 +66,26 @@ impl Lock {
             .truncate(false)
             .open(path)
             .map_err(failed)?;
-        let got = if alone { file.try_lock() } else { file.try_lock_shared() };
+        let got = if alone {
+            file.try_lock()
+        } else {
+            file.try_lock_shared()
+        };
         match got {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
                 let mut pid = String::new();
                 let _ = file.read_to_string(&mut pid);
-                let pid = if pid.trim().is_empty() { "?".into() } else { pid.trim().to_owned() };
-                return Err(LockError::Held { what: what.to_owned(), pid, path: path.to_owned() });
+                let pid = if pid.trim().is_empty() {
+                    "?".into()
+                } else {
+                    pid.trim().to_owned()
+                };
+                return Err(LockError::Held {
+                    what: what.to_owned(),
+                    pid,
+                    path: path.to_owned(),
+                });
             }
             Err(TryLockError::Error(e)) => return Err(failed(e)),
         }
@@ -94,7 +109,10 @@ mod tests {
         let path = Utf8PathBuf::from_path_buf(folder.path().join("x/lock")).unwrap();
         let first = Lock::exclusive(&path, "the run").unwrap();
         let error = Lock::exclusive(&path, "the run").unwrap_err().to_string();
-        assert!(error.contains(&format!("process {}", std::process::id())), "{error}");
+        assert!(
+            error.contains(&format!("process {}", std::process::id())),
+            "{error}"
+        );
         drop(first);
         let _a = Lock::shared(&path, "the store").unwrap();
         let _b = Lock::shared(&path, "the store").unwrap();

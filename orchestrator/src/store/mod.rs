@@ -55,7 +55,9 @@ impl RunFolder {
 
     /// Log of an instance by its label.
     pub fn log(&self, label: &str) -> Utf8PathBuf {
-        self.root.join("logs").join(format!("{}.log", safe_name(label)))
+        self.root
+            .join("logs")
+            .join(format!("{}.log", safe_name(label)))
     }
 
     /// Makes the folder and clears what a killed run left in `tmp`. Call only under the lock.
@@ -77,7 +79,11 @@ fn safe_name(name: &str) -> String {
     if !name.is_empty() && !name.starts_with('.') && name.chars().all(plain) && name.len() < 120 {
         return name.to_owned();
     }
-    let kept: String = name.chars().map(|c| if plain(c) { c } else { '_' }).take(60).collect();
+    let kept: String = name
+        .chars()
+        .map(|c| if plain(c) { c } else { '_' })
+        .take(60)
+        .collect();
     let hash = blake3::hash(name.as_bytes()).to_hex();
     format!("{}-{}", kept.trim_start_matches('.'), &hash[..8])
 }
@@ -85,7 +91,10 @@ fn safe_name(name: &str) -> String {
 impl Store {
     /// A store at `root`; nothing is made yet.
     pub fn new(root: Utf8PathBuf) -> Self {
-        Self { root, shards: RefCell::new([false; 256]) }
+        Self {
+            root,
+            shards: RefCell::new([false; 256]),
+        }
     }
 
     /// Its folder.
@@ -95,7 +104,9 @@ impl Store {
 
     /// The folder of a workflow's runs.
     pub fn run(&self, workflow: &str) -> RunFolder {
-        RunFolder { root: self.root.join("runs").join(safe_name(workflow)) }
+        RunFolder {
+            root: self.root.join("runs").join(safe_name(workflow)),
+        }
     }
 
     /// Folders of all runs.
@@ -224,7 +235,10 @@ mod tests {
         let key = Key([7; 32]);
         let (a, r) = (root.join("a"), root.join("r"));
         fs::write(&a, "artifact").unwrap();
-        assert!(store.commit(&key, &a, &r).is_err(), "a missing record must stop the commit");
+        assert!(
+            store.commit(&key, &a, &r).is_err(),
+            "a missing record must stop the commit"
+        );
         assert_eq!(store.size(&key), None);
         fs::write(&r, "{}").unwrap();
         store.commit(&key, &a, &r).unwrap();

@@ -28,7 +28,9 @@ fn refuse(text: &str) -> i32 {
 
 /// Dies when the engine dies, however it dies.
 fn follow(parent: &str) -> Result<(), String> {
-    let parent: i32 = parent.parse().map_err(|_| "--parent wants a process number")?;
+    let parent: i32 = parent
+        .parse()
+        .map_err(|_| "--parent wants a process number")?;
     rustix::process::set_parent_process_death_signal(Some(Signal::KILL))
         .map_err(|e| format!("cannot follow the engine's death: {e}"))?;
     // It may have died before the line above.
