@@ -185,6 +185,9 @@ impl MaterialRef {
             size: size_of::<pf_material_sizes>() as u64,
             ..Default::default()
         };
+        if raw.functions.is_null() || raw.instance.is_null() {
+            return Err("the material has no function table or no instance (NULL)".into());
+        }
         let code = unsafe { ((*raw.functions).sizes)(raw.instance, &raw mut s) };
         if code != PF_OK {
             return Err(format!("the material did not tell its sizes (code {code})"));
@@ -216,10 +219,20 @@ impl MaterialRef {
     }
 
     /// Membrane resultants of a batch.
+    ///
+    /// # Panics
+    /// When a slice is shorter than the contract says: the material would write beyond it.
     #[inline]
     pub fn membrane(&self, b: &mut MembraneBatch<'_>) -> i32 {
-        debug_assert_eq!(b.metric.len(), 3 * b.lanes);
-        debug_assert_eq!(b.history.len(), self.sizes.membrane_history * b.lanes);
+        assert!(
+            b.metric.len() >= 3 * b.lanes
+                && b.history.len() >= self.sizes.membrane_history * b.lanes
+                && b.stress.len() >= 3 * b.lanes
+                && b.energy.len() >= b.lanes
+                && b.stiffness.as_ref().is_none_or(|s| s.len() >= 2 * b.lanes),
+            "a membrane batch of {} lanes has a slice that is too short",
+            b.lanes
+        );
         let raw = pf_membrane_batch {
             size: size_of::<pf_membrane_batch>() as u64,
             lanes: b.lanes as u32,
@@ -235,8 +248,21 @@ impl MaterialRef {
     }
 
     /// Moments of a batch; zero work when the material has no bending.
+    ///
+    /// # Panics
+    /// When a slice is shorter than the contract says: the material would write beyond it.
     #[inline]
     pub fn bending(&self, b: &mut BendingBatch<'_>) -> i32 {
+        assert!(
+            b.metric.len() >= 3 * b.lanes
+                && b.curvature.len() >= 3 * b.lanes
+                && b.history.len() >= self.sizes.bending_history * b.lanes
+                && b.moment.len() >= 3 * b.lanes
+                && b.energy.len() >= b.lanes
+                && b.tangent.as_ref().is_none_or(|t| t.len() >= 3 * b.lanes),
+            "a bending batch of {} lanes has a slice that is too short",
+            b.lanes
+        );
         let raw = pf_bending_batch {
             size: size_of::<pf_bending_batch>() as u64,
             lanes: b.lanes as u32,
@@ -264,7 +290,9 @@ impl MaterialRef {
 }
 
 fn pointer(slice: &mut Option<&mut [f64]>) -> *mut f64 {
-    slice.as_deref_mut().map_or(std::ptr::null_mut(), <[f64]>::as_mut_ptr)
+    slice
+        .as_deref_mut()
+        .map_or(std::ptr::null_mut(), <[f64]>::as_mut_ptr)
 }
 
 /// An element formulation.
@@ -297,15 +325,27 @@ struct ElementInstance<E> {
 }
 
 unsafe fn rows<'a>(p: *const f64, n: usize) -> &'a [f64] {
-    if p.is_null() { &[] } else { unsafe { std::slice::from_raw_parts(p, n) } }
+    if p.is_null() {
+        &[]
+    } else {
+        unsafe { std::slice::from_raw_parts(p, n) }
+    }
 }
 
 unsafe fn rows_mut<'a>(p: *mut f64, n: usize) -> &'a mut [f64] {
-    if p.is_null() { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(p, n) } }
+    if p.is_null() {
+        &mut []
+    } else {
+        unsafe { std::slice::from_raw_parts_mut(p, n) }
+    }
 }
 
 unsafe fn some_mut<'a>(p: *mut f64, n: usize) -> Option<&'a mut [f64]> {
-    if p.is_null() { None } else { Some(unsafe { std::slice::from_raw_parts_mut(p, n) }) }
+    if p.is_null() {
+        None
+    } else {
+        Some(unsafe { std::slice::from_raw_parts_mut(p, n) })
+    }
 }
 
 unsafe fn element_batch<'a>(
@@ -380,7 +420,10 @@ unsafe fn create_guarded<T>(
             return PF_OK;
         }
         Ok(Err(text)) => (PF_ERROR, text),
-        Err(p) => (PF_PANIC, format!("the component panicked: {}", panic_text(p.as_ref()))),
+        Err(p) => (
+            PF_PANIC,
+            format!("the component panicked: {}", panic_text(p.as_ref())),
+        ),
     };
     if !error.is_null() {
         unsafe { (*error).set(&text) };
@@ -398,17 +441,26 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
     ) -> i32 {
         unsafe {
             create_guarded(out, error, || {
+                if material.is_null() {
+                    return Err("the element was given no material (NULL)".into());
+                }
                 let material = MaterialRef::new(*material)?;
                 let text = parameters.as_str().map_err(|e| e.to_string())?;
                 let element = E::create(text, &material)?;
                 let sizes = element.sizes();
-                Ok(ElementInstance { element, material, sizes })
+                Ok(ElementInstance {
+                    element,
+                    material,
+                    sizes,
+                })
             })
         }
     }
     unsafe extern "C" fn destroy<E: Element>(instance: *mut c_void) {
         guarded(|| {
-            drop(unsafe { Box::from_raw(instance.cast::<ElementInstance<E>>()) });
+            if !instance.is_null() {
+                drop(unsafe { Box::from_raw(instance.cast::<ElementInstance<E>>()) });
+            }
             PF_OK
         });
     }
@@ -453,8 +505,10 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
     ) -> i32 {
         guarded(|| unsafe {
             let i = &*instance.cast::<ElementInstance<E>>();
-            i.element
-                .forces(&mut element_batch(&*batch, &i.sizes, &i.material.sizes), &i.material)
+            i.element.forces(
+                &mut element_batch(&*batch, &i.sizes, &i.material.sizes),
+                &i.material,
+            )
         })
     }
     unsafe extern "C" fn patch_initialise<E: Element>(
@@ -476,8 +530,10 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
     ) -> i32 {
         guarded(|| unsafe {
             let i = &*instance.cast::<ElementInstance<E>>();
-            i.element
-                .patch_forces(&mut patch_batch(&*batch, &i.sizes, &i.material.sizes), &i.material)
+            i.element.patch_forces(
+                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes),
+                &i.material,
+            )
         })
     }
     pf_element_functions {
@@ -514,7 +570,9 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
     }
     unsafe extern "C" fn destroy<M: Material>(instance: *mut c_void) {
         guarded(|| {
-            drop(unsafe { Box::from_raw(instance.cast::<MaterialInstance<M>>()) });
+            if !instance.is_null() {
+                drop(unsafe { Box::from_raw(instance.cast::<MaterialInstance<M>>()) });
+            }
             PF_OK
         });
     }

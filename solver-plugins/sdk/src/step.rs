@@ -165,7 +165,13 @@ pub struct Progress<'a> {
 
 impl Default for Progress<'_> {
     fn default() -> Self {
-        Self { fraction: 0.0, simulated_time: -1.0, rate: -1.0, energy_ratio: -1.0, phase: "" }
+        Self {
+            fraction: 0.0,
+            simulated_time: -1.0,
+            rate: -1.0,
+            energy_ratio: -1.0,
+            phase: "",
+        }
     }
 }
 
@@ -174,7 +180,8 @@ pub struct Host {
     services: *const pf_services,
 }
 
-// log, progress and cancelled are thread-safe by contract; the rest is documented as single-thread.
+// The contract makes only log, progress and cancelled thread-safe, but the host of this release locks all
+// services (orchestrator/plugin-host), so sharing a `Host` between a step's threads is sound with it.
 unsafe impl Sync for Host {}
 
 macro_rules! call {
@@ -248,7 +255,11 @@ impl Host {
     /// # Errors
     /// Only that one.
     pub fn check_cancelled(&self) -> Result<(), StepError> {
-        if call!(self.cancelled()) != 0 { Err(StepError::Cancelled) } else { Ok(()) }
+        if call!(self.cancelled()) != 0 {
+            Err(StepError::Cancelled)
+        } else {
+            Ok(())
+        }
     }
 
     /// Threads that the step may use (at least 1).
@@ -282,7 +293,11 @@ impl Host {
     /// # Errors
     /// As [`Host::inputs`].
     pub fn inputs_of(&self, port: &str) -> Result<Vec<Input>, StepError> {
-        Ok(self.inputs()?.into_iter().filter(|i| i.port == port).collect())
+        Ok(self
+            .inputs()?
+            .into_iter()
+            .filter(|i| i.port == port)
+            .collect())
     }
 
     /// The single input of a port.
@@ -293,7 +308,9 @@ impl Host {
         let mut found = self.inputs_of(port)?;
         match found.len() {
             1 => Ok(found.remove(0)),
-            n => Err(StepError::Failed(format!("port '{port}' needs one input, has {n}"))),
+            n => Err(StepError::Failed(format!(
+                "port '{port}' needs one input, has {n}"
+            ))),
         }
     }
 
@@ -329,14 +346,17 @@ impl Host {
     ) -> Result<(Vec<T>, Vec<usize>), StepError> {
         let missing = || StepError::Failed(format!("'{}' has no array '{path}'", input.step));
         let info = self.array_info(input, path).ok_or_else(missing)?;
-        let shape: Vec<usize> =
-            info.shape[..info.rank as usize].iter().map(|n| *n as usize).collect();
+        let shape: Vec<usize> = info.shape[..info.rank as usize]
+            .iter()
+            .map(|n| *n as usize)
+            .collect();
         let mut data = vec![T::default(); shape.iter().product()];
         let bytes = size_of_val(data.as_slice()) as u64;
         let buffer = data.as_mut_ptr().cast();
-        check(call!(self.array_read(input.handle, pf_str::new(path), dtype, buffer, bytes)), || {
-            format!("reading '{path}' of '{}'", input.step)
-        })?;
+        check(
+            call!(self.array_read(input.handle, pf_str::new(path), dtype, buffer, bytes)),
+            || format!("reading '{path}' of '{}'", input.step),
+        )?;
         Ok((data, shape))
     }
 
@@ -373,6 +393,22 @@ impl Host {
         self.json(call!(self.meshes(input.handle)), &what)
     }
 
+    /// The services that read meshes take no sizes: a description of another artifact's body would make
+    /// the host write beyond the buffer.
+    fn check_body(&self, input: &Input, body: &BodyInfo) -> Result<(), StepError> {
+        let meshes = self.meshes(input)?;
+        let own = meshes.body(&body.name)?;
+        let sizes = |b: &BodyInfo| (b.points, b.cells, b.nodes_per_cell);
+        if sizes(own) == sizes(body) {
+            return Ok(());
+        }
+        Err(StepError::Failed(format!(
+            "body '{}' of '{}' has {} points and {} cells; the description given is of another \
+             artifact's body with {} and {}",
+            body.name, input.step, own.points, own.cells, body.points, body.cells
+        )))
+    }
+
     /// Reference points `[n]` (m) and cells `[m * nodes_per_cell]` of a body.
     ///
     /// # Errors
@@ -382,12 +418,14 @@ impl Host {
         input: &Input,
         body: &BodyInfo,
     ) -> Result<(Vec<[f64; 3]>, Vec<u32>), StepError> {
+        self.check_body(input, body)?;
         let mut points = vec![[0.0; 3]; body.points];
         let mut cells = vec![0u32; body.cells * body.nodes_per_cell];
         let (p, c) = (points.as_mut_ptr().cast(), cells.as_mut_ptr());
-        check(call!(self.mesh_read(input.handle, pf_str::new(&body.name), p, c)), || {
-            format!("body '{}' of '{}'", body.name, input.step)
-        })?;
+        check(
+            call!(self.mesh_read(input.handle, pf_str::new(&body.name), p, c)),
+            || format!("body '{}' of '{}'", body.name, input.step),
+        )?;
         Ok((points, cells))
     }
 
@@ -401,12 +439,14 @@ impl Host {
         body: &BodyInfo,
         frame: usize,
     ) -> Result<Vec<[f64; 3]>, StepError> {
+        self.check_body(input, body)?;
         let mut points = vec![[0.0; 3]; body.points];
         let p = points.as_mut_ptr().cast();
         let name = pf_str::new(&body.name);
-        check(call!(self.frame_points_read(input.handle, name, frame as u64, p)), || {
-            format!("frame {frame} of body '{}' of '{}'", body.name, input.step)
-        })?;
+        check(
+            call!(self.frame_points_read(input.handle, name, frame as u64, p)),
+            || format!("frame {frame} of body '{}' of '{}'", body.name, input.step),
+        )?;
         Ok(points)
     }
 
@@ -437,9 +477,10 @@ impl Host {
         let mut values = vec![0.0; rows * field.components as usize];
         let (p, n) = (values.as_mut_ptr(), values.len() as u64);
         let (b, f) = (pf_str::new(&body.name), pf_str::new(name));
-        check(call!(self.frame_field_read(input.handle, b, frame as u64, on, f, p, n)), || {
-            format!("field '{name}' of body '{}' of '{}'", body.name, input.step)
-        })?;
+        check(
+            call!(self.frame_field_read(input.handle, b, frame as u64, on, f, p, n)),
+            || format!("field '{name}' of body '{}' of '{}'", body.name, input.step),
+        )?;
         Ok(values)
     }
 
@@ -449,7 +490,9 @@ impl Host {
     /// When the host refuses.
     pub fn write_attributes(&self, value: &impl serde::Serialize) -> Result<(), StepError> {
         let text = serde_json::to_string(value).map_err(|e| StepError::Failed(e.to_string()))?;
-        check(call!(self.attributes_write(pf_str::new(&text))), || "writing attributes".into())
+        check(call!(self.attributes_write(pf_str::new(&text))), || {
+            "writing attributes".into()
+        })
     }
 
     fn write_array<T>(
@@ -468,12 +511,19 @@ impl Host {
                 data.len()
             )));
         }
-        let mut info = pf_array_info { dtype, rank: shape.len() as u32, ..Default::default() };
+        let mut info = pf_array_info {
+            dtype,
+            rank: shape.len() as u32,
+            ..Default::default()
+        };
         for (to, from) in info.shape.iter_mut().zip(shape) {
             *to = *from as u64;
         }
         let (p, u) = (pf_str::new(path), pf_str::new(unit));
-        check(call!(self.array_write(p, &raw const info, u, data.as_ptr().cast())), what)
+        check(
+            call!(self.array_write(p, &raw const info, u, data.as_ptr().cast())),
+            what,
+        )
     }
 
     /// Writes an f64 array (row-major) at `path`, e.g. `history/kinetic_energy`.
@@ -510,11 +560,19 @@ impl Host {
         cells: &[u32],
         attributes: &serde_json::Value,
     ) -> Result<(), StepError> {
+        if !matches!(k, 3 | 4) || !cells.len().is_multiple_of(k) {
+            return Err(StepError::Failed(format!(
+                "body '{body}': {} node numbers do not make cells of {k} nodes; a cell has 3 or 4",
+                cells.len()
+            )));
+        }
         let json = attributes.to_string();
         let (n, m) = (points.len() as u64, (cells.len() / k) as u64);
         let (p, c) = (points.as_ptr().cast(), cells.as_ptr());
         let (b, j) = (pf_str::new(body), pf_str::new(&json));
-        check(call!(self.mesh_define(b, n, p, m, k as u32, c, j)), || format!("body '{body}'"))
+        check(call!(self.mesh_define(b, n, p, m, k as u32, c, j)), || {
+            format!("body '{body}'")
+        })
     }
 
     /// Starts a frame at `time` (s).
@@ -522,7 +580,9 @@ impl Host {
     /// # Errors
     /// When a frame is open or the time does not grow.
     pub fn begin_frame(&self, time: f64) -> Result<(), StepError> {
-        check(call!(self.frame_begin(time)), || format!("frame at {time} s"))
+        check(call!(self.frame_begin(time)), || {
+            format!("frame at {time} s")
+        })
     }
 
     /// Points (m) of a body in the open frame.
@@ -530,8 +590,14 @@ impl Host {
     /// # Errors
     /// When the size differs from the body's or a value is not finite.
     pub fn write_points(&self, body: &str, points: &[[f64; 3]]) -> Result<(), StepError> {
-        let (b, p, n) = (pf_str::new(body), points.as_ptr().cast(), points.len() as u64);
-        check(call!(self.frame_points(b, p, n)), || format!("points of body '{body}'"))
+        let (b, p, n) = (
+            pf_str::new(body),
+            points.as_ptr().cast(),
+            points.len() as u64,
+        );
+        check(call!(self.frame_points(b, p, n)), || {
+            format!("points of body '{body}'")
+        })
     }
 
     /// A field `[rows * components]` of a body in the open frame.
@@ -547,12 +613,17 @@ impl Host {
         unit: &str,
         values: &[f64],
     ) -> Result<(), StepError> {
-        let on = if on == On::Points { PF_ON_POINTS } else { PF_ON_CELLS };
+        let on = if on == On::Points {
+            PF_ON_POINTS
+        } else {
+            PF_ON_CELLS
+        };
         let (b, f, u) = (pf_str::new(body), pf_str::new(name), pf_str::new(unit));
         let (p, n) = (values.as_ptr(), values.len() as u64);
-        check(call!(self.frame_field(b, on, f, components, u, p, n)), || {
-            format!("field '{name}' of body '{body}'")
-        })
+        check(
+            call!(self.frame_field(b, on, f, components, u, p, n)),
+            || format!("field '{name}' of body '{body}'"),
+        )
     }
 
     /// Ends the open frame.
@@ -569,7 +640,9 @@ impl Host {
     /// When the value is not finite or the name is taken.
     pub fn result(&self, name: &str, value: f64, unit: &str) -> Result<(), StepError> {
         let (n, u) = (pf_str::new(name), pf_str::new(unit));
-        check(call!(self.result(n, value, u, 0)), || format!("result '{name}' = {value}"))
+        check(call!(self.result(n, value, u, 0)), || {
+            format!("result '{name}' = {value}")
+        })
     }
 
     /// A named number that depends on the machine (seconds, bytes); kept beside the artifact.
@@ -589,9 +662,10 @@ impl Host {
     /// When the plugin's manifest does not declare a collection.
     pub fn collection(&self, names: &[String]) -> Result<(), StepError> {
         let json = serde_json::to_string(names).map_err(|e| StepError::Failed(e.to_string()))?;
-        check(call!(self.collection(names.len() as u64, pf_str::new(&json))), || {
-            "declaring the collection".into()
-        })
+        check(
+            call!(self.collection(names.len() as u64, pf_str::new(&json))),
+            || "declaring the collection".into(),
+        )
     }
 
     /// A component by name or path. Its function table stays valid until the process ends.
@@ -605,10 +679,17 @@ impl Host {
             functions: std::ptr::null(),
             manifest: pf_str::new(""),
         };
-        check(call!(self.find_component(kind, pf_str::new(name), &raw mut c)), || {
-            let what = if kind == PF_KIND_ELEMENT { "element" } else { "material" };
-            format!("{what} component '{name}'")
-        })?;
+        check(
+            call!(self.find_component(kind, pf_str::new(name), &raw mut c)),
+            || {
+                let what = if kind == PF_KIND_ELEMENT {
+                    "element"
+                } else {
+                    "material"
+                };
+                format!("{what} component '{name}'")
+            },
+        )?;
         Ok(c)
     }
 }
@@ -618,6 +699,11 @@ impl Host {
 /// # Safety
 /// `services` must be a valid table for the length of the call.
 pub unsafe fn run_step<S: Step>(services: *const pf_services) -> i32 {
+    let size = size_of::<pf_services>() as u64;
+    if services.is_null() || unsafe { (*services).size } < size {
+        // A host that accepts this plugin's ABI version has all of its services.
+        return PF_ERROR;
+    }
     let host = unsafe { Host::new(services) };
     let fail = |text: &str| unsafe { ((*services).fail)((*services).host, pf_str::new(text)) };
     match catch_unwind(AssertUnwindSafe(|| S::run(&host))) {
@@ -628,7 +714,10 @@ pub unsafe fn run_step<S: Step>(services: *const pf_services) -> i32 {
             PF_ERROR
         }
         Err(payload) => {
-            fail(&format!("the plugin panicked: {}", panic_text(payload.as_ref())));
+            fail(&format!(
+                "the plugin panicked: {}",
+                panic_text(payload.as_ref())
+            ));
             PF_PANIC
         }
     }

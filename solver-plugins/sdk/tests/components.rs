@@ -1,0 +1,209 @@
+//! Components through their C tables, as a host sees them.
+
+use plyflow_sdk::abi::*;
+use plyflow_sdk::{
+    Element, ElementBatch, ElementSizes, Material, MaterialRef, MaterialSizes, MembraneBatch,
+    element_table, material_table,
+};
+use std::ffi::c_void;
+
+struct Linear(f64);
+
+impl Material for Linear {
+    const MANIFEST: &'static str = "{}";
+
+    fn create(parameters: &str) -> Result<Self, String> {
+        match parameters {
+            "panic" => panic!("no such law"),
+            text => text
+                .parse()
+                .map(Self)
+                .map_err(|_| format!("modulus: {text} is no number")),
+        }
+    }
+
+    fn sizes(&self) -> MaterialSizes {
+        MaterialSizes {
+            membrane_history: 1,
+            thickness: 0.1,
+            areal_mass: 2.0,
+            ..Default::default()
+        }
+    }
+
+    fn membrane(&self, b: &mut MembraneBatch<'_>) {
+        assert!(b.metric[0] < 100.0, "too far");
+        for i in 0..b.lanes {
+            b.stress[i] = self.0 * (b.metric[i] - 1.0) / 2.0;
+            b.history[i] += 1.0;
+            b.energy[i] = b.dt;
+        }
+    }
+}
+
+fn create(parameters: &str) -> Result<*mut c_void, (i32, String)> {
+    let table = material_table::<Linear>();
+    let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
+    let p = pf_str::new(parameters);
+    match unsafe { (table.create)(p, &raw mut instance, &raw mut error) } {
+        PF_OK => Ok(instance),
+        code => Err((code, error.get())),
+    }
+}
+
+#[test]
+fn the_error_of_create_arrives_as_text() {
+    assert_eq!(
+        create("x"),
+        Err((PF_ERROR, "modulus: x is no number".into()))
+    );
+    let (code, text) = create("panic").unwrap_err();
+    assert_eq!(code, PF_PANIC);
+    assert!(text.contains("no such law"), "{text}");
+}
+
+fn call(material: &MaterialRef, metric: f64, stress: &mut [f64]) -> (i32, f64) {
+    let (mut history, mut energy) = ([0.0; 8], [0.0; 8]);
+    let code = material.membrane(&mut MembraneBatch {
+        lanes: 8,
+        dt: 0.5,
+        metric: &[metric; 24],
+        history: &mut history,
+        stress,
+        energy: &mut energy,
+        stiffness: None,
+    });
+    (code, history[7] + energy[7])
+}
+
+#[test]
+fn a_material_works_through_its_table_and_its_panics_become_a_status() {
+    let table = material_table::<Linear>();
+    let instance = create("4").unwrap();
+    let raw = pf_material {
+        functions: &raw const table,
+        instance,
+    };
+    let material = unsafe { MaterialRef::new(raw) }.unwrap();
+    assert_eq!(material.sizes().thickness, 0.1);
+    assert!(!material.sizes().has_bending);
+    let mut stress = [0.0; 24];
+    assert_eq!(call(&material, 1.5, &mut stress), (PF_OK, 1.5));
+    assert_eq!(stress[7], 1.0);
+    assert_eq!(call(&material, 1000.0, &mut stress).0, PF_PANIC);
+    unsafe { (table.destroy)(instance) };
+    unsafe { (table.destroy)(std::ptr::null_mut()) };
+}
+
+#[test]
+#[should_panic(expected = "too short")]
+fn a_short_slice_is_refused_before_the_material_writes() {
+    let table = material_table::<Linear>();
+    let raw = pf_material {
+        functions: &raw const table,
+        instance: create("4").unwrap(),
+    };
+    let material = unsafe { MaterialRef::new(raw) }.unwrap();
+    call(&material, 1.0, &mut [0.0; 23]);
+}
+
+struct Spring;
+
+impl Element for Spring {
+    const MANIFEST: &'static str = "{}";
+
+    fn create(_: &str, material: &MaterialRef) -> Result<Self, String> {
+        if material.sizes().areal_mass > 1.0 {
+            Ok(Self)
+        } else {
+            Err("too light".into())
+        }
+    }
+
+    fn sizes(&self) -> ElementSizes {
+        ElementSizes {
+            nodes: 4,
+            dofs_per_node: 3,
+            constants: 2,
+            material_points: 1,
+            ..Default::default()
+        }
+    }
+
+    fn initialise(&self, b: &mut ElementBatch<'_>, material: &MaterialRef) {
+        assert!(b.velocity.is_empty() && b.force.is_empty() && b.spin.is_empty());
+        assert_eq!(
+            (b.position.len(), b.axis.len(), b.constants.len()),
+            (96, 24, 16)
+        );
+        assert_eq!(
+            b.material_history.len(),
+            8,
+            "points times the material's history"
+        );
+        b.mass.fill(material.sizes().areal_mass);
+    }
+
+    fn forces(&self, _: &mut ElementBatch<'_>, _: &MaterialRef) -> i32 {
+        PF_BAD_VALUE
+    }
+}
+
+#[test]
+fn an_element_gets_slices_of_the_documented_sizes() {
+    let (materials, table) = (material_table::<Linear>(), element_table::<Spring>());
+    let raw = pf_material {
+        functions: &raw const materials,
+        instance: create("4").unwrap(),
+    };
+    let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
+    let none = std::ptr::null();
+    let code =
+        unsafe { (table.create)(pf_str::new("{}"), none, &raw mut instance, &raw mut error) };
+    assert_eq!(code, PF_ERROR);
+    assert!(error.get().contains("no material"), "{}", error.get());
+    let code = unsafe {
+        (table.create)(
+            pf_str::new("{}"),
+            &raw const raw,
+            &raw mut instance,
+            &raw mut error,
+        )
+    };
+    assert_eq!(code, PF_OK);
+
+    let (position, axis) = ([0.5; 96], [0.0; 24]);
+    let (mut constants, mut history, mut mass) = ([0.0; 16], [0.0; 8], [0.0; 32]);
+    let null = std::ptr::null_mut::<f64>();
+    let batch = pf_element_batch {
+        size: size_of::<pf_element_batch>() as u64,
+        lanes: 8,
+        reserved: 0,
+        dt: 0.0,
+        position: position.as_ptr(),
+        velocity: null,
+        spin: null,
+        axis: axis.as_ptr(),
+        constants: constants.as_mut_ptr(),
+        history: null,
+        material_history: history.as_mut_ptr(),
+        force: null,
+        moment: null,
+        energy: null,
+        fields: null,
+        mass: mass.as_mut_ptr(),
+        inertia: null,
+        critical_step: null,
+        material: &raw const raw,
+    };
+    assert_eq!(
+        unsafe { (table.initialise)(instance, &raw const batch) },
+        PF_OK
+    );
+    assert_eq!(mass, [2.0; 32]);
+    assert_eq!(
+        unsafe { (table.forces)(instance, &raw const batch) },
+        PF_BAD_VALUE
+    );
+    unsafe { (table.destroy)(instance) };
+}
