@@ -60,23 +60,30 @@ impl DType {
 
     fn memory(self) -> hid_t {
         match self {
-            Self::F64 => *H5T_NATIVE_DOUBLE,
-            Self::F32 => *H5T_NATIVE_FLOAT,
-            Self::I64 => *H5T_NATIVE_INT64,
-            Self::U32 => *H5T_NATIVE_UINT32,
-            Self::U8 => *H5T_NATIVE_UINT8,
+            Self::F64 => id(H5T_NATIVE_DOUBLE),
+            Self::F32 => id(H5T_NATIVE_FLOAT),
+            Self::I64 => id(H5T_NATIVE_INT64),
+            Self::U32 => id(H5T_NATIVE_UINT32),
+            Self::U8 => id(H5T_NATIVE_UINT8),
         }
     }
 
     fn file(self) -> hid_t {
         match self {
-            Self::F64 => *H5T_IEEE_F64LE,
-            Self::F32 => *H5T_IEEE_F32LE,
-            Self::I64 => *H5T_STD_I64LE,
-            Self::U32 => *H5T_STD_U32LE,
-            Self::U8 => *H5T_STD_U8LE,
+            Self::F64 => id(H5T_IEEE_F64LE),
+            Self::F32 => id(H5T_IEEE_F32LE),
+            Self::I64 => id(H5T_STD_I64LE),
+            Self::U32 => id(H5T_STD_U32LE),
+            Self::U8 => id(H5T_STD_U8LE),
         }
     }
+}
+
+/// The number behind one of the library's names. The library writes them when it starts, but the bindings
+/// call them immutable: a plain read may be moved by the compiler to before the start, and is in release
+/// builds.
+fn id(name: &'static hid_t) -> hid_t {
+    unsafe { std::ptr::read_volatile(name) }
 }
 
 static INIT: Once = Once::new();
@@ -162,7 +169,7 @@ closer!(close_plist, H5Pclose);
 
 fn plist(class: &'static hid_t) -> Result<Handle> {
     // The class has its number only once the library has started.
-    let id = locked(|| unsafe { H5Pcreate(*class) });
+    let id = locked(|| unsafe { H5Pcreate(id(class)) });
     checked(id, || "making a property list".into())?;
     Ok(Handle(id, close_plist))
 }
@@ -185,7 +192,7 @@ fn space(shape: &[u64], growing: bool) -> Result<Handle> {
 
 fn text_type(bytes: usize, ascii: bool) -> Result<Handle> {
     locked(|| unsafe {
-        let id = checked(H5Tcopy(*H5T_C_S1), || "making a text type".into())?;
+        let id = checked(H5Tcopy(id(H5T_C_S1)), || "making a text type".into())?;
         let t = Handle(id, close_type);
         let set = if ascii {
             H5T_cset_t::H5T_CSET_ASCII
