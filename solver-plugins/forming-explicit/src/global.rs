@@ -48,6 +48,7 @@ struct Layout {
     plies: Vec<Box2>,
     all_plies: Box2,
     joint: Box2,
+    fine: Box2,
     film: QuadMesh,
     film_size: f64,
 }
@@ -93,6 +94,7 @@ fn layout(
         plies,
         all_plies,
         joint,
+        fine,
         film: QuadMesh::grid(&xs, &ys),
         film_size,
     })
@@ -128,7 +130,12 @@ fn bottom_film(
         axis: assembly::axis(&stack[0].scene),
         layers: joined.iter().map(|j| if *j { 2.0 } else { 1.0 }).collect(),
         pressed: joined.iter().map(|j| if *j { Pressed::Both } else { Pressed::Below }).collect(),
-        least_areal_mass: p.least_areal_mass,
+        // Away from plies and tool nothing presses on the film: there it keeps its own mass.
+        least_areal_mass: mesh
+            .cells
+            .iter()
+            .map(|c| if is_inside(at, at.fine, c) { p.least_areal_mass } else { 0.0 })
+            .collect(),
         element: assembly::element(components, &stack[0], &p.diaphragm_element)?,
     };
     parts.placed.push(Placed {
@@ -140,10 +147,14 @@ fn bottom_film(
     Ok(frame)
 }
 
-fn is_joined(at: &Layout, cell: &[u32; 4]) -> bool {
+fn is_inside(at: &Layout, b: Box2, cell: &[u32; 4]) -> bool {
     let p = cell.map(|n| at.film.points[n as usize]);
     let c = [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]));
-    !inside(at.joint, c[0], c[1])
+    inside(b, c[0], c[1])
+}
+
+fn is_joined(at: &Layout, cell: &[u32; 4]) -> bool {
+    !is_inside(at, at.joint, cell)
 }
 
 fn ply(
@@ -170,9 +181,9 @@ fn ply(
         layers: vec![1.0; mesh.cells.len()],
         pressed: vec![Pressed::No; mesh.cells.len()],
         patches: mesh.patches(),
+        least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
         cells: mesh.cells,
         axis: assembly::axis(&sheet.scene),
-        least_areal_mass: p.least_areal_mass,
         element: assembly::element(components, sheet, &p.element)?,
     };
     parts.bodies.push(Body::new(sheet, k, spec.cells.clone()));
@@ -235,9 +246,9 @@ fn top_film(
         layers: vec![1.0; cells.len()],
         pressed: vec![Pressed::Above; cells.len()],
         patches: plan.patches(),
+        least_areal_mass: vec![p.least_areal_mass; cells.len()],
         cells,
         axis: assembly::axis(&top.scene),
-        least_areal_mass: p.least_areal_mass,
         element: assembly::element(components, top, &p.diaphragm_element)?,
     };
     parts.bodies.push(Body::new(top, last, spec.cells.clone()));

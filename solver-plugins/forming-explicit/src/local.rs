@@ -124,9 +124,9 @@ pub fn build_local(
             layers: vec![1.0; local.cells.len()],
             pressed: vec![pressed; local.cells.len()],
             patches: mesh.patches(),
+            least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
             cells: mesh.cells,
             axis: assembly::axis(&sheet.scene),
-            least_areal_mass: p.least_areal_mass,
             element: assembly::element(components, sheet, choice)?,
         });
     }

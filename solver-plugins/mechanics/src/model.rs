@@ -256,7 +256,7 @@ impl Model {
             added_mass: 0.0,
             element: spec.element,
         };
-        self.initialise(&mut sheet, spec.axis, spec.least_areal_mass, material.areal_mass)?;
+        self.initialise(&mut sheet, spec.axis, &spec.least_areal_mass, material.areal_mass)?;
         self.sheets.push(sheet);
         Ok(())
     }
@@ -332,7 +332,7 @@ impl Model {
         &mut self,
         sheet: &mut Sheet,
         axis: V,
-        least: f64,
+        least: &[f64],
         areal_mass: f64,
     ) -> Result<(), MechanicsError> {
         let axis: Vec<f64> = (0..3 * LANES).map(|k| axis[k / LANES]).collect();
@@ -340,7 +340,8 @@ impl Model {
         let mut force = Aligned::zeros(12 * LANES);
         let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
         let mut step = Aligned::zeros(LANES);
-        for batch in &mut self.batches[sheet.batch_range.0..sheet.batch_range.1] {
+        let batches = &mut self.batches[sheet.batch_range.0..sheet.batch_range.1];
+        for (b, batch) in batches.iter_mut().enumerate() {
             gather(&batch.nodes, &self.x, &mut position);
             let mut raw = empty_element_batch(sheet, 0.0, &position);
             raw.axis = axis.as_ptr();
@@ -366,7 +367,7 @@ impl Model {
                 }
                 let factor = (self.settings.target_step / critical)
                     .powi(2)
-                    .max(least / areal_mass)
+                    .max(least[b * LANES + l] / areal_mass)
                     .max(1.0);
                 batch.mass_factor[l] = factor;
                 for k in 0..4 {

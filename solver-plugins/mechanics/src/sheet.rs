@@ -64,8 +64,8 @@ pub struct SheetSpec {
     pub layers: Vec<f64>,
     /// `[m]` what presses on it.
     pub pressed: Vec<Pressed>,
-    /// Least areal mass (kg/m2) by explicit mass scaling; 0: none.
-    pub least_areal_mass: f64,
+    /// `[m]` least areal mass (kg/m2) by explicit mass scaling; 0: none.
+    pub least_areal_mass: Vec<f64>,
     /// The element formulation with its material.
     pub element: ElementInstance,
 }

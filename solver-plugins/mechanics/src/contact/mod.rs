@@ -29,7 +29,7 @@ pub struct ContactSettings {
 
 impl Default for ContactSettings {
     fn default() -> Self {
-        Self { stiffness_factor: 0.3, slip_factor: 0.5, damping_ratio: 0.1, augmentation: 0.005 }
+        Self { stiffness_factor: 0.3, slip_factor: 0.5, damping_ratio: 0.3, augmentation: 0.003 }
     }
 }
 
