@@ -389,14 +389,14 @@ impl ArtifactWriter {
             }
         }
         let attributes = self.description(&contents, provenance)?;
-        if self.file.is_none() {
-            if let Some(bytes) = small::write(&attributes) {
-                std::fs::write(&self.path, &bytes).map_err(|e| {
-                    let text = format!("writing the artifact {}: {e}", self.path.display());
-                    ArtifactError::new(ErrorKind::Io, text)
-                })?;
-                return Ok(bytes.len() as u64);
-            }
+        if self.file.is_none()
+            && let Some(bytes) = small::write(&attributes)
+        {
+            std::fs::write(&self.path, &bytes).map_err(|e| {
+                let text = format!("writing the artifact {}: {e}", self.path.display());
+                ArtifactError::new(ErrorKind::Io, text)
+            })?;
+            return Ok(bytes.len() as u64);
         }
         let group = self.file()?.ensure_group("/plyflow")?;
         for (name, value) in attributes {

@@ -58,14 +58,14 @@ pub fn worker_main(source: &str) -> i32 {
 pub fn run_job(job: &Job, events: &mut (dyn Write + Send)) -> i32 {
     let emitter = Emitter::new(events);
     let outcome = run(job, &emitter);
-    if job.scratch.exists() {
-        if let Err(e) = std::fs::remove_dir_all(&job.scratch) {
-            let text = format!(
-                "the scratch folder {} could not be removed: {e}",
-                job.scratch
-            );
-            emitter.log(LogLevel::Debug, &text);
-        }
+    if job.scratch.exists()
+        && let Err(e) = std::fs::remove_dir_all(&job.scratch)
+    {
+        let text = format!(
+            "the scratch folder {} could not be removed: {e}",
+            job.scratch
+        );
+        emitter.log(LogLevel::Debug, &text);
     }
     match outcome {
         Ok(record) => {
