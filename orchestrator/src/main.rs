@@ -1,12 +1,21 @@
 //! The `plyflow` program.
+//!
+//! It has a C `main`: workers start by the thousand, and the standard library's preparations (it reads
+//! this process's memory map to place a guard for stack overflows) would cost each a tenth of its time.
+#![no_main]
 
-use std::process::ExitCode;
+use std::ffi::{c_char, c_int};
 
-fn main() -> ExitCode {
-    // Before anything else: workers start by the thousand.
+/// Entry of the program.
+#[unsafe(no_mangle)]
+pub extern "C" fn main(_argc: c_int, _argv: *const *const c_char) -> c_int {
+    // On Linux with glibc the arguments reach the standard library even so.
     let mut arguments = std::env::args().skip(1);
     if arguments.next().as_deref() == Some("step-worker") {
         plyflow::worker::main(&arguments.collect::<Vec<_>>());
     }
-    ExitCode::from(plyflow::cli::main())
+    // As the standard library has it: a closed pipe is an error to handle, not a signal to die by.
+    unsafe { libc::signal(libc::SIGPIPE, libc::SIG_IGN) };
+    // No panic may leave a C function.
+    std::panic::catch_unwind(plyflow::cli::main).map_or(101, c_int::from)
 }

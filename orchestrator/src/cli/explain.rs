@@ -71,7 +71,7 @@ pub fn explain(args: &ExplainArgs) -> Done {
     if ids.is_empty() {
         let hidden = session
             .core
-            .hidden_by(opened.step_indices(&[args.step.clone()])?[0]);
+            .hidden_by(opened.step_indices(std::slice::from_ref(&args.step))?[0]);
         let from: Vec<String> = hidden.iter().map(|id| session.core.label(*id)).collect();
         out = match from.len() {
             0 => format!(

@@ -58,7 +58,8 @@ pub fn search_path(places: &Places, workflow: Option<&Utf8Path>) -> Result<Vec<U
             ));
         }
     }
-    if let Some(file) = workflow {
+    // The file is parsed twice only when it may name folders: a study may have ten thousand steps.
+    if let Some(file) = workflow.filter(|f| mentions_plugins(f)) {
         folders.extend(plyflow_workflow::plugin_search_folders(file));
     }
     if let Some(list) = std::env::var_os("PLYFLOW_PLUGINS") {
@@ -83,6 +84,10 @@ pub fn search_path(places: &Places, workflow: Option<&Utf8Path>) -> Result<Vec<U
         new
     });
     Ok(folders)
+}
+
+fn mentions_plugins(file: &Utf8Path) -> bool {
+    std::fs::read_to_string(file).is_ok_and(|text| text.contains("plugins"))
 }
 
 /// The store of a workflow file.

@@ -100,13 +100,10 @@ impl Local {
             .spawn()?;
         let pid = Pid::from_child(&process);
         let exit = rustix::process::pidfd_open(pid, PidfdFlags::empty())?;
-        for pipe in [
-            process.stdout.as_ref().map(AsFd::as_fd),
-            process.stderr.as_ref().map(AsFd::as_fd),
-        ] {
-            if let Some(pipe) = pipe {
-                rustix::fs::fcntl_setfl(pipe, OFlags::NONBLOCK)?;
-            }
+        let out = process.stdout.as_ref().map(AsFd::as_fd);
+        let err = process.stderr.as_ref().map(AsFd::as_fd);
+        for pipe in [out, err].into_iter().flatten() {
+            rustix::fs::fcntl_setfl(pipe, OFlags::NONBLOCK)?;
         }
         Ok((process, exit))
     }

@@ -1,7 +1,9 @@
 //! Kernel locks: they end with the process that holds them, so nothing is ever left to unlock.
 
 use camino::{Utf8Path, Utf8PathBuf};
-use std::fs::{self, File, TryLockError};
+use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
+use std::fs::{self, File};
 use std::io::{self, Read, Seek, Write};
 
 /// A lock, held until it is dropped.
@@ -66,20 +68,19 @@ impl Lock {
             .truncate(false)
             .open(path)
             .map_err(failed)?;
-        let got = if alone {
-            file.try_lock()
+        let how = if alone {
+            FlockOperation::NonBlockingLockExclusive
         } else {
-            file.try_lock_shared()
+            FlockOperation::NonBlockingLockShared
         };
-        match got {
+        match flock(&file, how) {
             Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
+            Err(Errno::WOULDBLOCK) => {
                 let mut pid = String::new();
                 let _ = file.read_to_string(&mut pid);
-                let pid = if pid.trim().is_empty() {
-                    "?".into()
-                } else {
-                    pid.trim().to_owned()
+                let pid = match pid.trim() {
+                    "" => "?".into(),
+                    pid => pid.to_owned(),
                 };
                 return Err(LockError::Held {
                     what: what.to_owned(),
@@ -87,7 +88,7 @@ impl Lock {
                     path: path.to_owned(),
                 });
             }
-            Err(TryLockError::Error(e)) => return Err(failed(e)),
+            Err(e) => return Err(failed(e.into())),
         }
         let write = |file: &mut File| {
             file.set_len(0)?;

@@ -5,9 +5,6 @@ use plyflow_mechanics::model::{Drive, Model, Pressures};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::DoubleDiaphragm;
 
-/// How often (steps) the cavity's volume is measured.
-pub const CAVITY_INTERVAL: u64 = 10;
-
 /// Pressures and frame height of the process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cycle {
@@ -155,16 +152,14 @@ impl Load {
                 let above = cycle.bag_pressure(t);
                 let mut below = above;
                 if t >= cycle.sealed_at() {
-                    below = model.pressures.below;
-                    if model.cycle.is_multiple_of(CAVITY_INTERVAL) || sealed_volume.is_none() {
-                        let volume = model.volume_below() - *tool_volume;
-                        let v0 = *sealed_volume.get_or_insert(volume.max(1e-9));
-                        // The facets of the film may cut into the tool: the gas is never squeezed
-                        // below half a per cent of its volume.
-                        below = cycle.bag * cycle.gas_left(t) * v0 / volume.max(0.005 * v0);
-                        // More than the surroundings would lift the film off its seal.
-                        below = below.min(1.2 * cycle.bag);
-                    }
+                    // Measured anew in every step: a pressure that lags behind the volume is a spring with
+                    // negative damping, and the light film would shake itself to pieces on it.
+                    let volume = model.volume_below() - *tool_volume;
+                    let v0 = *sealed_volume.get_or_insert(volume.max(1e-9));
+                    // The facets of the film may cut into the tool: the gas is never squeezed below half a
+                    // per cent of its volume. More than 1.2 times the surroundings would lift the seal.
+                    below = cycle.bag * cycle.gas_left(t) * v0 / volume.max(0.005 * v0);
+                    below = below.min(1.2 * cycle.bag);
                 }
                 model.pressures = Pressures { below, above };
             }

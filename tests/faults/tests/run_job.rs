@@ -286,6 +286,40 @@ fn an_unreadable_input_is_named_in_the_failure() {
     );
 }
 
+#[test]
+fn a_component_is_found_in_the_job_and_on_the_search_path() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut listed = job(&dir, "component", "test", json!({"material": "paper"}));
+    let path = utf8(library("paper"));
+    listed.components = vec![LibraryRef {
+        name: "paper".into(),
+        path: path.clone(),
+    }];
+    let (code, messages) = run(&listed);
+    assert_eq!(code, 0);
+    assert!(
+        matches!(messages.as_slice(), [Message::Done { .. }]),
+        "no warning: {messages:?}"
+    );
+
+    let mut by_path = job(
+        &dir,
+        "component",
+        "test",
+        json!({"material": path.as_str()}),
+    );
+    by_path.components = listed.components.clone();
+    assert_eq!(done(&by_path).results[0].value, 1e-4);
+
+    let mut searched = job(&dir, "component", "test", json!({"material": "paper"}));
+    searched.search_path = vec![path.parent().unwrap().to_owned()];
+    assert!(done(&searched).warnings[0].contains("will not make this step run again"));
+
+    let absent = job(&dir, "component", "test", json!({"material": "paper"}));
+    let (_, text) = failed(&absent);
+    assert!(text.contains("there is no material 'paper'"), "{text}");
+}
+
 // ---- in a process of its own ----------------------------------------------------------------------
 
 fn spawn(job: &Job, dir: &TempDir) -> std::process::Child {
