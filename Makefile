@@ -1,0 +1,50 @@
+# What people do with this repository. Every target does its own set-up on a fresh machine (scripts/setup).
+
+# One profile for everything, so that the demo, the tests, clippy and the benches share one build of HDF5.
+CARGO_FLAGS ?= --release --locked
+# What tests need and users do not.
+NOT_SHIPPED := --exclude plyflow-faults --exclude plyflow-e2e --exclude plyflow-benches
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+PLYFLOW := $(TARGET)/release/plyflow
+# The workflow of `make demo`; `make demo DEMO=workflows/flat-tool/workflow.yaml` runs another.
+DEMO ?= workflows/joggle-spar/workflow.yaml
+CARGO := . ./.tools/env && cargo
+
+.PHONY: help build demo test test-long lint bench docs clean
+
+help: ## show this list
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
+
+build: ## build the program and the plugins into target/release
+	@scripts/setup
+	$(CARGO) build $(CARGO_FLAGS) --workspace $(NOT_SHIPPED)
+
+demo: build ## run the joggle spar: coarse run, zones, local runs, report
+	$(PLYFLOW) run $(DEMO)
+	@report=$(dir $(DEMO))report.html; if [ -f $$report ]; then echo "report: $$report"; fi
+
+test: ## run all tests, also with VTK's own reader and a step in C
+	@scripts/setup tests
+	$(CARGO) test $(CARGO_FLAGS) --workspace
+	scripts/check-vtk
+
+test-long: ## run the tests that take many minutes
+	@scripts/setup
+	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -- --ignored --nocapture
+
+lint: ## check form, lints and JSON Schemas
+	@scripts/setup
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
+	scripts/check-docs
+
+bench: build ## measure; rows go to docs/benchmarks
+	$(CARGO) run $(CARGO_FLAGS) -p plyflow-benches
+
+docs: ## build the pages of the code and check the links of the book
+	@scripts/setup
+	RUSTDOCFLAGS="-D warnings" $(SHELL) -c '$(CARGO) doc $(CARGO_FLAGS) --workspace --no-deps'
+	scripts/check-docs
+
+clean: ## remove what was built; stores of workflows and .tools stay
+	cargo clean
