@@ -2,7 +2,6 @@
 
 use super::args::{PluginsArgs, SchemaArgs, SchemaKind, TextOrJson};
 use super::open::{catalog, search_path, store_root};
-use super::table::table;
 use super::{Done, Stop, print};
 use crate::exit;
 use camino::Utf8Path;
@@ -48,25 +47,17 @@ fn list(
             .collect();
         return print(&format!("{:#}\n", json!({"plugins": all, "broken": bad})));
     }
-    let line = |e: &CatalogEntry| {
-        vec![
-            e.id.name.clone(),
-            if e.manifest.role == e.manifest.kind.name() {
-                e.manifest.kind.to_string()
-            } else {
-                format!("{} ({})", e.manifest.kind, e.manifest.role)
-            },
-            e.id.version.clone(),
-            e.manifest.summary.clone(),
-            e.id.path.to_string(),
-        ]
-    };
-    let rows: Vec<Vec<String>> = entries.iter().map(line).collect();
-    let mut out = table(
-        &["plugin", "kind", "version", "summary", "library"],
-        &rows,
-        &[],
-    );
+    let mut out = String::new();
+    for e in entries {
+        let m = &e.manifest;
+        let role = if m.role == m.kind.name() {
+            String::new()
+        } else {
+            format!(", {}", m.role)
+        };
+        out += &format!("{} {} ({}{role})\n", e.id.name, e.id.version, m.kind);
+        out += &format!("    {}\n    {}\n", m.summary, e.id.path);
+    }
     for (path, reason) in broken {
         out += &format!("broken: {path}: {reason}\n");
     }

@@ -2,8 +2,8 @@
 
 use super::args::{LogFormat, ReportArgs, RunArgs};
 use super::clean::locked;
-use super::open::{Opened, cores, open, program};
-use super::results::{check, cost_table, records, results_table, rows};
+use super::open::{Opened, cores, open, program, store_root};
+use super::results::{Row, check, cost_table, records, results_table, rows};
 use super::{Done, Stop, print};
 use crate::engine::core::Limits;
 use crate::engine::{Failure, Local, Observer, Options, Session, Summary};
@@ -66,6 +66,12 @@ impl Interrupts {
 /// See [`exit`].
 pub fn run(args: &RunArgs) -> Done {
     let begun = Instant::now();
+    let file = &args.workflow.workflow;
+    if file.is_file() {
+        let root = store_root(&args.workflow.places, Some(file));
+        std::fs::create_dir_all(&root)
+            .map_err(Stop::machine(format!("making the store {root}")))?;
+    }
     let mut opened = open(&args.workflow)?;
     opened.restrict(&args.until)?;
     let options = options(args, &opened)?;
@@ -151,9 +157,7 @@ fn conclude(
         let records = records(session);
         let rows = rows(session, &records);
         if !args.quiet && args.log_format == LogFormat::Text {
-            if !rows.is_empty() && rows.len() <= LONGEST_TABLE {
-                print(&(results_table(&rows) + "\n"))?;
-            }
+            print(&short_results(args, &rows))?;
             if records.len() <= LONGEST_TABLE {
                 print(&(cost_table(session, &records) + "\n"))?;
             }
@@ -173,6 +177,30 @@ fn conclude(
         return Err(Stop::silent(exit::STEP_FAILED));
     }
     verdict
+}
+
+/// The results, or when they are many those that are judged.
+fn short_results(args: &RunArgs, rows: &[Row]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    if rows.len() <= LONGEST_TABLE {
+        return results_table(rows) + "\n";
+    }
+    let judged: Vec<Row> = rows
+        .iter()
+        .filter(|r| r.expected.is_some())
+        .cloned()
+        .collect();
+    let all = format!(
+        "{} results: plyflow results {}\n\n",
+        rows.len(),
+        args.workflow.workflow
+    );
+    match judged.len() {
+        1..=LONGEST_TABLE => results_table(&judged) + &all,
+        _ => all,
+    }
 }
 
 fn tell(

@@ -38,7 +38,7 @@ impl Default for Bars {
     fn default() -> Self {
         let all = MultiProgress::new();
         let total = all.add(ProgressBar::new(1));
-        total.set_style(style("{prefix:>24} [{bar:24}] {pos}/{len} {msg}"));
+        total.set_style(style("{prefix:>16} [{bar:12}] {pos}/{len} {msg}"));
         total.set_prefix("steps");
         let running = HashMap::new();
         Self {
@@ -120,13 +120,13 @@ impl Observer for Bars {
                 self.close(id);
                 if shown {
                     let wall = duration_text(record.cost.wall_seconds);
-                    self.line(&format!("{:>24} done in {wall}", core.label(id)));
+                    self.line(&format!("{:>16} done in {wall}", core.label(id)));
                 }
             }
             Update::Failed { reason, again } => {
                 self.close(id);
                 let next = if *again { " (trying again)" } else { "" };
-                self.line(&format!("{:>24} FAILED: {reason}{next}", core.label(id)));
+                self.line(&format!("{:>16} FAILED: {reason}{next}", core.label(id)));
             }
             Update::Stopped => self.close(id),
             Update::Skipped { .. } => {}
@@ -138,7 +138,7 @@ impl Observer for Bars {
         for running in self.running.values_mut() {
             if running.bar.is_none() && running.begun.elapsed() > PATIENCE {
                 let bar = self.all.insert_before(&self.total, ProgressBar::new(1000));
-                bar.set_style(style("{prefix:>24} [{bar:24}] {percent:>3} % {wide_msg}"));
+                bar.set_style(style("{prefix:>16} [{bar:12}] {percent:>3} % {wide_msg}"));
                 bar.set_prefix(running.label.clone());
                 bar.tick();
                 running.bar = Some(bar);

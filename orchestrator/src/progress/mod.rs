@@ -33,9 +33,12 @@ pub fn duration_text(seconds: f64) -> String {
 
 /// What a step says of itself in one line: simulated time, rate, energy ratio, time left.
 pub fn progress_text(progress: &Progress, elapsed: Duration) -> String {
+    // What matters most first: a narrow terminal cuts the end off.
     let mut parts = Vec::new();
-    if !progress.phase.is_empty() {
-        parts.push(progress.phase.clone());
+    let done = progress.fraction.clamp(0.0, 1.0);
+    if done > 0.01 && done < 1.0 {
+        let left = elapsed.as_secs_f64() * (1.0 - done) / done;
+        parts.push(format!("{} left", duration_text(left)));
     }
     if let Some(t) = progress.simulated_time {
         parts.push(format!("t = {t:.4} s"));
@@ -46,10 +49,8 @@ pub fn progress_text(progress: &Progress, elapsed: Duration) -> String {
     if let Some(ratio) = progress.energy_ratio {
         parts.push(format!("Ek/Ei {:.2} %", 100.0 * ratio));
     }
-    let done = progress.fraction.clamp(0.0, 1.0);
-    if done > 0.01 && done < 1.0 {
-        let left = elapsed.as_secs_f64() * (1.0 - done) / done;
-        parts.push(format!("{} left", duration_text(left)));
+    if !progress.phase.is_empty() {
+        parts.push(progress.phase.clone());
     }
     parts.join(", ")
 }
@@ -79,6 +80,6 @@ mod tests {
         p.simulated_time = Some(0.5);
         p.energy_ratio = Some(0.0123);
         let text = progress_text(&p, Duration::from_secs(1));
-        assert_eq!(text, "t = 0.5000 s, Ek/Ei 1.23 %, 3.0 s left");
+        assert_eq!(text, "3.0 s left, t = 0.5000 s, Ek/Ei 1.23 %");
     }
 }
