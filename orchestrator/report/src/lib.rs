@@ -1,1 +1,96 @@
-//! plyflow-report
+//! The end of a run: one self-contained HTML page that reads as a design-review document, and a table for
+//! the terminal.
+//!
+//! [`write_report`] makes the page from what the engine knows ([`ReportInput`]) and what the artifacts hold. The page
+//! needs no network, no fonts and no scripts; pictures are drawn here and lie inside. Workflows with artifacts of
+//! unknown kinds get a page with their steps, results and costs.
+
+mod colour;
+mod field;
+mod input;
+mod locate;
+mod page;
+mod plot;
+mod raster;
+mod read;
+mod study;
+mod summary;
+mod units;
+mod verdict;
+mod view;
+
+pub use input::{Expectation, Instance, ReportInput};
+pub use summary::summary;
+
+use camino::{Utf8Path, Utf8PathBuf};
+use std::io::Read;
+use study::Material;
+use view::Sharpness;
+
+/// A page larger than this is drawn again with coarser pictures (bytes).
+const LARGEST: usize = 4_500_000;
+
+/// Resolutions of the pictures that are tried, the finest first.
+const SHARPNESS: [f64; 4] = [1.35, 1.0, 0.7, 0.45];
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The file cannot be written.
+    #[error("the report {path} cannot be written: {source}")]
+    Write {
+        /// Where.
+        path: Utf8PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A picture cannot be made.
+    #[error("a picture of the report cannot be drawn: {0}")]
+    Picture(String),
+}
+
+/// Writes the report to `out` (under a temporary name first, so that a whole one is there at any moment) and returns
+/// its size in bytes. Artifacts that cannot be read are named among the warnings of the page.
+///
+/// # Errors
+/// When the file cannot be written or a picture not be encoded.
+pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportError> {
+    let material = Material::read(input, true);
+    let mut page = String::new();
+    for sharp in SHARPNESS {
+        page = page::page(input, &material, Sharpness(sharp)).map_err(ReportError::Picture)?;
+        if page.len() <= LARGEST {
+            break;
+        }
+    }
+    let wrong = |source| ReportError::Write {
+        path: out.to_owned(),
+        source,
+    };
+    if let Some(folder) = out.parent().filter(|f| !f.as_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(wrong)?;
+    }
+    let name = out.file_name().unwrap_or("report.html");
+    let partial = out.with_file_name(format!(".{name}.{}.partial", std::process::id()));
+    std::fs::write(&partial, &page).map_err(wrong)?;
+    std::fs::rename(&partial, out).map_err(|e| {
+        let _ = std::fs::remove_file(&partial);
+        wrong(e)
+    })?;
+    Ok(page.len() as u64)
+}
+
+/// Whether the report at `path` is the one of a fingerprint: then it need not be written again. Reads only the
+/// beginning of the file.
+#[must_use]
+pub fn is_current(path: &Utf8Path, fingerprint: &str) -> bool {
+    let mut head = [0u8; 512];
+    let Ok(mut file) = std::fs::File::open(path) else {
+        return false;
+    };
+    let Ok(n) = file.read(&mut head) else {
+        return false;
+    };
+    let mark = page::fingerprint_mark(fingerprint);
+    String::from_utf8_lossy(&head[..n]).contains(&mark)
+}

@@ -1,0 +1,87 @@
+//! What a report is made of.
+
+use camino::Utf8PathBuf;
+use plyflow_model::job::Record;
+
+/// A run as the engine knows it. Arrays are read from the artifacts when the report is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReportInput {
+    /// Name of the workflow.
+    pub workflow: String,
+    /// Its free text.
+    pub description: Option<String>,
+    /// Its file, as the user gave it.
+    pub file: Utf8PathBuf,
+    /// The command that makes these results again.
+    pub command: String,
+    /// This program and its version.
+    pub program: String,
+    /// Names the content of the report: equal fingerprints, equal content. See
+    /// [`is_current`](crate::is_current).
+    pub fingerprint: String,
+    /// What the store has, in the order of the workflow, items in their order.
+    pub instances: Vec<Instance>,
+    /// What is expected of results, each with what was found.
+    pub expectations: Vec<Expectation>,
+    /// What failed: label of the instance and reason.
+    pub failures: Vec<(String, String)>,
+    /// Number of instances that are known and did not run.
+    pub not_run: usize,
+}
+
+/// One finished step instance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// Step name.
+    pub step: String,
+    /// Labels of its item, outermost first; empty when the step is not fanned out.
+    pub item: Vec<String>,
+    /// Its artifact.
+    pub artifact: Utf8PathBuf,
+    /// Cost, results, warnings, kind and key.
+    pub record: Record,
+}
+
+impl Instance {
+    /// Name for people: `coarse`, `local[A]`.
+    #[must_use]
+    pub fn label(&self) -> String {
+        label(&self.step, &self.item)
+    }
+}
+
+/// `step` or `step[a,b]`.
+pub(crate) fn label(step: &str, item: &[String]) -> String {
+    if item.is_empty() {
+        step.to_owned()
+    } else {
+        format!("{step}[{}]", item.join(","))
+    }
+}
+
+/// An expectation on a result with what was found. All numbers in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expectation {
+    /// Step.
+    pub step: String,
+    /// Labels of the item.
+    pub item: Vec<String>,
+    /// Name of the result.
+    pub result: String,
+    /// Unit of the result; empty when the result is absent.
+    pub unit: String,
+    /// Value found; absent when the step did not report it.
+    pub got: Option<f64>,
+    /// Expected value.
+    pub value: Option<f64>,
+    /// Allowed deviation from it.
+    pub tolerance: Option<f64>,
+    /// Lower bound.
+    pub minimum: Option<f64>,
+    /// Upper bound.
+    pub maximum: Option<f64>,
+    /// Where the expectation comes from.
+    pub source: Option<String>,
+    /// Whether it is met.
+    pub met: bool,
+}

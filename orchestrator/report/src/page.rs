@@ -1,0 +1,144 @@
+//! The page.
+
+mod energy;
+mod maps;
+mod provenance;
+mod tables;
+
+pub(crate) use tables::{expected_text, got_text};
+
+use crate::input::ReportInput;
+use crate::study::{Material, Study};
+use crate::verdict::{self, Tone};
+use crate::view::Sharpness;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+const STYLE: &str = include_str!("style.css");
+
+/// What [`is_current`](crate::is_current) looks for at the beginning of the file.
+pub(crate) fn fingerprint_mark(fingerprint: &str) -> String {
+    html! { meta name="plyflow-report" content=(fingerprint); }.into_string()
+}
+
+/// The whole page.
+pub(crate) fn page(
+    input: &ReportInput,
+    material: &Material,
+    sharp: Sharpness,
+) -> Result<String, String> {
+    let mut studies = Vec::new();
+    for (n, study) in material.studies.iter().enumerate() {
+        studies.push(study_sections(study, n, sharp)?);
+    }
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                (PreEscaped(fingerprint_mark(&input.fingerprint)))
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (input.workflow) " – forming report" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                (head(input, material))
+                main {
+                    @for study in &studies { (study) }
+                    (tables::expectations(input))
+                    (tables::costs(input, material))
+                    (energy::section(material))
+                    (tables::results(input, material.studies.is_empty()))
+                    (provenance::section(input, material))
+                }
+                footer { "Made by " (input.program) ". This page is complete in itself: it loads nothing." }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+fn head(input: &ReportInput, material: &Material) -> Markup {
+    let warnings = verdict::warnings(input, material);
+    html! {
+        header {
+            p class="kind" { "Forming report" }
+            h1 { (input.workflow) }
+            @if let Some(text) = &input.description { p class="description" { (text) } }
+            @for study in &material.studies {
+                @let (tone, text) = verdict::of_study(study);
+                @if !text.is_empty() {
+                    p class={ "verdict " (class(tone)) } {
+                        @if !study.title.is_empty() { span class="of" { (study.title) } " " }
+                        (text)
+                    }
+                }
+            }
+            @let (tone, text) = verdict::of_run(input);
+            @if !text.is_empty() { p class={ "verdict " (class(tone)) } { (text) } }
+            @if material.studies.is_empty() && text.is_empty() {
+                p class="verdict good" { (input.instances.len()) " steps finished" }
+            }
+            @if !input.failures.is_empty() {
+                section class="warnings bad" id="failures" {
+                    h2 { "Failed" }
+                    dl { @for (label, reason) in &input.failures { dt { (label) } dd { (reason) } } }
+                }
+            }
+            @if !warnings.is_empty() {
+                section class="warnings" id="warnings" {
+                    h2 { "Warnings" }
+                    dl { @for (label, text) in &warnings { dt { (label) } dd { (text) } } }
+                }
+            }
+            (contents(material, input))
+        }
+    }
+}
+
+fn class(tone: Tone) -> &'static str {
+    match tone {
+        Tone::Good => "good",
+        Tone::Found => "found",
+        Tone::Bad => "bad",
+    }
+}
+
+fn contents(material: &Material, input: &ReportInput) -> Markup {
+    let study = material.studies.first();
+    let maps = study.is_some_and(|s| !s.plies.is_empty());
+    let local = material.studies.iter().any(|s| !s.locals.is_empty());
+    let items = [
+        (maps, "#maps-0", "Maps"),
+        (local, "#local-0", "Local runs"),
+        (
+            study.is_some_and(|s| s.comparison.is_some()),
+            "#defects-0",
+            "Defects",
+        ),
+        (
+            !input.expectations.is_empty(),
+            "#expectations",
+            "Expectations",
+        ),
+        (true, "#costs", "Costs"),
+        (study.is_some(), "#energy", "Energy and contact"),
+        (true, "#results", "Results"),
+        (true, "#provenance", "Provenance"),
+    ];
+    html! {
+        nav { @for (_, at, name) in items.into_iter().filter(|i| i.0) { a href=(at) { (name) } " " } }
+    }
+}
+
+fn study_sections(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup, String> {
+    let maps = maps::global(study, n, sharp)?;
+    let local = maps::local(study, n, sharp)?;
+    Ok(html! {
+        @if !study.title.is_empty() { h2 class="study" { (study.title) } }
+        (tables::zones(study))
+        (maps)
+        (tables::defects(study, n))
+        (local)
+    })
+}

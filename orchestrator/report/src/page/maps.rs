@@ -1,0 +1,175 @@
+//! Maps of the plies.
+
+use crate::field::{Field, Legend};
+use crate::study::{Defect, Local, Study};
+use crate::units::quantity;
+use crate::view::{Mark, Overlay, Sharpness, flat, formed};
+use maud::{Markup, html};
+
+/// Widths on the page (px).
+const FLAT: f64 = 560.0;
+const FORMED: f64 = 600.0;
+const LOCAL: f64 = 380.0;
+
+fn legends(study: &Study) -> Vec<Legend> {
+    Field::ALL.iter().filter_map(|f| f.legend(study)).collect()
+}
+
+/// Maps of the global run: each quantity on each ply, flat and formed.
+pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup, String> {
+    if study.plies.is_empty() {
+        return Ok(html! {});
+    }
+    let overlay = Overlay {
+        zones: study.zones.as_deref().unwrap_or_default(),
+        marks: &[],
+    };
+    let mut blocks = Vec::new();
+    for legend in legends(study) {
+        let mut rows = Vec::new();
+        for ply in study
+            .plies
+            .iter()
+            .filter(|p| legend.field.at_points(p).is_some())
+        {
+            let plan = flat(ply, &legend, &overlay, FLAT, sharp)?;
+            let view = formed(
+                ply,
+                study.tool.as_ref(),
+                &legend,
+                &overlay,
+                FORMED,
+                sharp,
+                true,
+            )?;
+            rows.push((ply.name.clone(), plan, view));
+        }
+        if !rows.is_empty() {
+            let id = format!("scale-{n}-{}", legend.field.unit().replace('/', "-"));
+            blocks.push((
+                legend.field,
+                html! { (legend.bar(&id)) (legend.note()) },
+                rows,
+            ));
+        }
+    }
+    Ok(html! {
+        section id={ "maps-" (n) } {
+            h2 { "Maps of the global run" }
+            @if let Some(run) = &study.global {
+                p { "Step " code { (run.label) } ", elements of " (quantity(run.facts.element_size, "m", 3))
+                    ". Left: the undeformed ply, axes in mm"
+                    @if study.detection.is_some() { "; dotted: what the detection flagged" }
+                    @if !overlay.zones.is_empty() { "; rectangles: the zones" }
+                    ". Right: the formed ply on the tool." }
+            }
+            @for (field, bar, rows) in &blocks {
+                div class="field" {
+                    h3 { (field.title()) }
+                    (bar)
+                    @for (name, plan, view) in rows {
+                        div class="pair" {
+                            figure class="map" { (plan) figcaption { (name) ", flat" } }
+                            figure class="map" { (view) figcaption { (name) ", formed" } }
+                        }
+                    }
+                }
+            }
+        }
+    })
+}
+
+/// Maps of the local runs, with their defects named.
+pub(super) fn local(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup, String> {
+    let shown = study.locals.iter().filter(|l| !l.plies.is_empty());
+    let legends = legends(study);
+    let mut zones = Vec::new();
+    for local in shown {
+        zones.push(zone(study, local, &legends, sharp)?);
+    }
+    if zones.is_empty() {
+        return Ok(html! {});
+    }
+    Ok(html! {
+        section id={ "local-" (n) } {
+            h2 { "Local runs" }
+            p { "Colours as in the maps of the global run. Dotted: wrinkles (W) and bridging (B) with their id in the table of defects." }
+            div class="bars-row" {
+                @for (k, legend) in legends.iter().enumerate() {
+                    div { p class="note" { (legend.field.title()) " (" (legend.unit()) ")" } (legend.bar(&format!("local-scale-{n}-{k}"))) }
+                }
+            }
+            @for zone in &zones { (zone) }
+        }
+    })
+}
+
+fn zone(
+    study: &Study,
+    local: &Local,
+    legends: &[Legend],
+    sharp: Sharpness,
+) -> Result<Markup, String> {
+    let defects: Vec<&Defect> = study
+        .comparison
+        .iter()
+        .flat_map(|c| c.local())
+        .filter(|d| d.zone == local.zone)
+        .collect();
+    let mut rows = Vec::new();
+    for ply in &local.plies {
+        let marks: Vec<Mark> = defects
+            .iter()
+            .filter(|d| d.ply == ply.name)
+            .map(|d| Mark {
+                text: d.id.clone(),
+                at: d.centre,
+            })
+            .collect();
+        let overlay = Overlay {
+            zones: &[],
+            marks: &marks,
+        };
+        let mut figures = Vec::new();
+        let known = || legends.iter().filter(|l| l.field.at_points(ply).is_some());
+        for legend in known() {
+            let title = legend.field.title();
+            figures.push((title.to_owned(), flat(ply, legend, &overlay, LOCAL, sharp)?));
+        }
+        // The formed view shows the shape; the distance tells most on it.
+        let legend = known()
+            .find(|l| l.field == Field::Distance)
+            .or(known().next());
+        if let Some(legend) = legend {
+            let view = formed(
+                ply,
+                study.tool.as_ref(),
+                legend,
+                &overlay,
+                LOCAL,
+                sharp,
+                false,
+            )?;
+            figures.push((format!("{}, formed", legend.field.title()), view));
+        }
+        rows.push((ply.name.clone(), marks.len(), figures));
+    }
+    Ok(html! {
+        div class="zone-block" {
+            h3 { "Zone " (local.zone) }
+            @if let Some(run) = &local.run {
+                p class="note" { "Step " code { (run.label) } ", elements of "
+                    (quantity(run.facts.element_size, "m", 3)) "." }
+            }
+            @for (name, found, figures) in &rows {
+                h4 { (name) span class="note" { ": "
+                    @if *found == 0 { "no wrinkle, no bridging" } @else { (found) " found" } } }
+                div class="row" {
+                    @for (title, figure) in figures {
+                        figure class="map" { (figure) figcaption { (title) } }
+                    }
+                }
+            }
+        }
+    })
+}

@@ -1,0 +1,73 @@
+//! Where everything comes from and how to make it again.
+
+use crate::input::{Instance, ReportInput};
+use crate::read::Facts;
+use crate::study::Material;
+use maud::{Markup, html};
+use serde_json::Value;
+
+/// Instances whose parameters are listed in full.
+const LONGEST: usize = 200;
+
+/// Per instance: key, plugin, components, inputs, parameters.
+pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
+    html! {
+        section id="provenance" {
+            h2 { "Provenance" }
+            p { "To make these results again:" }
+            pre { code { (input.command) } }
+            p class="note" { "Workflow file: " code { (input.file) } ". The same key means the same bytes." }
+            @if input.instances.len() > LONGEST {
+                p class="note" { "The first " (LONGEST) " of " (input.instances.len()) " steps." }
+            }
+            @for (i, facts) in input.instances.iter().zip(&material.facts).take(LONGEST) {
+                (instance(i, facts.as_ref()))
+            }
+        }
+    }
+}
+
+fn instance(i: &Instance, facts: Option<&Facts>) -> Markup {
+    let none = Value::Null;
+    let p = facts.map_or(&none, |f| &f.provenance);
+    let plugin = &p["plugin"];
+    html! {
+        details class="provenance" {
+            summary {
+                code { (i.label()) } " "
+                span class="note" { (binary(plugin)) " · key " (short(&i.record.key)) }
+            }
+            dl {
+                dt { "key" } dd { code { (i.record.key) } }
+                @if let Some(hash) = plugin["hash"].as_str() { dt { "plugin" } dd { (binary(plugin)) " " code { (hash) } } }
+                @for c in list(&p["components"]) {
+                    dt { "component" } dd { (binary(c)) " " code { (c["hash"].as_str().unwrap_or_default()) } }
+                }
+                @for input in list(&p["inputs"]) {
+                    dt { "input " (input["port"].as_str().unwrap_or_default()) }
+                    dd { (input["step"].as_str().unwrap_or_default()) " " code { (input["key"].as_str().unwrap_or_default()) } }
+                }
+                dt { "ran on" } dd { (i.record.host) ", " (i.record.cost.threads) " threads" }
+                @if let Some(f) = facts { @for line in &f.contents { dt { "holds" } dd { (line) } } }
+            }
+            @if p["parameters"].is_object() {
+                details { summary { "parameters (SI)" } pre { code { (format!("{:#}", p["parameters"])) } } }
+            }
+        }
+    }
+}
+
+fn list(value: &Value) -> impl Iterator<Item = &Value> {
+    value.as_array().into_iter().flatten()
+}
+
+fn binary(value: &Value) -> String {
+    let text = |key: &str| value[key].as_str().unwrap_or_default();
+    format!("{} {}", text("name"), text("version"))
+        .trim()
+        .to_owned()
+}
+
+fn short(key: &str) -> &str {
+    key.get(..12).unwrap_or(key)
+}

@@ -1,0 +1,289 @@
+//! Tables: zones, defects, expectations, costs, results.
+
+use crate::input::{Expectation, ReportInput, label};
+use crate::plot::bars;
+use crate::study::{Comparison, Defect, Material, Run, Study};
+use crate::units::{bytes, count, duration, fixed, number, quantity, shown};
+use maud::{Markup, html};
+use std::collections::BTreeMap;
+
+/// Tables of steps are shown up to this many rows.
+const LONGEST: usize = 400;
+
+/// Zones and what was flagged on each ply.
+pub(super) fn zones(study: &Study) -> Markup {
+    let mm = |v: f64| number((v * 1e4).round() / 10.0, 5);
+    html! {
+        @if study.zones.is_some() || study.detection.is_some() {
+            section class="zones" {
+                h2 { "Where to look" }
+                @if let Some(zones) = &study.zones {
+                    @if zones.is_empty() {
+                        p { "No defects found: no zones, no local runs." }
+                    } @else {
+                        div class="scroll" { table {
+                            thead { tr { th { "zone" } th class="n" { "x (mm)" } th class="n" { "y (mm)" } th class="n" { "size (mm)" }
+                                th { "plies" } th class="n" { "flagged (mm²)" } th { "sides on the edge of the blank" } } }
+                            tbody { @for z in zones {
+                                @let [x0, y0, x1, y1] = z.bounds;
+                                tr { th { (z.name) }
+                                    td class="n" { (mm(x0)) " … " (mm(x1)) } td class="n" { (mm(y0)) " … " (mm(y1)) }
+                                    td class="n" { (mm(x1 - x0)) " × " (mm(y1 - y0)) }
+                                    td { (z.plies.join(", ")) } td class="n" { (number(z.flagged_area * 1e6, 4)) }
+                                    td { (sides(z.free_sides)) } }
+                            } }
+                        } }
+                    }
+                }
+                @if let Some(d) = &study.detection {
+                    div class="scroll" { table {
+                        thead { tr { th { "ply" } th class="n" { "flagged (mm²)" } th class="n" { "over-sheared (mm²)" }
+                            th class="n" { "off the tool (mm²)" } th class="n" { "shear (deg)" } th class="n" { "largest distance (mm)" } } }
+                        tbody { @for p in &d.plies { tr {
+                            th { (p.name) }
+                            @for area in [p.flagged_area, p.over_shear_area, p.poor_conformity_area] { td class="n" { (number(area * 1e6, 4)) } }
+                            td class="n" { (fixed(p.shear_min.to_degrees(), 1)) " … " (fixed(p.shear_max.to_degrees(), 1)) }
+                            td class="n" { (fixed(p.distance_max * 1e3, 2)) }
+                        } } }
+                    } }
+                }
+            }
+        }
+    }
+}
+
+fn sides(free: [bool; 4]) -> String {
+    let names = ["left", "right", "bottom", "top"];
+    let all: Vec<&str> = names
+        .into_iter()
+        .zip(free)
+        .filter(|(_, f)| *f)
+        .map(|(n, _)| n)
+        .collect();
+    if all.is_empty() {
+        "none".into()
+    } else {
+        all.join(", ")
+    }
+}
+
+/// A defect in all models that have it, in the order of `roles`.
+struct Row<'a> {
+    first: &'a Defect,
+    models: Vec<Option<&'a Defect>>,
+}
+
+/// Defects by id, wrinkles before bridging in each zone, with one entry per role.
+fn defect_rows<'a>(c: &'a Comparison, roles: &[&str]) -> Vec<Row<'a>> {
+    let mut rows: BTreeMap<(String, bool, usize, String), Row<'a>> = BTreeMap::new();
+    for d in &c.defects {
+        let Some(column) = roles.iter().position(|r| *r == c.role(&d.model)) else {
+            continue;
+        };
+        let digits = d.id.trim_start_matches(|ch: char| !ch.is_ascii_digit());
+        let rank = digits.parse().unwrap_or(usize::MAX);
+        let row = rows
+            .entry((d.zone.clone(), !d.is_wrinkle(), rank, d.id.clone()))
+            .or_insert_with(|| Row {
+                first: d,
+                models: vec![None; roles.len()],
+            });
+        row.models[column] = row.models[column].or(Some(d));
+    }
+    rows.into_values().collect()
+}
+
+type Measure = (&'static str, fn(&Defect) -> String);
+
+const MEASURES: [Measure; 5] = [
+    ("length (mm)", |d| fixed(d.length * 1e3, 1)),
+    ("amplitude (mm)", |d| fixed(d.amplitude * 1e3, 2)),
+    ("area (mm²)", |d| number(d.area * 1e6, 4)),
+    ("max. curvature (1/mm)", |d| {
+        fixed(d.curvature_max * 1e-3, 3)
+    }),
+    ("shear (deg)", |d| {
+        format!(
+            "{} … {}",
+            fixed(d.shear_min.to_degrees(), 1),
+            fixed(d.shear_max.to_degrees(), 1)
+        )
+    }),
+];
+
+/// Defects, local and global side by side.
+pub(super) fn defects(study: &Study, n: usize) -> Markup {
+    let Some(c) = &study.comparison else {
+        return html! {};
+    };
+    let mut roles = vec!["local", "global"];
+    if c.models.iter().any(|m| m.role == "reference") {
+        roles.push("reference");
+    }
+    let rows = defect_rows(c, &roles);
+    html! {
+        section id={ "defects-" (n) } {
+            h2 { "Defects" }
+            @if rows.is_empty() {
+                p { "No wrinkle and no bridging was found in any model." }
+            } @else {
+                p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it." }
+                div class="scroll" { table class="defects" {
+                    thead {
+                        tr { th rowspan="2" { "id" } th rowspan="2" { "zone" } th rowspan="2" { "ply" } th rowspan="2" { "type" }
+                            @for (name, _) in MEASURES { th class="group" colspan=(roles.len()) { (name) } } th rowspan="2" { "remark" } }
+                        tr { @for _ in MEASURES { @for role in &roles { th class="n" { (role) } } } }
+                    }
+                    tbody { @for row in &rows {
+                        tr {
+                            th { (row.first.id) } td { (row.first.zone) } td { (row.first.ply) } td { (row.first.kind) }
+                            @for (_, measure) in MEASURES { @for (i, d) in row.models.iter().enumerate() {
+                                td class=(if i == 0 { "n first" } else { "n" }) { (d.map_or("–".to_owned(), measure)) }
+                            } }
+                            td { @if row.models.iter().flatten().any(|d| d.touches_cut) { "reaches the cut: zone too small" } }
+                        }
+                    } }
+                } }
+            }
+        }
+    }
+}
+
+/// What was expected, in words.
+pub(crate) fn expected_text(e: &Expectation) -> String {
+    let (factor, unit) = shown(&e.unit);
+    let value = |v: f64| number(v * factor, 5);
+    let mut parts = Vec::new();
+    if let Some(v) = e.value {
+        match e.tolerance {
+            Some(t) => parts.push(format!("{} ± {}", value(v), value(t))),
+            None => parts.push(value(v)),
+        }
+    }
+    parts.extend(e.minimum.map(|m| format!("≥ {}", value(m))));
+    parts.extend(e.maximum.map(|m| format!("≤ {}", value(m))));
+    crate::units::join(parts.join(", "), unit)
+}
+
+/// What was found, in words.
+pub(crate) fn got_text(e: &Expectation) -> String {
+    e.got
+        .map_or("not reported".into(), |v| quantity(v, &e.unit, 5))
+}
+
+/// Expectations with what was found.
+pub(super) fn expectations(input: &ReportInput) -> Markup {
+    html! {
+        @if !input.expectations.is_empty() {
+            section id="expectations" {
+                h2 { "Expectations" }
+                div class="scroll" { table {
+                    thead { tr { th { "step" } th { "result" } th class="n" { "expected" } th class="n" { "got" } th { "verdict" } th { "source" } } }
+                    tbody { @for e in &input.expectations { tr {
+                        td { (label(&e.step, &e.item)) } td { (e.result) }
+                        td class="n" { (expected_text(e)) } td class="n" { (got_text(e)) }
+                        td class=(if e.met { "met" } else { "missed" }) { (if e.met { "✓ met" } else { "✗ missed" }) }
+                        td { (e.source.as_deref().unwrap_or_default()) }
+                    } } }
+                } }
+            }
+        }
+    }
+}
+
+fn runs(material: &Material) -> BTreeMap<usize, &Run> {
+    let studies = material.studies.iter();
+    let all = studies.flat_map(|s| {
+        s.global
+            .iter()
+            .chain(&s.reference)
+            .chain(s.locals.iter().filter_map(|l| l.run.as_ref()))
+    });
+    all.map(|r| (r.instance, r)).collect()
+}
+
+/// What each step cost; forming runs with their elements and rate.
+pub(super) fn costs(input: &ReportInput, material: &Material) -> Markup {
+    let runs = runs(material);
+    let rate = |r: &Run, wall: f64| {
+        if wall > 0.0 && r.facts.element_cycles > 0.0 {
+            fixed(r.facts.element_cycles / wall * 1e-6, 2)
+        } else {
+            String::new()
+        }
+    };
+    let wall: f64 = input
+        .instances
+        .iter()
+        .map(|i| i.record.cost.wall_seconds)
+        .sum();
+    let cpu: f64 = input
+        .instances
+        .iter()
+        .map(|i| i.record.cost.cpu_seconds)
+        .sum();
+    let memory = input
+        .instances
+        .iter()
+        .map(|i| i.record.cost.peak_memory)
+        .max()
+        .unwrap_or(0);
+    let mut largest: Vec<(String, f64, String)> = (input.instances.iter())
+        .map(|i| {
+            let seconds = i.record.cost.cpu_seconds;
+            (i.label(), seconds, duration(seconds))
+        })
+        .collect();
+    largest.sort_by(|a, b| b.1.total_cmp(&a.1));
+    largest.truncate(16);
+    html! {
+        section id="costs" {
+            h2 { "Costs" }
+            div class="scroll" { table {
+                thead { tr { th { "step" } th { "kind" } th class="n" { "elements" } th class="n" { "time steps" } th class="n" { "10⁶ element-steps" }
+                    th class="n" { "wall" } th class="n" { "CPU" } th class="n" { "threads" } th class="n" { "peak memory" }
+                    th class="n" { "10⁶ element-steps/s" } th class="n" { "artifact" } } }
+                tbody { @for (at, i) in input.instances.iter().enumerate().take(LONGEST) {
+                    @let c = &i.record.cost;
+                    @let run = runs.get(&at);
+                    tr { th { (i.label()) } td { (i.record.kind) }
+                        td class="n" { @if let Some(r) = run { (count(r.facts.elements)) } }
+                        td class="n" { @if let Some(r) = run { (count(r.facts.cycles)) } }
+                        td class="n" { @if let Some(r) = run { (fixed(r.facts.element_cycles * 1e-6, 1)) } }
+                        td class="n" { (duration(c.wall_seconds)) } td class="n" { (duration(c.cpu_seconds)) }
+                        td class="n" { (c.threads) } td class="n" { (bytes(c.peak_memory)) }
+                        td class="n" { @if let Some(r) = run { (rate(r, c.wall_seconds)) } }
+                        td class="n" { (bytes(i.record.bytes)) } }
+                } }
+                tfoot { tr { th { "all steps" } td colspan="4" { @if input.instances.len() > LONGEST { "the first " (LONGEST) " of " (input.instances.len()) " steps are listed" } }
+                    td class="n" { (duration(wall)) } td class="n" { (duration(cpu)) } td {} td class="n" { (bytes(memory)) }
+                    td {} td {} } }
+            } }
+            @if largest.len() > 1 { (bars("CPU time by step", &largest)) }
+        }
+    }
+}
+
+/// All named numbers, by step.
+pub(super) fn results(input: &ReportInput, open: bool) -> Markup {
+    let with: Vec<_> = input
+        .instances
+        .iter()
+        .filter(|i| !i.record.results.is_empty())
+        .collect();
+    html! {
+        section id="results" {
+            h2 { "All results" }
+            @if with.is_empty() { p { "No step reported a result." } }
+            @if with.len() > LONGEST { p class="note" { "The first " (LONGEST) " of " (with.len()) " steps with results." } }
+            @for i in with.iter().take(LONGEST) {
+                details open[open && with.len() <= 12] {
+                    summary { code { (i.label()) } " " span class="note" { (i.record.results.len()) " numbers" } }
+                    table { tbody { @for r in &i.record.results {
+                        tr { td { (r.name) @if r.measured { span class="note" { " (measured)" } } } td class="n" { (quantity(r.value, &r.unit, 6)) } }
+                    } } }
+                }
+            }
+        }
+    }
+}

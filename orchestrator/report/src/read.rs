@@ -1,0 +1,301 @@
+//! What is read from an artifact.
+
+use crate::raster::{Triangles, Vec3};
+use camino::Utf8Path;
+use plyflow_artifact::{Artifact, On};
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+fn open(path: &Utf8Path) -> Result<Artifact, String> {
+    Artifact::open(path.as_std_path()).map_err(|e| e.to_string())
+}
+
+fn json(what: &str, text: &str) -> Result<Value, String> {
+    serde_json::from_str(text).map_err(|e| format!("its {what}: {e}"))
+}
+
+/// What an artifact tells of itself, without its arrays.
+#[derive(Debug)]
+pub(crate) struct Facts {
+    pub(crate) kind: String,
+    pub(crate) attributes: Value,
+    pub(crate) provenance: Value,
+    /// Bodies and arrays in words.
+    pub(crate) contents: Vec<String>,
+}
+
+impl Facts {
+    pub(crate) fn read(path: &Utf8Path) -> Result<Self, String> {
+        let artifact = open(path)?;
+        let c = artifact.contents();
+        let mut contents = Vec::new();
+        for b in &c.bodies {
+            let fields: Vec<&str> = b.fields.iter().map(|f| f.name.as_str()).collect();
+            let with = if fields.is_empty() {
+                String::new()
+            } else {
+                format!("; fields: {}", fields.join(", "))
+            };
+            contents.push(format!(
+                "body {}: {} points, {} cells{with}",
+                b.name, b.points, b.cells
+            ));
+        }
+        if c.frames > 0 {
+            contents.push(format!("{} frames", c.frames));
+        }
+        contents.extend(
+            c.arrays
+                .iter()
+                .map(|a| format!("array {} {:?} {}", a.path, a.shape, a.unit)),
+        );
+        Ok(Self {
+            kind: artifact.kind().to_owned(),
+            attributes: json("attributes", artifact.attributes())?,
+            provenance: json("provenance", artifact.provenance())?,
+            contents,
+        })
+    }
+
+    fn inputs(&self) -> impl Iterator<Item = &Value> {
+        self.provenance["inputs"].as_array().into_iter().flatten()
+    }
+
+    /// Whether it was made from the artifact of that key.
+    pub(crate) fn took(&self, key: &str) -> bool {
+        self.inputs().any(|i| i["key"] == key)
+    }
+
+    /// Keys of what arrived at a port.
+    pub(crate) fn at_port<'a>(&'a self, port: &'a str) -> impl Iterator<Item = &'a str> {
+        self.inputs()
+            .filter(move |i| i["port"] == port)
+            .filter_map(|i| i["key"].as_str())
+    }
+}
+
+/// Attributes of a forming run.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct FormingFacts {
+    pub(crate) sheets: Vec<Sheet>,
+    pub(crate) element_size: f64,
+    pub(crate) zone: Value,
+    pub(crate) cycles: f64,
+    pub(crate) element_cycles: f64,
+    pub(crate) elements: f64,
+    pub(crate) energy: Energy,
+    pub(crate) penetration: BTreeMap<String, Penetration>,
+    pub(crate) warnings: Vec<String>,
+}
+
+impl FormingFacts {
+    /// Names of the plies in the order of the stack.
+    pub(crate) fn plies(&self) -> Vec<String> {
+        self.sheets
+            .iter()
+            .filter(|s| s.kind == "ply")
+            .map(|s| s.name.clone())
+            .collect()
+    }
+}
+
+/// A sheet of a forming run.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Sheet {
+    pub(crate) name: String,
+    pub(crate) kind: String,
+}
+
+/// Health of a run's energies.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Energy {
+    pub(crate) peak_drift_ratio: Option<f64>,
+    pub(crate) peak_kinetic_ratio: Option<f64>,
+    pub(crate) kinetic_bound_kept: Option<bool>,
+    pub(crate) hourglass_ratio: Option<f64>,
+}
+
+/// Penetration of a contact pair (m).
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Penetration {
+    pub(crate) max: f64,
+    pub(crate) q999: f64,
+}
+
+/// Histories by name, all of one length; empty when there is none.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct History {
+    pub(crate) columns: BTreeMap<String, Vec<f64>>,
+}
+
+impl History {
+    pub(crate) fn read(path: &Utf8Path) -> Result<Self, String> {
+        let artifact = open(path)?;
+        let mut columns = BTreeMap::new();
+        for info in &artifact.contents().arrays {
+            let Some(name) = info.path.strip_prefix("history/") else {
+                continue;
+            };
+            let (data, shape) = artifact.array_f64(&info.path).map_err(|e| e.to_string())?;
+            if shape.len() == 1 {
+                columns.insert(name.to_owned(), data);
+            }
+        }
+        let rows = columns.get("time").map_or(0, Vec::len);
+        columns.retain(|_, c| c.len() == rows && rows > 1);
+        Ok(Self { columns })
+    }
+
+    /// A column, if there is one.
+    pub(crate) fn get(&self, name: &str) -> Option<&[f64]> {
+        self.columns.get(name).map(Vec::as_slice)
+    }
+
+    /// Membrane, bending and hourglass energy (J).
+    pub(crate) fn internal(&self) -> Option<Vec<f64>> {
+        let parts = ["membrane", "bending", "hourglass"].map(|n| self.get(n));
+        let rows = parts.iter().flatten().next()?.len();
+        Some(
+            (0..rows)
+                .map(|i| parts.iter().flatten().map(|p| p[i]).sum())
+                .collect(),
+        )
+    }
+}
+
+/// The rigid tool.
+#[derive(Debug, Clone)]
+pub(crate) struct Tool {
+    pub(crate) points: Vec<Vec3>,
+    pub(crate) mesh: Triangles,
+}
+
+/// The body `tool`, if there is one.
+pub(crate) fn tool(path: &Utf8Path) -> Result<Option<Tool>, String> {
+    let artifact = open(path)?;
+    let Some(body) = artifact.contents().body("tool") else {
+        return Ok(None);
+    };
+    let k = body.nodes_per_cell as usize;
+    let (points, cells) = artifact.mesh("tool").map_err(|e| e.to_string())?;
+    let mesh = Triangles::new(points.len(), &cells, k);
+    Ok(Some(Tool { points, mesh }))
+}
+
+/// A formed ply. Fields are absent when the artifact does not have them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ply {
+    pub(crate) name: String,
+    /// Undeformed points (m).
+    pub(crate) flat: Vec<Vec3>,
+    /// Formed points (m).
+    pub(crate) formed: Vec<Vec3>,
+    pub(crate) cells: Vec<[u32; 4]>,
+    /// Shear angle per cell (rad).
+    pub(crate) shear: Option<Vec<f64>>,
+    /// Distance from the tool per point (m).
+    pub(crate) distance: Option<Vec<f64>>,
+    /// Principal curvature of largest magnitude per point (1/m).
+    pub(crate) curvature: Option<Vec<f64>>,
+    /// Cells that the detection flagged, or that lie on a defect.
+    pub(crate) marked: Vec<bool>,
+}
+
+fn last_frame(artifact: &Artifact) -> Result<u64, String> {
+    artifact
+        .contents()
+        .frames
+        .checked_sub(1)
+        .ok_or_else(|| "it has no frame".to_owned())
+}
+
+fn quads(name: &str, cells: &[u32], k: u32) -> Result<Vec<[u32; 4]>, String> {
+    if k != 4 {
+        return Err(format!(
+            "body '{name}' has cells of {k} nodes; sheets have 4"
+        ));
+    }
+    Ok(cells.as_chunks::<4>().0.to_vec())
+}
+
+/// The plies of a `defects` or `comparison` artifact: bodies that are formed and know their flat place, with the
+/// attributes of the body.
+pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Value, Ply)>, String> {
+    let artifact = open(path)?;
+    if artifact.contents().bodies.is_empty() {
+        return Ok(Vec::new());
+    }
+    let frame = last_frame(&artifact)?;
+    let mut all = Vec::new();
+    for body in &artifact.contents().bodies {
+        let read = |on, what: &str| artifact.frame_field(&body.name, frame, on, what).ok();
+        let (_, cells) = artifact.mesh(&body.name).map_err(|e| e.to_string())?;
+        let formed = artifact
+            .frame_points(&body.name, frame)
+            .map_err(|e| e.to_string())?;
+        let cells = quads(&body.name, &cells, body.nodes_per_cell)?;
+        let flat = read(On::Points, "undeformed")
+            .ok_or_else(|| format!("body '{}' has no field 'undeformed'", body.name))?;
+        let marked = match (read(On::Cells, "flag"), read(On::Points, "defect")) {
+            (Some(flag), _) => flag.iter().map(|f| *f > 0.5).collect(),
+            // A cell lies on a defect when half of its nodes do.
+            (None, Some(d)) => {
+                let on = |c: &[u32; 4]| c.iter().filter(|i| d[**i as usize] > 0.5).count() >= 2;
+                cells.iter().map(on).collect()
+            }
+            _ => vec![false; cells.len()],
+        };
+        let ply = Ply {
+            name: body.attributes["ply"]
+                .as_str()
+                .unwrap_or(&body.name)
+                .to_owned(),
+            flat: flat.as_chunks::<3>().0.to_vec(),
+            formed,
+            shear: read(On::Cells, "shear_angle"),
+            distance: read(On::Points, "nodal_distance"),
+            curvature: read(On::Points, "curvature_max"),
+            marked,
+            cells,
+        };
+        all.push((body.attributes.clone(), ply));
+    }
+    Ok(all)
+}
+
+/// Plies of a `forming` artifact by name, in its last frame.
+pub(crate) fn formed_plies(path: &Utf8Path, names: &[String]) -> Result<Vec<Ply>, String> {
+    let artifact = open(path)?;
+    let frame = last_frame(&artifact)?;
+    let one = |name: &String| -> Result<Ply, String> {
+        let body = artifact.body(name).map_err(|e| e.to_string())?;
+        let (flat, cells) = artifact.mesh(name).map_err(|e| e.to_string())?;
+        let cells = quads(name, &cells, body.nodes_per_cell)?;
+        Ok(Ply {
+            name: name.clone(),
+            flat,
+            formed: artifact
+                .frame_points(name, frame)
+                .map_err(|e| e.to_string())?,
+            shear: artifact
+                .frame_field(name, frame, On::Cells, "shear_angle")
+                .ok(),
+            marked: vec![false; cells.len()],
+            cells,
+            ..Ply::default()
+        })
+    };
+    names.iter().map(one).collect()
+}
+
+impl Ply {
+    /// Its cells as triangles.
+    pub(crate) fn triangles(&self) -> Triangles {
+        Triangles::new(self.flat.len(), self.cells.as_flattened(), 4)
+    }
+}

@@ -1,0 +1,403 @@
+//! The runs of a workflow as studies: a global run, its defects and zones, its local runs, their comparison.
+
+use crate::input::{Instance, ReportInput};
+use crate::read::{self, Facts, FormingFacts, History, Ply, Tool};
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Studies of which pictures are drawn; of more only tables are shown.
+const DRAWN: usize = 6;
+
+/// What one global run led to.
+#[derive(Debug, Default)]
+pub(crate) struct Study {
+    /// Items of the global run, when there are several.
+    pub(crate) title: String,
+    /// The global run.
+    pub(crate) global: Option<Run>,
+    /// Its tool.
+    pub(crate) tool: Option<Tool>,
+    /// Its plies, formed, with what the detection found.
+    pub(crate) plies: Vec<Ply>,
+    /// What the detection tells of itself; absent without one.
+    pub(crate) detection: Option<Detection>,
+    /// Zones; absent when no step looked for them.
+    pub(crate) zones: Option<Vec<Zone>>,
+    /// One entry per zone with something to show.
+    pub(crate) locals: Vec<Local>,
+    /// What the comparison found.
+    pub(crate) comparison: Option<Comparison>,
+    /// A fine run of the whole scene.
+    pub(crate) reference: Option<Run>,
+}
+
+/// A forming run without its meshes.
+#[derive(Debug)]
+pub(crate) struct Run {
+    /// Name for people.
+    pub(crate) label: String,
+    /// Index of its instance.
+    pub(crate) instance: usize,
+    /// Its attributes.
+    pub(crate) facts: FormingFacts,
+    /// Bound on kinetic over internal energy that it was given.
+    pub(crate) kinetic_bound: Option<f64>,
+    /// Its history.
+    pub(crate) history: History,
+}
+
+/// A local run.
+#[derive(Debug)]
+pub(crate) struct Local {
+    /// Name of its zone.
+    pub(crate) zone: String,
+    /// The run.
+    pub(crate) run: Option<Run>,
+    /// Its plies, formed.
+    pub(crate) plies: Vec<Ply>,
+}
+
+/// A zone.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Zone {
+    pub(crate) name: String,
+    #[serde(rename = "box")]
+    pub(crate) bounds: [f64; 4],
+    pub(crate) free_sides: [bool; 4],
+    pub(crate) plies: Vec<String>,
+    pub(crate) flagged_area: f64,
+}
+
+/// Attributes of a detection.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Detection {
+    pub(crate) thresholds: BTreeMap<String, f64>,
+    pub(crate) plies: Vec<DetectionPly>,
+}
+
+/// What a detection found on a ply.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct DetectionPly {
+    pub(crate) name: String,
+    pub(crate) flagged_area: f64,
+    pub(crate) over_shear_area: f64,
+    pub(crate) poor_conformity_area: f64,
+    pub(crate) shear_min: f64,
+    pub(crate) shear_max: f64,
+    pub(crate) distance_max: f64,
+}
+
+/// Attributes of a comparison.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Comparison {
+    pub(crate) models: Vec<Model>,
+    pub(crate) defects: Vec<Defect>,
+}
+
+/// A model that was compared.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Model {
+    pub(crate) name: String,
+    pub(crate) role: String,
+    pub(crate) zone: Option<String>,
+}
+
+/// A defect in one model.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Defect {
+    pub(crate) id: String,
+    pub(crate) model: String,
+    pub(crate) zone: String,
+    pub(crate) ply: String,
+    #[serde(rename = "type")]
+    pub(crate) kind: String,
+    pub(crate) length: f64,
+    pub(crate) amplitude: f64,
+    pub(crate) area: f64,
+    pub(crate) centre: [f64; 2],
+    pub(crate) curvature_max: f64,
+    pub(crate) shear_min: f64,
+    pub(crate) shear_max: f64,
+    pub(crate) touches_cut: bool,
+}
+
+impl Defect {
+    /// Whether it is a wrinkle; else it is bridging.
+    pub(crate) fn is_wrinkle(&self) -> bool {
+        self.kind == "wrinkle"
+    }
+}
+
+impl Comparison {
+    /// Role of a model by name: `global`, `local`, `reference`.
+    pub(crate) fn role(&self, model: &str) -> &str {
+        self.models
+            .iter()
+            .find(|m| m.name == model)
+            .map_or("", |m| m.role.as_str())
+    }
+
+    /// Defects of the local runs.
+    pub(crate) fn local(&self) -> impl Iterator<Item = &Defect> {
+        self.defects
+            .iter()
+            .filter(|d| self.role(&d.model) == "local")
+    }
+}
+
+/// Everything that is read for a report.
+#[derive(Debug, Default)]
+pub(crate) struct Material {
+    /// What each instance tells of itself; absent when its artifact cannot be read.
+    pub(crate) facts: Vec<Option<Facts>>,
+    /// The studies.
+    pub(crate) studies: Vec<Study>,
+    /// What could not be read, or is not shown.
+    pub(crate) problems: Vec<String>,
+}
+
+impl Material {
+    /// Reads the attributes of all artifacts; with `pictures` also meshes, fields and histories.
+    pub(crate) fn read(input: &ReportInput, pictures: bool) -> Self {
+        let mut reader = Reader {
+            input,
+            all: Self::default(),
+            pictures,
+        };
+        for instance in &input.instances {
+            let facts = Facts::read(&instance.artifact);
+            let facts = reader.noted(&instance.label(), facts);
+            reader.all.facts.push(facts);
+        }
+        reader.studies();
+        reader.all
+    }
+}
+
+struct Reader<'a> {
+    input: &'a ReportInput,
+    all: Material,
+    pictures: bool,
+}
+
+impl Reader<'_> {
+    /// Keeps what went wrong for the list of problems.
+    fn noted<T>(&mut self, label: &str, result: Result<T, String>) -> Option<T> {
+        result
+            .map_err(|e| self.all.problems.push(format!("{label}: {e}")))
+            .ok()
+    }
+
+    fn kind(&self, at: usize) -> &str {
+        self.all.facts[at].as_ref().map_or("", |f| f.kind.as_str())
+    }
+
+    fn key(&self, at: usize) -> &str {
+        &self.input.instances[at].record.key
+    }
+
+    /// Instances of a kind that took the artifact of `giver`.
+    fn takers(&self, kind: &str, giver: usize) -> Vec<usize> {
+        let key = self.key(giver);
+        (0..self.all.facts.len())
+            .filter(|at| self.kind(*at) == kind)
+            .filter(|at| self.all.facts[*at].as_ref().is_some_and(|f| f.took(key)))
+            .collect()
+    }
+
+    fn is_local(&self, at: usize) -> bool {
+        self.all.facts[at]
+            .as_ref()
+            .is_some_and(|f| f.attributes["zone"].is_object())
+    }
+
+    fn studies(&mut self) {
+        let forming: Vec<usize> = (0..self.all.facts.len())
+            .filter(|at| self.kind(*at) == "forming")
+            .collect();
+        let references: BTreeSet<&str> = self
+            .all
+            .facts
+            .iter()
+            .flatten()
+            .flat_map(|f| f.at_port("reference"))
+            .collect();
+        let mut plans: Vec<(usize, Option<usize>)> = Vec::new();
+        for at in forming.iter().copied().filter(|at| !self.is_local(*at)) {
+            let detections = self.takers("defects", at);
+            if detections.is_empty() && !references.contains(self.key(at)) {
+                plans.push((at, None));
+            }
+            plans.extend(detections.into_iter().map(|d| (at, Some(d))));
+        }
+        let wide = self.pictures;
+        let many = plans.len() > 1;
+        for (n, (at, detection)) in plans.iter().enumerate() {
+            self.pictures = wide && n < DRAWN;
+            let mut study = self.study(*at, *detection);
+            if many {
+                let name = |at: usize| self.input.instances[at].label();
+                study.title =
+                    detection.map_or_else(|| name(*at), |d| format!("{}, {}", name(*at), name(d)));
+            }
+            self.all.studies.push(study);
+        }
+        if plans.len() > DRAWN && wide {
+            let text = format!(
+                "maps are drawn for the first {DRAWN} of {} global runs",
+                plans.len()
+            );
+            self.all.problems.push(text);
+        }
+    }
+
+    fn study(&mut self, global: usize, detection: Option<usize>) -> Study {
+        let mut study = Study {
+            global: self.run(global),
+            ..Study::default()
+        };
+        let zones_at = detection.and_then(|d| self.takers("zones", d).first().copied());
+        if let Some(at) = detection {
+            study.detection = self.attributes(at);
+        }
+        if let Some(at) = zones_at {
+            #[derive(Deserialize, Default)]
+            struct Zones {
+                zones: Vec<Zone>,
+            }
+            study.zones = self.attributes::<Zones>(at).map(|z| z.zones);
+        }
+        let comparison = zones_at
+            .and_then(|z| self.takers("comparison", z).first().copied())
+            .filter(|c| {
+                self.all.facts[*c]
+                    .as_ref()
+                    .is_some_and(|f| f.took(self.key(global)))
+            });
+        if let Some(at) = comparison {
+            study.comparison = self.attributes(at);
+        }
+        self.read_global(&mut study, global, detection);
+        let locals = zones_at.map(|z| self.local_runs(z)).unwrap_or_default();
+        self.read_locals(&mut study, &locals, comparison);
+        let reference = comparison.and_then(|c| {
+            let key = self.all.facts[c]
+                .as_ref()?
+                .at_port("reference")
+                .next()?
+                .to_owned();
+            (0..self.all.facts.len()).find(|at| self.key(*at) == key)
+        });
+        study.reference = reference.and_then(|at| self.run(at));
+        study
+    }
+
+    /// Forming runs whose boundary was made for the zones of an instance.
+    fn local_runs(&self, zones: usize) -> Vec<usize> {
+        let boundaries = self.takers("boundary", zones);
+        boundaries
+            .into_iter()
+            .flat_map(|b| self.takers("forming", b))
+            .collect()
+    }
+
+    fn instance(&self, at: usize) -> &Instance {
+        &self.input.instances[at]
+    }
+
+    fn attributes<T: for<'de> Deserialize<'de>>(&mut self, at: usize) -> Option<T> {
+        let value = self.all.facts[at].as_ref()?.attributes.clone();
+        let result = serde_json::from_value(value).map_err(|e| format!("its attributes: {e}"));
+        let label = self.instance(at).label();
+        self.noted(&label, result)
+    }
+
+    fn run(&mut self, at: usize) -> Option<Run> {
+        let facts: FormingFacts = self.attributes(at)?;
+        let label = self.instance(at).label();
+        let mut history = History::default();
+        if self.pictures {
+            let read = History::read(&self.instance(at).artifact);
+            history = self.noted(&label, read).unwrap_or_default();
+        }
+        let provenance = &self.all.facts[at].as_ref()?.provenance;
+        let kinetic_bound = provenance["parameters"]["kinetic_bound"].as_f64();
+        Some(Run {
+            label,
+            instance: at,
+            facts,
+            kinetic_bound,
+            history,
+        })
+    }
+
+    fn read_global(&mut self, study: &mut Study, global: usize, detection: Option<usize>) {
+        if !self.pictures {
+            return;
+        }
+        let path = self.instance(global).artifact.clone();
+        let label = self.instance(global).label();
+        study.tool = self.noted(&label, read::tool(&path)).flatten();
+        let plies = match detection {
+            Some(at) => {
+                let label = self.instance(at).label();
+                let plies = read::judged_plies(&self.instance(at).artifact);
+                self.noted(
+                    &label,
+                    plies.map(|all| all.into_iter().map(|(_, p)| p).collect()),
+                )
+            }
+            None => {
+                let names = study
+                    .global
+                    .as_ref()
+                    .map(|g| g.facts.plies())
+                    .unwrap_or_default();
+                self.noted(&label, read::formed_plies(&path, &names))
+            }
+        };
+        study.plies = plies.unwrap_or_default();
+    }
+
+    fn read_locals(&mut self, study: &mut Study, runs: &[usize], comparison: Option<usize>) {
+        let mut judged: Vec<(Value, Ply)> = Vec::new();
+        if let (Some(at), true) = (comparison, self.pictures) {
+            let label = self.instance(at).label();
+            let read = read::judged_plies(&self.instance(at).artifact);
+            judged = self.noted(&label, read).unwrap_or_default();
+        }
+        for at in runs {
+            let Some(run) = self.run(*at) else { continue };
+            let zone = run.facts.zone["name"].as_str().unwrap_or("?").to_owned();
+            let model = study.comparison.as_ref().and_then(|c| {
+                let of_zone = |m: &&Model| m.role == "local" && m.zone.as_deref() == Some(&zone);
+                c.models.iter().find(of_zone).map(|m| m.name.clone())
+            });
+            let mut plies: Vec<Ply> = Vec::new();
+            judged.retain_mut(|(about, ply)| {
+                let mine = model.is_some() && about["model"].as_str() == model.as_deref();
+                if mine {
+                    plies.push(std::mem::take(ply));
+                }
+                !mine
+            });
+            if plies.is_empty() && self.pictures {
+                let path = self.instance(*at).artifact.clone();
+                let read = read::formed_plies(&path, &run.facts.plies());
+                plies = self.noted(&run.label.clone(), read).unwrap_or_default();
+            }
+            study.locals.push(Local {
+                zone,
+                run: Some(run),
+                plies,
+            });
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! The table at the end of a run in the terminal.
+
+use crate::input::{Instance, ReportInput, label};
+use crate::page::{expected_text, got_text};
+use crate::study::{Comparison, Material, Study};
+use crate::units::{bytes, duration, fixed, number, quantity};
+use crate::verdict;
+use camino::Utf8Path;
+
+/// Tables are shown up to this many rows.
+const LONGEST: usize = 40;
+
+/// What the run found, in plain text: verdict, warnings, defects, expected results with verdicts (all results of
+/// workflows without expectations), costs, and the path of the report. Ends with a line break.
+#[must_use]
+pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
+    let material = Material::read(input, false);
+    let mut blocks: Vec<String> = Vec::new();
+    for study in &material.studies {
+        let (_, text) = verdict::of_study(study);
+        let title = if study.title.is_empty() {
+            &input.workflow
+        } else {
+            &study.title
+        };
+        if !text.is_empty() {
+            blocks.push(format!("{title}: {text}\n"));
+        }
+        blocks.push(zone_table(study));
+        blocks.extend(study.comparison.as_ref().map(defect_table));
+    }
+    let warnings = verdict::warnings(input, &material);
+    let line = |(label, text): &(String, String)| format!("warning: {label}: {text}\n");
+    blocks.push(warnings.iter().take(LONGEST).map(line).collect());
+    blocks.push(result_table(input));
+    blocks.push(cost_table(&input.instances));
+    blocks.extend(report.map(|path| format!("report: {path}\n")));
+    blocks.retain(|b| !b.is_empty());
+    blocks.join("\n")
+}
+
+fn zone_table(study: &Study) -> String {
+    let mm = |v: f64| fixed(v * 1e3, 0);
+    let zones = study.zones.as_deref().unwrap_or_default();
+    let rows: Vec<Vec<String>> = zones
+        .iter()
+        .map(|z| {
+            let [x0, y0, x1, y1] = z.bounds;
+            let place = format!(
+                "x {} to {} mm, y {} to {} mm",
+                mm(x0),
+                mm(x1),
+                mm(y0),
+                mm(y1)
+            );
+            vec![z.name.clone(), place, z.plies.join(", ")]
+        })
+        .collect();
+    table(&["zone", "place", "plies"], &rows, &[])
+}
+
+fn defect_table(c: &Comparison) -> String {
+    let rows: Vec<Vec<String>> = c
+        .local()
+        .map(|d| {
+            vec![
+                d.id.clone(),
+                d.ply.clone(),
+                d.kind.clone(),
+                quantity(d.length, "m", 3),
+                quantity(d.amplitude, "m", 3),
+                quantity(d.area, "m2", 3),
+            ]
+        })
+        .collect();
+    table(
+        &["defect", "ply", "type", "length", "amplitude", "area"],
+        &rows,
+        &[3, 4, 5],
+    )
+}
+
+fn result_table(input: &ReportInput) -> String {
+    if !input.expectations.is_empty() {
+        let rows: Vec<Vec<String>> = (input.expectations.iter())
+            .map(|e| {
+                let place = format!("{}.{}", label(&e.step, &e.item), e.result);
+                let verdict = if e.met { "ok" } else { "missed" };
+                vec![place, got_text(e), expected_text(e), verdict.into()]
+            })
+            .collect();
+        return table(&["result", "value", "expected", "verdict"], &rows, &[1]);
+    }
+    let rows: Vec<Vec<String>> = (input.instances.iter())
+        .flat_map(|i| i.record.results.iter().map(move |r| (i, r)))
+        .map(|(i, r)| {
+            vec![
+                format!("{}.{}", i.label(), r.name),
+                quantity(r.value, &r.unit, 6),
+            ]
+        })
+        .collect();
+    if rows.len() > LONGEST {
+        String::new()
+    } else {
+        table(&["result", "value"], &rows, &[1])
+    }
+}
+
+fn cost_table(instances: &[Instance]) -> String {
+    if instances.len() > LONGEST {
+        return String::new();
+    }
+    let rows: Vec<Vec<String>> = instances
+        .iter()
+        .map(|i| {
+            let c = &i.record.cost;
+            let rate = i
+                .record
+                .results
+                .iter()
+                .find(|r| r.name == "element_cycle_rate");
+            vec![
+                i.label(),
+                duration(c.wall_seconds),
+                duration(c.cpu_seconds),
+                c.threads.to_string(),
+                bytes(c.peak_memory),
+                rate.map_or(String::new(), |r| {
+                    format!("{} M/s", number(r.value * 1e-6, 3))
+                }),
+            ]
+        })
+        .collect();
+    table(
+        &["step", "wall", "cpu", "threads", "memory", "element-steps"],
+        &rows,
+        &[1, 2, 3, 4, 5],
+    )
+}
+
+/// Columns padded to their widest cell; those in `right` are aligned to the right. Empty without rows.
+fn table(head: &[&str], rows: &[Vec<String>], right: &[usize]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
+    let lines = || std::iter::once(&head).chain(rows);
+    let used: Vec<usize> = (0..head.len())
+        .filter(|at| rows.iter().any(|r| !r[*at].is_empty()))
+        .collect();
+    let mut out = String::new();
+    for row in lines() {
+        let mut line = String::new();
+        for at in &used {
+            let width = lines().map(|r| r[*at].chars().count()).max().unwrap_or(0);
+            let pad = " ".repeat(width - row[*at].chars().count());
+            line += &if right.contains(at) {
+                pad + &row[*at]
+            } else {
+                row[*at].clone() + &pad
+            };
+            line += "  ";
+        }
+        out += line.trim_end();
+        out.push('\n');
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn empty_columns_are_left_out_and_the_rest_lines_up() {
+        let rows = vec![
+            vec!["a".to_owned(), String::new(), "1".to_owned()],
+            vec!["bcd".to_owned(), String::new(), "22".to_owned()],
+        ];
+        assert_eq!(
+            table(&["x", "y", "n"], &rows, &[2]),
+            "x     n\na     1\nbcd  22\n"
+        );
+        assert_eq!(table(&["x"], &[], &[]), "");
+    }
+}

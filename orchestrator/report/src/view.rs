@@ -1,0 +1,320 @@
+//! Pictures of plies: the flat map and the formed view, with zones, marks and axes drawn over them.
+
+use crate::field::Legend;
+use crate::locate::{Locator, bounds};
+use crate::raster::{Camera, Canvas, Paint, Vec3};
+use crate::read::{Ply, Tool};
+use crate::study::Zone;
+use crate::units::number;
+use maud::{Markup, html};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// A text at a place of the flat ply (m).
+#[derive(Debug, Clone)]
+pub(crate) struct Mark {
+    pub(crate) text: String,
+    pub(crate) at: [f64; 2],
+}
+
+/// What is drawn over a ply.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Overlay<'a> {
+    pub(crate) zones: &'a [Zone],
+    pub(crate) marks: &'a [Mark],
+}
+
+/// A failure to make a picture, as a text.
+pub(crate) type Drawn = Result<Markup, String>;
+
+/// Left and bottom margin of the flat map's axes (px).
+const AXES: [f64; 2] = [34.0, 22.0];
+/// Right margin, for the half of the last number that reaches out (px).
+const RIGHT: f64 = 8.0;
+/// Points along zone outlines on the formed ply are this far apart (m).
+const OUTLINE_STEP: f64 = 2e-3;
+/// Outlines that lie this far (m) behind what is drawn still show.
+const OUTLINE_TOLERANCE: f64 = 3e-3;
+/// The ply is drawn this far (m) before the tool: its mid-plane touches the tool within the contact's play.
+const PLY_BIAS: f64 = 1.5e-3;
+
+/// Resolution of the pictures: pixels of the image per pixel of the page.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sharpness(pub(crate) f64);
+
+impl Sharpness {
+    /// Size of the image and the view onto it, for a camera that fits a page of `size`.
+    fn image(
+        self,
+        camera: Camera,
+        points: &[Vec3],
+        more: &[Vec3],
+        size: [f64; 2],
+    ) -> (Camera, [usize; 2]) {
+        let margin = 8.0 * self.0;
+        camera.fit(points.iter().chain(more), size.map(|s| s * self.0), margin)
+    }
+}
+
+/// The undeformed ply in colours, `width` px wide, with axes in mm.
+///
+/// # Errors
+/// When the picture cannot be encoded.
+pub(crate) fn flat(
+    ply: &Ply,
+    legend: &Legend,
+    overlay: &Overlay<'_>,
+    width: f64,
+    sharp: Sharpness,
+) -> Drawn {
+    let Some(values) = legend.field.at_points(ply) else {
+        return Ok(html! {});
+    };
+    let (camera, size) = sharp.image(
+        Camera::plan(),
+        &ply.flat,
+        &[],
+        [width - AXES[0] - RIGHT, 0.85 * width],
+    );
+    let mut canvas = Canvas::new(size);
+    let paint = Paint::Field(&values, legend.scale);
+    canvas.surface(&camera, &ply.flat, &ply.triangles(), paint, false, 0.0);
+    let image = canvas.data_url().map_err(|e| e.to_string())?;
+    let page = |p: [f64; 2]| {
+        let [x, y, _] = camera.project([p[0], p[1], 0.0]);
+        [AXES[0] + x / sharp.0, y / sharp.0]
+    };
+    let (w, h) = (size[0] as f64 / sharp.0, size[1] as f64 / sharp.0);
+    let marked = marked_outline(ply, &page);
+    let what = format!("{}, flat ply {}", legend.field.title(), ply.name);
+    Ok(html! {
+        svg viewBox={ "0 0 " (px(width)) " " (px(h + AXES[1])) } role="img" aria-label=(what) {
+            image href=(image) x=(AXES[0]) y="0" width=(px(w)) height=(px(h)) {}
+            (plan_axes(ply, &page, h))
+            path class="marked-halo" d=(marked) {}
+            path class="marked" d=(marked) {}
+            @for zone in overlay.zones {
+                @let [x0, y1] = page([zone.bounds[0], zone.bounds[1]]);
+                @let [x1, y0] = page([zone.bounds[2], zone.bounds[3]]);
+                rect class="zone-halo" x=(px(x0)) y=(px(y0)) width=(px(x1 - x0)) height=(px(y1 - y0)) {}
+                rect class="zone" x=(px(x0)) y=(px(y0)) width=(px(x1 - x0)) height=(px(y1 - y0)) {}
+                (label(&zone.name, [x0 + 5.0, y0 + 16.0], "zone-name", "start"))
+            }
+            @for mark in overlay.marks {
+                (label(&mark.text, page(mark.at), "defect-name", "middle"))
+            }
+        }
+    })
+}
+
+/// Numbers along the lower and left edge of the flat map, in mm.
+fn plan_axes(ply: &Ply, page: &dyn Fn([f64; 2]) -> [f64; 2], h: f64) -> Markup {
+    let [low, high] = bounds(&ply.flat);
+    let ticks = |d: usize, n| crate::plot::ticks(low[d] * 1e3, high[d] * 1e3, n);
+    html! {
+        @for t in ticks(0, 7) {
+            @let x = px(page([t * 1e-3, 0.0])[0]);
+            path class="axis" d={ "M" (x) " " (px(h)) "v4" } {}
+            text class="tick" x=(x) y=(px(h + 16.0)) text-anchor="middle" { (number(t, 4)) }
+        }
+        @for t in ticks(1, 5) {
+            @let y = page([0.0, t * 1e-3])[1];
+            path class="axis" d={ "M" (px(AXES[0])) " " (px(y)) "h-4" } {}
+            text class="tick" x=(px(AXES[0] - 7.0)) y=(px(y + 4.0)) text-anchor="end" { (number(t, 4)) }
+        }
+    }
+}
+
+/// The formed ply on the tool, `width` px wide. The view is from the side where most of what is marked faces.
+///
+/// # Errors
+/// When the picture cannot be encoded.
+pub(crate) fn formed(
+    ply: &Ply,
+    tool: Option<&Tool>,
+    legend: &Legend,
+    overlay: &Overlay<'_>,
+    width: f64,
+    sharp: Sharpness,
+    whole_tool: bool,
+) -> Drawn {
+    let Some(values) = legend.field.at_points(ply) else {
+        return Ok(html! {});
+    };
+    let front = !faces_back(ply);
+    let azimuth = if front { -65f64 } else { 65f64 }.to_radians();
+    let around = tool.filter(|_| whole_tool).map_or(&[][..], |t| &t.points);
+    let camera = Camera::oblique(azimuth, 38f64.to_radians());
+    let (camera, size) = sharp.image(camera, &ply.formed, around, [width, 0.72 * width]);
+    let mut canvas = Canvas::new(size);
+    if let Some(t) = tool {
+        canvas.surface(&camera, &t.points, &t.mesh, Paint::Grey(176.0), true, 0.0);
+    }
+    let paint = Paint::Field(&values, legend.scale);
+    canvas.surface(
+        &camera,
+        &ply.formed,
+        &ply.triangles(),
+        paint,
+        true,
+        PLY_BIAS,
+    );
+    let image = canvas.data_url().map_err(|e| e.to_string())?;
+    let view = View {
+        camera,
+        canvas,
+        sharp,
+        locator: Locator::new(&ply.flat, &ply.cells),
+        ply,
+    };
+    let (w, h) = (size[0] as f64 / sharp.0, size[1] as f64 / sharp.0);
+    let what = format!("{}, formed ply {}", legend.field.title(), ply.name);
+    Ok(html! {
+        svg viewBox={ "0 0 " (px(w)) " " (px(h)) } role="img" aria-label=(what) {
+            image href=(image) x="0" y="0" width=(px(w)) height=(px(h)) {}
+            @for zone in overlay.zones {
+                @let (path, corner) = view.outline(zone);
+                path class="zone-halo" d=(path) {}
+                path class="zone" d=(path) {}
+                @if let Some(c) = corner { (label(&zone.name, c, "zone-name", "middle")) }
+            }
+            @for mark in overlay.marks {
+                @if let Some((at, true)) = view.place(mark.at) {
+                    (label(&mark.text, at, "defect-name", "middle"))
+                }
+            }
+            (triad(&camera, [34.0, h - 26.0]))
+            text class="over" x=(px(w - 4.0)) y=(px(h - 6.0)) text-anchor="end" {
+                @if front { "seen from −y" } @else { "seen from +y" }
+            }
+        }
+    })
+}
+
+/// A drawn view, for placing lines on what it shows.
+struct View<'a> {
+    camera: Camera,
+    canvas: Canvas,
+    sharp: Sharpness,
+    locator: Locator<'a>,
+    ply: &'a Ply,
+}
+
+impl View<'_> {
+    /// Where a place of the flat ply (m) appears on the page (px), and whether it is seen.
+    fn place(&self, at: [f64; 2]) -> Option<([f64; 2], bool)> {
+        let (nodes, weights) = self.locator.locate(at)?;
+        let mut p = [0.0; 3];
+        for (node, w) in nodes.iter().zip(weights) {
+            (0..3).for_each(|d| p[d] += w * self.ply.formed[*node as usize][d]);
+        }
+        let mut on_image = self.camera.project(p);
+        on_image[2] += PLY_BIAS;
+        let seen = self.canvas.visible(on_image, OUTLINE_TOLERANCE);
+        Some((
+            [on_image[0] / self.sharp.0, on_image[1] / self.sharp.0],
+            seen,
+        ))
+    }
+
+    /// The visible part of a zone's outline as an SVG path, and where to write its name.
+    fn outline(&self, zone: &Zone) -> (String, Option<[f64; 2]>) {
+        let [x0, y0, x1, y1] = zone.bounds;
+        let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]];
+        let (mut path, mut pen_down, mut first) = (String::new(), false, None);
+        for side in corners.windows(2) {
+            let length = (side[1][0] - side[0][0]).hypot(side[1][1] - side[0][1]);
+            let steps = (length / OUTLINE_STEP).ceil().max(1.0) as usize;
+            for i in 0..=steps {
+                let t = i as f64 / steps as f64;
+                let at = [0, 1].map(|d| side[0][d] + t * (side[1][d] - side[0][d]));
+                match self.place(at) {
+                    Some((p, true)) => {
+                        let _ = write!(
+                            path,
+                            "{}{} {}",
+                            if pen_down { 'L' } else { 'M' },
+                            px(p[0]),
+                            px(p[1])
+                        );
+                        pen_down = true;
+                        first = first.or(Some(p));
+                    }
+                    _ => pen_down = false,
+                }
+            }
+        }
+        let centre = self.place([0.5 * (x0 + x1), 0.5 * (y0 + y1)]);
+        let name = match centre {
+            Some((p, true)) => Some(p),
+            _ => first,
+        };
+        (path, name)
+    }
+}
+
+/// Whether more of the marked cells (of all cells when none is marked) face +y than -y.
+fn faces_back(ply: &Ply) -> bool {
+    let any = ply.marked.iter().any(|m| *m);
+    let mut sum = 0.0;
+    for (cell, marked) in ply.cells.iter().zip(&ply.marked) {
+        if any && !marked {
+            continue;
+        }
+        let [a, b, c, d] = cell.map(|i| ply.formed[i as usize]);
+        let (e, f) = ([c[0] - a[0], c[2] - a[2]], [d[0] - b[0], d[2] - b[2]]);
+        // The y component of the cell's normal times twice its area.
+        sum += e[1] * f[0] - e[0] * f[1];
+    }
+    // A hair of preference for the front, so that rounding does not choose.
+    sum > 1e-4
+}
+
+/// Directions of the axes.
+fn triad(camera: &Camera, at: [f64; 2]) -> Markup {
+    let origin = camera.project([0.0; 3]);
+    let axis = |d: usize| {
+        let mut unit = [0.0; 3];
+        unit[d] = 22.0 / camera.scale;
+        let p = camera.project(unit);
+        [at[0] + p[0] - origin[0], at[1] + p[1] - origin[1]]
+    };
+    html! {
+        @for (d, name) in ["x", "y", "z"].into_iter().enumerate() {
+            @let [x, y] = axis(d);
+            path class="triad-halo" d={ "M" (px(at[0])) " " (px(at[1])) "L" (px(x)) " " (px(y)) } {}
+            path class="triad" d={ "M" (px(at[0])) " " (px(at[1])) "L" (px(x)) " " (px(y)) } {}
+            text class="over" x=(px(at[0] + 1.35 * (x - at[0]))) y=(px(at[1] + 1.35 * (y - at[1]) + 4.0))
+                text-anchor="middle" { (name) }
+        }
+    }
+}
+
+fn label(text: &str, at: [f64; 2], class: &str, anchor: &str) -> Markup {
+    html! { text class={ "label " (class) } x=(px(at[0])) y=(px(at[1])) text-anchor=(anchor) { (text) } }
+}
+
+/// The edges between marked and unmarked cells, as an SVG path.
+fn marked_outline(ply: &Ply, page: &dyn Fn([f64; 2]) -> [f64; 2]) -> String {
+    let mut edges: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+    for (cell, _) in ply.cells.iter().zip(&ply.marked).filter(|(_, m)| **m) {
+        for k in 0..4 {
+            let (a, b) = (cell[k], cell[(k + 1) % 4]);
+            *edges.entry((a.min(b), a.max(b))).or_default() += 1;
+        }
+    }
+    let mut path = String::new();
+    for ((a, b), _) in edges.into_iter().filter(|(_, n)| *n == 1) {
+        let [p, q] = [a, b].map(|i| {
+            let at = ply.flat[i as usize];
+            page([at[0], at[1]])
+        });
+        let _ = write!(path, "M{} {}L{} {}", px(p[0]), px(p[1]), px(q[0]), px(q[1]));
+    }
+    path
+}
+
+/// A place on the page, to a tenth of a pixel.
+pub(crate) fn px(v: f64) -> String {
+    number((v * 10.0).round() / 10.0, 6)
+}

@@ -1,0 +1,481 @@
+//! A made-up study: two plies bent over a cylinder along x, wavy in two zones.
+#![allow(dead_code, missing_docs)]
+
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_artifact::{ArtifactWriter, DType, On};
+use plyflow_model::job::{Cost, NamedResult, Record};
+use plyflow_report::{Expectation, Instance, ReportInput};
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+
+const RADIUS: f64 = 0.06;
+/// Half length and half width of the blank (m).
+const HALF: [f64; 2] = [0.12, 0.08];
+
+pub struct Study {
+    pub folder: Utf8PathBuf,
+    pub instances: Vec<Instance>,
+}
+
+struct Sheet {
+    flat: Vec<f64>,
+    formed: Vec<f64>,
+    cells: Vec<u32>,
+    shear: Vec<f64>,
+    distance: Vec<f64>,
+    curvature: Vec<f64>,
+}
+
+/// Height of the wave over a place of the flat ply.
+fn wave(x: f64, y: f64) -> f64 {
+    let bump = |cx: f64, cy: f64, a: f64| {
+        let (u, v) = ((x - cx) / 0.03, (y - cy) / 0.02);
+        a * (-(u * u + v * v)).exp() * (1.0 + (2.0 * PI * (x - cx) / 0.02).cos()) / 2.0
+    };
+    bump(-0.05, -0.045, 0.006) + bump(0.06, 0.03, 0.004)
+}
+
+fn sheet(bounds: [f64; 4], size: f64, offset: f64) -> Sheet {
+    let n = [0, 1].map(|d| ((bounds[d + 2] - bounds[d]) / size).round() as usize);
+    let mut s = Sheet {
+        flat: vec![],
+        formed: vec![],
+        cells: vec![],
+        shear: vec![],
+        distance: vec![],
+        curvature: vec![],
+    };
+    for j in 0..=n[1] {
+        for i in 0..=n[0] {
+            let x = bounds[0] + (bounds[2] - bounds[0]) * i as f64 / n[0] as f64;
+            let y = bounds[1] + (bounds[3] - bounds[1]) * j as f64 / n[1] as f64;
+            let (r, a) = (RADIUS + offset + wave(x, y), y / RADIUS);
+            s.flat.extend([x, y, 0.0]);
+            s.formed.extend([x, r * a.sin(), r * a.cos()]);
+            s.distance.push(wave(x, y));
+            s.curvature.push(-1.0 / RADIUS + 2e4 * wave(x, y));
+        }
+    }
+    let row = n[0] as u32 + 1;
+    for j in 0..n[1] as u32 {
+        for i in 0..n[0] as u32 {
+            let a = j * row + i;
+            s.cells.extend([a, a + 1, a + row + 1, a + row]);
+            let [x, y] = [0, 1].map(|d| s.flat[3 * a as usize + d]);
+            s.shear
+                .push(0.5 * (x / HALF[0]) * (y / HALF[1]).abs() - 0.1);
+        }
+    }
+    s
+}
+
+fn tool() -> (Vec<f64>, Vec<u32>) {
+    let (mut points, mut cells) = (vec![], vec![]);
+    let n = 40u32;
+    for k in 0..=n {
+        let a = PI * (f64::from(k) / f64::from(n) - 0.5) * 1.1;
+        points.extend([-0.16, RADIUS * a.sin(), RADIUS * a.cos()]);
+        points.extend([0.16, RADIUS * a.sin(), RADIUS * a.cos()]);
+        if k < n {
+            let i = 2 * k;
+            cells.extend([i, i + 1, i + 3, i, i + 3, i + 2]);
+        }
+    }
+    (points, cells)
+}
+
+impl Study {
+    pub fn new(folder: &Utf8Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            instances: Vec::new(),
+        }
+    }
+
+    /// Ends an artifact and lists its instance.
+    pub fn finish(
+        &mut self,
+        w: ArtifactWriter,
+        (step, item): (&str, &[&str]),
+        kind: &str,
+        inputs: &[(&str, &str)],
+        results: Vec<(&str, f64, &str)>,
+    ) {
+        let named = |(name, value, unit): (&str, f64, &str)| NamedResult {
+            name: name.into(),
+            value,
+            unit: unit.into(),
+            measured: false,
+        };
+        let wires: Vec<Value> = (inputs.iter())
+            .map(|(port, from)| json!({"port": port, "step": from, "item": [], "key": key(from)}))
+            .collect();
+        let parameters = json!({"kinetic_bound": 0.05, "note": "a < b & \"c\""});
+        let plugin = json!({"name": kind, "version": "0.1.0", "hash": "feed".repeat(16)});
+        let bytes = w.finish(&json!({
+            "step": step, "plugin": plugin, "components": [plugin], "parameters": parameters, "inputs": wires,
+        }));
+        let label = if item.is_empty() {
+            step.into()
+        } else {
+            format!("{step}[{}]", item.join(","))
+        };
+        let n = self.instances.len() as f64;
+        self.instances.push(Instance {
+            step: step.into(),
+            item: item.iter().map(|i| (*i).to_owned()).collect(),
+            artifact: self.path(&label),
+            record: Record {
+                version: 1,
+                step: step.into(),
+                item: vec![],
+                key: key(&label),
+                kind: kind.into(),
+                bytes: bytes.unwrap(),
+                cost: Cost {
+                    wall_seconds: 12.5 + n,
+                    cpu_seconds: 24.0 + 9.0 * n,
+                    peak_memory: 300 << 20,
+                    threads: 2,
+                },
+                results: results.into_iter().map(named).collect(),
+                collection: None,
+                warnings: vec![],
+                host: "bench".into(),
+                started: 0.0,
+            },
+        });
+    }
+
+    pub fn path(&self, label: &str) -> Utf8PathBuf {
+        self.folder.join(format!("{label}.h5"))
+    }
+
+    pub fn create(&self, label: &str, kind: &str) -> ArtifactWriter {
+        ArtifactWriter::create(self.path(label).as_std_path(), kind).unwrap()
+    }
+
+    /// A forming run; local when it has a zone.
+    pub fn forming(&mut self, label: &str, zone: Option<(&str, [f64; 4])>, size: f64) {
+        let (step, item) = split(label);
+        let mut w = self.create(label, "forming");
+        let sheets = plies(
+            zone.map_or([-HALF[0], -HALF[1], HALF[0], HALF[1]], |z| z.1),
+            size,
+        );
+        for (name, s) in &sheets {
+            w.define_mesh(name, &s.flat, 4, &s.cells, "").unwrap();
+        }
+        let (points, cells) = tool();
+        w.define_mesh("tool", &points, 3, &cells, "").unwrap();
+        for (t, last) in [(0.0, false), (1.0, true)] {
+            w.begin_frame(t).unwrap();
+            for (name, s) in &sheets {
+                w.frame_points(name, if last { &s.formed } else { &s.flat })
+                    .unwrap();
+                w.frame_field(name, On::Cells, "shear_angle", 1, "rad", &s.shear)
+                    .unwrap();
+            }
+            w.end_frame().unwrap();
+        }
+        history(&mut w);
+        let elements: usize = sheets.iter().map(|(_, s)| s.cells.len() / 4).sum();
+        let zone_json = zone.map_or(Value::Null, |(name, b)| json!({"name": name, "box": b}));
+        let list: Vec<Value> = sheets
+            .iter()
+            .map(|(n, _)| json!({"name": n, "kind": "ply", "offset": 0.001}))
+            .collect();
+        let attributes = json!({
+            "scene": "half-pipe", "sheets": list, "element_size": size, "zone": zone_json, "cycles": 40000,
+            "elements": elements, "element_cycles": 4e4 * elements as f64,
+            "energy": {"peak_drift_ratio": 0.011, "peak_kinetic_ratio": 0.023, "kinetic_bound_kept": true, "hourglass_ratio": 0.002},
+            "penetration": {"tool/ply_1": {"max": 2.1e-4, "q999": 8e-5}, "ply_1/ply_2": {"max": 1e-4, "q999": 6e-5}},
+            "warnings": if zone.is_none() { json!(["the film <upper> is stretched by 61 %"]) } else { json!([]) },
+        });
+        w.attributes(&attributes.to_string()).unwrap();
+        let input = zone.map(|(name, _)| format!("boundary[{name}]"));
+        let inputs: Vec<(&str, &str)> = input.iter().map(|l| ("boundary", l.as_str())).collect();
+        let results = vec![
+            ("kinetic_ratio", 0.023, "1"),
+            ("penetration_max", 2.1e-4, "m"),
+        ];
+        self.finish(w, (&step, &as_refs(&item)), "forming", &inputs, results);
+    }
+
+    pub fn defects(&mut self, flat_tool: bool) {
+        let mut w = self.create("detect", "defects");
+        let sheets = plies([-HALF[0], -HALF[1], HALF[0], HALF[1]], 0.004);
+        for (name, s) in &sheets {
+            w.define_mesh(name, &s.formed, 4, &s.cells, "").unwrap();
+        }
+        w.begin_frame(1.0).unwrap();
+        for (name, s) in &sheets {
+            let high = |c: &[u32]| c.iter().any(|i| s.distance[*i as usize] > 0.001) && !flat_tool;
+            let flag: Vec<f64> = s
+                .cells
+                .chunks(4)
+                .map(|c| f64::from(u8::from(high(c))))
+                .collect();
+            w.frame_points(name, &s.formed).unwrap();
+            w.frame_field(name, On::Cells, "shear_angle", 1, "rad", &s.shear)
+                .unwrap();
+            w.frame_field(name, On::Points, "nodal_distance", 1, "m", &s.distance)
+                .unwrap();
+            w.frame_field(name, On::Points, "curvature_max", 1, "1/m", &s.curvature)
+                .unwrap();
+            w.frame_field(name, On::Cells, "flag", 1, "1", &flag)
+                .unwrap();
+            w.frame_field(name, On::Points, "undeformed", 3, "m", &s.flat)
+                .unwrap();
+        }
+        w.end_frame().unwrap();
+        let area = if flat_tool { 0.0 } else { 0.0018 };
+        let ply = |name: &str| {
+            json!({"name": name, "flagged_area": area, "over_shear_area": 0.0, "poor_conformity_area": area,
+            "shear_min": -0.6, "shear_max": 0.4, "distance_max": 0.006})
+        };
+        let thresholds = json!({"over_shear_positive": 0.1396, "over_shear_negative": -0.8727, "distance_threshold": 0.001, "foot_margin": 0.01});
+        let attributes = json!({"thresholds": thresholds, "plies": [ply("ply_1"), ply("ply_2")]});
+        w.attributes(&attributes.to_string()).unwrap();
+        let results = vec![("flagged_area", 2.0 * area, "m2")];
+        self.finish(
+            w,
+            ("detect", &[]),
+            "defects",
+            &[("formed", "coarse")],
+            results,
+        );
+    }
+
+    pub fn zones(&mut self, zones: &[(&str, [f64; 4])]) {
+        let mut w = self.create("zones", "zones");
+        let list: Vec<Value> = zones
+            .iter()
+            .map(|(name, b)| {
+                json!({"name": name, "box": b, "free_sides": [false, false, name == &"A", false],
+                "plies": ["ply_1", "ply_2"], "flagged_area": 0.0009})
+            })
+            .collect();
+        w.attributes(&json!({"zones": list, "scale": 1.15}).to_string())
+            .unwrap();
+        let results = vec![("zone_count", zones.len() as f64, "1")];
+        self.finish(
+            w,
+            ("zones", &[]),
+            "zones",
+            &[("defects", "detect")],
+            results,
+        );
+    }
+
+    pub fn boundary(&mut self, zone: &str) {
+        let label = format!("boundary[{zone}]");
+        let mut w = self.create(&label, "boundary");
+        w.attributes("{}").unwrap();
+        let inputs = [("formed", "coarse"), ("zones", "zones")];
+        self.finish(w, ("boundary", &[zone]), "boundary", &inputs, vec![]);
+    }
+
+    pub fn comparison(&mut self, zones: &[(&str, [f64; 4])]) {
+        let mut w = self.create("compare", "comparison");
+        let mut defects = Vec::new();
+        let mut models = vec![json!({"name": "global", "role": "global", "zone": null})];
+        for (zone, bounds) in zones {
+            let model = format!("local.{zone}");
+            models.push(json!({"name": model, "role": "local", "zone": zone}));
+            let (cx, cy) = ((bounds[0] + bounds[2]) / 2.0, (bounds[1] + bounds[3]) / 2.0);
+            let defect = |model: &str, ply: &str, id: String, kind: &str, length: f64| {
+                json!({"id": id, "model": model, "zone": zone, "ply": ply, "type": kind, "length": length, "amplitude": 0.0052,
+                    "area": 4.1e-4, "centre": [cx, cy], "curvature_max": 171.0, "shear_min": -0.2, "shear_max": 0.31, "touches_cut": zone == &"B"})
+            };
+            defects.push(defect(
+                &model,
+                "ply_2",
+                format!("{zone}W1"),
+                "wrinkle",
+                0.0684,
+            ));
+            defects.push(defect(
+                "global",
+                "ply_2",
+                format!("{zone}W1"),
+                "wrinkle",
+                0.0523,
+            ));
+            defects.push(defect(
+                &model,
+                "ply_1",
+                format!("{zone}B1"),
+                "bridging",
+                0.02,
+            ));
+        }
+        for (zone, bounds) in zones {
+            for (name, s) in plies(*bounds, 0.002) {
+                let about = json!({"model": format!("local.{zone}"), "ply": name}).to_string();
+                w.define_mesh(
+                    &format!("local_{zone}_{name}"),
+                    &s.formed,
+                    4,
+                    &s.cells,
+                    &about,
+                )
+                .unwrap();
+            }
+        }
+        w.begin_frame(0.0).unwrap();
+        for (zone, bounds) in zones {
+            for (name, s) in plies(*bounds, 0.002) {
+                let body = format!("local_{zone}_{name}");
+                let defect: Vec<f64> = s
+                    .distance
+                    .iter()
+                    .map(|d| f64::from(u8::from(*d > 0.002)))
+                    .collect();
+                w.frame_points(&body, &s.formed).unwrap();
+                w.frame_field(&body, On::Points, "nodal_distance", 1, "m", &s.distance)
+                    .unwrap();
+                w.frame_field(&body, On::Points, "curvature_max", 1, "1/m", &s.curvature)
+                    .unwrap();
+                w.frame_field(&body, On::Points, "defect", 1, "1", &defect)
+                    .unwrap();
+                w.frame_field(&body, On::Points, "undeformed", 3, "m", &s.flat)
+                    .unwrap();
+                w.frame_field(&body, On::Cells, "shear_angle", 1, "rad", &s.shear)
+                    .unwrap();
+            }
+        }
+        w.end_frame().unwrap();
+        w.attributes(&json!({"models": models, "defects": defects}).to_string())
+            .unwrap();
+        let inputs = [("global", "coarse"), ("zones", "zones")];
+        let results = vec![("wrinkle_count", zones.len() as f64, "1")];
+        self.finish(w, ("compare", &[]), "comparison", &inputs, results);
+    }
+
+    /// An artifact of a kind that this crate does not know.
+    pub fn stranger(&mut self) {
+        let mut w = self.create("coupon", "coupon-test");
+        w.array("curve/force", DType::F64, &[2], "N", &[0; 16])
+            .unwrap();
+        w.attributes("{\"operator\": \"<b>me</b>\"}").unwrap();
+        self.finish(
+            w,
+            ("coupon", &[]),
+            "coupon-test",
+            &[],
+            vec![("modulus", 3.2e9, "Pa")],
+        );
+    }
+
+    pub fn input(self) -> ReportInput {
+        ReportInput {
+            workflow: "half-pipe <demo> & co".into(),
+            description: Some("Two plies over a \"cylinder\" <tool>".into()),
+            file: "workflow.yaml".into(),
+            command: "plyflow run workflow.yaml --set 'coarse.element=m4 & <x>'".into(),
+            program: "plyflow 0.1.0".into(),
+            fingerprint: "0123abcd".into(),
+            expectations: vec![
+                expectation("zones", "zone_count", Some(2.0), "1", true),
+                expectation("coarse", "penetration_max", Some(2.1e-4), "m", false),
+                expectation("coarse", "no_such", None, "", false),
+            ],
+            instances: self.instances,
+            failures: vec![],
+            not_run: 0,
+        }
+    }
+}
+
+fn expectation(step: &str, result: &str, got: Option<f64>, unit: &str, met: bool) -> Expectation {
+    Expectation {
+        step: step.into(),
+        item: vec![],
+        result: result.into(),
+        unit: unit.into(),
+        got,
+        value: None,
+        tolerance: None,
+        minimum: met.then_some(1.0),
+        maximum: (!met).then_some(2e-4),
+        source: Some("thesis 5.5 <table>".into()),
+        met,
+    }
+}
+
+fn as_refs(item: &[String]) -> Vec<&str> {
+    item.iter().map(String::as_str).collect()
+}
+
+fn split(label: &str) -> (String, Vec<String>) {
+    match label.split_once('[') {
+        Some((step, item)) => (step.into(), vec![item.trim_end_matches(']').into()]),
+        None => (label.into(), vec![]),
+    }
+}
+
+fn key(label: &str) -> String {
+    label.bytes().map(|b| format!("{b:02x}")).collect()
+}
+
+fn plies(bounds: [f64; 4], size: f64) -> [(&'static str, Sheet); 2] {
+    [
+        ("ply_1", sheet(bounds, size, 0.001)),
+        ("ply_2", sheet(bounds, size, 0.002)),
+    ]
+}
+
+fn history(w: &mut ArtifactWriter) {
+    let n = 600;
+    let time: Vec<f64> = (0..n).map(|i| f64::from(i) / f64::from(n - 1)).collect();
+    type Column = (&'static str, &'static str, fn(f64) -> f64);
+    let columns: [Column; 12] = [
+        ("time", "s", |t| t),
+        ("kinetic", "J", |t| {
+            0.3 * t * (1.0 - t) + 0.02 * (80.0 * t).sin().abs()
+        }),
+        ("membrane", "J", |t| 9.0 * t * t),
+        ("bending", "J", |t| 0.8 * t),
+        ("hourglass", "J", |t| 0.02 * t),
+        ("contact", "J", |t| 0.2 * t),
+        ("friction", "J", |t| 3.0 * t * t * t),
+        ("damping", "J", |t| 0.4 * t),
+        ("external", "J", |t| {
+            9.0 * t * t + 1.42 * t + 3.0 * t * t * t
+        }),
+        ("drift", "J", |t| 0.02 * t),
+        ("bag_pressure", "Pa", |t| 1e5 * t.min(0.8) / 0.8),
+        ("frame_height", "m", |t| 0.12 * (1.0 - t)),
+    ];
+    for (name, unit, f) in columns {
+        let data: Vec<u8> = time.iter().flat_map(|t| f(*t).to_ne_bytes()).collect();
+        w.array(
+            &format!("history/{name}"),
+            DType::F64,
+            &[u64::try_from(n).unwrap()],
+            unit,
+            &data,
+        )
+        .unwrap();
+    }
+}
+
+pub const ZONES: [(&str, [f64; 4]); 2] = [
+    ("A", [-0.10, -0.08, -0.004, -0.012]),
+    ("B", [0.02, 0.0, 0.1, 0.06]),
+];
+
+/// The whole way: coarse run, detection, zones, local runs, comparison.
+pub fn whole(folder: &Utf8Path) -> ReportInput {
+    let mut s = Study::new(folder);
+    s.forming("coarse", None, 0.004);
+    s.defects(false);
+    s.zones(&ZONES);
+    for (zone, bounds) in ZONES {
+        s.boundary(zone);
+        s.forming(&format!("local[{zone}]"), Some((zone, bounds)), 0.002);
+    }
+    s.comparison(&ZONES);
+    s.input()
+}

@@ -1,0 +1,241 @@
+//! The page of made-up runs, judged as text.
+
+mod common;
+
+use camino::{Utf8Path, Utf8PathBuf};
+use common::{Study, whole};
+use plyflow_report::{ReportInput, is_current, summary, write_report};
+
+fn folder() -> (tempfile::TempDir, Utf8PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = Utf8PathBuf::from_path_buf(dir.path().to_owned()).unwrap();
+    (dir, path)
+}
+
+fn page(input: &ReportInput, folder: &Utf8Path) -> String {
+    let out = folder.join("out/report.html");
+    let size = write_report(input, &out).unwrap();
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert_eq!(text.len() as u64, size);
+    let left: Vec<_> = std::fs::read_dir(folder.join("out")).unwrap().collect();
+    assert_eq!(left.len(), 1, "no temporary file is left behind");
+    text
+}
+
+/// Tags that are opened are closed, in order.
+fn assert_well_formed(page: &str) {
+    let void = ["meta", "br", "img", "link"];
+    let mut open: Vec<&str> = Vec::new();
+    for piece in page.split('<').skip(1) {
+        let end = piece.find(['>', ' ', '\n']).unwrap_or(piece.len());
+        let name = &piece[..end];
+        if let Some(closed) = name.strip_prefix('/') {
+            assert_eq!(
+                open.pop(),
+                Some(closed),
+                "at ...<{}",
+                &piece[..piece.len().min(80)]
+            );
+        } else if !name.starts_with('!') && !void.contains(&name) {
+            open.push(name);
+        }
+    }
+    assert_eq!(open, Vec::<&str>::new());
+}
+
+/// Nothing is fetched: no address but pictures inside and places on the page.
+fn assert_self_contained(page: &str) {
+    for attribute in ["href=\"", "src=\"", "url(", "@import", "srcset"] {
+        for (at, _) in page.match_indices(attribute) {
+            let target = &page[at + attribute.len()..];
+            let target = &target[..target.len().min(24)];
+            let inside = target.starts_with('#') || target.starts_with("data:image/png;base64,");
+            assert!(inside, "{attribute}{target}");
+        }
+    }
+    assert!(
+        !page.contains("http:") && !page.contains("https:"),
+        "an address of the network"
+    );
+    assert!(!page.contains("<script") && !page.contains("<link"));
+}
+
+#[test]
+fn a_whole_study_shows_every_section_in_one_file_without_network() {
+    let (_keep, folder) = folder();
+    let page = page(&whole(&folder), &folder);
+    assert_well_formed(&page);
+    assert_self_contained(&page);
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+    for id in [
+        "maps-0",
+        "local-0",
+        "defects-0",
+        "expectations",
+        "costs",
+        "energy",
+        "results",
+        "provenance",
+    ] {
+        assert!(page.contains(&format!("id=\"{id}\"")), "section {id}");
+        assert!(page.contains(&format!("href=\"#{id}\"")), "link to {id}");
+    }
+    // 3 quantities on 2 plies, flat and formed; per zone and ply 3 flat and 1 formed.
+    assert_eq!(page.matches("data:image/png;base64,").count(), 12 + 16);
+    assert!(
+        page.contains("2 zones; 2 wrinkles, longest 68.4 mm; 2 bridging areas; kinetic bound kept")
+    );
+    assert!(page.contains("2 of 3 expectations missed"));
+    for unit in [
+        "deg",
+        "mm",
+        "1/mm",
+        "energy (J)",
+        "pressure (kPa)",
+        "height (mm)",
+    ] {
+        assert!(page.contains(unit), "{unit}");
+    }
+}
+
+#[test]
+fn local_and_global_measures_of_a_defect_stand_in_one_row() {
+    let (_keep, folder) = folder();
+    let page = page(&whole(&folder), &folder);
+    let start = page.find("<table class=\"defects\">").unwrap();
+    let table = &page[start..start + page[start..].find("</table>").unwrap()];
+    let row = |id: &str| {
+        let at = table.find(&format!("<th>{id}</th>")).unwrap();
+        &table[at..at + table[at..].find("</tr>").unwrap()]
+    };
+    assert!(
+        row("AW1").contains(">68.4<") && row("AW1").contains(">52.3<"),
+        "{}",
+        row("AW1")
+    );
+    assert!(
+        row("AB1").contains(">20.0</td><td class=\"n\">–<"),
+        "{}",
+        row("AB1")
+    );
+    assert!(row("BW1").contains("reaches the cut") && !row("AW1").contains("reaches the cut"));
+    let order: Vec<usize> = ["AW1", "AB1", "BW1", "BB1"]
+        .iter()
+        .map(|id| table.find(&format!("<th>{id}</th>")).unwrap())
+        .collect();
+    assert!(
+        order.windows(2).all(|w| w[0] < w[1]),
+        "by zone, wrinkles first"
+    );
+}
+
+#[test]
+fn texts_from_files_are_escaped_everywhere() {
+    let (_keep, folder) = folder();
+    let mut input = whole(&folder);
+    input
+        .failures
+        .push(("s[<i>]".into(), "died of <script>alert(1)</script>".into()));
+    input.fingerprint = "\"><script>".into();
+    let page = page(&input, &folder);
+    assert_well_formed(&page);
+    assert!(!page.contains("<script") && !page.contains("<demo>") && !page.contains("<upper>"));
+    assert!(page.contains("half-pipe &lt;demo&gt; &amp; co"));
+    assert!(page.contains("the film &lt;upper&gt; is stretched by 61 %"));
+    assert!(page.contains("died of &lt;script&gt;"));
+}
+
+#[test]
+fn a_run_without_zones_says_so_in_words() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.004);
+    study.defects(true);
+    study.zones(&[]);
+    let input = study.input();
+    let page = page(&input, &folder);
+    assert_well_formed(&page);
+    assert!(page.contains("no defects found: no zones, no local runs; kinetic bound kept"));
+    assert!(!page.contains("id=\"local-0\"") && !page.contains("id=\"defects-0\""));
+    let text = summary(&input, None);
+    assert!(
+        text.contains("no defects found: no zones, no local runs"),
+        "{text}"
+    );
+}
+
+#[test]
+fn local_runs_are_shown_without_a_comparison() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.008);
+    study.defects(false);
+    study.zones(&common::ZONES[..1]);
+    study.boundary("A");
+    study.forming("local[A]", Some(common::ZONES[0]), 0.004);
+    let page = page(&study.input(), &folder);
+    assert!(page.contains("Zone A") && !page.contains("id=\"defects-0\""));
+    // The shear alone is known of the local run: flat and formed, on two plies.
+    assert_eq!(page.matches("data:image/png;base64,").count(), 12 + 4);
+}
+
+#[test]
+fn unknown_kinds_are_listed_with_their_results_and_costs() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.stranger();
+    let mut input = study.input();
+    input.expectations.clear();
+    let page = page(&input, &folder);
+    assert_well_formed(&page);
+    for text in [
+        "coupon-test",
+        "modulus",
+        "array curve/force [2] N",
+        "12.5 s",
+        "300.0 MiB",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    assert!(!page.contains("<b>me</b>"));
+    assert!(summary(&input, None).contains("coupon.modulus"));
+}
+
+#[test]
+fn an_unreadable_artifact_is_a_warning_and_the_rest_is_shown() {
+    let (_keep, folder) = folder();
+    let input = whole(&folder);
+    std::fs::write(folder.join("compare.h5"), b"torn").unwrap();
+    let page = page(&input, &folder);
+    assert!(page.contains("id=\"warnings\"") && page.contains("is not a Plyflow artifact"));
+    assert!(page.contains("id=\"maps-0\"") && page.contains("id=\"local-0\""));
+}
+
+#[test]
+fn the_same_run_gives_the_same_bytes_and_its_fingerprint_is_found() {
+    let (_keep, folder) = folder();
+    let input = whole(&folder);
+    let first = page(&input, &folder);
+    assert!(first == page(&input, &folder));
+    let out = folder.join("out/report.html");
+    assert!(is_current(&out, "0123abcd"));
+    assert!(!is_current(&out, "0123abce"));
+    assert!(!is_current(&folder.join("none.html"), "0123abcd"));
+}
+
+#[test]
+fn the_terminal_table_names_defects_missed_expectations_and_the_report() {
+    let (_keep, folder) = folder();
+    let text = summary(&whole(&folder), Some("out/report.html".into()));
+    for part in [
+        "2 zones",
+        "AW1",
+        "68.4 mm",
+        "coarse.penetration_max",
+        "missed",
+        "warning: coarse: the film",
+    ] {
+        assert!(text.contains(part), "{part} in\n{text}");
+    }
+    assert!(text.ends_with("report: out/report.html\n"));
+}
