@@ -7,6 +7,7 @@ mod inspect;
 mod open;
 mod plan;
 mod plugins;
+mod report;
 mod results;
 mod run;
 mod table;
@@ -85,7 +86,7 @@ fn dispatch(command: Command) -> Done {
         Command::Graph(a) => plan::graph(&a),
         Command::Explain(a) => explain::explain(&a),
         Command::Results(a) => results::results(&a),
-        Command::Report(a) => run::report(&a),
+        Command::Report(a) => report::report(&a),
         Command::Plugins(a) => plugins::plugins(&a),
         Command::Inspect(a) => inspect::inspect(&a),
         Command::Schema(a) => plugins::schema(&a),

@@ -1,9 +1,10 @@
-//! `run` and `report`.
+//! `run`.
 
-use super::args::{LogFormat, ReportArgs, RunArgs};
+use super::args::{LogFormat, RunArgs};
 use super::clean::locked;
-use super::open::{Opened, cores, open, program, store_root};
-use super::results::{Row, check, cost_table, records, results_table, rows};
+use super::open::{Opened, cores, open, store_root};
+use super::report;
+use super::results::check;
 use super::{Done, Stop, print};
 use crate::engine::core::Limits;
 use crate::engine::{Failure, Local, Observer, Options, Session, Summary};
@@ -18,8 +19,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 
-/// Tables at the end of a run are shown up to this many rows.
-const LONGEST_TABLE: usize = 40;
 /// Lines of a failed step's log that are shown.
 const LOG_LINES: usize = 15;
 
@@ -96,7 +95,8 @@ pub fn run(args: &RunArgs) -> Done {
     session.look(observer.as_mut());
     let interrupts = Interrupts::listen().map_err(machine())?;
     let wake = interrupts.poll_end().map_err(machine())?;
-    let mut executor = Local::new(program()?, Some(wake));
+    // Not the path: a build that replaces the program in the middle of a run must not mix versions.
+    let mut executor = Local::new("/proc/self/exe".into(), Some(wake));
     let (session, summary) = session
         .execute(&mut executor, observer.as_mut(), &|| interrupts.count())
         .map_err(machine())?;
@@ -151,21 +151,7 @@ fn conclude(
     summary: &Summary,
     begun: Instant,
 ) -> Done {
-    let worked = summary.executed + summary.failures.len() + summary.skipped > 0;
-    let mut verdict = Ok(());
-    if worked || args.check {
-        let records = records(session);
-        let rows = rows(session, &records);
-        if !args.quiet && args.log_format == LogFormat::Text {
-            print(&short_results(args, &rows))?;
-            if records.len() <= LONGEST_TABLE {
-                print(&(cost_table(session, &records) + "\n"))?;
-            }
-        }
-        if args.check {
-            verdict = check(&rows);
-        }
-    }
+    let verdict = tell_results(args, opened, session, summary);
     if !args.quiet {
         tell(args, opened, session, summary, begun)?;
     }
@@ -179,27 +165,38 @@ fn conclude(
     verdict
 }
 
-/// The results, or when they are many those that are judged.
-fn short_results(args: &RunArgs, rows: &[Row]) -> String {
-    if rows.is_empty() {
-        return String::new();
+/// Writes the report and prints the summary, both only when there is something new to tell; judges the
+/// expectations when asked to.
+fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary: &Summary) -> Done {
+    let worked = summary.executed + summary.failures.len() + summary.skipped > 0;
+    let any = summary.executed + summary.cached > 0;
+    let path = Some(report::beside(&opened.workflow.file))
+        .filter(|_| !args.no_report && any && !summary.interrupted);
+    let stale = path.as_ref().filter(|p| {
+        !report::is_written(p, &report::fingerprint(opened, session, &summary.failures))
+    });
+    let show = worked && any && !args.quiet && args.log_format == LogFormat::Text;
+    if stale.is_none() && !show && !args.check {
+        return Ok(());
     }
-    if rows.len() <= LONGEST_TABLE {
-        return results_table(rows) + "\n";
+    let found = report::Found::read(session);
+    let given = &args.workflow.workflow;
+    let input = report::input(opened, session, &found, &summary.failures, given);
+    let mut written = path.clone();
+    if let Some(path) = stale
+        && let Err(e) = plyflow_report::write_report(&input, path)
+    {
+        // The artifacts are whole: a report that cannot be written is no failed run.
+        eprintln!("plyflow: the report was not written: {e}");
+        written = None;
     }
-    let judged: Vec<Row> = rows
-        .iter()
-        .filter(|r| r.expected.is_some())
-        .cloned()
-        .collect();
-    let all = format!(
-        "{} results: plyflow results {}\n\n",
-        rows.len(),
-        args.workflow.workflow
-    );
-    match judged.len() {
-        1..=LONGEST_TABLE => results_table(&judged) + &all,
-        _ => all,
+    if show {
+        print(&(plyflow_report::summary(&input, written.as_deref()) + "\n"))?;
+    }
+    if args.check {
+        check(&found.rows)
+    } else {
+        Ok(())
     }
 }
 
@@ -277,17 +274,4 @@ fn failure_text(first: &Failure, summary: &Summary) -> String {
 
 fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
-}
-
-/// `plyflow report`.
-///
-/// # Errors
-/// See [`Stop`].
-pub fn report(args: &ReportArgs) -> Done {
-    let opened = open(&args.workflow)?;
-    let _session = opened.look()?;
-    Err(Stop::new(
-        exit::INTERNAL,
-        format!("no report writer for {}", opened.workflow.name),
-    ))
 }

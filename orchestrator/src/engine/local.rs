@@ -91,6 +91,7 @@ impl Local {
         io::Seek::rewind(&mut memory)?;
         // No pre_exec: so the standard library can use posix_spawn, whatever the size of this process.
         let process = Command::new(&self.program)
+            .arg0("plyflow")
             .args(["step-worker", "-", "--parent"])
             .arg(std::process::id().to_string())
             .stdin(Stdio::from(memory))

@@ -1,0 +1,164 @@
+//! `report`, and the report and summary at the end of a run.
+
+use super::args::ReportArgs;
+use super::open::{Opened, open};
+use super::results::{Row, records, rows};
+use super::{Done, Stop, print};
+use crate::engine::core::{Id, State};
+use crate::engine::{Failure, Session};
+use crate::exit;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::job::Record;
+use plyflow_report::{Expectation, Instance, ReportInput, is_current, write_report};
+
+/// `plyflow report`.
+///
+/// # Errors
+/// When there is nothing to report or the file cannot be written.
+pub fn report(args: &ReportArgs) -> Done {
+    let opened = open(&args.workflow)?;
+    let session = opened.look()?;
+    let found = Found::read(&session);
+    if found.records.is_empty() {
+        let text = format!(
+            "nothing has been run yet; start with: plyflow run {}",
+            args.workflow.workflow
+        );
+        return Err(Stop::new(exit::USAGE, text));
+    }
+    let path = args
+        .output
+        .clone()
+        .unwrap_or_else(|| beside(&opened.workflow.file));
+    let input = input(&opened, &session, &found, &[], &args.workflow.workflow);
+    let bytes = write_report(&input, &path).map_err(|e| Stop::new(exit::INTERNAL, e))?;
+    print(&format!("{path}: {}\n", super::table::bytes(bytes)))
+}
+
+/// What the store has of a workflow.
+pub struct Found {
+    /// Instances and their records, in the order of the workflow.
+    pub records: Vec<(Id, Record)>,
+    /// Their numbers.
+    pub rows: Vec<Row>,
+}
+
+impl Found {
+    /// Reads all records.
+    pub fn read(session: &Session<'_>) -> Self {
+        let records = records(session);
+        let rows = rows(session, &records);
+        Self { records, rows }
+    }
+}
+
+/// The report of a workflow file: `report.html` for `workflow.yaml`, `report-coarse.html` for
+/// `workflow-coarse.yaml`, `flat-report.html` for `flat.yaml`.
+pub fn beside(workflow: &Utf8Path) -> Utf8PathBuf {
+    let stem = workflow.file_stem().unwrap_or("workflow");
+    let name = match stem.strip_prefix("workflow") {
+        Some(rest) => format!("report{rest}.html"),
+        None => format!("{stem}-report.html"),
+    };
+    workflow.with_file_name(name)
+}
+
+/// Names all that a report depends on.
+pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    let mut add = |bytes: &[u8]| {
+        hasher.update(&(bytes.len() as u64).to_le_bytes());
+        hasher.update(bytes);
+    };
+    add(env!("CARGO_PKG_VERSION").as_bytes());
+    add(opened.workflow.name.as_bytes());
+    add(opened
+        .workflow
+        .description
+        .as_deref()
+        .unwrap_or_default()
+        .as_bytes());
+    add(&serde_json::to_vec(&opened.workflow.expectations).unwrap_or_default());
+    for instance in session.core.instances() {
+        add(&instance.key.map(|k| k.0).unwrap_or_default());
+        add(&[u8::from(matches!(instance.state, State::Done { .. }))]);
+    }
+    for failure in failures {
+        add(failure.label.as_bytes());
+        add(failure.reason.as_bytes());
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+/// Whether the report at `path` already tells this state.
+pub fn is_written(path: &Utf8Path, fingerprint: &str) -> bool {
+    is_current(path, fingerprint)
+}
+
+/// All that a report or a summary is made of. `given`: the workflow file as the user wrote it.
+pub fn input(
+    opened: &Opened,
+    session: &Session<'_>,
+    found: &Found,
+    failures: &[Failure],
+    given: &Utf8Path,
+) -> ReportInput {
+    let core = &session.core;
+    let instance = |(id, record): &(Id, Record)| {
+        let i = &core.instances()[*id];
+        Instance {
+            step: core.graph().steps[i.step].name.clone(),
+            item: core.item_labels(*id),
+            artifact: i
+                .key
+                .map(|k| session.store.artifact(&k))
+                .unwrap_or_default(),
+            record: record.clone(),
+        }
+    };
+    let expectation = |r: &Row| {
+        let e = r.expected.as_ref()?;
+        Some(Expectation {
+            step: r.step.clone(),
+            item: r.item.clone(),
+            result: r.name.clone(),
+            unit: r.unit.clone(),
+            got: r.value,
+            value: e.value,
+            tolerance: e.tolerance,
+            minimum: e.minimum,
+            maximum: e.maximum,
+            source: e.source.clone(),
+            met: r.verdict() == Some("ok"),
+        })
+    };
+    let done = |s: State| matches!(s, State::Done { .. } | State::Failed);
+    ReportInput {
+        workflow: opened.workflow.name.clone(),
+        description: opened.workflow.description.clone(),
+        file: given.to_owned(),
+        command: format!("plyflow run {given}"),
+        program: format!("plyflow {}", env!("CARGO_PKG_VERSION")),
+        fingerprint: fingerprint(opened, session, failures),
+        instances: found.records.iter().map(instance).collect(),
+        expectations: found.rows.iter().filter_map(expectation).collect(),
+        failures: failures
+            .iter()
+            .map(|f| (f.label.clone(), f.reason.clone()))
+            .collect(),
+        not_run: core.instances().iter().filter(|i| !done(i.state)).count(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn workflows_of_one_folder_have_reports_of_their_own() {
+        let name = |w: &str| beside(Utf8Path::new(w)).to_string();
+        assert_eq!(name("a/workflow.yaml"), "a/report.html");
+        assert_eq!(name("a/workflow-coarse.yaml"), "a/report-coarse.html");
+        assert_eq!(name("a/flat.yaml"), "a/flat-report.html");
+    }
+}
