@@ -1,0 +1,136 @@
+//! What the program says of itself.
+
+use plyflow_e2e::{program, repository};
+use std::process::{Command, Output};
+
+fn plyflow(words: &[&str]) -> Output {
+    Command::new(program())
+        .args(words)
+        .output()
+        .expect("plyflow starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+/// Names under `Commands:` in `plyflow --help`.
+fn commands() -> Vec<String> {
+    let help = text(&plyflow(&["--help"]).stdout);
+    let list = help
+        .split("Commands:\n")
+        .nth(1)
+        .expect("a list of commands");
+    let lines = list.lines().take_while(|l| l.starts_with("  "));
+    let names = lines
+        .filter_map(|l| l.split_whitespace().next())
+        .map(str::to_owned);
+    names.filter(|n| n != "help").collect()
+}
+
+#[test]
+fn every_command_explains_itself_and_its_options() {
+    let commands = commands();
+    assert!(commands.len() >= 11, "{commands:?}");
+    for name in commands {
+        let long = plyflow(&[&name, "--help"]);
+        assert_eq!(long.status.code(), Some(0), "{name}");
+        assert!(
+            text(&long.stdout).contains(&format!("Usage: plyflow {name}")),
+            "{name}"
+        );
+        // In the short form an option and what it does stand in one line: "  -j, --jobs <N>  Cores that ..".
+        let short = text(&plyflow(&[&name, "-h"]).stdout);
+        for line in short
+            .lines()
+            .map(str::trim_start)
+            .filter(|l| l.starts_with('-'))
+        {
+            let words = line.split("  ").filter(|part| !part.is_empty()).count();
+            assert!(words >= 2, "{name}: nothing is said of {line}");
+        }
+    }
+}
+
+#[test]
+fn the_exit_codes_of_help_and_of_the_book_are_the_same() {
+    let help = text(&plyflow(&["--help"]).stdout);
+    let list = help
+        .split("Exit codes:\n")
+        .nth(1)
+        .expect("a list of exit codes");
+    let first = |l: &str| {
+        l.split_whitespace()
+            .next()
+            .and_then(|w| w.parse::<u8>().ok())
+    };
+    let told: Vec<u8> = list.lines().filter_map(first).collect();
+    let page = std::fs::read_to_string(repository().join("docs/exit-codes.md")).unwrap();
+    let row = |l: &str| l.strip_prefix("| ")?.split(" |").next()?.parse::<u8>().ok();
+    let written: Vec<u8> = page.lines().filter_map(row).collect();
+    assert_eq!(told, written);
+    assert_eq!(told, [0, 1, 2, 3, 4, 5, 6, 130]);
+}
+
+#[test]
+fn a_wrong_command_line_is_code_2_and_says_what_is_right() {
+    for words in [
+        &[][..],
+        &["runn"],
+        &["run"],
+        &["run", "w.yaml", "--jobs", "0"],
+        &["run", "--jbos"],
+    ] {
+        let output = plyflow(words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        assert!(!output.stderr.is_empty(), "{words:?}");
+    }
+    assert!(text(&plyflow(&["runn"]).stderr).contains("'run'"));
+}
+
+#[test]
+fn schemas_and_completions_are_printed_without_a_workflow() {
+    for which in ["workflow", "plain-workflow", "scene", "material"] {
+        let output = plyflow(&["schema", which]);
+        let schema: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(
+            schema["$schema"].as_str().unwrap().contains("2020-12"),
+            "{which}"
+        );
+    }
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(
+            text(&plyflow(&["completions", shell]).stdout).contains("plyflow"),
+            "{shell}"
+        );
+    }
+}
+
+#[test]
+fn a_reader_that_goes_away_ends_a_command_quietly() {
+    let line = format!("'{}' schema workflow | head -1", program().display());
+    let output = Command::new("sh").args(["-c", &line]).output().unwrap();
+    assert_eq!(text(&output.stderr), "");
+}
+
+#[test]
+fn the_workflows_of_this_repository_are_valid() {
+    let studies = repository().join("workflows");
+    let mut seen = 0;
+    for folder in std::fs::read_dir(studies).unwrap().flatten() {
+        for file in std::fs::read_dir(folder.path())
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
+            let path = file.path();
+            let name = file.file_name().into_string().unwrap();
+            if name.starts_with("workflow") && name.ends_with(".yaml") {
+                let output = plyflow(&["validate", path.to_str().unwrap()]);
+                assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen >= 4, "{seen} workflows");
+}
