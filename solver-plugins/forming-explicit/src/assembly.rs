@@ -58,9 +58,8 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
     let n = scene.sheets.len();
     let kinds: Vec<SheetKind> = scene.sheets.iter().map(|s| s.kind).collect();
     let inner_plies = n >= 3 && kinds[1..n - 1].iter().all(|k| *k == SheetKind::Ply);
-    let outer_films = n >= 3
-        && kinds[0] == SheetKind::Diaphragm
-        && kinds[n - 1] == SheetKind::Diaphragm;
+    let outer_films =
+        n >= 3 && kinds[0] == SheetKind::Diaphragm && kinds[n - 1] == SheetKind::Diaphragm;
     if !(inner_plies && outer_films) {
         return Err(format!(
             "the sheets of scene '{}' must be, from the tool upwards: one diaphragm, one or more \
@@ -74,7 +73,10 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
         .iter()
         .map(|sheet| {
             let MaterialEntry::Inline(material) = &sheet.material else {
-                return Err(format!("the material of sheet '{}' was not read in", sheet.name));
+                return Err(format!(
+                    "the material of sheet '{}' was not read in",
+                    sheet.name
+                ));
             };
             let thickness = material.thickness.si();
             let offset = below + 0.5 * thickness;
@@ -107,13 +109,23 @@ pub fn element(
     let mut with = serde_json::Value::Object(sheet.material.with.clone());
     with["thickness"] = sheet.thickness.into();
     with["areal_mass"] = sheet.material.areal_mass.si().into();
-    let what = format!("material '{}' of sheet '{}'", sheet.material.name, sheet.scene.name);
+    let what = format!(
+        "material '{}' of sheet '{}'",
+        sheet.material.name, sheet.scene.name
+    );
     let found = components.material(&sheet.material.plugin)?;
     let material = unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }
         .map_err(|e| e.to_string())?;
-    let what = format!("element '{}' of sheet '{}'", choice.plugin, sheet.scene.name);
+    let what = format!(
+        "element '{}' of sheet '{}'",
+        choice.plugin, sheet.scene.name
+    );
     let found = components.element(&choice.plugin)?;
-    let parameters = if choice.with.is_null() { "{}".into() } else { choice.with.to_string() };
+    let parameters = if choice.with.is_null() {
+        "{}".into()
+    } else {
+        choice.with.to_string()
+    };
     unsafe { ElementInstance::create(&found, &parameters, material, &what) }
         .map_err(|e| e.to_string())
 }
@@ -123,7 +135,9 @@ pub fn element(
 /// still lies between e1 and e2.
 pub fn axis(sheet: &Sheet) -> V {
     let first = sheet.fibre_1.si();
-    let second = sheet.fibre_2.map_or(first + std::f64::consts::FRAC_PI_2, |a| a.si());
+    let second = sheet
+        .fibre_2
+        .map_or(first + std::f64::consts::FRAC_PI_2, |a| a.si());
     let turn = (second - first).sin();
     let e1 = if turn >= 0.0 { first } else { second };
     [e1.cos(), e1.sin(), 0.0]
@@ -131,7 +145,11 @@ pub fn axis(sheet: &Sheet) -> V {
 
 /// Settings of the time integration.
 pub fn step_settings(p: &Parameters) -> StepSettings {
-    StepSettings { target_step: p.time_step, safety: p.step_safety, damping: p.damping }
+    StepSettings {
+        target_step: p.time_step,
+        safety: p.step_safety,
+        damping: p.damping,
+    }
 }
 
 /// A sheet placed in a model, as the contacts see it.
@@ -166,20 +184,34 @@ pub fn add_contacts(
             friction: mu,
             slip_factor: p.slip_stiffness,
             augmentation: p.contact_augmentation,
-            items: placed[k].slaves.iter().map(|n| RigidItem::new(*n, offset)).collect(),
+            items: placed[k]
+                .slaves
+                .iter()
+                .map(|n| RigidItem::new(*n, offset))
+                .collect(),
         }
     };
     let bottom = &stack[0];
     let mu = friction.tool_diaphragm.0;
     let bed: Arc<dyn RigidSurface> = Arc::new(Plane { height: 0.0 });
     let name = |what: &str, k: usize| format!("{what}/{}", stack[k].scene.name);
-    model.rigid_contacts.push(rigid(name("tool", 0), tool.clone(), mu, 0, bottom.offset));
-    model.rigid_contacts.push(rigid(name("bed", 0), bed, mu, 0, bottom.offset));
+    model
+        .rigid_contacts
+        .push(rigid(name("tool", 0), tool.clone(), mu, 0, bottom.offset));
+    model
+        .rigid_contacts
+        .push(rigid(name("bed", 0), bed, mu, 0, bottom.offset));
     let top = placed.len() - 1;
     for k in 1..top {
         // The chords of the film's elements cut through convex fillets; the plies' own nodes must stay
         // outside the tool all the same. Their friction is that with the film.
-        model.rigid_contacts.push(rigid(name("tool", k), tool.clone(), 0.0, k, stack[k].offset));
+        model.rigid_contacts.push(rigid(
+            name("tool", k),
+            tool.clone(),
+            0.0,
+            k,
+            stack[k].offset,
+        ));
     }
     let mut pair = |slave: usize, master: usize, side: f64, mu: f64| {
         let offset = 0.5 * (stack[slave].thickness + stack[master].thickness);
@@ -196,9 +228,16 @@ pub fn add_contacts(
         });
     };
     for k in 1..top {
-        let mu = if k == 1 { friction.fabric_diaphragm.0 } else { friction.fabric_fabric.0 };
+        let mu = if k == 1 {
+            friction.fabric_diaphragm.0
+        } else {
+            friction.fabric_fabric.0
+        };
         pair(k, k - 1, 1.0, mu);
     }
+    // The plies' nodes are the slaves of both films: the two films have the same mesh, so whatever unevenness
+    // node-to-surface contact makes of a uniform pressure is the same above and below, and cancels. With the
+    // film above as the slave of the ply it does not, and the evacuated stack waves (tried).
     if top > 1 {
         pair(top - 1, top, -1.0, friction.fabric_diaphragm.0);
     }
@@ -211,7 +250,10 @@ pub fn add_contacts(
 fn locate(model: &Model, master: usize, slaves: &[u32]) -> Vec<SlaveItem> {
     let (c0, c1) = model.sheets[master].cell_range;
     if c0 == c1 {
-        return slaves.iter().map(|n| SlaveItem::new(*n, NONE, [0.0; 2])).collect();
+        return slaves
+            .iter()
+            .map(|n| SlaveItem::new(*n, NONE, [0.0; 2]))
+            .collect();
     }
     let cells = &model.cells[c0..c1];
     let centre = |c: usize| -> [f64; 2] {
@@ -249,7 +291,10 @@ pub fn inverse_bilinear(q: [V; 4], p: V) -> Option<[f64; 2]> {
         if det.abs() < 1e-300 {
             return None;
         }
-        let step = [(r[0] * j22 - r[1] * j12) / det, (j11 * r[1] - j21 * r[0]) / det];
+        let step = [
+            (r[0] * j22 - r[1] * j12) / det,
+            (j11 * r[1] - j21 * r[0]) / det,
+        ];
         xi = [xi[0] + step[0], xi[1] + step[1]];
         if step[0].abs() + step[1].abs() < 1e-13 {
             return Some(xi);
@@ -280,8 +325,13 @@ impl Bins {
         // About four cells a bin.
         let size = 2.0 * (area / centres.len() as f64).sqrt();
         let shape = [0, 1].map(|k| ((hi[k] - lo[k]) / size) as usize + 1);
-        let mut bins =
-            Self { centres, lo, size, shape, cells: vec![Vec::new(); shape[0] * shape[1]] };
+        let mut bins = Self {
+            centres,
+            lo,
+            size,
+            shape,
+            cells: vec![Vec::new(); shape[0] * shape[1]],
+        };
         for c in 0..bins.centres.len() {
             let [i, j] = bins.bin(bins.centres[c]);
             bins.cells[j * bins.shape[0] + i].push(c as u32);
@@ -305,7 +355,11 @@ impl Bins {
             }
         }
         // A graded mesh has cells larger than a bin: then look at all.
-        if found.is_empty() { (0..self.centres.len() as u32).collect() } else { found }
+        if found.is_empty() {
+            (0..self.centres.len() as u32).collect()
+        } else {
+            found
+        }
     }
 
     fn nearest(&self, p: V) -> u32 {
@@ -313,7 +367,9 @@ impl Bins {
             let q = self.centres[c as usize];
             (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2)
         };
-        (0..self.centres.len() as u32).min_by(|a, b| d(*a).total_cmp(&d(*b))).unwrap_or(NONE)
+        (0..self.centres.len() as u32)
+            .min_by(|a, b| d(*a).total_cmp(&d(*b)))
+            .unwrap_or(NONE)
     }
 }
 

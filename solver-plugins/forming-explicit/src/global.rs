@@ -16,7 +16,12 @@ use std::sync::Arc;
 type Box2 = [f64; 4];
 
 fn union(a: Box2, b: Box2) -> Box2 {
-    [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]
+    [
+        a[0].min(b[0]),
+        a[1].min(b[1]),
+        a[2].max(b[2]),
+        a[3].max(b[3]),
+    ]
 }
 
 fn grown(b: Box2, by: f64) -> Box2 {
@@ -60,9 +65,15 @@ fn layout(
     tool: &ToolMesh,
 ) -> Result<Layout, String> {
     let [lo, hi] = tool.bounds();
-    let plies: Vec<Box2> =
-        stack[1..stack.len() - 1].iter().map(ply_box).collect::<Result<_, _>>()?;
-    let all_plies = plies.iter().copied().reduce(union).ok_or("the scene has no ply")?;
+    let plies: Vec<Box2> = stack[1..stack.len() - 1]
+        .iter()
+        .map(ply_box)
+        .collect::<Result<_, _>>()?;
+    let all_plies = plies
+        .iter()
+        .copied()
+        .reduce(union)
+        .ok_or("the scene has no ply")?;
     let film_size = p.film_size();
     if film_size < 0.999 * p.element_size {
         return Err(format!(
@@ -72,9 +83,18 @@ fn layout(
         ));
     }
     // At least three cells of free film around the plies, so that the step at their edge has room.
-    let joint = grown(all_plies, process.film_joint_margin.si().max(3.0 * film_size));
-    let fine = union(grown(joint, film_size), grown([lo[0], lo[1], hi[0], hi[1]], 0.03));
-    let (hl, hw) = (0.5 * process.frame_length.si(), 0.5 * process.frame_width.si());
+    let joint = grown(
+        all_plies,
+        process.film_joint_margin.si().max(3.0 * film_size),
+    );
+    let fine = union(
+        grown(joint, film_size),
+        grown([lo[0], lo[1], hi[0], hi[1]], 0.03),
+    );
+    let (hl, hw) = (
+        0.5 * process.frame_length.si(),
+        0.5 * process.frame_width.si(),
+    );
     if fine[0] < -hl || fine[2] > hl || fine[1] < -hw || fine[3] > hw {
         return Err(format!(
             "the frame ({} x {} m) is too small for the tool and the plies, which need {:.3} x \
@@ -118,10 +138,16 @@ fn bottom_film(
 ) -> Result<Vec<u32>, String> {
     let mesh = &at.film;
     let joined: Vec<bool> = mesh.cells.iter().map(|c| is_joined(at, c)).collect();
-    parts.points.extend(mesh.points.iter().map(|q| [q[0], q[1], at.bottom_z]));
+    parts
+        .points
+        .extend(mesh.points.iter().map(|q| [q[0], q[1], at.bottom_z]));
     let boundary = mesh.on_boundary();
     let nodes: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    let frame: Vec<u32> = nodes.iter().copied().filter(|n| boundary[*n as usize]).collect();
+    let frame: Vec<u32> = nodes
+        .iter()
+        .copied()
+        .filter(|n| boundary[*n as usize])
+        .collect();
     let spec = SheetSpec {
         name: stack[0].scene.name.clone(),
         nodes: nodes.clone(),
@@ -129,20 +155,34 @@ fn bottom_film(
         patches: mesh.patches(),
         axis: assembly::axis(&stack[0].scene),
         layers: joined.iter().map(|j| if *j { 2.0 } else { 1.0 }).collect(),
-        pressed: joined.iter().map(|j| if *j { Pressed::Both } else { Pressed::Below }).collect(),
+        pressed: joined
+            .iter()
+            .map(|j| if *j { Pressed::Both } else { Pressed::Below })
+            .collect(),
         // Away from plies and tool nothing presses on the film: there it keeps its own mass.
         least_areal_mass: mesh
             .cells
             .iter()
-            .map(|c| if is_inside(at, at.fine, c) { p.least_areal_mass } else { 0.0 })
+            .map(|c| {
+                if is_inside(at, at.fine, c) {
+                    p.least_areal_mass
+                } else {
+                    0.0
+                }
+            })
             .collect(),
         element: assembly::element(components, &stack[0], &p.diaphragm_element)?,
     };
     parts.placed.push(Placed {
         index: 0,
-        slaves: nodes.into_iter().filter(|n| !boundary[*n as usize]).collect(),
+        slaves: nodes
+            .into_iter()
+            .filter(|n| !boundary[*n as usize])
+            .collect(),
     });
-    parts.bodies.push(Body::new(&stack[0], 0, spec.cells.clone()));
+    parts
+        .bodies
+        .push(Body::new(&stack[0], 0, spec.cells.clone()));
     parts.specs.push(spec);
     Ok(frame)
 }
@@ -173,7 +213,9 @@ fn ply(
     );
     let z = at.bottom_z + sheet.offset - bottom.offset;
     let first = parts.points.len() as u32;
-    parts.points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
+    parts
+        .points
+        .extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
     let nodes: Vec<u32> = (first..parts.points.len() as u32).collect();
     let spec = SheetSpec {
         name: sheet.scene.name.clone(),
@@ -187,7 +229,10 @@ fn ply(
         element: assembly::element(components, sheet, &p.element)?,
     };
     parts.bodies.push(Body::new(sheet, k, spec.cells.clone()));
-    parts.placed.push(Placed { index: k, slaves: nodes });
+    parts.placed.push(Placed {
+        index: k,
+        slaves: nodes,
+    });
     parts.specs.push(spec);
     Ok(())
 }
@@ -205,7 +250,12 @@ fn top_film(
     let last = stack.len() - 1;
     let (bottom, top) = (&stack[0], &stack[last]);
     let mesh = &at.film;
-    let free: Vec<[u32; 4]> = mesh.cells.iter().filter(|c| !is_joined(at, c)).copied().collect();
+    let free: Vec<[u32; 4]> = mesh
+        .cells
+        .iter()
+        .filter(|c| !is_joined(at, c))
+        .copied()
+        .collect();
     let mut shared = vec![false; mesh.points.len()];
     for cell in mesh.cells.iter().filter(|c| is_joined(at, c)) {
         for n in cell {
@@ -252,7 +302,10 @@ fn top_film(
         element: assembly::element(components, top, &p.diaphragm_element)?,
     };
     parts.bodies.push(Body::new(top, last, spec.cells.clone()));
-    parts.placed.push(Placed { index: last, slaves });
+    parts.placed.push(Placed {
+        index: last,
+        slaves,
+    });
     parts.specs.push(spec);
     Ok(())
 }
@@ -274,7 +327,10 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
     }
     top_film(&mut parts, &at, &stack, p, components)?;
     let cycle = Cycle::new(process, [at.bottom_z, stack[0].offset]);
-    let plan = frame.iter().map(|n| [0, 1].map(|k| parts.points[*n as usize][k])).collect();
+    let plan = frame
+        .iter()
+        .map(|n| [0, 1].map(|k| parts.points[*n as usize][k]))
+        .collect();
     let reference = parts.points.clone();
     let mut model = Model::new(parts.points, parts.specs, assembly::step_settings(p))
         .map_err(|e| e.to_string())?;
@@ -286,11 +342,21 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         p,
         Arc::new(ToolSurface(grid)),
     );
-    model.set_driven(frame, Box::new(FrameDrive { plan, cycle: cycle.clone() }));
+    model.set_driven(
+        frame,
+        Box::new(FrameDrive {
+            plan,
+            cycle: cycle.clone(),
+        }),
+    );
     debug_assert!(at.tool_top > 0.0);
     Ok(Forming {
         model,
-        load: Load::Process { cycle, tool_volume: tool.volume(), sealed_volume: None },
+        load: Load::Process {
+            cycle,
+            tool_volume: tool.volume(),
+            sealed_volume: None,
+        },
         stack,
         bodies: parts.bodies,
         reference,

@@ -90,10 +90,17 @@ pub fn build_local(
     let frames = input.time.len();
     let mut points = Vec::new();
     let (mut specs, mut bodies, mut placed) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut driven, mut position, mut velocity) =
-        (Vec::new(), vec![Vec::new(); frames], vec![Vec::new(); frames]);
+    let (mut driven, mut position, mut velocity) = (
+        Vec::new(),
+        vec![Vec::new(); frames],
+        vec![Vec::new(); frames],
+    );
     for (k, sheet) in stack.iter().enumerate() {
-        let local = input.sheets.iter().find(|s| s.name == sheet.scene.name).expect("filtered");
+        let local = input
+            .sheets
+            .iter()
+            .find(|s| s.name == sheet.scene.name)
+            .expect("filtered");
         let first = points.len() as u32;
         points.extend_from_slice(&local.points);
         let film = sheet.scene.kind == SheetKind::Diaphragm;
@@ -102,8 +109,15 @@ pub fn build_local(
             (true, false) => Pressed::Above,
             _ => Pressed::No,
         };
-        let choice = if film { &p.diaphragm_element } else { &p.element };
-        let mesh = QuadMesh { points: local.points.clone(), cells: local.cells.clone() };
+        let choice = if film {
+            &p.diaphragm_element
+        } else {
+            &p.element
+        };
+        let mesh = QuadMesh {
+            points: local.points.clone(),
+            cells: local.cells.clone(),
+        };
         let nodes: Vec<u32> = (first..points.len() as u32).collect();
         let mut free = vec![true; local.points.len()];
         for n in &local.driven {
@@ -115,7 +129,11 @@ pub fn build_local(
             velocity[f].extend_from_slice(&local.velocity[f]);
         }
         // Driven nodes push no one: they stand where the coarse run says, with its penetration.
-        let slaves = nodes.iter().copied().filter(|n| free[(n - first) as usize]).collect();
+        let slaves = nodes
+            .iter()
+            .copied()
+            .filter(|n| free[(n - first) as usize])
+            .collect();
         placed.push(Placed { index: k, slaves });
         bodies.push(Body::new(sheet, k, local.cells.clone()));
         specs.push(SheetSpec {
@@ -131,12 +149,26 @@ pub fn build_local(
         });
     }
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
-    let cycle = Cycle::new(assembly::process(scene), [input.frame[0], input.frame[frames - 1]]);
+    let cycle = Cycle::new(
+        assembly::process(scene),
+        [input.frame[0], input.frame[frames - 1]],
+    );
     let reference = points.clone();
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
-    assembly::add_contacts(&mut model, &stack, &placed, scene, p, Arc::new(ToolSurface(grid)));
-    let drive = CutDrive { time: input.time.clone(), position, velocity };
+    assembly::add_contacts(
+        &mut model,
+        &stack,
+        &placed,
+        scene,
+        p,
+        Arc::new(ToolSurface(grid)),
+    );
+    let drive = CutDrive {
+        time: input.time.clone(),
+        position,
+        velocity,
+    };
     model.set_driven(driven, Box::new(drive));
     Ok(Forming {
         model,

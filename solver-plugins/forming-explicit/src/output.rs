@@ -16,10 +16,14 @@ struct HostComponents<'a>(&'a Host);
 
 impl Components for HostComponents<'_> {
     fn element(&self, name: &str) -> Result<pf_component, String> {
-        self.0.component(PF_KIND_ELEMENT, name).map_err(|e| format!("{e:?}"))
+        self.0
+            .component(PF_KIND_ELEMENT, name)
+            .map_err(|e| format!("{e:?}"))
     }
     fn material(&self, name: &str) -> Result<pf_component, String> {
-        self.0.component(PF_KIND_MATERIAL, name).map_err(|e| format!("{e:?}"))
+        self.0
+            .component(PF_KIND_MATERIAL, name)
+            .map_err(|e| format!("{e:?}"))
     }
 }
 
@@ -71,7 +75,8 @@ impl Observer for Writer<'_> {
                 } else {
                     (On::Cells, forming.model.cell_field(body.sheet, f.row))
                 };
-                self.host.write_field(&body.name, on, &f.name, 1, &f.unit, &values)?;
+                self.host
+                    .write_field(&body.name, on, &f.name, 1, &f.unit, &values)?;
             }
             let pressure = forming.contact_pressure(body);
             self.host.write_field(
@@ -95,7 +100,11 @@ impl Observer for Writer<'_> {
                 fraction: forming.model.time / end,
                 simulated_time: forming.model.time,
                 rate: (cycle - self.cycle_shown) as f64 / elapsed,
-                energy_ratio: if e.internal() > 0.0 { e.kinetic / e.internal() } else { -1.0 },
+                energy_ratio: if e.internal() > 0.0 {
+                    e.kinetic / e.internal()
+                } else {
+                    -1.0
+                },
                 phase: forming.load.cycle().phase(forming.model.time),
             });
             self.shown = Instant::now();
@@ -119,7 +128,10 @@ pub fn run(host: &Host) -> Result<(), StepError> {
 }
 
 fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
-    host.progress(&Progress { phase: "building the model", ..Progress::default() });
+    host.progress(&Progress {
+        phase: "building the model",
+        ..Progress::default()
+    });
     let components = HostComponents(host);
     let boundary = host.inputs_of("boundary")?;
     let mut forming = match boundary.first() {
@@ -129,7 +141,11 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let mut fields = Vec::new();
     for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
         let film = sheet.scene.kind == SheetKind::Diaphragm;
-        let choice = if film { &p.diaphragm_element } else { &p.element };
+        let choice = if film {
+            &p.diaphragm_element
+        } else {
+            &p.element
+        };
         let found = host.component(PF_KIND_ELEMENT, &choice.plugin)?;
         let manifest = unsafe { found.manifest.as_str() }.unwrap_or("{}");
         let mut list = element_fields(manifest);
@@ -142,11 +158,28 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         define(host, &forming, body)?;
     }
     let tool_cells: Vec<u32> = forming.tool.triangles.iter().flatten().copied().collect();
-    host.define_mesh("tool", &forming.tool.points, 3, &tool_cells, &json!({"rigid": true}))?;
+    host.define_mesh(
+        "tool",
+        &forming.tool.points,
+        3,
+        &tool_cells,
+        &json!({"rigid": true}),
+    )?;
     let started = Instant::now();
-    let mut writer = Writer { host, fields, started, shown: started, cycle_shown: 0 };
-    let outcome =
-        forming.run(p.frames, p.time_step, p.step_safety, p.kinetic_bound, &mut writer)?;
+    let mut writer = Writer {
+        host,
+        fields,
+        started,
+        shown: started,
+        cycle_shown: 0,
+    };
+    let outcome = forming.run(
+        p.frames,
+        p.time_step,
+        p.step_safety,
+        p.kinetic_bound,
+        &mut writer,
+    )?;
     let seconds = writer.started.elapsed().as_secs_f64();
     write_history(host, &outcome)?;
     write_summary(host, p, &forming, &outcome, seconds)
@@ -158,7 +191,13 @@ fn define(host: &Host, forming: &Forming, body: &Body) -> Result<(), StepError> 
     let attributes = json!({
         "kind": sheet.scene.kind, "thickness": sheet.thickness, "offset": sheet.offset,
     });
-    host.define_mesh(&body.name, &forming.reference_points(body), 4, &cells, &attributes)
+    host.define_mesh(
+        &body.name,
+        &forming.reference_points(body),
+        4,
+        &cells,
+        &attributes,
+    )
 }
 
 fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
@@ -192,7 +231,10 @@ fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
         sheets.push(LocalSheet {
             name: body.name.clone(),
             points,
-            cells: cells.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect(),
+            cells: cells
+                .chunks_exact(4)
+                .map(|c| [c[0], c[1], c[2], c[3]])
+                .collect(),
             position: vectors("position")?,
             velocity: vectors("velocity")?,
             driven,
@@ -210,7 +252,11 @@ fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
 }
 
 fn write_history(host: &Host, outcome: &Outcome) -> Result<(), StepError> {
-    type Column = (&'static str, &'static str, fn(&crate::run::HistoryRow) -> f64);
+    type Column = (
+        &'static str,
+        &'static str,
+        fn(&crate::run::HistoryRow) -> f64,
+    );
     let columns: [Column; 13] = [
         ("time", "s", |r| r.time),
         ("kinetic", "J", |r| r.ledger.kinetic),
@@ -238,7 +284,11 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value>
     sheets
         .map(|(body, s)| {
             let film = s.scene.kind == SheetKind::Diaphragm;
-            let choice = if film { &p.diaphragm_element } else { &p.element };
+            let choice = if film {
+                &p.diaphragm_element
+            } else {
+                &p.element
+            };
             let mut value = json!({
                 "name": body.name,
                 "kind": s.scene.kind,
@@ -254,10 +304,11 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value>
                 value["fibre_2"] = s
                     .scene
                     .fibre_2
-                    .map_or(s.scene.fibre_1.si() + std::f64::consts::FRAC_PI_2, |a| a.si())
+                    .map_or(s.scene.fibre_1.si() + std::f64::consts::FRAC_PI_2, |a| {
+                        a.si()
+                    })
                     .into();
-                value["outline"] =
-                    json!([[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]);
+                value["outline"] = json!([[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]);
             }
             value
         })
@@ -314,8 +365,16 @@ fn write_summary(
     host.result("elements", elements as f64, "1")?;
     host.result("cycles", outcome.cycles as f64, "1")?;
     host.result("time_step", outcome.smallest_step, "s")?;
-    host.result("added_mass", m.sheets.iter().map(|s| s.added_mass).sum(), "kg")?;
-    host.measured("element_cycle_rate", element_cycles / seconds.max(1e-9), "1/s")
+    host.result(
+        "added_mass",
+        m.sheets.iter().map(|s| s.added_mass).sum(),
+        "kg",
+    )?;
+    host.measured(
+        "element_cycle_rate",
+        element_cycles / seconds.max(1e-9),
+        "1/s",
+    )
 }
 
 /// Smallest and largest shear angle (rad) and largest fibre strain by size, over the plies' elements, from
@@ -339,7 +398,11 @@ fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
             strain = strain.max(e);
         }
     }
-    if lo > hi { (0.0, 0.0, 0.0) } else { (lo, hi, strain) }
+    if lo > hi {
+        (0.0, 0.0, 0.0)
+    } else {
+        (lo, hi, strain)
+    }
 }
 
 /// Shear angle (rad) and largest fibre strain by size at the centre of a cell.

@@ -50,7 +50,11 @@ impl Cycle {
     /// Name of the phase at `t`.
     pub fn phase(&self, t: f64) -> &'static str {
         let mut end = 0.0;
-        for (d, name) in self.durations.iter().zip(["bagging", "lowering", "drawing"]) {
+        for (d, name) in self
+            .durations
+            .iter()
+            .zip(["bagging", "lowering", "drawing"])
+        {
             end += d;
             if t < end {
                 return name;
@@ -94,7 +98,11 @@ pub struct FrameDrive {
 impl Drive for FrameDrive {
     fn position(&self, k: usize, t: f64) -> V {
         let s = 1.0 + self.cycle.stretch(t);
-        [s * self.plan[k][0], s * self.plan[k][1], self.cycle.frame_height(t)]
+        [
+            s * self.plan[k][0],
+            s * self.plan[k][1],
+            self.cycle.frame_height(t),
+        ]
     }
 }
 
@@ -144,11 +152,19 @@ impl Load {
     pub fn apply(&mut self, model: &mut Model) {
         let t = model.time;
         match self {
-            Self::Given { time, cavity, bag, .. } => {
-                model.pressures =
-                    Pressures { below: linear(time, cavity, t), above: linear(time, bag, t) };
+            Self::Given {
+                time, cavity, bag, ..
+            } => {
+                model.pressures = Pressures {
+                    below: linear(time, cavity, t),
+                    above: linear(time, bag, t),
+                };
             }
-            Self::Process { cycle, tool_volume, sealed_volume } => {
+            Self::Process {
+                cycle,
+                tool_volume,
+                sealed_volume,
+            } => {
                 let above = cycle.bag_pressure(t);
                 let mut below = above;
                 if t >= cycle.sealed_at() {

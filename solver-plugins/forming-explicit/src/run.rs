@@ -24,7 +24,11 @@ pub struct Body {
 impl Body {
     /// The body of stack sheet `sheet`, number `index` of the model.
     pub fn new(sheet: &StackSheet, index: usize, cells: Vec<[u32; 4]>) -> Self {
-        Self { name: sheet.scene.name.clone(), sheet: index, cells }
+        Self {
+            name: sheet.scene.name.clone(),
+            sheet: index,
+            cells,
+        }
     }
 }
 
@@ -179,7 +183,13 @@ impl Forming {
         let ledgers: Vec<Ledger> = history.iter().map(|r| r.ledger).collect();
         let health = judge(&ledgers);
         let warnings = warnings(&health, kinetic_bound);
-        Ok(Outcome { history, health, cycles: self.model.cycle, smallest_step, warnings })
+        Ok(Outcome {
+            history,
+            health,
+            cycles: self.model.cycle,
+            smallest_step,
+            warnings,
+        })
     }
 
     /// Pressure (Pa) on the face of each of a body's points that looks to the tool.
@@ -215,17 +225,29 @@ impl Forming {
             depths.sort_by(f64::total_cmp);
             let at = (0.999 * depths.len() as f64) as usize;
             let max = depths.last().copied().unwrap_or(0.0);
-            let q = depths.get(at.min(depths.len().saturating_sub(1))).copied().unwrap_or(0.0);
+            let q = depths
+                .get(at.min(depths.len().saturating_sub(1)))
+                .copied()
+                .unwrap_or(0.0);
             (name.to_owned(), max, q)
         };
         let m = &self.model;
         let rigid = m.rigid_contacts.iter().map(|c| {
-            let depths = c.items.iter().map(|i| i.penetration).filter(|p| *p > 0.0).collect();
+            let depths = c
+                .items
+                .iter()
+                .map(|i| i.penetration)
+                .filter(|p| *p > 0.0)
+                .collect();
             judge(&c.name, depths)
         });
         let sheets = m.sheet_contacts.iter().map(|c| {
-            let depths =
-                c.items.iter().filter(|i| i.active).map(|i| i.penetration).collect();
+            let depths = c
+                .items
+                .iter()
+                .filter(|i| i.active)
+                .map(|i| i.penetration)
+                .collect();
             judge(&c.name, depths)
         });
         rigid.chain(sheets).collect()

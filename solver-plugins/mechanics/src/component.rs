@@ -30,7 +30,10 @@ impl MaterialInstance {
         parameters: &str,
         what: &str,
     ) -> Result<Arc<Self>, MechanicsError> {
-        let fail = |reason: String| MechanicsError::Component { what: what.to_owned(), reason };
+        let fail = |reason: String| MechanicsError::Component {
+            what: what.to_owned(),
+            reason,
+        };
         if component.kind != PF_KIND_MATERIAL {
             return Err(fail("is not a material".into()));
         }
@@ -42,9 +45,16 @@ impl MaterialInstance {
         if code != PF_OK {
             return Err(fail(error.get()));
         }
-        let raw = pf_material { functions, instance };
+        let raw = pf_material {
+            functions,
+            instance,
+        };
         let reference = unsafe { MaterialRef::new(raw) }.map_err(fail)?;
-        Ok(Arc::new(Self { reference, functions, instance }))
+        Ok(Arc::new(Self {
+            reference,
+            functions,
+            instance,
+        }))
     }
 
     /// The material as elements see it.
@@ -86,7 +96,10 @@ impl ElementInstance {
         material: Arc<MaterialInstance>,
         what: &str,
     ) -> Result<Self, MechanicsError> {
-        let fail = |reason: String| MechanicsError::Component { what: what.to_owned(), reason };
+        let fail = |reason: String| MechanicsError::Component {
+            what: what.to_owned(),
+            reason,
+        };
         if component.kind != PF_KIND_ELEMENT {
             return Err(fail("is not an element formulation".into()));
         }
@@ -122,9 +135,17 @@ impl ElementInstance {
             patch_history: s.patch_history as usize,
             patch_fields: s.patch_fields as usize,
         };
-        let made = Self { functions, instance, sizes, material };
+        let made = Self {
+            functions,
+            instance,
+            sizes,
+            material,
+        };
         if code != PF_OK || sizes.nodes != 4 {
-            return Err(fail(format!("has {} nodes; this solver takes quads", sizes.nodes)));
+            return Err(fail(format!(
+                "has {} nodes; this solver takes quads",
+                sizes.nodes
+            )));
         }
         if sizes.dofs_per_node != 3 {
             return Err(fail(format!(
@@ -136,7 +157,9 @@ impl ElementInstance {
             (*functions).patch_initialise.is_some() && (*functions).patch_forces.is_some()
         };
         if sizes.patch_nodes > 0 && !patches {
-            return Err(fail("declares patch nodes but has no patch functions".into()));
+            return Err(fail(
+                "declares patch nodes but has no patch functions".into(),
+            ));
         }
         Ok(made)
     }

@@ -29,8 +29,7 @@ impl Ledger {
 
     /// What does not add up: everything stored and lost, less the external work (J).
     pub fn drift(&self) -> f64 {
-        self.kinetic + self.internal() + self.contact + self.friction + self.damping
-            - self.external
+        self.kinetic + self.internal() + self.contact + self.friction + self.damping - self.external
     }
 }
 
@@ -60,6 +59,8 @@ pub fn judge(history: &[Ledger]) -> EnergyHealth {
     EnergyHealth {
         peak_drift_ratio: ratio(peak(&|l| l.drift().abs()), peak_work),
         peak_kinetic_ratio: kinetic,
-        hourglass_ratio: history.last().map_or(0.0, |l| ratio(l.hourglass, l.internal())),
+        hourglass_ratio: history
+            .last()
+            .map_or(0.0, |l| ratio(l.hourglass, l.internal())),
     }
 }

@@ -13,7 +13,10 @@ pub fn smooth_step(t: f64, start: f64, duration: f64) -> f64 {
 /// Where `t` lies among increasing `times`: index k and local coordinate s in 0..1 of the piece [k, k+1];
 /// outside, the nearest end. `times` has at least two entries.
 pub fn locate(times: &[f64], t: f64) -> (usize, f64) {
-    let k = times.partition_point(|x| *x <= t).saturating_sub(1).min(times.len() - 2);
+    let k = times
+        .partition_point(|x| *x <= t)
+        .saturating_sub(1)
+        .min(times.len() - 2);
     let s = ((t - times[k]) / (times[k + 1] - times[k])).clamp(0.0, 1.0);
     (k, s)
 }

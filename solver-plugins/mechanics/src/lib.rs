@@ -85,7 +85,11 @@ pub mod vec3 {
     /// a x b.
     #[inline(always)]
     pub fn cross(a: V, b: V) -> V {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
     }
     /// |a|.
     #[inline(always)]

@@ -78,13 +78,18 @@ pub fn graded_axis(
 /// Evenly spaced grid lines from `lo` to `hi` with a spacing near `size` (m).
 pub fn even_axis(lo: f64, hi: f64, size: f64) -> Vec<f64> {
     let n = ((hi - lo) / size).round().max(1.0) as usize;
-    (0..=n).map(|i| lo + (hi - lo) * i as f64 / n as f64).collect()
+    (0..=n)
+        .map(|i| lo + (hi - lo) * i as f64 / n as f64)
+        .collect()
 }
 
 impl QuadMesh {
     /// A structured grid in the plane z = 0; node (i, j) has the index j * xs.len() + i.
     pub fn grid(xs: &[f64], ys: &[f64]) -> Self {
-        let points = ys.iter().flat_map(|y| xs.iter().map(|x| [*x, *y, 0.0])).collect();
+        let points = ys
+            .iter()
+            .flat_map(|y| xs.iter().map(|x| [*x, *y, 0.0]))
+            .collect();
         let nx = xs.len() as u32;
         let cells = (0..ys.len() as u32 - 1)
             .flat_map(|j| {
@@ -99,7 +104,10 @@ impl QuadMesh {
 
     /// `[m]` area of each cell (m2).
     pub fn areas(&self) -> Vec<f64> {
-        self.cells.iter().map(|c| norm(area_vector(c.map(|n| self.points[n as usize])))).collect()
+        self.cells
+            .iter()
+            .map(|c| norm(area_vector(c.map(|n| self.points[n as usize]))))
+            .collect()
     }
 
     /// `[m][4]` the cell across edge e (from node e to node e+1), or [`NONE`].
@@ -155,19 +163,28 @@ impl QuadMesh {
         let around = self.cells_of_nodes();
         let areas = self.areas();
         let boundary = self.on_boundary();
-        let share = |n: usize| around[n].iter().map(|c| areas[*c as usize] / 4.0).sum::<f64>();
+        let share = |n: usize| {
+            around[n]
+                .iter()
+                .map(|c| areas[*c as usize] / 4.0)
+                .sum::<f64>()
+        };
         let mut area: Vec<f64> = (0..self.points.len()).map(share).collect();
         let ring = |n: usize| -> Vec<u32> {
-            let mut nodes: Vec<u32> =
-                around[n].iter().flat_map(|c| self.cells[*c as usize]).collect();
+            let mut nodes: Vec<u32> = around[n]
+                .iter()
+                .flat_map(|c| self.cells[*c as usize])
+                .collect();
             nodes.sort_unstable();
             nodes.dedup();
             nodes.retain(|m| *m as usize != n);
             nodes
         };
         for n in (0..self.points.len()).filter(|n| boundary[*n]) {
-            let inner: Vec<u32> =
-                ring(n).into_iter().filter(|m| !boundary[*m as usize]).collect();
+            let inner: Vec<u32> = ring(n)
+                .into_iter()
+                .filter(|m| !boundary[*m as usize])
+                .collect();
             for m in &inner {
                 area[*m as usize] += area[n] / inner.len() as f64;
             }
@@ -177,7 +194,10 @@ impl QuadMesh {
             .map(|n| {
                 let mut nodes = vec![n as u32];
                 nodes.extend(ring(n));
-                Patch { nodes, area: area[n] }
+                Patch {
+                    nodes,
+                    area: area[n],
+                }
             })
             .collect()
     }

@@ -205,11 +205,24 @@ impl Model {
     fn add_sheet(&mut self, spec: SheetSpec) -> Result<(), MechanicsError> {
         let sheet_index = self.sheets.len() as u32;
         let (cell0, batch0, patch0) = (self.cells.len(), self.batches.len(), self.patches.len());
-        let cells: Vec<[u32; 4]> =
-            spec.cells.iter().map(|c| c.map(|k| spec.nodes[k as usize])).collect();
-        let mesh = QuadMesh { points: self.x.clone(), cells: cells.clone() };
-        let shift = |c: u32| if c == crate::mesh::NONE { c } else { c + cell0 as u32 };
-        self.neighbours.extend(mesh.neighbours().into_iter().map(|e| e.map(shift)));
+        let cells: Vec<[u32; 4]> = spec
+            .cells
+            .iter()
+            .map(|c| c.map(|k| spec.nodes[k as usize]))
+            .collect();
+        let mesh = QuadMesh {
+            points: self.x.clone(),
+            cells: cells.clone(),
+        };
+        let shift = |c: u32| {
+            if c == crate::mesh::NONE {
+                c
+            } else {
+                c + cell0 as u32
+            }
+        };
+        self.neighbours
+            .extend(mesh.neighbours().into_iter().map(|e| e.map(shift)));
         let material = spec.element.material.reference().sizes();
         let s = spec.element.sizes;
         for (b, chunk) in cells.chunks(LANES).enumerate() {
@@ -218,8 +231,16 @@ impl Model {
             let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[lane(l)]);
             for l in 0..LANES {
                 let p = spec.pressed[lane(l)];
-                let below = if matches!(p, Pressed::Below | Pressed::Both) { 1.0 } else { 0.0 };
-                let above = if matches!(p, Pressed::Above | Pressed::Both) { 1.0 } else { 0.0 };
+                let below = if matches!(p, Pressed::Below | Pressed::Both) {
+                    1.0
+                } else {
+                    0.0
+                };
+                let above = if matches!(p, Pressed::Above | Pressed::Both) {
+                    1.0
+                } else {
+                    0.0
+                };
                 self.pressed.push([below, above]);
                 if l < chunk.len() {
                     self.cell_slot.push(((batch0 + b) * LANES + l) as u32);
@@ -256,7 +277,12 @@ impl Model {
             added_mass: 0.0,
             element: spec.element,
         };
-        self.initialise(&mut sheet, spec.axis, &spec.least_areal_mass, material.areal_mass)?;
+        self.initialise(
+            &mut sheet,
+            spec.axis,
+            &spec.least_areal_mass,
+            material.areal_mass,
+        )?;
         self.sheets.push(sheet);
         Ok(())
     }
@@ -382,16 +408,20 @@ impl Model {
 
     fn finish(&mut self) -> Result<(), MechanicsError> {
         if let Some(i) = self.mass.iter().position(|m| *m <= 0.0) {
-            return Err(MechanicsError::Input(format!("node {i} belongs to no element")));
+            return Err(MechanicsError::Input(format!(
+                "node {i} belongs to no element"
+            )));
         }
         let n = self.x.len();
         let nb = self.batches.len();
         self.element_force = Aligned::zeros(nb * 12 * LANES);
         self.element_energy = Aligned::zeros(nb * PF_ENERGIES * LANES);
         self.cell_area = Aligned::zeros(nb * AREA_ROWS * LANES);
-        let slots = self.cells.iter().zip(&self.cell_slot).flat_map(|(nodes, slot)| {
-            (0..4u32).map(move |k| (nodes[k as usize], slot * 4 + k))
-        });
+        let slots = self
+            .cells
+            .iter()
+            .zip(&self.cell_slot)
+            .flat_map(|(nodes, slot)| (0..4u32).map(move |k| (nodes[k as usize], slot * 4 + k)));
         self.node_slots = Csr::build(n, slots);
         let pairs: Vec<(u32, u32)> = self
             .patches
@@ -402,9 +432,9 @@ impl Model {
                 (0..batch.count as usize).flat_map(move |l| {
                     let row = &batch.nodes[l * width..(l + 1) * width];
                     let used = move |k: usize| k == 0 || row[k] != row[0];
-                    (0..width).filter(move |k| used(*k)).map(move |k| {
-                        (row[k], ((b * LANES + l) as u32) << 5 | k as u32)
-                    })
+                    (0..width)
+                        .filter(move |k| used(*k))
+                        .map(move |k| (row[k], ((b * LANES + l) as u32) << 5 | k as u32))
                 })
             })
             .collect();
@@ -440,10 +470,16 @@ impl Model {
         }
         for contact in &mut self.sheet_contacts {
             contact.augmentation = c.augmentation;
-            for item in contact.items.iter_mut().filter(|i| i.cell != crate::mesh::NONE) {
+            for item in contact
+                .items
+                .iter_mut()
+                .filter(|i| i.cell != crate::mesh::NONE)
+            {
                 let nodes = self.cells[item.cell as usize];
-                let lightest =
-                    nodes.iter().map(|n| mass[*n as usize]).fold(f64::INFINITY, f64::min);
+                let lightest = nodes
+                    .iter()
+                    .map(|n| mass[*n as usize])
+                    .fold(f64::INFINITY, f64::min);
                 let reduced = 1.0 / (1.0 / mass[item.node as usize] + 1.0 / lightest);
                 item.stiffness = c.stiffness_factor * reduced / dt2;
                 row[item.node as usize] += item.stiffness;
@@ -452,8 +488,11 @@ impl Model {
                 }
             }
         }
-        let limit: Vec<f64> =
-            row.iter().zip(mass).map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0)).collect();
+        let limit: Vec<f64> = row
+            .iter()
+            .zip(mass)
+            .map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0))
+            .collect();
         for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
             let m = mass[item.node as usize];
             item.stiffness *= limit[item.node as usize];
@@ -466,7 +505,10 @@ impl Model {
             let nodes = self.cells[item.cell as usize];
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.stiffness *= least.min(limit[item.node as usize]);
-            let lightest = nodes.iter().map(|n| mass[*n as usize]).fold(f64::INFINITY, f64::min);
+            let lightest = nodes
+                .iter()
+                .map(|n| mass[*n as usize])
+                .fold(f64::INFINITY, f64::min);
             let reduced = 1.0 / (1.0 / mass[item.node as usize] + 1.0 / lightest);
             item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
         }
@@ -479,7 +521,10 @@ impl Model {
         let dt = if self.cycle == 0 { 0.0 } else { self.dt };
         self.element_force
             .par_chunks_exact_mut(12 * LANES)
-            .zip_eq(self.element_energy.par_chunks_exact_mut(PF_ENERGIES * LANES))
+            .zip_eq(
+                self.element_energy
+                    .par_chunks_exact_mut(PF_ENERGIES * LANES),
+            )
             .zip_eq(self.cell_area.par_chunks_exact_mut(AREA_ROWS * LANES))
             .zip_eq(self.batches.par_iter_mut())
             .with_min_len(8)
@@ -487,10 +532,13 @@ impl Model {
                 let sheet = &sheets[batch.sheet as usize];
                 run_batch(sheet, batch, x, dt, force, energy, area, fields);
             });
-        self.patches.par_iter_mut().with_min_len(8).for_each(|batch| {
-            let sheet = &sheets[batch.sheet as usize];
-            run_patch(sheet, batch, x, dt, fields);
-        });
+        self.patches
+            .par_iter_mut()
+            .with_min_len(8)
+            .for_each(|batch| {
+                let sheet = &sheets[batch.sheet as usize];
+                run_patch(sheet, batch, x, dt, fields);
+            });
         let failed = self
             .batches
             .iter()
@@ -587,7 +635,9 @@ impl Model {
     fn integrate(&mut self) {
         let (dt, alpha, time) = (self.dt, self.settings.damping, self.time);
         let targets: Vec<V> = match &self.drive {
-            Some(drive) => (0..self.driven.len()).map(|k| drive.position(k, time + dt)).collect(),
+            Some(drive) => (0..self.driven.len())
+                .map(|k| drive.position(k, time + dt))
+                .collect(),
             None => Vec::new(),
         };
         for (n, target) in self.driven.iter().zip(targets) {
@@ -684,7 +734,9 @@ impl Model {
                 self.rigid_contacts
                     .iter()
                     .filter(|c| {
-                        c.items.iter().any(|i| i.node == node as u32 && i.normal_force > 0.0)
+                        c.items
+                            .iter()
+                            .any(|i| i.node == node as u32 && i.normal_force > 0.0)
                     })
                     .map(|c| c.name.as_str()),
             )
@@ -701,7 +753,11 @@ impl Model {
                 x[1],
                 x[2],
                 norm(self.v[node]),
-                if touching.is_empty() { "nothing" } else { &touching }
+                if touching.is_empty() {
+                    "nothing"
+                } else {
+                    &touching
+                }
             ),
             cause: "a step above the critical one, an element turned inside out, or a sheet that \
                     passed through its neighbour"
@@ -751,7 +807,11 @@ impl Model {
         for (n, r) in rows.into_iter().flatten() {
             row[n as usize] += r;
         }
-        let bending = row.iter().zip(&self.mass).map(|(r, m)| r / m).fold(0.0, f64::max);
+        let bending = row
+            .iter()
+            .zip(&self.mass)
+            .map(|(r, m)| r / m)
+            .fold(0.0, f64::max);
         // omega^2 of a sum of stiffnesses is at most the sum of their own bounds.
         let omega2 = (2.0 / membrane).powi(2) + bending;
         Ok(2.0 / omega2.sqrt())
@@ -823,7 +883,10 @@ fn component_status(code: i32, sheet: &str) -> Result<(), MechanicsError> {
         PF_BAD_VALUE => "a value is NaN, infinite or out of range".to_owned(),
         c => format!("it returned status {c}"),
     };
-    Err(MechanicsError::Component { what: format!("element of sheet '{sheet}'"), reason })
+    Err(MechanicsError::Component {
+        what: format!("element of sheet '{sheet}'"),
+        reason,
+    })
 }
 
 #[inline(always)]
@@ -912,7 +975,10 @@ fn run_batch(
     }
     batch.status = sheet.element.forces(&raw);
     if batch.layered {
-        for row in force.chunks_exact_mut(LANES).chain(energy.chunks_exact_mut(LANES)) {
+        for row in force
+            .chunks_exact_mut(LANES)
+            .chain(energy.chunks_exact_mut(LANES))
+        {
             for (value, layers) in row.iter_mut().zip(&batch.layers) {
                 *value *= layers;
             }

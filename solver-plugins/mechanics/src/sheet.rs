@@ -143,11 +143,7 @@ pub struct PatchBatch {
 }
 
 /// A batch view with everything null.
-pub(crate) fn empty_element_batch(
-    sheet: &Sheet,
-    dt: f64,
-    position: &[f64],
-) -> pf_element_batch {
+pub(crate) fn empty_element_batch(sheet: &Sheet, dt: f64, position: &[f64]) -> pf_element_batch {
     let null = std::ptr::null_mut();
     pf_element_batch {
         size: size_of::<pf_element_batch>() as u64,

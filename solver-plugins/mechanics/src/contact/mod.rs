@@ -29,7 +29,12 @@ pub struct ContactSettings {
 
 impl Default for ContactSettings {
     fn default() -> Self {
-        Self { stiffness_factor: 0.3, slip_factor: 0.5, damping_ratio: 0.3, augmentation: 0.003 }
+        Self {
+            stiffness_factor: 0.3,
+            slip_factor: 0.5,
+            damping_ratio: 0.3,
+            augmentation: 0.003,
+        }
     }
 }
 
@@ -76,7 +81,11 @@ pub(crate) fn normal_force(
     work: f64,
 ) -> Normal {
     let spring = (held - stiffness * gap).max(0.0);
-    let damper = if spring > 0.0 { (-damping * vn).max(-spring) } else { 0.0 };
+    let damper = if spring > 0.0 {
+        (-damping * vn).max(-spring)
+    } else {
+        0.0
+    };
     let multiplier = (held - augmentation * stiffness * gap).max(0.0);
     // Stored is F^2 / 2k; its change is mechanical work, but for what the multiplier's change puts in.
     let work = work + spring * (multiplier - held) / stiffness;
@@ -89,15 +98,54 @@ pub(crate) fn normal_force(
     }
 }
 
-/// Coulomb return: limits the trial traction to `limit`; gives the traction and the friction loss.
-/// `slip_stiffness` in N/m.
+/// Friction of a contact in a step.
+pub(crate) struct Friction {
+    /// Traction held by the slip spring (N).
+    pub slip: [f64; 3],
+    /// Force (N): the spring's and the damper's, together within Coulomb's limit.
+    pub force: [f64; 3],
+    /// Lost to sliding (J).
+    pub friction: f64,
+    /// Lost in the damper (J).
+    pub damping: f64,
+    /// Stored in the spring (J).
+    pub stored: f64,
+}
+
+/// Coulomb friction with an elastic-slip spring of stiffness `k` (N/m) and a damper `c` (N s/m) beside it.
+/// `held` (N) is the spring's force so far, in the plane of contact; `vt` (m/s) the sliding velocity;
+/// `limit` (N) the coefficient times the normal force. The damper calms a node that sticks in a fold of its
+/// master, where the direction of the normal force jumps.
 #[inline]
-pub(crate) fn coulomb(trial: [f64; 3], limit: f64, slip_stiffness: f64) -> ([f64; 3], f64) {
-    let size = crate::vec3::norm(trial);
-    if size <= limit || size == 0.0 {
+pub(crate) fn friction_force(
+    held: [f64; 3],
+    vt: [f64; 3],
+    dt: f64,
+    k: f64,
+    c: f64,
+    limit: f64,
+) -> Friction {
+    use crate::vec3::{dot, norm, scale, sub};
+    let trial = sub(held, scale(vt, k * dt));
+    let size = norm(trial);
+    let (slip, friction) = if size <= limit || size == 0.0 {
         (trial, 0.0)
     } else {
-        let loss = limit * (size - limit) / slip_stiffness;
-        (crate::vec3::scale(trial, limit / size), loss)
+        (scale(trial, limit / size), limit * (size - limit) / k)
+    };
+    let both = sub(slip, scale(vt, c));
+    let size = norm(both);
+    let force = if size > limit {
+        scale(both, limit / size)
+    } else {
+        both
+    };
+    let damping = -dot(sub(force, slip), vt) * dt;
+    Friction {
+        slip,
+        force,
+        friction,
+        damping,
+        stored: 0.5 * dot(slip, slip) / k,
     }
 }

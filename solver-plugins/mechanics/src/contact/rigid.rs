@@ -1,6 +1,6 @@
 //! Sheet nodes on a rigid surface that does not move.
 
-use super::{ContactEnergy, coulomb, normal_force};
+use super::{ContactEnergy, friction_force, normal_force};
 use crate::vec3::{V, add, dot, scale, sub};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -99,25 +99,28 @@ impl RigidContact {
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
-        self.items.par_iter_mut().with_min_len(512).for_each(|item| {
-            if item.sleep > 0 {
-                item.sleep -= 1;
-                return;
-            }
-            let n = item.node as usize;
-            let (distance, gradient) = surface.distance(x[n]);
-            let gap = distance - item.offset;
-            if gap <= 0.0 || item.multiplier > 0.0 {
-                touch(item, gap, gradient, v[n], &law);
-            } else {
-                *item = RigidItem {
-                    stiffness: item.stiffness,
-                    damping: item.damping,
-                    ..RigidItem::new(item.node, item.offset)
-                };
-                item.sleep = (gap / reach).min(200.0) as u32;
-            }
-        });
+        self.items
+            .par_iter_mut()
+            .with_min_len(512)
+            .for_each(|item| {
+                if item.sleep > 0 {
+                    item.sleep -= 1;
+                    return;
+                }
+                let n = item.node as usize;
+                let (distance, gradient) = surface.distance(x[n]);
+                let gap = distance - item.offset;
+                if gap <= 0.0 || item.multiplier > 0.0 {
+                    touch(item, gap, gradient, v[n], &law);
+                } else {
+                    *item = RigidItem {
+                        stiffness: item.stiffness,
+                        damping: item.damping,
+                        ..RigidItem::new(item.node, item.offset)
+                    };
+                    item.sleep = (gap / reach).min(200.0) as u32;
+                }
+            });
         let mut total = ContactEnergy::default();
         for item in &self.items {
             total.stored += item.energy.stored;
@@ -143,23 +146,33 @@ fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) {
     let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, held, work);
     // The gradient of a distance field is a unit vector up to the error of its interpolation.
     let n = scale(g, 1.0 / dot(g, g).max(1e-12).sqrt());
-    let slip_stiffness = law.slip_factor * k;
-    let (mut loss, mut slip_energy) = (0.0, 0.0);
+    let mut energy = ContactEnergy {
+        stored: normal.stored,
+        friction: 0.0,
+        damping: normal.loss,
+    };
+    item.force = scale(g, normal.force);
     if law.friction > 0.0 {
         let vt = sub(v, scale(n, dot(v, n)));
         let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-        let trial = sub(rest, scale(vt, slip_stiffness * law.dt));
-        (item.slip, loss) = coulomb(trial, law.friction * normal.force, slip_stiffness);
-        slip_energy = 0.5 * dot(item.slip, item.slip) / slip_stiffness;
+        let limit = law.friction * normal.force;
+        let f = friction_force(
+            rest,
+            vt,
+            law.dt,
+            law.slip_factor * k,
+            law.slip_factor * c,
+            limit,
+        );
+        item.slip = f.slip;
+        item.force = add(item.force, f.force);
+        energy.stored += f.stored;
+        energy.friction = f.friction;
+        energy.damping += f.damping;
     }
-    item.force = add(scale(g, normal.force), item.slip);
     item.normal_force = normal.force;
     item.multiplier = normal.multiplier;
     item.work = normal.work;
     item.penetration = (-gap).max(0.0);
-    item.energy = ContactEnergy {
-        stored: normal.stored + slip_energy,
-        friction: loss,
-        damping: normal.loss,
-    };
+    item.energy = energy;
 }

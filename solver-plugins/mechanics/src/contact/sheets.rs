@@ -6,9 +6,9 @@
 //! A force along an interpolated normal is smoother to look at but is no gradient: two flat sheets under
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
-use super::{ContactEnergy, coulomb, normal_force};
+use super::{ContactEnergy, friction_force, normal_force};
 use crate::mesh::NONE;
-use crate::vec3::{V, add, dot, scale, sub};
+use crate::vec3::{V, add, dot, scale, sub, unit};
 use rayon::prelude::*;
 
 /// One slave node.
@@ -19,6 +19,7 @@ pub struct SlaveItem {
     /// Master cell (model numbering) or [`NONE`].
     pub cell: u32,
     sleep: u32,
+    turn: u8,
     /// In touch in the last step.
     pub active: bool,
     /// Place in the cell, -1..1.
@@ -32,10 +33,16 @@ pub struct SlaveItem {
     work: f64,
     /// Friction force held by the slip spring (N).
     pub slip: V,
-    /// Force on the slave (N); minus this, by the weights, on the cell's nodes.
+    /// Force on the slave (N).
     pub force: V,
     /// Weights of the cell's nodes.
     pub weights: [f64; 4],
+    /// Its share of the force (N): minus this, by the weights, acts on the cell's nodes.
+    share: V,
+    /// The other cell of a concave fold in which the slave lies, or [`NONE`]; its weights and share.
+    second: u32,
+    second_weights: [f64; 4],
+    second_share: V,
     /// Normal part of the force (N).
     pub normal_force: f64,
     /// Penetration (m), 0 when apart.
@@ -50,6 +57,7 @@ impl SlaveItem {
             node,
             cell,
             sleep: 0,
+            turn: 0,
             active: false,
             xi,
             stiffness: 0.0,
@@ -59,6 +67,10 @@ impl SlaveItem {
             slip: [0.0; 3],
             force: [0.0; 3],
             weights: shape(xi),
+            share: [0.0; 3],
+            second: NONE,
+            second_weights: [0.0; 4],
+            second_share: [0.0; 3],
             normal_force: 0.0,
             penetration: 0.0,
             energy: ContactEnergy::default(),
@@ -69,6 +81,7 @@ impl SlaveItem {
         self.active = false;
         self.multiplier = 0.0;
         self.work = 0.0;
+        self.second = NONE;
         self.slip = [0.0; 3];
         self.force = [0.0; 3];
         self.normal_force = 0.0;
@@ -138,6 +151,14 @@ struct Closest {
     distance2: f64,
     /// Half the cell's shorter middle line (m).
     half: f64,
+    /// The foot of the perpendicular, not a place held at a side of the cell.
+    interior: bool,
+}
+
+/// The closest point of the surface, and in a concave fold the closest of the cell across it.
+struct Found {
+    first: Closest,
+    second: Option<Closest>,
 }
 
 /// How far a cell goes on past a free rim, in half cells: a node that sits on the rim would else balance on an
@@ -148,7 +169,7 @@ const RIM: f64 = 0.5;
 #[inline(always)]
 fn closest(s: &Surface<'_>, cell: u32, mut xi: [f64; 2], p: V, iterations: u32) -> Closest {
     let x = s.cells[cell as usize].map(|n| s.x[n as usize]);
-    let mut half = 0.0;
+    let (mut half, mut interior) = (0.0, true);
     let [south, east, north, west] = s.neighbours[cell as usize];
     let end = |near: u32| if near == NONE { 1.0 + RIM } else { 1.0 };
     let (low, high) = ([-end(west), -end(south)], [end(east), end(north)]);
@@ -165,13 +186,17 @@ fn closest(s: &Surface<'_>, cell: u32, mut xi: [f64; 2], p: V, iterations: u32) 
             xi[0] + (r1 * g22 - r2 * g12) / det,
             xi[1] + (r2 * g11 - r1 * g12) / det,
         ];
-        let held = [next[0].clamp(low[0], high[0]), next[1].clamp(low[1], high[1])];
+        let held = [
+            next[0].clamp(low[0], high[0]),
+            next[1].clamp(low[1], high[1]),
+        ];
         // Held at one side of the cell, the best place along that side is another one.
         let along = |k: usize, other: f64| {
             let (gkk, rk) = if k == 0 { (g11, r1) } else { (g22, r2) };
             (xi[k] + (rk - g12 * other) / gkk).clamp(low[k], high[k])
         };
         let out = [next[0] != held[0], next[1] != held[1]];
+        interior = !(out[0] || out[1]);
         xi = match out {
             [false, false] => held,
             [true, false] => [held[0], along(1, held[0] - xi[0])],
@@ -189,7 +214,15 @@ fn closest(s: &Surface<'_>, cell: u32, mut xi: [f64; 2], p: V, iterations: u32) 
     }
     let weights = shape(xi);
     let arm = sub(p, combine(weights, &x));
-    Closest { cell, xi, weights, arm, distance2: dot(arm, arm), half }
+    Closest {
+        cell,
+        xi,
+        weights,
+        arm,
+        distance2: dot(arm, arm),
+        half,
+        interior,
+    }
 }
 
 /// Where a walk over an edge enters the neighbour, coming from place `xi`.
@@ -203,17 +236,21 @@ fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
 }
 
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
-/// sides that the point lies on or so near that a concave fold could make the neighbour closer.
+/// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
+/// neighbour closer.
 #[inline]
-fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Closest {
+fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Found {
     let mut best = closest(s, item.cell, item.xi, p, iterations);
+    let mut second: Option<Closest> = None;
+    let careful = item.second != NONE || item.turn.is_multiple_of(8);
     for _ in 0..12 {
         let near = s.neighbours[best.cell as usize];
         let band = 1.0 - (best.distance2.sqrt() / best.half).min(0.5);
         let here = best;
+        second = None;
         for k in 0..2 {
             let place = here.xi[k];
-            if place.abs() < band {
+            if place.abs() < band || (place.abs() < 1.0 && !careful) {
                 continue;
             }
             // Sides 0: eta = -1, 1: xi = 1, 2: eta = 1, 3: xi = -1.
@@ -225,9 +262,12 @@ fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Closest {
             };
             if near[edge] != NONE {
                 let start = entry(s.neighbours, here.cell, near[edge]);
-                let other = closest(s, near[edge], start, p, 3);
+                let mut other = closest(s, near[edge], start, p, 3);
                 if other.distance2 < best.distance2 {
-                    best = other;
+                    std::mem::swap(&mut best, &mut other);
+                }
+                if second.is_none_or(|c| other.distance2 < c.distance2) {
+                    second = Some(other);
                 }
             }
         }
@@ -235,7 +275,33 @@ fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Closest {
             break;
         }
     }
-    best
+    // Only where both feet are perpendicular does the surface fold towards the slave.
+    let second = second.filter(|c| c.interior && best.interior);
+    Found {
+        first: best,
+        second,
+    }
+}
+
+/// Distance in a concave fold, and the share of the second cell. There the distance to the surface is the
+/// smaller of two, and its gradient jumps where they are equal: a node that is pressed into the fold would
+/// rattle between the two faces, and explicit steps heat such a rattle. So within
+/// e = 0.4 offset (1 - cos fold) of each other the two are blended into a smooth minimum,
+/// d = d1 - (e - (d2 - d1))^2 / 4e. Both feet are still perpendicular there, so nothing jumps at its ends.
+#[inline]
+fn blend(first: &Closest, second: Option<&Closest>, offset: f64) -> (f64, f64) {
+    let d1 = first.distance2.sqrt();
+    let Some(second) = second else {
+        return (d1, 0.0);
+    };
+    let d2 = second.distance2.sqrt();
+    let cosine = dot(first.arm, second.arm) / (d1 * d2);
+    let e = 0.4 * offset * (1.0 - cosine);
+    let rest = e - (d2 - d1);
+    if rest <= 0.0 || e < 1e-9 * offset {
+        return (d1, 0.0);
+    }
+    (d1 - rest * rest / (4.0 * e), rest / (2.0 * e))
 }
 
 impl SheetContact {
@@ -248,42 +314,66 @@ impl SheetContact {
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
-        self.items.par_iter_mut().with_min_len(256).for_each(|item| {
-            if item.cell == NONE {
-                return;
-            }
-            if item.sleep > 0 {
-                item.sleep -= 1;
-                return;
-            }
-            let n = item.node as usize;
-            // In touch, the place moves by far less than a cell in a step: one iteration follows it.
-            let found = track(s, item, s.x[n], if item.active { 1 } else { 3 });
-            (item.cell, item.xi) = (found.cell, found.xi);
-            let nodes = s.cells[found.cell as usize];
-            let up = combine(found.weights, &nodes.map(|n| s.normals[n as usize]));
-            let distance = found.distance2.sqrt();
-            let height = side * dot(found.arm, up);
-            // On its own side, the gap is the distance; a slave whose mid-surface has just passed through
-            // the master's has a negative one. Anything else lies beside the rim, or beyond a fold.
-            let (gap, n) = if height > 0.5 * distance {
-                (distance - offset, scale(found.arm, 1.0 / distance))
-            } else if item.active && height < -0.5 * distance && height > -offset {
-                (height - offset, scale(up, side))
-            } else {
-                item.part();
-                return;
-            };
-            // A slave that comes from beside cannot be deep inside at once: it has got behind the rim.
-            let behind = !item.active && gap < -0.5 * offset;
-            let apart = gap > 0.0 && item.multiplier == 0.0;
-            if behind || apart {
-                item.part();
-                item.sleep = (gap.max(0.0) / reach).min(50.0) as u32;
-            } else {
-                touch(item, s, v, gap, n, &found, &law);
-            }
-        });
+        self.items
+            .par_iter_mut()
+            .with_min_len(256)
+            .for_each(|item| {
+                if item.cell == NONE {
+                    return;
+                }
+                if item.sleep > 0 {
+                    item.sleep -= 1;
+                    return;
+                }
+                let n = item.node as usize;
+                item.turn = item.turn.wrapping_add(1);
+                // In touch, the place moves by far less than a cell in a step: one iteration follows it.
+                let found = track(s, item, s.x[n], if item.active { 1 } else { 3 });
+                let first = &found.first;
+                (item.cell, item.xi) = (first.cell, first.xi);
+                let nodes = s.cells[first.cell as usize];
+                let up = combine(first.weights, &nodes.map(|n| s.normals[n as usize]));
+                let distance = first.distance2.sqrt();
+                let height = side * dot(first.arm, up);
+                // At a free rim the sheet is round: there the gap is the distance, wherever the slave lies. On its
+                // own side, it is so too; a slave whose mid-surface has just passed through the master's has a
+                // negative one. Anything else lies beyond a fold.
+                let at_rim = first.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM);
+                let pull = if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
+                    let (d, w) = blend(first, found.second.as_ref(), offset);
+                    let n = scale(first.arm, (1.0 - w) / distance);
+                    let m = match &found.second {
+                        Some(c) if w > 0.0 => scale(c.arm, w / c.distance2.sqrt()),
+                        _ => [0.0; 3],
+                    };
+                    Pull {
+                        gap: d - offset,
+                        share: w,
+                        first: n,
+                        second: m,
+                    }
+                } else if item.active && height < -0.5 * distance && height > -offset {
+                    let n = scale(up, side);
+                    Pull {
+                        gap: height - offset,
+                        share: 0.0,
+                        first: n,
+                        second: [0.0; 3],
+                    }
+                } else {
+                    item.part();
+                    return;
+                };
+                // A slave that comes from beside cannot be deep inside at once: it has got behind the rim.
+                let behind = !item.active && pull.gap < -0.5 * offset;
+                let apart = pull.gap > 0.0 && item.multiplier == 0.0;
+                if behind || apart {
+                    item.part();
+                    item.sleep = (pull.gap.max(0.0) / reach).min(50.0) as u32;
+                } else {
+                    touch(item, s, v, &pull, &found, &law);
+                }
+            });
         let mut total = ContactEnergy::default();
         for item in &self.items {
             total.stored += item.energy.stored;
@@ -295,15 +385,31 @@ impl SheetContact {
 
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
     pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
+        let mut push = |cell: u32, weights: &[f64; 4], force: V| {
+            for (w, n) in weights.iter().zip(cells[cell as usize]) {
+                let n = n as usize;
+                f[n] = sub(f[n], scale(force, *w));
+            }
+        };
+        for item in self.items.iter().filter(|i| i.active) {
+            push(item.cell, &item.weights, item.share);
+            if item.second != NONE {
+                push(item.second, &item.second_weights, item.second_share);
+            }
+        }
         for item in self.items.iter().filter(|i| i.active) {
             let node = item.node as usize;
             f[node] = add(f[node], item.force);
-            for (k, n) in cells[item.cell as usize].iter().enumerate() {
-                let n = *n as usize;
-                f[n] = sub(f[n], scale(item.force, item.weights[k]));
-            }
         }
     }
+}
+
+/// Gap and its gradient for the slave: `first` and `second` are minus the gradients for the two cells' points.
+struct Pull {
+    gap: f64,
+    share: f64,
+    first: V,
+    second: V,
 }
 
 struct Law {
@@ -315,37 +421,54 @@ struct Law {
 
 /// Force of a slave in touch, or so lately that it still has a multiplier.
 #[inline]
-fn touch(
-    item: &mut SlaveItem,
-    s: &Surface<'_>,
-    v: &[V],
-    gap: f64,
-    n: V,
-    found: &Closest,
-    law: &Law,
-) {
-    let nodes = s.cells[found.cell as usize];
-    let master_v = combine(found.weights, &nodes.map(|n| v[n as usize]));
-    let rel = sub(v[item.node as usize], master_v);
-    let vn = dot(rel, n);
+fn touch(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], pull: &Pull, found: &Found, law: &Law) {
+    let speed = |c: &Closest| combine(c.weights, &s.cells[c.cell as usize].map(|n| v[n as usize]));
+    let own = v[item.node as usize];
+    let first = &found.first;
+    let rel1 = sub(own, speed(first));
+    let (mut rel, mut vn) = (rel1, dot(rel1, pull.first));
+    let second = found.second.as_ref().filter(|_| pull.share > 0.0);
+    if let Some(c) = second {
+        let rel2 = sub(own, speed(c));
+        vn += dot(rel2, pull.second);
+        rel = add(scale(rel1, 1.0 - pull.share), scale(rel2, pull.share));
+    }
     let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
-    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, held, work);
-    let slip_stiffness = law.slip_factor * k;
-    let vt = sub(rel, scale(n, vn));
+    let normal = normal_force(pull.gap, vn, law.dt, k, c, law.augmentation, held, work);
+    let n = unit(add(pull.first, pull.second));
+    let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-    let trial = sub(rest, scale(vt, slip_stiffness * law.dt));
-    let (slip, loss) = coulomb(trial, law.friction * normal.force, slip_stiffness);
+    let limit = law.friction * normal.force;
+    let f = friction_force(
+        rest,
+        vt,
+        law.dt,
+        law.slip_factor * k,
+        law.slip_factor * c,
+        limit,
+    );
     item.active = true;
-    item.slip = slip;
-    item.force = add(scale(n, normal.force), slip);
-    item.weights = found.weights;
+    item.slip = f.slip;
+    item.weights = first.weights;
+    item.share = add(
+        scale(pull.first, normal.force),
+        scale(f.force, 1.0 - pull.share),
+    );
+    item.force = item.share;
+    item.second = NONE;
+    if let Some(c) = second {
+        item.second = c.cell;
+        item.second_weights = c.weights;
+        item.second_share = add(scale(pull.second, normal.force), scale(f.force, pull.share));
+        item.force = add(item.force, item.second_share);
+    }
     item.normal_force = normal.force;
     item.multiplier = normal.multiplier;
     item.work = normal.work;
-    item.penetration = (-gap).max(0.0);
+    item.penetration = (-pull.gap).max(0.0);
     item.energy = ContactEnergy {
-        stored: normal.stored + 0.5 * dot(slip, slip) / slip_stiffness,
-        friction: loss,
-        damping: normal.loss,
+        stored: normal.stored + f.stored,
+        friction: f.friction,
+        damping: normal.loss + f.damping,
     };
 }
