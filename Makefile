@@ -39,7 +39,8 @@ lint: ## check form, lints and JSON Schemas
 	scripts/check-docs
 
 bench: build ## measure; rows go to docs/benchmarks
-	$(CARGO) run $(CARGO_FLAGS) -p plyflow-benches
+	$(CARGO) build $(CARGO_FLAGS) -p plyflow-benches
+	$(TARGET)/release/plyflow-benches
 
 docs: ## build the pages of the code and check the links of the book
 	@scripts/setup

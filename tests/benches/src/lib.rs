@@ -1,1 +1,0 @@
-//! plyflow-benches

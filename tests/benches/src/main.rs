@@ -1,0 +1,45 @@
+//! Measures the built program from outside and appends one JSON row per case to a file under
+//! `docs/benchmarks`, named after the machine's processor.
+//!
+//! `plyflow-benches [engine] [kernels] [study]`: these groups, or all.
+
+mod cases;
+mod machine;
+
+use std::io::Write;
+
+/// A group of cases that are measured together.
+type Group = (&'static str, fn() -> Vec<cases::Row>);
+
+fn main() {
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    let groups: [Group; 3] = [
+        ("engine", cases::engine),
+        ("kernels", cases::kernels),
+        ("study", cases::study),
+    ];
+    if let Some(odd) = wanted
+        .iter()
+        .find(|w| groups.iter().all(|g| g.0 != w.as_str()))
+    {
+        eprintln!("unknown group '{odd}'; there are: engine, kernels, study");
+        std::process::exit(2);
+    }
+    let class = machine::class();
+    let path = machine::record_file(&class);
+    let mut file = std::fs::File::options()
+        .create(true)
+        .append(true)
+        .open(&path)
+        .expect("docs/benchmarks can be written");
+    for (name, measure) in groups {
+        if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
+            continue;
+        }
+        for row in measure() {
+            println!("{:<44} {:>12.4} {}", row.case, row.value, row.unit);
+            writeln!(file, "{}", row.json(&class)).expect("a row is written");
+        }
+    }
+    println!("recorded in {}", path.display());
+}
