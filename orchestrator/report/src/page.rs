@@ -1,5 +1,6 @@
 //! The page.
 
+mod costs;
 mod energy;
 mod maps;
 mod provenance;
@@ -46,7 +47,7 @@ pub(crate) fn page(
                 main {
                     @for study in &studies { (study) }
                     (tables::expectations(input))
-                    (tables::costs(input, material))
+                    (costs::section(input, material))
                     (energy::section(material))
                     (tables::results(input, material.studies.is_empty()))
                     (provenance::section(input, material))
@@ -88,7 +89,7 @@ fn head(input: &ReportInput, material: &Material) -> Markup {
             @if !warnings.is_empty() {
                 section class="warnings" id="warnings" {
                     h2 { "Warnings" }
-                    dl { @for (label, text) in &warnings { dt { (label) } dd { (text) } } }
+                    dl { @for (label, texts) in verdict::by_step(&warnings) { dt { (label) } dd { (texts.join("\n")) } } }
                 }
             }
             (contents(material, input))

@@ -61,7 +61,8 @@ impl Plot<'_> {
     pub(crate) fn svg(&self) -> Markup {
         let [w, h] = self.size;
         let (t0, t1) = match (self.time.first(), self.time.last()) {
-            (Some(a), Some(b)) if b > a => (*a, *b),
+            // The first row comes a little after the start.
+            (Some(a), Some(b)) if b > a => (if *a < 0.05 * b { a.min(0.0) } else { *a }, *b),
             _ => return html! {},
         };
         let [low, high] = self.range();

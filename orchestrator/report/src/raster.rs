@@ -1,6 +1,6 @@
 //! A small orthographic rasteriser: triangles with a depth buffer, smooth colours and light, to PNG.
 
-use crate::colour::Scale;
+use crate::colour::{Rgb, Scale};
 use base64::Engine;
 
 pub(crate) type Vec3 = [f64; 3];
@@ -115,8 +115,8 @@ impl Camera {
 /// How a surface is coloured.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Paint<'a> {
-    /// One grey for all.
-    Grey(f32),
+    /// One colour for all.
+    Plain(Rgb),
     /// By a value per point.
     Field(&'a [f64], Scale),
 }
@@ -200,7 +200,7 @@ impl Canvas {
             vec![1.0; points.len()]
         };
         let place: Vec<f64> = match paint {
-            Paint::Grey(_) => vec![0.0; points.len()],
+            Paint::Plain(_) => vec![0.0; points.len()],
             Paint::Field(values, scale) => {
                 let values = mesh.extended(values, |q| (q[0] + q[1] + q[2] + q[3]) / 4.0);
                 values.iter().map(|v| scale.place(*v)).collect()
@@ -221,7 +221,7 @@ impl Canvas {
             .collect();
         let colour = |t: f32, shade: f32| -> [f32; 3] {
             match paint {
-                Paint::Grey(g) => [g * shade; 3],
+                Paint::Plain(c) => c.map(|c| c * shade),
                 Paint::Field(_, scale) => scale.palette.at(t).map(|c| c * shade),
             }
         };
@@ -362,7 +362,7 @@ mod tests {
             for z in order {
                 let (points, mesh) = square(z);
                 let grey = if z > 0.5 { 200.0 } else { 50.0 };
-                canvas.surface(&camera, &points, &mesh, Paint::Grey(grey), false, 0.0);
+                canvas.surface(&camera, &points, &mesh, Paint::Plain([grey; 3]), false, 0.0);
             }
             let pixels = canvas.pixels();
             assert_eq!(pixels[4 * (10 * 20 + 10)..][..4], [200, 200, 200, 255]);

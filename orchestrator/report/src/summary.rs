@@ -9,6 +9,10 @@ use camino::Utf8Path;
 
 /// Tables are shown up to this many rows.
 const LONGEST: usize = 40;
+/// Warnings that are shown.
+const WARNINGS: usize = 12;
+/// More items of a step than this are shown as one row.
+const ITEMS: usize = 3;
 
 /// What the run found, in plain text: verdict, warnings, defects, expected results with verdicts (all results of
 /// workflows without expectations), costs, and the path of the report. Ends with a line break.
@@ -29,14 +33,26 @@ pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
         blocks.push(zone_table(study));
         blocks.extend(study.comparison.as_ref().map(defect_table));
     }
-    let warnings = verdict::warnings(input, &material);
-    let line = |(label, text): &(String, String)| format!("warning: {label}: {text}\n");
-    blocks.push(warnings.iter().take(LONGEST).map(line).collect());
+    blocks.push(warning_lines(&verdict::warnings(input, &material)));
     blocks.push(result_table(input));
     blocks.push(cost_table(&input.instances));
     blocks.extend(report.map(|path| format!("report: {path}\n")));
     blocks.retain(|b| !b.is_empty());
     blocks.join("\n")
+}
+
+fn warning_lines(warnings: &[(String, String)]) -> String {
+    let mut out = String::new();
+    for (label, text) in warnings.iter().take(WARNINGS) {
+        out += &format!("warning: {label}: {text}\n");
+    }
+    if warnings.len() > WARNINGS {
+        out += &format!(
+            "{} more warnings are in the report\n",
+            warnings.len() - WARNINGS
+        );
+    }
+    out
 }
 
 fn zone_table(study: &Study) -> String {
@@ -67,7 +83,11 @@ fn defect_table(c: &Comparison) -> String {
                 d.id.clone(),
                 d.ply.clone(),
                 d.kind.clone(),
-                quantity(d.length, "m", 3),
+                if d.is_wrinkle() {
+                    quantity(d.length, "m", 3)
+                } else {
+                    String::new()
+                },
                 quantity(d.amplitude, "m", 3),
                 quantity(d.area, "m2", 3),
             ]
@@ -108,35 +128,51 @@ fn result_table(input: &ReportInput) -> String {
 }
 
 fn cost_table(instances: &[Instance]) -> String {
-    if instances.len() > LONGEST {
-        return String::new();
+    let mut steps: Vec<(&str, Vec<&Instance>)> = Vec::new();
+    for i in instances {
+        match steps.iter_mut().find(|(name, _)| *name == i.step) {
+            Some((_, items)) => items.push(i),
+            None => steps.push((&i.step, vec![i])),
+        }
     }
-    let rows: Vec<Vec<String>> = instances
+    let mut rows = Vec::new();
+    for (name, items) in steps.iter().take(LONGEST) {
+        if items.len() > ITEMS {
+            rows.push(cost_row(format!("{name} x {}", items.len()), items));
+        } else {
+            rows.extend(items.iter().map(|i| cost_row(i.label(), &[*i])));
+        }
+    }
+    if instances.len() > 1 {
+        rows.push(cost_row(
+            "all".into(),
+            &instances.iter().collect::<Vec<_>>(),
+        ));
+    }
+    let head = ["step", "wall", "cpu", "threads", "memory", "element-steps"];
+    table(&head, &rows, &[1, 2, 3, 4, 5])
+}
+
+/// Times are summed over the items; threads, memory and rate are the largest.
+fn cost_row(name: String, items: &[&Instance]) -> Vec<String> {
+    let cost = || items.iter().map(|i| i.record.cost);
+    let rates = items
         .iter()
-        .map(|i| {
-            let c = &i.record.cost;
-            let rate = i
-                .record
-                .results
-                .iter()
-                .find(|r| r.name == "element_cycle_rate");
-            vec![
-                i.label(),
-                duration(c.wall_seconds),
-                duration(c.cpu_seconds),
-                c.threads.to_string(),
-                bytes(c.peak_memory),
-                rate.map_or(String::new(), |r| {
-                    format!("{} M/s", number(r.value * 1e-6, 3))
-                }),
-            ]
-        })
-        .collect();
-    table(
-        &["step", "wall", "cpu", "threads", "memory", "element-steps"],
-        &rows,
-        &[1, 2, 3, 4, 5],
-    )
+        .flat_map(|i| &i.record.results)
+        .filter(|r| r.name == "element_cycle_rate");
+    let rate = rates.map(|r| r.value).fold(0.0, f64::max);
+    vec![
+        name,
+        duration(cost().map(|c| c.wall_seconds).sum()),
+        duration(cost().map(|c| c.cpu_seconds).sum()),
+        cost().map(|c| c.threads).max().unwrap_or(0).to_string(),
+        bytes(cost().map(|c| c.peak_memory).max().unwrap_or(0)),
+        if rate > 0.0 {
+            format!("{} M/s", number(rate * 1e-6, 3))
+        } else {
+            String::new()
+        },
+    ]
 }
 
 /// Columns padded to their widest cell; those in `right` are aligned to the right. Empty without rows.

@@ -65,9 +65,12 @@ pub(crate) fn join(number: String, unit: &str) -> String {
     }
 }
 
-/// A duration: `0.42 s`, `12.3 s`, `4 min 05 s`, `2 h 03 min`.
+/// A duration: `420 ms`, `12.3 s`, `4 min 05 s`, `2 h 03 min`.
 pub(crate) fn duration(seconds: f64) -> String {
     let s = seconds.max(0.0);
+    if s < 0.9995 {
+        return format!("{} ms", number(s * 1e3, 3));
+    }
     if s < 60.0 {
         return format!("{} s", number(s, 3));
     }
@@ -136,7 +139,8 @@ mod tests {
 
     #[test]
     fn durations_read_as_hours_minutes_or_seconds() {
-        assert_eq!(duration(0.4199), "0.42 s");
+        assert_eq!(duration(0.0419), "41.9 ms");
+        assert_eq!(duration(0.9999), "1 s");
         assert_eq!(duration(245.2), "4 min 05 s");
         assert_eq!(duration(7384.0), "2 h 03 min");
     }

@@ -1,8 +1,11 @@
 //! What the run found, in one line, and what must not be overlooked.
 
 use crate::input::ReportInput;
-use crate::study::{Material, Study};
-use crate::units::{plural, quantity};
+use crate::study::{Material, Run, Study};
+use crate::units::{fixed, plural, quantity};
+
+/// Energy that is not accounted for, over the external work, above which a run is not to be trusted.
+const DRIFT_BOUND: f64 = 0.05;
 
 /// How serious the verdict is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +69,16 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
             run.label
         ));
     }
+    let drift = |r: &&Run| r.facts.energy.peak_drift_ratio.unwrap_or(0.0);
+    let worst = runs().max_by(|a, b| drift(a).total_cmp(&drift(b)));
+    if let Some(run) = worst.filter(|r| drift(r) > DRIFT_BOUND) {
+        tone = Tone::Bad;
+        let percent = fixed(100.0 * drift(&run), 0);
+        parts.push(format!(
+            "energy ledger open by up to {percent} % ({})",
+            run.label
+        ));
+    }
     (tone, parts.join("; "))
 }
 
@@ -117,6 +130,18 @@ pub(crate) fn of_run(input: &ReportInput) -> (Tone, String) {
         ));
     }
     (tone, parts.join("; "))
+}
+
+/// Warnings gathered by step, in their order.
+pub(crate) fn by_step(warnings: &[(String, String)]) -> Vec<(&str, Vec<&str>)> {
+    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (label, text) in warnings {
+        match all.iter_mut().find(|(l, _)| l == label) {
+            Some((_, texts)) => texts.push(text),
+            None => all.push((label, vec![text])),
+        }
+    }
+    all
 }
 
 /// Warnings of all steps and what could not be read, each once, with the step.

@@ -1,5 +1,6 @@
 //! Pictures of plies: the flat map and the formed view, with zones, marks and axes drawn over them.
 
+use crate::colour::Rgb;
 use crate::field::Legend;
 use crate::locate::{Locator, bounds};
 use crate::raster::{Camera, Canvas, Paint, Vec3};
@@ -35,8 +36,12 @@ const RIGHT: f64 = 8.0;
 const OUTLINE_STEP: f64 = 2e-3;
 /// Outlines that lie this far (m) behind what is drawn still show.
 const OUTLINE_TOLERANCE: f64 = 3e-3;
-/// The ply is drawn this far (m) before the tool: its mid-plane touches the tool within the contact's play.
-const PLY_BIAS: f64 = 1.5e-3;
+/// The ply is drawn at least this far (m) before the tool, which its mid-plane touches within the contact's play.
+const LEAST_BIAS: f64 = 1.5e-3;
+/// And by this part of an element's side: its straight sides cut through the fillets.
+const BIAS_OF_SIDE: f64 = 0.25;
+/// Grey of the tool, unlike the light middle of the diverging scales.
+const TOOL: Rgb = [128.0, 136.0, 146.0];
 
 /// Resolution of the pictures: pixels of the image per pixel of the page.
 #[derive(Debug, Clone, Copy)]
@@ -101,7 +106,8 @@ pub(crate) fn flat(
                 (label(&zone.name, [x0 + 5.0, y0 + 16.0], "zone-name", "start"))
             }
             @for mark in overlay.marks {
-                (label(&mark.text, page(mark.at), "defect-name", "middle"))
+                @let [x, y] = page(mark.at);
+                (label(&mark.text, [x, (y + 4.0).clamp(13.0, h - 3.0)], "defect-name", "middle"))
             }
         }
     })
@@ -148,17 +154,11 @@ pub(crate) fn formed(
     let (camera, size) = sharp.image(camera, &ply.formed, around, [width, 0.72 * width]);
     let mut canvas = Canvas::new(size);
     if let Some(t) = tool {
-        canvas.surface(&camera, &t.points, &t.mesh, Paint::Grey(176.0), true, 0.0);
+        canvas.surface(&camera, &t.points, &t.mesh, Paint::Plain(TOOL), true, 0.0);
     }
     let paint = Paint::Field(&values, legend.scale);
-    canvas.surface(
-        &camera,
-        &ply.formed,
-        &ply.triangles(),
-        paint,
-        true,
-        PLY_BIAS,
-    );
+    let bias = LEAST_BIAS.max(BIAS_OF_SIDE * mean_side(ply));
+    canvas.surface(&camera, &ply.formed, &ply.triangles(), paint, true, bias);
     let image = canvas.data_url().map_err(|e| e.to_string())?;
     let view = View {
         camera,
@@ -166,12 +166,21 @@ pub(crate) fn formed(
         sharp,
         locator: Locator::new(&ply.flat, &ply.cells),
         ply,
+        bias,
+    };
+    let edge = Zone {
+        bounds: bounds(&ply.flat)
+            .as_flattened()
+            .try_into()
+            .unwrap_or_default(),
+        ..Zone::default()
     };
     let (w, h) = (size[0] as f64 / sharp.0, size[1] as f64 / sharp.0);
     let what = format!("{}, formed ply {}", legend.field.title(), ply.name);
     Ok(html! {
         svg viewBox={ "0 0 " (px(w)) " " (px(h)) } role="img" aria-label=(what) {
             image href=(image) x="0" y="0" width=(px(w)) height=(px(h)) {}
+            path class="ply-edge" d=(view.outline(&edge).0) {}
             @for zone in overlay.zones {
                 @let (path, corner) = view.outline(zone);
                 path class="zone-halo" d=(path) {}
@@ -183,9 +192,11 @@ pub(crate) fn formed(
                     (label(&mark.text, at, "defect-name", "middle"))
                 }
             }
-            (triad(&camera, [34.0, h - 26.0]))
-            text class="over" x=(px(w - 4.0)) y=(px(h - 6.0)) text-anchor="end" {
-                @if front { "seen from −y" } @else { "seen from +y" }
+            (triad(&camera, [if front { 34.0 } else { w - 34.0 }, h - 26.0]))
+            @if front {
+                text class="over" x=(px(w - 4.0)) y="14" text-anchor="end" { "seen from −y" }
+            } @else {
+                text class="over" x="4" y="14" { "seen from +y" }
             }
         }
     })
@@ -198,6 +209,7 @@ struct View<'a> {
     sharp: Sharpness,
     locator: Locator<'a>,
     ply: &'a Ply,
+    bias: f64,
 }
 
 impl View<'_> {
@@ -209,7 +221,7 @@ impl View<'_> {
             (0..3).for_each(|d| p[d] += w * self.ply.formed[*node as usize][d]);
         }
         let mut on_image = self.camera.project(p);
-        on_image[2] += PLY_BIAS;
+        on_image[2] += self.bias;
         let seen = self.canvas.visible(on_image, OUTLINE_TOLERANCE);
         Some((
             [on_image[0] / self.sharp.0, on_image[1] / self.sharp.0],
@@ -268,6 +280,15 @@ fn faces_back(ply: &Ply) -> bool {
     }
     // A hair of preference for the front, so that rounding does not choose.
     sum > 1e-4
+}
+
+/// Mean length of the formed elements' first sides (m).
+fn mean_side(ply: &Ply) -> f64 {
+    let side = |c: &[u32; 4]| {
+        let [a, b] = [c[0], c[1]].map(|i| ply.formed[i as usize]);
+        (0..3).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>().sqrt()
+    };
+    ply.cells.iter().map(side).sum::<f64>() / ply.cells.len().max(1) as f64
 }
 
 /// Directions of the axes.

@@ -114,7 +114,7 @@ fn local_and_global_measures_of_a_defect_stand_in_one_row() {
         row("AW1")
     );
     assert!(
-        row("AB1").contains(">20.0</td><td class=\"n\">–<"),
+        row("AB1").contains(">410</td><td class=\"n\">–<"),
         "{}",
         row("AB1")
     );

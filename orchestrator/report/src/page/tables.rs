@@ -1,9 +1,8 @@
-//! Tables: zones, defects, expectations, costs, results.
+//! Tables: zones, defects, expectations, results.
 
 use crate::input::{Expectation, ReportInput, label};
-use crate::plot::bars;
-use crate::study::{Comparison, Defect, Material, Run, Study};
-use crate::units::{bytes, count, duration, fixed, number, quantity, shown};
+use crate::study::{Comparison, Defect, Study};
+use crate::units::{fixed, number, quantity, shown};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
@@ -96,7 +95,13 @@ fn defect_rows<'a>(c: &'a Comparison, roles: &[&str]) -> Vec<Row<'a>> {
 type Measure = (&'static str, fn(&Defect) -> String);
 
 const MEASURES: [Measure; 5] = [
-    ("length (mm)", |d| fixed(d.length * 1e3, 1)),
+    ("length (mm)", |d| {
+        if d.is_wrinkle() {
+            fixed(d.length * 1e3, 1)
+        } else {
+            "–".into()
+        }
+    }),
     ("amplitude (mm)", |d| fixed(d.amplitude * 1e3, 2)),
     ("area (mm²)", |d| number(d.area * 1e6, 4)),
     ("max. curvature (1/mm)", |d| {
@@ -127,7 +132,7 @@ pub(super) fn defects(study: &Study, n: usize) -> Markup {
             @if rows.is_empty() {
                 p { "No wrinkle and no bridging was found in any model." }
             } @else {
-                p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it." }
+                p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it, or bridging, which has no length. A defect that reaches the cut needs a larger zone." }
                 div class="scroll" { table class="defects" {
                     thead {
                         tr { th rowspan="2" { "id" } th rowspan="2" { "zone" } th rowspan="2" { "ply" } th rowspan="2" { "type" }
@@ -140,7 +145,7 @@ pub(super) fn defects(study: &Study, n: usize) -> Markup {
                             @for (_, measure) in MEASURES { @for (i, d) in row.models.iter().enumerate() {
                                 td class=(if i == 0 { "n first" } else { "n" }) { (d.map_or("–".to_owned(), measure)) }
                             } }
-                            td { @if row.models.iter().flatten().any(|d| d.touches_cut) { "reaches the cut: zone too small" } }
+                            td { @if row.models.iter().flatten().any(|d| d.touches_cut) { "reaches the cut" } }
                         }
                     } }
                 } }
@@ -187,79 +192,6 @@ pub(super) fn expectations(input: &ReportInput) -> Markup {
                     } } }
                 } }
             }
-        }
-    }
-}
-
-fn runs(material: &Material) -> BTreeMap<usize, &Run> {
-    let studies = material.studies.iter();
-    let all = studies.flat_map(|s| {
-        s.global
-            .iter()
-            .chain(&s.reference)
-            .chain(s.locals.iter().filter_map(|l| l.run.as_ref()))
-    });
-    all.map(|r| (r.instance, r)).collect()
-}
-
-/// What each step cost; forming runs with their elements and rate.
-pub(super) fn costs(input: &ReportInput, material: &Material) -> Markup {
-    let runs = runs(material);
-    let rate = |r: &Run, wall: f64| {
-        if wall > 0.0 && r.facts.element_cycles > 0.0 {
-            fixed(r.facts.element_cycles / wall * 1e-6, 2)
-        } else {
-            String::new()
-        }
-    };
-    let wall: f64 = input
-        .instances
-        .iter()
-        .map(|i| i.record.cost.wall_seconds)
-        .sum();
-    let cpu: f64 = input
-        .instances
-        .iter()
-        .map(|i| i.record.cost.cpu_seconds)
-        .sum();
-    let memory = input
-        .instances
-        .iter()
-        .map(|i| i.record.cost.peak_memory)
-        .max()
-        .unwrap_or(0);
-    let mut largest: Vec<(String, f64, String)> = (input.instances.iter())
-        .map(|i| {
-            let seconds = i.record.cost.cpu_seconds;
-            (i.label(), seconds, duration(seconds))
-        })
-        .collect();
-    largest.sort_by(|a, b| b.1.total_cmp(&a.1));
-    largest.truncate(16);
-    html! {
-        section id="costs" {
-            h2 { "Costs" }
-            div class="scroll" { table {
-                thead { tr { th { "step" } th { "kind" } th class="n" { "elements" } th class="n" { "time steps" } th class="n" { "10⁶ element-steps" }
-                    th class="n" { "wall" } th class="n" { "CPU" } th class="n" { "threads" } th class="n" { "peak memory" }
-                    th class="n" { "10⁶ element-steps/s" } th class="n" { "artifact" } } }
-                tbody { @for (at, i) in input.instances.iter().enumerate().take(LONGEST) {
-                    @let c = &i.record.cost;
-                    @let run = runs.get(&at);
-                    tr { th { (i.label()) } td { (i.record.kind) }
-                        td class="n" { @if let Some(r) = run { (count(r.facts.elements)) } }
-                        td class="n" { @if let Some(r) = run { (count(r.facts.cycles)) } }
-                        td class="n" { @if let Some(r) = run { (fixed(r.facts.element_cycles * 1e-6, 1)) } }
-                        td class="n" { (duration(c.wall_seconds)) } td class="n" { (duration(c.cpu_seconds)) }
-                        td class="n" { (c.threads) } td class="n" { (bytes(c.peak_memory)) }
-                        td class="n" { @if let Some(r) = run { (rate(r, c.wall_seconds)) } }
-                        td class="n" { (bytes(i.record.bytes)) } }
-                } }
-                tfoot { tr { th { "all steps" } td colspan="4" { @if input.instances.len() > LONGEST { "the first " (LONGEST) " of " (input.instances.len()) " steps are listed" } }
-                    td class="n" { (duration(wall)) } td class="n" { (duration(cpu)) } td {} td class="n" { (bytes(memory)) }
-                    td {} td {} } }
-            } }
-            @if largest.len() > 1 { (bars("CPU time by step", &largest)) }
         }
     }
 }
