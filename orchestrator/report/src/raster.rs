@@ -233,37 +233,39 @@ impl Canvas {
     /// Corners are x, y (samples), depth (m), place on the scale, light.
     fn triangle(&mut self, t: [[f32; 5]; 3], colour: &impl Fn(f32, f32) -> [f32; 3]) {
         let [a, b, c] = t;
-        let (w, h) = (self.size[0] * FINE, self.size[1] * FINE);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area == 0.0 || !area.is_finite() {
             return;
         }
-        let span = |d: usize, end: usize| {
-            let (low, high) = (a[d].min(b[d]).min(c[d]), a[d].max(b[d]).max(c[d]));
-            let first = (low - 0.5).ceil().max(0.0) as usize;
-            (
-                first,
-                ((high - 0.5).floor() + 1.0).clamp(0.0, end as f32) as usize,
-            )
+        let (w, h) = (self.size[0] * FINE, self.size[1] * FINE);
+        let (top, bottom) = (a[1].min(b[1]).min(c[1]), a[1].max(b[1]).max(c[1]));
+        let (y0, y1) = samples(top, bottom, h);
+        // The weight of a corner is linear: how it grows with x and y, and its value at the corner a.
+        let weight = |p: [f32; 5], q: [f32; 5]| {
+            let (dx, dy) = ((p[1] - q[1]) / area, (q[0] - p[0]) / area);
+            (dx, dy, (a[0] - p[0]) * dx + (a[1] - p[1]) * dy)
         };
-        let ((x0, x1), (y0, y1)) = (span(0, w), span(1, h));
+        let weights = [weight(b, c), weight(c, a), weight(a, b)];
         for y in y0..y1 {
-            let py = y as f32 + 0.5;
-            for x in x0..x1 {
-                let px = x as f32 + 0.5;
-                let edge = |p: &[f32; 5], q: &[f32; 5]| {
-                    (q[0] - p[0]) * (py - p[1]) - (q[1] - p[1]) * (px - p[0])
-                };
-                let weight = [
-                    edge(&b, &c) / area,
-                    edge(&c, &a) / area,
-                    edge(&a, &b) / area,
-                ];
-                // A hair of overlap, so that no seam opens between neighbours.
-                if weight.iter().any(|v| *v < -1e-4) {
-                    continue;
+            let from_a = y as f32 + 0.5 - a[1];
+            let (mut left, mut right) = (f32::NEG_INFINITY, f32::INFINITY);
+            for (dx, dy, at_a) in weights {
+                // Where along the row the weight is zero, with a hair of overlap, so that no seam opens
+                // between neighbours.
+                let on_row = at_a + dy * from_a + 1e-4;
+                let zero = a[0] - on_row / dx;
+                match dx {
+                    d if d > 0.0 => left = left.max(zero),
+                    d if d < 0.0 => right = right.min(zero),
+                    _ if on_row < 0.0 => right = f32::NEG_INFINITY,
+                    _ => {}
                 }
-                let mix = |d: usize| weight[0] * a[d] + weight[1] * b[d] + weight[2] * c[d];
+            }
+            let (x0, x1) = samples(left, right, w);
+            for x in x0..x1 {
+                let along = x as f32 + 0.5 - a[0];
+                let [u, v, s] = weights.map(|(dx, dy, at_a)| at_a + dx * along + dy * from_a);
+                let mix = |d: usize| u * a[d] + v * b[d] + s * c[d];
                 let (depth, at) = (mix(2), y * w + x);
                 if depth > self.depth[at] {
                     self.depth[at] = depth;
@@ -326,6 +328,15 @@ impl Canvas {
         }
         out
     }
+}
+
+/// The samples of 0..`end` whose centres lie between `low` and `high`.
+fn samples(low: f32, high: f32, end: usize) -> (usize, usize) {
+    let first = (low - 0.5).ceil().max(0.0) as usize;
+    (
+        first,
+        ((high - 0.5).floor() + 1.0).clamp(0.0, end as f32) as usize,
+    )
 }
 
 /// Light at each point, from normals averaged over the triangles around it; both sides are lit.

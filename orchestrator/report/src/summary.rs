@@ -78,6 +78,7 @@ fn zone_table(study: &Study) -> String {
 fn defect_table(c: &Comparison) -> String {
     let rows: Vec<Vec<String>> = c
         .local()
+        .take(LONGEST)
         .map(|d| {
             vec![
                 d.id.clone(),

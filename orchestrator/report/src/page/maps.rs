@@ -1,10 +1,12 @@
 //! Maps of the plies.
 
 use crate::field::{Field, Legend};
+use crate::read::Ply;
 use crate::study::{Defect, Local, Study};
 use crate::units::quantity;
 use crate::view::{Mark, Overlay, Sharpness, flat, formed};
 use maud::{Markup, html};
+use rayon::prelude::*;
 
 /// Widths on the page (px).
 const FLAT: f64 = 560.0;
@@ -24,35 +26,23 @@ pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup
         zones: study.zones.as_deref().unwrap_or_default(),
         marks: &[],
     };
-    let mut blocks = Vec::new();
-    for legend in legends(study) {
-        let mut rows = Vec::new();
-        for ply in study
-            .plies
-            .iter()
-            .filter(|p| legend.field.at_points(p).is_some())
-        {
-            let plan = flat(ply, &legend, &overlay, FLAT, sharp)?;
-            let view = formed(
-                ply,
-                study.tool.as_ref(),
-                &legend,
-                &overlay,
-                FORMED,
-                sharp,
-                true,
-            )?;
-            rows.push((ply.name.clone(), plan, view));
-        }
-        if !rows.is_empty() {
-            let id = format!("scale-{n}-{}", legend.field.unit().replace('/', "-"));
-            blocks.push((
-                legend.field,
-                html! { (legend.bar(&id)) (legend.note()) },
-                rows,
-            ));
-        }
-    }
+    let legends = legends(study);
+    let has = |(l, p): &(&Legend, &Ply)| l.field.at_points(p).is_some();
+    let pairs = legends
+        .iter()
+        .flat_map(|l| study.plies.iter().map(move |p| (l, p)));
+    let pairs: Vec<(&Legend, &Ply)> = pairs.filter(has).collect();
+    let draw = |(legend, ply): &(&Legend, &Ply)| {
+        let tool = study.tool.as_ref();
+        let plan = flat(ply, legend, &overlay, FLAT, sharp)?;
+        let view = formed(ply, tool, legend, &overlay, FORMED, sharp, true)?;
+        Ok((legend.field, ply.name.clone(), plan, view))
+    };
+    let rows = pairs
+        .par_iter()
+        .map(draw)
+        .collect::<Result<Vec<_>, String>>()?;
+    let of = |field: Field| rows.iter().filter(move |r| r.0 == field);
     Ok(html! {
         section id={ "maps-" (n) } {
             h2 { "Maps of the global run" }
@@ -63,11 +53,12 @@ pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup
                     @if !overlay.zones.is_empty() { "; rectangles: the zones" }
                     ". Right: the formed ply on the tool." }
             }
-            @for (field, bar, rows) in &blocks {
+            @for legend in &legends {
                 div class="field" {
-                    h3 { (field.title()) }
-                    (bar)
-                    @for (name, plan, view) in rows {
+                    h3 { (legend.field.title()) }
+                    (legend.bar(&format!("scale-{n}-{}", legend.field.unit().replace('/', "-"))))
+                    (legend.note())
+                    @for (_, name, plan, view) in of(legend.field) {
                         div class="pair" {
                             figure class="map" { (plan) figcaption { (name) ", flat" } }
                             figure class="map" { (view) figcaption { (name) ", formed" } }
@@ -81,12 +72,17 @@ pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup
 
 /// Maps of the local runs, with their defects named.
 pub(super) fn local(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup, String> {
-    let shown = study.locals.iter().filter(|l| !l.plies.is_empty());
     let legends = legends(study);
-    let mut zones = Vec::new();
-    for local in shown {
-        zones.push(zone(study, local, &legends, sharp)?);
-    }
+    let shown: Vec<&Local> = study
+        .locals
+        .iter()
+        .filter(|l| !l.plies.is_empty())
+        .collect();
+    let draw = |local: &&Local| zone(study, local, &legends, sharp);
+    let zones = shown
+        .par_iter()
+        .map(draw)
+        .collect::<Result<Vec<_>, String>>()?;
     if zones.is_empty() {
         return Ok(html! {});
     }

@@ -103,7 +103,7 @@ const MEASURES: [Measure; 5] = [
         }
     }),
     ("amplitude (mm)", |d| fixed(d.amplitude * 1e3, 2)),
-    ("area (mm²)", |d| number(d.area * 1e6, 4)),
+    ("area (mm²)", |d| fixed(d.area * 1e6, 0)),
     ("max. curvature (1/mm)", |d| {
         fixed(d.curvature_max * 1e-3, 3)
     }),
