@@ -1,0 +1,119 @@
+//! The whole chain of real plugins on a part small enough for seconds: coarse run, defects, zones, local
+//! runs, comparison.
+
+use plyflow_e2e::{Ended, Study, repository, well};
+
+/// A flat block of 20 mm, two small plies, short phases: coarse enough that its numbers mean nothing.
+const SCENE: &str = "
+plyflow_scene: 1
+name: small
+tool: {flat: {length: 260 mm, width: 220 mm, height: 20 mm, fillet: 10 mm, facet_size: 10 mm}}
+sheets:
+  - {name: lower_film, kind: diaphragm, material: MATERIALS/stretchlon-ht350.yaml}
+  - {name: ply_1, kind: ply, material: MATERIALS/ncf-fcim359.yaml, length: 120 mm, width: 100 mm, fibre_1: -45 deg, fibre_2: 45 deg}
+  - {name: ply_2, kind: ply, material: MATERIALS/ncf-fcim359.yaml, length: 120 mm, width: 100 mm, fibre_1: -45 deg, fibre_2: 45 deg}
+  - {name: upper_film, kind: diaphragm, material: MATERIALS/stretchlon-ht350.yaml}
+friction: {tool_diaphragm: 0.5, fabric_diaphragm: 0.4, fabric_fabric: 0.35, diaphragm_diaphragm: 0.3}
+process:
+  double_diaphragm:
+    frame_length: 600 mm
+    frame_width: 560 mm
+    bag_pressure: 20 kPa
+    forming_pressure: 20 kPa
+    clearance: 5 mm
+    bagging_time: 10 ms
+    lowering_time: 20 ms
+    drawing_time: 20 ms
+    settling_time: 5 ms
+    film_pre_stretch: 0.01
+    film_joint_margin: 30 mm
+";
+
+/// `boxes`: zones drawn by hand, so that there is something to run locally.
+fn chain(boxes: &str) -> String {
+    format!(
+        "
+steps:
+  coarse:
+    plugin: forming-explicit
+    with: {{scene: scene.yaml, element: m4, element_size: 20 mm, frames: 20, tool_grid: 5 mm}}
+  defects: {{plugin: defect-detection, from: {{formed: coarse}}, with: {{distance_threshold: 20 mm}}}}
+  zones: {{plugin: zone-extraction, from: {{defects: defects}}, with: {{boxes: {boxes}}}}}
+  boundary:
+    plugin: boundary-interpolation
+    for_each: {{zone: zones}}
+    from: {{formed: coarse, zones: zones}}
+    with: {{element_size: 10 mm}}
+  local:
+    plugin: forming-explicit
+    for_each: {{zone: zones}}
+    from: {{boundary: boundary}}
+    with: {{scene: scene.yaml, element: rf4, frames: 20, tool_grid: 5 mm}}
+  comparison: {{plugin: comparison, from: {{global: coarse, zones: zones, local: local}}}}
+"
+    )
+}
+
+const TWO_ZONES: &str = "[[-60 mm, -50 mm, 0 mm, 50 mm], [10 mm, -50 mm, 60 mm, 50 mm]]";
+
+fn study(boxes: &str) -> Study {
+    let study = Study::new(&chain(boxes));
+    let materials = repository().join("workflows/materials");
+    let scene = SCENE.replace("MATERIALS", materials.to_str().expect("a UTF-8 path"));
+    std::fs::write(study.path("scene.yaml"), scene).expect("a scene");
+    study
+}
+
+#[test]
+fn without_defects_there_are_no_zones_and_no_local_runs_and_the_rest_ends_well() {
+    let study = study("[]");
+    assert_eq!(study.run(&[]), well(4, 0));
+    assert_eq!(study.values("zones", "zone_count"), [0.0]);
+    assert!(study.values("local", "cycles").is_empty());
+    assert!(study.values("coarse", "cycles")[0] > 0.0);
+    assert_eq!(study.run(&[]), well(0, 4));
+}
+
+#[test]
+fn another_element_runs_only_the_local_runs_and_the_comparison() {
+    let study = study(TWO_ZONES);
+    assert_eq!(study.run(&[]), well(3 + 2 + 2 + 1, 0));
+    assert_eq!(study.values("local", "cycles").len(), 2);
+    study.write(&chain(TWO_ZONES).replace("element: rf4", "element: m4"));
+    assert_eq!(study.run(&[]), well(2 + 1, 5));
+    // A threshold of the detection that changes no flag still changes its key, and all that follows.
+    study
+        .write(&chain(TWO_ZONES).replace("distance_threshold: 20 mm", "distance_threshold: 21 mm"));
+    let Ended { code, cached, .. } = study.run(&[]);
+    assert_eq!((code, cached), (Some(0), 1), "only the coarse run is kept");
+}
+
+#[test]
+fn the_whole_chain_has_the_same_bytes_with_one_and_with_two_cores() {
+    let (one, two) = (study(TWO_ZONES), study(TWO_ZONES));
+    assert_eq!(one.run(&["--jobs", "1"]), well(8, 0));
+    assert_eq!(two.run(&["--jobs", "2"]), well(8, 0));
+    let (one, two) = (one.artifacts(), two.artifacts());
+    assert_eq!(one.len(), 8);
+    assert!(one == two, "the artifacts differ");
+}
+
+#[test]
+fn the_same_length_in_other_units_is_the_same_run() {
+    let study = study("[]");
+    assert_eq!(study.run(&[]), well(4, 0));
+    study.write(
+        &chain("[]")
+            .replace("20 mm", "2.0 cm")
+            .replace("5 mm", "0.005 m"),
+    );
+    assert_eq!(study.run(&[]), well(0, 4));
+    let scene = study.path("scene.yaml");
+    let text = std::fs::read_to_string(&scene).unwrap();
+    std::fs::write(
+        &scene,
+        text.replace("20 kPa", "0.2 bar").replace("20 ms", "0.02 s"),
+    )
+    .unwrap();
+    assert_eq!(study.run(&[]), well(0, 4));
+}
