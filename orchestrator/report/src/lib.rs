@@ -31,7 +31,7 @@ use view::Sharpness;
 const LARGEST: usize = 4_500_000;
 
 /// Resolutions of the pictures that are tried, the finest first.
-const SHARPNESS: [f64; 4] = [1.35, 1.0, 0.7, 0.45];
+const SHARPNESS: [f64; 4] = [1.6, 1.2, 0.8, 0.5];
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]

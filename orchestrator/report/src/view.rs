@@ -18,6 +18,37 @@ pub(crate) struct Mark {
     pub(crate) at: [f64; 2],
 }
 
+/// The side from which a formed ply is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// From -y, x to the right.
+    Front,
+    /// From +y, x to the left.
+    Back,
+}
+
+impl Side {
+    /// The side to which most of the marked cells face (of all cells when none is marked).
+    pub(crate) fn facing(ply: &Ply) -> Self {
+        if faces_back(ply) {
+            Self::Back
+        } else {
+            Self::Front
+        }
+    }
+}
+
+/// How a formed ply is shown.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FormedView<'a> {
+    pub(crate) side: Side,
+    pub(crate) tool: Option<&'a Tool>,
+    /// Whether all of the tool must be on the picture, or the ply fills it.
+    pub(crate) whole_tool: bool,
+    /// Width on the page (px).
+    pub(crate) width: f64,
+}
+
 /// What is drawn over a ply.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Overlay<'a> {
@@ -131,25 +162,26 @@ fn plan_axes(ply: &Ply, page: &dyn Fn([f64; 2]) -> [f64; 2], h: f64) -> Markup {
     }
 }
 
-/// The formed ply on the tool, `width` px wide. The view is from the side where most of what is marked faces.
+/// The formed ply on the tool.
 ///
 /// # Errors
 /// When the picture cannot be encoded.
 pub(crate) fn formed(
     ply: &Ply,
-    tool: Option<&Tool>,
     legend: &Legend,
     overlay: &Overlay<'_>,
-    width: f64,
+    how: FormedView<'_>,
     sharp: Sharpness,
-    whole_tool: bool,
 ) -> Drawn {
     let Some(values) = legend.field.at_points(ply) else {
         return Ok(html! {});
     };
-    let front = !faces_back(ply);
+    let FormedView { tool, width, .. } = how;
+    let front = how.side == Side::Front;
     let azimuth = if front { -65f64 } else { 65f64 }.to_radians();
-    let around = tool.filter(|_| whole_tool).map_or(&[][..], |t| &t.points);
+    let around = tool
+        .filter(|_| how.whole_tool)
+        .map_or(&[][..], |t| &t.points);
     let camera = Camera::oblique(azimuth, 38f64.to_radians());
     let (camera, size) = sharp.image(camera, &ply.formed, around, [width, 0.72 * width]);
     let mut canvas = Canvas::new(size);

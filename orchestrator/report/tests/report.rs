@@ -80,8 +80,8 @@ fn a_whole_study_shows_every_section_in_one_file_without_network() {
         assert!(page.contains(&format!("id=\"{id}\"")), "section {id}");
         assert!(page.contains(&format!("href=\"#{id}\"")), "link to {id}");
     }
-    // 3 quantities on 2 plies, flat and formed; per zone and ply 3 flat and 1 formed.
-    assert_eq!(page.matches("data:image/png;base64,").count(), 12 + 16);
+    // 3 quantities on 2 plies, flat and formed from two sides; per zone and ply 3 flat and 1 formed.
+    assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 16);
     assert!(
         page.contains("2 zones; 2 wrinkles, longest 68.4 mm; 2 bridging areas; kinetic bound kept")
     );
@@ -176,7 +176,7 @@ fn local_runs_are_shown_without_a_comparison() {
     let page = page(&study.input(), &folder);
     assert!(page.contains("Zone A") && !page.contains("id=\"defects-0\""));
     // The shear alone is known of the local run: flat and formed, on two plies.
-    assert_eq!(page.matches("data:image/png;base64,").count(), 12 + 4);
+    assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 4);
 }
 
 #[test]

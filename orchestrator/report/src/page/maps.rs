@@ -4,14 +4,14 @@ use crate::field::{Field, Legend};
 use crate::read::Ply;
 use crate::study::{Defect, Local, Study};
 use crate::units::quantity;
-use crate::view::{Mark, Overlay, Sharpness, flat, formed};
+use crate::view::{FormedView, Mark, Overlay, Sharpness, Side, flat, formed};
 use maud::{Markup, html};
 use rayon::prelude::*;
 
 /// Widths on the page (px).
-const FLAT: f64 = 560.0;
-const FORMED: f64 = 600.0;
-const LOCAL: f64 = 380.0;
+const FLAT: f64 = 430.0;
+const FORMED: f64 = 430.0;
+const LOCAL: f64 = 340.0;
 
 fn legends(study: &Study) -> Vec<Legend> {
     Field::ALL.iter().filter_map(|f| f.legend(study)).collect()
@@ -33,10 +33,19 @@ pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup
         .flat_map(|l| study.plies.iter().map(move |p| (l, p)));
     let pairs: Vec<(&Legend, &Ply)> = pairs.filter(has).collect();
     let draw = |(legend, ply): &(&Legend, &Ply)| {
-        let tool = study.tool.as_ref();
         let plan = flat(ply, legend, &overlay, FLAT, sharp)?;
-        let view = formed(ply, tool, legend, &overlay, FORMED, sharp, true)?;
-        Ok((legend.field, ply.name.clone(), plan, view))
+        let view = |side| {
+            let tool = study.tool.as_ref();
+            let how = FormedView {
+                side,
+                tool,
+                whole_tool: true,
+                width: FORMED,
+            };
+            formed(ply, legend, &overlay, how, sharp)
+        };
+        let figures = [plan, view(Side::Front)?, view(Side::Back)?];
+        Ok((legend.field, ply.name.clone(), figures))
     };
     let rows = pairs
         .par_iter()
@@ -51,17 +60,18 @@ pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup
                     ". Left: the undeformed ply, axes in mm"
                     @if study.detection.is_some() { "; dotted: what the detection flagged" }
                     @if !overlay.zones.is_empty() { "; rectangles: the zones" }
-                    ". Right: the formed ply on the tool." }
+                    ". Right: the formed ply on the tool, from both sides." }
             }
             @for legend in &legends {
                 div class="field" {
                     h3 { (legend.field.title()) }
                     (legend.bar(&format!("scale-{n}-{}", legend.field.unit().replace('/', "-"))))
                     (legend.note())
-                    @for (_, name, plan, view) in of(legend.field) {
-                        div class="pair" {
-                            figure class="map" { (plan) figcaption { (name) ", flat" } }
-                            figure class="map" { (view) figcaption { (name) ", formed" } }
+                    @for (_, name, figures) in of(legend.field) {
+                        div class="triple" {
+                            @for (figure, what) in figures.iter().zip(["flat", "formed", "formed"]) {
+                                figure class="map" { (figure) figcaption { (name) ", " (what) } }
+                            }
                         }
                     }
                 }
@@ -137,15 +147,14 @@ fn zone(
             .find(|l| l.field == Field::Distance)
             .or(known().next());
         if let Some(legend) = legend {
-            let view = formed(
-                ply,
-                study.tool.as_ref(),
-                legend,
-                &overlay,
-                LOCAL,
-                sharp,
-                false,
-            )?;
+            let (side, tool) = (Side::facing(ply), study.tool.as_ref());
+            let how = FormedView {
+                side,
+                tool,
+                whole_tool: false,
+                width: LOCAL,
+            };
+            let view = formed(ply, legend, &overlay, how, sharp)?;
             figures.push((format!("{}, formed", legend.field.title()), view));
         }
         rows.push((ply.name.clone(), marks.len(), figures));
