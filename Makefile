@@ -21,7 +21,7 @@ build: ## build the program and the plugins into target/release
 
 demo: build ## run the joggle spar: coarse run, zones, local runs, report
 	$(PLYFLOW) run $(DEMO)
-	@echo 'report: $(dir $(DEMO))report.html'
+	@echo 'report: $(subst /workflow,/report,$(DEMO:.yaml=.html))'
 
 test: ## run all tests, also with VTK's own reader and a step in C
 	@scripts/setup tests
