@@ -4,7 +4,7 @@ use crate::contact::{ContactEnergy, ContactSettings, RigidContact, SheetContact,
 use crate::energy::Ledger;
 use crate::mesh::{QuadMesh, area_vector};
 use crate::sheet::*;
-use crate::vec3::{V, add, cross, dot, norm, scale, sub};
+use crate::vec3::{V, add, dot, norm, scale, sub};
 use crate::{LANES, MechanicsError};
 use plyflow_abi::*;
 use rayon::prelude::*;
@@ -148,6 +148,9 @@ impl NodeWork {
 }
 
 const NODE_CHUNK: usize = 1024;
+
+/// How often (steps) the nodes' normals and areas are computed.
+const NORMAL_INTERVAL: u64 = 16;
 
 impl Model {
     /// Builds a model from points (m, at their start) and sheets (from the tool upwards).
@@ -519,6 +522,7 @@ impl Model {
     fn internal_forces(&mut self, fields: bool) -> Result<(), MechanicsError> {
         let (sheets, x) = (&self.sheets, &self.x);
         let dt = if self.cycle == 0 { 0.0 } else { self.dt };
+        let (pressed, all) = (&self.pressed, self.cycle.is_multiple_of(NORMAL_INTERVAL));
         self.element_force
             .par_chunks_exact_mut(12 * LANES)
             .zip_eq(
@@ -527,9 +531,12 @@ impl Model {
             )
             .zip_eq(self.cell_area.par_chunks_exact_mut(AREA_ROWS * LANES))
             .zip_eq(self.batches.par_iter_mut())
+            .enumerate()
             .with_min_len(8)
-            .for_each(|(((force, energy), area), batch)| {
+            .for_each(|(b, (((force, energy), area), batch))| {
                 let sheet = &sheets[batch.sheet as usize];
+                let slots = &pressed[b * LANES..(b + 1) * LANES];
+                let area = (all || slots.iter().any(|w| *w != [0.0; 2])).then_some(area);
                 run_batch(sheet, batch, x, dt, force, energy, area, fields);
             });
         self.patches
@@ -553,6 +560,8 @@ impl Model {
 
     /// Sums element forces and pressure at the nodes, and the nodes' normals.
     fn assemble(&mut self) {
+        // Normals only tell the sides of contacts apart.
+        let with_normals = self.cycle.is_multiple_of(NORMAL_INTERVAL);
         let (p, slots, patch_slots) = (self.pressures, &self.node_slots, &self.patch_slots);
         let (element_force, cell_area, pressed) =
             (&*self.element_force, &*self.cell_area, &self.pressed);
@@ -576,10 +585,14 @@ impl Model {
                         let load = w[0] * p.below - w[1] * p.above;
                         let (sx, sy) = SIGNS[k];
                         for c in 0..3 {
-                            let row = |r: usize| cell_area[pa + (3 * r + c) * LANES];
                             f[c] -= element_force[at + c * LANES];
-                            a[c] += row(0);
-                            q[c] += load * (row(0) + sx * row(1) + sy * row(2));
+                        }
+                        if load != 0.0 || with_normals {
+                            for c in 0..3 {
+                                let row = |r: usize| cell_area[pa + (3 * r + c) * LANES];
+                                a[c] += row(0);
+                                q[c] += load * (row(0) + sx * row(1) + sy * row(2));
+                            }
                         }
                     }
                     for entry in patch_slots.of(node) {
@@ -592,8 +605,10 @@ impl Model {
                     }
                     force[i] = add(f, q);
                     pressure[i] = q;
-                    area[i] = a;
-                    normal[i] = crate::vec3::unit(a);
+                    if with_normals {
+                        area[i] = a;
+                        normal[i] = crate::vec3::unit(a);
+                    }
                 }
             });
     }
@@ -930,23 +945,47 @@ const SIGNS: [(f64, f64); 4] = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.
 #[inline(always)]
 fn cell_areas(p: &[f64; 12 * LANES], area: &mut [f64]) {
     let area = &mut area[..AREA_ROWS * LANES];
-    for l in 0..LANES {
-        let at = |k: usize, c: usize| 0.25 * p[(3 * k + c) * LANES + l];
-        let sum = |s: [f64; 4]| -> V {
-            std::array::from_fn(|c| {
-                s[0] * at(0, c) + s[1] * at(1, c) + s[2] * at(2, c) + s[3] * at(3, c)
-            })
-        };
-        let c1 = sum([-1.0, 1.0, 1.0, -1.0]);
-        let c2 = sum([-1.0, -1.0, 1.0, 1.0]);
-        let c3 = sum([1.0, -1.0, 1.0, -1.0]);
-        let (u, v, w) = (cross(c1, c2), cross(c1, c3), cross(c3, c2));
-        for c in 0..3 {
-            area[c * LANES + l] = u[c];
-            area[(3 + c) * LANES + l] = v[c] / 3.0;
-            area[(6 + c) * LANES + l] = w[c] / 3.0;
+    let row = |k: usize, c: usize| &p[(3 * k + c) * LANES..(3 * k + c + 1) * LANES];
+    let mut c = [[[0.0; LANES]; 3]; 3];
+    for k in 0..3 {
+        let (x0, x1, x2, x3) = (row(0, k), row(1, k), row(2, k), row(3, k));
+        for l in 0..LANES {
+            let (d, e) = (0.25 * (x2[l] - x0[l]), 0.25 * (x3[l] - x1[l]));
+            c[0][k][l] = d - e;
+            c[1][k][l] = d + e;
+            c[2][k][l] = 0.25 * (x0[l] - x1[l] + x2[l] - x3[l]);
         }
     }
+    for (r, (i, j, share)) in [(0, 1, 1.0), (0, 2, 1.0 / 3.0), (2, 1, 1.0 / 3.0)]
+        .into_iter()
+        .enumerate()
+    {
+        let (a, b) = (&c[i], &c[j]);
+        for k in 0..3 {
+            let (m, n) = ((k + 1) % 3, (k + 2) % 3);
+            let out = &mut area[(3 * r + k) * LANES..(3 * r + k + 1) * LANES];
+            for l in 0..LANES {
+                out[l] = share * (a[m][l] * b[n][l] - a[n][l] * b[m][l]);
+            }
+        }
+    }
+}
+
+/// [`cell_areas`] with the machine's widest vectors; no fused operations, so the bits are the same on all.
+#[inline]
+fn cell_areas_dispatch(p: &[f64; 12 * LANES], area: &mut [f64]) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn wide(p: &[f64; 12 * LANES], area: &mut [f64]) {
+            cell_areas(p, area);
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // Checked the line above.
+            return unsafe { wide(p, area) };
+        }
+    }
+    cell_areas(p, area);
 }
 
 fn run_batch(
@@ -956,13 +995,15 @@ fn run_batch(
     dt: f64,
     force: &mut [f64],
     energy: &mut [f64],
-    area: &mut [f64],
+    area: Option<&mut [f64]>,
     fields: bool,
 ) {
     let mut position = Buffer([0.0; 12 * LANES]);
     gather(&batch.nodes, x, &mut position.0);
     let p = &position.0;
-    cell_areas(p, area);
+    if let Some(area) = area {
+        cell_areas_dispatch(p, area);
+    }
     let mut raw = empty_element_batch(sheet, dt, p);
     raw.constants = batch.constants.as_mut_ptr();
     raw.history = batch.history.as_mut_ptr();

@@ -20,6 +20,10 @@ pub struct SlaveItem {
     pub cell: u32,
     sleep: u32,
     turn: u8,
+    /// The last search found one cell, on the slave's own side.
+    plain: bool,
+    /// Direction from master to slave at the last search.
+    direction: V,
     /// In touch in the last step.
     pub active: bool,
     /// Place in the cell, -1..1.
@@ -57,7 +61,10 @@ impl SlaveItem {
             node,
             cell,
             sleep: 0,
-            turn: 0,
+            // Spread over the nodes, so that every step searches for its share of them.
+            turn: (node % SEARCH_INTERVAL as u32) as u8,
+            plain: false,
+            direction: [0.0; 3],
             active: false,
             xi,
             stiffness: 0.0,
@@ -79,6 +86,7 @@ impl SlaveItem {
 
     fn part(&mut self) {
         self.active = false;
+        self.plain = false;
         self.multiplier = 0.0;
         self.work = 0.0;
         self.second = NONE;
@@ -89,6 +97,10 @@ impl SlaveItem {
         self.energy = ContactEnergy::default();
     }
 }
+
+/// How often (steps) the closest point of a slave in touch is searched anew. In between it keeps its place in the
+/// cell: it slides by some micrometres, which changes the distance by less than a nanometre.
+const SEARCH_INTERVAL: u8 = 4;
 
 /// Slaves of one sheet on one master sheet.
 pub struct SheetContact {
@@ -242,7 +254,7 @@ fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
 fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Found {
     let mut best = closest(s, item.cell, item.xi, p, iterations);
     let mut second: Option<Closest> = None;
-    let careful = item.second != NONE || item.turn.is_multiple_of(8);
+    let careful = item.second != NONE || item.turn.is_multiple_of(8) || !item.active;
     for _ in 0..12 {
         let near = s.neighbours[best.cell as usize];
         let band = 1.0 - (best.distance2.sqrt() / best.half).min(0.5);
@@ -327,6 +339,10 @@ impl SheetContact {
                 }
                 let n = item.node as usize;
                 item.turn = item.turn.wrapping_add(1);
+                if item.active && item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
+                    hold(item, s, v, offset, &law);
+                    return;
+                }
                 // In touch, the place moves by far less than a cell in a step: one iteration follows it.
                 let found = track(s, item, s.x[n], if item.active { 1 } else { 3 });
                 let first = &found.first;
@@ -339,6 +355,7 @@ impl SheetContact {
                 // own side, it is so too; a slave whose mid-surface has just passed through the master's has a
                 // negative one. Anything else lies beyond a fold.
                 let at_rim = first.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM);
+                let mut plain = false;
                 let pull = if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
                     let (d, w) = blend(first, found.second.as_ref(), offset);
                     let n = scale(first.arm, (1.0 - w) / distance);
@@ -346,6 +363,7 @@ impl SheetContact {
                         Some(c) if w > 0.0 => scale(c.arm, w / c.distance2.sqrt()),
                         _ => [0.0; 3],
                     };
+                    plain = w == 0.0 && !at_rim;
                     Pull {
                         gap: d - offset,
                         share: w,
@@ -371,6 +389,8 @@ impl SheetContact {
                     item.part();
                     item.sleep = (pull.gap.max(0.0) / reach).min(50.0) as u32;
                 } else {
+                    item.plain = plain;
+                    item.direction = pull.first;
                     touch(item, s, v, &pull, &found, &law);
                 }
             });
@@ -410,6 +430,42 @@ struct Pull {
     share: f64,
     first: V,
     second: V,
+}
+
+/// Force of a slave that keeps its place in its cell and its direction. (The distance to a point that stands
+/// still would not do: pressed at a tenth of a millimetre from it, the slave is a pendulum on its head.)
+#[inline]
+fn hold(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], offset: f64, law: &Law) {
+    let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
+    let arm = sub(s.x[item.node as usize], combine(item.weights, &x));
+    let n = item.direction;
+    let pull = Pull {
+        gap: dot(arm, n) - offset,
+        share: 0.0,
+        first: n,
+        second: [0.0; 3],
+    };
+    let (cell, xi, weights) = (item.cell, item.xi, item.weights);
+    let first = Closest {
+        cell,
+        xi,
+        weights,
+        arm,
+        distance2: 0.0,
+        half: 0.0,
+        interior: true,
+    };
+    touch(
+        item,
+        s,
+        v,
+        &pull,
+        &Found {
+            first,
+            second: None,
+        },
+        law,
+    );
 }
 
 struct Law {
