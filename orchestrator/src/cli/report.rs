@@ -1,6 +1,6 @@
 //! `report`, and the report and summary at the end of a run.
 
-use super::args::ReportArgs;
+use super::args::{ReportArgs, Workflow};
 use super::open::{Opened, open};
 use super::results::{Row, records, rows};
 use super::{Done, Stop, print};
@@ -30,7 +30,7 @@ pub fn report(args: &ReportArgs) -> Done {
         .output
         .clone()
         .unwrap_or_else(|| beside(&opened.workflow.file));
-    let input = input(&opened, &session, &found, &[], &args.workflow.workflow);
+    let input = input(&opened, &session, &found, &[], &args.workflow);
     let bytes = write_report(&input, &path).map_err(|e| Stop::new(exit::INTERNAL, e))?;
     print(&format!("{path}: {}\n", super::table::bytes(bytes)))
 }
@@ -95,13 +95,38 @@ pub fn is_written(path: &Utf8Path, fingerprint: &str) -> bool {
     is_current(path, fingerprint)
 }
 
-/// All that a report or a summary is made of. `given`: the workflow file as the user wrote it.
+/// The command that makes the results of a workflow again, as one types it.
+fn command(given: &Workflow) -> String {
+    let mut words = vec![
+        "plyflow".to_owned(),
+        "run".into(),
+        given.workflow.to_string(),
+    ];
+    let places = &given.places;
+    let folders = places.plugins.iter().map(|p| ("--plugins", p.as_str()));
+    let store = places.store.iter().map(|p| ("--store", p.as_str()));
+    let set = given.set.iter().map(|s| ("--set", s.as_str()));
+    for (option, value) in set.chain(store).chain(folders) {
+        words.extend([option.to_owned(), value.to_owned()]);
+    }
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+    let quoted = |w: &String| {
+        if !w.is_empty() && w.chars().all(plain) {
+            w.clone()
+        } else {
+            format!("'{}'", w.replace('\'', "'\\''"))
+        }
+    };
+    words.iter().map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+/// All that a report or a summary is made of. `given`: the workflow as the user asked for it.
 pub fn input(
     opened: &Opened,
     session: &Session<'_>,
     found: &Found,
     failures: &[Failure],
-    given: &Utf8Path,
+    given: &Workflow,
 ) -> ReportInput {
     let core = &session.core;
     let instance = |(id, record): &(Id, Record)| {
@@ -136,8 +161,8 @@ pub fn input(
     ReportInput {
         workflow: opened.workflow.name.clone(),
         description: opened.workflow.description.clone(),
-        file: given.to_owned(),
-        command: format!("plyflow run {given}"),
+        file: given.workflow.clone(),
+        command: command(given),
         program: format!("plyflow {}", env!("CARGO_PKG_VERSION")),
         fingerprint: fingerprint(opened, session, failures),
         instances: found.records.iter().map(instance).collect(),
@@ -153,6 +178,17 @@ pub fn input(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_command_of_a_report_repeats_overrides_so_that_a_shell_takes_them() {
+        let given = Workflow {
+            workflow: "a/workflow.yaml".into(),
+            places: super::super::args::Places::default(),
+            set: vec!["detect.over_shear_positive=9 deg".into(), "a.b=it's".into()],
+        };
+        let expected = "plyflow run a/workflow.yaml --set 'detect.over_shear_positive=9 deg' --set 'a.b=it'\\''s'";
+        assert_eq!(command(&given), expected);
+    }
 
     #[test]
     fn workflows_of_one_folder_have_reports_of_their_own() {

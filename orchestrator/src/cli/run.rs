@@ -180,8 +180,7 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         return Ok(());
     }
     let found = report::Found::read(session);
-    let given = &args.workflow.workflow;
-    let input = report::input(opened, session, &found, &summary.failures, given);
+    let input = report::input(opened, session, &found, &summary.failures, &args.workflow);
     let mut written = path.clone();
     if let Some(path) = stale
         && let Err(e) = plyflow_report::write_report(&input, path)
