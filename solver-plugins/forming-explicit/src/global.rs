@@ -263,7 +263,8 @@ fn top_film(
         }
     }
     let high = at.bottom_z + top.offset - bottom.offset;
-    let low = at.bottom_z + 0.5 * (bottom.thickness + top.thickness);
+    let low =
+        at.bottom_z + (0.5 * (bottom.thickness + top.thickness)).max(assembly::LEAST_FILM_DISTANCE);
     let over = grown(at.all_plies, 1.01 * at.film_size);
     let mut local = vec![u32::MAX; mesh.points.len()];
     let (mut nodes, mut slaves) = (Vec::new(), Vec::new());
