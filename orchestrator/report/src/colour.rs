@@ -79,17 +79,22 @@ impl Scale {
     }
 }
 
-/// The end of a scale that shows all but the largest few per mille of the sizes in `values`, at least
-/// `least`, rounded up to 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten of the unit `per` (a factor from SI).
-pub(crate) fn end_of_scale(values: impl Iterator<Item = f64>, least: f64, per: f64) -> f64 {
+/// The end of a scale that shows the part `quantile` of the sizes in `values`, at least `least`, rounded up to
+/// 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten of the unit `per` (a factor from SI).
+pub(crate) fn end_of_scale(
+    values: impl Iterator<Item = f64>,
+    quantile: f64,
+    least: f64,
+    per: f64,
+) -> f64 {
     let mut sizes: Vec<f64> = values.map(f64::abs).filter(|v| v.is_finite()).collect();
-    let at = ((sizes.len() as f64 * 0.995) as usize).min(sizes.len().saturating_sub(1));
-    let quantile = if sizes.is_empty() {
+    let at = ((sizes.len() as f64 * quantile) as usize).min(sizes.len().saturating_sub(1));
+    let size = if sizes.is_empty() {
         0.0
     } else {
         *sizes.select_nth_unstable_by(at, f64::total_cmp).1
     };
-    let value = quantile.max(least).max(1e-12) * per;
+    let value = size.max(least).max(1e-12) * per;
     let power = 10f64.powf(value.log10().floor());
     let steps = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
     let step = steps
@@ -137,7 +142,7 @@ mod tests {
     #[test]
     fn scales_end_at_round_numbers_and_ignore_a_few_outliers() {
         let values = (0..1000).map(|i| if i == 7 { 1.0 } else { 0.0023 });
-        assert_eq!(end_of_scale(values, 0.0, 1e3), 0.003);
-        assert_eq!(end_of_scale(std::iter::empty(), 0.002, 1e3), 0.002);
+        assert_eq!(end_of_scale(values, 0.995, 0.0, 1e3), 0.003);
+        assert_eq!(end_of_scale(std::iter::empty(), 0.995, 0.002, 1e3), 0.002);
     }
 }

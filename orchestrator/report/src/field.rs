@@ -118,7 +118,7 @@ impl Field {
         let limits = self.limits(study);
         let scale = match self {
             Self::Shear => {
-                let end = end_of_scale(values, 0.02, factor);
+                let end = end_of_scale(values, 0.995, 0.02, factor);
                 Scale {
                     palette: Palette::BlueRed,
                     low: -end,
@@ -126,7 +126,8 @@ impl Field {
                 }
             }
             Self::Curvature => {
-                let end = end_of_scale(values, 10.0, factor);
+                // Crests of the finest mesh are narrow; a scale that shows their peaks leaves the part pale.
+                let end = end_of_scale(values, 0.97, 10.0, factor);
                 Scale {
                     palette: Palette::PurpleOrange,
                     low: -end,
@@ -136,7 +137,7 @@ impl Field {
             Self::Distance => {
                 // Edges that hang in the air stand centimetres off; a scale that shows them hides all else.
                 let threshold = limits.first().copied().unwrap_or(1e-3);
-                let end = end_of_scale(values, 2.0 * threshold, factor).min(8.0 * threshold);
+                let end = end_of_scale(values, 0.995, 2.0 * threshold, factor).min(8.0 * threshold);
                 Scale {
                     palette: Palette::Viridis,
                     low: 0.0,

@@ -187,6 +187,31 @@ pub(crate) fn tool(path: &Utf8Path) -> Result<Option<Tool>, String> {
     Ok(Some(Tool { points, mesh }))
 }
 
+/// What is wrong with a cell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum Marked {
+    /// Nothing.
+    #[default]
+    No,
+    /// It lies on a wrinkle.
+    Wrinkle,
+    /// It bridges, or a detection flagged it.
+    Other,
+}
+
+impl Marked {
+    /// Of a cell by the codes of its nodes (1 wrinkle, 2 bridging): it lies on a defect when half of its nodes do.
+    fn of_nodes(codes: [f64; 4]) -> Self {
+        let wrinkle = codes.iter().filter(|c| (0.5..1.5).contains(*c)).count();
+        let any = codes.iter().filter(|c| **c > 0.5).count();
+        match (wrinkle, any) {
+            (2.., _) => Self::Wrinkle,
+            (_, 2..) => Self::Other,
+            _ => Self::No,
+        }
+    }
+}
+
 /// A formed ply. Fields are absent when the artifact does not have them.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ply {
@@ -203,7 +228,7 @@ pub(crate) struct Ply {
     /// Principal curvature of largest magnitude per point (1/m).
     pub(crate) curvature: Option<Vec<f64>>,
     /// Cells that the detection flagged, or that lie on a defect.
-    pub(crate) marked: Vec<bool>,
+    pub(crate) marked: Vec<Marked>,
 }
 
 fn last_frame(artifact: &Artifact) -> Result<u64, String> {
@@ -242,13 +267,15 @@ pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Value, Ply)>, String>
         let flat = read(On::Points, "undeformed")
             .ok_or_else(|| format!("body '{}' has no field 'undeformed'", body.name))?;
         let marked = match (read(On::Cells, "flag"), read(On::Points, "defect")) {
-            (Some(flag), _) => flag.iter().map(|f| *f > 0.5).collect(),
-            // A cell lies on a defect when half of its nodes do.
-            (None, Some(d)) => {
-                let on = |c: &[u32; 4]| c.iter().filter(|i| d[**i as usize] > 0.5).count() >= 2;
-                cells.iter().map(on).collect()
+            (Some(flag), _) => {
+                let of = |f: &f64| if *f > 0.5 { Marked::Other } else { Marked::No };
+                flag.iter().map(of).collect()
             }
-            _ => vec![false; cells.len()],
+            (None, Some(d)) => cells
+                .iter()
+                .map(|c| Marked::of_nodes(c.map(|i| d[i as usize])))
+                .collect(),
+            _ => vec![Marked::No; cells.len()],
         };
         let ply = Ply {
             name: body.attributes["ply"]
@@ -285,7 +312,7 @@ pub(crate) fn formed_plies(path: &Utf8Path, names: &[String]) -> Result<Vec<Ply>
             shear: artifact
                 .frame_field(name, frame, On::Cells, "shear_angle")
                 .ok(),
-            marked: vec![false; cells.len()],
+            marked: vec![Marked::No; cells.len()],
             cells,
             ..Ply::default()
         })
@@ -297,5 +324,18 @@ impl Ply {
     /// Its cells as triangles.
     pub(crate) fn triangles(&self) -> Triangles {
         Triangles::new(self.flat.len(), self.cells.as_flattened(), 4)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_lies_on_what_half_of_its_nodes_lie_on() {
+        assert_eq!(Marked::of_nodes([0.0, 1.0, 0.0, 0.0]), Marked::No);
+        assert_eq!(Marked::of_nodes([0.0, 1.0, 1.0, 0.0]), Marked::Wrinkle);
+        assert_eq!(Marked::of_nodes([2.0, 1.0, 1.0, 2.0]), Marked::Wrinkle);
+        assert_eq!(Marked::of_nodes([2.0, 0.0, 1.0, 0.0]), Marked::Other);
     }
 }

@@ -4,7 +4,7 @@ use crate::colour::Rgb;
 use crate::field::Legend;
 use crate::locate::{Locator, bounds};
 use crate::raster::{Camera, Canvas, Paint, Vec3};
-use crate::read::{Ply, Tool};
+use crate::read::{Marked, Ply, Tool};
 use crate::study::Zone;
 use crate::units::number;
 use maud::{Markup, html};
@@ -121,14 +121,20 @@ pub(crate) fn flat(
         [AXES[0] + x / sharp.0, y / sharp.0]
     };
     let (w, h) = (size[0] as f64 / sharp.0, size[1] as f64 / sharp.0);
-    let marked = marked_outline(ply, &page);
+    let marks = [
+        (Marked::Other, "marked"),
+        (Marked::Wrinkle, "marked wrinkle"),
+    ];
+    let marks = marks.map(|(kind, class)| (class, marked_outline(ply, kind, &page)));
     let what = format!("{}, flat ply {}", legend.field.title(), ply.name);
     Ok(html! {
         svg viewBox={ "0 0 " (px(width)) " " (px(h + AXES[1])) } role="img" aria-label=(what) {
             image href=(image) x=(AXES[0]) y="0" width=(px(w)) height=(px(h)) {}
             (plan_axes(ply, &page, h))
-            path class="marked-halo" d=(marked) {}
-            path class="marked" d=(marked) {}
+            @for (class, path) in marks.iter().filter(|m| !m.1.is_empty()) {
+                path class="marked-halo" d=(path) {}
+                path class=(class) d=(path) {}
+            }
             @for zone in overlay.zones {
                 @let [x0, y1] = page([zone.bounds[0], zone.bounds[1]]);
                 @let [x1, y0] = page([zone.bounds[2], zone.bounds[3]]);
@@ -299,10 +305,10 @@ impl View<'_> {
 
 /// Whether more of the marked cells (of all cells when none is marked) face +y than -y.
 fn faces_back(ply: &Ply) -> bool {
-    let any = ply.marked.iter().any(|m| *m);
+    let any = ply.marked.iter().any(|m| *m != Marked::No);
     let mut sum = 0.0;
     for (cell, marked) in ply.cells.iter().zip(&ply.marked) {
-        if any && !marked {
+        if any && *marked == Marked::No {
             continue;
         }
         let [a, b, c, d] = cell.map(|i| ply.formed[i as usize]);
@@ -347,10 +353,11 @@ fn label(text: &str, at: [f64; 2], class: &str, anchor: &str) -> Markup {
     html! { text class={ "label " (class) } x=(px(at[0])) y=(px(at[1])) text-anchor=(anchor) { (text) } }
 }
 
-/// The edges between marked and unmarked cells, as an SVG path.
-fn marked_outline(ply: &Ply, page: &dyn Fn([f64; 2]) -> [f64; 2]) -> String {
+/// The edges around the cells of a kind, as an SVG path.
+fn marked_outline(ply: &Ply, kind: Marked, page: &dyn Fn([f64; 2]) -> [f64; 2]) -> String {
     let mut edges: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-    for (cell, _) in ply.cells.iter().zip(&ply.marked).filter(|(_, m)| **m) {
+    let cells = ply.cells.iter().zip(&ply.marked);
+    for (cell, _) in cells.filter(|(_, m)| **m == kind) {
         for k in 0..4 {
             let (a, b) = (cell[k], cell[(k + 1) % 4]);
             *edges.entry((a.min(b), a.max(b))).or_default() += 1;

@@ -99,7 +99,7 @@ pub(super) fn local(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup,
     Ok(html! {
         section id={ "local-" (n) } {
             h2 { "Local runs" }
-            p { "Colours as in the maps of the global run. Dotted: wrinkles (W) and bridging (B) with their id in the table of defects." }
+            p { "Colours as in the maps of the global run. Solid outlines: wrinkles (W), dotted: bridging (B), with their id in the table of defects." }
             div class="bars-row" {
                 @for (k, legend) in legends.iter().enumerate() {
                     div { p class="note" { (legend.field.title()) " (" (legend.unit()) ")" } (legend.bar(&format!("local-scale-{n}-{k}"))) }
