@@ -1097,3 +1097,77 @@ fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32, f64)> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volume enclosed by bilinear cells: a third of the flux of x, by 2 x 2 Gauss points (exact).
+    fn volume(points: &[V], cells: &[[u32; 4]]) -> f64 {
+        let g = 1.0 / 3.0f64.sqrt();
+        let mut sum = 0.0;
+        for cell in cells {
+            let p = cell.map(|n| points[n as usize]);
+            for (a, b) in [(-g, -g), (g, -g), (g, g), (-g, g)] {
+                let at = |w: [f64; 4]| -> V {
+                    std::array::from_fn(|c| (0..4).map(|k| w[k] * p[k][c]).sum())
+                };
+                let w = crate::contact::shape([a, b]);
+                let (wa, wb) = ((1.0 - b, 1.0 + b), (1.0 - a, 1.0 + a));
+                let tx = at([-wa.0, wa.0, wa.1, -wa.1].map(|w| 0.25 * w));
+                let ty = at([-wb.0, -wb.1, wb.1, wb.0].map(|w| 0.25 * w));
+                sum += dot(at(w), crate::vec3::cross(tx, ty)) / 3.0;
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn pressure_weights_are_the_gradient_of_the_enclosed_volume() {
+        // A cube of six warped quads.
+        let mut points: Vec<V> = (0..8)
+            .map(|i| [(i & 1) as f64, ((i >> 1) & 1) as f64, (i >> 2) as f64])
+            .collect();
+        for (i, p) in points.iter_mut().enumerate() {
+            for (c, v) in p.iter_mut().enumerate() {
+                *v += 0.2 * (((i * 5 + c * 3) % 7) as f64 / 7.0 - 0.5);
+            }
+        }
+        let cells: [[u32; 4]; 6] = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let mut gradient = [[0.0; 3]; 8];
+        let mut nodes = [[0u32; 4]; LANES];
+        nodes[..6].copy_from_slice(&cells);
+        let mut position = [0.0; 12 * LANES];
+        gather(&nodes, &points, &mut position);
+        let mut area = vec![0.0; AREA_ROWS * LANES];
+        cell_areas(&position, &mut area);
+        for (l, cell) in cells.iter().enumerate() {
+            for k in 0..4 {
+                let (sx, sy) = SIGNS[k];
+                for c in 0..3 {
+                    let row = |r: usize| area[(3 * r + c) * LANES + l];
+                    gradient[cell[k] as usize][c] += row(0) + sx * row(1) + sy * row(2);
+                }
+            }
+        }
+        let h = 1e-6;
+        for n in 0..8 {
+            for c in 0..3 {
+                let at = |d: f64| {
+                    let mut q = points.clone();
+                    q[n][c] += d;
+                    volume(&q, &cells)
+                };
+                let slope = (at(h) - at(-h)) / (2.0 * h);
+                assert!((slope - gradient[n][c]).abs() < 1e-8, "node {n}, {c}");
+            }
+        }
+    }
+}

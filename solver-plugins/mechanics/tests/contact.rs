@@ -1,0 +1,197 @@
+//! Contact against what it must be: gradients of its own energy, balance, Coulomb's law.
+
+use plyflow_mechanics::contact::{
+    RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem, Surface,
+};
+use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
+use std::sync::Arc;
+
+const OFFSET: f64 = 4e-4;
+
+/// Two by two cells of 8 mm, folded along x = 0 by `fold` (rad, positive: a valley) and warped a little; one
+/// slave above at `place` and `height` over the middle line of the fold.
+fn scene(fold: f64, place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
+    let axis = [-0.008, 0.0, 0.008];
+    let mut mesh = QuadMesh::grid(&axis, &axis);
+    for (i, p) in mesh.points.iter_mut().enumerate() {
+        p[2] = p[0].abs() * (0.5 * fold).tan() + 1e-5 * ((i * 7) % 5) as f64;
+    }
+    let mut x = mesh.points.clone();
+    let ground = place[0].abs() * (0.5 * fold).tan();
+    x.push([place[0], place[1], ground + height]);
+    (mesh, x)
+}
+
+fn contact(slave: u32, cell: u32) -> SheetContact {
+    let mut item = SlaveItem::new(slave, cell, [0.0; 2]);
+    item.stiffness = 1e5;
+    SheetContact {
+        name: "test".into(),
+        side: 1.0,
+        offset: OFFSET,
+        friction: 0.0,
+        slip_factor: 0.5,
+        augmentation: 0.0,
+        items: vec![item],
+    }
+}
+
+/// Energy (J) and forces (N) of a fresh contact.
+fn evaluate(mesh: &QuadMesh, x: &[V], cell: u32) -> (f64, Vec<V>) {
+    let normals = vec![[0.0, 0.0, 1.0]; x.len()];
+    let neighbours = mesh.neighbours();
+    let surface = Surface {
+        cells: &mesh.cells,
+        neighbours: &neighbours,
+        x,
+        normals: &normals,
+    };
+    let mut c = contact(x.len() as u32 - 1, cell);
+    let v = vec![[0.0; 3]; x.len()];
+    let mut energy = 0.0;
+    // The first search starts afar; the second is at the place.
+    for _ in 0..2 {
+        energy = c.compute(&surface, &v, 1e-6, 1.0).stored;
+    }
+    let mut f = vec![[0.0; 3]; x.len()];
+    c.scatter(&mesh.cells, &mut f);
+    (energy, f)
+}
+
+fn gradient_error(fold: f64, place: [f64; 2], height: f64) -> f64 {
+    let (mesh, x) = scene(fold, place, height);
+    let (energy, f) = evaluate(&mesh, &x, 0);
+    assert!(energy > 0.0, "not in touch at {place:?}");
+    let size = norm(*f.last().unwrap());
+    let h = 1e-8;
+    let mut worst = 0.0f64;
+    for n in 0..x.len() {
+        for c in 0..3 {
+            let at = |d: f64| {
+                let mut y = x.clone();
+                y[n][c] += d;
+                evaluate(&mesh, &y, 0).0
+            };
+            let slope = (at(h) - at(-h)) / (2.0 * h);
+            worst = worst.max((f[n][c] + slope).abs() / size);
+        }
+    }
+    worst
+}
+
+#[test]
+fn force_is_the_gradient_of_its_energy_inside_cells_and_on_ridges() {
+    for (fold, place) in [
+        (0.0, [0.003, 0.002]),
+        (0.4, [0.004, -0.003]),
+        (-0.5, [0.003, 0.001]),
+        (-0.5, [0.00001, 0.001]),
+        (0.4, [-0.005, 0.006]),
+    ] {
+        let error = gradient_error(fold, place, 0.8 * OFFSET);
+        assert!(error < 1e-4, "fold {fold} at {place:?}: {error}");
+    }
+}
+
+#[test]
+fn force_is_the_gradient_of_its_energy_in_a_valley_but_for_the_turn_of_the_fold() {
+    // The width of the blend follows the fold; its change is left out of the gradient.
+    for x in [0.0, 5e-6, -8e-6, 2e-5] {
+        let error = gradient_error(0.5, [x, 0.001], 0.8 * OFFSET);
+        assert!(error < 0.02, "at {x}: {error}");
+    }
+}
+
+#[test]
+fn force_turns_smoothly_across_a_valley() {
+    let sideways = |x: f64| {
+        let (mesh, points) = scene(0.5, [x, 0.001], 0.8 * OFFSET);
+        let f = evaluate(&mesh, &points, 0).1;
+        f.last().unwrap()[0] / norm(*f.last().unwrap())
+    };
+    let steps: Vec<f64> = (-60..=60).map(|i| sideways(i as f64 * 1e-6)).collect();
+    let jump = steps
+        .windows(2)
+        .map(|p| (p[1] - p[0]).abs())
+        .fold(0.0, f64::max);
+    let whole = (steps[0] - steps[120]).abs();
+    assert!(whole > 0.4, "the fold is crossed: {whole}");
+    assert!(jump < 0.05 * whole, "largest jump {jump} of {whole}");
+}
+
+#[test]
+fn forces_and_moments_balance() {
+    for (fold, x) in [(0.0, 0.003), (0.5, 1e-5), (-0.5, 1e-5), (0.3, 0.002)] {
+        let (mesh, points) = scene(fold, [x, 0.001], 0.7 * OFFSET);
+        let (_, f) = evaluate(&mesh, &points, 3);
+        let force = f.iter().fold([0.0; 3], |a, b| add(a, *b));
+        let moment = f
+            .iter()
+            .zip(&points)
+            .fold([0.0; 3], |a, (f, p)| add(a, cross(*p, *f)));
+        let size = norm(*f.last().unwrap());
+        assert!(size > 0.0);
+        assert!(norm(force) < 1e-12 * size);
+        assert!(norm(moment) < 1e-9 * size, "fold {fold}: {moment:?}");
+    }
+}
+
+struct Incline {
+    normal: V,
+}
+
+impl RigidSurface for Incline {
+    fn distance(&self, p: V) -> (f64, V) {
+        (dot(p, self.normal), self.normal)
+    }
+}
+
+/// Slides a point mass for 0.1 s down a plane of the given angle; distance (m) along it.
+fn slide(angle: f64, friction: f64) -> f64 {
+    let normal = [angle.sin(), 0.0, angle.cos()];
+    let down = [angle.cos(), 0.0, -angle.sin()];
+    let (mass, dt, g) = (0.01, 1e-5, 9.81);
+    let mut item = RigidItem::new(0, 0.0);
+    item.stiffness = 1e5;
+    item.damping = 10.0;
+    // At rest on the slip spring, as far as friction holds.
+    let held = (mass * g * angle.sin()).min(friction * mass * g * angle.cos());
+    item.slip = scale(down, -held);
+    let mut c = RigidContact {
+        name: "incline".into(),
+        surface: Arc::new(Incline { normal }),
+        friction,
+        slip_factor: 0.5,
+        augmentation: 0.003,
+        items: vec![item],
+    };
+    // At rest on the penalty spring.
+    let start = scale(normal, -mass * g * angle.cos() / 1e5);
+    let (mut x, mut v) = (vec![start], vec![[0.0; 3]]);
+    for _ in 0..10_000 {
+        c.compute(&x, &v, dt, 1e-3);
+        let f = add(c.items[0].force, [0.0, 0.0, -mass * g]);
+        v[0] = add(v[0], scale(f, dt / mass));
+        x[0] = add(x[0], scale(v[0], dt));
+    }
+    dot(sub(x[0], start), down)
+}
+
+#[test]
+fn block_on_an_incline_sticks_below_the_angle_of_friction() {
+    let mu: f64 = 0.4;
+    assert!(slide(mu.atan() * 0.98, mu).abs() < 2e-6);
+}
+
+#[test]
+fn block_on_an_incline_slides_by_coulombs_law_above_it() {
+    let mu: f64 = 0.4;
+    let angle = mu.atan() * 1.3;
+    let expected = 0.5 * 9.81 * (angle.sin() - mu * angle.cos()) * 0.1f64.powi(2);
+    let got = slide(angle, mu);
+    assert!(
+        (got / expected - 1.0).abs() < 0.01,
+        "{got} against {expected}"
+    );
+}
