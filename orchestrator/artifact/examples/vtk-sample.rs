@@ -1,5 +1,5 @@
 //! Writes a forming-like artifact: a tool that stands still and three sheets with fields of their own.
-//! `cargo run -p plyflow-artifact --example sample -- FILE [FRAMES [SIDE]]`; the Python check in
+//! `cargo run -p plyflow-artifact --example vtk-sample -- FILE [FRAMES [SIDE]]`; the Python check in
 //! `tests/vtk` opens it.
 
 use plyflow_artifact::{ArtifactWriter, On};
