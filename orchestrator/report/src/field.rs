@@ -127,7 +127,7 @@ impl Field {
             }
             Self::Curvature => {
                 // Crests of the finest mesh are narrow; a scale that shows their peaks leaves the part pale.
-                let end = end_of_scale(values, 0.97, 10.0, factor);
+                let end = end_of_scale(values, 0.985, 10.0, factor);
                 Scale {
                     palette: Palette::PurpleOrange,
                     low: -end,
