@@ -1,0 +1,286 @@
+//! Calls of element formulations on batches, and the cells' areas.
+
+use super::*;
+
+pub(super) fn component_status(code: i32, sheet: &str) -> Result<(), MechanicsError> {
+    if code == PF_OK {
+        return Ok(());
+    }
+    let reason = match code {
+        PF_PANIC => "it panicked".to_owned(),
+        PF_BAD_VALUE => "a value is NaN, infinite or out of range".to_owned(),
+        c => format!("it returned status {c}"),
+    };
+    Err(MechanicsError::Component {
+        what: format!("element of sheet '{sheet}'"),
+        reason,
+    })
+}
+
+#[inline(always)]
+pub(super) fn gather(nodes: &[[u32; 4]; LANES], x: &[V], out: &mut [f64]) {
+    let out = &mut out[..12 * LANES];
+    for (l, cell) in nodes.iter().enumerate() {
+        for k in 0..4 {
+            let p = x[cell[k] as usize];
+            out[3 * k * LANES + l] = p[0];
+            out[(3 * k + 1) * LANES + l] = p[1];
+            out[(3 * k + 2) * LANES + l] = p[2];
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn gather_patch(nodes: &[u32], width: usize, x: &[V], out: &mut [f64]) {
+    for l in 0..LANES {
+        for k in 0..width {
+            let p = x[nodes[l * width + k] as usize];
+            for c in 0..3 {
+                out[(3 * k + c) * LANES + l] = p[c];
+            }
+        }
+    }
+}
+
+#[repr(align(64))]
+struct Buffer<const N: usize>([f64; N]);
+
+/// Rows of the cell areas: three vectors per cell.
+pub(super) const AREA_ROWS: usize = 9;
+
+/// Signs of the local coordinates of a cell's nodes.
+pub(super) const SIGNS: [(f64, f64); 4] = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+
+/// The integral of N_I x,xi x x,eta over a bilinear cell is u + xi_I v + eta_I w with u = c1 x c2,
+/// v = c1 x c3 / 3, w = c3 x c2 / 3, where x = c0 + c1 xi + c2 eta + c3 xi eta. Pressure by these weights is the
+/// exact gradient of the enclosed volume; by a quarter of the area each it is not, and under 1 bar the
+/// difference drives the hourglass modes into flutter.
+#[inline(always)]
+pub(super) fn cell_areas(p: &[f64; 12 * LANES], area: &mut [f64]) {
+    let area = &mut area[..AREA_ROWS * LANES];
+    let row = |k: usize, c: usize| &p[(3 * k + c) * LANES..(3 * k + c + 1) * LANES];
+    let mut c = [[[0.0; LANES]; 3]; 3];
+    for k in 0..3 {
+        let (x0, x1, x2, x3) = (row(0, k), row(1, k), row(2, k), row(3, k));
+        for l in 0..LANES {
+            let (d, e) = (0.25 * (x2[l] - x0[l]), 0.25 * (x3[l] - x1[l]));
+            c[0][k][l] = d - e;
+            c[1][k][l] = d + e;
+            c[2][k][l] = 0.25 * (x0[l] - x1[l] + x2[l] - x3[l]);
+        }
+    }
+    for (r, (i, j, share)) in [(0, 1, 1.0), (0, 2, 1.0 / 3.0), (2, 1, 1.0 / 3.0)]
+        .into_iter()
+        .enumerate()
+    {
+        let (a, b) = (&c[i], &c[j]);
+        for k in 0..3 {
+            let (m, n) = ((k + 1) % 3, (k + 2) % 3);
+            let out = &mut area[(3 * r + k) * LANES..(3 * r + k + 1) * LANES];
+            for l in 0..LANES {
+                out[l] = share * (a[m][l] * b[n][l] - a[n][l] * b[m][l]);
+            }
+        }
+    }
+}
+
+/// [`cell_areas`] with the machine's widest vectors; no fused operations, so the bits are the same on all.
+#[inline]
+pub(super) fn cell_areas_dispatch(p: &[f64; 12 * LANES], area: &mut [f64]) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn wide(p: &[f64; 12 * LANES], area: &mut [f64]) {
+            cell_areas(p, area);
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // Checked the line above.
+            return unsafe { wide(p, area) };
+        }
+    }
+    cell_areas(p, area);
+}
+
+pub(super) fn run_batch(
+    sheet: &Sheet,
+    batch: &mut Batch,
+    x: &[V],
+    dt: f64,
+    force: &mut [f64],
+    energy: &mut [f64],
+    area: Option<&mut [f64]>,
+    fields: bool,
+) {
+    let mut position = Buffer([0.0; 12 * LANES]);
+    gather(&batch.nodes, x, &mut position.0);
+    let p = &position.0;
+    if let Some(area) = area {
+        cell_areas_dispatch(p, area);
+    }
+    let mut raw = empty_element_batch(sheet, dt, p);
+    raw.constants = batch.constants.as_mut_ptr();
+    raw.history = batch.history.as_mut_ptr();
+    raw.material_history = batch.material_history.as_mut_ptr();
+    raw.force = force.as_mut_ptr();
+    raw.energy = energy.as_mut_ptr();
+    if fields {
+        batch.fields = Aligned::zeros(sheet.element.sizes.fields * LANES);
+        raw.fields = batch.fields.as_mut_ptr();
+    }
+    batch.status = sheet.element.forces(&raw);
+    if batch.layered {
+        for row in force
+            .chunks_exact_mut(LANES)
+            .chain(energy.chunks_exact_mut(LANES))
+        {
+            for (value, layers) in row.iter_mut().zip(&batch.layers) {
+                *value *= layers;
+            }
+        }
+    }
+}
+
+pub(super) fn run_patch(sheet: &Sheet, batch: &mut PatchBatch, x: &[V], dt: f64, fields: bool) {
+    let width = sheet.element.sizes.patch_nodes;
+    let mut position = Buffer([0.0; 32 * 3 * LANES]);
+    gather_patch(&batch.nodes, width, x, &mut position.0);
+    let mut raw = empty_patch_batch(sheet, dt, &position.0);
+    raw.constants = batch.constants.as_mut_ptr();
+    raw.history = batch.history.as_mut_ptr();
+    raw.force = batch.force.as_mut_ptr();
+    raw.energy = batch.energy.as_mut_ptr();
+    if fields {
+        batch.fields = Aligned::zeros(sheet.element.sizes.patch_fields * LANES);
+        raw.fields = batch.fields.as_mut_ptr();
+    }
+    batch.status = sheet.element.patch_forces(&raw);
+}
+
+/// The smallest critical step of a batch (s). Works on copies of the histories: asking changes nothing.
+pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 {
+    let mut position = Buffer([0.0; 12 * LANES]);
+    gather(&batch.nodes, x, &mut position.0);
+    let mut constants = batch.constants.clone();
+    let mut history = batch.history.clone();
+    let mut material_history = batch.material_history.clone();
+    let mut force = Aligned::zeros(12 * LANES);
+    let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
+    let mut step = Aligned::zeros(LANES);
+    let mut raw = empty_element_batch(sheet, 0.0, &position.0);
+    raw.constants = constants.as_mut_ptr();
+    raw.history = history.as_mut_ptr();
+    raw.material_history = material_history.as_mut_ptr();
+    raw.force = force.as_mut_ptr();
+    raw.energy = energy.as_mut_ptr();
+    raw.critical_step = step.as_mut_ptr();
+    if sheet.element.forces(&raw) != PF_OK {
+        return 0.0;
+    }
+    (0..batch.count as usize)
+        .map(|l| step[l] * batch.mass_factor[l].sqrt())
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Row sums of the bending stiffness (N/m) by model node.
+pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32, f64)> {
+    let width = sheet.element.sizes.patch_nodes;
+    let mut position = Buffer([0.0; 32 * 3 * LANES]);
+    gather_patch(&batch.nodes, width, x, &mut position.0);
+    let mut constants = batch.constants.clone();
+    let mut history = batch.history.clone();
+    let mut force = Aligned::zeros(3 * width * LANES);
+    let mut energy = Aligned::zeros(LANES);
+    let mut stiffness = Aligned::zeros(width * LANES);
+    let mut raw = empty_patch_batch(sheet, 0.0, &position.0);
+    raw.constants = constants.as_mut_ptr();
+    raw.history = history.as_mut_ptr();
+    raw.force = force.as_mut_ptr();
+    raw.energy = energy.as_mut_ptr();
+    raw.stiffness = stiffness.as_mut_ptr();
+    if sheet.element.patch_forces(&raw) != PF_OK {
+        return Vec::new();
+    }
+    (0..batch.count as usize)
+        .flat_map(|l| {
+            let nodes = &batch.nodes[l * width..(l + 1) * width];
+            let stiffness = &stiffness;
+            (0..width)
+                .filter(move |k| *k == 0 || nodes[*k] != nodes[0])
+                .map(move |k| (nodes[k], stiffness[k * LANES + l]))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volume enclosed by bilinear cells: a third of the flux of x, by 2 x 2 Gauss points (exact).
+    fn volume(points: &[V], cells: &[[u32; 4]]) -> f64 {
+        let g = 1.0 / 3.0f64.sqrt();
+        let mut sum = 0.0;
+        for cell in cells {
+            let p = cell.map(|n| points[n as usize]);
+            for (a, b) in [(-g, -g), (g, -g), (g, g), (-g, g)] {
+                let at = |w: [f64; 4]| -> V {
+                    std::array::from_fn(|c| (0..4).map(|k| w[k] * p[k][c]).sum())
+                };
+                let w = crate::contact::shape([a, b]);
+                let (wa, wb) = ((1.0 - b, 1.0 + b), (1.0 - a, 1.0 + a));
+                let tx = at([-wa.0, wa.0, wa.1, -wa.1].map(|w| 0.25 * w));
+                let ty = at([-wb.0, -wb.1, wb.1, wb.0].map(|w| 0.25 * w));
+                sum += dot(at(w), crate::vec3::cross(tx, ty)) / 3.0;
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn pressure_weights_are_the_gradient_of_the_enclosed_volume() {
+        // A cube of six warped quads.
+        let mut points: Vec<V> = (0..8)
+            .map(|i| [(i & 1) as f64, ((i >> 1) & 1) as f64, (i >> 2) as f64])
+            .collect();
+        for (i, p) in points.iter_mut().enumerate() {
+            for (c, v) in p.iter_mut().enumerate() {
+                *v += 0.2 * (((i * 5 + c * 3) % 7) as f64 / 7.0 - 0.5);
+            }
+        }
+        let cells: [[u32; 4]; 6] = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let mut gradient = [[0.0; 3]; 8];
+        let mut nodes = [[0u32; 4]; LANES];
+        nodes[..6].copy_from_slice(&cells);
+        let mut position = [0.0; 12 * LANES];
+        gather(&nodes, &points, &mut position);
+        let mut area = vec![0.0; AREA_ROWS * LANES];
+        cell_areas(&position, &mut area);
+        for (l, cell) in cells.iter().enumerate() {
+            for k in 0..4 {
+                let (sx, sy) = SIGNS[k];
+                for c in 0..3 {
+                    let row = |r: usize| area[(3 * r + c) * LANES + l];
+                    gradient[cell[k] as usize][c] += row(0) + sx * row(1) + sy * row(2);
+                }
+            }
+        }
+        let h = 1e-6;
+        for n in 0..8 {
+            for c in 0..3 {
+                let at = |d: f64| {
+                    let mut q = points.clone();
+                    q[n][c] += d;
+                    volume(&q, &cells)
+                };
+                let slope = (at(h) - at(-h)) / (2.0 * h);
+                assert!((slope - gradient[n][c]).abs() < 1e-8, "node {n}, {c}");
+            }
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! Building a model: sheets, batches, masses, contact stiffness.
+
+use super::*;
+
+impl Model {
+    /// Builds a model from points (m, at their start) and sheets (from the tool upwards).
+    ///
+    /// # Errors
+    /// When a component fails or a mass or step makes no sense.
+    pub fn new(
+        points: Vec<V>,
+        specs: Vec<SheetSpec>,
+        settings: StepSettings,
+    ) -> Result<Self, MechanicsError> {
+        let n = points.len();
+        let mut model = Self {
+            v: vec![[0.0; 3]; n],
+            mass: vec![0.0; n],
+            normals: vec![[0.0, 0.0, 1.0]; n],
+            area: vec![[0.0; 3]; n],
+            sheets: Vec::new(),
+            cells: Vec::new(),
+            neighbours: Vec::new(),
+            sheet_contacts: Vec::new(),
+            rigid_contacts: Vec::new(),
+            pressures: Pressures::default(),
+            time: 0.0,
+            cycle: 0,
+            dt: settings.target_step,
+            ledger: Ledger::default(),
+            settings,
+            batches: Vec::new(),
+            patches: Vec::new(),
+            pressed: Vec::new(),
+            element_force: Aligned::default(),
+            element_energy: Aligned::default(),
+            cell_area: Aligned::default(),
+            cell_slot: Vec::new(),
+            node_slots: Csr::default(),
+            patch_slots: Csr::default(),
+            force: vec![[0.0; 3]; n],
+            pressure_force: vec![[0.0; 3]; n],
+            held: vec![Held::Free; n],
+            driven: Vec::new(),
+            drive: None,
+            max_speed: 0.0,
+            contact: ContactEnergy::default(),
+            work: NodeWork::default(),
+            x: points,
+        };
+        for spec in specs {
+            model.add_sheet(spec)?;
+        }
+        model.finish()?;
+        Ok(model)
+    }
+
+    fn add_sheet(&mut self, spec: SheetSpec) -> Result<(), MechanicsError> {
+        let sheet_index = self.sheets.len() as u32;
+        let (cell0, batch0, patch0) = (self.cells.len(), self.batches.len(), self.patches.len());
+        let cells: Vec<[u32; 4]> = spec
+            .cells
+            .iter()
+            .map(|c| c.map(|k| spec.nodes[k as usize]))
+            .collect();
+        let mesh = QuadMesh {
+            points: self.x.clone(),
+            cells: cells.clone(),
+        };
+        let shift = |c: u32| {
+            if c == crate::mesh::NONE {
+                c
+            } else {
+                c + cell0 as u32
+            }
+        };
+        self.neighbours
+            .extend(mesh.neighbours().into_iter().map(|e| e.map(shift)));
+        let material = spec.element.material.reference().sizes();
+        let s = spec.element.sizes;
+        for (b, chunk) in cells.chunks(LANES).enumerate() {
+            let lane = |l: usize| b * LANES + l.min(chunk.len() - 1);
+            let nodes: [[u32; 4]; LANES] = std::array::from_fn(|l| cells[lane(l)]);
+            let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[lane(l)]);
+            for l in 0..LANES {
+                let p = spec.pressed[lane(l)];
+                let below = if matches!(p, Pressed::Below | Pressed::Both) {
+                    1.0
+                } else {
+                    0.0
+                };
+                let above = if matches!(p, Pressed::Above | Pressed::Both) {
+                    1.0
+                } else {
+                    0.0
+                };
+                self.pressed.push([below, above]);
+                if l < chunk.len() {
+                    self.cell_slot.push(((batch0 + b) * LANES + l) as u32);
+                }
+            }
+            self.batches.push(Batch {
+                sheet: sheet_index,
+                count: chunk.len() as u32,
+                nodes,
+                layers,
+                layered: layers.iter().any(|k| *k != 1.0),
+                mass_factor: [1.0; LANES],
+                mass: Aligned::zeros(4 * LANES),
+                constants: Aligned::zeros(s.constants * LANES),
+                history: Aligned::zeros(s.history * LANES),
+                material_history: Aligned::zeros(
+                    s.material_points * material.membrane_history * LANES,
+                ),
+                fields: Aligned::default(),
+                status: PF_OK,
+            });
+        }
+        if s.patch_nodes > 0 && material.has_bending {
+            self.add_patches(sheet_index, &spec, material.bending_history)?;
+        }
+        self.cells.extend(cells);
+        let mut sheet = Sheet {
+            name: spec.name,
+            nodes: spec.nodes,
+            cell_range: (cell0, self.cells.len()),
+            batch_range: (batch0, self.batches.len()),
+            patch_range: (patch0, self.patches.len()),
+            thickness: material.thickness,
+            added_mass: 0.0,
+            element: spec.element,
+        };
+        self.initialise(
+            &mut sheet,
+            spec.axis,
+            &spec.least_areal_mass,
+            material.areal_mass,
+        )?;
+        self.sheets.push(sheet);
+        Ok(())
+    }
+
+    fn add_patches(
+        &mut self,
+        sheet: u32,
+        spec: &SheetSpec,
+        bending_history: usize,
+    ) -> Result<(), MechanicsError> {
+        let s = spec.element.sizes;
+        if let Some(p) = spec.patches.iter().find(|p| p.nodes.len() > s.patch_nodes) {
+            return Err(MechanicsError::Input(format!(
+                "sheet '{}': node {} has {} nodes around it, its element takes at most {}; \
+                 use a more regular mesh or another element",
+                spec.name,
+                p.nodes[0],
+                p.nodes.len() - 1,
+                s.patch_nodes - 1
+            )));
+        }
+        for chunk in spec.patches.chunks(LANES) {
+            let of = |l: usize| &chunk[l.min(chunk.len() - 1)];
+            let nodes = (0..LANES)
+                .flat_map(|l| {
+                    let p = of(l);
+                    (0..s.patch_nodes).map(move |k| *p.nodes.get(k).unwrap_or(&p.nodes[0]))
+                })
+                .map(|k| spec.nodes[k as usize])
+                .collect();
+            let mut batch = PatchBatch {
+                sheet,
+                count: chunk.len() as u32,
+                nodes,
+                centres: (0..LANES).map(|l| of(l).nodes[0]).collect(),
+                constants: Aligned::zeros(s.patch_constants * LANES),
+                history: Aligned::zeros((s.patch_history + bending_history) * LANES),
+                fields: Aligned::default(),
+                force: Aligned::zeros(s.patch_nodes * 3 * LANES),
+                energy: Aligned::zeros(LANES),
+                status: PF_OK,
+            };
+            let mut position = Aligned::zeros(s.patch_nodes * 3 * LANES);
+            gather_patch(&batch.nodes, s.patch_nodes, &self.x, &mut position);
+            let count: Vec<f64> = (0..LANES).map(|l| of(l).nodes.len() as f64).collect();
+            let area: Vec<f64> = (0..LANES).map(|l| of(l).area).collect();
+            let axis: Vec<f64> = (0..3 * LANES).map(|k| spec.axis[k / LANES]).collect();
+            let raw = pf_patch_batch {
+                size: size_of::<pf_patch_batch>() as u64,
+                lanes: LANES as u32,
+                reserved: 0,
+                dt: 0.0,
+                position: position.as_ptr(),
+                count: count.as_ptr(),
+                area: area.as_ptr(),
+                axis: axis.as_ptr(),
+                constants: batch.constants.as_mut_ptr(),
+                history: batch.history.as_mut_ptr(),
+                force: std::ptr::null_mut(),
+                energy: std::ptr::null_mut(),
+                fields: std::ptr::null_mut(),
+                stiffness: std::ptr::null_mut(),
+                material: spec.element.material.reference().raw(),
+            };
+            component_status(spec.element.patch_initialise(&raw), &spec.name)?;
+            self.patches.push(batch);
+        }
+        Ok(())
+    }
+
+    /// Constants and masses of a sheet, with mass scaling to the wanted step and areal mass.
+    fn initialise(
+        &mut self,
+        sheet: &mut Sheet,
+        axis: V,
+        least: &[f64],
+        areal_mass: f64,
+    ) -> Result<(), MechanicsError> {
+        let axis: Vec<f64> = (0..3 * LANES).map(|k| axis[k / LANES]).collect();
+        let mut position = Aligned::zeros(12 * LANES);
+        let mut force = Aligned::zeros(12 * LANES);
+        let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
+        let mut step = Aligned::zeros(LANES);
+        let batches = &mut self.batches[sheet.batch_range.0..sheet.batch_range.1];
+        for (b, batch) in batches.iter_mut().enumerate() {
+            gather(&batch.nodes, &self.x, &mut position);
+            let mut raw = empty_element_batch(sheet, 0.0, &position);
+            raw.axis = axis.as_ptr();
+            raw.constants = batch.constants.as_mut_ptr();
+            raw.history = batch.history.as_mut_ptr();
+            raw.material_history = batch.material_history.as_mut_ptr();
+            raw.mass = batch.mass.as_mut_ptr();
+            component_status(sheet.element.initialise(&raw), &sheet.name)?;
+            raw.axis = std::ptr::null();
+            raw.mass = std::ptr::null_mut();
+            raw.force = force.as_mut_ptr();
+            raw.energy = energy.as_mut_ptr();
+            raw.critical_step = step.as_mut_ptr();
+            component_status(sheet.element.forces(&raw), &sheet.name)?;
+            for l in 0..batch.count as usize {
+                let critical = step[l] * self.settings.safety;
+                if !(critical > 0.0 && critical.is_finite()) {
+                    return Err(MechanicsError::Input(format!(
+                        "sheet '{}': an element has a critical step of {} s; its mesh or \
+                         material makes no sense",
+                        sheet.name, step[l]
+                    )));
+                }
+                let factor = (self.settings.target_step / critical)
+                    .powi(2)
+                    .max(least[b * LANES + l] / areal_mass)
+                    .max(1.0);
+                batch.mass_factor[l] = factor;
+                for k in 0..4 {
+                    let own = batch.mass[k * LANES + l] * batch.layers[l];
+                    self.mass[batch.nodes[l][k] as usize] += own * factor;
+                    sheet.added_mass += own * (factor - 1.0);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), MechanicsError> {
+        if let Some(i) = self.mass.iter().position(|m| *m <= 0.0) {
+            return Err(MechanicsError::Input(format!(
+                "node {i} belongs to no element"
+            )));
+        }
+        let n = self.x.len();
+        let nb = self.batches.len();
+        self.element_force = Aligned::zeros(nb * 12 * LANES);
+        self.element_energy = Aligned::zeros(nb * PF_ENERGIES * LANES);
+        self.cell_area = Aligned::zeros(nb * AREA_ROWS * LANES);
+        let slots = self
+            .cells
+            .iter()
+            .zip(&self.cell_slot)
+            .flat_map(|(nodes, slot)| (0..4u32).map(move |k| (nodes[k as usize], slot * 4 + k)));
+        self.node_slots = Csr::build(n, slots);
+        let pairs: Vec<(u32, u32)> = self
+            .patches
+            .iter()
+            .enumerate()
+            .flat_map(|(b, batch)| {
+                let width = batch.nodes.len() / LANES;
+                (0..batch.count as usize).flat_map(move |l| {
+                    let row = &batch.nodes[l * width..(l + 1) * width];
+                    let used = move |k: usize| k == 0 || row[k] != row[0];
+                    (0..width)
+                        .filter(move |k| used(*k))
+                        .map(move |k| (row[k], ((b * LANES + l) as u32) << 5 | k as u32))
+                })
+            })
+            .collect();
+        self.patch_slots = Csr::build(n, pairs.into_iter());
+        self.internal_forces(false)?;
+        self.assemble();
+        Ok(())
+    }
+
+    /// Sets which nodes are driven and by what. The order of `nodes` is that of [`Drive::position`].
+    pub fn set_driven(&mut self, nodes: Vec<u32>, drive: Box<dyn Drive>) {
+        self.held.fill(Held::Free);
+        for n in &nodes {
+            self.held[*n as usize] = Held::Driven;
+        }
+        self.driven = nodes;
+        self.drive = Some(drive);
+    }
+
+    /// Sets stiffness and damping of all contacts from the masses that they couple, and bounds the
+    /// assembled stiffness of every node: 2 sum(k) dt^2 / m stays below `2 * 0.7`, which leaves the rest of
+    /// the stability bound 4 to the elements.
+    pub fn set_contact_stiffness(&mut self, c: &ContactSettings) {
+        let dt2 = self.settings.target_step.powi(2);
+        let mass = &self.mass;
+        let mut row = vec![0.0; mass.len()];
+        for contact in &mut self.rigid_contacts {
+            contact.augmentation = c.augmentation;
+            for item in &mut contact.items {
+                item.stiffness = c.stiffness_factor * mass[item.node as usize] / dt2;
+                row[item.node as usize] += item.stiffness;
+            }
+        }
+        for contact in &mut self.sheet_contacts {
+            contact.augmentation = c.augmentation;
+            for item in contact
+                .items
+                .iter_mut()
+                .filter(|i| i.cell != crate::mesh::NONE)
+            {
+                let nodes = self.cells[item.cell as usize];
+                let lightest = nodes
+                    .iter()
+                    .map(|n| mass[*n as usize])
+                    .fold(f64::INFINITY, f64::min);
+                let reduced = 1.0 / (1.0 / mass[item.node as usize] + 1.0 / lightest);
+                item.stiffness = c.stiffness_factor * reduced / dt2;
+                row[item.node as usize] += item.stiffness;
+                for (k, n) in nodes.iter().enumerate() {
+                    row[*n as usize] += item.weights[k] * item.stiffness;
+                }
+            }
+        }
+        let limit: Vec<f64> = row
+            .iter()
+            .zip(mass)
+            .map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0))
+            .collect();
+        for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
+            let m = mass[item.node as usize];
+            item.stiffness *= limit[item.node as usize];
+            item.damping = 2.0 * c.damping_ratio * (item.stiffness * m).sqrt();
+        }
+        for item in self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items) {
+            if item.cell == crate::mesh::NONE {
+                continue;
+            }
+            let nodes = self.cells[item.cell as usize];
+            let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
+            item.stiffness *= least.min(limit[item.node as usize]);
+            let lightest = nodes
+                .iter()
+                .map(|n| mass[*n as usize])
+                .fold(f64::INFINITY, f64::min);
+            let reduced = 1.0 / (1.0 / mass[item.node as usize] + 1.0 / lightest);
+            item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
+        }
+    }
+}

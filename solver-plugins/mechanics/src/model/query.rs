@@ -1,0 +1,111 @@
+//! What a model tells of itself: energies, critical step, fields, volume.
+
+use super::*;
+
+impl Model {
+    /// The ledger at the present step.
+    pub fn energies(&self) -> Ledger {
+        let mut l = self.ledger;
+        l.kinetic = self.work.kinetic;
+        l.contact = self.contact.stored;
+        for (b, batch) in self.batches.iter().enumerate() {
+            let e = &self.element_energy[b * PF_ENERGIES * LANES..];
+            for lane in 0..batch.count as usize {
+                l.membrane += e[PF_ENERGY_MEMBRANE * LANES + lane];
+                l.bending += e[PF_ENERGY_BENDING * LANES + lane];
+                l.hourglass += e[PF_ENERGY_HOURGLASS * LANES + lane];
+            }
+        }
+        for batch in &self.patches {
+            l.bending += batch.energy[..batch.count as usize].iter().sum::<f64>();
+        }
+        l
+    }
+
+    /// The step that the elements allow at the present positions (s), with mass scaling and bending.
+    ///
+    /// # Errors
+    /// When a component fails.
+    pub fn critical_step(&self) -> Result<f64, MechanicsError> {
+        let (sheets, x) = (&self.sheets, &self.x);
+        let steps: Vec<f64> = self
+            .batches
+            .par_iter()
+            .map(|batch| batch_critical_step(&sheets[batch.sheet as usize], batch, x))
+            .collect();
+        let membrane = steps.into_iter().fold(f64::INFINITY, f64::min);
+        let rows: Vec<Vec<(u32, f64)>> = self
+            .patches
+            .par_iter()
+            .map(|batch| patch_rows(&sheets[batch.sheet as usize], batch, x))
+            .collect();
+        let mut row = vec![0.0; self.x.len()];
+        for (n, r) in rows.into_iter().flatten() {
+            row[n as usize] += r;
+        }
+        let bending = row
+            .iter()
+            .zip(&self.mass)
+            .map(|(r, m)| r / m)
+            .fold(0.0, f64::max);
+        // omega^2 of a sum of stiffnesses is at most the sum of their own bounds.
+        let omega2 = (2.0 / membrane).powi(2) + bending;
+        Ok(2.0 / omega2.sqrt())
+    }
+
+    /// Row `index` of the element fields of a sheet, per cell. Needs a step with `fields`.
+    pub fn cell_field(&self, sheet: usize, index: usize) -> Vec<f64> {
+        let (b0, b1) = self.sheets[sheet].batch_range;
+        self.batches[b0..b1]
+            .iter()
+            .flat_map(|b| {
+                let row = &b.fields[index * LANES..index * LANES + b.count as usize];
+                row.iter().copied()
+            })
+            .collect()
+    }
+
+    /// Row `index` of the patch fields of a sheet, per mesh-local node (0 where there is no patch).
+    pub fn patch_field(&self, sheet: usize, index: usize) -> Vec<f64> {
+        let (b0, b1) = self.sheets[sheet].patch_range;
+        let mut values = vec![0.0; self.sheets[sheet].nodes.len()];
+        for b in &self.patches[b0..b1] {
+            for l in 0..b.count as usize {
+                values[b.centres[l] as usize] = b.fields[index * LANES + l];
+            }
+        }
+        values
+    }
+
+    /// Number of elements.
+    pub fn element_count(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Number of node patches.
+    pub fn patch_count(&self) -> usize {
+        self.patches.iter().map(|b| b.count as usize).sum()
+    }
+
+    /// Volume (m3) under the cells that are pressed from below, over the plane z = 0.
+    pub fn volume_below(&self) -> f64 {
+        // Partial sums of fixed chunks, added in order: the same for any number of threads.
+        let parts: Vec<f64> = self
+            .cells
+            .par_chunks(NODE_CHUNK)
+            .zip_eq(self.cell_slot.par_chunks(NODE_CHUNK))
+            .map(|(cells, slots)| {
+                let mut volume = 0.0;
+                for (cell, slot) in cells.iter().zip(slots) {
+                    if self.pressed[*slot as usize][0] > 0.0 {
+                        let p = cell.map(|n| self.x[n as usize]);
+                        let height = 0.25 * (p[0][2] + p[1][2] + p[2][2] + p[3][2]);
+                        volume += area_vector(p)[2] * height;
+                    }
+                }
+                volume
+            })
+            .collect();
+        parts.into_iter().sum()
+    }
+}
