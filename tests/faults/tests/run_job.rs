@@ -410,9 +410,10 @@ fn a_worker_dies_with_the_process_that_started_it() {
     let job = job(&dir, "hang", "test", json!({}));
     let file = dir.path().join("job.json");
     std::fs::write(&file, serde_json::to_vec(&job).unwrap()).unwrap();
-    // A shell stands for the engine; `echo` tells the worker's process number.
+    // A shell stands for the engine; a second one tells its process number before it becomes the worker, so
+    // that the number comes before all that the worker says.
     let script = format!(
-        "{} {} & echo $!; wait",
+        "sh -c 'echo $$; exec {} {}' & wait",
         env!("CARGO_BIN_EXE_faults-worker"),
         file.display()
     );
