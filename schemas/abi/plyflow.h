@@ -262,7 +262,7 @@ typedef struct pf_element_batch {
   uint32_t reserved;
   double dt;               /* s, step just done (0 in the first call) */
   const double *position;  /* [nodes][3][lanes] m (reference positions in initialise) */
-  const double *velocity;  /* [nodes][3][lanes] m/s at the half step; NULL in initialise */
+  const double *velocity;  /* [nodes][3][lanes] m/s at the half step; NULL in initialise and with 3 dofs per node */
   const double *spin;      /* [nodes][3][lanes] rad/s or NULL */
   const double *axis;      /* [3][lanes] unit e1 in the undeformed plane; only in initialise */
   double *constants;       /* [constants][lanes]; written by initialise only */

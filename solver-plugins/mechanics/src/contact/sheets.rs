@@ -278,7 +278,7 @@ fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Found {
                 if other.distance2 < best.distance2 {
                     std::mem::swap(&mut best, &mut other);
                 }
-                if second.is_none_or(|c| other.distance2 < c.distance2) {
+                if other.interior && second.is_none_or(|c| other.distance2 < c.distance2) {
                     second = Some(other);
                 }
             }
@@ -288,7 +288,7 @@ fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Found {
         }
     }
     // Only where both feet are perpendicular does the surface fold towards the slave.
-    let second = second.filter(|c| c.interior && best.interior);
+    let second = second.filter(|_| best.interior);
     Found {
         first: best,
         second,
