@@ -44,7 +44,7 @@ bench: build ## measure; rows go to docs/benchmarks
 
 docs: ## build the pages of the code and check the links of the book
 	@scripts/setup
-	RUSTDOCFLAGS="-D warnings" $(SHELL) -c '$(CARGO) doc $(CARGO_FLAGS) --workspace --no-deps'
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(SHELL) -c '$(CARGO) doc $(CARGO_FLAGS) --workspace --no-deps'
 	scripts/check-docs
 
 clean: ## remove what was built; stores of workflows and .tools stay
