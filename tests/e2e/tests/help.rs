@@ -4,10 +4,10 @@ use plyflow_e2e::{program, repository};
 use std::process::{Command, Output};
 
 fn plyflow(words: &[&str]) -> Output {
-    Command::new(program())
-        .args(words)
-        .output()
-        .expect("plyflow starts")
+    // What is known of plugins is kept where the program is called: not in the repository.
+    let mut command = Command::new(program());
+    command.args(words).current_dir(env!("CARGO_TARGET_TMPDIR"));
+    command.output().expect("plyflow starts")
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -109,7 +109,12 @@ fn schemas_and_completions_are_printed_without_a_workflow() {
 #[test]
 fn a_reader_that_goes_away_ends_a_command_quietly() {
     let line = format!("'{}' schema workflow | head -1", program().display());
-    let output = Command::new("sh").args(["-c", &line]).output().unwrap();
+    let folder = env!("CARGO_TARGET_TMPDIR");
+    let output = Command::new("sh")
+        .args(["-c", &line])
+        .current_dir(folder)
+        .output()
+        .unwrap();
     assert_eq!(text(&output.stderr), "");
 }
 
