@@ -559,7 +559,7 @@ fn reason_text(outcome: &Outcome) -> String {
             format!("the worker ended with status {code} without saying how it went")
         }
         Outcome::TimedOut(limit) => format!(
-            "stopped at its time limit of {limit} s; raise `resources: {{time: ..}}` of the step if it needs longer"
+            "stopped at its time limit of {limit} s; raise `resources: {{time_limit: ..}}` of the step if it needs longer"
         ),
         Outcome::Cancelled => "stopped".into(),
         Outcome::NotStarted(text) => format!("the worker could not be started: {text}"),

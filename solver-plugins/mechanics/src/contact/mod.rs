@@ -1,8 +1,9 @@
 //! Contact by penalty: sheet on sheet, sheet on rigid surface.
 //!
-//! Normal force: k times the penetration, on the continuous normal of the surface (interpolated from the
-//! nodes of a sheet; the gradient of the distance field of a rigid surface), plus damping of the normal
-//! approach. Tangential force: Coulomb with an elastic-slip spring and a history per contact. The
+//! Normal force: k times the penetration, along the gradient of the distance (to the closest point of a sheet's
+//! bilinear cells, blended across concave folds; to a rigid surface's distance field), so that it is the
+//! gradient of an energy; plus damping of the normal approach. Tangential force: Coulomb with an elastic-slip
+//! spring, a damper and a history per contact. The
 //! stiffness is bounded by the masses that it couples, so that contact alone never sets the step. Such a
 //! penalty is too soft to carry 1 bar within a tenth of a film's thickness; so a multiplier per contact takes
 //! over the steady part of the force (augmented Lagrangian, a little in every step): the penetration of a
