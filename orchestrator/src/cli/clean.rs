@@ -56,7 +56,7 @@ pub fn clean(args: &CleanArgs) -> Done {
     };
     if args.all && !args.dry_run {
         // Only what a store is made of: `--store` may name a folder that holds other things too.
-        for folder in ["artifacts", "runs"] {
+        for folder in ["artifacts", "resolved", "runs"] {
             match std::fs::remove_dir_all(store.root().join(folder)) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(failed()(e)),
                 _ => {}

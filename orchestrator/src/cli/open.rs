@@ -7,7 +7,7 @@ use crate::engine::{Options, Session};
 use crate::exit;
 use crate::plan::Graph;
 use crate::progress::Quiet;
-use crate::store::Store;
+use crate::store::{Store, resolved};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_plugin_host::{Describer, PluginCatalog};
 use plyflow_workflow::resolved::ResolvedWorkflow;
@@ -146,9 +146,22 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
     let root = store_root(&args.places, Some(file));
     let catalog = catalog(search_path.clone(), &root)?;
     let overrides = overrides(&args.set)?;
-    let workflow = match plyflow_workflow::load_with(file, &catalog, &overrides) {
-        Ok(workflow) => workflow,
-        Err(findings) => return Ok(Err(findings)),
+    let full = absolute(file);
+    let circumstances = resolved::circumstances(&program()?, &full, &args.set, &search_path);
+    let kept = circumstances
+        .as_ref()
+        .and_then(|c| resolved::read(&root, &full, c, &catalog));
+    let workflow = match kept {
+        Some(workflow) => workflow,
+        None => match plyflow_workflow::resolve(file, &catalog, &overrides) {
+            Ok(resolution) => {
+                if let Some(c) = &circumstances {
+                    resolved::write(&root, &full, c, &resolution);
+                }
+                resolution.workflow
+            }
+            Err(findings) => return Ok(Err(findings)),
+        },
     };
     let graph = Graph::new(&workflow).map_err(|e| Stop::new(exit::INVALID, e))?;
     Ok(Ok(Opened {

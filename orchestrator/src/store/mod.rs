@@ -5,6 +5,7 @@
 //!   lock                           shared by runs, exclusive for `clean`
 //!   artifacts/ab/ab12...ef.h5      an artifact under its content key: whole or absent
 //!   artifacts/ab/ab12...ef.record.json   what it cost and found; there before the artifact is
+//!   resolved/<file>                the workflow of a file as last resolved; only saves time
 //!   runs/<workflow>/lock           held while a run is on; the kernel frees it whatever happens
 //!   runs/<workflow>/journal        one append-only file
 //!   runs/<workflow>/logs/          logs of workers that had something to say
@@ -13,6 +14,7 @@
 
 mod journal;
 mod lock;
+pub mod resolved;
 
 pub use journal::{Detail, Journal, Known};
 pub use lock::{Lock, LockError};

@@ -82,6 +82,20 @@ impl<'a> Plugins<'a> {
         answer.clone()
     }
 
+    /// Every question that was answered with a plugin: what was asked, and what was found.
+    pub fn answers(&self) -> Vec<(String, Utf8PathBuf, PluginId)> {
+        let known = self.known.borrow();
+        let mut found: Vec<_> = known
+            .iter()
+            .filter_map(|((name, folder), answer)| {
+                let entry = answer.as_ref().ok()?;
+                Some((name.clone(), folder.clone(), entry.id.clone()))
+            })
+            .collect();
+        found.sort_by(|a, b| (&a.0, &a.1).cmp(&(&b.0, &b.1)));
+        found
+    }
+
     /// See [`Catalog::names`].
     pub fn names(&self, kind: PluginKind) -> Vec<String> {
         self.catalog.names(kind)

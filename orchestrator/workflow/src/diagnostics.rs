@@ -3,6 +3,7 @@
 use crate::yaml::Span;
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -194,6 +195,7 @@ pub struct Source {
 #[derive(Debug, Default)]
 pub struct Problems {
     items: Vec<Diagnostic>,
+    read: BTreeMap<Utf8PathBuf, String>,
 }
 
 impl Problems {
@@ -239,6 +241,23 @@ impl Problems {
         let i = self.items.len();
         self.items.push(d);
         &mut self.items[i]
+    }
+
+    /// Takes down that a file was read, with the BLAKE3 of what was in it. A file that changed between two
+    /// readings in one pass keeps a hash that no content has: what was resolved from it is of no one state.
+    pub fn note_file(&mut self, path: &Utf8Path, hash: &str) {
+        let known = self
+            .read
+            .entry(path.to_owned())
+            .or_insert_with(|| hash.to_owned());
+        if known != hash {
+            known.clear();
+        }
+    }
+
+    /// The files that were read, with their hashes.
+    pub fn files(&self) -> &BTreeMap<Utf8PathBuf, String> {
+        &self.read
     }
 
     /// How many so far; to learn whether a part added any.

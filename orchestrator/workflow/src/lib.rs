@@ -4,6 +4,7 @@
 mod catalog;
 mod check;
 mod diagnostics;
+mod evidence;
 mod expect;
 mod graph;
 mod load;
@@ -16,7 +17,8 @@ mod yaml;
 
 pub use catalog::{Catalog, CatalogEntry, CatalogError};
 pub use diagnostics::{Diagnostic, Diagnostics, Severity};
+pub use evidence::{Evidence, Resolution};
 pub use graph::{dependencies, graph, to_dot, to_mermaid};
-pub use load::{load, load_with, plugin_search_folders};
+pub use load::{load, load_with, plugin_search_folders, resolve};
 pub use overrides::Override;
 pub use resolved::ResolvedWorkflow;

@@ -3,6 +3,7 @@
 use crate::catalog::{Catalog, CatalogEntry, Plugins};
 use crate::check::Checker;
 use crate::diagnostics::{Diagnostics, Problems, Source};
+use crate::evidence::{Evidence, Resolution};
 use crate::expect;
 use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
@@ -53,24 +54,40 @@ pub fn load_with(
     catalog: &dyn Catalog,
     overrides: &[Override],
 ) -> Result<ResolvedWorkflow, Diagnostics> {
+    resolve(path, catalog, overrides).map(|r| r.workflow)
+}
+
+/// As [`load_with`], with all that the result rests on, so that it can be kept and used again.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn resolve(
+    path: &Utf8Path,
+    catalog: &dyn Catalog,
+    overrides: &[Override],
+) -> Result<Resolution, Diagnostics> {
     let mut problems = Problems::default();
-    match load_into(path, catalog, overrides, &mut problems) {
-        Some(workflow) if problems.count() == 0 => Ok(workflow),
+    let plugins = Plugins::new(catalog);
+    match load_into(path, &plugins, overrides, &mut problems) {
+        Some((workflow, folders)) if problems.count() == 0 => Ok(Resolution {
+            workflow,
+            evidence: Evidence::new(&problems, folders, &plugins),
+        }),
         _ => Err(problems.finish()),
     }
 }
 
+/// The workflow, and the folders that its `plugins:` names.
 fn load_into(
     path: &Utf8Path,
-    catalog: &dyn Catalog,
+    catalog: &Plugins<'_>,
     overrides: &[Override],
     problems: &mut Problems,
-) -> Option<ResolvedWorkflow> {
+) -> Option<(ResolvedWorkflow, Vec<Utf8PathBuf>)> {
     let (source, mut root) = open(path, problems)?;
     overrides::apply(&mut root, overrides, &source, problems);
     Checker::new(&WORKFLOW, &source, problems).check(&root, "the workflow");
     plugin_folders(&root, &source, problems);
-    let catalog = &Plugins::new(catalog);
     let drafts = drafts(&root, &source, catalog, problems);
     let wiring = wires::connect(&drafts, &source, problems);
     let expectations = expect::expectations(&root, &drafts, &source, problems);
@@ -91,7 +108,7 @@ fn load_into(
         Some("fail-fast") => FailurePolicy::FailFast,
         _ => FailurePolicy::KeepGoing,
     };
-    Some(ResolvedWorkflow {
+    let workflow = ResolvedWorkflow {
         name: root.get("name")?.text()?.to_owned(),
         file: absolute(&source.folder, path.file_name()?),
         description: root
@@ -101,7 +118,8 @@ fn load_into(
         steps,
         expectations,
         on_failure,
-    })
+    };
+    Some((workflow, named_folders(&root, &source)))
 }
 
 /// Reads and parses the workflow file.
@@ -135,6 +153,10 @@ pub fn plugin_search_folders(path: &Utf8Path) -> Vec<Utf8PathBuf> {
     let Some((source, root)) = open(path, &mut Problems::default()) else {
         return Vec::new();
     };
+    named_folders(&root, &source)
+}
+
+fn named_folders(root: &Node, source: &Source) -> Vec<Utf8PathBuf> {
     let folders = root.get("plugins").map_or(&[][..], Node::items);
     folders
         .iter()

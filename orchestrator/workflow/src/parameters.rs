@@ -246,7 +246,8 @@ impl<'a> Resolver<'a> {
         let path = absolute(&at.source.folder, text);
         match std::fs::read(&path) {
             Ok(bytes) => {
-                let hash = blake3::hash(&bytes).to_hex().to_string();
+                let hash = crate::evidence::hash(&bytes);
+                self.problems.note_file(&path, &hash);
                 self.files.push(InputFile {
                     pointer: at.pointer.clone(),
                     path: path.clone(),

@@ -35,6 +35,7 @@ pub fn read(
 
 /// Parses the bytes of a file.
 pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Option<(Source, Node)> {
+    problems.note_file(&path, &crate::evidence::hash(&bytes));
     let Ok(text) = String::from_utf8(bytes) else {
         problems.add_unreadable(&shown(&path), "the file is not text in UTF-8".into());
         return None;

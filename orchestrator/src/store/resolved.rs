@@ -1,0 +1,265 @@
+//! The resolved workflow of the last command, kept so that a study of ten thousand steps is not parsed
+//! and checked each time. It is used only when the program, the file, the overrides, the search path and
+//! all that the resolution read and asked are the same; in any doubt the workflow is resolved anew.
+//! Findings are never kept: a workflow with one is read again each time.
+
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_workflow::resolved::{
+    Dimension, Expectation, FailurePolicy, InputFile, PluginId, ResolvedInput, ResolvedStep,
+    ResolvedWorkflow, Resources,
+};
+use plyflow_workflow::{Catalog, Evidence, Resolution};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Number, Value};
+use std::os::unix::fs::MetadataExt;
+
+/// Changes whenever the form of the file does.
+const FORM: &[u8] = b"plyflow resolved workflow 1";
+
+/// What a resolution depends on besides its [`Evidence`], as one hash.
+pub type Circumstances = [u8; 32];
+
+/// The circumstances of resolving `file` (absolute) with the overrides as given and the search path;
+/// `None` when this program cannot be told from another one.
+pub fn circumstances(
+    program: &Utf8Path,
+    file: &Utf8Path,
+    overrides: &[String],
+    search_path: &[Utf8PathBuf],
+) -> Option<Circumstances> {
+    let m = std::fs::metadata(program).ok()?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(FORM);
+    for number in [m.dev(), m.ino(), m.size()] {
+        hasher.update(&number.to_le_bytes());
+    }
+    for number in [m.mtime(), m.mtime_nsec(), m.ctime(), m.ctime_nsec()] {
+        hasher.update(&number.to_le_bytes());
+    }
+    let mut text = |t: &str| {
+        hasher.update(&(t.len() as u64).to_le_bytes());
+        hasher.update(t.as_bytes());
+    };
+    text(env!("CARGO_PKG_VERSION"));
+    text(file.as_str());
+    // The count keeps an override from passing as a folder.
+    text(&overrides.len().to_string());
+    overrides.iter().for_each(|t| text(t));
+    search_path.iter().for_each(|f| text(f.as_str()));
+    Some(*hasher.finalize().as_bytes())
+}
+
+/// Where the resolution of a workflow file (absolute) is kept.
+fn place(root: &Utf8Path, file: &Utf8Path) -> Utf8PathBuf {
+    let hash = blake3::hash(file.as_str().as_bytes()).to_hex();
+    root.join("resolved").join(&hash[..16])
+}
+
+/// The kept resolution, if there is one and everything it rests on is as it was.
+pub fn read(
+    root: &Utf8Path,
+    file: &Utf8Path,
+    circumstances: &Circumstances,
+    catalog: &dyn Catalog,
+) -> Option<ResolvedWorkflow> {
+    let bytes = std::fs::read(place(root, file)).ok()?;
+    let (known, rest) = bytes.split_first_chunk::<32>()?;
+    let (sum, payload) = rest.split_first_chunk::<32>()?;
+    if known != circumstances || blake3::hash(payload).as_bytes() != sum {
+        return None;
+    }
+    let (evidence, packed) = postcard::take_from_bytes::<Evidence>(payload).ok()?;
+    if !evidence.holds(catalog) {
+        return None;
+    }
+    postcard::from_bytes::<Packed>(packed).ok()?.unpack()
+}
+
+/// Keeps a resolution in a store that is there. One that cannot be written only costs time.
+pub fn write(
+    root: &Utf8Path,
+    file: &Utf8Path,
+    circumstances: &Circumstances,
+    resolution: &Resolution,
+) {
+    let place = place(root, file);
+    let temporary = Utf8PathBuf::from(format!("{place}.{}", std::process::id()));
+    let written = encode(circumstances, resolution).is_some_and(|bytes| {
+        root.is_dir()
+            && std::fs::create_dir_all(root.join("resolved"))
+                .and_then(|()| std::fs::write(&temporary, bytes))
+                .and_then(|()| std::fs::rename(&temporary, &place))
+                .is_ok()
+    });
+    if !written {
+        let _ = std::fs::remove_file(&temporary);
+    }
+}
+
+fn encode(circumstances: &Circumstances, resolution: &Resolution) -> Option<Vec<u8>> {
+    let mut payload = postcard::to_stdvec(&resolution.evidence).ok()?;
+    payload.extend(postcard::to_stdvec(&Packed::of(&resolution.workflow)).ok()?);
+    let mut bytes = circumstances.to_vec();
+    bytes.extend_from_slice(blake3::hash(&payload).as_bytes());
+    bytes.extend(payload);
+    Some(bytes)
+}
+
+/// A [`ResolvedWorkflow`] in a form that needs no names of fields, with every library once.
+#[derive(Serialize, Deserialize)]
+struct Packed {
+    name: String,
+    file: Utf8PathBuf,
+    description: Option<String>,
+    libraries: Vec<PluginId>,
+    steps: Vec<PackedStep>,
+    expectations: Vec<Expectation>,
+    fail_fast: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PackedStep {
+    name: String,
+    role: String,
+    plugin: usize,
+    components: Vec<usize>,
+    parameters: PackedValue,
+    files: Vec<InputFile>,
+    inputs: Vec<ResolvedInput>,
+    dimensions: Vec<Dimension>,
+    output_kind: String,
+    collection: bool,
+    resources: Resources,
+    retries: u32,
+}
+
+/// A JSON value with its numbers bit for bit: text could round them, and so move a key.
+#[derive(Serialize, Deserialize)]
+enum PackedValue {
+    Null,
+    Bool(bool),
+    Whole(u64),
+    Negative(i64),
+    Decimal(f64),
+    Text(String),
+    List(Vec<PackedValue>),
+    Map(Vec<(String, PackedValue)>),
+}
+
+impl PackedValue {
+    fn of(value: &Value) -> Self {
+        match value {
+            Value::Null => Self::Null,
+            Value::Bool(b) => Self::Bool(*b),
+            Value::Number(n) => match (n.as_u64(), n.as_i64()) {
+                (Some(n), _) => Self::Whole(n),
+                (None, Some(n)) => Self::Negative(n),
+                (None, None) => n.as_f64().map_or(Self::Null, Self::Decimal),
+            },
+            Value::String(text) => Self::Text(text.clone()),
+            Value::Array(items) => Self::List(items.iter().map(Self::of).collect()),
+            Value::Object(map) => {
+                Self::Map(map.iter().map(|(k, v)| (k.clone(), Self::of(v))).collect())
+            }
+        }
+    }
+
+    fn unpack(self) -> Option<Value> {
+        Some(match self {
+            Self::Null => Value::Null,
+            Self::Bool(b) => Value::Bool(b),
+            Self::Whole(n) => Value::Number(n.into()),
+            Self::Negative(n) => Value::Number(n.into()),
+            Self::Decimal(n) => Value::Number(Number::from_f64(n)?),
+            Self::Text(text) => Value::String(text),
+            Self::List(items) => {
+                Value::Array(items.into_iter().map(Self::unpack).collect::<Option<_>>()?)
+            }
+            Self::Map(entries) => Value::Object(
+                entries
+                    .into_iter()
+                    .map(|(k, v)| Some((k, v.unpack()?)))
+                    .collect::<Option<Map<_, _>>>()?,
+            ),
+        })
+    }
+}
+
+impl Packed {
+    fn of(workflow: &ResolvedWorkflow) -> Self {
+        let mut libraries: Vec<PluginId> = Vec::new();
+        let mut number = |id: &PluginId| {
+            libraries.iter().position(|l| l == id).unwrap_or_else(|| {
+                libraries.push(id.clone());
+                libraries.len() - 1
+            })
+        };
+        let steps = workflow
+            .steps
+            .iter()
+            .map(|s| PackedStep {
+                name: s.name.clone(),
+                role: s.role.clone(),
+                plugin: number(&s.plugin),
+                components: s.components.iter().map(&mut number).collect(),
+                parameters: PackedValue::of(&s.parameters),
+                files: s.files.clone(),
+                inputs: s.inputs.clone(),
+                dimensions: s.dimensions.clone(),
+                output_kind: s.output_kind.clone(),
+                collection: s.collection,
+                resources: s.resources,
+                retries: s.retries,
+            })
+            .collect();
+        Self {
+            name: workflow.name.clone(),
+            file: workflow.file.clone(),
+            description: workflow.description.clone(),
+            libraries,
+            steps,
+            expectations: workflow.expectations.clone(),
+            fail_fast: workflow.on_failure == FailurePolicy::FailFast,
+        }
+    }
+
+    fn unpack(self) -> Option<ResolvedWorkflow> {
+        let library = |i: usize| self.libraries.get(i).cloned();
+        let step = |s: PackedStep| {
+            Some(ResolvedStep {
+                name: s.name,
+                role: s.role,
+                plugin: library(s.plugin)?,
+                components: s
+                    .components
+                    .into_iter()
+                    .map(library)
+                    .collect::<Option<_>>()?,
+                parameters: s.parameters.unpack()?,
+                files: s.files,
+                inputs: s.inputs,
+                dimensions: s.dimensions,
+                output_kind: s.output_kind,
+                collection: s.collection,
+                resources: s.resources,
+                retries: s.retries,
+            })
+        };
+        Some(ResolvedWorkflow {
+            name: self.name,
+            file: self.file,
+            description: self.description,
+            steps: self.steps.into_iter().map(step).collect::<Option<_>>()?,
+            expectations: self.expectations,
+            on_failure: if self.fail_fast {
+                FailurePolicy::FailFast
+            } else {
+                FailurePolicy::KeepGoing
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+#[path = "resolved_tests.rs"]
+mod tests;

@@ -1,0 +1,62 @@
+//! What a resolved workflow rests on: as long as that holds, resolving again gives the same.
+
+use crate::catalog::{Catalog, Plugins};
+use crate::diagnostics::Problems;
+use crate::resolved::{PluginId, ResolvedWorkflow};
+use camino::Utf8PathBuf;
+use serde::{Deserialize, Serialize};
+
+/// A workflow and what it rests on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resolution {
+    /// The workflow.
+    pub workflow: ResolvedWorkflow,
+    /// What it was resolved from.
+    pub evidence: Evidence,
+}
+
+/// Everything that a resolution read and asked, besides the overrides and the program itself.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Absolute paths of the files that were read (the workflow, scenes, materials, meshes) with the
+    /// BLAKE3 of their bytes, hex.
+    files: Vec<(Utf8PathBuf, String)>,
+    /// Folders that had to exist.
+    folders: Vec<Utf8PathBuf>,
+    /// Plugin names or paths, the folder that paths start from, and what the catalog found.
+    plugins: Vec<(String, Utf8PathBuf, PluginId)>,
+}
+
+impl Evidence {
+    pub(crate) fn new(
+        problems: &Problems,
+        folders: Vec<Utf8PathBuf>,
+        plugins: &Plugins<'_>,
+    ) -> Self {
+        let files = problems.files().iter();
+        Self {
+            files: files.map(|(p, h)| (p.clone(), h.clone())).collect(),
+            folders,
+            plugins: plugins.answers(),
+        }
+    }
+
+    /// Whether every file has the same bytes, every folder is there, and the catalog gives the same
+    /// libraries. The files are read, not only looked at: a resolution from other bytes must never pass.
+    #[must_use]
+    pub fn holds(&self, catalog: &dyn Catalog) -> bool {
+        let same = |(path, known): &(Utf8PathBuf, String)| {
+            std::fs::read(path).is_ok_and(|bytes| hash(&bytes) == *known)
+        };
+        self.files.iter().all(same)
+            && self.folders.iter().all(|f| f.is_dir())
+            && self.plugins.iter().all(|(name, folder, known)| {
+                catalog.find(name, folder).is_ok_and(|e| e.id == *known)
+            })
+    }
+}
+
+/// BLAKE3 of some bytes, hex.
+pub(crate) fn hash(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
