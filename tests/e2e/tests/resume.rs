@@ -185,3 +185,47 @@ fn an_artifact_that_is_gone_or_cut_short_is_made_again_and_nothing_else() {
     assert_eq!(study.run(&[]), well(1, half - 1));
     assert_eq!(study.artifacts(), whole);
 }
+
+/// Files of kept resolved workflows.
+fn kept(study: &Study) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(study.path(".plyflow/resolved")).unwrap();
+    entries.map(|e| e.unwrap().path()).collect()
+}
+
+#[test]
+fn a_kept_workflow_gives_the_run_that_reading_it_anew_gives() {
+    let steps = "
+steps:
+  first: {plugin: trivial, with: {value: 2}}
+  second: {plugin: sum, from: {in: first}}
+";
+    let study = Study::new(steps);
+    assert_eq!(study.run(&[]), well(2, 0));
+    let [file] = &kept(&study)[..] else {
+        panic!("one workflow is kept as one file");
+    };
+    // In use, gone, cut, damaged: nothing runs.
+    assert_eq!(study.run(&[]), well(0, 2));
+    std::fs::remove_file(file).unwrap();
+    assert_eq!(study.run(&[]), well(0, 2));
+    let whole = std::fs::read(file).unwrap();
+    std::fs::write(file, &whole[..whole.len() / 2]).unwrap();
+    assert_eq!(study.run(&[]), well(0, 2));
+    assert_eq!(std::fs::read(file).unwrap(), whole, "it is made anew");
+    let damaged: Vec<u8> = whole.iter().map(|b| !b).collect();
+    std::fs::write(file, damaged).unwrap();
+    assert_eq!(study.run(&[]), well(0, 2));
+    // Another value of the same length, by the file and by the command line.
+    study.write(&steps.replace("value: 2", "value: 3"));
+    assert_eq!(study.run(&[]), well(2, 0));
+    assert_eq!(study.values("first", "value"), [3.0]);
+    assert_eq!(study.run(&["--set", "first.value=4"]), well(2, 0));
+    assert_eq!(study.run(&[]), well(0, 2));
+    // Findings are told each time.
+    study.write(&steps.replace("value: 2", "valu3: 2"));
+    for _ in 0..2 {
+        let output = study.call(&["run", "--no-report"]);
+        assert_eq!(output.status.code(), Some(3));
+        assert!(String::from_utf8_lossy(&output.stderr).contains("valu3"));
+    }
+}
