@@ -111,11 +111,9 @@ pub fn catalog(folders: Vec<Utf8PathBuf>, store: &Utf8Path) -> Result<PluginCata
         program: program()?,
         arguments: vec!["step-worker".into(), "--describe".into()],
     };
-    Ok(PluginCatalog::new(
-        folders,
-        Some(store.join("plugins.json")),
-        describer,
-    ))
+    // Only where there is a store: a look at the plugins leaves nothing in the folder where it was taken.
+    let cache = store.is_dir().then(|| store.join("plugins.json"));
+    Ok(PluginCatalog::new(folders, cache, describer))
 }
 
 /// Reads and checks a workflow; says everything that is wrong with it.
