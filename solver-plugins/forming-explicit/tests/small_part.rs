@@ -1,4 +1,8 @@
 //! A whole double-diaphragm process on a small part: two plies over a rounded block.
+//!
+//! What it does not claim: on this part hourglass energy is about 9 % of internal and the kinetic ratio about
+//! 7.5 %, both over their bounds; and at 10 mm elements over a 30 mm high block the ledger is open by 4.7 %. The mesh
+//! here is 7 mm and the block 20 mm high so that what it does claim can be judged.
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
 use plyflow_forming_explicit::assembly::Components;
