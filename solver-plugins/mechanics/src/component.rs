@@ -147,9 +147,10 @@ impl ElementInstance {
                 sizes.nodes
             )));
         }
-        if sizes.dofs_per_node != 3 {
+        if !matches!(sizes.dofs_per_node, 3 | 6) {
             return Err(fail(format!(
-                "has {} degrees of freedom per node; this solver carries the 3 translations",
+                "has {} degrees of freedom per node; this solver carries 3 (translations) or 6 \
+                 (and rotations)",
                 sizes.dofs_per_node
             )));
         }
@@ -162,6 +163,11 @@ impl ElementInstance {
             ));
         }
         Ok(made)
+    }
+
+    /// Whether its nodes rotate.
+    pub fn rotates(&self) -> bool {
+        self.sizes.dofs_per_node == 6
     }
 
     pub(crate) fn initialise(&self, batch: &pf_element_batch) -> i32 {

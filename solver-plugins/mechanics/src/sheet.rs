@@ -106,6 +106,8 @@ pub struct Batch {
     pub mass_factor: [f64; LANES],
     /// `[4][LANES]` element masses before scaling (kg).
     pub mass: Aligned,
+    /// `[4][LANES]` rotary inertias before scaling (kg m2); empty with 3 degrees of freedom per node.
+    pub inertia: Aligned,
     /// `[constants][LANES]`.
     pub constants: Aligned,
     /// `[history][LANES]`.

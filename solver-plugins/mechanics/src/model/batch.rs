@@ -30,6 +30,28 @@ pub(super) fn gather(nodes: &[[u32; 4]; LANES], x: &[V], out: &mut [f64]) {
     }
 }
 
+/// Velocities and spins of a batch at the half step, for elements whose nodes rotate.
+pub(super) struct Rates {
+    velocity: Buffer<{ 12 * LANES }>,
+    spin: Buffer<{ 12 * LANES }>,
+}
+
+impl Rates {
+    /// Of a body at rest.
+    pub(super) fn zero() -> Self {
+        Self {
+            velocity: Buffer([0.0; 12 * LANES]),
+            spin: Buffer([0.0; 12 * LANES]),
+        }
+    }
+
+    /// Puts them into a batch view, which must not outlive `self`.
+    pub(super) fn attach(&self, raw: &mut pf_element_batch) {
+        raw.velocity = self.velocity.0.as_ptr();
+        raw.spin = self.spin.0.as_ptr();
+    }
+}
+
 #[inline(always)]
 pub(super) fn gather_patch(nodes: &[u32], width: usize, x: &[V], out: &mut [f64]) {
     for l in 0..LANES {
@@ -101,18 +123,42 @@ pub(super) fn cell_areas_dispatch(p: &[f64; 12 * LANES], area: &mut [f64]) {
     cell_areas(p, area);
 }
 
+/// Where the nodes are and how they move.
+#[derive(Clone, Copy)]
+pub(super) struct Motion<'a> {
+    pub(super) x: &'a [V],
+    pub(super) v: &'a [V],
+    /// Empty when no sheet has rotations.
+    pub(super) spin: &'a [V],
+    /// Step just done (s).
+    pub(super) dt: f64,
+}
+
+/// What one batch writes besides its own histories.
+pub(super) struct Output<'a> {
+    pub(super) force: &'a mut [f64],
+    /// Empty when no sheet has rotations.
+    pub(super) moment: &'a mut [f64],
+    pub(super) energy: &'a mut [f64],
+    pub(super) area: Option<&'a mut [f64]>,
+}
+
 pub(super) fn run_batch(
     sheet: &Sheet,
     batch: &mut Batch,
-    x: &[V],
-    dt: f64,
-    force: &mut [f64],
-    energy: &mut [f64],
-    area: Option<&mut [f64]>,
+    motion: Motion<'_>,
+    out: Output<'_>,
     fields: bool,
 ) {
+    let Output {
+        force,
+        moment,
+        energy,
+        area,
+    } = out;
+    let dt = motion.dt;
     let mut position = Buffer([0.0; 12 * LANES]);
-    gather(&batch.nodes, x, &mut position.0);
+    gather(&batch.nodes, motion.x, &mut position.0);
     let p = &position.0;
     if let Some(area) = area {
         cell_areas_dispatch(p, area);
@@ -127,10 +173,20 @@ pub(super) fn run_batch(
         batch.fields = Aligned::zeros(sheet.element.sizes.fields * LANES);
         raw.fields = batch.fields.as_mut_ptr();
     }
-    batch.status = sheet.element.forces(&raw);
+    batch.status = if sheet.element.rotates() {
+        let mut rates = Rates::zero();
+        gather(&batch.nodes, motion.v, &mut rates.velocity.0);
+        gather(&batch.nodes, motion.spin, &mut rates.spin.0);
+        rates.attach(&mut raw);
+        raw.moment = moment.as_mut_ptr();
+        sheet.element.forces(&raw)
+    } else {
+        sheet.element.forces(&raw)
+    };
     if batch.layered {
         for row in force
             .chunks_exact_mut(LANES)
+            .chain(moment.chunks_exact_mut(LANES))
             .chain(energy.chunks_exact_mut(LANES))
         {
             for (value, layers) in row.iter_mut().zip(&batch.layers) {
@@ -164,9 +220,15 @@ pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 
     let mut history = batch.history.clone();
     let mut material_history = batch.material_history.clone();
     let mut force = Aligned::zeros(12 * LANES);
+    let mut moment = Aligned::zeros(12 * LANES);
     let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
     let mut step = Aligned::zeros(LANES);
+    let rates = Rates::zero();
     let mut raw = empty_element_batch(sheet, 0.0, &position.0);
+    if sheet.element.rotates() {
+        rates.attach(&mut raw);
+        raw.moment = moment.as_mut_ptr();
+    }
     raw.constants = constants.as_mut_ptr();
     raw.history = history.as_mut_ptr();
     raw.material_history = material_history.as_mut_ptr();

@@ -39,7 +39,14 @@ impl Model {
             node_slots: Csr::default(),
             patch_slots: Csr::default(),
             force: vec![[0.0; 3]; n],
-            pressure_force: vec![[0.0; 3]; n],
+            external_force: vec![[0.0; 3]; n],
+            own_mass: vec![0.0; n],
+            rotations: None,
+            supports: Supports::default(),
+            body_acceleration: [0.0; 3],
+            load_factor: 1.0,
+            loads: Vec::new(),
+            last_dt: 0.0,
             held: vec![Held::Free; n],
             driven: Vec::new(),
             drive: None,
@@ -107,6 +114,7 @@ impl Model {
                 layered: layers.iter().any(|k| *k != 1.0),
                 mass_factor: [1.0; LANES],
                 mass: Aligned::zeros(4 * LANES),
+                inertia: Aligned::zeros(if s.dofs_per_node == 6 { 4 * LANES } else { 0 }),
                 constants: Aligned::zeros(s.constants * LANES),
                 history: Aligned::zeros(s.history * LANES),
                 material_history: Aligned::zeros(
@@ -115,6 +123,9 @@ impl Model {
                 fields: Aligned::default(),
                 status: PF_OK,
             });
+        }
+        if s.dofs_per_node == 6 && self.rotations.is_none() {
+            self.rotations = Some(Box::new(Rotations::new(self.x.len())));
         }
         if s.patch_nodes > 0 && material.has_bending {
             self.add_patches(sheet_index, &spec, material.bending_history)?;
@@ -217,8 +228,10 @@ impl Model {
         let axis: Vec<f64> = (0..3 * LANES).map(|k| axis[k / LANES]).collect();
         let mut position = Aligned::zeros(12 * LANES);
         let mut force = Aligned::zeros(12 * LANES);
+        let mut moment = Aligned::zeros(12 * LANES);
         let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
         let mut step = Aligned::zeros(LANES);
+        let rates = Rates::zero();
         let batches = &mut self.batches[sheet.batch_range.0..sheet.batch_range.1];
         for (b, batch) in batches.iter_mut().enumerate() {
             gather(&batch.nodes, &self.x, &mut position);
@@ -228,9 +241,17 @@ impl Model {
             raw.history = batch.history.as_mut_ptr();
             raw.material_history = batch.material_history.as_mut_ptr();
             raw.mass = batch.mass.as_mut_ptr();
+            if sheet.element.rotates() {
+                raw.inertia = batch.inertia.as_mut_ptr();
+            }
             component_status(sheet.element.initialise(&raw), &sheet.name)?;
             raw.axis = std::ptr::null();
             raw.mass = std::ptr::null_mut();
+            raw.inertia = std::ptr::null_mut();
+            if sheet.element.rotates() {
+                rates.attach(&mut raw);
+                raw.moment = moment.as_mut_ptr();
+            }
             raw.force = force.as_mut_ptr();
             raw.energy = energy.as_mut_ptr();
             raw.critical_step = step.as_mut_ptr();
@@ -251,7 +272,14 @@ impl Model {
                 batch.mass_factor[l] = factor;
                 for k in 0..4 {
                     let own = batch.mass[k * LANES + l] * batch.layers[l];
-                    self.mass[batch.nodes[l][k] as usize] += own * factor;
+                    let node = batch.nodes[l][k] as usize;
+                    self.mass[node] += own * factor;
+                    self.own_mass[node] += own;
+                    if let Some(r) = self.rotations.as_deref_mut()
+                        && sheet.element.rotates()
+                    {
+                        r.inertia[node] += batch.inertia[k * LANES + l] * batch.layers[l] * factor;
+                    }
                     sheet.added_mass += own * (factor - 1.0);
                 }
             }
@@ -270,6 +298,9 @@ impl Model {
         self.element_force = Aligned::zeros(nb * 12 * LANES);
         self.element_energy = Aligned::zeros(nb * PF_ENERGIES * LANES);
         self.cell_area = Aligned::zeros(nb * AREA_ROWS * LANES);
+        if let Some(r) = self.rotations.as_deref_mut() {
+            r.element_moment = Aligned::zeros(nb * 12 * LANES);
+        }
         let slots = self
             .cells
             .iter()
@@ -303,6 +334,8 @@ impl Model {
         for n in &nodes {
             self.held[*n as usize] = Held::Driven;
         }
+        self.supports.reaction = vec![[0.0; 3]; nodes.len()];
+        self.supports.reaction_moment = vec![[0.0; 3]; nodes.len()];
         self.driven = nodes;
         self.drive = Some(drive);
     }

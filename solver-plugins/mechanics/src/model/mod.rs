@@ -3,8 +3,13 @@
 mod batch;
 mod build;
 mod query;
+mod rotation;
+mod support;
 
 use batch::*;
+use rotation::Rotations;
+use support::Supports;
+pub use support::{Fixed, NodalLoad};
 
 use crate::contact::{ContactEnergy, ContactSettings, RigidContact, SheetContact, Surface};
 use crate::energy::Ledger;
@@ -29,6 +34,12 @@ pub trait Drive: Send + Sync {
     /// Writes the position (m) at time `t` (s) of driven node `k`, in the order of
     /// [`Model::set_driven`].
     fn position(&self, k: usize, t: f64) -> V;
+
+    /// Spin (rad/s, global axes) of driven node `k` at time `t` (s), for sheets whose nodes rotate;
+    /// `None`: its rotation is free.
+    fn spin(&self, _k: usize, _t: f64) -> Option<V> {
+        None
+    }
 }
 
 /// Constants of the time integration.
@@ -93,7 +104,18 @@ pub struct Model {
     node_slots: Csr,
     patch_slots: Csr,
     force: Vec<V>,
-    pressure_force: Vec<V>,
+    /// Pressure, weight and nodal loads (N): what does external work on free nodes.
+    external_force: Vec<V>,
+    /// `[n]` masses without scaling (kg): what has weight.
+    own_mass: Vec<f64>,
+    rotations: Option<Box<Rotations>>,
+    supports: Supports,
+    /// Acceleration of free fall (m/s2), global axes.
+    pub body_acceleration: V,
+    /// What the nodal loads are multiplied by.
+    pub load_factor: f64,
+    loads: Vec<NodalLoad>,
+    last_dt: f64,
     held: Vec<Held>,
     driven: Vec<u32>,
     drive: Option<Box<dyn Drive>>,
@@ -155,6 +177,23 @@ impl NodeWork {
 
 const NODE_CHUNK: usize = 1024;
 
+/// The chunks `[12][LANES]` of the element moments, or as many empty ones when nothing rotates.
+fn moment_chunks(
+    moments: &mut [f64],
+    batches: usize,
+) -> impl IndexedParallelIterator<Item = &mut [f64]> {
+    let chunk = if moments.is_empty() { 0 } else { 12 * LANES };
+    let mut rest = moments;
+    let list: Vec<&mut [f64]> = (0..batches)
+        .map(|_| {
+            let (head, tail) = std::mem::take(&mut rest).split_at_mut(chunk);
+            rest = tail;
+            head
+        })
+        .collect();
+    list.into_par_iter()
+}
+
 /// How often (steps) the nodes' normals and areas are computed.
 const NORMAL_INTERVAL: u64 = 16;
 
@@ -162,8 +201,18 @@ impl Model {
     /// Internal forces, energies and cell areas at the present positions. With `fields`, the elements'
     /// fields too.
     fn internal_forces(&mut self, fields: bool) -> Result<(), MechanicsError> {
-        let (sheets, x) = (&self.sheets, &self.x);
-        let dt = if self.cycle == 0 { 0.0 } else { self.dt };
+        let sheets = &self.sheets;
+        let (spin, moments): (&[V], &mut [f64]) = match self.rotations.as_deref_mut() {
+            Some(r) => (&r.spin, &mut r.element_moment),
+            None => (&[], &mut []),
+        };
+        let motion = Motion {
+            x: &self.x,
+            v: &self.v,
+            spin,
+            dt: self.last_dt,
+        };
+        let moments = moment_chunks(moments, self.batches.len());
         let (pressed, all) = (&self.pressed, self.cycle.is_multiple_of(NORMAL_INTERVAL));
         self.element_force
             .par_chunks_exact_mut(12 * LANES)
@@ -173,14 +222,22 @@ impl Model {
             )
             .zip_eq(self.cell_area.par_chunks_exact_mut(AREA_ROWS * LANES))
             .zip_eq(self.batches.par_iter_mut())
+            .zip_eq(moments)
             .enumerate()
             .with_min_len(8)
-            .for_each(|(b, (((force, energy), area), batch))| {
+            .for_each(|(b, ((((force, energy), area), batch), moment))| {
                 let sheet = &sheets[batch.sheet as usize];
                 let slots = &pressed[b * LANES..(b + 1) * LANES];
                 let area = (all || slots.iter().any(|w| *w != [0.0; 2])).then_some(area);
-                run_batch(sheet, batch, x, dt, force, energy, area, fields);
+                let out = Output {
+                    force,
+                    moment,
+                    energy,
+                    area,
+                };
+                run_batch(sheet, batch, motion, out, fields);
             });
+        let (x, dt) = (motion.x, motion.dt);
         self.patches
             .par_iter_mut()
             .with_min_len(8)
@@ -208,9 +265,10 @@ impl Model {
         let (element_force, cell_area, pressed) =
             (&*self.element_force, &*self.cell_area, &self.pressed);
         let patches = &self.patches;
+        let (weight, own_mass) = (self.body_acceleration, &self.own_mass);
         self.force
             .par_chunks_mut(NODE_CHUNK)
-            .zip_eq(self.pressure_force.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(self.external_force.par_chunks_mut(NODE_CHUNK))
             .zip_eq(self.area.par_chunks_mut(NODE_CHUNK))
             .zip_eq(self.normals.par_chunks_mut(NODE_CHUNK))
             .enumerate()
@@ -245,6 +303,7 @@ impl Model {
                             f[c] -= batch.force[at + c * LANES];
                         }
                     }
+                    q = add(q, scale(weight, own_mass[node]));
                     force[i] = add(f, q);
                     pressure[i] = q;
                     if with_normals {
@@ -253,6 +312,8 @@ impl Model {
                     }
                 }
             });
+        self.apply_loads();
+        self.assemble_moments();
     }
 
     /// Forces of all contacts, added to the nodal forces.
@@ -297,20 +358,22 @@ impl Model {
                 .collect(),
             None => Vec::new(),
         };
-        for (n, target) in self.driven.iter().zip(targets) {
+        for (k, (n, target)) in self.driven.iter().zip(targets).enumerate() {
             let n = *n as usize;
             let next = scale(sub(target, self.x[n]), 1.0 / dt);
             // What holds the node makes up for the forces on it: its work is external.
             let mean = scale(add(next, self.v[n]), 0.5);
             let inertia = scale(sub(next, self.v[n]), self.mass[n] / dt);
-            let held = sub(inertia, sub(self.force[n], self.pressure_force[n]));
+            let held = sub(inertia, sub(self.force[n], self.external_force[n]));
             self.ledger.external += dot(held, mean) * dt;
+            self.supports.reaction[k] = sub(inertia, self.force[n]);
             self.x[n] = target;
             self.v[n] = next;
         }
         let (lo, hi) = (1.0 / dt - 0.5 * alpha, 1.0 / (1.0 / dt + 0.5 * alpha));
         let (force, pressure, mass, held) =
-            (&self.force, &self.pressure_force, &self.mass, &self.held);
+            (&self.force, &self.external_force, &self.mass, &self.held);
+        let fixed = &self.supports.fixed;
         let parts: Vec<NodeWork> = self
             .x
             .par_chunks_mut(NODE_CHUNK)
@@ -325,8 +388,11 @@ impl Model {
                         let mut v = [0.0; 3];
                         for c in 0..3 {
                             v[c] = (lo * old[c] + force[n][c] / mass[n]) * hi;
-                            xs[i][c] += v[c] * dt;
                         }
+                        if let Some(f) = fixed.get(n) {
+                            v = f.translation(v);
+                        }
+                        xs[i] = add(xs[i], scale(v, dt));
                         let mean = scale(add(v, old), 0.5);
                         work.external += dot(pressure[n], mean) * dt;
                         work.damping += alpha * mass[n] * dot(mean, mean) * dt;
@@ -343,10 +409,12 @@ impl Model {
             })
             .collect();
         self.work = parts.into_iter().fold(NodeWork::default(), NodeWork::add);
+        self.rotate();
         self.max_speed = self.work.speed.sqrt();
         self.ledger.external += self.work.external;
         self.ledger.damping += self.work.damping;
         self.time += dt;
+        self.last_dt = dt;
         self.cycle += 1;
     }
 

@@ -1,0 +1,97 @@
+//! Supports and nodal loads: fixed components, what driven nodes feel, forces and moments at nodes.
+
+use super::*;
+
+/// Components (global axes) of a node's motion that are held at zero.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Fixed {
+    /// Translations along x, y, z.
+    pub translations: [bool; 3],
+    /// Rotations about x, y, z.
+    pub rotations: [bool; 3],
+}
+
+impl Fixed {
+    #[inline(always)]
+    fn keep(held: [bool; 3], v: V) -> V {
+        std::array::from_fn(|c| if held[c] { 0.0 } else { v[c] })
+    }
+
+    /// The free part of a velocity.
+    #[inline(always)]
+    pub(super) fn translation(&self, v: V) -> V {
+        Self::keep(self.translations, v)
+    }
+
+    /// The free part of a spin.
+    #[inline(always)]
+    pub(super) fn rotation(&self, v: V) -> V {
+        Self::keep(self.rotations, v)
+    }
+}
+
+/// A dead load at a node (global axes); [`Model::load_factor`] multiplies it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodalLoad {
+    /// Node of the model.
+    pub node: u32,
+    /// Force (N).
+    pub force: V,
+    /// Moment (N m); needs a sheet whose nodes rotate.
+    pub moment: V,
+}
+
+/// What holds a model besides its drive.
+#[derive(Default)]
+pub(super) struct Supports {
+    /// `[n]`, or empty when nothing is fixed.
+    pub(super) fixed: Vec<Fixed>,
+    /// By driven node: force of the support on it (N).
+    pub(super) reaction: Vec<V>,
+    /// By driven node: moment of the support on it (N m).
+    pub(super) reaction_moment: Vec<V>,
+}
+
+impl Model {
+    /// Holds components of a node at zero. Held components do no work.
+    pub fn fix(&mut self, node: u32, fixed: Fixed) {
+        if self.supports.fixed.is_empty() {
+            self.supports.fixed = vec![Fixed::default(); self.x.len()];
+        }
+        self.supports.fixed[node as usize] = fixed;
+    }
+
+    /// Sets the nodal loads; [`Model::load_factor`] multiplies them.
+    pub fn set_loads(&mut self, loads: Vec<NodalLoad>) {
+        self.loads = loads;
+    }
+
+    /// Sets the mass-proportional damping (1/s) from the next step on.
+    pub fn set_damping(&mut self, damping: f64) {
+        self.settings.damping = damping;
+    }
+
+    /// `[driven]` forces (N) of what drives the nodes on them in the last step, in the order of
+    /// [`Model::set_driven`]: mass times acceleration less all other forces.
+    pub fn reactions(&self) -> &[V] {
+        &self.supports.reaction
+    }
+
+    /// `[driven]` moments (N m) of what drives the nodes' rotations; zero where these are free.
+    pub fn reaction_moments(&self) -> &[V] {
+        &self.supports.reaction_moment
+    }
+
+    /// `[n]` masses without scaling (kg).
+    pub fn own_masses(&self) -> &[f64] {
+        &self.own_mass
+    }
+
+    pub(super) fn apply_loads(&mut self) {
+        for load in &self.loads {
+            let (n, f) = (load.node as usize, scale(load.force, self.load_factor));
+            self.force[n] = add(self.force[n], f);
+            self.external_force[n] = add(self.external_force[n], f);
+        }
+    }
+}
