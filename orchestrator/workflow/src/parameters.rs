@@ -167,6 +167,7 @@ impl<'a> Resolver<'a> {
                 _ => self.wrong(node, at, &d.shape.expected()),
             },
             Shape::Scene => crate::scene::resolve(self, node, at),
+            Shape::SheetMaterial => crate::scene::sheet_material(self, node, at),
             Shape::File => match node.text() {
                 Some(text) => self.file(text, node, at).map(|path| json!(path)),
                 None => self.wrong(node, at, "the path of a file"),

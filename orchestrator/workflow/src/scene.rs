@@ -2,10 +2,10 @@
 
 use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
-use crate::parameters::{Place, Resolver, absolute, unreadable};
+use crate::parameters::{Place, Resolver, absolute, find, unreadable};
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
-use plyflow_model::manifest::PluginKind;
+use plyflow_model::manifest::{PluginKind, Shape};
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_model::{material::Material, scene::Scene, schema};
 use serde_json::{Value, json};
@@ -156,25 +156,123 @@ fn materials(resolver: &mut Resolver<'_>, scene: &Node, at: &Place<'_>) -> Vec<O
             key: entry.key_span.clone(),
         };
         all.push(match &entry.value.kind {
-            Kind::Text(file) => read(resolver.problems, at.source, &entry.value.span, file)
-                .and_then(|(source, node)| {
-                    let place = Place {
-                        source: &source,
-                        key: node.span.clone(),
-                        ..place
-                    };
-                    let before = resolver.problems.count();
-                    Checker::new(&MATERIAL, &source, resolver.problems)
-                        .check(&node, "the material");
-                    let sound = resolver.problems.count() == before;
-                    material_value(resolver, &node, &place, sound)
-                }),
+            Kind::Text(file) => material_file(resolver, &entry.value.span, file, &place),
             // The scene's schema has looked at a material that is written inside it.
             Kind::Map(_) => material_value(resolver, &entry.value, &place, true),
             _ => None,
         });
     }
     all
+}
+
+/// The material of a file that `at` names.
+fn material_file(
+    resolver: &mut Resolver<'_>,
+    span: &Span,
+    file: &str,
+    at: &Place<'_>,
+) -> Option<Value> {
+    let (source, node) = read(resolver.problems, at.source, span, file)?;
+    let place = Place {
+        source: &source,
+        key: node.span.clone(),
+        ..at.clone()
+    };
+    checked_material(resolver, &node, &place)
+}
+
+fn checked_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+    let before = resolver.problems.count();
+    Checker::new(&MATERIAL, at.source, resolver.problems).check(node, "the material");
+    let sound = resolver.problems.count() == before;
+    material_value(resolver, node, at, sound)
+}
+
+/// Resolves a parameter of type `sheet_material`: a file, a material, or `{file: .., with: {..}}`, where every
+/// parameter under `with` takes the place of the file's own (`null` removes it).
+pub fn sheet_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+    let expected = Shape::SheetMaterial.expected();
+    match &node.kind {
+        Kind::Text(file) => material_file(resolver, &node.span, file, at),
+        Kind::Map(entries) if node.get("file").is_some() => {
+            let known = ["file", "with"];
+            for e in entries.iter().filter(|e| !known.contains(&e.key.as_str())) {
+                crate::check::unknown_key(e, &at.what, known, at.source, resolver.problems);
+            }
+            let file = node.get("file")?;
+            let Some(path) = file.text() else {
+                let message = format!("`file` is {}", file.describe());
+                let d = resolver.problems.add(at.source, &file.span, message);
+                d.given(file.describe())
+                    .expected("the path of a material file");
+                return None;
+            };
+            let mut material = material_file(resolver, &file.span, path, at)?;
+            let with = node.entry("with").filter(|e| e.value.kind != Kind::Null);
+            if let Some(with) = with {
+                override_parameters(resolver, &with.value, &mut material, at)?;
+            }
+            Some(material)
+        }
+        Kind::Map(_) => checked_material(resolver, node, at),
+        _ => {
+            let message = format!("`{}` is {}", at.what, node.describe());
+            let d = resolver.problems.add(at.source, &node.span, message);
+            d.given(node.describe()).expected(expected);
+            None
+        }
+    }
+}
+
+/// Puts single parameters into a resolved material.
+fn override_parameters(
+    resolver: &mut Resolver<'_>,
+    with: &Node,
+    material: &mut Value,
+    at: &Place<'_>,
+) -> Option<()> {
+    let name = material["plugin"].as_str()?.to_owned();
+    let (kind, catalog) = (PluginKind::Material, resolver.catalog);
+    let found = find(
+        catalog,
+        resolver.problems,
+        at.source,
+        &name,
+        &with.span,
+        kind,
+    )?;
+    if !matches!(with.kind, Kind::Map(_)) {
+        let message = format!("`with` is {}", with.describe());
+        let d = resolver.problems.add(at.source, &with.span, message);
+        d.expected("a mapping of parameters");
+        return None;
+    }
+    let declared = &found.manifest.parameters;
+    let before = resolver.problems.count();
+    for entry in with.entries() {
+        let Some(declaration) = declared.get(&entry.key) else {
+            let message = format!("`{}` is no parameter of `{name}`", entry.key);
+            let d = resolver.problems.add(at.source, &entry.key_span, message);
+            d.given(entry.key.clone())
+                .suggest(&entry.key, declared.keys().map(String::as_str));
+            continue;
+        };
+        let place = at.below(&entry.key, entry.key.clone(), &entry.key_span);
+        if entry.value.kind == Kind::Null {
+            if declaration.required {
+                let message = format!("`{name}` needs the parameter `{}`", entry.key);
+                resolver
+                    .problems
+                    .add(at.source, &entry.key_span, message)
+                    .help("`null` takes a parameter away; give a value instead");
+            } else if let Some(map) = material["with"].as_object_mut() {
+                map.remove(&entry.key);
+            }
+        } else if let Some(value) = resolver.value(&entry.value, declaration, &place) {
+            material["with"][&entry.key] = value;
+        }
+    }
+    (resolver.problems.count() == before).then_some(())
 }
 
 /// The material with its parameters checked against its plugin, as JSON with SI numbers.

@@ -219,6 +219,8 @@ pub enum Shape {
     Object(IndexMap<String, Declaration>),
     /// A scene file or the scene itself.
     Scene,
+    /// A material of a sheet: a material file, the material itself, or a file with other parameters.
+    SheetMaterial,
     /// A path.
     File,
     /// An element or a material: name, path of a library, or `{plugin: .., with: {..}}`.
@@ -242,6 +244,9 @@ impl Shape {
                 format!("a mapping with {}", names.join(", "))
             }
             Shape::Scene => "the path of a scene file, or a scene".into(),
+            Shape::SheetMaterial => {
+                "the path of a material file, a material, or `{file: .., with: {..}}`".into()
+            }
             Shape::File => "the path of a file".into(),
             Shape::Component(kind) => format!(
                 "the name of an {kind} plugin, the path of its library, or `{{plugin: .., with: {{..}}}}`"
@@ -380,6 +385,7 @@ impl TryFrom<RawDeclaration> for Declaration {
                 &["fields"],
             ),
             "scene" => (Shape::Scene, &[]),
+            "sheet_material" => (Shape::SheetMaterial, &[]),
             "file" => (Shape::File, &[]),
             "element" => (Shape::Component(PluginKind::Element), &[]),
             "material" => (Shape::Component(PluginKind::Material), &[]),
@@ -453,6 +459,7 @@ impl From<Declaration> for RawDeclaration {
                 "object"
             }
             Shape::Scene => "scene",
+            Shape::SheetMaterial => "sheet_material",
             Shape::File => "file",
             Shape::Component(kind) => kind.name(),
         }
