@@ -319,6 +319,8 @@ pub enum SchemaKind {
     Scene,
     /// Materials
     Material,
+    /// Files of expectations
+    Expected,
 }
 
 /// `clean`

@@ -164,6 +164,7 @@ pub fn schema(args: &SchemaArgs) -> Done {
         SchemaKind::PlainWorkflow => schema::workflow(),
         SchemaKind::Scene => schema::scene(),
         SchemaKind::Material => schema::material(),
+        SchemaKind::Expected => schema::expected(),
         SchemaKind::Workflow => {
             let folders = search_path(&args.places, None)?;
             let catalog = catalog(folders, &store_root(&args.places, None))?;

@@ -90,21 +90,29 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
     for (id, record) in records {
         let step = &core.graph().steps[core.instances()[*id].step].name;
         for result in &record.results {
-            let at = expectations
-                .iter()
-                .position(|e| e.step == *step && e.result == result.name);
-            if let Some(at) = at {
-                met[at] = true;
-            }
-            rows.push(Row {
+            let row = Row {
                 step: step.clone(),
                 item: core.item_labels(*id),
                 name: result.name.clone(),
                 value: Some(result.value),
                 unit: result.unit.clone(),
                 measured: result.measured,
-                expected: at.map(|at| expectations[at].clone()),
-            });
+                expected: None,
+            };
+            let before = rows.len();
+            // A number may be held against several sources: one row each.
+            for (at, e) in expectations.iter().enumerate() {
+                if e.step == *step && e.result == result.name {
+                    met[at] = true;
+                    rows.push(Row {
+                        expected: Some(e.clone()),
+                        ..row.clone()
+                    });
+                }
+            }
+            if rows.len() == before {
+                rows.push(row);
+            }
         }
     }
     for (e, _) in expectations.iter().zip(met).filter(|(_, met)| !met) {

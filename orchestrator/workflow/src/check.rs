@@ -5,7 +5,7 @@
 //! Understood: `$ref`, `type`, `properties`, `required`, `additionalProperties`, `items`, `minItems`,
 //! `maxItems`, `const`, `minimum`, `maximum`, `anyOf` (by type of the value), `oneOf` (of constants, or
 //! of one-key mappings), and of ours `x-dimension`, `x-minimum`, `x-maximum`, `x-exclusive-minimum`
-//! (quantities) and `x-format: memory`.
+//! (quantities), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
 
 use crate::diagnostics::{Problems, Source};
 use crate::yaml::{Kind, Node, Span};
@@ -103,7 +103,21 @@ impl<'a> Checker<'a> {
         View(maps)
     }
 
+    /// Whether the type of the value is that of a branch of the `anyOf`.
+    fn fits_a_branch(&self, schema: &View<'a>, node: &Node) -> bool {
+        let branches = schema.get("anyOf").and_then(Value::as_array);
+        branches
+            .into_iter()
+            .flatten()
+            .any(|b| type_fits(&View(self.follow(b)), node))
+    }
+
     fn value(&mut self, node: &Node, schema: &View<'a>, what: &str, key: &Span) {
+        if let Some(expected) = schema.text("x-expected")
+            && !self.fits_a_branch(schema, node)
+        {
+            return self.wrong_type(node, what, expected, key, None);
+        }
         let schema = &self.choose(schema.clone(), node);
         if let Some(dimension) = schema.text("x-dimension") {
             self.quantity(node, schema, dimension, what, key);

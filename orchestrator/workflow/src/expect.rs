@@ -1,23 +1,93 @@
-//! The `expect` list: stated values and bounds of results, in SI.
+//! What is expected of results: stated values and bounds, in SI, from the list `expect` of a workflow or from the
+//! JSON file that it names.
 
+use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
 use crate::load::Draft;
+use crate::parameters::{absolute, unreadable};
 use crate::resolved::Expectation;
 use crate::yaml::{Entry, Kind, Node};
+use plyflow_model::schema;
 use plyflow_model::units::{Dimension, parse_quantity_in, parse_unit};
+use serde_json::Value;
+use std::sync::{Arc, LazyLock};
 
-/// Reads the list; everything wrong is reported.
+static EXPECTED: LazyLock<Value> = LazyLock::new(schema::expected);
+
+/// Reads the list, here or in its file; everything wrong is reported where it stands.
 pub(crate) fn expectations(
     root: &Node,
     drafts: &[Draft<'_>],
     source: &Source,
     problems: &mut Problems,
 ) -> Vec<Expectation> {
-    let items = root.get("expect").map_or(&[][..], Node::items);
-    items
-        .iter()
-        .filter_map(|item| expectation(item, drafts, source, problems))
-        .collect()
+    let Some(expect) = root.get("expect") else {
+        return Vec::new();
+    };
+    let list = |items: &[Node], source: &Source, problems: &mut Problems| {
+        let read = |item| expectation(item, drafts, source, problems);
+        items.iter().filter_map(read).collect::<Vec<_>>()
+    };
+    let Some(given) = expect.text() else {
+        return list(expect.items(), source, problems);
+    };
+    let Some((file, tree)) = read(given, expect, source, problems) else {
+        return Vec::new();
+    };
+    Checker::new(&EXPECTED, &file, problems).check(&tree, "the expectations");
+    let items = tree.get("expectations").map_or(&[][..], Node::items);
+    let origin = tree.get("source").and_then(Node::text);
+    let mut all = list(items, &file, problems);
+    for e in &mut all {
+        e.source = e.source.take().or_else(|| origin.map(str::to_owned));
+    }
+    all
+}
+
+/// Reads the JSON file that `expect` names. It is noted as read, so that a change of it is seen.
+fn read(given: &str, at: &Node, from: &Source, problems: &mut Problems) -> Option<(Source, Node)> {
+    let path = absolute(&from.folder, given);
+    let bytes = match std::fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(e) => {
+            unreadable(problems, from, &at.span, given, &path, &e);
+            return None;
+        }
+    };
+    problems.note_file(&path, &crate::evidence::hash(&bytes));
+    let Ok(text) = String::from_utf8(bytes) else {
+        problems.add_unreadable(&path, "the file is not text in UTF-8".into());
+        return None;
+    };
+    let folder = from.folder.clone();
+    let source = Source {
+        name: path,
+        folder,
+        text: Arc::new(text),
+    };
+    // JSON is YAML, and the YAML reader knows where everything stands; but it takes more than other programs do.
+    if let Err(e) = serde_json::from_str::<serde::de::IgnoredAny>(&source.text) {
+        let span = crate::yaml::span_at(&source.text, e.line(), e.column());
+        let mut message = e.to_string();
+        if let Some(i) = message.rfind(" at line ") {
+            message.truncate(i);
+        }
+        let d = problems.add(&source, &span, format!("this is no valid JSON: {message}"));
+        d.help("check brackets, quotes and colons at and above this place; JSON has no comments, and no comma before a closing bracket");
+        return None;
+    }
+    // YAML has its own mind about tabs. In JSON one is never more than a space, and of the same length.
+    match crate::yaml::parse(&source.text.replace('\t', " ")) {
+        Ok(tree) => {
+            repeated_keys(&tree, &source, problems);
+            Some((source, tree))
+        }
+        Err(e) => {
+            let message = format!("this JSON cannot be read: {}", e.message);
+            problems.add(&source, &e.span, message);
+            None
+        }
+    }
 }
 
 fn expectation(

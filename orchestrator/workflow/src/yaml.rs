@@ -202,6 +202,17 @@ fn span(text: &str, location: &Location) -> Span {
     }
 }
 
+/// The empty range at a line and a column (bytes, as `serde_json` counts), both from 1.
+pub fn span_at(text: &str, line: usize, column: usize) -> Span {
+    let lines = text.split_inclusive('\n');
+    let before: usize = lines.take(line.saturating_sub(1)).map(str::len).sum();
+    let mut at = (before + column.saturating_sub(1)).min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at..at
+}
+
 fn byte_of(text: &str, line: usize, column: usize) -> usize {
     let before: usize = text
         .split_inclusive('\n')

@@ -2,12 +2,16 @@
 
 mod common;
 
-use common::{FABRIC, FILM, SCENE, Study, WORKFLOW};
+use common::{EXPECTED, FABRIC, FILM, SCENE, Study, WORKFLOW};
 use proptest::prelude::*;
 
 /// Loads with one file replaced; findings are rendered both ways, since that walks all spans.
 fn survives(name: &str, bytes: &[u8]) {
-    let study = Study::sound();
+    let study = if name == "expected.json" {
+        Study::with_expected_file()
+    } else {
+        Study::sound()
+    };
     std::fs::write(study.path(name), bytes).unwrap();
     if let Err(found) = study.load() {
         assert!(!found.items.is_empty());
@@ -21,6 +25,7 @@ fn file() -> impl Strategy<Value = (&'static str, &'static str)> {
         Just(("scene.yaml", SCENE)),
         Just(("materials/fabric.yaml", FABRIC)),
         Just(("film.yaml", FILM)),
+        Just(("expected.json", EXPECTED)),
     ]
 }
 
@@ -68,6 +73,7 @@ fn deep_nesting_is_refused_without_panic() {
         .map(|i| format!("{}a:\n", " ".repeat(i)))
         .collect();
     survives("scene.yaml", deep.as_bytes());
+    survives("expected.json", "[".repeat(100_000).as_bytes());
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! JSON Schemas (draft 2020-12) of the files that users write, generated from the types.
 
 use crate::manifest::{Manifest, PluginKind};
-use crate::{material::Material, scene::Scene, workflow::Workflow};
+use crate::material::Material;
+use crate::scene::Scene;
+use crate::workflow::{Expected, Workflow};
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Value, json};
 
@@ -32,12 +34,18 @@ pub fn material() -> Value {
     schema_of::<Material>("material", "Plyflow material")
 }
 
+/// Schema of a file of expectations.
+pub fn expected() -> Value {
+    schema_of::<Expected>("expected", "Plyflow expectations")
+}
+
 /// All schemas with their file names, as checked in under `schemas/json/`.
-pub fn all() -> [(&'static str, Value); 3] {
+pub fn all() -> [(&'static str, Value); 4] {
     [
         ("workflow.schema.json", workflow()),
         ("scene.schema.json", scene()),
         ("material.schema.json", material()),
+        ("expected.schema.json", expected()),
     ]
 }
 

@@ -29,9 +29,10 @@ pub struct Workflow {
     pub plugins: Vec<String>,
     /// The steps by name, in any order.
     pub steps: IndexMap<String, Step>,
-    /// What is expected of results.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub expect: Vec<Expect>,
+    /// What is expected of results: a list, or the path of a JSON file with one, relative to this file.
+    #[serde(default, skip_serializing_if = "Expectations::is_empty")]
+    #[schemars(extend("x-expected" = "a list of expectations, or the path of a JSON file with them"))]
+    pub expect: Expectations,
 }
 
 /// Failure policy.
@@ -131,6 +132,46 @@ pub struct Expect {
     /// Where the expectation comes from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
+}
+
+/// Where expectations stand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Expectations {
+    /// In the workflow.
+    List(Vec<Expect>),
+    /// In a JSON file of their own (see [`Expected`]), relative to the workflow.
+    File(String),
+}
+
+impl Default for Expectations {
+    fn default() -> Self {
+        Self::List(Vec::new())
+    }
+}
+
+impl Expectations {
+    /// Whether nothing is expected.
+    pub fn is_empty(&self) -> bool {
+        matches!(self, Self::List(list) if list.is_empty())
+    }
+}
+
+/// Version of the format of a file of expectations that this crate reads.
+pub const EXPECTED_VERSION: u32 = 1;
+
+/// A file of expectations, which `expect` of a workflow names. JSON, so that other programs read and write it too.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Expected {
+    /// Version of the format: 1.
+    #[schemars(extend("const" = 1))]
+    pub plyflow_expected: u32,
+    /// Where the expectations come from; those with a `source` of their own keep theirs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// The expectations.
+    pub expectations: Vec<Expect>,
 }
 
 /// A value of a result: a plain number when the result has no unit, else text with a unit.
@@ -236,6 +277,26 @@ mod tests {
             assert!(wrong.parse::<Memory>().is_err(), "{wrong}");
         }
         assert!("4 gib".parse::<Memory>().unwrap_err().contains("`GiB`"));
+    }
+
+    #[test]
+    fn expectations_are_a_list_or_the_path_of_a_file() {
+        let read = |expect: serde_json::Value| {
+            let w = serde_json::json!({"plyflow": 1, "name": "w", "steps": {}, "expect": expect});
+            serde_json::from_value::<Workflow>(w).unwrap().expect
+        };
+        let file = Expectations::File("expected.json".into());
+        assert_eq!(read(serde_json::json!("expected.json")), file);
+        assert!(!file.is_empty() && read(serde_json::json!([])).is_empty());
+        let expected: Expected = serde_json::from_value(serde_json::json!({
+            "plyflow_expected": 1, "source": "thesis 3.4",
+            "expectations": [{"step": "a", "result": "r", "maximum": 1}]
+        }))
+        .unwrap();
+        assert_eq!(
+            expected.expectations[0].maximum,
+            Some(ResultValue::Number(1.0))
+        );
     }
 
     #[test]

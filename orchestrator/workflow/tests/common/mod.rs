@@ -198,6 +198,23 @@ thickness: 0.08 mm
 areal_mass: 90 g/m2
 "#;
 
+pub const EXPECTED: &str = r#"{
+  "plyflow_expected": 1,
+  "source": "thesis 5.5.2",
+  "expectations": [
+    {"step": "comparison", "result": "zone_count", "minimum": 1},
+    {
+      "step": "comparison",
+      "result": "wrinkle_length.AW1",
+      "value": "68 mm",
+      "tolerance": "7 mm",
+      "source": "table 5.3"
+    },
+    {"step": "coarse", "result": "kinetic_ratio", "maximum": 5e-2}
+  ]
+}
+"#;
+
 /// A study on disk.
 pub struct Study {
     folder: tempfile::TempDir,
@@ -217,6 +234,16 @@ impl Study {
         ] {
             study.write(name, text);
         }
+        study
+    }
+
+    /// The sound study with its expectations in a file of their own.
+    pub fn with_expected_file() -> Study {
+        let study = Study::sound();
+        let at = WORKFLOW.find("expect:").unwrap();
+        let workflow = format!("{}expect: expected.json\n", &WORKFLOW[..at]);
+        study.write("workflow.yaml", &workflow);
+        study.write("expected.json", EXPECTED);
         study
     }
 
