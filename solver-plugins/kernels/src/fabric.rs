@@ -11,15 +11,20 @@
 //! ([`bending`]). Stretches are floored at 0.001, so that no state gives NaN.
 
 mod bending;
+mod checks;
+mod cubic;
 mod hypoelastic;
 mod parameters;
 mod shear;
+mod stitch;
+mod yarn;
 
 use crate::{Lanes, WIDTH, dispatch};
 use bending::Bending;
 use parameters::Parameters;
 use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
-pub use shear::Shear;
+use shear::{Shear, ShearOf, Yarn};
+use yarn::Law;
 
 /// A floor for squared stretches.
 const LEAST: f64 = 1e-6;
@@ -45,13 +50,6 @@ pub struct Fabric {
     areal_mass: f64,
 }
 
-impl Fabric {
-    /// Shear law, for callers that need the curve itself.
-    pub fn shear(&self) -> &Shear {
-        &self.shear
-    }
-}
-
 impl Material for Fabric {
     const MANIFEST: &'static str = include_str!("../../material-fabric/manifest.json");
 
@@ -63,7 +61,7 @@ impl Material for Fabric {
 
     fn sizes(&self) -> MaterialSizes {
         let membrane_history = match self.form {
-            Form::FibreEnergy if self.shear.has_stitch() => STITCH_HISTORY,
+            Form::FibreEnergy if self.shear.stitch.is_some() => STITCH_HISTORY,
             Form::FibreEnergy => 0,
             Form::Hypoelastic => hypoelastic::HISTORY,
         };
@@ -106,9 +104,44 @@ dispatch!(fn membrane(
     stiffness: &mut [f64],
 ) = membrane_kernel);
 
+/// Calls a kernel that is written for one kind of yarns.
+macro_rules! for_yarn {
+    ($f:expr, $kernel:ident::<$V:ident>($($arg:expr),* $(,)?)) => {{
+        let stitch = $f.shear.stitch.as_ref();
+        match &$f.shear.yarn {
+            Yarn::Polynomial(yarn) => {
+                $kernel::<$V, _>($f, ShearOf { yarn: &**yarn, stitch }, $($arg),*);
+            }
+            Yarn::Table(yarn) => $kernel::<$V, _>($f, ShearOf { yarn, stitch }, $($arg),*),
+            Yarn::Signed(yarn) => {
+                $kernel::<$V, _>($f, ShearOf { yarn: &**yarn, stitch }, $($arg),*);
+            }
+        }
+    }};
+}
+use for_yarn;
+
 #[inline(always)]
 fn membrane_kernel<V: Lanes>(
     f: &Fabric,
+    n: usize,
+    metric: &[f64],
+    history: &mut [f64],
+    stress: &mut [f64],
+    energy: &mut [f64],
+    stiffness: &mut [f64],
+) {
+    for_yarn!(
+        f,
+        membrane_of::<V>(n, metric, history, stress, energy, stiffness)
+    );
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn membrane_of<V: Lanes, L: Law>(
+    f: &Fabric,
+    law: ShearOf<'_, L>,
     n: usize,
     metric: &[f64],
     history: &mut [f64],
@@ -131,14 +164,14 @@ fn membrane_kernel<V: Lanes>(
         let k2 = V::select(d2.lt(zero), compression, tension);
         let rr = r1 * r2;
         let s = c12 * rr;
-        let shear = if f.shear.has_stitch() {
+        let shear = if law.stitch.is_some() {
             let (g, sine) = (V::load(history, c), V::load(history, n + c));
-            let (shear, g, sine) = f.shear.with_stitch(s, g, sine);
+            let (shear, g, sine) = law.with_stitch(s, g, sine);
             g.store(history, c);
             sine.store(history, n + c);
             shear
         } else {
-            f.shear.yarn(s)
+            law.yarn(s)
         };
         let fs = shear.force * s;
         (k1 * d1 * r1 - fs * i1).store(stress, c);
@@ -146,15 +179,9 @@ fn membrane_kernel<V: Lanes>(
         (shear.force * rr).store(stress, 2 * n + c);
         (half * (k1 * d1 * d1 + k2 * d2 * d2) + shear.energy).store(energy, c);
         if !stiffness.is_empty() {
-            let (largest, soft) = tangents(
-                f,
-                s,
-                i1,
-                i2,
-                tension * i1 * r1,
-                tension * i2 * r2,
-                shear.force.abs(),
-            );
+            let slope = law.slopes(s).0;
+            let (a1, a2) = (tension * i1 * r1, tension * i2 * r2);
+            let (largest, soft) = tangents(slope, s, i1, i2, a1, a2, shear.force.abs());
             largest.store(stiffness, c);
             soft.store(stiffness, n + c);
         }
@@ -163,11 +190,10 @@ fn membrane_kernel<V: Lanes>(
 
 /// Bounds of the largest eigenvalue of dS/dE and of the shear tangent dS12 / d(2 E12); both are
 /// positive also while the stitch softens, and count compressed fibres as stretched ones. `a1`, `a2`
-/// are the fibre tangents k / l^3. The shear part is F' (ds/dE)^2 + F d2s/dE2, each factor by its
+/// are the fibre tangents k / l^3, `slope` bounds dF/ds. The shear part is F' (ds/dE)^2 + F d2s/dE2, each factor by its
 /// Frobenius norm.
 #[inline(always)]
-fn tangents<V: Lanes>(f: &Fabric, s: V, i1: V, i2: V, a1: V, a2: V, force: V) -> (V, V) {
-    let slope = f.shear.slopes(s).0;
+fn tangents<V: Lanes>(slope: V, s: V, i1: V, i2: V, a1: V, a2: V, force: V) -> (V, V) {
     let two = V::splat(2.0);
     let gradient = s * s * (i1 * i1 + i2 * i2) + two * i1 * i2;
     let widest = i1.max(i2);

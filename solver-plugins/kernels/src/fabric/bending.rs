@@ -1,34 +1,51 @@
 //! Bending of a fibre family: `M = linear k + asymptote (1 - exp(-|k| / scale)) sign k` (Voce, thesis
-//! eq. 3.4), with a law of its own for each sign, from the potential
-//! `linear k^2 / 2 + asymptote (|k| - scale (1 - exp(-|k| / scale)))`; twist is linear.
+//! eq. 3.4) from the potential `linear k^2 / 2 + asymptote (|k| - scale (1 - exp(-|k| / scale)))`, a
+//! constant stiffness (its case without asymptote), or a table ([`Cubic`], going on along its tangent
+//! beyond the last point), with a law of its own for each family and sign; twist is linear.
 //!
 //! Curvatures are those of material lines per undeformed length (k11 of a fibre that keeps its
 //! length is its normal curvature), and moments are per undeformed width: a family keeps its fibres
 //! while the ply shears, so the law does not depend on the shear angle. The metric has no influence,
 //! which keeps the bending force the exact gradient of this energy.
 
+use super::cubic::Cubic;
 use crate::{Lanes, WIDTH, dispatch, exp};
 
-/// Law of one sign (SI: N m, N, 1/m).
-#[derive(Clone, Copy, Debug, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Law {
+/// Voce's law (SI: N m, N, 1/m).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Voce {
     pub linear: f64,
-    #[serde(default)]
     pub asymptote: f64,
-    #[serde(default = "unit_scale")]
     pub scale: f64,
 }
 
-fn unit_scale() -> f64 {
-    1.0
+/// Law of one sign.
+#[derive(Clone, Debug)]
+pub(super) enum Law {
+    Voce(Voce),
+    Table(Cubic),
+}
+
+/// Laws of each family: positive, negative.
+#[derive(Clone, Debug)]
+pub(super) enum Laws {
+    Voce([[Voce; 2]; 2]),
+    Any(Box<[[Law; 2]; 2]>),
+}
+
+impl From<[[Law; 2]; 2]> for Laws {
+    fn from(laws: [[Law; 2]; 2]) -> Self {
+        if let [[Law::Voce(a), Law::Voce(b)], [Law::Voce(c), Law::Voce(d)]] = &laws {
+            return Laws::Voce([[*a, *b], [*c, *d]]);
+        }
+        Laws::Any(Box::new(laws))
+    }
 }
 
 /// Bending law of a ply.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Bending {
-    /// Positive, negative.
-    pub laws: [Law; 2],
+    pub laws: Laws,
     /// For each family: +1 when a positive curvature bends it positively.
     pub signs: [f64; 2],
     /// dM12/dk12 (N m).
@@ -53,6 +70,38 @@ fn moments_kernel<V: Lanes>(
     energy: &mut [f64],
     tangent: &mut [f64],
 ) {
+    match &law.laws {
+        Laws::Voce(laws) => moments_of::<V>(
+            law,
+            |family, k| voce(&laws[family], law.signs[family], k),
+            n,
+            curvature,
+            moment,
+            energy,
+            tangent,
+        ),
+        Laws::Any(laws) => moments_of::<V>(
+            law,
+            |family, k| any(&laws[family], law.signs[family], k),
+            n,
+            curvature,
+            moment,
+            energy,
+            tangent,
+        ),
+    }
+}
+
+#[inline(always)]
+fn moments_of<V: Lanes>(
+    law: &Bending,
+    family_law: impl Fn(usize, V) -> (V, V, V),
+    n: usize,
+    curvature: &[f64],
+    moment: &mut [f64],
+    energy: &mut [f64],
+    tangent: &mut [f64],
+) {
     let twist = V::splat(law.twist);
     for c in (0..n).step_by(WIDTH) {
         let k12 = V::load(curvature, 2 * n + c);
@@ -60,7 +109,7 @@ fn moments_kernel<V: Lanes>(
         let mut w = twist * k12 * k12;
         for family in 0..2 {
             let k = V::load(curvature, family * n + c);
-            let (m, u, t) = voce(&law.laws, law.signs[family], k);
+            let (m, u, t) = family_law(family, k);
             m.store(moment, family * n + c);
             w = w + u;
             if !tangent.is_empty() {
@@ -76,7 +125,7 @@ fn moments_kernel<V: Lanes>(
 
 /// Moment, energy and tangent of a family.
 #[inline(always)]
-fn voce<V: Lanes>(laws: &[Law; 2], sign: f64, k: V) -> (V, V, V) {
+fn voce<V: Lanes>(laws: &[Voce; 2], sign: f64, k: V) -> (V, V, V) {
     let one = V::splat(1.0);
     let positive = V::splat(0.0).lt(k * V::splat(sign));
     let pick = |a: f64, b: f64| V::select(positive, V::splat(a), V::splat(b));
@@ -90,4 +139,34 @@ fn voce<V: Lanes>(laws: &[Law; 2], sign: f64, k: V) -> (V, V, V) {
     let m = linear * a + asymptote * risen;
     let w = V::splat(0.5) * linear * a * a + asymptote * (a - scale * risen);
     (m.copysign(k), w, linear + asymptote * rate * e)
+}
+
+/// The same with any two laws: both are evaluated and one is kept.
+#[inline(always)]
+fn any<V: Lanes>(laws: &[Law; 2], sign: f64, k: V) -> (V, V, V) {
+    let positive = V::splat(0.0).lt(k * V::splat(sign));
+    let a = k.abs();
+    let (p, n) = (one_sign(&laws[0], a), one_sign(&laws[1], a));
+    let pick = |x: V, y: V| V::select(positive, x, y);
+    (pick(p.0, n.0).copysign(k), pick(p.1, n.1), pick(p.2, n.2))
+}
+
+/// Size of the moment, energy and tangent at the curvature `a >= 0`.
+#[inline(always)]
+fn one_sign<V: Lanes>(law: &Law, a: V) -> (V, V, V) {
+    match law {
+        Law::Voce(l) => voce(&[*l; 2], 1.0, a),
+        Law::Table(curve) => {
+            let cut = curve.at(a);
+            let zero = V::splat(0.0);
+            let beyond = (a - V::splat(curve.end)).max(zero);
+            let (end, slope) = (V::splat(curve.end_value), V::splat(curve.end_slope));
+            let more = slope * beyond;
+            (
+                cut.value + more,
+                cut.integral + (end + V::splat(0.5) * more) * beyond,
+                V::select(zero.lt(beyond), slope, cut.slope),
+            )
+        }
+    }
 }

@@ -12,7 +12,9 @@
 //! The frames turn with the fibres, so what eqs 3.10-3.17 do by polar decomposition needs no
 //! rotation here. Strain increments are taken at mid-step; the sine is clamped to 0.985 (80 deg).
 
-use super::{Fabric, LEAST, tangents};
+use super::shear::{ShearOf, Yarn};
+use super::yarn::Law;
+use super::{Fabric, LEAST, for_yarn, tangents};
 use crate::{Lanes, WIDTH, dispatch};
 
 /// Rows: C11 - 1, C22 - 1, C12 before; N1, N2, T1, T2 (N/m); F_norm cos g / 2 (N/m) before; work
@@ -33,6 +35,24 @@ dispatch!(pub(super) fn membrane(
 #[inline(always)]
 fn membrane_kernel<V: Lanes>(
     f: &Fabric,
+    n: usize,
+    metric: &[f64],
+    history: &mut [f64],
+    stress: &mut [f64],
+    energy: &mut [f64],
+    stiffness: &mut [f64],
+) {
+    for_yarn!(
+        f,
+        membrane_of::<V>(n, metric, history, stress, energy, stiffness)
+    );
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn membrane_of<V: Lanes, L: Law>(
+    f: &Fabric,
+    law: ShearOf<'_, L>,
     n: usize,
     metric: &[f64],
     history: &mut [f64],
@@ -67,9 +87,9 @@ fn membrane_kernel<V: Lanes>(
         let (n1, n2) = (row(history, 3), row(history, 4));
         let (m1, m2) = (n1 + k1 * e1, n2 + k2 * e2);
         // Shear stress of each frame.
-        let (response, g, gs) = f.shear.with_stitch(s, row(history, 9), row(history, 10));
+        let (response, g, gs) = law.with_stitch(s, row(history, 9), row(history, 10));
         let q = half * response.force * cosine;
-        let (_, yarn) = f.shear.slopes(s);
+        let (bound, yarn) = law.slopes(s);
         let modulus = half * (yarn * cosine - response.force * s / cosine) * cosine;
         let lean = modulus * middle * (e2 - e1);
         let dq = q - row(history, 7);
@@ -106,7 +126,7 @@ fn membrane_kernel<V: Lanes>(
             // d(N / C) / dE = (k - 2 N) / C^2; the frames' shear as in the energy form.
             let a1 = (tension + two * m1.abs()) * i1 * i1;
             let a2 = (tension + two * m2.abs()) * i2 * i2;
-            let (largest, soft) = tangents(f, s, i1, i2, a1, a2, response.force.abs());
+            let (largest, soft) = tangents(bound, s, i1, i2, a1, a2, response.force.abs());
             largest.store(stiffness, c);
             soft.store(stiffness, n + c);
         }

@@ -1,7 +1,11 @@
-//! The resolved `with` block of a fabric (SI numbers) and its checks.
+//! The resolved `with` block of a fabric (SI numbers), and the fabric made of it.
 
-use super::bending::{Bending, Law};
+use super::bending::{Bending, Law, Laws, Voce};
+use super::checks::{self, not_negative, positive};
+use super::cubic::Cubic;
 use super::shear::Shear;
+use super::stitch::Stitch;
+use super::yarn::{Branch, Table};
 use super::{Fabric, Form};
 use serde::Deserialize;
 
@@ -23,28 +27,82 @@ pub(super) struct Parameters {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ShearParameters {
-    coefficients: Vec<f64>,
-    #[serde(default = "sixty_degrees")]
-    limit: f64,
+    coefficients: Option<Vec<f64>>,
+    limit: Option<f64>,
+    table: Option<ShearTable>,
+    negative: Option<NegativeParameters>,
+    #[serde(default)]
+    allow_softening: bool,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct StitchParameters {
+struct NegativeParameters {
+    coefficients: Option<Vec<f64>>,
+    limit: Option<f64>,
+    table: Option<ShearTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ShearTable {
     angles: Vec<f64>,
     forces: Vec<f64>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct StitchParameters {
+    #[serde(default)]
+    direction: Direction,
+    angles: Vec<f64>,
+    forces: Vec<f64>,
+}
+
+#[derive(Deserialize, Default, Clone, Copy, PartialEq)]
+#[serde(rename_all = "kebab-case")]
+enum Direction {
+    #[default]
+    Positive,
+    Negative,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct BendingParameters {
-    positive: Law,
-    negative: Option<Law>,
+    positive: Option<LawParameters>,
+    negative: Option<LawParameters>,
+    family_1: Option<FamilyParameters>,
+    family_2: Option<FamilyParameters>,
     #[serde(default)]
     positive_face: Face,
     #[serde(default)]
     families: Families,
     twist_stiffness: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FamilyParameters {
+    positive: LawParameters,
+    negative: Option<LawParameters>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LawParameters {
+    linear: Option<f64>,
+    asymptote: Option<f64>,
+    scale: Option<f64>,
+    stiffness: Option<f64>,
+    table: Option<MomentTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MomentTable {
+    curvatures: Vec<f64>,
+    moments: Vec<f64>,
 }
 
 #[derive(Deserialize, Default, PartialEq)]
@@ -71,19 +129,6 @@ fn one() -> f64 {
     1.0
 }
 
-fn sixty_degrees() -> f64 {
-    60f64.to_radians()
-}
-
-fn positive(name: &str, value: f64, unit: &str) -> Result<(), String> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(format!(
-        "{name}: given {value} {unit}; expected a finite value above 0"
-    ))
-}
-
 impl Parameters {
     pub(super) fn build(self) -> Result<Fabric, String> {
         positive("fibre_modulus", self.fibre_modulus, "Pa")?;
@@ -95,13 +140,7 @@ impl Parameters {
                 self.compression_factor
             ));
         }
-        let stitch = self.stitch.as_ref();
-        let shear = Shear::new(
-            &self.shear.coefficients,
-            self.shear.limit,
-            stitch.map_or(&[], |s| &s.angles),
-            stitch.map_or(&[], |s| &s.forces),
-        )?;
+        let shear = self.shear.build(self.stitch)?;
         let h = self.thickness;
         let bending = self
             .bending
@@ -119,25 +158,98 @@ impl Parameters {
     }
 }
 
+impl ShearParameters {
+    fn build(self, stitch: Option<StitchParameters>) -> Result<Shear, String> {
+        let soft = self.allow_softening;
+        let positive = branch("shear", self.coefficients, self.limit, self.table, soft)?;
+        let negative = match self.negative {
+            Some(n) => Some(branch(
+                "shear.negative",
+                n.coefficients,
+                n.limit,
+                n.table,
+                soft,
+            )?),
+            None => None,
+        };
+        let stitch = match stitch {
+            Some(s) => {
+                let (sign, yarn) = match s.direction {
+                    Direction::Positive => (1.0, &positive),
+                    Direction::Negative => (-1.0, negative.as_ref().unwrap_or(&positive)),
+                };
+                checks::stitch(&s.angles, &s.forces, yarn.limit_angle())?;
+                Some(Stitch::new(sign, &s.angles, &s.forces))
+            }
+            None => None,
+        };
+        Ok(Shear::new(positive, negative, stitch))
+    }
+}
+
+/// A law of the yarns over |g|.
+fn branch(
+    path: &str,
+    coefficients: Option<Vec<f64>>,
+    limit: Option<f64>,
+    table: Option<ShearTable>,
+    softening: bool,
+) -> Result<Branch, String> {
+    match (coefficients, table) {
+        (Some(c), None) => {
+            let limit = limit.unwrap_or(60f64.to_radians());
+            let law = checks::polynomial(path, &c, limit, softening)?;
+            Ok(Branch::Polynomial(Box::new(law)))
+        }
+        (None, Some(t)) => {
+            if limit.is_some() {
+                return Err(format!(
+                    "{path}.limit: given together with {path}.table; expected without: a table ends at its \
+                     last angle"
+                ));
+            }
+            let at = format!("{path}.table");
+            checks::shear_table(&at, &t.angles, &t.forces, softening)?;
+            Ok(Branch::Table(Table::new(&t.angles, &t.forces)))
+        }
+        (given, _) => Err(format!(
+            "{path}: given {} 'coefficients' and 'table'; expected one of them",
+            if given.is_some() { "both" } else { "neither" }
+        )),
+    }
+}
+
 impl BendingParameters {
     /// `twist`: dM12/dk12 when none is given.
     fn build(self, twist: f64) -> Result<Bending, String> {
-        let negative = self.negative.unwrap_or(self.positive);
-        for (name, law) in [("positive", &self.positive), ("negative", &negative)] {
-            positive(&format!("bending.{name}.scale"), law.scale, "1/m")?;
-            let (a, b) = (law.linear, law.asymptote);
-            if !(a >= 0.0 && b >= 0.0 && a.is_finite() && b.is_finite()) {
+        let laws = match (self.positive, self.negative, self.family_1, self.family_2) {
+            (Some(p), n, None, None) => {
+                let both = pair("bending", p, n)?;
+                [both.clone(), both]
+            }
+            (None, None, Some(a), Some(b)) => [
+                pair("bending.family_1", a.positive, a.negative)?,
+                pair("bending.family_2", b.positive, b.negative)?,
+            ],
+            (p, n, a, b) => {
+                let given: Vec<&str> = [
+                    (p.is_some(), "positive"),
+                    (n.is_some(), "negative"),
+                    (a.is_some(), "family_1"),
+                    (b.is_some(), "family_2"),
+                ]
+                .iter()
+                .filter_map(|(is, name)| is.then_some(*name))
+                .collect();
                 return Err(format!(
-                    "bending.{name}: given linear {a} N m and asymptote {b} N; expected at least 0"
+                    "bending: given {given:?}; expected 'positive' (and 'negative' where it differs) for both \
+                     families, or 'family_1' and 'family_2' with these inside; leave 'bending' out for a ply \
+                     without bending stiffness"
                 ));
             }
-        }
+        };
         let twist = self.twist_stiffness.unwrap_or(twist);
-        if !(twist >= 0.0 && twist.is_finite()) {
-            return Err(format!(
-                "bending.twist_stiffness: given {twist} N m; expected at least 0"
-            ));
-        }
+        not_negative("bending.twist_stiffness", twist, "N m")?;
         let first = if self.positive_face == Face::Up {
             1.0
         } else {
@@ -149,9 +261,72 @@ impl BendingParameters {
             -first
         };
         Ok(Bending {
-            laws: [self.positive, negative],
+            laws: Laws::from(laws),
             signs: [first, second],
             twist,
         })
+    }
+}
+
+/// Laws of both signs.
+fn pair(
+    path: &str,
+    positive: LawParameters,
+    negative: Option<LawParameters>,
+) -> Result<[Law; 2], String> {
+    let p = positive.build(&format!("{path}.positive"))?;
+    let n = match negative {
+        Some(n) => n.build(&format!("{path}.negative"))?,
+        None => p.clone(),
+    };
+    Ok([p, n])
+}
+
+impl LawParameters {
+    fn build(self, path: &str) -> Result<Law, String> {
+        let voce = self.linear.is_some() || self.asymptote.is_some() || self.scale.is_some();
+        match (voce, self.stiffness, self.table) {
+            (true, None, None) => {
+                let linear = self.linear.unwrap_or(0.0);
+                let asymptote = self.asymptote.unwrap_or(0.0);
+                not_negative(&format!("{path}.linear"), linear, "N m")?;
+                not_negative(&format!("{path}.asymptote"), asymptote, "N")?;
+                let Some(scale) = self.scale.or((asymptote == 0.0).then_some(1.0)) else {
+                    return Err(format!(
+                        "{path}: given an asymptote of {asymptote} N without 'scale'; expected the \
+                         curvature at which it has reached 63 %, such as '0.004 1/mm'"
+                    ));
+                };
+                positive(&format!("{path}.scale"), scale, "1/m")?;
+                if linear + asymptote / scale <= 0.0 {
+                    return Err(format!(
+                        "{path}: given linear 0 N m and asymptote 0 N; expected a bending stiffness \
+                         at rest, linear + asymptote / scale, above 0: leave 'bending' out for a ply \
+                         without bending"
+                    ));
+                }
+                Ok(Law::Voce(Voce {
+                    linear,
+                    asymptote,
+                    scale,
+                }))
+            }
+            (false, Some(stiffness), None) => {
+                positive(&format!("{path}.stiffness"), stiffness, "N m")?;
+                Ok(Law::Voce(Voce {
+                    linear: stiffness,
+                    asymptote: 0.0,
+                    scale: 1.0,
+                }))
+            }
+            (false, None, Some(t)) => {
+                checks::moment_table(&format!("{path}.table"), &t.curvatures, &t.moments)?;
+                Ok(Law::Table(Cubic::new(&t.curvatures, &t.moments)))
+            }
+            _ => Err(format!(
+                "{path}: expected exactly one law: 'linear' with 'asymptote' and 'scale' (Voce), or \
+                 'stiffness' (constant), or 'table' with 'curvatures' and 'moments'"
+            )),
+        }
     }
 }

@@ -1,0 +1,246 @@
+//! Measured curves: a piecewise cubic through every point of a table, with a continuous tangent and
+//! no overshoot, with its exact integral, evaluated in lanes.
+//!
+//! Slopes at the points are those of the parabola through a point and its neighbours (three-point
+//! formula at the ends), limited to `0 .. 3 min(chords)` (Fritsch and Carlson 1980, the square of
+//! de Boor and Swartz 1977), and 0 where the table turns: between two points the curve is monotone
+//! if the points are.
+
+use crate::{Lanes, WIDTH};
+
+/// Most points of a table.
+pub(super) const MAX_POINTS: usize = 64;
+/// Least slope at the first point, over the first chord: a law without stiffness at rest has no
+/// stable flat state.
+const LEAST_START: f64 = 0.25;
+
+/// `[start, c0, c1, c2, c3, integral up to start, 0, 0]` of one piece: one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Piece([f64; 8]);
+
+/// Rows of a piece that the lanes need.
+const ROWS: usize = 6;
+
+/// Value, slope and integral from 0 at a place.
+#[derive(Clone, Copy)]
+pub(super) struct Cut<V> {
+    pub value: V,
+    pub slope: V,
+    pub integral: V,
+}
+
+/// The curve over `0 ..= end`.
+#[derive(Clone, Debug)]
+pub(super) struct Cubic {
+    pieces: Box<[Piece; MAX_POINTS]>,
+    /// Half of the number of pieces, rounded up to a power of two: first stride of the search.
+    stride: usize,
+    /// Last place, and what the curve is there.
+    pub end: f64,
+    pub end_value: f64,
+    pub end_slope: f64,
+}
+
+/// Slopes of the curve at its points.
+fn slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
+    let n = x.len();
+    let h: Vec<f64> = x.windows(2).map(|w| w[1] - w[0]).collect();
+    let chord: Vec<f64> = (0..n - 1).map(|i| (y[i + 1] - y[i]) / h[i]).collect();
+    if n == 2 {
+        return vec![chord[0]; 2];
+    }
+    let limited = |m: f64, chord: f64| {
+        if m * chord <= 0.0 {
+            0.0
+        } else {
+            m.abs().min(3.0 * chord.abs()).copysign(chord)
+        }
+    };
+    let end = |h0: f64, h1: f64, d0: f64, d1: f64| {
+        limited(((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1), d0)
+    };
+    let mut m = vec![0.0; n];
+    m[0] = end(h[0], h[1], chord[0], chord[1]);
+    if chord[0] > 0.0 {
+        m[0] = m[0].max(LEAST_START * chord[0]);
+    }
+    m[n - 1] = end(h[n - 2], h[n - 3], chord[n - 2], chord[n - 3]);
+    for i in 1..n - 1 {
+        let (a, b) = (chord[i - 1], chord[i]);
+        if a * b > 0.0 {
+            let parabola = (h[i] * a + h[i - 1] * b) / (h[i - 1] + h[i]);
+            m[i] = limited(limited(parabola, a), b);
+        }
+    }
+    m
+}
+
+impl Cubic {
+    /// The curve through the points, 2 to [`MAX_POINTS`], finite, `x` increasing from 0.
+    pub(super) fn new(x: &[f64], y: &[f64]) -> Self {
+        let m = slopes(x, y);
+        // Places after the last piece are never reached: the search compares with infinity.
+        let mut pieces = Box::new([Piece([f64::INFINITY; 8]); MAX_POINTS]);
+        let mut integral = 0.0;
+        let last = x.len() - 1;
+        for i in 0..last {
+            let h = x[i + 1] - x[i];
+            let chord = (y[i + 1] - y[i]) / h;
+            let c2 = (3.0 * chord - 2.0 * m[i] - m[i + 1]) / h;
+            let c3 = (m[i] + m[i + 1] - 2.0 * chord) / (h * h);
+            pieces[i] = Piece([x[i], y[i], m[i], c2, c3, integral, 0.0, 0.0]);
+            integral += h * (y[i] + h * (m[i] / 2.0 + h * (c2 / 3.0 + h * c3 / 4.0)));
+        }
+        Self {
+            pieces,
+            stride: last.next_power_of_two() / 2,
+            end: x[last],
+            end_value: y[last],
+            end_slope: m[last],
+        }
+    }
+
+    /// Slope at 0.
+    pub(super) fn start_slope(&self) -> f64 {
+        self.pieces[0].0[2]
+    }
+
+    /// Index of the piece that holds `x`: the same number of steps for every `x`.
+    #[inline(always)]
+    fn find(&self, x: f64) -> usize {
+        let (mut i, mut stride) = (0, self.stride);
+        while stride > 0 {
+            let next = i + stride;
+            i = if self.pieces[next % MAX_POINTS].0[0] <= x {
+                next
+            } else {
+                i
+            };
+            stride /= 2;
+        }
+        i
+    }
+
+    /// The curve at `x`, from 0 to the end.
+    #[inline(always)]
+    pub(super) fn at<V: Lanes>(&self, x: V) -> Cut<V> {
+        let x = x.min(V::splat(self.end));
+        let mut at = [0.0; WIDTH];
+        x.store(&mut at, 0);
+        let mut rows = [[0.0; WIDTH]; ROWS];
+        for l in 0..WIDTH {
+            let piece = &self.pieces[self.find(at[l]) % MAX_POINTS].0;
+            for r in 0..ROWS {
+                rows[r][l] = piece[r];
+            }
+        }
+        let row = |r: usize| V::load(&rows[r], 0);
+        let (x, c0, c1, c2, c3) = (x - row(0), row(1), row(2), row(3), row(4));
+        let (half, third, quarter) = (V::splat(0.5), V::splat(1.0 / 3.0), V::splat(0.25));
+        let (two, three) = (V::splat(2.0), V::splat(3.0));
+        Cut {
+            value: c0 + x * (c1 + x * (c2 + x * c3)),
+            slope: c1 + x * (two * c2 + three * x * c3),
+            integral: row(5) + x * (c0 + x * (half * c1 + x * (third * c2 + x * (quarter * c3)))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Portable;
+
+    fn at(c: &Cubic, x: f64) -> (f64, f64, f64) {
+        let cut = c.at(Portable::splat(x));
+        let get = |v: Portable| {
+            let mut out = [0.0; WIDTH];
+            v.store(&mut out, 0);
+            out[5]
+        };
+        (get(cut.value), get(cut.slope), get(cut.integral))
+    }
+
+    /// Steps, plateaus, and uneven points: what makes an ordinary spline overshoot.
+    fn rough(n: usize) -> (Vec<f64>, Vec<f64>) {
+        let (mut seed, mut x, mut y) = (7u64, 0.0, 0.0);
+        let mut next = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1);
+            (seed >> 40) as f64 / (1u64 << 24) as f64
+        };
+        let (mut xs, mut ys) = (vec![0.0], vec![0.0]);
+        for _ in 1..n {
+            x += 0.01 + next();
+            y += next().powi(8);
+            xs.push(x);
+            ys.push(y);
+        }
+        (xs, ys)
+    }
+
+    #[test]
+    fn curve_passes_through_its_points_and_never_falls_between_rising_ones() {
+        for n in [2, 3, 5, 17, 33, 64] {
+            let (x, y) = rough(n);
+            let c = Cubic::new(&x, &y);
+            for i in 0..n {
+                let v = at(&c, x[i]).0;
+                assert!(
+                    (v - y[i]).abs() < 1e-12,
+                    "{n}: point {i}: {v}, not {}",
+                    y[i]
+                );
+            }
+            for i in 0..n - 1 {
+                for j in 0..=50 {
+                    let t = x[i] + (x[i + 1] - x[i]) * j as f64 / 50.0;
+                    let (v, s, _) = at(&c, t);
+                    assert!(s > -1e-12 && v > y[i] - 1e-12 && v < y[i + 1] + 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn slope_and_integral_belong_to_the_value_and_are_continuous() {
+        let (x, y) = rough(20);
+        let c = Cubic::new(&x, &y);
+        let h = 1e-6;
+        for i in 1..2000 {
+            let t = c.end * i as f64 / 2000.0;
+            let (v, s, _) = at(&c, t);
+            let (a, b) = (at(&c, t - h), at(&c, t + h));
+            assert!(((b.0 - a.0) / (2.0 * h) - s).abs() < 1e-3 * (1.0 + s.abs()));
+            assert!(((b.2 - a.2) / (2.0 * h) - v).abs() < 1e-7 * (1.0 + v));
+            // No jump of the slope: its change is of the order of the step.
+            assert!((b.1 - a.1).abs() < 1e-2, "slope jumps at {t}");
+        }
+        let end = at(&c, c.end);
+        assert!((end.0 - c.end_value).abs() < 1e-12 && (end.1 - c.end_slope).abs() < 1e-10);
+    }
+
+    #[test]
+    fn smooth_curves_are_met_with_third_order() {
+        let error = |n: usize| {
+            let x: Vec<f64> = (0..n).map(|i| i as f64 / (n - 1) as f64).collect();
+            let y: Vec<f64> = x.iter().map(|x| (2.0 * x).exp() - 1.0).collect();
+            let c = Cubic::new(&x, &y);
+            (0..=1000)
+                .map(|i| i as f64 / 1000.0)
+                .map(|t| (at(&c, t).0 - ((2.0 * t).exp() - 1.0)).abs())
+                .fold(0.0, f64::max)
+        };
+        let order = (error(9) / error(33)).ln() / 4f64.ln();
+        assert!(order > 2.8, "order {order}, error {}", error(33));
+    }
+
+    #[test]
+    fn places_outside_give_finite_values() {
+        let (x, y) = rough(9);
+        let c = Cubic::new(&x, &y);
+        for t in [-1.0, c.end * 2.0, f64::INFINITY] {
+            assert!(at(&c, t).0.is_finite());
+        }
+    }
+}
