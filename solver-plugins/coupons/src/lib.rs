@@ -1,0 +1,17 @@
+//! Coupon tests: small specimens with simple loads whose answers are known from closed forms, from other
+//! methods or from measurements. Every test is a step plugin of the role `coupon` (thin crates beside this
+//! one); what they share is here:
+//!
+//! - [`specimen`]: material, element and mesh become a [`plyflow_mechanics::model::Model`];
+//! - [`run`]: the time loop of a [`run::Test`]: steps, samples, frames, energy ledger, health;
+//! - [`output`]: curves, plots, results and attributes of the artifact;
+//! - [`reference`]: curves to compare with, from CSV files;
+//! - one module for each test.
+//!
+//! All quantities are SI. Results are the same for any number of threads.
+
+pub mod output;
+pub mod picture_frame;
+pub mod reference;
+pub mod run;
+pub mod specimen;

@@ -1,0 +1,188 @@
+//! What a coupon test writes besides its frames.
+
+use crate::run::Outcome;
+use crate::specimen::{Common, Specimen};
+use plyflow_mechanics::energy::Ledger;
+use plyflow_sdk::{Host, Log, StepError};
+use serde_json::{Value, json};
+
+/// How a series of a plot is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// A line.
+    Line,
+    /// A dashed line: theory, other runs.
+    Dashed,
+    /// Points: measurements, tables.
+    Points,
+}
+
+/// Collects curves and plots and writes the attributes at the end.
+pub struct Output<'a> {
+    host: &'a Host,
+    plots: Vec<Value>,
+    attributes: serde_json::Map<String, Value>,
+    warnings: Vec<String>,
+}
+
+/// A plot under construction.
+pub struct Plot<'o, 'a> {
+    output: &'o mut Output<'a>,
+    plot: Value,
+}
+
+impl<'a> Output<'a> {
+    /// For one step.
+    pub fn new(host: &'a Host) -> Self {
+        Self {
+            host,
+            plots: Vec::new(),
+            attributes: serde_json::Map::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Writes the array `curves/<path>` (SI unit) and returns its whole path.
+    ///
+    /// # Errors
+    /// When a value is not finite or the path exists.
+    pub fn curve(&mut self, path: &str, unit: &str, values: &[f64]) -> Result<String, StepError> {
+        let path = format!("curves/{path}");
+        self.host.write_f64(&path, &[values.len()], unit, values)?;
+        Ok(path)
+    }
+
+    /// Begins a plot; `x` and `y` are label and unit of an axis.
+    pub fn plot<'o>(
+        &'o mut self,
+        name: &str,
+        title: &str,
+        x: (&str, &str),
+        y: (&str, &str),
+    ) -> Plot<'o, 'a> {
+        let plot = json!({
+            "name": name, "title": title, "series": [],
+            "x": {"label": x.0, "unit": x.1}, "y": {"label": y.0, "unit": y.1},
+        });
+        Plot { output: self, plot }
+    }
+
+    /// An attribute of the artifact.
+    pub fn attribute(&mut self, name: &str, value: Value) {
+        self.attributes.insert(name.into(), value);
+    }
+
+    /// Something that the user should know.
+    pub fn warn(&mut self, text: String) {
+        self.host.log(Log::Warn, &text);
+        self.warnings.push(text);
+    }
+
+    /// Writes the energy history, the results that every test has, and the attributes. Declares nothing
+    /// that depends on the machine except `element_cycle_rate`.
+    ///
+    /// # Errors
+    /// When the host refuses.
+    pub fn finish(
+        mut self,
+        p: &Common,
+        specimen: &Specimen,
+        outcome: &Outcome,
+    ) -> Result<(), StepError> {
+        type Column = (&'static str, fn(&Ledger) -> f64);
+        let columns: [Column; 9] = [
+            ("kinetic", |l| l.kinetic),
+            ("membrane", |l| l.membrane),
+            ("bending", |l| l.bending),
+            ("hourglass", |l| l.hourglass),
+            ("contact", |l| l.contact),
+            ("friction", |l| l.friction),
+            ("damping", |l| l.damping),
+            ("external", |l| l.external),
+            ("drift", Ledger::drift),
+        ];
+        let n = outcome.time.len();
+        self.host
+            .write_f64("history/time", &[n], "s", &outcome.time)?;
+        for (name, value) in columns {
+            let data: Vec<f64> = outcome.ledger.iter().map(value).collect();
+            self.host
+                .write_f64(&format!("history/{name}"), &[n], "J", &data)?;
+        }
+        let h = &outcome.health;
+        if h.peak_kinetic_ratio > p.kinetic_bound {
+            self.warn(format!(
+                "kinetic energy reached {:.1} % of internal energy (bound {:.1} %): the test is not \
+                 quasi-static. Give it a longer duration or less mass scaling",
+                100.0 * h.peak_kinetic_ratio,
+                100.0 * p.kinetic_bound
+            ));
+        }
+        if h.peak_drift_ratio > 0.01 {
+            self.warn(format!(
+                "{:.1} % of the external work is unaccounted for: reduce step_safety",
+                100.0 * h.peak_drift_ratio
+            ));
+        }
+        if outcome.hourglass_ratio > 0.02 {
+            self.warn(format!(
+                "hourglass energy reached {:.1} % of internal energy: refine the mesh",
+                100.0 * outcome.hourglass_ratio
+            ));
+        }
+        let elements = specimen.model.element_count();
+        let element_cycles = elements as f64 * outcome.cycles as f64;
+        self.attribute("element", json!(p.element.plugin));
+        self.attribute("material", json!(p.material.name));
+        self.attribute("element_size", json!(p.element_size));
+        self.attribute("elements", json!(elements));
+        self.attribute("cycles", json!(outcome.cycles));
+        self.attribute("time_step", json!(outcome.smallest_step));
+        self.attribute(
+            "energy",
+            json!({
+                "peak_drift_ratio": h.peak_drift_ratio,
+                "peak_kinetic_ratio": h.peak_kinetic_ratio,
+                "kinetic_bound_kept": h.peak_kinetic_ratio <= p.kinetic_bound,
+                "hourglass_ratio": outcome.hourglass_ratio,
+            }),
+        );
+        self.attribute("warnings", json!(self.warnings));
+        self.attribute("plots", json!(self.plots));
+        self.host
+            .write_attributes(&Value::Object(self.attributes))?;
+        let added: f64 = specimen.model.sheets.iter().map(|s| s.added_mass).sum();
+        self.host
+            .result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
+        self.host.result("drift_ratio", h.peak_drift_ratio, "1")?;
+        self.host
+            .result("hourglass_ratio", outcome.hourglass_ratio, "1")?;
+        self.host.result("elements", elements as f64, "1")?;
+        self.host.result("cycles", outcome.cycles as f64, "1")?;
+        self.host.result("time_step", outcome.smallest_step, "s")?;
+        self.host.result("added_mass", added, "kg")?;
+        let rate = element_cycles / outcome.seconds.max(1e-9);
+        self.host.measured("element_cycle_rate", rate, "1/s")
+    }
+}
+
+impl Plot<'_, '_> {
+    /// Adds a series; `x` and `y` are whole paths of arrays.
+    #[must_use]
+    pub fn series(mut self, label: &str, x: &str, y: &str, style: Style) -> Self {
+        let style = match style {
+            Style::Line => "line",
+            Style::Dashed => "dashed",
+            Style::Points => "points",
+        };
+        if let Some(list) = self.plot["series"].as_array_mut() {
+            list.push(json!({"label": label, "x": x, "y": y, "style": style}));
+        }
+        self
+    }
+
+    /// Puts it into the artifact.
+    pub fn done(self) {
+        self.output.plots.push(self.plot);
+    }
+}

@@ -1,0 +1,181 @@
+//! A specimen: one sheet of a material, meshed, with an element formulation.
+
+use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL};
+use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_mechanics::model::{Model, StepSettings};
+use plyflow_mechanics::sheet::{Pressed, SheetSpec};
+use plyflow_mechanics::vec3::V;
+use plyflow_model::material::Material;
+use plyflow_sdk::{Host, StepError};
+use serde::Deserialize;
+
+/// A component choice as the host resolves it.
+#[derive(Debug, Clone, Deserialize)]
+pub struct ComponentChoice {
+    /// Name or path of the plugin.
+    pub plugin: String,
+    /// Its resolved parameters.
+    #[serde(default)]
+    pub with: serde_json::Value,
+}
+
+/// The parameters that all coupon tests have (SI); put into the parameters of a test with
+/// `#[serde(flatten)]`.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Common {
+    /// Material of the specimen.
+    pub material: Material,
+    /// Element formulation.
+    pub element: ComponentChoice,
+    /// Edge of the elements (m).
+    pub element_size: f64,
+    /// Wanted step (s): elements below it are mass-scaled. Without it the natural step is used.
+    #[serde(default)]
+    pub time_step: Option<f64>,
+    /// Share of the critical step that is used.
+    pub step_safety: f64,
+    /// Mass-proportional damping (1/s).
+    pub damping: f64,
+    /// Frames besides the start.
+    pub frames: usize,
+    /// Largest kinetic over internal energy of a quasi-static run.
+    pub kinetic_bound: f64,
+}
+
+impl Common {
+    /// Thickness of the sheet (m).
+    pub fn thickness(&self) -> f64 {
+        self.material.thickness.si()
+    }
+
+    /// Mass per area (kg/m2).
+    pub fn areal_mass(&self) -> f64 {
+        self.material.areal_mass.si()
+    }
+}
+
+/// One field of the element formulation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ElementField {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// On node patches (points) instead of cells.
+    pub patch: bool,
+    /// Its row.
+    pub row: usize,
+}
+
+/// A specimen as a model and as a body.
+pub struct Specimen {
+    /// The model; its one sheet has the nodes of the mesh, in the same numbers.
+    pub model: Model,
+    /// The mesh at the start.
+    pub mesh: QuadMesh,
+    /// Fields of the element.
+    pub fields: Vec<ElementField>,
+}
+
+/// The element's fields as its manifest declares them, in the order of their rows.
+pub fn element_fields(manifest: &str) -> Vec<ElementField> {
+    let value: serde_json::Value = serde_json::from_str(manifest).unwrap_or_default();
+    let (mut cells, mut patches) = (0, 0);
+    value["fields"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .map(|f| {
+            let patch = f["patch"].as_bool().unwrap_or(false);
+            let count = if patch { &mut patches } else { &mut cells };
+            *count += 1;
+            ElementField {
+                name: f["name"].as_str().unwrap_or_default().into(),
+                unit: f["unit"].as_str().unwrap_or("1").into(),
+                patch,
+                row: *count - 1,
+            }
+        })
+        .collect()
+}
+
+/// The element instance of the common parameters.
+///
+/// # Errors
+/// When a component is missing or refuses its parameters.
+pub fn element(host: &Host, p: &Common) -> Result<(ElementInstance, Vec<ElementField>), StepError> {
+    let mut with = serde_json::Value::Object(p.material.with.clone());
+    with["thickness"] = p.thickness().into();
+    with["areal_mass"] = p.areal_mass().into();
+    let found = host.component(PF_KIND_MATERIAL, &p.material.plugin)?;
+    let what = format!("material '{}'", p.material.name);
+    // The host's tables stay valid until the process ends.
+    let material = unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }
+        .map_err(|e| e.to_string())?;
+    let found = host.component(PF_KIND_ELEMENT, &p.element.plugin)?;
+    let manifest = unsafe { found.manifest.as_str() }
+        .unwrap_or("{}")
+        .to_owned();
+    let parameters = if p.element.with.is_null() {
+        "{}".into()
+    } else {
+        p.element.with.to_string()
+    };
+    let what = format!("element '{}'", p.element.plugin);
+    let element = unsafe { ElementInstance::create(&found, &parameters, material, &what) }
+        .map_err(|e| e.to_string())?;
+    Ok((element, element_fields(&manifest)))
+}
+
+impl Specimen {
+    /// Builds the model of one sheet. `axis` is the direction of material axis e1 in the undeformed plane;
+    /// e2 lies 90 degrees counter-clockwise from it (seen against the normal).
+    ///
+    /// # Errors
+    /// When a component refuses or the mesh makes no model.
+    pub fn new(
+        host: &Host,
+        p: &Common,
+        mesh: QuadMesh,
+        axis: V,
+        pressed: Pressed,
+    ) -> Result<Self, StepError> {
+        let (element, fields) = element(host, p)?;
+        let m = mesh.cells.len();
+        let spec = SheetSpec {
+            name: "specimen".into(),
+            nodes: (0..mesh.points.len() as u32).collect(),
+            cells: mesh.cells.clone(),
+            patches: mesh.patches(),
+            axis,
+            layers: vec![1.0; m],
+            pressed: vec![pressed; m],
+            least_areal_mass: vec![0.0; m],
+            element,
+        };
+        let settings = StepSettings {
+            target_step: p.time_step.unwrap_or(0.0),
+            safety: p.step_safety,
+            damping: p.damping,
+        };
+        let model =
+            Model::new(mesh.points.clone(), vec![spec], settings).map_err(|e| e.to_string())?;
+        Ok(Self {
+            model,
+            mesh,
+            fields,
+        })
+    }
+
+    /// Values of a field of the element by name: per cell, or per point for patch fields. Needs a step that
+    /// kept fields (a frame or a sample).
+    pub fn field(&self, name: &str) -> Option<Vec<f64>> {
+        let f = self.fields.iter().find(|f| f.name == name)?;
+        Some(if f.patch {
+            self.model.patch_field(0, f.row)
+        } else {
+            self.model.cell_field(0, f.row)
+        })
+    }
+}
