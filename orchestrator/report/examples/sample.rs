@@ -1,4 +1,4 @@
-//! Writes the report of a made-up study: `cargo run -p plyflow-report --example sample -- FOLDER`.
+//! Writes the reports of made-up runs: `cargo run -p plyflow-report --example sample -- FOLDER`.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -8,10 +8,14 @@ use camino::Utf8PathBuf;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = Utf8PathBuf::from(std::env::args().nth(1).ok_or("usage: sample FOLDER")?);
     std::fs::create_dir_all(&folder)?;
-    let input = common::whole(&folder);
-    let out = folder.join("report.html");
-    let size = plyflow_report::write_report(&input, &out)?;
-    print!("{}", plyflow_report::summary(&input, Some(&out)));
-    println!("{size} bytes");
+    let study = common::whole(&folder);
+    let mut coupons = common::Study::new(&folder);
+    coupons.coupon();
+    for (input, name) in [(study, "report.html"), (coupons.input(), "coupon.html")] {
+        let out = folder.join(name);
+        let size = plyflow_report::write_report(&input, &out)?;
+        print!("{}", plyflow_report::summary(&input, Some(&out)));
+        println!("{size} bytes");
+    }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The three quantities that are mapped, and their colour scales.
+//! The quantities that are mapped, and their colour scales.
 
 use crate::colour::{Palette, Scale, end_of_scale};
 use crate::read::Ply;
@@ -6,15 +6,21 @@ use crate::study::Study;
 use crate::units::{number, shown};
 use maud::{Markup, html};
 
+/// A sheet that moved less than this (m) lies flat.
+const LEAST_DEFLECTION: f64 = 1e-5;
+
 /// A mapped quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Field {
     Shear,
     Distance,
     Curvature,
+    /// Of coupons, which have no tool.
+    Deflection,
 }
 
 impl Field {
+    /// Those of a forming run.
     pub(crate) const ALL: [Self; 3] = [Self::Shear, Self::Distance, Self::Curvature];
 
     pub(crate) fn title(self) -> &'static str {
@@ -22,6 +28,7 @@ impl Field {
             Self::Shear => "Shear angle",
             Self::Distance => "Nodal distance",
             Self::Curvature => "Curvature",
+            Self::Deflection => "Deflection along z",
         }
     }
 
@@ -29,7 +36,7 @@ impl Field {
     pub(crate) fn unit(self) -> &'static str {
         match self {
             Self::Shear => "rad",
-            Self::Distance => "m",
+            Self::Distance | Self::Deflection => "m",
             Self::Curvature => "1/m",
         }
     }
@@ -43,6 +50,7 @@ impl Field {
             Self::Distance => {
                 "Distance of the ply from where it would lie on the tool; large where it bridges or wrinkles."
             }
+            Self::Deflection => "How far the sheet moved out of its plane.",
             Self::Curvature => {
                 "Principal curvature of largest magnitude of the formed ply; the sign tells to which side it bends."
             }
@@ -54,6 +62,7 @@ impl Field {
         match self {
             Self::Distance => ply.distance.clone(),
             Self::Curvature => ply.curvature.clone(),
+            Self::Deflection => ply.deflection.clone(),
             Self::Shear => {
                 let cells = ply.shear.as_ref()?;
                 let mut sum = vec![0.0; ply.flat.len()];
@@ -79,6 +88,7 @@ impl Field {
             Self::Shear => ply.shear.as_deref(),
             Self::Distance => ply.distance.as_deref(),
             Self::Curvature => ply.curvature.as_deref(),
+            Self::Deflection => ply.deflection.as_deref(),
         }
     }
 
@@ -87,7 +97,7 @@ impl Field {
         let names: &[&str] = match self {
             Self::Shear => &["over_shear_negative", "over_shear_positive"],
             Self::Distance => &["distance_threshold"],
-            Self::Curvature => &[],
+            Self::Curvature | Self::Deflection => &[],
         };
         let Some(d) = &study.detection else {
             return Vec::new();
@@ -121,6 +131,14 @@ impl Field {
                 let end = end_of_scale(values, 0.995, 0.02, factor);
                 Scale {
                     palette: Palette::BlueRed,
+                    low: -end,
+                    high: end,
+                }
+            }
+            Self::Deflection => {
+                let end = end_of_scale(values, 1.0, LEAST_DEFLECTION, factor);
+                Scale {
+                    palette: Palette::PurpleOrange,
                     low: -end,
                     high: end,
                 }
@@ -165,6 +183,15 @@ pub(crate) struct Legend {
 }
 
 impl Legend {
+    /// Whether nothing is to be seen: all values are nought, but for rounding.
+    pub(crate) fn is_flat(&self) -> bool {
+        let least = match self.field {
+            Field::Deflection => LEAST_DEFLECTION,
+            _ => 1e-6,
+        };
+        self.range.iter().all(|v| v.abs() < least)
+    }
+
     /// The colour bar with ticks and limits.
     pub(crate) fn bar(&self, id: &str) -> Markup {
         let (factor, unit) = shown(self.field.unit());

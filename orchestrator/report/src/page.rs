@@ -4,6 +4,7 @@ mod costs;
 mod energy;
 mod maps;
 mod provenance;
+mod steps;
 mod tables;
 
 pub(crate) use tables::{expected_text, got_text};
@@ -31,6 +32,7 @@ pub(crate) fn page(
     for (n, study) in material.studies.iter().enumerate() {
         studies.push(study_sections(study, n, sharp)?);
     }
+    let steps = steps::section(input, material, sharp)?;
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -46,6 +48,7 @@ pub(crate) fn page(
                 (head(input, material))
                 main {
                     @for study in &studies { (study) }
+                    (steps)
                     (tables::expectations(input))
                     (costs::section(input, material))
                     (energy::section(material))
@@ -118,12 +121,17 @@ fn contents(material: &Material, input: &ReportInput) -> Markup {
             "Defects",
         ),
         (
+            !material.shown.is_empty(),
+            "#plots",
+            steps::heading(material),
+        ),
+        (
             !input.expectations.is_empty(),
             "#expectations",
             "Expectations",
         ),
         (true, "#costs", "Costs"),
-        (study.is_some(), "#energy", "Energy and contact"),
+        (energy::has(material), "#energy", "Energy and contact"),
         (true, "#results", "Results"),
         (true, "#provenance", "Provenance"),
     ];

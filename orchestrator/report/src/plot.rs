@@ -1,182 +1,327 @@
-//! Line plots and bars as SVG.
+//! Plots over two axes and bars, as SVG.
 
-use crate::units::number;
+mod axis;
+mod thin;
+
+pub(crate) use axis::ticks;
+
 use crate::view::px;
+use axis::{Axis, LARGEST, Zero, extent};
 use maud::{Markup, html};
+use std::borrow::Cow;
 use std::fmt::Write;
 
-/// Round numbers between `low` and `high`, about `count` of them.
-pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
-    if high <= low || !(high - low).is_finite() {
-        return vec![low];
-    }
-    let raw = (high - low) / count.max(1) as f64;
-    let power = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 2.5, 5.0, 10.0]
-        .into_iter()
-        .find(|s| s * power >= raw * 0.999);
-    let step = step.unwrap_or(10.0) * power;
-    let (first, last) = (
-        (low / step - 1e-6).ceil() as i64,
-        (high / step + 1e-6).floor() as i64,
-    );
-    (first..=last).map(|i| i as f64 * step).collect()
+/// Colours there are; further series take them again and carry marks.
+pub(crate) const COLOURS: usize = 8;
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Style {
+    /// Joined by a line.
+    Line,
+    /// Joined by a dashed line.
+    Dashed,
+    /// A marker at each value.
+    Points,
 }
 
-/// One line of a plot.
+/// One series of a plot.
 #[derive(Debug, Clone)]
-pub(crate) struct Line<'a> {
-    pub(crate) name: &'a str,
-    /// 0..8: the colour.
+pub(crate) struct Series<'a> {
+    /// Name in the legend.
+    pub(crate) name: Cow<'a, str>,
+    /// Number of its colour; those from [`COLOURS`] on are told apart by marks on the line.
     pub(crate) colour: usize,
-    /// One value per time.
-    pub(crate) values: Vec<f64>,
+    pub(crate) style: Style,
+    /// As many as `y`, in the unit of the axis. Where either is no number the series has a gap.
+    pub(crate) x: Cow<'a, [f64]>,
+    pub(crate) y: Cow<'a, [f64]>,
 }
 
-/// A plot of lines over time.
+/// A plot of series over two axes.
 #[derive(Debug, Clone)]
 pub(crate) struct Plot<'a> {
     pub(crate) title: &'a str,
-    /// Label of the vertical axis, with its unit.
-    pub(crate) label: &'a str,
-    /// Times (s).
-    pub(crate) time: &'a [f64],
-    pub(crate) lines: Vec<Line<'a>>,
+    /// Labels of the axes, with their units.
+    pub(crate) x_label: &'a str,
+    pub(crate) y_label: &'a str,
+    pub(crate) series: Vec<Series<'a>>,
+    /// Whether the vertical axis begins at zero whatever the values.
+    pub(crate) from_zero: bool,
     /// A horizontal line with its name.
     pub(crate) bound: Option<(f64, &'a str)>,
     /// Values above this are cut off.
     pub(crate) ceiling: Option<f64>,
+    /// Whether the series are named though there is one only.
+    pub(crate) legend_of_one: bool,
     pub(crate) size: [f64; 2],
 }
 
-const LEFT: f64 = 58.0;
-const RIGHT: f64 = 12.0;
-const TOP: f64 = 26.0;
-const BOTTOM: f64 = 36.0;
-/// A line is drawn with at most this many pairs of smallest and largest value.
-const BUCKETS: usize = 240;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 16.0;
+const BOTTOM: f64 = 38.0;
+/// Left margin: at least this, and else what the texts of the ticks need at this width per character (px).
+const LEFT: f64 = 50.0;
+const CHARACTER: f64 = 6.6;
+/// Marks on the lines of further series are this far apart (px).
+const MARK_EVERY: f64 = 60.0;
+
+/// Markers about a place, told apart without colour.
+const MARKERS: [&str; 6] = [
+    "m-2.8 0a2.8 2.8 0 1 0 5.6 0a2.8 2.8 0 1 0-5.6 0",
+    "m-2.5-2.5h5v5h-5z",
+    "m0-3.5l3.5 3.5l-3.5 3.5l-3.5-3.5z",
+    "m0-3.4l3.2 5.6h-6.4z",
+    "m0 3.4l3.2-5.6h-6.4z",
+    "m-2.6-2.6l5.2 5.2m0-5.2l-5.2 5.2",
+];
+
+/// Both axes of a plot.
+struct Frame {
+    x: Axis,
+    y: Axis,
+    /// Edges of the field (px).
+    left: f64,
+    right: f64,
+    bottom: f64,
+}
 
 impl Plot<'_> {
-    /// The plot, with a legend when it has several lines.
+    /// The plot with its title above and its legend below; nothing when no series has a value.
     pub(crate) fn svg(&self) -> Markup {
-        let [w, h] = self.size;
-        let (t0, t1) = match (self.time.first(), self.time.last()) {
-            // The first row comes a little after the start.
-            (Some(a), Some(b)) if b > a => (if *a < 0.05 * b { a.min(0.0) } else { *a }, *b),
-            _ => return html! {},
+        let Some(frame) = self.frame() else {
+            return html! {};
         };
-        let [low, high] = self.range();
-        let x = |t: f64| LEFT + (t - t0) / (t1 - t0) * (w - LEFT - RIGHT);
-        let y = |v: f64| h - BOTTOM - (v - low) / (high - low) * (h - TOP - BOTTOM);
+        let [w, h] = self.size;
         html! {
             figure class="plot" {
-                svg viewBox={ "0 0 " (px(w)) " " (px(h)) } role="img" aria-label=(self.title) {
-                    text class="plot-title" x=(px(LEFT)) y="14" { (self.title) }
-                    @for t in ticks(low, high, 5) {
-                        path class="grid" d={ "M" (px(LEFT)) " " (px(y(t))) "H" (px(w - RIGHT)) } {}
-                        text class="tick" x=(px(LEFT - 6.0)) y=(px(y(t) + 4.0)) text-anchor="end" { (number(t, 4)) }
-                    }
-                    @for t in ticks(t0, t1, 6) {
-                        path class="axis" d={ "M" (px(x(t))) " " (px(h - BOTTOM)) "v4" } {}
-                        text class="tick" x=(px(x(t))) y=(px(h - BOTTOM + 16.0)) text-anchor="middle" { (number(t, 4)) }
-                    }
-                    path class="axis" d={ "M" (px(LEFT)) " " (px(TOP)) "V" (px(h - BOTTOM)) "H" (px(w - RIGHT)) } {}
-                    text class="tick" x=(px((LEFT + w - RIGHT) / 2.0)) y=(px(h - 4.0)) text-anchor="middle" { "time (s)" }
-                    text class="tick" x="12" y=(px((TOP + h - BOTTOM) / 2.0)) text-anchor="middle"
-                        transform={ "rotate(-90 12 " (px((TOP + h - BOTTOM) / 2.0)) ")" } { (self.label) }
+                p class="plot-title" { (self.title) }
+                svg viewBox={ "0 0 " (px(w)) " " (px(h)) } role="img" aria-label=(self.description(&frame)) {
+                    (self.axes(&frame))
                     @if let Some((value, name)) = self.bound {
-                        path class="bound" d={ "M" (px(LEFT)) " " (px(y(value))) "H" (px(w - RIGHT)) } {}
-                        text class="tick bound-name" x=(px(w - RIGHT - 4.0)) y=(px(y(value) - 5.0)) text-anchor="end" { (name) }
+                        @let y = frame.y.at(value);
+                        path class="bound" d={ "M" (px(frame.left)) " " (px(y)) "H" (px(frame.right)) } {}
+                        text class="tick bound-name" x=(px(frame.right - 4.0)) y=(px(y - 5.0)) text-anchor="end" { (name) }
                     }
-                    @for line in &self.lines {
-                        path class={ "line c" (line.colour) } d=(self.path(line, high, &x, &y)) {}
-                    }
+                    @for (i, series) in self.series.iter().enumerate() { (self.drawn(i, series, &frame)) }
                 }
-                @if self.lines.len() > 1 { (self.legend()) }
+                @if self.series.len() > 1 || self.legend_of_one { (self.legend()) }
             }
         }
+    }
+
+    /// For those who do not see it.
+    fn description(&self, frame: &Frame) -> String {
+        let range = |a: &Axis| {
+            let text = |v: f64| crate::units::number(v, 3);
+            format!("from {} to {}", text(a.low), text(a.high))
+        };
+        let named = |s: &Series<'_>| {
+            let how = match s.style {
+                Style::Line => "line",
+                Style::Dashed => "dashed line",
+                Style::Points => "points",
+            };
+            format!("{} ({how})", s.name)
+        };
+        let all: Vec<String> = self.series.iter().map(named).collect();
+        format!(
+            "{}: {}, {}, over {}, {}. Series: {}.",
+            self.title,
+            self.y_label,
+            range(&frame.y),
+            self.x_label,
+            range(&frame.x),
+            all.join(", ")
+        )
+    }
+
+    fn frame(&self) -> Option<Frame> {
+        let drawn = |x: f64, y: f64| x.abs() < LARGEST && y.abs() < LARGEST;
+        let pairs = || {
+            let all = self.series.iter().flat_map(|s| s.x.iter().zip(s.y.iter()));
+            all.filter(|(x, y)| drawn(**x, **y))
+        };
+        pairs().next()?;
+        let near = if self.from_zero { 0.05 } else { 0.25 };
+        let across = extent(pairs().map(|p| *p.0), Zero::Near(near));
+        let [w, h] = self.size;
+        let bottom = h - BOTTOM;
+        let y = Axis::new(self.range(pairs().map(|p| *p.1)), 5, [bottom, TOP]);
+        let left = LEFT.max(30.0 + CHARACTER * y.widest() as f64);
+        let right = w - RIGHT;
+        let x = Axis::new(across, 6, [left, right]);
+        Some(Frame {
+            x,
+            y,
+            left,
+            right,
+            bottom,
+        })
+    }
+
+    /// Smallest and largest value shown, with some air.
+    fn range(&self, values: impl Iterator<Item = f64>) -> [f64; 2] {
+        let values = values.chain(self.bound.map(|b| b.0));
+        let zero = if self.from_zero {
+            Zero::Always
+        } else {
+            Zero::Near(0.4)
+        };
+        let [low, high] = extent(values, zero);
+        let high = self.ceiling.map_or(high, |c| high.min(c)).max(low);
+        let air = 0.04 * (high - low);
+        match (high > low, self.from_zero || low == 0.0) {
+            (false, _) => [low, low + 1.0],
+            (true, true) => [low, high + air],
+            (true, false) => [low - air, if high == 0.0 { 0.0 } else { high + air }],
+        }
+    }
+
+    fn axes(&self, f: &Frame) -> Markup {
+        let h = self.size[1];
+        let middle = (TOP + f.bottom) / 2.0;
+        html! {
+            @for t in &f.y.ticks {
+                @let y = f.y.at(*t);
+                path class="grid" d={ "M" (px(f.left)) " " (px(y)) "H" (px(f.right)) } {}
+                text class="tick" x=(px(f.left - 6.0)) y=(px(y + 4.0)) text-anchor="end" { (f.y.text(*t)) }
+            }
+            @for t in &f.x.ticks {
+                @let x = f.x.at(*t);
+                path class="grid" d={ "M" (px(x)) " " (px(TOP)) "V" (px(f.bottom)) } {}
+                path class="axis" d={ "M" (px(x)) " " (px(f.bottom)) "v4" } {}
+                text class="tick" x=(px(x)) y=(px(f.bottom + 16.0)) text-anchor="middle" { (f.x.text(*t)) }
+            }
+            @if f.y.low < 0.0 && f.y.high > 0.0 {
+                path class="nought" d={ "M" (px(f.left)) " " (px(f.y.at(0.0))) "H" (px(f.right)) } {}
+            }
+            @if f.x.low < 0.0 && f.x.high > 0.0 {
+                path class="nought" d={ "M" (px(f.x.at(0.0))) " " (px(TOP)) "V" (px(f.bottom)) } {}
+            }
+            path class="axis" d={ "M" (px(f.left)) " " (px(TOP)) "V" (px(f.bottom)) "H" (px(f.right)) } {}
+            text class="tick" x=(px((f.left + f.right) / 2.0)) y=(px(h - 5.0)) text-anchor="middle" { (self.x_label) }
+            text class="tick" x="12" y=(px(middle)) text-anchor="middle"
+                transform={ "rotate(-90 12 " (px(middle)) ")" } { (self.y_label) }
+            @if let Some(power) = f.y.power() { text class="tick" x=(px(f.left)) y="10" { (power) } }
+            @if let Some(power) = f.x.power() {
+                text class="tick" x=(px(f.right)) y=(px(h - 5.0)) text-anchor="end" { (power) }
+            }
+        }
+    }
+
+    /// The series on the page, thinned to what a screen shows.
+    fn drawn(&self, number: usize, series: &Series<'_>, f: &Frame) -> Markup {
+        let place = |(x, y): (&f64, &f64)| {
+            let shown = x.abs() < LARGEST && y.abs() < LARGEST;
+            shown.then(|| [f.x.at(*x), f.y.at(y.min(f.y.high))])
+        };
+        let places: Vec<_> = series.x.iter().zip(series.y.iter()).map(place).collect();
+        let colour = series.colour % COLOURS;
+        if series.style == Style::Points {
+            let at = thin::markers(&places);
+            return html! { path class={ "points c" (colour) } d=(marked(&at, self.shape(number))) {} };
+        }
+        let runs = thin::line(&places);
+        let class = line_class(series.style);
+        html! {
+            path class={ (class) " c" (colour) } d=(joined(&runs)) {}
+            @if series.colour >= COLOURS {
+                path class={ "points c" (colour) } d=(marked(&along(&runs), self.shape(number))) {}
+            }
+        }
+    }
+
+    /// Shape of a series' markers: each series that has markers its own, as long as there are shapes.
+    fn shape(&self, number: usize) -> &'static str {
+        let before = &self.series[..number];
+        let with = |s: &&Series<'_>| s.style == Style::Points || s.colour >= COLOURS;
+        MARKERS[before.iter().filter(with).count() % MARKERS.len()]
     }
 
     fn legend(&self) -> Markup {
         html! {
             figcaption class="legend" {
-                @for line in &self.lines {
-                    span { svg width="18" height="8" aria-hidden="true" {
-                        path class={ "line c" (line.colour) } d="M0 4H18" {}
-                    } " " (line.name) }
+                @for (i, s) in self.series.iter().enumerate() {
+                    @let colour = s.colour % COLOURS;
+                    span { svg width="26" height="10" viewBox="0 0 26 10" aria-hidden="true" {
+                        @if s.style != Style::Points {
+                            path class={ (line_class(s.style)) " c" (colour) } d="M0 5H26" {}
+                        }
+                        @if s.style == Style::Points || s.colour >= COLOURS {
+                            path class={ "points c" (colour) } d={ "M13 5" (self.shape(i)) } {}
+                        }
+                    } " " (s.name) }
                 }
             }
         }
     }
+}
 
-    /// Smallest and largest value shown.
-    fn range(&self) -> [f64; 2] {
-        let values = self.lines.iter().flat_map(|l| &l.values).copied();
-        let values = values
-            .chain(self.bound.map(|b| b.0))
-            .filter(|v| v.is_finite());
-        let [low, high] = values.fold([0.0, 0.0], |[a, b]: [f64; 2], v| [a.min(v), b.max(v)]);
-        let high = self.ceiling.map_or(high, |c| high.min(c));
-        if high > low {
-            [low, high + 0.04 * (high - low)]
-        } else {
-            [low, low + 1.0]
-        }
-    }
-
-    /// A line thinned to what a screen shows: of each stretch of time the smallest and largest value, in order.
-    fn path(
-        &self,
-        line: &Line<'_>,
-        high: f64,
-        x: &dyn Fn(f64) -> f64,
-        y: &dyn Fn(f64) -> f64,
-    ) -> String {
-        let mut path = String::new();
-        for i in thinned(&line.values, BUCKETS) {
-            let pen = if path.is_empty() { 'M' } else { 'L' };
-            let _ = write!(
-                path,
-                "{pen}{} {}",
-                px(x(self.time[i])),
-                px(y(line.values[i].min(high)))
-            );
-        }
-        path
+fn line_class(style: Style) -> &'static str {
+    if style == Style::Dashed {
+        "line dashed"
+    } else {
+        "line"
     }
 }
 
-/// Indices that keep the smallest and largest value of each of `buckets` stretches, and both ends.
-fn thinned(values: &[f64], buckets: usize) -> Vec<usize> {
-    let n = values.len();
-    if n <= 2 * buckets {
-        return (0..n).filter(|i| values[*i].is_finite()).collect();
+/// Lines through places, as an SVG path. A place of its own becomes a dot.
+fn joined(runs: &[Vec<[f64; 2]>]) -> String {
+    let mut path = String::new();
+    for run in runs {
+        let mut last = String::new();
+        for (i, p) in run.iter().enumerate() {
+            let text = format!("{} {}", px(p[0]), px(p[1]));
+            if i == 0 || text != last {
+                path.push(if i == 0 { 'M' } else { 'L' });
+                path += &text;
+                last = text;
+            }
+        }
+        if run.len() == 1 {
+            path += "h0";
+        }
     }
-    let mut kept = vec![0];
-    for b in 0..buckets {
-        let stretch = b * n / buckets..(b + 1) * n / buckets;
-        let by = |i: &usize, j: &usize| values[*i].total_cmp(&values[*j]);
-        let low = stretch.clone().min_by(by).unwrap_or(0);
-        let high = stretch.max_by(by).unwrap_or(0);
-        kept.extend([low.min(high), low.max(high)]);
+    path
+}
+
+/// Markers at places, as an SVG path.
+fn marked(places: &[[f64; 2]], shape: &str) -> String {
+    let mut path = String::new();
+    for p in places {
+        let _ = write!(path, "M{} {}{shape}", px(p[0]), px(p[1]));
     }
-    kept.push(n - 1);
-    kept.dedup();
-    kept.retain(|i| values[*i].is_finite());
-    kept
+    path
+}
+
+/// Places along lines, some way apart.
+fn along(runs: &[Vec<[f64; 2]>]) -> Vec<[f64; 2]> {
+    let mut found = Vec::new();
+    let mut gone = 0.5 * MARK_EVERY;
+    for run in runs {
+        for w in run.windows(2) {
+            gone += (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
+            if gone >= MARK_EVERY {
+                found.push(w[1]);
+                gone = 0.0;
+            }
+        }
+    }
+    found
 }
 
 /// Horizontal bars: name, value, text behind the bar.
 pub(crate) fn bars(title: &str, rows: &[(String, f64, String)]) -> Markup {
     let top = rows.iter().map(|r| r.1).fold(0.0, f64::max);
     let (row, left, width) = (24.0, 170.0, 400.0);
-    let h = row * rows.len() as f64 + 28.0;
+    let h = row * rows.len() as f64 + 8.0;
     html! {
         figure class="plot" {
+            p class="plot-title" { (title) }
             svg class="bars" viewBox={ "0 0 720 " (px(h)) } role="img" aria-label=(title) {
-                text class="plot-title" x="0" y="14" { (title) }
                 @for (i, (name, value, text)) in rows.iter().enumerate() {
-                    @let y = 24.0 + row * i as f64;
+                    @let y = 4.0 + row * i as f64;
                     @let w = if top > 0.0 { value / top * width } else { 0.0 };
                     text class="tick" x=(px(left - 8.0)) y=(px(y + 14.0)) text-anchor="end" { (name) }
                     rect class="bar-fill" x=(px(left)) y=(px(y + 3.0)) width=(px(w.max(1.0))) height="16" {}
@@ -188,47 +333,5 @@ pub(crate) fn bars(title: &str, rows: &[(String, f64, String)]) -> Markup {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_are_round_and_lie_inside() {
-        let close = |a: Vec<f64>, b: &[f64]| {
-            assert_eq!(a.len(), b.len(), "{a:?}");
-            assert!(a.iter().zip(b).all(|(x, y)| (x - y).abs() < 1e-9), "{a:?}");
-        };
-        close(ticks(0.0, 1.0, 5), &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0]);
-        close(ticks(-35.0, 35.0, 6), &[-20.0, 0.0, 20.0]);
-        close(ticks(3.0, 3.0, 5), &[3.0]);
-    }
-
-    #[test]
-    fn thinning_keeps_peaks_and_ends_of_long_histories() {
-        let mut values: Vec<f64> = (0..10_000).map(|i| (f64::from(i) * 0.01).sin()).collect();
-        values[4321] = 99.0;
-        values[8765] = -99.0;
-        let kept = thinned(&values, 100);
-        assert!(kept.len() <= 202 && kept.contains(&4321) && kept.contains(&8765));
-        assert!(kept.windows(2).all(|w| w[0] < w[1]));
-        assert_eq!((kept[0], *kept.last().unwrap()), (0, 9_999));
-    }
-
-    #[test]
-    fn the_bound_is_drawn_inside_even_when_all_values_are_far_below() {
-        let plot = Plot {
-            title: "t",
-            label: "l",
-            time: &[0.0, 1.0],
-            lines: vec![Line {
-                name: "a",
-                colour: 0,
-                values: vec![0.0, 0.001],
-            }],
-            bound: Some((5.0, "bound")),
-            ceiling: None,
-            size: [400.0, 200.0],
-        };
-        assert!(plot.range()[1] >= 5.0);
-        assert!(plot.svg().into_string().contains("class=\"bound\""));
-    }
-}
+#[path = "plot/tests.rs"]
+mod tests;

@@ -7,7 +7,8 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-fn open(path: &Utf8Path) -> Result<Artifact, String> {
+/// Opens an artifact.
+pub(crate) fn open(path: &Utf8Path) -> Result<Artifact, String> {
     Artifact::open(path.as_std_path()).map_err(|e| e.to_string())
 }
 
@@ -227,6 +228,8 @@ pub(crate) struct Ply {
     pub(crate) distance: Option<Vec<f64>>,
     /// Principal curvature of largest magnitude per point (1/m).
     pub(crate) curvature: Option<Vec<f64>>,
+    /// How far it moved along z per point (m).
+    pub(crate) deflection: Option<Vec<f64>>,
     /// Cells that the detection flagged, or that lie on a defect.
     pub(crate) marked: Vec<Marked>,
 }
@@ -287,6 +290,7 @@ pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Value, Ply)>, String>
             shear: read(On::Cells, "shear_angle"),
             distance: read(On::Points, "nodal_distance"),
             curvature: read(On::Points, "curvature_max"),
+            deflection: None,
             marked,
             cells,
         };
@@ -318,6 +322,31 @@ pub(crate) fn formed_plies(path: &Utf8Path, names: &[String]) -> Result<Vec<Ply>
         })
     };
     names.iter().map(one).collect()
+}
+
+/// The first moving body of quads in its last frame, with its shear angle and its deflection; `None` when there is
+/// none or it cannot be read.
+pub(crate) fn shown_sheet(artifact: &Artifact) -> Option<Ply> {
+    let frame = last_frame(artifact).ok()?;
+    let bodies = &artifact.contents().bodies;
+    let body = bodies
+        .iter()
+        .find(|b| b.moving && b.nodes_per_cell == 4 && b.cells > 0 && b.name != "tool")?;
+    let (flat, cells) = artifact.mesh(&body.name).ok()?;
+    let formed = artifact.frame_points(&body.name, frame).ok()?;
+    let cells = quads(&body.name, &cells, body.nodes_per_cell).ok()?;
+    let shear = artifact.frame_field(&body.name, frame, On::Cells, "shear_angle");
+    let deflection = flat.iter().zip(&formed).map(|(a, b)| b[2] - a[2]);
+    Some(Ply {
+        name: body.name.clone(),
+        shear: shear.ok().filter(|s| s.len() == cells.len()),
+        deflection: Some(deflection.collect()),
+        marked: vec![Marked::No; cells.len()],
+        flat,
+        formed,
+        cells,
+        ..Ply::default()
+    })
 }
 
 impl Ply {

@@ -2,6 +2,7 @@
 
 use crate::input::{Instance, ReportInput};
 use crate::read::{self, Facts, FormingFacts, History, Ply, Tool};
+use crate::steps::{self, Shown};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -159,6 +160,8 @@ pub(crate) struct Material {
     pub(crate) facts: Vec<Option<Facts>>,
     /// The studies.
     pub(crate) studies: Vec<Study>,
+    /// Steps with plots, files or numbers of their own.
+    pub(crate) shown: Vec<Shown>,
     /// What could not be read, or is not shown.
     pub(crate) problems: Vec<String>,
 }
@@ -177,7 +180,11 @@ impl Material {
             reader.all.facts.push(facts);
         }
         reader.studies();
-        reader.all
+        let mut all = reader.all;
+        if pictures {
+            all.shown = steps::read(input, &all.facts, &mut all.problems);
+        }
+        all
     }
 }
 

@@ -43,7 +43,8 @@ pub(crate) fn fixed(value: f64, places: usize) -> String {
     }
 }
 
-fn trim(text: String) -> String {
+/// Without zeros at the end behind the point.
+pub(crate) fn trim(text: String) -> String {
     if text.contains('.') {
         return text.trim_end_matches('0').trim_end_matches('.').to_owned();
     }

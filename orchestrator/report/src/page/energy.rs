@@ -1,6 +1,6 @@
 //! Energies, loads and contact over time.
 
-use crate::plot::{Line, Plot};
+use crate::plot::{Plot, Series, Style};
 use crate::study::{Material, Run};
 use crate::units::{fixed, number};
 use maud::{Markup, html};
@@ -15,8 +15,13 @@ const ENERGIES: [(&str, &str, usize); 6] = [
     ("drift", "drift", 6),
 ];
 
-/// Energies and contact of all forming runs.
-pub(super) fn section(material: &Material) -> Markup {
+/// Whether any run tells of its energies.
+pub(super) fn has(material: &Material) -> bool {
+    !runs(material).is_empty()
+}
+
+/// All forming runs and coupons, and whether they are whole: driven by pressure and frame, not by their edges.
+fn runs(material: &Material) -> Vec<(bool, &Run)> {
     let mut runs: Vec<(bool, &Run)> = Vec::new();
     for study in &material.studies {
         runs.extend(
@@ -34,6 +39,18 @@ pub(super) fn section(material: &Material) -> Markup {
                 .map(|r| (false, r)),
         );
     }
+    runs.extend(
+        material
+            .shown
+            .iter()
+            .filter_map(|s| Some((false, s.run.as_ref()?))),
+    );
+    runs
+}
+
+/// Energies and contact of all runs.
+pub(super) fn section(material: &Material) -> Markup {
+    let runs = runs(material);
     html! {
         @if !runs.is_empty() {
             section id="energy" {
@@ -74,86 +91,82 @@ fn health(runs: &[(bool, &Run)]) -> Markup {
     }
 }
 
+/// A series over the times of a history.
+fn over<'a>(time: &'a [f64], name: &'a str, colour: usize, values: Vec<f64>) -> Series<'a> {
+    Series {
+        name: name.into(),
+        colour,
+        style: Style::Line,
+        x: time.into(),
+        y: values.into(),
+    }
+}
+
 fn plots(run: &Run, whole: bool) -> Markup {
     let h = &run.history;
     let time = h.get("time").unwrap_or_default();
-    let size = [560.0, 300.0];
-    let mut lines: Vec<Line<'_>> = Vec::new();
     let internal = h.internal();
+    let mut energies: Vec<Series<'_>> = Vec::new();
     for (name, shown, colour) in ENERGIES {
         if let Some(values) = h.get(name) {
-            lines.push(Line {
-                name: shown,
-                colour,
-                values: values.to_vec(),
-            });
+            energies.push(over(time, shown, colour, values.to_vec()));
         }
     }
     if let Some(values) = &internal {
-        lines.insert(
-            1.min(lines.len()),
-            Line {
-                name: "internal",
-                colour: 1,
-                values: values.clone(),
-            },
-        );
+        let at = 1.min(energies.len());
+        energies.insert(at, over(time, "internal", 1, values.clone()));
     }
     let blank = Plot {
         title: "",
-        label: "",
-        time,
-        lines: Vec::new(),
+        x_label: "time (s)",
+        y_label: "",
+        series: Vec::new(),
+        from_zero: true,
         bound: None,
         ceiling: None,
-        size,
+        legend_of_one: false,
+        size: [560.0, 290.0],
     };
     let energy = Plot {
         title: "Energies",
-        label: "energy (J)",
-        lines,
+        y_label: "energy (J)",
+        series: energies,
         ..blank.clone()
     };
-    let pressures: Vec<Line<'_>> = [("cavity_pressure", "cavity", 0), ("bag_pressure", "bag", 1)]
-        .into_iter()
-        .filter_map(|(name, shown, colour)| {
-            let values = h.get(name)?.iter().map(|p| p * 1e-3).collect();
-            Some(Line {
-                name: shown,
-                colour,
-                values,
-            })
-        })
-        .collect();
+    let scaled = |(name, shown, colour, factor): (&str, &'static str, usize, f64)| {
+        let values = h.get(name)?.iter().map(|v| v * factor).collect();
+        Some(over(time, shown, colour, values))
+    };
+    let pressures = [
+        ("cavity_pressure", "cavity", 0, 1e-3),
+        ("bag_pressure", "bag", 1, 1e-3),
+    ];
     let pressure = Plot {
         title: "Pressures",
-        label: "pressure (kPa)",
-        lines: pressures,
+        y_label: "pressure (kPa)",
+        series: pressures.into_iter().filter_map(scaled).collect(),
         ..blank.clone()
     };
-    let height = h.get("frame_height").map(|z| Plot {
+    let height = Plot {
         title: "Frame height",
-        label: "height (mm)",
-        lines: vec![Line {
-            name: "frame",
-            colour: 0,
-            values: z.iter().map(|v| v * 1e3).collect(),
-        }],
+        y_label: "height (mm)",
+        series: scaled(("frame_height", "frame", 0, 1e3))
+            .into_iter()
+            .collect(),
         ..blank.clone()
-    });
+    };
     html! {
-        @if !energy.lines.is_empty() { (energy.svg()) }
+        (energy.svg())
         @if let (Some(kinetic), Some(internal)) = (h.get("kinetic"), &internal) {
             (ratio_plot(run, kinetic, internal, blank.clone()).svg())
         }
-        @if whole && !pressure.lines.is_empty() { (pressure.svg()) }
-        @if whole { @if let Some(p) = &height { (p.svg()) } }
+        @if whole { (pressure.svg()) (height.svg()) }
     }
 }
 
 /// Kinetic over internal energy in per cent; left out while the internal energy is below 5 % of its peak, where
 /// the ratio says nothing.
-fn ratio_plot<'a>(run: &Run, kinetic: &[f64], internal: &[f64], blank: Plot<'a>) -> Plot<'a> {
+fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64], blank: Plot<'a>) -> Plot<'a> {
     let peak = internal.iter().copied().fold(0.0, f64::max);
     let ratio = |(k, i): (&f64, &f64)| {
         if *i > 0.05 * peak {
@@ -164,14 +177,11 @@ fn ratio_plot<'a>(run: &Run, kinetic: &[f64], internal: &[f64], blank: Plot<'a>)
     };
     let values = kinetic.iter().zip(internal).map(ratio).collect();
     let bound = run.kinetic_bound.map(|b| (100.0 * b, "bound"));
+    let time = run.history.get("time").unwrap_or_default();
     Plot {
         title: "Kinetic over internal energy",
-        label: "ratio (%)",
-        lines: vec![Line {
-            name: "ratio",
-            colour: 2,
-            values,
-        }],
+        y_label: "ratio (%)",
+        series: vec![over(time, "ratio", 2, values)],
         ceiling: bound.map(|b| 3.0 * b.0),
         bound,
         ..blank

@@ -368,6 +368,86 @@ impl Study {
         );
     }
 
+    /// An artifact of any kind with arrays of one index (path, unit, values).
+    pub fn artifact(
+        &mut self,
+        (step, item): (&str, &[&str]),
+        kind: &str,
+        arrays: &[(&str, &str, Vec<f64>)],
+        attributes: &Value,
+        results: Vec<(&str, f64, &str)>,
+    ) {
+        let label = label_of(step, item);
+        let mut w = self.create(&label, kind);
+        for (path, unit, values) in arrays {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_ne_bytes()).collect();
+            let n = values.len() as u64;
+            w.array(path, DType::F64, &[n], unit, &bytes).unwrap();
+        }
+        w.attributes(&attributes.to_string()).unwrap();
+        self.finish(w, (step, item), kind, &[], results);
+    }
+
+    /// A picture frame: a wavy sheet, curves against a closed form and points, histories, numbers.
+    pub fn coupon(&mut self) {
+        let mut w = self.create("frame", "coupon");
+        let s = sheet([-0.1, -0.1, 0.1, 0.1], 0.005, 0.0);
+        w.define_mesh("fabric", &s.flat, 4, &s.cells, "{}").unwrap();
+        w.begin_frame(1.0).unwrap();
+        let mut bent = s.flat.clone();
+        for p in bent.as_chunks_mut::<3>().0 {
+            p[2] = 0.004 * (40.0 * p[0]).sin() * (30.0 * p[1]).cos();
+        }
+        w.frame_points("fabric", &bent).unwrap();
+        w.frame_field("fabric", On::Cells, "shear_angle", 1, "rad", &s.shear)
+            .unwrap();
+        w.end_frame().unwrap();
+        let angle: Vec<f64> = (0..=400)
+            .map(|i| f64::from(i - 200) * 0.8 / 200.0)
+            .collect();
+        let force = |g: &f64| 100.0 * g + 300.0 * g.powi(3);
+        let run: Vec<f64> = angle
+            .iter()
+            .map(|g| force(g) + 2.0 * (60.0 * g).sin())
+            .collect();
+        let exact: Vec<f64> = angle.iter().map(force).collect();
+        let few: Vec<f64> = angle.iter().step_by(40).copied().collect();
+        let told: Vec<f64> = few.iter().map(|g| 1.03 * force(g)).collect();
+        for (path, unit, values) in [
+            ("curves/run/shear_angle", "rad", &angle),
+            ("curves/run/force", "N", &run),
+            ("curves/closed_form/force", "N", &exact),
+            ("curves/thesis/shear_angle", "rad", &few),
+            ("curves/thesis/force", "N", &told),
+        ] {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_ne_bytes()).collect();
+            let n = values.len() as u64;
+            w.array(path, DType::F64, &[n], unit, &bytes).unwrap();
+        }
+        history(&mut w);
+        let energy = json!({"peak_drift_ratio": 0.004, "hourglass_ratio": 0.0123});
+        w.attributes(
+            &json!({
+                "title": "Picture frame, \"NCF\" <both signs>",
+                "energy": energy,
+                "plots": [{
+                    "name": "force", "title": "Cross-head force",
+                    "x": {"label": "shear angle", "unit": "deg"}, "y": {"label": "force", "unit": "N"},
+                    "series": [
+                        {"label": "this run", "x": "curves/run/shear_angle", "y": "curves/run/force", "style": "line"},
+                        {"label": "closed form", "x": "curves/run/shear_angle", "y": "curves/closed_form/force", "style": "dashed"},
+                        {"label": "thesis", "x": "curves/thesis/shear_angle", "y": "curves/thesis/force", "style": "points"},
+                    ],
+                }],
+                "files": [{"name": "material.yaml", "text": "plyflow_material: 1\nname: <NCF>\n"}],
+            })
+            .to_string(),
+        )
+        .unwrap();
+        let results = vec![("force_error", 0.0123, "1"), ("wrinkle_onset", 0.14, "rad")];
+        self.finish(w, ("frame", &[]), "coupon", &[], results);
+    }
+
     pub fn input(self) -> ReportInput {
         ReportInput {
             workflow: "half-pipe <demo> & co".into(),
@@ -388,7 +468,13 @@ impl Study {
     }
 }
 
-fn expectation(step: &str, result: &str, got: Option<f64>, unit: &str, met: bool) -> Expectation {
+pub fn expectation(
+    step: &str,
+    result: &str,
+    got: Option<f64>,
+    unit: &str,
+    met: bool,
+) -> Expectation {
     Expectation {
         step: step.into(),
         item: vec![],
@@ -401,6 +487,14 @@ fn expectation(step: &str, result: &str, got: Option<f64>, unit: &str, met: bool
         maximum: (!met).then_some(2e-4),
         source: Some("thesis 5.5 <table>".into()),
         met,
+    }
+}
+
+fn label_of(step: &str, item: &[&str]) -> String {
+    if item.is_empty() {
+        step.into()
+    } else {
+        format!("{step}[{}]", item.join(","))
     }
 }
 

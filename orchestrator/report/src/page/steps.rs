@@ -1,0 +1,169 @@
+//! Steps with plots: coupons, characterisations and whatever else carries some.
+
+use super::tables::{expected_text, got_text};
+use crate::field::Field;
+use crate::input::{Expectation, Instance, ReportInput};
+use crate::read::Ply;
+use crate::steps::{Shown, TextFile};
+use crate::study::{Material, Study};
+use crate::units::{bytes, quantity};
+use crate::view::{FormedView, Overlay, Sharpness, Side, flat, formed};
+use maud::{Markup, html};
+
+/// Width of a picture on the page (px).
+const PICTURE: f64 = 430.0;
+/// Of a longer file the beginning is shown (characters).
+const LONGEST: usize = 20_000;
+
+/// One block per step, in the order of the workflow.
+pub(super) fn section(
+    input: &ReportInput,
+    material: &Material,
+    sharp: Sharpness,
+) -> Result<Markup, String> {
+    if material.shown.is_empty() {
+        return Ok(html! {});
+    }
+    let mut blocks = Vec::new();
+    for shown in &material.shown {
+        blocks.push(block(input, shown, sharp)?);
+    }
+    Ok(html! {
+        section id="plots" {
+            h2 { (heading(material)) }
+            @for block in &blocks { (block) }
+        }
+    })
+}
+
+/// What the section is called.
+pub(super) fn heading(material: &Material) -> &'static str {
+    if material.shown.iter().any(|s| s.numbers) {
+        "Tests and plots"
+    } else {
+        "Plots"
+    }
+}
+
+fn block(input: &ReportInput, shown: &Shown, sharp: Sharpness) -> Result<Markup, String> {
+    let instance = &input.instances[shown.instance];
+    let pictures = match &shown.sheet {
+        Some(sheet) => pictures(sheet, shown.instance, sharp)?,
+        None => html! {},
+    };
+    let label = instance.label();
+    Ok(html! {
+        div class="step-block" {
+            h3 {
+                @if shown.title == label { code { (label) } } @else { (shown.title) " " code { (label) } }
+                " " span class="note" { (instance.record.kind) }
+            }
+            @if shown.numbers { (numbers(input, instance)) }
+            @if !shown.plots.is_empty() { div class="plots" { @for plot in &shown.plots { (plot) } } }
+            (pictures)
+            @if !shown.files.is_empty() { (files(input, &label, &shown.files)) }
+        }
+    })
+}
+
+/// The results of a step beside what is expected of them.
+fn numbers(input: &ReportInput, instance: &Instance) -> Markup {
+    let mine: Vec<&Expectation> = (input.expectations.iter())
+        .filter(|e| e.step == instance.step && (e.item == instance.item || e.got.is_none()))
+        .collect();
+    let of = |name: &str| -> Vec<&Expectation> {
+        mine.iter().copied().filter(|e| e.result == name).collect()
+    };
+    let results = &instance.record.results;
+    let absent = mine
+        .iter()
+        .filter(|e| !results.iter().any(|r| r.name == e.result));
+    html! {
+        @if !results.is_empty() || !mine.is_empty() {
+            div class="scroll" { table class="numbers" {
+                thead { tr { th { "result" } th class="n" { "value" } @if !mine.is_empty() {
+                    th class="n" { "expected" } th { "verdict" } th { "source" } } } }
+                tbody {
+                    @for r in results {
+                        @let all = of(&r.name);
+                        @if all.is_empty() {
+                            tr { th { (r.name) } td class="n" { (quantity(r.value, &r.unit, 5)) }
+                                @if !mine.is_empty() { td {} td {} td {} } }
+                        }
+                        @for (i, e) in all.iter().enumerate() {
+                            tr { th { @if i == 0 { (r.name) } }
+                                td class="n" { @if i == 0 { (quantity(r.value, &r.unit, 5)) } } (judged(e)) }
+                        }
+                    }
+                    @for e in absent {
+                        tr { th { (e.result) } td class="n" { (got_text(e)) } (judged(e)) }
+                    }
+                }
+            } }
+        }
+    }
+}
+
+fn judged(e: &Expectation) -> Markup {
+    html! {
+        td class="n" { (expected_text(e)) }
+        td class=(if e.met { "met" } else { "missed" }) { (if e.met { "✓ met" } else { "✗ missed" }) }
+        td { (e.source.as_deref().unwrap_or_default()) }
+    }
+}
+
+/// The sheet in its last state: shear on the flat sheet, deflection on the flat and on the deformed one.
+fn pictures(sheet: &Ply, n: usize, sharp: Sharpness) -> Result<Markup, String> {
+    let study = Study {
+        plies: vec![sheet.clone()],
+        ..Study::default()
+    };
+    let overlay = Overlay::default();
+    let mut rows = Vec::new();
+    for field in [Field::Shear, Field::Deflection] {
+        let Some(legend) = field.legend(&study).filter(|l| !l.is_flat()) else {
+            continue;
+        };
+        let mut figures = vec![(
+            "undeformed",
+            flat(sheet, &legend, &overlay, PICTURE, sharp)?,
+        )];
+        if field == Field::Deflection {
+            let how = FormedView {
+                side: Side::Front,
+                tool: None,
+                whole_tool: false,
+                width: PICTURE,
+            };
+            figures.push(("deformed", formed(sheet, &legend, &overlay, how, sharp)?));
+        }
+        rows.push((legend, figures));
+    }
+    Ok(html! {
+        @if !rows.is_empty() {
+            div class="row" {
+                @for (legend, figures) in &rows { @for (i, (what, figure)) in figures.iter().enumerate() {
+                    figure class="map" {
+                        p class="plot-title" { (legend.field.title()) " (" (legend.unit()) ")" }
+                        (figure)
+                        (legend.bar(&format!("step-{n}-{}-{i}", legend.field.unit())))
+                        figcaption { (sheet.name) ", " (what) ", last frame" }
+                    }
+                } }
+            }
+        }
+    })
+}
+
+fn files(input: &ReportInput, label: &str, files: &[TextFile]) -> Markup {
+    html! {
+        p class="note" { "Files of this step, to be written with " code { "plyflow extract " (input.file) " '" (label) "'" } ":" }
+        @for file in files {
+            @let beginning: String = file.text.chars().take(LONGEST).collect();
+            details {
+                summary { code { (file.name) } " " span class="note" { (bytes(file.text.len() as u64)) } }
+                pre { code { (beginning) @if beginning.len() < file.text.len() { "\n…" } } }
+            }
+        }
+    }
+}

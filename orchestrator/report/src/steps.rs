@@ -1,0 +1,128 @@
+//! What steps carry for people: plots and files of any artifact; coupons and characterisations with their numbers.
+
+use crate::input::{Instance, ReportInput};
+use crate::plots;
+use crate::read::{Facts, FormingFacts, History, Ply, open, shown_sheet};
+use crate::study::Run;
+use maud::Markup;
+use serde::Deserialize;
+
+/// Plots that are drawn on a page.
+const PLOTS: usize = 120;
+/// The drawn plots of a page are together about this long at most (bytes).
+const LENGTH: usize = 2_500_000;
+/// Steps of which the deformed sheet is drawn.
+const PICTURES: usize = 12;
+
+/// What is shown of one step.
+#[derive(Debug, Default)]
+pub(crate) struct Shown {
+    /// Index of its instance.
+    pub(crate) instance: usize,
+    /// What it calls itself, else its label.
+    pub(crate) title: String,
+    /// Whether its results stand beside its plots: it is a coupon or a characterisation.
+    pub(crate) numbers: bool,
+    /// Its plots, drawn.
+    pub(crate) plots: Vec<Markup>,
+    /// Its text files.
+    pub(crate) files: Vec<TextFile>,
+    /// The first sheet of a coupon in the last frame.
+    pub(crate) sheet: Option<Ply>,
+    /// Energies of a coupon, if it has a history.
+    pub(crate) run: Option<Run>,
+}
+
+/// A text file that an artifact carries.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(crate) struct TextFile {
+    pub(crate) name: String,
+    pub(crate) text: String,
+}
+
+/// Reads what is shown of all steps, in their order; what is wrong is added to `problems`.
+pub(crate) fn read(
+    input: &ReportInput,
+    facts: &[Option<Facts>],
+    problems: &mut Vec<String>,
+) -> Vec<Shown> {
+    let mut room = PLOTS;
+    let mut length = 0;
+    let mut pictures = PICTURES;
+    let mut all = Vec::new();
+    for (at, (instance, facts)) in input.instances.iter().zip(facts).enumerate() {
+        let Some(facts) = facts else { continue };
+        let mut wrong = Vec::new();
+        if let Some(mut shown) = one(instance, facts, room, &mut wrong) {
+            shown.instance = at;
+            room = room.saturating_sub(shown.plots.len());
+            length += shown.plots.iter().map(|p| p.0.len()).sum::<usize>();
+            if length > LENGTH {
+                room = 0;
+            }
+            if shown.sheet.is_some() && pictures == 0 {
+                shown.sheet = None;
+            }
+            pictures -= usize::from(shown.sheet.is_some());
+            all.push(shown);
+        }
+        problems.extend(wrong.iter().map(|w| format!("{}: {w}", instance.label())));
+    }
+    all
+}
+
+fn one(instance: &Instance, facts: &Facts, room: usize, wrong: &mut Vec<String>) -> Option<Shown> {
+    let a = &facts.attributes;
+    let numbers = matches!(facts.kind.as_str(), "coupon" | "characterisation");
+    if !numbers && a["plots"].is_null() && a["files"].is_null() {
+        return None;
+    }
+    let mut shown = Shown {
+        title: a["title"]
+            .as_str()
+            .map_or_else(|| instance.label(), str::to_owned),
+        numbers,
+        files: files(&a["files"], wrong),
+        ..Shown::default()
+    };
+    match open(&instance.artifact) {
+        Ok(artifact) => {
+            shown.plots = plots::drawn(a, &artifact, room, wrong);
+            if facts.kind == "coupon" {
+                shown.sheet = shown_sheet(&artifact);
+                shown.run = run(instance, facts, wrong);
+            }
+        }
+        Err(e) => wrong.push(e),
+    }
+    Some(shown)
+}
+
+fn files(value: &serde_json::Value, wrong: &mut Vec<String>) -> Vec<TextFile> {
+    if value.is_null() {
+        return Vec::new();
+    }
+    Vec::<TextFile>::deserialize(value).unwrap_or_else(|e| {
+        wrong.push(format!("its attribute 'files': {e}"));
+        Vec::new()
+    })
+}
+
+/// The energies of a coupon, which has the histories of a forming run.
+fn run(instance: &Instance, facts: &Facts, wrong: &mut Vec<String>) -> Option<Run> {
+    let history = History::read(&instance.artifact)
+        .map_err(|e| wrong.push(e))
+        .ok()?;
+    history.internal()?;
+    let energy = serde_json::from_value(facts.attributes["energy"].clone()).unwrap_or_default();
+    Some(Run {
+        label: instance.label(),
+        instance: 0,
+        facts: FormingFacts {
+            energy,
+            ..FormingFacts::default()
+        },
+        kinetic_bound: facts.provenance["parameters"]["kinetic_bound"].as_f64(),
+        history,
+    })
+}
