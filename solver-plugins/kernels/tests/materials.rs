@@ -249,33 +249,71 @@ fn film_from_a_table_returns_the_table() {
     check_gradient(&m, &p, [1.5, 1.1, 0.2], 1e-5);
 }
 
+/// The film's nominal stress by its definition, without the kernel: U'(I1) from the uniaxial curve, the strain of the
+/// same I1 by bisection.
+fn marlow_by_bisection(first: f64, power: i32, l: f64) -> f64 {
+    let t = |e: f64| 6.364e6 * ((0.4451 * e).exp() - (-7.545 * e).exp());
+    let (mut low, mut high) = (1.0f64, 50.0f64);
+    for _ in 0..200 {
+        let m = 0.5 * (low + high);
+        if m * m + 2.0 / m < first {
+            low = m;
+        } else {
+            high = m;
+        }
+    }
+    let rate = t(low - 1.0) / (2.0 * (low - low.powi(-2)));
+    2.0 * rate * (l - l.powi(-power))
+}
+
 #[test]
-fn film_matches_the_measured_biaxial_and_planar_curves_as_well_as_the_thesis_did() {
+fn film_predicts_the_measured_biaxial_and_planar_curves_better_than_stated_under_every_norm() {
     let m = film(FILM).unwrap();
     let p = Point::new(&m);
-    let error = |metric: fn(f64) -> [f64; 3], curve: fn(f64) -> f64, to: f64| {
-        let (mut d, mut f) = (0.0f64, 0.0f64);
+    // Root-mean-square difference over 0 to the end of the test (200 even strains), over the largest
+    // measured stress, over the root mean square of the measured stresses, and of the relative differences.
+    let errors = |metric: fn(f64) -> [f64; 3],
+                  first: fn(f64) -> f64,
+                  power: i32,
+                  curve: fn(f64) -> f64,
+                  to: f64| {
+        let (mut d, mut f, mut top, mut relative) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
         for i in 1..=200 {
             let e = to * i as f64 / 200.0;
-            let t = p.peek(&m, metric(1.0 + e)).stress[0] * (1.0 + e) / 8e-5;
+            let l = 1.0 + e;
+            let t = p.peek(&m, metric(l)).stress[0] * l / 8e-5;
+            let own = marlow_by_bisection(first(l), power, l);
+            assert!((t - own).abs() < 1e-7 * own, "{t} Pa, not {own}");
             d += (t - curve(e)).powi(2);
-            f = f.max(curve(e));
+            f += curve(e).powi(2);
+            relative += (t / curve(e) - 1.0).powi(2);
+            top = top.max(curve(e));
         }
-        (d / 200.0).sqrt() / f
+        [
+            (d / 200.0).sqrt() / top,
+            (d / f).sqrt(),
+            (relative / 200.0).sqrt(),
+        ]
     };
-    let biaxial = error(
+    let biaxial = errors(
         |l| [l * l, l * l, 0.0],
+        |l| 2.0 * l * l + l.powi(-4),
+        5,
         |e| 6.482e6 * ((0.4871 * e).exp() - (-12.04 * e).exp()),
         1.0,
     );
-    let planar = error(
+    let planar = errors(
         |l| [l * l, 1.0, 0.0],
+        |l| l * l + 1.0 + l.powi(-2),
+        3,
         |e| 7.238e6 * ((0.3774 * e).exp() - (-8.312 * e).exp()),
         2.0,
     );
+    println!("largest, rms, relative: equibiaxial {biaxial:.4?}, planar {planar:.4?}");
+    // The thesis states 7.5 % and 4.1 % and no norm.
     assert!(
-        biaxial < 0.10 && planar < 0.06,
-        "biaxial {biaxial}, planar {planar}"
+        biaxial.iter().all(|e| *e < 0.075) && planar.iter().all(|e| *e < 0.041),
+        "biaxial {biaxial:?}, planar {planar:?}"
     );
 }
 
