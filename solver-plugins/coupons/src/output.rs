@@ -78,6 +78,16 @@ impl<'a> Output<'a> {
         self.warnings.push(text);
     }
 
+    /// Writes the attributes, with plots and warnings, and nothing else: for tests with results of their own.
+    ///
+    /// # Errors
+    /// When the host refuses.
+    pub fn attributes_only(mut self) -> Result<(), StepError> {
+        self.attribute("warnings", json!(self.warnings));
+        self.attribute("plots", json!(self.plots));
+        self.host.write_attributes(&Value::Object(self.attributes))
+    }
+
     /// Writes the energy history, the results that every test has, and the attributes. Declares nothing
     /// that depends on the machine except `element_cycle_rate`.
     ///
@@ -147,22 +157,18 @@ impl<'a> Output<'a> {
                 "hourglass_ratio": outcome.hourglass_ratio,
             }),
         );
-        self.attribute("warnings", json!(self.warnings));
-        self.attribute("plots", json!(self.plots));
-        self.host
-            .write_attributes(&Value::Object(self.attributes))?;
+        let host = self.host;
+        self.attributes_only()?;
         let added: f64 = specimen.model.sheets.iter().map(|s| s.added_mass).sum();
-        self.host
-            .result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
-        self.host.result("drift_ratio", h.peak_drift_ratio, "1")?;
-        self.host
-            .result("hourglass_ratio", outcome.hourglass_ratio, "1")?;
-        self.host.result("elements", elements as f64, "1")?;
-        self.host.result("cycles", outcome.cycles as f64, "1")?;
-        self.host.result("time_step", outcome.smallest_step, "s")?;
-        self.host.result("added_mass", added, "kg")?;
+        host.result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
+        host.result("drift_ratio", h.peak_drift_ratio, "1")?;
+        host.result("hourglass_ratio", outcome.hourglass_ratio, "1")?;
+        host.result("elements", elements as f64, "1")?;
+        host.result("cycles", outcome.cycles as f64, "1")?;
+        host.result("time_step", outcome.smallest_step, "s")?;
+        host.result("added_mass", added, "kg")?;
         let rate = element_cycles / outcome.seconds.max(1e-9);
-        self.host.measured("element_cycle_rate", rate, "1/s")
+        host.measured("element_cycle_rate", rate, "1/s")
     }
 }
 

@@ -8,6 +8,7 @@
 //! - [`contact`]: node-to-surface contact between neighbouring sheets of the stack, and of sheet nodes
 //!   with rigid surfaces;
 //! - [`model`]: nodes, sheets, contacts and loads; one central-difference step;
+//! - [`relax`]: static equilibrium by explicit steps with kinetic damping;
 //! - [`energy`]: the ledger that says where the work went;
 //! - [`history`]: smooth ramps and cubic interpolation in time.
 //!
@@ -20,6 +21,7 @@ pub mod energy;
 pub mod history;
 pub mod mesh;
 pub mod model;
+pub mod relax;
 pub mod sheet;
 
 /// Elements per batch.

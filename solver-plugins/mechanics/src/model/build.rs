@@ -47,6 +47,7 @@ impl Model {
             load_factor: 1.0,
             loads: Vec::new(),
             last_dt: 0.0,
+            kick: 1.0,
             held: vec![Held::Free; n],
             driven: Vec::new(),
             drive: None,

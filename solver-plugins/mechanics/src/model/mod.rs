@@ -116,6 +116,8 @@ pub struct Model {
     pub load_factor: f64,
     loads: Vec<NodalLoad>,
     last_dt: f64,
+    /// 1, or 1/2 in the first step from rest: velocities live at half steps.
+    kick: f64,
     held: Vec<Held>,
     driven: Vec<u32>,
     drive: Option<Box<dyn Drive>>,
@@ -351,7 +353,7 @@ impl Model {
 
     /// Velocities and positions of the next step; works of the step.
     fn integrate(&mut self) {
-        let (dt, alpha, time) = (self.dt, self.settings.damping, self.time);
+        let (dt, alpha, time, kick) = (self.dt, self.settings.damping, self.time, self.kick);
         let targets: Vec<V> = match &self.drive {
             Some(drive) => (0..self.driven.len())
                 .map(|k| drive.position(k, time + dt))
@@ -387,7 +389,7 @@ impl Model {
                         let old = vs[i];
                         let mut v = [0.0; 3];
                         for c in 0..3 {
-                            v[c] = (lo * old[c] + force[n][c] / mass[n]) * hi;
+                            v[c] = (lo * old[c] + kick * force[n][c] / mass[n]) * hi;
                         }
                         if let Some(f) = fixed.get(n) {
                             v = f.translation(v);
@@ -415,6 +417,7 @@ impl Model {
         self.ledger.damping += self.work.damping;
         self.time += dt;
         self.last_dt = dt;
+        self.kick = 1.0;
         self.cycle += 1;
     }
 

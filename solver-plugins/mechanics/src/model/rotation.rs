@@ -77,7 +77,7 @@ impl Model {
         let Some(r) = self.rotations.as_deref_mut() else {
             return;
         };
-        let (dt, alpha) = (self.dt, self.settings.damping);
+        let (dt, alpha, kick) = (self.dt, self.settings.damping, self.kick);
         let middle = self.time + 0.5 * dt;
         let mut prescribed: Vec<Option<(u32, V)>> = Vec::new();
         if let Some(drive) = &self.drive {
@@ -126,7 +126,7 @@ impl Model {
                     if !held.get(n).is_some_and(|h| *h) {
                         let old = *spin;
                         let mut w: V =
-                            std::array::from_fn(|c| (lo * old[c] + moment[n][c] / inertia[n]) * hi);
+                            std::array::from_fn(|c| (lo * old[c] + kick * moment[n][c] / inertia[n]) * hi);
                         if let Some(f) = fixed.get(n) {
                             w = f.rotation(w);
                         }

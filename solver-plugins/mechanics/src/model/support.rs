@@ -87,6 +87,37 @@ impl Model {
         &self.own_mass
     }
 
+    /// Stops all nodes, also their rotations (kinetic damping). What they moved with counts as lost to
+    /// damping in the ledger. The next step is half a step of velocity, as from rest: a whole one would
+    /// feed the highest frequencies.
+    pub fn halt(&mut self) {
+        self.kick = 0.5;
+        self.ledger.damping += self.work.kinetic;
+        self.work.kinetic = 0.0;
+        self.v.fill([0.0; 3]);
+        if let Some(r) = self.rotations.as_deref_mut() {
+            r.spin.fill([0.0; 3]);
+        }
+    }
+
+    /// Kinetic energy (J) after the last step.
+    pub fn kinetic(&self) -> f64 {
+        self.work.kinetic
+    }
+
+    /// Forces out of balance on what is free to move, and the loads that act there (pressure, weight,
+    /// nodal loads): root sums of squares over the nodes (N), of the last step.
+    pub fn out_of_balance(&self) -> (f64, f64) {
+        let (mut rest, mut load) = (0.0, 0.0);
+        for n in (0..self.x.len()).filter(|n| self.held[*n] == Held::Free) {
+            let free = |f: V| self.supports.fixed.get(n).map_or(f, |s| s.translation(f));
+            let (f, e) = (free(self.force[n]), free(self.external_force[n]));
+            rest += dot(f, f);
+            load += dot(e, e);
+        }
+        (rest.sqrt(), load.sqrt())
+    }
+
     pub(super) fn apply_loads(&mut self) {
         for load in &self.loads {
             let (n, f) = (load.node as usize, scale(load.force, self.load_factor));

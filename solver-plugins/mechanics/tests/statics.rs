@@ -1,0 +1,165 @@
+//! Supports, loads and static equilibrium of a model, against closed forms.
+
+use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
+use plyflow_kernels::{fabric::Fabric, m4::M4};
+use plyflow_mechanics::MechanicsError;
+use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, StepSettings};
+use plyflow_mechanics::relax::{Tolerance, relax};
+use plyflow_mechanics::sheet::{Pressed, SheetSpec};
+use plyflow_mechanics::vec3::V;
+use plyflow_sdk::{element_table, material_table};
+
+/// 1e5 N/m along the fibres, 1 kg/m2.
+const FABRIC: &str =
+    r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0}"#;
+
+fn component<T>(kind: u32, table: T) -> pf_component {
+    pf_component {
+        kind,
+        reserved: 0,
+        // Lives as long as the process: a test.
+        functions: (&raw const *Box::leak(Box::new(table))).cast(),
+        manifest: pf_str::new("{}"),
+    }
+}
+
+struct Clamp(Vec<V>);
+
+impl Drive for Clamp {
+    fn position(&self, k: usize, _t: f64) -> V {
+        self.0[k]
+    }
+}
+
+/// A strip of 0.4 x 0.1 m, 8 x 2 elements, fibres along x and y, held at x = 0; its nodes at the other end.
+fn strip() -> (Model, Vec<u32>) {
+    let mesh = QuadMesh::grid(&even_axis(0.0, 0.4, 0.05), &even_axis(0.0, 0.1, 0.05));
+    let element = unsafe {
+        let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
+        let material = MaterialInstance::create(&material, FABRIC, "material").unwrap();
+        let element = component(PF_KIND_ELEMENT, element_table::<M4>());
+        ElementInstance::create(&element, "{}", material, "element").unwrap()
+    };
+    let m = mesh.cells.len();
+    let spec = SheetSpec {
+        name: "strip".into(),
+        nodes: (0..mesh.points.len() as u32).collect(),
+        cells: mesh.cells.clone(),
+        patches: Vec::new(),
+        axis: [1.0, 0.0, 0.0],
+        layers: vec![1.0; m],
+        pressed: vec![Pressed::No; m],
+        least_areal_mass: vec![0.0; m],
+        element,
+    };
+    let settings = StepSettings {
+        target_step: 0.0,
+        safety: 0.8,
+        damping: 0.0,
+    };
+    let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
+    let at = |x: f64| -> Vec<u32> {
+        (0..mesh.points.len())
+            .filter(|n| (mesh.points[*n][0] - x).abs() < 1e-9)
+            .map(|n| n as u32)
+            .collect()
+    };
+    let held = at(0.0);
+    let points = held.iter().map(|n| mesh.points[*n as usize]).collect();
+    model.set_driven(held, Box::new(Clamp(points)));
+    (model, at(0.4))
+}
+
+const STATIC: Tolerance = Tolerance {
+    balance: 1e-7,
+    safety: 0.8,
+    cycles: 200_000,
+};
+
+fn rest(model: &mut Model) {
+    let r = relax::<MechanicsError>(model, STATIC, |_| Ok(())).unwrap();
+    assert!(r.balanced, "{r:?}");
+}
+
+#[test]
+fn nodal_loads_stretch_a_strip_by_hookes_law_and_the_support_carries_them() {
+    let (mut model, end) = strip();
+    let total = 20.0;
+    let loads = end.iter().enumerate().map(|(j, n)| NodalLoad {
+        node: *n,
+        force: [if j == 1 { 0.5 } else { 0.25 }, 0.0, 0.0],
+        moment: [0.0; 3],
+    });
+    model.set_loads(loads.collect());
+    model.load_factor = total;
+    rest(&mut model);
+    // F = k w (l - 1) with k = 1e5 N/m over the width of 0.1 m.
+    let expected = 0.4 * total / (1e5 * 0.1);
+    for n in end {
+        let u = model.x[n as usize][0] - 0.4;
+        assert!(
+            (u / expected - 1.0).abs() < 1e-5,
+            "{u} instead of {expected}"
+        );
+    }
+    let support: f64 = model.reactions().iter().map(|r| r[0]).sum();
+    assert!((support + total).abs() < 1e-4 * total, "{support} N");
+}
+
+#[test]
+fn weight_of_a_hanging_strip_is_carried_by_its_support() {
+    let (mut model, end) = strip();
+    model.body_acceleration = [9.81, 0.0, 0.0];
+    rest(&mut model);
+    let weight = 0.4 * 0.1 * 9.81;
+    let support: f64 = model.reactions().iter().map(|r| r[0]).sum();
+    assert!((support + weight).abs() < 1e-4 * weight, "{support} N");
+    // u(L) = w L^2 / (2 k), and one-point elements with lumped masses give it exactly at the nodes.
+    let expected = 9.81 * 0.4 * 0.4 / (2.0 * 1e5);
+    let u = model.x[end[1] as usize][0] - 0.4;
+    assert!(
+        (u / expected - 1.0).abs() < 1e-3,
+        "{u} instead of {expected}"
+    );
+}
+
+#[test]
+fn fixed_components_stay_where_they_are() {
+    let (mut model, end) = strip();
+    let fixed = Fixed {
+        translations: [true, false, false],
+        rotations: [false; 3],
+    };
+    for n in &end {
+        model.fix(*n, fixed);
+    }
+    model.body_acceleration = [3.0, 5.0, 0.0];
+    rest(&mut model);
+    for n in &end {
+        let x = model.x[*n as usize];
+        assert_eq!(x[0], 0.4);
+        assert!(x[1] - 0.05 > -0.05, "moves along y: {x:?}");
+    }
+    assert!(end.iter().any(|n| model.x[*n as usize][2] == 0.0));
+}
+
+#[test]
+fn work_of_weight_and_loads_balances_the_energies() {
+    let (mut model, end) = strip();
+    model.body_acceleration = [9.81, 2.0, 0.0];
+    model.set_loads(vec![NodalLoad {
+        node: end[1],
+        force: [1.0, 0.5, 0.0],
+        moment: [0.0; 3],
+    }]);
+    model.dt = 0.5 * model.critical_step().unwrap();
+    let mut largest = 0.0f64;
+    for _ in 0..4000 {
+        model.step(false).unwrap();
+        let l = model.energies();
+        largest = largest.max(l.drift().abs() / l.external.abs().max(1e-3));
+    }
+    assert!(largest < 2e-2, "{largest}");
+}
