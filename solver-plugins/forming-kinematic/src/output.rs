@@ -1,0 +1,318 @@
+//! The step behind the host: scene, nets, artifact.
+
+use crate::net::{Fabric, Generators, Net, Stop};
+use crate::ply::{Draped, Ply, Stops, lay, plies, stops};
+use crate::root::drop_on;
+use crate::surface::SmoothSurface;
+use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_model::scene::{Process, Scene};
+use plyflow_sdk::{Host, Log, On, Progress, StepError};
+use plyflow_surface::vector::distance;
+use plyflow_tooling::ToolMesh;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::time::Instant;
+
+/// Parameters of the step, SI.
+#[derive(Debug, Clone, Deserialize)]
+struct Parameters {
+    scene: Scene,
+    element_size: f64,
+    net_spacing: Option<f64>,
+    start: Option<Vec<f64>>,
+    generators: Generators,
+    locking_angle: f64,
+    crease_angle: f64,
+}
+
+/// A ply with its net.
+struct Done {
+    ply: Ply,
+    mesh: QuadMesh,
+    draped: Draped,
+    start: [f64; 2],
+    net_nodes: usize,
+    fibre_strain: f64,
+    stops: Stops,
+}
+
+/// Runs the step.
+///
+/// # Errors
+/// Whatever stops it, as a text for the user.
+pub(crate) fn run(host: &Host) -> Result<(), StepError> {
+    let p: Parameters = host.parameters()?;
+    report(host, 0.0, "reading the tool");
+    let plies = plies(&p.scene)?;
+    let tool = plyflow_tooling::build(&p.scene.tool)?;
+    let surface = SmoothSurface::new(&tool, p.crease_angle)
+        .ok_or("the tool has no facet with an area: give another one")?;
+    let started = Instant::now();
+    let mut done = Vec::new();
+    for (k, ply) in plies.iter().enumerate() {
+        let part = |f: f64| 0.95 * (k as f64 + f) / plies.len() as f64;
+        done.push(drape(host, &p, &surface, &tool, ply, part)?);
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    report(host, 0.95, "writing");
+    write_bodies(host, &p.scene, &tool, &done)?;
+    write_summary(host, &p, &done, seconds)
+}
+
+fn report(host: &Host, fraction: f64, phase: &str) {
+    host.progress(&Progress {
+        fraction,
+        phase,
+        ..Progress::default()
+    });
+}
+
+fn millimetres([x, y]: [f64; 2]) -> String {
+    format!("({:.1}, {:.1}) mm", 1e3 * x, 1e3 * y)
+}
+
+/// The point of the flat ply that touches the tool first.
+fn start_of(p: &Parameters, ply: &Ply) -> Result<[f64; 2], String> {
+    let [x0, y0, x1, y1] = ply.blank;
+    let start = match p.start.as_deref() {
+        None => [0.5 * (x0 + x1), 0.5 * (y0 + y1)],
+        Some(&[x, y]) => [x, y],
+        Some(other) => {
+            return Err(format!(
+                "`start` has {} values; expected two lengths, [x, y]",
+                other.len()
+            ));
+        }
+    };
+    if !(x0..=x1).contains(&start[0]) || !(y0..=y1).contains(&start[1]) {
+        return Err(format!(
+            "the start at {} lies off ply '{}', which reaches from {} to {}; move `start` onto it",
+            millimetres(start),
+            ply.scene.name,
+            millimetres([x0, y0]),
+            millimetres([x1, y1])
+        ));
+    }
+    Ok(start)
+}
+
+fn drape(
+    host: &Host,
+    p: &Parameters,
+    surface: &SmoothSurface,
+    tool: &ToolMesh,
+    ply: &Ply,
+    part: impl Fn(f64) -> f64,
+) -> Result<Done, StepError> {
+    let name = &ply.scene.name;
+    let [x, y] = start_of(p, ply)?;
+    let [low, high] = tool.bounds();
+    let reach = 0.5 * (high[2] - low[2]).max(ply.offset) + 2.0 * ply.offset;
+    let (place, normal) = surface
+        .top(x, y)
+        .and_then(|(z, face)| drop_on(surface, [x, y, z], face, ply.offset, reach))
+        .ok_or_else(|| {
+            format!(
+                "ply '{name}' cannot start at {}: the tool, which reaches from {} to {}, is not below it; give \
+                 another `start`",
+                millimetres([x, y]),
+                millimetres([low[0], low[1]]),
+                millimetres([high[0], high[1]])
+            )
+        })?;
+    let spacing = p.net_spacing.unwrap_or(0.25 * p.element_size);
+    let fabric = Fabric {
+        directions: ply.directions(),
+        blank: ply.blank,
+        start: [x, y],
+        spacing,
+        locking: p.locking_angle,
+        generators: p.generators,
+        offset: ply.offset,
+    };
+    let mut net = Net::new(fabric).ok_or_else(|| {
+        format!(
+            "the net of ply '{name}' at a spacing of {spacing} m has too many nodes; enlarge `net_spacing`"
+        )
+    })?;
+    net.drape(surface, place, normal, |f| {
+        report(host, part(f), name);
+        host.check_cancelled()
+    })?;
+    let mesh = ply.mesh(p.element_size);
+    let draped = lay(&net, &mesh, surface, ply.offset).ok_or_else(|| {
+        format!(
+            "the net of ply '{name}' closes no cell at its start {}: take a smaller `net_spacing` or another \
+             `start`",
+            millimetres([x, y])
+        )
+    })?;
+    Ok(Done {
+        mesh,
+        draped,
+        start: [x, y],
+        net_nodes: net.nodes().filter(|n| net.position(n.0).is_some()).count(),
+        fibre_strain: fibre_strain(&net),
+        stops: stops(&net),
+        ply: ply.clone(),
+    })
+}
+
+/// Largest strain of a side of a whole cell, by size.
+fn fibre_strain(net: &Net) -> f64 {
+    let mut most = 0.0f64;
+    for (at, _) in net.nodes() {
+        if net.shear(at).is_some() {
+            let x = crate::net::corners(at).map(|c| net.position(c).unwrap_or_default());
+            for k in 0..4 {
+                most = most.max((distance(x[k], x[(k + 1) % 4]) / net.fabric.spacing - 1.0).abs());
+            }
+        }
+    }
+    most
+}
+
+fn write_bodies(
+    host: &Host,
+    scene: &Scene,
+    tool: &ToolMesh,
+    done: &[Done],
+) -> Result<(), StepError> {
+    let Process::DoubleDiaphragm(process) = &scene.process;
+    let above = tool.bounds()[1][2] + process.clearance.si();
+    for d in done {
+        let z = above + d.ply.offset;
+        let flat: Vec<[f64; 3]> = d.mesh.points.iter().map(|q| [q[0], q[1], z]).collect();
+        let cells = d.mesh.cells.as_flattened();
+        let about = json!({
+            "kind": d.ply.scene.kind, "thickness": d.ply.material.thickness.si(), "offset": d.ply.offset,
+        });
+        host.define_mesh(&d.ply.scene.name, &flat, 4, cells, &about)?;
+    }
+    let facets = tool.triangles.as_flattened();
+    host.define_mesh("tool", &tool.points, 3, facets, &json!({"rigid": true}))?;
+    host.begin_frame(0.0)?;
+    for d in done {
+        let name = &d.ply.scene.name;
+        host.write_points(name, &d.draped.points)?;
+        let none = vec![0.0; d.mesh.cells.len()];
+        let reached = d.draped.reached.iter().map(|r| f64::from(u8::from(*r)));
+        let reached: Vec<f64> = reached.collect();
+        let on = On::Cells;
+        host.write_field(name, on, "shear_angle", 1, "rad", &d.draped.shear)?;
+        host.write_field(name, on, "fibre_strain_1", 1, "1", &none)?;
+        host.write_field(name, on, "fibre_strain_2", 1, "1", &none)?;
+        host.write_field(name, on, "draped", 1, "1", &reached)?;
+    }
+    host.end_frame()
+}
+
+fn sheet(d: &Done) -> Value {
+    let s = &d.ply.scene;
+    let [x0, y0, x1, y1] = d.ply.blank;
+    let [first, second] = d.ply.stated();
+    json!({
+        "name": s.name,
+        "kind": s.kind,
+        "material": d.ply.material.name,
+        "thickness": d.ply.material.thickness.si(),
+        "offset": d.ply.offset,
+        "areal_mass": d.ply.material.areal_mass.si(),
+        "added_mass": 0.0,
+        "element": null,
+        "fibre_1": first,
+        "fibre_2": second,
+        "outline": [[x0, y0], [x1, y0], [x1, y1], [x0, y1]],
+        "start": d.start,
+        "net_nodes": d.net_nodes,
+    })
+}
+
+/// One text per ply and reason.
+fn warnings(p: &Parameters, d: &Done, unreached: usize) -> Vec<String> {
+    if unreached == 0 {
+        return Vec::new();
+    }
+    let all = d.mesh.cells.len();
+    d.stops
+        .iter()
+        .map(|(why, count, first)| {
+            let why = match why {
+                Stop::Locked => format!(
+                    "a cell could not be closed within the locking angle of {:.1} deg",
+                    p.locking_angle.to_degrees()
+                ),
+                Stop::Edge => "the tool's surface ends".into(),
+                Stop::Bed => "the ply reaches the machine bed".into(),
+            };
+            format!(
+                "ply '{}': {why} at {count} nodes of the net, first at {} of the flat ply; the net does not reach \
+                 {unreached} of {all} cells (field `draped`), which hang on as a plane",
+                d.ply.scene.name,
+                millimetres(*first)
+            )
+        })
+        .collect()
+}
+
+fn write_summary(
+    host: &Host,
+    p: &Parameters,
+    done: &[Done],
+    seconds: f64,
+) -> Result<(), StepError> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let (mut area, mut covered, mut unreachable, mut elements) = (0.0, 0.0, 0, 0);
+    let mut texts = Vec::new();
+    for d in done {
+        let areas = d.mesh.areas();
+        let mut missed = 0;
+        for (c, reached) in d.draped.reached.iter().enumerate() {
+            area += areas[c];
+            if *reached {
+                covered += areas[c];
+                low = low.min(d.draped.shear[c]);
+                high = high.max(d.draped.shear[c]);
+            } else {
+                missed += 1;
+            }
+        }
+        unreachable += missed;
+        elements += d.mesh.cells.len();
+        texts.extend(warnings(p, d, missed));
+    }
+    if low > high {
+        return Err(
+            "the net reaches no whole cell of any ply; take a smaller `element_size` or another `start`"
+                .into(),
+        );
+    }
+    for w in &texts {
+        host.log(Log::Warn, w);
+    }
+    host.write_attributes(&json!({
+        "scene": p.scene.name,
+        "sheets": done.iter().map(sheet).collect::<Vec<_>>(),
+        "element_size": p.element_size,
+        "net_spacing": p.net_spacing.unwrap_or(0.25 * p.element_size),
+        "zone": null,
+        "elements": elements,
+        "warnings": texts,
+    }))?;
+    let strain = done.iter().map(|d| d.fibre_strain).fold(0.0, f64::max);
+    let nodes = done.iter().map(|d| d.net_nodes).sum::<usize>() as f64;
+    host.result("shear_max", high, "rad")?;
+    host.result("shear_min", low, "rad")?;
+    host.result("fibre_strain_max", strain, "1")?;
+    // A whole drape covers exactly all, however its areas were added.
+    let coverage = if unreachable == 0 {
+        1.0
+    } else {
+        covered / area
+    };
+    host.result("coverage", coverage, "1")?;
+    host.result("unreachable_cells", unreachable as f64, "1")?;
+    host.result("elements", elements as f64, "1")?;
+    host.result("net_nodes", nodes, "1")?;
+    host.measured("node_rate", nodes / seconds.max(1e-9), "1/s")
+}

@@ -1,0 +1,269 @@
+//! The step behind a host in memory.
+
+use plyflow_forming_kinematic::FormingKinematic;
+use plyflow_surface::memory_host::{MemoryArtifact, run};
+use plyflow_surface::vector::{distance, norm};
+use plyflow_tooling::CHORD_TOLERANCE;
+use serde_json::{Value, json};
+
+const FILM: f64 = 8e-5;
+const PLY: f64 = 3e-4;
+
+fn material(name: &str, thickness: f64) -> Value {
+    json!({
+        "plyflow_material": 1, "name": name, "plugin": "none", "thickness": format!("{thickness} m"),
+        "areal_mass": "0.4 kg/m2", "with": {},
+    })
+}
+
+/// A scene as the host hands it over: quantities in SI with their unit, materials read in.
+fn scene(tool: Value, size: [f64; 2], fibres: [f64; 2]) -> Value {
+    let film =
+        |name: &str| json!({"name": name, "kind": "diaphragm", "material": material("film", FILM)});
+    let ply = |name: &str| {
+        json!({
+            "name": name, "kind": "ply", "material": material("woven", PLY),
+            "length": format!("{} m", size[0]), "width": format!("{} m", size[1]), "centre": ["0 m", "0 m"],
+            "fibre_1": format!("{} deg", fibres[0]), "fibre_2": format!("{} deg", fibres[1]),
+        })
+    };
+    json!({
+        "plyflow_scene": 1, "name": "test", "tool": tool,
+        "sheets": [film("lower"), ply("ply_1"), ply("ply_2"), film("upper")],
+        "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "fabric_fabric": 0.3, "diaphragm_diaphragm": 0.3},
+        "process": {"double_diaphragm": {
+            "frame_length": "1 m", "frame_width": "1 m", "clearance": "0.005 m", "bag_pressure": "1e5 Pa",
+            "forming_pressure": "1e5 Pa", "bagging_time": "0.1 s", "lowering_time": "0.1 s",
+            "drawing_time": "0.1 s", "settling_time": "0.1 s", "film_joint_margin": "0.03 m",
+        }},
+    })
+}
+
+fn hemisphere() -> Value {
+    json!({"hemisphere": {"radius": "0.05 m", "facet_size": "0.004 m"}})
+}
+
+fn drape(parameters: Value) -> Result<MemoryArtifact, String> {
+    run::<FormingKinematic>(parameters, &[], &[])
+}
+
+fn on_hemisphere(side: f64, more: Value) -> Result<MemoryArtifact, String> {
+    let mut with =
+        json!({"scene": scene(hemisphere(), [side, side], [0.0, 90.0]), "element_size": 0.004});
+    for (k, v) in more.as_object().into_iter().flatten() {
+        with[k] = v.clone();
+    }
+    drape(with)
+}
+
+fn last(artifact: &MemoryArtifact, ply: &str) -> Vec<[f64; 3]> {
+    artifact.body(ply).frames.last().expect("a frame").clone()
+}
+
+#[test]
+fn plies_lie_at_their_place_in_the_stack() {
+    let formed = on_hemisphere(0.08, json!({})).unwrap();
+    assert_eq!(formed.result("coverage"), 1.0);
+    assert_eq!(formed.result("unreachable_cells"), 0.0);
+    assert_eq!(formed.result("elements"), 800.0);
+    assert!(formed.result("fibre_strain_max") < 1e-12);
+    for (name, offset) in [("ply_1", FILM + 0.5 * PLY), ("ply_2", FILM + 1.5 * PLY)] {
+        for x in last(&formed, name) {
+            assert!(
+                (norm(x) - 0.05 - offset).abs() < 2e-8,
+                "{name}: {}",
+                norm(x) - 0.05
+            );
+        }
+        let cells = formed.body(name).cells.chunks_exact(4);
+        let points = last(&formed, name);
+        for c in cells {
+            // Counter-clockwise from outside.
+            let p = [0, 1, 3].map(|k| points[c[k] as usize]);
+            let [u, v] = [1, 2].map(|k| [0, 1, 2].map(|d| p[k][d] - p[0][d]));
+            let n = [
+                u[1] * v[2] - u[2] * v[1],
+                u[2] * v[0] - u[0] * v[2],
+                u[0] * v[1] - u[1] * v[0],
+            ];
+            assert!((0..3).map(|d| n[d] * p[0][d]).sum::<f64>() > 0.0);
+        }
+    }
+    assert!(formed.attributes["warnings"].as_array().unwrap().is_empty());
+    assert_eq!(formed.attributes["sheets"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn mesh_across_the_fibres_carries_the_shear_of_the_mesh_along_them() {
+    // The same net, meshed along its fibres and at 45 degrees to them.
+    let shear = |fibres: [f64; 2]| {
+        let with =
+            json!({"scene": scene(hemisphere(), [0.08, 0.08], fibres), "element_size": 0.002});
+        let formed = drape(with).unwrap();
+        let body = formed.body("ply_1");
+        let centre = |c: &[u32]| {
+            [0, 1].map(|d| c.iter().map(|n| body.points[*n as usize][d]).sum::<f64>() / 4.0)
+        };
+        body.cells
+            .chunks_exact(4)
+            .map(centre)
+            .zip(body.last("shear_angle").to_vec())
+            .collect::<Vec<_>>()
+    };
+    let along = shear([0.0, 90.0]);
+    let across = shear([-45.0, 45.0]);
+    let mut compared = 0;
+    for (at, g) in &across {
+        // In the axes of the fibres.
+        let k = 0.5f64.sqrt();
+        let (u, v) = (k * (at[0] - at[1]), k * (at[0] + at[1]));
+        let four: Vec<_> = along
+            .iter()
+            .filter(|(p, _)| (p[0] - u).abs() < 0.002 && (p[1] - v).abs() < 0.002)
+            .collect();
+        if four.len() != 4 {
+            continue;
+        }
+        let weight =
+            |p: &[f64; 2]| (1.0 - (p[0] - u).abs() / 0.002) * (1.0 - (p[1] - v).abs() / 0.002);
+        let expected: f64 = four.iter().map(|(p, g)| weight(p) * g).sum();
+        assert!((g - expected).abs() < 2e-3, "{at:?}: {g} {expected}");
+        compared += 1;
+    }
+    assert!(compared > 500, "{compared}");
+}
+
+#[test]
+fn families_named_the_other_way_round_shear_the_same() {
+    let shear = |fibres| {
+        let formed = drape(json!({"scene": scene(hemisphere(), [0.08, 0.06], fibres)})).unwrap();
+        formed.body("ply_1").last("shear_angle").to_vec()
+    };
+    let given = shear([-45.0, 45.0]);
+    for other in [[45.0, -45.0], [135.0, 225.0], [-225.0, -135.0]] {
+        for (a, b) in shear(other).iter().zip(&given) {
+            assert!((a - b).abs() < 1e-9, "{other:?}: {a} {b}");
+        }
+    }
+    assert!(given.iter().any(|g| g.abs() > 0.05));
+}
+
+#[test]
+fn bytes_are_the_same_twice() {
+    let twice = [0, 1].map(|_| on_hemisphere(0.11, json!({})).unwrap());
+    let bits = |a: &MemoryArtifact| -> Vec<u64> {
+        let points = a.bodies.iter().flat_map(|b| {
+            b.frames
+                .iter()
+                .flatten()
+                .flatten()
+                .copied()
+                .collect::<Vec<_>>()
+        });
+        points.map(f64::to_bits).collect()
+    };
+    assert_eq!(bits(&twice[0]), bits(&twice[1]));
+    assert_eq!(twice[0].attributes, twice[1].attributes);
+}
+
+#[test]
+fn ply_that_reaches_the_bed_is_marked_there_and_draped_elsewhere() {
+    let formed = on_hemisphere(0.18, json!({"locking_angle": 1.5})).unwrap();
+    let coverage = formed.result("coverage");
+    assert!(coverage > 0.3 && coverage < 0.9, "{coverage}");
+    let body = formed.body("ply_1");
+    let draped = body.last("draped");
+    let missed = |name: &str| {
+        let draped = formed.body(name).last("draped");
+        draped.iter().filter(|d| **d < 0.5).count()
+    };
+    let all = missed("ply_1") + missed("ply_2");
+    assert_eq!(formed.result("unreachable_cells"), all as f64);
+    let points = last(&formed, "ply_1");
+    for (cell, on) in body.cells.chunks_exact(4).zip(draped) {
+        for n in cell {
+            let x = points[*n as usize];
+            assert!(x[2] >= FILM + 0.5 * PLY - 1e-9, "{x:?} lies in the bed");
+            // The foot is a sharp edge of the tool, straight between its points: there the chord counts.
+            let bound = if x[2] > 0.008 { 1e-7 } else { CHORD_TOLERANCE };
+            let miss = (norm(x) - 0.05 - FILM - 0.5 * PLY).abs();
+            assert!(*on < 0.5 || miss < bound, "{x:?} misses by {miss}");
+        }
+    }
+    let text = formed.attributes["warnings"][0].as_str().unwrap();
+    assert!(
+        text.contains("ply 'ply_1'")
+            && text.contains("machine bed")
+            && text.contains("mm of the flat ply"),
+        "{text}"
+    );
+    assert!(
+        formed.log.iter().any(|l| l.contains("machine bed")),
+        "{:?}",
+        formed.log
+    );
+}
+
+#[test]
+fn cells_beyond_the_locking_angle_are_left_open_and_the_rest_is_draped() {
+    let locking = 25f64.to_radians();
+    let formed = on_hemisphere(0.096, json!({"locking_angle": locking})).unwrap();
+    let free = on_hemisphere(0.096, json!({})).unwrap();
+    assert_eq!(free.result("coverage"), 1.0);
+    let coverage = formed.result("coverage");
+    assert!(coverage > 0.5 && coverage < 0.95, "{coverage}");
+    assert!(formed.result("shear_max") <= locking && formed.result("shear_max") > 0.9 * locking);
+    let text = formed.attributes["warnings"][0].as_str().unwrap();
+    assert!(text.contains("locking angle of 25.0 deg"), "{text}");
+    // What is draped is draped as without the bound.
+    let (a, b) = (formed.body("ply_1"), free.body("ply_1"));
+    let (p, q) = (last(&formed, "ply_1"), last(&free, "ply_1"));
+    for (cell, on) in a.cells.chunks_exact(4).zip(a.last("draped")) {
+        for n in cell.iter().filter(|_| *on > 0.5) {
+            assert!(distance(p[*n as usize], q[*n as usize]) < 1e-12);
+        }
+    }
+    assert_eq!(a.cells, b.cells);
+}
+
+#[test]
+fn wrong_input_is_refused_with_what_to_do() {
+    let text = |more: Value| on_hemisphere(0.09, more).unwrap_err();
+    let off = text(json!({"start": [0.2, 0.0]}));
+    assert!(
+        off.contains("lies off ply 'ply_1'") && off.contains("(200.0, 0.0) mm"),
+        "{off}"
+    );
+    let odd = text(json!({"start": [0.0]}));
+    assert!(odd.contains("two lengths"), "{odd}");
+    let fine = text(json!({"net_spacing": 1e-6}));
+    assert!(fine.contains("enlarge `net_spacing`"), "{fine}");
+    let away =
+        drape(json!({"scene": scene(hemisphere(), [0.4, 0.1], [0.0, 90.0]), "start": [0.15, 0.0]}))
+            .unwrap_err();
+    assert!(away.contains("is not below it"), "{away}");
+    let along = drape(json!({"scene": scene(hemisphere(), [0.1, 0.1], [0.0, 3.0])})).unwrap_err();
+    assert!(
+        along.contains("fibre_1") && along.contains("3.0 deg"),
+        "{along}"
+    );
+    let mut bare = scene(hemisphere(), [0.1, 0.1], [0.0, 90.0]);
+    bare["sheets"] = json!([bare["sheets"][0]]);
+    let none = drape(json!({"scene": bare})).unwrap_err();
+    assert!(none.contains("nothing to drape"), "{none}");
+    let huge = on_hemisphere(0.09, json!({"net_spacing": 0.5})).unwrap_err();
+    assert!(huge.contains("net_spacing"), "{huge}");
+}
+
+#[test]
+fn drape_has_one_frame_so_that_no_step_takes_it_for_a_motion() {
+    let formed = on_hemisphere(0.09, json!({})).unwrap();
+    assert_eq!(formed.times, [0.0]);
+    assert!(formed.arrays.is_empty());
+    let body = formed.body("ply_1");
+    // The reference is the flat ply over the tool, as forming-explicit places it.
+    let z = 0.05 + 0.005 + FILM + 0.5 * PLY;
+    assert!(body.points.iter().all(|p| (p[2] - z).abs() < 1e-12));
+    let zeros = |name: &str| body.last(name).iter().all(|v| *v == 0.0);
+    assert!(zeros("fibre_strain_1") && zeros("fibre_strain_2"));
+}
