@@ -14,6 +14,8 @@ pub const STEP_FAILED: u8 = 4;
 pub const EXPECTATION: u8 = 5;
 /// Another process runs this workflow.
 pub const LOCKED: u8 = 6;
+/// A plugin does not keep the contract (`check-plugin`).
+pub const NOT_CONFORMING: u8 = 7;
 /// Stopped by the user (Ctrl-C) or SIGTERM.
 pub const INTERRUPTED: u8 = 130;
 
@@ -27,4 +29,5 @@ Exit codes:
     4  a step failed
     5  an expectation was missed (with --check)
     6  another process is running this workflow
+    7  a plugin does not keep the contract (check-plugin)
   130  stopped by Ctrl-C; the same command resumes";

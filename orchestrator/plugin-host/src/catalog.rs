@@ -9,13 +9,18 @@ use plyflow_workflow::resolved::PluginId;
 use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::os::unix::fs::MetadataExt;
 use std::os::unix::process::ExitStatusExt;
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Duration;
 
 /// Ending of a library's file name.
 const SUFFIX: &str = ".so";
+
+/// How long a library may take to load and describe itself.
+const LOAD_LIMIT: Duration = Duration::from_secs(30);
 
 /// Version of the cache file.
 const CACHE_VERSION: u32 = 1;
@@ -216,21 +221,22 @@ impl PluginCatalog {
         let Describer::Child { program, arguments } = &self.describer else {
             return describe(path);
         };
-        let output = Command::new(program)
-            .args(arguments)
-            .arg(path)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .output();
-        let output = match output {
-            Ok(output) => output,
+        let mut command = Command::new(program);
+        command.args(arguments).arg(path);
+        let (said, status) = match answer(command) {
+            Ok((said, Some(status))) => (said, status),
+            Ok((_, None)) => {
+                return Description::Broken(format!(
+                    "loading it had not ended after {} s: its initialisers or `plyflow_plugin` hang",
+                    LOAD_LIMIT.as_secs()
+                ));
+            }
             Err(e) => return Description::Broken(format!("{program} cannot be started: {e}")),
         };
-        if let Ok(description) = serde_json::from_slice(&output.stdout) {
+        if let Ok(description) = serde_json::from_slice(&said) {
             return description;
         }
-        let end = match (output.status.signal(), output.status.code()) {
+        let end = match (status.signal(), status.code()) {
             (Some(signal), _) => format!("killed by signal {signal}"),
             (None, Some(code)) => format!("ended with code {code}"),
             (None, None) => "ended".to_owned(),
@@ -355,6 +361,32 @@ fn libraries(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
         .collect();
     paths.sort();
     paths
+}
+
+/// Runs a command to its end: its standard output and its status, or no status when it had to be killed after
+/// [`LOAD_LIMIT`].
+fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)> {
+    let mut child = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()?;
+    let mut pipe = child.stdout.take().expect("piped above");
+    let (send, receive) = std::sync::mpsc::channel();
+    // A reader of its own, because the pipe alone tells when the child has ended.
+    std::thread::spawn(move || {
+        let mut said = Vec::new();
+        let _ = pipe.read_to_end(&mut said);
+        let _ = send.send(said);
+    });
+    match receive.recv_timeout(LOAD_LIMIT) {
+        Ok(said) => Ok((said, Some(child.wait()?))),
+        Err(_) => {
+            child.kill()?;
+            child.wait()?;
+            Ok((Vec::new(), None))
+        }
+    }
 }
 
 fn stamp(path: &Utf8Path) -> std::io::Result<Stamp> {

@@ -49,6 +49,9 @@ pub enum Command {
         after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --plugins ./build ./build/libmine.so"
     )]
     Plugins(PluginsArgs),
+    /// Judge a plugin against the contract, in a process of its own
+    #[command(after_help = CHECK_PLUGIN_EXAMPLES)]
+    CheckPlugin(CheckPluginArgs),
     /// Show what an artifact holds
     #[command(
         after_help = "Examples:\n  plyflow inspect result.h5\n  plyflow inspect 'local[A]' --workflow workflow.yaml"
@@ -87,6 +90,15 @@ const PLAN_EXAMPLES: &str = "\
 Examples:
   plyflow plan workflow.yaml
   plyflow plan workflow.yaml --set coarse.element=m4 --format json";
+
+const CHECK_PLUGIN_EXAMPLES: &str = "\
+Examples:
+  plyflow check-plugin ./libmy_element.so               # with a fabric and a film
+  plyflow check-plugin ./libmy_element.so --with '{hourglass: 300 N/m}' --material fabric.yaml
+  plyflow check-plugin ./libmy_material.so --material my-sheet.yaml
+  plyflow check-plugin material-fabric --material my-fabric.yaml --format json
+
+A crash, an exit or a hang of the plugin is a finding as any other. Ends with code 7 when a check failed.";
 
 /// A workflow and where things are.
 #[derive(Debug, Args)]
@@ -276,6 +288,30 @@ pub struct PluginsArgs {
     #[command(flatten)]
     /// Where things are.
     pub places: Places,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `check-plugin`
+#[derive(Debug, Args)]
+pub struct CheckPluginArgs {
+    /// The plugin: path of a library, or name on the search path
+    #[arg(value_name = "LIBRARY")]
+    pub plugin: String,
+    /// A material file: what an element is judged with, or the sheet of the material plugin that is judged; may be
+    /// repeated [default for elements: a fabric with stitches and a film]
+    #[arg(long, value_name = "FILE")]
+    pub material: Vec<Utf8PathBuf>,
+    /// The plugin's parameters, as under `with:` in a workflow: YAML or JSON, or a file of it
+    #[arg(long, value_name = "PARAMETERS")]
+    pub with: Option<String>,
+    /// Look for plugins here first; may be repeated
+    #[arg(long, value_name = "DIR")]
+    pub plugins: Vec<Utf8PathBuf>,
+    /// Seconds after which a plugin counts as hanging
+    #[arg(long, value_name = "SECONDS", default_value = "120")]
+    pub time_limit: f64,
     /// Form
     #[arg(long, value_enum, default_value = "text")]
     pub format: TextOrJson,

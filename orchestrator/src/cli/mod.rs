@@ -1,6 +1,7 @@
 //! The command line: what can be asked, and what each command answers.
 
 mod args;
+mod check_plugin;
 mod clean;
 mod explain;
 mod inspect;
@@ -88,6 +89,7 @@ fn dispatch(command: Command) -> Done {
         Command::Results(a) => results::results(&a),
         Command::Report(a) => report::report(&a),
         Command::Plugins(a) => plugins::plugins(&a),
+        Command::CheckPlugin(a) => check_plugin::check_plugin(&a),
         Command::Inspect(a) => inspect::inspect(&a),
         Command::Schema(a) => plugins::schema(&a),
         Command::Clean(a) => clean::clean(&a),

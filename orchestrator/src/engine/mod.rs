@@ -2,8 +2,8 @@
 
 pub mod core;
 mod drive;
-mod executor;
-mod local;
+pub(crate) mod executor;
+pub(crate) mod local;
 
 pub use drive::{Failure, Observer, Options, Session, Summary, Update, input_keys};
 pub use executor::{Executor, Outcome, Report, Task};

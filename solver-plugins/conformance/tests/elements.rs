@@ -1,71 +1,51 @@
-//! The repository's own components keep the contract; a faulty element is found out.
+//! The repository's own elements keep the contract; a faulty element is found out by the check that is meant
+//! for its fault.
 
-use plyflow_conformance::{Finding, check_element, check_material};
+mod common;
+
+use common::{sound, with_fabric, with_film};
+use plyflow_conformance::failed;
 use plyflow_kernels::m4::M4;
-use plyflow_kernels::marlow::Marlow;
-use plyflow_sdk::abi::*;
-use plyflow_sdk::{
-    Element, ElementBatch, ElementSizes, MaterialRef, element_table, material_table,
-};
+use plyflow_kernels::rf4::Rf4;
+use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef};
 
-const FILM: &str = r#"{"uniaxial": {"amplitude": 5e6, "growth": 0.5, "decay": 5.0},
-                       "thickness": 8e-5, "areal_mass": 0.09}"#;
-
-fn with_film<E: Element>(parameters: &str) -> Vec<Finding> {
-    let (materials, elements) = (material_table::<Marlow>(), element_table::<E>());
-    let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
-    let code = unsafe { (materials.create)(pf_str::new(FILM), &raw mut instance, &raw mut error) };
-    assert_eq!(code, PF_OK, "{}", error.get());
-    let material = pf_material {
-        functions: &raw const materials,
-        instance,
-    };
-    let found = unsafe { check_element(&raw const elements, parameters, &material) };
-    unsafe { (materials.destroy)(instance) };
-    found
-}
-
-#[test]
-fn nothing_is_found_in_the_film_material() {
-    let table = material_table::<Marlow>();
-    assert_eq!(unsafe { check_material(&raw const table, FILM) }, []);
-}
+const MEMBRANE: [&str; 13] = [
+    "create",
+    "sizes",
+    "status",
+    "guard-zones",
+    "complete",
+    "finite",
+    "batch-independence",
+    "threads",
+    "mass",
+    "balance",
+    "frame-invariance",
+    "energy",
+    "critical-step",
+];
+const PATCH: [&str; 5] = [
+    "patch-complete",
+    "patch-batch-independence",
+    "patch-frame-invariance",
+    "patch-energy",
+    "patch-stiffness",
+];
 
 #[test]
-fn nothing_is_found_in_the_membrane_element() {
-    assert_eq!(with_film::<M4>("{}"), []);
-}
-
-/// M4 whose forces miss a part along x: no derivative of the energy, and not turning with the element.
-struct Biased(M4);
-
-impl Element for Biased {
-    const MANIFEST: &'static str = M4::MANIFEST;
-
-    fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
-        M4::create(parameters, material).map(Self)
-    }
-
-    fn sizes(&self) -> ElementSizes {
-        self.0.sizes()
-    }
-
-    fn initialise(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) {
-        self.0.initialise(batch, material);
-    }
-
-    fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
-        let code = self.0.forces(batch, material);
-        let lanes = batch.lanes;
-        batch.force[..lanes].iter_mut().for_each(|f| *f *= 0.99);
-        code
+fn nothing_is_found_in_the_membrane_element_with_film_and_with_fabric() {
+    sound(&with_film::<M4>("{}"), &MEMBRANE);
+    for form in ["fibre-energy", "hypoelastic"] {
+        let checks = with_fabric::<M4>("{}", form);
+        sound(&checks, &MEMBRANE);
+        sound(&checks, &["work"]);
     }
 }
 
 #[test]
-fn forces_that_are_no_derivative_are_found() {
-    let checks: Vec<&str> = with_film::<Biased>("{}").iter().map(|f| f.check).collect();
-    assert!(checks.contains(&"balance"), "{checks:?}");
-    assert!(checks.contains(&"frame-invariance"), "{checks:?}");
-    assert!(checks.contains(&"derivative"), "{checks:?}");
+fn nothing_is_found_in_the_rotation_free_shell_with_film_and_with_fabric() {
+    sound(&with_film::<Rf4>("{}"), &MEMBRANE);
+    let checks = with_fabric::<Rf4>("{}", "fibre-energy");
+    sound(&checks, &MEMBRANE);
+    sound(&checks, &PATCH);
 }

@@ -1,0 +1,68 @@
+//! Materials and calls that the tests share.
+#![allow(dead_code)]
+
+use plyflow_conformance::{Check, Outcome, Silent, check_element, check_material, failed};
+use plyflow_kernels::fabric::Fabric;
+use plyflow_kernels::marlow::Marlow;
+use plyflow_sdk::abi::*;
+use plyflow_sdk::{Element, Material, element_table, material_table};
+
+/// StretchLon HT-350 of workflows/materials, SI.
+pub const FILM: &str = r#"{"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545},
+    "limit": 5.0, "thickness": 8e-5, "areal_mass": 0.08}"#;
+
+/// NCF FCIM359 of workflows/materials, SI, in one of the two forms.
+pub fn ncf(form: &str) -> String {
+    r#"{"form": "FORM", "fibre_modulus": 3e9,
+        "shear": {"coefficients": [0.0, 112.19, 94.73, 137.06, -65.56, 29.56]},
+        "stitch": {"angles": [0.06, 0.5, 0.75], "forces": [0.0, 880.0, 0.0]},
+        "bending": {"positive": {"linear": 1.9457e-4, "asymptote": 0.03139, "scale": 4.0},
+                    "negative": {"linear": 1.0279e-4, "asymptote": 0.03619, "scale": 6.5},
+                    "positive_face": "up", "families": "opposite"},
+        "thickness": 4e-4, "areal_mass": 0.44}"#
+        .replace("FORM", form)
+}
+
+/// Checks of a material.
+pub fn of_material<M: Material>(parameters: &str) -> Vec<Check> {
+    let table = material_table::<M>();
+    unsafe { check_material(&raw const table, parameters, &mut Silent) }
+}
+
+/// Checks of an element with a material.
+pub fn of_element<E: Element, M: Material>(with: &str, material: &str) -> Vec<Check> {
+    let (materials, elements) = (material_table::<M>(), element_table::<E>());
+    let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
+    let text = pf_str::new(material);
+    let code = unsafe { (materials.create)(text, &raw mut instance, &raw mut error) };
+    assert_eq!(code, PF_OK, "{}", error.get());
+    let raw = pf_material {
+        functions: &raw const materials,
+        instance,
+    };
+    let found = unsafe { check_element(&raw const elements, with, None, &raw, &mut Silent) };
+    unsafe { (materials.destroy)(instance) };
+    found
+}
+
+/// With the film.
+pub fn with_film<E: Element>(with: &str) -> Vec<Check> {
+    of_element::<E, Marlow>(with, FILM)
+}
+
+/// With the fabric in a form.
+pub fn with_fabric<E: Element>(with: &str, form: &str) -> Vec<Check> {
+    of_element::<E, Fabric>(with, &ncf(form))
+}
+
+/// Demands that nothing failed, and that these checks were really made.
+pub fn sound(checks: &[Check], made: &[&str]) {
+    for c in checks {
+        println!("{:?} {:26} {}", c.outcome, c.rule.name, c.seen);
+    }
+    assert_eq!(failed(checks), [""; 0]);
+    for name in made {
+        let passed = |c: &&Check| c.rule.name == *name && c.outcome == Outcome::Passed;
+        assert!(checks.iter().any(|c| passed(&c)), "{name} was not checked");
+    }
+}
