@@ -123,22 +123,51 @@ impl Exponential {
     }
 }
 
-impl Table {
-    fn new(strains: &[f64], stresses: &[f64]) -> Result<Self, String> {
-        let n = strains.len();
-        let rising = |v: &[f64]| v.windows(2).all(|w| w[1] > w[0]);
-        let fine = n == stresses.len()
-            && (2..=MAX_POINTS).contains(&n)
-            && strains[0] == 0.0
-            && stresses[0] == 0.0
-            && rising(strains)
-            && rising(stresses);
-        if !fine {
+/// A curve through the origin that rises all the way: else the film is unstable.
+fn check_table(strains: &[f64], stresses: &[f64]) -> Result<(), String> {
+    let n = strains.len();
+    if n != stresses.len() {
+        return Err(format!(
+            "uniaxial: given {n} strains and {} stresses; expected as many of each",
+            stresses.len()
+        ));
+    }
+    if !(2..=MAX_POINTS).contains(&n) {
+        return Err(format!(
+            "uniaxial: given {n} points; expected 2 to {MAX_POINTS}, closer together where the curve bends"
+        ));
+    }
+    for (name, unit, v) in [("strains", "", strains), ("stresses", " Pa", stresses)] {
+        if let Some(i) = v.iter().position(|x| !x.is_finite()) {
             return Err(format!(
-                "uniaxial: given strains {strains:?} and stresses {stresses:?} Pa; expected 2 to \
-                 {MAX_POINTS} of each, both starting at 0 and increasing"
+                "uniaxial.{name}[{i}]: given {}{unit}; expected a finite number",
+                v[i]
             ));
         }
+        if v[0] != 0.0 {
+            return Err(format!(
+                "uniaxial.{name}[0]: given {}{unit}; expected 0: put the point 0, 0 Pa in front, or take \
+                 the offset from the measured values",
+                v[0]
+            ));
+        }
+        if let Some(i) = (1..n).find(|i| v[*i] <= v[*i - 1]) {
+            return Err(format!(
+                "uniaxial.{name}[{i}]: given {}{unit} after {}{unit}; expected increasing {name} (a film \
+                 whose stress falls is unstable): sort or smooth the points, and end the table before the \
+                 film yields; beyond the last point the stress goes on along its tangent",
+                v[i],
+                v[i - 1]
+            ));
+        }
+    }
+    Ok(())
+}
+
+impl Table {
+    fn new(strains: &[f64], stresses: &[f64]) -> Result<Self, String> {
+        check_table(strains, stresses)?;
+        let n = strains.len();
         let mut before = 0.0;
         let mut hinges = Vec::with_capacity(n);
         for i in 0..n - 1 {

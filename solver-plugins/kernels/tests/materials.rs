@@ -531,3 +531,37 @@ fn wrong_parameters_are_refused_with_the_reason() {
         assert!(film(&json).err().is_some_and(|t| t.contains(word)));
     }
 }
+
+#[test]
+fn film_tables_that_cannot_be_are_refused_with_place_and_advice() {
+    let make = |e: &str, t: &str| {
+        film(&format!(
+            r#"{{"uniaxial":{{"strains":{e},"stresses":{t}}},"thickness":8e-5,"areal_mass":0.08}}"#
+        ))
+    };
+    assert!(make("[0,0.1,1]", "[0,4e6,9e6]").is_ok());
+    let long = format!("{:?}", (0..33).collect::<Vec<i32>>());
+    for (e, t, words) in [
+        ("[0,0.1]", "[0,4e6,9e6]", ["2 strains", "3 stresses"]),
+        ("[0]", "[0]", ["1 points", "2 to 32"]),
+        (&long, &long, ["33 points", "2 to 32"]),
+        ("[0.1,1]", "[0,4e6]", ["uniaxial.strains[0]", "in front"]),
+        ("[0,1]", "[5,4e6]", ["uniaxial.stresses[0]", "offset"]),
+        (
+            "[0,0.1,0.1]",
+            "[0,4e6,9e6]",
+            ["uniaxial.strains[2]", "0.1 after 0.1"],
+        ),
+        (
+            "[0,0.1,1]",
+            "[0,4e6,3e6]",
+            ["uniaxial.stresses[2]", "3000000 Pa after 4000000 Pa"],
+        ),
+        ("[0,0.1,-1]", "[0,4e6,9e6]", ["uniaxial.strains[2]", "sort"]),
+    ] {
+        let text = make(e, t).err().unwrap();
+        for word in words {
+            assert!(text.contains(word), "'{text}' does not say '{word}'");
+        }
+    }
+}
