@@ -3,6 +3,8 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "../tests/s4_support/mod.rs"]
+mod s4_support;
 
 use common::{El, FILM, Mat, fabric, film, ncf, woven};
 use plyflow_kernels::{Level, limit_level, m4::M4, rf4::Rf4};
@@ -32,6 +34,45 @@ fn cases() {
     elements::<M4>("m4", "ncf hypoelastic", &ncf("hypoelastic"));
     elements::<M4>("m4", "film", &film(FILM).expect("valid"));
     patches("ncf fibre-energy", &ncf("fibre-energy"));
+    shells("ncf fibre-energy", "{}", &ncf("fibre-energy"));
+    let total = r#"{"bending":"total","twist":"material"}"#;
+    shells(
+        "ncf fibre-energy, total, one point",
+        total,
+        &ncf("fibre-energy"),
+    );
+}
+
+/// `s4` on moved and turned elements; the directors go on turning.
+fn shells(name: &str, json: &str, material: &Mat) {
+    let s = s4_support::Shell::new(json, material).expect("the element is valid");
+    let mut r = common::Random(11);
+    let mut data = Vec::new();
+    for _ in 0..BATCHES {
+        let reference: Vec<_> = (0..LANES).map(|_| common::flat(&mut r, 0.1)).collect();
+        let moved: Vec<_> = reference
+            .iter()
+            .map(|q| q.map(|[x, y, z]| [x + 0.2 * y, y * 1.01, z + 5e-4 * r.next()]))
+            .collect();
+        let spin: Vec<f64> = (0..12 * LANES).map(|_| 100.0 * r.next()).collect();
+        let zeros = || vec![0.0; 12 * LANES];
+        let batch = s.start(&reference, [0.8, 0.6, 0.0]);
+        data.push((
+            batch,
+            common::rows(&moved),
+            spin,
+            [zeros(), zeros(), zeros()],
+        ));
+    }
+    let rate = best(
+        || {
+            for (batch, position, spin, [force, moment, energy]) in &mut data {
+                s.forces_into(batch, position, spin, [force, moment, energy]);
+            }
+        },
+        LANES * BATCHES,
+    );
+    row("s4", name, "element", rate);
 }
 
 fn row(element: &str, material: &str, what: &str, rate: f64) {

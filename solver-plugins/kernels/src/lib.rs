@@ -8,11 +8,13 @@
 
 pub mod fabric;
 mod functions;
+pub mod isotropic;
 mod lanes;
 pub mod m4;
 pub mod marlow;
 pub mod quad;
 pub mod rf4;
+pub mod s4;
 
 pub use functions::{asin, exp, polynomial};
 pub use lanes::*;

@@ -1,0 +1,4 @@
+//! The plugin `s4`: exports [`plyflow_kernels::s4::S4`], where the mechanics stand. They live in a
+//! library of their own so that tests and benches can link several components at once.
+
+plyflow_sdk::export_element!(plyflow_kernels::s4::S4);

@@ -1,0 +1,322 @@
+//! Bounds of the largest frequency of an element of `s4`.
+//!
+//! The stiffness is `sum of (strain derivative)^T tangent (strain derivative) + geometric part`. The
+//! first is positive semi-definite, so its largest eigenvalue, with masses and inertias, is at most
+//! that of the displacement block plus that of the rotation block. Each block is bounded as in
+//! [`crate::quad`]: a sum over the kinds of strain, each factor by its largest eigenvalue. Directors
+//! have length 1, so a strain's derivative by a rotation is never longer than that by its director.
+
+use super::forces::View;
+use super::{S4, V3, row};
+
+/// Largest eigenvalue of the symmetric [[a, c], [c, b]].
+pub(super) fn largest(a: f64, b: f64, c: f64) -> f64 {
+    0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt()
+}
+
+fn dot(a: V3, b: V3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn norm(a: V3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn mix(p: f64, a: V3, q: f64, b: V3) -> V3 {
+    core::array::from_fn(|k| p * a[k] + q * b[k])
+}
+
+/// Constants of one lane.
+struct Lane {
+    b: [f64; 4],
+    h: [f64; 2],
+    area: f64,
+    plane: f64,
+    /// b^T b: 11, 22, 12, and its largest eigenvalue.
+    gradient: [f64; 3],
+    widest: f64,
+    shear: [f64; 3],
+    edge: [f64; 2],
+    director: f64,
+    inertia: f64,
+}
+
+impl Lane {
+    fn new(constants: &[f64], n: usize, l: usize) -> Self {
+        let c = |r: usize| constants[r * n + l];
+        let b = [c(0), c(1), c(2), c(3)];
+        let gradient = [
+            2.0 * (b[0] * b[0] + b[1] * b[1]),
+            2.0 * (b[2] * b[2] + b[3] * b[3]),
+            2.0 * (b[0] * b[2] + b[1] * b[3]),
+        ];
+        Self {
+            b,
+            h: [c(4), c(5)],
+            area: c(6),
+            plane: c(7),
+            gradient,
+            widest: largest(gradient[0], gradient[1], gradient[2]),
+            shear: [c(row::SHEAR), c(row::SHEAR + 1), c(row::SHEAR + 2)],
+            edge: [c(row::EDGE), c(row::EDGE + 1)],
+            director: c(row::DIRECTOR),
+            inertia: c(row::INERTIA),
+        }
+    }
+
+    /// Squared length of the hourglass vector h - h1 B1 - h2 B2 (h and B are orthogonal).
+    fn mode(&self) -> f64 {
+        let ([h1, h2], g) = (self.h, self.gradient);
+        4.0 + h1 * h1 * g[0] + h2 * h2 * g[1] + 2.0 * h1 * h2 * g[2]
+    }
+
+    /// Stiffness over the displacements (N/m) of the transverse shear, without curvature in the
+    /// element: the sides' means through the gradient, their differences through the hourglass mode.
+    /// `skew`: cosine between the derivatives of the two means, 0 for equal directors.
+    fn plate(&self, skew: f64) -> f64 {
+        // Largest eigenvalue of K S, from trace and determinant.
+        let (k, s) = (self.shear, self.gradient);
+        let trace = k[0] * s[0] + k[1] * s[1] + 2.0 * k[2] * s[2];
+        let det = (k[0] * k[1] - k[2] * k[2]) * (s[0] * s[1] - s[2] * s[2]);
+        let means = 0.5 * trace + (0.25 * trace * trace - det).max(0.0).sqrt();
+        means * (1.0 + skew) + 4.0 * (self.edge[0] + self.edge[1])
+    }
+
+    /// Stiffness over the rotations (N m): transverse shear (sides along `along`, `across`), curvature
+    /// with the tangents `bending` and `twist`, the directors' hourglass mode. `c`: C11, C22.
+    fn rotational(
+        &self,
+        along: [V3; 2],
+        across: [V3; 2],
+        bending: f64,
+        twist: f64,
+        c: [f64; 2],
+    ) -> f64 {
+        let (b, k) = (self.b, self.shear);
+        let over = |p: [f64; 2], q: [f64; 2]| {
+            k[0] * p[0] * q[0] + k[1] * p[1] * q[1] + k[2] * (p[0] * q[1] + p[1] * q[0])
+        };
+        // Over the diagonals, then over the means s1, s2 of opposite sides (times root 2).
+        let (p13, p24) = ([b[0], b[2]], [b[1], b[3]]);
+        let (h13, h24, hx) = (over(p13, p13), over(p24, p24), over(p13, p24));
+        let (h11, h22, h12) = (
+            0.5 * (h13 + h24) - hx,
+            0.5 * (h13 + h24) + hx,
+            0.5 * (h13 - h24).abs(),
+        );
+        let (h1, h2) = (
+            (h11 + h12).max(2.0 * self.edge[0]),
+            (h22 + h12).max(2.0 * self.edge[1]),
+        );
+        let longest = |t: [V3; 2]| dot(t[0], t[0]).max(dot(t[1], t[1]));
+        let mut lean = 0.0f64;
+        for a in along {
+            for o in across {
+                lean = lean.max(dot(a, o).abs());
+            }
+        }
+        let sides = 0.5
+            * largest(
+                h1 * longest(along),
+                h2 * longest(across),
+                (h1 * h2).sqrt() * lean,
+            );
+        sides
+            + self.area * self.widest * (bending * c[0].max(c[1]) + 0.5 * twist * (c[0] + c[1]))
+            + self.director * self.mode()
+    }
+}
+
+/// Bound of the rotational stiffness (N m) at rest of lane l with reference nodes x.
+pub(super) fn at_rest(s4: &S4, constants: &[f64], n: usize, l: usize, x: &[V3; 4]) -> f64 {
+    let lane = Lane::new(constants, n, l);
+    let along = [mix(1.0, x[1], -1.0, x[0]), mix(1.0, x[2], -1.0, x[3])];
+    let across = [mix(1.0, x[3], -1.0, x[0]), mix(1.0, x[2], -1.0, x[1])];
+    let bending = s4.rest.stiffness * if s4.rest.coupled { 2.0 } else { 1.0 };
+    // The layers' twist is 4 w z^2 G = 0.15 h^2 G, far below the bending; the step's bound has it.
+    let twist = if s4.layers.is_some() {
+        0.0
+    } else {
+        s4.rest.twist
+    };
+    lane.rotational(along, across, bending, twist, [1.0, 1.0])
+}
+
+/// Stiffness over the displacements (N/m) of the transverse shear of lane l at rest.
+pub(super) fn plate(constants: &[f64], n: usize, l: usize) -> f64 {
+    Lane::new(constants, n, l).plate(0.0)
+}
+
+/// A bound of 2 / omega_max with the masses and inertias that `initialise` wrote.
+pub(super) fn critical_step(
+    s4: &S4,
+    position: &[f64],
+    directors: &[f64],
+    constants: &[f64],
+    n: usize,
+    s: &View<'_>,
+    step: &mut [f64],
+) {
+    for l in 0..n {
+        let lane = Lane::new(constants, n, l);
+        let state = State::new(s4, position, directors, n, l, s);
+        let mass = 0.25 * s4.areal_mass * lane.area;
+        let inertia = lane.inertia;
+        let mixed = (mass * inertia).sqrt();
+        let c = state.metric;
+        let (bending, twist) = (state.bending, state.twist);
+        let [s11, s22] = state.slope.map(|v| dot(v, v));
+        let bent = lane.area * lane.widest * (bending * s11.max(s22) + 0.5 * twist * (s11 + s22));
+        let displacement = state.membrane(&lane) + lane.plate(state.skew()) + bent;
+        let rotation = lane.rotational(
+            [state.side[0], state.side[1]],
+            [state.side[2], state.side[3]],
+            bending,
+            twist,
+            [c[0], c[1]],
+        );
+        // Second derivatives of the strains: curvature is bilinear in slopes of x and of d, a side's
+        // shear in its ends; a turned director has d2 d = t x (t x d).
+        let (pull, reaction) = state.loads(&lane);
+        let coupling = lane.area * lane.widest * state.moment() + 2.0 * pull;
+        let lambda =
+            displacement / mass + rotation / inertia + coupling / mixed + reaction / inertia;
+        step[l] = 2.0 / lambda.sqrt();
+    }
+}
+
+/// What the bound needs of the state of one lane.
+struct State {
+    x: [V3; 4],
+    d: [V3; 4],
+    g: [V3; 2],
+    slope: [V3; 2],
+    /// Sides 1-2, 4-3, 1-4, 2-3.
+    side: [V3; 4],
+    metric: [f64; 3],
+    stress: [f64; 3],
+    moments: [f64; 3],
+    /// Largest and shear tangent of all layers (N/m).
+    stiffness: [f64; 2],
+    bending: f64,
+    twist: f64,
+}
+
+impl State {
+    fn new(s4: &S4, position: &[f64], directors: &[f64], n: usize, l: usize, s: &View<'_>) -> Self {
+        let at = |from: &[f64], r: usize| -> V3 { core::array::from_fn(|k| from[(r + k) * n + l]) };
+        let x: [V3; 4] = core::array::from_fn(|i| at(position, 3 * i));
+        let side = |i: usize, j: usize| mix(1.0, x[j], -1.0, x[i]);
+        let tangent = |p: usize, r: usize| s.stiffness[(2 * p + r) * n + l].max(0.0);
+        let (mut stiffness, mut layered) = ([tangent(0, 0), tangent(0, 1)], 0.0);
+        if let Some(w) = &s4.layers {
+            let outer = |r: usize| w.surface * (tangent(1, r) + tangent(2, r));
+            stiffness = [0, 1].map(|r| w.core * stiffness[r] + outer(r));
+            // dM12/dk12 of the two layers; their tangent is at most the largest one.
+            layered = 2.0 * w.height * w.height * outer(1);
+        }
+        let t: V3 = at(s.tangent, 0);
+        let family = if s4.rest.coupled {
+            t[0] + t[1]
+        } else {
+            t[0].max(t[1])
+        };
+        Self {
+            x,
+            d: core::array::from_fn(|i| at(directors, 3 * i)),
+            g: [at(s.g, 0), at(s.g, 3)],
+            slope: [at(s.slope, 0), at(s.slope, 3)],
+            side: [side(0, 1), side(3, 2), side(0, 3), side(1, 2)],
+            metric: at(s.metric, 0),
+            stress: at(s.stress, 0),
+            moments: at(s.moment, 0),
+            stiffness,
+            bending: family.max(0.0),
+            twist: layered
+                + if s4.layers.is_some() {
+                    0.0
+                } else {
+                    t[2].max(0.0)
+                },
+        }
+    }
+
+    /// Cosine between the derivatives of the means of opposite sides by the displacements.
+    fn skew(&self) -> f64 {
+        let d = &self.d;
+        let half = |a: V3, b: V3, c: V3, e: V3| -> V3 {
+            core::array::from_fn(|k| 0.25 * (a[k] + b[k] - c[k] - e[k]))
+        };
+        dot(half(d[0], d[1], d[2], d[3]), half(d[0], d[3], d[1], d[2])).abs()
+    }
+
+    /// Largest moment resultant (N).
+    fn moment(&self) -> f64 {
+        let [a, b, c] = self.moments;
+        largest(a, b, c).max(largest(-a, -b, c))
+    }
+
+    /// Membrane and in-plane hourglass (N/m), as [`crate::quad`] explains.
+    fn membrane(&self, lane: &Lane) -> f64 {
+        let [c11, c22, c12] = self.metric;
+        let stretch = largest(c11, c22, c12);
+        let stress = largest(self.stress[0], self.stress[1], self.stress[2]).max(0.0);
+        let [tangent, shear] = self.stiffness;
+        let apart = ((tangent * c11.max(c22)).sqrt() + (shear * (c11 + c22)).sqrt()).powi(2);
+        let material = (tangent * stretch).min(apart);
+        let narrow = (c11 + c22 - stretch).max(1e-6).sqrt();
+        let q: V3 = core::array::from_fn(|k| {
+            let x = &self.x;
+            ((x[0][k] - x[1][k]) + (x[2][k] - x[3][k]))
+                - lane.h[0] * self.g[0][k]
+                - lane.h[1] * self.g[1][k]
+        });
+        let [g1, g2] = self.g;
+        let cross: V3 = core::array::from_fn(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            g1[i] * g2[j] - g1[j] * g2[i]
+        });
+        let qn = dot(q, cross).abs() / norm(cross).max(1e-6);
+        let turn = lane.widest.sqrt() / narrow;
+        let mode = lane.mode();
+        let bent = lane.plane * qn * (2.0 * mode.sqrt() * turn + 3.0 * norm(q) * turn * turn);
+        lane.area * (material + stress) * lane.widest + lane.plane * mode + bent
+    }
+
+    /// Bounds of the sides' transverse forces (N) and of |dW/dd| at a node (N m).
+    fn loads(&self, lane: &Lane) -> (f64, f64) {
+        let d = &self.d;
+        let ends = [[0, 1], [3, 2], [0, 3], [1, 2]];
+        let mut e = [0.0; 4];
+        for (e, (t, [i, j])) in e.iter_mut().zip(self.side.iter().zip(ends)) {
+            *e = 0.5 * (dot(*t, d[i]) + dot(*t, d[j]));
+        }
+        let b = lane.b;
+        let (m13, m24) = (
+            -0.5 * (e[0] + e[1] + e[2] + e[3]),
+            0.5 * (e[0] + e[1] - e[2] - e[3]),
+        );
+        let (y1, y2) = (b[0] * m13 + b[1] * m24, b[2] * m13 + b[3] * m24);
+        let k = lane.shear;
+        let (q1, q2) = (k[0] * y1 + k[2] * y2, k[2] * y1 + k[1] * y2);
+        let (c13, c24) = (b[0] * q1 + b[2] * q2, b[1] * q1 + b[3] * q2);
+        // The reference's warp counts as if it were shear: more than there is.
+        let pull = 0.5 * (c13.abs() + c24.abs())
+            + (lane.edge[0] * (e[0] - e[1])).abs()
+            + (lane.edge[1] * (e[2] - e[3])).abs();
+        let longest = self.side.iter().map(|t| norm(*t)).fold(0.0, f64::max);
+        let [m1, m2, m12] = self.moments;
+        let [g1, g2] = self.g;
+        let columns = [mix(m1, g1, m12, g2), mix(m12, g1, m2, g2)].map(|v| lane.area * norm(v));
+        let widest = lane.widest.sqrt();
+        let hourglass: V3 = core::array::from_fn(|k| {
+            ((d[0][k] - d[1][k]) + (d[2][k] - d[3][k]))
+                - lane.h[0] * self.slope[0][k]
+                - lane.h[1] * self.slope[1][k]
+        });
+        let reaction = widest * (columns[0] + columns[1])
+            + lane.director * lane.mode().sqrt() * norm(hourglass)
+            + pull * longest;
+        (pull, reaction)
+    }
+}

@@ -1,0 +1,4 @@
+//! The plugin `material-isotropic`: exports [`plyflow_kernels::isotropic::Isotropic`], where the mechanics stand. They live in a
+//! library of their own so that tests and benches can link several components at once.
+
+plyflow_sdk::export_material!(plyflow_kernels::isotropic::Isotropic);
