@@ -1,6 +1,7 @@
 //! The patches of `rf4` through the C table: gradients, invariance, exactness, convergence, bounds.
 
 mod common;
+mod fabric_support;
 use common::*;
 use plyflow_kernels::rf4::Rf4;
 
@@ -92,12 +93,29 @@ fn quadratic_surfaces_give_their_curvature_exactly_on_distorted_patches() {
 
 #[test]
 fn pure_bending_of_a_strip_returns_the_voce_moment_for_each_family_and_sign() {
-    // Rolled on a cylinder along a fibre family; moment = virtual work of the nodal forces over the
-    // curvature, per area.
-    let m = ply();
-    let e = El::new::<Rf4>("{}", &m).unwrap();
     let voce = |k: f64, [a, b, c]: [f64; 3]| a * k + b * (1.0 - (-k / c).exp());
     let (plus, minus) = ([1.9457e-4, 0.03139, 4.0], [1.0279e-4, 0.03619, 6.5]);
+    roll_a_strip(&ply(), |k, positive| {
+        voce(k, if positive { plus } else { minus })
+    });
+}
+
+#[test]
+fn pure_bending_of_a_strip_returns_constant_and_tabulated_moments() {
+    let shear = serde_json::json!({"coefficients": fabric_support::NCF_YARN});
+    let mut law = fabric_support::sheet("fibre-energy", &shear, None);
+    // Positive: a constant stiffness. Negative: straight from point to point of a table on a line.
+    law["bending"] = serde_json::json!({"positive": {"stiffness": 0.0038},
+        "negative": {"table": {"curvatures": [0.0, 5.0, 20.0], "moments": [0.0, 0.016, 0.064]}}});
+    roll_a_strip(&fabric_support::build(&law), |k, positive| {
+        k * if positive { 0.0038 } else { 0.0032 }
+    });
+}
+
+/// Rolls a strip on a cylinder along each fibre family and compares its moment with `law(|k|, positive)`: the
+/// virtual work of the nodal forces over the curvature, per area.
+fn roll_a_strip(m: &Mat, law: impl Fn(f64, bool) -> f64) {
+    let e = El::new::<Rf4>("{}", m).unwrap();
     // 2 mm, as the thesis' coupons.
     let two: Patch = grid(&mut Random(1), 0.0)
         .iter()
@@ -119,12 +137,7 @@ fn pure_bending_of_a_strip_returns_the_voce_moment_for_each_family_and_sign() {
                 .map(|(i, c)| f[(3 * i + c) * 8] * (a[i][c] - b[i][c]) / (2.0 * h))
                 .sum();
             let moment = work / (SIZE * SIZE);
-            let law = if (k > 0.0) == (family == 1) {
-                plus
-            } else {
-                minus
-            };
-            let want = voce(k.abs(), law).copysign(k);
+            let want = law(k.abs(), (k > 0.0) == (family == 1)).copysign(k);
             // At 50 1/m an element turns by 0.1 rad: its work over the roll is 0.3 % short.
             assert!(
                 (moment - want).abs() < 0.004 * want.abs(),

@@ -1,6 +1,7 @@
 //! Elements through their C tables: gradients, invariance, exactness, bounds.
 
 mod common;
+mod fabric_support;
 use common::*;
 use plyflow_kernels::{Level, limit_level, m4::M4, rf4::Rf4};
 
@@ -258,6 +259,30 @@ fn critical_step_bounds_the_exact_one_on_random_stretched_and_skewed_elements() 
         mean > 0.5,
         "the bound gives away too much: {mean} of the exact step"
     );
+}
+
+#[test]
+fn critical_step_bounds_the_exact_one_for_every_shear_law() {
+    let mut r = Random(15);
+    for (name, shear, stitch) in fabric_support::every_shear_law() {
+        let law = fabric_support::sheet("fibre-energy", &shear, stitch);
+        let material = fabric_support::build(&law);
+        let e = El::new::<M4>("{}", &material).unwrap();
+        let mut slack = 0.0;
+        for _ in 0..25 {
+            let q = flat(&mut r, 0.2);
+            let mut batch = e.initialise(&[q; 8], &[AXIS; 8]);
+            let x = deformed(&mut r, &q, 0.3, 0.05);
+            let f = e.forces(&mut batch, &[x; 8]);
+            let mass = batch.mass[0];
+            let exact = 2.0 / exact_frequency(&e, &mut batch, &x, mass);
+            let step = f.step[0];
+            assert!(step <= 1.0001 * exact, "{name}: {step} s, exact {exact} s");
+            slack += step / exact / 25.0;
+        }
+        // As on the elements above: most of the step is used.
+        assert!(slack > 0.5, "{name}: {slack} of the exact step in the mean");
+    }
 }
 
 #[test]
