@@ -10,7 +10,7 @@ PLYFLOW := $(TARGET)/release/plyflow
 DEMO ?= workflows/joggle-spar/workflow.yaml
 CARGO := . ./.tools/env && cargo
 
-.PHONY: help build demo test test-long lint bench docs clean
+.PHONY: help build demo test test-long templates lint bench docs clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -31,6 +31,9 @@ test: ## run all tests, also with VTK's own reader and a step in C
 test-long: ## run the tests that take many minutes
 	@scripts/setup
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -- --ignored --nocapture
+
+templates: build ## build, check and run the element templates outside of the repository
+	scripts/check-templates
 
 lint: ## check form, lints and JSON Schemas
 	@scripts/setup
