@@ -109,6 +109,10 @@ fn wrong_shear_tables_are_refused_with_place_and_advice() {
             &["shear.table.angles[2]", "89.38 deg"],
         ),
         (
+            table(json!([0, 0.005, 0.0175]), json!([0, 5, 6])),
+            &["shear.table.angles[2]", "1.00 deg", "unit"],
+        ),
+        (
             shear(json!({"table": {"angles": [0, 0.5], "forces": [0, 5]}, "limit": 1.0})),
             &["shear.limit", "last angle"],
         ),

@@ -6,6 +6,9 @@ use super::yarn::{MAX_COEFFICIENTS, Polynomial};
 
 /// Largest angle of a shear law (rad): 1/cos g must stay of the order of 1.
 const LARGEST_ANGLE: f64 = 1.5;
+/// Least last angle of a shear table (5 deg, as the least limit of a polynomial): a shorter one is a
+/// wrong unit, and all of a forming run would lie beyond it.
+const LEAST_LAST_ANGLE: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// Places at which the slope of a polynomial is looked at.
 const SAMPLES: usize = 2000;
 
@@ -157,6 +160,14 @@ pub(super) fn shear_table(path: &str, x: &[f64], y: &[f64], softening: bool) -> 
             x.len() - 1,
             angle(last),
             angle(LARGEST_ANGLE)
+        ));
+    }
+    if last < 0.999_999 * LEAST_LAST_ANGLE {
+        return Err(format!(
+            "{path}.angles[{}]: given {} as last angle; expected at least 5 deg: check the unit (rad, deg), \
+             or measure further",
+            x.len() - 1,
+            angle(last)
         ));
     }
     if let Some(i) = (1..y.len()).find(|i| y[*i] <= 0.0) {
