@@ -1,5 +1,5 @@
-//! What Plyflow's own component plugins are made of: the element formulations [`m4`] and [`rf4`],
-//! the materials [`fabric`] and [`marlow`], and the lane arithmetic under them ([`Lanes`],
+//! What Plyflow's own component plugins are made of: the element formulations [`m4`], [`rf4`] and
+//! [`s4`], the materials [`fabric`], [`isotropic`] and [`marlow`], and the lane arithmetic under them ([`Lanes`],
 //! [`dispatch!`], [`exp`], [`asin`]).
 //!
 //! The plugin crates `element-*` and `material-*` only export these types: a library may be linked

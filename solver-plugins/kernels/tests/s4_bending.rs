@@ -145,9 +145,16 @@ fn thin_cantilever_with_an_end_load_is_exact_for_any_number_of_elements() {
     let rigidity = 1e9 * thickness * thickness * thickness / 12.0 * width;
     let load = 1e-4;
     let want = load * length.powi(3) / (3.0 * rigidity);
-    for n in [1, 2, 5] {
+    // With a physical shear modulus in series also P L / (5/6 G h).
+    let modulus = 1e5;
+    let shear = load * length / (5.0 / 6.0 * modulus * thickness * width);
+    let soft = PLATE.replace('}', r#","transverse_shear_modulus":1e5}"#);
+    for (n, json, want) in [1, 2, 5]
+        .into_iter()
+        .flat_map(|n| [(n, PLATE, want), (n, &soft, want + shear)])
+    {
         let mut s = Model::new(
-            PLATE,
+            json,
             &m,
             rectangle([n, 1], [length, width], 0.0),
             [1.0, 0.0, 0.0],
@@ -159,7 +166,7 @@ fn thin_cantilever_with_an_end_load_is_exact_for_any_number_of_elements() {
         let got = s.x[n][2];
         assert!(
             (got / want - 1.0).abs() < 1e-5,
-            "{n} elements: {got} m, exact {want} m"
+            "{n} elements, {json}: {got} m, exact {want} m"
         );
     }
 }

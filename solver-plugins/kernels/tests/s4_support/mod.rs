@@ -1,7 +1,7 @@
 //! The element `s4` behind its C table, batches that are easy to fill, and small dense algebra.
 #![allow(dead_code)]
 
-use super::common::{Mat, Quad, rows};
+use super::common::*;
 use plyflow_kernels::{isotropic::Isotropic, s4::S4};
 use plyflow_sdk::abi::*;
 use plyflow_sdk::{Element, Material, MaterialRef, element_table, material_table};
@@ -329,4 +329,52 @@ pub fn rotated(t: V3, x: V3) -> V3 {
     let u = t.map(|c| c / a);
     let (v, p) = (cross(u, x), dot(u, x) * (1.0 - a.cos()));
     std::array::from_fn(|k| a.cos() * x[k] + a.sin() * v[k] + p * u[k])
+}
+
+/// As NCF with fibres so soft that bending counts in the energies.
+pub fn soft() -> Mat {
+    fabric(&ncf("fibre-energy", "").replace("3e9", "1e6")).unwrap()
+}
+
+/// A distorted quadrilateral, also out of its plane.
+pub fn uneven(r: &mut Random, distortion: f64, warp: f64) -> Quad {
+    flat(r, distortion).map(|[x, y, _]| [x, y, warp * SIZE * r.next()])
+}
+
+/// A deformed state that was reached in one step: positions and rotations of up to `angle` besides
+/// the rigid one.
+pub fn bent(
+    r: &mut Random,
+    s: &Shell,
+    b: &mut Batch,
+    reference: &[Quad],
+    strain: f64,
+    angle: f64,
+) -> Vec<Quad> {
+    let mut x = Vec::new();
+    let mut w = Vec::new();
+    for q in reference {
+        let turn: V3 = std::array::from_fn(|_| r.next());
+        let f: [[f64; 2]; 2] = std::array::from_fn(|i| {
+            std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 } + strain * r.next())
+        });
+        x.push(q.map(|[x, y, z]| {
+            let bump = 0.1 * SIZE * strain.min(0.5);
+            let p = [
+                f[0][0] * x + f[0][1] * y + bump * r.next(),
+                f[1][0] * x + f[1][1] * y + bump * r.next(),
+                z + 0.3 * angle * SIZE * r.next(),
+            ];
+            rotated(turn, p)
+        }));
+        w.push(q.map(|_| turn));
+    }
+    // The rigid turn first (exactly the same for all directors), then each node's own.
+    s.forces(b, &x, &w, 1.0);
+    let own: Vec<Quad> = reference
+        .iter()
+        .map(|_| std::array::from_fn(|_| std::array::from_fn(|_| angle * r.next())))
+        .collect();
+    s.forces(b, &x, &own, 1.0);
+    x
 }
