@@ -1,0 +1,310 @@
+//! CSV files of raw test data: `#` comment lines, one header line `name [unit],name [unit]`, rows of numbers.
+//!
+//! Everything that is wrong is an error with file, line and column: a test that is read wrongly gives a
+//! law that looks right.
+
+use plyflow_model::units::{Dimension, parse_quantity, parse_unit};
+
+/// A column that a reader asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Column {
+    /// Name in the header.
+    pub name: &'static str,
+    /// Dimension that its unit must have.
+    pub dimension: Dimension,
+    /// Whether a file without it is refused.
+    pub required: bool,
+}
+
+impl Column {
+    /// A column that must be there.
+    pub const fn required(name: &'static str, dimension: Dimension) -> Self {
+        Self {
+            name,
+            dimension,
+            required: true,
+        }
+    }
+
+    /// A column that may be there.
+    pub const fn optional(name: &'static str, dimension: Dimension) -> Self {
+        Self {
+            name,
+            dimension,
+            required: false,
+        }
+    }
+}
+
+/// The columns that were asked for, in SI.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Table {
+    /// Name of the file, for messages.
+    pub source: String,
+    /// Line in the file (from 1) of each row.
+    pub lines: Vec<usize>,
+    columns: Vec<(&'static str, Vec<f64>)>,
+}
+
+impl Table {
+    /// Values of a column (SI), one per row; `None` when the file has no such column.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns
+            .iter()
+            .find(|c| c.0 == name)
+            .map(|c| c.1.as_slice())
+    }
+
+    /// Values of a column that was asked for as required.
+    ///
+    /// # Errors
+    /// When it was not.
+    pub fn values(&self, name: &str) -> Result<&[f64], String> {
+        self.column(name)
+            .ok_or_else(|| format!("{}: there is no column '{name}'", self.source))
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// `file:line` of a row, for messages.
+    pub fn place(&self, row: usize) -> String {
+        format!(
+            "{}:{}",
+            self.source,
+            self.lines.get(row).copied().unwrap_or(0)
+        )
+    }
+
+    /// Refuses a table with too few rows.
+    ///
+    /// # Errors
+    /// Says how many there are, how many are needed and for what.
+    pub fn at_least(&self, rows: usize, why: &str) -> Result<(), String> {
+        if self.rows() >= rows {
+            return Ok(());
+        }
+        let n = self.rows();
+        Err(format!(
+            "{}: {n} rows of data; {why} needs at least {rows}",
+            self.source
+        ))
+    }
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// When it cannot be read, and as [`parse`].
+pub fn read(path: &str, wanted: &[Column]) -> Result<Table, String> {
+    let bytes = std::fs::read(path).map_err(|e| format!("{path}: cannot be read: {e}"))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| format!("{path}: is not UTF-8 text; save the table as CSV (UTF-8)"))?;
+    let name = std::path::Path::new(path)
+        .file_name()
+        .and_then(|n| n.to_str());
+    parse(&text, name.unwrap_or(path), wanted)
+}
+
+/// Reads a text; columns that nobody asked for are passed over.
+///
+/// # Errors
+/// A missing or repeated column, a missing, unknown or unfit unit, a row of another length, a value that is
+/// no finite number: each with `source`, line and column.
+pub fn parse(text: &str, source: &str, wanted: &[Column]) -> Result<Table, String> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = (text.lines().enumerate())
+        .map(|(i, line)| (i + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let expected = || {
+        let names: Vec<String> = wanted.iter().filter(|c| c.required).map(heading).collect();
+        format!("a header line such as `{}`", names.join(","))
+    };
+    let (header_line, header) = lines
+        .next()
+        .ok_or_else(|| format!("{source}: is empty; expected {}", expected()))?;
+    if !header.contains('[') {
+        let text = format!(
+            "{source}:{header_line}: `{header}` names no units; expected {}",
+            expected()
+        );
+        return Err(text);
+    }
+    let heads: Vec<(&str, &str)> = header.split(',').map(split_head).collect();
+    let picked = pick(&heads, wanted, source, header_line)?;
+    let mut table = Table {
+        source: source.to_owned(),
+        lines: Vec::new(),
+        columns: picked.iter().map(|p| (p.1.name, Vec::new())).collect(),
+    };
+    for (line, row) in lines {
+        let cells: Vec<&str> = row.split(',').map(str::trim).collect();
+        if cells.len() != heads.len() {
+            let (n, m) = (cells.len(), heads.len());
+            return Err(format!(
+                "{source}:{line}: {n} values where the header names {m} columns; values are separated by commas, decimals by a point"
+            ));
+        }
+        for ((index, column, unit), (_, values)) in picked.iter().zip(&mut table.columns) {
+            let value = value(cells[*index], unit, column.dimension)
+                .map_err(|e| format!("{source}:{line}: column '{}': {e}", column.name))?;
+            values.push(value);
+        }
+        table.lines.push(line);
+    }
+    Ok(table)
+}
+
+fn heading(column: &Column) -> String {
+    let example = column.dimension.example();
+    let unit = example.split_once(' ').map_or("1", |e| e.1);
+    format!("{} [{unit}]", column.name)
+}
+
+/// `force [N]` -> (`force`, `N`); no brackets: unit `?`.
+fn split_head(head: &str) -> (&str, &str) {
+    let head = head.trim().trim_matches('"');
+    match head.split_once('[') {
+        Some((name, rest)) => (name.trim(), rest.trim_end_matches(']').trim()),
+        None => (head, "?"),
+    }
+}
+
+fn pick<'a>(
+    heads: &[(&'a str, &'a str)],
+    wanted: &[Column],
+    source: &str,
+    line: usize,
+) -> Result<Vec<(usize, Column, &'a str)>, String> {
+    let mut picked = Vec::new();
+    for column in wanted {
+        let found: Vec<usize> = (0..heads.len())
+            .filter(|&i| heads[i].0 == column.name)
+            .collect();
+        let index = match found[..] {
+            [] if !column.required => continue,
+            [] => {
+                let names: Vec<&str> = heads.iter().map(|h| h.0).collect();
+                return Err(format!(
+                    "{source}:{line}: there is no column '{}'; the header names: {}; expected `{}`",
+                    column.name,
+                    names.join(", "),
+                    heading(column)
+                ));
+            }
+            [index] => index,
+            _ => {
+                return Err(format!(
+                    "{source}:{line}: column '{}' stands there more than once",
+                    column.name
+                ));
+            }
+        };
+        let unit = heads[index].1;
+        let what = column.dimension.with_article();
+        let say = |e: String| {
+            format!(
+                "{source}:{line}: column '{}': {e}; expected {what}, such as `{}`",
+                column.name,
+                heading(column)
+            )
+        };
+        if unit == "?" {
+            return Err(say("has no unit".into()));
+        }
+        let parsed = parse_unit(unit).map_err(|e| say(e.to_string()))?;
+        if parsed.exponents != column.dimension.exponents() {
+            return Err(say(format!("the unit '{unit}' does not fit")));
+        }
+        picked.push((index, *column, unit));
+    }
+    Ok(picked)
+}
+
+fn value(text: &str, unit: &str, dimension: Dimension) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| match text {
+        "" => "there is no value".to_owned(),
+        _ => format!("'{text}' is not a number"),
+    })?;
+    if !number.is_finite() {
+        return Err(format!(
+            "'{text}' is not a finite number; leave the row out"
+        ));
+    }
+    if dimension == Dimension::Dimensionless && matches!(unit, "" | "1") {
+        return Ok(number);
+    }
+    // Through the one reader of units, so that 10 mm and 1 cm are the same bits here too.
+    parse_quantity(&format!("{text} {unit}"), dimension).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WANTED: [Column; 2] = [
+        Column::required("displacement", Dimension::Length),
+        Column::required("force", Dimension::Force),
+    ];
+
+    fn error(text: &str) -> String {
+        parse(text, "t.csv", &WANTED).unwrap_err()
+    }
+
+    #[test]
+    fn values_arrive_in_si_and_keep_their_lines() {
+        let text = "\u{feff}# made up\n\nnote [1], force [kN], displacement [mm]\n1,0.002, 10\n# pause\n2,3,1.5e1\n";
+        let table = parse(text, "t.csv", &WANTED).unwrap();
+        assert_eq!(table.values("displacement").unwrap(), [0.01, 0.015]);
+        assert_eq!(table.values("force").unwrap(), [2.0, 3000.0]);
+        assert_eq!(table.lines, [4, 6]);
+        assert!(table.column("note").is_none());
+    }
+
+    #[test]
+    fn a_missing_column_is_named_with_those_there_are() {
+        let e = error("displacement [mm],load [N]\n1,2\n");
+        assert!(
+            e.starts_with("t.csv:1: there is no column 'force'")
+                && e.contains("displacement, load"),
+            "{e}"
+        );
+    }
+
+    #[test]
+    fn a_wrong_an_unknown_and_a_missing_unit_are_located() {
+        let e = error("# c\ndisplacement [N],force [N]\n1,2\n");
+        assert!(
+            e.starts_with("t.csv:2: column 'displacement': the unit 'N' does not fit"),
+            "{e}"
+        );
+        let e = error("displacement [mm],force [bananas]\n1,2\n");
+        assert!(e.contains("bananas"), "{e}");
+        let e = error("displacement [mm],force\n1,2\n");
+        assert!(e.contains("'force': has no unit"), "{e}");
+        let e = error("displacement,force\n1,2\n");
+        assert!(e.contains("names no units"), "{e}");
+    }
+
+    #[test]
+    fn what_is_no_finite_number_is_located() {
+        for bad in ["NaN", "inf", "abc", "", "1.2.3"] {
+            let e = error(&format!("displacement [mm],force [N]\n1,2\n3,{bad}\n"));
+            assert!(e.starts_with("t.csv:3: column 'force'"), "{e}");
+        }
+    }
+
+    #[test]
+    fn a_row_of_another_length_is_located() {
+        let e = error("displacement [mm],force [N]\n1,2\n1,5,2\n");
+        assert!(e.starts_with("t.csv:3: 3 values"), "{e}");
+    }
+
+    #[test]
+    fn an_empty_file_says_what_is_expected() {
+        let e = error("# nothing\n");
+        assert!(e.contains("displacement [mm],force [N]"), "{e}");
+    }
+}

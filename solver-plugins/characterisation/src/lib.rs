@@ -1,0 +1,24 @@
+//! From raw test data of fabrics to laws: what the characterisation plugins share.
+//!
+//! Each test has a module that takes numbers in SI and gives a law with its residuals and its conditioning
+//! ([`cantilever`], [`bending`], [`picture_frame`], [`sled`]); [`csv`] reads raw data with located errors,
+//! [`material`] writes material files, [`output`] an artifact of kind `characterisation`.
+
+pub use plyflow_model::units::Dimension;
+
+pub mod bending;
+pub mod cantilever;
+pub mod csv;
+pub mod linear;
+pub mod material;
+pub mod output;
+pub mod picture_frame;
+pub mod profile;
+pub mod sled;
+pub mod stitch;
+#[cfg(feature = "synthetic")]
+pub mod synthetic;
+pub mod voce;
+
+/// Acceleration of free fall (m/s2) that weights are computed with.
+pub const GRAVITY: f64 = 9.80665;

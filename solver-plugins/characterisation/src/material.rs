@@ -1,0 +1,356 @@
+//! Material files: new numbers put into a complete file, or a fragment of one.
+
+use plyflow_model::material::Material;
+use plyflow_sdk::{Host, StepError};
+use serde_json::{Map, Value, json};
+
+/// A complete material file that new numbers are put into.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Template {
+    value: Map<String, Value>,
+    /// Where it came from, for the head of the new file.
+    origin: String,
+    /// Mass per area (kg/m2).
+    pub areal_mass: f64,
+}
+
+impl Template {
+    /// Reads a material file's text.
+    ///
+    /// # Errors
+    /// When it is no YAML or no material.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, String> {
+        let mut options = serde_saphyr::Options::default();
+        options.strict_booleans = true;
+        let value: Value = serde_saphyr::from_str_with_options(text, options)
+            .map_err(|e| format!("{origin}: is no YAML: {e}"))?;
+        let material: Material = serde_json::from_value(value.clone())
+            .map_err(|e| format!("{origin}: is no material file: {e}"))?;
+        let Value::Object(value) = value else {
+            return Err(format!("{origin}: is no material file"));
+        };
+        Ok(Self {
+            value,
+            origin: origin.into(),
+            areal_mass: material.areal_mass.si(),
+        })
+    }
+
+    /// The template of a step: from the file that its parameter `template` names, or from the files of the
+    /// characterisation wired to its port `material`; `None` when there is neither.
+    ///
+    /// # Errors
+    /// When both are given, or what is given holds no material.
+    pub fn of(host: &Host, file: Option<&str>) -> Result<Option<Self>, StepError> {
+        let inputs = host.inputs_of("material")?;
+        match (file, inputs.first()) {
+            (None, None) => Ok(None),
+            (Some(_), Some(_)) => Err(
+                "both the parameter `template` and the input `material` are given; \
+                 the numbers can go into one material file only"
+                    .into(),
+            ),
+            (Some(path), None) => {
+                let text = std::fs::read_to_string(path)
+                    .map_err(|e| format!("{path}: cannot be read: {e}"))?;
+                let name = std::path::Path::new(path)
+                    .file_name()
+                    .and_then(|n| n.to_str());
+                Ok(Some(Self::parse(&text, name.unwrap_or(path))?))
+            }
+            (None, Some(input)) => {
+                let attributes: Value = host.attributes(input)?;
+                let files = attributes["files"].as_array().cloned().unwrap_or_default();
+                let origin = format!("step '{}'", input.step);
+                let found = files
+                    .iter()
+                    .filter_map(|f| f["text"].as_str())
+                    .find_map(|text| Self::parse(text, &origin).ok());
+                found.map(Some).ok_or_else(|| {
+                    format!(
+                        "step '{}' made no complete material file; give it a `template`",
+                        input.step
+                    )
+                    .into()
+                })
+            }
+        }
+    }
+}
+
+/// The areal mass of a test: the parameter, else that of the template.
+///
+/// # Errors
+/// When there is neither.
+pub fn areal_mass(given: Option<f64>, template: Option<&Template>) -> Result<f64, String> {
+    given.or(template.map(|t| t.areal_mass)).ok_or_else(|| {
+        "neither `areal_mass` nor a `template` is given; the weight of the strip must be known"
+            .to_owned()
+    })
+}
+
+/// A block of the parameters under `with:`: where it goes, and what; `None` takes it away.
+pub type Block<'a> = (&'a [&'a str], Option<Value>);
+
+/// Name and text of the file that a characterisation gives: `material.yaml`, the template with the blocks
+/// put in, or `fragment` with the blocks alone. `note`: comment lines that say where the numbers come from.
+///
+/// # Errors
+/// When the result is no valid material file.
+pub fn file(
+    template: Option<&Template>,
+    blocks: &[Block<'_>],
+    fragment: &str,
+    note: &[String],
+) -> Result<(String, String), String> {
+    let mut text = String::new();
+    for line in note {
+        text.push_str(&format!("# {line}\n"));
+    }
+    let Some(template) = template else {
+        let mut with = Map::new();
+        blocks.iter().for_each(|b| put(&mut with, b));
+        text.push_str("# A fragment: its blocks go under `with:` of a material file.\n");
+        emit_map(&mut text, &with, 0);
+        return Ok((fragment.into(), text));
+    };
+    let mut value = template.value.clone();
+    let with = value.entry("with").or_insert_with(|| json!({}));
+    if let Value::Object(with) = with {
+        blocks.iter().for_each(|b| put(with, b));
+    }
+    let names: Vec<String> = blocks
+        .iter()
+        .filter(|b| b.1.is_some())
+        .map(|b| b.0.join("."))
+        .collect();
+    text.push_str(&format!(
+        "# New here: {}. All other numbers are those of {}; comments are not carried over.\n",
+        names.join(", "),
+        template.origin
+    ));
+    emit_map(&mut text, &value, 0);
+    Template::parse(&text, "the new material file")?;
+    Ok(("material.yaml".into(), text))
+}
+
+fn put(into: &mut Map<String, Value>, (path, value): &Block<'_>) {
+    match path {
+        [] => {}
+        [last] => match value {
+            Some(value) => {
+                into.insert((*last).into(), value.clone());
+            }
+            None => {
+                into.remove(*last);
+            }
+        },
+        [first, rest @ ..] => {
+            if let Value::Object(below) = into.entry(*first).or_insert_with(|| json!({})) {
+                put(below, &(rest, value.clone()));
+            }
+        }
+    }
+}
+
+/// A quantity as text with six significant digits: `value` in SI, `per` the SI value of one `unit`.
+pub fn quantity(value: f64, per: f64, unit: &str) -> String {
+    format!("{} {unit}", significant(value / per))
+}
+
+/// A number with six significant digits.
+pub fn significant(value: f64) -> String {
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    let text = format!("{rounded}");
+    if text.len() > 14 {
+        format!("{rounded:e}")
+    } else {
+        text
+    }
+}
+
+/// The order in which people expect a material file's keys; all others follow in the alphabet's.
+const ORDER: [&str; 7] = [
+    "plyflow_material",
+    "name",
+    "source",
+    "plugin",
+    "thickness",
+    "areal_mass",
+    "with",
+];
+const WIDTH: usize = 100;
+
+fn emit_map(text: &mut String, map: &Map<String, Value>, depth: usize) {
+    let mut keys: Vec<&String> = map.keys().collect();
+    keys.sort_by_key(|k| {
+        (
+            ORDER.iter().position(|o| o == k).unwrap_or(ORDER.len()),
+            k.as_str(),
+        )
+    });
+    for key in keys {
+        text.push_str(&format!("{}{}:", "  ".repeat(depth), scalar(key)));
+        emit(text, &map[key.as_str()], depth);
+    }
+}
+
+/// What follows `key:` or `-`, with its line end.
+fn emit(text: &mut String, value: &Value, depth: usize) {
+    let flow = flow(value);
+    match value {
+        Value::Object(map)
+            if !map.is_empty()
+                && (flow.len() > WIDTH || map.values().any(|v| v.is_object() || v.is_array())) =>
+        {
+            text.push('\n');
+            emit_map(text, map, depth + 1);
+        }
+        Value::Array(items) if !items.is_empty() && flow.len() > WIDTH => {
+            text.push('\n');
+            for item in items {
+                text.push_str(&format!(
+                    "{}- {}\n",
+                    "  ".repeat(depth + 1),
+                    self::flow(item)
+                ));
+            }
+        }
+        _ => text.push_str(&format!(" {flow}\n")),
+    }
+}
+
+fn flow(value: &Value) -> String {
+    match value {
+        Value::String(s) => scalar(s),
+        Value::Array(items) => format!(
+            "[{}]",
+            items.iter().map(flow).collect::<Vec<_>>().join(", ")
+        ),
+        Value::Object(map) => {
+            let mut pairs: Vec<(&String, &Value)> = map.iter().collect();
+            pairs.sort_by_key(|p| p.0);
+            let pairs: Vec<String> = pairs
+                .iter()
+                .map(|(k, v)| format!("{}: {}", scalar(k), flow(v)))
+                .collect();
+            format!("{{{}}}", pairs.join(", "))
+        }
+        other => other.to_string(),
+    }
+}
+
+/// A text, quoted unless it can only be read as itself.
+fn scalar(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || " ._/+-%".contains(c);
+    let first = text
+        .chars()
+        .next()
+        .is_some_and(|c| c.is_ascii_alphanumeric() || "./+-".contains(c));
+    let word = ["true", "false", "yes", "no", "on", "off", "null", "y", "n"];
+    let safe = first
+        && text.chars().all(plain)
+        && text.trim() == text
+        && text.parse::<f64>().is_err()
+        && !text.starts_with("- ")
+        && !text.starts_with("--")
+        && !word.contains(&text.to_ascii_lowercase().as_str());
+    if safe {
+        text.to_owned()
+    } else {
+        Value::from(text).to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WOVEN: &str = include_str!("../../../workflows/materials/woven-38616.yaml");
+    const NCF: &str = include_str!("../../../workflows/materials/ncf-fcim359.yaml");
+
+    #[test]
+    fn nothing_but_the_new_block_changes_in_a_material() {
+        for text in [WOVEN, NCF] {
+            let template = Template::parse(text, "old.yaml").unwrap();
+            let new = json!({"linear": "0.0001 N m", "asymptote": "0.01 N", "scale": "5 1/m"});
+            let blocks: [Block<'_>; 1] = [(&["bending", "positive"], Some(new.clone()))];
+            let (name, text) = file(
+                Some(&template),
+                &blocks,
+                "bending.yaml",
+                &["Measured.".into()],
+            )
+            .unwrap();
+            assert_eq!(name, "material.yaml");
+            assert!(
+                text.starts_with("# Measured.\n# New here: bending.positive."),
+                "{text}"
+            );
+            let mut expected = template.value.clone();
+            expected["with"]["bending"]["positive"] = new;
+            assert_eq!(
+                Template::parse(&text, "new").unwrap().value,
+                expected,
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_block_may_be_taken_away_and_a_fragment_stands_alone() {
+        let template = Template::parse(NCF, "old.yaml").unwrap();
+        let (_, text) = file(Some(&template), &[(&["stitch"], None)], "f", &[]).unwrap();
+        assert!(!text.contains("stitch:"), "{text}");
+        let (name, text) = file(
+            None,
+            &[(&["bending", "positive"], Some(json!({"linear": "1 N m"})))],
+            "bending.yaml",
+            &[],
+        )
+        .unwrap();
+        assert_eq!(name, "bending.yaml");
+        assert!(
+            text.ends_with("bending:\n  positive: {linear: 1 N m}\n"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn texts_that_yaml_would_read_as_something_else_are_quoted() {
+        for (given, expected) in [
+            ("0.19457 N mm", "0.19457 N mm"),
+            ("-4.5e-3 1/mm", "-4.5e-3 1/mm"),
+            ("5", "\"5\""),
+            ("no", "\"no\""),
+            ("a: b", "\"a: b\""),
+            ("", "\"\""),
+            ("a, b", "\"a, b\""),
+        ] {
+            assert_eq!(scalar(given), expected);
+        }
+    }
+
+    #[test]
+    fn numbers_keep_six_digits() {
+        assert_eq!(quantity(0.19457e-3, 1e-3, "N mm"), "0.19457 N mm");
+        assert_eq!(quantity(-3539.561234, 1.0, "N/m"), "-3539.56 N/m");
+        assert_eq!(significant(1.23456789e-12), "1.23457e-12");
+        assert_eq!(significant(0.0), "0");
+    }
+
+    #[test]
+    fn what_is_no_material_is_refused() {
+        assert!(
+            Template::parse("a: [", "x")
+                .unwrap_err()
+                .contains("x: is no YAML")
+        );
+        assert!(
+            Template::parse("a: 1", "x")
+                .unwrap_err()
+                .contains("x: is no material file")
+        );
+        assert!(areal_mass(None, None).unwrap_err().contains("areal_mass"));
+    }
+}

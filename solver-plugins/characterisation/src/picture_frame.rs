@@ -1,0 +1,222 @@
+//! The picture-frame test: shear angle and normalised shear force from the cross-head, and the laws of yarns
+//! and stitch.
+
+use crate::csv::Table;
+use crate::linear::{Polynomial, bayes_criterion, fit_polynomial};
+use crate::stitch::{StitchFit, fit_stitch};
+use crate::voce::rms;
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
+
+/// Highest degree of a shear polynomial that `material-fabric` takes.
+pub const MAXIMUM_DEGREE: usize = 9;
+/// A test with fewer rows is refused.
+pub const FEWEST_ROWS: usize = 20;
+
+/// The rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Distance between the hinges (m).
+    pub side: f64,
+    /// Side of the sheared part of the specimen (m).
+    pub specimen_side: f64,
+}
+
+impl Frame {
+    /// Shear angle (rad) when the hinges on the diagonal have moved apart by `displacement` (m):
+    /// `pi/2 - 2 acos(1/sqrt 2 + d / 2L)`. `None` beyond the folded frame.
+    pub fn shear_angle(&self, displacement: f64) -> Option<f64> {
+        let cosine = FRAC_1_SQRT_2 + displacement / (2.0 * self.side);
+        (0.0..1.0)
+            .contains(&cosine)
+            .then(|| FRAC_PI_2 - 2.0 * cosine.acos())
+    }
+
+    /// Normalised shear force (N/m) from the cross-head's force (N) at a shear angle (rad):
+    /// `F L / (2 l^2 cos((pi/2 - g)/2))`, from equal virtual work; for a specimen that fills the frame
+    /// (`l = L`) the usual `F / (2 L cos((pi/2 - g)/2))`.
+    pub fn normalised(&self, force: f64, angle: f64) -> f64 {
+        let half = 0.5 * (FRAC_PI_2 - angle);
+        force * self.side / (2.0 * self.specimen_side * self.specimen_side * half.cos())
+    }
+}
+
+/// One test: shear angle as a magnitude (rad) and normalised force (N/m).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Test {
+    /// Shear angle, not signed (rad).
+    pub angle: Vec<f64>,
+    /// Normalised force, not signed (N/m).
+    pub force: Vec<f64>,
+}
+
+impl Test {
+    /// Normalises the columns `displacement` and `force` of a table.
+    ///
+    /// # Errors
+    /// Too few rows, a displacement that the frame cannot have, a test that hardly shears.
+    pub fn new(table: &Table, frame: &Frame) -> Result<Self, String> {
+        table.at_least(FEWEST_ROWS, "a shear curve")?;
+        let (displacement, force) = (table.values("displacement")?, table.values("force")?);
+        let mut test = Self::default();
+        for i in 0..table.rows() {
+            let d = displacement[i];
+            let angle = frame.shear_angle(d).filter(|_| d >= -0.005 * frame.side);
+            let Some(angle) = angle else {
+                return Err(format!(
+                    "{}: a displacement of {:.3} mm does not fit a frame with a side of {:.3} mm; it is 0 where the \
+                     frame is square, grows as it is pulled and stays below {:.3} mm",
+                    table.place(i),
+                    1e3 * d,
+                    1e3 * frame.side,
+                    1e3 * frame.side * (2.0 - 2f64.sqrt())
+                ));
+            };
+            test.angle.push(angle);
+            test.force.push(frame.normalised(force[i], angle));
+        }
+        let reached = test.largest_angle();
+        if reached < 5f64.to_radians() {
+            return Err(format!(
+                "{}: the test reaches a shear angle of {:.2} deg only; is the displacement in the unit of the header, \
+                 and `frame_side` right?",
+                table.source,
+                reached.to_degrees()
+            ));
+        }
+        Ok(test)
+    }
+
+    fn largest_angle(&self) -> f64 {
+        self.angle.iter().fold(0.0f64, |m, g| m.max(*g))
+    }
+
+    fn up_to(&self, angle: f64) -> (Vec<f64>, Vec<f64>) {
+        let rows = self
+            .angle
+            .iter()
+            .zip(&self.force)
+            .filter(|(g, _)| **g <= angle);
+        rows.map(|(g, f)| (*g, *f)).unzip()
+    }
+}
+
+/// What picture-frame tests tell.
+#[derive(Debug, Clone)]
+pub struct Shear {
+    /// Force of the yarns over the shear angle's magnitude, zero at zero.
+    pub yarns: Polynomial,
+    /// Root mean square residual of the yarns' fit over that of the forces.
+    pub yarns_relative_rms: f64,
+    /// Condition of the yarns' fit.
+    pub condition: f64,
+    /// The stitch's part, for positive shear.
+    pub stitch: Option<StitchFit>,
+    /// Largest angle of the yarns' data (rad): beyond it the polynomial says nothing.
+    pub limit: f64,
+    /// Root mean square of measured less fitted force over that of the measured, positive shear.
+    pub positive_relative_rms: f64,
+    /// The same for negative shear; 0 without a test.
+    pub negative_relative_rms: f64,
+}
+
+impl Shear {
+    /// Normalised force (N/m), odd but for the stitch, at a signed shear angle (rad).
+    pub fn force(&self, g: f64) -> f64 {
+        self.yarns.odd(g) + self.stitch.map_or(0.0, |s| s.stitch.force(g))
+    }
+}
+
+/// Fits the laws.
+///
+/// With a stitch the yarns are fitted to the negative tests, where it is slack, and the stitch to what the
+/// positive tests have above the yarns; without, the yarns to all tests. `degree`: of the yarns' polynomial;
+/// `None`: of 2 to 9 the one with the least Bayesian information criterion.
+///
+/// # Errors
+/// A stitch without negative tests, data that do not determine the fit, no data below `maximum_angle` (rad).
+pub fn characterise(
+    positive: &[Test],
+    negative: &[Test],
+    with_stitch: bool,
+    degree: Option<usize>,
+    maximum_angle: f64,
+) -> Result<Shear, String> {
+    if with_stitch && negative.is_empty() {
+        return Err("the stitch is what positive shear has above negative shear: give tests in `negative` too".into());
+    }
+    let join = |tests: &[&[Test]]| -> (Vec<f64>, Vec<f64>) {
+        let (mut angle, mut force) = (Vec::new(), Vec::new());
+        for test in tests.iter().copied().flatten() {
+            let (g, f) = test.up_to(maximum_angle);
+            angle.extend(g);
+            force.extend(f);
+        }
+        (angle, force)
+    };
+    let (up, down) = (join(&[positive]), join(&[negative]));
+    let own = if with_stitch {
+        down.clone()
+    } else {
+        join(&[positive, negative])
+    };
+    let (yarns, yarns_rms, condition) = fit_yarns(&own.0, &own.1, degree)?;
+    let limit = own.0.iter().fold(0.0f64, |m, g| m.max(*g));
+    let stitch = if with_stitch {
+        let rows = up.0.iter().zip(&up.1).filter(|(g, _)| **g <= limit);
+        let (angle, rest): (Vec<f64>, Vec<f64>) =
+            rows.map(|(g, f)| (*g, f - yarns.odd(*g))).unzip();
+        Some(fit_stitch(&angle, &rest)?)
+    } else {
+        None
+    };
+    let mut shear = Shear {
+        yarns_relative_rms: yarns_rms / rms(&own.1),
+        yarns,
+        condition,
+        stitch,
+        limit,
+        positive_relative_rms: 0.0,
+        negative_relative_rms: 0.0,
+    };
+    let misfit = |(angle, force): &(Vec<f64>, Vec<f64>), sign: f64| {
+        let kept: Vec<usize> = (0..angle.len()).filter(|&i| angle[i] <= limit).collect();
+        let rest: Vec<f64> = kept
+            .iter()
+            .map(|&i| force[i] - sign * shear.force(sign * angle[i]))
+            .collect();
+        let size: Vec<f64> = kept.iter().map(|&i| force[i]).collect();
+        if size.is_empty() {
+            0.0
+        } else {
+            rms(&rest) / rms(&size)
+        }
+    };
+    let told = [misfit(&up, 1.0), misfit(&down, -1.0)];
+    [shear.positive_relative_rms, shear.negative_relative_rms] = told;
+    Ok(shear)
+}
+
+/// Polynomial, rms residual (N/m) and condition.
+fn fit_yarns(
+    angle: &[f64],
+    force: &[f64],
+    degree: Option<usize>,
+) -> Result<(Polynomial, f64, f64), String> {
+    if angle.len() < FEWEST_ROWS {
+        return Err(format!(
+            "{} points of shear lie in the range of the fit; at least {FEWEST_ROWS} are needed",
+            angle.len()
+        ));
+    }
+    let floor = 1e-6 * rms(force);
+    let mut best: Option<(f64, Polynomial, f64, f64)> = None;
+    for d in degree.map_or(2..=MAXIMUM_DEGREE, |d| d..=d) {
+        let (polynomial, solution) = fit_polynomial(angle, force, d)?;
+        let criterion = bayes_criterion(solution.rms, floor, angle.len(), d);
+        if best.as_ref().is_none_or(|b| criterion < b.0) {
+            best = Some((criterion, polynomial, solution.rms, solution.condition));
+        }
+    }
+    best.map(|b| (b.1, b.2, b.3))
+        .ok_or_else(|| "no degree was tried".into())
+}

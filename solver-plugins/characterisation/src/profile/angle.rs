@@ -1,0 +1,348 @@
+//! A clamped polynomial of the tangent's angle over the arc:
+//! `d theta / d xi = (1 - xi)^2 sum b_j P_j(2 xi - 1)`, `xi = s / L`, `theta(0) = 0`.
+//!
+//! The curve has length L exactly, may hang as steeply as it likes, and ends as a free tip must: no moment
+//! and no shear force there, so neither curvature nor its slope. Gauss-Newton on the distances normal to the
+//! curve; the length is the arc at the last point, unless the overhang is given.
+
+use super::grid::{Grid, legendre};
+use super::{Choice, Method, Profile, ProfileFit, Stations, overhang_reaches, spread};
+use crate::linear::{Solution, least_squares};
+use nalgebra::DMatrix;
+
+pub const LEAST_DEGREE: usize = 4;
+const ITERATIONS: usize = 60;
+/// Chords from which the first guess is made.
+const CHORDS: usize = 16;
+/// Stations searched to each side for the foot of a point.
+const WINDOW: usize = 12;
+
+/// The curve for some unknowns, with its derivatives.
+struct Curve {
+    length: f64,
+    angle: Vec<f64>,
+    curvature: Vec<f64>,
+    place: Vec<[f64; 2]>,
+    /// `[term][station]`: derivative of the place with respect to an unknown.
+    change: Vec<Vec<[f64; 2]>>,
+}
+
+/// `[term][station]`: derivative of angle and of curvature times length with respect to an unknown.
+struct Basis {
+    angle: Vec<Vec<f64>>,
+    curvature: Vec<Vec<f64>>,
+}
+
+fn shape(j: usize, t: f64) -> f64 {
+    (1.0 - t) * (1.0 - t) * legendre(j, t)[0]
+}
+
+fn basis(grid: &Grid, terms: usize) -> Basis {
+    Basis {
+        angle: (0..terms)
+            .map(|j| grid.integral_of(|t| shape(j, t)))
+            .collect(),
+        curvature: (0..terms)
+            .map(|j| grid.at.iter().map(|t| shape(j, *t)).collect())
+            .collect(),
+    }
+}
+
+fn combine(rows: &[Vec<f64>], unknowns: &[f64], stations: usize) -> Vec<f64> {
+    (0..stations)
+        .map(|i| unknowns.iter().zip(rows).map(|(b, row)| b * row[i]).sum())
+        .collect()
+}
+
+fn curve(grid: &Grid, basis: &Basis, unknowns: &[f64], length: f64) -> Curve {
+    let n = grid.at.len();
+    let angle = combine(&basis.angle, unknowns, n);
+    let curvature = combine(&basis.curvature, unknowns, n)
+        .iter()
+        .map(|k| k / length)
+        .collect();
+    let along = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let values: Vec<f64> = (0..n).map(|i| length * f(i)).collect();
+        grid.integral(&values)
+    };
+    let pair = |a: Vec<f64>, b: Vec<f64>| -> Vec<[f64; 2]> {
+        a.into_iter().zip(b).map(|(a, b)| [a, b]).collect()
+    };
+    let place = pair(along(&|i| angle[i].cos()), along(&|i| angle[i].sin()));
+    let change = (basis.angle.iter())
+        .map(|phi| {
+            pair(
+                along(&|i| -angle[i].sin() * phi[i]),
+                along(&|i| angle[i].cos() * phi[i]),
+            )
+        })
+        .collect();
+    Curve {
+        length,
+        angle,
+        curvature,
+        place,
+        change,
+    }
+}
+
+/// Where a point's normal meets the curve.
+struct Foot {
+    /// Arc length; before 0 and beyond the length on the straight continuations.
+    arc: f64,
+    /// Distance normal to the curve, signed (m).
+    distance: f64,
+    normal: [f64; 2],
+    station: usize,
+    weight: f64,
+}
+
+impl Curve {
+    /// `near`: a station to search from.
+    fn foot(&self, p: [f64; 2], near: usize) -> Foot {
+        let n = self.place.len();
+        let h = self.length / (n - 1) as f64;
+        let square =
+            |i: usize| (self.place[i][0] - p[0]).powi(2) + (self.place[i][1] - p[1]).powi(2);
+        let (mut nearest, mut least) = (0, f64::INFINITY);
+        // The nearest station within a window, which moves along while the nearest is its last.
+        let (mut from, mut to) = (near.saturating_sub(WINDOW), (near + WINDOW).min(n - 1));
+        loop {
+            for i in from..=to {
+                let d = square(i);
+                if d < least {
+                    (nearest, least) = (i, d);
+                }
+            }
+            if nearest == to && to < n - 1 {
+                (from, to) = (to, (to + WINDOW).min(n - 1));
+            } else if nearest == from && from > 0 && from < near {
+                (from, to) = (from.saturating_sub(WINDOW), from);
+            } else {
+                break;
+            }
+        }
+        let mut s = nearest as f64 * h;
+        for _ in 0..4 {
+            let (c, angle, k) = self.at(s);
+            let (t, normal) = ([angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]);
+            let away = [c[0] - p[0], c[1] - p[1]];
+            let slope = 1.0 + k * (away[0] * normal[0] + away[1] * normal[1]);
+            s -= (away[0] * t[0] + away[1] * t[1]) / slope.max(0.2);
+        }
+        let (c, angle, _) = self.at(s);
+        let normal = [-angle.sin(), angle.cos()];
+        let along = (s / h).clamp(0.0, (n - 1) as f64);
+        let station = (along as usize).min(n - 2);
+        Foot {
+            arc: s,
+            distance: (p[0] - c[0]) * normal[0] + (p[1] - c[1]) * normal[1],
+            normal,
+            station,
+            weight: along - station as f64,
+        }
+    }
+
+    /// Place, angle and curvature at an arc length.
+    fn at(&self, s: f64) -> ([f64; 2], f64, f64) {
+        let n = self.place.len();
+        if s <= 0.0 {
+            return ([s, 0.0], 0.0, 0.0);
+        }
+        if s >= self.length {
+            let (c, a) = (self.place[n - 1], self.angle[n - 1]);
+            let beyond = s - self.length;
+            return ([c[0] + beyond * a.cos(), c[1] + beyond * a.sin()], a, 0.0);
+        }
+        let h = self.length / (n - 1) as f64;
+        let i = ((s / h) as usize).min(n - 2);
+        let t = s / h - i as f64;
+        let (t2, t3) = (t * t, t * t * t);
+        let w = [
+            2.0 * t3 - 3.0 * t2 + 1.0,
+            t3 - 2.0 * t2 + t,
+            3.0 * t2 - 2.0 * t3,
+            t3 - t2,
+        ];
+        let hermite =
+            |a: f64, da: f64, b: f64, db: f64| w[0] * a + w[2] * b + h * (w[1] * da + w[3] * db);
+        let ends = [i, i + 1].map(|i| [self.angle[i].cos(), self.angle[i].sin()]);
+        let c = [0, 1].map(|d| {
+            hermite(
+                self.place[i][d],
+                ends[0][d],
+                self.place[i + 1][d],
+                ends[1][d],
+            )
+        });
+        let (k0, k1) = (self.curvature[i], self.curvature[i + 1]);
+        (
+            c,
+            hermite(self.angle[i], k0, self.angle[i + 1], k1),
+            k0 + t * (k1 - k0),
+        )
+    }
+}
+
+/// Fits; `start`: unknowns of a lower degree and the length found with them.
+pub fn fit(
+    grid: &Grid,
+    profiles: &[Profile],
+    degree: usize,
+    choice: &Choice,
+    start: Option<&(Vec<f64>, f64)>,
+) -> Result<ProfileFit, String> {
+    let terms = degree - 2;
+    let basis = basis(grid, terms);
+    let (mut unknowns, mut length) = match start {
+        Some((unknowns, length)) => (unknowns.clone(), *length),
+        None => guess(grid, &profiles[0], terms)?,
+    };
+    unknowns.resize(terms, 0.0);
+    let given = choice.overhang;
+    length = given.unwrap_or(length);
+    let (mut now, mut arc) = misfit(&curve(grid, &basis, &unknowns, length), profiles);
+    let mut left = squares(&now);
+    let mut solved = None;
+    for _ in 0..ITERATIONS {
+        let shape = curve(grid, &basis, &unknowns, length);
+        let matrix = DMatrix::from_fn(now.len(), terms, |i, j| {
+            let f = &now[i];
+            let [a, b] = [shape.change[j][f.station], shape.change[j][f.station + 1]];
+            let blend = |d: usize| (1.0 - f.weight) * a[d] + f.weight * b[d];
+            blend(0) * f.normal[0] + blend(1) * f.normal[1]
+        });
+        let right: Vec<f64> = now.iter().map(|f| f.distance).collect();
+        let solution = least_squares(&matrix, &right)?;
+        let longer = given.unwrap_or(arc);
+        let step = solution.unknowns.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let moved = (longer - length).abs() / length;
+        let mut factor = 1.0;
+        loop {
+            let tried: Vec<f64> = unknowns
+                .iter()
+                .zip(&solution.unknowns)
+                .map(|(b, d)| b + factor * d)
+                .collect();
+            let stretched = length + factor * (longer - length);
+            let (feet, reached) = misfit(&curve(grid, &basis, &tried, stretched), profiles);
+            let sum = squares(&feet);
+            // The length follows the last point, so the sum may rise a little on the way.
+            if sum <= left * 1.05 + 1e-20 || factor < 0.05 {
+                (unknowns, length, now, arc, left) = (tried, stretched, feet, reached, sum);
+                break;
+            }
+            factor *= 0.5;
+        }
+        solved = Some(solution);
+        if step < 1e-10 && moved < 1e-11 {
+            break;
+        }
+    }
+    let solution = solved.ok_or("the fit of the profile did not start")?;
+    if !left.is_finite() || unknowns.iter().any(|b| !b.is_finite()) {
+        return Err(format!(
+            "the fit of degree {degree} to the profile does not converge"
+        ));
+    }
+    if let Some(overhang) = given {
+        overhang_reaches(overhang, arc)?;
+    }
+    Ok(finish(
+        grid,
+        degree,
+        unknowns,
+        length,
+        now.len(),
+        left,
+        &solution,
+        choice,
+    ))
+}
+
+fn finish(
+    grid: &Grid,
+    degree: usize,
+    unknowns: Vec<f64>,
+    length: f64,
+    rows: usize,
+    left: f64,
+    solution: &Solution,
+    choice: &Choice,
+) -> ProfileFit {
+    let variance = left / (rows as f64 - unknowns.len() as f64).max(1.0);
+    let curve = stations(grid, &unknowns, length);
+    ProfileFit {
+        degree,
+        spread: spread(solution, variance.sqrt()),
+        rms: (left / rows as f64).sqrt(),
+        condition: solution.condition,
+        length,
+        monotone: curve.bends_monotonically(choice.trim),
+        stations: curve,
+        method: Method::TangentAngle,
+        reach: 0.0,
+        unknowns,
+    }
+}
+
+fn squares(feet: &[Foot]) -> f64 {
+    feet.iter().map(|f| f.distance * f.distance).sum()
+}
+
+/// Feet of all points, and the mean over the profiles of the arc at the last point.
+fn misfit(curve: &Curve, profiles: &[Profile]) -> (Vec<Foot>, f64) {
+    let (mut feet, mut arcs) = (Vec::new(), 0.0);
+    for p in profiles {
+        let mut near = 0;
+        for (x, y) in p.x.iter().zip(&p.deflection) {
+            let foot = curve.foot([*x, *y], near);
+            near = foot.station;
+            feet.push(foot);
+        }
+        arcs += feet.last().map_or(0.0, |f: &Foot| f.arc);
+    }
+    (feet, arcs / profiles.len() as f64)
+}
+
+/// Unknowns and length from the angles of chords between points spread over the profile.
+fn guess(grid: &Grid, profile: &Profile, terms: usize) -> Result<(Vec<f64>, f64), String> {
+    let chords = CHORDS.min(profile.last());
+    let knots: Vec<usize> = (0..=chords).map(|c| c * profile.last() / chords).collect();
+    let (mut arc, mut rows) = (0.0, Vec::new());
+    for pair in knots.windows(2) {
+        let d = [
+            profile.x[pair[1]] - profile.x[pair[0]],
+            profile.deflection[pair[1]] - profile.deflection[pair[0]],
+        ];
+        let length = d[0].hypot(d[1]);
+        if length > 0.0 {
+            rows.push((arc + 0.5 * length, d[1].atan2(d[0])));
+        }
+        arc += length;
+    }
+    let basis = basis(grid, terms);
+    let n = grid.at.len() - 1;
+    let station = |i: usize| ((rows[i].0 / arc * n as f64).round() as usize).min(n);
+    let matrix = DMatrix::from_fn(rows.len(), terms, |i, j| basis.angle[j][station(i)]);
+    let right: Vec<f64> = rows.iter().map(|r| r.1).collect();
+    Ok((least_squares(&matrix, &right)?.unknowns, arc))
+}
+
+/// The curve with its curvature and moment arm.
+pub fn stations(grid: &Grid, unknowns: &[f64], length: f64) -> Stations {
+    let shape = curve(grid, &basis(grid, unknowns.len()), unknowns, length);
+    let x: Vec<f64> = shape.place.iter().map(|p| p[0]).collect();
+    let weighted: Vec<f64> = x.iter().map(|x| length * x).collect();
+    let first_moment = grid.integral(&weighted);
+    let last = grid.at.len() - 1;
+    let arc: Vec<f64> = grid.at.iter().map(|t| t * length).collect();
+    let arm = |i: usize| first_moment[last] - first_moment[i] - x[i] * (length - arc[i]);
+    Stations {
+        moment_arm: (0..=last).map(arm).collect(),
+        arc,
+        x,
+        deflection: shape.place.iter().map(|p| p[1]).collect(),
+        curvature: shape.curvature,
+    }
+}

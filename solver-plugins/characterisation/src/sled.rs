@@ -1,0 +1,174 @@
+//! The friction sled: static peak and dynamic mean of the pulling force over the normal force.
+
+use crate::csv::Table;
+
+/// Displacements may go back by so much (m): the jitter of an encoder.
+const JITTER: f64 = 1e-4;
+/// A test with fewer rows in the window is refused.
+const FEWEST_ROWS: usize = 10;
+
+/// What one pull tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pull {
+    /// Largest force before the window, over the normal force.
+    pub static_coefficient: f64,
+    /// Mean force over the window's displacement, over the normal force.
+    pub dynamic_coefficient: f64,
+    /// Standard deviation of the force over the window's displacement, over the normal force: stick-slip and
+    /// noise.
+    pub scatter: f64,
+}
+
+/// Evaluates the columns `displacement` and `force` of a table; `window`: from, to (m); `normal` force (N).
+///
+/// The mean is the integral of the force over the displacement (straight between the rows) over the window's
+/// length, so it does not depend on how densely the machine recorded.
+///
+/// # Errors
+/// A displacement that goes back, a test that does not cover the window, too few rows in it.
+pub fn evaluate(table: &Table, window: [f64; 2], normal: f64) -> Result<Pull, String> {
+    let [from, to] = window;
+    if from.is_nan() || to.is_nan() || from < 0.0 || to <= from {
+        return Err(format!(
+            "the window from {:.3} mm to {:.3} mm is empty",
+            1e3 * from,
+            1e3 * to
+        ));
+    }
+    if normal.is_nan() || normal <= 0.0 {
+        return Err(format!(
+            "a normal force of {normal} N is none; it must be positive"
+        ));
+    }
+    let (s, f) = (table.values("displacement")?, table.values("force")?);
+    let mut farthest = f64::NEG_INFINITY;
+    for i in 0..s.len() {
+        if s[i] < farthest - JITTER {
+            return Err(format!(
+                "{}: the displacement goes back from {:.3} mm to {:.3} mm; one file holds one pull",
+                table.place(i),
+                1e3 * farthest,
+                1e3 * s[i]
+            ));
+        }
+        farthest = farthest.max(s[i]);
+    }
+    let (first, last) = (
+        s.first().copied().unwrap_or(0.0),
+        s.last().copied().unwrap_or(0.0),
+    );
+    if first > from || last < to {
+        return Err(format!(
+            "{}: the test covers {:.2} mm to {:.2} mm; the mean is taken from {:.2} mm to {:.2} mm",
+            table.source,
+            1e3 * first,
+            1e3 * last,
+            1e3 * from,
+            1e3 * to
+        ));
+    }
+    let inside = s.iter().filter(|v| (from..=to).contains(*v)).count();
+    if inside < FEWEST_ROWS {
+        return Err(format!(
+            "{}: {inside} rows lie in the window; at least {FEWEST_ROWS} are needed",
+            table.source
+        ));
+    }
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for i in 1..s.len() {
+        let (a, b) = (s[i - 1].clamp(from, to), s[i].clamp(from, to));
+        if a == b {
+            continue;
+        }
+        let at = |v: f64| f[i - 1] + (f[i] - f[i - 1]) * (v - s[i - 1]) / (s[i] - s[i - 1]);
+        let (fa, fb) = (at(a), at(b));
+        sum += 0.5 * (fa + fb) * (b - a);
+        squares += (fa * fa + fa * fb + fb * fb) / 3.0 * (b - a);
+    }
+    let mean = sum / (to - from);
+    let variance = squares / (to - from) - mean * mean;
+    let peak = s
+        .iter()
+        .zip(f)
+        .filter(|(v, _)| **v < from)
+        .fold(0.0f64, |m, (_, f)| m.max(*f));
+    Ok(Pull {
+        static_coefficient: peak / normal,
+        dynamic_coefficient: mean / normal,
+        scatter: variance.max(0.0).sqrt() / normal,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::csv::{Column, parse};
+    use plyflow_model::units::Dimension;
+
+    fn table(rows: impl Iterator<Item = (f64, f64)>) -> Table {
+        let wanted = [
+            Column::required("displacement", Dimension::Length),
+            Column::required("force", Dimension::Force),
+        ];
+        let rows: Vec<String> = rows.map(|(s, f)| format!("{s},{f}\n")).collect();
+        parse(
+            &format!("displacement [mm],force [N]\n{}", rows.concat()),
+            "t.csv",
+            &wanted,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn mean_peak_and_scatter_of_a_known_pull() {
+        // 3 N at 20 mm, then 2 N + 0.5 N sin with whole periods in the window, recorded unevenly.
+        let force = |s: f64| match s {
+            s if s < 20.0 => 3.0 * s / 20.0,
+            s => 2.0 + 0.5 * (std::f64::consts::TAU * s / 10.0).sin(),
+        };
+        let places = (0..=4000).map(|i| 250.0 * (i as f64 / 4000.0).powf(1.3));
+        let pull = evaluate(&table(places.map(|s| (s, force(s)))), [0.1, 0.2], 5.0).unwrap();
+        assert!((pull.dynamic_coefficient - 0.4).abs() < 1e-5, "{pull:?}");
+        assert!((pull.static_coefficient - 0.6).abs() < 0.01, "{pull:?}");
+        assert!(
+            (pull.scatter - 0.5 / 2f64.sqrt() / 5.0).abs() < 1e-4,
+            "{pull:?}"
+        );
+    }
+
+    #[test]
+    fn the_mean_does_not_depend_on_how_densely_parts_are_recorded() {
+        let force = |s: f64| 1.0 + s / 100.0;
+        let even = table(
+            (0..=200)
+                .map(|i| f64::from(i) * 1.25)
+                .map(|s| (s, force(s))),
+        );
+        let crowded = table(
+            (0..=1000)
+                .map(|i| {
+                    if i < 900 {
+                        0.13 * f64::from(i)
+                    } else {
+                        117.0 + 1.33 * f64::from(i - 900)
+                    }
+                })
+                .map(|s| (s, force(s))),
+        );
+        let mean = |t: &Table| evaluate(t, [0.1, 0.2], 1.0).unwrap().dynamic_coefficient;
+        assert!((mean(&even) - 2.5).abs() < 1e-12 && (mean(&crowded) - 2.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_no_pull_through_the_window_is_refused() {
+        let line = |to: u32| table((0..=to).map(|i| (f64::from(i), 2.0)));
+        let error = |t: &Table, window| evaluate(t, window, 5.0).unwrap_err();
+        assert!(error(&line(150), [0.1, 0.2]).contains("covers 0.00 mm to 150.00 mm"));
+        assert!(error(&line(250), [0.2, 0.1]).contains("is empty"));
+        let back = table((0..=250).map(|i| (f64::from(if i == 120 { 80 } else { i }), 2.0)));
+        assert!(error(&back, [0.1, 0.2]).starts_with("t.csv:122: the displacement goes back"));
+        assert!(evaluate(&line(250), [0.1, 0.2], 0.0).is_err());
+        let thin = table((0..=5).map(|i| (f64::from(i) * 50.0, 2.0)));
+        assert!(error(&thin, [0.1, 0.2]).contains("3 rows"));
+    }
+}

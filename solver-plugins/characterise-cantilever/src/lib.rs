@@ -1,0 +1,95 @@
+//! Step plugin `characterise-cantilever`: constant bending stiffness from a standard cantilever test.
+
+use plyflow_characterisation::GRAVITY;
+use plyflow_characterisation::cantilever::{Formula, mean_and_deviation, stiffness};
+use plyflow_characterisation::csv::{Column, read};
+use plyflow_characterisation::material::{self, Template, quantity, significant};
+use plyflow_characterisation::output::{Output, Series};
+use plyflow_sdk::{Host, Step, StepError, export_step};
+use serde::Deserialize;
+use serde_json::json;
+
+/// The step.
+pub struct CharacteriseCantilever;
+
+export_step!(CharacteriseCantilever);
+
+#[derive(Deserialize)]
+struct Parameters {
+    overhangs: String,
+    angle: f64,
+    formula: Formula,
+    areal_mass: Option<f64>,
+    bending: String,
+    template: Option<String>,
+}
+
+const COLUMNS: [Column; 2] = [
+    Column::required("overhang", plyflow_characterisation::Dimension::Length),
+    Column::optional("angle", plyflow_characterisation::Dimension::Angle),
+];
+
+impl Step for CharacteriseCantilever {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let p: Parameters = host.parameters()?;
+        let template = Template::of(host, p.template.as_deref())?;
+        let weight = GRAVITY * material::areal_mass(p.areal_mass, template.as_ref())?;
+        let table = read(&p.overhangs, &COLUMNS)?;
+        table.at_least(1, "a stiffness")?;
+        let overhangs = table.values("overhang")?;
+        let mut stiffnesses = Vec::new();
+        for (i, overhang) in overhangs.iter().enumerate() {
+            let angle = table.column("angle").map_or(p.angle, |a| a[i]);
+            let b = stiffness(p.formula, *overhang, angle, weight);
+            stiffnesses.push(b.map_err(|e| format!("{}: {e}", table.place(i)))?);
+        }
+        let [mean, deviation] = mean_and_deviation(&stiffnesses);
+        let n = stiffnesses.len();
+        let mut out = Output::default();
+        let numbers: Vec<f64> = (1..=n).map(|i| i as f64).collect();
+        out.curve("curves/specimens/number", "1", &numbers);
+        out.curve("curves/specimens/overhang", "m", overhangs);
+        out.curve("curves/specimens/stiffness", "N m", &stiffnesses);
+        out.curve("curves/specimens/mean", "N m", &vec![mean; n]);
+        let number = "curves/specimens/number";
+        out.plot(
+            "stiffness",
+            "Bending stiffness by specimen",
+            ("specimen", "1"),
+            ("bending stiffness", "N mm"),
+            &[
+                Series::new("measured", number, "curves/specimens/stiffness", "points"),
+                Series::new("mean", number, "curves/specimens/mean", "dashed"),
+            ],
+        );
+        let relative = if mean > 0.0 {
+            100.0 * deviation / mean
+        } else {
+            0.0
+        };
+        let note = [format!(
+            "Bending stiffness ({}) from a standard cantilever test of {n} specimens ({}): standard deviation {} %.",
+            p.bending,
+            table.source,
+            significant(relative)
+        )];
+        let law = json!({"linear": quantity(mean, 1e-3, "N mm")});
+        let path = ["bending", p.bending.as_str()];
+        let (name, text) = material::file(
+            template.as_ref(),
+            &[(&path, Some(law))],
+            "bending.yaml",
+            &note,
+        )?;
+        out.file(&name, &text);
+        out.attribute("source", json!(table.source));
+        out.attribute("bending", json!(p.bending));
+        out.result("bending_stiffness", mean, "N m");
+        out.result("bending_stiffness_deviation", deviation, "N m");
+        out.result("bending_length", (mean / weight).cbrt(), "m");
+        out.result("specimens", n as f64, "1");
+        out.write(host)
+    }
+}

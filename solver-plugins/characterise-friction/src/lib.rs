@@ -1,0 +1,107 @@
+//! Step plugin `characterise-friction`: Coulomb coefficients from sled tests.
+
+use plyflow_characterisation::cantilever::mean_and_deviation;
+use plyflow_characterisation::csv::{Column, read};
+use plyflow_characterisation::material::significant;
+use plyflow_characterisation::output::{Output, Series};
+use plyflow_characterisation::sled::{Pull, evaluate};
+use plyflow_characterisation::{Dimension, GRAVITY};
+use plyflow_sdk::{Host, Step, StepError, export_step};
+use serde::Deserialize;
+use serde_json::json;
+
+/// The step.
+pub struct CharacteriseFriction;
+
+export_step!(CharacteriseFriction);
+
+#[derive(Deserialize)]
+struct Parameters {
+    pulls: Vec<String>,
+    normal_force: Option<f64>,
+    sled_mass: Option<f64>,
+    from: f64,
+    to: f64,
+    pair: String,
+}
+
+const COLUMNS: [Column; 2] = [
+    Column::required("displacement", Dimension::Length),
+    Column::required("force", Dimension::Force),
+];
+
+impl Step for CharacteriseFriction {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let p: Parameters = host.parameters()?;
+        let normal = match (p.normal_force, p.sled_mass) {
+            (Some(force), None) => force,
+            (None, Some(mass)) => mass * GRAVITY,
+            (Some(_), Some(_)) => {
+                return Err(
+                    "both `normal_force` and `sled_mass` are given; give one of them".into(),
+                );
+            }
+            (None, None) => {
+                return Err(
+                    "neither `normal_force` nor `sled_mass` is given; give one of them".into(),
+                );
+            }
+        };
+        if p.pulls.is_empty() {
+            return Err("`pulls` is empty; give at least one CSV file of a pull".into());
+        }
+        let mut out = Output::default();
+        let (mut pulls, mut series) = (Vec::<Pull>::new(), Vec::new());
+        for (i, path) in p.pulls.iter().enumerate() {
+            let table = read(path, &COLUMNS)?;
+            pulls.push(evaluate(&table, [p.from, p.to], normal)?);
+            let [x, y] =
+                ["displacement", "coefficient"].map(|n| format!("curves/pull_{}/{n}", i + 1));
+            let coefficient: Vec<f64> = table.values("force")?.iter().map(|f| f / normal).collect();
+            out.curve(&x, "m", table.values("displacement")?);
+            out.curve(&y, "1", &coefficient);
+            series.push(Series::new(&table.source, &x, &y, "line"));
+        }
+        let of = |f: fn(&Pull) -> f64| mean_and_deviation(&pulls.iter().map(f).collect::<Vec<_>>());
+        let [dynamic, dynamic_deviation] = of(|p| p.dynamic_coefficient);
+        let [peak, peak_deviation] = of(|p| p.static_coefficient);
+        out.curve("curves/mean/displacement", "m", &[p.from, p.to]);
+        out.curve("curves/mean/coefficient", "1", &[dynamic; 2]);
+        series.push(Series::new(
+            "dynamic mean",
+            "curves/mean/displacement",
+            "curves/mean/coefficient",
+            "dashed",
+        ));
+        let y = ("force over normal force", "1");
+        out.plot(
+            "friction",
+            "Pulling force over normal force",
+            ("displacement", "mm"),
+            y,
+            &series,
+        );
+        out.file(
+            "friction.yaml",
+            &format!(
+                "# Dynamic coefficient from {} pulls, standard deviation {}; static peak {}.\n\
+                 # A fragment: its line goes into `friction:` of a scene.\nfriction:\n  {}: {}\n",
+                pulls.len(),
+                significant(dynamic_deviation),
+                significant(peak),
+                p.pair,
+                significant(dynamic)
+            ),
+        );
+        out.attribute("pair", json!(p.pair));
+        out.result("dynamic_coefficient", dynamic, "1");
+        out.result("dynamic_deviation", dynamic_deviation, "1");
+        out.result("static_coefficient", peak, "1");
+        out.result("static_deviation", peak_deviation, "1");
+        out.result("scatter", of(|p| p.scatter)[0], "1");
+        out.result("repeats", pulls.len() as f64, "1");
+        out.write(host)
+    }
+}

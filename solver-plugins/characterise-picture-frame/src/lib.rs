@@ -1,0 +1,172 @@
+//! Step plugin `characterise-picture-frame`: shear law of yarns and stitch from picture-frame tests.
+
+use plyflow_characterisation::Dimension;
+use plyflow_characterisation::csv::{Column, read};
+use plyflow_characterisation::material::{self, Block, Template, quantity, significant};
+use plyflow_characterisation::output::{Output, Series};
+use plyflow_characterisation::picture_frame::{Frame, Shear, Test, characterise};
+use plyflow_sdk::{Host, Log, Step, StepError, export_step};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// The step.
+pub struct CharacterisePictureFrame;
+
+export_step!(CharacterisePictureFrame);
+
+#[derive(Deserialize)]
+struct Parameters {
+    positive: Vec<String>,
+    negative: Vec<String>,
+    frame_side: f64,
+    specimen_side: Option<f64>,
+    stitch: bool,
+    degree: Option<usize>,
+    maximum_angle: f64,
+    template: Option<String>,
+}
+
+const COLUMNS: [Column; 2] = [
+    Column::required("displacement", Dimension::Length),
+    Column::required("force", Dimension::Force),
+];
+/// Points of a fitted curve.
+const POINTS: usize = 240;
+/// What `material-fabric` takes as the end of the fitted range (rad).
+const LIMITS: [f64; 2] = [
+    5.0 * std::f64::consts::PI / 180.0,
+    80.0 * std::f64::consts::PI / 180.0,
+];
+
+impl Step for CharacterisePictureFrame {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let p: Parameters = host.parameters()?;
+        let template = Template::of(host, p.template.as_deref())?;
+        if p.positive.is_empty() {
+            return Err("`positive` is empty; give at least one CSV file of a test".into());
+        }
+        let frame = Frame {
+            side: p.frame_side,
+            specimen_side: p.specimen_side.unwrap_or(p.frame_side),
+        };
+        if frame.specimen_side > frame.side {
+            return Err("`specimen_side` is larger than `frame_side`; the sheared part lies within the frame".into());
+        }
+        let mut out = Output::default();
+        let (positive, mut series) = read_tests(&mut out, &frame, &p.positive, "positive", 1.0)?;
+        let (negative, more) = read_tests(&mut out, &frame, &p.negative, "negative", -1.0)?;
+        let shear = characterise(&positive, &negative, p.stitch, p.degree, p.maximum_angle)?;
+        if shear.yarns.value(0.5 * shear.limit) <= 0.0 {
+            host.log(
+                Log::Warn,
+                "the fitted shear force is not positive half-way: look at the data",
+            );
+        }
+        series.extend(more);
+        write_fit(&mut out, &shear, !negative.is_empty(), series);
+        write_file(&mut out, &shear, template.as_ref(), &p)?;
+        write_results(&mut out, &shear, !negative.is_empty());
+        out.write(host)
+    }
+}
+
+fn read_tests(
+    out: &mut Output,
+    frame: &Frame,
+    paths: &[String],
+    name: &str,
+    sign: f64,
+) -> Result<(Vec<Test>, Vec<Series>), StepError> {
+    let (mut tests, mut series) = (Vec::new(), Vec::new());
+    for (i, path) in paths.iter().enumerate() {
+        let table = read(path, &COLUMNS)?;
+        let test = Test::new(&table, frame)?;
+        let [x, y] =
+            ["shear_angle", "normalised_force"].map(|n| format!("curves/{name}_{}/{n}", i + 1));
+        let signed = |v: &[f64]| v.iter().map(|v| sign * v).collect::<Vec<_>>();
+        out.curve(&x, "rad", &signed(&test.angle));
+        out.curve(&y, "N/m", &signed(&test.force));
+        series.push(Series::new(&table.source, &x, &y, "points"));
+        tests.push(test);
+    }
+    Ok((tests, series))
+}
+
+fn write_fit(out: &mut Output, shear: &Shear, both: bool, mut series: Vec<Series>) {
+    let from = if both { -shear.limit } else { 0.0 };
+    let angle: Vec<f64> = (0..=POINTS)
+        .map(|i| from + (shear.limit - from) * i as f64 / POINTS as f64)
+        .collect();
+    let of = |f: &dyn Fn(f64) -> f64| angle.iter().map(|g| f(*g)).collect::<Vec<f64>>();
+    out.curve("curves/fit/shear_angle", "rad", &angle);
+    out.curve(
+        "curves/fit/normalised_force",
+        "N/m",
+        &of(&|g| shear.force(g)),
+    );
+    let x = "curves/fit/shear_angle";
+    series.push(Series::new("fit", x, "curves/fit/normalised_force", "line"));
+    if shear.stitch.is_some() {
+        out.curve("curves/fit/yarns", "N/m", &of(&|g| shear.yarns.odd(g)));
+        series.push(Series::new("yarns", x, "curves/fit/yarns", "dashed"));
+    }
+    let axes = [("shear angle", "deg"), ("normalised shear force", "N/m")];
+    out.plot("shear", "Normalised shear force", axes[0], axes[1], &series);
+}
+
+fn write_file(
+    out: &mut Output,
+    shear: &Shear,
+    template: Option<&Template>,
+    p: &Parameters,
+) -> Result<(), StepError> {
+    let coefficients: Vec<Value> = shear
+        .yarns
+        .coefficients
+        .iter()
+        .map(|c| json!(quantity(*c, 1.0, "N/m")))
+        .collect();
+    let limit = shear.limit.clamp(LIMITS[0], LIMITS[1]);
+    let law = json!({"coefficients": coefficients, "limit": quantity(limit, 1.0, "rad")});
+    let stitch = shear.stitch.map(|s| {
+        let angles = s.stitch.angles.map(|g| quantity(g, 1.0, "rad"));
+        let forces = [0.0, s.stitch.peak, 0.0].map(|f| quantity(f, 1.0, "N/m"));
+        json!({"angles": angles, "forces": forces})
+    });
+    let note = [format!(
+        "Shear from {} positive and {} negative picture-frame tests, to {} deg: rms residual {} % of the force.",
+        p.positive.len(),
+        p.negative.len(),
+        significant(shear.limit.to_degrees()),
+        significant(100.0 * shear.positive_relative_rms)
+    )];
+    // A stitch of the template would be counted twice where the yarns' polynomial holds all of the force.
+    let blocks: [Block<'_>; 2] = [(&["shear"], Some(law)), (&["stitch"], stitch)];
+    let (name, text) = material::file(template, &blocks, "shear.yaml", &note)?;
+    out.file(&name, &text);
+    Ok(())
+}
+
+fn write_results(out: &mut Output, shear: &Shear, both: bool) {
+    for (n, c) in shear.yarns.coefficients.iter().enumerate().skip(1) {
+        out.result(&format!("coefficient.{n}"), *c, "N/m");
+    }
+    out.result("degree", (shear.yarns.coefficients.len() - 1) as f64, "1");
+    out.result("limit", shear.limit, "rad");
+    out.result("condition", shear.condition, "1");
+    out.result("yarns_rms", shear.yarns_relative_rms, "1");
+    out.result("positive_rms", shear.positive_relative_rms, "1");
+    if both {
+        out.result("negative_rms", shear.negative_relative_rms, "1");
+    }
+    if let Some(fit) = shear.stitch {
+        let [onset, top, end] = fit.stitch.angles;
+        out.result("stitch_onset", onset, "rad");
+        out.result("stitch_peak_angle", top, "rad");
+        out.result("stitch_end", end, "rad");
+        out.result("stitch_peak", fit.stitch.peak, "N/m");
+        out.result("stitch_condition", fit.condition, "1");
+    }
+}

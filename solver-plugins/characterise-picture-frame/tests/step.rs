@@ -1,0 +1,155 @@
+//! The step on cross-head curves of known laws.
+
+use plyflow_characterisation::synthetic::{Noise, frame_force, ncf_shear, woven_shear};
+use plyflow_characterise_picture_frame::CharacterisePictureFrame;
+use plyflow_model::units::{Dimension, parse_quantity};
+use plyflow_surface::memory_host::{MemoryArtifact, run};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+const SIDE: f64 = 0.145;
+const SPECIMEN: f64 = 0.120;
+
+fn csv(folder: &Path, name: &str, law: fn(f64) -> f64, sign: f64, to: f64) -> PathBuf {
+    let last = 2.0 * SIDE * ((0.5 * (90.0 - to)).to_radians().cos() - 0.5f64.sqrt());
+    let mut random = Noise::new(name.len() as u64);
+    let rows: String = (0..=400)
+        .map(|i| last * f64::from(i) / 400.0)
+        .map(|d| {
+            (
+                d,
+                frame_force(&law, SIDE, SPECIMEN, d, sign) + 0.01 * random.normal(),
+            )
+        })
+        .map(|(d, f)| format!("{},{f}\n", 1e3 * d))
+        .collect();
+    let path = folder.join(name);
+    std::fs::write(&path, format!("displacement [mm],force [N]\n{rows}")).unwrap();
+    path
+}
+
+fn with(positive: &[PathBuf], negative: &[PathBuf], stitch: bool, material: &str) -> Value {
+    let template = format!(
+        "{}/../../workflows/materials/{material}.yaml",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    json!({"positive": positive, "negative": negative, "frame_side": SIDE, "specimen_side": SPECIMEN,
+           "stitch": stitch, "template": template})
+}
+
+/// Root mean square of the curve `curves/fit` less the law, over that of the law, for one sign of shear.
+fn curve_error(out: &MemoryArtifact, law: fn(f64) -> f64, sign: f64) -> f64 {
+    let (g, f) = (
+        &out.arrays["curves/fit/shear_angle"].1,
+        &out.arrays["curves/fit/normalised_force"].1,
+    );
+    let (mut off, mut size) = (0.0, 0.0);
+    for (g, f) in g.iter().zip(f).filter(|(g, _)| **g * sign > 0.0) {
+        off += (f - law(*g)).powi(2);
+        size += law(*g).powi(2);
+    }
+    (off / size).sqrt()
+}
+
+fn material(out: &MemoryArtifact) -> Value {
+    serde_saphyr::from_str(out.attributes["files"][0]["text"].as_str().unwrap()).unwrap()
+}
+
+#[test]
+fn the_woven_law_comes_back_and_stands_in_the_material() {
+    let folder = tempfile::tempdir().unwrap();
+    let up = csv(folder.path(), "up.csv", woven_shear, 1.0, 60.0);
+    let down = csv(folder.path(), "down.csv", woven_shear, -1.0, 60.0);
+    let out = run::<CharacterisePictureFrame>(with(&[up], &[down], false, "woven-38616"), &[], &[])
+        .unwrap();
+    for sign in [1.0, -1.0] {
+        let error = curve_error(&out, woven_shear, sign);
+        println!("woven {sign}: {error:.5}");
+        assert!(error < 0.003, "{error}");
+    }
+    // The polynomial of the file is the curve of the artifact.
+    let value = material(&out);
+    let coefficients: Vec<f64> = (value["with"]["shear"]["coefficients"]
+        .as_array()
+        .unwrap()
+        .iter())
+    .map(|c| parse_quantity(c.as_str().unwrap(), Dimension::ForcePerLength).unwrap())
+    .collect();
+    assert_eq!(coefficients[0], 0.0);
+    let g = 0.8f64;
+    let sum: f64 = (0..).zip(&coefficients).map(|(n, c)| c * g.powi(n)).sum();
+    assert!((sum / woven_shear(g) - 1.0).abs() < 0.005, "{sum}");
+    assert!(value["with"]["stitch"].is_null());
+}
+
+#[test]
+fn yarns_and_stitch_of_the_ncf_come_back_and_stand_in_the_material() {
+    let folder = tempfile::tempdir().unwrap();
+    let up = csv(folder.path(), "up.csv", ncf_shear, 1.0, 55.0);
+    let down = csv(folder.path(), "down.csv", ncf_shear, -1.0, 55.0);
+    let out = run::<CharacterisePictureFrame>(with(&[up], &[down], true, "ncf-fcim359"), &[], &[])
+        .unwrap();
+    for sign in [1.0, -1.0] {
+        let error = curve_error(&out, ncf_shear, sign);
+        println!("NCF {sign}: {error:.5}");
+        assert!(error < 0.01, "{error}");
+    }
+    assert!((out.result("stitch_onset") - 0.06).abs() < 2e-3);
+    assert!((out.result("stitch_peak_angle") - 0.5).abs() < 2e-3);
+    assert!((out.result("stitch_end") - 0.75).abs() < 2e-3);
+    assert!((out.result("stitch_peak") / 880.0 - 1.0).abs() < 2e-3);
+    let value = material(&out);
+    let forces = &value["with"]["stitch"]["forces"];
+    assert_eq!(
+        (forces[0].as_str(), forces[2].as_str()),
+        (Some("0 N/m"), Some("0 N/m"))
+    );
+    assert!(value["with"]["bending"]["negative"].is_object());
+}
+
+#[test]
+fn a_fabric_fitted_without_a_stitch_loses_that_of_the_template() {
+    let folder = tempfile::tempdir().unwrap();
+    let up = csv(folder.path(), "up.csv", woven_shear, 1.0, 60.0);
+    let out =
+        run::<CharacterisePictureFrame>(with(&[up], &[], false, "ncf-fcim359"), &[], &[]).unwrap();
+    assert!(material(&out)["with"]["stitch"].is_null());
+}
+
+#[test]
+fn bad_tests_are_refused_with_file_and_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let bad = folder.path().join("bad.csv");
+    let refused = |text: &str| {
+        std::fs::write(&bad, text).unwrap();
+        run::<CharacterisePictureFrame>(json!({"positive": [bad], "frame_side": SIDE}), &[], &[])
+            .unwrap_err()
+    };
+    for (text, expected) in [
+        (
+            "displacement [mm],load [N]\n1,2\n",
+            "bad.csv:1: there is no column 'force'",
+        ),
+        (
+            "displacement [mm],force [N/m]\n1,2\n",
+            "the unit 'N/m' does not fit",
+        ),
+        (
+            "displacement [mm],force [N]\n1,inf\n",
+            "bad.csv:2: column 'force'",
+        ),
+        ("displacement [mm],force [N]\n1,2\n2,3\n", "at least 20"),
+    ] {
+        let e = refused(text);
+        assert!(e.contains(expected), "{e}");
+    }
+    let good = csv(folder.path(), "up.csv", woven_shear, 1.0, 60.0);
+    let error = |with| run::<CharacterisePictureFrame>(with, &[], &[]).unwrap_err();
+    assert!(error(json!({"positive": [], "frame_side": SIDE})).contains("`positive` is empty"));
+    assert!(
+        error(json!({"positive": [good], "frame_side": SIDE, "stitch": true}))
+            .contains("`negative`")
+    );
+    let large = json!({"positive": [good], "frame_side": SIDE, "specimen_side": 2.0 * SIDE});
+    assert!(error(large).contains("`specimen_side` is larger"));
+}
