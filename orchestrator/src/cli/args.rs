@@ -57,6 +57,11 @@ pub enum Command {
         after_help = "Examples:\n  plyflow inspect result.h5\n  plyflow inspect 'local[A]' --workflow workflow.yaml"
     )]
     Inspect(InspectArgs),
+    /// Write the text files that the artifact of a step carries, such as a material file
+    #[command(
+        after_help = "Examples:\n  plyflow extract workflow.yaml bending --list\n  plyflow extract workflow.yaml bending --to materials\n  plyflow extract workflow.yaml 'local[A]' --to out --force"
+    )]
+    Extract(ExtractArgs),
     /// Print the JSON Schema of a file format, for editors
     #[command(
         after_help = "Examples:\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
@@ -331,6 +336,25 @@ pub struct InspectArgs {
     /// Form
     #[arg(long, value_enum, default_value = "text")]
     pub format: TextOrJson,
+}
+
+/// `extract`
+#[derive(Debug, Args)]
+pub struct ExtractArgs {
+    #[command(flatten)]
+    /// The workflow.
+    pub workflow: Workflow,
+    /// A step, or one of its items: local[A]
+    pub step: String,
+    /// Folder to write into, made if need be [default: the current one]
+    #[arg(long, value_name = "DIR")]
+    pub to: Option<Utf8PathBuf>,
+    /// Only list the files
+    #[arg(long, short)]
+    pub list: bool,
+    /// Replace files that are there with another content
+    #[arg(long, conflicts_with = "list")]
+    pub force: bool,
 }
 
 /// `schema`

@@ -2,7 +2,7 @@
 
 use super::args::{InspectArgs, Places, TextOrJson, Workflow};
 use super::explain::instances_named;
-use super::open::open;
+use super::open::{Opened, open};
 use super::table::{bytes, number, table};
 use super::{Done, Stop, print};
 use crate::engine::core::State;
@@ -67,15 +67,23 @@ fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
         places,
         set: Vec::new(),
     })?;
+    artifact_of(&opened, &args.artifact, file)
+}
+
+/// The artifact of a step or of one of its items (`local[A]`) of the workflow in `file`.
+///
+/// # Errors
+/// [`exit::USAGE`] when there is no such step or item, several items, or no artifact yet.
+pub fn artifact_of(opened: &Opened, word: &str, file: &Utf8Path) -> Result<Utf8PathBuf, Stop> {
     let session = opened.look()?;
-    let ids = instances_named(&opened, &session, &args.artifact)?;
+    let ids = instances_named(opened, &session, word)?;
     let labels: Vec<String> = ids.iter().map(|id| session.core.label(*id)).collect();
     let [id] = ids[..] else {
-        let text = format!(
-            "'{}' has several items: {}",
-            args.artifact,
-            labels.join(", ")
-        );
+        let text = if labels.is_empty() {
+            format!("'{word}' has no items yet, or none at all; start with: plyflow run {file}")
+        } else {
+            format!("'{word}' has several items: {}", labels.join(", "))
+        };
         return Err(Stop::new(exit::USAGE, text));
     };
     let instance = &session.core.instances()[id];

@@ -4,6 +4,7 @@ mod args;
 mod check_plugin;
 mod clean;
 mod explain;
+mod extract;
 mod inspect;
 mod open;
 mod plan;
@@ -91,6 +92,7 @@ fn dispatch(command: Command) -> Done {
         Command::Plugins(a) => plugins::plugins(&a),
         Command::CheckPlugin(a) => check_plugin::check_plugin(&a),
         Command::Inspect(a) => inspect::inspect(&a),
+        Command::Extract(a) => extract::extract(&a),
         Command::Schema(a) => plugins::schema(&a),
         Command::Clean(a) => clean::clean(&a),
         Command::Completions { shell } => {

@@ -63,6 +63,9 @@ pub fn beside(workflow: &Utf8Path) -> Utf8PathBuf {
     workflow.with_file_name(name)
 }
 
+/// Changes with what a page shows of the same artifacts: an older page is then written again.
+const LAYOUT: &[u8] = b"page 2";
+
 /// Names all that a report depends on.
 pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure]) -> String {
     let mut hasher = blake3::Hasher::new();
@@ -71,6 +74,7 @@ pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure])
         hasher.update(bytes);
     };
     add(env!("CARGO_PKG_VERSION").as_bytes());
+    add(LAYOUT);
     add(opened.workflow.name.as_bytes());
     add(opened
         .workflow

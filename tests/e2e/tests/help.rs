@@ -90,7 +90,13 @@ fn a_wrong_command_line_is_code_2_and_says_what_is_right() {
 
 #[test]
 fn schemas_and_completions_are_printed_without_a_workflow() {
-    for which in ["workflow", "plain-workflow", "scene", "material"] {
+    for which in [
+        "workflow",
+        "plain-workflow",
+        "scene",
+        "material",
+        "expected",
+    ] {
         let output = plyflow(&["schema", which]);
         let schema: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         assert!(

@@ -1,0 +1,232 @@
+//! `extract`: writes the text files that an artifact carries.
+
+use super::args::ExtractArgs;
+use super::inspect::artifact_of;
+use super::open::open;
+use super::table::{bytes, table};
+use super::{Done, Stop, print};
+use crate::exit;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_artifact::Artifact;
+use serde::Deserialize;
+use serde_json::Value;
+
+/// A text file that an artifact carries in its attributes.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+struct TextFile {
+    name: String,
+    text: String,
+}
+
+/// `plyflow extract`.
+///
+/// # Errors
+/// [`exit::USAGE`] when the step has no artifact or no files, or when another file is in the way;
+/// [`exit::INTERNAL`] when what the step wrote cannot be used or a file cannot be written. Nothing is written then, but
+/// what was before a disk failed.
+pub fn extract(args: &ExtractArgs) -> Done {
+    let opened = open(&args.workflow)?;
+    let path = artifact_of(&opened, &args.step, &args.workflow.workflow)?;
+    let artifact = Artifact::open(path.as_std_path()).map_err(|e| Stop::new(exit::INTERNAL, e))?;
+    let files = files(artifact.attributes())
+        .map_err(|e| Stop::new(exit::INTERNAL, format!("{}: {e}; {path}", args.step)))?;
+    if files.is_empty() {
+        let text = format!(
+            "the artifact of {} carries no files; what it holds: plyflow inspect '{}' --workflow {}",
+            args.step, args.step, args.workflow.workflow
+        );
+        return Err(Stop::new(exit::USAGE, text));
+    }
+    if args.list {
+        let row = |f: &TextFile| vec![f.name.clone(), bytes(f.text.len() as u64)];
+        let rows: Vec<Vec<String>> = files.iter().map(row).collect();
+        return print(&table(&["file", "size"], &rows, &[1]));
+    }
+    let here = Utf8Path::new(".");
+    let folder = args.to.as_deref().unwrap_or(here);
+    print(&write_all(&files, folder, args.force)?)
+}
+
+/// The files in the attributes of an artifact, each with a name that stays in its folder.
+fn files(attributes: &str) -> Result<Vec<TextFile>, String> {
+    let attributes: Value =
+        serde_json::from_str(attributes).map_err(|e| format!("its attributes: {e}"))?;
+    if attributes["files"].is_null() {
+        return Ok(Vec::new());
+    }
+    let files = Vec::<TextFile>::deserialize(&attributes["files"])
+        .map_err(|e| format!("its attribute 'files' is no list of name and text: {e}"))?;
+    for (i, file) in files.iter().enumerate() {
+        let name = &file.name;
+        if let Some(why) = unfit(name) {
+            return Err(format!(
+                "it carries a file with the name {name:?}, which {why}; nothing is written"
+            ));
+        }
+        if files[..i].iter().any(|f| f.name == *name) {
+            return Err(format!(
+                "it carries two files with the name {name:?}; nothing is written"
+            ));
+        }
+    }
+    Ok(files)
+}
+
+/// Why a text cannot be the name of a file in the folder that the user gave.
+fn unfit(name: &str) -> Option<&'static str> {
+    if name.is_empty() {
+        Some("is empty")
+    } else if name.contains(['/', '\\']) {
+        Some("names another folder")
+    } else if name == "." || name.contains("..") {
+        Some("could lead out of the folder")
+    } else if name.chars().any(char::is_control) {
+        Some("has a control character")
+    } else if name.len() > 200 {
+        Some("is too long")
+    } else {
+        None
+    }
+}
+
+/// Writes all files or, when one is in the way, none; says what was done.
+fn write_all(files: &[TextFile], folder: &Utf8Path, force: bool) -> Result<String, Stop> {
+    let mut todo: Vec<(Utf8PathBuf, &TextFile, bool)> = Vec::new();
+    let mut in_the_way = Vec::new();
+    for file in files {
+        let path = folder.join(&file.name);
+        // Not followed: what a link points to is not what the user named.
+        match std::fs::symlink_metadata(&path) {
+            Err(_) => todo.push((path, file, true)),
+            Ok(m) if !m.is_file() => {
+                let text = format!("{path} is in the way: it is no plain file; nothing is written");
+                return Err(Stop::new(exit::USAGE, text));
+            }
+            Ok(_) => {
+                let same = std::fs::read(&path).is_ok_and(|b| b == file.text.as_bytes());
+                if !same && !force {
+                    in_the_way.push(path.to_string());
+                }
+                todo.push((path, file, !same));
+            }
+        }
+    }
+    if !in_the_way.is_empty() {
+        let text = format!(
+            "{} in the way, with another content: {}; nothing is written; use --to DIR for another folder or --force \
+             to replace",
+            if in_the_way.len() == 1 {
+                "a file is"
+            } else {
+                "files are"
+            },
+            in_the_way.join(", ")
+        );
+        return Err(Stop::new(exit::USAGE, text));
+    }
+    std::fs::create_dir_all(folder)
+        .map_err(Stop::machine(format!("making the folder {folder}")))?;
+    let mut out = String::new();
+    for (path, file, new) in todo {
+        if new {
+            write(&path, &file.text).map_err(Stop::machine(format!("writing {path}")))?;
+        }
+        let size = bytes(file.text.len() as u64);
+        let what = if new { "" } else { ", as it was" };
+        out += &format!("{path}: {size}{what}\n");
+    }
+    Ok(out)
+}
+
+/// Under a temporary name first, so that a whole file is there at any moment.
+fn write(path: &Utf8Path, text: &str) -> std::io::Result<()> {
+    let name = path.file_name().unwrap_or("file");
+    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
+    let written = std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&partial);
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn attributes(name: &str) -> String {
+        serde_json::json!({"files": [{"name": name, "text": "t"}]}).to_string()
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_are_refused_and_say_why() {
+        for name in [
+            "", ".", "..", "../a", "a/b", "/etc/a", "a\\b", "a..b", "a\nb", "a\0",
+        ] {
+            let error = files(&attributes(name)).unwrap_err();
+            assert!(error.contains("nothing is written"), "{name:?}: {error}");
+        }
+        assert!(files(&attributes(&"a".repeat(300))).is_err());
+        for name in ["material.yaml", ".hidden", "Träger 1.csv", "a-b_c.d"] {
+            assert_eq!(files(&attributes(name)).unwrap()[0].name, name);
+        }
+    }
+
+    #[test]
+    fn attributes_without_files_have_none_and_odd_ones_are_refused() {
+        assert_eq!(files("{}").unwrap(), []);
+        assert_eq!(files("{\"files\": []}").unwrap(), []);
+        for odd in ["", "{\"files\": 5}", "{\"files\": [{\"name\": \"a\"}]}"] {
+            assert!(files(odd).is_err(), "{odd}");
+        }
+        let twice = r#"{"files": [{"name": "a", "text": "1"}, {"name": "a", "text": "2"}]}"#;
+        assert!(files(twice).unwrap_err().contains("two files"));
+    }
+
+    fn folder() -> (tempfile::TempDir, Utf8PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = Utf8PathBuf::from_path_buf(dir.path().to_owned()).unwrap();
+        (dir, path)
+    }
+
+    fn file(name: &str, text: &str) -> TextFile {
+        TextFile {
+            name: name.into(),
+            text: text.into(),
+        }
+    }
+
+    #[test]
+    fn another_file_is_never_replaced_without_force_and_then_nothing_is_written() {
+        let (_keep, dir) = folder();
+        let to = dir.join("new/folder");
+        let all = [file("a", "1\n"), file("b", "2\n")];
+        assert_eq!(
+            write_all(&all, &to, false).unwrap(),
+            format!("{to}/a: 2 B\n{to}/b: 2 B\n")
+        );
+        // The same content is no reason to stop.
+        assert!(write_all(&all, &to, false).unwrap().contains("as it was"));
+        std::fs::write(to.join("b"), "mine").unwrap();
+        std::fs::remove_file(to.join("a")).unwrap();
+        let stop = write_all(&all, &to, false).unwrap_err();
+        assert_eq!(stop.code, exit::USAGE);
+        assert!(stop.text.contains("/b") && stop.text.contains("--force"));
+        assert!(!to.join("a").exists());
+        assert_eq!(std::fs::read_to_string(to.join("b")).unwrap(), "mine");
+        write_all(&all, &to, true).unwrap();
+        assert_eq!(std::fs::read_to_string(to.join("b")).unwrap(), "2\n");
+        assert_eq!(std::fs::read_dir(&to).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn links_and_folders_are_never_written_through_even_with_force() {
+        let (_keep, dir) = folder();
+        std::fs::create_dir(dir.join("a")).unwrap();
+        std::os::unix::fs::symlink(dir.join("elsewhere"), dir.join("b")).unwrap();
+        for name in ["a", "b"] {
+            let stop = write_all(&[file(name, "t")], &dir, true).unwrap_err();
+            assert!(stop.text.contains("no plain file"), "{}", stop.text);
+        }
+        assert!(!dir.join("elsewhere").exists());
+    }
+}
