@@ -138,10 +138,7 @@ pub fn stops(net: &Net) -> Stops {
 /// not reach hangs on in the plane of the nearest whole cell, not below `offset` over the bed. `None`
 /// when no cell of the net is whole.
 pub fn lay(net: &Net, mesh: &QuadMesh, surface: &dyn DrapeSurface, offset: f64) -> Option<Draped> {
-    let whole: Vec<([i32; 2], f64)> = net
-        .nodes()
-        .filter_map(|(at, _)| net.shear(at).map(|g| (at, g)))
-        .collect();
+    let whole = rim(net);
     if whole.is_empty() {
         return None;
     }
@@ -213,6 +210,19 @@ fn beyond(net: &Net, cell: [i32; 2], at: [f64; 2]) -> Vec3 {
     }
     let (p, q) = (0.5 * (s - 0.5), 0.5 * (t - 0.5));
     sum([0.25 - p - q, 0.25 + p - q, 0.25 + p + q, 0.25 - p + q])
+}
+
+/// Whole cells with a side where the net ends, with their shear angles (rad): the nearest cell to what is not reached is one
+/// of them.
+fn rim(net: &Net) -> Vec<([i32; 2], f64)> {
+    let inner = |[i, j]: [i32; 2]| {
+        let sides = [[i - 1, j], [i + 1, j], [i, j - 1], [i, j + 1]];
+        sides.iter().all(|c| net.shear(*c).is_some())
+    };
+    net.nodes()
+        .filter_map(|(at, _)| net.shear(at).map(|g| (at, g)))
+        .filter(|(at, _)| !inner(*at))
+        .collect()
 }
 
 fn onto(surface: &dyn DrapeSurface, mut x: Vec3, offset: f64) -> Vec3 {
