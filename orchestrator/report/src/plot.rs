@@ -144,13 +144,15 @@ impl Plot<'_> {
         };
         pairs().next()?;
         let near = if self.from_zero { 0.05 } else { 0.25 };
-        let across = extent(pairs().map(|p| *p.0), Zero::Near(near));
+        // Also where only the other value is no number: plots of one history then lie below each other.
+        let across = self.series.iter().flat_map(|s| s.x.iter().copied());
+        let across = extent(across, Zero::Near(near));
         let [w, h] = self.size;
         let bottom = h - BOTTOM;
-        let y = Axis::new(self.range(pairs().map(|p| *p.1)), 5, [bottom, TOP]);
+        let y = Axis::new(self.range(pairs().map(|p| *p.1)), 7, [bottom, TOP]);
         let left = LEFT.max(30.0 + CHARACTER * y.widest() as f64);
         let right = w - RIGHT;
-        let x = Axis::new(across, 6, [left, right]);
+        let x = Axis::new(across, 8, [left, right]);
         Some(Frame {
             x,
             y,

@@ -55,6 +55,9 @@ pub(crate) fn read(
         let mut wrong = Vec::new();
         if let Some(mut shown) = one(instance, facts, room, &mut wrong) {
             shown.instance = at;
+            if let Some(run) = &mut shown.run {
+                run.instance = at;
+            }
             room = room.saturating_sub(shown.plots.len());
             length += shown.plots.iter().map(|p| p.0.len()).sum::<usize>();
             if length > LENGTH {
@@ -114,12 +117,18 @@ fn run(instance: &Instance, facts: &Facts, wrong: &mut Vec<String>) -> Option<Ru
         .map_err(|e| wrong.push(e))
         .ok()?;
     history.internal()?;
-    let energy = serde_json::from_value(facts.attributes["energy"].clone()).unwrap_or_default();
+    let a = &facts.attributes;
+    let number = |name: &str| a[name].as_f64().unwrap_or(0.0);
+    let (elements, cycles) = (number("elements"), number("cycles"));
     Some(Run {
         label: instance.label(),
         instance: 0,
         facts: FormingFacts {
-            energy,
+            energy: serde_json::from_value(a["energy"].clone()).unwrap_or_default(),
+            element_size: number("element_size"),
+            element_cycles: elements * cycles,
+            elements,
+            cycles,
             ..FormingFacts::default()
         },
         kinetic_bound: facts.provenance["parameters"]["kinetic_bound"].as_f64(),

@@ -251,6 +251,8 @@ fn a_coupon_shows_its_numbers_beside_what_is_expected_its_curves_and_its_sheet()
         "name: &lt;NCF&gt;",
         // Its energies stand with those of forming runs.
         "1.23 %",
+        // Its element-steps with the costs: 1600 elements, 5000 steps.
+        "<td class=\"n\">8.0</td>",
         "Kinetic over internal energy",
     ] {
         assert!(page.contains(text), "{text}");

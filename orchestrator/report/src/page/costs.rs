@@ -12,14 +12,15 @@ const LONGEST: usize = 400;
 /// Bars are drawn for at most this many steps, and none below this part of the longest.
 const BARS: (usize, f64) = (16, 0.005);
 
-/// Forming runs by their instance.
+/// Forming runs and coupons by their instance.
 fn runs(material: &Material) -> BTreeMap<usize, &Run> {
     let studies = material.studies.iter();
     let all = studies.flat_map(|s| {
         let local = s.locals.iter().filter_map(|l| l.run.as_ref());
         s.global.iter().chain(&s.reference).chain(local)
     });
-    all.map(|r| (r.instance, r)).collect()
+    let coupons = material.shown.iter().filter_map(|s| s.run.as_ref());
+    all.chain(coupons).map(|r| (r.instance, r)).collect()
 }
 
 /// Element-steps per second, as the step measured them or else over the whole step; 0 when unknown.

@@ -429,7 +429,7 @@ impl Study {
         w.attributes(
             &json!({
                 "title": "Picture frame, \"NCF\" <both signs>",
-                "energy": energy,
+                "energy": energy, "elements": 1600, "cycles": 5000,
                 "plots": [{
                     "name": "force", "title": "Cross-head force",
                     "x": {"label": "shear angle", "unit": "deg"}, "y": {"label": "force", "unit": "N"},
