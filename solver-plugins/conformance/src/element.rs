@@ -1,7 +1,7 @@
 //! Checks of an element formulation: its calls, its buffers, its lanes.
 
 use crate::shapes::{Elements, pick};
-use crate::subject::{Answer, Ask, Breaches, Masses, Motion, State, Subject};
+use crate::subject::{Answer, Ask, Breaches, Masses, Motion, Refusal, State, Subject};
 use crate::{Check, Run, Seen, Sink, element_motion, patch, rules};
 use plyflow_sdk::abi::*;
 use std::sync::Barrier;
@@ -17,6 +17,9 @@ const CALLS: usize = 5000;
 /// Checks an element formulation made with `parameters` (JSON, SI numbers) for a material: its element part and,
 /// when it has one, its patch part. `fields` are the numbers of element and patch fields in its manifest; `None`
 /// when they are not known.
+///
+/// An element may refuse a material, with a text: then the check `create` is skipped and nothing else is made. The
+/// caller sees to it that some material is accepted.
 ///
 /// # Safety
 /// `functions` and `material` must be valid for the length of the call.
@@ -36,7 +39,11 @@ pub unsafe fn check_element(
             (subject, twin) = (Some(a), Some(b));
             Seen::Well("made twice from the same parameters".into())
         }
-        (Err(text), _) | (_, Err(text)) => Seen::Bad(text),
+        (Err(Refusal::Said(text)), _) => Seen::Nothing(format!(
+            "it refuses this material or these parameters: {text}"
+        )),
+        (Err(Refusal::Broken(text)), _) => Seen::Bad(text),
+        (_, Err(refusal)) => Seen::Bad(format!("a second instance: {}", refusal.text())),
     });
     if let (Some(subject), Some(twin)) = (&subject, &twin)
         && run.check(rules::SIZES, || sizes(subject, fields))

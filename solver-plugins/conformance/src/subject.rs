@@ -91,6 +91,22 @@ impl Breaches {
     }
 }
 
+/// Why there is no instance.
+#[derive(Debug)]
+pub(crate) enum Refusal {
+    /// The element says in a text what it does not want.
+    Said(String),
+    /// It broke the contract.
+    Broken(String),
+}
+
+impl Refusal {
+    pub(crate) fn text(&self) -> &str {
+        let (Self::Said(text) | Self::Broken(text)) = self;
+        text
+    }
+}
+
 /// An element formulation made for a material.
 pub(crate) struct Subject {
     functions: *const pf_element_functions,
@@ -183,16 +199,21 @@ impl Subject {
         functions: *const pf_element_functions,
         parameters: &str,
         material: &pf_material,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refusal> {
         let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
         let text = pf_str::new(parameters);
         let code =
             unsafe { ((*functions).create)(text, material, &raw mut instance, &raw mut error) };
         if code != PF_OK {
-            return Err(format!("create returned {code}: {}", error.get()));
+            let text = error.get();
+            return Err(match code {
+                PF_ERROR if !text.is_empty() => Refusal::Said(text),
+                _ => Refusal::Broken(format!("create returned {code} with the text '{text}'")),
+            });
         }
         if instance.is_null() {
-            return Err("create returned 0 (PF_OK) but left the instance NULL".into());
+            let text = "create returned 0 (PF_OK) but left the instance NULL";
+            return Err(Refusal::Broken(text.into()));
         }
         let mut of_material = pf_material_sizes {
             size: size_of::<pf_material_sizes>() as u64,
@@ -211,7 +232,7 @@ impl Subject {
         };
         let code = unsafe { ((*functions).sizes)(instance, &raw mut new.sizes) };
         if code != PF_OK {
-            return Err(format!("sizes returned {code}"));
+            return Err(Refusal::Broken(format!("sizes returned {code}")));
         }
         Ok(new)
     }

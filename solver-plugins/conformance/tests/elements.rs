@@ -3,10 +3,12 @@
 
 mod common;
 
-use common::{sound, with_fabric, with_film};
+use common::{ISOTROPIC, of_element, sound, with_fabric, with_film};
 use plyflow_conformance::failed;
+use plyflow_kernels::isotropic::Isotropic;
 use plyflow_kernels::m4::M4;
 use plyflow_kernels::rf4::Rf4;
+use plyflow_kernels::s4::S4;
 use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef};
 
 const MEMBRANE: [&str; 13] = [
@@ -48,4 +50,83 @@ fn nothing_is_found_in_the_rotation_free_shell_with_film_and_with_fabric() {
     let checks = with_fabric::<Rf4>("{}", "fibre-energy");
     sound(&checks, &MEMBRANE);
     sound(&checks, &PATCH);
+}
+
+#[test]
+fn nothing_is_found_in_the_shell_with_rotations_with_every_kind_of_law() {
+    let refused = with_film::<S4>("{}");
+    assert_eq!(refused.len(), 1, "a film has no bending");
+    assert!(refused[0].seen.contains("bending"), "{}", refused[0].seen);
+    let total = r#"{"bending": "total"}"#;
+    for with in ["{}", total] {
+        for form in ["fibre-energy", "hypoelastic"] {
+            let checks = with_fabric::<S4>(with, form);
+            sound(&checks, &MEMBRANE);
+            sound(&checks, &["work"]);
+        }
+    }
+    let checks =
+        of_element::<S4, Isotropic>(r#"{"bending": "total", "twist": "material"}"#, ISOTROPIC);
+    sound(&checks, &MEMBRANE);
+}
+
+/// What only an element with rotations can do wrong.
+const DEAF: u8 = 0;
+const SIGN: u8 = 1;
+const SOFT: u8 = 2;
+const WEIGHTLESS: u8 = 3;
+const DRILLING: u8 = 4;
+
+/// Of a batch of the most lanes.
+static STILL: [f64; 12 * 64] = [0.0; 12 * 64];
+
+/// S4 with one of these faults.
+struct Faulty<const FAULT: u8>(S4);
+
+impl<const FAULT: u8> Element for Faulty<FAULT> {
+    const MANIFEST: &'static str = S4::MANIFEST;
+
+    fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
+        S4::create(parameters, material).map(Self)
+    }
+
+    fn sizes(&self) -> ElementSizes {
+        self.0.sizes()
+    }
+
+    fn initialise(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) {
+        self.0.initialise(batch, material);
+        if FAULT == WEIGHTLESS {
+            batch.inertia.fill(0.0);
+        }
+    }
+
+    fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
+        if FAULT == DEAF {
+            batch.spin = &STILL[..batch.spin.len()];
+        }
+        let code = self.0.forces(batch, material);
+        for (i, m) in batch.moment.iter_mut().enumerate() {
+            match FAULT {
+                SIGN => *m = -*m,
+                SOFT => *m *= 0.99,
+                DRILLING if i < batch.lanes => *m += 1e-6,
+                _ => {}
+            }
+        }
+        code
+    }
+}
+
+#[test]
+fn each_fault_of_rotations_is_found_by_the_check_that_is_meant_for_it() {
+    fn found<const FAULT: u8>() -> Vec<&'static str> {
+        failed(&with_fabric::<Faulty<FAULT>>("{}", "fibre-energy"))
+    }
+    assert!(found::<DEAF>().contains(&"frame-invariance"));
+    assert!(found::<SIGN>().contains(&"energy"));
+    assert!(found::<SOFT>().contains(&"energy"));
+    assert!(found::<SOFT>().contains(&"balance"));
+    assert!(found::<WEIGHTLESS>().contains(&"mass"));
+    assert!(found::<DRILLING>().contains(&"rest"));
 }

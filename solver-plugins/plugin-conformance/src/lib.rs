@@ -63,6 +63,7 @@ impl Step for Conformance {
             return Err("materials: the list is empty; give at least one material".into());
         }
         let mut all: Vec<Value> = Vec::new();
+        let mut refused = 0;
         let mut count = [0usize; 3];
         for material in &p.materials {
             host.check_cancelled()?;
@@ -71,10 +72,20 @@ impl Step for Conformance {
                 None => format!("{}: {}", material.plugin, material.name),
             };
             let mut teller = Teller { host, subject };
-            let checks = match &p.element {
+            let mut checks = match &p.element {
                 Some(element) => judge_element(host, element, material, &mut teller)?,
                 None => judge_material(host, material, &mut teller)?,
             };
+            // An element may refuse a material, but not all of them.
+            let only = checks.len() == 1 && checks[0].outcome == Outcome::Skipped;
+            refused += usize::from(only);
+            if refused == p.materials.len() {
+                let mut check = checks[0].clone();
+                check.outcome = Outcome::Failed;
+                check.seen = format!("no material is accepted; {}", check.seen);
+                teller.ends(&check);
+                checks.push(check);
+            }
             for check in &checks {
                 count[match check.outcome {
                     Outcome::Passed => 0,

@@ -184,10 +184,13 @@ fn sound_plugins_in_c_pass() {
 
 #[test]
 fn all_of_plyflow_s_own_components_pass() {
-    for element in ["m4", "rf4"] {
+    for element in ["m4", "rf4", "s4"] {
         let (code, said) = check(Path::new(element), &[]);
         assert_eq!((code, failed(&said)), (0, vec![]), "{element}");
     }
+    let foil = "{youngs_modulus: 70 GPa, poisson_ratio: 0.33}";
+    let (code, said) = check(Path::new("material-isotropic"), &["--with", foil]);
+    assert_eq!((code, failed(&said)), (0, vec![]), "material-isotropic");
     for (plugin, file) in [
         ("material-fabric", "ncf-fcim359"),
         ("material-fabric", "woven-38616"),

@@ -11,6 +11,10 @@ use plyflow_sdk::{Element, Material, element_table, material_table};
 pub const FILM: &str = r#"{"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545},
     "limit": 5.0, "thickness": 8e-5, "areal_mass": 0.08}"#;
 
+/// An aluminium foil, SI.
+pub const ISOTROPIC: &str =
+    r#"{"youngs_modulus": 7e10, "poisson_ratio": 0.33, "thickness": 2e-4, "areal_mass": 0.54}"#;
+
 /// NCF FCIM359 of workflows/materials, SI, in one of the two forms.
 pub fn ncf(form: &str) -> String {
     r#"{"form": "FORM", "fibre_modulus": 3e9,
