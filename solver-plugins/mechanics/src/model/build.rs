@@ -47,6 +47,7 @@ impl Model {
             load_factor: 1.0,
             loads: Vec::new(),
             last_dt: 0.0,
+            shortest_edge: 0.0,
             kick: 1.0,
             held: vec![Held::Free; n],
             driven: Vec::new(),
@@ -295,6 +296,12 @@ impl Model {
             )));
         }
         let n = self.x.len();
+        let edge = |a: u32, b: u32| norm(sub(self.x[a as usize], self.x[b as usize]));
+        self.shortest_edge = self
+            .cells
+            .iter()
+            .flat_map(|c| (0..4).map(move |k| edge(c[k], c[(k + 1) % 4])))
+            .fold(f64::INFINITY, f64::min);
         let nb = self.batches.len();
         self.element_force = Aligned::zeros(nb * 12 * LANES);
         self.element_energy = Aligned::zeros(nb * PF_ENERGIES * LANES);

@@ -116,6 +116,8 @@ pub struct Model {
     pub load_factor: f64,
     loads: Vec<NodalLoad>,
     last_dt: f64,
+    /// Shortest edge of a cell at the start (m).
+    shortest_edge: f64,
     /// 1, or 1/2 in the first step from rest: velocities live at half steps.
     kick: f64,
     held: Vec<Held>,
@@ -440,7 +442,7 @@ impl Model {
 
     /// A speed (m/s) at which a node crosses a cell in a few steps: no forming motion.
     fn speed_limit(&self) -> f64 {
-        1e-3 / self.dt
+        0.2 * self.shortest_edge / self.dt
     }
 
     fn unstable(&self, limit: f64) -> MechanicsError {

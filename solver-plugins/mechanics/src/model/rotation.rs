@@ -125,8 +125,9 @@ impl Model {
                     }
                     if !held.get(n).is_some_and(|h| *h) {
                         let old = *spin;
-                        let mut w: V =
-                            std::array::from_fn(|c| (lo * old[c] + kick * moment[n][c] / inertia[n]) * hi);
+                        let mut w: V = std::array::from_fn(|c| {
+                            (lo * old[c] + kick * moment[n][c] / inertia[n]) * hi
+                        });
                         if let Some(f) = fixed.get(n) {
                             w = f.rotation(w);
                         }
