@@ -124,10 +124,18 @@ pub fn file(
         .filter(|b| b.1.is_some())
         .map(|b| b.0.join("."))
         .collect();
+    let names = names.join(", ");
+    if let Some(first) = note.first() {
+        let old = value
+            .get("source")
+            .and_then(Value::as_str)
+            .map(|s| format!("{s}; "));
+        let source = format!("{}{names}: {first}", old.unwrap_or_default());
+        value.insert("source".into(), Value::from(source.trim_end_matches('.')));
+    }
     text.push_str(&format!(
         "# New here: {}. All other numbers are those of {}; comments are not carried over.\n",
-        names.join(", "),
-        template.origin
+        names, template.origin
     ));
     emit_map(&mut text, &value, 0);
     Template::parse(&text, "the new material file")?;
@@ -289,6 +297,8 @@ mod tests {
             );
             let mut expected = template.value.clone();
             expected["with"]["bending"]["positive"] = new;
+            let old = expected["source"].as_str().unwrap_or_default();
+            expected["source"] = json!(format!("{old}; bending.positive: Measured"));
             assert_eq!(
                 Template::parse(&text, "new").unwrap().value,
                 expected,
