@@ -10,8 +10,12 @@
 //!
 //! All quantities are SI. Results are the same for any number of threads.
 
+pub mod bias_plane;
+pub mod film;
+pub mod inflation;
 pub mod output;
 pub mod picture_frame;
 pub mod reference;
+pub mod rotated_mesh;
 pub mod run;
 pub mod specimen;

@@ -33,6 +33,12 @@ pub struct Parameters {
     /// CSV with columns shear_angle, normalised_force.
     #[serde(default)]
     reference: Option<String>,
+    /// CSV with columns path_length, normalised_force.
+    #[serde(default)]
+    path_reference: Option<String>,
+    /// Energy per undeformed area that the whole path should cost (J/m2).
+    #[serde(default)]
+    dissipation: Option<f64>,
 }
 
 /// The shear angle over time: smooth legs between the angles of the path.
@@ -49,6 +55,15 @@ impl Path {
             g += (w[1] - w[0]) * smooth_step(t, self.leg * k as f64, self.leg);
         }
         g
+    }
+
+    /// Shear passed through so far (rad): the sum of the sizes of its changes.
+    fn length(&self, t: f64) -> f64 {
+        let mut l = 0.0;
+        for (k, w) in self.angles.windows(2).enumerate() {
+            l += (w[1] - w[0]).abs() * smooth_step(t, self.leg * k as f64, self.leg);
+        }
+        l
     }
 
     fn duration(&self) -> f64 {
@@ -71,12 +86,28 @@ impl Drive for Frame {
     }
 }
 
+/// Sums over the steps since the last sample.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    /// Generalised force (N m).
+    moment: f64,
+    /// Shear angle (rad).
+    angle: f64,
+    /// Shear passed through (rad).
+    length: f64,
+    steps: f64,
+}
+
 struct PictureFrame {
     path: Path,
     side: f64,
     corners: Vec<[f64; 2]>,
-    /// Sum of the generalised force over the steps since the last sample (N m), of their angles, number.
-    sum: (f64, f64, f64),
+    sum: Sum,
+    /// Work of the frame on the specimen (J).
+    work: f64,
+    /// Samples: work so far (J), shear passed through (rad), shear angle (rad), force (N).
+    work_history: Vec<f64>,
+    length: Vec<f64>,
     angle: Vec<f64>,
     force: Vec<f64>,
     extremes: [f64; 2],
@@ -96,23 +127,30 @@ impl Test for PictureFrame {
 
     fn stepped(&mut self, specimen: &Specimen) {
         // Reactions belong to the positions before the step.
-        let angle = self.path.angle(specimen.model.time - specimen.model.dt);
+        let (t, dt) = (specimen.model.time - specimen.model.dt, specimen.model.dt);
+        let angle = self.path.angle(t);
         let (c, s) = ((0.5 * angle).cos(), (0.5 * angle).sin());
-        let mut work = 0.0;
+        let mut moment = 0.0;
         for (r, [x, y]) in specimen.model.reactions().iter().zip(&self.corners) {
-            work += 0.5 * (r[0] * (y * c - x * s) + r[1] * (x * c - y * s));
+            moment += 0.5 * (r[0] * (y * c - x * s) + r[1] * (x * c - y * s));
         }
-        self.sum = (self.sum.0 + work, self.sum.1 + angle, self.sum.2 + 1.0);
+        self.work += moment * 0.5 * (self.path.angle(t + dt) - self.path.angle(t - dt));
+        self.sum.moment += moment;
+        self.sum.angle += angle;
+        self.sum.length += self.path.length(t);
+        self.sum.steps += 1.0;
     }
 
     fn sample(&mut self, specimen: &Specimen, _t: f64) {
-        if self.sum.2 > 1.0 {
-            let angle = self.sum.1 / self.sum.2;
+        let sum = std::mem::take(&mut self.sum);
+        if sum.steps > 1.0 {
+            let angle = sum.angle / sum.steps;
             self.angle.push(angle);
+            self.length.push(sum.length / sum.steps);
             self.force
-                .push(self.crosshead(self.sum.0 / self.sum.2, angle));
+                .push(self.crosshead(sum.moment / sum.steps, angle));
+            self.work_history.push(self.work);
         }
-        self.sum = (0.0, 0.0, 0.0);
         if let Some(shear) = specimen.field("shear_angle") {
             let fold = |f: fn(f64, f64) -> f64, a: f64| shear.iter().copied().fold(a, f);
             self.extremes = [
@@ -146,6 +184,14 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         )?),
         None => None,
     };
+    let whole = match &p.path_reference {
+        Some(path) => Some(Curve::read(
+            path,
+            ("path_length", Dimension::Angle),
+            ("normalised_force", Dimension::ForcePerLength),
+        )?),
+        None => None,
+    };
     let axis = even_axis(0.0, p.side, p.common.element_size);
     let mesh = QuadMesh::grid(&axis, &axis);
     let driven: Vec<u32> = (mesh.on_boundary().iter().enumerate())
@@ -170,13 +216,26 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         path,
         side: p.side,
         corners,
-        sum: (0.0, 0.0, 0.0),
+        sum: Sum::default(),
+        work: 0.0,
+        work_history: Vec::new(),
+        length: Vec::new(),
         angle: Vec::new(),
         force: Vec::new(),
         extremes: [0.0; 2],
     };
     let outcome = run(host, &p.common, &mut specimen, &mut test)?;
-    write(host, p, &specimen, &test, reference.as_ref(), &outcome)
+    let references = References {
+        first_leg: reference,
+        whole_path: whole,
+    };
+    write(host, p, &specimen, &test, &references, &outcome)
+}
+
+/// What the run is compared with.
+struct References {
+    first_leg: Option<Curve>,
+    whole_path: Option<Curve>,
 }
 
 fn check(p: &Parameters) -> Result<(), StepError> {
@@ -199,9 +258,10 @@ fn write(
     p: &Parameters,
     specimen: &Specimen,
     test: &PictureFrame,
-    reference: Option<&Curve>,
+    references: &References,
     outcome: &Outcome,
 ) -> Result<(), StepError> {
+    let reference = references.first_leg.as_ref();
     let mut out = Output::new(host);
     let lever = |g: f64| 2.0 * p.side * (0.25 * std::f64::consts::PI - 0.5 * g).cos();
     let normalised: Vec<f64> = test
@@ -268,10 +328,73 @@ fn write(
         })?;
         host.result("force_error", error, "1")?;
     }
+    write_path(host, &mut out, p, test, (&normalised, &norm), references)?;
     let peak = test.force.iter().map(|f| f.abs()).fold(0.0, f64::max);
     host.result("force_peak", peak, "N")?;
     host.result("shear_min", test.extremes[0], "rad")?;
     host.result("shear_max", test.extremes[1], "rad")?;
     out.attribute("side", p.side.into());
     out.finish(&p.common, specimen, outcome)
+}
+
+/// What belongs to a path of several legs: its curve, its work, the largest force of each leg.
+fn write_path(
+    host: &Host,
+    out: &mut Output<'_>,
+    p: &Parameters,
+    test: &PictureFrame,
+    (normalised, norm): (&[f64], &str),
+    references: &References,
+) -> Result<(), StepError> {
+    let area = p.side * p.side;
+    let density: Vec<f64> = test.work_history.iter().map(|w| w / area).collect();
+    let length = out.curve("run/path_length", "rad", &test.length)?;
+    let work = out.curve("run/work_density", "N/m", &density)?;
+    let legs = p.path.len();
+    let samples = crate::run::SAMPLES / legs;
+    for (k, leg) in normalised.chunks(samples).take(legs).enumerate() {
+        let peak = leg.iter().map(|f| f.abs()).fold(0.0, f64::max);
+        host.result(&format!("leg_force.{}", k + 1), peak, "N/m")?;
+    }
+    if legs > 1 {
+        let axis = ("shear passed through", "deg");
+        let mut theory = None;
+        if let Some(curve) = &references.whole_path {
+            let x = out.curve("reference/path_length", "rad", &curve.x)?;
+            theory = Some((x, out.curve("reference/path_force", "N/m", &curve.y)?));
+        }
+        let mut plot = out.plot(
+            "path",
+            "Picture frame: normalised force along the path",
+            axis,
+            ("normalised force", "N/m"),
+        );
+        plot = plot.series("this run", &length, norm, Style::Line);
+        if let Some((x, y)) = &theory {
+            plot = plot.series("closed form", x, y, Style::Dashed);
+        }
+        plot.done();
+        out.plot(
+            "work",
+            "Picture frame: work per area along the path",
+            axis,
+            ("work", "N/m"),
+        )
+        .series("this run", &length, &work, Style::Line)
+        .done();
+    }
+    if let Some(curve) = &references.whole_path {
+        let error = curve
+            .relative_rms(&test.length, normalised)
+            .ok_or_else(|| {
+                "path_reference: fewer than two points of the run lie in its range".to_owned()
+            })?;
+        host.result("path_error", error, "1")?;
+    }
+    let density = test.work / area;
+    host.result("work_density", density, "N/m")?;
+    if let Some(expected) = p.dissipation {
+        host.result("dissipation_error", (density / expected - 1.0).abs(), "1")?;
+    }
+    Ok(())
 }

@@ -53,6 +53,18 @@ impl Curve {
     /// curve's range, weighted by the width of x around each point (so that uneven sampling does not
     /// matter). `x` increases. `None` when fewer than two points lie inside.
     pub fn relative_rms(&self, x: &[f64], y: &[f64]) -> Option<f64> {
+        let (error, size, _) = self.squares(x, y)?;
+        (size > 0.0).then(|| (error / size).sqrt())
+    }
+
+    /// Root mean square of `y - self(x)`, as for [`Curve::relative_rms`] but in the unit of y.
+    pub fn rms_difference(&self, x: &[f64], y: &[f64]) -> Option<f64> {
+        let (error, _, width) = self.squares(x, y)?;
+        (width > 0.0).then(|| (error / width).sqrt())
+    }
+
+    /// Integrals over x of `(y - self(x))^2` and `self(x)^2`, each twice, and twice the length of x.
+    fn squares(&self, x: &[f64], y: &[f64]) -> Option<(f64, f64, f64)> {
         let (first, last) = (*self.x.first()?, *self.x.last()?);
         let inside: Vec<(f64, f64)> = x
             .iter()
@@ -63,15 +75,16 @@ impl Curve {
         if inside.len() < 2 {
             return None;
         }
-        let (mut error, mut size) = (0.0, 0.0);
+        let (mut error, mut size, mut length) = (0.0, 0.0, 0.0);
         for w in inside.windows(2) {
             let width = (w[1].0 - w[0].0).max(0.0);
             for (x, y) in w {
                 let r = self.at(*x);
                 error += width * (y - r) * (y - r);
                 size += width * r * r;
+                length += width;
             }
         }
-        (size > 0.0).then(|| (error / size).sqrt())
+        Some((error, size, length))
     }
 }

@@ -9,7 +9,7 @@ mod services;
 use crate::vector::Vec3;
 use plyflow_model::manifest::{Manifest, Shape};
 use plyflow_model::units::parse_quantity;
-use plyflow_sdk::abi::PF_OK;
+use plyflow_sdk::abi::{PF_OK, pf_component};
 use plyflow_sdk::{On, Step, run_step};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -146,6 +146,41 @@ pub fn run<S: Step>(
     inputs: &[MemoryInput<'_>],
     item: &[u64],
 ) -> Result<MemoryArtifact, String> {
+    run_on::<S>(&Machine::default(), overrides, inputs, item)
+}
+
+/// What a host offers besides the workflow.
+#[derive(Debug, Clone, Copy)]
+pub struct Machine {
+    /// Threads that the step may use.
+    pub threads: u32,
+    /// The component (`PF_KIND_*`) of that name; `None`: there is none.
+    pub component: fn(u32, &str) -> Option<pf_component>,
+}
+
+impl Default for Machine {
+    /// One thread, no components.
+    fn default() -> Self {
+        Self {
+            threads: 1,
+            component: |_, _| None,
+        }
+    }
+}
+
+/// [`run`] with threads and components.
+///
+/// # Errors
+/// As [`run`].
+///
+/// # Panics
+/// As [`run`].
+pub fn run_on<S: Step>(
+    machine: &Machine,
+    overrides: Value,
+    inputs: &[MemoryInput<'_>],
+    item: &[u64],
+) -> Result<MemoryArtifact, String> {
     let manifest = Manifest::parse(S::MANIFEST).unwrap_or_else(|e| panic!("{e}"));
     let mut parameters = Map::new();
     for (name, declaration) in &manifest.parameters {
@@ -181,6 +216,7 @@ pub fn run<S: Step>(
         .map(|o| o.kind.clone())
         .unwrap_or_default();
     let mut state = services::State {
+        machine: *machine,
         manifest,
         inputs: inputs.to_vec(),
         texts: Vec::new(),

@@ -1,6 +1,6 @@
 //! The service table of the host in memory.
 
-use super::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput};
+use super::{Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput};
 use crate::vector::Vec3;
 use plyflow_model::manifest::Manifest;
 use plyflow_sdk::On;
@@ -10,6 +10,7 @@ use std::ffi::c_void;
 
 /// What a run reads and writes.
 pub(super) struct State<'a> {
+    pub(super) machine: Machine,
     pub(super) manifest: Manifest,
     pub(super) inputs: Vec<MemoryInput<'a>>,
     pub(super) texts: Vec<Box<str>>,
@@ -39,7 +40,7 @@ pub(super) fn table(host: *mut c_void) -> pf_services {
         progress: no_progress,
         cancelled: never,
         fail,
-        threads: one,
+        threads,
         parameters,
         scratch: nothing,
         inputs,
@@ -60,7 +61,7 @@ pub(super) fn table(host: *mut c_void) -> pf_services {
         frame_end,
         result,
         collection,
-        find_component: no_component,
+        find_component,
     }
 }
 
@@ -79,16 +80,27 @@ unsafe extern "C" fn never(_: *mut c_void) -> i32 {
     0
 }
 
-unsafe extern "C" fn one(_: *mut c_void) -> u32 {
-    1
+unsafe extern "C" fn threads(host: *mut c_void) -> u32 {
+    unsafe { state(host) }.machine.threads
 }
 
 unsafe extern "C" fn nothing(_: *mut c_void) -> pf_str {
     pf_str::new("")
 }
 
-unsafe extern "C" fn no_component(_: *mut c_void, _: u32, _: pf_str, _: *mut pf_component) -> i32 {
-    PF_NOT_FOUND
+unsafe extern "C" fn find_component(
+    host: *mut c_void,
+    kind: u32,
+    name: pf_str,
+    found: *mut pf_component,
+) -> i32 {
+    match (unsafe { state(host) }.machine.component)(kind, &text(name)) {
+        Some(component) => {
+            unsafe { found.write(component) };
+            PF_OK
+        }
+        None => PF_NOT_FOUND,
+    }
 }
 
 unsafe extern "C" fn log(host: *mut c_void, _: u32, line: pf_str) {

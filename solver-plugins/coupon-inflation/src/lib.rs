@@ -1,0 +1,16 @@
+//! Step plugin `coupon-inflation`: see [`plyflow_coupons::inflation`].
+
+use plyflow_sdk::{Host, Step, StepError};
+
+/// The step.
+pub struct Inflation;
+
+impl Step for Inflation {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        plyflow_coupons::inflation::main(host)
+    }
+}
+
+plyflow_sdk::export_step!(Inflation);

@@ -1,0 +1,168 @@
+//! Coupons give the same bytes for any number of threads. The pieces that threads share are larger than one
+//! (batches of elements, blocks of nodes): the meshes here have more than a thousand nodes.
+
+use plyflow_abi::{PF_KIND_ELEMENT, pf_component, pf_str};
+use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4};
+use plyflow_sdk::{Host, Step, StepError, element_table, material_table};
+use plyflow_surface::memory_host::{Machine, MemoryArtifact, run_on};
+use serde_json::{Value, json};
+
+macro_rules! step {
+    ($name:ident, $manifest:literal, $module:ident) => {
+        struct $name;
+        impl Step for $name {
+            const MANIFEST: &'static str = include_str!(concat!("../../", $manifest));
+            fn run(host: &Host) -> Result<(), StepError> {
+                plyflow_coupons::$module::main(host)
+            }
+        }
+    };
+}
+
+step!(
+    PictureFrame,
+    "coupon-picture-frame/manifest.json",
+    picture_frame
+);
+step!(Film, "coupon-film/manifest.json", film);
+step!(Inflation, "coupon-inflation/manifest.json", inflation);
+step!(BiasPlane, "coupon-bias-plane/manifest.json", bias_plane);
+
+fn component(kind: u32, name: &str) -> Option<pf_component> {
+    let functions: *const std::ffi::c_void = match (kind, name) {
+        (PF_KIND_ELEMENT, "m4") => {
+            std::ptr::from_ref(Box::leak(Box::new(element_table::<M4>()))).cast()
+        }
+        (PF_KIND_ELEMENT, "rf4") => {
+            std::ptr::from_ref(Box::leak(Box::new(element_table::<Rf4>()))).cast()
+        }
+        (_, "material-fabric") => {
+            std::ptr::from_ref(Box::leak(Box::new(material_table::<Fabric>()))).cast()
+        }
+        (_, "material-marlow") => {
+            std::ptr::from_ref(Box::leak(Box::new(material_table::<Marlow>()))).cast()
+        }
+        _ => return None,
+    };
+    let manifest = match name {
+        "m4" => include_str!("../../element-m4/manifest.json"),
+        "rf4" => include_str!("../../element-rf4/manifest.json"),
+        _ => "{}",
+    };
+    Some(pf_component {
+        kind,
+        reserved: 0,
+        functions,
+        manifest: pf_str::new(manifest),
+    })
+}
+
+fn element(name: &str) -> Value {
+    json!({"plugin": name, "with": {"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01}})
+}
+
+fn ncf() -> Value {
+    json!({
+        "plyflow_material": 1, "name": "NCF", "plugin": "material-fabric",
+        "thickness": "0.0004 m", "areal_mass": "0.44 kg/m2",
+        "with": {
+            "form": "fibre-energy", "fibre_modulus": 3e9, "compression_factor": 1.0,
+            "shear": {"coefficients": [0.0, 112.19, 94.73, 137.06, -65.56, 29.56]},
+            "stitch": {"angles": [0.06, 0.5, 0.75], "forces": [0.0, 880.0, 0.0]},
+            "bending": {"positive": {"linear": 0.00019457, "asymptote": 0.03139, "scale": 4.0}}
+        }
+    })
+}
+
+fn film() -> Value {
+    json!({
+        "plyflow_material": 1, "name": "film", "plugin": "material-marlow",
+        "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
+        "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
+    })
+}
+
+/// Everything that an artifact holds, with numbers as their bits.
+fn content(a: &MemoryArtifact) -> Vec<(String, Vec<u64>)> {
+    let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    let mut list: Vec<(String, Vec<u64>)> = (a.arrays.iter())
+        .map(|(name, (_, values))| (name.clone(), bits(values)))
+        .collect();
+    list.extend((a.results.iter()).map(|(name, (v, _))| (format!("result {name}"), bits(&[*v]))));
+    list.push(("times".into(), bits(&a.times)));
+    for body in &a.bodies {
+        for (k, frame) in body.frames.iter().enumerate() {
+            list.push((format!("frame {k}"), bits(frame.as_flattened())));
+        }
+        for (k, fields) in body.fields.iter().enumerate() {
+            let named = |f: &plyflow_surface::memory_host::MemoryField| {
+                (format!("{} {k}", f.name), bits(&f.values))
+            };
+            list.extend(fields.iter().map(named));
+        }
+    }
+    list.push((a.attributes.to_string(), Vec::new()));
+    list
+}
+
+fn same_on_one_and_two_threads<S: Step>(parameters: &Value) {
+    let with = |threads| {
+        let machine = Machine { threads, component };
+        run_on::<S>(&machine, parameters.clone(), &[], &[]).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let (one, two) = (with(1), with(2));
+    let (one, two) = (content(&one), content(&two));
+    assert_eq!(one.len(), two.len());
+    assert!(one.len() > 20, "{} entries", one.len());
+    for (a, b) in one.iter().zip(&two) {
+        assert!(a == b, "'{}' differs from '{}'", a.0, b.0);
+    }
+}
+
+#[test]
+fn same_bytes_on_one_and_two_threads_picture_frame() {
+    same_on_one_and_two_threads::<PictureFrame>(&json!({
+        "material": ncf(), "element": element("rf4"), "element_size": 0.145 / 34.0,
+        "path": [0.6, 0.3], "leg_time": 0.0015, "frames": 3
+    }));
+}
+
+#[test]
+fn same_bytes_on_one_and_two_threads_bias_extension_with_a_turned_mesh() {
+    same_on_one_and_two_threads::<BiasPlane>(&json!({
+        "material": ncf(), "element": element("m4"), "element_size": 0.005, "extension": 0.02,
+        "time": 0.002, "mesh_angle": 0.4, "frames": 3
+    }));
+}
+
+#[test]
+fn same_bytes_on_one_and_two_threads_film_and_disc() {
+    same_on_one_and_two_threads::<Film>(&json!({
+        "material": film(), "element": element("m4"), "element_size": 0.002, "mode": "planar",
+        "length": 0.075, "width": 0.075, "strain": 1.0, "time": 0.005, "frames": 3
+    }));
+    same_on_one_and_two_threads::<Inflation>(&json!({
+        "material": film(), "element": element("m4"), "element_size": 0.005, "pressure": 2000.0,
+        "ramp_time": 0.006, "hold_time": 0.001, "frames": 3
+    }));
+}
+
+#[test]
+fn a_disc_beyond_its_limit_point_stops_with_a_statement() {
+    let machine = Machine {
+        threads: 1,
+        component,
+    };
+    let with = json!({
+        "material": film(), "element": element("m4"), "element_size": 0.02, "pressure": 12000.0,
+        "ramp_time": 0.1, "hold_time": 0.1, "frames": 3
+    });
+    let run = run_on::<Inflation>(&machine, with, &[], &[]).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(run.result("ran_away"), 1.0);
+    assert!(run.result("centre_height") < 0.2);
+    assert!(
+        run.log.iter().any(|l| l.contains("the disc ran away")),
+        "{:?}",
+        run.log
+    );
+}
