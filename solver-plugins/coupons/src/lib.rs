@@ -10,12 +10,17 @@
 //!
 //! All quantities are SI. Results are the same for any number of threads.
 
+pub mod bias_extension;
 pub mod bias_plane;
+pub mod cantilever;
 pub mod film;
 pub mod inflation;
 pub mod output;
 pub mod picture_frame;
+pub mod pure_bending;
 pub mod reference;
 pub mod rotated_mesh;
 pub mod run;
+pub mod shell_benchmark;
 pub mod specimen;
+pub mod strip;

@@ -122,13 +122,17 @@ pub fn run(
                 host.check_cancelled()?;
                 report(host, specimen, test, &energies, end, &mut shown);
             }
+            // At once: what runs away does not wait for the next sample.
+            if test.done() {
+                break;
+            }
         }
         if test.done() {
             break;
         }
     }
-    let t = specimen.model.time + specimen.model.dt;
-    specimen.model.time = t;
+    // A step has moved the time to its end.
+    let t = specimen.model.time;
     test.apply(specimen, t);
     specimen.model.step(true).map_err(|e| e.to_string())?;
     test.sample(specimen, t);
