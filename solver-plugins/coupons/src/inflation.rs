@@ -84,6 +84,7 @@ impl Test for Inflation {
         let rim: f64 = specimen.model.reactions().iter().map(|r| r[2]).sum();
         self.sum = (self.sum.0 + height, self.sum.1 + pressure, self.sum.2 + 1.0);
         self.rim.0 += rim;
+        self.ran_away |= height > self.stop_height;
     }
 
     fn sample(&mut self, specimen: &Specimen, _t: f64) {
@@ -92,7 +93,6 @@ impl Test for Inflation {
             self.height.push(height / steps);
             self.applied.push(pressure / steps);
             self.rim = (0.0, self.rim.0 / steps);
-            self.ran_away = height / steps > self.stop_height;
         }
         self.rim.0 = 0.0;
         if let Some(stretch) = specimen.field("principal_stretch") {
