@@ -118,6 +118,21 @@ impl Diagnostics {
     }
 }
 
+/// Longest line that is shown (bytes). Files that programs write may be one line of any length; nobody finds a caret in
+/// such a line, and miette panics when one stands further right than 65535.
+const LONGEST_LINE: usize = 2000;
+
+/// Whether the lines of a place are short enough to be shown with a caret.
+fn shows_well(text: &str, span: &Span) -> bool {
+    let bytes = text.as_bytes();
+    let (start, end) = (span.start.min(bytes.len()), span.end.min(bytes.len()));
+    let before = bytes[..start].iter().rposition(|b| *b == b'\n');
+    let after = bytes[end..].iter().position(|b| *b == b'\n');
+    let from = before.map_or(0, |i| i + 1);
+    let to = after.map_or(bytes.len(), |i| end + i);
+    to - from <= LONGEST_LINE
+}
+
 /// A finding as miette wants it.
 #[derive(Debug)]
 struct Report<'a> {
@@ -130,6 +145,7 @@ impl<'a> Report<'a> {
         let source = finding
             .text
             .clone()
+            .filter(|text| shows_well(text, &finding.span))
             .map(|text| miette::NamedSource::new(finding.file.as_str(), text));
         Report { finding, source }
     }
@@ -139,10 +155,17 @@ impl std::error::Error for Report<'_> {}
 
 impl fmt::Display for Report<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.source.is_none() {
-            write!(f, "{}: ", self.finding.file)?;
+        let d = self.finding;
+        match (&self.source, d.line) {
+            (Some(_), _) => f.write_str(&d.message),
+            (None, 0) => write!(f, "{}: {}", d.file, d.message),
+            (None, line) => {
+                write!(f, "{}:{line}:{}: {}", d.file, d.column, d.message)?;
+                // Elsewhere this stands at the caret.
+                let expected = d.expected.as_ref();
+                expected.map_or(Ok(()), |e| write!(f, "; expected {e}"))
+            }
         }
-        f.write_str(&self.finding.message)
     }
 }
 

@@ -56,6 +56,26 @@ fn a_file_with_tabs_and_without_a_line_break_is_read_as_any_json() {
     assert_eq!(study.load().unwrap().expectations.len(), 3);
 }
 
+#[test]
+fn a_mistake_far_along_one_long_line_is_told_with_its_place() {
+    let study = Study::with_expected_file();
+    let one_line: String = EXPECTED.lines().map(str::trim).collect();
+    let entry = "{\"step\": \"coarse\", \"result\": \"kinetic_ratio\", \"maximum\": 1},";
+    let long = one_line.replace("[{", &format!("[{}{{", entry.repeat(2000)));
+    let wrong = long.replace("68 mm", "68 kg");
+    assert!(wrong.find("68 kg").unwrap() > 70_000);
+    study.write(E, &wrong);
+    let found = findings(&study);
+    let column = wrong.find("\"68 kg").unwrap() + 1;
+    let told = found.render(false);
+    assert!(
+        told.contains(&format!("expected.json:1:{column}: ")) && told.contains("68 kg"),
+        "{}",
+        &told[..told.len().min(2000)]
+    );
+    assert!(told.len() < 2000 && told.contains("a length such as"));
+}
+
 /// (text of the file, replaced by, text at whose start the error stands, what it says)
 type Case = (
     &'static str,
