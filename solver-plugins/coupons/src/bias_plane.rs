@@ -265,7 +265,7 @@ fn write(
     let force = out.curve("run/force", "N", &test.force)?;
     let shear = out.curve("run/centre_shear", "rad", &test.shear)?;
     let others = others(host)?;
-    let own = format!("mesh at {:.4} deg to the fibres", p.mesh_angle.to_degrees());
+    let own = format!("mesh at {:.1} deg to the fibres", p.mesh_angle.to_degrees());
     let mut series = vec![(own, x, force, shear, Style::Line)];
     for r in &others {
         let at = |name: &str| format!("{}/{name}", r.label);
