@@ -178,10 +178,16 @@ impl<'a> Case<'a> {
         let x = &self.patches.reference;
         let rest = self.subject.patch_forces(&mut state, x, 0.0, Ask::Nothing);
         let (force, lane) = self.worst(&rest.force, &vec![0.0; rest.force.len()]);
+        let energy = rest.energy.iter().zip(&self.answer.energy);
+        let energy = energy.fold(0.0f64, |m, (rest, bent)| {
+            m.max(rest.abs() / bent.abs().max(f64::MIN_POSITIVE))
+        });
         Seen::Number {
-            measured: force,
+            measured: force.max(energy),
             limit: 1e-8,
-            what: format!("force at rest {force:.1e} of that of the bent patch (lane {lane})"),
+            what: format!(
+                "force at rest {force:.1e} of that of the bent patch (lane {lane}), energy {energy:.1e}"
+            ),
         }
     }
 

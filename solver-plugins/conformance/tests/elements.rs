@@ -3,8 +3,9 @@
 
 mod common;
 
-use common::{ISOTROPIC, of_element, sound, with_fabric, with_film};
+use common::{ISOTROPIC, WOVEN, of_element, sound, with_fabric, with_film};
 use plyflow_conformance::failed;
+use plyflow_kernels::fabric::Fabric;
 use plyflow_kernels::isotropic::Isotropic;
 use plyflow_kernels::m4::M4;
 use plyflow_kernels::rf4::Rf4;
@@ -65,6 +66,7 @@ fn nothing_is_found_in_the_shell_with_rotations_with_every_kind_of_law() {
             sound(&checks, &["work"]);
         }
     }
+    sound(&of_element::<S4, Fabric>("{}", WOVEN), &MEMBRANE);
     let checks =
         of_element::<S4, Isotropic>(r#"{"bending": "total", "twist": "material"}"#, ISOTROPIC);
     sound(&checks, &MEMBRANE);

@@ -65,7 +65,7 @@ fn failed(said: &Value) -> Vec<(String, String)> {
 
 /// Demands that a fault is refused by a check whose text says these words.
 fn refused(folder: &Path, source: &str, fault: &str, by: &str, words: &str) {
-    let (code, said) = check(&build(folder, source, fault), &["--time-limit", "20"]);
+    let (code, said) = check(&build(folder, source, fault), &["--time-limit", "60"]);
     assert_eq!(code, NOT_CONFORMING, "{fault}: {said:#}");
     let found = failed(&said);
     let meant = found
@@ -123,7 +123,7 @@ fn a_crash_an_exit_and_a_hang_are_findings_of_the_check_that_was_under_way() {
         ("HANG", "time limit"),
     ] {
         let library = build(folder.path(), "faulty_element", fault);
-        let (code, said) = check(&library, &["--time-limit", "3"]);
+        let (code, said) = check(&library, &["--time-limit", "10"]);
         assert_eq!(code, NOT_CONFORMING, "{fault}");
         let found = failed(&said);
         assert_eq!(found.len(), 1, "{fault}: {found:?}");

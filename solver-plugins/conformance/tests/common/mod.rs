@@ -27,6 +27,12 @@ pub fn ncf(form: &str) -> String {
         .replace("FORM", form)
 }
 
+/// Woven 38616 of workflows/materials, SI: a polynomial whose energy is a difference of large terms.
+pub const WOVEN: &str = r#"{"form": "fibre-energy", "fibre_modulus": 3e9,
+    "shear": {"coefficients": [0.0, 37.35, -322.61, 1458.51, -3539.56, 4727.84, -3275.20, 930.53]},
+    "bending": {"positive": {"linear": 1.549e-5, "asymptote": 0.00757, "scale": 20.0}},
+    "thickness": 3e-4, "areal_mass": 0.21}"#;
+
 /// Checks of a material.
 pub fn of_material<M: Material>(parameters: &str) -> Vec<Check> {
     let table = material_table::<M>();
