@@ -69,7 +69,7 @@ fn the_exit_codes_of_help_and_of_the_book_are_the_same() {
     let row = |l: &str| l.strip_prefix("| ")?.split(" |").next()?.parse::<u8>().ok();
     let written: Vec<u8> = page.lines().filter_map(row).collect();
     assert_eq!(told, written);
-    assert_eq!(told, [0, 1, 2, 3, 4, 5, 6, 130]);
+    assert_eq!(told, [0, 1, 2, 3, 4, 5, 6, 7, 130]);
 }
 
 #[test]
@@ -124,24 +124,25 @@ fn a_reader_that_goes_away_ends_a_command_quietly() {
     assert_eq!(text(&output.stderr), "");
 }
 
-#[test]
-fn the_workflows_of_this_repository_are_valid() {
-    let studies = repository().join("workflows");
-    let mut seen = 0;
-    for folder in std::fs::read_dir(studies).unwrap().flatten() {
-        for file in std::fs::read_dir(folder.path())
-            .into_iter()
-            .flatten()
-            .flatten()
-        {
-            let path = file.path();
-            let name = file.file_name().into_string().unwrap();
-            if name.starts_with("workflow") && name.ends_with(".yaml") {
-                let output = plyflow(&["validate", path.to_str().unwrap()]);
-                assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-                seen += 1;
-            }
+/// Workflow files below a folder, at any depth; what runs leave behind is hidden and passed over.
+fn workflows(folder: &std::path::Path, found: &mut Vec<std::path::PathBuf>) {
+    for file in std::fs::read_dir(folder).unwrap().flatten() {
+        let (path, name) = (file.path(), file.file_name().into_string().unwrap());
+        if path.is_dir() && !name.starts_with('.') {
+            workflows(&path, found);
+        } else if name.starts_with("workflow") && name.ends_with(".yaml") {
+            found.push(path);
         }
     }
-    assert!(seen >= 4, "{seen} workflows");
+}
+
+#[test]
+fn the_workflows_of_this_repository_are_valid() {
+    let mut found = Vec::new();
+    workflows(&repository().join("workflows"), &mut found);
+    for path in &found {
+        let output = plyflow(&["validate", path.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    }
+    assert!(found.len() >= 20, "{} workflows", found.len());
 }
