@@ -108,6 +108,8 @@ pub struct Batch {
     pub mass: Aligned,
     /// `[4][LANES]` rotary inertias before scaling (kg m2); empty with 3 degrees of freedom per node.
     pub inertia: Aligned,
+    /// `[4][3][LANES]` moments of the last call (N m); empty with 3 degrees of freedom per node.
+    pub moment: Aligned,
     /// `[constants][LANES]`.
     pub constants: Aligned,
     /// `[history][LANES]`.

@@ -140,9 +140,10 @@ fn fixed_components_stay_where_they_are() {
     for n in &end {
         let x = model.x[*n as usize];
         assert_eq!(x[0], 0.4);
-        assert!(x[1] - 0.05 > -0.05, "moves along y: {x:?}");
     }
-    assert!(end.iter().any(|n| model.x[*n as usize][2] == 0.0));
+    // The other components are free: weight along y sags the end.
+    let lowest = model.x[end[0] as usize][1];
+    assert!(lowest > 1e-6, "{lowest} m");
 }
 
 #[test]

@@ -137,8 +137,6 @@ pub(super) struct Motion<'a> {
 /// What one batch writes besides its own histories.
 pub(super) struct Output<'a> {
     pub(super) force: &'a mut [f64],
-    /// Empty when no sheet has rotations.
-    pub(super) moment: &'a mut [f64],
     pub(super) energy: &'a mut [f64],
     pub(super) area: Option<&'a mut [f64]>,
 }
@@ -152,7 +150,6 @@ pub(super) fn run_batch(
 ) {
     let Output {
         force,
-        moment,
         energy,
         area,
     } = out;
@@ -178,7 +175,7 @@ pub(super) fn run_batch(
         gather(&batch.nodes, motion.v, &mut rates.velocity.0);
         gather(&batch.nodes, motion.spin, &mut rates.spin.0);
         rates.attach(&mut raw);
-        raw.moment = moment.as_mut_ptr();
+        raw.moment = batch.moment.as_mut_ptr();
         sheet.element.forces(&raw)
     } else {
         sheet.element.forces(&raw)
@@ -186,7 +183,7 @@ pub(super) fn run_batch(
     if batch.layered {
         for row in force
             .chunks_exact_mut(LANES)
-            .chain(moment.chunks_exact_mut(LANES))
+            .chain(batch.moment.chunks_exact_mut(LANES))
             .chain(energy.chunks_exact_mut(LANES))
         {
             for (value, layers) in row.iter_mut().zip(&batch.layers) {

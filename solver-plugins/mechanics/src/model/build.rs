@@ -116,6 +116,7 @@ impl Model {
                 layered: layers.iter().any(|k| *k != 1.0),
                 mass_factor: [1.0; LANES],
                 mass: Aligned::zeros(4 * LANES),
+                moment: Aligned::zeros(if s.dofs_per_node == 6 { 12 * LANES } else { 0 }),
                 inertia: Aligned::zeros(if s.dofs_per_node == 6 { 4 * LANES } else { 0 }),
                 constants: Aligned::zeros(s.constants * LANES),
                 history: Aligned::zeros(s.history * LANES),
@@ -306,9 +307,6 @@ impl Model {
         self.element_force = Aligned::zeros(nb * 12 * LANES);
         self.element_energy = Aligned::zeros(nb * PF_ENERGIES * LANES);
         self.cell_area = Aligned::zeros(nb * AREA_ROWS * LANES);
-        if let Some(r) = self.rotations.as_deref_mut() {
-            r.element_moment = Aligned::zeros(nb * 12 * LANES);
-        }
         let slots = self
             .cells
             .iter()

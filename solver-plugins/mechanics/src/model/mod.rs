@@ -181,23 +181,6 @@ impl NodeWork {
 
 const NODE_CHUNK: usize = 1024;
 
-/// The chunks `[12][LANES]` of the element moments, or as many empty ones when nothing rotates.
-fn moment_chunks(
-    moments: &mut [f64],
-    batches: usize,
-) -> impl IndexedParallelIterator<Item = &mut [f64]> {
-    let chunk = if moments.is_empty() { 0 } else { 12 * LANES };
-    let mut rest = moments;
-    let list: Vec<&mut [f64]> = (0..batches)
-        .map(|_| {
-            let (head, tail) = std::mem::take(&mut rest).split_at_mut(chunk);
-            rest = tail;
-            head
-        })
-        .collect();
-    list.into_par_iter()
-}
-
 /// How often (steps) the nodes' normals and areas are computed.
 const NORMAL_INTERVAL: u64 = 16;
 
@@ -206,17 +189,12 @@ impl Model {
     /// fields too.
     fn internal_forces(&mut self, fields: bool) -> Result<(), MechanicsError> {
         let sheets = &self.sheets;
-        let (spin, moments): (&[V], &mut [f64]) = match self.rotations.as_deref_mut() {
-            Some(r) => (&r.spin, &mut r.element_moment),
-            None => (&[], &mut []),
-        };
         let motion = Motion {
             x: &self.x,
             v: &self.v,
-            spin,
+            spin: self.rotations.as_deref().map_or(&[], |r| &r.spin),
             dt: self.last_dt,
         };
-        let moments = moment_chunks(moments, self.batches.len());
         let (pressed, all) = (&self.pressed, self.cycle.is_multiple_of(NORMAL_INTERVAL));
         self.element_force
             .par_chunks_exact_mut(12 * LANES)
@@ -226,16 +204,14 @@ impl Model {
             )
             .zip_eq(self.cell_area.par_chunks_exact_mut(AREA_ROWS * LANES))
             .zip_eq(self.batches.par_iter_mut())
-            .zip_eq(moments)
             .enumerate()
             .with_min_len(8)
-            .for_each(|(b, ((((force, energy), area), batch), moment))| {
+            .for_each(|(b, (((force, energy), area), batch))| {
                 let sheet = &sheets[batch.sheet as usize];
                 let slots = &pressed[b * LANES..(b + 1) * LANES];
                 let area = (all || slots.iter().any(|w| *w != [0.0; 2])).then_some(area);
                 let out = Output {
                     force,
-                    moment,
                     energy,
                     area,
                 };

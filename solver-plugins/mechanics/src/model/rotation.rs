@@ -16,8 +16,6 @@ pub(super) struct Rotations {
     moment: Vec<V>,
     /// `[n]` the part of them that is a load.
     external: Vec<V>,
-    /// `[batches][12][LANES]` (N m).
-    pub(super) element_moment: Aligned,
 }
 
 impl Rotations {
@@ -27,7 +25,6 @@ impl Rotations {
             inertia: vec![0.0; n],
             moment: vec![[0.0; 3]; n],
             external: vec![[0.0; 3]; n],
-            element_moment: Aligned::default(),
         }
     }
 }
@@ -43,7 +40,7 @@ impl Model {
         let Some(r) = self.rotations.as_deref_mut() else {
             return;
         };
-        let (slots, element, inertia) = (&self.node_slots, &*r.element_moment, &r.inertia);
+        let (slots, batches, inertia) = (&self.node_slots, &self.batches, &r.inertia);
         r.moment
             .par_chunks_mut(NODE_CHUNK)
             .enumerate()
@@ -56,17 +53,24 @@ impl Model {
                     }
                     for entry in slots.of(node) {
                         let (slot, k) = ((entry / 4) as usize, (entry % 4) as usize);
-                        let at = (slot / LANES) * 12 * LANES + k * 3 * LANES + slot % LANES;
+                        let moment = &batches[slot / LANES].moment;
+                        if moment.is_empty() {
+                            continue;
+                        }
+                        let at = k * 3 * LANES + slot % LANES;
                         for c in 0..3 {
-                            m[c] -= element[at + c * LANES];
+                            m[c] -= moment[at + c * LANES];
                         }
                     }
                 }
             });
         for load in &self.loads {
+            r.external[load.node as usize] = [0.0; 3];
+        }
+        for load in &self.loads {
             let n = load.node as usize;
             let m = scale(load.moment, self.load_factor);
-            r.external[n] = m;
+            r.external[n] = add(r.external[n], m);
             r.moment[n] = add(r.moment[n], m);
         }
     }
