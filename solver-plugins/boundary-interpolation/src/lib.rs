@@ -59,9 +59,12 @@ impl Step for BoundaryInterpolation {
         let meshes = host.meshes(&input)?;
         if meshes.times.len() < 2 {
             let n = meshes.times.len();
-            return Err(
-                format!("'{}' has {n} frames; a motion needs at least 2", input.step).into(),
-            );
+            return Err(format!(
+                "'{}' has {n} frames; a motion needs at least 2. A kinematic drape is one state and cannot drive \
+                 a local run: take `formed` from a step such as forming-explicit",
+                input.step
+            )
+            .into());
         }
         let listed = attributes["sheets"].as_array().cloned().unwrap_or_default();
         let mut sheets = Vec::new();

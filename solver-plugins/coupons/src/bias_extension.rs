@@ -2,7 +2,8 @@
 //!
 //! The stitch direction e1 + e2 lies along the pull, so that the shear is positive. The moving end starts and stops
 //! smoothly and has a constant speed between. The specimen is not flat: it has a random out-of-plane shape
-//! ([`imperfection`]), the same for every mesh and for every run with the same seed.
+//! ([`imperfection`]), the same for every mesh and for every run with the same seed. The pull flattens that shape long
+//! before a wrinkle starts, so a dead load along z in the same shape can hold it up (`transverse_load`).
 //!
 //! **Wrinkles** are measured from the out-of-plane places of the nodes: `top` = max z, `bottom` = -min z,
 //! `half_height` = (max z - min z) / 2, each over the whole specimen; `section` = max |z| over the central
@@ -22,7 +23,7 @@ use crate::run::{Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use crate::strip::{CLAMPED, Grid, fibre_strain, rows};
 use plyflow_mechanics::history::linear;
-use plyflow_mechanics::model::Drive;
+use plyflow_mechanics::model::{Drive, NodalLoad};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::units::Dimension;
@@ -63,6 +64,8 @@ pub struct Parameters {
     ramp_share: f64,
     /// Largest out-of-plane place of the undeformed specimen (m).
     imperfection: f64,
+    /// Largest of the lateral load in the same shape (Pa).
+    transverse_load: f64,
     /// Which random shape.
     seed: u64,
     /// Amplitude at which a wrinkle counts (m).
@@ -271,6 +274,10 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     }
     let axis = [FRAC_1_SQRT_2, -FRAC_1_SQRT_2, 0.0];
     let mut specimen = Specimen::new(host, &p.common, mesh, axis, Pressed::No)?;
+    if p.transverse_load > 0.0 {
+        let loads = transverse_loads(p, &grid, &shape, &specimen);
+        specimen.model.set_loads(loads);
+    }
     let columns = grid.xs.len();
     let mut driven = grid.columns(0..CLAMPED);
     driven.extend(grid.columns(columns - CLAMPED..columns));
@@ -317,6 +324,31 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         shear,
     }
     .write(host, &specimen, &outcome)
+}
+
+/// The lateral load at the nodes: its value there times the area that a node stands for.
+fn transverse_loads(
+    p: &Parameters,
+    grid: &Grid,
+    shape: &imperfection::Shape,
+    specimen: &Specimen,
+) -> Vec<NodalLoad> {
+    // Half of the gaps to both neighbours; the gaps outside are none.
+    let share = |at: &[f64], i: usize| {
+        let (last, first) = (at[(i + 1).min(at.len() - 1)], at[i.saturating_sub(1)]);
+        0.5 * (last - first)
+    };
+    (0..specimen.mesh.points.len() as u32)
+        .filter_map(|node| {
+            let (i, j) = grid.place(node);
+            let value = p.transverse_load * shape.at(grid.xs[i], grid.ys[j]);
+            (value != 0.0).then(|| NodalLoad {
+                node,
+                force: [0.0, 0.0, value * share(&grid.xs, i) * share(&grid.ys, j)],
+                moment: [0.0; 3],
+            })
+        })
+        .collect()
 }
 
 /// Elements whose centres lie within `radius` of a point, or the nearest one.

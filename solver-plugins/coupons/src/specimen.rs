@@ -1,7 +1,9 @@
 //! A specimen: one sheet of a material, meshed, with an element formulation.
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL};
-use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+use plyflow_mechanics::component::{
+    ElementField, ElementInstance, MaterialInstance, element_fields,
+};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
@@ -59,19 +61,6 @@ impl Common {
     }
 }
 
-/// One field of the element formulation.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ElementField {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: String,
-    /// On node patches (points) instead of cells.
-    pub patch: bool,
-    /// Its row.
-    pub row: usize,
-}
-
 /// A specimen as a model and as a body.
 pub struct Specimen {
     /// The model; its one sheet has the nodes of the mesh, in the same numbers.
@@ -80,28 +69,6 @@ pub struct Specimen {
     pub mesh: QuadMesh,
     /// Fields of the element.
     pub fields: Vec<ElementField>,
-}
-
-/// The element's fields as its manifest declares them, in the order of their rows.
-pub fn element_fields(manifest: &str) -> Vec<ElementField> {
-    let value: serde_json::Value = serde_json::from_str(manifest).unwrap_or_default();
-    let (mut cells, mut patches) = (0, 0);
-    value["fields"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .map(|f| {
-            let patch = f["patch"].as_bool().unwrap_or(false);
-            let count = if patch { &mut patches } else { &mut cells };
-            *count += 1;
-            ElementField {
-                name: f["name"].as_str().unwrap_or_default().into(),
-                unit: f["unit"].as_str().unwrap_or("1").into(),
-                patch,
-                row: *count - 1,
-            }
-        })
-        .collect()
 }
 
 /// The element instance of the common parameters.

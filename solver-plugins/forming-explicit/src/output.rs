@@ -5,6 +5,7 @@ use crate::local::{LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use crate::run::{Body, Forming, Observer, Outcome};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
+use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::SheetKind;
@@ -25,35 +26,6 @@ impl Components for HostComponents<'_> {
             .component(PF_KIND_MATERIAL, name)
             .map_err(|e| format!("{e:?}"))
     }
-}
-
-/// One field of an element formulation.
-struct ElementField {
-    name: String,
-    unit: String,
-    patch: bool,
-    row: usize,
-}
-
-fn element_fields(manifest: &str) -> Vec<ElementField> {
-    let value: serde_json::Value = serde_json::from_str(manifest).unwrap_or_default();
-    let (mut cells, mut patches) = (0, 0);
-    value["fields"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .map(|f| {
-            let patch = f["patch"].as_bool().unwrap_or(false);
-            let count = if patch { &mut patches } else { &mut cells };
-            *count += 1;
-            ElementField {
-                name: f["name"].as_str().unwrap_or_default().into(),
-                unit: f["unit"].as_str().unwrap_or("1").into(),
-                patch,
-                row: *count - 1,
-            }
-        })
-        .collect()
 }
 
 struct Writer<'a> {

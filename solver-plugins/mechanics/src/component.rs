@@ -6,6 +6,41 @@ use plyflow_sdk::{ElementSizes, MaterialRef};
 use std::ffi::c_void;
 use std::sync::Arc;
 
+/// One field of an element formulation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ElementField {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// On node patches (points) instead of cells.
+    pub patch: bool,
+    /// Its row among the fields of cells, or of patches.
+    pub row: usize,
+}
+
+/// The fields that an element's manifest declares, in the order of their rows; none when it is no JSON.
+pub fn element_fields(manifest: &str) -> Vec<ElementField> {
+    let value: serde_json::Value = serde_json::from_str(manifest).unwrap_or_default();
+    let (mut cells, mut patches) = (0, 0);
+    value["fields"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .map(|f| {
+            let patch = f["patch"].as_bool().unwrap_or(false);
+            let count = if patch { &mut patches } else { &mut cells };
+            *count += 1;
+            ElementField {
+                name: f["name"].as_str().unwrap_or_default().into(),
+                unit: f["unit"].as_str().unwrap_or("1").into(),
+                patch,
+                row: *count - 1,
+            }
+        })
+        .collect()
+}
+
 /// A material made from its parameters.
 pub struct MaterialInstance {
     reference: MaterialRef,
