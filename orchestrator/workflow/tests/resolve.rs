@@ -81,7 +81,7 @@ fn a_scene_has_its_materials_inside_and_reads_back_as_its_type() {
         "prose does not enter"
     );
     let typed: plyflow_model::scene::Scene = serde_json::from_value(scene.clone()).unwrap();
-    assert_eq!(typed.friction.tool_diaphragm.0, 0.51);
+    assert_eq!(typed.friction.tool_diaphragm.map(|n| n.0), Some(0.51));
     assert_eq!(serde_json::to_value(&typed).unwrap(), *scene);
 }
 

@@ -5,7 +5,7 @@
 //! stands on it, centred at x = y = 0.
 
 use crate::material::MaterialEntry;
-use crate::units::{Angle, Length, Number, Pressure, Time};
+use crate::units::{Angle, Force, Length, Number, Pressure, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -193,22 +193,26 @@ pub struct Sheet {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Friction {
-    /// Tool (and machine bed) against diaphragm.
+    /// Tool (and machine bed) against diaphragm; needed where the stack has diaphragms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub tool_diaphragm: Number,
-    /// Tool against fabric.
+    pub tool_diaphragm: Option<Number>,
+    /// Tool (punch, die and blank holder) against fabric; needed in a press.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub tool_fabric: Option<Number>,
-    /// Fabric against diaphragm.
+    /// Fabric against diaphragm; needed where the stack has diaphragms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub fabric_diaphragm: Number,
-    /// Fabric against fabric.
+    pub fabric_diaphragm: Option<Number>,
+    /// Fabric against fabric; needed where plies lie on each other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub fabric_fabric: Number,
-    /// Diaphragm against diaphragm.
+    pub fabric_fabric: Option<Number>,
+    /// Diaphragm against diaphragm; needed where the stack has diaphragms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub diaphragm_diaphragm: Number,
+    pub diaphragm_diaphragm: Option<Number>,
 }
 
 /// The process.
@@ -217,6 +221,108 @@ pub struct Friction {
 pub enum Process {
     /// Double-diaphragm forming.
     DoubleDiaphragm(DoubleDiaphragm),
+    /// Press forming: punch, die and blank holder.
+    Press(Press),
+}
+
+impl Process {
+    /// Height over the tool's highest point at which the lowest sheet starts (m).
+    pub fn clearance(&self) -> f64 {
+        match self {
+            Self::DoubleDiaphragm(p) => p.clearance.si(),
+            Self::Press(_) => 0.0,
+        }
+    }
+
+    /// The word for it in a scene file.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::DoubleDiaphragm(_) => "double_diaphragm",
+            Self::Press(_) => "press",
+        }
+    }
+}
+
+/// Press forming: the scene's tool is the punch, drawn where it ends. It starts `stroke` below, in touch with
+/// the lowest ply, and rises through the opening of the die, a plate over the plies; a blank holder below them,
+/// when given, keeps them from folding. Upside down to most presses; nothing depends on that but the weight,
+/// which is left out unless `weight` says where it pulls.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Press {
+    /// Way of the punch, from its first touch.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub stroke: Length,
+    /// Simulated duration of the stroke.
+    #[schemars(extend("x-exclusive-minimum" = "0 s"))]
+    pub forming_time: Time,
+    /// Share of that time in which the punch gathers speed, and in which it loses it.
+    #[serde(default = "Press::default_ramp_share")]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
+    pub ramp_share: Number,
+    /// Simulated duration after the stroke, for the motion to die out.
+    #[schemars(extend("x-minimum" = "0 s"))]
+    pub settling_time: Time,
+    /// The die.
+    pub die: PressPlate,
+    /// The blank holder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holder: Option<Holder>,
+    /// Where the weight of the plies pulls them; left out: they have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weight: Option<Towards>,
+}
+
+impl Press {
+    fn default_ramp_share() -> Number {
+        Number(0.1)
+    }
+}
+
+/// A direction in a press.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Towards {
+    /// Upwards, onto the die.
+    Die,
+    /// Downwards, onto the holder.
+    Holder,
+}
+
+/// A flat plate with a round opening about the tool's axis x = y = 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressPlate {
+    /// Radius of the opening.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub opening_radius: Length,
+    /// Radius of the rounding of its edge.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub edge_radius: Length,
+}
+
+/// The blank holder: a plate that keeps a distance from the die, or one that a force presses towards it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Holder {
+    /// Its opening; that of the die unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opening_radius: Option<Length>,
+    /// Radius of the rounding of its edge; that of the die unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edge_radius: Option<Length>,
+    /// How it is held.
+    pub hold: Hold,
+}
+
+/// What a blank holder keeps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Hold {
+    /// Distance between the faces of die and holder.
+    Gap(Length),
+    /// Force towards the die.
+    Force(Force),
 }
 
 /// Double-diaphragm forming: the frame is lowered with the bag under vacuum until the lower film meets

@@ -4,13 +4,15 @@ use crate::parameters::{ComponentChoice, Parameters};
 use plyflow_abi::pf_component;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
-    ContactSettings, Plane, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
+    ContactSettings, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface, SheetContact,
+    SlaveItem,
 };
 use plyflow_mechanics::mesh::NONE;
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::material::{Material, MaterialEntry};
-use plyflow_model::scene::{DoubleDiaphragm, Process, Scene, Sheet, SheetKind};
+use plyflow_model::scene::{Process, Scene, Sheet, SheetKind};
+use plyflow_model::units::Number;
 use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
 
@@ -59,18 +61,27 @@ pub struct StackSheet {
 /// The stack of a scene, bottom to top, with offsets.
 ///
 /// # Errors
-/// When it is no double-diaphragm stack: film, plies, film.
+/// When it does not fit the process: film, plies, film for double-diaphragm forming, plies alone for a press.
 pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
     let n = scene.sheets.len();
     let kinds: Vec<SheetKind> = scene.sheets.iter().map(|s| s.kind).collect();
-    let inner_plies = n >= 3 && kinds[1..n - 1].iter().all(|k| *k == SheetKind::Ply);
-    let outer_films =
-        n >= 3 && kinds[0] == SheetKind::Diaphragm && kinds[n - 1] == SheetKind::Diaphragm;
-    if !(inner_plies && outer_films) {
+    let plies =
+        |kinds: &[SheetKind]| !kinds.is_empty() && kinds.iter().all(|k| *k == SheetKind::Ply);
+    let (fits, expected) = match scene.process {
+        Process::DoubleDiaphragm(_) => (
+            n >= 3
+                && plies(&kinds[1..n - 1])
+                && kinds[0] == SheetKind::Diaphragm
+                && kinds[n - 1] == SheetKind::Diaphragm,
+            "one diaphragm, one or more plies, one diaphragm",
+        ),
+        Process::Press(_) => (plies(&kinds), "one or more plies, no diaphragm"),
+    };
+    if !fits {
         return Err(format!(
-            "the sheets of scene '{}' must be, from the tool upwards: one diaphragm, one or more \
-             plies, one diaphragm",
-            scene.name
+            "the sheets of scene '{}' must be, from the tool upwards, for the process {}: {expected}",
+            scene.name,
+            scene.process.word()
         ));
     }
     let mut below = 0.0;
@@ -97,10 +108,57 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
         .collect()
 }
 
-/// The process of the scene.
-pub fn process(scene: &Scene) -> &DoubleDiaphragm {
-    let Process::DoubleDiaphragm(p) = &scene.process;
-    p
+/// A friction coefficient that this scene needs.
+///
+/// # Errors
+/// When the scene does not give it.
+pub fn coefficient(value: Option<Number>, name: &str) -> Result<f64, String> {
+    value.map(|n| n.0).ok_or_else(|| {
+        format!("friction.{name}: not given, but this scene has surfaces that touch so; expected a coefficient")
+    })
+}
+
+/// Constants of all contacts.
+pub fn contact_settings(p: &Parameters) -> ContactSettings {
+    ContactSettings {
+        stiffness_factor: p.contact_stiffness,
+        slip_factor: p.slip_stiffness,
+        damping_ratio: p.contact_damping,
+        augmentation: p.contact_augmentation,
+    }
+}
+
+/// Adds the contact of slaves (their place in the stack, their nodes) on a master (its place,
+/// its sheet's number). `side` 1: the slaves lie above.
+pub fn add_sheet_contact(
+    model: &mut Model,
+    stack: &[StackSheet],
+    (slave, nodes): (usize, &[u32]),
+    (master, index): (usize, usize),
+    side: f64,
+    mu: f64,
+    p: &Parameters,
+) {
+    let touching = 0.5 * (stack[slave].thickness + stack[master].thickness);
+    let films = [slave, master]
+        .iter()
+        .all(|k| stack[*k].scene.kind == SheetKind::Diaphragm);
+    let offset = if films {
+        touching.max(LEAST_FILM_DISTANCE)
+    } else {
+        touching
+    };
+    let items = locate(model, index, nodes);
+    let name = format!("{}/{}", stack[master].scene.name, stack[slave].scene.name);
+    model.sheet_contacts.push(SheetContact {
+        name,
+        side,
+        offset,
+        friction: mu,
+        slip_factor: p.slip_stiffness,
+        augmentation: p.contact_augmentation,
+        items,
+    });
 }
 
 /// Makes the element of a sheet with its material.
@@ -168,6 +226,9 @@ pub struct Placed {
 
 /// Sets up all contacts of the stack. `placed` is in stack order (first and last are the films);
 /// `tool` may be absent (a scene whose zone lies off the tool).
+///
+/// # Errors
+/// When a friction coefficient is missing.
 pub fn add_contacts(
     model: &mut Model,
     stack: &[StackSheet],
@@ -175,18 +236,21 @@ pub fn add_contacts(
     scene: &Scene,
     p: &Parameters,
     tool: Arc<dyn RigidSurface>,
-) {
-    let settings = ContactSettings {
-        stiffness_factor: p.contact_stiffness,
-        slip_factor: p.slip_stiffness,
-        damping_ratio: p.contact_damping,
-        augmentation: p.contact_augmentation,
-    };
+) -> Result<(), String> {
     let friction = &scene.friction;
+    let tool_diaphragm = coefficient(friction.tool_diaphragm, "tool_diaphragm")?;
+    let fabric_diaphragm = coefficient(friction.fabric_diaphragm, "fabric_diaphragm")?;
+    let diaphragms = coefficient(friction.diaphragm_diaphragm, "diaphragm_diaphragm")?;
+    let fabrics = if placed.len() > 3 {
+        coefficient(friction.fabric_fabric, "fabric_fabric")?
+    } else {
+        0.0
+    };
     let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: f64, k: usize, offset: f64| {
         RigidContact {
             name,
             surface,
+            motion: RigidMotion::default(),
             friction: mu,
             slip_factor: p.slip_stiffness,
             augmentation: p.contact_augmentation,
@@ -198,7 +262,7 @@ pub fn add_contacts(
         }
     };
     let bottom = &stack[0];
-    let mu = friction.tool_diaphragm.0;
+    let mu = tool_diaphragm;
     let bed: Arc<dyn RigidSurface> = Arc::new(Plane { height: 0.0 });
     let name = |what: &str, k: usize| format!("{what}/{}", stack[k].scene.name);
     model
@@ -220,43 +284,30 @@ pub fn add_contacts(
         ));
     }
     let mut pair = |slave: usize, master: usize, side: f64, mu: f64| {
-        let touching = 0.5 * (stack[slave].thickness + stack[master].thickness);
-        let films = [slave, master]
-            .iter()
-            .all(|k| stack[*k].scene.kind == SheetKind::Diaphragm);
-        let offset = if films {
-            touching.max(LEAST_FILM_DISTANCE)
-        } else {
-            touching
-        };
-        let items = locate(model, placed[master].index, &placed[slave].slaves);
-        let name = format!("{}/{}", stack[master].scene.name, stack[slave].scene.name);
-        model.sheet_contacts.push(SheetContact {
-            name,
+        let on = (master, placed[master].index);
+        add_sheet_contact(
+            model,
+            stack,
+            (slave, &placed[slave].slaves),
+            on,
             side,
-            offset,
-            friction: mu,
-            slip_factor: p.slip_stiffness,
-            augmentation: p.contact_augmentation,
-            items,
-        });
+            mu,
+            p,
+        );
     };
     for k in 1..top {
-        let mu = if k == 1 {
-            friction.fabric_diaphragm.0
-        } else {
-            friction.fabric_fabric.0
-        };
+        let mu = if k == 1 { fabric_diaphragm } else { fabrics };
         pair(k, k - 1, 1.0, mu);
     }
     // The plies' nodes are the slaves of both films: the two films have the same mesh, so whatever unevenness
     // node-to-surface contact makes of a uniform pressure is the same above and below, and cancels. With the
     // film above as the slave of the ply it does not, and the evacuated stack waves (tried).
     if top > 1 {
-        pair(top - 1, top, -1.0, friction.fabric_diaphragm.0);
+        pair(top - 1, top, -1.0, fabric_diaphragm);
     }
-    pair(top, 0, 1.0, friction.diaphragm_diaphragm.0);
-    model.set_contact_stiffness(&settings);
+    pair(top, 0, 1.0, diaphragms);
+    model.set_contact_stiffness(&contact_settings(p));
+    Ok(())
 }
 
 /// Places slaves on the master in the undeformed plane. A slave beyond the master's edge gets the nearest

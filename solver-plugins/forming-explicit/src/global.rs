@@ -2,13 +2,14 @@
 
 use crate::assembly::{self, Components, Placed, StackSheet, ToolSurface};
 use crate::parameters::Parameters;
+use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
 use crate::run::{Body, Forming};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis, graded_axis};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
-use plyflow_model::scene::DoubleDiaphragm;
+use plyflow_model::scene::{DoubleDiaphragm, Process};
 use plyflow_tooling::ToolMesh;
 use std::sync::Arc;
 
@@ -317,8 +318,11 @@ fn top_film(
 /// A text for the user: what of the scene or the parameters makes no model.
 pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Forming, String> {
     let scene = &p.scene;
+    let process = match &scene.process {
+        Process::DoubleDiaphragm(process) => process,
+        Process::Press(press) => return build_press(p, press, components),
+    };
     let stack = assembly::stack(scene)?;
-    let process = assembly::process(scene);
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
     let at = layout(&stack, process, p, &tool)?;
     let mut parts = Parts::default();
@@ -342,7 +346,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         scene,
         p,
         Arc::new(ToolSurface(grid)),
-    );
+    )?;
     model.set_driven(
         frame,
         Box::new(FrameDrive {
@@ -362,6 +366,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         bodies: parts.bodies,
         reference,
         tool,
+        rigid: Vec::new(),
         zone: None,
         element_size: p.element_size,
     })

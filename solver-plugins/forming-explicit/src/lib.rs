@@ -1,4 +1,5 @@
-//! Step plugin `forming-explicit`: explicit dynamic forming of a stack of sheets over a rigid tool. A
+//! Step plugin `forming-explicit`: explicit dynamic forming of a stack of sheets over a rigid tool, between
+//! diaphragms or in a press. A
 //! global run meshes the scene itself; with a `boundary` input it is a local run of one zone.
 
 pub mod assembly;
@@ -6,6 +7,7 @@ mod global;
 mod local;
 mod output;
 pub mod parameters;
+pub mod press;
 pub mod process;
 pub mod run;
 

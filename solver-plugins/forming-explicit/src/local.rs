@@ -9,7 +9,7 @@ use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Drive, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
-use plyflow_model::scene::SheetKind;
+use plyflow_model::scene::{Process, SheetKind};
 use std::sync::Arc;
 
 /// A sheet of the zone as the boundary artifact holds it.
@@ -73,6 +73,14 @@ pub fn build_local(
     components: &dyn Components,
 ) -> Result<Forming, String> {
     let scene = &p.scene;
+    let Process::DoubleDiaphragm(process) = &scene.process else {
+        return Err(format!(
+            "scene '{}' is formed by a {}; local runs are built for double_diaphragm only. Run the whole scene with \
+             bending elements instead: leave out the boundary",
+            scene.name,
+            scene.process.word()
+        ));
+    };
     let whole = assembly::stack(scene)?;
     let has = |name: &str| input.sheets.iter().any(|s| s.name == name);
     let stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
@@ -149,10 +157,7 @@ pub fn build_local(
         });
     }
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
-    let cycle = Cycle::new(
-        assembly::process(scene),
-        [input.frame[0], input.frame[frames - 1]],
-    );
+    let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]]);
     let reference = points.clone();
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
@@ -163,7 +168,7 @@ pub fn build_local(
         scene,
         p,
         Arc::new(ToolSurface(grid)),
-    );
+    )?;
     let drive = CutDrive {
         time: input.time.clone(),
         position,
@@ -183,6 +188,7 @@ pub fn build_local(
         bodies,
         reference,
         tool,
+        rigid: Vec::new(),
         zone: Some(input.zone),
         element_size: input.element_size,
     })

@@ -7,7 +7,7 @@ use crate::run::{Body, Forming, Observer, Outcome};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_mechanics::energy::Ledger;
-use plyflow_mechanics::vec3::V;
+use plyflow_mechanics::vec3::{V, add};
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::{Host, Input, Log, On, Progress, StepError};
 use serde_json::json;
@@ -60,6 +60,18 @@ impl Observer for Writer<'_> {
                 &pressure,
             )?;
         }
+        if forming.load.press().is_some() {
+            let moved = |points: &[V], part: &str| -> Vec<V> {
+                let shift = forming.shift(part);
+                points.iter().map(|x| add(*x, shift)).collect()
+            };
+            self.host
+                .write_points("tool", &moved(&forming.tool.points, "tool"))?;
+            for part in &forming.rigid {
+                self.host
+                    .write_points(&part.name, &moved(&part.points, &part.name))?;
+            }
+        }
         self.host.end_frame()
     }
 
@@ -77,7 +89,7 @@ impl Observer for Writer<'_> {
                 } else {
                     -1.0
                 },
-                phase: forming.load.cycle().phase(forming.model.time),
+                phase: forming.load.phase(forming.model.time),
             });
             self.shown = Instant::now();
             self.cycle_shown = cycle;
@@ -137,6 +149,16 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         &tool_cells,
         &json!({"rigid": true}),
     )?;
+    for part in &forming.rigid {
+        let about = json!({"rigid": true});
+        host.define_mesh(
+            &part.name,
+            &part.points,
+            4,
+            part.cells.as_flattened(),
+            &about,
+        )?;
+    }
     let started = Instant::now();
     let mut writer = Writer {
         host,
@@ -153,7 +175,7 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         &mut writer,
     )?;
     let seconds = writer.started.elapsed().as_secs_f64();
-    write_history(host, &outcome)?;
+    write_history(host, &outcome, forming.load.press().is_some())?;
     write_summary(host, p, &forming, &outcome, seconds)
 }
 
@@ -223,13 +245,13 @@ fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
     })
 }
 
-fn write_history(host: &Host, outcome: &Outcome) -> Result<(), StepError> {
+fn write_history(host: &Host, outcome: &Outcome, press: bool) -> Result<(), StepError> {
     type Column = (
         &'static str,
         &'static str,
         fn(&crate::run::HistoryRow) -> f64,
     );
-    let columns: [Column; 13] = [
+    let mut columns: Vec<Column> = vec![
         ("time", "s", |r| r.time),
         ("kinetic", "J", |r| r.ledger.kinetic),
         ("membrane", "J", |r| r.ledger.membrane),
@@ -244,6 +266,10 @@ fn write_history(host: &Host, outcome: &Outcome) -> Result<(), StepError> {
         ("bag_pressure", "Pa", |r| r.bag),
         ("frame_height", "m", |r| r.frame),
     ];
+    if press {
+        columns.push(("punch_force", "N", |r| r.punch_force));
+        columns.push(("holder_travel", "m", |r| r.holder_travel));
+    }
     for (name, unit, value) in columns {
         let data: Vec<f64> = outcome.history.iter().map(value).collect();
         host.write_f64(&format!("history/{name}"), &[data.len()], unit, &data)?;

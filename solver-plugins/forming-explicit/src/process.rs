@@ -1,5 +1,6 @@
-//! Double-diaphragm forming in time: bagging, lowering, drawing, settling.
+//! Processes in time. Double-diaphragm forming: bagging, lowering, drawing, settling; a press: forming, settling.
 
+use crate::press::PressLoad;
 use plyflow_mechanics::history::{linear, smooth_step};
 use plyflow_mechanics::model::{Drive, Model, Pressures};
 use plyflow_mechanics::vec3::V;
@@ -130,28 +131,50 @@ pub enum Load {
         /// Phases, for names and the end.
         cycle: Cycle,
     },
+    /// Punch and holder of a press.
+    Press(PressLoad),
 }
 
 impl Load {
-    /// The phases.
-    pub fn cycle(&self) -> &Cycle {
+    /// Whole duration (s).
+    pub fn duration(&self) -> f64 {
         match self {
-            Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle,
+            Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle.duration(),
+            Self::Press(p) => p.stroke.forming + p.stroke.settling,
         }
     }
 
-    /// Height of the frame at `t` (m).
+    /// Name of the phase at `t`.
+    pub fn phase(&self, t: f64) -> &'static str {
+        match self {
+            Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle.phase(t),
+            Self::Press(p) if t < p.stroke.forming => "forming",
+            Self::Press(_) => "settling",
+        }
+    }
+
+    /// Height of the frame at `t` (m); of a press's punch over its end.
     pub fn frame_height(&self, t: f64) -> f64 {
         match self {
             Self::Process { cycle, .. } => cycle.frame_height(t),
             Self::Given { time, frame, .. } => linear(time, frame, t),
+            Self::Press(p) => -p.stroke.left(t),
         }
     }
 
-    /// Sets the model's pressures for its present time.
+    /// The press, when it is one.
+    pub fn press(&self) -> Option<&PressLoad> {
+        match self {
+            Self::Press(p) => Some(p),
+            _ => None,
+        }
+    }
+
+    /// Sets the model's pressures, or the places of the press's parts, for its present time.
     pub fn apply(&mut self, model: &mut Model) {
         let t = model.time;
         match self {
+            Self::Press(p) => p.apply(model),
             Self::Given {
                 time, cavity, bag, ..
             } => {

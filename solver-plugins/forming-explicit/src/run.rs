@@ -1,7 +1,9 @@
 //! The time loop: frames, ledger, step control, health.
 
 use crate::assembly::StackSheet;
+use crate::press::PressLoad;
 use crate::process::Load;
+use plyflow_mechanics::contact::{OpenPlate, RigidContact};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, judge};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::{V, norm};
@@ -32,6 +34,56 @@ impl Body {
     }
 }
 
+/// A rigid part besides the tool, as a body of the artifact.
+#[derive(Debug, Clone)]
+pub struct RigidBody {
+    /// Name; contacts with it begin with the name and a slash.
+    pub name: String,
+    /// Points at the start (m).
+    pub points: Vec<V>,
+    /// Quads.
+    pub cells: Vec<[u32; 4]>,
+}
+
+impl RigidBody {
+    /// The face of a plate out to a radius that covers `reach` (m), its rounding, and as much of the wall again.
+    pub fn plate(name: &str, plate: &OpenPlate, reach: f64) -> Self {
+        const AROUND: usize = 96;
+        const ALONG: usize = 8;
+        let a = plate.opening + plate.edge;
+        let mut profile = vec![[1.05 * reach.max(a), 0.0]];
+        for i in 0..=ALONG {
+            let (s, c) = (std::f64::consts::FRAC_PI_2 * i as f64 / ALONG as f64).sin_cos();
+            profile.push([a - plate.edge * s, plate.edge * (1.0 - c)]);
+        }
+        profile.push([plate.opening, 2.0 * plate.edge]);
+        let mut points = Vec::with_capacity(profile.len() * AROUND);
+        for [r, y] in &profile {
+            for k in 0..AROUND {
+                let (s, c) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
+                points.push([r * c, r * s, plate.height + plate.side * y]);
+            }
+        }
+        let node = |i: usize, k: usize| (i * AROUND + k % AROUND) as u32;
+        let cells = (0..profile.len() - 1)
+            .flat_map(|i| (0..AROUND).map(move |k| (i, k)))
+            .map(|(i, k)| {
+                [
+                    node(i, k),
+                    node(i, k + 1),
+                    node(i + 1, k + 1),
+                    node(i + 1, k),
+                ]
+            })
+            .collect();
+        Self {
+            name: name.into(),
+            points,
+            cells,
+        }
+    }
+}
+
 /// A forming run, ready to go.
 pub struct Forming {
     /// The model.
@@ -46,6 +98,8 @@ pub struct Forming {
     pub reference: Vec<V>,
     /// The tool.
     pub tool: ToolMesh,
+    /// What else is rigid, to be looked at.
+    pub rigid: Vec<RigidBody>,
     /// The zone of a local run.
     pub zone: Option<serde_json::Value>,
     /// Edge of the plies' elements (m).
@@ -63,8 +117,12 @@ pub struct HistoryRow {
     pub cavity: f64,
     /// Bag pressure (Pa).
     pub bag: f64,
-    /// Frame height (m).
+    /// Frame height (m); of a press's punch over its end.
     pub frame: f64,
+    /// Force of a press's punch on the plies (N).
+    pub punch_force: f64,
+    /// Way of a press's holder towards the die (m).
+    pub holder_travel: f64,
 }
 
 /// What came of a run.
@@ -114,6 +172,13 @@ impl Forming {
         nodes.iter().map(|n| self.reference[*n as usize]).collect()
     }
 
+    /// Where the part of that name has moved (m).
+    pub fn shift(&self, part: &str) -> V {
+        let of = |c: &&RigidContact| c.name.split('/').next() == Some(part);
+        let found = self.model.rigid_contacts.iter().find(of);
+        found.map_or([0.0; 3], |c| c.motion.shift)
+    }
+
     fn row(&self, ledger: Ledger) -> HistoryRow {
         let m = &self.model;
         HistoryRow {
@@ -122,6 +187,8 @@ impl Forming {
             cavity: m.pressures.below,
             bag: m.pressures.above,
             frame: self.load.frame_height(m.time),
+            punch_force: self.load.press().map_or(0.0, |p| p.punch_force(m)),
+            holder_travel: self.load.press().map_or(0.0, PressLoad::holder_travel),
         }
     }
 
@@ -138,7 +205,7 @@ impl Forming {
         kinetic_bound: f64,
         observer: &mut dyn Observer,
     ) -> Result<Outcome, plyflow_sdk::StepError> {
-        let end = self.load.cycle().duration();
+        let end = self.load.duration();
         let interval = end / frames as f64;
         let mut history = Vec::with_capacity(frames * LEDGER_PER_FRAME as usize + 1);
         let mut smallest_step = f64::INFINITY;
@@ -196,7 +263,9 @@ impl Forming {
     pub fn contact_pressure(&self, body: &Body) -> Vec<f64> {
         let m = &self.model;
         let mut force = vec![0.0; m.x.len()];
-        for c in m.rigid_contacts.iter() {
+        // The die of a press lies on the other face.
+        let facing = |c: &&RigidContact| !c.name.starts_with("die/");
+        for c in m.rigid_contacts.iter().filter(facing) {
             for i in &c.items {
                 force[i.node as usize] += i.normal_force;
             }

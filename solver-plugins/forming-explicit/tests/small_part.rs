@@ -4,55 +4,11 @@
 //! 7.5 %, both over their bounds; and at 10 mm elements over a 30 mm high block the ledger is open by 4.7 %. The mesh
 //! here is 7 mm and the block 20 mm high so that what it does claim can be judged.
 
-use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
-use plyflow_forming_explicit::assembly::Components;
-use plyflow_forming_explicit::build_global;
+mod common;
+
+use common::{fabric, form};
 use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
-use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow};
-use plyflow_mechanics::energy::Ledger;
-use plyflow_sdk::{StepError, element_table, material_table};
 use serde_json::json;
-
-struct BuiltIn;
-
-fn component(kind: u32, functions: *const std::ffi::c_void) -> pf_component {
-    pf_component {
-        kind,
-        reserved: 0,
-        functions,
-        manifest: pf_str::new("{}"),
-    }
-}
-
-impl Components for BuiltIn {
-    fn element(&self, _: &str) -> Result<pf_component, String> {
-        let table = Box::leak(Box::new(element_table::<M4>()));
-        Ok(component(PF_KIND_ELEMENT, std::ptr::from_ref(table).cast()))
-    }
-    fn material(&self, name: &str) -> Result<pf_component, String> {
-        let table = match name {
-            "material-fabric" => material_table::<Fabric>(),
-            _ => material_table::<Marlow>(),
-        };
-        let table = Box::leak(Box::new(table));
-        Ok(component(
-            PF_KIND_MATERIAL,
-            std::ptr::from_ref(table).cast(),
-        ))
-    }
-}
-
-struct Silent;
-
-impl Observer for Silent {
-    fn frame(&mut self, _: &Forming, _: f64) -> Result<(), StepError> {
-        Ok(())
-    }
-    fn tick(&mut self, _: &Forming, _: &Ledger, _: f64) -> Result<(), StepError> {
-        Ok(())
-    }
-}
 
 fn parameters() -> Parameters {
     let film = json!({
@@ -60,20 +16,11 @@ fn parameters() -> Parameters {
         "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
         "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
     });
-    let fabric = json!({
-        "plyflow_material": 1, "name": "NCF", "plugin": "material-fabric",
-        "thickness": "0.0004 m", "areal_mass": "0.44 kg/m2",
-        "with": {
-            "form": "fibre-energy", "fibre_modulus": 3e9, "compression_factor": 1.0,
-            "shear": {"coefficients": [0.0, 112.19, 94.73, 137.06, -65.56, 29.56], "limit": 1.05},
-            "stitch": {"angles": [0.06, 0.5, 0.75], "forces": [0.0, 880.0, 0.0]}
-        }
-    });
     let diaphragm =
         |name: &str| json!({"name": name, "kind": "diaphragm", "material": film.clone()});
     let ply = |name: &str| {
         json!({
-            "name": name, "kind": "ply", "material": fabric.clone(), "length": "0.12 m",
+            "name": name, "kind": "ply", "material": fabric(), "length": "0.12 m",
             "width": "0.08 m", "fibre_1": "-0.7853981633974483 rad",
             "fibre_2": "0.7853981633974483 rad"
         })
@@ -104,30 +51,9 @@ fn parameters() -> Parameters {
     .expect("the parameters fit their type")
 }
 
-fn form(threads: usize) -> (Forming, Outcome) {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .unwrap();
-    pool.install(|| {
-        let p = parameters();
-        let mut forming = build_global(&p, &BuiltIn).unwrap();
-        let outcome = forming
-            .run(
-                p.frames,
-                p.time_step,
-                p.step_safety,
-                p.kinetic_bound,
-                &mut Silent,
-            )
-            .unwrap_or_else(|e| panic!("{e:?}"));
-        (forming, outcome)
-    })
-}
-
 #[test]
 fn small_part_is_formed_quietly_with_a_closed_ledger_and_the_same_bits_on_two_threads() {
-    let (forming, outcome) = form(1);
+    let (forming, outcome) = form(&parameters(), 1);
     let health = &outcome.health;
     assert!(health.peak_drift_ratio < 0.02, "{health:?}");
 
@@ -165,7 +91,7 @@ fn small_part_is_formed_quietly_with_a_closed_ledger_and_the_same_bits_on_two_th
         );
     }
 
-    let (again, _) = form(2);
+    let (again, _) = form(&parameters(), 2);
     assert!(
         forming.model.x == again.model.x,
         "two threads give other positions"

@@ -5,7 +5,7 @@ use crate::ply::{Draped, Ply, Stops, lay, plies, stops};
 use crate::root::drop_on;
 use crate::surface::SmoothSurface;
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_model::scene::{Process, Scene};
+use plyflow_model::scene::Scene;
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
 use plyflow_surface::vector::distance;
 use plyflow_tooling::ToolMesh;
@@ -178,8 +178,7 @@ fn write_bodies(
     tool: &ToolMesh,
     done: &[Done],
 ) -> Result<(), StepError> {
-    let Process::DoubleDiaphragm(process) = &scene.process;
-    let above = tool.bounds()[1][2] + process.clearance.si();
+    let above = tool.bounds()[1][2] + scene.process.clearance();
     for d in done {
         let z = above + d.ply.offset;
         let flat: Vec<[f64; 3]> = d.mesh.points.iter().map(|q| [q[0], q[1], z]).collect();

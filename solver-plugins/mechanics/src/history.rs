@@ -10,6 +10,22 @@ pub fn smooth_step(t: f64, start: f64, duration: f64) -> f64 {
     s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
 }
 
+/// Way (m) at time t (s) of what goes `way` in `time`: its speed rises smoothly over `ramp` (s, at most half of the
+/// time), is constant, and falls as smoothly. The speed rises by 3 s^2 - 2 s^3, so the acceleration has no jump.
+pub fn constant_speed_way(t: f64, way: f64, time: f64, ramp: f64) -> f64 {
+    let speed = way / (time - ramp);
+    // Integral of the speed's rise over the ramp.
+    let risen = |s: f64| s * s * s * (1.0 - 0.5 * s);
+    let t = t.clamp(0.0, time);
+    if t < ramp {
+        speed * ramp * risen(t / ramp)
+    } else if t <= time - ramp {
+        speed * (t - 0.5 * ramp)
+    } else {
+        way - speed * ramp * risen((time - t) / ramp)
+    }
+}
+
 /// Where `t` lies among increasing `times`: index k and local coordinate s in 0..1 of the piece [k, k+1];
 /// outside, the nearest end. `times` has at least two entries.
 pub fn locate(times: &[f64], t: f64) -> (usize, f64) {
@@ -55,6 +71,22 @@ mod tests {
             assert!((f(t + h) - 2.0 * f(t) + f(t - h)).abs() / (h * h) < 1e-2);
         }
         assert_eq!((f(0.0), f(2.0), f(4.0)), (0.0, 0.5, 1.0));
+    }
+
+    #[test]
+    fn constant_speed_way_starts_and_stops_smoothly_and_arrives() {
+        for ramp in [0.02, 0.1] {
+            let at = |t: f64| constant_speed_way(t, 0.04, 0.2, ramp);
+            assert_eq!((at(0.0), at(0.2), at(1.0)), (0.0, 0.04, 0.04));
+            let d = 1e-6;
+            let speed = |t: f64| (at(t + d) - at(t - d)) / (2.0 * d);
+            let most = 0.04 / (0.2 - ramp);
+            for i in 1..1000 {
+                let t = 0.2 * f64::from(i) / 1000.0;
+                assert!(speed(t) >= 0.0 && speed(t) <= most * (1.0 + 1e-6));
+                assert!((speed(t + 1e-4) - speed(t)).abs() <= 1.6 * most * 1e-4 / ramp);
+            }
+        }
     }
 
     #[test]

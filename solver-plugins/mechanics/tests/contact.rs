@@ -1,7 +1,7 @@
 //! Contact against what it must be: gradients of its own energy, balance, Coulomb's law.
 
 use plyflow_mechanics::contact::{
-    RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem, Surface,
+    RigidContact, RigidItem, RigidMotion, RigidSurface, SheetContact, SlaveItem, Surface,
 };
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
@@ -161,6 +161,7 @@ fn slide(angle: f64, friction: f64) -> f64 {
     let mut c = RigidContact {
         name: "incline".into(),
         surface: Arc::new(Incline { normal }),
+        motion: RigidMotion::default(),
         friction,
         slip_factor: 0.5,
         augmentation: 0.003,

@@ -12,7 +12,7 @@
 mod rigid;
 mod sheets;
 
-pub use rigid::{Plane, RigidContact, RigidItem, RigidSurface};
+pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
 pub use sheets::{SheetContact, SlaveItem, Surface, shape};
 
 /// Constants that all contacts share.

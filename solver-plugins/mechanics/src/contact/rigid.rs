@@ -1,7 +1,7 @@
-//! Sheet nodes on a rigid surface that does not move.
+//! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::{ContactEnergy, friction_force, normal_force};
-use crate::vec3::{V, add, dot, scale, sub};
+use crate::vec3::{V, add, dot, norm, scale, sub};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -23,6 +23,56 @@ impl RigidSurface for Plane {
     fn distance(&self, point: V) -> (f64, V) {
         (point[2] - self.height, [0.0, 0.0, 1.0])
     }
+}
+
+/// A plate with a face at `height` and a round opening about the z axis, whose edge is rounded.
+///
+/// In a half plane through the axis, r outwards and y into the plate: the face y = 0 for r >= a, a quarter circle
+/// about (a, edge) with radius `edge`, the wall r = `opening` beyond; a = opening + edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OpenPlate {
+    /// Height of the face (m).
+    pub height: f64,
+    /// 1: solid above the face; -1: solid below.
+    pub side: f64,
+    /// Radius of the opening (m).
+    pub opening: f64,
+    /// Radius of the rounding (m).
+    pub edge: f64,
+}
+
+impl RigidSurface for OpenPlate {
+    fn distance(&self, p: V) -> (f64, V) {
+        let y = self.side * (p[2] - self.height);
+        let r = p[0].hypot(p[1]);
+        let a = self.opening + self.edge;
+        let outwards = if r > 0.0 {
+            [p[0] / r, p[1] / r]
+        } else {
+            [1.0, 0.0]
+        };
+        let (distance, along, into) = if r >= a {
+            (-y, 0.0, -1.0)
+        } else if y >= self.edge {
+            (self.opening - r, -1.0, 0.0)
+        } else {
+            // Both parts are negative: the quarter that faces the opening and the sheets.
+            let (dr, dy) = (r - a, y - self.edge);
+            let size = dr.hypot(dy).max(1e-12);
+            (size - self.edge, dr / size, dy / size)
+        };
+        let gradient = [along * outwards[0], along * outwards[1], self.side * into];
+        (distance, gradient)
+    }
+}
+
+/// Where a rigid surface is, and how fast it moves: set before each step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct RigidMotion {
+    /// Way from where the surface is described (m).
+    pub shift: V,
+    /// Mean velocity over the last step (m/s), as that of the nodes.
+    pub velocity: V,
 }
 
 /// One node that may touch the surface.
@@ -78,6 +128,8 @@ pub struct RigidContact {
     pub name: String,
     /// The surface.
     pub surface: Arc<dyn RigidSurface>,
+    /// Its motion.
+    pub motion: RigidMotion,
     /// Coulomb coefficient.
     pub friction: f64,
     /// Elastic-slip stiffness over normal stiffness.
@@ -90,9 +142,11 @@ pub struct RigidContact {
 
 impl RigidContact {
     /// Computes the force of every item from positions (m) and velocities (m/s). `reach` (m): twice the
-    /// furthest that any node moves in a step.
+    /// furthest that any node moves in a step, and the surface too.
     pub fn compute(&mut self, x: &[V], v: &[V], dt: f64, reach: f64) -> ContactEnergy {
         let surface = self.surface.as_ref();
+        let motion = self.motion;
+        let reach = reach + 2.0 * norm(motion.velocity) * dt;
         let law = Law {
             dt,
             friction: self.friction,
@@ -108,10 +162,10 @@ impl RigidContact {
                     return;
                 }
                 let n = item.node as usize;
-                let (distance, gradient) = surface.distance(x[n]);
+                let (distance, gradient) = surface.distance(sub(x[n], motion.shift));
                 let gap = distance - item.offset;
                 if gap <= 0.0 || item.multiplier > 0.0 {
-                    touch(item, gap, gradient, v[n], &law);
+                    touch(item, gap, gradient, sub(v[n], motion.velocity), &law);
                 } else {
                     *item = RigidItem {
                         stiffness: item.stiffness,
@@ -129,6 +183,14 @@ impl RigidContact {
         }
         total
     }
+
+    /// Sum of the forces on the nodes (N) in the last step; on the surface acts the opposite.
+    pub fn resultant(&self) -> V {
+        self.items
+            .iter()
+            .filter(|i| i.normal_force > 0.0)
+            .fold([0.0; 3], |sum, i| add(sum, i.force))
+    }
 }
 
 struct Law {
@@ -138,7 +200,7 @@ struct Law {
     augmentation: f64,
 }
 
-/// Force of an item in touch, or so lately that it still has a multiplier.
+/// Force of an item in touch, or so lately that it still has a multiplier. `v`: relative to the surface.
 fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) {
     let (k, c) = (item.stiffness, item.damping);
     let vn = dot(v, g);

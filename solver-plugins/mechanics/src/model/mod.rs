@@ -309,9 +309,12 @@ impl Model {
         };
         for contact in &mut self.rigid_contacts {
             count(contact.compute(&self.x, &self.v, self.dt, reach));
+            let velocity = contact.motion.velocity;
             for item in contact.items.iter().filter(|i| i.normal_force > 0.0) {
                 let n = item.node as usize;
                 self.force[n] = add(self.force[n], item.force);
+                // What moves the surface does this work on the sheets.
+                self.ledger.external += dot(item.force, velocity) * self.dt;
             }
         }
         let surface = Surface {

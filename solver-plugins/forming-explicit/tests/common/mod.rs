@@ -1,0 +1,86 @@
+//! What the tests of whole runs share: components without a host, fabric, the run itself.
+
+use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
+use plyflow_forming_explicit::assembly::Components;
+use plyflow_forming_explicit::build_global;
+use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
+use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow};
+use plyflow_mechanics::energy::Ledger;
+use plyflow_sdk::{StepError, element_table, material_table};
+use serde_json::{Value, json};
+
+/// The element `m4`, the fabric and the film.
+pub struct BuiltIn;
+
+fn component(kind: u32, functions: *const std::ffi::c_void) -> pf_component {
+    pf_component {
+        kind,
+        reserved: 0,
+        functions,
+        manifest: pf_str::new("{}"),
+    }
+}
+
+impl Components for BuiltIn {
+    fn element(&self, _: &str) -> Result<pf_component, String> {
+        let table = Box::leak(Box::new(element_table::<M4>()));
+        Ok(component(PF_KIND_ELEMENT, std::ptr::from_ref(table).cast()))
+    }
+    fn material(&self, name: &str) -> Result<pf_component, String> {
+        let table = match name {
+            "material-fabric" => material_table::<Fabric>(),
+            _ => material_table::<Marlow>(),
+        };
+        let table = Box::leak(Box::new(table));
+        Ok(component(
+            PF_KIND_MATERIAL,
+            std::ptr::from_ref(table).cast(),
+        ))
+    }
+}
+
+struct Silent;
+
+impl Observer for Silent {
+    fn frame(&mut self, _: &Forming, _: f64) -> Result<(), StepError> {
+        Ok(())
+    }
+    fn tick(&mut self, _: &Forming, _: &Ledger, _: f64) -> Result<(), StepError> {
+        Ok(())
+    }
+}
+
+/// The non-crimp fabric, its fibres made softer for the step.
+pub fn fabric() -> Value {
+    json!({
+        "plyflow_material": 1, "name": "NCF", "plugin": "material-fabric",
+        "thickness": "0.0004 m", "areal_mass": "0.44 kg/m2",
+        "with": {
+            "form": "fibre-energy", "fibre_modulus": 3e9, "compression_factor": 1.0,
+            "shear": {"coefficients": [0.0, 112.19, 94.73, 137.06, -65.56, 29.56], "limit": 1.05},
+            "stitch": {"angles": [0.06, 0.5, 0.75], "forces": [0.0, 880.0, 0.0]}
+        }
+    })
+}
+
+/// Builds and runs a scene to its end.
+pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap();
+    pool.install(|| {
+        let mut forming = build_global(p, &BuiltIn).unwrap();
+        let outcome = forming
+            .run(
+                p.frames,
+                p.time_step,
+                p.step_safety,
+                p.kinetic_bound,
+                &mut Silent,
+            )
+            .unwrap_or_else(|e| panic!("{e:?}"));
+        (forming, outcome)
+    })
+}

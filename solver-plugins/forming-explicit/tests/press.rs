@@ -1,0 +1,180 @@
+//! A whole press stroke on a small part: a ply over a hemisphere of 25 mm radius, through a hole, between plates.
+
+mod common;
+
+use common::{BuiltIn, fabric, form};
+use plyflow_forming_explicit::build_global;
+use plyflow_forming_explicit::parameters::Parameters;
+use serde_json::{Value, json};
+
+const RADIUS: f64 = 0.025;
+const STROKE: f64 = 0.02;
+
+fn parameters(plies: usize, holder: &Value) -> Parameters {
+    let ply = |k: usize| {
+        json!({"name": format!("ply_{k}"), "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.12 m",
+               "fibre_1": "-0.7853981633974483 rad", "fibre_2": "0.7853981633974483 rad"})
+    };
+    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 300.0, "hourglass_normal": 0.01});
+    let mut press = json!({
+        "stroke": "0.02 m", "forming_time": "0.2 s", "settling_time": "0.01 s",
+        "die": {"opening_radius": "0.027 m", "edge_radius": "0.004 m"}});
+    if !holder.is_null() {
+        press["holder"] = json!({"hold": holder});
+    }
+    serde_json::from_value(json!({
+        "scene": {
+            "plyflow_scene": 1, "name": "dome",
+            "tool": {"hemisphere": {"radius": "0.025 m", "facet_size": "0.001 m"}},
+            "sheets": (1..=plies).map(ply).collect::<Vec<_>>(),
+            "friction": {"tool_fabric": 0.23, "fabric_fabric": 0.36},
+            "process": {"press": press}
+        },
+        "element": {"plugin": "m4", "with": hourglass},
+        "diaphragm_element": {"plugin": "m4", "with": {}},
+        "element_size": 0.006, "diaphragm_growth": 1.25, "time_step": 8e-6, "step_safety": 0.8,
+        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
+        "contact_damping": 0.3, "contact_augmentation": 0.0, "frames": 20, "tool_grid": 0.0015,
+        "kinetic_bound": 0.05
+    }))
+    .expect("the parameters fit their type")
+}
+
+/// Distance (m) of a point from the punch's dome at its end.
+fn over_dome(x: [f64; 3]) -> f64 {
+    (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]).sqrt() - RADIUS
+}
+
+#[test]
+fn a_ply_takes_the_shape_of_the_punch_and_the_ledger_closes() {
+    let p = parameters(1, &json!({"gap": "0.002 m"}));
+    let (forming, outcome) = form(&p, 1);
+    let health = &outcome.health;
+    assert!(health.peak_drift_ratio < 0.01, "{health:?}");
+    assert!(health.peak_kinetic_ratio < 0.05, "{health:?}");
+
+    // The punch has arrived, and its force has grown along the way.
+    let last = outcome.history.last().unwrap();
+    assert_eq!(last.frame, 0.0);
+    let force = |share: f64| {
+        let row = outcome
+            .history
+            .iter()
+            .find(|r| r.time >= share * 0.2)
+            .unwrap();
+        row.punch_force
+    };
+    assert!(force(0.5) > 0.0 && force(0.95) > 2.0 * force(0.5));
+
+    let points = forming.points(&forming.bodies[0]);
+    let half = 0.5 * forming.stack[0].thickness;
+    // Nothing lies in the punch, the die (its face at the start's height of the stack) or the holder.
+    let dome = points.iter().filter(|x| x[2] > 0.005);
+    let least = dome.map(|x| over_dome(*x)).fold(f64::MAX, f64::min);
+    assert!(least > half - 2e-5, "{least}");
+    let face = RADIUS - STROKE + 2.0 * half;
+    for x in points.iter().filter(|x| x[0].hypot(x[1]) > 0.032) {
+        assert!(
+            x[2] < face - half + 2e-5 && x[2] > face - 0.002 + half - 2e-5,
+            "{x:?}"
+        );
+    }
+    // The cap lies on the dome.
+    for x in points.iter().filter(|x| x[0].hypot(x[1]) < 0.012) {
+        assert!(
+            (over_dome(*x) - half).abs() < 3e-4,
+            "{x:?}: {}",
+            over_dome(*x)
+        );
+    }
+    // A ply at +-45 degrees: positive shear along x and y, negative along the diagonals; the same in opposite quadrants.
+    let shear = forming.model.cell_field(0, 0);
+    let mean = |sign: [f64; 2]| {
+        let cells = forming.bodies[0].cells.iter().zip(&shear).filter(|(c, _)| {
+            let corners = c.map(|n| forming.model.x[n as usize]);
+            let x = [0, 1].map(|k| 0.25 * corners.iter().map(|q| q[k]).sum::<f64>());
+            let (r, along) = (x[0].hypot(x[1]), sign[0] * x[0] + sign[1] * x[1]);
+            r > 0.012 && r < 0.03 && along > 0.96 * r * sign[0].hypot(sign[1])
+        });
+        let values: Vec<f64> = cells.map(|(_, s)| *s).collect();
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    let (along, across) = (mean([1.0, 0.0]), mean([0.0, 1.0]));
+    let signs = [along, across, mean([-1.0, 0.0]), mean([0.0, -1.0])];
+    assert!(along.abs() > 0.1, "{signs:?}");
+    // Shear has one sign along x and the other along y: the two bias directions of the fibres.
+    assert!(along * across < 0.0, "{signs:?}");
+    for k in 0..2 {
+        assert!(
+            (signs[k] - signs[k + 2]).abs() < 0.03 * along.abs(),
+            "{signs:?}"
+        );
+    }
+
+    let (again, _) = form(&p, 2);
+    assert!(
+        forming.model.x == again.model.x,
+        "two threads give other positions"
+    );
+}
+
+#[test]
+fn a_holder_with_a_force_presses_with_that_force_on_two_plies() {
+    let p = parameters(2, &json!({"force": "200 N"}));
+    let (forming, outcome) = form(&p, 2);
+    assert!(
+        outcome.health.peak_drift_ratio < 0.01,
+        "{:?}",
+        outcome.health
+    );
+    let on = |part: &str| -> f64 {
+        let contacts = forming.model.rigid_contacts.iter();
+        let of = contacts.filter(|c| c.name.starts_with(part));
+        of.map(|c| c.resultant()[2]).sum()
+    };
+    let (holder, punch, die) = (on("holder/"), on("tool/"), on("die/"));
+    assert!((holder - 200.0).abs() < 4.0, "{holder}");
+    // What pushes up is held down by the die.
+    assert!(
+        (holder + punch + die).abs() < 0.03 * -die,
+        "{holder} {punch} {die}"
+    );
+    for (pair, _, q999) in forming.penetrations() {
+        assert!(q999 < 4e-5, "{pair}: {q999} m");
+    }
+    // The second ply lies on the first over the dome.
+    let top = |k: usize| {
+        forming
+            .points(&forming.bodies[k])
+            .iter()
+            .map(|x| x[2])
+            .fold(0.0, f64::max)
+    };
+    assert!(
+        (top(1) - top(0) - 4e-4).abs() < 3e-5,
+        "{} {}",
+        top(0),
+        top(1)
+    );
+}
+
+#[test]
+fn what_makes_no_press_is_refused_with_what_to_do() {
+    let refused = |p: &Parameters| build_global(p, &BuiltIn).err().expect("refused");
+    let tight = refused(&parameters(2, &json!({"gap": "0.0005 m"})));
+    assert!(
+        tight.contains("gap") && tight.contains("0.800 mm"),
+        "{tight}"
+    );
+    let mut p = parameters(1, &Value::Null);
+    p.scene.friction.tool_fabric = None;
+    let rough = refused(&p);
+    assert!(rough.contains("friction.tool_fabric"), "{rough}");
+    let mut p = parameters(1, &Value::Null);
+    p.scene.sheets[0].kind = plyflow_model::scene::SheetKind::Diaphragm;
+    let film = refused(&p);
+    assert!(
+        film.contains("press") && film.contains("no diaphragm"),
+        "{film}"
+    );
+}

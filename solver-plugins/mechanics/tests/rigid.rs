@@ -1,0 +1,110 @@
+//! Rigid surfaces: distances of the open plate, and surfaces that move.
+
+use plyflow_mechanics::contact::{
+    OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface,
+};
+use plyflow_mechanics::history::constant_speed_way;
+use plyflow_mechanics::vec3::{V, add, dot, norm, scale};
+use std::sync::Arc;
+
+const PLATE: OpenPlate = OpenPlate {
+    height: 0.01,
+    side: 1.0,
+    opening: 0.05,
+    edge: 0.006,
+};
+
+#[test]
+fn distance_to_an_open_plate_is_that_of_its_parts() {
+    let at = |x: V| PLATE.distance(x).0;
+    // Below the face, at the wall of the opening, at the rounding's middle.
+    assert!((at([0.07, 0.02, 0.004]) - 0.006).abs() < 1e-15);
+    assert!((at([0.0, 0.03, 0.03]) - 0.02).abs() < 1e-15);
+    let diagonal = 0.056 - 0.006 * 0.5f64.sqrt();
+    let on_edge = [diagonal, 0.0, 0.016 - 0.006 * 0.5f64.sqrt()];
+    assert!(at(on_edge).abs() < 1e-15);
+    // A plate whose solid lies below is the mirror image.
+    let mirrored = OpenPlate {
+        side: -1.0,
+        height: -0.01,
+        ..PLATE
+    };
+    for x in [[0.052, 0.003, 0.012], [0.04, -0.02, 0.03], [0.08, 0.0, 0.0]] {
+        let ((d, g), (m, h)) = (PLATE.distance(x), mirrored.distance([x[0], x[1], -x[2]]));
+        assert_eq!((d, g), (m, [h[0], h[1], -h[2]]));
+    }
+}
+
+#[test]
+fn gradient_of_the_distance_is_its_derivative_and_has_length_one() {
+    for i in 0..40 {
+        for j in 0..40 {
+            let r = 0.03 + 0.04 * f64::from(i) / 40.0 + 1e-5;
+            let z = -0.005 + 0.03 * f64::from(j) / 40.0 + 1e-5;
+            let x = [0.6 * r, 0.8 * r, z];
+            let (d, g) = PLATE.distance(x);
+            // Inside the plate nothing but the skin matters.
+            if d < -0.002 {
+                continue;
+            }
+            assert!((norm(g) - 1.0).abs() < 1e-12);
+            for c in 0..3 {
+                let h = 1e-7;
+                let moved = |s: f64| {
+                    let mut y = x;
+                    y[c] += s * h;
+                    PLATE.distance(y).0
+                };
+                let slope = (moved(1.0) - moved(-1.0)) / (2.0 * h);
+                assert!((slope - g[c]).abs() < 1e-6, "{x:?} {c}: {slope} {}", g[c]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rising_floor_lifts_a_weight_and_does_its_work() {
+    let (mass, dt, gravity) = (0.01, 1e-5, 9.81);
+    let mut item = RigidItem::new(0, 0.0);
+    (item.stiffness, item.damping) = (1e5, 10.0);
+    let mut contact = RigidContact {
+        name: "floor".into(),
+        surface: Arc::new(Plane { height: 0.0 }),
+        motion: RigidMotion::default(),
+        friction: 0.3,
+        slip_factor: 0.5,
+        augmentation: 0.0,
+        items: vec![item],
+    };
+    // The floor also drifts sideways: friction takes the weight along.
+    let way = |t: f64| {
+        let up = constant_speed_way(t, 0.02, 0.1, 0.02);
+        [0.1 * up, 0.0, up]
+    };
+    let (mut x, mut v) = (vec![[0.0, 0.0, -mass * gravity / 1e5]], vec![[0.0; 3]]);
+    let start = x[0];
+    let (mut external, mut lost, mut stored) = (0.0, 0.0, None);
+    for i in 0..10_000 {
+        let t = f64::from(i) * dt;
+        let before = if i == 0 { way(0.0) } else { way(t - dt) };
+        contact.motion = RigidMotion {
+            shift: way(t),
+            velocity: scale(add(way(t), scale(before, -1.0)), 1.0 / dt),
+        };
+        let energy = contact.compute(&x, &v, dt, 1e-3);
+        stored.get_or_insert(energy.stored);
+        lost += energy.friction + energy.damping;
+        external += dot(contact.items[0].force, contact.motion.velocity) * dt;
+        if i == 9_999 {
+            let gained = 0.5 * mass * dot(v[0], v[0]) + mass * gravity * (x[0][2] - start[2]);
+            let kept = energy.stored - stored.unwrap();
+            assert!((x[0][2] - start[2] - 0.02).abs() < 1e-5, "{:?}", x[0]);
+            assert!((x[0][0] - 0.002).abs() < 1e-5, "{:?}", x[0]);
+            let open = (external - gained - kept - lost).abs();
+            assert!(open < 2e-3 * external, "{external} {gained} {kept} {lost}");
+        }
+        let f = add(contact.items[0].force, [0.0, 0.0, -mass * gravity]);
+        v[0] = add(v[0], scale(f, dt / mass));
+        x[0] = add(x[0], scale(v[0], dt));
+    }
+}
