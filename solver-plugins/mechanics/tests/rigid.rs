@@ -76,9 +76,10 @@ fn a_rising_floor_lifts_a_weight_and_does_its_work() {
         augmentation: 0.0,
         items: vec![item],
     };
-    // The floor also drifts sideways: friction takes the weight along.
+    // The floor also drifts sideways: friction takes the weight along. It stops more gently than a weight falls, so
+    // that the weight stays on it.
     let way = |t: f64| {
-        let up = constant_speed_way(t, 0.02, 0.1, 0.02);
+        let up = constant_speed_way(t, 0.005, 0.1, 0.02);
         [0.1 * up, 0.0, up]
     };
     let (mut x, mut v) = (vec![[0.0, 0.0, -mass * gravity / 1e5]], vec![[0.0; 3]]);
@@ -98,8 +99,8 @@ fn a_rising_floor_lifts_a_weight_and_does_its_work() {
         if i == 9_999 {
             let gained = 0.5 * mass * dot(v[0], v[0]) + mass * gravity * (x[0][2] - start[2]);
             let kept = energy.stored - stored.unwrap();
-            assert!((x[0][2] - start[2] - 0.02).abs() < 1e-5, "{:?}", x[0]);
-            assert!((x[0][0] - 0.002).abs() < 1e-5, "{:?}", x[0]);
+            assert!((x[0][2] - start[2] - 0.005).abs() < 1e-5, "{:?}", x[0]);
+            assert!((x[0][0] - 0.0005).abs() < 1e-5, "{:?}", x[0]);
             let open = (external - gained - kept - lost).abs();
             assert!(open < 2e-3 * external, "{external} {gained} {kept} {lost}");
         }
