@@ -301,6 +301,7 @@ fn material_value(
 /// a broken rule.
 fn rules(scene: &Node, source: &Source, problems: &mut Problems) {
     sheet_rules(scene, source, problems);
+    friction_rules(scene, source, problems);
     let Some(tool) = scene.get("tool") else {
         return;
     };
@@ -312,6 +313,39 @@ fn rules(scene: &Node, source: &Source, problems: &mut Problems) {
         // Both top edges are rounded.
         at_most(spar, "fillet", "top_width", 0.5, source, problems);
         joggle_rules(spar, source, problems);
+    }
+}
+
+/// Coefficients of the surfaces that touch in this stack and process.
+fn friction_rules(scene: &Node, source: &Source, problems: &mut Problems) {
+    let (Some(entry), Some(sheets)) = (scene.entry("friction"), scene.get("sheets")) else {
+        return;
+    };
+    if !matches!(entry.value.kind, Kind::Map(_)) {
+        return;
+    }
+    let count = |kind: &str| {
+        let of = |s: &&Node| s.get("kind").and_then(Node::text) == Some(kind);
+        sheets.items().iter().filter(of).count()
+    };
+    let press = scene
+        .get("process")
+        .is_some_and(|p| p.get("press").is_some());
+    let films = count("diaphragm") > 0;
+    let why_films = "the stack has diaphragms";
+    for (name, needed, why) in [
+        ("tool_diaphragm", films, why_films),
+        ("fabric_diaphragm", films, why_films),
+        ("diaphragm_diaphragm", films, why_films),
+        ("fabric_fabric", count("ply") > 1, "plies lie on each other"),
+        ("tool_fabric", press, "a press touches the plies"),
+    ] {
+        if needed && entry.value.get(name).is_none() {
+            let message = format!("`{name}` is missing in `friction`");
+            let d = problems.add(source, &entry.key_span, message);
+            d.expected(format!("`{name}: ..`"))
+                .help(format!("it is needed because {why}"));
+        }
     }
 }
 

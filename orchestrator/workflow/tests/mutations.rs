@@ -477,10 +477,10 @@ const CASES: &[Case] = &[
     ),
     (
         S,
-        "  fabric_fabric: 0.35\n",
+        "  fabric_diaphragm: 0.40\n",
         "",
         usize::MAX,
-        &["`fabric_fabric` is missing in `friction`"],
+        &["`fabric_diaphragm` is missing in `friction`"],
     ),
     (
         S,
@@ -602,6 +602,31 @@ fn every_mutation_is_reported_in_its_file_and_line() {
         CASES.len(),
         failures.join("\n")
     );
+}
+
+#[test]
+fn friction_is_asked_for_where_surfaces_touch() {
+    let found = |from: &str, to: &str| {
+        let study = Study::sound();
+        study.mutate(S, from, to);
+        study
+            .load()
+            .err()
+            .map(|d| d.to_string())
+            .unwrap_or_default()
+    };
+    // One ply needs no friction between plies; two do.
+    assert_eq!(found("  fabric_fabric: 0.35\n", ""), "");
+    let study = Study::sound();
+    study.mutate(S, "  fabric_fabric: 0.35\n", "");
+    let second = "  - {name: ply-2, kind: ply, material: materials/fabric.yaml, length: 480 mm, width: 300 mm}\n  - name: upper-film";
+    study.mutate(S, "  - name: upper-film", second);
+    let two = findings(&study).to_string();
+    assert!(two.contains("`fabric_fabric` is missing"), "{two}");
+    // A press touches the plies with tool, die and holder.
+    let press = "process:\n  press:\n    stroke: 50 mm\n    forming_time: 1 s\n    settling_time: 0 s\n    die: {opening_radius: 53 mm, edge_radius: 6 mm}\n#";
+    let missing = found("process:", press);
+    assert!(missing.contains("`tool_fabric` is missing"), "{missing}");
 }
 
 #[test]
