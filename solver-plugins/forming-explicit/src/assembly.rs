@@ -4,8 +4,7 @@ use crate::parameters::{ComponentChoice, Parameters};
 use plyflow_abi::pf_component;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
-    ContactSettings, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface, SheetContact,
-    SlaveItem,
+    ContactSettings, Plane, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
 };
 use plyflow_mechanics::mesh::NONE;
 use plyflow_mechanics::model::{Model, StepSettings};
@@ -247,19 +246,9 @@ pub fn add_contacts(
         0.0
     };
     let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: f64, k: usize, offset: f64| {
-        RigidContact {
-            name,
-            surface,
-            motion: RigidMotion::default(),
-            friction: mu,
-            slip_factor: p.slip_stiffness,
-            augmentation: p.contact_augmentation,
-            items: placed[k]
-                .slaves
-                .iter()
-                .map(|n| RigidItem::new(*n, offset))
-                .collect(),
-        }
+        let slaves = placed[k].slaves.iter();
+        let items = slaves.map(|n| RigidItem::new(*n, offset)).collect();
+        RigidContact::new(name, surface, mu, &contact_settings(p), items)
     };
     let bottom = &stack[0];
     let mu = tool_diaphragm;

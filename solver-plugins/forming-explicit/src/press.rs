@@ -227,15 +227,13 @@ pub fn build_press(
                 sheet.offset
             };
             let nodes = &model.sheets[k].nodes;
-            let contact = RigidContact {
-                name: format!("{part}/{}", sheet.scene.name),
-                surface: surface.clone(),
-                motion: RigidMotion::default(),
-                friction: if faces { mu } else { 0.0 },
-                slip_factor: p.slip_stiffness,
-                augmentation: p.contact_augmentation,
-                items: nodes.iter().map(|n| RigidItem::new(*n, offset)).collect(),
-            };
+            let contact = RigidContact::new(
+                format!("{part}/{}", sheet.scene.name),
+                surface.clone(),
+                if faces { mu } else { 0.0 },
+                &assembly::contact_settings(p),
+                nodes.iter().map(|n| RigidItem::new(*n, offset)).collect(),
+            );
             model.rigid_contacts.push(contact);
         }
     }

@@ -32,10 +32,12 @@
 //! whole metric and not the shear alone: then the sum is one energy, and forces are its gradient.
 //! With `twist: material` the middle is the only point, and M12 comes from the material's moments.
 //!
+//! `bending: total` takes M(k) of the material: the force is the exact gradient of the energy.
 //! `bending: lagged-tangent` (the thesis, 3.3.3) adds `dM/dk` at the previous curvature times the
-//! change of curvature, for each fibre family by itself, and reports the work done as energy.
-//! `bending: total` takes M(k) of the material: the force is then the exact gradient of the energy.
-//! Tangents across families are not in the material's contract, so the former refuses a material
+//! change of curvature, for each fibre family by itself, and reports the work done as energy. Every step
+//! then leaves an error of `M'' dk^2 / 2`, always of the same sign: moments creep away from the law, and in long
+//! runs a strip at rest can come alive (`docs/decisions/0011`).
+//! Tangents across families are not in the material's contract, so it also refuses a material
 //! that couples them (an isotropic plate).
 //!
 //! # Penalty of transverse shear
@@ -123,7 +125,7 @@ struct Parameters {
 impl Default for Parameters {
     fn default() -> Self {
         Self {
-            bending: BendingRule::LaggedTangent,
+            bending: BendingRule::Total,
             twist: Twist::Layers,
             core_share: 1.0 / 3.0,
             transverse_shear: 1.0,

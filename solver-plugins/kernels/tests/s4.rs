@@ -48,7 +48,7 @@ fn forces_and_moments_are_the_gradient_of_the_energy_with_total_moments() {
 fn rigid_turns_of_any_size_give_no_force_also_to_warped_elements() {
     // 1000 steps through 5 turns, about an axis that itself wanders.
     let mut r = Random(102);
-    for json in ["{}", r#"{"bending":"total"}"#] {
+    for json in [r#"{"bending":"lagged-tangent"}"#, "{}"] {
         let m = ply();
         let s = Shell::new(json, &m).unwrap();
         let reference: Vec<Quad> = (0..8)
@@ -482,11 +482,12 @@ fn manifests_obey_the_models_rules_and_agree_with_the_code() {
 
 #[test]
 fn what_cannot_work_is_refused_with_what_to_do() {
+    const LAGGED: &str = r#"{"bending":"lagged-tangent"}"#;
     let no_bending = film(FILM).unwrap();
     let iso = plate(1e9, 0.3, 1e-3);
     let cases = [
         (&no_bending, "{}", "m4"),
-        (&iso, "{}", "bending: total"),
+        (&iso, LAGGED, "bending: total"),
         (&ply(), r#"{"core_share":1.0}"#, "core_share"),
         (&ply(), r#"{"transverse_shear":0}"#, "transverse_shear"),
         (&ply(), r#"{"hourglass_director":-1}"#, "hourglass_director"),
@@ -504,7 +505,7 @@ fn what_cannot_work_is_refused_with_what_to_do() {
         assert!(text.contains(word), "{json}: {text}");
     }
     // Without Poisson's ratio nothing couples.
-    assert!(Shell::new("{}", &plate(1e9, 0.0, 1e-3)).is_ok());
+    assert!(Shell::new(LAGGED, &plate(1e9, 0.0, 1e-3)).is_ok());
     // A host that gives no spins gets a status, not a crash.
     let s = Shell::new("{}", &ply()).unwrap();
     let q = [[

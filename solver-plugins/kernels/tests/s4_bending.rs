@@ -75,7 +75,10 @@ fn pure_bending_returns_the_law_in_both_signs_and_families_at_any_shear() {
         (ply(), NCF, false),
         (fabric(&woven("fibre-energy")).unwrap(), WOVEN, true),
     ] {
-        for (rule, json) in ["{}", r#"{"bending":"total"}"#].into_iter().enumerate() {
+        for (rule, json) in [r#"{"bending":"lagged-tangent"}"#, "{}"]
+            .into_iter()
+            .enumerate()
+        {
             let s = Shell::new(json, &m).unwrap();
             for family in 0..2 {
                 for g in [0.0f64, 30.0, -30.0] {
@@ -108,7 +111,7 @@ fn pure_bending_returns_the_law_in_both_signs_and_families_at_any_shear() {
 #[test]
 fn lagged_tangents_come_back_to_the_law_when_a_ply_is_unrolled() {
     // The work left over after rolling and unrolling is that of the finite increments alone.
-    let s = Shell::new("{}", &ply()).unwrap();
+    let s = Shell::new(r#"{"bending":"lagged-tangent"}"#, &ply()).unwrap();
     let size = 0.002;
     let square = [
         [0.0; 3],

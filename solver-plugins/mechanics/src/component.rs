@@ -6,6 +6,9 @@ use plyflow_sdk::{ElementSizes, MaterialRef};
 use std::ffi::c_void;
 use std::sync::Arc;
 
+/// Most nodes of a patch.
+pub const MOST_PATCH_NODES: usize = 32;
+
 /// One field of an element formulation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ElementField {
@@ -196,6 +199,12 @@ impl ElementInstance {
             return Err(fail(
                 "declares patch nodes but has no patch functions".into(),
             ));
+        }
+        if sizes.patch_nodes > MOST_PATCH_NODES {
+            return Err(fail(format!(
+                "declares patches of {} nodes; this solver takes at most {MOST_PATCH_NODES}",
+                sizes.patch_nodes
+            )));
         }
         Ok(made)
     }

@@ -78,9 +78,9 @@ pub struct Sheet {
     pub nodes: Vec<u32>,
     /// Its cells in the model's numbering: first and one past the last.
     pub cell_range: (usize, usize),
-    /// Its batches: first and one past the last.
-    pub batch_range: (usize, usize),
-    /// Its patch batches.
+    /// Its blocks of batches: first and one past the last.
+    pub block_range: (usize, usize),
+    /// Its blocks of patch batches.
     pub patch_range: (usize, usize),
     /// The element formulation.
     pub element: ElementInstance,
@@ -96,8 +96,14 @@ pub struct Batch {
     pub sheet: u32,
     /// Elements that count; the rest repeat the last.
     pub count: u32,
-    /// Model nodes by lane.
-    pub nodes: [[u32; 4]; LANES],
+    /// Model nodes by corner and lane.
+    pub nodes: [[u32; LANES]; 4],
+    /// Places of the nodes in the sums of the block.
+    pub places: [[u16; LANES]; 4],
+    /// Shares of the pressure from below and from above, by lane.
+    pub pressed: [[f64; 2]; LANES],
+    /// Whether anything presses on any lane.
+    pub is_pressed: bool,
     /// Layers by lane.
     pub layers: [f64; LANES],
     /// Whether any lane stands for more than one layer.
@@ -108,8 +114,8 @@ pub struct Batch {
     pub mass: Aligned,
     /// `[4][LANES]` rotary inertias before scaling (kg m2); empty with 3 degrees of freedom per node.
     pub inertia: Aligned,
-    /// `[4][3][LANES]` moments of the last call (N m); empty with 3 degrees of freedom per node.
-    pub moment: Aligned,
+    /// `[PF_ENERGIES][LANES]` energies of the last call (J).
+    pub energy: Aligned,
     /// `[constants][LANES]`.
     pub constants: Aligned,
     /// `[history][LANES]`.
@@ -128,8 +134,10 @@ pub struct PatchBatch {
     pub sheet: u32,
     /// Patches that count.
     pub count: u32,
-    /// `[LANES][patch_nodes]` model nodes; unused slots repeat the centre.
-    pub nodes: Vec<u32>,
+    /// `[patch_nodes][LANES]` model nodes; unused slots repeat the centre.
+    pub nodes: Vec<[u32; LANES]>,
+    /// Places of the nodes in the sums of the block.
+    pub places: Vec<[u16; LANES]>,
     /// Mesh-local centre nodes of the lanes.
     pub centres: Vec<u32>,
     /// `[patch_constants][LANES]`.
@@ -138,8 +146,6 @@ pub struct PatchBatch {
     pub history: Aligned,
     /// `[patch_fields][LANES]`; empty unless asked for.
     pub fields: Aligned,
-    /// `[patch_nodes][3][LANES]` (N).
-    pub force: Aligned,
     /// `[LANES]` (J).
     pub energy: Aligned,
     /// Status of the last call.

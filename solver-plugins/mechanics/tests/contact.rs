@@ -1,7 +1,7 @@
 //! Contact against what it must be: gradients of its own energy, balance, Coulomb's law.
 
 use plyflow_mechanics::contact::{
-    RigidContact, RigidItem, RigidMotion, RigidSurface, SheetContact, SlaveItem, Surface,
+    ContactSettings, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem, Surface,
 };
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
@@ -158,15 +158,9 @@ fn slide(angle: f64, friction: f64) -> f64 {
     // At rest on the slip spring, as far as friction holds.
     let held = (mass * g * angle.sin()).min(friction * mass * g * angle.cos());
     item.slip = scale(down, -held);
-    let mut c = RigidContact {
-        name: "incline".into(),
-        surface: Arc::new(Incline { normal }),
-        motion: RigidMotion::default(),
-        friction,
-        slip_factor: 0.5,
-        augmentation: 0.003,
-        items: vec![item],
-    };
+    let surface = Arc::new(Incline { normal });
+    let settings = ContactSettings::default();
+    let mut c = RigidContact::new("incline".into(), surface, friction, &settings, vec![item]);
     // At rest on the penalty spring.
     let start = scale(normal, -mass * g * angle.cos() / 1e5);
     let (mut x, mut v) = (vec![start], vec![[0.0; 3]]);

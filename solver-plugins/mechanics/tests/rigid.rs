@@ -1,7 +1,7 @@
 //! Rigid surfaces: distances of the open plate, and surfaces that move.
 
 use plyflow_mechanics::contact::{
-    OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface,
+    ContactSettings, OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface,
 };
 use plyflow_mechanics::history::constant_speed_way;
 use plyflow_mechanics::vec3::{V, add, dot, norm, scale};
@@ -67,15 +67,12 @@ fn a_rising_floor_lifts_a_weight_and_does_its_work() {
     let (mass, dt, gravity) = (0.01, 1e-5, 9.81);
     let mut item = RigidItem::new(0, 0.0);
     (item.stiffness, item.damping) = (1e5, 10.0);
-    let mut contact = RigidContact {
-        name: "floor".into(),
-        surface: Arc::new(Plane { height: 0.0 }),
-        motion: RigidMotion::default(),
-        friction: 0.3,
-        slip_factor: 0.5,
+    let settings = ContactSettings {
         augmentation: 0.0,
-        items: vec![item],
+        ..ContactSettings::default()
     };
+    let floor = Arc::new(Plane { height: 0.0 });
+    let mut contact = RigidContact::new("floor".into(), floor, 0.3, &settings, vec![item]);
     // The floor also drifts sideways: friction takes the weight along. It stops more gently than a weight falls, so
     // that the weight stays on it.
     let way = |t: f64| {

@@ -50,6 +50,14 @@ pub struct ContactEnergy {
     pub damping: f64,
 }
 
+impl ContactEnergy {
+    fn add(&mut self, o: &Self) {
+        self.stored += o.stored;
+        self.friction += o.friction;
+        self.damping += o.damping;
+    }
+}
+
 /// Normal force of a contact with a multiplier.
 pub(crate) struct Normal {
     /// Force (N), not negative.

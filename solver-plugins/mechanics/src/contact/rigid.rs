@@ -1,6 +1,6 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
-use super::{ContactEnergy, friction_force, normal_force};
+use super::{ContactEnergy, ContactSettings, friction_force, normal_force};
 use crate::vec3::{V, add, dot, norm, scale, sub};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ pub struct OpenPlate {
 impl RigidSurface for OpenPlate {
     fn distance(&self, p: V) -> (f64, V) {
         let y = self.side * (p[2] - self.height);
-        let r = p[0].hypot(p[1]);
+        let r = (p[0] * p[0] + p[1] * p[1]).sqrt();
         let a = self.opening + self.edge;
         let outwards = if r > 0.0 {
             [p[0] / r, p[1] / r]
@@ -58,7 +58,7 @@ impl RigidSurface for OpenPlate {
         } else {
             // Both parts are negative: the quarter that faces the opening and the sheets.
             let (dr, dy) = (r - a, y - self.edge);
-            let size = dr.hypot(dy).max(1e-12);
+            let size = (dr * dr + dy * dy).sqrt().max(1e-12);
             (size - self.edge, dr / size, dy / size)
         };
         let gradient = [along * outwards[0], along * outwards[1], self.side * into];
@@ -80,8 +80,8 @@ pub struct RigidMotion {
 pub struct RigidItem {
     /// Model node.
     pub node: u32,
-    /// Steps to sleep: the node cannot reach the surface before.
-    sleep: u32,
+    /// Call of [`RigidContact::compute`] before which the node cannot reach the surface.
+    wake: u64,
     /// Distance that it keeps from the surface (m).
     pub offset: f64,
     /// Normal stiffness (N/m).
@@ -107,7 +107,7 @@ impl RigidItem {
     pub fn new(node: u32, offset: f64) -> Self {
         Self {
             node,
-            sleep: 0,
+            wake: 0,
             offset,
             stiffness: 0.0,
             damping: 0.0,
@@ -119,6 +119,15 @@ impl RigidItem {
             penetration: 0.0,
             energy: ContactEnergy::default(),
         }
+    }
+
+    /// Forgets the contact.
+    fn part(&mut self) {
+        *self = Self {
+            stiffness: self.stiffness,
+            damping: self.damping,
+            ..Self::new(self.node, self.offset)
+        };
     }
 }
 
@@ -138,9 +147,32 @@ pub struct RigidContact {
     pub augmentation: f64,
     /// The nodes.
     pub items: Vec<RigidItem>,
+    spans: Vec<Span>,
+    cycle: u64,
 }
 
 impl RigidContact {
+    /// Nodes on a surface at rest; the settings' `stiffness_factor` and `damping_ratio` are not used here.
+    pub fn new(
+        name: String,
+        surface: Arc<dyn RigidSurface>,
+        friction: f64,
+        settings: &ContactSettings,
+        items: Vec<RigidItem>,
+    ) -> Self {
+        Self {
+            name,
+            surface,
+            motion: RigidMotion::default(),
+            friction,
+            slip_factor: settings.slip_factor,
+            augmentation: settings.augmentation,
+            items,
+            spans: Vec::new(),
+            cycle: 0,
+        }
+    }
+
     /// Computes the force of every item from positions (m) and velocities (m/s). `reach` (m): twice the
     /// furthest that any node moves in a step, and the surface too.
     pub fn compute(&mut self, x: &[V], v: &[V], dt: f64, reach: f64) -> ContactEnergy {
@@ -153,44 +185,78 @@ impl RigidContact {
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
+        let cycle = self.cycle;
+        self.cycle += 1;
+        self.spans
+            .resize_with(self.items.len().div_ceil(SPAN), Span::default);
         self.items
-            .par_iter_mut()
-            .with_min_len(512)
-            .for_each(|item| {
-                if item.sleep > 0 {
-                    item.sleep -= 1;
+            .par_chunks_mut(SPAN)
+            .zip_eq(self.spans.par_iter_mut())
+            .for_each(|(items, span)| {
+                if cycle < span.wake {
                     return;
                 }
-                let n = item.node as usize;
-                let (distance, gradient) = surface.distance(sub(x[n], motion.shift));
-                let gap = distance - item.offset;
-                if gap <= 0.0 || item.multiplier > 0.0 {
-                    touch(item, gap, gradient, sub(v[n], motion.velocity), &law);
-                } else {
-                    *item = RigidItem {
-                        stiffness: item.stiffness,
-                        damping: item.damping,
-                        ..RigidItem::new(item.node, item.offset)
-                    };
-                    item.sleep = (gap / reach).min(200.0) as u32;
+                *span = Span {
+                    wake: u64::MAX,
+                    ..Span::default()
+                };
+                for item in items {
+                    if cycle >= item.wake {
+                        let n = item.node as usize;
+                        let (distance, gradient) = surface.distance(sub(x[n], motion.shift));
+                        let gap = distance - item.offset;
+                        if gap <= 0.0 || item.multiplier > 0.0 {
+                            touch(item, gap, gradient, sub(v[n], motion.velocity), &law);
+                            span.force = add(span.force, item.force);
+                            span.energy.add(&item.energy);
+                            span.touches = true;
+                        } else {
+                            item.part();
+                            item.wake = cycle + 1 + (gap / reach).min(200.0) as u64;
+                        }
+                    }
+                    span.wake = span.wake.min(item.wake);
                 }
             });
         let mut total = ContactEnergy::default();
-        for item in &self.items {
-            total.stored += item.energy.stored;
-            total.friction += item.energy.friction;
-            total.damping += item.energy.damping;
+        for span in self.spans.iter().filter(|s| s.touches) {
+            total.add(&span.energy);
         }
         total
     }
 
+    /// Adds the forces on the nodes to `f` (N).
+    pub fn scatter(&self, f: &mut [V]) {
+        for (items, span) in self.items.chunks(SPAN).zip(&self.spans) {
+            if span.touches {
+                for item in items.iter().filter(|i| i.normal_force > 0.0) {
+                    let n = item.node as usize;
+                    f[n] = add(f[n], item.force);
+                }
+            }
+        }
+    }
+
     /// Sum of the forces on the nodes (N) in the last step; on the surface acts the opposite.
     pub fn resultant(&self) -> V {
-        self.items
-            .iter()
-            .filter(|i| i.normal_force > 0.0)
-            .fold([0.0; 3], |sum, i| add(sum, i.force))
+        let touching = self.spans.iter().filter(|s| s.touches);
+        touching.fold([0.0; 3], |sum, s| add(sum, s.force))
     }
+}
+
+/// Nodes whose forces are summed, and that are passed over while all of them sleep.
+const SPAN: usize = 256;
+
+/// A run of [`SPAN`] nodes.
+#[derive(Debug, Clone, Copy, Default)]
+struct Span {
+    /// Call of [`RigidContact::compute`] in which the first of them wakes.
+    wake: u64,
+    /// Whether any touched in the last call.
+    touches: bool,
+    /// Sum of their forces (N).
+    force: V,
+    energy: ContactEnergy,
 }
 
 struct Law {

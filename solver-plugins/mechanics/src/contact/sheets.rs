@@ -395,10 +395,8 @@ impl SheetContact {
                 }
             });
         let mut total = ContactEnergy::default();
-        for item in &self.items {
-            total.stored += item.energy.stored;
-            total.friction += item.energy.friction;
-            total.damping += item.energy.damping;
+        for item in self.items.iter().filter(|i| i.active) {
+            total.add(&item.energy);
         }
         total
     }

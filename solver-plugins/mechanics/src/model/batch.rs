@@ -1,6 +1,7 @@
 //! Calls of element formulations on batches, and the cells' areas.
 
 use super::*;
+use crate::component::MOST_PATCH_NODES;
 
 pub(super) fn component_status(code: i32, sheet: &str) -> Result<(), MechanicsError> {
     if code == PF_OK {
@@ -17,15 +18,15 @@ pub(super) fn component_status(code: i32, sheet: &str) -> Result<(), MechanicsEr
     })
 }
 
+/// Writes `[node][3][LANES]` of `nodes`.
 #[inline(always)]
-pub(super) fn gather(nodes: &[[u32; 4]; LANES], x: &[V], out: &mut [f64]) {
-    let out = &mut out[..12 * LANES];
-    for (l, cell) in nodes.iter().enumerate() {
-        for k in 0..4 {
-            let p = x[cell[k] as usize];
-            out[3 * k * LANES + l] = p[0];
-            out[(3 * k + 1) * LANES + l] = p[1];
-            out[(3 * k + 2) * LANES + l] = p[2];
+pub(super) fn gather(nodes: &[[u32; LANES]], x: &[V], out: &mut [f64]) {
+    for (nodes, rows) in nodes.iter().zip(out.chunks_exact_mut(3 * LANES)) {
+        let (a, rest) = rows.split_at_mut(LANES);
+        let (b, c) = rest.split_at_mut(LANES);
+        for l in 0..LANES {
+            let p = x[nodes[l] as usize];
+            (a[l], b[l], c[l]) = (p[0], p[1], p[2]);
         }
     }
 }
@@ -52,20 +53,51 @@ impl Rates {
     }
 }
 
-#[inline(always)]
-pub(super) fn gather_patch(nodes: &[u32], width: usize, x: &[V], out: &mut [f64]) {
-    for l in 0..LANES {
-        for k in 0..width {
-            let p = x[nodes[l * width + k] as usize];
-            for c in 0..3 {
-                out[(3 * k + c) * LANES + l] = p[c];
-            }
+#[repr(align(64))]
+pub(super) struct Buffer<const N: usize>(pub(super) [f64; N]);
+
+/// What the batches of a block are computed in, one after the other.
+pub(super) struct Workspace {
+    position: Buffer<{ 12 * LANES }>,
+    rates: Rates,
+    /// `[4][3][LANES]` (N).
+    pub(super) force: Buffer<{ 12 * LANES }>,
+    /// `[4][3][LANES]` (N m), of elements whose nodes rotate.
+    pub(super) moment: Buffer<{ 12 * LANES }>,
+    /// `[AREA_ROWS][LANES]` (m2).
+    pub(super) area: Buffer<{ AREA_ROWS * LANES }>,
+    /// `[4][3][LANES]` pressure (N).
+    pub(super) load: Buffer<{ 12 * LANES }>,
+}
+
+impl Workspace {
+    pub(super) fn new() -> Self {
+        Self {
+            position: Buffer([0.0; 12 * LANES]),
+            rates: Rates::zero(),
+            force: Buffer([0.0; 12 * LANES]),
+            moment: Buffer([0.0; 12 * LANES]),
+            area: Buffer([0.0; AREA_ROWS * LANES]),
+            load: Buffer([0.0; 12 * LANES]),
         }
     }
 }
 
-#[repr(align(64))]
-struct Buffer<const N: usize>([f64; N]);
+/// What the patches of a block are computed in.
+pub(super) struct PatchWorkspace {
+    position: Buffer<{ MOST_PATCH_NODES * 3 * LANES }>,
+    /// `[patch_nodes][3][LANES]` (N).
+    pub(super) force: Buffer<{ MOST_PATCH_NODES * 3 * LANES }>,
+}
+
+impl PatchWorkspace {
+    pub(super) fn new() -> Self {
+        Self {
+            position: Buffer([0.0; MOST_PATCH_NODES * 3 * LANES]),
+            force: Buffer([0.0; MOST_PATCH_NODES * 3 * LANES]),
+        }
+    }
+}
 
 /// Rows of the cell areas: three vectors per cell.
 pub(super) const AREA_ROWS: usize = 9;
@@ -134,57 +166,36 @@ pub(super) struct Motion<'a> {
     pub(super) dt: f64,
 }
 
-/// What one batch writes besides its own histories.
-pub(super) struct Output<'a> {
-    pub(super) force: &'a mut [f64],
-    pub(super) energy: &'a mut [f64],
-    pub(super) area: Option<&'a mut [f64]>,
-}
-
-pub(super) fn run_batch(
-    sheet: &Sheet,
-    batch: &mut Batch,
-    motion: Motion<'_>,
-    out: Output<'_>,
-    fields: bool,
-) {
-    let Output {
-        force,
-        energy,
-        area,
-    } = out;
-    let dt = motion.dt;
-    let mut position = Buffer([0.0; 12 * LANES]);
-    gather(&batch.nodes, motion.x, &mut position.0);
-    let p = &position.0;
-    if let Some(area) = area {
-        cell_areas_dispatch(p, area);
+/// Forces of a batch into `work`; cell areas too where they are needed.
+pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Workspace) {
+    let sheet = &present.sheets[batch.sheet as usize];
+    let motion = present.motion;
+    gather(&batch.nodes, motion.x, &mut work.position.0);
+    if batch.is_pressed || present.areas {
+        cell_areas_dispatch(&work.position.0, &mut work.area.0);
     }
-    let mut raw = empty_element_batch(sheet, dt, p);
+    let mut raw = empty_element_batch(sheet, motion.dt, &work.position.0);
     raw.constants = batch.constants.as_mut_ptr();
     raw.history = batch.history.as_mut_ptr();
     raw.material_history = batch.material_history.as_mut_ptr();
-    raw.force = force.as_mut_ptr();
-    raw.energy = energy.as_mut_ptr();
-    if fields {
+    raw.force = work.force.0.as_mut_ptr();
+    raw.energy = batch.energy.as_mut_ptr();
+    if present.fields {
         batch.fields = Aligned::zeros(sheet.element.sizes.fields * LANES);
         raw.fields = batch.fields.as_mut_ptr();
     }
-    batch.status = if sheet.element.rotates() {
-        let mut rates = Rates::zero();
-        gather(&batch.nodes, motion.v, &mut rates.velocity.0);
-        gather(&batch.nodes, motion.spin, &mut rates.spin.0);
-        rates.attach(&mut raw);
-        raw.moment = batch.moment.as_mut_ptr();
-        sheet.element.forces(&raw)
-    } else {
-        sheet.element.forces(&raw)
-    };
+    if sheet.element.rotates() {
+        gather(&batch.nodes, motion.v, &mut work.rates.velocity.0);
+        gather(&batch.nodes, motion.spin, &mut work.rates.spin.0);
+        work.rates.attach(&mut raw);
+        raw.moment = work.moment.0.as_mut_ptr();
+    }
+    batch.status = sheet.element.forces(&raw);
     if batch.layered {
-        for row in force
-            .chunks_exact_mut(LANES)
-            .chain(batch.moment.chunks_exact_mut(LANES))
-            .chain(energy.chunks_exact_mut(LANES))
+        let rows = work.force.0.chunks_exact_mut(LANES);
+        for row in rows
+            .chain(work.moment.0.chunks_exact_mut(LANES))
+            .chain(batch.energy.chunks_exact_mut(LANES))
         {
             for (value, layers) in row.iter_mut().zip(&batch.layers) {
                 *value *= layers;
@@ -193,20 +204,39 @@ pub(super) fn run_batch(
     }
 }
 
-pub(super) fn run_patch(sheet: &Sheet, batch: &mut PatchBatch, x: &[V], dt: f64, fields: bool) {
-    let width = sheet.element.sizes.patch_nodes;
-    let mut position = Buffer([0.0; 32 * 3 * LANES]);
-    gather_patch(&batch.nodes, width, x, &mut position.0);
-    let mut raw = empty_patch_batch(sheet, dt, &position.0);
+/// Forces of a batch of patches into `work`.
+pub(super) fn run_patch(batch: &mut PatchBatch, present: Present<'_>, work: &mut PatchWorkspace) {
+    let sheet = &present.sheets[batch.sheet as usize];
+    gather(&batch.nodes, present.motion.x, &mut work.position.0);
+    let mut raw = empty_patch_batch(sheet, present.motion.dt, &work.position.0);
     raw.constants = batch.constants.as_mut_ptr();
     raw.history = batch.history.as_mut_ptr();
-    raw.force = batch.force.as_mut_ptr();
+    raw.force = work.force.0.as_mut_ptr();
     raw.energy = batch.energy.as_mut_ptr();
-    if fields {
+    if present.fields {
         batch.fields = Aligned::zeros(sheet.element.sizes.patch_fields * LANES);
         raw.fields = batch.fields.as_mut_ptr();
     }
     batch.status = sheet.element.patch_forces(&raw);
+}
+
+/// Forces `[4][3][LANES]` of a pressure (Pa) by lane on the cells' nodes, from [`cell_areas`].
+#[inline(always)]
+pub(super) fn pressure_forces(
+    area: &[f64; AREA_ROWS * LANES],
+    pressure: &[f64; LANES],
+    force: &mut [f64; 12 * LANES],
+) {
+    for (k, (sx, sy)) in SIGNS.into_iter().enumerate() {
+        for c in 0..3 {
+            let row = |r: usize| &area[(3 * r + c) * LANES..(3 * r + c + 1) * LANES];
+            let (u, v, w) = (row(0), row(1), row(2));
+            let out = &mut force[(3 * k + c) * LANES..(3 * k + c + 1) * LANES];
+            for l in 0..LANES {
+                out[l] = pressure[l] * (u[l] + sx * v[l] + sy * w[l]);
+            }
+        }
+    }
 }
 
 /// The smallest critical step of a batch (s). Works on copies of the histories: asking changes nothing.
@@ -243,14 +273,14 @@ pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 
 /// Row sums of the bending stiffness (N/m) by model node.
 pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32, f64)> {
     let width = sheet.element.sizes.patch_nodes;
-    let mut position = Buffer([0.0; 32 * 3 * LANES]);
-    gather_patch(&batch.nodes, width, x, &mut position.0);
+    let mut position = Aligned::zeros(3 * width * LANES);
+    gather(&batch.nodes, x, &mut position);
     let mut constants = batch.constants.clone();
     let mut history = batch.history.clone();
     let mut force = Aligned::zeros(3 * width * LANES);
     let mut energy = Aligned::zeros(LANES);
     let mut stiffness = Aligned::zeros(width * LANES);
-    let mut raw = empty_patch_batch(sheet, 0.0, &position.0);
+    let mut raw = empty_patch_batch(sheet, 0.0, &position);
     raw.constants = constants.as_mut_ptr();
     raw.history = history.as_mut_ptr();
     raw.force = force.as_mut_ptr();
@@ -261,11 +291,10 @@ pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32
     }
     (0..batch.count as usize)
         .flat_map(|l| {
-            let nodes = &batch.nodes[l * width..(l + 1) * width];
-            let stiffness = &stiffness;
+            let (nodes, stiffness) = (&batch.nodes, &stiffness);
             (0..width)
-                .filter(move |k| *k == 0 || nodes[*k] != nodes[0])
-                .map(move |k| (nodes[k], stiffness[k * LANES + l]))
+                .filter(move |k| *k == 0 || nodes[*k][l] != nodes[0][l])
+                .map(move |k| (nodes[k][l], stiffness[k * LANES + l]))
         })
         .collect()
 }
@@ -314,18 +343,18 @@ mod tests {
             [1, 3, 7, 5],
         ];
         let mut gradient = [[0.0; 3]; 8];
-        let mut nodes = [[0u32; 4]; LANES];
-        nodes[..6].copy_from_slice(&cells);
+        let nodes: [[u32; LANES]; 4] =
+            std::array::from_fn(|k| std::array::from_fn(|l| cells.get(l).map_or(0, |c| c[k])));
         let mut position = [0.0; 12 * LANES];
         gather(&nodes, &points, &mut position);
-        let mut area = vec![0.0; AREA_ROWS * LANES];
+        let mut area = [0.0; AREA_ROWS * LANES];
         cell_areas(&position, &mut area);
+        let mut force = [0.0; 12 * LANES];
+        pressure_forces(&area, &[1.0; LANES], &mut force);
         for (l, cell) in cells.iter().enumerate() {
             for k in 0..4 {
-                let (sx, sy) = SIGNS[k];
                 for c in 0..3 {
-                    let row = |r: usize| area[(3 * r + c) * LANES + l];
-                    gradient[cell[k] as usize][c] += row(0) + sx * row(1) + sy * row(2);
+                    gradient[cell[k] as usize][c] += force[(3 * k + c) * LANES + l];
                 }
             }
         }

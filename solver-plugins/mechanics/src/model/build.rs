@@ -1,6 +1,7 @@
 //! Building a model: sheets, batches, masses, contact stiffness.
 
 use super::*;
+use crate::mesh::Patch;
 
 impl Model {
     /// Builds a model from points (m, at their start) and sheets (from the tool upwards).
@@ -29,23 +30,23 @@ impl Model {
             dt: settings.target_step,
             ledger: Ledger::default(),
             settings,
-            batches: Vec::new(),
+            blocks: Vec::new(),
             patches: Vec::new(),
-            pressed: Vec::new(),
-            element_force: Aligned::default(),
-            element_energy: Aligned::default(),
-            cell_area: Aligned::default(),
-            cell_slot: Vec::new(),
-            node_slots: Csr::default(),
-            patch_slots: Csr::default(),
+            pressed_below: Vec::new(),
+            cell_place: Vec::new(),
+            sums: Sums::default(),
+            patch_sums: Sums::default(),
+            free_mass: Vec::new(),
+            per_mass: Vec::new(),
             force: vec![[0.0; 3]; n],
+            contact_force: vec![[0.0; 3]; n],
             external_force: vec![[0.0; 3]; n],
             own_mass: vec![0.0; n],
             rotations: None,
             supports: Supports::default(),
             body_acceleration: [0.0; 3],
             load_factor: 1.0,
-            loads: Vec::new(),
+            loads: Loads::default(),
             last_dt: 0.0,
             shortest_edge: 0.0,
             kick: 1.0,
@@ -66,7 +67,7 @@ impl Model {
 
     fn add_sheet(&mut self, spec: SheetSpec) -> Result<(), MechanicsError> {
         let sheet_index = self.sheets.len() as u32;
-        let (cell0, batch0, patch0) = (self.cells.len(), self.batches.len(), self.patches.len());
+        let (cell0, block0, patch0) = (self.cells.len(), self.blocks.len(), self.patches.len());
         let cells: Vec<[u32; 4]> = spec
             .cells
             .iter()
@@ -87,47 +88,69 @@ impl Model {
             .extend(mesh.neighbours().into_iter().map(|e| e.map(shift)));
         let material = spec.element.material.reference().sizes();
         let s = spec.element.sizes;
-        for (b, chunk) in cells.chunks(LANES).enumerate() {
-            let lane = |l: usize| b * LANES + l.min(chunk.len() - 1);
-            let nodes: [[u32; 4]; LANES] = std::array::from_fn(|l| cells[lane(l)]);
-            let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[lane(l)]);
-            for l in 0..LANES {
-                let p = spec.pressed[lane(l)];
-                let below = if matches!(p, Pressed::Below | Pressed::Both) {
-                    1.0
-                } else {
-                    0.0
-                };
-                let above = if matches!(p, Pressed::Above | Pressed::Both) {
-                    1.0
-                } else {
-                    0.0
-                };
-                self.pressed.push([below, above]);
-                if l < chunk.len() {
-                    self.cell_slot.push(((batch0 + b) * LANES + l) as u32);
+        let rotates = s.dofs_per_node == 6;
+        let centres: Vec<V> = cells
+            .iter()
+            .map(|c| {
+                scale(
+                    c.iter().fold([0.0; 3], |m, n| add(m, self.x[*n as usize])),
+                    0.25,
+                )
+            })
+            .collect();
+        let order = compact_order(&centres, BLOCK * LANES);
+        self.cell_place
+            .resize(cell0 + cells.len(), CellPlace::default());
+        let pressed = |c: usize| matches!(spec.pressed[c], Pressed::Below | Pressed::Both);
+        self.pressed_below.extend((0..cells.len()).map(pressed));
+        for group in order.chunks(BLOCK * LANES) {
+            let used = group.iter().flat_map(|c| cells[*c as usize]);
+            let mut block = Block::new(used);
+            for (b, chunk) in group.chunks(LANES).enumerate() {
+                for (l, c) in chunk.iter().enumerate() {
+                    self.cell_place[cell0 + *c as usize] = CellPlace {
+                        block: self.blocks.len() as u32,
+                        batch: b as u16,
+                        lane: l as u16,
+                    };
                 }
+                // Lanes beyond the last element repeat it.
+                let cell = |l: usize| chunk[l.min(chunk.len() - 1)] as usize;
+                let nodes: [[u32; LANES]; 4] =
+                    std::array::from_fn(|k| std::array::from_fn(|l| cells[cell(l)][k]));
+                let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[cell(l)]);
+                let pressed: [[f64; 2]; LANES] =
+                    std::array::from_fn(|l| match spec.pressed[cell(l)] {
+                        Pressed::No => [0.0, 0.0],
+                        Pressed::Below => [1.0, 0.0],
+                        Pressed::Above => [0.0, 1.0],
+                        Pressed::Both => [1.0, 1.0],
+                    });
+                block.batches.push(Batch {
+                    sheet: sheet_index,
+                    count: chunk.len() as u32,
+                    places: nodes.map(|n| n.map(|n| block.place(n))),
+                    nodes,
+                    is_pressed: pressed.iter().any(|w| *w != [0.0; 2]),
+                    pressed,
+                    layered: layers.iter().any(|k| *k != 1.0),
+                    layers,
+                    mass_factor: [1.0; LANES],
+                    mass: Aligned::zeros(4 * LANES),
+                    energy: Aligned::zeros(PF_ENERGIES * LANES),
+                    inertia: Aligned::zeros(if rotates { 4 * LANES } else { 0 }),
+                    constants: Aligned::zeros(s.constants * LANES),
+                    history: Aligned::zeros(s.history * LANES),
+                    material_history: Aligned::zeros(
+                        s.material_points * material.membrane_history * LANES,
+                    ),
+                    fields: Aligned::default(),
+                    status: PF_OK,
+                });
             }
-            self.batches.push(Batch {
-                sheet: sheet_index,
-                count: chunk.len() as u32,
-                nodes,
-                layers,
-                layered: layers.iter().any(|k| *k != 1.0),
-                mass_factor: [1.0; LANES],
-                mass: Aligned::zeros(4 * LANES),
-                moment: Aligned::zeros(if s.dofs_per_node == 6 { 12 * LANES } else { 0 }),
-                inertia: Aligned::zeros(if s.dofs_per_node == 6 { 4 * LANES } else { 0 }),
-                constants: Aligned::zeros(s.constants * LANES),
-                history: Aligned::zeros(s.history * LANES),
-                material_history: Aligned::zeros(
-                    s.material_points * material.membrane_history * LANES,
-                ),
-                fields: Aligned::default(),
-                status: PF_OK,
-            });
+            self.blocks.push(block);
         }
-        if s.dofs_per_node == 6 && self.rotations.is_none() {
+        if rotates && self.rotations.is_none() {
             self.rotations = Some(Box::new(Rotations::new(self.x.len())));
         }
         if s.patch_nodes > 0 && material.has_bending {
@@ -138,7 +161,7 @@ impl Model {
             name: spec.name,
             nodes: spec.nodes,
             cell_range: (cell0, self.cells.len()),
-            batch_range: (batch0, self.batches.len()),
+            block_range: (block0, self.blocks.len()),
             patch_range: (patch0, self.patches.len()),
             thickness: material.thickness,
             added_mass: 0.0,
@@ -147,6 +170,7 @@ impl Model {
         self.initialise(
             &mut sheet,
             spec.axis,
+            &order,
             &spec.least_areal_mass,
             material.areal_mass,
         )?;
@@ -171,53 +195,81 @@ impl Model {
                 s.patch_nodes - 1
             )));
         }
-        for chunk in spec.patches.chunks(LANES) {
-            let of = |l: usize| &chunk[l.min(chunk.len() - 1)];
-            let nodes = (0..LANES)
-                .flat_map(|l| {
-                    let p = of(l);
-                    (0..s.patch_nodes).map(move |k| *p.nodes.get(k).unwrap_or(&p.nodes[0]))
-                })
-                .map(|k| spec.nodes[k as usize])
-                .collect();
-            let mut batch = PatchBatch {
-                sheet,
-                count: chunk.len() as u32,
-                nodes,
-                centres: (0..LANES).map(|l| of(l).nodes[0]).collect(),
-                constants: Aligned::zeros(s.patch_constants * LANES),
-                history: Aligned::zeros((s.patch_history + bending_history) * LANES),
-                fields: Aligned::default(),
-                force: Aligned::zeros(s.patch_nodes * 3 * LANES),
-                energy: Aligned::zeros(LANES),
-                status: PF_OK,
-            };
-            let mut position = Aligned::zeros(s.patch_nodes * 3 * LANES);
-            gather_patch(&batch.nodes, s.patch_nodes, &self.x, &mut position);
-            let count: Vec<f64> = (0..LANES).map(|l| of(l).nodes.len() as f64).collect();
-            let area: Vec<f64> = (0..LANES).map(|l| of(l).area).collect();
-            let axis: Vec<f64> = (0..3 * LANES).map(|k| spec.axis[k / LANES]).collect();
-            let raw = pf_patch_batch {
-                size: size_of::<pf_patch_batch>() as u64,
-                lanes: LANES as u32,
-                reserved: 0,
-                dt: 0.0,
-                position: position.as_ptr(),
-                count: count.as_ptr(),
-                area: area.as_ptr(),
-                axis: axis.as_ptr(),
-                constants: batch.constants.as_mut_ptr(),
-                history: batch.history.as_mut_ptr(),
-                force: std::ptr::null_mut(),
-                energy: std::ptr::null_mut(),
-                fields: std::ptr::null_mut(),
-                stiffness: std::ptr::null_mut(),
-                material: spec.element.material.reference().raw(),
-            };
-            component_status(spec.element.patch_initialise(&raw), &spec.name)?;
-            self.patches.push(batch);
+        let centres: Vec<V> = spec
+            .patches
+            .iter()
+            .map(|p| self.x[spec.nodes[p.nodes[0] as usize] as usize])
+            .collect();
+        let order = compact_order(&centres, BLOCK * LANES);
+        for group in order.chunks(BLOCK * LANES) {
+            let patch = |k: u32| &spec.patches[k as usize];
+            let used = group.iter().flat_map(|k| &patch(*k).nodes);
+            let mut block = Block::new(used.map(|k| spec.nodes[*k as usize]));
+            for chunk in group.chunks(LANES) {
+                let of = |l: usize| patch(chunk[l.min(chunk.len() - 1)]);
+                let batch = self.patch_batch(sheet, spec, chunk.len(), of, &block, bending_history);
+                block.batches.push(batch?);
+            }
+            self.patches.push(block);
         }
         Ok(())
+    }
+
+    /// A batch of the patches `of(lane)`, of which `count` count.
+    fn patch_batch<'a>(
+        &self,
+        sheet: u32,
+        spec: &SheetSpec,
+        count: usize,
+        of: impl Fn(usize) -> &'a Patch,
+        block: &Block<PatchBatch>,
+        bending_history: usize,
+    ) -> Result<PatchBatch, MechanicsError> {
+        let s = spec.element.sizes;
+        let nodes: Vec<[u32; LANES]> = (0..s.patch_nodes)
+            .map(|k| {
+                std::array::from_fn(|l| {
+                    let p = of(l);
+                    spec.nodes[*p.nodes.get(k).unwrap_or(&p.nodes[0]) as usize]
+                })
+            })
+            .collect();
+        let mut batch = PatchBatch {
+            sheet,
+            count: count as u32,
+            places: nodes.iter().map(|n| n.map(|n| block.place(n))).collect(),
+            nodes,
+            centres: (0..LANES).map(|l| of(l).nodes[0]).collect(),
+            constants: Aligned::zeros(s.patch_constants * LANES),
+            history: Aligned::zeros((s.patch_history + bending_history) * LANES),
+            fields: Aligned::default(),
+            energy: Aligned::zeros(LANES),
+            status: PF_OK,
+        };
+        let mut position = Aligned::zeros(s.patch_nodes * 3 * LANES);
+        gather(&batch.nodes, &self.x, &mut position);
+        let count: Vec<f64> = (0..LANES).map(|l| of(l).nodes.len() as f64).collect();
+        let area: Vec<f64> = (0..LANES).map(|l| of(l).area).collect();
+        let axis: Vec<f64> = (0..3 * LANES).map(|k| spec.axis[k / LANES]).collect();
+        let raw = pf_patch_batch {
+            size: size_of::<pf_patch_batch>() as u64,
+            lanes: LANES as u32,
+            reserved: 0,
+            dt: 0.0,
+            position: position.as_ptr(),
+            count: count.as_ptr(),
+            area: area.as_ptr(),
+            axis: axis.as_ptr(),
+            constants: batch.constants.as_mut_ptr(),
+            history: batch.history.as_mut_ptr(),
+            force: std::ptr::null_mut(),
+            energy: std::ptr::null_mut(),
+            fields: std::ptr::null_mut(),
+            stiffness: std::ptr::null_mut(),
+            material: spec.element.material.reference().raw(),
+        };
+        component_status(spec.element.patch_initialise(&raw), &spec.name)?;
+        Ok(batch)
     }
 
     /// Constants and masses of a sheet, with mass scaling to the wanted step and areal mass.
@@ -225,6 +277,7 @@ impl Model {
         &mut self,
         sheet: &mut Sheet,
         axis: V,
+        order: &[u32],
         least: &[f64],
         areal_mass: f64,
     ) -> Result<(), MechanicsError> {
@@ -235,8 +288,9 @@ impl Model {
         let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
         let mut step = Aligned::zeros(LANES);
         let rates = Rates::zero();
-        let batches = &mut self.batches[sheet.batch_range.0..sheet.batch_range.1];
-        for (b, batch) in batches.iter_mut().enumerate() {
+        let blocks = &mut self.blocks[sheet.block_range.0..sheet.block_range.1];
+        let batches = blocks.iter_mut().flat_map(|b| &mut b.batches);
+        for (batch, cells) in batches.zip(order.chunks(LANES)) {
             gather(&batch.nodes, &self.x, &mut position);
             let mut raw = empty_element_batch(sheet, 0.0, &position);
             raw.axis = axis.as_ptr();
@@ -270,12 +324,12 @@ impl Model {
                 }
                 let factor = (self.settings.target_step / critical)
                     .powi(2)
-                    .max(least[b * LANES + l] / areal_mass)
+                    .max(least[cells[l] as usize] / areal_mass)
                     .max(1.0);
                 batch.mass_factor[l] = factor;
                 for k in 0..4 {
                     let own = batch.mass[k * LANES + l] * batch.layers[l];
-                    let node = batch.nodes[l][k] as usize;
+                    let node = batch.nodes[k][l] as usize;
                     self.mass[node] += own * factor;
                     self.own_mass[node] += own;
                     if let Some(r) = self.rotations.as_deref_mut()
@@ -303,34 +357,19 @@ impl Model {
             .iter()
             .flat_map(|c| (0..4).map(move |k| edge(c[k], c[(k + 1) % 4])))
             .fold(f64::INFINITY, f64::min);
-        let nb = self.batches.len();
-        self.element_force = Aligned::zeros(nb * 12 * LANES);
-        self.element_energy = Aligned::zeros(nb * PF_ENERGIES * LANES);
-        self.cell_area = Aligned::zeros(nb * AREA_ROWS * LANES);
-        let slots = self
-            .cells
-            .iter()
-            .zip(&self.cell_slot)
-            .flat_map(|(nodes, slot)| (0..4u32).map(move |k| (nodes[k as usize], slot * 4 + k)));
-        self.node_slots = Csr::build(n, slots);
-        let pairs: Vec<(u32, u32)> = self
-            .patches
-            .iter()
-            .enumerate()
-            .flat_map(|(b, batch)| {
-                let width = batch.nodes.len() / LANES;
-                (0..batch.count as usize).flat_map(move |l| {
-                    let row = &batch.nodes[l * width..(l + 1) * width];
-                    let used = move |k: usize| k == 0 || row[k] != row[0];
-                    (0..width)
-                        .filter(move |k| used(*k))
-                        .map(move |k| (row[k], ((b * LANES + l) as u32) << 5 | k as u32))
-                })
-            })
-            .collect();
-        self.patch_slots = Csr::build(n, pairs.into_iter());
+        self.sums = Sums::new(n, &self.blocks);
+        self.sums.area = self.sums.zeros();
+        let pressed = |b: &Block<Batch>| b.batches.iter().any(|b| b.is_pressed);
+        if self.blocks.iter().any(pressed) {
+            self.sums.pressure = self.sums.zeros();
+        }
+        if self.rotations.is_some() {
+            self.sums.moment = self.sums.zeros();
+        }
+        self.patch_sums = Sums::new(n, &self.patches);
+        self.set_free_masses();
         self.internal_forces(false)?;
-        self.assemble();
+        self.normals();
         Ok(())
     }
 
@@ -344,6 +383,7 @@ impl Model {
         self.supports.reaction_moment = vec![[0.0; 3]; nodes.len()];
         self.driven = nodes;
         self.drive = Some(drive);
+        self.set_free_masses();
     }
 
     /// Sets stiffness and damping of all contacts from the masses that they couple, and bounds the

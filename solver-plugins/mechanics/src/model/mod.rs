@@ -1,15 +1,18 @@
 //! Nodes, sheets, contacts and loads; one central-difference step.
 
+mod advance;
 mod batch;
+mod blocks;
 mod build;
 mod query;
 mod rotation;
 mod support;
 
 use batch::*;
+use blocks::*;
 use rotation::Rotations;
-use support::Supports;
 pub use support::{Fixed, NodalLoad};
+use support::{Loads, Supports};
 
 use crate::contact::{ContactEnergy, ContactSettings, RigidContact, SheetContact, Surface};
 use crate::energy::Ledger;
@@ -94,18 +97,24 @@ pub struct Model {
     /// Accumulated losses and external work, and the stored energies of the last ledger.
     pub ledger: Ledger,
     settings: StepSettings,
-    batches: Vec<Batch>,
-    patches: Vec<PatchBatch>,
-    pressed: Vec<[f64; 2]>,
-    element_force: Aligned,
-    element_energy: Aligned,
-    cell_area: Aligned,
-    cell_slot: Vec<u32>,
-    node_slots: Csr,
-    patch_slots: Csr,
+    blocks: Vec<Block<Batch>>,
+    patches: Vec<Block<PatchBatch>>,
+    /// `[cells]` whether the cavity presses from below.
+    pressed_below: Vec<bool>,
+    /// `[cells]` where their elements are.
+    cell_place: Vec<CellPlace>,
+    sums: Sums,
+    patch_sums: Sums,
+    /// `[n]` mass of a node by component (kg); 0: driven.
+    free_mass: Vec<V>,
+    /// `[n]` what a force accelerates (1/kg); 0: driven or fixed.
+    per_mass: Vec<V>,
+    /// `[n]` forces on the nodes in the last step (N).
     force: Vec<V>,
     /// Pressure, weight and nodal loads (N): what does external work on free nodes.
     external_force: Vec<V>,
+    /// `[n]` forces of the contacts (N); zero between steps.
+    contact_force: Vec<V>,
     /// `[n]` masses without scaling (kg): what has weight.
     own_mass: Vec<f64>,
     rotations: Option<Box<Rotations>>,
@@ -114,7 +123,7 @@ pub struct Model {
     pub body_acceleration: V,
     /// What the nodal loads are multiplied by.
     pub load_factor: f64,
-    loads: Vec<NodalLoad>,
+    loads: Loads,
     last_dt: f64,
     /// Shortest edge of a cell at the start (m).
     shortest_edge: f64,
@@ -128,34 +137,12 @@ pub struct Model {
     work: NodeWork,
 }
 
-#[derive(Default)]
-struct Csr {
-    start: Vec<u32>,
-    entry: Vec<u32>,
-}
-
-impl Csr {
-    fn build(n: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
-        let mut start = vec![0u32; n + 1];
-        for (node, _) in pairs.clone() {
-            start[node as usize + 1] += 1;
-        }
-        for i in 0..n {
-            start[i + 1] += start[i];
-        }
-        let mut next = start.clone();
-        let mut entry = vec![0u32; start[n] as usize];
-        for (node, value) in pairs {
-            entry[next[node as usize] as usize] = value;
-            next[node as usize] += 1;
-        }
-        Self { start, entry }
-    }
-
-    #[inline(always)]
-    fn of(&self, node: usize) -> &[u32] {
-        &self.entry[self.start[node] as usize..self.start[node + 1] as usize]
-    }
+/// Where the element of a cell is.
+#[derive(Debug, Clone, Copy, Default)]
+struct CellPlace {
+    block: u32,
+    batch: u16,
+    lane: u16,
 }
 
 /// Sums over nodes of one step (J), and the largest speed (m/s).
@@ -169,6 +156,16 @@ struct NodeWork {
 }
 
 impl NodeWork {
+    /// Counts a node of mass or rotary inertia `m` with its new velocity or spin.
+    #[inline(always)]
+    fn count(&mut self, m: f64, node: usize, v: V) {
+        let v2 = dot(v, v);
+        self.kinetic += 0.5 * m * v2;
+        if !v2.is_finite() {
+            self.bad = self.bad.or(Some(node as u32));
+        }
+    }
+
     fn add(mut self, o: Self) -> Self {
         self.kinetic += o.kinetic;
         self.external += o.external;
@@ -179,124 +176,56 @@ impl NodeWork {
     }
 }
 
-const NODE_CHUNK: usize = 1024;
+/// Nodes that are moved together.
+const NODE_CHUNK: usize = 256;
 
 /// How often (steps) the nodes' normals and areas are computed.
 const NORMAL_INTERVAL: u64 = 16;
 
 impl Model {
-    /// Internal forces, energies and cell areas at the present positions. With `fields`, the elements'
-    /// fields too.
+    /// Internal forces, pressure and energies at the present positions. With `fields`, the elements' fields
+    /// too.
     fn internal_forces(&mut self, fields: bool) -> Result<(), MechanicsError> {
-        let sheets = &self.sheets;
-        let motion = Motion {
-            x: &self.x,
-            v: &self.v,
-            spin: self.rotations.as_deref().map_or(&[], |r| &r.spin),
-            dt: self.last_dt,
+        let present = Present {
+            sheets: &self.sheets,
+            motion: Motion {
+                x: &self.x,
+                v: &self.v,
+                spin: self.rotations.as_deref().map_or(&[], |r| &r.spin),
+                dt: self.last_dt,
+            },
+            pressures: self.pressures,
+            areas: self.cycle.is_multiple_of(NORMAL_INTERVAL),
+            fields,
         };
-        let (pressed, all) = (&self.pressed, self.cycle.is_multiple_of(NORMAL_INTERVAL));
-        self.element_force
-            .par_chunks_exact_mut(12 * LANES)
-            .zip_eq(
-                self.element_energy
-                    .par_chunks_exact_mut(PF_ENERGIES * LANES),
-            )
-            .zip_eq(self.cell_area.par_chunks_exact_mut(AREA_ROWS * LANES))
-            .zip_eq(self.batches.par_iter_mut())
-            .enumerate()
-            .with_min_len(8)
-            .for_each(|(b, (((force, energy), area), batch))| {
-                let sheet = &sheets[batch.sheet as usize];
-                let slots = &pressed[b * LANES..(b + 1) * LANES];
-                let area = (all || slots.iter().any(|w| *w != [0.0; 2])).then_some(area);
-                let out = Output {
-                    force,
-                    energy,
-                    area,
-                };
-                run_batch(sheet, batch, motion, out, fields);
-            });
-        let (x, dt) = (motion.x, motion.dt);
-        self.patches
-            .par_iter_mut()
-            .with_min_len(8)
-            .for_each(|batch| {
-                let sheet = &sheets[batch.sheet as usize];
-                run_patch(sheet, batch, x, dt, fields);
-            });
-        let failed = self
-            .batches
-            .iter()
-            .map(|b| (b.status, b.sheet))
-            .chain(self.patches.iter().map(|b| (b.status, b.sheet)))
-            .find(|(s, _)| *s != PF_OK);
-        match failed {
+        run_blocks(&mut self.blocks, &mut self.sums, present);
+        run_patch_blocks(&mut self.patches, &mut self.patch_sums, present);
+        let failed = self.blocks.iter().map(|b| b.failed);
+        let failed = failed.chain(self.patches.iter().map(|b| b.failed));
+        match failed.flatten().next() {
             Some((code, sheet)) => component_status(code, &self.sheets[sheet as usize].name),
             None => Ok(()),
         }
     }
 
-    /// Sums element forces and pressure at the nodes, and the nodes' normals.
-    fn assemble(&mut self) {
-        // Normals only tell the sides of contacts apart.
-        let with_normals = self.cycle.is_multiple_of(NORMAL_INTERVAL);
-        let (p, slots, patch_slots) = (self.pressures, &self.node_slots, &self.patch_slots);
-        let (element_force, cell_area, pressed) =
-            (&*self.element_force, &*self.cell_area, &self.pressed);
-        let patches = &self.patches;
-        let (weight, own_mass) = (self.body_acceleration, &self.own_mass);
-        self.force
+    /// The nodes' normals and areas, in the steps in which the blocks have summed areas. Normals only tell the
+    /// sides of contacts apart.
+    fn normals(&mut self) {
+        let sums = &self.sums;
+        self.area
             .par_chunks_mut(NODE_CHUNK)
-            .zip_eq(self.external_force.par_chunks_mut(NODE_CHUNK))
-            .zip_eq(self.area.par_chunks_mut(NODE_CHUNK))
             .zip_eq(self.normals.par_chunks_mut(NODE_CHUNK))
             .enumerate()
-            .for_each(|(chunk, (((force, pressure), area), normal))| {
-                for i in 0..force.len() {
-                    let node = chunk * NODE_CHUNK + i;
-                    let (mut f, mut q, mut a) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-                    for entry in slots.of(node) {
-                        let (slot, k) = ((entry / 4) as usize, (entry % 4) as usize);
-                        let (b, l) = (slot / LANES, slot % LANES);
-                        let at = b * 12 * LANES + k * 3 * LANES + l;
-                        let pa = b * AREA_ROWS * LANES + l;
-                        let w = pressed[slot];
-                        let load = w[0] * p.below - w[1] * p.above;
-                        let (sx, sy) = SIGNS[k];
-                        for c in 0..3 {
-                            f[c] -= element_force[at + c * LANES];
-                        }
-                        if load != 0.0 || with_normals {
-                            for c in 0..3 {
-                                let row = |r: usize| cell_area[pa + (3 * r + c) * LANES];
-                                a[c] += row(0);
-                                q[c] += load * (row(0) + sx * row(1) + sy * row(2));
-                            }
-                        }
-                    }
-                    for entry in patch_slots.of(node) {
-                        let (slot, k) = ((entry >> 5) as usize, (entry & 31) as usize);
-                        let batch = &patches[slot / LANES];
-                        let at = k * 3 * LANES + slot % LANES;
-                        for c in 0..3 {
-                            f[c] -= batch.force[at + c * LANES];
-                        }
-                    }
-                    q = add(q, scale(weight, own_mass[node]));
-                    force[i] = add(f, q);
-                    pressure[i] = q;
-                    if with_normals {
-                        area[i] = a;
-                        normal[i] = crate::vec3::unit(a);
-                    }
+            .for_each(|(chunk, (areas, normals))| {
+                areas.fill([0.0; 3]);
+                sums.collect(&sums.area, chunk, areas);
+                for (area, normal) in areas.iter().zip(normals) {
+                    *normal = crate::vec3::unit(*area);
                 }
             });
-        self.apply_loads();
-        self.assemble_moments();
     }
 
-    /// Forces of all contacts, added to the nodal forces.
+    /// Forces of all contacts.
     fn contacts(&mut self) {
         // Speeds may grow while a node sleeps: 5 m/s is more than a film picks up under 1 bar over the
         // gaps for which a node sleeps more than a few steps.
@@ -309,13 +238,10 @@ impl Model {
         };
         for contact in &mut self.rigid_contacts {
             count(contact.compute(&self.x, &self.v, self.dt, reach));
-            let velocity = contact.motion.velocity;
-            for item in contact.items.iter().filter(|i| i.normal_force > 0.0) {
-                let n = item.node as usize;
-                self.force[n] = add(self.force[n], item.force);
-                // What moves the surface does this work on the sheets.
-                self.ledger.external += dot(item.force, velocity) * self.dt;
-            }
+            contact.scatter(&mut self.contact_force);
+            // What moves the surface does this work on the sheets.
+            let (force, velocity) = (contact.resultant(), contact.motion.velocity);
+            self.ledger.external += dot(force, velocity) * self.dt;
         }
         let surface = Surface {
             cells: &self.cells,
@@ -325,81 +251,11 @@ impl Model {
         };
         for contact in &mut self.sheet_contacts {
             count(contact.compute(&surface, &self.v, self.dt, reach));
-            contact.scatter(&self.cells, &mut self.force);
+            contact.scatter(&self.cells, &mut self.contact_force);
         }
         self.ledger.friction += total.friction;
         self.ledger.damping += total.damping;
         self.contact = total;
-    }
-
-    /// Velocities and positions of the next step; works of the step.
-    fn integrate(&mut self) {
-        let (dt, alpha, time, kick) = (self.dt, self.settings.damping, self.time, self.kick);
-        let targets: Vec<V> = match &self.drive {
-            Some(drive) => (0..self.driven.len())
-                .map(|k| drive.position(k, time + dt))
-                .collect(),
-            None => Vec::new(),
-        };
-        for (k, (n, target)) in self.driven.iter().zip(targets).enumerate() {
-            let n = *n as usize;
-            let next = scale(sub(target, self.x[n]), 1.0 / dt);
-            // What holds the node makes up for the forces on it: its work is external.
-            let mean = scale(add(next, self.v[n]), 0.5);
-            let inertia = scale(sub(next, self.v[n]), self.mass[n] / dt);
-            let held = sub(inertia, sub(self.force[n], self.external_force[n]));
-            self.ledger.external += dot(held, mean) * dt;
-            self.supports.reaction[k] = sub(inertia, self.force[n]);
-            self.x[n] = target;
-            self.v[n] = next;
-        }
-        let (lo, hi) = (1.0 / dt - 0.5 * alpha, 1.0 / (1.0 / dt + 0.5 * alpha));
-        let (force, pressure, mass, held) =
-            (&self.force, &self.external_force, &self.mass, &self.held);
-        let fixed = &self.supports.fixed;
-        let parts: Vec<NodeWork> = self
-            .x
-            .par_chunks_mut(NODE_CHUNK)
-            .zip_eq(self.v.par_chunks_mut(NODE_CHUNK))
-            .enumerate()
-            .map(|(chunk, (xs, vs))| {
-                let mut work = NodeWork::default();
-                for i in 0..xs.len() {
-                    let n = chunk * NODE_CHUNK + i;
-                    if held[n] == Held::Free {
-                        let old = vs[i];
-                        let mut v = [0.0; 3];
-                        for c in 0..3 {
-                            v[c] = (lo * old[c] + kick * force[n][c] / mass[n]) * hi;
-                        }
-                        if let Some(f) = fixed.get(n) {
-                            v = f.translation(v);
-                        }
-                        xs[i] = add(xs[i], scale(v, dt));
-                        let mean = scale(add(v, old), 0.5);
-                        work.external += dot(pressure[n], mean) * dt;
-                        work.damping += alpha * mass[n] * dot(mean, mean) * dt;
-                        vs[i] = v;
-                    }
-                    let v2 = dot(vs[i], vs[i]);
-                    work.kinetic += 0.5 * mass[n] * v2;
-                    work.speed = work.speed.max(v2);
-                    if !v2.is_finite() {
-                        work.bad = work.bad.or(Some(n as u32));
-                    }
-                }
-                work
-            })
-            .collect();
-        self.work = parts.into_iter().fold(NodeWork::default(), NodeWork::add);
-        self.rotate();
-        self.max_speed = self.work.speed.sqrt();
-        self.ledger.external += self.work.external;
-        self.ledger.damping += self.work.damping;
-        self.time += dt;
-        self.last_dt = dt;
-        self.kick = 1.0;
-        self.cycle += 1;
     }
 
     /// One step. With `fields`, the elements' fields at the positions before the step are kept for
@@ -408,10 +264,13 @@ impl Model {
     /// # Errors
     /// When a component fails or a velocity is not finite.
     pub fn step(&mut self, fields: bool) -> Result<(), MechanicsError> {
+        let with_normals = self.cycle.is_multiple_of(NORMAL_INTERVAL);
         self.internal_forces(fields)?;
-        self.assemble();
+        if with_normals {
+            self.normals();
+        }
         self.contacts();
-        self.integrate();
+        self.advance();
         let limit = self.speed_limit();
         if self.work.bad.is_some() || self.max_speed > limit {
             return Err(self.unstable(limit));

@@ -8,15 +8,13 @@ impl Model {
         let mut l = self.ledger;
         l.kinetic = self.work.kinetic;
         l.contact = self.contact.stored;
-        for (b, batch) in self.batches.iter().enumerate() {
-            let e = &self.element_energy[b * PF_ENERGIES * LANES..];
-            for lane in 0..batch.count as usize {
-                l.membrane += e[PF_ENERGY_MEMBRANE * LANES + lane];
-                l.bending += e[PF_ENERGY_BENDING * LANES + lane];
-                l.hourglass += e[PF_ENERGY_HOURGLASS * LANES + lane];
-            }
+        for batch in self.blocks.iter().flat_map(|b| &b.batches) {
+            let row = |r: usize| &batch.energy[r * LANES..r * LANES + batch.count as usize];
+            l.membrane += row(PF_ENERGY_MEMBRANE).iter().sum::<f64>();
+            l.bending += row(PF_ENERGY_BENDING).iter().sum::<f64>();
+            l.hourglass += row(PF_ENERGY_HOURGLASS).iter().sum::<f64>();
         }
-        for batch in &self.patches {
+        for batch in self.patches.iter().flat_map(|b| &b.batches) {
             l.bending += batch.energy[..batch.count as usize].iter().sum::<f64>();
         }
         l
@@ -29,14 +27,16 @@ impl Model {
     pub fn critical_step(&self) -> Result<f64, MechanicsError> {
         let (sheets, x) = (&self.sheets, &self.x);
         let steps: Vec<f64> = self
-            .batches
+            .blocks
             .par_iter()
+            .flat_map_iter(|block| &block.batches)
             .map(|batch| batch_critical_step(&sheets[batch.sheet as usize], batch, x))
             .collect();
         let membrane = steps.into_iter().fold(f64::INFINITY, f64::min);
         let rows: Vec<Vec<(u32, f64)>> = self
             .patches
             .par_iter()
+            .flat_map_iter(|block| &block.batches)
             .map(|batch| patch_rows(&sheets[batch.sheet as usize], batch, x))
             .collect();
         let mut row = vec![0.0; self.x.len()];
@@ -55,21 +55,19 @@ impl Model {
 
     /// Row `index` of the element fields of a sheet, per cell. Needs a step with `fields`.
     pub fn cell_field(&self, sheet: usize, index: usize) -> Vec<f64> {
-        let (b0, b1) = self.sheets[sheet].batch_range;
-        self.batches[b0..b1]
-            .iter()
-            .flat_map(|b| {
-                let row = &b.fields[index * LANES..index * LANES + b.count as usize];
-                row.iter().copied()
-            })
-            .collect()
+        let (c0, c1) = self.sheets[sheet].cell_range;
+        let of = |at: &CellPlace| {
+            let batch = &self.blocks[at.block as usize].batches[usize::from(at.batch)];
+            batch.fields[index * LANES + usize::from(at.lane)]
+        };
+        self.cell_place[c0..c1].iter().map(of).collect()
     }
 
     /// Row `index` of the patch fields of a sheet, per mesh-local node (0 where there is no patch).
     pub fn patch_field(&self, sheet: usize, index: usize) -> Vec<f64> {
         let (b0, b1) = self.sheets[sheet].patch_range;
         let mut values = vec![0.0; self.sheets[sheet].nodes.len()];
-        for b in &self.patches[b0..b1] {
+        for b in self.patches[b0..b1].iter().flat_map(|b| &b.batches) {
             for l in 0..b.count as usize {
                 values[b.centres[l] as usize] = b.fields[index * LANES + l];
             }
@@ -84,7 +82,8 @@ impl Model {
 
     /// Number of node patches.
     pub fn patch_count(&self) -> usize {
-        self.patches.iter().map(|b| b.count as usize).sum()
+        let batches = self.patches.iter().flat_map(|b| &b.batches);
+        batches.map(|b| b.count as usize).sum()
     }
 
     /// Volume (m3) under the cells that are pressed from below, over the plane z = 0.
@@ -93,11 +92,11 @@ impl Model {
         let parts: Vec<f64> = self
             .cells
             .par_chunks(NODE_CHUNK)
-            .zip_eq(self.cell_slot.par_chunks(NODE_CHUNK))
-            .map(|(cells, slots)| {
+            .zip_eq(self.pressed_below.par_chunks(NODE_CHUNK))
+            .map(|(cells, pressed)| {
                 let mut volume = 0.0;
-                for (cell, slot) in cells.iter().zip(slots) {
-                    if self.pressed[*slot as usize][0] > 0.0 {
+                for (cell, pressed) in cells.iter().zip(pressed) {
+                    if *pressed {
                         let p = cell.map(|n| self.x[n as usize]);
                         let height = 0.25 * (p[0][2] + p[1][2] + p[2][2] + p[3][2]);
                         volume += area_vector(p)[2] * height;

@@ -41,6 +41,15 @@ pub struct NodalLoad {
     pub moment: V,
 }
 
+/// Dead loads by node.
+#[derive(Default)]
+pub(super) struct Loads {
+    /// `[n]` (N), or empty without forces.
+    pub(super) force: Vec<V>,
+    /// `[n]` (N m), or empty without moments.
+    pub(super) moment: Vec<V>,
+}
+
 /// What holds a model besides its drive.
 #[derive(Default)]
 pub(super) struct Supports {
@@ -59,11 +68,25 @@ impl Model {
             self.supports.fixed = vec![Fixed::default(); self.x.len()];
         }
         self.supports.fixed[node as usize] = fixed;
+        self.v[node as usize] = fixed.translation(self.v[node as usize]);
+        self.per_mass[node as usize] = fixed.translation(self.per_mass[node as usize]);
     }
 
     /// Sets the nodal loads; [`Model::load_factor`] multiplies them.
     pub fn set_loads(&mut self, loads: Vec<NodalLoad>) {
-        self.loads = loads;
+        let sum = |of: &dyn Fn(&NodalLoad) -> V| {
+            let some = loads.iter().any(|l| of(l) != [0.0; 3]);
+            let mut sums = vec![[0.0; 3]; if some { self.x.len() } else { 0 }];
+            for load in loads.iter().filter(|_| some) {
+                let at = &mut sums[load.node as usize];
+                *at = add(*at, of(load));
+            }
+            sums
+        };
+        self.loads = Loads {
+            force: sum(&|l| l.force),
+            moment: sum(&|l| l.moment),
+        };
     }
 
     /// Sets the mass-proportional damping (1/s) from the next step on.
@@ -116,13 +139,5 @@ impl Model {
             load += dot(e, e);
         }
         (rest.sqrt(), load.sqrt())
-    }
-
-    pub(super) fn apply_loads(&mut self) {
-        for load in &self.loads {
-            let (n, f) = (load.node as usize, scale(load.force, self.load_factor));
-            self.force[n] = add(self.force[n], f);
-            self.external_force[n] = add(self.external_force[n], f);
-        }
     }
 }

@@ -1,0 +1,237 @@
+//! Forces on the nodes, and where they take them.
+
+use super::*;
+
+/// What moves the nodes of a model in a step.
+#[derive(Clone, Copy)]
+struct Moving {
+    dt: f64,
+    /// `v = (lo v + kick f / m) hi`.
+    lo: f64,
+    hi: f64,
+    kick: f64,
+    damping: f64,
+    /// Whether anything but contacts, elements and supports acts on the nodes.
+    loaded: bool,
+}
+
+/// Components of all nodes of a chunk, one after the other.
+struct Components<'a> {
+    x: &'a mut [f64],
+    v: &'a mut [f64],
+    /// Of the elements; then of everything.
+    force: &'a mut [f64],
+    contact: &'a mut [f64],
+    external: &'a [f64],
+    mass: &'a [f64],
+    per_mass: &'a [f64],
+}
+
+/// Components whose sums are kept apart: eight nodes.
+const GROUP: usize = 24;
+
+impl Model {
+    /// Velocities and positions of the next step; works of the step.
+    pub(super) fn advance(&mut self) {
+        let (dt, alpha) = (self.dt, self.settings.damping);
+        let weight = self.body_acceleration;
+        let moving = Moving {
+            dt,
+            lo: 1.0 / dt - 0.5 * alpha,
+            hi: 1.0 / (1.0 / dt + 0.5 * alpha),
+            kick: self.kick,
+            damping: alpha,
+            loaded: weight != [0.0; 3]
+                || !self.loads.force.is_empty()
+                || !self.sums.pressure.is_empty(),
+        };
+        if !moving.loaded {
+            // What no longer acts.
+            self.external_force.fill([0.0; 3]);
+        }
+        let before: Vec<(V, V)> = self
+            .driven
+            .iter()
+            .map(|n| (self.x[*n as usize], self.v[*n as usize]))
+            .collect();
+        let (sums, patch_sums) = (&self.sums, &self.patch_sums);
+        let (free_mass, per_mass) = (&self.free_mass, &self.per_mass);
+        let own_mass = &self.own_mass;
+        let (loads, load_factor) = (&self.loads.force, self.load_factor);
+        let works: Vec<NodeWork> = self
+            .x
+            .par_chunks_mut(NODE_CHUNK)
+            .zip_eq(self.v.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(self.force.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(self.external_force.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(self.contact_force.par_chunks_mut(NODE_CHUNK))
+            .enumerate()
+            .map(|(chunk, ((((x, v), force), external), contact))| {
+                let nodes = chunk * NODE_CHUNK..chunk * NODE_CHUNK + x.len();
+                force.fill([0.0; 3]);
+                sums.collect(&sums.force, chunk, force);
+                if patch_sums.stride > 0 {
+                    patch_sums.collect(&patch_sums.force, chunk, force);
+                }
+                if moving.loaded {
+                    for (q, m) in external.iter_mut().zip(&own_mass[nodes.clone()]) {
+                        *q = scale(weight, *m);
+                    }
+                    if !sums.pressure.is_empty() {
+                        sums.collect(&sums.pressure, chunk, external);
+                    }
+                    if !loads.is_empty() {
+                        for (q, load) in external.iter_mut().zip(&loads[nodes.clone()]) {
+                            *q = add(*q, scale(*load, load_factor));
+                        }
+                    }
+                }
+                moving.chunk(Components {
+                    x: x.as_flattened_mut(),
+                    v: v.as_flattened_mut(),
+                    force: force.as_flattened_mut(),
+                    contact: contact.as_flattened_mut(),
+                    external: external.as_flattened(),
+                    mass: free_mass[nodes.clone()].as_flattened(),
+                    per_mass: per_mass[nodes].as_flattened(),
+                })
+            })
+            .collect();
+        self.work = works.into_iter().fold(NodeWork::default(), NodeWork::add);
+        self.follow(&before);
+        if !self.work.kinetic.is_finite() {
+            let bad = |v: &V| !v.iter().all(|c| c.is_finite());
+            self.work.bad = self.v.iter().position(bad).map(|n| n as u32);
+        }
+        self.rotate();
+        self.max_speed = self.work.speed.sqrt();
+        self.ledger.external += self.work.external;
+        self.ledger.damping += self.work.damping;
+        self.time += dt;
+        self.last_dt = dt;
+        self.kick = 1.0;
+        self.cycle += 1;
+    }
+
+    /// Puts the driven nodes where their drive wants them. `before`: their positions and velocities.
+    fn follow(&mut self, before: &[(V, V)]) {
+        let Some(drive) = &self.drive else { return };
+        let dt = self.dt;
+        for (k, (n, (x, v))) in self.driven.iter().zip(before).enumerate() {
+            let n = *n as usize;
+            let target = drive.position(k, self.time + dt);
+            let next = scale(sub(target, *x), 1.0 / dt);
+            // What holds the node makes up for the forces on it: its work is external.
+            let mean = scale(add(next, *v), 0.5);
+            let inertia = scale(sub(next, *v), self.mass[n] / dt);
+            let held = sub(inertia, sub(self.force[n], self.external_force[n]));
+            self.ledger.external += dot(held, mean) * dt;
+            self.supports.reaction[k] = sub(inertia, self.force[n]);
+            self.x[n] = target;
+            self.v[n] = next;
+            self.work.count(self.mass[n], n, next);
+            self.work.speed = self.work.speed.max(dot(next, next));
+        }
+    }
+
+    /// Masses as [`Model::advance`] wants them.
+    pub(super) fn set_free_masses(&mut self) {
+        self.free_mass = self.mass.iter().map(|m| [*m; 3]).collect();
+        self.per_mass = self.mass.iter().map(|m| [1.0 / m; 3]).collect();
+        for n in &self.driven {
+            self.free_mass[*n as usize] = [0.0; 3];
+            self.per_mass[*n as usize] = [0.0; 3];
+        }
+        for (m, fixed) in self.per_mass.iter_mut().zip(&self.supports.fixed) {
+            *m = fixed.translation(*m);
+        }
+    }
+}
+
+impl Moving {
+    /// Moves a chunk with the machine's widest vectors; no fused operations and sums by group, so the bits are
+    /// the same on all.
+    fn chunk(self, c: Components<'_>) -> NodeWork {
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx2")]
+            fn wide(moving: Moving, c: Components<'_>) -> NodeWork {
+                moving.components(c)
+            }
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // Checked the line above.
+                return unsafe { wide(self, c) };
+            }
+        }
+        self.components(c)
+    }
+
+    #[inline(always)]
+    fn components(self, mut c: Components<'_>) -> NodeWork {
+        let mut sums = Works::default();
+        let n = c.x.len();
+        let whole = n - n % GROUP;
+        for start in (0..whole).step_by(GROUP) {
+            self.group::<GROUP>(&mut c, start, &mut sums);
+        }
+        for start in (whole..n).step_by(3) {
+            self.group::<3>(&mut c, start, &mut sums);
+        }
+        NodeWork {
+            kinetic: 0.5 * sums.kinetic.iter().sum::<f64>(),
+            external: sums.done.iter().sum::<f64>() * self.dt,
+            damping: sums.lost.iter().sum::<f64>() * self.damping * self.dt,
+            speed: sums.speed.iter().fold(0.0, |m, s| m.max(*s)),
+            bad: None,
+        }
+    }
+
+    /// Moves `N` components, three of a node, at most [`GROUP`].
+    #[inline(always)]
+    fn group<const N: usize>(self, c: &mut Components<'_>, start: usize, sums: &mut Works) {
+        fn of<const N: usize>(from: &[f64]) -> &[f64; N] {
+            from.first_chunk().expect("whole groups")
+        }
+        fn to<const N: usize>(from: &mut [f64]) -> &mut [f64; N] {
+            from.first_chunk_mut().expect("whole groups")
+        }
+        let x = to::<N>(&mut c.x[start..]);
+        let v = to::<N>(&mut c.v[start..]);
+        let f = to::<N>(&mut c.force[start..]);
+        let contact = to::<N>(&mut c.contact[start..]);
+        let q = of::<N>(&c.external[start..]);
+        let (mass, per_mass) = (of::<N>(&c.mass[start..]), of::<N>(&c.per_mass[start..]));
+        for i in 0..N {
+            f[i] += contact[i] + q[i];
+            contact[i] = 0.0;
+            let old = v[i];
+            let new = (self.lo * old + self.kick * per_mass[i] * f[i]) * self.hi;
+            v[i] = new;
+            x[i] += new * self.dt;
+            sums.kinetic[i] += mass[i] * (new * new);
+            let mean = 0.5 * (new + old);
+            sums.lost[i] += mass[i] * (mean * mean);
+            // Supports do the work at driven nodes.
+            sums.done[i] += if mass[i] > 0.0 { q[i] * mean } else { 0.0 };
+        }
+        for k in 0..N / 3 {
+            let v2 =
+                v[3 * k] * v[3 * k] + v[3 * k + 1] * v[3 * k + 1] + v[3 * k + 2] * v[3 * k + 2];
+            let s = &mut sums.speed[k];
+            *s = if v2 > *s { v2 } else { *s };
+        }
+    }
+}
+
+/// Sums by place in a group.
+#[derive(Default)]
+struct Works {
+    /// Twice the kinetic energies (J).
+    kinetic: [f64; GROUP],
+    /// Mass times mean velocity squared (J).
+    lost: [f64; GROUP],
+    /// Powers of the external forces (W).
+    done: [f64; GROUP],
+    /// Largest squares of the speed (m2/s2).
+    speed: [f64; GROUP / 3],
+}

@@ -1,0 +1,328 @@
+//! Blocks: compact pieces of the sheets whose batches are gathered, computed and summed together.
+//!
+//! A block sums the forces of its elements at its own nodes, so that a node collects the sums of the one to four
+//! blocks around it instead of every element's forces from all over memory. Blocks do not depend on the
+//! number of threads, and neither does the order of any sum.
+
+use super::*;
+
+/// Batches in a block: 16 x 16 elements.
+pub(super) const BLOCK: usize = 8;
+
+/// Batches and the nodes that they share.
+pub(super) struct Block<B> {
+    /// At most [`BLOCK`].
+    pub(super) batches: Vec<B>,
+    /// Nodes of the model, in ascending order.
+    pub(super) nodes: Vec<u32>,
+    /// Status of the first batch that failed in the last step, and its sheet.
+    pub(super) failed: Option<(i32, u32)>,
+}
+
+impl<B> Block<B> {
+    /// A block without batches; `used` names its nodes, in any order and repeatedly.
+    pub(super) fn new(used: impl Iterator<Item = u32>) -> Self {
+        let mut nodes: Vec<u32> = used.collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        Self {
+            batches: Vec::new(),
+            nodes,
+            failed: None,
+        }
+    }
+
+    /// Place of a node of the block.
+    pub(super) fn place(&self, node: u32) -> u16 {
+        self.nodes.partition_point(|n| *n < node) as u16
+    }
+}
+
+/// Sums of all blocks at their nodes, and where those of a node are.
+#[derive(Default)]
+pub(super) struct Sums {
+    /// Places that every block has in the arrays.
+    pub(super) stride: usize,
+    /// `[n]` first place of a node; one past the blocks' places, which is always zero, where it has none.
+    first: Vec<u32>,
+    /// The other places: node and place, by node.
+    more: Vec<(u32, u32)>,
+    /// Where the nodes of every [`NODE_CHUNK`] start in `more`.
+    more_start: Vec<u32>,
+    /// `[blocks * stride + 1]` forces of the elements on the nodes (N).
+    pub(super) force: Vec<V>,
+    /// The same: moments of the elements (N m); empty when no node rotates.
+    pub(super) moment: Vec<V>,
+    /// Pressure (N); empty when nothing presses.
+    pub(super) pressure: Vec<V>,
+    /// Sums of a quarter of the cells' area vectors (m2), every [`NORMAL_INTERVAL`] steps.
+    pub(super) area: Vec<V>,
+}
+
+impl Sums {
+    /// For `n` nodes of a model.
+    pub(super) fn new<B>(n: usize, blocks: &[Block<B>]) -> Self {
+        let stride = blocks.iter().map(|b| b.nodes.len()).max().unwrap_or(0);
+        let none = (blocks.len() * stride) as u32;
+        let mut first = vec![none; n];
+        let mut more = Vec::new();
+        for (b, block) in blocks.iter().enumerate() {
+            for (place, node) in block.nodes.iter().enumerate() {
+                let at = (b * stride + place) as u32;
+                match &mut first[*node as usize] {
+                    f if *f == none => *f = at,
+                    _ => more.push((*node, at)),
+                }
+            }
+        }
+        more.sort_unstable();
+        let chunks = n.div_ceil(NODE_CHUNK);
+        let start = |c: usize| more.partition_point(|(n, _)| (*n as usize) < c * NODE_CHUNK);
+        Self {
+            stride,
+            first,
+            more_start: (0..=chunks).map(|c| start(c) as u32).collect(),
+            more,
+            force: vec![[0.0; 3]; none as usize + 1],
+            ..Self::default()
+        }
+    }
+
+    /// An array of zeros for more sums.
+    pub(super) fn zeros(&self) -> Vec<V> {
+        vec![[0.0; 3]; self.force.len()]
+    }
+
+    /// Adds the sums `of` (one of the arrays) at the nodes of a chunk to `to`.
+    #[inline(always)]
+    pub(super) fn collect(&self, of: &[V], chunk: usize, to: &mut [V]) {
+        let base = chunk * NODE_CHUNK;
+        for (t, place) in to.iter_mut().zip(&self.first[base..]) {
+            let part = &of[*place as usize];
+            for c in 0..3 {
+                t[c] += part[c];
+            }
+        }
+        let (start, end) = (self.more_start[chunk], self.more_start[chunk + 1]);
+        for (node, place) in &self.more[start as usize..end as usize] {
+            let t = &mut to[*node as usize - base];
+            *t = add(*t, of[*place as usize]);
+        }
+    }
+}
+
+/// A block's part of the arrays of [`Sums`].
+pub(super) struct Part<'a> {
+    force: &'a mut [V],
+    moment: &'a mut [V],
+    pressure: &'a mut [V],
+    area: &'a mut [V],
+}
+
+/// An order of points in which every run of `group` lies close together: halves by the longer extent, cut at
+/// whole groups. Within a group the order is the given one.
+pub(super) fn compact_order(points: &[V], group: usize) -> Vec<u32> {
+    fn split(order: &mut [u32], points: &[V], group: usize) {
+        if order.len() <= group {
+            order.sort_unstable();
+            return;
+        }
+        let extent = |c: usize| {
+            let of = |n: &u32| points[*n as usize][c];
+            let low = order.iter().map(of).fold(f64::INFINITY, f64::min);
+            let high = order.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+            high - low
+        };
+        let sizes = [extent(0), extent(1), extent(2)];
+        let axis = (0..3).fold(0, |m, c| if sizes[c] > sizes[m] { c } else { m });
+        let half = order.len().div_ceil(group).div_ceil(2) * group;
+        let key = |n: &u32| points[*n as usize][axis];
+        order.select_nth_unstable_by(half - 1, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+        let (left, right) = order.split_at_mut(half);
+        split(left, points, group);
+        split(right, points, group);
+    }
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    split(&mut order, points, group);
+    order
+}
+
+/// What the elements of a step see.
+#[derive(Clone, Copy)]
+pub(super) struct Present<'a> {
+    pub(super) sheets: &'a [Sheet],
+    pub(super) motion: Motion<'a>,
+    pub(super) pressures: Pressures,
+    /// Whether area vectors are wanted of all cells.
+    pub(super) areas: bool,
+    /// Whether the elements' fields are wanted.
+    pub(super) fields: bool,
+}
+
+/// Computes all batches and sums them by block.
+pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: Present<'_>) {
+    let (stride, places) = (sums.stride, blocks.len() * sums.stride);
+    if blocks.is_empty() {
+        return;
+    }
+    // Arrays that are not wanted give no chunks.
+    fn chunks(array: &mut [V], stride: usize, n: usize) -> Vec<&mut [V]> {
+        let mut chunks: Vec<&mut [V]> = array.chunks_exact_mut(stride).take(n).collect();
+        chunks.resize_with(n, Default::default);
+        chunks
+    }
+    let n = blocks.len();
+    let areas = if present.areas {
+        &mut sums.area[..]
+    } else {
+        &mut []
+    };
+    let others = chunks(&mut sums.moment, stride, n)
+        .into_par_iter()
+        .zip_eq(chunks(&mut sums.pressure, stride, n))
+        .zip_eq(chunks(areas, stride, n));
+    blocks
+        .par_iter_mut()
+        .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
+        .zip_eq(others)
+        .for_each(|((block, force), ((moment, pressure), area))| {
+            let part = Part {
+                force,
+                moment,
+                pressure,
+                area,
+            };
+            run_block(block, part, present);
+        });
+}
+
+fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>) {
+    part.force.fill([0.0; 3]);
+    part.moment.fill([0.0; 3]);
+    part.pressure.fill([0.0; 3]);
+    part.area.fill([0.0; 3]);
+    block.failed = None;
+    let mut work = Workspace::new();
+    for batch in &mut block.batches {
+        run_batch(batch, present, &mut work);
+        if batch.status != PF_OK {
+            block.failed = block.failed.or(Some((batch.status, batch.sheet)));
+            continue;
+        }
+        let (places, count) = (&batch.places, batch.count as usize);
+        scatter(places, count, &work.force.0, -1.0, part.force);
+        if present.sheets[batch.sheet as usize].element.rotates() {
+            scatter(places, count, &work.moment.0, -1.0, part.moment);
+        }
+        if batch.is_pressed {
+            let pressure = std::array::from_fn(|l| {
+                batch.pressed[l][0] * present.pressures.below
+                    - batch.pressed[l][1] * present.pressures.above
+            });
+            pressure_forces(&work.area.0, &pressure, &mut work.load.0);
+            scatter(places, count, &work.load.0, 1.0, part.pressure);
+        }
+        if present.areas {
+            let rows = &work.area.0[..3 * LANES];
+            for places in places {
+                scatter_node(places, count, rows, 1.0, part.area);
+            }
+        }
+    }
+}
+
+/// The same for patches.
+pub(super) fn run_patch_blocks(
+    blocks: &mut [Block<PatchBatch>],
+    sums: &mut Sums,
+    present: Present<'_>,
+) {
+    let (stride, places) = (sums.stride, blocks.len() * sums.stride);
+    if blocks.is_empty() {
+        return;
+    }
+    blocks
+        .par_iter_mut()
+        .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
+        .for_each(|(block, force)| {
+            force.fill([0.0; 3]);
+            block.failed = None;
+            let mut work = PatchWorkspace::new();
+            for batch in &mut block.batches {
+                run_patch(batch, present, &mut work);
+                if batch.status != PF_OK {
+                    block.failed = block.failed.or(Some((batch.status, batch.sheet)));
+                    continue;
+                }
+                // Unused nodes of a patch repeat its centre and have no force.
+                let rows = work.force.0.chunks_exact(3 * LANES);
+                for (places, rows) in batch.places.iter().zip(rows) {
+                    scatter_node(places, batch.count as usize, rows, -1.0, force);
+                }
+            }
+        });
+}
+
+/// Adds `sign` times the rows `[4][3][LANES]` at the places of the first `count` lanes.
+#[inline(always)]
+fn scatter(places: &[[u16; LANES]; 4], count: usize, rows: &[f64], sign: f64, to: &mut [V]) {
+    for (places, rows) in places.iter().zip(rows.chunks_exact(3 * LANES)) {
+        scatter_node(places, count, rows, sign, to);
+    }
+}
+
+#[inline(always)]
+fn scatter_node(places: &[u16; LANES], count: usize, rows: &[f64], sign: f64, to: &mut [V]) {
+    let (x, rest) = rows[..3 * LANES].split_at(LANES);
+    let (y, z) = rest.split_at(LANES);
+    for l in 0..count.min(LANES) {
+        let t = &mut to[places[l] as usize];
+        t[0] += sign * x[l];
+        t[1] += sign * y[l];
+        t[2] += sign * z[l];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_of_a_grid_are_compact() {
+        let points: Vec<V> = (0..96 * 64)
+            .map(|i| [f64::from(i % 96), f64::from(i / 96), 0.0])
+            .collect();
+        let order = compact_order(&points, 256);
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert!(sorted.iter().enumerate().all(|(i, n)| i as u32 == *n));
+        for group in order.chunks(256) {
+            for c in 0..2 {
+                let of = |n: &u32| points[*n as usize][c];
+                let low = group.iter().map(of).fold(f64::INFINITY, f64::min);
+                let high = group.iter().map(of).fold(0.0, f64::max);
+                assert!(high - low < 32.0, "{low} to {high}");
+            }
+        }
+    }
+
+    #[test]
+    fn sums_of_blocks_come_together_at_their_nodes() {
+        let blocks = [[7, 3, 9, 3, 7], [9, 1, 7, 0, 300]].map(|n| Block::<()>::new(n.into_iter()));
+        assert_eq!(blocks[0].nodes, [3, 7, 9]);
+        assert_eq!([3, 7, 9].map(|n| blocks[0].place(n)), [0, 1, 2]);
+        let mut sums = Sums::new(301, &blocks);
+        assert_eq!(sums.stride, 5);
+        for (i, f) in sums.force[..10].iter_mut().enumerate() {
+            *f = [10f64.powi(i as i32), 0.0, 1.0];
+        }
+        let mut to = vec![[0.0; 3]; 301];
+        for (chunk, to) in to.chunks_mut(NODE_CHUNK).enumerate() {
+            sums.collect(&sums.force, chunk, to);
+        }
+        let of = |n: usize| to[n][0];
+        assert_eq!([0, 1, 2, 3].map(of), [1e5, 1e6, 0.0, 1.0]);
+        assert_eq!([7, 9, 300].map(of), [10.0 + 1e7, 100.0 + 1e8, 1e9]);
+        assert_eq!(to.iter().map(|t| t[2]).sum::<f64>(), 8.0);
+    }
+}
