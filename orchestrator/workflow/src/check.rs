@@ -3,7 +3,7 @@
 //! all at once.
 //!
 //! Understood: `$ref`, `type`, `properties`, `required`, `additionalProperties`, `items`, `minItems`,
-//! `maxItems`, `const`, `minimum`, `maximum`, `anyOf` (by type of the value), `oneOf` (of constants, or
+//! `maxItems`, `const`, `minimum`, `maximum`, `anyOf` (by type and keys of the value), `oneOf` (of constants, or
 //! of one-key mappings), and of ours `x-dimension`, `x-minimum`, `x-maximum`, `x-exclusive-minimum`
 //! (quantities), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
 
@@ -76,7 +76,7 @@ impl<'a> Checker<'a> {
         maps
     }
 
-    /// Replaces an `anyOf` by the branch that fits the type of the value; the first that is not null when
+    /// Replaces an `anyOf` by the branch that fits the type and keys of the value; the first that is not null when
     /// none fits, so that its expectation is named.
     fn choose(&self, schema: View<'a>, node: &Node) -> View<'a> {
         let Some(Value::Array(branches)) = schema.get("anyOf") else {
@@ -94,7 +94,14 @@ impl<'a> Checker<'a> {
             })
             .filter(|v| !matches!(v.text("type"), Some("null")))
             .collect();
-        let fitting = views.iter().find(|v| type_fits(v, node)).or(views.first());
+        // Of several mappings the one most of whose required keys are there.
+        let keys = |v: &View<'a>| {
+            let required = v.get("required").and_then(Value::as_array);
+            let required = required.into_iter().flatten().filter_map(Value::as_str);
+            required.filter(|k| node.get(k).is_some()).count()
+        };
+        let fitting = views.iter().filter(|v| type_fits(v, node));
+        let fitting = fitting.rev().max_by_key(|v| keys(v)).or(views.first());
         let mut maps = schema.0.clone();
         if let Some(view) = fitting {
             maps.extend(view.0.iter().copied());

@@ -157,7 +157,10 @@ fn materials(resolver: &mut Resolver<'_>, scene: &Node, at: &Place<'_>) -> Vec<O
         };
         all.push(match &entry.value.kind {
             Kind::Text(file) => material_file(resolver, &entry.value.span, file, &place),
-            // The scene's schema has looked at a material that is written inside it.
+            // The scene's schema has looked at what is written inside it.
+            Kind::Map(_) if entry.value.get("file").is_some() => {
+                varied_material(resolver, &entry.value, &place)
+            }
             Kind::Map(_) => material_value(resolver, &entry.value, &place, true),
             _ => None,
         });
@@ -200,19 +203,13 @@ pub fn sheet_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) 
                 crate::check::unknown_key(e, &at.what, known, at.source, resolver.problems);
             }
             let file = node.get("file")?;
-            let Some(path) = file.text() else {
+            if file.text().is_none() {
                 let message = format!("`file` is {}", file.describe());
                 let d = resolver.problems.add(at.source, &file.span, message);
                 d.given(file.describe())
                     .expected("the path of a material file");
-                return None;
-            };
-            let mut material = material_file(resolver, &file.span, path, at)?;
-            let with = node.entry("with").filter(|e| e.value.kind != Kind::Null);
-            if let Some(with) = with {
-                override_parameters(resolver, &with.value, &mut material, at)?;
             }
-            Some(material)
+            varied_material(resolver, node, at)
         }
         Kind::Map(_) => checked_material(resolver, node, at),
         _ => {
@@ -222,6 +219,17 @@ pub fn sheet_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) 
             None
         }
     }
+}
+
+/// The material of `{file: .., with: {..}}`, whose keys have been checked.
+fn varied_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+    let file = node.get("file")?;
+    let mut material = material_file(resolver, &file.span, file.text()?, at)?;
+    let with = node.entry("with").filter(|e| e.value.kind != Kind::Null);
+    if let Some(with) = with {
+        override_parameters(resolver, &with.value, &mut material, at)?;
+    }
+    Some(material)
 }
 
 /// Puts single parameters into a resolved material.

@@ -279,6 +279,43 @@ fn a_scene_and_its_materials_may_stand_in_the_workflow() {
 }
 
 #[test]
+fn a_sheet_may_replace_parameters_of_its_material() {
+    let study = Study::sound();
+    study.mutate(
+        "scene.yaml",
+        "material: materials/fabric.yaml",
+        "material: {file: materials/fabric.yaml, with: {fibre_modulus: 30 MPa, shear: null}}",
+    );
+    let w = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let ply = &step(&w, "coarse").parameters["scene"]["sheets"][1];
+    assert_eq!(ply["material"]["with"], json!({"fibre_modulus": 3e7}));
+    assert_eq!(ply["material"]["thickness"], json!("0.0004 m"));
+
+    for (given, wanted) in [
+        ("{file: materials/fabric.yaml, wiht: {}}", "wiht"),
+        ("{file: 3}", "`file` is"),
+        (
+            "{file: materials/fabric.yaml, with: {sheer: 1 N/m}}",
+            "no parameter of `material-fabric`",
+        ),
+        ("{with: {shear: 1 N/m}}", "`file` is missing"),
+    ] {
+        let study = Study::sound();
+        study.mutate(
+            "scene.yaml",
+            "material: materials/fabric.yaml",
+            &format!("material: {given}"),
+        );
+        let text = study.load().expect_err(given).render(false);
+        assert!(text.contains(wanted), "{given}: {text}");
+        // Both steps read the scene: a mistake in it is said once.
+        assert!(text.contains("\n1 error"), "{text}");
+    }
+}
+
+#[test]
 fn further_plugin_folders_are_absolute() {
     let study = Study::sound();
     study.mutate("workflow.yaml", "steps:", "plugins: [./materials]\nsteps:");

@@ -38,6 +38,19 @@ pub struct Material {
 pub enum MaterialEntry {
     /// Path of a material file, relative to the scene file.
     File(String),
+    /// A material file with some of its parameters replaced.
+    Varied(VariedMaterial),
     /// The material itself.
     Inline(Box<Material>),
+}
+
+/// A material file with some of its parameters replaced.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VariedMaterial {
+    /// Path of a material file, relative to the scene file.
+    pub file: String,
+    /// Parameters that take the place of the file's own; `null` removes one.
+    #[serde(default)]
+    pub with: serde_json::Map<String, serde_json::Value>,
 }
