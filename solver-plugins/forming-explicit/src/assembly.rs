@@ -6,8 +6,9 @@ use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
     ContactSettings, Plane, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
 };
-use plyflow_mechanics::mesh::NONE;
+use plyflow_mechanics::mesh::{NONE, QuadMesh, even_axis};
 use plyflow_mechanics::model::{Model, StepSettings};
+use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::scene::{Process, Scene, Sheet, SheetKind};
@@ -158,6 +159,38 @@ pub fn add_sheet_contact(
         augmentation: p.contact_augmentation,
         items,
     });
+}
+
+/// Adds a ply as a regular grid within `[x0, y0, x1, y1]` (m) at height `z` (m) to the points of a model; its sheet.
+///
+/// # Errors
+/// A text for the user when its element cannot be made.
+pub fn add_ply(
+    points: &mut Vec<V>,
+    bounds: [f64; 4],
+    z: f64,
+    sheet: &StackSheet,
+    p: &Parameters,
+    components: &dyn Components,
+) -> Result<SheetSpec, String> {
+    let [x0, y0, x1, y1] = bounds;
+    let mesh = QuadMesh::grid(
+        &even_axis(x0, x1, p.element_size),
+        &even_axis(y0, y1, p.element_size),
+    );
+    let first = points.len() as u32;
+    points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
+    Ok(SheetSpec {
+        name: sheet.scene.name.clone(),
+        nodes: (first..points.len() as u32).collect(),
+        layers: vec![1.0; mesh.cells.len()],
+        pressed: vec![Pressed::No; mesh.cells.len()],
+        patches: mesh.patches(),
+        least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
+        cells: mesh.cells,
+        axis: axis(&sheet.scene),
+        element: element(components, sheet, &p.element)?,
+    })
 }
 
 /// Makes the element of a sheet with its material.

@@ -5,7 +5,7 @@ use crate::parameters::Parameters;
 use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
 use crate::run::{Body, Forming};
-use plyflow_mechanics::mesh::{QuadMesh, even_axis, graded_axis};
+use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
@@ -207,28 +207,9 @@ fn ply(
     p: &Parameters,
     components: &dyn Components,
 ) -> Result<(), String> {
-    let b = at.plies[k - 1];
-    let mesh = QuadMesh::grid(
-        &even_axis(b[0], b[2], p.element_size),
-        &even_axis(b[1], b[3], p.element_size),
-    );
     let z = at.bottom_z + sheet.offset - bottom.offset;
-    let first = parts.points.len() as u32;
-    parts
-        .points
-        .extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
-    let nodes: Vec<u32> = (first..parts.points.len() as u32).collect();
-    let spec = SheetSpec {
-        name: sheet.scene.name.clone(),
-        nodes: nodes.clone(),
-        layers: vec![1.0; mesh.cells.len()],
-        pressed: vec![Pressed::No; mesh.cells.len()],
-        patches: mesh.patches(),
-        least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
-        cells: mesh.cells,
-        axis: assembly::axis(&sheet.scene),
-        element: assembly::element(components, sheet, &p.element)?,
-    };
+    let spec = assembly::add_ply(&mut parts.points, at.plies[k - 1], z, sheet, p, components)?;
+    let nodes = spec.nodes.clone();
     parts.bodies.push(Body::new(sheet, k, spec.cells.clone()));
     parts.placed.push(Placed {
         index: k,

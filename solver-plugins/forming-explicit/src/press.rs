@@ -10,10 +10,9 @@ use crate::process::Load;
 use crate::run::{Body, Forming, RigidBody};
 use plyflow_mechanics::contact::{OpenPlate, RigidContact, RigidItem, RigidMotion, RigidSurface};
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
-use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::Model;
-use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_model::scene::{Hold, Press, Towards};
+use plyflow_model::scene::{Hold, Press, Scene, Towards};
+use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
 
 /// Free fall (m/s2).
@@ -147,6 +146,104 @@ fn levels(press: &Press, stack: &[StackSheet], tool_top: f64) -> Result<Levels, 
     Ok(Levels { blank, die, holder })
 }
 
+/// Whether the punch ends inside its own height and goes through the openings, with the plies over it.
+fn check_passage(press: &Press, at: &Levels, tool: &ToolMesh) -> Result<(), String> {
+    let [low, high] = tool.bounds().map(|b| b[2]);
+    let mm = |x: f64| 1e3 * x;
+    if press.stroke.si() > high - low + 1e-9 {
+        return Err(format!(
+            "process.press.stroke: given {:.1} mm, the punch is {:.1} mm high; expected at most its height",
+            mm(press.stroke.si()),
+            mm(high - low)
+        ));
+    }
+    let (die, holder) = plates(press, at);
+    let radius_above = |z: f64| {
+        let through = tool.points.iter().filter(|q| q[2] > z);
+        through.map(|q| q[0].hypot(q[1])).fold(0.0, f64::max)
+    };
+    // Below the rounding of its edge a plate leaves more room.
+    let thickness = at.die - at.blank;
+    let in_die = radius_above(die.height + die.edge) + thickness;
+    if in_die > die.opening {
+        return Err(format!(
+            "process.press.die.opening_radius: given {:.2} mm; expected at least {:.2} mm: where the punch with its plies \
+             ({:.2} mm) goes through",
+            mm(die.opening),
+            mm(in_die),
+            mm(thickness)
+        ));
+    }
+    if let Some(holder) = holder {
+        let in_holder = radius_above(holder.height);
+        if in_holder > holder.opening {
+            return Err(format!(
+                "process.press.holder.opening_radius: {:.2} mm (that of the die unless given); expected at least \
+                 {:.2} mm: the punch goes through it",
+                mm(holder.opening),
+                mm(in_holder)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The rigid parts: name, surface, and whether it lies above the plies.
+fn rigid_parts(
+    press: &Press,
+    at: &Levels,
+    grid: SignedDistanceGrid,
+) -> Vec<(&'static str, Arc<dyn RigidSurface>, bool)> {
+    let (die, holder) = plates(press, at);
+    let punch: Arc<dyn RigidSurface> = Arc::new(ToolSurface(grid));
+    let mut parts = vec![("tool", punch, false)];
+    parts.push(("die", Arc::new(die), true));
+    if let Some(plate) = holder {
+        parts.push(("holder", Arc::new(plate), false));
+    }
+    parts
+}
+
+/// Plies on rigid parts, and on each other.
+fn add_contacts(
+    model: &mut Model,
+    stack: &[StackSheet],
+    parts: &[(&str, Arc<dyn RigidSurface>, bool)],
+    scene: &Scene,
+    p: &Parameters,
+) -> Result<(), String> {
+    let settings = assembly::contact_settings(p);
+    let mu = assembly::coefficient(scene.friction.tool_fabric, "tool_fabric")?;
+    let top: f64 = stack.iter().map(|s| s.thickness).sum();
+    for (part, surface, above) in parts {
+        for (k, sheet) in stack.iter().enumerate() {
+            // Only the ply that faces the part rubs on it; the others just stay outside.
+            let (faces, offset) = if *above {
+                (k + 1 == stack.len(), top - sheet.offset)
+            } else {
+                (k == 0, sheet.offset)
+            };
+            let nodes = model.sheets[k].nodes.iter();
+            let contact = RigidContact::new(
+                format!("{part}/{}", sheet.scene.name),
+                surface.clone(),
+                if faces { mu } else { 0.0 },
+                &settings,
+                nodes.map(|n| RigidItem::new(*n, offset)).collect(),
+            );
+            model.rigid_contacts.push(contact);
+        }
+    }
+    for k in 1..stack.len() {
+        let between = assembly::coefficient(scene.friction.fabric_fabric, "fabric_fabric")?;
+        let slaves = model.sheets[k].nodes.clone();
+        let on = (k - 1, k - 1);
+        assembly::add_sheet_contact(model, stack, (k, &slaves), on, 1.0, between, p);
+    }
+    model.set_contact_stiffness(&settings);
+    Ok(())
+}
+
 /// Builds the model of a press.
 ///
 /// # Errors
@@ -158,36 +255,15 @@ pub fn build_press(
 ) -> Result<Forming, String> {
     let scene = &p.scene;
     let stack = assembly::stack(scene)?;
-    let mu = assembly::coefficient(scene.friction.tool_fabric, "tool_fabric")?;
-    let between = if stack.len() > 1 {
-        assembly::coefficient(scene.friction.fabric_fabric, "fabric_fabric")?
-    } else {
-        0.0
-    };
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
     let at = levels(press, &stack, tool.bounds()[1][2])?;
+    check_passage(press, &at, &tool)?;
     let (mut points, mut specs, mut bodies) = (Vec::new(), Vec::new(), Vec::new());
     for (k, sheet) in stack.iter().enumerate() {
-        let b = ply_box(sheet)?;
-        let mesh = QuadMesh::grid(
-            &even_axis(b[0], b[2], p.element_size),
-            &even_axis(b[1], b[3], p.element_size),
-        );
-        let first = points.len() as u32;
         let z = at.blank + sheet.offset;
-        points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
-        bodies.push(Body::new(sheet, k, mesh.cells.clone()));
-        specs.push(SheetSpec {
-            name: sheet.scene.name.clone(),
-            nodes: (first..points.len() as u32).collect(),
-            layers: vec![1.0; mesh.cells.len()],
-            pressed: vec![Pressed::No; mesh.cells.len()],
-            patches: mesh.patches(),
-            least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
-            cells: mesh.cells,
-            axis: assembly::axis(&sheet.scene),
-            element: assembly::element(components, sheet, &p.element)?,
-        });
+        let spec = assembly::add_ply(&mut points, ply_box(sheet)?, z, sheet, p, components)?;
+        bodies.push(Body::new(sheet, k, spec.cells.clone()));
+        specs.push(spec);
     }
     let reference = points.clone();
     let mut model =
@@ -197,52 +273,16 @@ pub fn build_press(
         Some(Towards::Die) => GRAVITY,
         Some(Towards::Holder) => -GRAVITY,
     };
-    let (die, holder) = plates(press, &at);
-    let mut parts = vec![
-        (
-            "tool",
-            Arc::new(ToolSurface(grid)) as Arc<dyn RigidSurface>,
-            false,
-        ),
-        ("die", Arc::new(die), true),
-    ];
-    if let Some(plate) = holder {
-        parts.push(("holder", Arc::new(plate), false));
-    }
-    let contacts = |part: &str, model: &Model| -> Vec<usize> {
-        let prefix = format!("{part}/");
-        let of = |c: &RigidContact| c.name.starts_with(&prefix);
-        (0..model.rigid_contacts.len())
-            .filter(|k| of(&model.rigid_contacts[*k]))
+    let parts = rigid_parts(press, &at, grid);
+    add_contacts(&mut model, &stack, &parts, scene, p)?;
+    let of_part = |part: &str| -> Vec<usize> {
+        let contacts = model.rigid_contacts.iter().enumerate();
+        let of = |name: &str| name.strip_prefix(part).is_some_and(|n| n.starts_with('/'));
+        contacts
+            .filter(|(_, c)| of(&c.name))
+            .map(|(k, _)| k)
             .collect()
     };
-    let top: f64 = stack.iter().map(|s| s.thickness).sum();
-    for (part, surface, above) in parts {
-        for (k, sheet) in stack.iter().enumerate() {
-            // Only the ply that faces the part rubs on it; the others just stay outside.
-            let faces = if above { k + 1 == stack.len() } else { k == 0 };
-            let offset = if above {
-                top - sheet.offset
-            } else {
-                sheet.offset
-            };
-            let nodes = &model.sheets[k].nodes;
-            let contact = RigidContact::new(
-                format!("{part}/{}", sheet.scene.name),
-                surface.clone(),
-                if faces { mu } else { 0.0 },
-                &assembly::contact_settings(p),
-                nodes.iter().map(|n| RigidItem::new(*n, offset)).collect(),
-            );
-            model.rigid_contacts.push(contact);
-        }
-    }
-    for k in 1..stack.len() {
-        let slaves = model.sheets[k].nodes.clone();
-        let on = (k - 1, k - 1);
-        assembly::add_sheet_contact(&mut model, &stack, (k, &slaves), on, 1.0, between, p);
-    }
-    model.set_contact_stiffness(&assembly::contact_settings(p));
     let held = match press.holder.as_ref().map(|h| &h.hold) {
         Some(Hold::Force(force)) => Some(HeldByForce {
             force: force.si(),
@@ -259,12 +299,13 @@ pub fn build_press(
             ramp: press.ramp_share.0 * press.forming_time.si(),
             settling: press.settling_time.si(),
         },
-        punch: contacts("tool", &model),
-        holder: contacts("holder", &model),
+        punch: of_part("tool"),
+        holder: of_part("holder"),
         held,
     };
     load.apply(&mut model);
     let reach = bodies_reach(&reference);
+    let (die, holder) = plates(press, &at);
     let mut rigid = vec![RigidBody::plate("die", &die, reach)];
     rigid.extend(holder.map(|h| RigidBody::plate("holder", &h, reach)));
     Ok(Forming {

@@ -166,6 +166,25 @@ fn what_makes_no_press_is_refused_with_what_to_do() {
         tight.contains("gap") && tight.contains("0.800 mm"),
         "{tight}"
     );
+    let text = |key: &str, value: Value| {
+        let mut scene =
+            serde_json::to_value(parameters(1, &json!({"gap": "0.002 m"})).scene).unwrap();
+        let press = &mut scene["process"]["press"];
+        *press.pointer_mut(key).unwrap() = value;
+        let mut p = parameters(1, &Value::Null);
+        p.scene = serde_json::from_value(scene).unwrap();
+        refused(&p)
+    };
+    let deep = text("/stroke", json!("0.03 m"));
+    assert!(
+        deep.contains("stroke") && deep.contains("25.0 mm"),
+        "{deep}"
+    );
+    let narrow = text("/die/opening_radius", json!("0.02 m"));
+    assert!(narrow.contains("die.opening_radius"), "{narrow}");
+    let holder = json!({"opening_radius": "0.024 m", "hold": {"gap": "0.002 m"}});
+    let narrow = text("/holder", holder);
+    assert!(narrow.contains("holder.opening_radius"), "{narrow}");
     let mut p = parameters(1, &Value::Null);
     p.scene.friction.tool_fabric = None;
     let rough = refused(&p);
