@@ -1,8 +1,7 @@
 //! Friction against closed forms: a belt around a drum (Euler and Eytelwein), a sheet pulled out from between two.
 
-use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
-use plyflow_kernels::{fabric::Fabric, m4::M4};
-use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+mod common;
+
 use plyflow_mechanics::contact::{
     ContactSettings, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
 };
@@ -11,31 +10,11 @@ use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, add, dot, scale, sub};
-use plyflow_sdk::{element_table, material_table};
 use std::sync::Arc;
-
-/// 1e5 N/m along the fibres, 1 kg/m2.
-const FABRIC: &str =
-    r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0}"#;
-
-fn component<T>(kind: u32, table: T) -> pf_component {
-    pf_component {
-        kind,
-        reserved: 0,
-        // Lives as long as the process: a test.
-        functions: (&raw const *Box::leak(Box::new(table))).cast(),
-        manifest: pf_str::new("{}"),
-    }
-}
 
 /// A sheet of the fabric; its nodes follow `first` of the model.
 fn sheet(name: &str, mesh: &QuadMesh, first: u32, axis: V, pressed: Pressed) -> SheetSpec {
-    let element = unsafe {
-        let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
-        let material = MaterialInstance::create(&material, FABRIC, "material").unwrap();
-        let element = component(PF_KIND_ELEMENT, element_table::<M4>());
-        ElementInstance::create(&element, "{}", material, "element").unwrap()
-    };
+    let element = common::membrane();
     let m = mesh.cells.len();
     SheetSpec {
         name: name.into(),

@@ -1,29 +1,13 @@
 //! Supports, loads and static equilibrium of a model, against closed forms.
 
-use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
-use plyflow_kernels::{fabric::Fabric, m4::M4};
+mod common;
+
 use plyflow_mechanics::MechanicsError;
-use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::relax::{Tolerance, relax};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
-use plyflow_sdk::{element_table, material_table};
-
-/// 1e5 N/m along the fibres, 1 kg/m2.
-const FABRIC: &str =
-    r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0}"#;
-
-fn component<T>(kind: u32, table: T) -> pf_component {
-    pf_component {
-        kind,
-        reserved: 0,
-        // Lives as long as the process: a test.
-        functions: (&raw const *Box::leak(Box::new(table))).cast(),
-        manifest: pf_str::new("{}"),
-    }
-}
 
 struct Clamp(Vec<V>);
 
@@ -36,12 +20,7 @@ impl Drive for Clamp {
 /// A strip of 0.4 x 0.1 m, 8 x 2 elements, fibres along x and y, held at x = 0; its nodes at the other end.
 fn strip() -> (Model, Vec<u32>) {
     let mesh = QuadMesh::grid(&even_axis(0.0, 0.4, 0.05), &even_axis(0.0, 0.1, 0.05));
-    let element = unsafe {
-        let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
-        let material = MaterialInstance::create(&material, FABRIC, "material").unwrap();
-        let element = component(PF_KIND_ELEMENT, element_table::<M4>());
-        ElementInstance::create(&element, "{}", material, "element").unwrap()
-    };
+    let element = common::membrane();
     let m = mesh.cells.len();
     let spec = SheetSpec {
         name: "strip".into(),

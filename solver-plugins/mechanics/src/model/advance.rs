@@ -45,10 +45,11 @@ impl Model {
                 || !self.loads.force.is_empty()
                 || !self.sums.pressure.is_empty(),
         };
-        if !moving.loaded {
+        if self.loaded && !moving.loaded {
             // What no longer acts.
             self.external_force.fill([0.0; 3]);
         }
+        self.loaded = moving.loaded;
         let before: Vec<(V, V)> = self
             .driven
             .iter()

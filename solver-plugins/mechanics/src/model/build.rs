@@ -40,6 +40,7 @@ impl Model {
             per_mass: Vec::new(),
             force: vec![[0.0; 3]; n],
             contact_force: vec![[0.0; 3]; n],
+            loaded: false,
             external_force: vec![[0.0; 3]; n],
             own_mass: vec![0.0; n],
             rotations: None,

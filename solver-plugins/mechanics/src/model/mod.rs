@@ -113,6 +113,8 @@ pub struct Model {
     force: Vec<V>,
     /// Pressure, weight and nodal loads (N): what does external work on free nodes.
     external_force: Vec<V>,
+    /// Whether anything external acted in the last step.
+    loaded: bool,
     /// `[n]` forces of the contacts (N); zero between steps.
     contact_force: Vec<V>,
     /// `[n]` masses without scaling (kg): what has weight.

@@ -1,0 +1,30 @@
+//! A fabric for tests, behind the C ABI.
+
+use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
+use plyflow_kernels::{fabric::Fabric, m4::M4};
+use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+use plyflow_sdk::{element_table, material_table};
+
+/// 1e5 N/m along the fibres, 1 kg/m2.
+const FABRIC: &str =
+    r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0}"#;
+
+fn component<T>(kind: u32, table: T) -> pf_component {
+    pf_component {
+        kind,
+        reserved: 0,
+        // Lives as long as the process: a test.
+        functions: (&raw const *Box::leak(Box::new(table))).cast(),
+        manifest: pf_str::new("{}"),
+    }
+}
+
+/// `m4` of the fabric.
+pub fn membrane() -> ElementInstance {
+    unsafe {
+        let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
+        let material = MaterialInstance::create(&material, FABRIC, "material").unwrap();
+        let element = component(PF_KIND_ELEMENT, element_table::<M4>());
+        ElementInstance::create(&element, "{}", material, "element").unwrap()
+    }
+}
