@@ -30,6 +30,7 @@ fn critical_step_bounds_the_exact_one_on_random_bent_and_skewed_elements() {
     let mut slack: Vec<f64> = Vec::new();
     let thick = plate(1e9, 0.3, 2e-3);
     let cases = [
+        (ply(), "{}", 0.3, 0.2),
         (ply(), r#"{"bending":"lagged-tangent"}"#, 0.3, 0.2),
         (
             soft(),

@@ -115,39 +115,8 @@ impl Model {
                         lane: l as u16,
                     };
                 }
-                // Lanes beyond the last element repeat it.
-                let cell = |l: usize| chunk[l.min(chunk.len() - 1)] as usize;
-                let nodes: [[u32; LANES]; 4] =
-                    std::array::from_fn(|k| std::array::from_fn(|l| cells[cell(l)][k]));
-                let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[cell(l)]);
-                let pressed: [[f64; 2]; LANES] =
-                    std::array::from_fn(|l| match spec.pressed[cell(l)] {
-                        Pressed::No => [0.0, 0.0],
-                        Pressed::Below => [1.0, 0.0],
-                        Pressed::Above => [0.0, 1.0],
-                        Pressed::Both => [1.0, 1.0],
-                    });
-                block.batches.push(Batch {
-                    sheet: sheet_index,
-                    count: chunk.len() as u32,
-                    places: nodes.map(|n| n.map(|n| block.place(n))),
-                    nodes,
-                    is_pressed: pressed.iter().any(|w| *w != [0.0; 2]),
-                    pressed,
-                    layered: layers.iter().any(|k| *k != 1.0),
-                    layers,
-                    mass_factor: [1.0; LANES],
-                    mass: Aligned::zeros(4 * LANES),
-                    energy: Aligned::zeros(PF_ENERGIES * LANES),
-                    inertia: Aligned::zeros(if rotates { 4 * LANES } else { 0 }),
-                    constants: Aligned::zeros(s.constants * LANES),
-                    history: Aligned::zeros(s.history * LANES),
-                    material_history: Aligned::zeros(
-                        s.material_points * material.membrane_history * LANES,
-                    ),
-                    fields: Aligned::default(),
-                    status: PF_OK,
-                });
+                let batch = element_batch(sheet_index, &spec, &cells, chunk, &block);
+                block.batches.push(batch);
             }
             self.blocks.push(block);
         }
@@ -445,5 +414,48 @@ impl Model {
             let reduced = 1.0 / (1.0 / mass[item.node as usize] + 1.0 / lightest);
             item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
         }
+    }
+}
+
+/// A batch of the cells `chunk` of a sheet; `cells` in model nodes.
+fn element_batch(
+    sheet: u32,
+    spec: &SheetSpec,
+    cells: &[[u32; 4]],
+    chunk: &[u32],
+    block: &Block<Batch>,
+) -> Batch {
+    let s = spec.element.sizes;
+    let rotates = spec.element.rotates();
+    let membrane_history = spec.element.material.reference().sizes().membrane_history;
+    // Lanes beyond the last element repeat it.
+    let cell = |l: usize| chunk[l.min(chunk.len() - 1)] as usize;
+    let nodes: [[u32; LANES]; 4] =
+        std::array::from_fn(|k| std::array::from_fn(|l| cells[cell(l)][k]));
+    let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[cell(l)]);
+    let pressed: [[f64; 2]; LANES] = std::array::from_fn(|l| match spec.pressed[cell(l)] {
+        Pressed::No => [0.0, 0.0],
+        Pressed::Below => [1.0, 0.0],
+        Pressed::Above => [0.0, 1.0],
+        Pressed::Both => [1.0, 1.0],
+    });
+    Batch {
+        sheet,
+        count: chunk.len() as u32,
+        places: nodes.map(|n| n.map(|n| block.place(n))),
+        nodes,
+        is_pressed: pressed.iter().any(|w| *w != [0.0; 2]),
+        pressed,
+        layered: layers.iter().any(|k| *k != 1.0),
+        layers,
+        mass_factor: [1.0; LANES],
+        mass: Aligned::zeros(4 * LANES),
+        energy: Aligned::zeros(PF_ENERGIES * LANES),
+        inertia: Aligned::zeros(if rotates { 4 * LANES } else { 0 }),
+        constants: Aligned::zeros(s.constants * LANES),
+        history: Aligned::zeros(s.history * LANES),
+        material_history: Aligned::zeros(s.material_points * membrane_history * LANES),
+        fields: Aligned::default(),
+        status: PF_OK,
     }
 }
