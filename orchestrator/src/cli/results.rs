@@ -102,7 +102,8 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
             let before = rows.len();
             // A number may be held against several sources: one row each.
             for (at, e) in expectations.iter().enumerate() {
-                if e.step == *step && e.result == result.name {
+                let each = e.mean_over.is_empty();
+                if each && e.step == *step && e.result == result.name {
                     met[at] = true;
                     rows.push(Row {
                         expected: Some(e.clone()),
@@ -116,17 +117,54 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
         }
     }
     for (e, _) in expectations.iter().zip(met).filter(|(_, met)| !met) {
-        rows.push(Row {
-            step: e.step.clone(),
-            item: vec![],
-            name: e.result.clone(),
-            value: None,
-            unit: String::new(),
-            measured: false,
-            expected: Some(e.clone()),
-        });
+        let row = if e.mean_over.is_empty() {
+            absent(e)
+        } else {
+            mean(e, &rows)
+        };
+        rows.push(row);
     }
     rows
+}
+
+/// An expectation whose number is not there.
+fn absent(e: &Expectation) -> Row {
+    Row {
+        step: e.step.clone(),
+        item: vec![],
+        name: e.result.clone(),
+        value: None,
+        unit: String::new(),
+        measured: false,
+        expected: Some(e.clone()),
+    }
+}
+
+/// The mean over steps and their items of what `e` is about; without a value unless every step has reported.
+fn mean(e: &Expectation, rows: &[Row]) -> Row {
+    let mut seen: Vec<(&str, &[String])> = Vec::new();
+    let mut row = Row {
+        step: e.mean_over.join(", "),
+        name: format!("mean of {}", e.result),
+        ..absent(e)
+    };
+    let mut sum = 0.0;
+    for r in rows.iter().filter(|r| r.name == e.result) {
+        let Some(value) = r.value.filter(|_| e.mean_over.contains(&r.step)) else {
+            continue;
+        };
+        // A number that is held against several sources has several rows.
+        if !seen.contains(&(&r.step, &r.item)) {
+            seen.push((&r.step, &r.item));
+            sum += value;
+            (row.unit, row.measured) = (r.unit.clone(), row.measured || r.measured);
+        }
+    }
+    let reported = |step: &String| seen.iter().any(|(s, _)| s == step);
+    if e.mean_over.iter().all(reported) {
+        row.value = Some(sum / seen.len() as f64);
+    }
+    row
 }
 
 /// A table of numbers.
@@ -258,7 +296,10 @@ pub fn results(args: &ResultsArgs) -> Done {
     let mut records = records(&session);
     let mut rows = rows(&session, &records);
     if !args.step.is_empty() {
-        rows.retain(|r| args.step.contains(&r.step));
+        let over = |r: &Row| r.expected.as_ref().map_or(vec![], |e| e.mean_over.clone());
+        rows.retain(|r| {
+            args.step.contains(&r.step) || over(r).iter().any(|s| args.step.contains(s))
+        });
         records.retain(|(id, _)| {
             let step = session.core.instances()[*id].step;
             args.step.contains(&session.core.graph().steps[step].name)
@@ -325,6 +366,7 @@ mod tests {
     fn expectation() -> Expectation {
         Expectation {
             step: "s".into(),
+            mean_over: vec![],
             result: "n".into(),
             value: None,
             tolerance: None,
@@ -361,5 +403,33 @@ mod tests {
             ..expectation()
         };
         assert_eq!(row(Some(f64::NAN), near).verdict(), Some("missed"));
+    }
+
+    #[test]
+    fn a_mean_counts_every_item_of_its_steps_once_and_wants_all_steps() {
+        let of = |step: &str, item: &str, value: f64| Row {
+            step: step.into(),
+            item: vec![item.into()],
+            expected: None,
+            ..row(Some(value), expectation())
+        };
+        let e = Expectation {
+            mean_over: vec!["s".into(), "t".into()],
+            value: Some(2.0),
+            tolerance: Some(0.1),
+            ..expectation()
+        };
+        let mut rows = vec![of("s", "a", 1.0), of("s", "b", 2.0), of("u", "a", 50.0)];
+        assert_eq!(
+            (mean(&e, &rows).value, mean(&e, &rows).verdict()),
+            (None, Some("missed"))
+        );
+        rows.extend([of("t", "a", 3.0), of("t", "a", 3.0)]);
+        let all = mean(&e, &rows);
+        assert_eq!((all.value, all.verdict()), (Some(2.0), Some("ok")));
+        assert_eq!(
+            (all.step.as_str(), all.name.as_str()),
+            ("s, t", "mean of n")
+        );
     }
 }

@@ -25,8 +25,8 @@ pub(crate) fn expectations(
         return Vec::new();
     };
     let list = |items: &[Node], source: &Source, problems: &mut Problems| {
-        let read = |item| expectation(item, drafts, source, problems);
-        items.iter().filter_map(read).collect::<Vec<_>>()
+        let read = |item| entry(item, drafts, source, problems);
+        items.iter().flat_map(read).collect::<Vec<_>>()
     };
     let Some(given) = expect.text() else {
         return list(expect.items(), source, problems);
@@ -90,13 +90,55 @@ fn read(given: &str, at: &Node, from: &Source, problems: &mut Problems) -> Optio
     }
 }
 
-fn expectation(
+/// The expectations of one entry: one for each of its steps, or a single one of their mean.
+fn entry(
     item: &Node,
     drafts: &[Draft<'_>],
     source: &Source,
     problems: &mut Problems,
+) -> Vec<Expectation> {
+    let Some(at) = item.get("step") else {
+        return Vec::new();
+    };
+    let names = match at.text() {
+        Some(_) => std::slice::from_ref(at),
+        None => at.items(),
+    };
+    if names.is_empty() {
+        let d = problems.add(source, &at.span, "this expectation names no step");
+        d.expected("the name of a step, or a list of names");
+    }
+    let of = |step| expectation(item, step, drafts, source, problems);
+    let mut all: Vec<Expectation> = names.iter().filter_map(of).collect();
+    if item.get("of").and_then(Node::text) == Some("mean") && !all.is_empty() {
+        let mut units = all.iter().filter_map(|e| unit(e, drafts));
+        if let Some(first) = units.next()
+            && let Some(other) = units.find(|u| *u != first)
+        {
+            let message = format!("a mean of results in {first} and in {other}");
+            let d = problems.add(source, &at.span, message);
+            d.expected("steps whose results have the same unit");
+        }
+        all[0].mean_over = all.iter().map(|e| e.step.clone()).collect();
+        all.truncate(1);
+    }
+    all
+}
+
+/// The unit of the result that is expected.
+fn unit<'a>(e: &Expectation, drafts: &'a [Draft<'_>]) -> Option<&'a str> {
+    let draft = drafts.iter().find(|d| d.name() == e.step)?;
+    let result = draft.plugin.as_ref()?.manifest.result(&e.result)?;
+    Some(&result.unit)
+}
+
+fn expectation(
+    item: &Node,
+    step: &Node,
+    drafts: &[Draft<'_>],
+    source: &Source,
+    problems: &mut Problems,
 ) -> Option<Expectation> {
-    let step = item.get("step")?;
     let name = step.text()?;
     let Some(draft) = drafts.iter().find(|d| d.name() == name) else {
         let d = problems.add(source, &step.span, format!("there is no step `{name}`"));
@@ -146,6 +188,7 @@ fn expectation(
     }
     Some(Expectation {
         step: name.to_owned(),
+        mean_over: Vec::new(),
         result: result_name.to_owned(),
         value,
         tolerance,

@@ -91,8 +91,10 @@ pub struct ResolvedStep {
 /// A stated expectation on a result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expectation {
-    /// Step.
+    /// Step; the first of `mean_over` if there are any.
     pub step: String,
+    /// Steps over which, and over the items of which, the mean is meant; empty: every result of `step`.
+    pub mean_over: Vec<String>,
     /// Result name.
     pub result: String,
     /// Expected value (SI), if stated.

@@ -46,6 +46,37 @@ fn a_file_says_the_same_as_the_list_of_a_workflow() {
 }
 
 #[test]
+fn an_entry_may_name_several_steps_and_mean_each_or_their_mean() {
+    let study = Study::with_expected_file();
+    let of = |step: &str, rest: &str| {
+        let entry = format!("\"step\": {step}, \"result\": \"kinetic_ratio\"{rest}");
+        let from = "\"step\": \"coarse\", \"result\": \"kinetic_ratio\"";
+        study.write(E, &EXPECTED.replace(from, &entry));
+        study.load()
+    };
+    let each = of("[\"coarse\", \"local\"]", "").unwrap().expectations;
+    let steps: Vec<&str> = each.iter().skip(2).map(|e| e.step.as_str()).collect();
+    assert_eq!(steps, ["coarse", "local"]);
+    assert!(
+        each.iter()
+            .all(|e| e.mean_over.is_empty() && e.step != "zones")
+    );
+    let mean = of("[\"coarse\", \"local\"]", ", \"of\": \"mean\"").unwrap();
+    let mean = &mean.expectations[2..];
+    assert_eq!((mean.len(), mean[0].maximum), (1, Some(0.05)));
+    assert_eq!(mean[0].mean_over, ["coarse", "local"]);
+    for (step, rest, says) in [
+        ("[]", "", "names no step"),
+        ("[\"coarse\", \"lokal\"]", "", "there is no step `lokal`"),
+        ("5", "", "a list of names"),
+        ("\"coarse\"", ", \"of\": \"median\"", "median"),
+    ] {
+        let told = of(step, rest).unwrap_err().render(false);
+        assert!(told.contains(says), "{told}");
+    }
+}
+
+#[test]
 fn a_file_with_tabs_and_without_a_line_break_is_read_as_any_json() {
     let study = Study::with_expected_file();
     let tabs = EXPECTED.replace("    ", "\t\t").replace("  ", "\t");

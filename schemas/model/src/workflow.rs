@@ -82,13 +82,13 @@ pub enum From {
     Ports(IndexMap<String, Sources>),
 }
 
-/// What arrives at one port.
+/// One step or several.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Sources {
     /// One step.
     One(String),
-    /// Several, for ports that take many.
+    /// Several, where many are taken.
     Many(Vec<String>),
 }
 
@@ -113,10 +113,14 @@ pub struct Resources {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Expect {
-    /// Step.
-    pub step: String,
+    /// Step, or several.
+    #[schemars(extend("x-expected" = "the name of a step, or a list of names"))]
+    pub step: Sources,
     /// Name of the result.
     pub result: String,
+    /// What is held against the value and the bounds.
+    #[serde(default, skip_serializing_if = "Of::is_each")]
+    pub of: Of,
     /// Expected value, with the unit of the result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<ResultValue>,
@@ -132,6 +136,24 @@ pub struct Expect {
     /// Where the expectation comes from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
+}
+
+/// What of several results is held against an expectation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Of {
+    /// Each of them, of every step and every item.
+    #[default]
+    Each,
+    /// Their mean over the steps and their items: for what depends on chance, such as a random imperfection.
+    Mean,
+}
+
+impl Of {
+    /// Whether each result is meant.
+    pub fn is_each(&self) -> bool {
+        *self == Self::Each
+    }
 }
 
 /// Where expectations stand.
