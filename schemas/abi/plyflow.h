@@ -1,4 +1,4 @@
-/* plyflow.h: the contract between the Plyflow host and a plugin. ABI 1.0.
+/* plyflow.h: the contract between the Plyflow host and a plugin. ABI 1.1.
  *
  * A plugin is a shared library that exports one symbol:
  *
@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 #define PF_ABI_MAJOR 1u
-#define PF_ABI_MINOR 0u
+#define PF_ABI_MINOR 1u /* 1: checkpoints */
 #define PF_MAGIC 0x31574F4C46594C50ull /* the bytes "PLYFLOW1" in memory on a little-endian machine */
 #define PF_SYMBOL "plyflow_plugin"
 
@@ -155,6 +155,16 @@ typedef struct pf_services {
 
   /* A component by name (search path) or path, as given in a parameter of type "component" or "material". */
   int32_t (*find_component)(void *host, uint32_t kind, pf_str name, pf_component *component);
+
+  /* Checkpoints, since ABI 1.1: so that long work that is killed goes on where it was.
+   * `checkpoint`: a folder that is kept until the step has succeeded. What lies in it was written by an earlier attempt
+   * with the same plugin, components, parameters and inputs; a file may be torn, and none is required to be there.
+   * Empty text: this host keeps nothing. `checkpoint_due`: 1 when enough time has passed since the last one.
+   * `checkpoint_saved`: everything is on disk; the cost of the step so far is noted, so that a later attempt adds to it.
+   * The artifact must not depend on whether and when a checkpoint was made. */
+  pf_str (*checkpoint)(void *host);
+  int32_t (*checkpoint_due)(void *host);
+  void (*checkpoint_saved)(void *host);
 } pf_services;
 
 typedef struct pf_step_functions {

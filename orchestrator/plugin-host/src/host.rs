@@ -1,6 +1,7 @@
 //! The state behind the services of one running step.
 
 use crate::catalog::find_component_library;
+use crate::checkpoints::Checkpoints;
 use crate::emitter::Emitter;
 use crate::load::Plugin;
 use plyflow_abi::{PF_BAD_SHAPE, PF_BAD_VALUE, PF_ERROR, PF_NOT_FOUND};
@@ -42,6 +43,7 @@ pub(crate) struct HostState<'a, 'w> {
     pub(crate) item: String,
     pub(crate) scratch: OnceLock<String>,
     pub(crate) slots: Vec<InputSlot>,
+    pub(crate) checkpoints: Checkpoints<'a>,
     output: Mutex<Output>,
 }
 
@@ -78,6 +80,7 @@ impl<'a, 'w> HostState<'a, 'w> {
             item: serde_json::Value::from(job.item.clone()).to_string(),
             scratch: OnceLock::new(),
             slots: job.inputs.iter().map(|_| InputSlot::default()).collect(),
+            checkpoints: Checkpoints::new(job.checkpoints.as_ref()),
             output: Mutex::new(output),
         })
     }

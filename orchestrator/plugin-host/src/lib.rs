@@ -7,6 +7,7 @@
 //! - [`describe_main`] is the body of `plyflow step-worker --describe LIBRARY`.
 
 mod catalog;
+mod checkpoints;
 mod describe;
 mod emitter;
 mod host;

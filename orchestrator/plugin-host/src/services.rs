@@ -43,6 +43,9 @@ pub(crate) fn table(state: &HostState<'_, '_>) -> pf_services {
         result,
         collection,
         find_component,
+        checkpoint,
+        checkpoint_due,
+        checkpoint_saved,
     }
 }
 
@@ -198,6 +201,20 @@ unsafe extern "C" fn parameters(host: *mut c_void) -> pf_str {
 
 unsafe extern "C" fn scratch(host: *mut c_void) -> pf_str {
     guard(host, pf_str::new(""), |s| pf_str::new(s.scratch()))
+}
+
+unsafe extern "C" fn checkpoint(host: *mut c_void) -> pf_str {
+    guard(host, pf_str::new(""), |s| {
+        pf_str::new(s.checkpoints.folder(s.emitter))
+    })
+}
+
+unsafe extern "C" fn checkpoint_due(host: *mut c_void) -> i32 {
+    guard(host, 0, |s| i32::from(s.checkpoints.due()))
+}
+
+unsafe extern "C" fn checkpoint_saved(host: *mut c_void) {
+    guard(host, (), |s| s.checkpoints.saved(s.emitter));
 }
 
 unsafe extern "C" fn inputs(host: *mut c_void) -> pf_str {

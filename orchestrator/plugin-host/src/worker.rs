@@ -1,5 +1,6 @@
 //! Running one step in this process.
 
+use crate::checkpoints::Checkpoints;
 use crate::emitter::Emitter;
 use crate::host::HostState;
 use crate::load::Plugin;
@@ -69,6 +70,10 @@ pub fn run_job(job: &Job, events: &mut (dyn Write + Send)) -> i32 {
     }
     match outcome {
         Ok(record) => {
+            if let Err(e) = Checkpoints::remove(job.checkpoints.as_ref()) {
+                let text = format!("the checkpoints cannot be removed: {e}");
+                emitter.log(LogLevel::Debug, &text);
+            }
             emitter.send(&Message::Done {
                 record: Box::new(record),
             });
@@ -97,6 +102,12 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
     let code = unsafe { ((*functions).run)(&raw const table) };
     let wall_seconds = clock.elapsed().as_secs_f64();
 
+    let cost = state.checkpoints.with_earlier(Cost {
+        wall_seconds,
+        cpu_seconds: process::cpu_seconds(),
+        peak_memory: process::peak_memory(),
+        threads: job.threads.max(1),
+    });
     let mut output = state.output();
     judge(job, code, &mut output)?;
     let writer = output.writer.take().expect("only taken here");
@@ -118,12 +129,7 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
         key: job.key.clone(),
         kind: job.output_kind.clone(),
         bytes,
-        cost: Cost {
-            wall_seconds,
-            cpu_seconds: process::cpu_seconds(),
-            peak_memory: process::peak_memory(),
-            threads: job.threads.max(1),
-        },
+        cost,
         results: std::mem::take(&mut output.results),
         collection: labels,
         warnings: emitter.warnings(),

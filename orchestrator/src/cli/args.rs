@@ -153,6 +153,9 @@ pub struct RunArgs {
     /// Run this step again even if the store has it; may be repeated
     #[arg(long, value_name = "STEP")]
     pub force: Vec<String>,
+    /// How long a running step may go without a checkpoint, if it makes any
+    #[arg(long, value_name = "TIME", default_value = "1 min")]
+    pub checkpoint_every: String,
     /// Show nothing but failures
     #[arg(long, short)]
     pub quiet: bool,

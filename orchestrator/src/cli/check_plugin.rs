@@ -260,6 +260,7 @@ fn job(step: &ResolvedStep, search_path: Vec<Utf8PathBuf>, folder: &Utf8Path) ->
         artifact: folder.join("checks.h5"),
         record: folder.join("checks.json"),
         scratch: folder.join("scratch"),
+        checkpoints: None,
         provenance: json!({}),
     }
 }

@@ -6,6 +6,7 @@ use super::table::bytes;
 use super::{Done, Stop, print};
 use crate::exit;
 use crate::store::{Journal, Lock, LockError, Store};
+use camino::Utf8Path;
 use std::collections::BTreeSet;
 
 /// Turns a lock that is not to be had into an exit code.
@@ -49,6 +50,16 @@ pub fn clean(args: &CleanArgs) -> Done {
             store.remove(&key).map_err(failed())?;
         }
     }
+    let mut old = 0u64;
+    for run in store.runs().map_err(failed())? {
+        for folder in run.old_checkpoints().map_err(failed())? {
+            old += 1;
+            size += folder_size(&folder);
+            if !args.dry_run {
+                std::fs::remove_dir_all(&folder).map_err(failed())?;
+            }
+        }
+    }
     let verb = if args.dry_run {
         "would remove"
     } else {
@@ -65,5 +76,22 @@ pub fn clean(args: &CleanArgs) -> Done {
         let _ = std::fs::remove_file(store.root().join("plugins.json"));
     }
     let s = if count == 1 { "" } else { "s" };
-    print(&format!("{verb} {count} artifact{s}, {}\n", bytes(size)))
+    let checkpoints = match old {
+        0 => String::new(),
+        1 => " and 1 old checkpoint".into(),
+        n => format!(" and {n} old checkpoints"),
+    };
+    print(&format!(
+        "{verb} {count} artifact{s}{checkpoints}, {}\n",
+        bytes(size)
+    ))
+}
+
+/// Size of the files in a folder (bytes).
+fn folder_size(folder: &Utf8Path) -> u64 {
+    let files = folder.read_dir_utf8().into_iter().flatten().flatten();
+    files
+        .filter_map(|f| f.metadata().ok())
+        .map(|m| m.len())
+        .sum()
 }

@@ -193,6 +193,7 @@ impl Opened {
             limits,
             search_path: self.search_path.clone(),
             force: Vec::new(),
+            checkpoint_interval: f64::INFINITY,
         };
         let mut session =
             Session::new(&self.workflow, &self.graph, &self.store, options, false).map_err(

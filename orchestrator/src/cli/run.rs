@@ -11,6 +11,7 @@ use crate::engine::{Failure, Local, Observer, Options, Session, Summary};
 use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
 use crate::store::Lock;
+use plyflow_model::units::parse_quantity_in;
 use plyflow_workflow::resolved::FailurePolicy;
 use std::io::{IsTerminal, Read};
 use std::os::fd::OwnedFd;
@@ -125,7 +126,22 @@ fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
         },
         search_path: opened.search_path.clone(),
         force: opened.step_indices(&args.force)?,
+        checkpoint_interval: checkpoint_interval(&args.checkpoint_every)?,
     })
+}
+
+/// The time between checkpoints (s).
+fn checkpoint_interval(text: &str) -> Result<f64, Stop> {
+    let wrong = |why: String| {
+        let text =
+            format!("--checkpoint-every {text}: {why}; expected a time such as `30 s` or `5 min`");
+        Stop::new(exit::USAGE, text)
+    };
+    match parse_quantity_in(text, "s") {
+        Ok(seconds) if seconds >= 0.0 => Ok(seconds),
+        Ok(_) => Err(wrong("it is negative".into())),
+        Err(e) => Err(wrong(e.reason())),
+    }
 }
 
 /// Memory of this machine (bytes); 0 when the system does not tell.

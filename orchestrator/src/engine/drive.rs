@@ -7,8 +7,8 @@ use crate::plan::{Graph, InputKey, Key};
 use crate::store::{Journal, Known, RunFolder, Store};
 use camino::Utf8PathBuf;
 use plyflow_model::job::{
-    Cost, DATA_MODEL_VERSION, FailureKind, JOB_VERSION, Job, JobInput, LibraryRef, LogLevel,
-    Message, Progress, Record,
+    Checkpoints, Cost, DATA_MODEL_VERSION, FailureKind, JOB_VERSION, Job, JobInput, LibraryRef,
+    LogLevel, Message, Progress, Record,
 };
 use plyflow_workflow::resolved::ResolvedWorkflow;
 use std::collections::{HashMap, VecDeque};
@@ -26,6 +26,8 @@ pub struct Options {
     pub search_path: Vec<Utf8PathBuf>,
     /// Run again even what the store has (for steps named here).
     pub force: Vec<usize>,
+    /// Time between checkpoints of a running step (s).
+    pub checkpoint_interval: f64,
 }
 
 /// Something to show.
@@ -356,6 +358,13 @@ impl<'a> Session<'a> {
         let (artifact, record) = (place(".h5"), place(".record.json"));
         self.jobs.insert(id, (artifact.clone(), record.clone()));
         let instance = &self.core.instances()[id];
+        let label = self.core.label(id);
+        if let Some(key) = instance.key
+            && self.options.force.contains(&instance.step)
+        {
+            // To run again means from the start.
+            let _ = std::fs::remove_dir_all(self.folder.checkpoints(&label, &key));
+        }
         let library = |p: &plyflow_workflow::resolved::PluginId| LibraryRef {
             name: p.name.clone(),
             path: p.path.clone(),
@@ -377,9 +386,13 @@ impl<'a> Session<'a> {
             artifact,
             record,
             scratch: place(".scratch"),
+            checkpoints: instance.key.map(|key| Checkpoints {
+                folder: self.folder.checkpoints(&label, &key),
+                interval: self.options.checkpoint_interval,
+            }),
             provenance: self.provenance(id),
         };
-        let log = self.folder.log(&self.core.label(id));
+        let log = self.folder.log(&label);
         // A log of an earlier attempt must not pass for this one's.
         let _ = std::fs::remove_file(&log);
         Task {

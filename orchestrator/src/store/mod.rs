@@ -10,6 +10,7 @@
 //!   runs/<workflow>/journal        one append-only file
 //!   runs/<workflow>/logs/          logs of workers that had something to say
 //!   runs/<workflow>/tmp/           artifacts being written
+//!   runs/<workflow>/checkpoints/<instance>/<key>/   what lets a killed step go on
 //! ```
 
 mod journal;
@@ -60,6 +61,28 @@ impl RunFolder {
         self.root
             .join("logs")
             .join(format!("{}.log", safe_name(label)))
+    }
+
+    /// Checkpoints of an instance, by its label and key.
+    pub fn checkpoints(&self, label: &str, key: &Key) -> Utf8PathBuf {
+        let of = self.root.join("checkpoints").join(safe_name(label));
+        of.join(key.hex())
+    }
+
+    /// Checkpoints that no command will go on from: of every instance all but those last written to.
+    ///
+    /// # Errors
+    /// When a folder cannot be read.
+    pub fn old_checkpoints(&self) -> io::Result<Vec<Utf8PathBuf>> {
+        let mut old = Vec::new();
+        for instance in list(&self.root.join("checkpoints"))? {
+            let mut of = list(&instance)?;
+            let written = |p: &Utf8PathBuf| fs::metadata(p).and_then(|m| m.modified()).ok();
+            of.sort_by_cached_key(|p| (written(p), p.clone()));
+            of.pop();
+            old.extend(of);
+        }
+        Ok(old)
     }
 
     /// Makes the folder and clears what a killed run left in `tmp`. Call only under the lock.

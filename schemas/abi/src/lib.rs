@@ -1,4 +1,4 @@
-//! The Rust twin of `plyflow.h` (ABI 1.0): same structs, same order, no dependencies.
+//! The Rust twin of `plyflow.h` (ABI 1.1): same structs, same order, no dependencies.
 //!
 //! The header is the reference text; what a field means, its shape, unit and index order are
 //! written there. A test compiles the header with the machine's C compiler and compares every
@@ -8,7 +8,7 @@
 use core::ffi::{c_char, c_void};
 
 pub const PF_ABI_MAJOR: u32 = 1;
-pub const PF_ABI_MINOR: u32 = 0;
+pub const PF_ABI_MINOR: u32 = 1;
 /// The bytes `PLYFLOW1` in memory on a little-endian machine.
 pub const PF_MAGIC: u64 = 0x3157_4F4C_4659_4C50;
 pub const PF_SYMBOL: &[u8] = b"plyflow_plugin\0";
@@ -181,6 +181,9 @@ pub struct pf_services {
     pub result: unsafe extern "C" fn(*mut c_void, pf_str, f64, pf_str, u32) -> i32,
     pub collection: unsafe extern "C" fn(*mut c_void, u64, pf_str) -> i32,
     pub find_component: unsafe extern "C" fn(*mut c_void, u32, pf_str, *mut pf_component) -> i32,
+    pub checkpoint: unsafe extern "C" fn(*mut c_void) -> pf_str,
+    pub checkpoint_due: unsafe extern "C" fn(*mut c_void) -> i32,
+    pub checkpoint_saved: unsafe extern "C" fn(*mut c_void),
 }
 
 #[repr(C)]

@@ -33,7 +33,7 @@ fn rust_layouts() -> Layouts {
             size, host, log, progress, cancelled, fail, threads, parameters, scratch, inputs, item,
             attributes, array_info, array_read, meshes, mesh_read, frame_points_read,
             frame_field_read, attributes_write, array_write, mesh_define, frame_begin, frame_points,
-            frame_field, frame_end, result, collection, find_component,
+            frame_field, frame_end, result, collection, find_component, checkpoint, checkpoint_due, checkpoint_saved,
         }
         pf_step_functions { size, run }
         pf_error { text }

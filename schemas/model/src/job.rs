@@ -55,6 +55,16 @@ pub struct JobInput {
     pub cost: Cost,
 }
 
+/// Where a step may keep what lets a later attempt go on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Checkpoints {
+    /// A folder of this instance and key alone, made when the plugin first asks for it and removed when the step has
+    /// succeeded.
+    pub folder: Utf8PathBuf,
+    /// Wall-clock time between two checkpoints (s).
+    pub interval: f64,
+}
+
 /// One step instance to run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Job {
@@ -90,6 +100,9 @@ pub struct Job {
     pub record: Utf8PathBuf,
     /// A private folder, made by the worker when the plugin first asks for it and removed at the end.
     pub scratch: Utf8PathBuf,
+    /// Checkpoints; without them the step starts anew in every attempt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checkpoints: Option<Checkpoints>,
     /// Written as it is into the artifact (`/plyflow`, attribute `provenance`); holds nothing that
     /// depends on the machine.
     pub provenance: serde_json::Value,

@@ -3,6 +3,7 @@
 //! global run meshes the scene itself; with a `boundary` input it is a local run of one zone.
 
 pub mod assembly;
+mod checkpoint;
 mod global;
 mod local;
 mod output;

@@ -1,16 +1,18 @@
 //! The step behind the host: inputs, frames, attributes, results.
 
 use crate::assembly::Components;
+use crate::checkpoint::{Part, Recorder};
 use crate::local::{LocalInput, LocalSheet};
 use crate::parameters::Parameters;
-use crate::run::{Body, Forming, Observer, Outcome};
+use crate::run::{Body, Course, Forming, Observer, Outcome};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::vec3::{V, add};
 use plyflow_model::scene::SheetKind;
-use plyflow_sdk::{Host, Input, Log, On, Progress, StepError};
+use plyflow_sdk::{Host, Input, Log, Progress, StepError};
 use serde_json::json;
+use std::borrow::Cow;
 use std::time::Instant;
 
 struct HostComponents<'a>(&'a Host);
@@ -30,49 +32,63 @@ impl Components for HostComponents<'_> {
 
 struct Writer<'a> {
     host: &'a Host,
+    frames: Recorder<'a>,
     fields: Vec<Vec<ElementField>>,
     started: Instant,
     shown: Instant,
     cycle_shown: u64,
+    /// Where this attempt began.
+    first_cycle: u64,
 }
 
 impl Observer for Writer<'_> {
     fn frame(&mut self, forming: &Forming, time: f64) -> Result<(), StepError> {
-        self.host.begin_frame(time)?;
+        self.frames.put(&Part::Begin(time))?;
         for (body, fields) in forming.bodies.iter().zip(&self.fields) {
-            self.host.write_points(&body.name, &forming.points(body))?;
+            let name = || Cow::from(&body.name);
+            let points = forming.points(body).into();
+            self.frames.put(&Part::Points(name(), points))?;
             for f in fields {
-                let (on, values) = if f.patch {
-                    (On::Points, forming.model.patch_field(body.sheet, f.row))
+                let values = if f.patch {
+                    forming.model.patch_field(body.sheet, f.row)
                 } else {
-                    (On::Cells, forming.model.cell_field(body.sheet, f.row))
+                    forming.model.cell_field(body.sheet, f.row)
                 };
-                self.host
-                    .write_field(&body.name, on, &f.name, 1, &f.unit, &values)?;
+                let (field, unit) = (Cow::from(&f.name), Cow::from(&f.unit));
+                self.frames
+                    .put(&Part::Field(name(), !f.patch, field, unit, values.into()))?;
             }
-            let pressure = forming.contact_pressure(body);
-            self.host.write_field(
-                &body.name,
-                On::Points,
-                "contact_pressure",
-                1,
-                "Pa",
-                &pressure,
-            )?;
+            let pressure = forming.contact_pressure(body).into();
+            let (field, unit) = ("contact_pressure".into(), "Pa".into());
+            self.frames
+                .put(&Part::Field(name(), false, field, unit, pressure))?;
         }
         if forming.load.press().is_some() {
             let moved = |points: &[V], part: &str| -> Vec<V> {
                 let shift = forming.shift(part);
                 points.iter().map(|x| add(*x, shift)).collect()
             };
-            self.host
-                .write_points("tool", &moved(&forming.tool.points, "tool"))?;
+            let tool = moved(&forming.tool.points, "tool").into();
+            self.frames.put(&Part::Points("tool".into(), tool))?;
             for part in &forming.rigid {
-                self.host
-                    .write_points(&part.name, &moved(&part.points, &part.name))?;
+                let points = moved(&part.points, &part.name).into();
+                self.frames
+                    .put(&Part::Points(Cow::from(&part.name), points))?;
             }
         }
-        self.host.end_frame()
+        self.frames.put(&Part::End)
+    }
+
+    fn resume(&mut self, forming: &mut Forming, course: &mut Course) -> Result<(), StepError> {
+        if self.frames.resume(forming, course)? {
+            self.cycle_shown = forming.model.cycle;
+            self.first_cycle = forming.model.cycle;
+        }
+        Ok(())
+    }
+
+    fn between_frames(&mut self, forming: &mut Forming, course: &mut Course) {
+        self.frames.checkpoint(forming, course);
     }
 
     fn tick(&mut self, forming: &Forming, e: &Ledger, end: f64) -> Result<(), StepError> {
@@ -162,10 +178,12 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let started = Instant::now();
     let mut writer = Writer {
         host,
+        frames: Recorder::new(host),
         fields,
         started,
         shown: started,
         cycle_shown: 0,
+        first_cycle: 0,
     };
     let outcome = forming.run(
         p.frames,
@@ -174,9 +192,10 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         p.kinetic_bound,
         &mut writer,
     )?;
-    let seconds = writer.started.elapsed().as_secs_f64();
+    let own_cycles = outcome.cycles - writer.first_cycle;
+    let rate = own_cycles as f64 / writer.started.elapsed().as_secs_f64().max(1e-9);
     write_history(host, &outcome, forming.load.press().is_some())?;
-    write_summary(host, p, &forming, &outcome, seconds)
+    write_summary(host, p, &forming, &outcome, rate)
 }
 
 fn define(host: &Host, forming: &Forming, body: &Body) -> Result<(), StepError> {
@@ -318,7 +337,7 @@ fn write_summary(
     p: &Parameters,
     forming: &Forming,
     outcome: &Outcome,
-    seconds: f64,
+    rate: f64,
 ) -> Result<(), StepError> {
     let h = &outcome.health;
     let m = &forming.model;
@@ -368,11 +387,7 @@ fn write_summary(
         m.sheets.iter().map(|s| s.added_mass).sum(),
         "kg",
     )?;
-    host.measured(
-        "element_cycle_rate",
-        element_cycles / seconds.max(1e-9),
-        "1/s",
-    )
+    host.measured("element_cycle_rate", elements as f64 * rate, "1/s")
 }
 
 /// Smallest and largest shear angle (rad) and largest fibre strain by size, over the plies' elements, from

@@ -8,6 +8,7 @@ use crate::global::ply_box;
 use crate::parameters::Parameters;
 use crate::process::Load;
 use crate::run::{Body, Forming, RigidBody};
+use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{OpenPlate, RigidContact, RigidItem, RigidMotion, RigidSurface};
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
 use plyflow_mechanics::model::Model;
@@ -105,6 +106,15 @@ impl PressLoad {
         for c in &self.holder {
             model.rigid_contacts[*c].motion = moved(held.height, before);
         }
+    }
+
+    /// Where the holder is that a force presses.
+    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        if let Some(held) = &mut self.held {
+            a.value(&mut held.height)?;
+            a.value(&mut held.velocity)?;
+        }
+        Ok(())
     }
 
     /// Force of the punch on the plies, upwards (N).

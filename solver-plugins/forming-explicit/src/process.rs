@@ -1,6 +1,7 @@
 //! Processes in time. Double-diaphragm forming: bagging, lowering, drawing, settling; a press: forming, settling.
 
 use crate::press::PressLoad;
+use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::history::{linear, smooth_step};
 use plyflow_mechanics::model::{Drive, Model, Pressures};
 use plyflow_mechanics::vec3::V;
@@ -167,6 +168,15 @@ impl Load {
         match self {
             Self::Press(p) => Some(p),
             _ => None,
+        }
+    }
+
+    /// What it remembers of the run.
+    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        match self {
+            Self::Process { sealed_volume, .. } => a.value(sealed_volume),
+            Self::Given { .. } => Ok(()),
+            Self::Press(p) => p.archive(a),
         }
     }
 

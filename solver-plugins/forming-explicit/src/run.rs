@@ -3,11 +3,13 @@
 use crate::assembly::StackSheet;
 use crate::press::PressLoad;
 use crate::process::Load;
+use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{OpenPlate, RigidContact};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, judge};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::{V, norm};
 use plyflow_tooling::ToolMesh;
+use serde::{Deserialize, Serialize};
 
 /// Ledger entries per frame.
 const LEDGER_PER_FRAME: u64 = 10;
@@ -107,7 +109,7 @@ pub struct Forming {
 }
 
 /// One line of the history.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HistoryRow {
     /// Time (s).
     pub time: f64,
@@ -123,6 +125,35 @@ pub struct HistoryRow {
     pub punch_force: f64,
     /// Way of a press's holder towards the die (m).
     pub holder_travel: f64,
+}
+
+/// How far a run has come, between two frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    /// Frames written.
+    pub frame: usize,
+    /// The history so far.
+    pub history: Vec<HistoryRow>,
+    /// Smallest step used (s).
+    pub smallest_step: f64,
+}
+
+impl Default for Course {
+    fn default() -> Self {
+        Self {
+            frame: 0,
+            history: Vec::new(),
+            smallest_step: f64::INFINITY,
+        }
+    }
+}
+
+impl Course {
+    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        a.value(&mut self.frame)?;
+        a.value(&mut self.history)?;
+        a.value(&mut self.smallest_step)
+    }
 }
 
 /// What came of a run.
@@ -157,6 +188,19 @@ pub trait Observer {
         energies: &Ledger,
         end: f64,
     ) -> Result<(), plyflow_sdk::StepError>;
+    /// Called before anything else: may put a run at its start to where an earlier attempt was.
+    ///
+    /// # Errors
+    /// Stops the run.
+    fn resume(
+        &mut self,
+        _forming: &mut Forming,
+        _course: &mut Course,
+    ) -> Result<(), plyflow_sdk::StepError> {
+        Ok(())
+    }
+    /// Called between two frames, where a run can be taken up again.
+    fn between_frames(&mut self, _forming: &mut Forming, _course: &mut Course) {}
 }
 
 impl Forming {
@@ -177,6 +221,12 @@ impl Forming {
         let of = |c: &&RigidContact| c.name.split('/').next() == Some(part);
         let found = self.model.rigid_contacts.iter().find(of);
         found.map_or([0.0; 3], |c| c.motion.shift)
+    }
+
+    /// What changes: the model, and what its loads remember.
+    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.model.archive(a)?;
+        self.load.archive(a)
     }
 
     fn row(&self, ledger: Ledger) -> HistoryRow {
@@ -207,9 +257,13 @@ impl Forming {
     ) -> Result<Outcome, plyflow_sdk::StepError> {
         let end = self.load.duration();
         let interval = end / frames as f64;
-        let mut history = Vec::with_capacity(frames * LEDGER_PER_FRAME as usize + 1);
-        let mut smallest_step = f64::INFINITY;
-        for frame in 0..frames {
+        let mut course = Course::default();
+        observer.resume(self, &mut course)?;
+        for frame in course.frame..frames {
+            if frame > course.frame {
+                course.frame = frame;
+                observer.between_frames(self, &mut course);
+            }
             let critical = self.model.critical_step().map_err(|e| e.to_string())?;
             let wanted = target_step.min(safety * critical);
             let steps = (interval / wanted).ceil().max(1.0) as u64;
@@ -223,7 +277,7 @@ impl Forming {
                 .into());
             }
             self.model.dt = interval / steps as f64;
-            smallest_step = smallest_step.min(self.model.dt);
+            course.smallest_step = course.smallest_step.min(self.model.dt);
             let start = interval * frame as f64;
             for k in 0..steps {
                 // Times from the count, not from a sum: frames fall on the same instants in every run.
@@ -237,7 +291,7 @@ impl Forming {
                 }
                 if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
                     let energies = self.model.energies();
-                    history.push(self.row(energies));
+                    course.history.push(self.row(energies));
                     observer.tick(self, &energies, end)?;
                 }
             }
@@ -246,6 +300,11 @@ impl Forming {
         self.load.apply(&mut self.model);
         self.model.step(true).map_err(|e| e.to_string())?;
         observer.frame(self, end)?;
+        let Course {
+            mut history,
+            smallest_step,
+            ..
+        } = course;
         history.push(self.row(self.model.energies()));
         let ledgers: Vec<Ledger> = history.iter().map(|r| r.ledger).collect();
         let health = judge(&ledgers);

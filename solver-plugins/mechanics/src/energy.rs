@@ -1,7 +1,7 @@
 //! The energy ledger.
 
 /// Where the work is (J). Sums run in a fixed order.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ledger {
     /// Kinetic.
     pub kinetic: f64,

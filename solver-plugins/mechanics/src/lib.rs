@@ -10,11 +10,13 @@
 //! - [`model`]: nodes, sheets, contacts and loads; one central-difference step;
 //! - [`relax`]: static equilibrium by explicit steps with kinetic damping;
 //! - [`energy`]: the ledger that says where the work went;
+//! - [`archive`]: what changes during a run as bytes, for checkpoints;
 //! - [`history`]: smooth ramps and cubic interpolation in time.
 //!
 //! All quantities are SI. Results are identical for any number of threads: parallel passes write to their
 //! own slots, and every sum runs in a fixed order.
 
+pub mod archive;
 pub mod component;
 pub mod contact;
 pub mod energy;

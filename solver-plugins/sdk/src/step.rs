@@ -280,6 +280,22 @@ impl Host {
         self.text(call!(self.scratch()))
     }
 
+    /// A folder that is kept until the step has succeeded: what lies in it was written by an earlier attempt with the
+    /// same plugin, components, parameters and inputs. `None`: this host keeps nothing.
+    pub fn checkpoint(&self) -> Option<&str> {
+        Some(self.text(call!(self.checkpoint()))).filter(|f| !f.is_empty())
+    }
+
+    /// Whether enough time has passed since the last checkpoint.
+    pub fn checkpoint_due(&self) -> bool {
+        call!(self.checkpoint_due()) != 0
+    }
+
+    /// Tells the host that a checkpoint is on disk, so that it notes the cost of the step so far.
+    pub fn checkpoint_saved(&self) {
+        call!(self.checkpoint_saved());
+    }
+
     /// All inputs in the order of the workflow.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! The whole chain of real plugins on a part small enough for seconds: coarse run, defects, zones, local
 //! runs, comparison.
 
-use plyflow_e2e::{Ended, Study, repository, well};
+use plyflow_e2e::{Ended, Study, repository, wait_for, well, workers_of};
 
 /// A flat block of 20 mm, two small plies, short phases: coarse enough that its numbers mean nothing.
 const SCENE: &str = "
@@ -116,4 +116,81 @@ fn the_same_length_in_other_units_is_the_same_run() {
     )
     .unwrap();
     assert_eq!(study.run(&[]), well(0, 4));
+}
+
+/// Checkpoints in the study's store: their instances.
+fn checkpoints(study: &Study) -> Vec<String> {
+    let folder = study.path(".plyflow/runs/study/checkpoints");
+    let instances = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let has_state = |i: &std::fs::DirEntry| {
+        let keys = std::fs::read_dir(i.path()).into_iter().flatten().flatten();
+        keys.into_iter().any(|k| k.path().join("state").exists())
+    };
+    let with_state = instances.filter(has_state);
+    with_state
+        .map(|i| i.file_name().into_string().expect("a UTF-8 name"))
+        .collect()
+}
+
+#[test]
+fn a_run_killed_while_it_forms_goes_on_from_its_checkpoint_to_the_same_bytes() {
+    let undisturbed = study(TWO_ZONES);
+    assert_eq!(undisturbed.run(&[]), well(8, 0));
+    assert!(checkpoints(&undisturbed).is_empty(), "an hour is not over");
+
+    let study = study(TWO_ZONES);
+    let often = ["--checkpoint-every", "0 s", "--jobs", "1"];
+    for instance in ["coarse", "local"] {
+        let mut engine = study.start(&often);
+        wait_for("a checkpoint", || {
+            checkpoints(&study).iter().any(|i| i.starts_with(instance))
+        });
+        engine.kill().unwrap();
+        engine.wait().unwrap();
+        wait_for("the workers' end", || workers_of(engine.id()) == 0);
+    }
+    let left = checkpoints(&study);
+    assert!(left.iter().any(|i| i.starts_with("local")), "{left:?}");
+    let mut engine = study.start(&often);
+    assert!(engine.wait().unwrap().success());
+    assert!(
+        study.log().contains("goes on from a checkpoint at t = "),
+        "{}",
+        study.log()
+    );
+    assert!(
+        undisturbed.artifacts() == study.artifacts(),
+        "the artifacts differ"
+    );
+    assert!(
+        checkpoints(&study).is_empty(),
+        "they are removed in the end"
+    );
+    // What earlier attempts cost is counted, and no wall time is negative or nothing.
+    let spent = study.results();
+    let steps = spent["steps"].as_array().unwrap();
+    assert!(
+        steps
+            .iter()
+            .all(|s| s["cost"]["wall_seconds"].as_f64() > Some(0.0))
+    );
+}
+
+#[test]
+fn a_torn_checkpoint_is_not_taken_up() {
+    let study = study("[]");
+    let often = ["--checkpoint-every", "0 s", "--until", "coarse"];
+    let mut engine = study.start(&often);
+    wait_for("a checkpoint", || !checkpoints(&study).is_empty());
+    engine.kill().unwrap();
+    engine.wait().unwrap();
+    wait_for("the workers' end", || workers_of(engine.id()) == 0);
+    let folder = study.path(".plyflow/runs/study/checkpoints/coarse");
+    let key = std::fs::read_dir(folder).unwrap().flatten().next().unwrap();
+    let state = key.path().join("state");
+    let bytes = std::fs::read(&state).unwrap();
+    std::fs::write(&state, &bytes[..bytes.len() / 2]).unwrap();
+    let mut engine = study.start(&often);
+    assert!(engine.wait().unwrap().success());
+    assert!(!study.log().contains("goes on from a checkpoint"));
 }

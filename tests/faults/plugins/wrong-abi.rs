@@ -14,7 +14,7 @@ static FUNCTIONS: pf_step_functions = pf_step_functions {
 static PLUGIN: pf_plugin = pf_plugin {
     magic: PF_MAGIC,
     abi_major: PF_ABI_MAJOR + 98,
-    abi_minor: PF_ABI_MINOR,
+    abi_minor: 0,
     size: size_of::<pf_plugin>() as u64,
     kind: PF_KIND_STEP,
     reserved: 0,

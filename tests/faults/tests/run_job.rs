@@ -38,6 +38,7 @@ fn job(dir: &TempDir, plugin: &str, kind: &str, parameters: Value) -> Job {
         artifact: at("h5.tmp"),
         record: at("record.tmp"),
         scratch: at("scratch"),
+        checkpoints: None,
         provenance: json!({"step": plugin}),
     }
 }
@@ -249,7 +250,7 @@ fn loading_is_refused_with_what_was_found_and_expected() {
     for (plugin, expected) in [
         (
             "wrong-abi",
-            "ABI 99.0; this program accepts 1.0 to 1.0: update Plyflow",
+            "ABI 99.0; this program accepts 1.0 to 1.1: update Plyflow",
         ),
         ("bad-magic", "0x0000000000001234 instead of PF_MAGIC"),
         ("bad-manifest", "does not follow schemas/manifest.md"),

@@ -57,6 +57,7 @@ fn a_step_in_c_runs_when_built_with_only_the_header() {
         artifact: at("out.h5"),
         record: at("out.json"),
         scratch: at("scratch"),
+        checkpoints: None,
         provenance: json!({}),
     };
     let mut out = Vec::new();

@@ -40,7 +40,7 @@ impl Default for ContactSettings {
 }
 
 /// What contacts did in a step (J): stored, lost to friction, lost to damping.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactEnergy {
     /// Stored in normal and slip springs.
     pub stored: f64,

@@ -1,8 +1,10 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::{ContactEnergy, ContactSettings, friction_force, normal_force};
+use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A rigid surface as a signed distance field.
@@ -67,7 +69,7 @@ impl RigidSurface for OpenPlate {
 }
 
 /// Where a rigid surface is, and how fast it moves: set before each step.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct RigidMotion {
     /// Way from where the surface is described (m).
     pub shift: V,
@@ -76,7 +78,7 @@ pub struct RigidMotion {
 }
 
 /// One node that may touch the surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigidItem {
     /// Model node.
     pub node: u32,
@@ -237,6 +239,14 @@ impl RigidContact {
         }
     }
 
+    /// What changes: motion, nodes, sleep.
+    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        a.value(&mut self.motion)?;
+        a.value(&mut self.cycle)?;
+        a.value(&mut self.spans)?;
+        a.values(&mut self.items)
+    }
+
     /// Sum of the forces on the nodes (N) in the last step; on the surface acts the opposite.
     pub fn resultant(&self) -> V {
         let touching = self.spans.iter().filter(|s| s.touches);
@@ -248,7 +258,7 @@ impl RigidContact {
 const SPAN: usize = 256;
 
 /// A run of [`SPAN`] nodes.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Span {
     /// Call of [`RigidContact::compute`] in which the first of them wakes.
     wake: u64,

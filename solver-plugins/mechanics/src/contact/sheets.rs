@@ -10,9 +10,10 @@ use super::{ContactEnergy, friction_force, normal_force};
 use crate::mesh::NONE;
 use crate::vec3::{V, add, dot, scale, sub, unit};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// One slave node.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlaveItem {
     /// Model node.
     pub node: u32,

@@ -1,6 +1,7 @@
 //! Nodes, sheets, contacts and loads; one central-difference step.
 
 mod advance;
+mod archive;
 mod batch;
 mod blocks;
 mod build;
@@ -57,7 +58,7 @@ pub struct StepSettings {
 }
 
 /// Pressures at the current time (Pa).
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pressures {
     /// From below on cells pressed below.
     pub below: f64,

@@ -1,13 +1,16 @@
 //! A fabric for tests, behind the C ABI.
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
-use plyflow_kernels::{fabric::Fabric, m4::M4};
+use plyflow_kernels::{fabric::Fabric, m4::M4, s4::S4};
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
-use plyflow_sdk::{element_table, material_table};
+use plyflow_sdk::{Element, element_table, material_table};
 
 /// 1e5 N/m along the fibres, 1 kg/m2.
 const FABRIC: &str =
     r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0}"#;
+
+const STITCHED: &str = r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0,
+    "stitch":{"angles":[0.01,0.05,0.1],"forces":[0,880,0]},"bending":{"positive":{"linear":1e-3},"negative":{"linear":1e-3}}}"#;
 
 fn component<T>(kind: u32, table: T) -> pf_component {
     pf_component {
@@ -19,12 +22,23 @@ fn component<T>(kind: u32, table: T) -> pf_component {
     }
 }
 
-/// `m4` of the fabric.
-pub fn membrane() -> ElementInstance {
+fn instance<E: Element>(fabric: &str) -> ElementInstance {
     unsafe {
         let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
-        let material = MaterialInstance::create(&material, FABRIC, "material").unwrap();
-        let element = component(PF_KIND_ELEMENT, element_table::<M4>());
+        let material = MaterialInstance::create(&material, fabric, "material").unwrap();
+        let element = component(PF_KIND_ELEMENT, element_table::<E>());
         ElementInstance::create(&element, "{}", material, "element").unwrap()
     }
+}
+
+/// `m4` of the fabric.
+#[allow(dead_code)]
+pub fn membrane() -> ElementInstance {
+    instance::<M4>(FABRIC)
+}
+
+/// `s4` of a fabric with a stitch that fails, and with bending stiffness: everything that has a history.
+#[allow(dead_code)]
+pub fn shell() -> ElementInstance {
+    instance::<S4>(STITCHED)
 }

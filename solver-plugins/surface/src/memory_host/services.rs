@@ -62,6 +62,9 @@ pub(super) fn table(host: *mut c_void) -> pf_services {
         result,
         collection,
         find_component,
+        checkpoint: nothing,
+        checkpoint_due: never,
+        checkpoint_saved: ignored,
     }
 }
 
@@ -79,6 +82,8 @@ unsafe extern "C" fn no_progress(_: *mut c_void, _: *const pf_progress) {}
 unsafe extern "C" fn never(_: *mut c_void) -> i32 {
     0
 }
+
+unsafe extern "C" fn ignored(_: *mut c_void) {}
 
 unsafe extern "C" fn threads(host: *mut c_void) -> u32 {
     unsafe { state(host) }.machine.threads

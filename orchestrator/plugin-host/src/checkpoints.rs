@@ -1,0 +1,154 @@
+//! What outlives a killed attempt of a step: a folder for the plugin, and what the step has cost so far.
+
+use crate::emitter::Emitter;
+use crate::process;
+use plyflow_model::job::{self, Cost, LogLevel};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Instant;
+
+/// The cost up to the last checkpoint, beside the plugin's files.
+const COST: &str = "plyflow-cost.json";
+
+/// Checkpoints of the running step.
+pub(crate) struct Checkpoints<'a> {
+    job: Option<&'a job::Checkpoints>,
+    folder: OnceLock<String>,
+    started: Instant,
+    last: Mutex<Instant>,
+    /// What earlier attempts cost up to the checkpoint that this one may go on from.
+    earlier: OnceLock<Cost>,
+}
+
+impl<'a> Checkpoints<'a> {
+    pub(crate) fn new(job: Option<&'a job::Checkpoints>) -> Self {
+        let now = Instant::now();
+        Self {
+            job,
+            folder: OnceLock::new(),
+            started: now,
+            last: Mutex::new(now),
+            earlier: OnceLock::new(),
+        }
+    }
+
+    /// The folder, made on the first call; empty when nothing is kept.
+    pub(crate) fn folder(&self, emitter: &Emitter<'_>) -> &str {
+        self.folder.get_or_init(|| {
+            let Some(job) = self.job else {
+                return String::new();
+            };
+            if let Err(e) = std::fs::create_dir_all(&job.folder) {
+                let text = format!(
+                    "no checkpoints are kept: the folder {} cannot be made: {e}",
+                    job.folder
+                );
+                emitter.log(LogLevel::Warn, &text);
+                return String::new();
+            }
+            let cost = std::fs::read(job.folder.join(COST)).ok();
+            let cost = cost.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+            let _ = self.earlier.set(cost.unwrap_or_default());
+            job.folder.to_string()
+        })
+    }
+
+    /// Whether enough time has passed since the last one.
+    pub(crate) fn due(&self) -> bool {
+        let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = self.folder.get().is_some_and(|f| !f.is_empty());
+        kept && (self.job).is_some_and(|j| last.elapsed().as_secs_f64() >= j.interval)
+    }
+
+    /// Notes the cost so far.
+    pub(crate) fn saved(&self, emitter: &Emitter<'_>) {
+        let Some(job) = self.job else { return };
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+        let cost = self.with_earlier(Cost {
+            wall_seconds: self.started.elapsed().as_secs_f64(),
+            cpu_seconds: process::cpu_seconds(),
+            peak_memory: process::peak_memory(),
+            threads: 0,
+        });
+        let written = serde_json::to_vec(&cost).map_err(std::io::Error::from);
+        let new = job.folder.join(format!("{COST}.new"));
+        let written = written
+            .and_then(|bytes| std::fs::write(&new, bytes))
+            .and_then(|()| std::fs::rename(&new, job.folder.join(COST)));
+        if let Err(e) = written {
+            let text = format!("{}: the cost so far cannot be noted: {e}", job.folder);
+            emitter.log(LogLevel::Debug, &text);
+        }
+    }
+
+    /// A cost of this attempt with that of the earlier ones.
+    pub(crate) fn with_earlier(&self, cost: Cost) -> Cost {
+        let earlier = self.earlier.get().copied().unwrap_or_default();
+        Cost {
+            wall_seconds: cost.wall_seconds + earlier.wall_seconds,
+            cpu_seconds: cost.cpu_seconds + earlier.cpu_seconds,
+            peak_memory: cost.peak_memory.max(earlier.peak_memory),
+            threads: cost.threads,
+        }
+    }
+
+    /// Removes the folder of a step that has succeeded.
+    pub(crate) fn remove(job: Option<&job::Checkpoints>) -> std::io::Result<()> {
+        match job.map(|j| std::fs::remove_dir_all(&j.folder)) {
+            Some(Err(e)) if e.kind() != std::io::ErrorKind::NotFound => Err(e),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_later_attempt_adds_the_cost_up_to_the_last_checkpoint() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("label/key");
+        let job = |interval| job::Checkpoints {
+            folder: folder.to_str().unwrap().into(),
+            interval,
+        };
+        let cost = |wall, cpu, peak_memory| Cost {
+            wall_seconds: wall,
+            cpu_seconds: cpu,
+            peak_memory,
+            threads: 2,
+        };
+        let mut out = Vec::new();
+        let emitter = Emitter::new(&mut out);
+        let none = Checkpoints::new(None);
+        assert_eq!((none.folder(&emitter), none.due()), ("", false));
+
+        let often = job(0.0);
+        let first = Checkpoints::new(Some(&often));
+        assert!(!first.due(), "nobody has asked where to write to");
+        assert_eq!(first.folder(&emitter), folder.to_str().unwrap());
+        assert!(first.due());
+        assert_eq!(first.with_earlier(cost(1.0, 2.0, 5)), cost(1.0, 2.0, 5));
+        first.saved(&emitter);
+
+        let rarely = job(3600.0);
+        let second = Checkpoints::new(Some(&rarely));
+        second.folder(&emitter);
+        assert!(!second.due());
+        let noted = *second.earlier.get().unwrap();
+        assert!(noted.wall_seconds > 0.0 && noted.cpu_seconds > 0.0 && noted.peak_memory > 0);
+        let sum = second.with_earlier(cost(1.0, 2.0, 5));
+        assert_eq!(sum.wall_seconds, 1.0 + noted.wall_seconds);
+        assert_eq!(sum.cpu_seconds, 2.0 + noted.cpu_seconds);
+        assert_eq!((sum.peak_memory, sum.threads), (noted.peak_memory, 2));
+        // A third attempt has the cost of both.
+        second.saved(&emitter);
+        let third = Checkpoints::new(Some(&rarely));
+        third.folder(&emitter);
+        assert!(third.earlier.get().unwrap().cpu_seconds > noted.cpu_seconds);
+
+        Checkpoints::remove(Some(&rarely)).unwrap();
+        assert!(!folder.exists());
+        Checkpoints::remove(Some(&rarely)).unwrap();
+    }
+}
