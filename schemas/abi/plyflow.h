@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 #define PF_ABI_MAJOR 1u
-#define PF_ABI_MINOR 1u /* 1: checkpoints */
+#define PF_ABI_MINOR 1u /* 1: checkpoints, ignores_velocity */
 #define PF_MAGIC 0x31574F4C46594C50ull /* the bytes "PLYFLOW1" in memory on a little-endian machine */
 #define PF_SYMBOL "plyflow_plugin"
 
@@ -258,6 +258,9 @@ typedef struct pf_element_sizes {
   uint32_t patch_constants;
   uint32_t patch_history; /* besides the material's bending_history */
   uint32_t patch_fields;
+  /* Since ABI 1.1. */
+  uint32_t ignores_velocity; /* 1: `velocity` may be NULL in every call, which saves gathering it */
+  uint32_t reserved;
 } pf_element_sizes;
 
 /* rows of pf_element_batch.energy */
@@ -272,7 +275,7 @@ typedef struct pf_element_batch {
   uint32_t reserved;
   double dt;               /* s, step just done (0 in the first call) */
   const double *position;  /* [nodes][3][lanes] m (reference positions in initialise) */
-  const double *velocity;  /* [nodes][3][lanes] m/s at the half step; NULL in initialise and with 3 dofs per node */
+  const double *velocity;  /* [nodes][3][lanes] m/s at the half step; NULL in initialise, with 3 dofs per node, and with ignores_velocity */
   const double *spin;      /* [nodes][3][lanes] rad/s or NULL */
   const double *axis;      /* [3][lanes] unit e1 in the undeformed plane; only in initialise */
   double *constants;       /* [constants][lanes]; written by initialise only */

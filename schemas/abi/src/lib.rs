@@ -311,6 +311,8 @@ pub struct pf_element_sizes {
     pub patch_constants: u32,
     pub patch_history: u32,
     pub patch_fields: u32,
+    pub ignores_velocity: u32,
+    pub reserved: u32,
 }
 
 #[repr(C)]

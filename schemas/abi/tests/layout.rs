@@ -50,7 +50,7 @@ fn rust_layouts() -> Layouts {
         pf_material { functions, instance }
         pf_element_sizes {
             size, nodes, dofs_per_node, constants, history, material_points, fields, patch_nodes,
-            patch_constants, patch_history, patch_fields,
+            patch_constants, patch_history, patch_fields, ignores_velocity, reserved,
         }
         pf_element_batch {
             size, lanes, reserved, dt, position, velocity, spin, axis, constants, history,

@@ -37,6 +37,8 @@ pub trait Lanes:
     fn max(self, other: Self) -> Self;
     /// `self < other`, lane by lane.
     fn lt(self, other: Self) -> Self::Mask;
+    /// Whether the mask is true in every lane.
+    fn all(mask: Self::Mask) -> bool;
     /// `if mask { yes } else { no }`, lane by lane.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Magnitude of `self` with the sign of `sign`.
@@ -127,6 +129,10 @@ impl Lanes for Portable {
     #[inline(always)]
     fn lt(self, other: Self) -> Self::Mask {
         core::array::from_fn(|l| self.0[l] < other.0[l])
+    }
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        mask.iter().all(|m| *m)
     }
     #[inline(always)]
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
@@ -242,6 +248,10 @@ mod x86 {
             unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, o.0) }
         }
         #[inline(always)]
+        fn all(mask: Self::Mask) -> bool {
+            mask == 0xff
+        }
+        #[inline(always)]
         fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
             unsafe { Self(_mm512_mask_blend_pd(mask, no.0, yes.0)) }
         }
@@ -311,6 +321,10 @@ mod x86 {
                     _mm256_cmp_pd::<_CMP_LT_OQ>(self.1, o.1),
                 )
             }
+        }
+        #[inline(always)]
+        fn all(mask: Self::Mask) -> bool {
+            unsafe { _mm256_movemask_pd(_mm256_and_pd(mask.0, mask.1)) == 0xf }
         }
         #[inline(always)]
         fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {

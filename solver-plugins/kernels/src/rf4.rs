@@ -61,6 +61,7 @@ impl Element for Rf4 {
             patch_constants: PATCH_CONSTANTS,
             patch_history: 0,
             patch_fields: PATCH_FIELDS,
+            ..Default::default()
         }
     }
 

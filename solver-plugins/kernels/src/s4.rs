@@ -311,6 +311,7 @@ impl Element for S4 {
             history: self.material_rows() + self.bending_history,
             material_points: self.points(),
             fields: FIELDS,
+            ignores_velocity: true,
             ..Default::default()
         }
     }

@@ -172,6 +172,7 @@ impl ElementInstance {
             patch_constants: s.patch_constants as usize,
             patch_history: s.patch_history as usize,
             patch_fields: s.patch_fields as usize,
+            ignores_velocity: s.ignores_velocity != 0,
         };
         let made = Self {
             functions,

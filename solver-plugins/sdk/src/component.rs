@@ -99,6 +99,8 @@ pub struct ElementSizes {
     pub patch_history: usize,
     /// Fields per patch.
     pub patch_fields: usize,
+    /// Whether `velocity` may be empty in every call, which saves gathering it.
+    pub ignores_velocity: bool,
 }
 
 /// One element call; see `pf_element_batch`.
@@ -482,6 +484,8 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
                 patch_constants: s.patch_constants as u32,
                 patch_history: s.patch_history as u32,
                 patch_fields: s.patch_fields as u32,
+                ignores_velocity: u32::from(s.ignores_velocity),
+                reserved: 0,
             };
         }
         PF_OK

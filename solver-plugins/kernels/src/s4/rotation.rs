@@ -48,15 +48,22 @@ pub(super) fn scaled<V: Lanes>(p: V, a: &V3<V>) -> V3<V> {
 /// The unit vector d turned by the rotation vector t (Rodrigues), any angle, and renormalised:
 /// `d cos a + (t x d) sin a / a + t (t . d) (1 - cos a) / a^2`, a = |t|.
 ///
-/// Sine and cosine are Taylor series at a quarter of the angle (at most pi/4 after whole turns are
-/// taken off; truncation below 1e-16), doubled twice. `(1 - cos a) / a^2` is
-/// `(sin(a/2) / (a/2))^2 / 2`, which has no cancellation.
+/// When no lane turns by more than [`SMALL`], which in a step of a run is nearly always, `sin a / a` and
+/// `(1 - cos a) / a^2` are Taylor series in a^2 of four terms (truncation below 1e-17): no root, no quotient. Else sine
+/// and cosine are Taylor series at a quarter of the angle (at most pi/4 after whole turns are taken off; truncation below
+/// 1e-16), doubled twice, and `(1 - cos a) / a^2` is `(sin(a/2) / (a/2))^2 / 2`, which has no cancellation.
 #[inline(always)]
 pub(super) fn turn<V: Lanes>(d: &V3<V>, t: &V3<V>) -> V3<V> {
+    let squared = dot(t, t);
+    if V::all(squared.lt(V::splat(SMALL * SMALL))) {
+        let (sine, versine) = (cubic(&SINC, squared), cubic(&VERSINE, squared));
+        let cosine = V::splat(1.0) - squared * versine;
+        return rotated(d, t, sine, cosine, versine);
+    }
     const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it rounds to a whole number
     let (one, two, half) = (V::splat(1.0), V::splat(2.0), V::splat(0.5));
     // The floor keeps the quotients below defined; at 1e-100 rad they are 1 and 1/2.
-    let a = dot(t, t).sqrt().max(V::splat(1e-100));
+    let a = squared.sqrt().max(V::splat(1e-100));
     let turns =
         (a * V::splat(core::f64::consts::FRAC_1_PI * 0.5) + V::splat(SHIFT)) - V::splat(SHIFT);
     let rest = a - turns * V::splat(core::f64::consts::TAU);
@@ -74,12 +81,28 @@ pub(super) fn turn<V: Lanes>(d: &V3<V>, t: &V3<V>) -> V3<V> {
     let over = one / a;
     let along = two * s2 * over;
     let versine = half * along * along;
-    let (sine, td, x) = (s4 * over, dot(t, d), cross(t, d));
-    let r = mix(c4, d, versine * td, t);
+    rotated(d, t, s4 * over, c4, versine)
+}
+
+#[inline(always)]
+fn cubic<V: Lanes>(c: &[f64; 4], x: V) -> V {
+    ((V::splat(c[3]) * x + V::splat(c[2])) * x + V::splat(c[1])) * x + V::splat(c[0])
+}
+
+/// Of a rotation by a: sin a / a, cos a, (1 - cos a) / a^2.
+#[inline(always)]
+fn rotated<V: Lanes>(d: &V3<V>, t: &V3<V>, sine: V, cosine: V, versine: V) -> V3<V> {
+    let (td, x) = (dot(t, d), cross(t, d));
+    let r = mix(cosine, d, versine * td, t);
     let r = [r[0] + sine * x[0], r[1] + sine * x[1], r[2] + sine * x[2]];
     // One Newton step to length 1: the length is off by rounding alone.
-    scaled(V::splat(1.5) - half * dot(&r, &r), &r)
+    scaled(V::splat(1.5) - V::splat(0.5) * dot(&r, &r), &r)
 }
+
+/// Angle (rad).
+const SMALL: f64 = 0.03;
+const SINC: [f64; 4] = [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0];
+const VERSINE: [f64; 4] = [0.5, -1.0 / 24.0, 1.0 / 720.0, -1.0 / 40_320.0];
 
 const SINE: [f64; 9] = [
     1.0,

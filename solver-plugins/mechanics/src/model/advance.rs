@@ -2,9 +2,9 @@
 
 use super::*;
 
-/// What moves the nodes of a model in a step.
+/// What moves or turns the nodes of a model in a step.
 #[derive(Clone, Copy)]
-struct Moving {
+pub(super) struct Moving {
     dt: f64,
     /// `v = (lo v + kick f / m) hi`.
     lo: f64,
@@ -27,24 +27,27 @@ struct Components<'a> {
     per_mass: &'a [f64],
 }
 
+/// The same of their rotations.
+pub(super) struct Turns<'a> {
+    pub(super) spin: &'a mut [f64],
+    /// Of the elements.
+    pub(super) moment: &'a [f64],
+    pub(super) external: &'a [f64],
+    pub(super) inertia: &'a [f64],
+    pub(super) per_inertia: &'a [f64],
+}
+
 /// Components whose sums are kept apart: eight nodes.
 const GROUP: usize = 24;
 
 impl Model {
     /// Velocities and positions of the next step; works of the step.
     pub(super) fn advance(&mut self) {
-        let (dt, alpha) = (self.dt, self.settings.damping);
+        let dt = self.dt;
         let weight = self.body_acceleration;
-        let moving = Moving {
-            dt,
-            lo: 1.0 / dt - 0.5 * alpha,
-            hi: 1.0 / (1.0 / dt + 0.5 * alpha),
-            kick: self.kick,
-            damping: alpha,
-            loaded: weight != [0.0; 3]
-                || !self.loads.force.is_empty()
-                || !self.sums.pressure.is_empty(),
-        };
+        let loaded =
+            weight != [0.0; 3] || !self.loads.force.is_empty() || !self.sums.pressure.is_empty();
+        let moving = self.moving(loaded);
         if self.loaded && !moving.loaded {
             // What no longer acts.
             self.external_force.fill([0.0; 3]);
@@ -114,6 +117,19 @@ impl Model {
         self.cycle += 1;
     }
 
+    /// What this step does to velocities and spins.
+    pub(super) fn moving(&self, loaded: bool) -> Moving {
+        let (dt, alpha) = (self.dt, self.settings.damping);
+        Moving {
+            dt,
+            lo: 1.0 / dt - 0.5 * alpha,
+            hi: 1.0 / (1.0 / dt + 0.5 * alpha),
+            kick: self.kick,
+            damping: alpha,
+            loaded,
+        }
+    }
+
     /// Puts the driven nodes where their drive wants them. `before`: their positions and velocities.
     fn follow(&mut self, before: &[(V, V)]) {
         let Some(drive) = &self.drive else { return };
@@ -146,6 +162,7 @@ impl Model {
         for (m, fixed) in self.per_mass.iter_mut().zip(&self.supports.fixed) {
             *m = fixed.translation(*m);
         }
+        self.set_free_inertias();
     }
 }
 
@@ -167,6 +184,68 @@ impl Moving {
         self.components(c)
     }
 
+    /// Turns a chunk, in the same way.
+    pub(super) fn turn(self, c: Turns<'_>) -> NodeWork {
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx2")]
+            fn wide(moving: Moving, c: Turns<'_>) -> NodeWork {
+                moving.turns(c)
+            }
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // Checked the line above.
+                return unsafe { wide(self, c) };
+            }
+        }
+        self.turns(c)
+    }
+
+    #[inline(always)]
+    fn turns(self, mut c: Turns<'_>) -> NodeWork {
+        let mut sums = Works::default();
+        let n = c.spin.len();
+        let whole = n - n % GROUP;
+        for start in (0..whole).step_by(GROUP) {
+            self.turn_group::<GROUP>(&mut c, start, &mut sums);
+        }
+        for start in (whole..n).step_by(3) {
+            self.turn_group::<3>(&mut c, start, &mut sums);
+        }
+        self.work(&sums)
+    }
+
+    /// Turns `N` components, three of a node, at most [`GROUP`].
+    #[inline(always)]
+    fn turn_group<const N: usize>(self, c: &mut Turns<'_>, start: usize, sums: &mut Works) {
+        let spin = to::<N>(&mut c.spin[start..]);
+        let (moment, q) = (of::<N>(&c.moment[start..]), of::<N>(&c.external[start..]));
+        let (inertia, per_inertia) = (
+            of::<N>(&c.inertia[start..]),
+            of::<N>(&c.per_inertia[start..]),
+        );
+        for i in 0..N {
+            let old = spin[i];
+            let new = (self.lo * old + self.kick * per_inertia[i] * (moment[i] + q[i])) * self.hi;
+            spin[i] = new;
+            sums.kinetic[i] += inertia[i] * (new * new);
+            let mean = 0.5 * (new + old);
+            sums.lost[i] += inertia[i] * (mean * mean);
+            sums.done[i] += if inertia[i] > 0.0 { q[i] * mean } else { 0.0 };
+        }
+    }
+
+    /// Works of a chunk.
+    #[inline(always)]
+    fn work(self, sums: &Works) -> NodeWork {
+        NodeWork {
+            kinetic: 0.5 * sums.kinetic.iter().sum::<f64>(),
+            external: sums.done.iter().sum::<f64>() * self.dt,
+            damping: sums.lost.iter().sum::<f64>() * self.damping * self.dt,
+            speed: sums.speed.iter().fold(0.0, |m, s| m.max(*s)),
+            bad: None,
+        }
+    }
+
     #[inline(always)]
     fn components(self, mut c: Components<'_>) -> NodeWork {
         let mut sums = Works::default();
@@ -178,24 +257,12 @@ impl Moving {
         for start in (whole..n).step_by(3) {
             self.group::<3>(&mut c, start, &mut sums);
         }
-        NodeWork {
-            kinetic: 0.5 * sums.kinetic.iter().sum::<f64>(),
-            external: sums.done.iter().sum::<f64>() * self.dt,
-            damping: sums.lost.iter().sum::<f64>() * self.damping * self.dt,
-            speed: sums.speed.iter().fold(0.0, |m, s| m.max(*s)),
-            bad: None,
-        }
+        self.work(&sums)
     }
 
     /// Moves `N` components, three of a node, at most [`GROUP`].
     #[inline(always)]
     fn group<const N: usize>(self, c: &mut Components<'_>, start: usize, sums: &mut Works) {
-        fn of<const N: usize>(from: &[f64]) -> &[f64; N] {
-            from.first_chunk().expect("whole groups")
-        }
-        fn to<const N: usize>(from: &mut [f64]) -> &mut [f64; N] {
-            from.first_chunk_mut().expect("whole groups")
-        }
         let x = to::<N>(&mut c.x[start..]);
         let v = to::<N>(&mut c.v[start..]);
         let f = to::<N>(&mut c.force[start..]);
@@ -222,6 +289,14 @@ impl Moving {
             *s = if v2 > *s { v2 } else { *s };
         }
     }
+}
+
+fn of<const N: usize>(from: &[f64]) -> &[f64; N] {
+    from.first_chunk().expect("whole groups")
+}
+
+fn to<const N: usize>(from: &mut [f64]) -> &mut [f64; N] {
+    from.first_chunk_mut().expect("whole groups")
 }
 
 /// Sums by place in a group.

@@ -18,19 +18,6 @@ pub(super) fn component_status(code: i32, sheet: &str) -> Result<(), MechanicsEr
     })
 }
 
-/// Writes `[node][3][LANES]` of `nodes`.
-#[inline(always)]
-pub(super) fn gather(nodes: &[[u32; LANES]], x: &[V], out: &mut [f64]) {
-    for (nodes, rows) in nodes.iter().zip(out.chunks_exact_mut(3 * LANES)) {
-        let (a, rest) = rows.split_at_mut(LANES);
-        let (b, c) = rest.split_at_mut(LANES);
-        for l in 0..LANES {
-            let p = x[nodes[l] as usize];
-            (a[l], b[l], c[l]) = (p[0], p[1], p[2]);
-        }
-    }
-}
-
 /// Velocities and spins of a batch at the half step, for elements whose nodes rotate.
 pub(super) struct Rates {
     velocity: Buffer<{ 12 * LANES }>,
@@ -185,9 +172,13 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Work
         raw.fields = batch.fields.as_mut_ptr();
     }
     if sheet.element.rotates() {
-        gather(&batch.nodes, motion.v, &mut work.rates.velocity.0);
         gather(&batch.nodes, motion.spin, &mut work.rates.spin.0);
         work.rates.attach(&mut raw);
+        if sheet.element.sizes.ignores_velocity {
+            raw.velocity = std::ptr::null();
+        } else {
+            gather(&batch.nodes, motion.v, &mut work.rates.velocity.0);
+        }
         raw.moment = work.moment.0.as_mut_ptr();
     }
     batch.status = sheet.element.forces(&raw);

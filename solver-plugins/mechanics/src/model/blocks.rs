@@ -4,6 +4,7 @@
 //! blocks around it instead of every element's forces from all over memory. Blocks do not depend on the
 //! number of threads, and neither does the order of any sum.
 
+use super::transpose::{Sum, scatter};
 use super::*;
 
 /// Batches in a block: 16 x 16 elements.
@@ -50,13 +51,13 @@ pub(super) struct Sums {
     /// Where the nodes of every [`NODE_CHUNK`] start in `more`.
     more_start: Vec<u32>,
     /// `[blocks * stride + 1]` forces of the elements on the nodes (N).
-    pub(super) force: Vec<V>,
+    pub(super) force: Vec<Sum>,
     /// The same: moments of the elements (N m); empty when no node rotates.
-    pub(super) moment: Vec<V>,
+    pub(super) moment: Vec<Sum>,
     /// Pressure (N); empty when nothing presses.
-    pub(super) pressure: Vec<V>,
+    pub(super) pressure: Vec<Sum>,
     /// Sums of a quarter of the cells' area vectors (m2), every [`NORMAL_INTERVAL`] steps.
-    pub(super) area: Vec<V>,
+    pub(super) area: Vec<Sum>,
 }
 
 impl Sums {
@@ -83,22 +84,22 @@ impl Sums {
             first,
             more_start: (0..=chunks).map(|c| start(c) as u32).collect(),
             more,
-            force: vec![[0.0; 3]; none as usize + 1],
+            force: vec![Sum::default(); none as usize + 1],
             ..Self::default()
         }
     }
 
     /// An array of zeros for more sums.
-    pub(super) fn zeros(&self) -> Vec<V> {
-        vec![[0.0; 3]; self.force.len()]
+    pub(super) fn zeros(&self) -> Vec<Sum> {
+        vec![Sum::default(); self.force.len()]
     }
 
     /// Adds the sums `of` (one of the arrays) at the nodes of a chunk to `to`.
     #[inline(always)]
-    pub(super) fn collect(&self, of: &[V], chunk: usize, to: &mut [V]) {
+    pub(super) fn collect(&self, of: &[Sum], chunk: usize, to: &mut [V]) {
         let base = chunk * NODE_CHUNK;
         for (t, place) in to.iter_mut().zip(&self.first[base..]) {
-            let part = &of[*place as usize];
+            let part = &of[*place as usize].0;
             for c in 0..3 {
                 t[c] += part[c];
             }
@@ -106,17 +107,18 @@ impl Sums {
         let (start, end) = (self.more_start[chunk], self.more_start[chunk + 1]);
         for (node, place) in &self.more[start as usize..end as usize] {
             let t = &mut to[*node as usize - base];
-            *t = add(*t, of[*place as usize]);
+            let [x, y, z, _] = of[*place as usize].0;
+            *t = add(*t, [x, y, z]);
         }
     }
 }
 
 /// A block's part of the arrays of [`Sums`].
 pub(super) struct Part<'a> {
-    force: &'a mut [V],
-    moment: &'a mut [V],
-    pressure: &'a mut [V],
-    area: &'a mut [V],
+    force: &'a mut [Sum],
+    moment: &'a mut [Sum],
+    pressure: &'a mut [Sum],
+    area: &'a mut [Sum],
 }
 
 /// An order of points in which every run of `group` lies close together: halves by the longer extent, cut at
@@ -166,8 +168,8 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
         return;
     }
     // Arrays that are not wanted give no chunks.
-    fn chunks(array: &mut [V], stride: usize, n: usize) -> Vec<&mut [V]> {
-        let mut chunks: Vec<&mut [V]> = array.chunks_exact_mut(stride).take(n).collect();
+    fn chunks(array: &mut [Sum], stride: usize, n: usize) -> Vec<&mut [Sum]> {
+        let mut chunks: Vec<&mut [Sum]> = array.chunks_exact_mut(stride).take(n).collect();
         chunks.resize_with(n, Default::default);
         chunks
     }
@@ -197,10 +199,10 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
 }
 
 fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>) {
-    part.force.fill([0.0; 3]);
-    part.moment.fill([0.0; 3]);
-    part.pressure.fill([0.0; 3]);
-    part.area.fill([0.0; 3]);
+    part.force.fill(Sum::default());
+    part.moment.fill(Sum::default());
+    part.pressure.fill(Sum::default());
+    part.area.fill(Sum::default());
     block.failed = None;
     let mut work = Workspace::new();
     for batch in &mut block.batches {
@@ -210,9 +212,9 @@ fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>) {
             continue;
         }
         let (places, count) = (&batch.places, batch.count as usize);
-        scatter(places, count, &work.force.0, -1.0, part.force);
+        scatter_all(places, count, &work.force.0, true, part.force);
         if present.sheets[batch.sheet as usize].element.rotates() {
-            scatter(places, count, &work.moment.0, -1.0, part.moment);
+            scatter_all(places, count, &work.moment.0, true, part.moment);
         }
         if batch.is_pressed {
             let pressure = std::array::from_fn(|l| {
@@ -220,12 +222,12 @@ fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>) {
                     - batch.pressed[l][1] * present.pressures.above
             });
             pressure_forces(&work.area.0, &pressure, &mut work.load.0);
-            scatter(places, count, &work.load.0, 1.0, part.pressure);
+            scatter_all(places, count, &work.load.0, false, part.pressure);
         }
         if present.areas {
             let rows = &work.area.0[..3 * LANES];
             for places in places {
-                scatter_node(places, count, rows, 1.0, part.area);
+                scatter(places, count, rows, false, part.area);
             }
         }
     }
@@ -245,7 +247,7 @@ pub(super) fn run_patch_blocks(
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .for_each(|(block, force)| {
-            force.fill([0.0; 3]);
+            force.fill(Sum::default());
             block.failed = None;
             let mut work = PatchWorkspace::new();
             for batch in &mut block.batches {
@@ -255,31 +257,17 @@ pub(super) fn run_patch_blocks(
                     continue;
                 }
                 // Unused nodes of a patch repeat its centre and have no force.
-                let rows = work.force.0.chunks_exact(3 * LANES);
-                for (places, rows) in batch.places.iter().zip(rows) {
-                    scatter_node(places, batch.count as usize, rows, -1.0, force);
-                }
+                let count = batch.count as usize;
+                scatter_all(&batch.places, count, &work.force.0, true, force);
             }
         });
 }
 
-/// Adds `sign` times the rows `[4][3][LANES]` at the places of the first `count` lanes.
+/// Adds or takes off the rows `[node][3][LANES]` at the places of the first `count` lanes.
 #[inline(always)]
-fn scatter(places: &[[u16; LANES]; 4], count: usize, rows: &[f64], sign: f64, to: &mut [V]) {
+fn scatter_all(places: &[[u16; LANES]], count: usize, rows: &[f64], minus: bool, to: &mut [Sum]) {
     for (places, rows) in places.iter().zip(rows.chunks_exact(3 * LANES)) {
-        scatter_node(places, count, rows, sign, to);
-    }
-}
-
-#[inline(always)]
-fn scatter_node(places: &[u16; LANES], count: usize, rows: &[f64], sign: f64, to: &mut [V]) {
-    let (x, rest) = rows[..3 * LANES].split_at(LANES);
-    let (y, z) = rest.split_at(LANES);
-    for l in 0..count.min(LANES) {
-        let t = &mut to[places[l] as usize];
-        t[0] += sign * x[l];
-        t[1] += sign * y[l];
-        t[2] += sign * z[l];
+        scatter(places, count, rows, minus, to);
     }
 }
 
@@ -314,7 +302,7 @@ mod tests {
         let mut sums = Sums::new(301, &blocks);
         assert_eq!(sums.stride, 5);
         for (i, f) in sums.force[..10].iter_mut().enumerate() {
-            *f = [10f64.powi(i as i32), 0.0, 1.0];
+            *f = Sum([10f64.powi(i as i32), 0.0, 1.0, 0.0]);
         }
         let mut to = vec![[0.0; 3]; 301];
         for (chunk, to) in to.chunks_mut(NODE_CHUNK).enumerate() {

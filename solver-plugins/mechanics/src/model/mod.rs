@@ -8,12 +8,14 @@ mod build;
 mod query;
 mod rotation;
 mod support;
+mod transpose;
 
 use batch::*;
 use blocks::*;
 use rotation::Rotations;
 pub use support::{Fixed, NodalLoad};
 use support::{Loads, Supports};
+use transpose::gather;
 
 use crate::contact::{ContactEnergy, ContactSettings, RigidContact, SheetContact, Surface};
 use crate::energy::Ledger;

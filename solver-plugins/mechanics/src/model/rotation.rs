@@ -4,6 +4,7 @@
 //! gyroscopic term: `I dw/dt = moment`. Elements turn their own directors by the spin; the model keeps
 //! no orientation.
 
+use super::advance::Turns;
 use super::*;
 
 /// Rotational state; per-node arrays in the model's numbering.
@@ -14,6 +15,10 @@ pub(super) struct Rotations {
     pub(super) inertia: Vec<f64>,
     /// `[n]` moments of the elements (N m).
     moment: Vec<V>,
+    /// `[n]` inertia of a node by component (kg m2); 0: it does not rotate, or is driven.
+    free_inertia: Vec<V>,
+    /// `[n]` what a moment accelerates (1/(kg m2)); 0: nothing.
+    per_inertia: Vec<V>,
 }
 
 impl Rotations {
@@ -22,7 +27,15 @@ impl Rotations {
             spin: vec![[0.0; 3]; n],
             inertia: vec![0.0; n],
             moment: vec![[0.0; 3]; n],
+            free_inertia: Vec::new(),
+            per_inertia: Vec::new(),
         }
+    }
+
+    /// Holds components of a node's rotation at zero.
+    pub(super) fn fix(&mut self, node: usize, fixed: Fixed) {
+        self.spin[node] = fixed.rotation(self.spin[node]);
+        self.per_inertia[node] = fixed.rotation(self.per_inertia[node]);
     }
 }
 
@@ -32,49 +45,74 @@ impl Model {
         self.rotations.as_deref().map(|r| r.spin.as_slice())
     }
 
-    /// Sums the moments; spins of the next half step; their kinetic energy and works. Uses the same central
-    /// differences and the same mass-proportional damping as the translations.
-    pub(super) fn rotate(&mut self) {
+    /// Inertias as [`Model::rotate`] wants them.
+    pub(super) fn set_free_inertias(&mut self) {
         let Some(r) = self.rotations.as_deref_mut() else {
             return;
         };
+        let per = |i: &f64| if *i > 0.0 { [1.0 / i; 3] } else { [0.0; 3] };
+        r.free_inertia = r.inertia.iter().map(|i| [*i; 3]).collect();
+        r.per_inertia = r.inertia.iter().map(per).collect();
+        for n in &self.driven {
+            r.free_inertia[*n as usize] = [0.0; 3];
+            r.per_inertia[*n as usize] = [0.0; 3];
+        }
+        for (n, fixed) in self.supports.fixed.iter().enumerate() {
+            r.fix(n, *fixed);
+        }
+    }
+
+    /// Sums the moments; spins of the next half step; their kinetic energy and works. Uses the same central
+    /// differences and the same mass-proportional damping as the translations.
+    pub(super) fn rotate(&mut self) {
+        let moving = self.moving(false);
+        let Some(r) = self.rotations.as_deref_mut() else {
+            return;
+        };
+        let before: Vec<V> = (self.driven.iter()).map(|n| r.spin[*n as usize]).collect();
+        let (sums, loads, factor) = (&self.sums, &self.loads.moment, self.load_factor);
+        let (inertia, per_inertia) = (&r.free_inertia, &r.per_inertia);
+        let works: Vec<NodeWork> = r
+            .spin
+            .par_chunks_mut(NODE_CHUNK)
+            .zip_eq(r.moment.par_chunks_mut(NODE_CHUNK))
+            .enumerate()
+            .map(|(chunk, (spin, moment))| {
+                let nodes = chunk * NODE_CHUNK..chunk * NODE_CHUNK + spin.len();
+                moment.fill([0.0; 3]);
+                sums.collect(&sums.moment, chunk, moment);
+                let mut external = [[0.0; 3]; NODE_CHUNK];
+                if !loads.is_empty() {
+                    for (q, load) in external.iter_mut().zip(&loads[nodes.clone()]) {
+                        *q = scale(*load, factor);
+                    }
+                }
+                moving.turn(Turns {
+                    external: external[..spin.len()].as_flattened(),
+                    spin: spin.as_flattened_mut(),
+                    moment: moment.as_flattened(),
+                    inertia: inertia[nodes.clone()].as_flattened(),
+                    per_inertia: per_inertia[nodes].as_flattened(),
+                })
+            })
+            .collect();
+        let mut work = works.into_iter().fold(NodeWork::default(), NodeWork::add);
         let turning = Turning {
             dt: self.dt,
             damping: self.settings.damping,
             kick: self.kick,
             inertia: &r.inertia,
             fixed: &self.supports.fixed,
-            loads: &self.loads.moment,
-            load_factor: self.load_factor,
+            loads,
+            load_factor: factor,
         };
-        let sums = &self.sums;
-        let nodes_held = &self.held;
-        let works: Vec<NodeWork> = r
-            .spin
-            .par_chunks_mut(NODE_CHUNK)
-            .zip_eq(r.moment.par_chunks_mut(NODE_CHUNK))
-            .enumerate()
-            .map(|(chunk, (spins, moments))| {
-                let mut work = NodeWork::default();
-                moments.fill([0.0; 3]);
-                sums.collect(&sums.moment, chunk, moments);
-                for (i, (spin, moment)) in spins.iter_mut().zip(moments).enumerate() {
-                    let n = chunk * NODE_CHUNK + i;
-                    if turning.inertia[n] > 0.0 && nodes_held[n] == Held::Free {
-                        *spin = turning.free(n, *spin, *moment, &mut work);
-                    }
-                }
-                work
-            })
-            .collect();
-        let mut work = works.into_iter().fold(NodeWork::default(), NodeWork::add);
         let middle = self.time + 0.5 * self.dt;
-        for (k, n) in self.driven.iter().enumerate() {
+        for (k, (n, old)) in self.driven.iter().zip(before).enumerate() {
             let n = *n as usize;
             if turning.inertia[n] <= 0.0 {
                 continue;
             }
-            let (old, moment) = (r.spin[n], r.moment[n]);
+            let moment = r.moment[n];
             r.spin[n] = match self.drive.as_ref().and_then(|d| d.spin(k, middle)) {
                 None => turning.free(n, old, moment, &mut work),
                 Some(next) => {
@@ -88,11 +126,15 @@ impl Model {
                 }
             };
         }
+        if !work.kinetic.is_finite() {
+            let bad = |w: &V| !w.iter().all(|c| c.is_finite());
+            work.bad = work.bad.or(r.spin.iter().position(bad).map(|n| n as u32));
+        }
         self.work = self.work.add(work);
     }
 }
 
-/// What turns the nodes in a step.
+/// What turns a driven node whose drive leaves its rotation free.
 struct Turning<'a> {
     dt: f64,
     damping: f64,

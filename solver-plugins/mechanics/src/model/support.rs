@@ -70,6 +70,9 @@ impl Model {
         self.supports.fixed[node as usize] = fixed;
         self.v[node as usize] = fixed.translation(self.v[node as usize]);
         self.per_mass[node as usize] = fixed.translation(self.per_mass[node as usize]);
+        if let Some(r) = self.rotations.as_deref_mut() {
+            r.fix(node as usize, fixed);
+        }
     }
 
     /// Sets the nodal loads; [`Model::load_factor`] multiplies them.
