@@ -100,20 +100,14 @@ pub struct Batch {
     pub nodes: [[u32; LANES]; 4],
     /// Places of the nodes in the sums of the block.
     pub places: [[u16; LANES]; 4],
-    /// Shares of the pressure from below and from above, by lane.
-    pub pressed: [[f64; 2]; LANES],
-    /// Whether anything presses on any lane.
-    pub is_pressed: bool,
+    /// Shares of the pressure from below and from above, by lane; empty when nothing presses on any.
+    pub pressed: Vec<[f64; 2]>,
     /// Layers by lane.
     pub layers: [f64; LANES],
     /// Whether any lane stands for more than one layer.
     pub layered: bool,
     /// Mass scaling factor by lane.
     pub mass_factor: [f64; LANES],
-    /// `[4][LANES]` element masses before scaling (kg).
-    pub mass: Aligned,
-    /// `[4][LANES]` rotary inertias before scaling (kg m2); empty with 3 degrees of freedom per node.
-    pub inertia: Aligned,
     /// `[PF_ENERGIES][LANES]` energies of the last call (J).
     pub energy: Aligned,
     /// `[constants][LANES]`.

@@ -99,7 +99,6 @@ pub struct RigidItem {
     pub normal_force: f64,
     /// Penetration (m), 0 when apart.
     pub penetration: f64,
-    energy: ContactEnergy,
 }
 
 impl RigidItem {
@@ -116,7 +115,6 @@ impl RigidItem {
             force: [0.0; 3],
             normal_force: 0.0,
             penetration: 0.0,
-            energy: ContactEnergy::default(),
         }
     }
 
@@ -211,9 +209,9 @@ impl RigidContact {
                         let (distance, gradient) = surface.distance(sub(x[n], motion.shift));
                         let gap = distance - item.offset;
                         if gap <= 0.0 || item.multiplier > 0.0 {
-                            touch(item, gap, gradient, sub(v[n], motion.velocity), &law);
+                            let relative = sub(v[n], motion.velocity);
+                            span.energy.add(&touch(item, gap, gradient, relative, &law));
                             span.force = add(span.force, item.force);
-                            span.energy.add(&item.energy);
                             span.touches = true;
                         } else {
                             item.part();
@@ -280,8 +278,8 @@ struct Law {
     augmentation: f64,
 }
 
-/// Force of an item in touch, or so lately that it still has a multiplier. `v`: relative to the surface.
-fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) {
+/// Force of an item in touch, or so lately that it still has a multiplier; its energy. `v`: relative to the surface.
+fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) -> ContactEnergy {
     let (k, c) = (item.stiffness, item.damping);
     let vn = dot(v, g);
     let (held, work) = (item.multiplier, item.work);
@@ -316,5 +314,5 @@ fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) {
     item.multiplier = normal.multiplier;
     item.work = normal.work;
     item.penetration = (-gap).max(0.0);
-    item.energy = energy;
+    energy
 }

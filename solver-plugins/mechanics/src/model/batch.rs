@@ -158,7 +158,7 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Work
     let sheet = &present.sheets[batch.sheet as usize];
     let motion = present.motion;
     gather(&batch.nodes, motion.x, &mut work.position.0);
-    if batch.is_pressed || present.areas {
+    if !batch.pressed.is_empty() || present.areas {
         cell_areas_dispatch(&work.position.0, &mut work.area.0);
     }
     let mut raw = empty_element_batch(sheet, motion.dt, &work.position.0);

@@ -216,7 +216,7 @@ fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>) {
         if present.sheets[batch.sheet as usize].element.rotates() {
             scatter_all(places, count, &work.moment.0, true, part.moment);
         }
-        if batch.is_pressed {
+        if !batch.pressed.is_empty() {
             let pressure = std::array::from_fn(|l| {
                 batch.pressed[l][0] * present.pressures.below
                     - batch.pressed[l][1] * present.pressures.above

@@ -257,6 +257,8 @@ impl Model {
         let mut moment = Aligned::zeros(12 * LANES);
         let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
         let mut step = Aligned::zeros(LANES);
+        let mut mass = Aligned::zeros(4 * LANES);
+        let mut inertia = Aligned::zeros(4 * LANES);
         let rates = Rates::zero();
         let blocks = &mut self.blocks[sheet.block_range.0..sheet.block_range.1];
         let batches = blocks.iter_mut().flat_map(|b| &mut b.batches);
@@ -267,9 +269,11 @@ impl Model {
             raw.constants = batch.constants.as_mut_ptr();
             raw.history = batch.history.as_mut_ptr();
             raw.material_history = batch.material_history.as_mut_ptr();
-            raw.mass = batch.mass.as_mut_ptr();
+            mass.fill(0.0);
+            inertia.fill(0.0);
+            raw.mass = mass.as_mut_ptr();
             if sheet.element.rotates() {
-                raw.inertia = batch.inertia.as_mut_ptr();
+                raw.inertia = inertia.as_mut_ptr();
             }
             component_status(sheet.element.initialise(&raw), &sheet.name)?;
             raw.axis = std::ptr::null();
@@ -298,14 +302,14 @@ impl Model {
                     .max(1.0);
                 batch.mass_factor[l] = factor;
                 for k in 0..4 {
-                    let own = batch.mass[k * LANES + l] * batch.layers[l];
+                    let own = mass[k * LANES + l] * batch.layers[l];
                     let node = batch.nodes[k][l] as usize;
                     self.mass[node] += own * factor;
                     self.own_mass[node] += own;
                     if let Some(r) = self.rotations.as_deref_mut()
                         && sheet.element.rotates()
                     {
-                        r.inertia[node] += batch.inertia[k * LANES + l] * batch.layers[l] * factor;
+                        r.inertia[node] += inertia[k * LANES + l] * batch.layers[l] * factor;
                     }
                     sheet.added_mass += own * (factor - 1.0);
                 }
@@ -329,7 +333,7 @@ impl Model {
             .fold(f64::INFINITY, f64::min);
         self.sums = Sums::new(n, &self.blocks);
         self.sums.area = self.sums.zeros();
-        let pressed = |b: &Block<Batch>| b.batches.iter().any(|b| b.is_pressed);
+        let pressed = |b: &Block<Batch>| b.batches.iter().any(|b| !b.pressed.is_empty());
         if self.blocks.iter().any(pressed) {
             self.sums.pressure = self.sums.zeros();
         }
@@ -426,32 +430,29 @@ fn element_batch(
     block: &Block<Batch>,
 ) -> Batch {
     let s = spec.element.sizes;
-    let rotates = spec.element.rotates();
     let membrane_history = spec.element.material.reference().sizes().membrane_history;
     // Lanes beyond the last element repeat it.
     let cell = |l: usize| chunk[l.min(chunk.len() - 1)] as usize;
     let nodes: [[u32; LANES]; 4] =
         std::array::from_fn(|k| std::array::from_fn(|l| cells[cell(l)][k]));
     let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[cell(l)]);
-    let pressed: [[f64; 2]; LANES] = std::array::from_fn(|l| match spec.pressed[cell(l)] {
+    let shares = |l: usize| match spec.pressed[cell(l)] {
         Pressed::No => [0.0, 0.0],
         Pressed::Below => [1.0, 0.0],
         Pressed::Above => [0.0, 1.0],
         Pressed::Both => [1.0, 1.0],
-    });
+    };
+    let is_pressed = (0..LANES).any(|l| shares(l) != [0.0; 2]);
     Batch {
         sheet,
         count: chunk.len() as u32,
         places: nodes.map(|n| n.map(|n| block.place(n))),
         nodes,
-        is_pressed: pressed.iter().any(|w| *w != [0.0; 2]),
-        pressed,
+        pressed: (0..LANES).filter(|_| is_pressed).map(shares).collect(),
         layered: layers.iter().any(|k| *k != 1.0),
         layers,
         mass_factor: [1.0; LANES],
-        mass: Aligned::zeros(4 * LANES),
         energy: Aligned::zeros(PF_ENERGIES * LANES),
-        inertia: Aligned::zeros(if rotates { 4 * LANES } else { 0 }),
         constants: Aligned::zeros(s.constants * LANES),
         history: Aligned::zeros(s.history * LANES),
         material_history: Aligned::zeros(s.material_points * membrane_history * LANES),

@@ -1,0 +1,140 @@
+//! A formed ply met by vertical lines.
+
+use plyflow_surface::vector::Vec3;
+
+/// What a vertical line meets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// z (m).
+    pub height: f64,
+    /// Shear angle of the cell (rad).
+    pub shear: f64,
+}
+
+/// Cells of a formed ply by their place in the plane.
+pub struct Cut<'a> {
+    points: &'a [Vec3],
+    cells: &'a [u32],
+    shear: &'a [f64],
+    low: [f64; 2],
+    size: f64,
+    count: [usize; 2],
+    bins: Vec<Vec<u32>>,
+}
+
+impl<'a> Cut<'a> {
+    /// Of a ply with `[n]` points (m), quads (four nodes each) and the `[cells]` shear angles (rad).
+    pub fn new(points: &'a [Vec3], cells: &'a [u32], shear: &'a [f64]) -> Self {
+        let bounds = |c: usize| {
+            let of = points.iter().map(|p| p[c]);
+            (
+                of.clone().fold(f64::INFINITY, f64::min),
+                of.fold(f64::NEG_INFINITY, f64::max),
+            )
+        };
+        let ([x0, x1], [y0, y1]) = (bounds(0).into(), bounds(1).into());
+        // About one cell a bin.
+        let size = ((x1 - x0) * (y1 - y0) / (cells.len() / 4).max(1) as f64)
+            .sqrt()
+            .max(1e-9);
+        let count = [x1 - x0, y1 - y0].map(|w| (w / size) as usize + 1);
+        let mut cut = Self {
+            points,
+            cells,
+            shear,
+            low: [x0, y0],
+            size,
+            count,
+            bins: vec![Vec::new(); count[0] * count[1]],
+        };
+        for (cell, nodes) in cells.chunks_exact(4).enumerate() {
+            let place = |c: usize| {
+                let of = nodes.iter().map(|n| cut.place(points[*n as usize][c], c));
+                (of.clone().min().unwrap_or(0), of.max().unwrap_or(0))
+            };
+            let ((i0, i1), (j0, j1)) = (place(0), place(1));
+            for j in j0..=j1 {
+                for i in i0..=i1 {
+                    cut.bins[j * count[0] + i].push(cell as u32);
+                }
+            }
+        }
+        cut
+    }
+
+    fn place(&self, x: f64, c: usize) -> usize {
+        (((x - self.low[c]) / self.size).max(0.0) as usize).min(self.count[c] - 1)
+    }
+
+    /// The highest place of the ply over `(x, y)` (m); `None` beside the ply.
+    pub fn top(&self, at: [f64; 2]) -> Option<Hit> {
+        let beyond = |c: usize| {
+            let along = (at[c] - self.low[c]) / self.size;
+            along < 0.0 || along > self.count[c] as f64
+        };
+        if beyond(0) || beyond(1) {
+            return None;
+        }
+        let bin = self.place(at[1], 1) * self.count[0] + self.place(at[0], 0);
+        let mut best: Option<Hit> = None;
+        for cell in &self.bins[bin] {
+            let nodes = &self.cells[4 * *cell as usize..4 * *cell as usize + 4];
+            for corners in [[0, 1, 2], [0, 2, 3]] {
+                let triangle = corners.map(|k| self.points[nodes[k] as usize]);
+                if let Some(height) = height(triangle, at)
+                    && best.is_none_or(|b| height > b.height)
+                {
+                    let shear = self.shear[*cell as usize];
+                    best = Some(Hit { height, shear });
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Height of a triangle over a place inside of it.
+fn height([a, b, c]: [Vec3; 3], at: [f64; 2]) -> Option<f64> {
+    let twice = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    };
+    let flat = |v: Vec3| [v[0], v[1]];
+    let whole = twice(flat(a), flat(b), flat(c));
+    // A wall has no height over its foot.
+    if whole.abs() < 1e-16 {
+        return None;
+    }
+    let weights = [
+        twice(at, flat(b), flat(c)),
+        twice(flat(a), at, flat(c)),
+        twice(flat(a), flat(b), at),
+    ]
+    .map(|w| w / whole);
+    let inside = weights.iter().all(|w| *w >= -1e-9);
+    inside.then(|| weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_upper_of_two_layers_is_met_and_nothing_beside_them() {
+        // A strip that is folded over: 0..2 at z = 0, back to x = 1 at z = 1.
+        let points: Vec<Vec3> = [0.0, 1.0, 2.0]
+            .iter()
+            .map(|x| [*x, 0.0, 0.0])
+            .chain([[2.0, 0.0, 1.0], [1.0, 0.0, 1.0]])
+            .flat_map(|p| [p, [p[0], 1.0, p[2]]])
+            .collect();
+        let cells: Vec<u32> = (0..4u32)
+            .flat_map(|i| [2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1])
+            .collect();
+        let shear = [0.1, 0.2, 0.3, 0.4];
+        let cut = Cut::new(&points, &cells, &shear);
+        let at = |x: f64| cut.top([x, 0.4]);
+        assert_eq!(at(0.5).map(|h| (h.height, h.shear)), Some((0.0, 0.1)));
+        assert_eq!(at(1.5).map(|h| (h.height, h.shear)), Some((1.0, 0.4)));
+        assert_eq!((at(-0.1), at(2.1), cut.top([0.5, 1.2])), (None, None, None));
+    }
+}
