@@ -42,8 +42,12 @@ pub enum Tool {
     JoggleSpar(JoggleSpar),
     /// A block with a flat top that lies just above the bed.
     Flat(FlatTool),
+    /// U-shaped spar with a recess in its top and sides.
+    RampedSpar(RampedSpar),
     /// Half a sphere on the bed.
     Hemisphere(HemisphereTool),
+    /// A tetrahedron with a rounded top and edges.
+    Tetrahedron(TetrahedronTool),
     /// A triangulated surface.
     Stl(StlTool),
 }
@@ -100,6 +104,63 @@ pub struct Joggle {
     /// steps sideways, of the step and rise together.
     #[schemars(extend("x-minimum" = "0 mm"))]
     pub fillet: Length,
+}
+
+/// A spar of trapezoidal section whose top and side walls fall back over a ramp, stay back, and return over a ramp of
+/// the same length: the kind of tool of thesis chapter 6. With a ramp of 180 mm a depth of 10 mm is its ratio of 1:18 for
+/// the top, and a side depth of 5 mm its 1:36 for the sides; the other sizes are not in the thesis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RampedSpar {
+    /// Length along x, measured at the foot on the bed.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub length: Length,
+    /// Width of the top face between the theoretical corners, outside of the recess.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub top_width: Length,
+    /// Height of the top face over the bed outside of the recess.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub height: Length,
+    /// Angle of the side and end walls from the vertical.
+    #[schemars(extend("x-minimum" = "0 deg", "x-maximum" = "60 deg"))]
+    pub draft: Angle,
+    /// Radius of the fillets between top and walls, and where the ramps begin and end.
+    #[schemars(extend("x-minimum" = "0 mm"))]
+    pub fillet: Length,
+    /// Length of the recess's bottom along x, in the middle of the spar.
+    #[schemars(extend("x-minimum" = "0 mm"))]
+    pub recess: Length,
+    /// Length of each ramp along x, its fillets included.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub ramp: Length,
+    /// How far the top falls back.
+    #[schemars(extend("x-minimum" = "0 mm"))]
+    pub depth: Length,
+    /// How far each side wall falls back.
+    #[schemars(extend("x-minimum" = "0 mm"))]
+    pub side_depth: Length,
+    /// Largest edge of the triangulation.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub facet_size: Length,
+}
+
+/// A pyramid over an equilateral triangle, one edge of which is parallel to x at y < 0, with its axis on z. Its three
+/// edges and its top are rounded; on the bed it ends sharply.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TetrahedronTool {
+    /// Edge of the triangle on the bed, between the theoretical corners.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub edge: Length,
+    /// Height of the theoretical top over the bed, before rounding; edge * sqrt(2/3) for a regular tetrahedron.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub height: Length,
+    /// Radius of the edges and of the top.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub radius: Length,
+    /// Largest edge of the triangulation.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub facet_size: Length,
 }
 
 /// A flat block.

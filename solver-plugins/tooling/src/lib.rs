@@ -12,6 +12,7 @@ pub mod sdf;
 mod spar;
 mod stl;
 mod sweep;
+mod tetrahedron;
 mod tree;
 mod vector;
 
@@ -38,6 +39,8 @@ pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
     match tool {
         Tool::JoggleSpar(spar) => spar::joggle_spar(spar),
         Tool::Flat(flat) => spar::flat(flat),
+        Tool::RampedSpar(ramped) => spar::ramped_spar(ramped),
+        Tool::Tetrahedron(t) => tetrahedron::tetrahedron(t),
         Tool::Hemisphere(h) => hemisphere::hemisphere(h.radius.si(), h.facet_size.si()),
         Tool::Stl(s) => {
             let path = folder.join(&s.file);

@@ -5,15 +5,97 @@ use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::ramp::Ramp;
 use crate::sweep::{JoggleShape, Sweep};
-use plyflow_model::scene::{FlatTool, Joggle, JoggleSpar};
+use plyflow_model::scene::{FlatTool, Joggle, JoggleSpar, RampedSpar};
+use plyflow_model::units::{Angle, Length};
 
 const SPAR: &str = "joggle_spar";
 const FLAT: &str = "flat";
+const RAMPED: &str = "ramped_spar";
 
 /// The spar's closed surface, standing on z = 0.
 pub(crate) fn joggle_spar(spar: &JoggleSpar) -> Result<ToolMesh, ToolError> {
     positive(SPAR, "facet_size", spar.facet_size.si())?;
     Ok(spar_sweep(spar)?.mesh(spar.facet_size.si(), CHORD_TOLERANCE))
+}
+
+/// The ramped spar's closed surface, standing on z = 0: a joggle down, and one up again.
+pub(crate) fn ramped_spar(spar: &RampedSpar) -> Result<ToolMesh, ToolError> {
+    for (name, value) in [
+        ("recess", spar.recess.si()),
+        ("depth", spar.depth.si()),
+        ("side_depth", spar.side_depth.si()),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            let expected = "it must be at least 0 mm".into();
+            return Err(ToolError::length(
+                RAMPED,
+                name,
+                value,
+                expected,
+                "give a length",
+            ));
+        }
+    }
+    let half = 0.5 * spar.recess.si();
+    let ramp = |start: f64, way: f64| Joggle {
+        start: Length(start),
+        length: spar.ramp,
+        rise: Length(way * spar.depth.si()),
+        skew: Angle(0.0),
+        side_step: [Length(way * spar.side_depth.si()); 2],
+        fillet: spar.fillet,
+    };
+    let joggled = JoggleSpar {
+        length: spar.length,
+        top_width: spar.top_width,
+        height: spar.height,
+        draft: spar.draft,
+        fillet: spar.fillet,
+        corner: None,
+        joggles: vec![ramp(-half - spar.ramp.si(), -1.0), ramp(half, 1.0)],
+        facet_size: spar.facet_size,
+    };
+    joggle_spar(&joggled).map_err(|e| ramped(spar, e))
+}
+
+/// What is wrong with the joggles that stand for the ramps, in the words of the ramped spar.
+fn ramped(spar: &RampedSpar, e: ToolError) -> ToolError {
+    let ToolError::Parameter {
+        parameter,
+        given,
+        expected,
+        remedy,
+        ..
+    } = e
+    else {
+        return e;
+    };
+    match parameter.strip_prefix("joggles").map(|p| &p[4..]) {
+        Some("start") => ToolError::length(
+            RAMPED,
+            "recess",
+            spar.recess.si(),
+            format!(
+                "with its two ramps of {} it must fit between the rounded ends",
+                mm(spar.ramp.si())
+            ),
+            "lengthen the spar, or shorten recess or ramps",
+        ),
+        Some(field) => ToolError::Parameter {
+            tool: RAMPED,
+            parameter: if field == "length" { "ramp" } else { field }.into(),
+            given,
+            expected,
+            remedy,
+        },
+        None => ToolError::Parameter {
+            tool: RAMPED,
+            parameter,
+            given,
+            expected,
+            remedy,
+        },
+    }
 }
 
 /// The block's closed surface, standing on z = 0.

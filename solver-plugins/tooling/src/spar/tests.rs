@@ -291,3 +291,76 @@ fn impossible_parameters_are_errors_that_name_the_parameter_and_its_bound() {
     );
     check(text(&|s| s.draft = Angle(1.4)), &["draft is 80.21 deg"]);
 }
+
+/// A spar with the thesis' ratios of its ramps, 1:18 and 1:36.
+fn recessed() -> RampedSpar {
+    RampedSpar {
+        length: mm(640.0),
+        top_width: mm(120.0),
+        height: mm(60.0),
+        draft: Angle(0.1),
+        fillet: mm(10.0),
+        recess: mm(100.0),
+        ramp: mm(180.0),
+        depth: mm(10.0),
+        side_depth: mm(5.0),
+        facet_size: mm(5.0),
+    }
+}
+
+#[test]
+fn a_ramped_spar_falls_back_in_its_middle_by_depth_and_side_depth() {
+    let spar = recessed();
+    let mesh = ramped_spar(&spar).unwrap();
+    assert!(mesh.is_watertight() && mesh.longest_edge() <= 0.005);
+    let top = |x: f64| {
+        let near = mesh.points.iter().filter(|p| (p[0] - x).abs() < 3e-3);
+        near.map(|p| p[2]).fold(0.0, f64::max)
+    };
+    assert!((top(0.0) - 0.050).abs() < 1e-9, "{}", top(0.0));
+    assert!((top(0.28) - 0.060).abs() < 1e-9 && (top(-0.28) - 0.060).abs() < 1e-9);
+    // At 30 mm over the bed the walls stand 5 mm further in, and nearer by the draft: the top is as far over it as it was.
+    let wall = |x: f64| {
+        let on = mesh.points.iter();
+        let on = on.filter(|p| (p[0] - x).abs() < 3e-3 && (p[2] - 0.030).abs() < 2.5e-3);
+        on.map(|p| p[1] + (p[2] - 0.030) * 0.1f64.tan())
+            .fold(0.0, f64::max)
+    };
+    let inward = wall(0.25) - wall(0.0);
+    assert!(
+        (inward - 0.005 - 0.010 * 0.1f64.tan()).abs() < 1e-4,
+        "{inward}"
+    );
+    // It is symmetric about both middle planes.
+    let [lo, hi] = mesh.bounds();
+    assert!((lo[0] + hi[0]).abs() < 1e-9 && (lo[1] + hi[1]).abs() < 1e-9);
+}
+
+#[test]
+fn a_ramped_spar_tells_what_does_not_fit_in_its_own_words() {
+    let told = |change: &dyn Fn(&mut RampedSpar)| {
+        let mut spar = recessed();
+        change(&mut spar);
+        ramped_spar(&spar).unwrap_err().to_string()
+    };
+    for (text, says) in [
+        (
+            told(&|s| s.recess = mm(250.0)),
+            ["`ramped_spar`: recess is 250 mm", "two ramps of 180 mm"],
+        ),
+        (
+            told(&|s| s.ramp = mm(5.0)),
+            ["`ramped_spar`: ramp is 5 mm", "need at least"],
+        ),
+        (
+            told(&|s| s.depth = mm(-1.0)),
+            ["`ramped_spar`: depth is -1 mm", "at least 0 mm"],
+        ),
+        (
+            told(&|s| s.height = mm(10.0)),
+            ["`ramped_spar`: height is 10 mm", "raise the tool"],
+        ),
+    ] {
+        assert!(says.iter().all(|w| text.contains(w)), "{text}");
+    }
+}
