@@ -32,6 +32,16 @@ pub struct Row {
 }
 
 impl Row {
+    /// What it is about, in a list.
+    fn title(&self) -> String {
+        let e = self.expected.as_ref();
+        if e.is_some_and(|e| !e.mean_over.is_empty()) {
+            format!("{} ({})", self.name, self.step)
+        } else {
+            format!("{}.{}", self.step, self.name)
+        }
+    }
+
     /// `ok` or `missed` when something is expected.
     pub fn verdict(&self) -> Option<&'static str> {
         let e = self.expected.as_ref()?;
@@ -334,7 +344,7 @@ pub fn check(rows: &[Row]) -> Done {
     let missed: Vec<String> = rows
         .iter()
         .filter(|r| r.verdict() == Some("missed"))
-        .map(|r| format!("{}.{}", r.step, r.name))
+        .map(Row::title)
         .collect();
     if missed.is_empty() {
         return Ok(());
@@ -427,9 +437,6 @@ mod tests {
         rows.extend([of("t", "a", 3.0), of("t", "a", 3.0)]);
         let all = mean(&e, &rows);
         assert_eq!((all.value, all.verdict()), (Some(2.0), Some("ok")));
-        assert_eq!(
-            (all.step.as_str(), all.name.as_str()),
-            ("s, t", "mean of n")
-        );
+        assert_eq!(all.title(), "mean of n (s, t)");
     }
 }

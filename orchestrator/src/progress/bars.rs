@@ -1,6 +1,6 @@
 //! Bars on a terminal: one per running step, one for the run.
 
-use super::{duration_text, progress_text};
+use super::{Pace, duration_text, progress_text};
 use crate::engine::core::{Core, Id, State};
 use crate::engine::{Observer, Update};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -24,6 +24,7 @@ pub struct Bars {
 struct Running {
     label: String,
     begun: Instant,
+    pace: Pace,
     bar: Option<ProgressBar>,
 }
 
@@ -99,16 +100,18 @@ impl Observer for Bars {
                     Running {
                         label,
                         begun: Instant::now(),
+                        pace: Pace::default(),
                         bar: None,
                     },
                 );
             }
             Update::Progress(p) => {
-                if let Some(running) = self.running.get(&id)
-                    && let Some(bar) = &running.bar
-                {
-                    bar.set_position((1000.0 * p.fraction.clamp(0.0, 1.0)) as u64);
-                    bar.set_message(progress_text(p, running.begun.elapsed()));
+                if let Some(running) = self.running.get_mut(&id) {
+                    let left = running.pace.left(p.fraction, Instant::now());
+                    if let Some(bar) = &running.bar {
+                        bar.set_position((1000.0 * p.fraction.clamp(0.0, 1.0)) as u64);
+                        bar.set_message(progress_text(p, left));
+                    }
                 }
             }
             Update::Log { level, text } if *level <= LogLevel::Warn => {

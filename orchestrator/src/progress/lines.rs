@@ -1,6 +1,6 @@
 //! One line per event, for files and pipes.
 
-use super::{duration_text, progress_text};
+use super::{Pace, duration_text, progress_text};
 use crate::engine::core::{Core, Id};
 use crate::engine::{Observer, Update};
 use plyflow_model::job::LogLevel;
@@ -14,7 +14,7 @@ const PACE: Duration = Duration::from_secs(10);
 /// Writes to standard error.
 #[derive(Default)]
 pub struct Lines {
-    running: HashMap<Id, (Instant, Instant)>,
+    running: HashMap<Id, (Pace, Instant)>,
 }
 
 fn say(text: &str) {
@@ -28,7 +28,7 @@ impl Observer for Lines {
             Update::Cached => {}
             Update::Started { threads, attempt } => {
                 let now = Instant::now();
-                self.running.insert(id, (now, now));
+                self.running.insert(id, (Pace::default(), now));
                 let s = if *threads == 1 { "" } else { "s" };
                 let again = if *attempt > 1 {
                     format!(", attempt {attempt}")
@@ -41,11 +41,14 @@ impl Observer for Lines {
                 ));
             }
             Update::Progress(p) => {
-                if let Some((begun, told)) = self.running.get_mut(&id)
-                    && told.elapsed() >= PACE
-                {
-                    *told = Instant::now();
-                    let text = progress_text(p, begun.elapsed());
+                let Some((pace, told)) = self.running.get_mut(&id) else {
+                    return;
+                };
+                let now = Instant::now();
+                let left = pace.left(p.fraction, now);
+                if told.elapsed() >= PACE {
+                    *told = now;
+                    let text = progress_text(p, left);
                     let percent = 100.0 * p.fraction;
                     say(&format!(
                         "         {} {percent:.0} %: {text}",

@@ -11,7 +11,7 @@ pub use lines::Lines;
 use crate::engine::core::{Core, Id};
 use crate::engine::{Observer, Update};
 use plyflow_model::job::Progress;
-use std::time::Duration;
+use std::time::Instant;
 
 /// Shows nothing.
 pub struct Quiet;
@@ -31,13 +31,30 @@ pub fn duration_text(seconds: f64) -> String {
     }
 }
 
-/// What a step says of itself in one line: simulated time, rate, energy ratio, time left.
-pub fn progress_text(progress: &Progress, elapsed: Duration) -> String {
+/// How fast a step gets on: counted from the first sign of progress, because one that goes on from a checkpoint begins
+/// far along.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pace(Option<(Instant, f64)>);
+
+impl Pace {
+    /// Time left (s) at `now` with this part done (0..1), once there is something to tell it from.
+    pub fn left(&mut self, fraction: f64, now: Instant) -> Option<f64> {
+        let done = fraction.clamp(0.0, 1.0);
+        if done <= 0.0 {
+            return None;
+        }
+        let (begun, from) = *self.0.get_or_insert((now, done));
+        let way = done - from;
+        let elapsed = now.saturating_duration_since(begun).as_secs_f64();
+        (way > 0.01 && done < 1.0).then(|| elapsed * (1.0 - done) / way)
+    }
+}
+
+/// What a step says of itself in one line: time left (s), simulated time, rate, energy ratio.
+pub fn progress_text(progress: &Progress, left: Option<f64>) -> String {
     // What matters most first: a narrow terminal cuts the end off.
     let mut parts = Vec::new();
-    let done = progress.fraction.clamp(0.0, 1.0);
-    if done > 0.01 && done < 1.0 {
-        let left = elapsed.as_secs_f64() * (1.0 - done) / done;
+    if let Some(left) = left {
         parts.push(format!("{} left", duration_text(left)));
     }
     if let Some(t) = progress.simulated_time {
@@ -58,6 +75,7 @@ pub fn progress_text(progress: &Progress, elapsed: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     #[test]
     fn durations_are_written_as_people_say_them() {
@@ -69,17 +87,30 @@ mod tests {
 
     #[test]
     fn a_progress_line_says_only_what_the_step_has() {
-        let mut p = Progress {
-            fraction: 0.25,
-            ..Default::default()
-        };
-        assert_eq!(
-            progress_text(&p, Duration::from_secs(20)),
-            "1 min 00 s left"
-        );
+        let mut p = Progress::default();
+        assert_eq!(progress_text(&p, Some(60.0)), "1 min 00 s left");
         p.simulated_time = Some(0.5);
         p.energy_ratio = Some(0.0123);
-        let text = progress_text(&p, Duration::from_secs(1));
+        let text = progress_text(&p, Some(3.0));
         assert_eq!(text, "3.0 s left, t = 0.5000 s, Ek/Ei 1.23 %");
+    }
+
+    #[test]
+    fn the_time_left_of_a_step_that_goes_on_is_told_from_what_this_attempt_did() {
+        let start = Instant::now();
+        let at = |s: u64| start + Duration::from_secs(s);
+        let mut fresh = Pace::default();
+        assert_eq!(
+            [fresh.left(0.0, at(0)), fresh.left(0.005, at(1))],
+            [None, None]
+        );
+        assert_eq!(fresh.left(0.505, at(101)), Some(99.0));
+        let mut resumed = Pace::default();
+        assert_eq!(
+            [resumed.left(0.0, at(0)), resumed.left(0.4, at(1))],
+            [None, None]
+        );
+        assert_eq!(resumed.left(0.7, at(31)).map(f64::round), Some(30.0));
+        assert_eq!(resumed.left(1.0, at(61)), None);
     }
 }

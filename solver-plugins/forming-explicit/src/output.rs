@@ -81,8 +81,14 @@ impl Observer for Writer<'_> {
 
     fn resume(&mut self, forming: &mut Forming, course: &mut Course) -> Result<(), StepError> {
         if self.frames.resume(forming, course)? {
-            self.cycle_shown = forming.model.cycle;
-            self.first_cycle = forming.model.cycle;
+            let model = &forming.model;
+            (self.cycle_shown, self.first_cycle) = (model.cycle, model.cycle);
+            self.host.progress(&Progress {
+                fraction: model.time / forming.load.duration(),
+                simulated_time: model.time,
+                phase: "going on from a checkpoint",
+                ..Progress::default()
+            });
         }
         Ok(())
     }

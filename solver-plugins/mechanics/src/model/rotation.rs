@@ -65,11 +65,23 @@ impl Model {
     /// Sums the moments; spins of the next half step; their kinetic energy and works. Uses the same central
     /// differences and the same mass-proportional damping as the translations.
     pub(super) fn rotate(&mut self) {
-        let moving = self.moving(false);
-        let Some(r) = self.rotations.as_deref_mut() else {
+        let Some(mut r) = self.rotations.take() else {
             return;
         };
         let before: Vec<V> = (self.driven.iter()).map(|n| r.spin[*n as usize]).collect();
+        let mut work = self.turn_all(&mut r);
+        self.turn_driven(&mut r, &before, &mut work);
+        if !work.kinetic.is_finite() {
+            let bad = |w: &V| !w.iter().all(|c| c.is_finite());
+            work.bad = work.bad.or(r.spin.iter().position(bad).map(|n| n as u32));
+        }
+        self.work = self.work.add(work);
+        self.rotations = Some(r);
+    }
+
+    /// Spins of all nodes as if none was driven; works of those that are not.
+    fn turn_all(&self, r: &mut Rotations) -> NodeWork {
+        let moving = self.moving(false);
         let (sums, loads, factor) = (&self.sums, &self.loads.moment, self.load_factor);
         let (inertia, per_inertia) = (&r.free_inertia, &r.per_inertia);
         let works: Vec<NodeWork> = r
@@ -96,15 +108,19 @@ impl Model {
                 })
             })
             .collect();
-        let mut work = works.into_iter().fold(NodeWork::default(), NodeWork::add);
+        works.into_iter().fold(NodeWork::default(), NodeWork::add)
+    }
+
+    /// Spins of the driven nodes, which were `before`, and their works.
+    fn turn_driven(&mut self, r: &mut Rotations, before: &[V], work: &mut NodeWork) {
         let turning = Turning {
             dt: self.dt,
             damping: self.settings.damping,
             kick: self.kick,
             inertia: &r.inertia,
             fixed: &self.supports.fixed,
-            loads,
-            load_factor: factor,
+            loads: &self.loads.moment,
+            load_factor: self.load_factor,
         };
         let middle = self.time + 0.5 * self.dt;
         for (k, (n, old)) in self.driven.iter().zip(before).enumerate() {
@@ -114,10 +130,10 @@ impl Model {
             }
             let moment = r.moment[n];
             r.spin[n] = match self.drive.as_ref().and_then(|d| d.spin(k, middle)) {
-                None => turning.free(n, old, moment, &mut work),
+                None => turning.free(n, *old, moment, work),
                 Some(next) => {
-                    let mean = scale(add(next, old), 0.5);
-                    let inertia = scale(sub(next, old), turning.inertia[n] / turning.dt);
+                    let mean = scale(add(next, *old), 0.5);
+                    let inertia = scale(sub(next, *old), turning.inertia[n] / turning.dt);
                     let support = sub(inertia, moment);
                     self.ledger.external += dot(support, mean) * turning.dt;
                     self.supports.reaction_moment[k] = sub(support, turning.load(n));
@@ -126,11 +142,6 @@ impl Model {
                 }
             };
         }
-        if !work.kinetic.is_finite() {
-            let bad = |w: &V| !w.iter().all(|c| c.is_finite());
-            work.bad = work.bad.or(r.spin.iter().position(bad).map(|n| n as u32));
-        }
-        self.work = self.work.add(work);
     }
 }
 
