@@ -130,7 +130,9 @@ impl<'a> Recorder<'a> {
 
     /// No checkpoint is worth the run: without them it goes on.
     fn give_up(&mut self, e: &dyn std::fmt::Display) {
-        let text = format!("no more checkpoints: {e}; a killed run begins anew");
+        let text = format!(
+            "no more checkpoints: {e}; a killed run goes on from the last one, or begins anew"
+        );
         self.host.log(Log::Warn, &text);
         self.folder = None;
         self.frame = None;

@@ -4,7 +4,7 @@ use crate::CHORD_TOLERANCE;
 use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
-use crate::vector::{V3, add, scale, unit};
+use crate::vector::{V3, scale, slerp};
 use std::f64::consts::FRAC_PI_2;
 
 /// Four octants, each divided evenly; the bottom is the same net pressed flat.
@@ -111,19 +111,6 @@ fn axes(quarter: usize) -> [V3; 2] {
         [0.0, -1.0, 0.0],
     ];
     [AXES[quarter], AXES[(quarter + 1) % 4]]
-}
-
-/// Between two unit vectors along the great circle.
-fn slerp(a: V3, b: V3, w: f64) -> V3 {
-    let angle = crate::vector::dot(a, b).clamp(-1.0, 1.0).acos();
-    if angle < 1e-12 {
-        return a;
-    }
-    let s = angle.sin();
-    unit(add(
-        scale(a, ((1.0 - w) * angle).sin() / s),
-        scale(b, (w * angle).sin() / s),
-    ))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::CHORD_TOLERANCE;
 use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
-use crate::vector::{V3, add, cross, dot, norm, scale, sub, unit};
+use crate::vector::{V3, add, cross, dot, norm, scale, slerp, sub, unit};
 use plyflow_model::scene::TetrahedronTool;
 use std::f64::consts::FRAC_PI_6;
 
@@ -214,17 +214,6 @@ fn mesh_bottom(mesh: &mut ToolMesh, rim: &[u32], facet: f64) {
         let next = outer[(k + 1) % outer.len()];
         mesh.triangles.push([outer[k], centre, next]);
     }
-}
-
-/// Between two unit vectors along the great circle.
-fn slerp(a: V3, b: V3, w: f64) -> V3 {
-    let angle = dot(a, b).clamp(-1.0, 1.0).acos();
-    if angle < 1e-12 {
-        return a;
-    }
-    let s = angle.sin();
-    let (from, to) = (((1.0 - w) * angle).sin() / s, (w * angle).sin() / s);
-    unit(add(scale(a, from), scale(b, to)))
 }
 
 #[cfg(test)]

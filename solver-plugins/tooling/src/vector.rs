@@ -42,3 +42,16 @@ pub(crate) fn unit(a: V3) -> V3 {
     let n = norm(a);
     if n > 0.0 { scale(a, 1.0 / n) } else { a }
 }
+
+/// Between two unit vectors along the great circle.
+pub(crate) fn slerp(a: V3, b: V3, w: f64) -> V3 {
+    let angle = dot(a, b).clamp(-1.0, 1.0).acos();
+    if angle < 1e-12 {
+        return a;
+    }
+    let s = angle.sin();
+    unit(add(
+        scale(a, ((1.0 - w) * angle).sin() / s),
+        scale(b, (w * angle).sin() / s),
+    ))
+}
