@@ -4,6 +4,7 @@
 
 pub mod assembly;
 mod checkpoint;
+mod diagnosis;
 mod global;
 mod local;
 mod output;

@@ -7,7 +7,8 @@ use crate::parameters::Parameters;
 use crate::run::{Body, Course, Forming, Observer, Outcome};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::component::{ElementField, element_fields};
-use plyflow_mechanics::energy::Ledger;
+use plyflow_mechanics::contact::ContactEnergy;
+use plyflow_mechanics::energy::{Ledger, SheetEnergy};
 use plyflow_mechanics::vec3::{V, add};
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::{Host, Input, Log, Progress, StepError};
@@ -191,16 +192,11 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         cycle_shown: 0,
         first_cycle: 0,
     };
-    let outcome = forming.run(
-        p.frames,
-        p.time_step,
-        p.step_safety,
-        p.kinetic_bound,
-        &mut writer,
-    )?;
+    let outcome = forming.run(&p.control(), &mut writer)?;
     let own_cycles = outcome.cycles - writer.first_cycle;
     let rate = own_cycles as f64 / writer.started.elapsed().as_secs_f64().max(1e-9);
     write_history(host, &outcome, forming.load.press().is_some())?;
+    write_energies(host, &forming, &outcome)?;
     write_summary(host, p, &forming, &outcome, rate)
 }
 
@@ -298,6 +294,37 @@ fn write_history(host: &Host, outcome: &Outcome, press: bool) -> Result<(), Step
     for (name, unit, value) in columns {
         let data: Vec<f64> = outcome.history.iter().map(value).collect();
         host.write_f64(&format!("history/{name}"), &[data.len()], unit, &data)?;
+    }
+    Ok(())
+}
+
+/// Energies by sheet and by interface over the times of the history.
+fn write_energies(host: &Host, forming: &Forming, outcome: &Outcome) -> Result<(), StepError> {
+    type Of<T> = (&'static str, fn(&T) -> f64);
+    let sheet: [Of<SheetEnergy>; 4] = [
+        ("kinetic", |e| e.kinetic),
+        ("membrane", |e| e.membrane),
+        ("bending", |e| e.bending),
+        ("hourglass", |e| e.hourglass),
+    ];
+    let interface: [Of<ContactEnergy>; 3] = [
+        ("stored", |e| e.stored),
+        ("friction", |e| e.friction),
+        ("damping", |e| e.damping),
+    ];
+    let write = |path: String, data: Vec<f64>| host.write_f64(&path, &[data.len()], "J", &data);
+    let rows = &outcome.history;
+    for (k, s) in forming.model.sheets.iter().enumerate() {
+        for (what, of) in sheet {
+            let data = rows.iter().map(|r| r.sheets.get(k).map_or(0.0, of));
+            write(format!("history/sheets/{}/{what}", s.name), data.collect())?;
+        }
+    }
+    for (k, (name, _)) in forming.model.interface_energies().enumerate() {
+        for (what, of) in interface {
+            let data = rows.iter().map(|r| r.interfaces.get(k).map_or(0.0, of));
+            write(format!("history/interfaces/{name}/{what}"), data.collect())?;
+        }
     }
     Ok(())
 }
@@ -425,7 +452,7 @@ fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
 }
 
 /// Shear angle (rad) and largest fibre strain by size at the centre of a cell.
-fn cell_strain(then: [V; 4], now: [V; 4], axis: V) -> (f64, f64) {
+pub(crate) fn cell_strain(then: [V; 4], now: [V; 4], axis: V) -> (f64, f64) {
     use plyflow_mechanics::vec3::{add, dot, norm, scale, sub};
     let mid = |p: &[V; 4]| (sub(p[2], p[0]), sub(p[3], p[1]));
     let ((a, b), (d, e)) = (mid(&then), mid(&now));

@@ -1,5 +1,6 @@
 //! The resolved parameters.
 
+use crate::run::Control;
 use plyflow_model::scene::Scene;
 use serde::Deserialize;
 
@@ -51,9 +52,22 @@ pub struct Parameters {
     pub tool_grid: f64,
     /// Kinetic bound.
     pub kinetic_bound: f64,
+    /// Energy unaccounted for that stops a run.
+    pub drift_bound: f64,
 }
 
 impl Parameters {
+    /// What controls the steps of the run.
+    pub fn control(&self) -> Control {
+        Control {
+            frames: self.frames,
+            target_step: self.time_step,
+            safety: self.step_safety,
+            kinetic_bound: self.kinetic_bound,
+            drift_bound: self.drift_bound,
+        }
+    }
+
     /// Edge of the diaphragms' elements (m).
     pub fn film_size(&self) -> f64 {
         self.diaphragm_element_size.unwrap_or(self.element_size)

@@ -1,11 +1,12 @@
 //! The time loop: frames, ledger, step control, health.
 
 use crate::assembly::StackSheet;
+use crate::diagnosis;
 use crate::press::PressLoad;
 use crate::process::Load;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
-use plyflow_mechanics::contact::{OpenPlate, RigidContact};
-use plyflow_mechanics::energy::{EnergyHealth, Ledger, judge};
+use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact};
+use plyflow_mechanics::energy::{EnergyHealth, Ledger, SheetEnergy, judge};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::{V, norm};
 use plyflow_tooling::ToolMesh;
@@ -86,6 +87,21 @@ impl RigidBody {
     }
 }
 
+/// What controls the steps of a run, and when it is given up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Control {
+    /// Frames after the first.
+    pub frames: usize,
+    /// Wanted step (s).
+    pub target_step: f64,
+    /// Share of the critical step that is used.
+    pub safety: f64,
+    /// Kinetic over internal energy above which the run is marked.
+    pub kinetic_bound: f64,
+    /// Energy unaccounted for over the largest work so far beyond which the run stops.
+    pub drift_bound: f64,
+}
+
 /// A forming run, ready to go.
 pub struct Forming {
     /// The model.
@@ -109,7 +125,7 @@ pub struct Forming {
 }
 
 /// One line of the history.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HistoryRow {
     /// Time (s).
     pub time: f64,
@@ -125,6 +141,10 @@ pub struct HistoryRow {
     pub punch_force: f64,
     /// Way of a press's holder towards the die (m).
     pub holder_travel: f64,
+    /// By sheet of the model.
+    pub sheets: Vec<SheetEnergy>,
+    /// By interface, in the order of [`Model::interface_energies`].
+    pub interfaces: Vec<ContactEnergy>,
 }
 
 /// How far a run has come, between two frames.
@@ -239,6 +259,8 @@ impl Forming {
             frame: self.load.frame_height(m.time),
             punch_force: self.load.press().map_or(0.0, |p| p.punch_force(m)),
             holder_travel: self.load.press().map_or(0.0, PressLoad::holder_travel),
+            sheets: m.sheet_energies(),
+            interfaces: m.interface_energies().map(|(_, e)| e).collect(),
         }
     }
 
@@ -246,15 +268,19 @@ impl Forming {
     /// of the time between frames, chosen anew at each frame from the elements' critical step.
     ///
     /// # Errors
-    /// When the run becomes unstable, a component fails, or the observer stops it.
+    /// When the run becomes unstable, its ledger opens beyond a bound, a component fails, or the observer stops it.
     pub fn run(
         &mut self,
-        frames: usize,
-        target_step: f64,
-        safety: f64,
-        kinetic_bound: f64,
+        control: &Control,
         observer: &mut dyn Observer,
     ) -> Result<Outcome, plyflow_sdk::StepError> {
+        let &Control {
+            frames,
+            target_step,
+            safety,
+            kinetic_bound,
+            drift_bound,
+        } = control;
         let end = self.load.duration();
         let interval = end / frames as f64;
         let mut course = Course::default();
@@ -268,13 +294,10 @@ impl Forming {
             let wanted = target_step.min(safety * critical);
             let steps = (interval / wanted).ceil().max(1.0) as u64;
             if wanted < 0.02 * target_step {
-                return Err(format!(
-                    "the critical step has fallen to {critical:.3e} s at t = {:.5} s, below 2 % of \
-                     the wanted step: an element has collapsed. Try a larger hourglass stiffness, \
-                     a finer mesh or more friction-free sliding",
-                    self.model.time
-                )
-                .into());
+                let what = format!(
+                    "the critical step has fallen to {critical:.3e} s, below 2 % of the wanted one"
+                );
+                return Err(diagnosis::of(self, &course.history, &what).into());
             }
             self.model.dt = interval / steps as f64;
             course.smallest_step = course.smallest_step.min(self.model.dt);
@@ -283,7 +306,9 @@ impl Forming {
                 // Times from the count, not from a sum: frames fall on the same instants in every run.
                 self.model.time = start + self.model.dt * k as f64;
                 self.load.apply(&mut self.model);
-                self.model.step(k == 0).map_err(|e| e.to_string())?;
+                if let Err(e) = self.model.step(k == 0) {
+                    return Err(diagnosis::of(self, &course.history, &e.to_string()).into());
+                }
                 if k == 0 {
                     // Fields belong to the positions before the step; its motion is far below output
                     // precision.
@@ -292,6 +317,9 @@ impl Forming {
                 if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
                     let energies = self.model.energies();
                     course.history.push(self.row(energies));
+                    if let Some(what) = diagnosis::open_ledger(&course.history, drift_bound) {
+                        return Err(diagnosis::of(self, &course.history, &what).into());
+                    }
                     observer.tick(self, &energies, end)?;
                 }
             }

@@ -5,7 +5,9 @@ mod common;
 use common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::run::{Forming, Outcome};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 const RADIUS: f64 = 0.025;
 const STROKE: f64 = 0.02;
@@ -35,7 +37,7 @@ fn parameters(plies: usize, holder: &Value) -> Parameters {
         "element_size": 0.006, "diaphragm_growth": 1.25, "time_step": 8e-6, "step_safety": 0.8,
         "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
         "contact_damping": 0.3, "contact_augmentation": 0.0, "frames": 20, "tool_grid": 0.0015,
-        "kinetic_bound": 0.05
+        "kinetic_bound": 0.05, "drift_bound": 0.5
     }))
     .expect("the parameters fit their type")
 }
@@ -156,6 +158,45 @@ fn a_holder_with_a_force_presses_with_that_force_on_two_plies() {
         top(0),
         top(1)
     );
+    parts_add_up(&forming, &outcome);
+}
+
+/// The energies of sheets and interfaces are those of the ledger, in every row.
+fn parts_add_up(forming: &Forming, outcome: &Outcome) {
+    let near = |parts: f64, whole: f64, what: &str| {
+        let apart = (parts - whole).abs();
+        assert!(
+            apart <= 1e-9 * whole.abs().max(1e-6),
+            "{what}: {parts} and {whole}"
+        );
+    };
+    for r in &outcome.history {
+        let (l, s, i) = (&r.ledger, &r.sheets, &r.interfaces);
+        near(s.iter().map(|e| e.kinetic).sum(), l.kinetic, "kinetic");
+        near(s.iter().map(|e| e.membrane).sum(), l.membrane, "membrane");
+        near(s.iter().map(|e| e.bending).sum(), l.bending, "bending");
+        near(
+            s.iter().map(|e| e.hourglass).sum(),
+            l.hourglass,
+            "hourglass",
+        );
+        near(i.iter().map(|e| e.stored).sum(), l.contact, "contact");
+        near(i.iter().map(|e| e.friction).sum(), l.friction, "friction");
+    }
+    // Every surface that slides on another one loses something, and the holder more than the punch.
+    let last = &outcome.history.last().expect("rows").interfaces;
+    let names = forming.model.interface_energies().map(|(name, _)| name);
+    let friction: BTreeMap<&str, f64> = names.zip(last.iter().map(|e| e.friction)).collect();
+    let of = |name: &str| {
+        friction
+            .get(name)
+            .copied()
+            .unwrap_or_else(|| panic!("{name} in {friction:?}"))
+    };
+    for name in ["tool/ply_1", "ply_1/ply_2", "die/ply_2", "holder/ply_1"] {
+        assert!(of(name) > 0.0, "{friction:?}");
+    }
+    assert!(of("holder/ply_1") > of("tool/ply_1"), "{friction:?}");
 }
 
 #[test]
@@ -196,4 +237,27 @@ fn what_makes_no_press_is_refused_with_what_to_do() {
         film.contains("press") && film.contains("no diaphragm"),
         "{film}"
     );
+}
+
+#[test]
+fn an_open_ledger_stops_the_run_and_says_where() {
+    let mut p = parameters(1, &json!({"gap": "0.002 m"}));
+    // What rounding and the step's own error leave is beyond this.
+    p.drift_bound = 1e-7;
+    let mut forming = build_global(&p, &BuiltIn).unwrap();
+    let error = forming.run(&p.control(), &mut common::Silent).unwrap_err();
+    let text = format!("{error:?}");
+    for part in [
+        "of the work is unaccounted for (drift_bound",
+        "The step is set by an element of 'ply_1' at (",
+        "shear",
+        "Deepest contact: ",
+        "Fastest: 'ply_1' at",
+        "Likely cause: ",
+        "What to try: ",
+    ] {
+        assert!(text.contains(part), "'{part}' is not in: {text}");
+    }
+    // It stopped early, not at the end.
+    assert!(forming.model.time < 0.15, "{}", forming.model.time);
 }

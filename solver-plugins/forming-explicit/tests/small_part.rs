@@ -46,7 +46,7 @@ fn parameters() -> Parameters {
         "element_size": 0.007, "diaphragm_growth": 1.25, "time_step": 1.2e-5, "step_safety": 0.8,
         "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
         "contact_damping": 0.3, "contact_augmentation": 0.003, "frames": 40, "tool_grid": 0.003,
-        "kinetic_bound": 0.05
+        "kinetic_bound": 0.05, "drift_bound": 0.5
     }))
     .expect("the parameters fit their type")
 }

@@ -21,6 +21,19 @@ pub struct Ledger {
     pub external: f64,
 }
 
+/// Energies of one sheet (J). A node that two sheets share moves with the first.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SheetEnergy {
+    /// Kinetic.
+    pub kinetic: f64,
+    /// Stored in membranes.
+    pub membrane: f64,
+    /// Stored in bending.
+    pub bending: f64,
+    /// Hourglass control.
+    pub hourglass: f64,
+}
+
 impl Ledger {
     /// Internal energy: membrane, bending, hourglass.
     pub fn internal(&self) -> f64 {

@@ -40,7 +40,8 @@ impl Components for BuiltIn {
     }
 }
 
-struct Silent;
+/// Follows a run without a word.
+pub struct Silent;
 
 impl Observer for Silent {
     fn frame(&mut self, _: &Forming, _: f64) -> Result<(), StepError> {
@@ -73,13 +74,7 @@ pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
     pool.install(|| {
         let mut forming = build_global(p, &BuiltIn).unwrap();
         let outcome = forming
-            .run(
-                p.frames,
-                p.time_step,
-                p.step_safety,
-                p.kinetic_bound,
-                &mut Silent,
-            )
+            .run(&p.control(), &mut Silent)
             .unwrap_or_else(|e| panic!("{e:?}"));
         (forming, outcome)
     })

@@ -1,13 +1,17 @@
 //! Bounds of the largest frequency of an element of `s4`.
 //!
-//! The stiffness is `sum of (strain derivative)^T tangent (strain derivative) + geometric part`. The
-//! first is positive semi-definite, so its largest eigenvalue, with masses and inertias, is at most
-//! that of the displacement block plus that of the rotation block. Each block is bounded as in
-//! [`crate::quad`]: a sum over the kinds of strain, each factor by its largest eigenvalue. Directors
-//! have length 1, so a strain's derivative by a rotation is never longer than that by its director.
+//! The stiffness is `sum of (strain derivative)^T tangent (strain derivative) + geometric part`.
+//! Each kind of strain is moved by three parts of a motion: displacements in the element's plane (y),
+//! across it (z), and rotations (r), with masses and inertias taken in. What a kind can store is at
+//! most `(a |y| + b |z| + c |r|)^2`, where a^2, b^2, c^2 bound its blocks as in [`crate::quad`]: a
+//! product of the largest eigenvalues of its factors. So omega^2 is at most the largest eigenvalue of
+//! the sum of `(a, b, c) (a, b, c)^T` over the kinds. In a flat element membrane and transverse shear
+//! move different parts, and the larger of them counts, not their sum. Directors have length 1, so a
+//! strain's derivative by a rotation is never longer than that by its director.
 
 use super::forces::View;
 use super::{S4, V3, row};
+use nalgebra::{Matrix3, Vector3};
 
 /// Largest eigenvalue of the symmetric [[a, c], [c, b]].
 pub(super) fn largest(a: f64, b: f64, c: f64) -> f64 {
@@ -18,12 +22,55 @@ fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+fn cross(a: V3, b: V3) -> V3 {
+    core::array::from_fn(|k| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        a[i] * b[j] - a[j] * b[i]
+    })
+}
+
 fn norm(a: V3) -> f64 {
     dot(a, a).sqrt()
 }
 
 fn mix(p: f64, a: V3, q: f64, b: V3) -> V3 {
     core::array::from_fn(|k| p * a[k] + q * b[k])
+}
+
+/// What each kind of strain stores over displacements in the plane, across it, and rotations: roots of
+/// its blocks' bounds (1/s).
+#[derive(Default)]
+struct Kinds(Matrix3<f64>);
+
+impl Kinds {
+    /// Adds a kind by the bounds of its blocks' omega^2 (1/s2).
+    fn add(&mut self, blocks: [f64; 3]) {
+        let v = Vector3::from(blocks.map(|b| b.max(0.0).sqrt()));
+        self.0 += v * v.transpose();
+    }
+
+    /// Bound of omega^2 of all kinds together (1/s2).
+    fn largest(&self) -> f64 {
+        self.0.symmetric_eigenvalues().max()
+    }
+}
+
+/// Bounds of the rotational stiffness (N m) by kind.
+struct Rotational {
+    /// Transverse shear of the sides.
+    sides: f64,
+    /// Curvature along the fibres.
+    bending: f64,
+    /// Twist.
+    twist: f64,
+    /// The directors' hourglass mode.
+    hourglass: f64,
+}
+
+impl Rotational {
+    fn sum(&self) -> f64 {
+        self.sides + self.bending + self.twist + self.hourglass
+    }
 }
 
 /// Constants of one lane.
@@ -91,7 +138,7 @@ impl Lane {
         bending: f64,
         twist: f64,
         c: [f64; 2],
-    ) -> f64 {
+    ) -> Rotational {
         let (b, k) = (self.b, self.shear);
         let over = |p: [f64; 2], q: [f64; 2]| {
             k[0] * p[0] * q[0] + k[1] * p[1] * q[1] + k[2] * (p[0] * q[1] + p[1] * q[0])
@@ -121,9 +168,12 @@ impl Lane {
                 h2 * longest(across),
                 (h1 * h2).sqrt() * lean,
             );
-        sides
-            + self.area * self.widest * (bending * c[0].max(c[1]) + 0.5 * twist * (c[0] + c[1]))
-            + self.director * self.mode()
+        Rotational {
+            sides,
+            bending: self.area * self.widest * bending * c[0].max(c[1]),
+            twist: self.area * self.widest * 0.5 * twist * (c[0] + c[1]),
+            hourglass: self.director * self.mode(),
+        }
     }
 }
 
@@ -139,7 +189,8 @@ pub(super) fn at_rest(s4: &S4, constants: &[f64], n: usize, l: usize, x: &[V3; 4
     } else {
         s4.rest.twist
     };
-    lane.rotational(along, across, bending, twist, [1.0, 1.0])
+    let bound = lane.rotational(along, across, bending, twist, [1.0, 1.0]);
+    bound.sum()
 }
 
 /// Stiffness over the displacements (N/m) of the transverse shear of lane l at rest.
@@ -166,8 +217,8 @@ pub(super) fn critical_step(
         let c = state.metric;
         let (bending, twist) = (state.bending, state.twist);
         let [s11, s22] = state.slope.map(|v| dot(v, v));
-        let bent = lane.area * lane.widest * (bending * s11.max(s22) + 0.5 * twist * (s11 + s22));
-        let displacement = state.membrane(&lane) + lane.plate(state.skew()) + bent;
+        let bent = lane.area * lane.widest * bending * s11.max(s22);
+        let twisted = lane.area * lane.widest * 0.5 * twist * (s11 + s22);
         let rotation = lane.rotational(
             [state.side[0], state.side[1]],
             [state.side[2], state.side[3]],
@@ -175,12 +226,21 @@ pub(super) fn critical_step(
             twist,
             [c[0], c[1]],
         );
+        // The layers' shear is membrane and twist in one kind of strain.
+        let (material, rest) = state.membrane(&lane);
+        let shear = lane.plate(state.skew());
+        let lean = state.lean();
+        let mut kinds = Kinds::default();
+        let [y, z, r] = [1.0 / mass, 1.0 / mass, 1.0 / inertia];
+        kinds.add([(material + twisted) * y, 0.0, rotation.twist * r]);
+        kinds.add([shear * lean * lean * y, shear * z, rotation.sides * r]);
+        kinds.add([bent * y, 0.0, rotation.bending * r]);
+        kinds.add([0.0, 0.0, rotation.hourglass * r]);
         // Second derivatives of the strains: curvature is bilinear in slopes of x and of d, a side's
         // shear in its ends; a turned director has d2 d = t x (t x d).
         let (pull, reaction) = state.loads(&lane);
         let coupling = lane.area * lane.widest * state.moment() + 2.0 * pull;
-        let lambda =
-            displacement / mass + rotation / inertia + coupling / mixed + reaction / inertia;
+        let lambda = kinds.largest() + rest / mass + coupling / mixed + reaction / inertia;
         step[l] = 2.0 / lambda.sqrt();
     }
 }
@@ -256,8 +316,23 @@ impl State {
         largest(a, b, c).max(largest(-a, -b, c))
     }
 
-    /// Membrane and in-plane hourglass (N/m), as [`crate::quad`] explains.
-    fn membrane(&self, lane: &Lane) -> f64 {
+    /// Sine of the largest angle between a director and the normal.
+    fn lean(&self) -> f64 {
+        let [g1, g2] = self.g;
+        let normal = cross(g1, g2);
+        let n = mix(
+            1.0 / norm(normal).max(f64::MIN_POSITIVE),
+            normal,
+            0.0,
+            normal,
+        );
+        let out = |d: &V3| norm(mix(1.0, *d, -dot(*d, n), n));
+        self.d.iter().map(out).fold(0.0, f64::max).min(1.0)
+    }
+
+    /// Stiffness over the displacements (N/m) as [`crate::quad`] explains: of the material, which acts in the
+    /// plane, and of stress and hourglass control, which act in any direction.
+    fn membrane(&self, lane: &Lane) -> (f64, f64) {
         let [c11, c22, c12] = self.metric;
         let stretch = largest(c11, c22, c12);
         let stress = largest(self.stress[0], self.stress[1], self.stress[2]).max(0.0);
@@ -272,15 +347,13 @@ impl State {
                 - lane.h[1] * self.g[1][k]
         });
         let [g1, g2] = self.g;
-        let cross: V3 = core::array::from_fn(|k| {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            g1[i] * g2[j] - g1[j] * g2[i]
-        });
-        let qn = dot(q, cross).abs() / norm(cross).max(1e-6);
+        let normal = cross(g1, g2);
+        let qn = dot(q, normal).abs() / norm(normal).max(1e-6);
         let turn = lane.widest.sqrt() / narrow;
         let mode = lane.mode();
         let bent = lane.plane * qn * (2.0 * mode.sqrt() * turn + 3.0 * norm(q) * turn * turn);
-        lane.area * (material + stress) * lane.widest + lane.plane * mode + bent
+        let over = lane.area * lane.widest;
+        (over * material, over * stress + lane.plane * mode + bent)
     }
 
     /// Bounds of the sides' transverse forces (N) and of |dW/dd| at a node (N m).

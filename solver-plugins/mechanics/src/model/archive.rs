@@ -28,6 +28,7 @@ impl Model {
         a.value(&mut self.loaded)?;
         a.value(&mut self.max_speed)?;
         a.value(&mut self.ledger)?;
+        a.value(&mut self.interfaces)?;
         for batch in self.blocks.iter_mut().flat_map(|b| &mut b.batches) {
             a.numbers(&mut batch.history)?;
             a.numbers(&mut batch.material_history)?;

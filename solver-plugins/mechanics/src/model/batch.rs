@@ -230,8 +230,15 @@ pub(super) fn pressure_forces(
     }
 }
 
-/// The smallest critical step of a batch (s). Works on copies of the histories: asking changes nothing.
+/// The smallest critical step of a batch (s).
 pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 {
+    let steps = cell_critical_steps(sheet, batch, x);
+    steps.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+/// Critical steps of a batch's elements (s); 0 where they fail. Works on copies of the histories: asking changes
+/// nothing.
+pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<f64> {
     let mut position = Buffer([0.0; 12 * LANES]);
     gather(&batch.nodes, x, &mut position.0);
     let mut constants = batch.constants.clone();
@@ -254,11 +261,11 @@ pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 
     raw.energy = energy.as_mut_ptr();
     raw.critical_step = step.as_mut_ptr();
     if sheet.element.forces(&raw) != PF_OK {
-        return 0.0;
+        return vec![0.0; batch.count as usize];
     }
     (0..batch.count as usize)
         .map(|l| step[l] * batch.mass_factor[l].sqrt())
-        .fold(f64::INFINITY, f64::min)
+        .collect()
 }
 
 /// Row sums of the bending stiffness (N/m) by model node.

@@ -56,6 +56,7 @@ impl Model {
             drive: None,
             max_speed: 0.0,
             contact: ContactEnergy::default(),
+            interfaces: Vec::new(),
             work: NodeWork::default(),
             x: points,
         };

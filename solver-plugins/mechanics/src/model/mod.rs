@@ -139,6 +139,8 @@ pub struct Model {
     drive: Option<Box<dyn Drive>>,
     max_speed: f64,
     contact: ContactEnergy,
+    /// By contact, the rigid ones first: stored at present, lost so far (J).
+    interfaces: Vec<ContactEnergy>,
     work: NodeWork,
 }
 
@@ -236,10 +238,18 @@ impl Model {
         // gaps for which a node sleeps more than a few steps.
         let reach = 2.0 * (2.0 * self.max_speed).max(5.0) * self.dt;
         let mut total = ContactEnergy::default();
+        let n = self.rigid_contacts.len() + self.sheet_contacts.len();
+        self.interfaces.resize_with(n, ContactEnergy::default);
+        let mut interfaces = self.interfaces.iter_mut();
         let mut count = |e: ContactEnergy| {
             total.stored += e.stored;
             total.friction += e.friction;
             total.damping += e.damping;
+            if let Some(i) = interfaces.next() {
+                i.stored = e.stored;
+                i.friction += e.friction;
+                i.damping += e.damping;
+            }
         };
         for contact in &mut self.rigid_contacts {
             count(contact.compute(&self.x, &self.v, self.dt, reach));

@@ -1,6 +1,7 @@
 //! What a model tells of itself: energies, critical step, fields, volume.
 
 use super::*;
+use crate::energy::SheetEnergy;
 
 impl Model {
     /// The ledger at the present step.
@@ -18,6 +19,67 @@ impl Model {
             l.bending += batch.energy[..batch.count as usize].iter().sum::<f64>();
         }
         l
+    }
+
+    /// Energies by sheet at the present step.
+    pub fn sheet_energies(&self) -> Vec<SheetEnergy> {
+        let mut of = vec![SheetEnergy::default(); self.sheets.len()];
+        for batch in self.blocks.iter().flat_map(|b| &b.batches) {
+            let row = |r: usize| &batch.energy[r * LANES..r * LANES + batch.count as usize];
+            let e = &mut of[batch.sheet as usize];
+            e.membrane += row(PF_ENERGY_MEMBRANE).iter().sum::<f64>();
+            e.bending += row(PF_ENERGY_BENDING).iter().sum::<f64>();
+            e.hourglass += row(PF_ENERGY_HOURGLASS).iter().sum::<f64>();
+        }
+        for batch in self.patches.iter().flat_map(|b| &b.batches) {
+            of[batch.sheet as usize].bending +=
+                batch.energy[..batch.count as usize].iter().sum::<f64>();
+        }
+        let spin = self.rotations.as_deref();
+        let mut counted = vec![false; self.x.len()];
+        for (sheet, e) in self.sheets.iter().zip(&mut of) {
+            for n in sheet.nodes.iter().map(|n| *n as usize) {
+                if std::mem::replace(&mut counted[n], true) {
+                    continue;
+                }
+                e.kinetic += 0.5 * self.mass[n] * dot(self.v[n], self.v[n]);
+                if let Some(r) = spin {
+                    e.kinetic += 0.5 * r.inertia[n] * dot(r.spin[n], r.spin[n]);
+                }
+            }
+        }
+        of
+    }
+
+    /// By contact: its name, and what it stores and has lost so far (J).
+    pub fn interface_energies(&self) -> impl Iterator<Item = (&str, ContactEnergy)> {
+        let rigid = self.rigid_contacts.iter().map(|c| c.name.as_str());
+        let sheets = self.sheet_contacts.iter().map(|c| c.name.as_str());
+        rigid.chain(sheets).zip(self.interfaces.iter().copied())
+    }
+
+    /// The cell whose element allows the smallest step, and that step (s).
+    pub fn weakest_cell(&self) -> Option<(usize, f64)> {
+        let steps: Vec<Vec<f64>> = (self.blocks.par_iter())
+            .map(|block| {
+                let of =
+                    |b: &Batch| cell_critical_steps(&self.sheets[b.sheet as usize], b, &self.x);
+                block.batches.iter().flat_map(of).collect()
+            })
+            .collect();
+        let at = |place: &CellPlace| {
+            let block = &self.blocks[place.block as usize];
+            let before = &block.batches[..usize::from(place.batch)];
+            let first: usize = before.iter().map(|b| b.count as usize).sum();
+            steps[place.block as usize]
+                .get(first + usize::from(place.lane))
+                .copied()
+        };
+        self.cell_place
+            .iter()
+            .map(|p| at(p).unwrap_or(0.0))
+            .enumerate()
+            .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// The step that the elements allow at the present positions (s), with mass scaling and bending.

@@ -1,0 +1,223 @@
+//! Where and why a run went wrong, for the one who has to change it.
+
+use crate::output::cell_strain;
+use crate::run::{Forming, HistoryRow};
+use plyflow_mechanics::vec3::{V, norm};
+use std::fmt::Write;
+
+/// Energy unaccounted for over the largest work so far from which on a ledger counts as opening.
+const OPENING: f64 = 0.02;
+/// Rows of the history for which it must stay open: a single one may be a knock that closes again.
+const ROWS: usize = 3;
+/// Rows at the start that are not judged: there is hardly any work to compare with.
+const FIRST_ROWS: usize = 20;
+
+/// Energy unaccounted for over the largest work or internal energy so far, by row.
+fn open_shares(history: &[HistoryRow]) -> Vec<f64> {
+    let mut work = 0.0f64;
+    (history.iter())
+        .map(|r| {
+            let l = &r.ledger;
+            work = work.max(l.external.abs()).max(l.internal());
+            if work > 0.0 {
+                l.drift().abs() / work
+            } else {
+                0.0
+            }
+        })
+        .collect()
+}
+
+/// What to say when the ledger has been open by more than `bound` for some rows.
+pub(crate) fn open_ledger(history: &[HistoryRow], bound: f64) -> Option<String> {
+    if history.len() < FIRST_ROWS {
+        return None;
+    }
+    let shares = open_shares(history);
+    let open = shares.iter().rev().take(ROWS).all(|s| !(*s <= bound));
+    open.then(|| {
+        format!(
+            "{:.0} % of the work is unaccounted for (drift_bound {:.0} %)",
+            100.0 * shares.last().copied().unwrap_or(f64::NAN),
+            100.0 * bound
+        )
+    })
+}
+
+/// A text of what happened, where it shows, what the likely cause is and what to change. `what` opens it.
+pub(crate) fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
+    let m = &forming.model;
+    let (t, end) = (m.time, forming.load.duration());
+    let mut text = format!(
+        "{what}; seen at t = {t:.5} s of {end:.5} s ({}).",
+        forming.load.phase(t)
+    );
+    let shares = open_shares(history);
+    let calm = shares.iter().rposition(|s| *s < OPENING);
+    if let Some(row) = calm.map_or(history.first(), |i| history.get(i + 1)) {
+        let _ = write!(
+            text,
+            " The ledger is open by more than {:.0} % since t = {:.5} s.",
+            100.0 * OPENING,
+            row.time
+        );
+    }
+    let cell = weakest(forming);
+    if let Some(c) = &cell {
+        text.push_str(&c.text);
+    }
+    let deep = deepest(forming);
+    if let Some(d) = &deep {
+        text.push_str(&d.text);
+    }
+    text.push_str(&fastest(forming));
+    let kinetic = history.last().map_or(0.0, |r| {
+        r.ledger.kinetic / r.ledger.internal().max(f64::MIN_POSITIVE)
+    });
+    let (cause, remedy) = match (&cell, &deep) {
+        (Some(c), _) if !(c.shear.abs() < 65f64.to_radians()) => (
+            "the ply has gathered until an element collapsed: a fold narrower than the mesh",
+            "smaller element_size, element s4 instead of rf4, a larger hourglass_floor, or a holder that leaves less room",
+        ),
+        (_, Some(d)) if d.share > 0.5 => (
+            "a sheet is on its way through its neighbour",
+            "smaller time_step, larger least_areal_mass (stiffer contact), longer process times",
+        ),
+        _ if kinetic > 0.5 => (
+            "the process is too fast for its masses",
+            "longer process times, or less least_areal_mass",
+        ),
+        _ => (
+            "a step above the critical one",
+            "smaller step_safety or time_step, less contact_damping",
+        ),
+    };
+    let _ = write!(text, " Likely cause: {cause}. What to try: {remedy}.");
+    text
+}
+
+fn millimetres(x: V) -> String {
+    let [x, y, z] = x.map(|c| 1e3 * c);
+    format!("({x:.1}, {y:.1}, {z:.1}) mm")
+}
+
+fn centre(points: &[V], nodes: &[u32]) -> V {
+    let n = nodes.len() as f64;
+    nodes.iter().fold([0.0; 3], |s, k| {
+        let p = points[*k as usize];
+        [s[0] + p[0] / n, s[1] + p[1] / n, s[2] + p[2] / n]
+    })
+}
+
+struct Weakest {
+    /// Shear angle (rad); NaN when it cannot be told.
+    shear: f64,
+    text: String,
+}
+
+/// The element that sets the step.
+fn weakest(forming: &Forming) -> Option<Weakest> {
+    let m = &forming.model;
+    let (cell, step) = m.weakest_cell()?;
+    let body = (forming.bodies.iter()).find(|b| {
+        let (first, end) = m.sheets[b.sheet].cell_range;
+        (first..end).contains(&cell)
+    })?;
+    let nodes = m.cells[cell];
+    let of = |points: &[V]| nodes.map(|n| points[n as usize]);
+    let scene = forming.stack.get(body.sheet).map(|s| &s.scene)?;
+    let (shear, strain) = cell_strain(
+        of(&forming.reference),
+        of(&m.x),
+        crate::assembly::axis(scene),
+    );
+    Some(Weakest {
+        shear,
+        text: format!(
+            " The step is set by an element of '{}' at {} (before forming {}): {:.3} us, shear {:.0} deg, fibre strain {:.1} %.",
+            body.name,
+            millimetres(centre(&m.x, &nodes)),
+            millimetres(centre(&forming.reference, &nodes)),
+            1e6 * step,
+            shear.to_degrees(),
+            100.0 * strain,
+        ),
+    })
+}
+
+struct Deepest {
+    /// Over the thinnest sheet.
+    share: f64,
+    text: String,
+}
+
+/// The contact that is deepest.
+fn deepest(forming: &Forming) -> Option<Deepest> {
+    let (name, depth, _) = (forming.penetrations().into_iter())
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, depth, _)| *depth > 0.0)?;
+    let thinnest = (forming.stack.iter()).fold(f64::INFINITY, |t, s| t.min(s.thickness));
+    Some(Deepest {
+        share: depth / thinnest,
+        text: format!(
+            " Deepest contact: {name}, {:.0} um ({:.0} % of the thinnest sheet).",
+            1e6 * depth,
+            100.0 * depth / thinnest
+        ),
+    })
+}
+
+/// The node that moves fastest.
+fn fastest(forming: &Forming) -> String {
+    let m = &forming.model;
+    let Some(node) = (0..m.v.len()).max_by(|a, b| norm(m.v[*a]).total_cmp(&norm(m.v[*b]))) else {
+        return String::new();
+    };
+    let sheet = (m.sheets.iter()).find(|s| s.nodes.contains(&(node as u32)));
+    format!(
+        " Fastest: '{}' at {} with {:.1} m/s.",
+        sheet.map_or("?", |s| s.name.as_str()),
+        millimetres(m.x[node]),
+        norm(m.v[node])
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plyflow_mechanics::energy::Ledger;
+
+    /// A history whose work grows by 1 J a row, with that energy unaccounted for in each.
+    fn history(drift: impl Fn(usize) -> f64, rows: usize) -> Vec<HistoryRow> {
+        let row = |i: usize| HistoryRow {
+            time: i as f64,
+            ledger: Ledger {
+                external: i as f64,
+                membrane: i as f64 + drift(i),
+                ..Ledger::default()
+            },
+            cavity: 0.0,
+            bag: 0.0,
+            frame: 0.0,
+            punch_force: 0.0,
+            holder_travel: 0.0,
+            sheets: Vec::new(),
+            interfaces: Vec::new(),
+        };
+        (0..rows).map(row).collect()
+    }
+
+    #[test]
+    fn a_ledger_is_open_only_beyond_the_bound_and_for_some_rows() {
+        let open = |drift: &dyn Fn(usize) -> f64, rows| open_ledger(&history(drift, rows), 0.1);
+        assert_eq!(open(&|_| 0.0, 50), None);
+        assert_eq!(open(&|i| 0.05 * i as f64, 50), None);
+        let text = open(&|i| -0.2 * i as f64, 50).unwrap();
+        assert!(text.starts_with("20 % of the work"), "{text}");
+        // A knock, and what is open before there is any work.
+        assert_eq!(open(&|i| if i == 48 { 30.0 } else { 0.0 }, 50), None);
+        assert_eq!(open(&|_| 5.0, FIRST_ROWS - 1), None);
+        // What is no number is not closed.
+        assert!(open(&|i| if i > 40 { f64::NAN } else { 0.0 }, 50).is_some());
+    }
+}
