@@ -200,6 +200,16 @@ fn parts_add_up(forming: &Forming, outcome: &Outcome) {
 }
 
 #[test]
+fn the_strongest_contact_damping_keeps_the_ledger_closed() {
+    // Nodes of two plies under a holder feel the dampers of the plates, of the punch and of each other.
+    let mut p = parameters(2, &json!({"force": "200 N"}));
+    p.contact_damping = 1.0;
+    let (_, outcome) = form(&p, 2);
+    let health = &outcome.health;
+    assert!(health.peak_drift_ratio < 0.01, "{health:?}");
+}
+
+#[test]
 fn what_makes_no_press_is_refused_with_what_to_do() {
     let refused = |p: &Parameters| build_global(p, &BuiltIn).err().expect("refused");
     let tight = refused(&parameters(2, &json!({"gap": "0.0005 m"})));
