@@ -80,8 +80,10 @@ fn a_scene_has_its_materials_inside_and_reads_back_as_its_type() {
         ply["material"].get("source").is_none(),
         "prose does not enter"
     );
+    use plyflow_model::{friction::Coefficient, units::Number};
     let typed: plyflow_model::scene::Scene = serde_json::from_value(scene.clone()).unwrap();
-    assert_eq!(typed.friction.tool_diaphragm.map(|n| n.0), Some(0.51));
+    let constant = |n| Some(Coefficient::Constant(Number(n)));
+    assert_eq!(typed.friction.tool_diaphragm, constant(0.51));
     assert_eq!(serde_json::to_value(&typed).unwrap(), *scene);
 }
 

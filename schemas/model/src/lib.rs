@@ -2,6 +2,7 @@
 //! a plugin. Everything else in the repository depends on this crate and it depends on nothing of it.
 
 pub mod canonical;
+pub mod friction;
 pub mod job;
 pub mod manifest;
 pub mod material;

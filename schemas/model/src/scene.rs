@@ -4,6 +4,7 @@
 //! Coordinates: x along the tool, y across, z up; the machine bed is the plane z = 0 and the tool
 //! stands on it, centred at x = y = 0.
 
+use crate::friction::Friction;
 use crate::material::MaterialEntry;
 use crate::units::{Angle, Force, Length, Number, Pressure, Time};
 use schemars::JsonSchema;
@@ -248,32 +249,6 @@ pub struct Sheet {
     /// shear stretches it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fibre_2: Option<Angle>,
-}
-
-/// Coulomb friction coefficients.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Friction {
-    /// Tool (and machine bed) against diaphragm; needed where the stack has diaphragms.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub tool_diaphragm: Option<Number>,
-    /// Tool (punch, die and blank holder) against fabric; needed in a press.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub tool_fabric: Option<Number>,
-    /// Fabric against diaphragm; needed where the stack has diaphragms.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub fabric_diaphragm: Option<Number>,
-    /// Fabric against fabric; needed where plies lie on each other.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub fabric_fabric: Option<Number>,
-    /// Diaphragm against diaphragm; needed where the stack has diaphragms.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("minimum" = 0, "maximum" = 2))]
-    pub diaphragm_diaphragm: Option<Number>,
 }
 
 /// The process.

@@ -1,10 +1,12 @@
 //! What global and local runs share: checking the stack, making components, stacking the contacts.
 
+use crate::friction::{FrictionTable, Touching};
 use crate::parameters::{ComponentChoice, Parameters};
 use plyflow_abi::pf_component;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
-    ContactSettings, Plane, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
+    ContactSettings, FrictionLaw, Plane, RigidContact, RigidItem, RigidSurface, SheetContact,
+    SlaveItem,
 };
 use plyflow_mechanics::mesh::{NONE, QuadMesh, even_axis};
 use plyflow_mechanics::model::{Model, StepSettings};
@@ -12,7 +14,6 @@ use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::scene::{Process, Scene, Sheet, SheetKind};
-use plyflow_model::units::Number;
 use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
 
@@ -108,16 +109,6 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
         .collect()
 }
 
-/// A friction coefficient that this scene needs.
-///
-/// # Errors
-/// When the scene does not give it.
-pub fn coefficient(value: Option<Number>, name: &str) -> Result<f64, String> {
-    value.map(|n| n.0).ok_or_else(|| {
-        format!("friction.{name}: not given, but this scene has surfaces that touch so; expected a coefficient")
-    })
-}
-
 /// Constants of all contacts.
 pub fn contact_settings(p: &Parameters) -> ContactSettings {
     ContactSettings {
@@ -136,7 +127,7 @@ pub fn add_sheet_contact(
     (slave, nodes): (usize, &[u32]),
     (master, index): (usize, usize),
     side: f64,
-    mu: f64,
+    friction: FrictionLaw,
     p: &Parameters,
 ) {
     let touching = 0.5 * (stack[slave].thickness + stack[master].thickness);
@@ -154,7 +145,7 @@ pub fn add_sheet_contact(
         name,
         side,
         offset,
-        friction: mu,
+        friction,
         slip_factor: p.slip_stiffness,
         augmentation: p.contact_augmentation,
         items,
@@ -260,7 +251,7 @@ pub struct Placed {
 /// `tool` may be absent (a scene whose zone lies off the tool).
 ///
 /// # Errors
-/// When a friction coefficient is missing.
+/// When a friction coefficient is missing or makes no sense.
 pub fn add_contacts(
     model: &mut Model,
     stack: &[StackSheet],
@@ -269,44 +260,46 @@ pub fn add_contacts(
     p: &Parameters,
     tool: Arc<dyn RigidSurface>,
 ) -> Result<(), String> {
-    let friction = &scene.friction;
-    let tool_diaphragm = coefficient(friction.tool_diaphragm, "tool_diaphragm")?;
-    let fabric_diaphragm = coefficient(friction.fabric_diaphragm, "fabric_diaphragm")?;
-    let diaphragms = coefficient(friction.diaphragm_diaphragm, "diaphragm_diaphragm")?;
-    let fabrics = if placed.len() > 3 {
-        coefficient(friction.fabric_fabric, "fabric_fabric")?
-    } else {
-        0.0
-    };
-    let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: f64, k: usize, offset: f64| {
+    let friction = FrictionTable::new(scene)?;
+    let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: FrictionLaw, k: usize| {
         let slaves = placed[k].slaves.iter();
-        let items = slaves.map(|n| RigidItem::new(*n, offset)).collect();
+        let items = slaves
+            .map(|n| RigidItem::new(*n, stack[k].offset))
+            .collect();
         RigidContact::new(name, surface, mu, &contact_settings(p), items)
     };
-    let bottom = &stack[0];
-    let mu = tool_diaphragm;
+    let bottom = stack[0].scene.name.as_str();
+    let under = |model: &Model, part: &str| {
+        let touching = Touching {
+            parts: [part, bottom],
+            slave: bottom,
+        };
+        friction.law(model, &touching)
+    };
     let bed: Arc<dyn RigidSurface> = Arc::new(Plane { height: 0.0 });
     let name = |what: &str, k: usize| format!("{what}/{}", stack[k].scene.name);
-    model
-        .rigid_contacts
-        .push(rigid(name("tool", 0), tool.clone(), mu, 0, bottom.offset));
-    model
-        .rigid_contacts
-        .push(rigid(name("bed", 0), bed, mu, 0, bottom.offset));
+    for (part, surface) in [("tool", tool.clone()), ("bed", bed)] {
+        let mu = under(model, part)?;
+        model
+            .rigid_contacts
+            .push(rigid(name(part, 0), surface, mu, 0));
+    }
     let top = placed.len() - 1;
     for k in 1..top {
         // The chords of the film's elements cut through convex fillets; the plies' own nodes must stay
         // outside the tool all the same. Their friction is that with the film.
-        model.rigid_contacts.push(rigid(
-            name("tool", k),
-            tool.clone(),
-            0.0,
-            k,
-            stack[k].offset,
-        ));
+        model
+            .rigid_contacts
+            .push(rigid(name("tool", k), tool.clone(), 0.0.into(), k));
     }
-    let mut pair = |slave: usize, master: usize, side: f64, mu: f64| {
+    let mut pair = |slave: usize, master: usize, side: f64| -> Result<(), String> {
         let on = (master, placed[master].index);
+        let of = |k: usize| stack[k].scene.name.as_str();
+        let touching = Touching {
+            parts: [of(slave.min(master)), of(slave.max(master))],
+            slave: of(slave),
+        };
+        let mu = friction.law(model, &touching)?;
         add_sheet_contact(
             model,
             stack,
@@ -316,18 +309,18 @@ pub fn add_contacts(
             mu,
             p,
         );
+        Ok(())
     };
     for k in 1..top {
-        let mu = if k == 1 { fabric_diaphragm } else { fabrics };
-        pair(k, k - 1, 1.0, mu);
+        pair(k, k - 1, 1.0)?;
     }
     // The plies' nodes are the slaves of both films: the two films have the same mesh, so whatever unevenness
     // node-to-surface contact makes of a uniform pressure is the same above and below, and cancels. With the
     // film above as the slave of the ply it does not, and the evacuated stack waves (tried).
     if top > 1 {
-        pair(top - 1, top, -1.0, fabric_diaphragm);
+        pair(top - 1, top, -1.0)?;
     }
-    pair(top, 0, 1.0, diaphragms);
+    pair(top, 0, 1.0)?;
     model.set_contact_stiffness(&contact_settings(p));
     Ok(())
 }

@@ -5,6 +5,7 @@
 pub mod assembly;
 mod checkpoint;
 mod diagnosis;
+pub mod friction;
 mod global;
 mod local;
 mod output;

@@ -4,6 +4,7 @@
 //! lowest ply, and pushes the plies through the opening of the die.
 
 use crate::assembly::{self, Components, StackSheet, ToolSurface};
+use crate::friction::{FrictionTable, Touching};
 use crate::global::ply_box;
 use crate::parameters::Parameters;
 use crate::process::Load;
@@ -223,7 +224,7 @@ fn add_contacts(
     p: &Parameters,
 ) -> Result<(), String> {
     let settings = assembly::contact_settings(p);
-    let mu = assembly::coefficient(scene.friction.tool_fabric, "tool_fabric")?;
+    let friction = FrictionTable::new(scene)?;
     let top: f64 = stack.iter().map(|s| s.thickness).sum();
     for (part, surface, above) in parts {
         for (k, sheet) in stack.iter().enumerate() {
@@ -233,11 +234,18 @@ fn add_contacts(
             } else {
                 (k == 0, sheet.offset)
             };
+            let own = sheet.scene.name.as_str();
+            let parts = if *above { [own, part] } else { [part, own] };
+            let mu = if faces {
+                friction.law(model, &Touching { parts, slave: own })?
+            } else {
+                0.0.into()
+            };
             let nodes = model.sheets[k].nodes.iter();
             let contact = RigidContact::new(
                 format!("{part}/{}", sheet.scene.name),
                 surface.clone(),
-                if faces { mu } else { 0.0 },
+                mu,
                 &settings,
                 nodes.map(|n| RigidItem::new(*n, offset)).collect(),
             );
@@ -245,7 +253,12 @@ fn add_contacts(
         }
     }
     for k in 1..stack.len() {
-        let between = assembly::coefficient(scene.friction.fabric_fabric, "fabric_fabric")?;
+        let [lower, upper] = [k - 1, k].map(|k| stack[k].scene.name.as_str());
+        let touching = Touching {
+            parts: [lower, upper],
+            slave: upper,
+        };
+        let between = friction.law(model, &touching)?;
         let slaves = model.sheets[k].nodes.clone();
         let on = (k - 1, k - 1);
         assembly::add_sheet_contact(model, stack, (k, &slaves), on, 1.0, between, p);

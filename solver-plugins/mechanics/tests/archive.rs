@@ -74,7 +74,7 @@ fn pressed_stack() -> Model {
         name: "sheet 1 on sheet 0".into(),
         side: 1.0,
         offset: THICKNESS,
-        friction: 0.3,
+        friction: 0.3.into(),
         slip_factor: contact.slip_factor,
         augmentation: contact.augmentation,
         items: (0..n).map(corner).collect(),

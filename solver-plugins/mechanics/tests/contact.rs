@@ -30,7 +30,7 @@ fn contact(slave: u32, cell: u32) -> SheetContact {
         name: "test".into(),
         side: 1.0,
         offset: OFFSET,
-        friction: 0.0,
+        friction: 0.0.into(),
         slip_factor: 0.5,
         augmentation: 0.0,
         items: vec![item],

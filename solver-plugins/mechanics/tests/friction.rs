@@ -1,15 +1,18 @@
-//! Friction against closed forms: a belt around a drum (Euler and Eytelwein), a sheet pulled out from between two.
+//! Friction against closed forms: a belt around a drum (Euler and Eytelwein), a sheet pulled out from between two, a block
+//! on an incline; constant coefficients, and those by pressure and by the angle to the fibres.
 
 mod common;
 
 use plyflow_mechanics::contact::{
-    ContactSettings, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
+    AngleDependence, ContactSettings, FibreField, FrictionLaw, Plane, PressureDependence,
+    RigidContact, RigidItem, RigidSurface, SheetCells, SheetContact, SlaveItem, VaryingFriction,
+    Whose,
 };
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::{V, add, dot, scale, sub};
+use plyflow_mechanics::vec3::{V, add, dot, scale};
 use std::sync::Arc;
 
 /// A sheet of the fabric; its nodes follow `first` of the model.
@@ -151,7 +154,8 @@ fn a_belt_around_a_drum_follows_the_capstan_equation() {
         let (got, law) = (belt(angle, friction), (friction * angle).exp());
         assert!(
             (got / law - 1.0).abs() < 0.03,
-            "{angle} rad, {friction}: {got} instead of {law}"
+            "{angle} rad, coefficient {friction}: T2/T1 = {got} instead of {law}, {:.2} % off",
+            100.0 * (got / law - 1.0)
         );
     }
 }
@@ -169,11 +173,23 @@ fn locate(mesh: &QuadMesh, p: V) -> (u32, [f64; 2]) {
         .expect("the lower sheet is larger")
 }
 
-#[test]
-fn a_sheet_pulled_from_between_two_under_one_bar_is_held_by_both_faces() {
-    const PRESSURE: f64 = 1e5;
-    const FRICTION: f64 = 0.3;
-    const THICKNESS: f64 = 1e-3;
+const THICKNESS: f64 = 1e-3;
+/// Area of the upper sheet of a sandwich (m2).
+const AREA: f64 = 0.05 * 0.05;
+
+/// What a sandwich does while its middle sheet slides.
+struct Sandwich {
+    /// Mean pulling force (N).
+    pull: f64,
+    /// Mean friction on the slaves of the lower and of the upper face (N).
+    faces: [f64; 2],
+    /// Height of the upper sheet over its start at the end (m).
+    lift: f64,
+}
+
+/// Pulls a sheet along x out from between two, under `pressure` (Pa) on the upper one. `laws`: of the lower and upper face;
+/// the middle sheet's nodes are the slaves on the lower sheet, the upper one's on the middle sheet.
+fn sandwich(pressure: f64, laws: impl Fn(&Model) -> [FrictionLaw; 2]) -> Sandwich {
     let grid =
         |x: [f64; 2], y: f64| QuadMesh::grid(&even_axis(x[0], x[1], 0.01), &even_axis(-y, y, 0.01));
     // The upper sheet stays on the middle one, and that on the lower one, all the way.
@@ -221,7 +237,8 @@ fn a_sheet_pulled_from_between_two_under_one_bar_is_held_by_both_faces() {
         model.fix(n, in_plane);
     }
     let settings = ContactSettings::default();
-    for k in 1..3 {
+    for (k, law) in laws(&model).into_iter().enumerate() {
+        let k = k + 1;
         let nodes = first[k]..first[k] + meshes[k].points.len() as u32;
         let cell0 = model.sheets[k - 1].cell_range.0 as u32;
         let items = nodes.map(|n| {
@@ -232,7 +249,7 @@ fn a_sheet_pulled_from_between_two_under_one_bar_is_held_by_both_faces() {
             name: format!("{k}"),
             side: 1.0,
             offset: THICKNESS,
-            friction: FRICTION,
+            friction: law,
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
             items: items.collect(),
@@ -242,21 +259,260 @@ fn a_sheet_pulled_from_between_two_under_one_bar_is_held_by_both_faces() {
     // A membrane's slack tail would float up and fold over the edge of the upper sheet; its weight, a ten
     // thousandth of the pressure, keeps it down.
     model.body_acceleration[2] = -9.81;
-    let (mut sum, mut count) = (0.0, 0);
+    let (mut pull, mut faces, mut count) = (0.0, [0.0; 2], 0.0);
     while model.time < begin + 0.9 * duration {
-        model.pressures.above = PRESSURE * smooth_step(model.time, 0.0, 0.5 * begin);
+        model.pressures.above = pressure * smooth_step(model.time, 0.0, 0.5 * begin);
         model.step(false).unwrap();
         if model.time > begin + 0.6 * duration {
-            sum += model.reactions()[still..].iter().map(|r| r[0]).sum::<f64>();
-            count += 1;
+            pull += model.reactions()[still..].iter().map(|r| r[0]).sum::<f64>();
+            for (face, contact) in faces.iter_mut().zip(&model.sheet_contacts) {
+                *face += contact.items.iter().map(|i| i.force[0]).sum::<f64>();
+            }
+            count += 1.0;
         }
     }
+    Sandwich {
+        pull: pull / count,
+        faces: faces.map(|f| f / count),
+        lift: model.x[first[2] as usize + 14][2] - 2.0 * THICKNESS,
+    }
+}
+
+#[test]
+fn a_sheet_pulled_from_between_two_under_one_bar_is_held_by_both_faces() {
+    let (pressure, friction) = (1e5, 0.3);
+    let got = sandwich(pressure, |_| [friction.into(), friction.into()]);
     // Thin sheets sag between nodes by nothing that counts: what presses is the upper sheet's area.
-    let law = 2.0 * FRICTION * PRESSURE * 0.05 * 0.05;
-    let got = sum / f64::from(count);
-    assert!((got / law - 1.0).abs() < 0.01, "{got} N instead of {law} N");
+    let law = friction * pressure * AREA;
+    for (face, force) in ["lower", "upper"].iter().zip(got.faces) {
+        let error = 100.0 * (force.abs() / law - 1.0);
+        assert!(
+            error.abs() < 1.0,
+            "{face} face: {force} N instead of mu p A = {law} N, {error:.2} % off"
+        );
+    }
+    let error = 100.0 * (got.pull / (2.0 * law) - 1.0);
+    assert!(
+        error.abs() < 1.0,
+        "{} N instead of 2 mu p A = {} N, {error:.2} % off",
+        got.pull,
+        2.0 * law
+    );
     // The upper sheet kept its height over the middle one.
-    let lifted = model.x[first[2] as usize + 14];
-    let height = sub(lifted, [0.0, 0.0, 2.0 * THICKNESS])[2];
-    assert!(height.abs() < 8e-6, "{height} m");
+    assert!(got.lift.abs() < 8e-6, "{} m", got.lift);
+}
+
+/// The cells of a sheet of a model.
+fn cells(model: &Model, sheet: usize) -> &[[u32; 4]] {
+    let (c0, c1) = model.sheets[sheet].cell_range;
+    &model.cells[c0..c1]
+}
+
+/// A law for slaves of a sheet.
+fn varying(
+    model: &Model,
+    slave: usize,
+    pressure: PressureDependence,
+    angle: Option<AngleDependence>,
+) -> FrictionLaw {
+    let slave = SheetCells::new(cells(model, slave));
+    FrictionLaw::Varying(Arc::new(VaryingFriction {
+        pressure,
+        angle,
+        slave,
+    }))
+}
+
+#[test]
+fn pulls_under_two_pressures_follow_laws_of_pressure() {
+    let power = PressureDependence::Power {
+        coefficient: 0.3,
+        reference: 5e4,
+        exponent: -0.3,
+    };
+    let table = PressureDependence::Table(vec![[2e4, 0.5], [1.2e5, 0.1]]);
+    let of_table = |p: f64| 0.5 - 0.4 * (p - 2e4) / 1e5;
+    let lower = 0.1;
+    for (law, pressure, expected) in [
+        (&power, 5e4, 0.3),
+        (&power, 1e5, 0.3 * 2f64.powf(-0.3)),
+        (&table, 5e4, of_table(5e4)),
+        (&table, 1e5, of_table(1e5)),
+    ] {
+        let got = sandwich(pressure, |m| {
+            [lower.into(), varying(m, 2, law.clone(), None)]
+        });
+        let face = got.faces[1].abs() / (pressure * AREA);
+        let whole = got.pull / (pressure * AREA) - lower;
+        for (what, got) in [("face", face), ("pull", whole)] {
+            let error = 100.0 * (got / expected - 1.0);
+            assert!(
+                error.abs() < 1.0,
+                "{law:?} at {pressure} Pa, {what}: coefficient {got} instead of {expected}, {error:.2} % off"
+            );
+        }
+    }
+}
+
+#[test]
+fn pulls_along_and_across_fibres_differ_by_the_factor_of_the_angle() {
+    let pressure = 1e5;
+    let factors = vec![[0.0, 1.0], [std::f64::consts::FRAC_PI_2, 0.5]];
+    // Fibres of the upper sheet, which stands still, and of the middle one, which slides.
+    for (whose, degrees, factor) in [
+        (Whose::Slave, 0.0, 1.0),
+        (Whose::Slave, 45.0, 0.75),
+        (Whose::Slave, 90.0, 0.5),
+        (Whose::Master, 0.0, 1.0),
+        (Whose::Master, 90.0, 0.5),
+    ] {
+        let got = sandwich(pressure, |m| {
+            let sheet = if whose == Whose::Slave { 2 } else { 1 };
+            let (s, c) = f64::to_radians(degrees).sin_cos();
+            let first = m.sheets[sheet].cell_range.0;
+            let fibres = FibreField::new(cells(m, sheet), first, &m.x, [c, s, 0.0]);
+            let angle = AngleDependence {
+                factors: factors.clone(),
+                whose,
+                fibres,
+            };
+            let coefficient = PressureDependence::Constant(0.4);
+            [0.1.into(), varying(m, 2, coefficient, Some(angle))]
+        });
+        let expected = 0.4 * factor * pressure * AREA;
+        let force = got.faces[1].abs();
+        let error = 100.0 * (force / expected - 1.0);
+        assert!(
+            error.abs() < 1.0,
+            "{whose:?} fibres at {degrees} deg: {force} N instead of {expected} N, {error:.2} % off"
+        );
+    }
+}
+
+/// Pulls a sheet of 50 x 30 mm under `pressure` over a rigid plane; the mean force (N) while it slides.
+fn sledge(pressure: f64, law: impl Fn(&Model) -> FrictionLaw) -> f64 {
+    let mesh = QuadMesh::grid(&even_axis(0.0, 0.05, 0.01), &even_axis(0.0, 0.03, 0.01));
+    let settings = StepSettings {
+        target_step: 1e-5,
+        safety: 0.8,
+        damping: 50.0,
+    };
+    let spec = sheet("sledge", &mesh, 0, [1.0, 0.0, 0.0], Pressed::Above);
+    let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
+    let n = mesh.points.len() as u32;
+    let front = (0..n).filter(|n| mesh.points[*n as usize][0] > 0.0499);
+    let driven: Vec<u32> = front.collect();
+    let (begin, duration) = (0.02, 0.1);
+    let drive = Pull {
+        start: driven.iter().map(|n| mesh.points[*n as usize]).collect(),
+        still: 0,
+        direction: [1.0, 0.0, 0.0],
+        begin,
+        way: 0.006,
+        duration,
+    };
+    model.set_driven(driven, Box::new(drive));
+    let floor = Arc::new(Plane { height: 0.0 });
+    let items = (0..n).map(|n| RigidItem::new(n, 0.0)).collect();
+    let contact = ContactSettings::default();
+    let law = law(&model);
+    let on = RigidContact::new("floor".into(), floor, law, &contact, items);
+    model.rigid_contacts.push(on);
+    model.set_contact_stiffness(&contact);
+    let (mut sum, mut count) = (0.0, 0.0);
+    while model.time < begin + 0.9 * duration {
+        model.pressures.above = pressure * smooth_step(model.time, 0.0, 0.5 * begin);
+        model.step(false).unwrap();
+        if model.time > begin + 0.6 * duration {
+            sum += model.reactions().iter().map(|r| r[0]).sum::<f64>();
+            count += 1.0;
+        }
+    }
+    sum / count
+}
+
+#[test]
+fn a_sledge_on_a_rigid_plane_follows_pressure_and_fibres() {
+    // The driven edge keeps its height: what lies on its nodes does not press.
+    let area = 0.045 * 0.03;
+    for (pressure, degrees, factor) in [(2e4, 0.0, 1.0), (8e4, 0.0, 1.0), (8e4, 90.0, 0.6)] {
+        let got = sledge(pressure, |m| {
+            let (s, c) = f64::to_radians(degrees).sin_cos();
+            let law = PressureDependence::Power {
+                coefficient: 0.25,
+                reference: 2e4,
+                exponent: -0.25,
+            };
+            let angle = AngleDependence {
+                factors: vec![[0.0, 1.0], [std::f64::consts::FRAC_PI_2, 0.6]],
+                whose: Whose::Slave,
+                fibres: FibreField::new(cells(m, 0), 0, &m.x, [c, s, 0.0]),
+            };
+            varying(m, 0, law, Some(angle))
+        });
+        let coefficient = 0.25 * (pressure / 2e4).powf(-0.25) * factor;
+        let expected = coefficient * pressure * area;
+        let error = 100.0 * (got / expected - 1.0);
+        assert!(
+            error.abs() < 1.0,
+            "{pressure} Pa, fibres at {degrees} deg: {got} N instead of {expected} N, {error:.2} % off"
+        );
+    }
+}
+
+/// Lets a block (a sheet under its weight) go on a plane inclined by `angle` (rad): its way (m) down the plane after 0.05 s, and
+/// its mean acceleration (m/s2) over the second half of that time.
+fn incline(angle: f64, friction: f64) -> (f64, f64) {
+    let axis = even_axis(0.0, 0.02, 0.01);
+    let mesh = QuadMesh::grid(&axis, &axis);
+    let settings = StepSettings {
+        target_step: 1e-5,
+        safety: 0.8,
+        damping: 0.0,
+    };
+    let spec = sheet("block", &mesh, 0, [1.0, 0.0, 0.0], Pressed::No);
+    let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
+    let floor = Arc::new(Plane { height: 0.0 });
+    let items = (0..9).map(|n| RigidItem::new(n, 0.0)).collect();
+    let contact = ContactSettings::default();
+    let on = RigidContact::new("incline".into(), floor, friction, &contact, items);
+    model.rigid_contacts.push(on);
+    model.set_contact_stiffness(&contact);
+    let g = 9.81;
+    let speed = |m: &Model| m.v.iter().map(|v| v[0]).sum::<f64>() / 9.0;
+    let settle = 0.02;
+    let mut seen = [0.0; 2];
+    let mut start = 0.0;
+    while model.time < settle + 0.05 {
+        // First it lies down on the level plane; then the plane tilts at once.
+        let tilt = if model.time < settle { 0.0 } else { angle };
+        let weight = g * smooth_step(model.time, 0.0, 0.5 * settle);
+        model.body_acceleration = [weight * tilt.sin(), 0.0, -weight * tilt.cos()];
+        model.step(false).unwrap();
+        if model.time < settle {
+            start = model.x[4][0];
+        }
+        if model.time < settle + 0.025 {
+            seen[0] = speed(&model);
+        }
+        seen[1] = speed(&model);
+    }
+    (model.x[4][0] - start, (seen[1] - seen[0]) / 0.025)
+}
+
+#[test]
+fn a_block_on_an_incline_sticks_below_the_angle_of_friction_and_slides_by_coulombs_law_above_it() {
+    let friction: f64 = 0.4;
+    let (way, _) = incline(friction.atan() * 0.98, friction);
+    assert!(way.abs() < 2e-6, "it sticks, but went {way} m");
+    for share in [1.1, 1.5] {
+        let angle = friction.atan() * share;
+        let law = 9.81 * (angle.sin() - friction * angle.cos());
+        let (way, got) = incline(angle, friction);
+        let error = 100.0 * (got / law - 1.0);
+        assert!(
+            error.abs() < 1.0 && way > 0.0,
+            "at {share} of the angle of friction: {got} m/s2 instead of {law} m/s2, {error:.2} % off"
+        );
+    }
 }

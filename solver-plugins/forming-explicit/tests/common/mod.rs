@@ -41,6 +41,7 @@ impl Components for BuiltIn {
 }
 
 /// Follows a run without a word.
+#[allow(dead_code)]
 pub struct Silent;
 
 impl Observer for Silent {
@@ -66,6 +67,7 @@ pub fn fabric() -> Value {
 }
 
 /// Builds and runs a scene to its end.
+#[allow(dead_code)]
 pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

@@ -9,9 +9,14 @@
 //! over the steady part of the force (augmented Lagrangian, a little in every step): the penetration of a
 //! contact at rest dies out over 1 / augmentation steps, at no cost in step size.
 
+mod friction;
 mod rigid;
 mod sheets;
 
+pub use friction::{
+    AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, PressureDependence, SheetCells,
+    VaryingFriction, Whose,
+};
 pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
 pub use sheets::{SheetContact, SlaveItem, Surface, shape};
 
@@ -108,7 +113,7 @@ pub(crate) fn normal_force(
 }
 
 /// Friction of a contact in a step.
-pub(crate) struct Friction {
+pub(crate) struct Tangential {
     /// Traction held by the slip spring (N).
     pub slip: [f64; 3],
     /// Force (N): the spring's and the damper's, together within Coulomb's limit.
@@ -133,7 +138,7 @@ pub(crate) fn friction_force(
     k: f64,
     c: f64,
     limit: f64,
-) -> Friction {
+) -> Tangential {
     use crate::vec3::{dot, norm, scale, sub};
     let trial = sub(held, scale(vt, k * dt));
     let size = norm(trial);
@@ -150,7 +155,7 @@ pub(crate) fn friction_force(
         both
     };
     let damping = -dot(sub(force, slip), vt) * dt;
-    Friction {
+    Tangential {
         slip,
         force,
         friction,

@@ -1,5 +1,6 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
+use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
 use super::{ContactEnergy, ContactSettings, friction_force, normal_force};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
@@ -137,7 +138,7 @@ pub struct RigidContact {
     /// Its motion.
     pub motion: RigidMotion,
     /// Coulomb coefficient.
-    pub friction: f64,
+    pub friction: FrictionLaw,
     /// Elastic-slip stiffness over normal stiffness.
     pub slip_factor: f64,
     /// Share of the penalty force that a step adds to the multiplier.
@@ -156,7 +157,7 @@ impl RigidContact {
     pub fn new(
         name: String,
         surface: Arc<dyn RigidSurface>,
-        friction: f64,
+        friction: impl Into<FrictionLaw>,
         settings: &ContactSettings,
         items: Vec<RigidItem>,
     ) -> Self {
@@ -164,7 +165,7 @@ impl RigidContact {
             name,
             surface,
             motion: RigidMotion::default(),
-            friction,
+            friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
             items,
@@ -177,12 +178,27 @@ impl RigidContact {
     /// Computes the force of every item from positions (m) and velocities (m/s). `reach` (m): twice the
     /// furthest that any node moves in a step, and the surface too.
     pub fn compute(&mut self, x: &[V], v: &[V], dt: f64, reach: f64) -> ContactEnergy {
+        match self.friction.clone() {
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), x, v, dt, reach),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, x, v, dt, reach),
+        }
+    }
+
+    fn compute_with<F: Coulomb>(
+        &mut self,
+        friction: &F,
+        x: &[V],
+        v: &[V],
+        dt: f64,
+        reach: f64,
+    ) -> ContactEnergy {
         let surface = self.surface.as_ref();
         let motion = self.motion;
         let reach = reach + 2.0 * norm(motion.velocity) * dt;
         let law = Law {
             dt,
-            friction: self.friction,
+            friction,
+            x,
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
@@ -271,15 +287,22 @@ struct Span {
     energy: ContactEnergy,
 }
 
-struct Law {
+struct Law<'a, F> {
     dt: f64,
-    friction: f64,
+    friction: &'a F,
+    x: &'a [V],
     slip_factor: f64,
     augmentation: f64,
 }
 
 /// Force of an item in touch, or so lately that it still has a multiplier; its energy. `v`: relative to the surface.
-fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) -> ContactEnergy {
+fn touch<F: Coulomb>(
+    item: &mut RigidItem,
+    gap: f64,
+    g: V,
+    v: V,
+    law: &Law<'_, F>,
+) -> ContactEnergy {
     let (k, c) = (item.stiffness, item.damping);
     let vn = dot(v, g);
     let (held, work) = (item.multiplier, item.work);
@@ -292,10 +315,19 @@ fn touch(item: &mut RigidItem, gap: f64, g: V, v: V, law: &Law) -> ContactEnergy
         damping: normal.loss,
     };
     item.force = scale(g, normal.force);
-    if law.friction > 0.0 {
+    if !law.friction.is_smooth() {
         let vt = sub(v, scale(n, dot(v, n)));
         let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-        let limit = law.friction * normal.force;
+        let limit = law.friction.limit(&Sliding {
+            node: item.node,
+            cell: crate::mesh::NONE,
+            x: law.x,
+            normal: n,
+            force: normal.force,
+            held: rest,
+            vt,
+            spring: law.slip_factor * k * law.dt,
+        });
         let f = friction_force(
             rest,
             vt,

@@ -6,6 +6,7 @@
 //! A force along an interpolated normal is smoother to look at but is no gradient: two flat sheets under
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
+use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
 use super::{ContactEnergy, friction_force, normal_force};
 use crate::mesh::NONE;
 use crate::vec3::{V, add, dot, scale, sub, unit};
@@ -112,7 +113,7 @@ pub struct SheetContact {
     /// Distance of the two mid-surfaces in touch (m).
     pub offset: f64,
     /// Coulomb coefficient.
-    pub friction: f64,
+    pub friction: FrictionLaw,
     /// Elastic-slip stiffness over normal stiffness.
     pub slip_factor: f64,
     /// Share of the penalty force that a step adds to the multiplier.
@@ -320,10 +321,24 @@ fn blend(first: &Closest, second: Option<&Closest>, offset: f64) -> (f64, f64) {
 impl SheetContact {
     /// Computes the force of every slave. `reach` (m): twice the furthest that any node moves in a step.
     pub fn compute(&mut self, s: &Surface<'_>, v: &[V], dt: f64, reach: f64) -> ContactEnergy {
+        match self.friction.clone() {
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, dt, reach),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, dt, reach),
+        }
+    }
+
+    fn compute_with<F: Coulomb>(
+        &mut self,
+        friction: &F,
+        s: &Surface<'_>,
+        v: &[V],
+        dt: f64,
+        reach: f64,
+    ) -> ContactEnergy {
         let (side, offset) = (self.side, self.offset);
         let law = Law {
             dt,
-            friction: self.friction,
+            friction,
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
@@ -434,7 +449,7 @@ struct Pull {
 /// Force of a slave that keeps its place in its cell and its direction. (The distance to a point that stands
 /// still would not do: pressed at a tenth of a millimetre from it, the slave is a pendulum on its head.)
 #[inline]
-fn hold(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], offset: f64, law: &Law) {
+fn hold<F: Coulomb>(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], offset: f64, law: &Law<'_, F>) {
     let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
     let arm = sub(s.x[item.node as usize], combine(item.weights, &x));
     let n = item.direction;
@@ -467,16 +482,23 @@ fn hold(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], offset: f64, law: &Law) 
     );
 }
 
-struct Law {
+struct Law<'a, F> {
     dt: f64,
-    friction: f64,
+    friction: &'a F,
     slip_factor: f64,
     augmentation: f64,
 }
 
 /// Force of a slave in touch, or so lately that it still has a multiplier.
 #[inline]
-fn touch(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], pull: &Pull, found: &Found, law: &Law) {
+fn touch<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    v: &[V],
+    pull: &Pull,
+    found: &Found,
+    law: &Law<'_, F>,
+) {
     let speed = |c: &Closest| combine(c.weights, &s.cells[c.cell as usize].map(|n| v[n as usize]));
     let own = v[item.node as usize];
     let first = &found.first;
@@ -493,7 +515,16 @@ fn touch(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], pull: &Pull, found: &Fo
     let n = unit(add(pull.first, pull.second));
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-    let limit = law.friction * normal.force;
+    let limit = law.friction.limit(&Sliding {
+        node: item.node,
+        cell: first.cell,
+        x: s.x,
+        normal: n,
+        force: normal.force,
+        held: rest,
+        vt,
+        spring: law.slip_factor * k * law.dt,
+    });
     let f = friction_force(
         rest,
         vt,

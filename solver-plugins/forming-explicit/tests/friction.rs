@@ -1,0 +1,193 @@
+//! The friction of a scene: classes, named pairs, laws of pressure and angle; and what is refused.
+
+mod common;
+
+use common::{BuiltIn, fabric};
+use plyflow_forming_explicit::build_global;
+use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_mechanics::contact::{FrictionLaw, PressureDependence, Whose};
+use plyflow_mechanics::model::Model;
+use serde_json::{Value, json};
+
+/// Two plies in a press with a holder, and with this friction.
+fn parameters(friction: &Value) -> Parameters {
+    let ply = |name: &str| {
+        json!({"name": name, "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.12 m",
+               "fibre_1": "0 rad", "fibre_2": "1.5707963267948966 rad"})
+    };
+    serde_json::from_value(json!({
+        "scene": {
+            "plyflow_scene": 1, "name": "dome",
+            "tool": {"hemisphere": {"radius": "0.025 m", "facet_size": "0.004 m"}},
+            "sheets": [ply("inner"), ply("outer")],
+            "friction": friction,
+            "process": {"press": {
+                "stroke": "0.02 m", "forming_time": "0.2 s", "settling_time": "0.01 s",
+                "die": {"opening_radius": "0.027 m", "edge_radius": "0.004 m"},
+                "holder": {"hold": {"gap": "0.002 m"}}}}
+        },
+        "element": {"plugin": "m4", "with": {}},
+        "diaphragm_element": {"plugin": "m4", "with": {}},
+        "element_size": 0.012, "diaphragm_growth": 1.25, "time_step": 8e-6, "step_safety": 0.8,
+        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
+        "contact_damping": 0.3, "contact_augmentation": 0.0, "frames": 20, "tool_grid": 0.004,
+        "kinetic_bound": 0.05, "drift_bound": 0.5
+    }))
+    .expect("the parameters fit their type")
+}
+
+fn model(friction: &Value) -> Model {
+    let p = parameters(friction);
+    build_global(&p, &BuiltIn).map(|f| f.model).unwrap()
+}
+
+/// The law of a contact by its name.
+fn law<'a>(model: &'a Model, name: &str) -> &'a FrictionLaw {
+    let rigid = model.rigid_contacts.iter().map(|c| (&c.name, &c.friction));
+    let sheets = model.sheet_contacts.iter().map(|c| (&c.name, &c.friction));
+    let found = rigid.chain(sheets).find(|(n, _)| n.as_str() == name);
+    found.unwrap_or_else(|| panic!("no contact {name}")).1
+}
+
+fn constant(model: &Model, name: &str) -> f64 {
+    match law(model, name) {
+        FrictionLaw::Constant(mu) => *mu,
+        FrictionLaw::Varying(law) => panic!("{name}: {law:?}"),
+    }
+}
+
+#[test]
+fn pairs_take_the_place_of_their_class_in_either_order() {
+    let m = model(&json!({
+        "tool_fabric": 0.2, "fabric_fabric": 0.3,
+        "pairs": [{"between": ["die", "outer"], "coefficient": 0.5}, {"between": ["outer", "inner"], "coefficient": 0.4}]
+    }));
+    assert_eq!(constant(&m, "tool/inner"), 0.2);
+    assert_eq!(constant(&m, "holder/inner"), 0.2);
+    assert_eq!(constant(&m, "die/outer"), 0.5);
+    assert_eq!(constant(&m, "inner/outer"), 0.4);
+    // The inner ply only stays outside of the die.
+    assert_eq!(constant(&m, "die/inner"), 0.0);
+    // A class whose pairs are all named is not needed.
+    model(
+        &json!({"tool_fabric": 0.2, "pairs": [{"between": ["outer", "inner"], "coefficient": 0.4}]}),
+    );
+}
+
+#[test]
+fn laws_of_pressure_and_angle_reach_the_contacts() {
+    let factors = json!([{"angle": "0 deg", "factor": 1.0}, {"angle": "90 deg", "factor": 0.7}]);
+    let m = model(&json!({
+        "tool_fabric": {"coefficient": 0.25, "pressure": {"power": {"reference": "50 kPa", "exponent": -0.2}}},
+        "fabric_fabric": {"coefficient": 0.3, "angle": {"of": "lower", "family": 2, "factors": factors}},
+        "pairs": [{"between": ["holder", "inner"], "angle": {"factors": factors},
+                   "pressure": {"table": [{"pressure": "0 kPa", "coefficient": 0.4}, {"pressure": "100 kPa", "coefficient": 0.2}]}}]
+    }));
+    let varying = |name: &str| match law(&m, name) {
+        FrictionLaw::Varying(law) => law.clone(),
+        FrictionLaw::Constant(mu) => panic!("{name}: {mu}"),
+    };
+    let power = varying("tool/inner");
+    assert!(power.angle.is_none());
+    let at = power.pressure.coefficient(1e5);
+    assert!((at - 0.25 * 2f64.powf(-0.2)).abs() < 1e-12, "{at}");
+    let between = varying("inner/outer");
+    assert_eq!(between.pressure, PressureDependence::Constant(0.3));
+    // The outer ply's nodes touch the inner ply, whose fibres count.
+    assert_eq!(between.angle.as_ref().unwrap().whose, Whose::Master);
+    let table = varying("holder/inner");
+    assert!((table.pressure.coefficient(25e3) - 0.35).abs() < 1e-12);
+    let angle = table.angle.as_ref().unwrap();
+    assert_eq!(angle.whose, Whose::Slave);
+    assert!(
+        (angle.factors[1][0] - std::f64::consts::FRAC_PI_2).abs() < 1e-9
+            && angle.factors[1][1] == 0.7
+    );
+}
+
+#[test]
+fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
+    let pair = |names: [&str; 2]| json!({"between": names, "coefficient": 0.3});
+    let with =
+        |pairs: Vec<Value>| json!({"tool_fabric": 0.2, "fabric_fabric": 0.3, "pairs": pairs});
+    let tool = |law: Value| json!({"tool_fabric": law, "fabric_fabric": 0.3});
+    let plies = |law: Value| json!({"tool_fabric": 0.2, "fabric_fabric": law});
+    let factors = |rows: &[(&str, f64)]| -> Value {
+        rows.iter()
+            .map(|(a, f)| json!({"angle": a, "factor": f}))
+            .collect()
+    };
+    let table = |rows: &[(&str, f64)]| -> Value {
+        rows.iter()
+            .map(|(p, c)| json!({"pressure": p, "coefficient": c}))
+            .collect()
+    };
+    for (friction, words) in [
+        (
+            with(vec![pair(["inner", "oter"])]),
+            vec!["pairs[0].between", "'oter'", "did you mean 'outer'?"],
+        ),
+        (
+            with(vec![pair(["bed", "inner"])]),
+            vec!["'bed'", "tool, inner, outer, die, holder"],
+        ),
+        (
+            with(vec![pair(["tool", "outer"])]),
+            vec!["do not rub", "tool and inner; outer and die"],
+        ),
+        (
+            with(vec![pair(["inner", "outer"]), pair(["outer", "inner"])]),
+            vec!["pairs[1].between", "already the pair of friction.pairs[0]"],
+        ),
+        (
+            tool(json!(-0.1)),
+            vec!["friction.tool_fabric", "-0.1", "from 0 to 2"],
+        ),
+        (
+            tool(json!({})),
+            vec!["friction.tool_fabric.coefficient", "not given"],
+        ),
+        (
+            tool(
+                json!({"coefficient": 0.2, "pressure": {"power": {"reference": "1 kPa", "exponent": -1.0}}}),
+            ),
+            vec!["tool_fabric.pressure.power.exponent", "-1"],
+        ),
+        (
+            tool(json!({"pressure": {"table": table(&[("1 kPa", 0.2), ("1 kPa", 0.3)])}})),
+            vec!["tool_fabric.pressure.table[1]", "growing pressures"],
+        ),
+        (
+            tool(
+                json!({"coefficient": 0.2, "pressure": {"table": table(&[("1 kPa", 0.2), ("2 kPa", 0.3)])}}),
+            ),
+            vec!["tool_fabric.coefficient", "remove one"],
+        ),
+        (
+            tool(json!({"coefficient": 0.2, "angle": {"factors": factors(&[("0 deg", 1.0)])}})),
+            vec!["tool_fabric.angle.factors", "one row"],
+        ),
+        (
+            tool(
+                json!({"coefficient": 0.5, "angle": {"factors": factors(&[("0 deg", 1.0), ("90 deg", 5.0)])}}),
+            ),
+            vec!["factors[1].factor", "at most 2"],
+        ),
+        (
+            plies(
+                json!({"coefficient": 0.3, "angle": {"factors": factors(&[("0 deg", 1.0), ("90 deg", 0.5)])}}),
+            ),
+            vec!["fabric_fabric.angle.of", "`lower` or `upper`"],
+        ),
+        (
+            json!({"tool_fabric": 0.2}),
+            vec!["friction.fabric_fabric", "inner and outer touch"],
+        ),
+    ] {
+        let p = parameters(&friction);
+        let text = build_global(&p, &BuiltIn).err().expect("refused");
+        for word in words {
+            assert!(text.contains(word), "{friction}: '{text}' lacks '{word}'");
+        }
+    }
+}
