@@ -47,6 +47,8 @@ pub enum Tool {
     RampedSpar(RampedSpar),
     /// Half a sphere on the bed.
     Hemisphere(HemisphereTool),
+    /// Two domes joined by a waist.
+    DoubleDome(DoubleDomeTool),
     /// A tetrahedron with a rounded top and edges.
     Tetrahedron(TetrahedronTool),
     /// A triangulated surface.
@@ -192,6 +194,31 @@ pub struct HemisphereTool {
     /// Radius.
     #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub radius: Length,
+    /// Largest edge of the triangulation.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub facet_size: Length,
+}
+
+/// Two domes along x, joined by a waist: the kind of tool of the double-dome forming benchmark of woven composites. An outline of two
+/// circles and the two arcs between them, hollow and tangent to both, is turned about the x axis; its upper half stands on a
+/// vertical wall with the same outline. For example `dome_radius: 60 mm`, `dome_distance: 180 mm`, `waist_radius: 150 mm`: 300 mm
+/// long, 120 mm wide and 79.5 mm at the waist. The benchmark's own drawing was not at hand: take its sizes from there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DoubleDomeTool {
+    /// Radius of the domes.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub dome_radius: Length,
+    /// Distance of their centres.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub dome_distance: Length,
+    /// Radius of the hollow arcs between them.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub waist_radius: Length,
+    /// Height of the vertical wall under the domes.
+    #[serde(default)]
+    #[schemars(extend("x-minimum" = "0 mm"))]
+    pub wall: Length,
     /// Largest edge of the triangulation.
     #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub facet_size: Length,

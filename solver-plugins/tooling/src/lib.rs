@@ -4,6 +4,7 @@
 //! Coordinates as in scenes: x along the tool, y across, z up, the machine bed is the plane z = 0.
 //! Lengths in metres.
 
+mod double_dome;
 mod error;
 mod hemisphere;
 mod mesh;
@@ -41,6 +42,7 @@ pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
         Tool::Flat(flat) => spar::flat(flat),
         Tool::RampedSpar(ramped) => spar::ramped_spar(ramped),
         Tool::Tetrahedron(t) => tetrahedron::tetrahedron(t),
+        Tool::DoubleDome(d) => double_dome::double_dome(d),
         Tool::Hemisphere(h) => hemisphere::hemisphere(h.radius.si(), h.facet_size.si()),
         Tool::Stl(s) => {
             let path = folder.join(&s.file);
