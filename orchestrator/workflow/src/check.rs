@@ -113,10 +113,10 @@ impl<'a> Checker<'a> {
     /// Whether the type of the value is that of a branch of the `anyOf`.
     fn fits_a_branch(&self, schema: &View<'a>, node: &Node) -> bool {
         let branches = schema.get("anyOf").and_then(Value::as_array);
-        branches
-            .into_iter()
-            .flatten()
-            .any(|b| type_fits(&View(self.follow(b)), node))
+        branches.into_iter().flatten().any(|b| {
+            let branch = View(self.follow(b));
+            type_fits(&branch, node) || self.fits_a_branch(&branch, node)
+        })
     }
 
     fn value(&mut self, node: &Node, schema: &View<'a>, what: &str, key: &Span) {

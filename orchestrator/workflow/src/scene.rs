@@ -380,20 +380,7 @@ fn sheet_rules(scene: &Node, source: &Source, problems: &mut Problems) {
             }
             names.push(name);
         }
-        if sheet.get("kind").and_then(Node::text) == Some("ply") {
-            for wanted in ["length", "width", "fibre_2"] {
-                if sheet.get(wanted).is_none() && matches!(sheet.kind, Kind::Map(_)) {
-                    let at = sheet.entry("kind").map_or(&sheet.span, |e| &e.value.span);
-                    let d = problems.add(source, at, format!("a ply needs `{wanted}`"));
-                    let example = if wanted == "fibre_2" {
-                        "45 deg"
-                    } else {
-                        "300 mm"
-                    };
-                    d.expected(format!("`{wanted}: {example}`, say"));
-                }
-            }
-        }
+        crate::blank::rules(sheet, source, problems);
     }
 }
 

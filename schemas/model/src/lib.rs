@@ -7,6 +7,7 @@ pub mod job;
 pub mod manifest;
 pub mod material;
 pub mod nearest;
+pub mod outline;
 pub mod scene;
 pub mod schema;
 pub mod units;

@@ -266,7 +266,14 @@ pub struct Sheet {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub width: Option<Length>,
-    /// Plies: position of the centre over the tool.
+    /// Plies, instead of length and width: the outline before forming, relative to `centre`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], or {circle: {radius: ..}}"))]
+    pub outline: Option<Contour>,
+    /// Plies with an outline: holes in it, relative to `centre`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holes: Vec<Contour>,
+    /// Plies: position of the centre over the tool; of an outline, of its point (0, 0).
     #[serde(default)]
     pub centre: [Length; 2],
     /// Plies: direction of fibre family 1 from x, counter-clockwise seen from above.
@@ -276,6 +283,37 @@ pub struct Sheet {
     /// shear stretches it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fibre_2: Option<Angle>,
+}
+
+/// A closed contour in the plane. It may run either way round and closes by itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(extend("x-expected" = "a list of points, [[x, y], ..], or {circle: {radius: ..}}"))]
+pub enum Contour {
+    /// Corners `[x, y]`, at least three.
+    Polygon(Vec<[Length; 2]>),
+    /// A circle.
+    Round(RoundContour),
+}
+
+/// A round contour.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RoundContour {
+    /// The circle.
+    pub circle: Circle,
+}
+
+/// A circle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Circle {
+    /// Its centre.
+    #[serde(default)]
+    pub centre: [Length; 2],
+    /// Its radius.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub radius: Length,
 }
 
 /// The process.

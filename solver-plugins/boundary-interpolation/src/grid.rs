@@ -1,5 +1,7 @@
 //! Fine structured meshes of a zone's sheets, in the undeformed plane.
 
+use plyflow_model::outline::{sides, signed_area, winds};
+
 /// `[x0, y0, x1, y1]` (m).
 pub type Rectangle = [f64; 4];
 
@@ -32,19 +34,77 @@ impl Grid {
     }
 }
 
-/// The part of a ply inside a zone. Sides where the zone reaches the ply's edge (or past it) are free, the
-/// others are cut. Of an outline that is no upright rectangle, the cells with their centre inside are kept,
-/// so slanted edges become steps of one cell. `None` when less than one cell of the ply lies in the zone.
-pub fn ply_grid(zone: Rectangle, outline: &[[f64; 2]], size: f64) -> Option<Grid> {
-    let mut ply = [
+/// The part of a ply inside a zone. The ply is an upright rectangle, or the zone lies wholly inside of it.
+///
+/// # Errors
+/// When the zone crosses an outline that is no upright rectangle, or a hole (contours in m).
+pub fn ply_part(
+    zone: Rectangle,
+    outline: &[[f64; 2]],
+    holes: &[Vec<[f64; 2]>],
+    size: f64,
+) -> Result<Option<Grid>, &'static str> {
+    let ply = around(outline);
+    let box_area = (ply[2] - ply[0]) * (ply[3] - ply[1]);
+    // Only an upright rectangle fills its box.
+    let rectangle = (signed_area(outline).abs() - box_area).abs() < SAME_PLACE * box_area;
+    if !rectangle && crosses(zone, outline) {
+        return Err("its outline, which is no upright rectangle");
+    }
+    if holes.iter().any(|h| crosses(zone, h)) {
+        return Err("a hole");
+    }
+    let middle = [0.5 * (zone[0] + zone[2]), 0.5 * (zone[1] + zone[3])];
+    let material = (rectangle || winds(outline, middle)) && !holes.iter().any(|h| winds(h, middle));
+    Ok(if material {
+        ply_grid(zone, ply, size)
+    } else {
+        None
+    })
+}
+
+/// Whether a contour has a part inside a box; one that only touches it has none.
+fn crosses(zone: Rectangle, contour: &[[f64; 2]]) -> bool {
+    sides(contour).any(|(a, b)| {
+        // The part of the side between the zone's lines (Liang and Barsky 1984).
+        let (mut from, mut to) = (0.0f64, 1.0f64);
+        for d in 0..2 {
+            let (low, high) = (zone[d] + SAME_PLACE, zone[d + 2] - SAME_PLACE);
+            let way = b[d] - a[d];
+            if way == 0.0 {
+                if a[d] < low || a[d] > high {
+                    return false;
+                }
+                continue;
+            }
+            let (s, t) = ((low - a[d]) / way, (high - a[d]) / way);
+            from = from.max(s.min(t));
+            to = to.min(s.max(t));
+        }
+        from <= to
+    })
+}
+
+fn around(outline: &[[f64; 2]]) -> Rectangle {
+    let none = [
         f64::INFINITY,
         f64::INFINITY,
         f64::NEG_INFINITY,
         f64::NEG_INFINITY,
     ];
-    for &[x, y] in outline {
-        ply = [ply[0].min(x), ply[1].min(y), ply[2].max(x), ply[3].max(y)];
-    }
+    outline.iter().fold(none, |b, p| {
+        [
+            b[0].min(p[0]),
+            b[1].min(p[1]),
+            b[2].max(p[0]),
+            b[3].max(p[1]),
+        ]
+    })
+}
+
+/// The part of a rectangular ply inside a zone. Sides where the zone reaches the ply's edge (or past it) are free, the
+/// others are cut. `None` when less than one cell of the ply lies in the zone.
+pub fn ply_grid(zone: Rectangle, ply: Rectangle, size: f64) -> Option<Grid> {
     let bounds = [
         zone[0].max(ply[0]),
         zone[1].max(ply[1]),
@@ -60,17 +120,7 @@ pub fn ply_grid(zone: Rectangle, outline: &[[f64; 2]], size: f64) -> Option<Grid
         ply[1] >= zone[1] - SAME_PLACE,
         ply[3] <= zone[3] + SAME_PLACE,
     ];
-    // Shoelace formula: only an upright rectangle fills its box.
-    let next = outline.iter().cycle().skip(1);
-    let twice: f64 = outline
-        .iter()
-        .zip(next)
-        .map(|(p, q)| p[0] * q[1] - q[0] * p[1])
-        .sum();
-    let around = (ply[2] - ply[0]) * (ply[3] - ply[1]);
-    let rectangle = (0.5 * twice.abs() - around).abs() < SAME_PLACE * around;
-    let keep = |centre: [f64; 2]| rectangle || inside(outline, centre);
-    structured(bounds, size, free, keep)
+    structured(bounds, size, free)
 }
 
 /// The part of a film under or over a zone: the zone and `margin` on every side, as far as the film reaches.
@@ -85,15 +135,10 @@ pub fn film_grid(zone: Rectangle, film: Rectangle, margin: f64, size: f64) -> Op
     if bounds[0] >= bounds[2] || bounds[1] >= bounds[3] {
         return None;
     }
-    structured(bounds, size, [false; SIDES], |_| true)
+    structured(bounds, size, [false; SIDES])
 }
 
-fn structured(
-    b: Rectangle,
-    size: f64,
-    free: [bool; SIDES],
-    keep: impl Fn([f64; 2]) -> bool,
-) -> Option<Grid> {
+fn structured(b: Rectangle, size: f64, free: [bool; SIDES]) -> Option<Grid> {
     // The slack keeps a side of a whole number of cells from getting one more by rounding.
     let count = |d: usize| (((b[d + 2] - b[d]) / size - 1e-6).ceil() as usize).max(1);
     let (nx, ny) = (count(0), count(1));
@@ -104,48 +149,23 @@ fn structured(
             b[d] + (b[d + 2] - b[d]) * i as f64 / n as f64
         }
     };
-    let mut number = vec![u32::MAX; (nx + 1) * (ny + 1)];
+    let number = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
     let mut cells = Vec::new();
     for j in 0..ny {
         for i in 0..nx {
-            let centre = [
-                0.5 * (at(0, i, nx) + at(0, i + 1, nx)),
-                0.5 * (at(1, j, ny) + at(1, j + 1, ny)),
-            ];
-            if keep(centre) {
-                for (i, j) in [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)] {
-                    let node = j * (nx + 1) + i;
-                    number[node] = 0;
-                    cells.push(node as u32);
-                }
-            }
+            cells.extend([
+                number(i, j),
+                number(i + 1, j),
+                number(i + 1, j + 1),
+                number(i, j + 1),
+            ]);
         }
     }
-    let mut points = Vec::new();
-    for j in 0..=ny {
-        for i in 0..=nx {
-            let number = &mut number[j * (nx + 1) + i];
-            if *number == 0 {
-                *number = points.len() as u32;
-                points.push([at(0, i, nx), at(1, j, ny)]);
-            }
-        }
-    }
-    if cells.is_empty() {
-        return None;
-    }
-    cells.iter_mut().for_each(|c| *c = number[*c as usize]);
-    let used = |node: usize| (number[node] != u32::MAX).then_some(number[node]);
-    let row = |j: usize| {
-        (0..=nx)
-            .filter_map(|i| used(j * (nx + 1) + i))
-            .collect::<Vec<_>>()
-    };
-    let column = |i: usize| {
-        (0..=ny)
-            .filter_map(|j| used(j * (nx + 1) + i))
-            .collect::<Vec<_>>()
-    };
+    let points = (0..=ny)
+        .flat_map(|j| (0..=nx).map(move |i| [at(0, i, nx), at(1, j, ny)]))
+        .collect();
+    let row = |j: usize| (0..=nx).map(|i| number(i, j)).collect::<Vec<_>>();
+    let column = |i: usize| (0..=ny).map(|j| number(i, j)).collect::<Vec<_>>();
     let all = [column(0), column(nx), row(0), row(ny)];
     let mut sides = all
         .into_iter()
@@ -157,15 +177,5 @@ fn structured(
         cells,
         cuts,
         bounds: b,
-    })
-}
-
-/// Whether a point lies inside a polygon (even-odd rule).
-fn inside(outline: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
-    let n = outline.len();
-    (0..n).fold(false, |odd, i| {
-        let ([ax, ay], [bx, by]) = (outline[i], outline[(i + 1) % n]);
-        let crosses = (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax);
-        odd != crosses
     })
 }

@@ -6,7 +6,7 @@ mod grid;
 mod spline;
 
 pub use cut::Placed;
-pub use grid::{Grid, Rectangle, film_grid, ply_grid};
+pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
 pub use spline::{linear, spline_slopes};
 
 use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
@@ -31,6 +31,8 @@ struct Sheet {
     name: String,
     kind: String,
     outline: Option<Vec<[f64; 2]>>,
+    #[serde(default)]
+    holes: Vec<Vec<[f64; 2]>>,
 }
 
 /// A sheet of the zone with its motion.
@@ -154,7 +156,13 @@ fn drive(
     let (points, cells) = host.mesh(input, body)?;
     let grid = if sheet.kind == "ply" {
         let outline = sheet.outline.unwrap_or_else(|| corners(around(&points)));
-        ply_grid(zone, &outline, p.element_size)
+        ply_part(zone, &outline, &sheet.holes, p.element_size).map_err(|what| {
+            format!(
+                "the zone at {zone:?} m crosses {what}, of ply '{}'; a local run is built where a zone lies wholly inside of such \
+                 a ply. Draw a zone inside of it (`boxes` of zone-extraction), or run the whole ply with smaller elements",
+                sheet.name
+            )
+        })?
     } else {
         let size = p.film_element_size.unwrap_or(p.element_size);
         film_grid(zone, around(&points), p.film_margin, size)

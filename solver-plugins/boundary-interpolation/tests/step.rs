@@ -1,7 +1,7 @@
 //! The step on a coarse motion that is known, and the splines and meshes it is made of.
 
 use plyflow_boundary_interpolation::{
-    BoundaryInterpolation, film_grid, linear, ply_grid, spline_slopes,
+    BoundaryInterpolation, film_grid, linear, ply_grid, ply_part, spline_slopes,
 };
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
@@ -87,8 +87,8 @@ fn rectangle(b: [f64; 4]) -> Vec<[f64; 2]> {
 
 #[test]
 fn a_cut_that_lies_on_the_ply_s_edge_stays_free() {
-    let ply = rectangle([-0.24, -0.15, 0.24, 0.15]);
-    let grid = ply_grid([-0.24, 0.05, -0.14, 0.15], &ply, 0.003).unwrap();
+    let ply = [-0.24, -0.15, 0.24, 0.15];
+    let grid = ply_grid([-0.24, 0.05, -0.14, 0.15], ply, 0.003).unwrap();
     assert_eq!(
         grid.cuts.clone().map(|c| c.is_some()),
         [false, true, true, false]
@@ -99,36 +99,69 @@ fn a_cut_that_lies_on_the_ply_s_edge_stays_free() {
         (35 * 35, 4 * 34 * 34)
     );
     assert_eq!(grid.driven_nodes().len(), 35 + 34);
-    let whole = ply_grid([-0.3, -0.2, 0.3, 0.2], &ply, 0.01).unwrap();
+    let whole = ply_grid([-0.3, -0.2, 0.3, 0.2], ply, 0.01).unwrap();
     assert!(whole.driven_nodes().is_empty());
     assert_eq!(whole.bounds, [-0.24, -0.15, 0.24, 0.15]);
     assert!(
-        ply_grid([0.239, -0.1, 0.3, 0.1], &ply, 0.003).is_none(),
+        ply_grid([0.239, -0.1, 0.3, 0.1], ply, 0.003).is_none(),
         "less than a cell"
     );
 }
 
 #[test]
-fn a_smaller_ply_has_its_own_edges_and_a_slanted_one_keeps_cells_inside() {
-    let small = ply_grid(
-        [0.0, 0.0, 0.1, 0.1],
-        &rectangle([0.03, -0.1, 0.08, 0.05]),
-        0.005,
-    )
-    .unwrap();
+fn a_smaller_ply_has_its_own_edges() {
+    let small = ply_grid([0.0, 0.0, 0.1, 0.1], [0.03, -0.1, 0.08, 0.05], 0.005).unwrap();
     assert_eq!(small.bounds, [0.03, 0.0, 0.08, 0.05]);
     assert_eq!(
         small.cuts.clone().map(|c| c.is_some()),
         [false, false, true, false]
     );
-    let triangle = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]];
-    let grid = ply_grid([-1.0, -1.0, 1.0, 1.0], &triangle, 0.01).unwrap();
+}
+
+#[test]
+fn a_zone_is_cut_out_of_a_polygon_only_where_it_lies_wholly_inside_or_outside() {
+    let part =
+        |zone, outline: &[[f64; 2]], holes: &[Vec<[f64; 2]>]| ply_part(zone, outline, holes, 0.005);
+    let ell = [
+        [0.0, 0.0],
+        [0.2, 0.0],
+        [0.2, 0.08],
+        [0.08, 0.08],
+        [0.08, 0.2],
+        [0.0, 0.2],
+    ];
+    let hole = vec![vec![[0.12, 0.02], [0.16, 0.02], [0.14, 0.06]]];
+    let inside = part([0.01, 0.01, 0.05, 0.06], &ell, &hole)
+        .unwrap()
+        .unwrap();
+    assert_eq!(inside.bounds, [0.01, 0.01, 0.05, 0.06]);
+    assert!(inside.cuts.iter().all(|c| c.is_some()));
+    // Beside the L, in its notch and in the hole there is no ply.
+    for zone in [
+        [0.1, 0.1, 0.15, 0.15],
+        [0.3, 0.0, 0.4, 0.1],
+        [0.135, 0.025, 0.145, 0.035],
+    ] {
+        assert_eq!(part(zone, &ell, &hole), Ok(None), "{zone:?}");
+    }
+    let slanted = [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]];
+    for (zone, outline, what) in [
+        ([0.06, 0.06, 0.1, 0.1], &ell[..], "outline"),
+        ([0.09, 0.01, 0.13, 0.05], &ell[..], "hole"),
+        ([0.08, 0.08, 0.15, 0.15], &slanted[..], "outline"),
+        ([-1.0, -1.0, 1.0, 1.0], &slanted[..], "outline"),
+    ] {
+        let refused = part(zone, outline, &hole).unwrap_err();
+        assert!(refused.contains(what), "{zone:?}: {refused}");
+    }
+    // A rectangle has edges of its own, but not a hole.
+    let plate = rectangle([0.0, 0.0, 0.2, 0.1]);
     assert!(
-        (40..=55).contains(&(grid.cells.len() / 4)),
-        "{}",
-        grid.cells.len() / 4
+        part([-0.1, -0.1, 0.05, 0.05], &plate, &hole)
+            .unwrap()
+            .is_some()
     );
-    assert!(grid.cells.iter().all(|&i| (i as usize) < grid.points.len()));
+    assert!(part([0.1, 0.0, 0.2, 0.1], &plate, &hole).is_err());
 }
 
 #[test]

@@ -3,12 +3,13 @@
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::{ComponentChoice, Parameters};
 use plyflow_abi::pf_component;
+use plyflow_blank::{Blank, Quality};
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
     ContactSettings, FrictionLaw, Plane, RigidContact, RigidItem, RigidSurface, SheetContact,
     SlaveItem,
 };
-use plyflow_mechanics::mesh::{NONE, QuadMesh, even_axis};
+use plyflow_mechanics::mesh::{NONE, limit_patches};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
@@ -152,36 +153,45 @@ pub fn add_sheet_contact(
     });
 }
 
-/// Adds a ply as a regular grid within `[x0, y0, x1, y1]` (m) at height `z` (m) to the points of a model; its sheet.
+/// The blank of a ply before forming.
 ///
 /// # Errors
-/// A text for the user when its element cannot be made.
+/// When the scene gives no size, or an outline that is none.
+pub fn blank(sheet: &StackSheet) -> Result<Blank, String> {
+    Blank::new(&sheet.scene).map_err(|e| e.to_string())
+}
+
+/// Adds a ply at height `z` (m) to the points of a model: its sheet, and the quality of a mesh that follows an outline.
+///
+/// # Errors
+/// A text for the user when its blank cannot be meshed or its element cannot be made.
 pub fn add_ply(
     points: &mut Vec<V>,
-    bounds: [f64; 4],
+    blank: &Blank,
     z: f64,
     sheet: &StackSheet,
     p: &Parameters,
     components: &dyn Components,
-) -> Result<SheetSpec, String> {
-    let [x0, y0, x1, y1] = bounds;
-    let mesh = QuadMesh::grid(
-        &even_axis(x0, x1, p.element_size),
-        &even_axis(y0, y1, p.element_size),
-    );
+) -> Result<(SheetSpec, Option<Quality>), String> {
+    let name = &sheet.scene.name;
+    let (mesh, quality) = (blank.mesh(p.element_size)).map_err(|e| format!("ply '{name}': {e}"))?;
     let first = points.len() as u32;
     points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
-    Ok(SheetSpec {
-        name: sheet.scene.name.clone(),
+    let element = element(components, sheet, &p.element)?;
+    let mut patches = mesh.patches();
+    limit_patches(&mut patches, &mesh.points, element.sizes.patch_nodes);
+    let spec = SheetSpec {
+        name: name.clone(),
         nodes: (first..points.len() as u32).collect(),
         layers: vec![1.0; mesh.cells.len()],
         pressed: vec![Pressed::No; mesh.cells.len()],
-        patches: mesh.patches(),
+        patches,
         least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
         cells: mesh.cells,
         axis: axis(&sheet.scene),
-        element: element(components, sheet, &p.element)?,
-    })
+        element,
+    };
+    Ok((spec, quality))
 }
 
 /// Makes the element of a sheet with its material.

@@ -5,6 +5,7 @@ use crate::parameters::Parameters;
 use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
 use crate::run::{Body, Forming};
+use plyflow_blank::Blank;
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
@@ -33,25 +34,11 @@ fn inside(b: Box2, x: f64, y: f64) -> bool {
     x > b[0] && x < b[2] && y > b[1] && y < b[3]
 }
 
-/// Outline of a ply before forming.
-///
-/// # Errors
-/// When the scene gives no size.
-pub fn ply_box(sheet: &StackSheet) -> Result<Box2, String> {
-    let s = &sheet.scene;
-    let (Some(l), Some(w)) = (s.length, s.width) else {
-        return Err(format!("ply '{}' needs length and width", s.name));
-    };
-    let [cx, cy] = s.centre.map(|c| c.si());
-    let (hl, hw) = (0.5 * l.si(), 0.5 * w.si());
-    Ok([cx - hl, cy - hw, cx + hl, cy + hw])
-}
-
 /// Places of everything before meshing.
 struct Layout {
     tool_top: f64,
     bottom_z: f64,
-    plies: Vec<Box2>,
+    plies: Vec<Blank>,
     all_plies: Box2,
     joint: Box2,
     fine: Box2,
@@ -66,13 +53,13 @@ fn layout(
     tool: &ToolMesh,
 ) -> Result<Layout, String> {
     let [lo, hi] = tool.bounds();
-    let plies: Vec<Box2> = stack[1..stack.len() - 1]
+    let plies: Vec<Blank> = stack[1..stack.len() - 1]
         .iter()
-        .map(ply_box)
+        .map(assembly::blank)
         .collect::<Result<_, _>>()?;
     let all_plies = plies
         .iter()
-        .copied()
+        .map(Blank::bounds)
         .reduce(union)
         .ok_or("the scene has no ply")?;
     let film_size = p.film_size();
@@ -208,15 +195,28 @@ fn ply(
     components: &dyn Components,
 ) -> Result<(), String> {
     let z = at.bottom_z + sheet.offset - bottom.offset;
-    let spec = assembly::add_ply(&mut parts.points, at.plies[k - 1], z, sheet, p, components)?;
+    let blank = &at.plies[k - 1];
+    let (spec, quality) = assembly::add_ply(&mut parts.points, blank, z, sheet, p, components)?;
     let nodes = spec.nodes.clone();
-    parts.bodies.push(Body::new(sheet, k, spec.cells.clone()));
+    parts.bodies.push(Body {
+        quality,
+        ..Body::new(sheet, k, spec.cells.clone())
+    });
     parts.placed.push(Placed {
         index: k,
         slaves: nodes,
     });
     parts.specs.push(spec);
     Ok(())
+}
+
+/// Whether a place lies over a ply, or within a film element beside one.
+fn over_ply(at: &Layout, [x, y]: [f64; 2]) -> bool {
+    let beside = 1.01 * at.film_size;
+    let in_box = inside(grown(at.all_plies, beside), x, y);
+    // Rectangles of one stack cover nearly the same: the box around all of them has no steps between them.
+    let rectangles = at.plies.iter().all(|b| matches!(b, Blank::Rectangle(_)));
+    in_box && (rectangles || at.plies.iter().any(|b| b.distance([x, y]) < beside))
 }
 
 /// The top film where it is not joined to the bottom film; its outline shares the bottom film's nodes.
@@ -247,7 +247,6 @@ fn top_film(
     let high = at.bottom_z + top.offset - bottom.offset;
     let low =
         at.bottom_z + (0.5 * (bottom.thickness + top.thickness)).max(assembly::LEAST_FILM_DISTANCE);
-    let over = grown(at.all_plies, 1.01 * at.film_size);
     let mut local = vec![u32::MAX; mesh.points.len()];
     let (mut nodes, mut slaves) = (Vec::new(), Vec::new());
     let mut cells = Vec::with_capacity(free.len());
@@ -260,7 +259,11 @@ fn top_film(
                     nodes.push(n);
                 } else {
                     let q = mesh.points[i];
-                    let z = if inside(over, q[0], q[1]) { high } else { low };
+                    let z = if over_ply(at, [q[0], q[1]]) {
+                        high
+                    } else {
+                        low
+                    };
                     slaves.push(parts.points.len() as u32);
                     nodes.push(parts.points.len() as u32);
                     parts.points.push([q[0], q[1], z]);

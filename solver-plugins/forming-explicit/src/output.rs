@@ -349,7 +349,7 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value>
                 "added_mass": forming.model.sheets[body.sheet].added_mass,
                 "element": choice.plugin,
             });
-            if let Ok(b) = crate::global::ply_box(s) {
+            if let Ok(blank) = crate::assembly::blank(s) {
                 value["fibre_1"] = s.scene.fibre_1.si().into();
                 value["fibre_2"] = s
                     .scene
@@ -358,11 +358,34 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value>
                         a.si()
                     })
                     .into();
-                value["outline"] = json!([[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]);
+                value["outline"] = json!(blank.outline());
+                if !blank.holes().is_empty() {
+                    value["holes"] = json!(blank.holes());
+                }
+            }
+            if let Some(q) = &body.quality {
+                value["mesh_quality"] = json!({
+                    "least_scaled_jacobian": q.least_scaled_jacobian,
+                    "least_angle": q.least_angle,
+                    "largest_angle": q.largest_angle,
+                    "edge_ratio": q.edge_ratio,
+                    "least_edge": q.least_edge,
+                    "area_error": q.area_error,
+                    "worst_at": q.worst_at,
+                });
             }
             value
         })
         .collect()
+}
+
+/// What is poor about the meshes of outlined plies.
+fn mesh_warnings(forming: &Forming) -> Vec<String> {
+    let poor = |b: &Body| {
+        let text = b.quality.and_then(|q| q.warning())?;
+        Some(format!("ply '{}': {text}", b.name))
+    };
+    forming.bodies.iter().filter_map(poor).collect()
 }
 
 fn write_summary(
@@ -375,6 +398,8 @@ fn write_summary(
     let h = &outcome.health;
     let m = &forming.model;
     let penetrations = forming.penetrations();
+    let mut warnings = mesh_warnings(forming);
+    warnings.extend(outcome.warnings.iter().cloned());
     let elements = m.element_count();
     let element_cycles = elements as f64 * outcome.cycles as f64;
     let penetration: serde_json::Map<String, serde_json::Value> = penetrations
@@ -397,9 +422,9 @@ fn write_summary(
             "hourglass_ratio": h.hourglass_ratio,
         },
         "penetration": penetration,
-        "warnings": outcome.warnings,
+        "warnings": warnings,
     }))?;
-    for w in &outcome.warnings {
+    for w in &warnings {
         host.log(Log::Warn, w);
     }
     let worst = |f: fn(&(String, f64, f64)) -> f64| penetrations.iter().map(f).fold(0.0, f64::max);
@@ -408,6 +433,17 @@ fn write_summary(
     host.result("hourglass_ratio", h.hourglass_ratio, "1")?;
     host.result("penetration_max", worst(|x| x.1), "m")?;
     host.result("penetration_q999", worst(|x| x.2), "m")?;
+    let outlined = || forming.bodies.iter().filter_map(|b| b.quality);
+    if outlined().next().is_some() {
+        let least =
+            |f: fn(plyflow_blank::Quality) -> f64| outlined().map(f).fold(f64::INFINITY, f64::min);
+        host.result(
+            "mesh_scaled_jacobian",
+            least(|q| q.least_scaled_jacobian),
+            "1",
+        )?;
+        host.result("mesh_least_edge", least(|q| q.least_edge), "1")?;
+    }
     let (lo, hi, strain) = ply_extremes(forming);
     host.result("shear_max", hi, "rad")?;
     host.result("shear_min", lo, "rad")?;

@@ -5,7 +5,6 @@
 
 use crate::assembly::{self, Components, StackSheet, ToolSurface};
 use crate::friction::{FrictionTable, Touching};
-use crate::global::ply_box;
 use crate::parameters::Parameters;
 use crate::process::Load;
 use crate::run::{Body, Forming, RigidBody};
@@ -284,8 +283,12 @@ pub fn build_press(
     let (mut points, mut specs, mut bodies) = (Vec::new(), Vec::new(), Vec::new());
     for (k, sheet) in stack.iter().enumerate() {
         let z = at.blank + sheet.offset;
-        let spec = assembly::add_ply(&mut points, ply_box(sheet)?, z, sheet, p, components)?;
-        bodies.push(Body::new(sheet, k, spec.cells.clone()));
+        let blank = assembly::blank(sheet)?;
+        let (spec, quality) = assembly::add_ply(&mut points, &blank, z, sheet, p, components)?;
+        bodies.push(Body {
+            quality,
+            ..Body::new(sheet, k, spec.cells.clone())
+        });
         specs.push(spec);
     }
     let reference = points.clone();

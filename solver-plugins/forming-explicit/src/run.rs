@@ -24,6 +24,8 @@ pub struct Body {
     pub sheet: usize,
     /// `[m]` cells in mesh-local numbers.
     pub cells: Vec<[u32; 4]>,
+    /// Quality of a mesh that follows an outline.
+    pub quality: Option<plyflow_blank::Quality>,
 }
 
 impl Body {
@@ -33,6 +35,7 @@ impl Body {
             name: sheet.scene.name.clone(),
             sheet: index,
             cells,
+            quality: None,
         }
     }
 }

@@ -120,6 +120,78 @@ fn a_ply_takes_the_shape_of_the_punch_and_the_ledger_closes() {
     );
 }
 
+/// The blank of `parameters(1, ..)` replaced by an outline, and its elements.
+fn outlined(outline: Value, holes: Value, holder: &Value) -> Parameters {
+    let mut p = parameters(1, holder);
+    let mut sheet = serde_json::to_value(&p.scene.sheets[0]).unwrap();
+    let map = sheet.as_object_mut().unwrap();
+    map.remove("length");
+    map.remove("width");
+    map.insert("outline".into(), outline);
+    map.insert("holes".into(), holes);
+    p.scene.sheets[0] = serde_json::from_value(sheet).expect("a sheet");
+    p
+}
+
+#[test]
+fn a_round_blank_with_a_hole_is_pressed_with_a_closed_ledger_and_the_hole_opens_evenly() {
+    let holes = json!([{"circle": {"radius": "0.012 m"}}]);
+    let outline = json!({"circle": {"radius": "0.06 m"}});
+    let p = outlined(outline, holes, &json!({"gap": "0.002 m"}));
+    let (forming, outcome) = form(&p, 1);
+    let health = &outcome.health;
+    assert!(health.peak_drift_ratio < 0.01, "{health:?}");
+    let quality = forming.bodies[0].quality.expect("an outlined ply");
+    assert!(
+        quality.least_scaled_jacobian > 0.6 && quality.least_edge > 0.35,
+        "{quality:?}"
+    );
+    let (now, then) = (
+        forming.points(&forming.bodies[0]),
+        forming.reference_points(&forming.bodies[0]),
+    );
+    // The edge of the hole is still around the axis, and the ply lies on the dome, not in it.
+    let hole = || {
+        now.iter()
+            .zip(&then)
+            .filter(|p| p.1[0].hypot(p.1[1]) < 0.0121)
+    };
+    let radii: Vec<f64> = hole().map(|p| p.0[0].hypot(p.0[1])).collect();
+    assert!(
+        radii.len() >= 8 && radii.iter().all(|r| *r > 0.008 && *r < 0.02),
+        "{radii:?}"
+    );
+    let middle = |k: usize| hole().map(|p| p.0[k]).sum::<f64>() / radii.len() as f64;
+    assert!(
+        middle(0).abs() < 5e-4 && middle(1).abs() < 5e-4,
+        "{} {}",
+        middle(0),
+        middle(1)
+    );
+    let half = 0.5 * forming.stack[0].thickness;
+    let dome = now.iter().filter(|x| x[2] > 0.005);
+    let least = dome.map(|x| over_dome(*x)).fold(f64::MAX, f64::min);
+    assert!(least > half - 2e-5, "{least}");
+    let (again, _) = form(&p, 2);
+    assert!(
+        forming.model.x == again.model.x,
+        "two threads give other positions"
+    );
+}
+
+#[test]
+fn an_outline_that_the_elements_cannot_follow_is_refused_with_the_size_that_can() {
+    let outline = json!({"circle": {"radius": "0.06 m"}});
+    let holes = json!([{"circle": {"centre": ["0.05 m", "0 m"], "radius": "0.008 m"}}]);
+    let p = outlined(outline, holes, &Value::Null);
+    let text = build_global(&p, &BuiltIn).err().expect("refused");
+    assert!(
+        text.contains("ply 'ply_1'") && text.contains("measures 2.0"),
+        "{text}"
+    );
+    assert!(text.contains("element size of at most 2.8"), "{text}");
+}
+
 #[test]
 fn a_holder_with_a_force_presses_with_that_force_on_two_plies() {
     let p = parameters(2, &json!({"force": "200 N"}));

@@ -97,3 +97,41 @@ fn small_part_is_formed_quietly_with_a_closed_ledger_and_the_same_bits_on_two_th
         "two threads give other positions"
     );
 }
+
+#[test]
+fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
+    let mut p = parameters();
+    p.scene.sheets.remove(2);
+    let ell = [[-60, -40], [60, -40], [60, 5], [10, 5], [10, 40], [-60, 40]];
+    let mut sheet = serde_json::to_value(&p.scene.sheets[1]).unwrap();
+    let map = sheet.as_object_mut().unwrap();
+    map.remove("length");
+    map.remove("width");
+    let corners = ell.map(|c| c.map(|x| format!("{x} mm")));
+    map.insert("outline".into(), json!(corners));
+    let hole = json!({"circle": {"centre": ["-20 mm", "-5 mm"], "radius": "15 mm"}});
+    map.insert("holes".into(), json!([hole]));
+    p.scene.sheets[1] = serde_json::from_value(sheet).expect("a sheet");
+    let (forming, outcome) = form(&p, 2);
+    let health = &outcome.health;
+    assert!(health.peak_drift_ratio < 0.02, "{health:?}");
+    for (pair, _, q999) in forming.penetrations() {
+        assert!(q999 < 1e-5, "{pair}: {q999} m");
+    }
+    // On the block's top the upper film lies on the ply, and in the ply's hole on the lower film.
+    let upper = forming.bodies.iter().find(|b| b.name == "upper").unwrap();
+    let (now, then) = (forming.points(upper), forming.reference_points(upper));
+    let height = |x: [f64; 2], reach: f64| {
+        let near = now
+            .iter()
+            .zip(&then)
+            .filter(|p| (p.1[0] - x[0]).hypot(p.1[1] - x[1]) < reach);
+        let z: Vec<f64> = near.map(|p| p.0[2]).collect();
+        z.iter().sum::<f64>() / z.len() as f64 - 0.02
+    };
+    let (film, ply) = (8e-5, 4e-4);
+    let on_ply = height([15.0e-3, -15.0e-3], 0.012);
+    assert!((on_ply - (1.5 * film + ply)).abs() < 1e-4, "{on_ply}");
+    let in_hole = height([-20.0e-3, -5.0e-3], 0.008);
+    assert!((in_hole - (0.5 * film + 3e-4)).abs() < 1e-4, "{in_hole}");
+}

@@ -4,6 +4,7 @@ use crate::net::{Fabric, Generators, Net, Stop};
 use crate::ply::{Draped, Ply, Stops, lay, plies, stops};
 use crate::root::drop_on;
 use crate::surface::SmoothSurface;
+use plyflow_blank::Quality;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::scene::Scene;
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
@@ -29,6 +30,7 @@ struct Parameters {
 struct Done {
     ply: Ply,
     mesh: QuadMesh,
+    quality: Option<Quality>,
     draped: Draped,
     start: [f64; 2],
     net_nodes: usize,
@@ -73,7 +75,7 @@ fn millimetres([x, y]: [f64; 2]) -> String {
 
 /// The point of the flat ply that touches the tool first.
 fn start_of(p: &Parameters, ply: &Ply) -> Result<[f64; 2], String> {
-    let [x0, y0, x1, y1] = ply.blank;
+    let [x0, y0, x1, y1] = ply.blank.bounds();
     let start = match p.start.as_deref() {
         None => [0.5 * (x0 + x1), 0.5 * (y0 + y1)],
         Some(&[x, y]) => [x, y],
@@ -123,7 +125,7 @@ fn drape(
     let spacing = p.net_spacing.unwrap_or(0.25 * p.element_size);
     let fabric = Fabric {
         directions: ply.directions(),
-        blank: ply.blank,
+        blank: ply.blank.bounds(),
         start: [x, y],
         spacing,
         locking: p.locking_angle,
@@ -139,7 +141,7 @@ fn drape(
         report(host, part(f), name);
         host.check_cancelled()
     })?;
-    let mesh = ply.mesh(p.element_size);
+    let (mesh, quality) = ply.mesh(p.element_size)?;
     let draped = lay(&net, &mesh, surface, ply.offset).ok_or_else(|| {
         format!(
             "the net of ply '{name}' closes no cell at its start {}: take a smaller `net_spacing` or another \
@@ -149,6 +151,7 @@ fn drape(
     })?;
     Ok(Done {
         mesh,
+        quality,
         draped,
         start: [x, y],
         net_nodes: net.nodes().filter(|n| net.position(n.0).is_some()).count(),
@@ -208,9 +211,8 @@ fn write_bodies(
 
 fn sheet(d: &Done) -> Value {
     let s = &d.ply.scene;
-    let [x0, y0, x1, y1] = d.ply.blank;
     let [first, second] = d.ply.stated();
-    json!({
+    let mut value = json!({
         "name": s.name,
         "kind": s.kind,
         "material": d.ply.material.name,
@@ -221,19 +223,35 @@ fn sheet(d: &Done) -> Value {
         "element": null,
         "fibre_1": first,
         "fibre_2": second,
-        "outline": [[x0, y0], [x1, y0], [x1, y1], [x0, y1]],
+        "outline": d.ply.blank.outline(),
         "start": d.start,
         "net_nodes": d.net_nodes,
-    })
+    });
+    if !d.ply.blank.holes().is_empty() {
+        value["holes"] = json!(d.ply.blank.holes());
+    }
+    value
 }
 
 /// One text per ply and reason.
 fn warnings(p: &Parameters, d: &Done, unreached: usize) -> Vec<String> {
+    let name = &d.ply.scene.name;
+    let mut texts = Vec::new();
+    if d.ply.blank.distance(d.start) > 0.0 {
+        texts.push(format!(
+            "ply '{name}': its net starts at {}, where the ply has no material, and runs across the gap as if it had; \
+             give a `start` on the ply",
+            millimetres(d.start)
+        ));
+    }
+    let poor = d.quality.and_then(|q| q.warning());
+    texts.extend(poor.map(|text| format!("ply '{name}': {text}")));
     if unreached == 0 {
-        return Vec::new();
+        return texts;
     }
     let all = d.mesh.cells.len();
-    d.stops
+    let stopped = d
+        .stops
         .iter()
         .map(|(why, count, first)| {
             let why = match why {
@@ -247,11 +265,12 @@ fn warnings(p: &Parameters, d: &Done, unreached: usize) -> Vec<String> {
             format!(
                 "ply '{}': {why} at {count} nodes of the net, first at {} of the flat ply; the net does not reach \
                  {unreached} of {all} cells (field `draped`), which hang on as a plane",
-                d.ply.scene.name,
+                name,
                 millimetres(*first)
             )
-        })
-        .collect()
+        });
+    texts.extend(stopped);
+    texts
 }
 
 fn write_summary(

@@ -2,7 +2,8 @@
 
 use crate::net::{Net, Node, Stop};
 use crate::surface::DrapeSurface;
-use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+use plyflow_blank::{Blank, Quality};
+use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::scene::{Scene, Sheet, SheetKind};
 use plyflow_surface::vector::{Vec3, add, scale, sub};
@@ -17,8 +18,8 @@ pub struct Ply {
     pub material: Material,
     /// Distance of its mid-plane from the tool when all sheets lie on it (m).
     pub offset: f64,
-    /// Outline before forming: x0, y0, x1, y1 (m).
-    pub blank: [f64; 4],
+    /// Its shape before forming.
+    pub blank: Blank,
 }
 
 /// The plies of a scene from the tool upwards; films count with their thickness.
@@ -41,16 +42,11 @@ pub fn plies(scene: &Scene) -> Result<Vec<Ply>, String> {
         if sheet.kind != SheetKind::Ply {
             continue;
         }
-        let (Some(l), Some(w)) = (sheet.length, sheet.width) else {
-            return Err(format!("ply '{}' needs length and width", sheet.name));
-        };
-        let [cx, cy] = sheet.centre.map(|c| c.si());
-        let (hl, hw) = (0.5 * l.si(), 0.5 * w.si());
         let ply = Ply {
             scene: sheet.clone(),
             material: (**material).clone(),
             offset,
-            blank: [cx - hl, cy - hw, cx + hl, cy + hw],
+            blank: Blank::new(sheet).map_err(|e| e.to_string())?,
         };
         let [a, b] = ply.directions();
         if (b - a).sin() < 0.1 {
@@ -96,12 +92,12 @@ impl Ply {
     }
 
     /// The mesh of the flat ply, as `forming-explicit` makes it.
-    pub fn mesh(&self, element_size: f64) -> QuadMesh {
-        let [x0, y0, x1, y1] = self.blank;
-        QuadMesh::grid(
-            &even_axis(x0, x1, element_size),
-            &even_axis(y0, y1, element_size),
-        )
+    ///
+    /// # Errors
+    /// When the elements cannot follow its outline.
+    pub fn mesh(&self, element_size: f64) -> Result<(QuadMesh, Option<Quality>), String> {
+        let mesh = self.blank.mesh(element_size);
+        mesh.map_err(|e| format!("ply '{}': {e}", self.scene.name))
     }
 }
 

@@ -203,6 +203,23 @@ impl QuadMesh {
     }
 }
 
+/// Drops from patches of more than `most` nodes (0: no patches) those farthest from the centre: six cells and more around
+/// a node have more nodes than a fit of five derivatives needs.
+pub fn limit_patches(patches: &mut [Patch], points: &[[f64; 3]], most: usize) {
+    for patch in patches
+        .iter_mut()
+        .filter(|p| most > 0 && p.nodes.len() > most)
+    {
+        let centre = points[patch.nodes[0] as usize];
+        let mut ring = patch.nodes.split_off(1);
+        let away = |n: &u32| norm(sub(points[*n as usize], centre));
+        ring.sort_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)));
+        ring.truncate(most - 1);
+        ring.sort_unstable();
+        patch.nodes.extend(ring);
+    }
+}
+
 /// Area vector of a quad: half the cross product of its diagonals (m2).
 #[inline(always)]
 pub fn area_vector(p: [[f64; 3]; 4]) -> [f64; 3] {
@@ -228,6 +245,37 @@ mod tests {
         let total: f64 = mesh.patches().iter().map(|p| p.area).sum();
         assert!((total - 0.06).abs() < 1e-12);
         assert!(mesh.patches().iter().all(|p| p.nodes.len() == 9));
+    }
+
+    #[test]
+    fn patches_of_too_many_nodes_keep_the_nearest() {
+        let at = |k: u32, r: f64| {
+            let (s, c) = (std::f64::consts::TAU * f64::from(k) / 12.0).sin_cos();
+            [r * c, r * s, 0.0]
+        };
+        let mut points = vec![[0.0; 3]];
+        points.extend((0..12).map(|k| {
+            at(
+                k,
+                if k % 2 == 0 {
+                    1.0
+                } else {
+                    1.4 + 0.01 * f64::from(k)
+                },
+            )
+        }));
+        let cells = (0..6).map(|k| [0, 1 + 2 * k, 2 + 2 * k, 1 + (2 * k + 2) % 12]);
+        let mesh = QuadMesh {
+            points,
+            cells: cells.collect(),
+        };
+        let mut patches = mesh.patches();
+        assert_eq!((patches.len(), patches[0].nodes.len()), (1, 13));
+        limit_patches(&mut patches, &mesh.points, 12);
+        // The corner of the last cell is the farthest.
+        assert_eq!(patches[0].nodes, (0..12).collect::<Vec<u32>>());
+        limit_patches(&mut patches, &mesh.points, 0);
+        assert_eq!(patches[0].nodes.len(), 12);
     }
 
     #[test]

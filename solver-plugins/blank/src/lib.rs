@@ -1,0 +1,145 @@
+//! Blanks of plies before forming: rectangles, and outlines with holes.
+//!
+//! A rectangle is a regular grid. Any other outline is meshed with quads alone that follow it ([`mesh_region`]): nodes on
+//! its edge, one on each sharp corner, grid lines along x and y inside.
+
+mod coarse;
+mod edge;
+mod mesher;
+mod quality;
+mod smooth;
+
+pub use edge::{LEAST_FEATURE, SHARP};
+pub use mesher::mesh_region;
+pub use quality::{POOR_JACOBIAN, Quality};
+
+use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+use plyflow_model::outline::{Millimetres, OutlineError, Point, Region};
+use plyflow_model::scene::Sheet;
+
+/// Why a blank has no mesh.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// The sheet has no size.
+    #[error("ply '{0}' needs length and width, or an outline")]
+    Size(String),
+    /// Its outline bounds no region.
+    #[error("ply '{0}': {1}")]
+    Outline(String, OutlineError),
+    /// Something is smaller than the elements can follow. Lengths in mm.
+    #[error(
+        "{what} at {at} measures {given:.3} mm, too small for elements of {size:.3} mm; take an element size of at most \
+         {wanted:.3} mm, or leave that feature out of the outline"
+    )]
+    Small {
+        /// What it is.
+        what: &'static str,
+        /// Where.
+        at: Millimetres,
+        /// Its size (mm).
+        given: f64,
+        /// The elements' (mm).
+        size: f64,
+        /// Largest elements that follow it (mm).
+        wanted: f64,
+    },
+    /// The edge cannot be followed at this size.
+    #[error(
+        "the outline cannot be followed with elements of {size:.3} mm near {at}: {why}; take smaller elements"
+    )]
+    Coarse {
+        /// Element size (mm).
+        size: f64,
+        /// Where.
+        at: Millimetres,
+        /// What happened.
+        why: &'static str,
+    },
+}
+
+/// The blank of a ply, placed over the tool.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Blank {
+    /// x0, y0, x1, y1 (m).
+    Rectangle([f64; 4]),
+    /// Any other.
+    Region(Region),
+}
+
+impl Blank {
+    /// The blank of a sheet of the scene.
+    ///
+    /// # Errors
+    /// When it has no size, or an outline that bounds no region.
+    pub fn new(sheet: &Sheet) -> Result<Self, MeshError> {
+        let region = sheet
+            .region()
+            .map_err(|e| MeshError::Outline(sheet.name.clone(), e))?;
+        if let Some(region) = region {
+            return Ok(Self::Region(region));
+        }
+        let (Some(l), Some(w)) = (sheet.length, sheet.width) else {
+            return Err(MeshError::Size(sheet.name.clone()));
+        };
+        let [cx, cy] = sheet.centre.map(|c| c.si());
+        let (hl, hw) = (0.5 * l.si(), 0.5 * w.si());
+        Ok(Self::Rectangle([cx - hl, cy - hw, cx + hl, cy + hw]))
+    }
+
+    /// The box around it: x0, y0, x1, y1 (m).
+    pub fn bounds(&self) -> [f64; 4] {
+        match self {
+            Self::Rectangle(b) => *b,
+            Self::Region(region) => region.bounds(),
+        }
+    }
+
+    /// Corners of its outline (m), counter-clockwise.
+    pub fn outline(&self) -> Vec<Point> {
+        match self {
+            Self::Rectangle([x0, y0, x1, y1]) => {
+                vec![[*x0, *y0], [*x1, *y0], [*x1, *y1], [*x0, *y1]]
+            }
+            Self::Region(region) => region.outline.clone(),
+        }
+    }
+
+    /// Corners of its holes (m), clockwise.
+    pub fn holes(&self) -> &[Vec<Point>] {
+        match self {
+            Self::Rectangle(_) => &[],
+            Self::Region(region) => &region.holes,
+        }
+    }
+
+    /// Distance of a point from its material (m); 0 on it.
+    pub fn distance(&self, p: Point) -> f64 {
+        match self {
+            Self::Rectangle([x0, y0, x1, y1]) => {
+                let dx = (x0 - p[0]).max(p[0] - x1).max(0.0);
+                let dy = (y0 - p[1]).max(p[1] - y1).max(0.0);
+                dx.hypot(dy)
+            }
+            Self::Region(region) if region.contains(p) => 0.0,
+            Self::Region(region) => region.distance_to_edge(p),
+        }
+    }
+
+    /// Its mesh in the plane z = 0 with edges near `size` (m), and the quality of a mesh that follows an outline.
+    ///
+    /// # Errors
+    /// When the outline cannot be followed at this size.
+    pub fn mesh(&self, size: f64) -> Result<(QuadMesh, Option<Quality>), MeshError> {
+        match self {
+            Self::Rectangle([x0, y0, x1, y1]) => {
+                let grid = QuadMesh::grid(&even_axis(*x0, *x1, size), &even_axis(*y0, *y1, size));
+                Ok((grid, None))
+            }
+            Self::Region(region) => {
+                let mesh = mesh_region(region, size)?;
+                let quality = Quality::new(&mesh, region, size);
+                Ok((mesh, Some(quality)))
+            }
+        }
+    }
+}
