@@ -1,0 +1,340 @@
+//! The quiet bag: films and two plies under 1 bar, flat or draped over a dome, the frame at rest, without mass damping: what moves
+//! must not gain energy, and no sheet may get through another.
+//!
+//! The loads come on with mass damping (a drum of film has nothing of its own that would stop it); then it is switched off and
+//! the bag is watched. What stays on is what every run has: the damping of the normal approach (`contact_damping` 0.3) and
+//! friction. The bound is a millionth of the pressure's work while the bag is evacuated.
+//!
+//! Two known defects have tests that turn red when they are repaired. Without any mass damping the bag is quiet for half a second;
+//! then a motion that grows by e in some 30 ms has come out of rounding: the multipliers feed it. A damping of 50/s, as in the
+//! studies, keeps it down.
+//! And a slave on the common corner of four cells of a hollow master is pushed by the two nearest cells alone, by each two in
+//! turn: it runs in a circle of some tenths of a micrometre, whose energy neither grows nor dies out. The two films have one
+//! mesh and do so where they lie on each other (`FLAT_BOUND`); plies do so where their nodes lie under those of a film.
+
+mod common;
+
+use common::{BuiltIn, fabric};
+use plyflow_forming_explicit::assembly::inverse_bilinear;
+use plyflow_forming_explicit::build_global;
+use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::run::Forming;
+use plyflow_mechanics::contact::shape;
+use plyflow_mechanics::history::smooth_step;
+use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_mechanics::model::{Drive, Pressures};
+use plyflow_mechanics::vec3::V;
+use serde_json::json;
+
+/// Vacuum in the bag (Pa).
+const PRESSURE: f64 = 1e5;
+/// The frame stretches the films, the air is drawn, and the frame goes down (s).
+const PHASES: [f64; 3] = [0.05, 0.05, 0.1];
+/// Then the frame is at rest, damped (s).
+const REST: f64 = 0.1;
+/// Mass damping until the end of that (1/s).
+const DAMPING: f64 = 200.0;
+
+/// A bag to be watched.
+struct Bag {
+    /// How far the frame goes down over the tool (m); 0: the bag stays flat above it.
+    way: f64,
+    /// Edge of the films' elements (m); that of the plies is 10 mm.
+    film: f64,
+    /// How long it is watched (s).
+    hold: f64,
+    /// Mass damping while it is watched (1/s).
+    damping: f64,
+    /// Share of the penalty force that the multipliers take over in a step.
+    augmentation: f64,
+}
+
+/// What was seen.
+#[derive(Debug)]
+struct Seen {
+    /// Work of the pressure while the air was drawn, the frame at rest (J).
+    work: f64,
+    /// Largest kinetic energy (J) in each tenth of the time for which it is watched.
+    kinetic: [f64; 10],
+    /// Least distance of a node from the surface under it over that at which they touch.
+    least_distance: f64,
+}
+
+fn parameters(bag: &Bag) -> Parameters {
+    let film = json!({
+        "plyflow_material": 1, "name": "film", "plugin": "material-marlow",
+        "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
+        "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
+    });
+    let diaphragm =
+        |name: &str| json!({"name": name, "kind": "diaphragm", "material": film.clone()});
+    let ply = |name: &str, turn: f64| {
+        json!({
+            "name": name, "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.08 m",
+            "fibre_1": format!("{} rad", turn - std::f64::consts::FRAC_PI_4),
+            "fibre_2": format!("{} rad", turn + std::f64::consts::FRAC_PI_4)
+        })
+    };
+    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01});
+    serde_json::from_value(json!({
+        "scene": {
+            "plyflow_scene": 1, "name": "quiet bag",
+            "tool": {"hemisphere": {"radius": "0.06 m", "facet_size": "0.004 m"}},
+            "sheets": [diaphragm("lower"), ply("ply_1", 0.0), ply("ply_2", std::f64::consts::FRAC_PI_4), diaphragm("upper")],
+            "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "fabric_fabric": 0.35,
+                         "diaphragm_diaphragm": 0.3},
+            "process": {"double_diaphragm": {
+                "frame_length": "0.4 m", "frame_width": "0.34 m", "clearance": "0.005 m",
+                "bag_pressure": "100000 Pa", "forming_pressure": "100000 Pa",
+                "bagging_time": "0.1 s", "lowering_time": "1 s", "drawing_time": "1 s",
+                "settling_time": "1 s", "film_pre_stretch": 0.01, "film_joint_margin": "0.03 m"}}
+        },
+        "element": {"plugin": "m4", "with": hourglass},
+        "diaphragm_element": {"plugin": "m4", "with": hourglass},
+        "element_size": 0.01, "diaphragm_element_size": bag.film, "diaphragm_growth": 1.25, "time_step": 1.2e-5, "step_safety": 0.8,
+        "least_areal_mass": 2.0, "damping": DAMPING, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
+        "contact_damping": 0.3, "contact_augmentation": bag.augmentation, "frames": 1, "tool_grid": 0.003,
+        "kinetic_bound": 0.05, "drift_bound": 0.5
+    }))
+    .expect("the parameters fit their type")
+}
+
+/// The frame: it stretches the films, waits for the air to be drawn, and goes down.
+struct Frame {
+    start: Vec<V>,
+    way: f64,
+}
+
+impl Drive for Frame {
+    fn position(&self, k: usize, t: f64) -> V {
+        let stretch = 1.0 + 0.01 * smooth_step(t, 0.0, PHASES[0]);
+        let down = self.way * smooth_step(t, PHASES[0] + PHASES[1], PHASES[2]);
+        let [x, y, z] = self.start[k];
+        [stretch * x, stretch * y, z - down]
+    }
+}
+
+/// Steps to `end` (s); `see` gets the time and the kinetic energy after every step.
+fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(f64, f64)) {
+    let model = &mut forming.model;
+    let mut check = model.time;
+    while model.time < end {
+        if model.time >= check {
+            model.dt = p
+                .time_step
+                .min(p.step_safety * model.critical_step().unwrap());
+            check += 0.01;
+        }
+        let bag = PRESSURE * smooth_step(model.time, PHASES[0], PHASES[1]);
+        // The same air around: nothing is drawn from under the lower film.
+        model.pressures = Pressures {
+            below: bag,
+            above: bag,
+        };
+        model.step(false).unwrap();
+        see(model.time, model.kinetic());
+    }
+}
+
+/// Least height of a node over the sheet under it (along z, times the cosine of the slope), over the distance at which they touch.
+fn least_distance(forming: &Forming) -> f64 {
+    let model = &forming.model;
+    let mut least = f64::INFINITY;
+    for contact in &model.sheet_contacts {
+        let master = contact.name.split('/').next().unwrap();
+        let sheet = model.sheets.iter().find(|s| s.name == master).unwrap();
+        let cells = &model.cells[sheet.cell_range.0..sheet.cell_range.1];
+        for item in &contact.items {
+            let p = model.x[item.node as usize];
+            for cell in cells {
+                let q = cell.map(|n| model.x[n as usize]);
+                let out = |k: usize| {
+                    let (lo, hi) = q
+                        .iter()
+                        .fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c[k]), h.max(c[k])));
+                    p[k] < lo || p[k] > hi
+                };
+                if out(0) || out(1) {
+                    continue;
+                }
+                let Some(xi) =
+                    inverse_bilinear(q, p).filter(|xi| xi.iter().all(|x| x.abs() <= 1.0))
+                else {
+                    continue;
+                };
+                let z: f64 = shape(xi).iter().zip(&q).map(|(w, c)| w * c[2]).sum();
+                let area = plyflow_mechanics::mesh::area_vector(q);
+                let slope = area[2] / plyflow_mechanics::vec3::norm(area);
+                least = least.min(contact.side * (p[2] - z) * slope / contact.offset);
+            }
+        }
+    }
+    least
+}
+
+fn watch(bag: &Bag) -> Seen {
+    let p = parameters(bag);
+    let mut forming = build_global(&p, &BuiltIn).unwrap();
+    let film = &forming.bodies[0];
+    let mesh = QuadMesh {
+        points: forming.points(film),
+        cells: film.cells.clone(),
+    };
+    let on = mesh.on_boundary();
+    let nodes = (0..mesh.points.len()).filter(|n| on[*n]);
+    let frame: Vec<u32> = nodes.map(|n| n as u32).collect();
+    let start = frame.iter().map(|n| mesh.points[*n as usize]).collect();
+    let drive = Frame {
+        start,
+        way: bag.way,
+    };
+    forming.model.set_driven(frame, Box::new(drive));
+    run(&mut forming, &p, PHASES[0], |_, _| {});
+    let before = forming.model.ledger.external;
+    run(&mut forming, &p, PHASES[0] + PHASES[1], |_, _| {});
+    let work = (forming.model.ledger.external - before).abs();
+    let lowering = if bag.way > 0.0 { PHASES[2] } else { 0.0 };
+    let begin = PHASES[0] + PHASES[1] + lowering + REST;
+    run(&mut forming, &p, begin, |_, _| {});
+    forming.model.set_damping(bag.damping);
+    let mut kinetic = [0.0f64; 10];
+    run(&mut forming, &p, begin + bag.hold, |t, k| {
+        let tenth = ((t - begin) / bag.hold * 10.0) as usize;
+        let of = &mut kinetic[tenth.min(9)];
+        *of = of.max(k);
+    });
+    Seen {
+        work,
+        kinetic,
+        least_distance: least_distance(&forming),
+    }
+}
+
+/// The bag stays quiet: at most `bound` of the pressure's work moves, no more at the end than at the start, and every sheet is
+/// where it belongs.
+fn assert_quiet(what: &str, bag: &Bag, bound: f64) {
+    let seen = watch(bag);
+    println!("{what}, {} s: {seen:?}", bag.hold);
+    let share = seen.kinetic.map(|k| k / seen.work);
+    let most = share.iter().fold(0.0, |m: f64, k| m.max(*k));
+    assert!(
+        most < bound,
+        "{what}: kinetic energy over the pressure's work ({} J), by tenths of {} s: {share:?}; bound {bound}",
+        seen.work,
+        bag.hold
+    );
+    // Below a hundredth of the bound it is noise that neither grows nor dies.
+    assert!(
+        share[9] < 1.2 * share[0].max(0.01 * bound),
+        "{what}: kinetic energy grows: {share:?}"
+    );
+    assert!(
+        seen.least_distance > 0.9,
+        "{what}: a node has come to {} of its distance from another sheet",
+        seen.least_distance
+    );
+}
+
+/// What the films' circling nodes leave of the bound of 1e-6.
+const FLAT_BOUND: f64 = 5e-5;
+
+fn flat(hold: f64) -> Bag {
+    Bag {
+        way: 0.0,
+        film: 0.0113,
+        hold,
+        damping: 0.0,
+        augmentation: 0.003,
+    }
+}
+
+fn draped(film: f64, hold: f64) -> Bag {
+    Bag {
+        way: 0.025,
+        film,
+        hold,
+        damping: 0.0,
+        augmentation: 0.003,
+    }
+}
+
+#[test]
+fn a_flat_bag_stays_quiet() {
+    assert_quiet("flat", &flat(0.05), FLAT_BOUND);
+}
+
+#[test]
+fn a_bag_draped_over_a_dome_stays_quiet() {
+    assert_quiet("draped", &draped(0.0113, 0.05), 1e-6);
+}
+
+#[test]
+#[ignore = "minutes: make test-long"]
+fn a_flat_bag_with_the_damping_of_the_studies_stays_quiet_for_a_second() {
+    let bag = Bag {
+        damping: 50.0,
+        ..flat(1.0)
+    };
+    assert_quiet("flat, damping 50/s", &bag, FLAT_BOUND);
+}
+
+#[test]
+#[ignore = "minutes: make test-long"]
+fn a_draped_bag_with_the_damping_of_the_studies_stays_quiet_for_a_second() {
+    let bag = Bag {
+        damping: 50.0,
+        ..draped(0.0113, 1.0)
+    };
+    assert_quiet("draped, damping 50/s", &bag, 1e-6);
+}
+
+/// A known defect: quiet for 0.4 s, then not. When this fails because the end is quiet, [`assert_quiet`] can hold for the second.
+fn assert_quiet_at_first(what: &str, bag: &Bag, bound: f64) {
+    let seen = watch(bag);
+    let share = seen.kinetic.map(|k| k / seen.work);
+    println!("{what}, {} s, shares {share:?}: {seen:?}", bag.hold);
+    assert!(share[..4].iter().all(|k| *k < bound), "{what}: {share:?}");
+    assert!(share[9] > 1e-4 && share[9] < 0.1, "{what}: {share:?}");
+    assert!(seen.least_distance > 0.9, "{}", seen.least_distance);
+}
+
+#[test]
+#[ignore = "minutes: make test-long"]
+fn a_flat_bag_without_damping_begins_to_move_within_a_second() {
+    assert_quiet_at_first("flat", &flat(1.0), FLAT_BOUND);
+}
+
+#[test]
+#[ignore = "minutes: make test-long"]
+fn a_draped_bag_without_damping_begins_to_move_within_a_second() {
+    assert_quiet_at_first("draped", &draped(0.0113, 1.0), 1e-6);
+}
+
+/// Where the energy of that motion comes from: without multipliers there is none. But then the sheets sink into each other.
+#[test]
+#[ignore = "minutes: make test-long"]
+fn a_draped_bag_without_damping_and_multipliers_stays_quiet_for_a_second() {
+    let bag = Bag {
+        augmentation: 0.0,
+        ..draped(0.0113, 1.0)
+    };
+    let seen = watch(&bag);
+    let share = seen.kinetic.map(|k| k / seen.work);
+    println!("draped, no multipliers, shares {share:?}: {seen:?}");
+    assert!(share.iter().all(|k| *k < 1e-6), "{share:?}");
+    assert!(seen.least_distance > 0.0, "{}", seen.least_distance);
+}
+
+/// A known defect. When this fails because the energy is less, the flat bag can have the bound of the draped one.
+#[test]
+#[ignore = "minutes: make test-long"]
+fn nodes_under_the_corners_of_a_hollow_sheet_circle() {
+    let seen = watch(&draped(0.01, 0.05));
+    println!("draped, node on node: {seen:?}");
+    let share = seen.kinetic[9] / seen.work;
+    assert!(
+        share > 1e-5 && share < 1e-3,
+        "{share} of the pressure's work"
+    );
+    assert!(seen.least_distance > 0.9, "{}", seen.least_distance);
+}
