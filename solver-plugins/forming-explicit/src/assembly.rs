@@ -6,8 +6,8 @@ use plyflow_abi::pf_component;
 use plyflow_blank::{Blank, Quality};
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
-    ContactSettings, FrictionLaw, Plane, RigidContact, RigidItem, RigidSurface, SheetContact,
-    SlaveItem,
+    ContactSettings, FoldSpec, FrictionLaw, Plane, RigidContact, RigidItem, RigidSurface,
+    SheetContact, SlaveItem,
 };
 use plyflow_mechanics::mesh::{NONE, limit_patches};
 use plyflow_mechanics::model::{Model, StepSettings};
@@ -151,6 +151,48 @@ pub fn add_sheet_contact(
         augmentation: p.contact_augmentation,
         items,
     });
+}
+
+/// Adds the contact of a ply (its place in the stack, its sheet's number, its nodes that may be slaves) with itself,
+/// unless `self_contact` is off. The model must still be as it starts, with the plies flat. Where the scene has no
+/// coefficient for fabric on fabric it is without friction: few plies fold, and a scene of one ply need not give it.
+///
+/// # Errors
+/// When the law of friction makes no sense.
+pub fn add_self_contact(
+    model: &mut Model,
+    stack: &[StackSheet],
+    (ply, index): (usize, usize),
+    slaves: &[u32],
+    p: &Parameters,
+) -> Result<(), String> {
+    let (first, end) = model.sheets[index].cell_range;
+    if !p.self_contact || first == end {
+        return Ok(());
+    }
+    let undeformed = model.x.clone();
+    let mut slaves = slaves.to_vec();
+    slaves.sort_unstable();
+    let name = &stack[ply].scene.name;
+    let friction = if p.scene.friction.fabric_fabric.is_some() {
+        let touching = Touching {
+            parts: [name, name],
+            slave: name,
+        };
+        FrictionTable::new(&p.scene)?.law(model, &touching)?
+    } else {
+        0.0.into()
+    };
+    let spec = FoldSpec {
+        name: format!("{name}/{name}"),
+        slaves,
+        cell_range: model.sheets[index].cell_range,
+        thickness: stack[ply].thickness,
+        friction,
+        undeformed: &undeformed,
+    };
+    model.add_self_contact(spec, &contact_settings(p));
+    Ok(())
 }
 
 /// The blank of a ply before forming.
@@ -331,6 +373,9 @@ pub fn add_contacts(
         pair(top - 1, top, -1.0)?;
     }
     pair(top, 0, 1.0)?;
+    for (k, ply) in placed.iter().enumerate().take(top).skip(1) {
+        add_self_contact(model, stack, (k, ply.index), &ply.slaves, p)?;
+    }
     model.set_contact_stiffness(&contact_settings(p));
     Ok(())
 }

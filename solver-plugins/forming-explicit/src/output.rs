@@ -192,7 +192,10 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         cycle_shown: 0,
         first_cycle: 0,
     };
-    let outcome = forming.run(&p.control(), &mut writer)?;
+    let mut outcome = forming.run(&p.control(), &mut writer)?;
+    outcome
+        .warnings
+        .extend(forming.frictionless_folds(&p.scene));
     let own_cycles = outcome.cycles - writer.first_cycle;
     let rate = own_cycles as f64 / writer.started.elapsed().as_secs_f64().max(1e-9);
     write_history(host, &outcome, forming.load.press().is_some())?;

@@ -46,6 +46,9 @@ pub struct Parameters {
     pub contact_damping: f64,
     /// Contact augmentation.
     pub contact_augmentation: f64,
+    /// Whether plies touch themselves.
+    #[serde(default = "yes")]
+    pub self_contact: bool,
     /// Frames besides the start.
     pub frames: usize,
     /// Spacing of the signed-distance grid (m).
@@ -54,6 +57,10 @@ pub struct Parameters {
     pub kinetic_bound: f64,
     /// Energy unaccounted for that stops a run.
     pub drift_bound: f64,
+}
+
+fn yes() -> bool {
+    true
 }
 
 impl Parameters {

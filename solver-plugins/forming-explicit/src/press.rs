@@ -262,6 +262,10 @@ fn add_contacts(
         let on = (k - 1, k - 1);
         assembly::add_sheet_contact(model, stack, (k, &slaves), on, 1.0, between, p);
     }
+    for k in 0..stack.len() {
+        let slaves = model.sheets[k].nodes.clone();
+        assembly::add_self_contact(model, stack, (k, k), &slaves, p)?;
+    }
     model.set_contact_stiffness(&settings);
     Ok(())
 }

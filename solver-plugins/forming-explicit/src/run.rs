@@ -8,7 +8,8 @@ use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, SheetEnergy, judge};
 use plyflow_mechanics::model::Model;
-use plyflow_mechanics::vec3::{V, norm};
+use plyflow_mechanics::vec3::{V, dot, norm};
+use plyflow_model::scene::Scene;
 use plyflow_tooling::ToolMesh;
 use serde::{Deserialize, Serialize};
 
@@ -371,11 +372,39 @@ impl Forming {
                 }
             }
         }
+        for i in m.self_contacts.iter().flat_map(|c| &c.items) {
+            let slave = &i.slave;
+            if !slave.active {
+                continue;
+            }
+            // The slave's face that looks to the tool is pressed from there, and so is the master's, or neither.
+            if dot(slave.force, m.normals[slave.node as usize]) > 0.0 {
+                force[slave.node as usize] += slave.normal_force;
+            }
+            if i.side < 0.0 {
+                for (w, n) in slave.weights.iter().zip(m.cells[slave.cell as usize]) {
+                    force[n as usize] += w * slave.normal_force;
+                }
+            }
+        }
         m.sheets[body.sheet]
             .nodes
             .iter()
             .map(|n| force[*n as usize] / norm(m.area[*n as usize]).max(1e-12))
             .collect()
+    }
+
+    /// What to say when plies have touched themselves and the scene does not tell how they rub.
+    pub fn frictionless_folds(&self, scene: &Scene) -> Option<String> {
+        let contacts = self.model.self_contacts.iter().filter(|c| c.touched);
+        let touched: Vec<&str> = contacts.map(|c| c.name.as_str()).collect();
+        (scene.friction.fabric_fabric.is_none() && !touched.is_empty()).then(|| {
+            format!(
+                "friction.fabric_fabric: not given, but plies touched themselves ({}) and slid without friction; expected \
+                 the coefficient of fabric on fabric",
+                touched.join(", ")
+            )
+        })
     }
 
     /// Penetrations (m) of the nodes in contact by pair: name, largest, 99.9 % quantile.
@@ -409,7 +438,11 @@ impl Forming {
                 .collect();
             judge(&c.name, depths)
         });
-        rigid.chain(sheets).collect()
+        let selves = m.self_contacts.iter().map(|c| {
+            let touching = c.items.iter().filter(|i| i.slave.active);
+            judge(&c.name, touching.map(|i| i.slave.penetration).collect())
+        });
+        rigid.chain(sheets).chain(selves).collect()
     }
 }
 

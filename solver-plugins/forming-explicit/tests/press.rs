@@ -282,6 +282,32 @@ fn the_strongest_contact_damping_keeps_the_ledger_closed() {
 }
 
 #[test]
+fn contact_with_itself_changes_nothing_where_no_ply_folds() {
+    let mut p = parameters(1, &json!({"gap": "0.002 m"}));
+    p.scene.friction.fabric_fabric = None;
+    (p.element_size, p.time_step) = (0.01, 1.2e-5);
+    let (mut with, _) = form(&p, 1);
+    p.self_contact = false;
+    let (without, _) = form(&p, 1);
+    assert!(with.model.x == without.model.x && with.model.v == without.model.v);
+    let pairs = |f: &Forming| -> Vec<String> {
+        let all = f.penetrations().into_iter();
+        let own = all.filter(|(_, max, _)| *max == 0.0).map(|p| p.0);
+        own.filter(|n| n == "ply_1/ply_1").collect()
+    };
+    assert_eq!((pairs(&with).len(), pairs(&without).len()), (1, 0));
+    // Without a coefficient a fold slides freely, and the run says so, but only if there was one.
+    assert!(with.frictionless_folds(&p.scene).is_none());
+    with.model.self_contacts[0].touched = true;
+    let text = with.frictionless_folds(&p.scene).unwrap();
+    assert!(text.contains("friction.fabric_fabric") && text.contains("ply_1/ply_1"));
+    p.scene.friction.fabric_fabric = Some(plyflow_model::friction::Coefficient::Constant(
+        plyflow_model::units::Number(0.3),
+    ));
+    assert!(with.frictionless_folds(&p.scene).is_none());
+}
+
+#[test]
 fn what_makes_no_press_is_refused_with_what_to_do() {
     let refused = |p: &Parameters| build_global(p, &BuiltIn).err().expect("refused");
     let tight = refused(&parameters(2, &json!({"gap": "0.0005 m"})));

@@ -1,4 +1,4 @@
-//! Contact by penalty: sheet on sheet, sheet on rigid surface.
+//! Contact by penalty: sheet on sheet, sheet on itself, sheet on rigid surface.
 //!
 //! Normal force: k times the penetration, along the gradient of the distance (to the closest point of a sheet's
 //! bilinear cells, blended across concave folds; to a rigid surface's distance field), so that it is the
@@ -9,10 +9,14 @@
 //! over the steady part of the force (augmented Lagrangian, a little in every step): the penetration of a
 //! contact at rest dies out over 1 / augmentation steps, at no cost in step size.
 
+mod folds;
 mod friction;
+mod proximity;
 mod rigid;
 mod sheets;
 
+pub(crate) use folds::Bearing;
+pub use folds::{FoldItem, FoldSpec, SelfContact};
 pub use friction::{
     AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, PressureDependence, SheetCells,
     VaryingFriction, Whose,

@@ -9,7 +9,7 @@
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
 use super::{ContactEnergy, friction_force, normal_force};
 use crate::mesh::NONE;
-use crate::vec3::{V, add, dot, scale, sub, unit};
+use crate::vec3::{V, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -20,12 +20,12 @@ pub struct SlaveItem {
     pub node: u32,
     /// Master cell (model numbering) or [`NONE`].
     pub cell: u32,
-    sleep: u32,
-    turn: u8,
+    pub(super) sleep: u32,
+    pub(super) turn: u8,
     /// The last search found one cell, on the slave's own side.
-    plain: bool,
+    pub(super) plain: bool,
     /// Direction from master to slave at the last search.
-    direction: V,
+    pub(super) direction: V,
     /// In touch in the last step.
     pub active: bool,
     /// Place in the cell, -1..1.
@@ -36,7 +36,7 @@ pub struct SlaveItem {
     pub damping: f64,
     /// Multiplier: the steady part of the normal force (N).
     pub multiplier: f64,
-    work: f64,
+    pub(super) work: f64,
     /// Friction force held by the slip spring (N).
     pub slip: V,
     /// Force on the slave (N).
@@ -44,16 +44,20 @@ pub struct SlaveItem {
     /// Weights of the cell's nodes.
     pub weights: [f64; 4],
     /// Its share of the force (N): minus this, by the weights, acts on the cell's nodes.
-    share: V,
+    pub(super) share: V,
     /// The other cell of a concave fold in which the slave lies, or [`NONE`]; its weights and share.
-    second: u32,
-    second_weights: [f64; 4],
-    second_share: V,
+    pub(super) second: u32,
+    pub(super) second_weights: [f64; 4],
+    pub(super) second_share: V,
     /// Normal part of the force (N).
     pub normal_force: f64,
     /// Penetration (m), 0 when apart.
     pub penetration: f64,
-    energy: ContactEnergy,
+    /// Part of it that no motion has brought about (m): it is left standing and pushes nothing ([`SlaveItem::admit`]).
+    pub(super) ignored: f64,
+    /// Whether penetrations that no motion has brought about are ignored.
+    pub(super) guarded: bool,
+    pub(super) energy: ContactEnergy,
 }
 
 impl SlaveItem {
@@ -82,12 +86,15 @@ impl SlaveItem {
             second_share: [0.0; 3],
             normal_force: 0.0,
             penetration: 0.0,
+            ignored: 0.0,
+            guarded: false,
             energy: ContactEnergy::default(),
         }
     }
 
-    fn part(&mut self) {
+    pub(super) fn part(&mut self) {
         self.active = false;
+        self.ignored = 0.0;
         self.plain = false;
         self.multiplier = 0.0;
         self.work = 0.0;
@@ -98,11 +105,30 @@ impl SlaveItem {
         self.penetration = 0.0;
         self.energy = ContactEnergy::default();
     }
+
+    /// Takes note of a penetration `depth` (m, negative when apart) after a step `dt` (s) at the relative velocity
+    /// `rel` (m/s), and gives the part of it that pushes.
+    ///
+    /// What motion cannot have brought about has come from the search: another face of a fold has become the
+    /// closest one, or a slave has got behind a rim. To push it out would make energy from nothing. It is left
+    /// standing; as the slave comes out it shrinks, and it never grows again.
+    #[inline]
+    fn admit(&mut self, depth: f64, rel: V, dt: f64, offset: f64) -> f64 {
+        let jump = depth - self.penetration;
+        if self.guarded && jump > SLACK * offset && jump > SLACK * offset + 2.0 * norm(rel) * dt {
+            self.ignored += jump;
+        }
+        self.ignored = self.ignored.min(depth.max(0.0));
+        depth - self.ignored
+    }
 }
+
+/// What a search may move the closest point by while nothing folds, over the offset.
+const SLACK: f64 = 1e-2;
 
 /// How often (steps) the closest point of a slave in touch is searched anew. In between it keeps its place in the
 /// cell: it slides by some micrometres, which changes the distance by less than a nanometre.
-const SEARCH_INTERVAL: u8 = 4;
+pub(super) const SEARCH_INTERVAL: u8 = 4;
 
 /// Slaves of one sheet on one master sheet.
 pub struct SheetContact {
@@ -131,7 +157,7 @@ pub fn shape(xi: [f64; 2]) -> [f64; 4] {
 }
 
 #[inline(always)]
-fn combine(w: [f64; 4], p: &[V; 4]) -> V {
+pub(super) fn combine(w: [f64; 4], p: &[V; 4]) -> V {
     let mut s = [0.0; 3];
     for (w, p) in w.iter().zip(p) {
         for c in 0..3 {
@@ -156,32 +182,38 @@ pub struct Surface<'a> {
 
 /// Closest point of a cell to a slave.
 #[derive(Clone, Copy)]
-struct Closest {
-    cell: u32,
-    xi: [f64; 2],
-    weights: [f64; 4],
+pub(super) struct Closest {
+    pub(super) cell: u32,
+    pub(super) xi: [f64; 2],
+    pub(super) weights: [f64; 4],
     /// From the closest point to the slave (m).
-    arm: V,
-    distance2: f64,
+    pub(super) arm: V,
+    pub(super) distance2: f64,
     /// Half the cell's shorter middle line (m).
     half: f64,
     /// The foot of the perpendicular, not a place held at a side of the cell.
-    interior: bool,
+    pub(super) interior: bool,
 }
 
 /// The closest point of the surface, and in a concave fold the closest of the cell across it.
-struct Found {
-    first: Closest,
-    second: Option<Closest>,
+pub(super) struct Found {
+    pub(super) first: Closest,
+    pub(super) second: Option<Closest>,
 }
 
 /// How far a cell goes on past a free rim, in half cells: a node that sits on the rim would else balance on an
 /// edge, slide off and get under the sheet.
-const RIM: f64 = 0.5;
+pub(super) const RIM: f64 = 0.5;
 
 /// Closest point of one cell to `p` by Newton steps from `xi`, kept inside the cell.
 #[inline(always)]
-fn closest(s: &Surface<'_>, cell: u32, mut xi: [f64; 2], p: V, iterations: u32) -> Closest {
+pub(super) fn closest(
+    s: &Surface<'_>,
+    cell: u32,
+    mut xi: [f64; 2],
+    p: V,
+    iterations: u32,
+) -> Closest {
     let x = s.cells[cell as usize].map(|n| s.x[n as usize]);
     let (mut half, mut interior) = (0.0, true);
     let [south, east, north, west] = s.neighbours[cell as usize];
@@ -239,6 +271,17 @@ fn closest(s: &Surface<'_>, cell: u32, mut xi: [f64; 2], p: V, iterations: u32) 
     }
 }
 
+/// Unit normal of a cell at a place in it.
+pub(super) fn cell_normal(s: &Surface<'_>, cell: u32, xi: [f64; 2]) -> V {
+    let x = s.cells[cell as usize].map(|n| s.x[n as usize]);
+    let (a, b) = (1.0 - xi[1], 1.0 + xi[1]);
+    let (c, d) = (1.0 - xi[0], 1.0 + xi[0]);
+    unit(cross(
+        combine([-a, a, b, -b], &x),
+        combine([-c, -d, d, c], &x),
+    ))
+}
+
 /// Where a walk over an edge enters the neighbour, coming from place `xi`.
 fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
     match neighbours[to as usize].iter().position(|n| *n == from) {
@@ -251,15 +294,25 @@ fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
 
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
 /// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
-/// neighbour closer.
+/// neighbour closer. The walk enters only cells that are `open` to it.
 #[inline]
-fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Found {
+pub(super) fn track(
+    s: &Surface<'_>,
+    item: &SlaveItem,
+    p: V,
+    iterations: u32,
+    open: impl Fn(u32) -> bool,
+) -> Found {
     let mut best = closest(s, item.cell, item.xi, p, iterations);
     let mut second: Option<Closest> = None;
-    let careful = item.second != NONE || item.turn.is_multiple_of(8) || !item.active;
+    let every = |n: u8| item.second != NONE || item.turn.is_multiple_of(n) || !item.active;
+    let careful = every(8);
+    // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
+    // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
+    let reach = if every(16) { 4.0 } else { 1.0 };
     for _ in 0..12 {
         let near = s.neighbours[best.cell as usize];
-        let band = 1.0 - (best.distance2.sqrt() / best.half).min(0.5);
+        let band = 1.0 - (reach * best.distance2.sqrt() / best.half).min(0.5);
         let here = best;
         second = None;
         for k in 0..2 {
@@ -274,7 +327,7 @@ fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Found {
                 (_, true) => 2,
                 (_, false) => 0,
             };
-            if near[edge] != NONE {
+            if near[edge] != NONE && open(near[edge]) {
                 let start = entry(s.neighbours, here.cell, near[edge]);
                 let mut other = closest(s, near[edge], start, p, 3);
                 if other.distance2 < best.distance2 {
@@ -303,7 +356,7 @@ fn track(s: &Surface<'_>, item: &SlaveItem, p: V, iterations: u32) -> Found {
 /// e = 0.4 offset (1 - cos fold) of each other the two are blended into a smooth minimum,
 /// d = d1 - (e - (d2 - d1))^2 / 4e. Both feet are still perpendicular there, so nothing jumps at its ends.
 #[inline]
-fn blend(first: &Closest, second: Option<&Closest>, offset: f64) -> (f64, f64) {
+pub(super) fn blend(first: &Closest, second: Option<&Closest>, offset: f64) -> (f64, f64) {
     let d1 = first.distance2.sqrt();
     let Some(second) = second else {
         return (d1, 0.0);
@@ -339,6 +392,7 @@ impl SheetContact {
         let law = Law {
             dt,
             friction,
+            offset,
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
@@ -360,7 +414,7 @@ impl SheetContact {
                     return;
                 }
                 // In touch, the place moves by far less than a cell in a step: one iteration follows it.
-                let found = track(s, item, s.x[n], if item.active { 1 } else { 3 });
+                let found = track(s, item, s.x[n], if item.active { 1 } else { 3 }, |_| true);
                 let first = &found.first;
                 (item.cell, item.xi) = (first.cell, first.xi);
                 let nodes = s.cells[first.cell as usize];
@@ -419,37 +473,52 @@ impl SheetContact {
 
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
     pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
-        let mut push = |cell: u32, weights: &[f64; 4], force: V| {
-            for (w, n) in weights.iter().zip(cells[cell as usize]) {
-                let n = n as usize;
-                f[n] = sub(f[n], scale(force, *w));
-            }
-        };
-        for item in self.items.iter().filter(|i| i.active) {
-            push(item.cell, &item.weights, item.share);
-            if item.second != NONE {
-                push(item.second, &item.second_weights, item.second_share);
-            }
+        scatter(self.items.iter(), cells, f);
+    }
+}
+
+/// Adds the forces of the items in touch to `f` (N): all masters', then all slaves'.
+pub(super) fn scatter<'a>(
+    items: impl Iterator<Item = &'a SlaveItem> + Clone,
+    cells: &[[u32; 4]],
+    f: &mut [V],
+) {
+    let mut push = |cell: u32, weights: &[f64; 4], force: V| {
+        for (w, n) in weights.iter().zip(cells[cell as usize]) {
+            let n = n as usize;
+            f[n] = sub(f[n], scale(force, *w));
         }
-        for item in self.items.iter().filter(|i| i.active) {
-            let node = item.node as usize;
-            f[node] = add(f[node], item.force);
+    };
+    for item in items.clone().filter(|i| i.active) {
+        push(item.cell, &item.weights, item.share);
+        if item.second != NONE {
+            push(item.second, &item.second_weights, item.second_share);
         }
+    }
+    for item in items.filter(|i| i.active) {
+        let node = item.node as usize;
+        f[node] = add(f[node], item.force);
     }
 }
 
 /// Gap and its gradient for the slave: `first` and `second` are minus the gradients for the two cells' points.
-struct Pull {
-    gap: f64,
-    share: f64,
-    first: V,
-    second: V,
+pub(super) struct Pull {
+    pub(super) gap: f64,
+    pub(super) share: f64,
+    pub(super) first: V,
+    pub(super) second: V,
 }
 
 /// Force of a slave that keeps its place in its cell and its direction. (The distance to a point that stands
 /// still would not do: pressed at a tenth of a millimetre from it, the slave is a pendulum on its head.)
 #[inline]
-fn hold<F: Coulomb>(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], offset: f64, law: &Law<'_, F>) {
+pub(super) fn hold<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    v: &[V],
+    offset: f64,
+    law: &Law<'_, F>,
+) {
     let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
     let arm = sub(s.x[item.node as usize], combine(item.weights, &x));
     let n = item.direction;
@@ -482,16 +551,18 @@ fn hold<F: Coulomb>(item: &mut SlaveItem, s: &Surface<'_>, v: &[V], offset: f64,
     );
 }
 
-struct Law<'a, F> {
-    dt: f64,
-    friction: &'a F,
-    slip_factor: f64,
-    augmentation: f64,
+/// Constants of a contact in a step.
+pub(super) struct Law<'a, F> {
+    pub(super) dt: f64,
+    pub(super) offset: f64,
+    pub(super) friction: &'a F,
+    pub(super) slip_factor: f64,
+    pub(super) augmentation: f64,
 }
 
 /// Force of a slave in touch, or so lately that it still has a multiplier.
 #[inline]
-fn touch<F: Coulomb>(
+pub(super) fn touch<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
     v: &[V],
@@ -511,7 +582,9 @@ fn touch<F: Coulomb>(
         rel = add(scale(rel1, 1.0 - pull.share), scale(rel2, pull.share));
     }
     let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
-    let normal = normal_force(pull.gap, vn, law.dt, k, c, law.augmentation, held, work);
+    let depth = -pull.gap;
+    let gap = -item.admit(depth, rel, law.dt, law.offset);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, held, work);
     let n = unit(add(pull.first, pull.second));
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
@@ -551,7 +624,7 @@ fn touch<F: Coulomb>(
     item.normal_force = normal.force;
     item.multiplier = normal.multiplier;
     item.work = normal.work;
-    item.penetration = (-pull.gap).max(0.0);
+    item.penetration = depth.max(0.0);
     item.energy = ContactEnergy {
         stored: normal.stored + f.stored,
         friction: f.friction,

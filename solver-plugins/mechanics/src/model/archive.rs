@@ -42,6 +42,9 @@ impl Model {
         for contact in &mut self.sheet_contacts {
             a.values(&mut contact.items)?;
         }
+        for contact in &mut self.self_contacts {
+            contact.archive(a)?;
+        }
         Ok(())
     }
 }

@@ -123,7 +123,7 @@ pub(super) struct Part<'a> {
 
 /// An order of points in which every run of `group` lies close together: halves by the longer extent, cut at
 /// whole groups. Within a group the order is the given one.
-pub(super) fn compact_order(points: &[V], group: usize) -> Vec<u32> {
+pub(crate) fn compact_order(points: &[V], group: usize) -> Vec<u32> {
     fn split(order: &mut [u32], points: &[V], group: usize) {
         if order.len() <= group {
             order.sort_unstable();

@@ -24,6 +24,7 @@ impl Model {
             cells: Vec::new(),
             neighbours: Vec::new(),
             sheet_contacts: Vec::new(),
+            self_contacts: Vec::new(),
             rigid_contacts: Vec::new(),
             pressures: Pressures::default(),
             time: 0.0,
@@ -51,6 +52,7 @@ impl Model {
             loads: Loads::default(),
             last_dt: 0.0,
             shortest_edge: 0.0,
+            contact_room: Vec::new(),
             kick: 1.0,
             held: vec![Held::Free; n],
             driven: Vec::new(),
@@ -421,6 +423,7 @@ impl Model {
             item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
         }
         self.bound_contact_damping();
+        self.set_contact_room();
     }
 
     /// Bounds the assembled damping of every node. The damper's force is that of the velocity half a step ago,
@@ -457,6 +460,39 @@ impl Model {
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.damping *= least.min(limit[item.node as usize]);
         }
+    }
+
+    /// Adds the contact of a sheet with itself. `undeformed`: the model's points (m) with the sheet flat; what
+    /// is near in it does not touch. The other contacts' stiffness is set, or comes to be set, by
+    /// [`Model::set_contact_stiffness`].
+    pub fn add_self_contact(&mut self, spec: FoldSpec<'_>, c: &ContactSettings) {
+        let contact = SelfContact::new(spec, &self.cells, *c);
+        self.self_contacts.push(contact);
+        self.set_contact_room();
+    }
+
+    /// What the other contacts leave of `sum(rigid k) + 2 sum(sheet k) < 2 * 0.7 m / dt^2`: a rigid surface does not
+    /// move, so its springs count once. Where they leave little, a node gets a small share all the same: it does
+    /// not touch everything at once.
+    fn set_contact_room(&mut self) {
+        if self.self_contacts.is_empty() {
+            return;
+        }
+        let dt2 = self.settings.target_step.powi(2);
+        let mut used = vec![0.0; self.mass.len()];
+        for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
+            used[item.node as usize] += 0.5 * item.stiffness;
+        }
+        for item in self.sheet_contacts.iter().flat_map(|c| &c.items) {
+            if item.cell != crate::mesh::NONE {
+                used[item.node as usize] += item.stiffness;
+                for (w, n) in item.weights.iter().zip(self.cells[item.cell as usize]) {
+                    used[n as usize] += w.max(0.0) * item.stiffness;
+                }
+            }
+        }
+        let left = |(u, m): (&f64, &f64)| (0.7 * m / dt2 - u).max(0.1 * m / dt2);
+        self.contact_room = used.iter().zip(&self.mass).map(left).collect();
     }
 }
 

@@ -11,13 +11,14 @@ mod support;
 mod transpose;
 
 use batch::*;
+pub(crate) use blocks::compact_order;
 use blocks::*;
 use rotation::Rotations;
 pub use support::{Fixed, NodalLoad};
 use support::{Loads, Supports};
 use transpose::gather;
 
-use crate::contact::{ContactEnergy, ContactSettings, RigidContact, SheetContact, Surface};
+use crate::contact::*;
 use crate::energy::Ledger;
 use crate::mesh::{QuadMesh, area_vector};
 use crate::sheet::*;
@@ -87,6 +88,8 @@ pub struct Model {
     neighbours: Vec<[u32; 4]>,
     /// Sheet on sheet.
     pub sheet_contacts: Vec<SheetContact>,
+    /// Sheets on themselves; added by [`Model::add_self_contact`].
+    pub self_contacts: Vec<SelfContact>,
     /// Sheets on rigid surfaces.
     pub rigid_contacts: Vec<RigidContact>,
     /// Pressures, set before each step.
@@ -132,6 +135,8 @@ pub struct Model {
     last_dt: f64,
     /// Shortest edge of a cell at the start (m).
     shortest_edge: f64,
+    /// `[n]` stiffness that self-contacts may add to a node (N/m); empty without them.
+    contact_room: Vec<f64>,
     /// 1, or 1/2 in the first step from rest: velocities live at half steps.
     kick: f64,
     held: Vec<Held>,
@@ -139,7 +144,7 @@ pub struct Model {
     drive: Option<Box<dyn Drive>>,
     max_speed: f64,
     contact: ContactEnergy,
-    /// By contact, the rigid ones first: stored at present, lost so far (J).
+    /// By contact, rigid ones, sheets on sheets, sheets on themselves: stored at present, lost so far (J).
     interfaces: Vec<ContactEnergy>,
     work: NodeWork,
 }
@@ -238,7 +243,7 @@ impl Model {
         // gaps for which a node sleeps more than a few steps.
         let reach = 2.0 * (2.0 * self.max_speed).max(5.0) * self.dt;
         let mut total = ContactEnergy::default();
-        let n = self.rigid_contacts.len() + self.sheet_contacts.len();
+        let n = self.rigid_contacts.len() + self.sheet_contacts.len() + self.self_contacts.len();
         self.interfaces.resize_with(n, ContactEnergy::default);
         let mut interfaces = self.interfaces.iter_mut();
         let mut count = |e: ContactEnergy| {
@@ -266,6 +271,16 @@ impl Model {
         };
         for contact in &mut self.sheet_contacts {
             count(contact.compute(&surface, &self.v, self.dt, reach));
+            contact.scatter(&self.cells, &mut self.contact_force);
+        }
+        let bearing = Bearing {
+            mass: &self.mass,
+            room: &self.contact_room,
+            step: self.settings.target_step,
+        };
+        for contact in &mut self.self_contacts {
+            let ways = (self.max_speed * self.last_dt, reach);
+            count(contact.compute(&surface, &self.v, self.dt, ways, bearing));
             contact.scatter(&self.cells, &mut self.contact_force);
         }
         self.ledger.friction += total.friction;
@@ -313,6 +328,10 @@ impl Model {
             .iter()
             .filter(|c| c.items.iter().any(|i| i.node == node as u32 && i.active))
             .map(|c| c.name.as_str())
+            .chain(self.self_contacts.iter().filter_map(|c| {
+                let touches = |i: &FoldItem| i.slave.node == node as u32 && i.slave.active;
+                c.items.iter().any(touches).then_some(c.name.as_str())
+            }))
             .chain(
                 self.rigid_contacts
                     .iter()

@@ -55,7 +55,11 @@ impl Model {
     pub fn interface_energies(&self) -> impl Iterator<Item = (&str, ContactEnergy)> {
         let rigid = self.rigid_contacts.iter().map(|c| c.name.as_str());
         let sheets = self.sheet_contacts.iter().map(|c| c.name.as_str());
-        rigid.chain(sheets).zip(self.interfaces.iter().copied())
+        let selves = self.self_contacts.iter().map(|c| c.name.as_str());
+        rigid
+            .chain(sheets)
+            .chain(selves)
+            .zip(self.interfaces.iter().copied())
     }
 
     /// The cell whose element allows the smallest step, and that step (s).

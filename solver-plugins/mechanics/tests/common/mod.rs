@@ -42,3 +42,12 @@ pub fn membrane() -> ElementInstance {
 pub fn shell() -> ElementInstance {
     instance::<S4>(STITCHED)
 }
+
+/// `s4` of a fabric that resists bending enough to fold in an arc of some millimetres.
+#[allow(dead_code)]
+pub fn stiff_shell() -> ElementInstance {
+    instance::<S4>(
+        r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0,
+            "bending":{"positive":{"linear":5e-3},"negative":{"linear":5e-3}}}"#,
+    )
+}

@@ -1,0 +1,438 @@
+//! A sheet on itself.
+//!
+//! Slaves are the sheet's nodes, masters its cells. For every node the cells whose corners lie further than a
+//! few thicknesses from it in the undeformed sheet are a fixed set, its far cells; the gap is the distance to
+//! the closest point of these, less the thickness, and the force is its exact gradient, as between two sheets
+//! (`docs/decisions/0003`, `docs/decisions/0017`). A flat sheet has no far cell within reach.
+//!
+//! A search in space finds the pairs that may touch; it is done anew only when some node may have moved
+//! further than the margin that the last one allowed for. In between each pair is followed by walking.
+
+use super::friction::{Constant, Coulomb, FrictionLaw};
+use super::proximity::{Blocks, Candidate, Reach};
+use super::sheets::*;
+use super::{ContactEnergy, ContactSettings};
+use crate::archive::{Archive, ArchiveError};
+use crate::vec3::{V, dot, norm, scale, sub};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Distance in the undeformed sheet, over the thickness, up to which a node does not see a cell. Two legs that
+/// touch around the tightest fold of a thick sheet begin at pi / 2; at 3, a flat sheet may be sheared by 70
+/// degrees before a cell that counts is as near as a thickness.
+const NEAR: f64 = 3.0;
+
+/// What a search looks beyond the thickness, over the mean edge of a cell.
+const MARGIN: f64 = 0.25;
+
+/// Contacts that a node may have at a time: one on each face.
+const MOST: usize = 2;
+
+/// Least penalty of a pair over mass / step^2, where other contacts have used up what a node bears.
+const LEAST_STIFFNESS: f64 = 0.02;
+
+/// A node on another part of its sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FoldItem {
+    /// Slave, place and forces.
+    pub slave: SlaveItem,
+    /// +1: the slave lies on the side of the master cell's normal; -1: on the other. Never changes in touch.
+    pub side: f64,
+}
+
+/// What a search starts from.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Search {
+    /// `[slaves]` positions at the last search (m); empty before the first.
+    x: Vec<V>,
+    /// How far a node may have moved since the displacements were looked at (m).
+    travelled: f64,
+    /// At how much of that they are looked at again (m).
+    room: f64,
+}
+
+/// What a self-contact is made of.
+pub struct FoldSpec<'a> {
+    /// Name of the pair, for reports.
+    pub name: String,
+    /// Slaves: model nodes in increasing order.
+    pub slaves: Vec<u32>,
+    /// Its cells in the model's numbering: first and one past the last.
+    pub cell_range: (usize, usize),
+    /// Thickness (m): distance of the mid-surfaces in touch.
+    pub thickness: f64,
+    /// Coulomb coefficient.
+    pub friction: FrictionLaw,
+    /// `[nodes]` positions in the flat, undeformed sheet (m).
+    pub undeformed: &'a [V],
+}
+
+/// A sheet on itself.
+pub struct SelfContact {
+    /// Name of the pair, for reports.
+    pub name: String,
+    /// Distance of the two mid-surfaces in touch (m).
+    pub offset: f64,
+    /// Coulomb coefficient.
+    pub friction: FrictionLaw,
+    /// Constants shared with the other contacts.
+    pub settings: ContactSettings,
+    /// The pairs within reach, by slave.
+    pub items: Vec<FoldItem>,
+    /// Whether the sheet has ever touched itself.
+    pub touched: bool,
+    /// How often pairs were searched.
+    pub searches: u64,
+    slaves: Vec<u32>,
+    undeformed: Arc<[V]>,
+    blocks: Blocks,
+    near: f64,
+    margin: f64,
+    /// Edge of a cell (m), mean.
+    edge: f64,
+    search: Search,
+}
+
+/// What bounds the penalty of new pairs.
+#[derive(Clone, Copy)]
+pub(crate) struct Bearing<'a> {
+    /// `[nodes]` masses (kg).
+    pub mass: &'a [f64],
+    /// `[nodes]` stiffness that self-contacts may add to a node (N/m).
+    pub room: &'a [f64],
+    /// Step (s) that the stiffness must bear.
+    pub step: f64,
+}
+
+impl SelfContact {
+    /// A sheet on itself; `cells` are the model's.
+    pub(crate) fn new(spec: FoldSpec<'_>, cells: &[[u32; 4]], settings: ContactSettings) -> Self {
+        let (c0, c1) = spec.cell_range;
+        let own = &cells[c0..c1];
+        let at = |n: u32| spec.undeformed[n as usize];
+        let sides = own
+            .iter()
+            .flat_map(|c| (0..4).map(move |k| (c[k], c[(k + 1) % 4])));
+        let length: f64 = sides.map(|(a, b)| norm(sub(at(a), at(b)))).sum();
+        let edge = length / (4 * own.len()).max(1) as f64;
+        let margin = (MARGIN * edge).max(0.5 * spec.thickness);
+        let reach = spec.thickness + margin;
+        let blocks = Blocks::new(
+            spec.cell_range,
+            cells,
+            &spec.slaves,
+            spec.undeformed,
+            reach / edge,
+        );
+        Self {
+            name: spec.name,
+            offset: spec.thickness,
+            friction: spec.friction,
+            settings,
+            items: Vec::new(),
+            touched: false,
+            searches: 0,
+            slaves: spec.slaves,
+            undeformed: spec.undeformed.into(),
+            blocks,
+            near: NEAR * spec.thickness,
+            margin,
+            edge,
+            search: Search::default(),
+        }
+    }
+
+    /// Follows the pairs, after a search if one is due, and computes the force of every slave. `stride` (m): the
+    /// furthest that any node has moved in the last step; `reach` (m) as of [`super::SheetContact::compute`].
+    pub(crate) fn compute(
+        &mut self,
+        s: &Surface<'_>,
+        v: &[V],
+        dt: f64,
+        (stride, reach): (f64, f64),
+        bearing: Bearing<'_>,
+    ) -> ContactEnergy {
+        if self.slaves.is_empty() {
+            return ContactEnergy::default();
+        }
+        if self.is_search_due(s.x, stride) {
+            self.search(s, bearing);
+        }
+        match self.friction.clone() {
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, dt, reach),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, dt, reach),
+        }
+    }
+
+    fn compute_with<F: Coulomb>(
+        &mut self,
+        friction: &F,
+        s: &Surface<'_>,
+        v: &[V],
+        dt: f64,
+        reach: f64,
+    ) -> ContactEnergy {
+        let law = Law {
+            dt,
+            offset: self.offset,
+            friction,
+            slip_factor: self.settings.slip_factor,
+            augmentation: self.settings.augmentation,
+        };
+        let (undeformed, near) = (&self.undeformed, self.near);
+        self.items
+            .par_iter_mut()
+            .with_min_len(256)
+            .for_each(|item| {
+                let own = undeformed[item.slave.node as usize];
+                let open = |cell: u32| is_far(s.cells[cell as usize], undeformed, own, near);
+                follow(item, s, v, reach, &law, open);
+            });
+        let mut total = ContactEnergy::default();
+        for item in self.items.iter().filter(|i| i.slave.active) {
+            total.add(&item.slave.energy);
+            self.touched = true;
+        }
+        total
+    }
+
+    /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
+    pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
+        scatter(self.items.iter().map(|i| &i.slave), cells, f);
+    }
+
+    /// Whether two points that the last search found out of reach may have come within the thickness. What
+    /// counts is how far nodes have moved against each other: the mean motion is taken off.
+    fn is_search_due(&mut self, x: &[V], stride: f64) -> bool {
+        let search = &mut self.search;
+        if search.x.is_empty() {
+            return true;
+        }
+        search.travelled += stride;
+        if search.travelled + stride < search.room {
+            return false;
+        }
+        let moved = |(n, then): (&u32, &V)| sub(x[*n as usize], *then);
+        let pairs = || self.slaves.iter().zip(&search.x);
+        let mut mean = [0.0; 3];
+        for d in pairs().map(moved) {
+            mean = crate::vec3::add(mean, d);
+        }
+        mean = scale(mean, 1.0 / self.slaves.len() as f64);
+        let from_mean = |d: V| sub(d, mean);
+        let square = |d: V| dot(d, d);
+        let most = pairs()
+            .map(moved)
+            .map(from_mean)
+            .map(square)
+            .fold(0.0, f64::max)
+            .sqrt();
+        // Two nodes at this distance from the mean motion may have moved by twice of it, and each step moves a
+        // node and the mean.
+        let half = 0.5 * self.margin;
+        search.travelled = 0.0;
+        search.room = 0.5 * (half - most);
+        most + 2.0 * stride > 0.7 * half
+    }
+
+    /// Finds all pairs within reach. Those in touch stay as they are; of the others a node keeps the nearest,
+    /// and the nearest on its other side.
+    fn search(&mut self, s: &Surface<'_>, bearing: Bearing<'_>) {
+        let reach = Reach {
+            distance: self.offset + self.margin,
+            near: self.near,
+            undeformed: &self.undeformed,
+        };
+        let candidates = self.blocks.candidates(s, &reach);
+        let mut kept = std::mem::take(&mut self.items);
+        kept.retain(|i| i.slave.active || i.slave.multiplier > 0.0);
+        let carried = kept.len();
+        let mut fresh: Vec<FoldItem> = Vec::new();
+        for group in candidates.chunk_by(|a, b| a.node == b.node) {
+            let node = group[0].node;
+            let begin = kept[..carried].partition_point(|i| i.slave.node < node);
+            let end = kept[..carried].partition_point(|i| i.slave.node <= node);
+            let mut taken: Vec<(V, V)> = kept[begin..end]
+                .iter()
+                .map(|i| (i.slave.direction, self.foot(s, &i.slave)))
+                .collect();
+            for c in group {
+                let direction = scale(c.arm, 1.0 / c.distance.max(1e-300));
+                let foot = combine(shape(c.xi), &self.corners(s, c.cell));
+                // The nearest of a direction hides what lies behind it; and a patch that the slave touches, or has
+                // passed through by a little, is not met again from its other side.
+                let is_known = |(d, f): &(V, V)| {
+                    dot(*d, direction) > 0.0 || norm(sub(*f, foot)) < self.near + self.edge
+                };
+                if taken.len() < MOST && !taken.iter().any(is_known) {
+                    taken.push((direction, foot));
+                    fresh.push(self.pair(s, c, direction));
+                }
+            }
+        }
+        self.stiffen(s.cells, &kept, &mut fresh, bearing);
+        kept.append(&mut fresh);
+        kept.sort_by_key(|i| i.slave.node);
+        self.items = kept;
+        self.search = Search {
+            x: self.slaves.iter().map(|n| s.x[*n as usize]).collect(),
+            travelled: 0.0,
+            room: 0.25 * self.margin,
+        };
+        self.searches += 1;
+    }
+
+    fn corners(&self, s: &Surface<'_>, cell: u32) -> [V; 4] {
+        s.cells[cell as usize].map(|n| self.undeformed[n as usize])
+    }
+
+    /// Where the closest point lies in the undeformed sheet (m).
+    fn foot(&self, s: &Surface<'_>, item: &SlaveItem) -> V {
+        combine(shape(item.xi), &self.corners(s, item.cell))
+    }
+
+    fn pair(&self, s: &Surface<'_>, c: &Candidate, direction: V) -> FoldItem {
+        let mut slave = SlaveItem::new(c.node, c.cell, c.xi);
+        slave.direction = direction;
+        // It was out of reach before, so it cannot be deep inside.
+        slave.guarded = true;
+        let up = cell_normal(s, c.cell, c.xi);
+        let side = if dot(direction, up) < 0.0 { -1.0 } else { 1.0 };
+        FoldItem { slave, side }
+    }
+
+    /// Stiffness and damping of new pairs, so that all pairs of a node together stay within what it bears. Pairs
+    /// in touch keep theirs: to change it would change what they store.
+    fn stiffen(
+        &self,
+        cells: &[[u32; 4]],
+        kept: &[FoldItem],
+        fresh: &mut [FoldItem],
+        bearing: Bearing<'_>,
+    ) {
+        let (c, mass) = (&self.settings, bearing.mass);
+        let unit = 1.0 / bearing.step.powi(2);
+        let reduced = |i: &SlaveItem| {
+            let nodes = cells[i.cell as usize].iter();
+            let lightest = nodes
+                .map(|n| mass[*n as usize])
+                .fold(f64::INFINITY, f64::min);
+            1.0 / (1.0 / mass[i.node as usize] + 1.0 / lightest)
+        };
+        // By node: of the pairs in touch, of the new ones.
+        let mut rows = std::collections::BTreeMap::<u32, [f64; 2]>::new();
+        let mut add = |i: &SlaveItem, k: usize| {
+            rows.entry(i.node).or_default()[k] += i.stiffness;
+            for (w, n) in shape(i.xi).iter().zip(cells[i.cell as usize]) {
+                rows.entry(n).or_default()[k] += w.max(0.0) * i.stiffness;
+            }
+        };
+        kept.iter().for_each(|i| add(&i.slave, 0));
+        for item in fresh.iter_mut() {
+            item.slave.stiffness = c.stiffness_factor * reduced(&item.slave) * unit;
+            add(&item.slave, 1);
+        }
+        let share = |n: u32| {
+            let [old, new] = rows[&n];
+            ((bearing.room[n as usize] - old) / new.max(1e-300)).clamp(0.0, 1.0)
+        };
+        for item in fresh {
+            let m = reduced(&item.slave);
+            let nodes = cells[item.slave.cell as usize].iter();
+            let least = nodes
+                .map(|n| share(*n))
+                .fold(share(item.slave.node), f64::min);
+            let k = (item.slave.stiffness * least).max(LEAST_STIFFNESS * m * unit);
+            item.slave.stiffness = k;
+            item.slave.damping = 2.0 * c.damping_ratio * (k * m).sqrt();
+        }
+    }
+
+    /// What changes from step to step.
+    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        a.value(&mut self.items)?;
+        a.value(&mut self.touched)?;
+        a.value(&mut self.searches)?;
+        a.value(&mut self.search.x)?;
+        a.value(&mut self.search.travelled)?;
+        a.value(&mut self.search.room)
+    }
+}
+
+/// Whether no corner of a cell is `near` (m) a point in the undeformed sheet.
+#[inline]
+pub(super) fn is_far(cell: [u32; 4], undeformed: &[V], own: V, near: f64) -> bool {
+    cell.iter().all(|n| {
+        let d = sub(undeformed[*n as usize], own);
+        dot(d, d) > near * near
+    })
+}
+
+/// Follows a pair and computes its force.
+fn follow<F: Coulomb>(
+    pair: &mut FoldItem,
+    s: &Surface<'_>,
+    v: &[V],
+    reach: f64,
+    law: &Law<'_, F>,
+    open: impl Fn(u32) -> bool,
+) {
+    let (item, offset) = (&mut pair.slave, law.offset);
+    if item.sleep > 0 {
+        item.sleep -= 1;
+        return;
+    }
+    item.turn = item.turn.wrapping_add(1);
+    if item.active && item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
+        hold(item, s, v, offset, law);
+        return;
+    }
+    let p = s.x[item.node as usize];
+    let found = track(s, item, p, if item.active { 1 } else { 3 }, open);
+    let first = &found.first;
+    (item.cell, item.xi) = (first.cell, first.xi);
+    let up = cell_normal(s, first.cell, first.xi);
+    let distance = first.distance2.sqrt();
+    if !item.active && distance > offset {
+        // Apart, it lies where it is seen to lie.
+        pair.side = if dot(first.arm, up) < 0.0 { -1.0 } else { 1.0 };
+    }
+    let height = pair.side * dot(first.arm, up);
+    let through = height < -0.5 * distance;
+    if through && (!item.active || height < -offset) {
+        item.part();
+        return;
+    }
+    let pull = if through || distance < 1e-3 * offset {
+        Pull {
+            gap: height - offset,
+            share: 0.0,
+            first: scale(up, pair.side),
+            second: [0.0; 3],
+        }
+    } else {
+        // Also on ridges and at the border of what the slave sees, where the foot is no perpendicular's.
+        let (d, w) = blend(first, found.second.as_ref(), offset);
+        item.plain = w == 0.0 && height > 0.999 * distance;
+        Pull {
+            gap: d - offset,
+            share: w,
+            first: scale(first.arm, (1.0 - w) / distance),
+            second: match &found.second {
+                Some(c) if w > 0.0 => scale(c.arm, w / c.distance2.sqrt()),
+                _ => [0.0; 3],
+            },
+        }
+    };
+    let plain = item.plain && !through;
+    if pull.gap > 0.0 && item.multiplier == 0.0 {
+        item.part();
+        item.direction = pull.first;
+        item.sleep = (pull.gap / reach).min(50.0) as u32;
+    } else {
+        item.plain = plain;
+        item.direction = pull.first;
+        touch(item, s, v, &pull, &found, law);
+    }
+}
