@@ -9,18 +9,19 @@ use std::fmt::Write;
 const OPENING: f64 = 0.02;
 /// Rows of the history for which it must stay open: a single one may be a knock that closes again.
 const ROWS: usize = 3;
-/// Rows at the start that are not judged: there is hardly any work to compare with.
+/// Rows at the start that are not judged.
 const FIRST_ROWS: usize = 20;
 
-/// Energy unaccounted for over the largest work or internal energy so far, by row.
-fn open_shares(history: &[HistoryRow]) -> Vec<f64> {
+/// Energy unaccounted for, by row, over the largest work or internal energy so far, projected to the end of the process:
+/// work grows about with the square of time, and at the start there is hardly any to compare with.
+fn open_shares(history: &[HistoryRow], end: f64) -> Vec<f64> {
     let mut work = 0.0f64;
     (history.iter())
         .map(|r| {
             let l = &r.ledger;
             work = work.max(l.external.abs()).max(l.internal());
             if work > 0.0 {
-                l.drift().abs() / work
+                l.drift().abs() / work * (r.time / end).powi(2)
             } else {
                 0.0
             }
@@ -29,15 +30,19 @@ fn open_shares(history: &[HistoryRow]) -> Vec<f64> {
 }
 
 /// What to say when the ledger has been open by more than `bound` for some rows.
-pub(crate) fn open_ledger(history: &[HistoryRow], bound: f64) -> Option<String> {
+pub(crate) fn open_ledger(history: &[HistoryRow], end: f64, bound: f64) -> Option<String> {
     if history.len() < FIRST_ROWS {
         return None;
     }
-    let shares = open_shares(history);
-    let open = shares.iter().rev().take(ROWS).all(|s| !(*s <= bound));
+    let shares = open_shares(history, end);
+    let open = shares
+        .iter()
+        .rev()
+        .take(ROWS)
+        .all(|s| s.is_nan() || *s > bound);
     open.then(|| {
         format!(
-            "{:.0} % of the work is unaccounted for (drift_bound {:.0} %)",
+            "{:.0} % of the work that is to be expected is unaccounted for (drift_bound {:.0} %)",
             100.0 * shares.last().copied().unwrap_or(f64::NAN),
             100.0 * bound
         )
@@ -52,7 +57,7 @@ pub(crate) fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> Strin
         "{what}; seen at t = {t:.5} s of {end:.5} s ({}).",
         forming.load.phase(t)
     );
-    let shares = open_shares(history);
+    let shares = open_shares(history, end);
     let calm = shares.iter().rposition(|s| *s < OPENING);
     if let Some(row) = calm.map_or(history.first(), |i| history.get(i + 1)) {
         let _ = write!(
@@ -75,7 +80,7 @@ pub(crate) fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> Strin
         r.ledger.kinetic / r.ledger.internal().max(f64::MIN_POSITIVE)
     });
     let (cause, remedy) = match (&cell, &deep) {
-        (Some(c), _) if !(c.shear.abs() < 65f64.to_radians()) => (
+        (Some(c), _) if c.shear.is_nan() || c.shear.abs() > 65f64.to_radians() => (
             "the ply has gathered until an element collapsed: a fold narrower than the mesh",
             "smaller element_size, element s4 instead of rf4, a larger hourglass_floor, or a holder that leaves less room",
         ),
@@ -209,11 +214,16 @@ mod tests {
 
     #[test]
     fn a_ledger_is_open_only_beyond_the_bound_and_for_some_rows() {
-        let open = |drift: &dyn Fn(usize) -> f64, rows| open_ledger(&history(drift, rows), 0.1);
+        let open = |drift: &dyn Fn(usize) -> f64, rows| {
+            open_ledger(&history(drift, rows), (rows - 1) as f64, 0.1)
+        };
         assert_eq!(open(&|_| 0.0, 50), None);
         assert_eq!(open(&|i| 0.05 * i as f64, 50), None);
         let text = open(&|i| -0.2 * i as f64, 50).unwrap();
         assert!(text.starts_with("20 % of the work"), "{text}");
+        // The same share early on, when there will be nine times as much work.
+        let early = history(|i| -0.2 * i as f64, 50);
+        assert_eq!(open_ledger(&early, 147.0, 0.1), None);
         // A knock, and what is open before there is any work.
         assert_eq!(open(&|i| if i == 48 { 30.0 } else { 0.0 }, 50), None);
         assert_eq!(open(&|_| 5.0, FIRST_ROWS - 1), None);

@@ -321,7 +321,7 @@ impl Forming {
                 if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
                     let energies = self.model.energies();
                     course.history.push(self.row(energies));
-                    if let Some(what) = diagnosis::open_ledger(&course.history, drift_bound) {
+                    if let Some(what) = diagnosis::open_ledger(&course.history, end, drift_bound) {
                         return Err(diagnosis::of(self, &course.history, &what).into());
                     }
                     observer.tick(self, &energies, end)?;

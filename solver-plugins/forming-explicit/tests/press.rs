@@ -356,7 +356,7 @@ fn an_open_ledger_stops_the_run_and_says_where() {
     let error = forming.run(&p.control(), &mut common::Silent).unwrap_err();
     let text = format!("{error:?}");
     for part in [
-        "of the work is unaccounted for (drift_bound",
+        "is unaccounted for (drift_bound",
         "The step is set by an element of 'ply_1' at (",
         "shear",
         "Deepest contact: ",

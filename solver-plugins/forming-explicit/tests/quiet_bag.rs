@@ -5,12 +5,13 @@
 //! the bag is watched. What stays on is what every run has: the damping of the normal approach (`contact_damping` 0.3) and
 //! friction. The bound is a millionth of the pressure's work while the bag is evacuated.
 //!
-//! Two known defects have tests that turn red when they are repaired. Without any mass damping the bag is quiet for half a second;
-//! then a motion that grows by e in some 30 ms has come out of rounding: the multipliers feed it. A damping of 50/s, as in the
-//! studies, keeps it down.
-//! And a slave on the common corner of four cells of a hollow master is pushed by the two nearest cells alone, by each two in
-//! turn: it runs in a circle of some tenths of a micrometre, whose energy neither grows nor dies out. The two films have one
-//! mesh and do so where they lie on each other (`FLAT_BOUND`); plies do so where their nodes lie under those of a film.
+//! The multipliers of contact must be content with a small penetration: when they followed every one, the bag began to move
+//! after half a second, and grew by e in some 30 ms (`docs/theory/contact.md`).
+//!
+//! A known defect has a test that turns red when it is repaired: a slave on the common corner of four cells of a hollow master is
+//! pushed by the two nearest cells alone, by each two in turn: it runs in a circle of some tenths of a micrometre, whose energy
+//! neither grows nor dies out. The two films have one mesh and do so where they lie on each other (`FLAT_BOUND`); plies do
+//! so where their nodes lie under those of a film.
 
 mod common;
 
@@ -43,10 +44,6 @@ struct Bag {
     film: f64,
     /// How long it is watched (s).
     hold: f64,
-    /// Mass damping while it is watched (1/s).
-    damping: f64,
-    /// Share of the penalty force that the multipliers take over in a step.
-    augmentation: f64,
 }
 
 /// What was seen.
@@ -93,7 +90,7 @@ fn parameters(bag: &Bag) -> Parameters {
         "diaphragm_element": {"plugin": "m4", "with": hourglass},
         "element_size": 0.01, "diaphragm_element_size": bag.film, "diaphragm_growth": 1.25, "time_step": 1.2e-5, "step_safety": 0.8,
         "least_areal_mass": 2.0, "damping": DAMPING, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        "contact_damping": 0.3, "contact_augmentation": bag.augmentation, "frames": 1, "tool_grid": 0.003,
+        "contact_damping": 0.3, "contact_augmentation": 0.003, "frames": 1, "tool_grid": 0.003,
         "kinetic_bound": 0.05, "drift_bound": 0.5
     }))
     .expect("the parameters fit their type")
@@ -196,7 +193,7 @@ fn watch(bag: &Bag) -> Seen {
     let lowering = if bag.way > 0.0 { PHASES[2] } else { 0.0 };
     let begin = PHASES[0] + PHASES[1] + lowering + REST;
     run(&mut forming, &p, begin, |_, _| {});
-    forming.model.set_damping(bag.damping);
+    forming.model.set_damping(0.0);
     let mut kinetic = [0.0f64; 10];
     run(&mut forming, &p, begin + bag.hold, |t, k| {
         let tenth = ((t - begin) / bag.hold * 10.0) as usize;
@@ -243,8 +240,6 @@ fn flat(hold: f64) -> Bag {
         way: 0.0,
         film: 0.0113,
         hold,
-        damping: 0.0,
-        augmentation: 0.003,
     }
 }
 
@@ -253,8 +248,6 @@ fn draped(film: f64, hold: f64) -> Bag {
         way: 0.025,
         film,
         hold,
-        damping: 0.0,
-        augmentation: 0.003,
     }
 }
 
@@ -270,59 +263,14 @@ fn a_bag_draped_over_a_dome_stays_quiet() {
 
 #[test]
 #[ignore = "minutes: make test-long"]
-fn a_flat_bag_with_the_damping_of_the_studies_stays_quiet_for_a_second() {
-    let bag = Bag {
-        damping: 50.0,
-        ..flat(1.0)
-    };
-    assert_quiet("flat, damping 50/s", &bag, FLAT_BOUND);
+fn a_flat_bag_stays_quiet_for_a_second() {
+    assert_quiet("flat", &flat(1.0), FLAT_BOUND);
 }
 
 #[test]
 #[ignore = "minutes: make test-long"]
-fn a_draped_bag_with_the_damping_of_the_studies_stays_quiet_for_a_second() {
-    let bag = Bag {
-        damping: 50.0,
-        ..draped(0.0113, 1.0)
-    };
-    assert_quiet("draped, damping 50/s", &bag, 1e-6);
-}
-
-/// A known defect: quiet for 0.4 s, then not. When this fails because the end is quiet, [`assert_quiet`] can hold for the second.
-fn assert_quiet_at_first(what: &str, bag: &Bag, bound: f64) {
-    let seen = watch(bag);
-    let share = seen.kinetic.map(|k| k / seen.work);
-    println!("{what}, {} s, shares {share:?}: {seen:?}", bag.hold);
-    assert!(share[..4].iter().all(|k| *k < bound), "{what}: {share:?}");
-    assert!(share[9] > 1e-4 && share[9] < 0.1, "{what}: {share:?}");
-    assert!(seen.least_distance > 0.9, "{}", seen.least_distance);
-}
-
-#[test]
-#[ignore = "minutes: make test-long"]
-fn a_flat_bag_without_damping_begins_to_move_within_a_second() {
-    assert_quiet_at_first("flat", &flat(1.0), FLAT_BOUND);
-}
-
-#[test]
-#[ignore = "minutes: make test-long"]
-fn a_draped_bag_without_damping_begins_to_move_within_a_second() {
-    assert_quiet_at_first("draped", &draped(0.0113, 1.0), 1e-6);
-}
-
-/// Where the energy of that motion comes from: without multipliers there is none. But then the sheets sink into each other.
-#[test]
-#[ignore = "minutes: make test-long"]
-fn a_draped_bag_without_damping_and_multipliers_stays_quiet_for_a_second() {
-    let bag = Bag {
-        augmentation: 0.0,
-        ..draped(0.0113, 1.0)
-    };
-    let seen = watch(&bag);
-    let share = seen.kinetic.map(|k| k / seen.work);
-    println!("draped, no multipliers, shares {share:?}: {seen:?}");
-    assert!(share.iter().all(|k| *k < 1e-6), "{share:?}");
-    assert!(seen.least_distance > 0.0, "{}", seen.least_distance);
+fn a_draped_bag_stays_quiet_for_a_second() {
+    assert_quiet("draped", &draped(0.0113, 1.0), 1e-6);
 }
 
 /// A known defect. When this fails because the energy is less, the flat bag can have the bound of the draped one.

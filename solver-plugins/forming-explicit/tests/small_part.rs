@@ -130,7 +130,7 @@ fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
         z.iter().sum::<f64>() / z.len() as f64 - 0.02
     };
     let (film, ply) = (8e-5, 4e-4);
-    let on_ply = height([15.0e-3, -15.0e-3], 0.012);
+    let on_ply = height([15.0e-3, -15.0e-3], 0.008);
     assert!((on_ply - (1.5 * film + ply)).abs() < 1e-4, "{on_ply}");
     let in_hole = height([-20.0e-3, -5.0e-3], 0.008);
     assert!((in_hole - (0.5 * film + 3e-4)).abs() < 1e-4, "{in_hole}");

@@ -20,7 +20,8 @@ pub struct Row {
 }
 
 impl Row {
-    fn new(case: impl Into<String>, value: f64, unit: &'static str) -> Self {
+    /// A number of a case.
+    pub fn new(case: impl Into<String>, value: f64, unit: &'static str) -> Self {
         Self {
             case: case.into(),
             value,

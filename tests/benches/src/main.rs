@@ -1,10 +1,12 @@
 //! Measures the built program from outside and appends one JSON row per case to a file under
 //! `docs/benchmarks`, named after the machine's processor.
 //!
-//! `plyflow-benches [engine] [kernels] [study]`: these groups, or all.
+//! `plyflow-benches [engine] [kernels] [solver] [limits] [study]`: these groups, or all.
 
 mod cases;
+mod limits;
 mod machine;
+mod solver;
 
 use std::io::Write;
 
@@ -13,16 +15,18 @@ type Group = (&'static str, fn() -> Vec<cases::Row>);
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let groups: [Group; 3] = [
+    let groups: [Group; 5] = [
         ("engine", cases::engine),
         ("kernels", cases::kernels),
+        ("solver", solver::solver),
+        ("limits", limits::limits),
         ("study", cases::study),
     ];
     if let Some(odd) = wanted
         .iter()
         .find(|w| groups.iter().all(|g| g.0 != w.as_str()))
     {
-        eprintln!("unknown group '{odd}'; there are: engine, kernels, study");
+        eprintln!("unknown group '{odd}'; there are: engine, kernels, solver, limits, study");
         std::process::exit(2);
     }
     let class = machine::class();

@@ -24,6 +24,13 @@ pub use friction::{
 pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
 pub use sheets::{SheetContact, SlaveItem, Surface, shape};
 
+/// Penetration (m) with which a multiplier is content where surfaces touch at the distance `offset` (m): half a percent
+/// of it, and at most a micrometre, so that thick sheets do not sink in further than thin ones.
+#[inline]
+pub(crate) fn content(offset: f64) -> f64 {
+    (0.005 * offset).min(1e-6)
+}
+
 /// Constants that all contacts share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactSettings {
@@ -84,6 +91,11 @@ pub(crate) struct Normal {
 /// Penalty, multiplier and damper. `gap` (m) negative inside, `vn` (m/s) opening speed, `held` multiplier
 /// (N), `work` put in by it so far (J).
 ///
+/// The multiplier takes over what lies beyond `rest`, a penetration (m) with which it is content. A multiplier that
+/// follows every penetration lags behind an oscillation like the integral part of a controller and feeds it:
+/// bags at rest came alive out of rounding. Within the band between touch and `rest` it stands still, and
+/// the contact is a spring that conserves energy.
+///
 /// An open contact keeps its multiplier, which dies out at the rate at which it grew: to drop it at once
 /// would let the sheets fall back freely over `held / stiffness`, and a bag that rattles would gain
 /// energy in every cycle.
@@ -95,6 +107,7 @@ pub(crate) fn normal_force(
     stiffness: f64,
     damping: f64,
     augmentation: f64,
+    rest: f64,
     held: f64,
     work: f64,
 ) -> Normal {
@@ -104,7 +117,8 @@ pub(crate) fn normal_force(
     } else {
         0.0
     };
-    let multiplier = (held - augmentation * stiffness * gap).max(0.0);
+    let beyond = gap.max(0.0) + (gap + rest).min(0.0);
+    let multiplier = (held - augmentation * stiffness * beyond).max(0.0);
     // Stored is F^2 / 2k; its change is mechanical work, but for what the multiplier's change puts in.
     let work = work + spring * (multiplier - held) / stiffness;
     Normal {

@@ -1,7 +1,7 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
-use super::{ContactEnergy, ContactSettings, friction_force, normal_force};
+use super::{ContactEnergy, ContactSettings, content, friction_force, normal_force};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
 use rayon::prelude::*;
@@ -306,7 +306,8 @@ fn touch<F: Coulomb>(
     let (k, c) = (item.stiffness, item.damping);
     let vn = dot(v, g);
     let (held, work) = (item.multiplier, item.work);
-    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, held, work);
+    let rest = content(item.offset);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
     // The gradient of a distance field is a unit vector up to the error of its interpolation.
     let n = scale(g, 1.0 / dot(g, g).max(1e-12).sqrt());
     let mut energy = ContactEnergy {

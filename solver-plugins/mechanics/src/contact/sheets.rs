@@ -7,7 +7,7 @@
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
-use super::{ContactEnergy, friction_force, normal_force};
+use super::{ContactEnergy, content, friction_force, normal_force};
 use crate::mesh::NONE;
 use crate::vec3::{V, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
@@ -584,7 +584,8 @@ pub(super) fn touch<F: Coulomb>(
     let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
     let depth = -pull.gap;
     let gap = -item.admit(depth, rel, law.dt, law.offset);
-    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, held, work);
+    let rest = content(law.offset);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
     let n = unit(add(pull.first, pull.second));
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));

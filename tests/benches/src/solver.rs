@@ -1,0 +1,182 @@
+//! Whole steps of the solver: without and with contact, by thread, by element size.
+
+use crate::cases::Row;
+use plyflow_e2e::{program, repository};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// One run of a step that computes elements.
+#[derive(Clone)]
+struct Run {
+    elements: f64,
+    steps: f64,
+    /// Of the step's process: building the model and writing the artifact too (s).
+    wall: f64,
+    cpu: f64,
+    /// Largest resident memory of it (bytes).
+    memory: f64,
+    drift: f64,
+}
+
+impl Run {
+    fn element_steps(&self) -> f64 {
+        self.elements * self.steps
+    }
+
+    /// CPU nanoseconds per element and step.
+    fn cost(&self) -> f64 {
+        1e9 * self.cpu / self.element_steps()
+    }
+
+    fn row(&self, case: String) -> Row {
+        let mut row = Row::new(case, self.cost(), "CPU ns per element-step");
+        row.more = json!({
+            "elements": self.elements, "steps": self.steps, "wall_s": self.wall, "cpu_s": self.cpu,
+            "memory_bytes": self.memory, "drift_ratio": self.drift,
+        });
+        row
+    }
+}
+
+/// Runs the one step of a workflow text in a copy of the repository's `workflows`, with so many cores.
+fn run(place: &Path, workflow: &str, cores: usize) -> Run {
+    let store = place.join(".plyflow");
+    if store.exists() {
+        std::fs::remove_dir_all(&store).expect("the old store can go");
+    }
+    let file = place.join("bench.yaml");
+    std::fs::write(&file, workflow).expect("a workflow");
+    let status = Command::new(program())
+        .args([
+            "run",
+            "bench.yaml",
+            "--no-report",
+            "--quiet",
+            "--jobs",
+            &cores.to_string(),
+        ])
+        .current_dir(place)
+        .stdout(Stdio::null())
+        .status()
+        .expect("plyflow starts");
+    assert!(status.success(), "{workflow}");
+    let out = Command::new(program())
+        .args(["results", "bench.yaml", "--format", "json"])
+        .current_dir(place)
+        .output()
+        .expect("plyflow starts");
+    let out: Value = serde_json::from_slice(&out.stdout).expect("results in JSON");
+    let value = |name: &str| {
+        let rows = out["results"].as_array().expect("results");
+        let found = rows.iter().find(|r| r["result"] == name);
+        found.and_then(|r| r["value"].as_f64()).unwrap_or(f64::NAN)
+    };
+    let cost = &out["steps"][0]["cost"];
+    let spent = |name: &str| cost[name].as_f64().unwrap_or(f64::NAN);
+    Run {
+        elements: value("elements"),
+        steps: value("cycles"),
+        wall: spent("wall_seconds"),
+        cpu: spent("cpu_seconds"),
+        memory: spent("peak_memory"),
+        drift: value("drift_ratio"),
+    }
+}
+
+/// The run with the least CPU time: what disturbs can only add.
+fn least(times: usize, one: impl Fn() -> Run) -> Run {
+    let runs = (0..times).map(|_| one());
+    runs.min_by(|a, b| a.cpu.total_cmp(&b.cpu)).expect("a run")
+}
+
+/// A strip of fabric pulled in its plane: elements, nodes, ledger, and nothing else.
+fn strip(element: &str, size: &str, time: &str) -> String {
+    format!(
+        "plyflow: 1\nname: bench\nsteps:\n  strip:\n    plugin: coupon-bias-plane\n    with: {{element: {{plugin: \
+         {element}, with: {{hourglass: 0.5, hourglass_floor: 0 N/m}}}}, material: \
+         ../../materials/woven-38616.yaml, length: 300 mm, width: 150 mm, element_size: {size}, extension: \
+         6 mm, mesh_angle: 0 deg, time: {time}}}\n"
+    )
+}
+
+/// The press of `workflows/peers`, its first share of the stroke at the same speed.
+fn press(element: &str, size_mm: f64, step_us: f64) -> String {
+    format!(
+        "plyflow: 1\nname: bench\nsteps:\n  press:\n    plugin: forming-explicit\n    with: {{scene: scene-bench.yaml, \
+         element: {{plugin: {element}, with: {{hourglass_floor: 0 N/m}}}}, element_size: {size_mm} mm, time_step: \
+         {step_us} us, step_safety: 0.9, least_areal_mass: 0.44 kg/m2, contact_augmentation: 0, tool_grid: 2 \
+         mm, frames: 4, kinetic_bound: 1000}}\n"
+    )
+}
+
+/// A copy of the workflows, with the press's scene cut to a share of its stroke.
+fn copy(share: f64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let status = Command::new("cp")
+        .arg("-r")
+        .arg(repository().join("workflows"))
+        .arg(folder.path())
+        .status();
+    assert!(status.is_ok_and(|s| s.success()), "workflows are copied");
+    let place = folder.path().join("workflows/peers/hemisphere-press");
+    let scene = std::fs::read_to_string(place.join("scene.yaml")).expect("the peer's scene");
+    let cut = scene
+        .replace("stroke: 50 mm", &format!("stroke: {} mm", 50.0 * share))
+        .replace(
+            "forming_time: 20 ms",
+            &format!("forming_time: {} ms", 20.0 * share),
+        );
+    assert_ne!(cut, scene, "the scene has another stroke or time");
+    std::fs::write(place.join("scene-bench.yaml"), cut).expect("a scene");
+    folder
+}
+
+/// Whole steps: without contact, with contact, by thread, by element size.
+pub fn solver() -> Vec<Row> {
+    let mut rows = Vec::new();
+    let folder = copy(0.2);
+    let strips = folder.path().join("workflows/coupons/angle-study");
+    let presses = folder.path().join("workflows/peers/hemisphere-press");
+    for element in ["m4", "rf4", "s4"] {
+        let one = least(3, || run(&strips, &strip(element, "2.5 mm", "10 ms"), 1));
+        rows.push(one.row(format!("{element}, strip, no contact, 1 thread")));
+        let with = least(2, || run(&presses, &press(element, 3.0, 1.6), 1));
+        rows.push(with.row(format!("{element}, press 3 mm, 1 thread")));
+        rows.push(Row::new(
+            format!("{element}, press over strip, rate"),
+            one.cost() / with.cost(),
+            "1",
+        ));
+    }
+    for element in ["rf4", "s4"] {
+        let of = |cores| least(2, || run(&presses, &press(element, 2.0, 1.08), cores));
+        let (one, two) = (of(1), of(2));
+        rows.push(two.row(format!("{element}, press 2 mm, 2 threads")));
+        rows.push(Row::new(
+            format!("{element}, press 2 mm, 1 thread over 2, wall"),
+            one.wall / two.wall,
+            "1",
+        ));
+    }
+    rows.extend(by_size(&presses));
+    rows
+}
+
+/// Cost of the same share of the stroke by element size, and the exponent between neighbours.
+fn by_size(place: &Path) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let mut coarser: Option<(f64, Run)> = None;
+    for (size, step) in [(5.0, 2.7), (3.0, 1.62), (2.0, 1.08), (1.0, 0.54)] {
+        let one = run(place, &press("s4", size, step), 2);
+        rows.push(one.row(format!("s4, press {size} mm, 2 threads")));
+        if let Some((h, run)) = coarser.replace((size, one.clone())) {
+            rows.push(Row::new(
+                format!("s4, press, cost {size} mm over {h} mm, exponent of 1/h"),
+                (one.cpu / run.cpu).ln() / (h / size).ln(),
+                "1",
+            ));
+        }
+    }
+    rows
+}
