@@ -5,7 +5,7 @@ use crate::run::{Forming, HistoryRow};
 use plyflow_mechanics::vec3::{V, norm};
 use std::fmt::Write;
 
-/// Energy unaccounted for over the largest work so far from which on a ledger counts as opening.
+/// Share of [`open_shares`] from which on a ledger counts as opening.
 const OPENING: f64 = 0.02;
 /// Rows of the history for which it must stay open: a single one may be a knock that closes again.
 const ROWS: usize = 3;

@@ -4,6 +4,7 @@ use crate::assembly::StackSheet;
 use crate::diagnosis;
 use crate::press::PressLoad;
 use crate::process::Load;
+use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, SheetEnergy, judge};
@@ -310,8 +311,14 @@ impl Forming {
                 // Times from the count, not from a sum: frames fall on the same instants in every run.
                 self.model.time = start + self.model.dt * k as f64;
                 self.load.apply(&mut self.model);
-                if let Err(e) = self.model.step(k == 0) {
-                    return Err(diagnosis::of(self, &course.history, &e.to_string()).into());
+                match self.model.step(k == 0) {
+                    Ok(()) => {}
+                    // The diagnosis has its own cause and remedy.
+                    Err(MechanicsError::Unstable { cycle, what, .. }) => {
+                        let what = format!("the run became unstable in cycle {cycle}: {what}");
+                        return Err(diagnosis::of(self, &course.history, &what).into());
+                    }
+                    Err(e) => return Err(e.to_string().into()),
                 }
                 if k == 0 {
                     // Fields belong to the positions before the step; its motion is far below output
