@@ -278,7 +278,7 @@ typedef struct pf_element_batch {
   const double *velocity;  /* [nodes][3][lanes] m/s at the half step; NULL in initialise, with 3 dofs per node, and with ignores_velocity */
   const double *spin;      /* [nodes][3][lanes] rad/s or NULL */
   const double *axis;      /* [3][lanes] unit e1 in the undeformed plane; only in initialise */
-  double *constants;       /* [constants][lanes]; written by initialise only */
+  double *constants;       /* [constants][lanes]; written by initialise only: batches may share them */
   double *history;         /* [history][lanes]; zeros at the start */
   double *material_history; /* [material_points * membrane_history][lanes] */
   double *force;           /* [nodes][3][lanes] N: internal force, dW/dx; overwritten */
@@ -300,7 +300,7 @@ typedef struct pf_patch_batch {
   const double *count;    /* [lanes]: nodes in use; only in patch_initialise */
   const double *area;     /* [lanes] undeformed tributary area (m2); only in patch_initialise */
   const double *axis;     /* [3][lanes]; only in patch_initialise */
-  double *constants;      /* [patch_constants][lanes] */
+  double *constants;      /* [patch_constants][lanes]; written by patch_initialise only */
   double *history;        /* [patch_history + bending_history][lanes] */
   double *force;          /* [patch_nodes][3][lanes] N; overwritten; zero in unused slots */
   double *energy;         /* [lanes] J of bending; overwritten */

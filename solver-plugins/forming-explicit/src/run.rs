@@ -394,11 +394,9 @@ impl Forming {
                 }
             }
         }
-        m.sheets[body.sheet]
-            .nodes
-            .iter()
-            .map(|n| force[*n as usize] / norm(m.area[*n as usize]).max(1e-12))
-            .collect()
+        let (nodes, areas) = (&m.sheets[body.sheet].nodes, m.node_areas(body.sheet));
+        let pressure = |(n, area): (&u32, &V)| force[*n as usize] / norm(*area).max(1e-12);
+        nodes.iter().zip(&areas).map(pressure).collect()
     }
 
     /// What to say when plies have touched themselves and the scene does not tell how they rub.
@@ -431,7 +429,7 @@ impl Forming {
             let depths = c
                 .items
                 .iter()
-                .map(|i| i.penetration)
+                .map(|i| f64::from(i.penetration))
                 .filter(|p| *p > 0.0)
                 .collect();
             judge(&c.name, depths)

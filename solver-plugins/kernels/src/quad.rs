@@ -176,12 +176,12 @@ pub fn initialise(batch: &mut ElementBatch<'_>, material: &MaterialRef, hourglas
         let mut history = zeros;
         let mut scratch = Scratch::<MAX_LANES>::new();
         let mut scratch = scratch.view();
-        metric_of(batch.position, batch.constants, n, &mut scratch);
+        metric_of(batch.position, &batch.constants, n, &mut scratch);
         if material_call(material, &mut history, n, 0.0, &mut scratch, true) != PF_OK {
             step.fill(0.0);
             return;
         }
-        critical_step_of(batch.constants, n, areal_mass, &scratch, step);
+        critical_step_of(&batch.constants, n, areal_mass, &scratch, step);
     }
 }
 
@@ -270,7 +270,7 @@ pub fn forces(batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
 
 fn forces_with(batch: &mut ElementBatch<'_>, material: &MaterialRef, mut s: View<'_>) -> i32 {
     let n = batch.lanes;
-    metric_of(batch.position, batch.constants, n, &mut s);
+    metric_of(batch.position, &batch.constants, n, &mut s);
     let wanted = batch.critical_step.is_some();
     let code = material_call(
         material,
@@ -285,14 +285,14 @@ fn forces_with(batch: &mut ElementBatch<'_>, material: &MaterialRef, mut s: View
     }
     forces_of(
         batch.position,
-        batch.constants,
+        &batch.constants,
         n,
         &mut s,
         batch.force,
         batch.energy,
     );
     if let Some(step) = batch.critical_step.as_deref_mut() {
-        critical_step_of(batch.constants, n, material.sizes().areal_mass, &s, step);
+        critical_step_of(&batch.constants, n, material.sizes().areal_mass, &s, step);
     }
     if let Some(fields) = batch.fields.as_deref_mut() {
         fields_of(n, s.metric, fields);

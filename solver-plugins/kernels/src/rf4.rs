@@ -93,12 +93,12 @@ impl Element for Rf4 {
         if let Some(stiffness) = batch.stiffness.as_deref_mut() {
             let mut s = Scratch::<MAX_LANES>::new();
             let mut s = s.view();
-            derivatives(batch.position, batch.constants, n, &mut s);
+            derivatives(batch.position, &batch.constants, n, &mut s);
             let mut history = vec![0.0; material.sizes().bending_history * n];
             if bend(material, &mut history, n, 0.0, &mut s, true) != PF_OK {
                 s.tangent.fill(f64::INFINITY);
             }
-            row_sums(batch.constants, n, &s, stiffness);
+            row_sums(&batch.constants, n, &s, stiffness);
         }
     }
 
@@ -113,15 +113,15 @@ impl Element for Rf4 {
 
 fn forces_with(batch: &mut PatchBatch<'_>, material: &MaterialRef, mut s: View<'_>) -> i32 {
     let n = batch.lanes;
-    derivatives(batch.position, batch.constants, n, &mut s);
+    derivatives(batch.position, &batch.constants, n, &mut s);
     let wanted = batch.stiffness.is_some();
     let code = bend(material, batch.history, n, batch.dt, &mut s, wanted);
     if code != PF_OK {
         return code;
     }
-    forces(batch.constants, n, &s, batch.force, batch.energy);
+    forces(&batch.constants, n, &s, batch.force, batch.energy);
     if let Some(stiffness) = batch.stiffness.as_deref_mut() {
-        row_sums(batch.constants, n, &s, stiffness);
+        row_sums(&batch.constants, n, &s, stiffness);
     }
     if let Some(fields) = batch.fields.as_deref_mut() {
         for l in 0..n {

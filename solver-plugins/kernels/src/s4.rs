@@ -66,7 +66,9 @@ mod rotation;
 use crate::WIDTH;
 use crate::quad::{self, Hourglass, MAX_LANES, Rows, material_frame};
 use plyflow_sdk::abi::{PF_BAD_SHAPE, PF_OK};
-use plyflow_sdk::{BendingBatch, Element, ElementBatch, ElementSizes, MaterialRef, MembraneBatch};
+use plyflow_sdk::{
+    BendingBatch, Constants, Element, ElementBatch, ElementSizes, MaterialRef, MembraneBatch,
+};
 
 /// Rows of constants after those of [`crate::quad`].
 mod row {
@@ -327,7 +329,7 @@ impl Element for S4 {
                 velocity: &[],
                 spin: &[],
                 axis: batch.axis,
-                constants: &mut *batch.constants,
+                constants: Constants::Open(&mut batch.constants),
                 history: &mut [],
                 material_history: &mut [],
                 force: &mut [],
@@ -346,7 +348,7 @@ impl Element for S4 {
                 core::array::from_fn(|k| batch.position[(3 * i + k) * n + l])
             });
             let axis: V3 = core::array::from_fn(|k| batch.axis[k * n + l]);
-            let constants = &mut *batch.constants;
+            let constants = &mut batch.constants;
             self.plate_constants(&x, axis, constants, n, l);
             // Bound of the rotational stiffness at rest against omega^2 of the membrane.
             let rotational = bounds::at_rest(self, constants, n, l, &x);
@@ -451,7 +453,7 @@ impl S4 {
             batch.position,
             batch.spin,
             batch.dt,
-            batch.constants,
+            &batch.constants,
             n,
             height,
             directors,
@@ -492,7 +494,7 @@ impl S4 {
         forces::forces(
             batch.position,
             directors,
-            batch.constants,
+            &batch.constants,
             n,
             &s,
             batch.force,
@@ -504,7 +506,7 @@ impl S4 {
                 self,
                 batch.position,
                 directors,
-                batch.constants,
+                &batch.constants,
                 n,
                 &s,
                 step,

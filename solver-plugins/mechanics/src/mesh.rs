@@ -60,9 +60,7 @@ pub fn graded_axis(
     if let Some(first) = xs.first_mut() {
         *first = lo;
     }
-    for i in 0..=fine_cells {
-        xs.push(fine_lo + h * i as f64);
-    }
+    xs.extend(even_lines(fine_lo, fine_hi, fine_cells));
     x = fine_hi;
     let right = outward(hi - fine_hi);
     for w in &right {
@@ -78,9 +76,17 @@ pub fn graded_axis(
 /// Evenly spaced grid lines from `lo` to `hi` with a spacing near `size` (m).
 pub fn even_axis(lo: f64, hi: f64, size: f64) -> Vec<f64> {
     let n = ((hi - lo) / size).round().max(1.0) as usize;
-    (0..=n)
-        .map(|i| lo + (hi - lo) * i as f64 / n as f64)
-        .collect()
+    even_lines(lo, hi, n).collect()
+}
+
+/// `n + 1` evenly spaced lines from `lo` to `hi` (m), on whole multiples of 2^-44 m (6e-14 m): differences between
+/// them are then exact, all elements between them have the same bits of constants, and these are kept once.
+fn even_lines(lo: f64, hi: f64, n: usize) -> impl Iterator<Item = f64> {
+    const QUANTUM: f64 = 1.0 / (1u64 << 44) as f64;
+    let whole = |x: f64| (x / QUANTUM).round();
+    // From the middle, so that what is symmetric stays so.
+    let (middle, step) = (whole(0.5 * (lo + hi)), whole((hi - lo) / n as f64 / 2.0));
+    (0..=n).map(move |i| (middle + (2.0 * i as f64 - n as f64) * step) * QUANTUM)
 }
 
 impl QuadMesh {

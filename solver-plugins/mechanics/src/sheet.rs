@@ -4,6 +4,9 @@ use crate::LANES;
 use crate::component::ElementInstance;
 use crate::mesh::Patch;
 use plyflow_abi::*;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hasher};
+use std::sync::Arc;
 
 /// One cache line of doubles; keeps batch arrays 64-byte aligned.
 #[repr(C, align(64))]
@@ -13,6 +16,30 @@ struct Line([f64; 8]);
 /// A zeroed, 64-byte aligned array of doubles whose length is a multiple of 8.
 #[derive(Clone, Default)]
 pub struct Aligned(Vec<Line>);
+
+/// Arrays that are never written again, each kept once: the elements of a regular mesh have the same constants.
+#[derive(Default)]
+pub(crate) struct Shared {
+    by_hash: HashMap<u64, Vec<Arc<Aligned>>>,
+}
+
+impl Shared {
+    /// The array with these bits.
+    pub(crate) fn keep(&mut self, rows: Aligned) -> Arc<Aligned> {
+        let same = |a: &Aligned, b: &Aligned| {
+            a.len() == b.len() && a.iter().zip(&**b).all(|(a, b)| a.to_bits() == b.to_bits())
+        };
+        let mut hash = DefaultHasher::new();
+        rows.iter().for_each(|x| hash.write_u64(x.to_bits()));
+        let kept = self.by_hash.entry(hash.finish()).or_default();
+        if let Some(found) = kept.iter().find(|k| same(k, &rows)) {
+            return found.clone();
+        }
+        let rows = Arc::new(rows);
+        kept.push(rows.clone());
+        rows
+    }
+}
 
 impl Aligned {
     /// `n` zeros, rounded up to a multiple of 8.
@@ -102,16 +129,14 @@ pub struct Batch {
     pub places: [[u16; LANES]; 4],
     /// Shares of the pressure from below and from above, by lane; empty when nothing presses on any.
     pub pressed: Vec<[f64; 2]>,
-    /// Layers by lane.
-    pub layers: [f64; LANES],
-    /// Whether any lane stands for more than one layer.
-    pub layered: bool,
+    /// Layers by lane; empty when all stand for one.
+    pub layers: Vec<f64>,
     /// Mass scaling factor by lane.
     pub mass_factor: [f64; LANES],
     /// `[PF_ENERGIES][LANES]` energies of the last call (J).
     pub energy: Aligned,
-    /// `[constants][LANES]`.
-    pub constants: Aligned,
+    /// `[constants][LANES]`; batches of the same constants share them.
+    pub constants: Arc<Aligned>,
     /// `[history][LANES]`.
     pub history: Aligned,
     /// `[points * membrane_history][LANES]`.
@@ -128,14 +153,14 @@ pub struct PatchBatch {
     pub sheet: u32,
     /// Patches that count.
     pub count: u32,
-    /// `[patch_nodes][LANES]` model nodes; unused slots repeat the centre.
+    /// `[used][LANES]` model nodes, as many as the largest patch has; unused slots of a smaller one repeat its centre.
     pub nodes: Vec<[u32; LANES]>,
     /// Places of the nodes in the sums of the block.
     pub places: Vec<[u16; LANES]>,
     /// Mesh-local centre nodes of the lanes.
     pub centres: Vec<u32>,
-    /// `[patch_constants][LANES]`.
-    pub constants: Aligned,
+    /// `[patch_constants][LANES]`; batches of the same constants share them.
+    pub constants: Arc<Aligned>,
     /// `[patch_history + bending_history][LANES]`.
     pub history: Aligned,
     /// `[patch_fields][LANES]`; empty unless asked for.

@@ -103,6 +103,36 @@ pub struct ElementSizes {
     pub ignores_velocity: bool,
 }
 
+/// Rows of constants. Writing to them outside of an initialise call panics: batches with the same constants share
+/// them.
+pub enum Constants<'a> {
+    /// In the initialise calls.
+    Open(&'a mut [f64]),
+    /// Afterwards.
+    Fixed(&'a [f64]),
+}
+
+impl std::ops::Deref for Constants<'_> {
+    type Target = [f64];
+    #[inline]
+    fn deref(&self) -> &[f64] {
+        match self {
+            Self::Open(rows) => rows,
+            Self::Fixed(rows) => rows,
+        }
+    }
+}
+
+impl std::ops::DerefMut for Constants<'_> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut [f64] {
+        match self {
+            Self::Open(rows) => rows,
+            Self::Fixed(_) => panic!("constants are written by initialise only; use the history"),
+        }
+    }
+}
+
 /// One element call; see `pf_element_batch`.
 pub struct ElementBatch<'a> {
     /// Lanes per row.
@@ -118,7 +148,7 @@ pub struct ElementBatch<'a> {
     /// `[3][lanes]`; empty outside initialise.
     pub axis: &'a [f64],
     /// `[constants][lanes]`; written by initialise only.
-    pub constants: &'a mut [f64],
+    pub constants: Constants<'a>,
     /// `[history][lanes]`.
     pub history: &'a mut [f64],
     /// `[material_points * membrane_history][lanes]`.
@@ -153,8 +183,8 @@ pub struct PatchBatch<'a> {
     pub area: &'a [f64],
     /// `[3][lanes]`; empty outside patch_initialise.
     pub axis: &'a [f64],
-    /// `[patch_constants][lanes]`.
-    pub constants: &'a mut [f64],
+    /// `[patch_constants][lanes]`; written by patch_initialise only.
+    pub constants: Constants<'a>,
     /// `[patch_history + bending_history][lanes]`.
     pub history: &'a mut [f64],
     /// `[patch_nodes][3][lanes]` (N), out; empty in patch_initialise.
@@ -350,10 +380,20 @@ unsafe fn some_mut<'a>(p: *mut f64, n: usize) -> Option<&'a mut [f64]> {
     }
 }
 
+/// Constants as the first call or as a later one sees them.
+unsafe fn constants<'a>(p: *mut f64, n: usize, first: bool) -> Constants<'a> {
+    if first {
+        Constants::Open(unsafe { rows_mut(p, n) })
+    } else {
+        Constants::Fixed(unsafe { rows(p, n) })
+    }
+}
+
 unsafe fn element_batch<'a>(
     b: &pf_element_batch,
     s: &ElementSizes,
     m: &MaterialSizes,
+    first: bool,
 ) -> ElementBatch<'a> {
     let lanes = b.lanes as usize;
     let v = s.nodes * 3 * lanes;
@@ -365,7 +405,7 @@ unsafe fn element_batch<'a>(
             velocity: rows(b.velocity, v),
             spin: rows(b.spin, v),
             axis: rows(b.axis, 3 * lanes),
-            constants: rows_mut(b.constants, s.constants * lanes),
+            constants: constants(b.constants, s.constants * lanes, first),
             history: rows_mut(b.history, s.history * lanes),
             material_history: rows_mut(
                 b.material_history,
@@ -386,6 +426,7 @@ unsafe fn patch_batch<'a>(
     b: &pf_patch_batch,
     s: &ElementSizes,
     m: &MaterialSizes,
+    first: bool,
 ) -> PatchBatch<'a> {
     let lanes = b.lanes as usize;
     let v = s.patch_nodes * 3 * lanes;
@@ -397,7 +438,7 @@ unsafe fn patch_batch<'a>(
             count: rows(b.count, lanes),
             area: rows(b.area, lanes),
             axis: rows(b.axis, 3 * lanes),
-            constants: rows_mut(b.constants, s.patch_constants * lanes),
+            constants: constants(b.constants, s.patch_constants * lanes, first),
             history: rows_mut(b.history, (s.patch_history + m.bending_history) * lanes),
             force: rows_mut(b.force, v),
             energy: rows_mut(b.energy, lanes),
@@ -497,7 +538,7 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         guarded(|| unsafe {
             let i = &*instance.cast::<ElementInstance<E>>();
             i.element.initialise(
-                &mut element_batch(&*batch, &i.sizes, &i.material.sizes),
+                &mut element_batch(&*batch, &i.sizes, &i.material.sizes, true),
                 &i.material,
             );
             PF_OK
@@ -510,7 +551,7 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         guarded(|| unsafe {
             let i = &*instance.cast::<ElementInstance<E>>();
             i.element.forces(
-                &mut element_batch(&*batch, &i.sizes, &i.material.sizes),
+                &mut element_batch(&*batch, &i.sizes, &i.material.sizes, false),
                 &i.material,
             )
         })
@@ -522,7 +563,7 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         guarded(|| unsafe {
             let i = &*instance.cast::<ElementInstance<E>>();
             i.element.patch_initialise(
-                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes),
+                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes, true),
                 &i.material,
             );
             PF_OK
@@ -535,7 +576,7 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         guarded(|| unsafe {
             let i = &*instance.cast::<ElementInstance<E>>();
             i.element.patch_forces(
-                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes),
+                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes, false),
                 &i.material,
             )
         })

@@ -12,8 +12,8 @@ mod component;
 mod step;
 
 pub use component::{
-    BendingBatch, Element, ElementBatch, ElementSizes, Material, MaterialRef, MaterialSizes,
-    MembraneBatch, PatchBatch, element_table, material_table,
+    BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,
+    MaterialSizes, MembraneBatch, PatchBatch, element_table, material_table,
 };
 pub use plyflow_abi as abi;
 pub use step::{

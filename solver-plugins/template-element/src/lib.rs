@@ -142,7 +142,7 @@ impl Element for MyMembrane {
         let mut tangent = Rows([0.0; 2 * MAX_LANES]);
         for l in 0..lanes {
             let [d13, d24, _] = differences(batch.position, lanes, l);
-            let [g1, g2] = axes(d13, d24, batch.constants, lanes, l);
+            let [g1, g2] = axes(d13, d24, &batch.constants, lanes, l);
             metric.0[l] = dot(g1, g1);
             metric.0[lanes + l] = dot(g2, g2);
             metric.0[2 * lanes + l] = dot(g1, g2);
@@ -168,7 +168,7 @@ impl Element for MyMembrane {
             let [s11, s22, s12] = [0, 1, 2].map(|r| row(&stress.0, r));
             let [c11, c22, c12] = [0, 1, 2].map(|r| row(&metric.0, r));
             let [d13, d24, h] = differences(batch.position, lanes, l);
-            let [g1, g2] = axes(d13, d24, batch.constants, lanes, l);
+            let [g1, g2] = axes(d13, d24, &batch.constants, lanes, l);
             let mut mode = 0.0;
             for i in 0..3 {
                 let q = h[i] - h1 * g1[i] - h2 * g2[i];

@@ -83,6 +83,8 @@ pub struct RigidMotion {
 pub struct RigidItem {
     /// Model node.
     pub node: u32,
+    /// Penetration (m), 0 when apart; for reports.
+    pub penetration: f32,
     /// Distance that it keeps from the surface (m).
     pub offset: f64,
     /// Normal stiffness (N/m).
@@ -98,8 +100,6 @@ pub struct RigidItem {
     pub force: V,
     /// Normal part of it (N).
     pub normal_force: f64,
-    /// Penetration (m), 0 when apart.
-    pub penetration: f64,
 }
 
 impl RigidItem {
@@ -107,6 +107,7 @@ impl RigidItem {
     pub fn new(node: u32, offset: f64) -> Self {
         Self {
             node,
+            penetration: 0.0,
             offset,
             stiffness: 0.0,
             damping: 0.0,
@@ -115,7 +116,6 @@ impl RigidItem {
             slip: [0.0; 3],
             force: [0.0; 3],
             normal_force: 0.0,
-            penetration: 0.0,
         }
     }
 
@@ -346,6 +346,6 @@ fn touch<F: Coulomb>(
     item.normal_force = normal.force;
     item.multiplier = normal.multiplier;
     item.work = normal.work;
-    item.penetration = (-gap).max(0.0);
+    item.penetration = (-gap).max(0.0) as f32;
     energy
 }

@@ -22,9 +22,12 @@ struct Components<'a> {
     /// Of the elements; then of everything.
     force: &'a mut [f64],
     contact: &'a mut [f64],
+    /// Empty when nothing external acts.
     external: &'a [f64],
+    /// By node (kg); 0: driven.
     mass: &'a [f64],
-    per_mass: &'a [f64],
+    /// By node, or empty when nothing is fixed.
+    fixed: &'a [Fixed],
 }
 
 /// The same of their rotations.
@@ -33,8 +36,10 @@ pub(super) struct Turns<'a> {
     /// Of the elements.
     pub(super) moment: &'a [f64],
     pub(super) external: &'a [f64],
+    /// By node (kg m2); 0: it does not rotate, or is driven.
     pub(super) inertia: &'a [f64],
-    pub(super) per_inertia: &'a [f64],
+    /// By node, or empty when nothing is fixed.
+    pub(super) fixed: &'a [Fixed],
 }
 
 /// Components whose sums are kept apart: eight nodes.
@@ -48,26 +53,26 @@ impl Model {
         let loaded =
             weight != [0.0; 3] || !self.loads.force.is_empty() || !self.sums.pressure.is_empty();
         let moving = self.moving(loaded);
-        if self.loaded && !moving.loaded {
-            // What no longer acts.
-            self.external_force.fill([0.0; 3]);
-        }
-        self.loaded = moving.loaded;
+        // None are kept while nothing acts.
+        let loaded_nodes = if loaded { self.x.len() } else { 0 };
+        self.external_force.resize(loaded_nodes, [0.0; 3]);
         let before: Vec<(V, V)> = self
             .driven
             .iter()
             .map(|n| (self.x[*n as usize], self.v[*n as usize]))
             .collect();
         let (sums, patch_sums) = (&self.sums, &self.patch_sums);
-        let (free_mass, per_mass) = (&self.free_mass, &self.per_mass);
+        let (free_mass, fixed) = (&self.free_mass, &self.supports.fixed);
         let own_mass = &self.own_mass;
+        let mut external: Vec<&mut [V]> = self.external_force.chunks_mut(NODE_CHUNK).collect();
+        external.resize_with(self.x.len().div_ceil(NODE_CHUNK), Default::default);
         let (loads, load_factor) = (&self.loads.force, self.load_factor);
         let works: Vec<NodeWork> = self
             .x
             .par_chunks_mut(NODE_CHUNK)
             .zip_eq(self.v.par_chunks_mut(NODE_CHUNK))
             .zip_eq(self.force.par_chunks_mut(NODE_CHUNK))
-            .zip_eq(self.external_force.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(external)
             .zip_eq(self.contact_force.par_chunks_mut(NODE_CHUNK))
             .enumerate()
             .map(|(chunk, ((((x, v), force), external), contact))| {
@@ -96,8 +101,8 @@ impl Model {
                     force: force.as_flattened_mut(),
                     contact: contact.as_flattened_mut(),
                     external: external.as_flattened(),
-                    mass: free_mass[nodes.clone()].as_flattened(),
-                    per_mass: per_mass[nodes].as_flattened(),
+                    mass: &free_mass[nodes.clone()],
+                    fixed: fixed.get(nodes).unwrap_or_default(),
                 })
             })
             .collect();
@@ -141,7 +146,8 @@ impl Model {
             // What holds the node makes up for the forces on it: its work is external.
             let mean = scale(add(next, *v), 0.5);
             let inertia = scale(sub(next, *v), self.mass[n] / dt);
-            let held = sub(inertia, sub(self.force[n], self.external_force[n]));
+            let external = self.external_force.get(n).copied().unwrap_or_default();
+            let held = sub(inertia, sub(self.force[n], external));
             self.ledger.external += dot(held, mean) * dt;
             self.supports.reaction[k] = sub(inertia, self.force[n]);
             self.x[n] = target;
@@ -153,14 +159,9 @@ impl Model {
 
     /// Masses as [`Model::advance`] wants them.
     pub(super) fn set_free_masses(&mut self) {
-        self.free_mass = self.mass.iter().map(|m| [*m; 3]).collect();
-        self.per_mass = self.mass.iter().map(|m| [1.0 / m; 3]).collect();
+        self.free_mass.clone_from(&self.mass);
         for n in &self.driven {
-            self.free_mass[*n as usize] = [0.0; 3];
-            self.per_mass[*n as usize] = [0.0; 3];
-        }
-        for (m, fixed) in self.per_mass.iter_mut().zip(&self.supports.fixed) {
-            *m = fixed.translation(*m);
+            self.free_mass[*n as usize] = 0.0;
         }
         self.set_free_inertias();
     }
@@ -219,10 +220,12 @@ impl Moving {
     fn turn_group<const N: usize>(self, c: &mut Turns<'_>, start: usize, sums: &mut Works) {
         let spin = to::<N>(&mut c.spin[start..]);
         let (moment, q) = (of::<N>(&c.moment[start..]), of::<N>(&c.external[start..]));
-        let (inertia, per_inertia) = (
-            of::<N>(&c.inertia[start..]),
-            of::<N>(&c.per_inertia[start..]),
-        );
+        let inertia = by_component::<N>(c.inertia, start);
+        let mut per_inertia = inertia.map(reciprocal);
+        for (k, fixed) in part::<N>(c.fixed, start).iter().enumerate() {
+            let free = to(&mut per_inertia[3 * k..]);
+            *free = fixed.rotation(*free);
+        }
         for i in 0..N {
             let old = spin[i];
             let new = (self.lo * old + self.kick * per_inertia[i] * (moment[i] + q[i])) * self.hi;
@@ -267,8 +270,16 @@ impl Moving {
         let v = to::<N>(&mut c.v[start..]);
         let f = to::<N>(&mut c.force[start..]);
         let contact = to::<N>(&mut c.contact[start..]);
-        let q = of::<N>(&c.external[start..]);
-        let (mass, per_mass) = (of::<N>(&c.mass[start..]), of::<N>(&c.per_mass[start..]));
+        let q = match c.external {
+            [] => &[0.0; N],
+            external => of::<N>(&external[start..]),
+        };
+        let mass = by_component::<N>(c.mass, start);
+        let mut per_mass = mass.map(reciprocal);
+        for (k, fixed) in part::<N>(c.fixed, start).iter().enumerate() {
+            let free = to(&mut per_mass[3 * k..]);
+            *free = fixed.translation(*free);
+        }
         for i in 0..N {
             f[i] += contact[i] + q[i];
             contact[i] = 0.0;
@@ -289,6 +300,25 @@ impl Moving {
             *s = if v2 > *s { v2 } else { *s };
         }
     }
+}
+
+/// What a force accelerates: nothing where there is no free mass.
+#[inline(always)]
+fn reciprocal(mass: f64) -> f64 {
+    if mass > 0.0 { 1.0 / mass } else { 0.0 }
+}
+
+/// Values by node for the `N` components from `start`.
+#[inline(always)]
+fn by_component<const N: usize>(of_nodes: &[f64], start: usize) -> [f64; N] {
+    let of_nodes = &of_nodes[start / 3..start / 3 + N / 3];
+    std::array::from_fn(|i| of_nodes[i / 3])
+}
+
+/// The nodes of the `N` components from `start`; none when nothing is fixed.
+#[inline(always)]
+fn part<const N: usize>(fixed: &[Fixed], start: usize) -> &[Fixed] {
+    fixed.get(start / 3..start / 3 + N / 3).unwrap_or_default()
 }
 
 fn of<const N: usize>(from: &[f64]) -> &[f64; N] {

@@ -13,7 +13,6 @@ impl Model {
         a.numbers(self.x.as_flattened_mut())?;
         a.numbers(self.v.as_flattened_mut())?;
         a.numbers(self.normals.as_flattened_mut())?;
-        a.numbers(self.area.as_flattened_mut())?;
         if let Some(r) = self.rotations.as_deref_mut() {
             a.numbers(r.spin.as_flattened_mut())?;
         }
@@ -25,7 +24,6 @@ impl Model {
         a.value(&mut self.kick)?;
         a.value(&mut self.load_factor)?;
         a.value(&mut self.body_acceleration)?;
-        a.value(&mut self.loaded)?;
         a.value(&mut self.max_speed)?;
         a.value(&mut self.ledger)?;
         a.value(&mut self.interfaces)?;

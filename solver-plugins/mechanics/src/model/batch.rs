@@ -162,7 +162,7 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Work
         cell_areas_dispatch(&work.position.0, &mut work.area.0);
     }
     let mut raw = empty_element_batch(sheet, motion.dt, &work.position.0);
-    raw.constants = batch.constants.as_mut_ptr();
+    raw.constants = batch.constants.as_ptr().cast_mut();
     raw.history = batch.history.as_mut_ptr();
     raw.material_history = batch.material_history.as_mut_ptr();
     raw.force = work.force.0.as_mut_ptr();
@@ -182,7 +182,7 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Work
         raw.moment = work.moment.0.as_mut_ptr();
     }
     batch.status = sheet.element.forces(&raw);
-    if batch.layered {
+    if !batch.layers.is_empty() {
         let rows = work.force.0.chunks_exact_mut(LANES);
         for row in rows
             .chain(work.moment.0.chunks_exact_mut(LANES))
@@ -195,12 +195,22 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Work
     }
 }
 
+/// Positions `[patch_nodes][3][LANES]` of a batch of patches; unused slots repeat the centre.
+fn gather_patches(sheet: &Sheet, batch: &PatchBatch, x: &[V], position: &mut [f64]) {
+    let rows = 3 * LANES * batch.nodes.len();
+    let width = 3 * LANES * sheet.element.sizes.patch_nodes;
+    gather(&batch.nodes, x, &mut position[..rows]);
+    for start in (rows..width).step_by(3 * LANES) {
+        position.copy_within(..3 * LANES, start);
+    }
+}
+
 /// Forces of a batch of patches into `work`.
 pub(super) fn run_patch(batch: &mut PatchBatch, present: Present<'_>, work: &mut PatchWorkspace) {
     let sheet = &present.sheets[batch.sheet as usize];
-    gather(&batch.nodes, present.motion.x, &mut work.position.0);
+    gather_patches(sheet, batch, present.motion.x, &mut work.position.0);
     let mut raw = empty_patch_batch(sheet, present.motion.dt, &work.position.0);
-    raw.constants = batch.constants.as_mut_ptr();
+    raw.constants = batch.constants.as_ptr().cast_mut();
     raw.history = batch.history.as_mut_ptr();
     raw.force = work.force.0.as_mut_ptr();
     raw.energy = batch.energy.as_mut_ptr();
@@ -241,7 +251,6 @@ pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 
 pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<f64> {
     let mut position = Buffer([0.0; 12 * LANES]);
     gather(&batch.nodes, x, &mut position.0);
-    let mut constants = batch.constants.clone();
     let mut history = batch.history.clone();
     let mut material_history = batch.material_history.clone();
     let mut force = Aligned::zeros(12 * LANES);
@@ -254,7 +263,7 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<
         rates.attach(&mut raw);
         raw.moment = moment.as_mut_ptr();
     }
-    raw.constants = constants.as_mut_ptr();
+    raw.constants = batch.constants.as_ptr().cast_mut();
     raw.history = history.as_mut_ptr();
     raw.material_history = material_history.as_mut_ptr();
     raw.force = force.as_mut_ptr();
@@ -272,14 +281,13 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<
 pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32, f64)> {
     let width = sheet.element.sizes.patch_nodes;
     let mut position = Aligned::zeros(3 * width * LANES);
-    gather(&batch.nodes, x, &mut position);
-    let mut constants = batch.constants.clone();
+    gather_patches(sheet, batch, x, &mut position);
     let mut history = batch.history.clone();
     let mut force = Aligned::zeros(3 * width * LANES);
     let mut energy = Aligned::zeros(LANES);
     let mut stiffness = Aligned::zeros(width * LANES);
     let mut raw = empty_patch_batch(sheet, 0.0, &position);
-    raw.constants = constants.as_mut_ptr();
+    raw.constants = batch.constants.as_ptr().cast_mut();
     raw.history = history.as_mut_ptr();
     raw.force = force.as_mut_ptr();
     raw.energy = energy.as_mut_ptr();
@@ -290,7 +298,7 @@ pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32
     (0..batch.count as usize)
         .flat_map(|l| {
             let (nodes, stiffness) = (&batch.nodes, &stiffness);
-            (0..width)
+            (0..nodes.len())
                 .filter(move |k| *k == 0 || nodes[*k][l] != nodes[0][l])
                 .map(move |k| (nodes[k][l], stiffness[k * LANES + l]))
         })

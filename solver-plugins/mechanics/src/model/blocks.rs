@@ -94,6 +94,21 @@ impl Sums {
         vec![Sum::default(); self.force.len()]
     }
 
+    /// Sum of `of` (one of the arrays) at a node, in the order of [`Sums::collect`].
+    pub(super) fn at(&self, of: &[Sum], node: usize) -> V {
+        let chunk = node / NODE_CHUNK;
+        let (start, end) = (self.more_start[chunk], self.more_start[chunk + 1]);
+        let more = &self.more[start as usize..end as usize];
+        let others = more.iter().filter(|(n, _)| *n as usize == node);
+        let places = others.map(|(_, place)| *place);
+        std::iter::once(self.first[node])
+            .chain(places)
+            .fold([0.0; 3], |sum, place| {
+                let [x, y, z, _] = of[place as usize].0;
+                add(sum, [x, y, z])
+            })
+    }
+
     /// Adds the sums `of` (one of the arrays) at the nodes of a chunk to `to`.
     #[inline(always)]
     pub(super) fn collect(&self, of: &[Sum], chunk: usize, to: &mut [V]) {
@@ -187,26 +202,28 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .zip_eq(others)
-        .for_each(|((block, force), ((moment, pressure), area))| {
-            let part = Part {
-                force,
-                moment,
-                pressure,
-                area,
-            };
-            run_block(block, part, present);
-        });
+        .for_each_init(
+            Workspace::new,
+            |work, ((block, force), ((moment, pressure), area))| {
+                let part = Part {
+                    force,
+                    moment,
+                    pressure,
+                    area,
+                };
+                run_block(block, part, present, work);
+            },
+        );
 }
 
-fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>) {
+fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>, work: &mut Workspace) {
     part.force.fill(Sum::default());
     part.moment.fill(Sum::default());
     part.pressure.fill(Sum::default());
     part.area.fill(Sum::default());
     block.failed = None;
-    let mut work = Workspace::new();
     for batch in &mut block.batches {
-        run_batch(batch, present, &mut work);
+        run_batch(batch, present, work);
         if batch.status != PF_OK {
             block.failed = block.failed.or(Some((batch.status, batch.sheet)));
             continue;
@@ -246,12 +263,11 @@ pub(super) fn run_patch_blocks(
     blocks
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
-        .for_each(|(block, force)| {
+        .for_each_init(PatchWorkspace::new, |work, (block, force)| {
             force.fill(Sum::default());
             block.failed = None;
-            let mut work = PatchWorkspace::new();
             for batch in &mut block.batches {
-                run_patch(batch, present, &mut work);
+                run_patch(batch, present, work);
                 if batch.status != PF_OK {
                     block.failed = block.failed.or(Some((batch.status, batch.sheet)));
                     continue;

@@ -3,6 +3,7 @@
 use super::*;
 use crate::contact::SlaveItem;
 use crate::mesh::Patch;
+use std::sync::Arc;
 
 impl Model {
     /// Builds a model from points (m, at their start) and sheets (from the tool upwards).
@@ -19,7 +20,6 @@ impl Model {
             v: vec![[0.0; 3]; n],
             mass: vec![0.0; n],
             normals: vec![[0.0, 0.0, 1.0]; n],
-            area: vec![[0.0; 3]; n],
             sheets: Vec::new(),
             cells: Vec::new(),
             neighbours: Vec::new(),
@@ -39,11 +39,9 @@ impl Model {
             sums: Sums::default(),
             patch_sums: Sums::default(),
             free_mass: Vec::new(),
-            per_mass: Vec::new(),
             force: vec![[0.0; 3]; n],
             contact_force: vec![[0.0; 3]; n],
-            loaded: false,
-            external_force: vec![[0.0; 3]; n],
+            external_force: Vec::new(),
             own_mass: vec![0.0; n],
             rotations: None,
             supports: Supports::default(),
@@ -175,13 +173,16 @@ impl Model {
             .map(|p| self.x[spec.nodes[p.nodes[0] as usize] as usize])
             .collect();
         let order = compact_order(&centres, BLOCK * LANES);
+        let mut shared = Shared::default();
         for group in order.chunks(BLOCK * LANES) {
             let patch = |k: u32| &spec.patches[k as usize];
             let used = group.iter().flat_map(|k| &patch(*k).nodes);
             let mut block = Block::new(used.map(|k| spec.nodes[*k as usize]));
             for chunk in group.chunks(LANES) {
                 let of = |l: usize| patch(chunk[l.min(chunk.len() - 1)]);
-                let batch = self.patch_batch(sheet, spec, chunk.len(), of, &block, bending_history);
+                let count = chunk.len();
+                let batch =
+                    self.patch_batch(sheet, spec, count, of, &block, bending_history, &mut shared);
                 block.batches.push(batch?);
             }
             self.patches.push(block);
@@ -198,6 +199,7 @@ impl Model {
         of: impl Fn(usize) -> &'a Patch,
         block: &Block<PatchBatch>,
         bending_history: usize,
+        shared: &mut Shared,
     ) -> Result<PatchBatch, MechanicsError> {
         let s = spec.element.sizes;
         let nodes: Vec<[u32; LANES]> = (0..s.patch_nodes)
@@ -214,12 +216,13 @@ impl Model {
             places: nodes.iter().map(|n| n.map(|n| block.place(n))).collect(),
             nodes,
             centres: (0..LANES).map(|l| of(l).nodes[0]).collect(),
-            constants: Aligned::zeros(s.patch_constants * LANES),
+            constants: Arc::default(),
             history: Aligned::zeros((s.patch_history + bending_history) * LANES),
             fields: Aligned::default(),
             energy: Aligned::zeros(LANES),
             status: PF_OK,
         };
+        let mut constants = Aligned::zeros(s.patch_constants * LANES);
         let mut position = Aligned::zeros(s.patch_nodes * 3 * LANES);
         gather(&batch.nodes, &self.x, &mut position);
         let count: Vec<f64> = (0..LANES).map(|l| of(l).nodes.len() as f64).collect();
@@ -234,7 +237,7 @@ impl Model {
             count: count.as_ptr(),
             area: area.as_ptr(),
             axis: axis.as_ptr(),
-            constants: batch.constants.as_mut_ptr(),
+            constants: constants.as_mut_ptr(),
             history: batch.history.as_mut_ptr(),
             force: std::ptr::null_mut(),
             energy: std::ptr::null_mut(),
@@ -243,6 +246,10 @@ impl Model {
             material: spec.element.material.reference().raw(),
         };
         component_status(spec.element.patch_initialise(&raw), &spec.name)?;
+        batch.constants = shared.keep(constants);
+        let used = (0..LANES).map(|l| of(l).nodes.len()).max();
+        batch.nodes.truncate(used.unwrap_or(0));
+        batch.places.truncate(used.unwrap_or(0));
         Ok(batch)
     }
 
@@ -266,11 +273,13 @@ impl Model {
         let rates = Rates::zero();
         let blocks = &mut self.blocks[sheet.block_range.0..sheet.block_range.1];
         let batches = blocks.iter_mut().flat_map(|b| &mut b.batches);
+        let mut shared = Shared::default();
         for (batch, cells) in batches.zip(order.chunks(LANES)) {
             gather(&batch.nodes, &self.x, &mut position);
+            let mut constants = Aligned::zeros(sheet.element.sizes.constants * LANES);
             let mut raw = empty_element_batch(sheet, 0.0, &position);
             raw.axis = axis.as_ptr();
-            raw.constants = batch.constants.as_mut_ptr();
+            raw.constants = constants.as_mut_ptr();
             raw.history = batch.history.as_mut_ptr();
             raw.material_history = batch.material_history.as_mut_ptr();
             mass.fill(0.0);
@@ -291,6 +300,9 @@ impl Model {
             raw.energy = energy.as_mut_ptr();
             raw.critical_step = step.as_mut_ptr();
             component_status(sheet.element.forces(&raw), &sheet.name)?;
+            batch.constants = shared.keep(constants);
+            let batch_layers = std::mem::take(&mut batch.layers);
+            let layers = |l: usize| batch_layers.get(l).copied().unwrap_or(1.0);
             for l in 0..batch.count as usize {
                 let critical = step[l] * self.settings.safety;
                 if !(critical > 0.0 && critical.is_finite()) {
@@ -306,18 +318,19 @@ impl Model {
                     .max(1.0);
                 batch.mass_factor[l] = factor;
                 for k in 0..4 {
-                    let own = mass[k * LANES + l] * batch.layers[l];
+                    let own = mass[k * LANES + l] * layers(l);
                     let node = batch.nodes[k][l] as usize;
                     self.mass[node] += own * factor;
                     self.own_mass[node] += own;
                     if let Some(r) = self.rotations.as_deref_mut()
                         && sheet.element.rotates()
                     {
-                        r.inertia[node] += inertia[k * LANES + l] * batch.layers[l] * factor;
+                        r.inertia[node] += inertia[k * LANES + l] * layers(l) * factor;
                     }
                     sheet.added_mass += own * (factor - 1.0);
                 }
             }
+            batch.layers = batch_layers;
         }
         Ok(())
     }
@@ -510,7 +523,8 @@ fn element_batch(
     let cell = |l: usize| chunk[l.min(chunk.len() - 1)] as usize;
     let nodes: [[u32; LANES]; 4] =
         std::array::from_fn(|k| std::array::from_fn(|l| cells[cell(l)][k]));
-    let layers: [f64; LANES] = std::array::from_fn(|l| spec.layers[cell(l)]);
+    let layers: Vec<f64> = (0..LANES).map(|l| spec.layers[cell(l)]).collect();
+    let layered = layers.iter().any(|k| *k != 1.0);
     let shares = |l: usize| match spec.pressed[cell(l)] {
         Pressed::No => [0.0, 0.0],
         Pressed::Below => [1.0, 0.0],
@@ -524,11 +538,10 @@ fn element_batch(
         places: nodes.map(|n| n.map(|n| block.place(n))),
         nodes,
         pressed: (0..LANES).filter(|_| is_pressed).map(shares).collect(),
-        layered: layers.iter().any(|k| *k != 1.0),
-        layers,
+        layers: if layered { layers } else { Vec::new() },
         mass_factor: [1.0; LANES],
         energy: Aligned::zeros(PF_ENERGIES * LANES),
-        constants: Aligned::zeros(s.constants * LANES),
+        constants: Arc::default(),
         history: Aligned::zeros(s.history * LANES),
         material_history: Aligned::zeros(s.material_points * membrane_history * LANES),
         fields: Aligned::default(),

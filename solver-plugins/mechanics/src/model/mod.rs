@@ -79,8 +79,6 @@ pub struct Model {
     pub mass: Vec<f64>,
     /// `[n]` unit normals of the sheets.
     pub normals: Vec<V>,
-    /// `[n]` sum of a quarter of the area vectors of the cells around (m2).
-    pub area: Vec<V>,
     /// Sheets from the tool upwards.
     pub sheets: Vec<Sheet>,
     /// `[cells][4]` model nodes of all sheets' cells.
@@ -111,16 +109,12 @@ pub struct Model {
     cell_place: Vec<CellPlace>,
     sums: Sums,
     patch_sums: Sums,
-    /// `[n]` mass of a node by component (kg); 0: driven.
-    free_mass: Vec<V>,
-    /// `[n]` what a force accelerates (1/kg); 0: driven or fixed.
-    per_mass: Vec<V>,
+    /// `[n]` mass of a node (kg); 0: driven.
+    free_mass: Vec<f64>,
     /// `[n]` forces on the nodes in the last step (N).
     force: Vec<V>,
-    /// Pressure, weight and nodal loads (N): what does external work on free nodes.
+    /// `[n]` pressure, weight and nodal loads (N): what does external work on free nodes. Empty when nothing acts.
     external_force: Vec<V>,
-    /// Whether anything external acted in the last step.
-    loaded: bool,
     /// `[n]` forces of the contacts (N); zero between steps.
     contact_force: Vec<V>,
     /// `[n]` masses without scaling (kg): what has weight.
@@ -224,15 +218,14 @@ impl Model {
     /// sides of contacts apart.
     fn normals(&mut self) {
         let sums = &self.sums;
-        self.area
+        self.normals
             .par_chunks_mut(NODE_CHUNK)
-            .zip_eq(self.normals.par_chunks_mut(NODE_CHUNK))
             .enumerate()
-            .for_each(|(chunk, (areas, normals))| {
-                areas.fill([0.0; 3]);
-                sums.collect(&sums.area, chunk, areas);
-                for (area, normal) in areas.iter().zip(normals) {
-                    *normal = crate::vec3::unit(*area);
+            .for_each(|(chunk, normals)| {
+                normals.fill([0.0; 3]);
+                sums.collect(&sums.area, chunk, normals);
+                for normal in normals {
+                    *normal = crate::vec3::unit(*normal);
                 }
             });
     }

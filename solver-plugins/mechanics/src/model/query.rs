@@ -51,6 +51,19 @@ impl Model {
         of
     }
 
+    /// By node of a sheet: sum of a quarter of the area vectors of its cells around it (m2).
+    pub fn node_areas(&self, sheet: usize) -> Vec<V> {
+        let sheet = &self.sheets[sheet];
+        let mut areas = vec![[0.0; 3]; self.x.len()];
+        for cell in &self.cells[sheet.cell_range.0..sheet.cell_range.1] {
+            let quarter = scale(area_vector(cell.map(|n| self.x[n as usize])), 0.25);
+            for n in cell {
+                areas[*n as usize] = add(areas[*n as usize], quarter);
+            }
+        }
+        sheet.nodes.iter().map(|n| areas[*n as usize]).collect()
+    }
+
     /// By contact: its name, and what it stores and has lost so far (J).
     pub fn interface_energies(&self) -> impl Iterator<Item = (&str, ContactEnergy)> {
         let rigid = self.rigid_contacts.iter().map(|c| c.name.as_str());

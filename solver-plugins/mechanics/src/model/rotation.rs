@@ -13,12 +13,8 @@ pub(super) struct Rotations {
     pub(super) spin: Vec<V>,
     /// `[n]` rotary inertias (kg m2); 0: the node does not rotate.
     pub(super) inertia: Vec<f64>,
-    /// `[n]` moments of the elements (N m).
-    moment: Vec<V>,
-    /// `[n]` inertia of a node by component (kg m2); 0: it does not rotate, or is driven.
-    free_inertia: Vec<V>,
-    /// `[n]` what a moment accelerates (1/(kg m2)); 0: nothing.
-    per_inertia: Vec<V>,
+    /// `[n]` inertia of a node (kg m2); 0: it does not rotate, or is driven.
+    free_inertia: Vec<f64>,
 }
 
 impl Rotations {
@@ -26,16 +22,13 @@ impl Rotations {
         Self {
             spin: vec![[0.0; 3]; n],
             inertia: vec![0.0; n],
-            moment: vec![[0.0; 3]; n],
             free_inertia: Vec::new(),
-            per_inertia: Vec::new(),
         }
     }
 
     /// Holds components of a node's rotation at zero.
     pub(super) fn fix(&mut self, node: usize, fixed: Fixed) {
         self.spin[node] = fixed.rotation(self.spin[node]);
-        self.per_inertia[node] = fixed.rotation(self.per_inertia[node]);
     }
 }
 
@@ -50,12 +43,9 @@ impl Model {
         let Some(r) = self.rotations.as_deref_mut() else {
             return;
         };
-        let per = |i: &f64| if *i > 0.0 { [1.0 / i; 3] } else { [0.0; 3] };
-        r.free_inertia = r.inertia.iter().map(|i| [*i; 3]).collect();
-        r.per_inertia = r.inertia.iter().map(per).collect();
+        r.free_inertia.clone_from(&r.inertia);
         for n in &self.driven {
-            r.free_inertia[*n as usize] = [0.0; 3];
-            r.per_inertia[*n as usize] = [0.0; 3];
+            r.free_inertia[*n as usize] = 0.0;
         }
         for (n, fixed) in self.supports.fixed.iter().enumerate() {
             r.fix(n, *fixed);
@@ -83,15 +73,15 @@ impl Model {
     fn turn_all(&self, r: &mut Rotations) -> NodeWork {
         let moving = self.moving(false);
         let (sums, loads, factor) = (&self.sums, &self.loads.moment, self.load_factor);
-        let (inertia, per_inertia) = (&r.free_inertia, &r.per_inertia);
+        let (inertia, fixed) = (&r.free_inertia, &self.supports.fixed);
         let works: Vec<NodeWork> = r
             .spin
             .par_chunks_mut(NODE_CHUNK)
-            .zip_eq(r.moment.par_chunks_mut(NODE_CHUNK))
             .enumerate()
-            .map(|(chunk, (spin, moment))| {
+            .map(|(chunk, spin)| {
                 let nodes = chunk * NODE_CHUNK..chunk * NODE_CHUNK + spin.len();
-                moment.fill([0.0; 3]);
+                let mut moment = [[0.0; 3]; NODE_CHUNK];
+                let moment = &mut moment[..spin.len()];
                 sums.collect(&sums.moment, chunk, moment);
                 let mut external = [[0.0; 3]; NODE_CHUNK];
                 if !loads.is_empty() {
@@ -103,8 +93,8 @@ impl Model {
                     external: external[..spin.len()].as_flattened(),
                     spin: spin.as_flattened_mut(),
                     moment: moment.as_flattened(),
-                    inertia: inertia[nodes.clone()].as_flattened(),
-                    per_inertia: per_inertia[nodes].as_flattened(),
+                    inertia: &inertia[nodes.clone()],
+                    fixed: fixed.get(nodes).unwrap_or_default(),
                 })
             })
             .collect();
@@ -128,7 +118,7 @@ impl Model {
             if turning.inertia[n] <= 0.0 {
                 continue;
             }
-            let moment = r.moment[n];
+            let moment = self.sums.at(&self.sums.moment, n);
             r.spin[n] = match self.drive.as_ref().and_then(|d| d.spin(k, middle)) {
                 None => turning.free(n, *old, moment, work),
                 Some(next) => {

@@ -69,7 +69,6 @@ impl Model {
         }
         self.supports.fixed[node as usize] = fixed;
         self.v[node as usize] = fixed.translation(self.v[node as usize]);
-        self.per_mass[node as usize] = fixed.translation(self.per_mass[node as usize]);
         if let Some(r) = self.rotations.as_deref_mut() {
             r.fix(node as usize, fixed);
         }
@@ -137,7 +136,8 @@ impl Model {
         let (mut rest, mut load) = (0.0, 0.0);
         for n in (0..self.x.len()).filter(|n| self.held[*n] == Held::Free) {
             let free = |f: V| self.supports.fixed.get(n).map_or(f, |s| s.translation(f));
-            let (f, e) = (free(self.force[n]), free(self.external_force[n]));
+            let external = self.external_force.get(n).copied().unwrap_or_default();
+            let (f, e) = (free(self.force[n]), free(external));
             rest += dot(f, f);
             load += dot(e, e);
         }
