@@ -142,15 +142,9 @@ pub fn add_sheet_contact(
     };
     let items = locate(model, index, nodes);
     let name = format!("{}/{}", stack[master].scene.name, stack[slave].scene.name);
-    model.sheet_contacts.push(SheetContact {
-        name,
-        side,
-        offset,
-        friction,
-        slip_factor: p.slip_stiffness,
-        augmentation: p.contact_augmentation,
-        items,
-    });
+    let settings = contact_settings(p);
+    let contact = SheetContact::new(name, side, offset, friction, &settings, items);
+    model.sheet_contacts.push(contact);
 }
 
 /// Adds the contact of a ply (its place in the stack, its sheet's number, its nodes that may be slaves) with itself,

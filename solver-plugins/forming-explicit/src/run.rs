@@ -373,7 +373,7 @@ impl Forming {
                 if c.side > 0.0 {
                     force[i.node as usize] += i.normal_force;
                 } else {
-                    for (w, n) in i.weights.iter().zip(m.cells[i.cell as usize]) {
+                    for (w, n) in i.weights().iter().zip(m.cells[i.cell as usize]) {
                         force[n as usize] += w * i.normal_force;
                     }
                 }
@@ -389,7 +389,7 @@ impl Forming {
                 force[slave.node as usize] += slave.normal_force;
             }
             if i.side < 0.0 {
-                for (w, n) in slave.weights.iter().zip(m.cells[slave.cell as usize]) {
+                for (w, n) in slave.weights().iter().zip(m.cells[slave.cell as usize]) {
                     force[n as usize] += w * slave.normal_force;
                 }
             }

@@ -70,15 +70,10 @@ fn pressed_stack() -> Model {
         let xi = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]][at];
         SlaveItem::new(n + k, cell as u32, xi)
     };
-    model.sheet_contacts.push(SheetContact {
-        name: "sheet 1 on sheet 0".into(),
-        side: 1.0,
-        offset: THICKNESS,
-        friction: 0.3.into(),
-        slip_factor: contact.slip_factor,
-        augmentation: contact.augmentation,
-        items: (0..n).map(corner).collect(),
-    });
+    let slaves = (0..n).map(corner).collect();
+    let name = "sheet 1 on sheet 0".into();
+    let on_sheet = SheetContact::new(name, 1.0, THICKNESS, 0.3, &contact, slaves);
+    model.sheet_contacts.push(on_sheet);
     model.set_contact_stiffness(&contact);
     model.pressures.above = 1e5;
     model

@@ -26,15 +26,13 @@ fn scene(fold: f64, place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
 fn contact(slave: u32, cell: u32) -> SheetContact {
     let mut item = SlaveItem::new(slave, cell, [0.0; 2]);
     item.stiffness = 1e5;
-    SheetContact {
-        name: "test".into(),
-        side: 1.0,
-        offset: OFFSET,
-        friction: 0.0.into(),
+    let settings = ContactSettings {
+        stiffness_factor: 0.0,
         slip_factor: 0.5,
+        damping_ratio: 0.0,
         augmentation: 0.0,
-        items: vec![item],
-    }
+    };
+    SheetContact::new("test".into(), 1.0, OFFSET, 0.0, &settings, vec![item])
 }
 
 /// Energy (J) and forces (N) of a fresh contact.

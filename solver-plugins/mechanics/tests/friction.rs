@@ -260,15 +260,9 @@ fn heavy_sandwich(
             let (cell, xi) = locate(&meshes[k - 1], points[n as usize]);
             SlaveItem::new(n, cell0 + cell, xi)
         });
-        model.sheet_contacts.push(SheetContact {
-            name: format!("{k}"),
-            side: 1.0,
-            offset: THICKNESS,
-            friction: law,
-            slip_factor: settings.slip_factor,
-            augmentation: settings.augmentation,
-            items: items.collect(),
-        });
+        let (name, items) = (format!("{k}"), items.collect());
+        let contact = SheetContact::new(name, 1.0, THICKNESS, law, &settings, items);
+        model.sheet_contacts.push(contact);
     }
     model.set_contact_stiffness(&settings);
     model.body_acceleration[2] = -gravity;

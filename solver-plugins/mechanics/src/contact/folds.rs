@@ -11,6 +11,7 @@
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::proximity::{Blocks, Candidate, Reach};
 use super::sheets::*;
+use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, scatter, touch};
 use super::{ContactEnergy, ContactSettings};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, dot, norm, scale, sub};
@@ -39,6 +40,8 @@ pub struct FoldItem {
     pub slave: SlaveItem,
     /// +1: the slave lies on the side of the master cell's normal; -1: on the other. Never changes in touch.
     pub side: f64,
+    /// Steps for which it is passed over.
+    sleep: u32,
 }
 
 /// What a search starts from.
@@ -181,18 +184,24 @@ impl SelfContact {
             augmentation: self.settings.augmentation,
         };
         let (undeformed, near) = (&self.undeformed, self.near);
-        self.items
-            .par_iter_mut()
-            .with_min_len(256)
-            .for_each(|item| {
+        let follow_all = |items: &mut [FoldItem]| {
+            let (mut sum, mut touched) = (ContactEnergy::default(), false);
+            for item in items {
                 let own = undeformed[item.slave.node as usize];
                 let open = |cell: u32| is_far(s.cells[cell as usize], undeformed, own, near);
-                follow(item, s, v, reach, &law, open);
-            });
+                if let Some(energy) = follow(item, s, v, reach, &law, open) {
+                    sum.add(&energy);
+                    touched = true;
+                }
+            }
+            (sum, touched)
+        };
+        let chunks: Vec<(ContactEnergy, bool)> =
+            self.items.par_chunks_mut(256).map(follow_all).collect();
         let mut total = ContactEnergy::default();
-        for item in self.items.iter().filter(|i| i.slave.active) {
-            total.add(&item.slave.energy);
-            self.touched = true;
+        for (energy, touched) in chunks {
+            total.add(&energy);
+            self.touched |= touched;
         }
         total
     }
@@ -299,7 +308,11 @@ impl SelfContact {
         slave.guarded = true;
         let up = cell_normal(s, c.cell, c.xi);
         let side = if dot(direction, up) < 0.0 { -1.0 } else { 1.0 };
-        FoldItem { slave, side }
+        FoldItem {
+            slave,
+            side,
+            sleep: 0,
+        }
     }
 
     /// Stiffness and damping of new pairs, so that all pairs of a node together stay within what it bears. Pairs
@@ -369,7 +382,7 @@ pub(super) fn is_far(cell: [u32; 4], undeformed: &[V], own: V, near: f64) -> boo
     })
 }
 
-/// Follows a pair and computes its force.
+/// Follows a pair and computes its force; its energy in touch.
 fn follow<F: Coulomb>(
     pair: &mut FoldItem,
     s: &Surface<'_>,
@@ -377,16 +390,15 @@ fn follow<F: Coulomb>(
     reach: f64,
     law: &Law<'_, F>,
     open: impl Fn(u32) -> bool,
-) {
-    let (item, offset) = (&mut pair.slave, law.offset);
-    if item.sleep > 0 {
-        item.sleep -= 1;
-        return;
+) -> Option<ContactEnergy> {
+    if pair.sleep > 0 {
+        pair.sleep -= 1;
+        return None;
     }
+    let (item, offset) = (&mut pair.slave, law.offset);
     item.turn = item.turn.wrapping_add(1);
     if item.active && item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
-        hold(item, s, v, offset, law);
-        return;
+        return Some(hold(item, s, v, law));
     }
     let p = s.x[item.node as usize];
     let found = track(s, item, p, if item.active { 1 } else { 3 }, open);
@@ -402,7 +414,7 @@ fn follow<F: Coulomb>(
     let through = height < -0.5 * distance;
     if through && (!item.active || height < -offset) {
         item.part();
-        return;
+        return None;
     }
     let pull = if through || distance < 1e-3 * offset {
         Pull {
@@ -429,10 +441,11 @@ fn follow<F: Coulomb>(
     if pull.gap > 0.0 && item.multiplier == 0.0 {
         item.part();
         item.direction = pull.first;
-        item.sleep = (pull.gap / reach).min(50.0) as u32;
+        pair.sleep = (pull.gap / reach).min(50.0) as u32;
+        None
     } else {
         item.plain = plain;
         item.direction = pull.first;
-        touch(item, s, v, &pull, &found, law);
+        Some(touch(item, s, v, &pull, &found, law))
     }
 }

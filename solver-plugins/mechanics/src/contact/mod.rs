@@ -14,6 +14,7 @@ mod friction;
 mod proximity;
 mod rigid;
 mod sheets;
+mod slave;
 
 pub(crate) use folds::Bearing;
 pub use folds::{FoldItem, FoldSpec, SelfContact};
@@ -22,7 +23,8 @@ pub use friction::{
     VaryingFriction, Whose,
 };
 pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
-pub use sheets::{SheetContact, SlaveItem, Surface, shape};
+pub use sheets::{SheetContact, Surface, shape};
+pub use slave::SlaveItem;
 
 /// Penetration (m) with which a multiplier is content where surfaces touch at the distance `offset` (m): half a percent
 /// of it, and at most a micrometre, so that thick sheets do not sink in further than thin ones.

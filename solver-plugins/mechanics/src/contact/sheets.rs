@@ -6,129 +6,14 @@
 //! A force along an interpolated normal is smoother to look at but is no gradient: two flat sheets under
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
-use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
-use super::{ContactEnergy, content, friction_force, normal_force};
+use super::friction::{Constant, Coulomb, FrictionLaw};
+use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, scatter, touch};
+use super::{ContactEnergy, ContactSettings};
+use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
-use crate::vec3::{V, add, cross, dot, norm, scale, sub, unit};
+use crate::vec3::{V, cross, dot, scale, sub, unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-
-/// One slave node.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct SlaveItem {
-    /// Model node.
-    pub node: u32,
-    /// Master cell (model numbering) or [`NONE`].
-    pub cell: u32,
-    pub(super) sleep: u32,
-    pub(super) turn: u8,
-    /// The last search found one cell, on the slave's own side.
-    pub(super) plain: bool,
-    /// Direction from master to slave at the last search.
-    pub(super) direction: V,
-    /// In touch in the last step.
-    pub active: bool,
-    /// Place in the cell, -1..1.
-    pub xi: [f64; 2],
-    /// Normal stiffness (N/m).
-    pub stiffness: f64,
-    /// Damping (N s/m).
-    pub damping: f64,
-    /// Multiplier: the steady part of the normal force (N).
-    pub multiplier: f64,
-    pub(super) work: f64,
-    /// Friction force held by the slip spring (N).
-    pub slip: V,
-    /// Force on the slave (N).
-    pub force: V,
-    /// Weights of the cell's nodes.
-    pub weights: [f64; 4],
-    /// Its share of the force (N): minus this, by the weights, acts on the cell's nodes.
-    pub(super) share: V,
-    /// The other cell of a concave fold in which the slave lies, or [`NONE`]; its weights and share.
-    pub(super) second: u32,
-    pub(super) second_weights: [f64; 4],
-    pub(super) second_share: V,
-    /// Normal part of the force (N).
-    pub normal_force: f64,
-    /// Penetration (m), 0 when apart.
-    pub penetration: f64,
-    /// Part of it that no motion has brought about (m): it is left standing and pushes nothing ([`SlaveItem::admit`]).
-    pub(super) ignored: f64,
-    /// Whether penetrations that no motion has brought about are ignored.
-    pub(super) guarded: bool,
-    pub(super) energy: ContactEnergy,
-}
-
-impl SlaveItem {
-    /// A node above (or below) a cell; stiffness and damping are set by the model.
-    pub fn new(node: u32, cell: u32, xi: [f64; 2]) -> Self {
-        Self {
-            node,
-            cell,
-            sleep: 0,
-            // Spread over the nodes, so that every step searches for its share of them.
-            turn: (node % SEARCH_INTERVAL as u32) as u8,
-            plain: false,
-            direction: [0.0; 3],
-            active: false,
-            xi,
-            stiffness: 0.0,
-            damping: 0.0,
-            multiplier: 0.0,
-            work: 0.0,
-            slip: [0.0; 3],
-            force: [0.0; 3],
-            weights: shape(xi),
-            share: [0.0; 3],
-            second: NONE,
-            second_weights: [0.0; 4],
-            second_share: [0.0; 3],
-            normal_force: 0.0,
-            penetration: 0.0,
-            ignored: 0.0,
-            guarded: false,
-            energy: ContactEnergy::default(),
-        }
-    }
-
-    pub(super) fn part(&mut self) {
-        self.active = false;
-        self.ignored = 0.0;
-        self.plain = false;
-        self.multiplier = 0.0;
-        self.work = 0.0;
-        self.second = NONE;
-        self.slip = [0.0; 3];
-        self.force = [0.0; 3];
-        self.normal_force = 0.0;
-        self.penetration = 0.0;
-        self.energy = ContactEnergy::default();
-    }
-
-    /// Takes note of a penetration `depth` (m, negative when apart) after a step `dt` (s) at the relative velocity
-    /// `rel` (m/s), and gives the part of it that pushes.
-    ///
-    /// What motion cannot have brought about has come from the search: another face of a fold has become the
-    /// closest one, or a slave has got behind a rim. To push it out would make energy from nothing. It is left
-    /// standing; as the slave comes out it shrinks, and it never grows again.
-    #[inline]
-    fn admit(&mut self, depth: f64, rel: V, dt: f64, offset: f64) -> f64 {
-        let jump = depth - self.penetration;
-        if self.guarded && jump > SLACK * offset && jump > SLACK * offset + 2.0 * norm(rel) * dt {
-            self.ignored += jump;
-        }
-        self.ignored = self.ignored.min(depth.max(0.0));
-        depth - self.ignored
-    }
-}
-
-/// What a search may move the closest point by while nothing folds, over the offset.
-const SLACK: f64 = 1e-2;
-
-/// How often (steps) the closest point of a slave in touch is searched anew. In between it keeps its place in the
-/// cell: it slides by some micrometres, which changes the distance by less than a nanometre.
-pub(super) const SEARCH_INTERVAL: u8 = 4;
 
 /// Slaves of one sheet on one master sheet.
 pub struct SheetContact {
@@ -146,6 +31,11 @@ pub struct SheetContact {
     pub augmentation: f64,
     /// The slaves.
     pub items: Vec<SlaveItem>,
+    /// By slave: call of [`SheetContact::compute`] before which it cannot touch. Apart from the items, so that to pass over one
+    /// that sleeps touches eight bytes and not some cache lines.
+    wakes: Vec<u64>,
+    spans: Vec<Span>,
+    cycle: u64,
 }
 
 /// Bilinear shape functions at `xi`.
@@ -190,7 +80,7 @@ pub(super) struct Closest {
     pub(super) arm: V,
     pub(super) distance2: f64,
     /// Half the cell's shorter middle line (m).
-    half: f64,
+    pub(super) half: f64,
     /// The foot of the perpendicular, not a place held at a side of the cell.
     pub(super) interior: bool,
 }
@@ -372,6 +262,29 @@ pub(super) fn blend(first: &Closest, second: Option<&Closest>, offset: f64) -> (
 }
 
 impl SheetContact {
+    /// A master sheet and its slaves; the settings' `stiffness_factor` and `damping_ratio` are not used here.
+    pub fn new(
+        name: String,
+        side: f64,
+        offset: f64,
+        friction: impl Into<FrictionLaw>,
+        settings: &ContactSettings,
+        items: Vec<SlaveItem>,
+    ) -> Self {
+        Self {
+            name,
+            side,
+            offset,
+            friction: friction.into(),
+            slip_factor: settings.slip_factor,
+            augmentation: settings.augmentation,
+            items,
+            wakes: Vec::new(),
+            spans: Vec::new(),
+            cycle: 0,
+        }
+    }
+
     /// Computes the force of every slave. `reach` (m): twice the furthest that any node moves in a step.
     pub fn compute(&mut self, s: &Surface<'_>, v: &[V], dt: f64, reach: f64) -> ContactEnergy {
         match self.friction.clone() {
@@ -388,247 +301,168 @@ impl SheetContact {
         dt: f64,
         reach: f64,
     ) -> ContactEnergy {
-        let (side, offset) = (self.side, self.offset);
+        let side = self.side;
         let law = Law {
             dt,
             friction,
-            offset,
+            offset: self.offset,
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
+        let cycle = self.cycle;
+        self.cycle += 1;
+        self.wakes.resize(self.items.len(), 0);
+        self.spans
+            .resize_with(self.items.len().div_ceil(SPAN), Span::default);
         self.items
-            .par_iter_mut()
-            .with_min_len(256)
-            .for_each(|item| {
-                if item.cell == NONE {
+            .par_chunks_mut(SPAN)
+            .zip_eq(self.wakes.par_chunks_mut(SPAN))
+            .zip_eq(self.spans.par_iter_mut())
+            .for_each(|((items, wakes), span)| {
+                if cycle < span.wake {
                     return;
                 }
-                if item.sleep > 0 {
-                    item.sleep -= 1;
-                    return;
-                }
-                let n = item.node as usize;
-                item.turn = item.turn.wrapping_add(1);
-                if item.active && item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
-                    hold(item, s, v, offset, &law);
-                    return;
-                }
-                // In touch, the place moves by far less than a cell in a step: one iteration follows it.
-                let found = track(s, item, s.x[n], if item.active { 1 } else { 3 }, |_| true);
-                let first = &found.first;
-                (item.cell, item.xi) = (first.cell, first.xi);
-                let nodes = s.cells[first.cell as usize];
-                let up = combine(first.weights, &nodes.map(|n| s.normals[n as usize]));
-                let distance = first.distance2.sqrt();
-                let height = side * dot(first.arm, up);
-                // At a free rim the sheet is round: there the gap is the distance, wherever the slave lies. On its
-                // own side, it is so too; a slave whose mid-surface has just passed through the master's has a
-                // negative one. Anything else lies beyond a fold.
-                let at_rim = first.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM);
-                let mut plain = false;
-                let pull = if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
-                    let (d, w) = blend(first, found.second.as_ref(), offset);
-                    let n = scale(first.arm, (1.0 - w) / distance);
-                    let m = match &found.second {
-                        Some(c) if w > 0.0 => scale(c.arm, w / c.distance2.sqrt()),
-                        _ => [0.0; 3],
-                    };
-                    plain = w == 0.0 && !at_rim;
-                    Pull {
-                        gap: d - offset,
-                        share: w,
-                        first: n,
-                        second: m,
-                    }
-                } else if item.active && height < -0.5 * distance && height > -offset {
-                    let n = scale(up, side);
-                    Pull {
-                        gap: height - offset,
-                        share: 0.0,
-                        first: n,
-                        second: [0.0; 3],
-                    }
-                } else {
-                    item.part();
-                    return;
+                *span = Span {
+                    wake: u64::MAX,
+                    ..Span::default()
                 };
-                // A slave that comes from beside cannot be deep inside at once: it has got behind the rim.
-                let behind = !item.active && pull.gap < -0.5 * offset;
-                let apart = pull.gap > 0.0 && item.multiplier == 0.0;
-                if behind || apart {
-                    item.part();
-                    item.sleep = (pull.gap.max(0.0) / reach).min(50.0) as u32;
-                } else {
-                    item.plain = plain;
-                    item.direction = pull.first;
-                    touch(item, s, v, &pull, &found, &law);
+                for (item, wake) in items.iter_mut().zip(wakes) {
+                    if cycle >= *wake {
+                        match follow(item, s, v, side, reach, &law) {
+                            Met::Touch(energy) => {
+                                span.energy.add(&energy);
+                                span.touches = true;
+                            }
+                            Met::Apart(steps) => *wake = cycle + 1 + steps,
+                            Met::Never => *wake = u64::MAX,
+                        }
+                    }
+                    span.wake = span.wake.min(*wake);
                 }
             });
         let mut total = ContactEnergy::default();
-        for item in self.items.iter().filter(|i| i.active) {
-            total.add(&item.energy);
+        for span in self.spans.iter().filter(|s| s.touches) {
+            total.add(&span.energy);
         }
         total
     }
 
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
     pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
-        scatter(self.items.iter(), cells, f);
-    }
-}
-
-/// Adds the forces of the items in touch to `f` (N): all masters', then all slaves'.
-pub(super) fn scatter<'a>(
-    items: impl Iterator<Item = &'a SlaveItem> + Clone,
-    cells: &[[u32; 4]],
-    f: &mut [V],
-) {
-    let mut push = |cell: u32, weights: &[f64; 4], force: V| {
-        for (w, n) in weights.iter().zip(cells[cell as usize]) {
-            let n = n as usize;
-            f[n] = sub(f[n], scale(force, *w));
-        }
-    };
-    for item in items.clone().filter(|i| i.active) {
-        push(item.cell, &item.weights, item.share);
-        if item.second != NONE {
-            push(item.second, &item.second_weights, item.second_share);
+        for (items, span) in self.items.chunks(SPAN).zip(&self.spans) {
+            if span.touches {
+                scatter(items.iter(), cells, f);
+            }
         }
     }
-    for item in items.filter(|i| i.active) {
-        let node = item.node as usize;
-        f[node] = add(f[node], item.force);
+
+    /// What changes: slaves and their sleep.
+    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        a.value(&mut self.cycle)?;
+        a.value(&mut self.wakes)?;
+        a.value(&mut self.spans)?;
+        a.values(&mut self.items)
     }
 }
 
-/// Gap and its gradient for the slave: `first` and `second` are minus the gradients for the two cells' points.
-pub(super) struct Pull {
-    pub(super) gap: f64,
-    pub(super) share: f64,
-    pub(super) first: V,
-    pub(super) second: V,
+/// Slaves whose energies are summed, and that are passed over while all of them sleep.
+const SPAN: usize = 256;
+
+/// A run of [`SPAN`] slaves.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+struct Span {
+    /// Call of [`SheetContact::compute`] in which the first of them wakes.
+    wake: u64,
+    /// Whether any touched in the last call.
+    touches: bool,
+    energy: ContactEnergy,
 }
 
-/// Force of a slave that keeps its place in its cell and its direction. (The distance to a point that stands
-/// still would not do: pressed at a tenth of a millimetre from it, the slave is a pendulum on its head.)
+/// How a slave has been found.
+enum Met {
+    Touch(ContactEnergy),
+    /// So many steps may pass before it can touch.
+    Apart(u64),
+    /// It has no cell to touch.
+    Never,
+}
+
+/// Follows a slave to the closest point of the surface and computes its force.
 #[inline]
-pub(super) fn hold<F: Coulomb>(
+fn follow<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
     v: &[V],
-    offset: f64,
+    side: f64,
+    reach: f64,
     law: &Law<'_, F>,
-) {
-    let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
-    let arm = sub(s.x[item.node as usize], combine(item.weights, &x));
-    let n = item.direction;
-    let pull = Pull {
-        gap: dot(arm, n) - offset,
+) -> Met {
+    if item.cell == NONE {
+        return Met::Never;
+    }
+    item.turn = item.turn.wrapping_add(1);
+    if item.active && item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
+        return Met::Touch(hold(item, s, v, law));
+    }
+    // In touch, the place moves by far less than a cell in a step: one iteration follows it.
+    let iterations = if item.active { 1 } else { 3 };
+    let found = track(s, item, s.x[item.node as usize], iterations, |_| true);
+    (item.cell, item.xi) = (found.first.cell, found.first.xi);
+    let Some((pull, plain)) = pull_of(item, s, &found, side, law.offset) else {
+        item.part();
+        return Met::Apart(0);
+    };
+    // A slave that comes from beside cannot be deep inside at once: it has got behind the rim.
+    let behind = !item.active && pull.gap < -0.5 * law.offset;
+    let apart = pull.gap > 0.0 && item.multiplier == 0.0;
+    if behind || apart {
+        item.part();
+        return Met::Apart((pull.gap.max(0.0) / reach).min(50.0) as u64);
+    }
+    item.plain = plain;
+    item.direction = pull.first;
+    Met::Touch(touch(item, s, v, &pull, &found, law))
+}
+
+/// Gap and direction of a slave whose closest point is found, and whether it may keep both for some steps; `None`: it lies
+/// beyond a fold.
+#[inline]
+fn pull_of(
+    item: &SlaveItem,
+    s: &Surface<'_>,
+    found: &Found,
+    side: f64,
+    offset: f64,
+) -> Option<(Pull, bool)> {
+    let first = &found.first;
+    let nodes = s.cells[first.cell as usize];
+    let up = combine(first.weights, &nodes.map(|n| s.normals[n as usize]));
+    let distance = first.distance2.sqrt();
+    let height = side * dot(first.arm, up);
+    // At a free rim the sheet is round: there the gap is the distance, wherever the slave lies. On its
+    // own side, it is so too; a slave whose mid-surface has just passed through the master's has a
+    // negative one. Anything else lies beyond a fold.
+    let at_rim = first.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM);
+    if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
+        let (d, w) = blend(first, found.second.as_ref(), offset);
+        let second = match &found.second {
+            Some(c) if w > 0.0 => scale(c.arm, w / c.distance2.sqrt()),
+            _ => [0.0; 3],
+        };
+        let pull = Pull {
+            gap: d - offset,
+            share: w,
+            first: scale(first.arm, (1.0 - w) / distance),
+            second,
+        };
+        return Some((pull, w == 0.0 && !at_rim));
+    }
+    let through = item.active && height < -0.5 * distance && height > -offset;
+    let pull = || Pull {
+        gap: height - offset,
         share: 0.0,
-        first: n,
+        first: scale(up, side),
         second: [0.0; 3],
     };
-    let (cell, xi, weights) = (item.cell, item.xi, item.weights);
-    let first = Closest {
-        cell,
-        xi,
-        weights,
-        arm,
-        distance2: 0.0,
-        half: 0.0,
-        interior: true,
-    };
-    touch(
-        item,
-        s,
-        v,
-        &pull,
-        &Found {
-            first,
-            second: None,
-        },
-        law,
-    );
-}
-
-/// Constants of a contact in a step.
-pub(super) struct Law<'a, F> {
-    pub(super) dt: f64,
-    pub(super) offset: f64,
-    pub(super) friction: &'a F,
-    pub(super) slip_factor: f64,
-    pub(super) augmentation: f64,
-}
-
-/// Force of a slave in touch, or so lately that it still has a multiplier.
-#[inline]
-pub(super) fn touch<F: Coulomb>(
-    item: &mut SlaveItem,
-    s: &Surface<'_>,
-    v: &[V],
-    pull: &Pull,
-    found: &Found,
-    law: &Law<'_, F>,
-) {
-    let speed = |c: &Closest| combine(c.weights, &s.cells[c.cell as usize].map(|n| v[n as usize]));
-    let own = v[item.node as usize];
-    let first = &found.first;
-    let rel1 = sub(own, speed(first));
-    let (mut rel, mut vn) = (rel1, dot(rel1, pull.first));
-    let second = found.second.as_ref().filter(|_| pull.share > 0.0);
-    if let Some(c) = second {
-        let rel2 = sub(own, speed(c));
-        vn += dot(rel2, pull.second);
-        rel = add(scale(rel1, 1.0 - pull.share), scale(rel2, pull.share));
-    }
-    let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
-    let depth = -pull.gap;
-    let gap = -item.admit(depth, rel, law.dt, law.offset);
-    let rest = content(law.offset);
-    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
-    let n = unit(add(pull.first, pull.second));
-    let vt = sub(rel, scale(n, dot(rel, n)));
-    let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-    let limit = law.friction.limit(&Sliding {
-        node: item.node,
-        cell: first.cell,
-        x: s.x,
-        normal: n,
-        force: normal.force,
-        held: rest,
-        vt,
-        spring: law.slip_factor * k * law.dt,
-    });
-    let f = friction_force(
-        rest,
-        vt,
-        law.dt,
-        law.slip_factor * k,
-        law.slip_factor * c,
-        limit,
-    );
-    item.active = true;
-    item.slip = f.slip;
-    item.weights = first.weights;
-    item.share = add(
-        scale(pull.first, normal.force),
-        scale(f.force, 1.0 - pull.share),
-    );
-    item.force = item.share;
-    item.second = NONE;
-    if let Some(c) = second {
-        item.second = c.cell;
-        item.second_weights = c.weights;
-        item.second_share = add(scale(pull.second, normal.force), scale(f.force, pull.share));
-        item.force = add(item.force, item.second_share);
-    }
-    item.normal_force = normal.force;
-    item.multiplier = normal.multiplier;
-    item.work = normal.work;
-    item.penetration = depth.max(0.0);
-    item.energy = ContactEnergy {
-        stored: normal.stored + f.stored,
-        friction: f.friction,
-        damping: normal.loss + f.damping,
-    };
+    through.then(|| (pull(), false))
 }

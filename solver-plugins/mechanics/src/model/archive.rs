@@ -38,7 +38,7 @@ impl Model {
             contact.archive(a)?;
         }
         for contact in &mut self.sheet_contacts {
-            a.values(&mut contact.items)?;
+            contact.archive(a)?;
         }
         for contact in &mut self.self_contacts {
             contact.archive(a)?;

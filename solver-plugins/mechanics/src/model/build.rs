@@ -407,7 +407,7 @@ impl Model {
                 item.stiffness = c.stiffness_factor * reduced / dt2;
                 row[item.node as usize] += item.stiffness;
                 for (k, n) in nodes.iter().enumerate() {
-                    row[*n as usize] += item.weights[k] * item.stiffness;
+                    row[*n as usize] += item.weights()[k] * item.stiffness;
                 }
             }
         }
@@ -457,7 +457,7 @@ impl Model {
         for item in sheets.filter(on_sheets) {
             row[item.node as usize] += 2.0 * item.damping;
             for (k, n) in self.cells[item.cell as usize].iter().enumerate() {
-                row[*n as usize] += 2.0 * item.weights[k] * item.damping;
+                row[*n as usize] += 2.0 * item.weights()[k] * item.damping;
             }
         }
         let of = row.iter().zip(&self.mass);
@@ -499,7 +499,7 @@ impl Model {
         for item in self.sheet_contacts.iter().flat_map(|c| &c.items) {
             if item.cell != crate::mesh::NONE {
                 used[item.node as usize] += item.stiffness;
-                for (w, n) in item.weights.iter().zip(self.cells[item.cell as usize]) {
+                for (w, n) in item.weights().iter().zip(self.cells[item.cell as usize]) {
                     used[n as usize] += w.max(0.0) * item.stiffness;
                 }
             }

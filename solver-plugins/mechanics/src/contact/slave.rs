@@ -1,0 +1,277 @@
+//! One node of a sheet on another sheet: its state, its force in touch, and where that goes.
+
+use super::friction::{Coulomb, Sliding};
+use super::sheets::{Closest, Found, Surface, combine, shape};
+use super::{ContactEnergy, content, friction_force, normal_force};
+use crate::mesh::NONE;
+use crate::vec3::{V, add, dot, norm, scale, sub, unit};
+use serde::{Deserialize, Serialize};
+
+/// One slave node.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SlaveItem {
+    /// Model node.
+    pub node: u32,
+    /// Master cell (model numbering) or [`NONE`].
+    pub cell: u32,
+    /// The other cell of a concave fold in which the slave lies, or [`NONE`].
+    pub(super) second: u32,
+    pub(super) turn: u8,
+    /// The last search found one cell, on the slave's own side.
+    pub(super) plain: bool,
+    /// In touch in the last step.
+    pub active: bool,
+    /// Whether penetrations that no motion has brought about are ignored.
+    pub(super) guarded: bool,
+    /// Direction from master to slave at the last search.
+    pub(super) direction: V,
+    /// Place in the cell, -1..1.
+    pub xi: [f64; 2],
+    /// Place in the second cell.
+    pub(super) second_xi: [f64; 2],
+    /// Normal stiffness (N/m).
+    pub stiffness: f64,
+    /// Damping (N s/m).
+    pub damping: f64,
+    /// Multiplier: the steady part of the normal force (N).
+    pub multiplier: f64,
+    pub(super) work: f64,
+    /// Friction force held by the slip spring (N).
+    pub slip: V,
+    /// Force on the slave (N): minus this acts on the cells' nodes.
+    pub force: V,
+    /// The second cell's share of it (N).
+    pub(super) second_share: V,
+    /// Normal part of the force (N).
+    pub normal_force: f64,
+    /// Penetration (m), 0 when apart.
+    pub penetration: f64,
+    /// Part of it that no motion has brought about (m): it is left standing and pushes nothing ([`SlaveItem::admit`]).
+    pub(super) ignored: f64,
+}
+
+impl SlaveItem {
+    /// A node above (or below) a cell; stiffness and damping are set by the model.
+    pub fn new(node: u32, cell: u32, xi: [f64; 2]) -> Self {
+        Self {
+            node,
+            cell,
+            second: NONE,
+            // Spread over the nodes, so that every step searches for its share of them.
+            turn: (node % u32::from(SEARCH_INTERVAL)) as u8,
+            plain: false,
+            active: false,
+            guarded: false,
+            direction: [0.0; 3],
+            xi,
+            second_xi: [0.0; 2],
+            stiffness: 0.0,
+            damping: 0.0,
+            multiplier: 0.0,
+            work: 0.0,
+            slip: [0.0; 3],
+            force: [0.0; 3],
+            second_share: [0.0; 3],
+            normal_force: 0.0,
+            penetration: 0.0,
+            ignored: 0.0,
+        }
+    }
+
+    /// Weights of the cell's nodes.
+    pub fn weights(&self) -> [f64; 4] {
+        shape(self.xi)
+    }
+
+    pub(super) fn part(&mut self) {
+        self.active = false;
+        self.ignored = 0.0;
+        self.plain = false;
+        self.multiplier = 0.0;
+        self.work = 0.0;
+        self.second = NONE;
+        self.slip = [0.0; 3];
+        self.force = [0.0; 3];
+        self.normal_force = 0.0;
+        self.penetration = 0.0;
+    }
+
+    /// Takes note of a penetration `depth` (m, negative when apart) after a step `dt` (s) at the relative velocity
+    /// `rel` (m/s), and gives the part of it that pushes.
+    ///
+    /// What motion cannot have brought about has come from the search: another face of a fold has become the
+    /// closest one, or a slave has got behind a rim. To push it out would make energy from nothing. It is left
+    /// standing; as the slave comes out it shrinks, and it never grows again.
+    #[inline]
+    fn admit(&mut self, depth: f64, rel: V, dt: f64, offset: f64) -> f64 {
+        let jump = depth - self.penetration;
+        if self.guarded && jump > SLACK * offset && jump > SLACK * offset + 2.0 * norm(rel) * dt {
+            self.ignored += jump;
+        }
+        self.ignored = self.ignored.min(depth.max(0.0));
+        depth - self.ignored
+    }
+}
+
+/// What a search may move the closest point by while nothing folds, over the offset.
+const SLACK: f64 = 1e-2;
+
+/// How often (steps) the closest point of a slave in touch is searched anew. In between it keeps its place in the
+/// cell: it slides by some micrometres, which changes the distance by less than a nanometre.
+pub(super) const SEARCH_INTERVAL: u8 = 4;
+
+/// Adds the forces of the items in touch to `f` (N), slaves and masters.
+pub(super) fn scatter<'a>(
+    items: impl Iterator<Item = &'a SlaveItem>,
+    cells: &[[u32; 4]],
+    f: &mut [V],
+) {
+    fn push(cell: [u32; 4], xi: [f64; 2], force: V, f: &mut [V]) {
+        for (w, n) in shape(xi).iter().zip(cell) {
+            let n = n as usize;
+            f[n] = sub(f[n], scale(force, *w));
+        }
+    }
+    for item in items.filter(|i| i.active) {
+        let cell = |c: u32| cells[c as usize];
+        if item.second == NONE {
+            push(cell(item.cell), item.xi, item.force, f);
+        } else {
+            let share = sub(item.force, item.second_share);
+            push(cell(item.cell), item.xi, share, f);
+            push(cell(item.second), item.second_xi, item.second_share, f);
+        }
+        let node = item.node as usize;
+        f[node] = add(f[node], item.force);
+    }
+}
+
+/// Gap and its gradient for the slave: `first` and `second` are minus the gradients for the two cells' points.
+pub(super) struct Pull {
+    pub(super) gap: f64,
+    pub(super) share: f64,
+    pub(super) first: V,
+    pub(super) second: V,
+}
+
+/// Force of a slave that keeps its place in its cell and its direction. (The distance to a point that stands
+/// still would not do: pressed at a tenth of a millimetre from it, the slave is a pendulum on its head.)
+#[inline]
+pub(super) fn hold<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    v: &[V],
+    law: &Law<'_, F>,
+) -> ContactEnergy {
+    let weights = item.weights();
+    let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
+    let arm = sub(s.x[item.node as usize], combine(weights, &x));
+    let n = item.direction;
+    let pull = Pull {
+        gap: dot(arm, n) - law.offset,
+        share: 0.0,
+        first: n,
+        second: [0.0; 3],
+    };
+    let (cell, xi) = (item.cell, item.xi);
+    let first = Closest {
+        cell,
+        xi,
+        weights,
+        arm,
+        distance2: 0.0,
+        half: 0.0,
+        interior: true,
+    };
+    touch(
+        item,
+        s,
+        v,
+        &pull,
+        &Found {
+            first,
+            second: None,
+        },
+        law,
+    )
+}
+
+/// Constants of a contact in a step.
+#[derive(Clone, Copy)]
+pub(super) struct Law<'a, F> {
+    pub(super) dt: f64,
+    pub(super) offset: f64,
+    pub(super) friction: &'a F,
+    pub(super) slip_factor: f64,
+    pub(super) augmentation: f64,
+}
+
+/// Force of a slave in touch, or so lately that it still has a multiplier.
+#[inline]
+pub(super) fn touch<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    v: &[V],
+    pull: &Pull,
+    found: &Found,
+    law: &Law<'_, F>,
+) -> ContactEnergy {
+    let speed = |c: &Closest| combine(c.weights, &s.cells[c.cell as usize].map(|n| v[n as usize]));
+    let own = v[item.node as usize];
+    let first = &found.first;
+    let rel1 = sub(own, speed(first));
+    let (mut rel, mut vn) = (rel1, dot(rel1, pull.first));
+    let second = found.second.as_ref().filter(|_| pull.share > 0.0);
+    if let Some(c) = second {
+        let rel2 = sub(own, speed(c));
+        vn += dot(rel2, pull.second);
+        rel = add(scale(rel1, 1.0 - pull.share), scale(rel2, pull.share));
+    }
+    let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
+    let depth = -pull.gap;
+    let gap = -item.admit(depth, rel, law.dt, law.offset);
+    let rest = content(law.offset);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
+    let n = unit(add(pull.first, pull.second));
+    let vt = sub(rel, scale(n, dot(rel, n)));
+    let rest = sub(item.slip, scale(n, dot(item.slip, n)));
+    let limit = law.friction.limit(&Sliding {
+        node: item.node,
+        cell: first.cell,
+        x: s.x,
+        normal: n,
+        force: normal.force,
+        held: rest,
+        vt,
+        spring: law.slip_factor * k * law.dt,
+    });
+    let f = friction_force(
+        rest,
+        vt,
+        law.dt,
+        law.slip_factor * k,
+        law.slip_factor * c,
+        limit,
+    );
+    item.active = true;
+    item.slip = f.slip;
+    item.second = NONE;
+    item.force = add(
+        scale(pull.first, normal.force),
+        scale(f.force, 1.0 - pull.share),
+    );
+    if let Some(c) = second {
+        (item.second, item.second_xi) = (c.cell, c.xi);
+        item.second_share = add(scale(pull.second, normal.force), scale(f.force, pull.share));
+        item.force = add(item.force, item.second_share);
+    }
+    item.normal_force = normal.force;
+    item.multiplier = normal.multiplier;
+    item.work = normal.work;
+    item.penetration = depth.max(0.0);
+    ContactEnergy {
+        stored: normal.stored + f.stored,
+        friction: f.friction,
+        damping: normal.loss + f.damping,
+    }
+}
