@@ -14,7 +14,7 @@ const N: usize = 10;
 fn census(wrinkles: usize, width: f64, deviation: f64, moment: Option<f64>) -> MemoryArtifact {
     let wave = |k: usize| {
         json!({"angle": k, "z": 0.0, "height": -1e-3 * (k + 1) as f64, "prominence": 1e-3,
-        "width": width, "shear": if k % 2 == 0 { 0.1 } else { -0.1 }, "length": 0.03})
+        "width": width, "shear": if k.is_multiple_of(2) { 0.1 } else { -0.1 }, "length": 0.03})
     };
     let waves: Vec<Value> = (0..wrinkles).map(wave).collect();
     let node = |i: usize, j: usize| (j * (N + 1) + i) as u32;
