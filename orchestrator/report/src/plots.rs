@@ -84,7 +84,7 @@ pub(crate) fn drawn(
     plots
 }
 
-fn in_words(value: &Value) -> &'static str {
+pub(crate) fn in_words(value: &Value) -> &'static str {
     match value {
         Value::Null => "nothing",
         Value::Bool(_) => "true or false",
@@ -147,7 +147,7 @@ impl GivenAxis {
 }
 
 /// A unit as it is printed: `mm2` is mm².
-fn pretty(unit: &str) -> String {
+pub(crate) fn pretty(unit: &str) -> String {
     let mut out = String::new();
     for c in unit.trim().chars() {
         let behind_letter = out.chars().last().is_some_and(char::is_alphabetic);
@@ -241,7 +241,7 @@ fn values(artifact: &Artifact, path: &str, unit: &str) -> Result<Vec<f64>, Strin
 }
 
 /// SI value = scale x (value in `unit`) + offset; `None` when `unit` is not of the dimension of `stored`.
-fn to_si(unit: &str, stored: &str) -> Option<(f64, f64)> {
+pub(crate) fn to_si(unit: &str, stored: &str) -> Option<(f64, f64)> {
     let none = |u: &str| matches!(u.trim(), "" | "1");
     if none(unit) && none(stored) {
         return Some((1.0, 0.0));

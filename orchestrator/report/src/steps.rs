@@ -1,9 +1,11 @@
-//! What steps carry for people: plots and files of any artifact; coupons and characterisations with their numbers.
+//! What steps carry for people: tables, plots, maps and files of any artifact; coupons and characterisations with their numbers.
 
 use crate::input::{Instance, ReportInput};
+use crate::maps::{self, Map};
 use crate::plots;
 use crate::read::{Facts, FormingFacts, History, Ply, open, shown_sheet};
 use crate::study::Run;
+use crate::tables;
 use maud::Markup;
 use serde::Deserialize;
 
@@ -11,6 +13,8 @@ use serde::Deserialize;
 const PLOTS: usize = 120;
 /// The drawn plots of a page are together about this long at most (bytes).
 const LENGTH: usize = 2_500_000;
+/// Panels of maps that are drawn on a page.
+const PANELS: usize = 60;
 /// Steps of which the deformed sheet is drawn.
 const PICTURES: usize = 12;
 
@@ -23,6 +27,10 @@ pub(crate) struct Shown {
     pub(crate) title: String,
     /// Whether its results stand beside its plots: it is a coupon or a characterisation.
     pub(crate) numbers: bool,
+    /// Its tables, drawn.
+    pub(crate) tables: Vec<Markup>,
+    /// Its maps.
+    pub(crate) maps: Vec<Map>,
     /// Its plots, drawn.
     pub(crate) plots: Vec<Markup>,
     /// Its text files.
@@ -46,7 +54,7 @@ pub(crate) fn read(
     facts: &[Option<Facts>],
     problems: &mut Vec<String>,
 ) -> Vec<Shown> {
-    let mut room = PLOTS;
+    let mut room = [PLOTS, PANELS];
     let mut length = 0;
     let mut pictures = PICTURES;
     let mut all = Vec::new();
@@ -58,10 +66,12 @@ pub(crate) fn read(
             if let Some(run) = &mut shown.run {
                 run.instance = at;
             }
-            room = room.saturating_sub(shown.plots.len());
+            let panels: usize = shown.maps.iter().map(Map::panels).sum();
+            room[0] = room[0].saturating_sub(shown.plots.len());
+            room[1] = room[1].saturating_sub(panels);
             length += shown.plots.iter().map(|p| p.0.len()).sum::<usize>();
             if length > LENGTH {
-                room = 0;
+                room[0] = 0;
             }
             if shown.sheet.is_some() && pictures == 0 {
                 shown.sheet = None;
@@ -74,10 +84,17 @@ pub(crate) fn read(
     all
 }
 
-fn one(instance: &Instance, facts: &Facts, room: usize, wrong: &mut Vec<String>) -> Option<Shown> {
+/// What is shown of one step, of at most as many plots and panels of maps as there is room for.
+fn one(
+    instance: &Instance,
+    facts: &Facts,
+    room: [usize; 2],
+    wrong: &mut Vec<String>,
+) -> Option<Shown> {
     let a = &facts.attributes;
     let numbers = matches!(facts.kind.as_str(), "coupon" | "characterisation");
-    if !numbers && a["plots"].is_null() && a["files"].is_null() {
+    let carried = ["plots", "files", "tables", "maps"];
+    if !numbers && carried.iter().all(|what| a[*what].is_null()) {
         return None;
     }
     let mut shown = Shown {
@@ -86,11 +103,13 @@ fn one(instance: &Instance, facts: &Facts, room: usize, wrong: &mut Vec<String>)
             .map_or_else(|| instance.label(), str::to_owned),
         numbers,
         files: files(&a["files"], wrong),
+        tables: tables::drawn(a, wrong),
         ..Shown::default()
     };
     match open(&instance.artifact) {
         Ok(artifact) => {
-            shown.plots = plots::drawn(a, &artifact, room, wrong);
+            shown.plots = plots::drawn(a, &artifact, room[0], wrong);
+            shown.maps = maps::read(a, &artifact, room[1], wrong);
             if facts.kind == "coupon" {
                 shown.sheet = shown_sheet(&artifact);
                 shown.run = run(instance, facts, wrong);

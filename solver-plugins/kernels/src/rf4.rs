@@ -33,7 +33,8 @@ pub const PATCH_NODES: usize = 12;
 const TERMS: usize = 5;
 /// Area, count, then `[node - 1][term]` weights.
 const PATCH_CONSTANTS: usize = 2 + (PATCH_NODES - 1) * TERMS;
-const PATCH_FIELDS: usize = 2;
+/// Curvatures and moments along the two fibre families.
+const PATCH_FIELDS: usize = 4;
 
 /// The formulation for one material.
 pub struct Rf4 {
@@ -128,6 +129,7 @@ fn forces_with(batch: &mut PatchBatch<'_>, material: &MaterialRef, mut s: View<'
             for a in 0..2 {
                 let stretch = s.metric[a * n + l].max(f64::MIN_POSITIVE);
                 fields[a * n + l] = s.curvature[a * n + l] / stretch;
+                fields[(2 + a) * n + l] = s.moment[a * n + l];
             }
         }
     }

@@ -90,8 +90,8 @@ mod row {
 /// Rows of history: directors `[4][3]`; with lagged tangents also those of [`lag`]; then the
 /// material's bending history.
 const DIRECTORS: usize = 12;
-/// Rows of fields: those of [`crate::quad`], then the curvatures along the two fibre families.
-const FIELDS: usize = quad::FIELDS + 2;
+/// Rows of fields: those of [`crate::quad`], then curvatures and moments along the two fibre families.
+const FIELDS: usize = quad::FIELDS + 4;
 /// The rotations' share of omega^2.
 const ROTATION_SHARE: f64 = 0.125;
 
@@ -557,5 +557,7 @@ fn fields_of(n: usize, s: &forces::View<'_>, fields: &mut [f64]) {
         fields[3 * n + l] = bounds::largest(c11, c22, c12).max(0.0).sqrt();
         fields[4 * n + l] = s.curvature[l] / c11.max(f64::MIN_POSITIVE);
         fields[5 * n + l] = s.curvature[n + l] / c22.max(f64::MIN_POSITIVE);
+        fields[6 * n + l] = s.moment[l];
+        fields[7 * n + l] = s.moment[n + l];
     }
 }

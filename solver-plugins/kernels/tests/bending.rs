@@ -71,6 +71,7 @@ fn quadratic_surfaces_give_their_curvature_exactly_on_distorted_patches() {
             })
             .collect();
         let f = e.patch_forces(&mut p, &moved);
+        let law = bend(&m, [1.0, 1.0, 0.0], k);
         for l in 0..8 {
             for a in 0..2 {
                 let got = f.fields[a * 8 + l];
@@ -80,9 +81,15 @@ fn quadratic_surfaces_give_their_curvature_exactly_on_distorted_patches() {
                     a + 1,
                     k[a]
                 );
+                let (got, want) = (f.fields[(2 + a) * 8 + l], law.moment[a]);
+                assert!(
+                    (got - want).abs() < 1e-7 * want.abs() + 1e-12,
+                    "bending_moment_{} {got}, not {want}",
+                    a + 1
+                );
             }
         }
-        let want = SIZE * SIZE * bend(&m, [1.0, 1.0, 0.0], k).energy;
+        let want = SIZE * SIZE * law.energy;
         assert!(
             f.energy.iter().all(|w| (w - want).abs() < 1e-6 * want),
             "{:?}, {want}",

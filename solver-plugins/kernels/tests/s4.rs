@@ -317,6 +317,12 @@ fn patch_of_distorted_elements_carries_constant_curvature_and_twist_exactly() {
                         a + 1,
                         k[a]
                     );
+                    let moment = q.out.fields[(6 + a) * 16 + l];
+                    assert!(
+                        (moment - 0.005 * k[a]).abs() < 5e-11,
+                        "bending_moment_{} {moment}",
+                        a + 1
+                    );
                 }
             }
         }

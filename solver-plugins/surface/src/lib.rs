@@ -1,10 +1,11 @@
 //! Geometry of meshed surfaces that several steps share: exact closest point and signed distance,
-//! curvature, ridge lines, location in an undeformed quad mesh. All lengths in m. Everything is
+//! curvature, distributions, ridge lines, location in an undeformed quad mesh. All lengths in m. Everything is
 //! deterministic: ties go to the lowest index.
 
 mod closest;
 mod conformity;
 mod curvature;
+mod distribution;
 mod locate;
 mod ridge;
 mod topology;
@@ -13,6 +14,7 @@ pub mod vector;
 pub use closest::{Closest, Feature, Surface};
 pub use conformity::{NodalDistance, foot_height, nodal_distances, tool_crests};
 pub use curvature::{Curvature, curvatures};
+pub use distribution::{bin_width, density, weighted_mean, weighted_quantiles};
 pub use locate::{Location, QuadLocator};
 pub use ridge::{Ridge, ridge_line};
 pub use topology::{Topology, triangles};

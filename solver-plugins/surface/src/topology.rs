@@ -213,6 +213,15 @@ impl Topology {
         areas
     }
 
+    /// The areas of [`Topology::node_areas`], but 0 at nodes on a free edge: for what is known only where a node is
+    /// surrounded by cells.
+    pub fn inner_node_areas(&self, points: &[Vec3]) -> Vec<f64> {
+        let areas = self.node_areas(points).into_iter().enumerate();
+        areas
+            .map(|(i, a)| if self.is_free(i) { 0.0 } else { a })
+            .collect()
+    }
+
     /// Length of the shortest path over cell sides and diagonals from the nearest of `sources` to every
     /// node (m); infinite beyond `reach` and where `passable` (`[nodes]`) does not let it through.
     pub fn path_lengths(

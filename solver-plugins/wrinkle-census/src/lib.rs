@@ -1,35 +1,37 @@
-//! Step plugin `wrinkle-census`: wrinkles of a formed ply on circles about a vertical axis, and sections through it.
+//! Step plugin `wrinkle-census`: wrinkles of a formed ply on circles about a vertical axis, sections through it, and the
+//! distributions of its deviation and of its bending moments.
 //!
 //! Made for parts pressed by an axisymmetric punch (thesis chapter 4): there wrinkles run outwards, and a circle crosses
 //! each of them once.
 
+mod deviation;
+mod moments;
+mod parameters;
+mod plot;
+mod spread;
 mod surface;
+mod trace;
 mod waves;
 
 pub use surface::{Cut, Hit};
-pub use waves::{Wave, median, waves};
+pub use trace::Trace;
+pub use waves::{Criteria, Side, Wave, median, waves};
 
-use plyflow_sdk::{Host, Input, Step, StepError, export_step};
+use parameters::Parameters;
+use plot::{Curve, Plots};
+use plyflow_sdk::{Host, Input, On, Step, StepError, export_step};
+use plyflow_surface::Topology;
 use plyflow_surface::vector::Vec3;
+use plyflow_surface::{weighted_mean, weighted_quantiles};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use spread::Spread;
 use std::f64::consts::TAU;
 
 /// The step.
 pub struct WrinkleCensus;
 
 export_step!(WrinkleCensus);
-
-#[derive(Deserialize)]
-struct Parameters {
-    ply: Option<String>,
-    centre: Vec<f64>,
-    circles: Vec<f64>,
-    inner_circles: Vec<f64>,
-    sections: Vec<f64>,
-    threshold: f64,
-    samples: usize,
-}
 
 #[derive(Deserialize)]
 struct Formed {
@@ -40,13 +42,25 @@ struct Formed {
 struct Sheet {
     name: String,
     kind: String,
+    #[serde(default)]
+    thickness: f64,
+    #[serde(default)]
+    offset: f64,
 }
 
 /// A ply in its last frame.
 struct Ply {
+    name: String,
+    /// Undeformed and formed points (m).
+    flat: Vec<Vec3>,
     points: Vec<Vec3>,
     cells: Vec<u32>,
     shear: Vec<f64>,
+    /// Distance of its mid-surface from the tool when the stack lies on it, and thickness of the stack (m).
+    offset: f64,
+    stack: f64,
+    /// What of it is bent how much; `None` when the artifact does not say.
+    moments: Option<(On, Vec<f64>)>,
 }
 
 impl Step for WrinkleCensus {
@@ -54,18 +68,13 @@ impl Step for WrinkleCensus {
 
     fn run(host: &Host) -> Result<(), StepError> {
         let p: Parameters = host.parameters()?;
-        let [x, y] = p.centre[..] else {
-            return Err(format!(
-                "centre: given {} numbers; expected two, [x, y]",
-                p.centre.len()
-            )
-            .into());
-        };
-        if p.circles.is_empty() {
-            return Err("circles: given none; expected at least one radius".into());
-        }
-        let ply = read(host, &host.input("formed")?, p.ply.as_deref())?;
+        p.check()?;
+        let input = host.input("formed")?;
+        let frame = last_frame(host, &input)?;
+        let ply = read(host, &input, frame, p.ply.as_deref())?;
+        let rests = deviation::rests(host, &input, frame, &ply, p.surfaces.as_deref())?;
         let cut = Cut::new(&ply.points, &ply.cells, &ply.shear);
+        let [x, y] = [p.centre[0], p.centre[1]];
         let around = |radius: f64| -> Vec<Option<Hit>> {
             let place = |i: usize| {
                 let (s, c) = (TAU * i as f64 / p.samples as f64).sin_cos();
@@ -73,45 +82,68 @@ impl Step for WrinkleCensus {
             };
             (0..p.samples).map(place).collect()
         };
-        let mut plots = Vec::new();
-        let counted = circles(host, &p, &around, &mut plots)?;
+        let mut plots = Plots::default();
+        let mut counted = circles(host, &p, &around, &mut plots)?;
+        let trace = Trace {
+            around: &around,
+            what: p.criteria(),
+            step: p.trace_step,
+            inner: p.inner_circles.iter().copied().fold(p.trace_step, f64::max),
+        };
+        trace.lengths(p.circles[0], &mut counted[0]);
         let inner = inner_deviation(&p, &around)?;
-        sections(host, &p, &cut, [x, y], &mut plots)?;
+        sections(host, &p, &cut, &mut plots)?;
+        let deviation = (!rests.is_empty()).then(|| deviation::deviations(&ply.points, &rests));
+        let maps = fields(host, &p, &ply, deviation, &mut plots)?;
         let list: Vec<Value> = (p.circles.iter().zip(&counted))
             .map(|(radius, waves)| json!({"radius": radius, "wrinkles": waves}))
             .collect();
         host.write_attributes(&json!({
-            "circles": list, "threshold": p.threshold, "plots": plots,
+            "ply": ply.name, "circles": list, "threshold": p.threshold, "prominence": p.criteria().prominence,
+            "curves": plots.curves, "plots": plots.plots, "maps": maps,
         }))?;
         results(host, &counted[0], inner)
     }
 }
 
-fn read(host: &Host, input: &Input, wanted: Option<&str>) -> Result<Ply, StepError> {
+fn last_frame(host: &Host, input: &Input) -> Result<usize, StepError> {
+    let frames = host.meshes(input)?.times.len();
+    let last = frames.checked_sub(1);
+    last.ok_or_else(|| format!("'{}' has no frame to measure", input.step).into())
+}
+
+fn read(host: &Host, input: &Input, frame: usize, wanted: Option<&str>) -> Result<Ply, StepError> {
     let formed: Formed = host.attributes(input)?;
-    let plies: Vec<&str> = (formed.sheets.iter().filter(|s| s.kind == "ply"))
-        .map(|s| s.name.as_str())
-        .collect();
-    let name = match wanted {
-        Some(name) if plies.contains(&name) => name,
-        Some(name) => {
-            let there = plies.join(", ");
-            return Err(format!("ply: given '{name}'; expected one of {there}").into());
-        }
+    let plies: Vec<&Sheet> = formed.sheets.iter().filter(|s| s.kind == "ply").collect();
+    let sheet = match wanted {
+        Some(name) => plies.iter().find(|s| s.name == name).ok_or_else(|| {
+            let there: Vec<&str> = plies.iter().map(|s| s.name.as_str()).collect();
+            format!("ply: given '{name}'; expected one of {}", there.join(", "))
+        })?,
         None => plies
             .first()
-            .copied()
             .ok_or_else(|| format!("'{}' has no ply", input.step))?,
     };
     let meshes = host.meshes(input)?;
-    let frame = meshes.times.len().checked_sub(1);
-    let frame = frame.ok_or_else(|| format!("'{}' has no frame to measure", input.step))?;
-    let body = meshes.body(name)?;
-    let (_, cells) = host.mesh(input, body)?;
+    let body = meshes.body(&sheet.name)?;
+    if body.nodes_per_cell != 4 {
+        let n = body.nodes_per_cell;
+        return Err(format!(
+            "ply '{}' has cells of {n} nodes; quads are expected",
+            sheet.name
+        )
+        .into());
+    }
+    let (flat, cells) = host.mesh(input, body)?;
     Ok(Ply {
+        name: sheet.name.clone(),
         points: host.frame_points(input, body, frame)?,
-        cells,
         shear: host.frame_field(input, body, frame, "shear_angle")?,
+        moments: moments::read(host, input, body, frame)?,
+        offset: sheet.offset,
+        stack: formed.sheets.iter().map(|s| s.thickness).sum(),
+        flat,
+        cells,
     })
 }
 
@@ -120,7 +152,7 @@ fn circles(
     host: &Host,
     p: &Parameters,
     around: &dyn Fn(f64) -> Vec<Option<Hit>>,
-    plots: &mut Vec<Value>,
+    plots: &mut Plots,
 ) -> Result<Vec<Vec<Wave>>, StepError> {
     let (mut counted, mut series) = (Vec::new(), Vec::new());
     for (k, radius) in p.circles.iter().enumerate() {
@@ -132,7 +164,7 @@ fn circles(
             )
             .into());
         };
-        counted.push(waves(&hits, *radius, p.threshold));
+        counted.push(waves(&hits, *radius, &p.criteria()));
         let on = hits
             .iter()
             .enumerate()
@@ -140,21 +172,16 @@ fn circles(
         let (angle, height): (Vec<f64>, Vec<f64>) = on
             .map(|(i, h)| (TAU * i as f64 / p.samples as f64, h.height - middle))
             .unzip();
-        let label = format!("radius {:.0} mm", 1e3 * radius);
-        series.push(curve(
-            host,
-            &format!("circle_{k}"),
-            &label,
-            ["angle", "rad"],
-            &angle,
-            &height,
-        )?);
+        let curve = Curve {
+            name: format!("circle_{k}"),
+            label: format!("radius {:.0} mm", 1e3 * radius),
+            x: ("angle", "rad", &angle),
+            y: ("height", "m", &height),
+        };
+        series.push(plots.curve(host, "circles", &curve)?);
     }
-    plots.push(json!({
-        "name": "circles", "title": "Height around the axis, less its median",
-        "x": {"label": "angle from x", "unit": "deg"}, "y": {"label": "height", "unit": "mm"},
-        "series": series,
-    }));
+    let title = "Height around the axis, less its median";
+    plots.heights("circles", title, ["angle from x", "deg"], series);
     Ok(counted)
 }
 
@@ -179,79 +206,163 @@ fn inner_deviation(
     Ok(largest)
 }
 
-/// Writes the sections.
+/// Writes the sections through the axis, and those across.
 fn sections(
     host: &Host,
     p: &Parameters,
     cut: &Cut<'_>,
-    [x, y]: [f64; 2],
-    plots: &mut Vec<Value>,
+    plots: &mut Plots,
 ) -> Result<(), StepError> {
     let reach = p.circles.iter().copied().fold(0.0, f64::max);
+    // Along the direction (c, s) through the place `from`, `half` to both sides.
+    let line = |from: [f64; 2], [c, s]: [f64; 2], half: f64| -> (Vec<f64>, Vec<f64>) {
+        let place = |i: usize| half * (2.0 * i as f64 / (p.samples - 1) as f64 - 1.0);
+        let height = |d: f64| Some((d, cut.top([from[0] + d * c, from[1] + d * s])?.height));
+        (0..p.samples).map(place).filter_map(height).unzip()
+    };
+    let [x, y] = [p.centre[0], p.centre[1]];
     let mut series = Vec::new();
     for (k, angle) in p.sections.iter().enumerate() {
         let (s, c) = angle.sin_cos();
-        let place = |i: usize| reach * (2.0 * i as f64 / (p.samples - 1) as f64 - 1.0);
-        let hits = (0..p.samples).map(place);
-        let (along, height): (Vec<f64>, Vec<f64>) = hits
-            .filter_map(|d| Some((d, cut.top([x + d * c, y + d * s])?.height)))
-            .unzip();
-        let label = format!("section at {:.0} deg", angle.to_degrees());
-        series.push(curve(
-            host,
-            &format!("section_{k}"),
-            &label,
-            ["distance", "m"],
-            &along,
-            &height,
-        )?);
+        let (along, height) = line([x, y], [c, s], reach);
+        let curve = Curve {
+            name: format!("section_{k}"),
+            label: format!("section at {:.0} deg", angle.to_degrees()),
+            x: ("distance", "m", &along),
+            y: ("height", "m", &height),
+        };
+        series.push(plots.curve(host, "sections", &curve)?);
     }
-    if !series.is_empty() {
-        plots.push(json!({
-            "name": "sections", "title": "Sections through the axis",
-            "x": {"label": "distance from the axis", "unit": "mm"}, "y": {"label": "height", "unit": "mm"},
-            "series": series,
-        }));
+    let axis = ["distance from the axis", "mm"];
+    plots.heights("sections", "Sections through the axis", axis, series);
+    let mut series = Vec::new();
+    for (k, across) in p.cross_sections.iter().enumerate() {
+        let (s, c) = across.angle.sin_cos();
+        let from = [x + across.offset * c, y + across.offset * s];
+        let (along, height) = line(from, [-s, c], reach);
+        if along.is_empty() {
+            return Err(format!(
+                "cross_sections: '{}' at {:.1} mm from the axis lies all beside the ply; take a smaller offset",
+                across.label,
+                1e3 * across.offset
+            )
+            .into());
+        }
+        let curve = Curve {
+            name: format!("cross_section_{k}"),
+            label: across.label.clone(),
+            x: ("distance", "m", &along),
+            y: ("height", "m", &height),
+        };
+        series.push(plots.curve(host, "cross_sections", &curve)?);
     }
+    let axis = ["distance along the section", "mm"];
+    plots.heights("cross_sections", "Sections across", axis, series);
     Ok(())
 }
 
-/// Writes `curves/<name>/<what>` and `curves/<name>/height`; the series of a plot that shows them.
-fn curve(
+/// Writes the ply with its deviation and moments, and their distributions; the maps that show them.
+fn fields(
     host: &Host,
-    name: &str,
-    label: &str,
-    [what, unit]: [&str; 2],
-    x: &[f64],
-    height: &[f64],
-) -> Result<Value, StepError> {
-    let (along, up) = (
-        format!("curves/{name}/{what}"),
-        format!("curves/{name}/height"),
-    );
-    host.write_f64(&along, &[x.len()], unit, x)?;
-    host.write_f64(&up, &[height.len()], "m", height)?;
-    Ok(json!({"label": label, "x": along, "y": up}))
+    p: &Parameters,
+    ply: &Ply,
+    deviation: Option<Vec<f64>>,
+    plots: &mut Plots,
+) -> Result<Vec<Value>, StepError> {
+    let topology = Topology::new(ply.flat.len(), 4, &ply.cells);
+    let mut spreads = Vec::new();
+    if let Some(values) = deviation {
+        let weights = topology.node_areas(&ply.flat);
+        if let Some(radius) = p.dome_radius {
+            dome(host, p, ply, radius, &values, &weights)?;
+        }
+        spreads.push(Spread {
+            name: "deviation",
+            title: "Deviation from punch and die",
+            unit: "m",
+            shown: "mm",
+            on: On::Points,
+            values,
+            weights,
+        });
+    }
+    if let Some((on, values)) = ply.moments.clone() {
+        spreads.push(Spread {
+            name: "bending_moment",
+            title: "RMS bending moment along the fibres",
+            unit: "N",
+            shown: "N",
+            weights: moments::weights(on, &topology, &ply.flat),
+            on,
+            values,
+        });
+    }
+    for spread in &spreads {
+        spread.write(host, plots)?;
+    }
+    host.define_mesh(
+        &ply.name,
+        &ply.flat,
+        4,
+        &ply.cells,
+        &json!({"ply": ply.name}),
+    )?;
+    host.begin_frame(0.0)?;
+    host.write_points(&ply.name, &ply.points)?;
+    host.write_field(&ply.name, On::Cells, "shear_angle", 1, "rad", &ply.shear)?;
+    let mut maps = Vec::new();
+    for s in &spreads {
+        host.write_field(&ply.name, s.on, s.name, 1, s.unit, &s.values)?;
+        maps.push(json!({"name": s.name, "title": s.title, "unit": s.shown,
+                         "panels": [{"label": ply.name, "body": ply.name, "field": s.name}]}));
+    }
+    host.end_frame()?;
+    Ok(maps)
+}
+
+/// Deviation of what lies within a radius of the axis.
+fn dome(
+    host: &Host,
+    p: &Parameters,
+    ply: &Ply,
+    radius: f64,
+    values: &[f64],
+    weights: &[f64],
+) -> Result<(), StepError> {
+    let within = |q: &Vec3| (q[0] - p.centre[0]).hypot(q[1] - p.centre[1]) <= radius;
+    let weights: Vec<f64> = (ply.points.iter().zip(weights))
+        .map(|(q, w)| if within(q) { *w } else { 0.0 })
+        .collect();
+    let largest = weighted_quantiles(values, &weights, &[1.0])[0];
+    host.result("dome_deviation_mean", weighted_mean(values, &weights), "m")?;
+    host.result("dome_deviation_largest", largest, "m")
 }
 
 fn results(host: &Host, waves: &[Wave], inner: f64) -> Result<(), StepError> {
+    let mean = |of: &dyn Fn(&Wave) -> bool, what: fn(&Wave) -> f64| {
+        let values: Vec<f64> = waves.iter().filter(|w| of(w)).map(what).collect();
+        values.iter().sum::<f64>() / values.len().max(1) as f64
+    };
     let count = |of: &dyn Fn(&Wave) -> bool| waves.iter().filter(|w| of(w)).count() as f64;
     host.result("wrinkles", count(&|_| true), "1")?;
     for k in 0..4 {
         let name = format!("wrinkles_q{}", k + 1);
         host.result(&name, count(&|w| w.quadrant() == k), "1")?;
     }
-    let positive = |w: &Wave| w.shear > 0.0;
-    let negative = |w: &Wave| w.shear <= 0.0;
-    host.result("wrinkles_positive_shear", count(&positive), "1")?;
-    host.result("wrinkles_negative_shear", count(&negative), "1")?;
+    host.result("height_mean", mean(&|_| true, |w| w.height.abs()), "m")?;
     let highest = waves.iter().map(|w| w.height.abs()).fold(0.0, f64::max);
     host.result("height_largest", highest, "m")?;
-    let width = |of: &dyn Fn(&Wave) -> bool| {
-        let widths = waves.iter().filter(|w| of(w)).map(|w| w.width);
-        widths.sum::<f64>() / count(of).max(1.0)
-    };
-    host.result("width_positive_shear", width(&positive), "m")?;
-    host.result("width_negative_shear", width(&negative), "m")?;
+    host.result("width_mean", mean(&|_| true, |w| w.width), "m")?;
+    host.result("length_mean", mean(&|_| true, |w| w.length), "m")?;
+    for (sign, positive) in [("positive", true), ("negative", false)] {
+        let of = move |w: &Wave| (w.shear > 0.0) == positive;
+        host.result(&format!("wrinkles_{sign}_shear"), count(&of), "1")?;
+        host.result(&format!("width_{sign}_shear"), mean(&of, |w| w.width), "m")?;
+        host.result(
+            &format!("length_{sign}_shear"),
+            mean(&of, |w| w.length),
+            "m",
+        )?;
+    }
     host.result("inner_deviation", inner, "m")
 }

@@ -1,14 +1,17 @@
-//! The step on a surface whose wrinkles are known.
+//! The step on surfaces whose wrinkles, deviations and moments are known.
 
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
 use plyflow_wrinkle_census::WrinkleCensus;
 use serde_json::{Value, json};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+/// Cells along a side.
+const N: usize = 100;
 
 /// A square of 300 mm in cells of 3 mm; `z` (m) by radius and angle; shear positive where x y > 0.
 fn formed(z: impl Fn(f64, f64) -> f64) -> MemoryArtifact {
-    const N: usize = 100;
     let at = |i: usize| 0.3 * (i as f64 / N as f64 - 0.5);
     let points: Vec<Vec3> = (0..(N + 1) * (N + 1))
         .map(|k| [at(k % (N + 1)), at(k / (N + 1)), 0.0])
@@ -48,11 +51,48 @@ fn formed(z: impl Fn(f64, f64) -> f64) -> MemoryArtifact {
     };
     MemoryArtifact {
         kind: "forming".into(),
-        attributes: json!({"sheets": [{"name": "ply_1", "kind": "ply"}]}),
+        attributes: json!({"sheets": [{"name": "ply_1", "kind": "ply", "thickness": 4e-4, "offset": 2e-4}]}),
         times: vec![1.0],
         bodies: vec![ply],
         ..Default::default()
     }
+}
+
+/// A level square plate of 1 m at that height (m).
+fn plate(name: &str, z: f64) -> MemoryBody {
+    MemoryBody {
+        name: name.into(),
+        points: vec![
+            [-0.5, -0.5, z],
+            [0.5, -0.5, z],
+            [0.5, 0.5, z],
+            [-0.5, 0.5, z],
+        ],
+        nodes_per_cell: 4,
+        cells: vec![0, 1, 2, 3],
+        ..Default::default()
+    }
+}
+
+/// Gives the ply moments along its families (N) on its points or cells.
+fn bent(mut input: MemoryArtifact, on: On, moments: impl Fn(usize) -> [f64; 2]) -> MemoryArtifact {
+    let rows = if on == On::Cells {
+        N * N
+    } else {
+        (N + 1) * (N + 1)
+    };
+    for (family, name) in ["bending_moment_1", "bending_moment_2"]
+        .into_iter()
+        .enumerate()
+    {
+        input.bodies[0].fields[0].push(MemoryField {
+            name: name.into(),
+            on,
+            components: 1,
+            values: (0..rows).map(|k| moments(k)[family]).collect(),
+        });
+    }
+    input
 }
 
 fn census(input: &MemoryArtifact, with: Value) -> Result<MemoryArtifact, String> {
@@ -62,26 +102,27 @@ fn census(input: &MemoryArtifact, with: Value) -> Result<MemoryArtifact, String>
 
 fn parameters(circles: Value) -> Value {
     json!({"centre": [0.0, 0.0], "circles": circles, "inner_circles": [0.02, 0.04],
-           "sections": [0.0, std::f64::consts::FRAC_PI_4], "threshold": 1e-3, "samples": 720})
+           "sections": [0.0, FRAC_PI_4], "threshold": 1e-3, "samples": 720})
 }
 
-#[test]
-fn wrinkles_on_the_diagonals_are_counted_by_quadrant_and_shear() {
-    // Outside of a dome of 50 mm: four wrinkles on the diagonals, those at negative shear twice as wide.
-    let input = formed(|r, a| {
+/// Outside of a dome of 50 mm: four wrinkles 3 mm high on the diagonals, those at negative shear twice as wide; they
+/// start at 50 mm and are whole from 60 mm on.
+fn four_wrinkles() -> MemoryArtifact {
+    formed(|r, a| {
         let dome = (0.05f64.powi(2) - r * r).max(0.0).sqrt();
         let wave = |top: f64, wide: f64| {
             let d = (a - top).sin().atan2((a - top).cos());
             3e-3 * (-(4.0 * 2f64.ln()) * (d / wide).powi(2)).exp()
         };
         let on = [(0.25, 0.15), (0.75, 0.3), (-0.75, 0.15), (-0.25, 0.3)];
-        let waves: f64 = on
-            .map(|(q, w)| wave(q * std::f64::consts::PI, w))
-            .iter()
-            .sum();
+        let waves: f64 = on.map(|(q, w)| wave(q * PI, w)).iter().sum();
         dome + waves * ((r - 0.05) / 0.01).clamp(0.0, 1.0)
-    });
-    let found = census(&input, parameters(json!([0.09, 0.07]))).unwrap();
+    })
+}
+
+#[test]
+fn wrinkles_on_the_diagonals_are_counted_by_quadrant_and_shear() {
+    let found = census(&four_wrinkles(), parameters(json!([0.09, 0.07]))).unwrap();
     let of = |name: &str| found.result(name);
     assert_eq!(of("wrinkles"), 4.0);
     for q in 1..=4 {
@@ -92,8 +133,15 @@ fn wrinkles_on_the_diagonals_are_counted_by_quadrant_and_shear() {
         [2.0, 2.0]
     );
     assert!((of("height_largest") - 3e-3).abs() < 1e-4);
+    assert!((of("height_mean") - 3e-3).abs() < 1e-4);
     assert!((of("width_positive_shear") - 0.15 * 0.09).abs() < 1.5e-3);
     assert!((of("width_negative_shear") - 0.3 * 0.09).abs() < 1.5e-3);
+    // 1 mm of height is reached at 53.3 mm. Outwards the corner of the ply, at 212 mm, leaves less and less of a circle: the
+    // wrinkle stands 1 mm over its ends up to 201 mm where it is narrow, to 192 mm where it is wide.
+    let long = of("length_positive_shear");
+    assert!((long - 0.1477).abs() < 4e-3, "{long}");
+    let long = of("length_negative_shear");
+    assert!((long - 0.1387).abs() < 4e-3, "{long}");
     // Cells of 3 mm on a sphere of 50 mm.
     assert!(of("inner_deviation") < 3e-4, "{}", of("inner_deviation"));
     let circles = found.attributes["circles"].as_array().unwrap();
@@ -102,6 +150,158 @@ fn wrinkles_on_the_diagonals_are_counted_by_quadrant_and_shear() {
     let top = height.iter().copied().fold(0.0, f64::max);
     assert!((top - 0.05).abs() < 1e-4);
     assert_eq!(found.attributes["plots"].as_array().unwrap().len(), 2);
+    // Neither tool nor moments: nothing is made up.
+    assert!(!found.results.keys().any(|k| k.starts_with("deviation")));
+    assert!(
+        !found
+            .results
+            .keys()
+            .any(|k| k.starts_with("bending_moment"))
+    );
+}
+
+#[test]
+fn a_section_across_shows_the_wrinkle_that_it_cuts() {
+    let mut with = parameters(json!([0.09]));
+    with["cross_sections"] = json!([{"label": "A-A'", "angle": FRAC_PI_4, "offset": 0.09}, {"label": "B-B'", "angle": FRAC_PI_2, "offset": 0.09}]);
+    let found = census(&four_wrinkles(), with.clone()).unwrap();
+    let at = |k: usize, what: &str| {
+        found.arrays[&format!("curves/cross_section_{k}/{what}")]
+            .1
+            .clone()
+    };
+    let (along, height) = (at(0, "distance"), at(0, "height"));
+    let peak = |of: &[f64]| of.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let top = (0..height.len())
+        .max_by(|a, b| height[*a].total_cmp(&height[*b]))
+        .unwrap();
+    // The wrinkle's top lies in the middle of the section.
+    assert!(along[top].abs() < 5e-4 && (height[top] - 3e-3).abs() < 1e-4);
+    // B-B' stands between two wrinkles: its middle is level.
+    let (along, height) = (at(1, "distance"), at(1, "height"));
+    let near: Vec<f64> = along
+        .iter()
+        .zip(&height)
+        .filter(|(d, _)| d.abs() < 0.02)
+        .map(|(_, h)| *h)
+        .collect();
+    assert!(peak(&near) < 3e-5, "{}", peak(&near));
+    assert!(found.attributes["plots"].to_string().contains("A-A'"));
+    with["cross_sections"][0]["offset"] = json!(0.4);
+    let told = census(&four_wrinkles(), with).unwrap_err();
+    assert!(told.contains("A-A'") && told.contains("400.0 mm"), "{told}");
+}
+
+#[test]
+fn deviation_is_the_distance_from_the_nearest_surface_less_that_at_rest() {
+    // The die above the ply at 10 mm: at rest its mid-surface is 0.2 mm below. Three quarters of the ply lie there, a
+    // quarter hangs 4 mm lower, but for a tenth of that which lies on the punch at 2 mm.
+    let mut input = formed(|_, _| 0.0);
+    let places = input.bodies[0].frames[0].clone();
+    for p in places.iter().zip(&mut input.bodies[0].frames[0]) {
+        let (from, to) = p;
+        to[2] = if from[0] < 0.075 - 1e-9 {
+            9.8e-3
+        } else {
+            5.8e-3
+        };
+        if from[0] > 0.075 + 1e-9 && from[1] < -0.12 - 1e-9 {
+            to[2] = 2.2e-3;
+        }
+    }
+    input.bodies.push(plate("die", 10e-3));
+    input.bodies.push(plate("tool", 2e-3));
+    input.bodies.push(plate("holder", 3e-3));
+    let mut with = parameters(json!([0.09]));
+    with["inner_circles"] = json!([]);
+    with["dome_radius"] = json!(0.05);
+    let found = census(&input, with.clone()).unwrap();
+    let of = |name: &str| found.result(name);
+    // Hangs 4 mm under the die, 3.8 mm - 0.2 mm over the punch: the nearest counts, 3.6 mm.
+    assert!(
+        (of("deviation_largest") - 3.6e-3).abs() < 1e-12,
+        "{}",
+        of("deviation_largest")
+    );
+    assert!(of("deviation_q50") < 1e-15 && of("dome_deviation_largest") < 1e-15);
+    assert!((of("deviation_q90") - 3.6e-3).abs() < 1e-12);
+    // 75 of 300 mm, half a cell more at the nodes of the step; less its tenth of 30 mm.
+    let expected = 3.6e-3 * (76.5 * 300.0 - 73.5 * 28.5) / 9e4;
+    assert!(
+        (of("deviation_mean") - expected).abs() < 1e-3 * expected,
+        "{} {expected}",
+        of("deviation_mean")
+    );
+    // The body carries it, and the map names it.
+    assert_eq!(
+        found.body("ply_1").last("deviation").len(),
+        (N + 1) * (N + 1)
+    );
+    assert_eq!(
+        found.attributes["maps"][0]["panels"][0]["field"],
+        "deviation"
+    );
+    // The density integrates to the whole.
+    let value = &found.arrays["curves/deviation/value"].1;
+    let sum: f64 = found.arrays["curves/deviation/density"].1.iter().sum();
+    assert!((sum * (value[1] - value[0]) - 1.0).abs() < 1e-9, "{sum}");
+    // With the die alone, 4 mm and 7.6 mm.
+    with["surfaces"] = json!(["die"]);
+    let found = census(&input, with.clone()).unwrap();
+    assert!((found.result("deviation_largest") - 7.6e-3).abs() < 1e-12);
+    for (surfaces, told) in [(json!(["dei"]), "'dei'"), (json!([]), "given none")] {
+        with["surfaces"] = surfaces;
+        let error = census(&input, with.clone()).unwrap_err();
+        assert!(
+            error.contains("surfaces: ") && error.contains(told),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn moments_of_both_families_are_spread_by_area() {
+    // On cells: 3 and 4 N in a fifth of the ply, 1 and 1 N in the rest.
+    let level = || formed(|_, _| 0.0);
+    let cells = bent(level(), On::Cells, |k| {
+        if k % N < N / 5 {
+            [3.0, -4.0]
+        } else {
+            [1.0, -1.0]
+        }
+    });
+    let mut with = parameters(json!([0.09]));
+    with["inner_circles"] = json!([]);
+    let found = census(&cells, with.clone()).unwrap();
+    let of = |name: &str| found.result(name);
+    let high = 12.5f64.sqrt();
+    assert_eq!(
+        [of("bending_moment_q50"), of("bending_moment_largest")],
+        [1.0, high]
+    );
+    assert_eq!(of("bending_moment_q90"), high);
+    assert!((of("bending_moment_mean") - (0.8 + 0.2 * high)).abs() < 1e-9);
+    assert_eq!(found.results["bending_moment_mean"].1, "N");
+    // On points: a node on the edge has no moment and counts for nothing.
+    let inside = |k: usize| (1..N).contains(&(k % (N + 1))) && (1..N).contains(&(k / (N + 1)));
+    let points = bent(level(), On::Points, |k| {
+        if inside(k) { [2.0, 2.0] } else { [0.0, 0.0] }
+    });
+    let found = census(&points, with.clone()).unwrap();
+    let of = |name: &str| found.result(name);
+    assert!((of("bending_moment_mean") - 2.0).abs() < 1e-12);
+    let value = &found.arrays["curves/bending_moment/value"].1;
+    let density = &found.arrays["curves/bending_moment/density"].1;
+    assert!((density.iter().sum::<f64>() * (value[1] - value[0]) - 1.0).abs() < 1e-9);
+    // One family on points and one on cells cannot be put together.
+    let mut mixed = bent(level(), On::Cells, |_| [1.0, 1.0]);
+    mixed.bodies[0].fields[0][2].on = On::Points;
+    mixed.bodies[0].fields[0][2].values = vec![1.0; (N + 1) * (N + 1)];
+    let told = census(&mixed, with).unwrap_err();
+    assert!(
+        told.contains("bending_moment_2") && told.contains("both on"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Steps with plots: coupons, characterisations and whatever else carries some.
+//! Steps with plots, maps and tables: coupons, characterisations and whatever else carries some.
 
 use super::tables::{expected_text, got_text};
 use crate::field::Field;
@@ -51,6 +51,10 @@ fn block(input: &ReportInput, shown: &Shown, sharp: Sharpness) -> Result<Markup,
         Some(sheet) => pictures(sheet, shown.instance, sharp)?,
         None => html! {},
     };
+    let mut maps = Vec::new();
+    for (k, map) in shown.maps.iter().enumerate() {
+        maps.push(map.drawn(&format!("map-{}-{k}", shown.instance), sharp)?);
+    }
     let label = instance.label();
     Ok(html! {
         div class="step-block" {
@@ -59,6 +63,8 @@ fn block(input: &ReportInput, shown: &Shown, sharp: Sharpness) -> Result<Markup,
                 " " span class="note" { (instance.record.kind) }
             }
             @if shown.numbers { (numbers(input, instance)) }
+            @for table in &shown.tables { (table) }
+            @for map in &maps { (map) }
             @if !shown.plots.is_empty() { div class="plots" { @for plot in &shown.plots { (plot) } } }
             (pictures)
             @if !shown.files.is_empty() { (files(input, &label, &shown.files)) }

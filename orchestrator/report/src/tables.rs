@@ -1,0 +1,138 @@
+//! Tables that an artifact carries in its attributes, for every kind of artifact (`tables` in the data model).
+
+use crate::plots::in_words;
+use crate::units::{number, shown};
+use maud::{Markup, html};
+use serde::Deserialize;
+use serde_json::Value;
+
+/// Rows of a table that are shown.
+const ROWS: usize = 200;
+
+/// A table as the attributes give it.
+#[derive(Debug, Deserialize)]
+struct Given {
+    name: String,
+    title: Option<String>,
+    columns: Vec<Column>,
+    rows: Vec<Vec<Value>>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Column {
+    label: String,
+    /// SI unit of its numbers.
+    #[serde(default)]
+    unit: String,
+}
+
+/// Draws the tables that the attributes of an artifact describe. What is wrong is said in `wrong`, one text each.
+pub(crate) fn drawn(attributes: &Value, wrong: &mut Vec<String>) -> Vec<Markup> {
+    let all = match &attributes["tables"] {
+        Value::Null => return Vec::new(),
+        Value::Array(all) => all,
+        other => {
+            let what = in_words(other);
+            wrong.push(format!(
+                "its attribute 'tables' is {what}; expected a list of tables"
+            ));
+            return Vec::new();
+        }
+    };
+    let mut tables = Vec::new();
+    for (i, value) in all.iter().enumerate() {
+        match Given::deserialize(value) {
+            Ok(given) => tables.push(table(&given, wrong)),
+            Err(e) => {
+                let name = value["name"].as_str().unwrap_or_default();
+                wrong.push(format!("table {} '{name}' of its attributes: {e}", i + 1));
+            }
+        }
+    }
+    tables
+}
+
+fn table(given: &Given, wrong: &mut Vec<String>) -> Markup {
+    let of = |text: String| format!("table '{}': {text}", given.name);
+    let wide = given.columns.len();
+    for (i, row) in given
+        .rows
+        .iter()
+        .enumerate()
+        .filter(|(_, r)| r.len() != wide)
+    {
+        let got = row.len();
+        wrong.push(of(format!(
+            "row {} has {got} cells; expected {wide}",
+            i + 1
+        )));
+    }
+    if given.rows.len() > ROWS {
+        let all = given.rows.len();
+        wrong.push(of(format!("the first {ROWS} of its {all} rows are shown")));
+    }
+    let numeric = |k: usize| {
+        given
+            .rows
+            .iter()
+            .any(|r| r.get(k).is_some_and(Value::is_number))
+    };
+    let class = |k: usize| if numeric(k) { "n" } else { "" };
+    html! {
+        p class="plot-title" { (given.title.as_deref().unwrap_or(&given.name)) }
+        div class="scroll" { table {
+            thead { tr { @for (k, c) in given.columns.iter().enumerate() { th class=(class(k)) { (heading(c)) } } } }
+            tbody { @for row in given.rows.iter().take(ROWS) { tr {
+                @for (k, (c, v)) in given.columns.iter().zip(row).enumerate() { td class=(class(k)) { (cell(c, v)) } }
+            } } }
+        } }
+    }
+}
+
+fn heading(c: &Column) -> String {
+    match shown(&c.unit).1 {
+        "" => c.label.clone(),
+        unit => format!("{} ({unit})", c.label),
+    }
+}
+
+fn cell(c: &Column, value: &Value) -> String {
+    match value {
+        Value::Null => "–".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Number(n) => number(n.as_f64().unwrap_or(f64::NAN) * shown(&c.unit).0, 4),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn numbers_are_shown_in_the_units_of_the_trade_and_mistakes_are_told() {
+        let about = json!({"tables": [
+            {"name": "runs", "columns": [{"label": "run"}, {"label": "height", "unit": "m"}],
+             "rows": [["a <b>", 0.0031], ["c", null], ["short"]]},
+            {"name": "no columns"},
+        ]});
+        let mut wrong = Vec::new();
+        let tables = drawn(&about, &mut wrong);
+        let text = &tables[0].0;
+        for part in ["height (mm)", ">3.1<", "a &lt;b&gt;", ">–<"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert_eq!(wrong.len(), 2);
+        assert!(
+            wrong[0].contains("row 3 has 1 cells; expected 2"),
+            "{wrong:?}"
+        );
+        assert!(
+            wrong[1].contains("'no columns'") && wrong[1].contains("columns"),
+            "{wrong:?}"
+        );
+        assert!(drawn(&json!({"tables": 3}), &mut wrong).is_empty());
+        assert!(wrong[2].contains("a number"), "{wrong:?}");
+    }
+}

@@ -1,0 +1,121 @@
+//! The table of the runs, and how their wrinkles change with the bending stiffness.
+
+use crate::run::{Field, Run, Wrinkle};
+use plyflow_sdk::{Host, StepError};
+use plyflow_surface::{weighted_mean, weighted_quantiles};
+use serde_json::{Value, json};
+
+/// Columns of the table: label, SI unit.
+const COLUMNS: [(&str, &str); 13] = [
+    ("run", ""),
+    ("bending stiffness", "N m"),
+    ("wrinkles", ""),
+    ("positive shear", ""),
+    ("negative shear", ""),
+    ("mean height", "m"),
+    ("largest height", "m"),
+    ("mean width", "m"),
+    ("mean length", "m"),
+    ("mean deviation", "m"),
+    ("deviation, 99 %", "m"),
+    ("mean bending moment", "N"),
+    ("bending moment, 99 %", "N"),
+];
+
+/// The table as in the data model.
+pub fn table(runs: &[Run]) -> Value {
+    let columns = COLUMNS.map(|(label, unit)| json!({"label": label, "unit": unit}));
+    let rows: Vec<Value> = runs.iter().map(row).collect();
+    json!({"name": "runs", "title": "Wrinkles on the first circle, and distributions over the ply",
+           "columns": columns, "rows": rows})
+}
+
+fn row(run: &Run) -> Value {
+    let w = &run.wrinkles;
+    let signs = w.iter().filter(|w| w.shear > 0.0).count();
+    let largest = w.iter().map(|w| w.height.abs()).reduce(f64::max);
+    let spread = |f: &Option<Field>| {
+        let mean = f.as_ref().map(|f| weighted_mean(&f.values, &f.weights));
+        let q = f.as_ref();
+        let q = q.map(|f| weighted_quantiles(&f.values, &f.weights, &[0.99])[0]);
+        (mean, q)
+    };
+    let (deviation, moment) = (spread(&run.deviation), spread(&run.bending_moment));
+    json!([
+        run.label,
+        run.bending_stiffness,
+        w.len(),
+        signs,
+        w.len() - signs,
+        mean(w, |w| w.height.abs()),
+        largest,
+        mean(w, |w| w.width),
+        mean(w, |w| w.length),
+        deviation.0,
+        deviation.1,
+        moment.0,
+        moment.1
+    ])
+}
+
+/// Over the wrinkles; `None` without one.
+fn mean(of: &[Wrinkle], what: fn(&Wrinkle) -> f64) -> Option<f64> {
+    let sum: f64 = of.iter().map(what).sum();
+    (!of.is_empty()).then(|| sum / of.len() as f64)
+}
+
+/// The runs for programs.
+pub fn list(runs: &[Run]) -> Vec<Value> {
+    let one = |r: &Run| json!({"name": r.name, "label": r.label, "bending_stiffness": r.bending_stiffness});
+    runs.iter().map(one).collect()
+}
+
+/// Whether the second number of the pairs never rises from one to the next when they are sorted by the first.
+pub fn never_rises(pairs: &[[f64; 2]]) -> bool {
+    sorted(pairs).windows(2).all(|p| p[1][1] <= p[0][1])
+}
+
+/// Whether it never falls.
+pub fn never_falls(pairs: &[[f64; 2]]) -> bool {
+    sorted(pairs).windows(2).all(|p| p[1][1] >= p[0][1])
+}
+
+fn sorted(pairs: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut all = pairs.to_vec();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    all
+}
+
+/// Reports the results.
+///
+/// # Errors
+/// When two runs have the same stiffness, or the host refuses.
+pub fn results(host: &Host, runs: &[Run]) -> Result<(), StepError> {
+    host.result("runs", runs.len() as f64, "1")?;
+    for run in runs {
+        let name = format!("wrinkles.{}", run.name);
+        host.result(&name, run.wrinkles.len() as f64, "1")?;
+    }
+    let stiff: Vec<(&Run, f64)> = (runs.iter())
+        .filter_map(|r| Some((r, r.bending_stiffness?)))
+        .collect();
+    for (k, (a, b)) in stiff.iter().enumerate() {
+        if let Some((c, _)) = stiff[..k].iter().find(|(_, other)| other == b) {
+            return Err(format!(
+                "runs: '{}' and '{}' have the same bending_stiffness, {b} N m; give each its own, or leave one's out",
+                c.name, a.name
+            )
+            .into());
+        }
+    }
+    if stiff.len() < 2 {
+        return Ok(());
+    }
+    let of = |what: &dyn Fn(&Run) -> f64| -> Vec<[f64; 2]> {
+        stiff.iter().map(|(r, b)| [*b, what(r)]).collect()
+    };
+    let falls = never_rises(&of(&|r| r.wrinkles.len() as f64));
+    let grows = never_falls(&of(&|r| mean(&r.wrinkles, |w| w.width).unwrap_or(0.0)));
+    host.result("falls", f64::from(u8::from(falls)), "1")?;
+    host.result("grows", f64::from(u8::from(grows)), "1")
+}
