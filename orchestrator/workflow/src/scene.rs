@@ -310,6 +310,7 @@ fn material_value(
 fn rules(scene: &Node, source: &Source, problems: &mut Problems) {
     sheet_rules(scene, source, problems);
     friction_rules(scene, source, problems);
+    symmetry_rules(scene, source, problems);
     let Some(tool) = scene.get("tool") else {
         return;
     };
@@ -321,6 +322,20 @@ fn rules(scene: &Node, source: &Source, problems: &mut Problems) {
         // Both top edges are rounded.
         at_most(spar, "fillet", "top_width", 0.5, source, problems);
         joggle_rules(spar, source, problems);
+    }
+}
+
+/// Every mirror plane once.
+fn symmetry_rules(scene: &Node, source: &Source, problems: &mut Problems) {
+    let planes = scene.get("symmetry").map_or(&[][..], Node::items);
+    for (i, plane) in planes.iter().enumerate() {
+        let text = plane.text();
+        if text.is_some() && planes[..i].iter().any(|p| p.text() == text) {
+            let message = format!("the plane {} is named twice", plane.describe());
+            let d = problems.add(source, &plane.span, message);
+            d.given(plane.describe())
+                .expected("each of `x` and `y` at most once");
+        }
     }
 }
 

@@ -33,6 +33,29 @@ pub struct Scene {
     pub friction: Friction,
     /// The forming process.
     pub process: Process,
+    /// Mirror planes of everything above: explicit forming computes the part with x >= 0 (y >= 0) and writes the whole.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub symmetry: Vec<MirrorPlane>,
+}
+
+/// A mirror plane through the tool's axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MirrorPlane {
+    /// The plane x = 0.
+    X,
+    /// The plane y = 0.
+    Y,
+}
+
+impl MirrorPlane {
+    /// The word for it in a scene file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+        }
+    }
 }
 
 /// The rigid tool: one of the parametric generators or an STL file.

@@ -4,6 +4,7 @@
 //! its edge, one on each sharp corner, grid lines along x and y inside.
 
 mod coarse;
+mod cut;
 mod edge;
 mod mesher;
 mod quality;
@@ -14,6 +15,7 @@ pub use mesher::mesh_region;
 pub use quality::{POOR_JACOBIAN, Quality};
 
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+use plyflow_mechanics::mirror::Planes;
 use plyflow_model::outline::{Millimetres, OutlineError, Point, Region};
 use plyflow_model::scene::Sheet;
 
@@ -42,6 +44,19 @@ pub enum MeshError {
         size: f64,
         /// Largest elements that follow it (mm).
         wanted: f64,
+    },
+    /// It is not its own mirror image. Lengths in mm.
+    #[error(
+        "the blank is not its own mirror image in the plane {plane} = 0: the image of its edge at {at} lies {apart:.3} mm off \
+         the edge; move the blank or change its outline, or leave `{plane}` out of `symmetry`"
+    )]
+    Asymmetric {
+        /// x or y.
+        plane: char,
+        /// Where.
+        at: Millimetres,
+        /// How far apart they are (mm).
+        apart: f64,
     },
     /// The edge cannot be followed at this size.
     #[error(
@@ -123,6 +138,14 @@ impl Blank {
             Self::Region(region) if region.contains(p) => 0.0,
             Self::Region(region) => region.distance_to_edge(p),
         }
+    }
+
+    /// The part of it with x >= 0 (y >= 0) beside mirror planes.
+    ///
+    /// # Errors
+    /// When it is not its own mirror image in one of them.
+    pub fn part(&self, planes: Planes) -> Result<Self, MeshError> {
+        cut::part(self, planes)
     }
 
     /// Its mesh in the plane z = 0 with edges near `size` (m), and the quality of a mesh that follows an outline.

@@ -2,14 +2,17 @@
 
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::{ComponentChoice, Parameters};
+use crate::run::Body;
+use crate::symmetry::{self, Families, MirroredBody};
 use plyflow_abi::pf_component;
-use plyflow_blank::{Blank, Quality};
+use plyflow_blank::Blank;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
     ContactSettings, FoldSpec, FrictionLaw, Plane, RigidContact, RigidItem, RigidSurface,
     SheetContact, SlaveItem,
 };
-use plyflow_mechanics::mesh::{NONE, limit_patches};
+use plyflow_mechanics::mesh::{NONE, Patch, QuadMesh};
+use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, Whole, part_patches, reflect};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
@@ -197,28 +200,67 @@ pub fn blank(sheet: &StackSheet) -> Result<Blank, String> {
     Blank::new(&sheet.scene).map_err(|e| e.to_string())
 }
 
-/// Adds a ply at height `z` (m) to the points of a model: its sheet, and the quality of a mesh that follows an outline.
+/// The part of a ply's blank that mirror planes bound: all of it without planes.
 ///
 /// # Errors
-/// A text for the user when its blank cannot be meshed or its element cannot be made.
+/// As [`blank`]; when it is not its own mirror image.
+pub fn blank_part(sheet: &StackSheet, planes: Planes) -> Result<Blank, String> {
+    let part = blank(sheet)?.part(planes);
+    part.map_err(|e| format!("ply '{}': {e}", sheet.scene.name))
+}
+
+/// Node patches of a sheet's mesh whose nodes have the numbers `nodes`, for its element. Ghosts beyond mirror planes are
+/// added to the points, to `nodes` and to `mirrors`.
+pub fn patches(
+    points: &mut Vec<V>,
+    nodes: &mut Vec<u32>,
+    mesh: &QuadMesh,
+    element: &ElementInstance,
+    mirrors: &mut Mirrors,
+) -> Vec<Patch> {
+    let most = element.sizes.patch_nodes;
+    if most == 0 || !element.material.reference().sizes().has_bending {
+        return Vec::new();
+    }
+    let (patches, ghosts) = part_patches(mesh, mirrors.planes, most);
+    for ghost in ghosts {
+        let (of, node) = (nodes[ghost.of as usize], points.len() as u32);
+        points.push(reflect(points[of as usize], ghost.image));
+        nodes.push(node);
+        mirrors.ghosts.push(Ghost { node, of, ..ghost });
+    }
+    patches
+}
+
+/// Adds a ply (its place in the stack, which is that in the model too) at height `z` (m) to the points of a model: its
+/// sheet and its body. `blank` is its part between the planes of `mirrors`.
+///
+/// # Errors
+/// A text for the user when its blank cannot be meshed, its element cannot be made, or it is not its own mirror image.
 pub fn add_ply(
     points: &mut Vec<V>,
+    mirrors: &mut Mirrors,
     blank: &Blank,
     z: f64,
-    sheet: &StackSheet,
+    (index, sheet): (usize, &StackSheet),
     p: &Parameters,
     components: &dyn Components,
-) -> Result<(SheetSpec, Option<Quality>), String> {
+) -> Result<(SheetSpec, Body), String> {
     let name = &sheet.scene.name;
     let (mesh, quality) = (blank.mesh(p.element_size)).map_err(|e| format!("ply '{name}': {e}"))?;
     let first = points.len() as u32;
     points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
     let element = element(components, sheet, &p.element)?;
-    let mut patches = mesh.patches();
-    limit_patches(&mut patches, &mesh.points, element.sizes.patch_nodes);
+    symmetry::check_material(&element, sheet, mirrors.planes)?;
+    let body = Body {
+        quality,
+        ..body(sheet, index, &mesh.points, &mesh.cells, mirrors.planes)?
+    };
+    let mut nodes = (first..points.len() as u32).collect();
+    let patches = patches(points, &mut nodes, &mesh, &element, mirrors);
     let spec = SheetSpec {
         name: name.clone(),
-        nodes: (first..points.len() as u32).collect(),
+        nodes,
         layers: vec![1.0; mesh.cells.len()],
         pressed: vec![Pressed::No; mesh.cells.len()],
         patches,
@@ -227,7 +269,7 @@ pub fn add_ply(
         axis: axis(&sheet.scene),
         element,
     };
-    Ok((spec, quality))
+    Ok((spec, body))
 }
 
 /// Makes the element of a sheet with its material.
@@ -500,6 +542,30 @@ impl Bins {
             .min_by(|a, b| d(*a).total_cmp(&d(*b)))
             .unwrap_or(NONE)
     }
+}
+
+/// The body of a sheet of the scene, number `index` of the model: of its part between mirror planes, which has the points
+/// `points` (m) and `cells` in their numbers, and of its images.
+///
+/// # Errors
+/// When its fibres lie askew to the planes.
+pub fn body(
+    sheet: &StackSheet,
+    index: usize,
+    points: &[V],
+    cells: &[[u32; 4]],
+    planes: Planes,
+) -> Result<Body, String> {
+    let mut body = Body::new(sheet, index, cells.to_vec());
+    if planes.any() {
+        let whole = Whole::new(points, cells, planes);
+        body.cells.clone_from(&whole.cells);
+        body.mirrored = Some(MirroredBody {
+            whole,
+            families: Families::of(sheet, planes)?,
+        });
+    }
+    Ok(body)
 }
 
 /// Tool mesh and its distance field.

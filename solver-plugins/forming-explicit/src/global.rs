@@ -5,8 +5,10 @@ use crate::parameters::Parameters;
 use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
 use crate::run::{Body, Forming};
+use crate::symmetry;
 use plyflow_blank::Blank;
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
+use plyflow_mechanics::mirror::{Mirrors, Planes, on_outer_boundary};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
@@ -44,6 +46,7 @@ struct Layout {
     fine: Box2,
     film: QuadMesh,
     film_size: f64,
+    planes: Planes,
 }
 
 fn layout(
@@ -51,11 +54,12 @@ fn layout(
     process: &DoubleDiaphragm,
     p: &Parameters,
     tool: &ToolMesh,
+    planes: Planes,
 ) -> Result<Layout, String> {
     let [lo, hi] = tool.bounds();
     let plies: Vec<Blank> = stack[1..stack.len() - 1]
         .iter()
-        .map(assembly::blank)
+        .map(|sheet| assembly::blank_part(sheet, planes))
         .collect::<Result<_, _>>()?;
     let all_plies = plies
         .iter()
@@ -93,8 +97,23 @@ fn layout(
             2.0 * fine[3].max(-fine[1])
         ));
     }
-    let xs = graded_axis(-hl, hl, fine[0], fine[2], film_size, p.diaphragm_growth);
-    let ys = graded_axis(-hw, hw, fine[1], fine[3], film_size, p.diaphragm_growth);
+    // A grid line lies on every mirror plane.
+    let axis = |k: usize, half: f64| {
+        let (low, fine_low) = if planes.0[k] {
+            (0.0, 0.0)
+        } else {
+            (-half, fine[k])
+        };
+        graded_axis(
+            low,
+            half,
+            fine_low,
+            fine[k + 2],
+            film_size,
+            p.diaphragm_growth,
+        )
+    };
+    let (xs, ys) = (axis(0, hl), axis(1, hw));
     let tool_top = hi[2];
     Ok(Layout {
         tool_top,
@@ -105,6 +124,7 @@ fn layout(
         fine,
         film: QuadMesh::grid(&xs, &ys),
         film_size,
+        planes,
     })
 }
 
@@ -115,6 +135,7 @@ struct Parts {
     specs: Vec<SheetSpec>,
     bodies: Vec<Body>,
     placed: Vec<Placed>,
+    mirrors: Mirrors,
 }
 
 fn bottom_film(
@@ -129,18 +150,24 @@ fn bottom_film(
     parts
         .points
         .extend(mesh.points.iter().map(|q| [q[0], q[1], at.bottom_z]));
-    let boundary = mesh.on_boundary();
-    let nodes: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    let boundary = on_outer_boundary(mesh, at.planes);
+    let mut nodes: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let frame: Vec<u32> = nodes
         .iter()
         .copied()
         .filter(|n| boundary[*n as usize])
         .collect();
+    let inner = nodes.iter().copied();
+    let slaves = inner.filter(|n| !boundary[*n as usize]).collect();
+    let element = assembly::element(components, &stack[0], &p.diaphragm_element)?;
+    symmetry::check_material(&element, &stack[0], at.planes)?;
+    let (points, mirrors) = (&mut parts.points, &mut parts.mirrors);
+    let patches = assembly::patches(points, &mut nodes, mesh, &element, mirrors);
     let spec = SheetSpec {
         name: stack[0].scene.name.clone(),
-        nodes: nodes.clone(),
+        nodes,
         cells: mesh.cells.clone(),
-        patches: mesh.patches(),
+        patches,
         axis: assembly::axis(&stack[0].scene),
         layers: joined.iter().map(|j| if *j { 2.0 } else { 1.0 }).collect(),
         pressed: joined
@@ -159,18 +186,11 @@ fn bottom_film(
                 }
             })
             .collect(),
-        element: assembly::element(components, &stack[0], &p.diaphragm_element)?,
+        element,
     };
-    parts.placed.push(Placed {
-        index: 0,
-        slaves: nodes
-            .into_iter()
-            .filter(|n| !boundary[*n as usize])
-            .collect(),
-    });
-    parts
-        .bodies
-        .push(Body::new(&stack[0], 0, spec.cells.clone()));
+    parts.placed.push(Placed { index: 0, slaves });
+    let body = assembly::body(&stack[0], 0, &mesh.points, &mesh.cells, at.planes)?;
+    parts.bodies.push(body);
     parts.specs.push(spec);
     Ok(frame)
 }
@@ -196,15 +216,14 @@ fn ply(
 ) -> Result<(), String> {
     let z = at.bottom_z + sheet.offset - bottom.offset;
     let blank = &at.plies[k - 1];
-    let (spec, quality) = assembly::add_ply(&mut parts.points, blank, z, sheet, p, components)?;
-    let nodes = spec.nodes.clone();
-    parts.bodies.push(Body {
-        quality,
-        ..Body::new(sheet, k, spec.cells.clone())
-    });
+    let (points, mirrors) = (&mut parts.points, &mut parts.mirrors);
+    let (before, first) = (mirrors.ghosts.len(), points.len() as u32);
+    let (spec, body) = assembly::add_ply(points, mirrors, blank, z, (k, sheet), p, components)?;
+    let own = (points.len() - (mirrors.ghosts.len() - before)) as u32;
+    parts.bodies.push(body);
     parts.placed.push(Placed {
         index: k,
-        slaves: nodes,
+        slaves: (first..own).collect(),
     });
     parts.specs.push(spec);
     Ok(())
@@ -276,18 +295,23 @@ fn top_film(
         points: nodes.iter().map(|n| parts.points[*n as usize]).collect(),
         cells: cells.clone(),
     };
+    let body = assembly::body(top, last, &plan.points, &plan.cells, at.planes)?;
+    let element = assembly::element(components, top, &p.diaphragm_element)?;
+    symmetry::check_material(&element, top, at.planes)?;
+    let (points, mirrors) = (&mut parts.points, &mut parts.mirrors);
+    let patches = assembly::patches(points, &mut nodes, &plan, &element, mirrors);
     let spec = SheetSpec {
         name: top.scene.name.clone(),
         nodes,
         layers: vec![1.0; cells.len()],
         pressed: vec![Pressed::Above; cells.len()],
-        patches: plan.patches(),
+        patches,
         least_areal_mass: vec![p.least_areal_mass; cells.len()],
         cells,
         axis: assembly::axis(&top.scene),
-        element: assembly::element(components, top, &p.diaphragm_element)?,
+        element,
     };
-    parts.bodies.push(Body::new(top, last, spec.cells.clone()));
+    parts.bodies.push(body);
     parts.placed.push(Placed {
         index: last,
         slaves,
@@ -308,8 +332,11 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
     };
     let stack = assembly::stack(scene)?;
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
-    let at = layout(&stack, process, p, &tool)?;
+    let planes = symmetry::planes(scene);
+    symmetry::check(scene, planes, &stack, &tool)?;
+    let at = layout(&stack, process, p, &tool, planes)?;
     let mut parts = Parts::default();
+    parts.mirrors.planes = planes;
     let frame = bottom_film(&mut parts, &at, &stack, p, components)?;
     for k in 1..stack.len() - 1 {
         ply(&mut parts, &at, k, &stack[k], &stack[0], p, components)?;
@@ -321,7 +348,8 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         .map(|n| [0, 1].map(|k| parts.points[*n as usize][k]))
         .collect();
     let reference = parts.points.clone();
-    let mut model = Model::new(parts.points, parts.specs, assembly::step_settings(p))
+    let settings = assembly::step_settings(p);
+    let mut model = Model::mirrored(parts.points, parts.specs, settings, parts.mirrors)
         .map_err(|e| e.to_string())?;
     assembly::add_contacts(
         &mut model,
@@ -331,6 +359,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         p,
         Arc::new(ToolSurface(grid)),
     )?;
+    model.add_plane_contacts(&assembly::contact_settings(p));
     model.set_driven(
         frame,
         Box::new(FrameDrive {
@@ -343,7 +372,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         model,
         load: Load::Process {
             cycle,
-            tool_volume: tool.volume(),
+            tool_volume: tool.volume() / planes.copies() as f64,
             sealed_volume: None,
         },
         stack,

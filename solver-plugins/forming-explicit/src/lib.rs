@@ -13,6 +13,7 @@ pub mod parameters;
 pub mod press;
 pub mod process;
 pub mod run;
+pub mod symmetry;
 
 pub use global::build_global;
 pub use local::{LocalInput, build_local};

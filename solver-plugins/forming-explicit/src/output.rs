@@ -50,11 +50,7 @@ impl Observer for Writer<'_> {
             let points = forming.points(body).into();
             self.frames.put(&Part::Points(name(), points))?;
             for f in fields {
-                let values = if f.patch {
-                    forming.model.patch_field(body.sheet, f.row)
-                } else {
-                    forming.model.cell_field(body.sheet, f.row)
-                };
+                let values = forming.field(body, f, fields);
                 let (field, unit) = (Cow::from(&f.name), Cow::from(&f.unit));
                 self.frames
                     .put(&Part::Field(name(), !f.patch, field, unit, values.into()))?;
@@ -349,7 +345,7 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value>
                 "thickness": s.thickness,
                 "offset": s.offset,
                 "areal_mass": s.material.areal_mass.si(),
-                "added_mass": forming.model.sheets[body.sheet].added_mass,
+                "added_mass": forming.copies() * forming.model.sheets[body.sheet].added_mass,
                 "element": choice.plugin,
             });
             if let Ok(blank) = crate::assembly::blank(s) {
@@ -412,6 +408,7 @@ fn write_summary(
     host.write_attributes(&json!({
         "scene": p.scene.name,
         "sheets": sheet_attributes(forming, p),
+        "symmetry": crate::symmetry::words(m.planes()),
         "element_size": forming.element_size,
         "zone": forming.zone,
         "time_step": outcome.smallest_step,
@@ -456,7 +453,7 @@ fn write_summary(
     host.result("time_step", outcome.smallest_step, "s")?;
     host.result(
         "added_mass",
-        m.sheets.iter().map(|s| s.added_mass).sum(),
+        forming.copies() * m.sheets.iter().map(|s| s.added_mass).sum::<f64>(),
         "kg",
     )?;
     host.measured("element_cycle_rate", elements as f64 * rate, "1/s")

@@ -7,10 +7,12 @@ use crate::assembly::{self, Components, StackSheet, ToolSurface};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
 use crate::process::Load;
-use crate::run::{Body, Forming, RigidBody};
+use crate::run::{Forming, RigidBody};
+use crate::symmetry;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{OpenPlate, RigidContact, RigidItem, RigidMotion, RigidSurface};
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
+use plyflow_mechanics::mirror::Mirrors;
 use plyflow_mechanics::model::Model;
 use plyflow_model::scene::{Hold, Press, Scene, Towards};
 use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
@@ -282,22 +284,33 @@ pub fn build_press(
     let scene = &p.scene;
     let stack = assembly::stack(scene)?;
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
+    let planes = symmetry::planes(scene);
+    symmetry::check(scene, planes, &stack, &tool)?;
     let at = levels(press, &stack, tool.bounds()[1][2])?;
     check_passage(press, &at, &tool)?;
     let (mut points, mut specs, mut bodies) = (Vec::new(), Vec::new(), Vec::new());
+    let mut mirrors = Mirrors {
+        planes,
+        ..Mirrors::default()
+    };
     for (k, sheet) in stack.iter().enumerate() {
         let z = at.blank + sheet.offset;
-        let blank = assembly::blank(sheet)?;
-        let (spec, quality) = assembly::add_ply(&mut points, &blank, z, sheet, p, components)?;
-        bodies.push(Body {
-            quality,
-            ..Body::new(sheet, k, spec.cells.clone())
-        });
+        let blank = assembly::blank_part(sheet, planes)?;
+        let (spec, body) = assembly::add_ply(
+            &mut points,
+            &mut mirrors,
+            &blank,
+            z,
+            (k, sheet),
+            p,
+            components,
+        )?;
+        bodies.push(body);
         specs.push(spec);
     }
     let reference = points.clone();
-    let mut model =
-        Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
+    let mut model = Model::mirrored(points, specs, assembly::step_settings(p), mirrors)
+        .map_err(|e| e.to_string())?;
     model.body_acceleration[2] = match press.weight {
         None => 0.0,
         Some(Towards::Die) => GRAVITY,
@@ -305,6 +318,7 @@ pub fn build_press(
     };
     let parts = rigid_parts(press, &at, grid);
     add_contacts(&mut model, &stack, &parts, scene, p)?;
+    model.add_plane_contacts(&assembly::contact_settings(p));
     let of_part = |part: &str| -> Vec<usize> {
         let contacts = model.rigid_contacts.iter().enumerate();
         let of = |name: &str| name.strip_prefix(part).is_some_and(|n| n.starts_with('/'));
@@ -315,7 +329,8 @@ pub fn build_press(
     };
     let held = match press.holder.as_ref().map(|h| &h.hold) {
         Some(Hold::Force(force)) => Some(HeldByForce {
-            force: force.si(),
+            // What is given holds the whole.
+            force: force.si() / planes.copies() as f64,
             mass: HOLDER_MASS * model.mass.iter().sum::<f64>(),
             height: 0.0,
             velocity: 0.0,

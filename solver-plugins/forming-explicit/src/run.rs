@@ -4,8 +4,10 @@ use crate::assembly::StackSheet;
 use crate::diagnosis;
 use crate::press::PressLoad;
 use crate::process::Load;
+use crate::symmetry::MirroredBody;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
+use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, SheetEnergy, judge};
 use plyflow_mechanics::model::Model;
@@ -24,8 +26,10 @@ pub struct Body {
     pub name: String,
     /// Index in [`Model::sheets`].
     pub sheet: usize,
-    /// `[m]` cells in mesh-local numbers.
+    /// `[m]` cells in mesh-local numbers, of the whole body.
     pub cells: Vec<[u32; 4]>,
+    /// Where mirror planes bound what is computed: the whole, of which that is the beginning.
+    pub mirrored: Option<MirroredBody>,
     /// Quality of a mesh that follows an outline.
     pub quality: Option<plyflow_blank::Quality>,
 }
@@ -37,6 +41,7 @@ impl Body {
             name: sheet.scene.name.clone(),
             sheet: index,
             cells,
+            mirrored: None,
             quality: None,
         }
     }
@@ -231,14 +236,41 @@ pub trait Observer {
 impl Forming {
     /// Positions (m) of a body's points now.
     pub fn points(&self, body: &Body) -> Vec<V> {
-        let nodes = &self.model.sheets[body.sheet].nodes;
-        nodes.iter().map(|n| self.model.x[*n as usize]).collect()
+        self.whole_points(body, &self.model.x)
     }
 
     /// Reference points (m) of a body.
     pub fn reference_points(&self, body: &Body) -> Vec<V> {
+        self.whole_points(body, &self.reference)
+    }
+
+    fn whole_points(&self, body: &Body, x: &[V]) -> Vec<V> {
         let nodes = &self.model.sheets[body.sheet].nodes;
-        nodes.iter().map(|n| self.reference[*n as usize]).collect()
+        let part: Vec<V> = nodes.iter().map(|n| x[*n as usize]).collect();
+        match &body.mirrored {
+            Some(m) => m.whole.points(&part),
+            None => part,
+        }
+    }
+
+    /// Values of a field of a body's elements, which have the fields `all`. Needs a step with fields.
+    pub fn field(&self, body: &Body, f: &ElementField, all: &[ElementField]) -> Vec<f64> {
+        let of = |f: &ElementField| {
+            if f.patch {
+                self.model.patch_field(body.sheet, f.row)
+            } else {
+                self.model.cell_field(body.sheet, f.row)
+            }
+        };
+        match &body.mirrored {
+            Some(m) => m.field(f, all, of),
+            None => of(f),
+        }
+    }
+
+    /// How often the whole holds what is computed: 1, or with mirror planes 2 or 4.
+    pub fn copies(&self) -> f64 {
+        self.model.planes().copies() as f64
     }
 
     /// Where the part of that name has moved (m).
@@ -256,16 +288,18 @@ impl Forming {
 
     fn row(&self, ledger: Ledger) -> HistoryRow {
         let m = &self.model;
+        // Of the whole.
+        let n = self.copies();
         HistoryRow {
             time: m.time,
-            ledger,
+            ledger: ledger.times(n),
             cavity: m.pressures.below,
             bag: m.pressures.above,
             frame: self.load.frame_height(m.time),
-            punch_force: self.load.press().map_or(0.0, |p| p.punch_force(m)),
+            punch_force: n * self.load.press().map_or(0.0, |p| p.punch_force(m)),
             holder_travel: self.load.press().map_or(0.0, PressLoad::holder_travel),
-            sheets: m.sheet_energies(),
-            interfaces: m.interface_energies().map(|(_, e)| e).collect(),
+            sheets: m.sheet_energies().iter().map(|e| e.times(n)).collect(),
+            interfaces: m.interface_energies().map(|(_, e)| e.times(n)).collect(),
         }
     }
 
@@ -361,8 +395,9 @@ impl Forming {
     pub fn contact_pressure(&self, body: &Body) -> Vec<f64> {
         let m = &self.model;
         let mut force = vec![0.0; m.x.len()];
-        // The die of a press lies on the other face.
-        let facing = |c: &&RigidContact| !c.name.starts_with("die/");
+        // The die of a press lies on the other face, and a mirror plane beside the sheet.
+        let facing =
+            |c: &&RigidContact| !c.name.starts_with("die/") && !c.name.starts_with("symmetry_");
         for c in m.rigid_contacts.iter().filter(facing) {
             for i in &c.items {
                 force[i.node as usize] += i.normal_force;
@@ -396,7 +431,11 @@ impl Forming {
         }
         let (nodes, areas) = (&m.sheets[body.sheet].nodes, m.node_areas(body.sheet));
         let pressure = |(n, area): (&u32, &V)| force[*n as usize] / norm(*area).max(1e-12);
-        nodes.iter().zip(&areas).map(pressure).collect()
+        let part: Vec<f64> = nodes.iter().zip(&areas).map(pressure).collect();
+        match &body.mirrored {
+            Some(b) => b.whole.at_nodes(|n, _| part[n]),
+            None => part,
+        }
     }
 
     /// What to say when plies have touched themselves and the scene does not tell how they rub.

@@ -34,7 +34,33 @@ pub struct SheetEnergy {
     pub hourglass: f64,
 }
 
+impl SheetEnergy {
+    /// `n` times as much.
+    pub fn times(&self, n: f64) -> Self {
+        Self {
+            kinetic: n * self.kinetic,
+            membrane: n * self.membrane,
+            bending: n * self.bending,
+            hourglass: n * self.hourglass,
+        }
+    }
+}
+
 impl Ledger {
+    /// `n` times as much.
+    pub fn times(&self, n: f64) -> Self {
+        Self {
+            kinetic: n * self.kinetic,
+            membrane: n * self.membrane,
+            bending: n * self.bending,
+            hourglass: n * self.hourglass,
+            contact: n * self.contact,
+            friction: n * self.friction,
+            damping: n * self.damping,
+            external: n * self.external,
+        }
+    }
+
     /// Internal energy: membrane, bending, hourglass.
     pub fn internal(&self) -> f64 {
         self.membrane + self.bending + self.hourglass

@@ -3,6 +3,7 @@
 //! One page of how it fits together:
 //!
 //! - [`mesh`]: quad meshes (graded grids, adjacency, node patches);
+//! - [`mirror`]: halves and quarters that mirror planes bound;
 //! - [`component`]: instances of element formulations and materials behind the C ABI;
 //! - [`sheet`]: a meshed sheet cut into batches of [`LANES`] elements, and its node patches;
 //! - [`contact`]: node-to-surface contact between neighbouring sheets of the stack, and of sheet nodes
@@ -22,6 +23,7 @@ pub mod contact;
 pub mod energy;
 pub mod history;
 pub mod mesh;
+pub mod mirror;
 pub mod model;
 pub mod relax;
 pub mod sheet;

@@ -5,12 +5,12 @@ use plyflow_forming_explicit::assembly::Components;
 use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
-use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow};
+use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4, s4::S4};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_sdk::{StepError, element_table, material_table};
 use serde_json::{Value, json};
 
-/// The element `m4`, the fabric and the film.
+/// The elements, the fabric and the film.
 pub struct BuiltIn;
 
 fn component(kind: u32, functions: *const std::ffi::c_void) -> pf_component {
@@ -23,8 +23,13 @@ fn component(kind: u32, functions: *const std::ffi::c_void) -> pf_component {
 }
 
 impl Components for BuiltIn {
-    fn element(&self, _: &str) -> Result<pf_component, String> {
-        let table = Box::leak(Box::new(element_table::<M4>()));
+    fn element(&self, name: &str) -> Result<pf_component, String> {
+        let table = match name {
+            "rf4" => element_table::<Rf4>(),
+            "s4" => element_table::<S4>(),
+            _ => element_table::<M4>(),
+        };
+        let table = Box::leak(Box::new(table));
         Ok(component(PF_KIND_ELEMENT, std::ptr::from_ref(table).cast()))
     }
     fn material(&self, name: &str) -> Result<pf_component, String> {

@@ -69,6 +69,15 @@ pub struct ContactEnergy {
 }
 
 impl ContactEnergy {
+    /// `n` times as much.
+    pub fn times(&self, n: f64) -> Self {
+        Self {
+            stored: n * self.stored,
+            friction: n * self.friction,
+            damping: n * self.damping,
+        }
+    }
+
     fn add(&mut self, o: &Self) {
         self.stored += o.stored;
         self.friction += o.friction;

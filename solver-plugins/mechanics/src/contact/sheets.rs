@@ -11,6 +11,7 @@ use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, scatter, touch};
 use super::{ContactEnergy, ContactSettings};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
+use crate::mirror::{Image, mirrored_in, reflect};
 use crate::vec3::{V, cross, dot, scale, sub, unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -62,7 +63,7 @@ pub(super) fn combine(w: [f64; 4], p: &[V; 4]) -> V {
 pub struct Surface<'a> {
     /// `[cells][4]` model nodes.
     pub cells: &'a [[u32; 4]],
-    /// `[cells][4]` cell across each edge or [`NONE`].
+    /// `[cells][4]` cell across each edge, [`NONE`], or one of [`crate::mirror::MIRRORED`].
     pub neighbours: &'a [[u32; 4]],
     /// `[nodes]` positions (m).
     pub x: &'a [V],
@@ -83,6 +84,8 @@ pub(super) struct Closest {
     pub(super) half: f64,
     /// The foot of the perpendicular, not a place held at a side of the cell.
     pub(super) interior: bool,
+    /// Whether it lies on the cell's mirror image.
+    pub(super) image: Image,
 }
 
 /// The closest point of the surface, and in a concave fold the closest of the cell across it.
@@ -158,6 +161,7 @@ pub(super) fn closest(
         distance2: dot(arm, arm),
         half,
         interior,
+        image: [false; 2],
     }
 }
 
@@ -174,11 +178,29 @@ pub(super) fn cell_normal(s: &Surface<'_>, cell: u32, xi: [f64; 2]) -> V {
 
 /// Where a walk over an edge enters the neighbour, coming from place `xi`.
 fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
-    match neighbours[to as usize].iter().position(|n| *n == from) {
-        Some(0) => [0.0, -1.0],
-        Some(1) => [1.0, 0.0],
-        Some(2) => [0.0, 1.0],
+    let edge = neighbours[to as usize].iter().position(|n| *n == from);
+    middle(edge.unwrap_or(3))
+}
+
+/// The middle of an edge.
+fn middle(edge: usize) -> [f64; 2] {
+    match edge {
+        0 => [0.0, -1.0],
+        1 => [1.0, 0.0],
+        2 => [0.0, 1.0],
         _ => [-1.0, 0.0],
+    }
+}
+
+/// Closest point to `p` of the mirror image of a cell that has an edge on the plane: the image of the closest point to
+/// the image of `p`.
+fn across(s: &Surface<'_>, cell: u32, edge: usize, p: V, plane: usize) -> Closest {
+    let image = [plane == 0, plane == 1];
+    let other = closest(s, cell, middle(edge), reflect(p, image), 3);
+    Closest {
+        arm: reflect(other.arm, image),
+        image,
+        ..other
     }
 }
 
@@ -217,7 +239,13 @@ pub(super) fn track(
                 (_, true) => 2,
                 (_, false) => 0,
             };
-            if near[edge] != NONE && open(near[edge]) {
+            if let Some(plane) = mirrored_in(near[edge]) {
+                // Across the plane the surface goes on as its own image, which is never closer.
+                let other = across(s, here.cell, edge, p, plane);
+                if other.interior && second.is_none_or(|c| other.distance2 < c.distance2) {
+                    second = Some(other);
+                }
+            } else if near[edge] != NONE && open(near[edge]) {
                 let start = entry(s.neighbours, here.cell, near[edge]);
                 let mut other = closest(s, near[edge], start, p, 3);
                 if other.distance2 < best.distance2 {

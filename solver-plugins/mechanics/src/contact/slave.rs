@@ -4,6 +4,7 @@ use super::friction::{Coulomb, Sliding};
 use super::sheets::{Closest, Found, Surface, combine, shape};
 use super::{ContactEnergy, content, friction_force, normal_force};
 use crate::mesh::NONE;
+use crate::mirror::{Image, reflect};
 use crate::vec3::{V, add, dot, norm, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,8 @@ pub struct SlaveItem {
     pub force: V,
     /// The second cell's share of it (N).
     pub(super) second_share: V,
+    /// The mirror planes across which the slave touches the second cell: its image.
+    pub(super) second_image: Image,
     /// Normal part of the force (N).
     pub normal_force: f64,
     /// Penetration (m), 0 when apart.
@@ -72,6 +75,7 @@ impl SlaveItem {
             slip: [0.0; 3],
             force: [0.0; 3],
             second_share: [0.0; 3],
+            second_image: [false; 2],
             normal_force: 0.0,
             penetration: 0.0,
             ignored: 0.0,
@@ -139,7 +143,9 @@ pub(super) fn scatter<'a>(
         } else {
             let share = sub(item.force, item.second_share);
             push(cell(item.cell), item.xi, share, f);
-            push(cell(item.second), item.second_xi, item.second_share, f);
+            // What acts on an image acts mirrored on the cell itself.
+            let mirrored = reflect(item.second_share, item.second_image);
+            push(cell(item.second), item.second_xi, mirrored, f);
         }
         let node = item.node as usize;
         f[node] = add(f[node], item.force);
@@ -182,6 +188,7 @@ pub(super) fn hold<F: Coulomb>(
         distance2: 0.0,
         half: 0.0,
         interior: true,
+        image: [false; 2],
     };
     touch(
         item,
@@ -216,7 +223,10 @@ pub(super) fn touch<F: Coulomb>(
     found: &Found,
     law: &Law<'_, F>,
 ) -> ContactEnergy {
-    let speed = |c: &Closest| combine(c.weights, &s.cells[c.cell as usize].map(|n| v[n as usize]));
+    let speed = |c: &Closest| {
+        let own = combine(c.weights, &s.cells[c.cell as usize].map(|n| v[n as usize]));
+        reflect(own, c.image)
+    };
     let own = v[item.node as usize];
     let first = &found.first;
     let rel1 = sub(own, speed(first));
@@ -261,7 +271,7 @@ pub(super) fn touch<F: Coulomb>(
         scale(f.force, 1.0 - pull.share),
     );
     if let Some(c) = second {
-        (item.second, item.second_xi) = (c.cell, c.xi);
+        (item.second, item.second_xi, item.second_image) = (c.cell, c.xi, c.image);
         item.second_share = add(scale(pull.second, normal.force), scale(f.force, pull.share));
         item.force = add(item.force, item.second_share);
     }

@@ -89,6 +89,18 @@ impl Sums {
         }
     }
 
+    /// Where the sums of a node are.
+    pub(super) fn places(&self, node: u32) -> impl Iterator<Item = u32> {
+        let first = self.first[node as usize];
+        let none = self.force.len() as u32 - 1;
+        let start = self.more.partition_point(|(n, _)| *n < node);
+        let more = self.more[start..].iter().take_while(move |m| m.0 == node);
+        (first != none)
+            .then_some(first)
+            .into_iter()
+            .chain(more.map(|m| m.1))
+    }
+
     /// An array of zeros for more sums.
     pub(super) fn zeros(&self) -> Vec<Sum> {
         vec![Sum::default(); self.force.len()]

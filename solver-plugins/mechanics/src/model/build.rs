@@ -3,6 +3,7 @@
 use super::*;
 use crate::contact::SlaveItem;
 use crate::mesh::Patch;
+use crate::mirror::{Mirrors, mirrored_in};
 use std::sync::Arc;
 
 impl Model {
@@ -14,6 +15,19 @@ impl Model {
         points: Vec<V>,
         specs: Vec<SheetSpec>,
         settings: StepSettings,
+    ) -> Result<Self, MechanicsError> {
+        Self::mirrored(points, specs, settings, Mirrors::default())
+    }
+
+    /// The same for the part of a model that mirror planes bound, with its ghosts among the points.
+    ///
+    /// # Errors
+    /// As [`Model::new`].
+    pub fn mirrored(
+        points: Vec<V>,
+        specs: Vec<SheetSpec>,
+        settings: StepSettings,
+        mirrors: Mirrors,
     ) -> Result<Self, MechanicsError> {
         let n = points.len();
         let mut model = Self {
@@ -44,6 +58,7 @@ impl Model {
             external_force: Vec::new(),
             own_mass: vec![0.0; n],
             rotations: None,
+            mirroring: Mirroring::new(mirrors, &points),
             supports: Supports::default(),
             body_acceleration: [0.0; 3],
             load_factor: 1.0,
@@ -81,14 +96,16 @@ impl Model {
             cells: cells.clone(),
         };
         let shift = |c: u32| {
-            if c == crate::mesh::NONE {
+            if c == crate::mesh::NONE || mirrored_in(c).is_some() {
                 c
             } else {
                 c + cell0 as u32
             }
         };
+        let mut neighbours = mesh.neighbours();
+        self.mirroring.mark(&cells, &self.x, &mut neighbours);
         self.neighbours
-            .extend(mesh.neighbours().into_iter().map(|e| e.map(shift)));
+            .extend(neighbours.into_iter().map(|e| e.map(shift)));
         let material = spec.element.material.reference().sizes();
         let s = spec.element.sizes;
         let rotates = s.dofs_per_node == 6;
@@ -131,7 +148,7 @@ impl Model {
         self.cells.extend(cells);
         let mut sheet = Sheet {
             name: spec.name,
-            nodes: spec.nodes,
+            nodes: self.mirroring.own(spec.nodes),
             cell_range: (cell0, self.cells.len()),
             block_range: (block0, self.blocks.len()),
             patch_range: (patch0, self.patches.len()),
@@ -336,7 +353,9 @@ impl Model {
     }
 
     fn finish(&mut self) -> Result<(), MechanicsError> {
-        if let Some(i) = self.mass.iter().position(|m| *m <= 0.0) {
+        let is_ghost = |n: usize| self.mirroring.is_ghost(n as u32);
+        let without = |(n, m): (usize, &f64)| *m <= 0.0 && !is_ghost(n);
+        if let Some(i) = self.mass.iter().enumerate().position(without) {
             return Err(MechanicsError::Input(format!(
                 "node {i} belongs to no element"
             )));
@@ -358,7 +377,9 @@ impl Model {
             self.sums.moment = self.sums.zeros();
         }
         self.patch_sums = Sums::new(n, &self.patches);
+        self.mirroring.place(&self.patch_sums)?;
         self.set_free_masses();
+        self.hold_at_planes();
         self.internal_forces(false)?;
         self.normals();
         Ok(())
@@ -383,6 +404,13 @@ impl Model {
     pub fn set_contact_stiffness(&mut self, c: &ContactSettings) {
         let dt2 = self.settings.target_step.powi(2);
         let mass = &self.mass;
+        // Of the whole node where a mirror plane cuts it, so that contacts there are as stiff as in the whole model.
+        let mirroring = &self.mirroring;
+        let reduced = |node: u32, cell: [u32; 4]| {
+            let whole = |n: u32| mass[n as usize] / mirroring.share(n);
+            let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
+            mirroring.share(node) / (1.0 / whole(node) + 1.0 / lightest)
+        };
         let mut row = vec![0.0; mass.len()];
         for contact in &mut self.rigid_contacts {
             contact.augmentation = c.augmentation;
@@ -399,12 +427,7 @@ impl Model {
                 .filter(|i| i.cell != crate::mesh::NONE)
             {
                 let nodes = self.cells[item.cell as usize];
-                let lightest = nodes
-                    .iter()
-                    .map(|n| mass[*n as usize])
-                    .fold(f64::INFINITY, f64::min);
-                let reduced = 1.0 / (1.0 / mass[item.node as usize] + 1.0 / lightest);
-                item.stiffness = c.stiffness_factor * reduced / dt2;
+                item.stiffness = c.stiffness_factor * reduced(item.node, nodes) / dt2;
                 row[item.node as usize] += item.stiffness;
                 for (k, n) in nodes.iter().enumerate() {
                     row[*n as usize] += item.weights()[k] * item.stiffness;
@@ -428,11 +451,7 @@ impl Model {
             let nodes = self.cells[item.cell as usize];
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.stiffness *= least.min(limit[item.node as usize]);
-            let lightest = nodes
-                .iter()
-                .map(|n| mass[*n as usize])
-                .fold(f64::INFINITY, f64::min);
-            let reduced = 1.0 / (1.0 / mass[item.node as usize] + 1.0 / lightest);
+            let reduced = reduced(item.node, nodes);
             item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
         }
         self.bound_contact_damping();

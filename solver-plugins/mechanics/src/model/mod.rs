@@ -5,6 +5,7 @@ mod archive;
 mod batch;
 mod blocks;
 mod build;
+mod mirror;
 mod query;
 mod rotation;
 mod support;
@@ -13,6 +14,7 @@ mod transpose;
 use batch::*;
 pub(crate) use blocks::compact_order;
 use blocks::*;
+use mirror::Mirroring;
 use rotation::Rotations;
 pub use support::{Fixed, NodalLoad};
 use support::{Loads, Supports};
@@ -120,6 +122,7 @@ pub struct Model {
     /// `[n]` masses without scaling (kg): what has weight.
     own_mass: Vec<f64>,
     rotations: Option<Box<Rotations>>,
+    mirroring: Mirroring,
     supports: Supports,
     /// Acceleration of free fall (m/s2), global axes.
     pub body_acceleration: V,
@@ -206,6 +209,7 @@ impl Model {
         };
         run_blocks(&mut self.blocks, &mut self.sums, present);
         run_patch_blocks(&mut self.patches, &mut self.patch_sums, present);
+        self.mirroring.hand_over(&mut self.patch_sums.force);
         let failed = self.blocks.iter().map(|b| b.failed);
         let failed = failed.chain(self.patches.iter().map(|b| b.failed));
         match failed.flatten().next() {
@@ -228,6 +232,7 @@ impl Model {
                     *normal = crate::vec3::unit(*normal);
                 }
             });
+        self.mirroring.level_normals(&mut self.normals);
     }
 
     /// Forces of all contacts.
@@ -294,6 +299,7 @@ impl Model {
         }
         self.contacts();
         self.advance();
+        self.mirroring.follow(&mut self.x);
         let limit = self.speed_limit();
         if self.work.bad.is_some() || self.max_speed > limit {
             return Err(self.unstable(limit));

@@ -61,6 +61,7 @@ impl Model {
                 areas[*n as usize] = add(areas[*n as usize], quarter);
             }
         }
+        self.mirroring.level(&mut areas);
         sheet.nodes.iter().map(|n| areas[*n as usize]).collect()
     }
 
@@ -122,9 +123,11 @@ impl Model {
         for (n, r) in rows.into_iter().flatten() {
             row[n as usize] += r;
         }
+        self.mirroring.fold(&mut row);
         let bending = row
             .iter()
             .zip(&self.mass)
+            .filter(|(r, _)| **r > 0.0)
             .map(|(r, m)| r / m)
             .fold(0.0, f64::max);
         // omega^2 of a sum of stiffnesses is at most the sum of their own bounds.

@@ -51,3 +51,12 @@ pub fn stiff_shell() -> ElementInstance {
             "bending":{"positive":{"linear":5e-3},"negative":{"linear":5e-3}}}"#,
     )
 }
+
+/// `rf4` of a fabric that resists bending, more along the second family.
+#[allow(dead_code)]
+pub fn rotation_free() -> ElementInstance {
+    instance::<plyflow_kernels::rf4::Rf4>(
+        r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0,
+            "bending":{"positive":{"linear":5e-3},"negative":{"linear":5e-3}}}"#,
+    )
+}

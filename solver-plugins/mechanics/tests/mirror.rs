@@ -1,0 +1,204 @@
+//! Halves and quarters that mirror planes bound, against the whole and against their own energy.
+
+mod common;
+
+use plyflow_mechanics::MechanicsError;
+use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+use plyflow_mechanics::mirror::{Mirrors, Planes, Whole, part_patches, reflect};
+use plyflow_mechanics::model::{Model, StepSettings};
+use plyflow_mechanics::sheet::{Pressed, SheetSpec};
+use plyflow_mechanics::vec3::{V, norm, sub};
+
+const STEP: f64 = 1e-7;
+
+/// The part of a sheet of 60 x 40 mm, elements of 10 mm, that planes bound.
+fn part(planes: Planes) -> QuadMesh {
+    let axis = |k: usize, half: f64| {
+        let low = if planes.0[k] { 0.0 } else { -half };
+        even_axis(low, half, 0.01)
+    };
+    QuadMesh::grid(&axis(0, 0.03), &axis(1, 0.02))
+}
+
+/// A model of `rf4` of such a part, and its mesh.
+fn model(planes: Planes) -> (Model, QuadMesh) {
+    let mesh = part(planes);
+    let element = common::rotation_free();
+    let (patches, ghosts) = part_patches(&mesh, planes, element.sizes.patch_nodes);
+    let m = mesh.cells.len();
+    let mut points = mesh.points.clone();
+    points.extend(
+        ghosts
+            .iter()
+            .map(|g| reflect(mesh.points[g.of as usize], g.image)),
+    );
+    let spec = SheetSpec {
+        name: "sheet".into(),
+        nodes: (0..points.len() as u32).collect(),
+        cells: mesh.cells.clone(),
+        patches,
+        axis: [1.0, 0.0, 0.0],
+        layers: vec![1.0; m],
+        pressed: vec![Pressed::No; m],
+        least_areal_mass: vec![0.0; m],
+        element,
+    };
+    let settings = StepSettings {
+        target_step: STEP,
+        safety: 0.8,
+        damping: 0.0,
+    };
+    let mut model =
+        Model::mirrored(points, vec![spec], settings, Mirrors { planes, ghosts }).unwrap();
+    model.dt = STEP;
+    (model, mesh)
+}
+
+/// A deformation that both planes mirror.
+fn deformed(p: V) -> V {
+    let (x, y) = (p[0] / 0.03, p[1] / 0.02);
+    [
+        p[0] * (1.01 + 0.02 * y * y),
+        p[1] * (0.99 + 0.03 * x * x),
+        0.004 * (x * x + 0.7 * y * y - 0.4 * x * x * y * y),
+    ]
+}
+
+/// Puts a part to `x` (its own nodes) and makes a step from rest: energies there and forces.
+fn forces(planes: Planes, x: &[V]) -> (f64, f64, Vec<V>, Model) {
+    let (mut model, _) = model(planes);
+    model.x[..x.len()].copy_from_slice(x);
+    model.place_ghosts();
+    model.step(false).unwrap();
+    let e = model.energies();
+    let force = |n: usize| model.v[n].map(|v| v * model.mass[n] / STEP);
+    let forces = (0..x.len()).map(force).collect();
+    (e.membrane + e.hourglass, e.bending, forces, model)
+}
+
+fn place(mesh: &QuadMesh) -> Vec<V> {
+    mesh.points.iter().map(|p| deformed(*p)).collect()
+}
+
+#[test]
+fn energies_and_forces_of_halves_and_quarters_are_those_of_the_whole() {
+    let none = Planes::default();
+    let whole = part(none);
+    let (membrane, bending, all, _) = forces(none, &place(&whole));
+    assert!(bending > 1e-4 && membrane > 1e-4, "{membrane} {bending}");
+    let largest = all.iter().map(|f| norm(*f)).fold(0.0, f64::max);
+    for planes in [[true, false], [false, true], [true, true]].map(Planes) {
+        let mesh = part(planes);
+        let n = planes.copies() as f64;
+        let (m, b, own, model) = forces(planes, &place(&mesh));
+        assert!((n * m / membrane - 1.0).abs() < 1e-12, "{m} {membrane}");
+        assert!((n * b / bending - 1.0).abs() < 1e-12, "{b} {bending}");
+        assert!((n * model.mass.iter().sum::<f64>() - 0.06 * 0.04).abs() < 1e-12);
+        for (p, f) in mesh.points.iter().zip(own) {
+            let near = |q: &V| norm(sub(*q, *p)) < 1e-9;
+            let twin = all[whole.points.iter().position(near).unwrap()];
+            // What pushes off a plane is held there.
+            let on = planes.holding(*p);
+            let expected = [0, 1, 2].map(|c| {
+                let held = c < 2 && on[c];
+                if held {
+                    0.0
+                } else {
+                    twin[c] * planes.share(*p)
+                }
+            });
+            let apart = norm(sub(f, expected));
+            assert!(apart < 1e-11 * largest, "{p:?}: {f:?} {expected:?}");
+        }
+        let step = model.critical_step().unwrap();
+        let (_, _, _, all) = forces(none, &place(&whole));
+        let reference = all.critical_step().unwrap();
+        assert!((step / reference - 1.0).abs() < 1e-6, "{step} {reference}");
+    }
+}
+
+#[test]
+fn forces_of_a_quarter_with_ghosts_are_the_gradient_of_its_energy() {
+    let planes = Planes([true; 2]);
+    let mesh = part(planes);
+    let x = place(&mesh);
+    let (_, _, force, _) = forces(planes, &x);
+    let largest = force.iter().map(|f| norm(*f)).fold(0.0, f64::max);
+    let h = 1e-7;
+    for n in 0..x.len() {
+        let on = planes.holding(mesh.points[n]);
+        for c in (0..3).filter(|c| *c == 2 || !on[*c]) {
+            let energy = |d: f64| {
+                let mut moved = x.clone();
+                moved[n][c] += d;
+                let (m, b, _, _) = forces(planes, &moved);
+                m + b
+            };
+            let slope = (energy(h) - energy(-h)) / (2.0 * h);
+            let apart = (slope + force[n][c]).abs();
+            assert!(
+                apart < 1e-6 * largest,
+                "node {n}, {c}: {slope} {}",
+                force[n][c]
+            );
+        }
+    }
+}
+
+#[test]
+fn ghosts_follow_their_images_and_rigid_motion_along_a_plane_costs_nothing() {
+    let planes = Planes([true, false]);
+    let (mut model, mesh) = model(planes);
+    for v in &mut model.v[..mesh.points.len()] {
+        *v = [0.0, 0.3, -0.2];
+    }
+    for _ in 0..20 {
+        model.step(false).unwrap();
+    }
+    let way = 20.0 * STEP;
+    let whole = Whole::new(&mesh.points, &mesh.cells, planes);
+    let ghosts = model.x.len() - mesh.points.len();
+    // One row beside the plane.
+    assert_eq!(ghosts, 5);
+    for p in &model.x[mesh.points.len()..] {
+        let stands = [p[0], p[1] - 0.3 * way, p[2] + 0.2 * way];
+        let near = |q: &V| norm(sub(*q, stands)) < 1e-12;
+        assert!(
+            p[0] < 0.0 && whole.points(&mesh.points).iter().any(near),
+            "{p:?}"
+        );
+    }
+    let e = model.energies();
+    assert!(e.internal() < 1e-12, "{e:?}");
+}
+
+#[test]
+fn a_ghost_of_a_node_without_a_patch_is_refused() {
+    let planes = Planes([true, false]);
+    let mesh = part(planes);
+    let (_, ghosts) = part_patches(&mesh, planes, 0);
+    let mut points = mesh.points.clone();
+    points.extend(ghosts.iter().map(|g| mesh.points[g.of as usize]));
+    let m = mesh.cells.len();
+    let spec = SheetSpec {
+        name: "sheet".into(),
+        nodes: (0..points.len() as u32).collect(),
+        cells: mesh.cells.clone(),
+        patches: Vec::new(),
+        axis: [1.0, 0.0, 0.0],
+        layers: vec![1.0; m],
+        pressed: vec![Pressed::No; m],
+        least_areal_mass: vec![0.0; m],
+        element: common::rotation_free(),
+    };
+    let settings = StepSettings {
+        target_step: STEP,
+        safety: 0.8,
+        damping: 0.0,
+    };
+    let refused = Model::mirrored(points, vec![spec], settings, Mirrors { planes, ghosts });
+    let Err(MechanicsError::Input(text)) = refused else {
+        panic!("a ghost without a patch was taken");
+    };
+    assert!(text.contains("belongs to a patch"), "{text}");
+}
