@@ -80,13 +80,19 @@ pub fn even_axis(lo: f64, hi: f64, size: f64) -> Vec<f64> {
 }
 
 /// `n + 1` evenly spaced lines from `lo` to `hi` (m), on whole multiples of 2^-44 m (6e-14 m): differences between
-/// them are then exact, all elements between them have the same bits of constants, and these are kept once.
+/// them are then exact, all elements between them have the same bits of constants, and these are kept once. From 0 on they
+/// are those of twice as many between `-hi` and `hi`: the first is exactly 0, where a mirror plane may be.
 fn even_lines(lo: f64, hi: f64, n: usize) -> impl Iterator<Item = f64> {
     const QUANTUM: f64 = 1.0 / (1u64 << 44) as f64;
     let whole = |x: f64| (x / QUANTUM).round();
     // From the middle, so that what is symmetric stays so.
-    let (middle, step) = (whole(0.5 * (lo + hi)), whole((hi - lo) / n as f64 / 2.0));
-    (0..=n).map(move |i| (middle + (2.0 * i as f64 - n as f64) * step) * QUANTUM)
+    let (middle, before) = if lo == 0.0 {
+        (0.0, 0.0)
+    } else {
+        (whole(0.5 * (lo + hi)), n as f64)
+    };
+    let step = whole((hi - lo) / n as f64 / 2.0);
+    (0..=n).map(move |i| (middle + (2.0 * i as f64 - before) * step) * QUANTUM)
 }
 
 impl QuadMesh {
@@ -243,6 +249,19 @@ mod tests {
         let w: Vec<f64> = xs.windows(2).map(|p| p[1] - p[0]).collect();
         assert!(w.iter().all(|w| *w > 0.0));
         assert!(w.windows(2).all(|p| p[0] / p[1] < 1.3 && p[1] / p[0] < 1.3));
+    }
+
+    #[test]
+    fn lines_from_nought_are_half_of_those_on_both_sides() {
+        for (half, size) in [(0.1, 0.0033), (0.15, 0.007), (0.06, 0.006)] {
+            let part = even_axis(0.0, half, size);
+            let n = part.len() - 1;
+            let whole: Vec<f64> = even_lines(-half, half, 2 * n).collect();
+            assert_eq!((part[0], &part[..]), (0.0, &whole[n..]));
+            assert!((part[n] - half).abs() < 1e-11);
+            let part = graded_axis(0.0, 2.0 * half, 0.0, half, size, 1.2);
+            assert_eq!(part[..=n], whole[n..]);
+        }
     }
 
     #[test]

@@ -3,6 +3,8 @@
 mod common;
 
 use plyflow_mechanics::MechanicsError;
+use plyflow_mechanics::archive::Archive;
+use plyflow_mechanics::contact::{ContactSettings, SheetContact, SlaveItem};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::mirror::{Mirrors, Planes, Whole, part_patches, reflect};
 use plyflow_mechanics::model::{Model, StepSettings};
@@ -201,4 +203,174 @@ fn a_ghost_of_a_node_without_a_patch_is_refused() {
         panic!("a ghost without a patch was taken");
     };
     assert!(text.contains("belongs to a patch"), "{text}");
+}
+
+#[test]
+fn a_quarter_that_takes_up_a_state_goes_on_with_the_same_bits() {
+    let start = || {
+        let planes = Planes([true; 2]);
+        let (mut model, mesh) = model(planes);
+        let x = place(&mesh);
+        model.x[..x.len()].copy_from_slice(&x);
+        model.place_ghosts();
+        model
+    };
+    let steps = |m: &mut Model| (0..30).for_each(|_| m.step(false).unwrap());
+    let mut model = start();
+    steps(&mut model);
+    let mut bytes = Vec::new();
+    model.archive(&mut Archive::Save(&mut bytes)).unwrap();
+    steps(&mut model);
+    let mut other = start();
+    other.archive(&mut Archive::Load(&bytes)).unwrap();
+    steps(&mut other);
+    assert!(model.x == other.x && model.v == other.v);
+    assert!(norm(model.v[3]) > 0.0);
+}
+
+/// A trough z = 0.3 |x| along y of elements of 10 mm, and a finer one that is pressed 0.1 mm into it.
+fn troughs(planes: Planes) -> (Model, Vec<V>) {
+    const OFFSET: f64 = 1e-3;
+    let low = if planes.0[0] { 0.0 } else { -0.04 };
+    let mesh = |size: f64| QuadMesh::grid(&even_axis(low, 0.04, size), &even_axis(0.0, 0.02, size));
+    let (lower, upper) = (mesh(0.01), mesh(0.004));
+    let over = 0.9 * OFFSET * (1.0 + 0.3f64 * 0.3).sqrt();
+    let mut points: Vec<V> = Vec::new();
+    let mut specs = Vec::new();
+    for (mesh, up) in [(&lower, 0.0), (&upper, over)] {
+        let first = points.len() as u32;
+        points.extend(
+            mesh.points
+                .iter()
+                .map(|p| [p[0], p[1], 0.3 * p[0].abs() + up]),
+        );
+        let m = mesh.cells.len();
+        specs.push(SheetSpec {
+            name: "trough".into(),
+            nodes: (first..points.len() as u32).collect(),
+            cells: mesh.cells.clone(),
+            patches: Vec::new(),
+            axis: [0.0, 1.0, 0.0],
+            layers: vec![1.0; m],
+            pressed: vec![Pressed::No; m],
+            least_areal_mass: vec![0.0; m],
+            element: common::membrane(),
+        });
+    }
+    let settings = StepSettings {
+        target_step: 1e-6,
+        safety: 0.8,
+        damping: 0.0,
+    };
+    let mirrors = Mirrors {
+        planes,
+        ghosts: Vec::new(),
+    };
+    let n = lower.points.len();
+    let place = |k: usize| {
+        let p = upper.points[k];
+        let holds = |c: &[u32; 4]| {
+            let [a, _, b, _] = c.map(|n| lower.points[n as usize]);
+            (0..2).all(|k| a[k] - 1e-9 <= p[k] && p[k] <= b[k] + 1e-9)
+        };
+        let cell = lower.cells.iter().position(holds).unwrap();
+        let [a, _, b, _] = lower.cells[cell].map(|n| lower.points[n as usize]);
+        let xi = [0, 1].map(|k| 2.0 * (p[k] - a[k]) / (b[k] - a[k]) - 1.0);
+        SlaveItem::new((n + k) as u32, cell as u32, xi)
+    };
+    let contact = ContactSettings::default();
+    let items = (0..upper.points.len()).map(place).collect();
+    let start = points.clone();
+    let mut model = Model::mirrored(points, specs, settings, mirrors).unwrap();
+    model.dt = 1e-6;
+    model.sheet_contacts.push(SheetContact {
+        name: "trough/trough".into(),
+        side: 1.0,
+        offset: OFFSET,
+        friction: 0.2.into(),
+        slip_factor: contact.slip_factor,
+        augmentation: 0.0,
+        items,
+    });
+    model.set_contact_stiffness(&contact);
+    (model, start)
+}
+
+#[test]
+fn in_a_fold_on_a_plane_a_node_touches_the_image_of_the_other_face() {
+    let run = |planes: Planes, steps: usize| {
+        let (mut model, start) = troughs(planes);
+        for _ in 0..steps {
+            model.step(false).unwrap();
+        }
+        (model, start)
+    };
+    // The second step has speeds for dampers and friction. Closest points are searched anew for every fourth node in turn,
+    // so that the whole is no longer exactly its own mirror image.
+    for (steps, bound) in [(1, 1e-9), (2, 1e-4)] {
+        let (whole, places) = run(Planes::default(), steps);
+        let (half, own) = run(Planes([true, false]), steps);
+        let fastest = whole.v.iter().map(|v| norm(*v)).fold(0.0, f64::max);
+        assert!(fastest > 1.0, "{fastest}");
+        for (n, p) in own.iter().enumerate() {
+            let near = |q: &V| norm(sub(*q, *p)) < 1e-9;
+            let twin = places.iter().position(near).unwrap();
+            let (a, b) = (half.v[n], whole.v[twin]);
+            assert!(
+                norm(sub(a, b)) < bound * fastest,
+                "{steps}: {p:?}: {a:?} {b:?}"
+            );
+        }
+    }
+    let (whole, half) = (run(Planes::default(), 1).0, run(Planes([true, false]), 1).0);
+    let stored = |m: &Model| m.energies().contact;
+    assert!((2.0 * stored(&half) / stored(&whole) - 1.0).abs() < 1e-12);
+    // Only in the fold is that more than the distance from one face.
+    let line = half.sheet_contacts[0]
+        .items
+        .iter()
+        .filter(|i| half.x[i.node as usize][0] == 0.0);
+    let deep: Vec<f64> = line.map(|i| i.penetration).collect();
+    assert!(deep.iter().all(|d| *d > 1.1e-4 && *d < 1.5e-4), "{deep:?}");
+}
+
+#[test]
+fn nodes_that_reach_a_plane_are_held_off_it_and_come_back() {
+    let planes = Planes([true, false]);
+    let (mut model, mesh) = model(planes);
+    model.add_plane_contacts(&ContactSettings {
+        damping_ratio: 0.0,
+        ..ContactSettings::default()
+    });
+    // A membrane of no size: its last column alone flies at the plane.
+    let far: Vec<usize> = (0..mesh.points.len())
+        .filter(|n| mesh.points[*n][0] > 0.0)
+        .collect();
+    let contact = |m: &Model| {
+        m.rigid_contacts
+            .iter()
+            .map(|c| c.items.len())
+            .sum::<usize>()
+    };
+    assert_eq!(contact(&model), far.len());
+    let node = far[0];
+    model.x[node][0] = 1e-6;
+    model.x[node][2] = 0.01;
+    model.place_ghosts();
+    model.v[node] = [-20.0, 0.0, 0.0];
+    let mut least = f64::INFINITY;
+    for _ in 0..200 {
+        model.step(false).unwrap();
+        least = least.min(model.x[node][0]);
+    }
+    let touched = model
+        .rigid_contacts
+        .iter()
+        .any(|c| c.name == "symmetry_x/sheet");
+    assert!(touched && least < 0.0 && least > -2e-4, "{least}");
+    assert!(
+        model.x[node][0] > 0.0 && model.v[node][0] > 0.0,
+        "{:?}",
+        model.x[node]
+    );
 }
