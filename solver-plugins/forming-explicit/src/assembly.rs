@@ -247,7 +247,14 @@ pub fn add_ply(
     components: &dyn Components,
 ) -> Result<(SheetSpec, Body), String> {
     let name = &sheet.scene.name;
-    let (mesh, quality) = (blank.mesh(p.element_size)).map_err(|e| format!("ply '{name}': {e}"))?;
+    let (mut mesh, quality) =
+        (blank.mesh(p.element_size)).map_err(|e| format!("ply '{name}': {e}"))?;
+    // A mesh that follows an outline may leave rounding there; nodes of a plane are those that are exactly on it.
+    for c in mesh.points.iter_mut().flat_map(|q| (0..2).zip(q)) {
+        if mirrors.planes.0[c.0] && c.1.abs() < 1e-9 {
+            *c.1 = 0.0;
+        }
+    }
     let first = points.len() as u32;
     points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
     let element = element(components, sheet, &p.element)?;

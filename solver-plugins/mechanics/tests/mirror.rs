@@ -278,7 +278,11 @@ fn troughs(planes: Planes) -> (Model, Vec<V>) {
         let xi = [0, 1].map(|k| 2.0 * (p[k] - a[k]) / (b[k] - a[k]) - 1.0);
         SlaveItem::new((n + k) as u32, cell as u32, xi)
     };
-    let contact = ContactSettings::default();
+    // Soft, so that a step moves nodes by less than a micrometre.
+    let contact = ContactSettings {
+        stiffness_factor: 0.003,
+        ..ContactSettings::default()
+    };
     let items = (0..upper.points.len()).map(place).collect();
     let start = points.clone();
     let mut model = Model::mirrored(points, specs, settings, mirrors).unwrap();
@@ -307,11 +311,11 @@ fn in_a_fold_on_a_plane_a_node_touches_the_image_of_the_other_face() {
     };
     // The second step has speeds for dampers and friction. Closest points are searched anew for every fourth node in turn,
     // so that the whole is no longer exactly its own mirror image.
-    for (steps, bound) in [(1, 1e-9), (2, 1e-4)] {
+    for (steps, bound) in [(1, 1e-8), (2, 1e-5)] {
         let (whole, places) = run(Planes::default(), steps);
         let (half, own) = run(Planes([true, false]), steps);
         let fastest = whole.v.iter().map(|v| norm(*v)).fold(0.0, f64::max);
-        assert!(fastest > 1.0, "{fastest}");
+        assert!(fastest > 0.1, "{fastest}");
         for (n, p) in own.iter().enumerate() {
             let near = |q: &V| norm(sub(*q, *p)) < 1e-9;
             let twin = places.iter().position(near).unwrap();
