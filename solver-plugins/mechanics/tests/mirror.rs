@@ -287,15 +287,13 @@ fn troughs(planes: Planes) -> (Model, Vec<V>) {
     let start = points.clone();
     let mut model = Model::mirrored(points, specs, settings, mirrors).unwrap();
     model.dt = 1e-6;
-    model.sheet_contacts.push(SheetContact {
-        name: "trough/trough".into(),
-        side: 1.0,
-        offset: OFFSET,
-        friction: 0.2.into(),
-        slip_factor: contact.slip_factor,
+    let without = ContactSettings {
         augmentation: 0.0,
-        items,
-    });
+        ..contact
+    };
+    let name = "trough/trough".into();
+    let pair = SheetContact::new(name, 1.0, OFFSET, 0.2, &without, items);
+    model.sheet_contacts.push(pair);
     model.set_contact_stiffness(&contact);
     (model, start)
 }
