@@ -158,9 +158,10 @@ struct Deepest {
 
 /// The contact that is deepest.
 fn deepest(forming: &Forming) -> Option<Deepest> {
-    let (name, depth, _) = (forming.penetrations().into_iter())
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|(_, depth, _)| *depth > 0.0)?;
+    let worst = (forming.penetrations().into_iter())
+        .max_by(|a, b| a.largest.total_cmp(&b.largest))
+        .filter(|p| p.largest > 0.0)?;
+    let (name, depth) = (worst.pair, worst.largest);
     let thinnest = (forming.stack.iter()).fold(f64::INFINITY, |t, s| t.min(s.thickness));
     Some(Deepest {
         share: depth / thinnest,

@@ -10,6 +10,7 @@ mod global;
 mod local;
 mod output;
 pub mod parameters;
+pub mod penetration;
 pub mod press;
 pub mod process;
 pub mod run;

@@ -4,6 +4,7 @@ use crate::assembly::Components;
 use crate::checkpoint::{Part, Recorder};
 use crate::local::{LocalInput, LocalSheet};
 use crate::parameters::Parameters;
+use crate::penetration::Penetration;
 use crate::run::{Body, Course, Forming, Observer, Outcome};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::component::{ElementField, element_fields};
@@ -403,7 +404,10 @@ fn write_summary(
     let element_cycles = elements as f64 * outcome.cycles as f64;
     let penetration: serde_json::Map<String, serde_json::Value> = penetrations
         .iter()
-        .map(|(name, max, q)| (name.clone(), json!({"max": max, "q999": q})))
+        .map(|p| {
+            let of = json!({"max": p.largest, "q999": p.q999, "overlap": p.overlap()});
+            (p.pair.clone(), of)
+        })
         .collect();
     host.write_attributes(&json!({
         "scene": p.scene.name,
@@ -427,12 +431,13 @@ fn write_summary(
     for w in &warnings {
         host.log(Log::Warn, w);
     }
-    let worst = |f: fn(&(String, f64, f64)) -> f64| penetrations.iter().map(f).fold(0.0, f64::max);
+    let worst = |f: fn(&Penetration) -> f64| penetrations.iter().map(f).fold(0.0, f64::max);
     host.result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
     host.result("drift_ratio", h.peak_drift_ratio, "1")?;
     host.result("hourglass_ratio", h.hourglass_ratio, "1")?;
-    host.result("penetration_max", worst(|x| x.1), "m")?;
-    host.result("penetration_q999", worst(|x| x.2), "m")?;
+    host.result("penetration_max", worst(|p| p.largest), "m")?;
+    host.result("penetration_q999", worst(|p| p.q999), "m")?;
+    host.result("overlap_ratio", worst(Penetration::overlap), "1")?;
     let outlined = || forming.bodies.iter().filter_map(|b| b.quality);
     if outlined().next().is_some() {
         let least =

@@ -450,44 +450,6 @@ impl Forming {
             )
         })
     }
-
-    /// Penetrations (m) of the nodes in contact by pair: name, largest, 99.9 % quantile.
-    pub fn penetrations(&self) -> Vec<(String, f64, f64)> {
-        let judge = |name: &str, mut depths: Vec<f64>| {
-            depths.sort_by(f64::total_cmp);
-            let at = (0.999 * depths.len() as f64) as usize;
-            let max = depths.last().copied().unwrap_or(0.0);
-            let q = depths
-                .get(at.min(depths.len().saturating_sub(1)))
-                .copied()
-                .unwrap_or(0.0);
-            (name.to_owned(), max, q)
-        };
-        let m = &self.model;
-        let rigid = m.rigid_contacts.iter().map(|c| {
-            let depths = c
-                .items
-                .iter()
-                .map(|i| f64::from(i.penetration))
-                .filter(|p| *p > 0.0)
-                .collect();
-            judge(&c.name, depths)
-        });
-        let sheets = m.sheet_contacts.iter().map(|c| {
-            let depths = c
-                .items
-                .iter()
-                .filter(|i| i.active)
-                .map(|i| i.penetration)
-                .collect();
-            judge(&c.name, depths)
-        });
-        let selves = m.self_contacts.iter().map(|c| {
-            let touching = c.items.iter().filter(|i| i.slave.active);
-            judge(&c.name, touching.map(|i| i.slave.penetration).collect())
-        });
-        rigid.chain(sheets).chain(selves).collect()
-    }
 }
 
 fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {

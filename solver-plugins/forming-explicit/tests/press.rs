@@ -213,8 +213,8 @@ fn a_holder_with_a_force_presses_with_that_force_on_two_plies() {
         (holder + punch + die).abs() < 0.03 * -die,
         "{holder} {punch} {die}"
     );
-    for (pair, _, q999) in forming.penetrations() {
-        assert!(q999 < 4e-5, "{pair}: {q999} m");
+    for p in forming.penetrations() {
+        assert!(p.q999 < 4e-5, "{p:?}");
     }
     // The second ply lies on the first over the dome.
     let top = |k: usize| {
@@ -292,7 +292,7 @@ fn contact_with_itself_changes_nothing_where_no_ply_folds() {
     assert!(with.model.x == without.model.x && with.model.v == without.model.v);
     let pairs = |f: &Forming| -> Vec<String> {
         let all = f.penetrations().into_iter();
-        let own = all.filter(|(_, max, _)| *max == 0.0).map(|p| p.0);
+        let own = all.filter(|p| p.largest == 0.0).map(|p| p.pair);
         own.filter(|n| n == "ply_1/ply_1").collect()
     };
     assert_eq!((pairs(&with).len(), pairs(&without).len()), (1, 0));

@@ -63,8 +63,8 @@ fn small_part_is_formed_quietly_with_a_closed_ledger_and_the_same_bits_on_two_th
     assert!(bagged.ledger.kinetic < 1e-3 * film, "{bagged:?}");
 
     // A tenth of the thinnest sheet, at the 99.9 % quantile of every pair.
-    for (pair, _, q999) in forming.penetrations() {
-        assert!(q999 < 8e-6, "{pair}: {q999} m");
+    for p in forming.penetrations() {
+        assert!(p.q999 < 8e-6, "{p:?}");
     }
 
     // Over the middle of the block's top every sheet lies at its height in the stack. (On the mean: where ply
@@ -115,8 +115,8 @@ fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
     let (forming, outcome) = form(&p, 2);
     let health = &outcome.health;
     assert!(health.peak_drift_ratio < 0.02, "{health:?}");
-    for (pair, _, q999) in forming.penetrations() {
-        assert!(q999 < 1e-5, "{pair}: {q999} m");
+    for p in forming.penetrations() {
+        assert!(p.q999 < 1e-5, "{p:?}");
     }
     // On the block's top the upper film lies on the ply, and in the ply's hole on the lower film.
     let upper = forming.bodies.iter().find(|b| b.name == "upper").unwrap();

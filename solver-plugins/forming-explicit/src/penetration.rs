@@ -1,0 +1,95 @@
+//! How deep sheets lie in each other and in rigid surfaces.
+
+use crate::run::Forming;
+
+/// Penetration of one pair at present.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Penetration {
+    /// Name of the pair.
+    pub pair: String,
+    /// Largest of its nodes in touch (m).
+    pub largest: f64,
+    /// 99.9 % quantile of them (m).
+    pub q999: f64,
+    /// By how much two sheets are kept further apart than they are thick (m).
+    pub spare: f64,
+    /// Thickness of the thinner sheet (m).
+    pub thinner: f64,
+}
+
+impl Penetration {
+    fn new(pair: &str, mut depths: Vec<f64>, spare: f64, thinner: f64) -> Self {
+        depths.sort_by(f64::total_cmp);
+        let last = depths.len().saturating_sub(1);
+        let at = (0.999 * depths.len() as f64) as usize;
+        let depth = |i: usize| depths.get(i).copied().unwrap_or(0.0);
+        Self {
+            pair: pair.to_owned(),
+            largest: depth(last),
+            q999: depth(at.min(last)),
+            spare,
+            thinner,
+        }
+    }
+
+    /// What the bodies themselves share of the thinner one's thickness, at the 99.9 % quantile: penetration beyond the distance
+    /// by which a pair is kept further apart than it is thick.
+    pub fn overlap(&self) -> f64 {
+        ((self.q999 - self.spare) / self.thinner).max(0.0)
+    }
+}
+
+impl Forming {
+    /// Penetrations of all pairs: on rigid surfaces, of sheets on each other, of plies on themselves.
+    pub fn penetrations(&self) -> Vec<Penetration> {
+        let m = &self.model;
+        // Pairs are called by their two bodies; what is no sheet is rigid, and has no thickness.
+        let thickness = |pair: &str| -> Vec<f64> {
+            let of = |name: &str| m.sheets.iter().find(|s| s.name == name);
+            pair.split('/')
+                .filter_map(of)
+                .map(|s| s.thickness)
+                .collect()
+        };
+        let judge = |pair: &str, spare: f64, depths: Vec<f64>| {
+            let thinner = thickness(pair).into_iter().fold(f64::INFINITY, f64::min);
+            Penetration::new(pair, depths, spare, thinner)
+        };
+        let between = |pair: &str, offset: f64, depths: Vec<f64>| {
+            let spare = offset - 0.5 * thickness(pair).iter().sum::<f64>();
+            judge(pair, spare, depths)
+        };
+        let rigid = m.rigid_contacts.iter().map(|c| {
+            let depths = c.items.iter().map(|i| f64::from(i.penetration));
+            judge(&c.name, 0.0, depths.filter(|p| *p > 0.0).collect())
+        });
+        let sheets = m.sheet_contacts.iter().map(|c| {
+            let touching = c.items.iter().filter(|i| i.active);
+            between(&c.name, c.offset, touching.map(|i| i.penetration).collect())
+        });
+        let selves = m.self_contacts.iter().map(|c| {
+            let touching = c.items.iter().map(|i| &i.slave).filter(|i| i.active);
+            judge(&c.name, 0.0, touching.map(|i| i.penetration).collect())
+        });
+        rigid.chain(sheets).chain(selves).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_further_apart_than_it_is_thick_overlaps_later() {
+        let depths: Vec<f64> = (0..2000).map(|i| f64::from(i) / 1e8).collect();
+        let close = Penetration::new("film/ply", depths.clone(), 0.0, 8e-5);
+        assert_eq!((close.largest, close.q999), (1.999e-5, 1.998e-5));
+        assert!((close.overlap() - 0.24975).abs() < 1e-12);
+        let apart = Penetration::new("film/film", depths, 2.2e-4, 8e-5);
+        assert_eq!(apart.overlap(), 0.0);
+        assert_eq!(
+            Penetration::new("ply/ply", Vec::new(), 0.0, 1e-4).overlap(),
+            0.0
+        );
+    }
+}
