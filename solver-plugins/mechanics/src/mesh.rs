@@ -79,11 +79,11 @@ pub fn even_axis(lo: f64, hi: f64, size: f64) -> Vec<f64> {
     even_lines(lo, hi, n).collect()
 }
 
-/// `n + 1` evenly spaced lines from `lo` to `hi` (m), on whole multiples of 2^-44 m (6e-14 m): differences between
+/// `n + 1` evenly spaced lines from `lo` to `hi` (m), on whole multiples of 2^-48 m (4e-15 m): differences between
 /// them are then exact, all elements between them have the same bits of constants, and these are kept once. From 0 on they
 /// are those of twice as many between `-hi` and `hi`: the first is exactly 0, where a mirror plane may be.
 fn even_lines(lo: f64, hi: f64, n: usize) -> impl Iterator<Item = f64> {
-    const QUANTUM: f64 = 1.0 / (1u64 << 44) as f64;
+    const QUANTUM: f64 = 1.0 / (1u64 << 48) as f64;
     let whole = |x: f64| (x / QUANTUM).round();
     // From the middle, so that what is symmetric stays so.
     let (middle, before) = if lo == 0.0 {
