@@ -406,9 +406,15 @@ fn best_level() -> Level {
     Level::Portable
 }
 
+/// Lanes of the batches that forming runs are made of: kernels are compiled for this number too.
+pub const USUAL: usize = 32;
+
 /// `dispatch!(fn name(arg: Type, ..) -> Ret = kernel);` defines `name`, which runs
 /// `kernel::<V>(arg, ..)` (generic over [`Lanes`], `#[inline(always)]`) with the widest lanes of
 /// the machine.
+///
+/// `= kernel, lanes n` does the same for a kernel whose argument `n` is the number of lanes: when it is
+/// [`USUAL`], code runs in which it, and with it the distance between rows, is a constant.
 #[macro_export]
 macro_rules! dispatch {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident) => {
@@ -422,6 +428,37 @@ macro_rules! dispatch {
                 }
                 #[target_feature(enable = "avx2")]
                 fn half($($arg: $ty),*) $(-> $ret)? {
+                    $kernel::<$crate::Avx2>($($arg),*)
+                }
+                match $crate::level() {
+                    // SAFETY: `level` has found the instruction set on this machine.
+                    $crate::Level::Avx512 => return unsafe { wide($($arg),*) },
+                    $crate::Level::Avx2 => return unsafe { half($($arg),*) },
+                    $crate::Level::Portable => {}
+                }
+            }
+            $kernel::<$crate::Portable>($($arg),*)
+        }
+    };
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident, lanes $n:ident) => {
+        $(#[$meta])*
+        $vis fn $name($($arg: $ty),*) $(-> $ret)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512dq")]
+                fn wide($($arg: $ty),*) $(-> $ret)? {
+                    if $n == $crate::USUAL {
+                        let $n = $crate::USUAL;
+                        return $kernel::<$crate::Avx512>($($arg),*);
+                    }
+                    $kernel::<$crate::Avx512>($($arg),*)
+                }
+                #[target_feature(enable = "avx2")]
+                fn half($($arg: $ty),*) $(-> $ret)? {
+                    if $n == $crate::USUAL {
+                        let $n = $crate::USUAL;
+                        return $kernel::<$crate::Avx2>($($arg),*);
+                    }
                     $kernel::<$crate::Avx2>($($arg),*)
                 }
                 match $crate::level() {

@@ -300,7 +300,7 @@ fn forces_with(batch: &mut ElementBatch<'_>, material: &MaterialRef, mut s: View
     PF_OK
 }
 
-dispatch!(fn metric_of(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) = metric_kernel);
+dispatch!(fn metric_of(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) = metric_kernel, lanes n);
 dispatch!(fn forces_of(
     position: &[f64],
     constants: &[f64],
@@ -308,7 +308,7 @@ dispatch!(fn forces_of(
     s: &mut View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
-) = forces_kernel);
+) = forces_kernel, lanes n);
 
 #[inline(always)]
 fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) {

@@ -319,14 +319,14 @@ fn bend(
     })
 }
 
-dispatch!(fn derivatives(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) = derivatives_kernel);
+dispatch!(fn derivatives(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) = derivatives_kernel, lanes n);
 dispatch!(fn forces(
     constants: &[f64],
     n: usize,
     s: &View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
-) = forces_kernel);
+) = forces_kernel, lanes n);
 
 /// Nodes in use in a chunk: the most of its lanes (a lane's own unused nodes have zero weights and
 /// sit on the centre, so they add exact zeros).

@@ -80,8 +80,8 @@ dispatch!(pub(super) fn kinematics(
     height: Option<f64>,
     directors: &mut [f64],
     s: &mut View<'_>,
-) = kinematics_kernel);
-dispatch!(pub(super) fn superpose(n: usize, layers: &Layers, s: &mut View<'_>) = superpose_kernel);
+) = kinematics_kernel, lanes n);
+dispatch!(pub(super) fn superpose(n: usize, layers: &Layers, s: &mut View<'_>) = superpose_kernel, lanes n);
 dispatch!(pub(super) fn forces(
     position: &[f64],
     directors: &[f64],
@@ -91,7 +91,7 @@ dispatch!(pub(super) fn forces(
     force: &mut [f64],
     moment: &mut [f64],
     energy: &mut [f64],
-) = forces_kernel);
+) = forces_kernel, lanes n);
 
 /// A node's or a column's three components.
 #[inline(always)]

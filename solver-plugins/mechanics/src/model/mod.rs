@@ -164,6 +164,26 @@ struct NodeWork {
     bad: Option<u32>,
 }
 
+/// The contact whose forces are computed and not yet on the nodes.
+#[derive(Clone, Copy)]
+enum Ready<'a> {
+    Nothing,
+    Rigid(&'a RigidContact),
+    Sheet(&'a SheetContact),
+    Fold(&'a SelfContact),
+}
+
+impl Ready<'_> {
+    fn scatter(self, cells: &[[u32; 4]], force: &mut [V]) {
+        match self {
+            Ready::Nothing => {}
+            Ready::Rigid(contact) => contact.scatter(force),
+            Ready::Sheet(contact) => contact.scatter(cells, force),
+            Ready::Fold(contact) => contact.scatter(cells, force),
+        }
+    }
+}
+
 impl NodeWork {
     /// Counts a node of mass or rotary inertia `m` with its new velocity or spin.
     #[inline(always)]
@@ -235,7 +255,7 @@ impl Model {
         self.mirroring.level_normals(&mut self.normals);
     }
 
-    /// Forces of all contacts.
+    /// Forces of all contacts. Those of one are added to the nodes, by one thread, while those of the next are computed.
     fn contacts(&mut self) {
         // Speeds may grow while a node sleeps: 5 m/s is more than a film picks up under 1 bar over the
         // gaps for which a node sleeps more than a few steps.
@@ -254,22 +274,27 @@ impl Model {
                 i.damping += e.damping;
             }
         };
+        let cells = &self.cells;
+        let force = &mut self.contact_force;
+        let mut ready = Ready::Nothing;
         for contact in &mut self.rigid_contacts {
-            count(contact.compute(&self.x, &self.v, self.dt, reach));
-            contact.scatter(&mut self.contact_force);
+            let compute = || contact.compute(&self.x, &self.v, self.dt, reach);
+            count(rayon::join(compute, || ready.scatter(cells, force)).0);
             // What moves the surface does this work on the sheets.
-            let (force, velocity) = (contact.resultant(), contact.motion.velocity);
-            self.ledger.external += dot(force, velocity) * self.dt;
+            let (resultant, velocity) = (contact.resultant(), contact.motion.velocity);
+            self.ledger.external += dot(resultant, velocity) * self.dt;
+            ready = Ready::Rigid(contact);
         }
         let surface = Surface {
-            cells: &self.cells,
+            cells,
             neighbours: &self.neighbours,
             x: &self.x,
             normals: &self.normals,
         };
         for contact in &mut self.sheet_contacts {
-            count(contact.compute(&surface, &self.v, self.dt, reach));
-            contact.scatter(&self.cells, &mut self.contact_force);
+            let compute = || contact.compute(&surface, &self.v, self.dt, reach);
+            count(rayon::join(compute, || ready.scatter(cells, force)).0);
+            ready = Ready::Sheet(contact);
         }
         let bearing = Bearing {
             mass: &self.mass,
@@ -278,9 +303,11 @@ impl Model {
         };
         for contact in &mut self.self_contacts {
             let ways = (self.max_speed * self.last_dt, reach);
-            count(contact.compute(&surface, &self.v, self.dt, ways, bearing));
-            contact.scatter(&self.cells, &mut self.contact_force);
+            let compute = || contact.compute(&surface, &self.v, self.dt, ways, bearing);
+            count(rayon::join(compute, || ready.scatter(cells, force)).0);
+            ready = Ready::Fold(contact);
         }
+        ready.scatter(cells, force);
         self.ledger.friction += total.friction;
         self.ledger.damping += total.damping;
         self.contact = total;
