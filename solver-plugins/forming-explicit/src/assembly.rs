@@ -358,10 +358,9 @@ pub fn add_contacts(
     let friction = FrictionTable::new(scene)?;
     let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: FrictionLaw, k: usize| {
         let slaves = placed[k].slaves.iter();
-        let items = slaves
-            .map(|n| RigidItem::new(*n, stack[k].offset))
-            .collect();
-        RigidContact::new(name, surface, mu, &contact_settings(p), items)
+        let items = slaves.map(|n| RigidItem::new(*n)).collect();
+        let (offset, settings) = (stack[k].offset, contact_settings(p));
+        RigidContact::new(name, surface, offset, mu, &settings, items)
     };
     let bottom = stack[0].scene.name.as_str();
     let under = |model: &Model, part: &str| {

@@ -246,9 +246,10 @@ fn add_contacts(
             let contact = RigidContact::new(
                 format!("{part}/{}", sheet.scene.name),
                 surface.clone(),
+                offset,
                 mu,
                 &settings,
-                nodes.map(|n| RigidItem::new(*n, offset)).collect(),
+                nodes.map(|n| RigidItem::new(*n)).collect(),
             );
             model.rigid_contacts.push(contact);
         }

@@ -131,10 +131,10 @@ pub struct Batch {
     pub pressed: Vec<[f64; 2]>,
     /// Layers by lane; empty when all stand for one.
     pub layers: Vec<f64>,
-    /// Mass scaling factor by lane.
-    pub mass_factor: [f64; LANES],
-    /// `[PF_ENERGIES][LANES]` energies of the last call (J).
-    pub energy: Aligned,
+    /// Mass scaling factor by lane; empty when no mass is added.
+    pub mass_factor: Vec<f64>,
+    /// Energies of the elements that count, in the last call (J).
+    pub energy: [f64; PF_ENERGIES],
     /// `[constants][LANES]`; batches of the same constants share them.
     pub constants: Arc<Aligned>,
     /// `[history][LANES]`.
@@ -165,8 +165,8 @@ pub struct PatchBatch {
     pub history: Aligned,
     /// `[patch_fields][LANES]`; empty unless asked for.
     pub fields: Aligned,
-    /// `[LANES]` (J).
-    pub energy: Aligned,
+    /// Of the patches that count, in the last call (J).
+    pub energy: f64,
     /// Status of the last call.
     pub status: i32,
 }

@@ -58,9 +58,16 @@ fn pressed_stack() -> Model {
     let start = edge.iter().map(|k| points[*k as usize]).collect();
     model.set_driven(edge, Box::new(Shear(start)));
     let contact = ContactSettings::default();
-    let items = (0..n).map(|k| RigidItem::new(k, 0.5 * THICKNESS));
+    let items = (0..n).map(RigidItem::new);
     let floor = Arc::new(Plane { height: 0.0 });
-    let on = RigidContact::new("floor".into(), floor, 0.3, &contact, items.collect());
+    let on = RigidContact::new(
+        "floor".into(),
+        floor,
+        0.5 * THICKNESS,
+        0.3,
+        &contact,
+        items.collect(),
+    );
     model.rigid_contacts.push(on);
     // Both grids are the same: a node lies at the corner of the cell that begins with it, or ends.
     let corner = |k: u32| {

@@ -150,7 +150,7 @@ fn slide(angle: f64, friction: f64) -> f64 {
     let normal = [angle.sin(), 0.0, angle.cos()];
     let down = [angle.cos(), 0.0, -angle.sin()];
     let (mass, dt, g) = (0.01, 1e-5, 9.81);
-    let mut item = RigidItem::new(0, 0.0);
+    let mut item = RigidItem::new(0);
     item.stiffness = 1e5;
     item.damping = 10.0;
     // At rest on the slip spring, as far as friction holds.
@@ -158,7 +158,14 @@ fn slide(angle: f64, friction: f64) -> f64 {
     item.slip = scale(down, -held);
     let surface = Arc::new(Incline { normal });
     let settings = ContactSettings::default();
-    let mut c = RigidContact::new("incline".into(), surface, friction, &settings, vec![item]);
+    let mut c = RigidContact::new(
+        "incline".into(),
+        surface,
+        0.0,
+        friction,
+        &settings,
+        vec![item],
+    );
     // At rest on the penalty spring.
     let start = scale(normal, -mass * g * angle.cos() / 1e5);
     let (mut x, mut v) = (vec![start], vec![[0.0; 3]]);

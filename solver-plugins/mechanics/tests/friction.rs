@@ -123,10 +123,17 @@ fn belt(angle: f64, friction: f64) -> f64 {
         duration,
     };
     model.set_driven(pulled, Box::new(drive));
-    let items = (0..points.len() as u32).map(|n| RigidItem::new(n, 0.0));
+    let items = (0..points.len() as u32).map(RigidItem::new);
     let contact = ContactSettings::default();
     let drum = Arc::new(Drum { radius: RADIUS });
-    let on = RigidContact::new("drum".into(), drum, friction, &contact, items.collect());
+    let on = RigidContact::new(
+        "drum".into(),
+        drum,
+        0.0,
+        friction,
+        &contact,
+        items.collect(),
+    );
     model.rigid_contacts.push(on);
     model.set_contact_stiffness(&contact);
     let holding = 2.0;
@@ -427,10 +434,10 @@ fn sledge(pressure: f64, law: impl Fn(&Model) -> FrictionLaw) -> f64 {
     };
     model.set_driven(driven, Box::new(drive));
     let floor = Arc::new(Plane { height: 0.0 });
-    let items = (0..n).map(|n| RigidItem::new(n, 0.0)).collect();
+    let items = (0..n).map(RigidItem::new).collect();
     let contact = ContactSettings::default();
     let law = law(&model);
-    let on = RigidContact::new("floor".into(), floor, law, &contact, items);
+    let on = RigidContact::new("floor".into(), floor, 0.0, law, &contact, items);
     model.rigid_contacts.push(on);
     model.set_contact_stiffness(&contact);
     let (mut sum, mut count) = (0.0, 0.0);
@@ -487,9 +494,9 @@ fn incline(angle: f64, friction: f64) -> (f64, f64) {
     let spec = sheet("block", &mesh, 0, [1.0, 0.0, 0.0], Pressed::No);
     let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
     let floor = Arc::new(Plane { height: 0.0 });
-    let items = (0..9).map(|n| RigidItem::new(n, 0.0)).collect();
+    let items = (0..9).map(RigidItem::new).collect();
     let contact = ContactSettings::default();
-    let on = RigidContact::new("incline".into(), floor, friction, &contact, items);
+    let on = RigidContact::new("incline".into(), floor, 0.0, friction, &contact, items);
     model.rigid_contacts.push(on);
     model.set_contact_stiffness(&contact);
     let g = 9.81;

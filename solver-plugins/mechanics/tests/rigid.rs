@@ -65,14 +65,14 @@ fn gradient_of_the_distance_is_its_derivative_and_has_length_one() {
 #[test]
 fn a_rising_floor_lifts_a_weight_and_does_its_work() {
     let (mass, dt, gravity) = (0.01, 1e-5, 9.81);
-    let mut item = RigidItem::new(0, 0.0);
+    let mut item = RigidItem::new(0);
     (item.stiffness, item.damping) = (1e5, 10.0);
     let settings = ContactSettings {
         augmentation: 0.0,
         ..ContactSettings::default()
     };
     let floor = Arc::new(Plane { height: 0.0 });
-    let mut contact = RigidContact::new("floor".into(), floor, 0.3, &settings, vec![item]);
+    let mut contact = RigidContact::new("floor".into(), floor, 0.0, 0.3, &settings, vec![item]);
     // The floor also drifts sideways: friction takes the weight along. It stops more gently than a weight falls, so
     // that the weight stays on it.
     let way = |t: f64| {

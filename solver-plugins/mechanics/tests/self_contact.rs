@@ -159,8 +159,8 @@ fn a_strip_folded_over_onto_itself_stays_outside_itself_and_the_ledger_closes() 
     let half = 0.5 * THICKNESS;
     let floor = Arc::new(Plane { height: -half });
     let contact = ContactSettings::default();
-    let items = (0..flat.len() as u32).map(|n| RigidItem::new(n, half));
-    let on = RigidContact::new("floor".into(), floor, 0.3, &contact, items.collect());
+    let items = (0..flat.len() as u32).map(RigidItem::new);
+    let on = RigidContact::new("floor".into(), floor, half, 0.3, &contact, items.collect());
     model.rigid_contacts.push(on);
     model.set_contact_stiffness(&contact);
     model.body_acceleration[2] = -9.81;

@@ -33,6 +33,13 @@ pub(crate) fn content(offset: f64) -> f64 {
     (0.005 * offset).min(1e-6)
 }
 
+/// Number of the call up to which a node sleeps: `cycle + steps`. In 32 bits, for every node has one; a run of more calls
+/// (seven weeks at a millisecond each) finds its nodes awake.
+#[inline]
+pub(crate) fn waking(cycle: u64, steps: u64) -> u32 {
+    (cycle + steps).min(u64::from(u32::MAX)) as u32
+}
+
 /// Constants that all contacts share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactSettings {

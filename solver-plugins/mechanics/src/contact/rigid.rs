@@ -1,7 +1,7 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
-use super::{ContactEnergy, ContactSettings, content, friction_force, normal_force};
+use super::{ContactEnergy, ContactSettings, content, friction_force, normal_force, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
 use rayon::prelude::*;
@@ -85,8 +85,6 @@ pub struct RigidItem {
     pub node: u32,
     /// Penetration (m), 0 when apart; for reports.
     pub penetration: f32,
-    /// Distance that it keeps from the surface (m).
-    pub offset: f64,
     /// Normal stiffness (N/m).
     pub stiffness: f64,
     /// Damping (N s/m).
@@ -104,11 +102,10 @@ pub struct RigidItem {
 
 impl RigidItem {
     /// A node at rest; stiffness and damping are set by the model.
-    pub fn new(node: u32, offset: f64) -> Self {
+    pub fn new(node: u32) -> Self {
         Self {
             node,
             penetration: 0.0,
-            offset,
             stiffness: 0.0,
             damping: 0.0,
             multiplier: 0.0,
@@ -124,7 +121,7 @@ impl RigidItem {
         *self = Self {
             stiffness: self.stiffness,
             damping: self.damping,
-            ..Self::new(self.node, self.offset)
+            ..Self::new(self.node)
         };
     }
 }
@@ -137,6 +134,8 @@ pub struct RigidContact {
     pub surface: Arc<dyn RigidSurface>,
     /// Its motion.
     pub motion: RigidMotion,
+    /// Distance that the nodes keep from the surface (m).
+    pub offset: f64,
     /// Coulomb coefficient.
     pub friction: FrictionLaw,
     /// Elastic-slip stiffness over normal stiffness.
@@ -146,17 +145,18 @@ pub struct RigidContact {
     /// The nodes.
     pub items: Vec<RigidItem>,
     /// By item: call of [`RigidContact::compute`] before which the node cannot reach the surface. Apart from the items,
-    /// so that to pass over one that sleeps touches eight bytes and not a cache line or two.
-    wakes: Vec<u64>,
+    /// so that to pass over one that sleeps touches four bytes and not a cache line or two.
+    wakes: Vec<u32>,
     spans: Vec<Span>,
     cycle: u64,
 }
 
 impl RigidContact {
-    /// Nodes on a surface at rest; the settings' `stiffness_factor` and `damping_ratio` are not used here.
+    /// Nodes that keep the distance `offset` (m) from a surface at rest; the settings' `stiffness_factor` and `damping_ratio` are not used here.
     pub fn new(
         name: String,
         surface: Arc<dyn RigidSurface>,
+        offset: f64,
         friction: impl Into<FrictionLaw>,
         settings: &ContactSettings,
         items: Vec<RigidItem>,
@@ -165,6 +165,7 @@ impl RigidContact {
             name,
             surface,
             motion: RigidMotion::default(),
+            offset,
             friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
@@ -195,10 +196,12 @@ impl RigidContact {
         let surface = self.surface.as_ref();
         let motion = self.motion;
         let reach = reach + 2.0 * norm(motion.velocity) * dt;
+        let offset = self.offset;
         let law = Law {
             dt,
             friction,
             x,
+            offset,
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
         };
@@ -212,18 +215,18 @@ impl RigidContact {
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
             .zip_eq(self.spans.par_iter_mut())
             .for_each(|((items, wakes), span)| {
-                if cycle < span.wake {
+                if cycle < u64::from(span.wake) {
                     return;
                 }
                 *span = Span {
-                    wake: u64::MAX,
+                    wake: u32::MAX,
                     ..Span::default()
                 };
                 for (item, wake) in items.iter_mut().zip(wakes) {
-                    if cycle >= *wake {
+                    if cycle >= u64::from(*wake) {
                         let n = item.node as usize;
                         let (distance, gradient) = surface.distance(sub(x[n], motion.shift));
-                        let gap = distance - item.offset;
+                        let gap = distance - offset;
                         if gap <= 0.0 || item.multiplier > 0.0 {
                             let relative = sub(v[n], motion.velocity);
                             span.energy.add(&touch(item, gap, gradient, relative, &law));
@@ -231,7 +234,7 @@ impl RigidContact {
                             span.touches = true;
                         } else {
                             item.part();
-                            *wake = cycle + 1 + (gap / reach).min(200.0) as u64;
+                            *wake = waking(cycle, 1 + (gap / reach).min(200.0) as u64);
                         }
                     }
                     span.wake = span.wake.min(*wake);
@@ -279,7 +282,7 @@ const SPAN: usize = 256;
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Span {
     /// Call of [`RigidContact::compute`] in which the first of them wakes.
-    wake: u64,
+    wake: u32,
     /// Whether any touched in the last call.
     touches: bool,
     /// Sum of their forces (N).
@@ -291,6 +294,7 @@ struct Law<'a, F> {
     dt: f64,
     friction: &'a F,
     x: &'a [V],
+    offset: f64,
     slip_factor: f64,
     augmentation: f64,
 }
@@ -306,7 +310,7 @@ fn touch<F: Coulomb>(
     let (k, c) = (item.stiffness, item.damping);
     let vn = dot(v, g);
     let (held, work) = (item.multiplier, item.work);
-    let rest = content(item.offset);
+    let rest = content(law.offset);
     let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
     // The gradient of a distance field is a unit vector up to the error of its interpolation.
     let n = scale(g, 1.0 / dot(g, g).max(1e-12).sqrt());

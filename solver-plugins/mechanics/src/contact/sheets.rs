@@ -8,7 +8,7 @@
 
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, scatter, touch};
-use super::{ContactEnergy, ContactSettings};
+use super::{ContactEnergy, ContactSettings, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
 use crate::mirror::{Image, mirrored_in, reflect};
@@ -33,8 +33,8 @@ pub struct SheetContact {
     /// The slaves.
     pub items: Vec<SlaveItem>,
     /// By slave: call of [`SheetContact::compute`] before which it cannot touch. Apart from the items, so that to pass over one
-    /// that sleeps touches eight bytes and not some cache lines.
-    wakes: Vec<u64>,
+    /// that sleeps touches four bytes and not some cache lines.
+    wakes: Vec<u32>,
     spans: Vec<Span>,
     cycle: u64,
 }
@@ -347,22 +347,22 @@ impl SheetContact {
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
             .zip_eq(self.spans.par_iter_mut())
             .for_each(|((items, wakes), span)| {
-                if cycle < span.wake {
+                if cycle < u64::from(span.wake) {
                     return;
                 }
                 *span = Span {
-                    wake: u64::MAX,
+                    wake: u32::MAX,
                     ..Span::default()
                 };
                 for (item, wake) in items.iter_mut().zip(wakes) {
-                    if cycle >= *wake {
+                    if cycle >= u64::from(*wake) {
                         match follow(item, s, v, side, reach, &law) {
                             Met::Touch(energy) => {
                                 span.energy.add(&energy);
                                 span.touches = true;
                             }
-                            Met::Apart(steps) => *wake = cycle + 1 + steps,
-                            Met::Never => *wake = u64::MAX,
+                            Met::Apart(steps) => *wake = waking(cycle, 1 + steps),
+                            Met::Never => *wake = u32::MAX,
                         }
                     }
                     span.wake = span.wake.min(*wake);
@@ -400,7 +400,7 @@ const SPAN: usize = 256;
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Span {
     /// Call of [`SheetContact::compute`] in which the first of them wakes.
-    wake: u64,
+    wake: u32,
     /// Whether any touched in the last call.
     touches: bool,
     energy: ContactEnergy,

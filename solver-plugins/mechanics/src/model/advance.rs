@@ -62,7 +62,8 @@ impl Model {
             .map(|n| (self.x[*n as usize], self.v[*n as usize]))
             .collect();
         let (sums, patch_sums) = (&self.sums, &self.patch_sums);
-        let (free_mass, fixed) = (&self.free_mass, &self.supports.fixed);
+        let free_mass = free_or_all(&self.free_mass, &self.mass);
+        let fixed = &self.supports.fixed;
         let own_mass = &self.own_mass;
         let mut external: Vec<&mut [V]> = self.external_force.chunks_mut(NODE_CHUNK).collect();
         external.resize_with(self.x.len().div_ceil(NODE_CHUNK), Default::default);
@@ -159,12 +160,26 @@ impl Model {
 
     /// Masses as [`Model::advance`] wants them.
     pub(super) fn set_free_masses(&mut self) {
-        self.free_mass.clone_from(&self.mass);
-        for n in &self.driven {
-            self.free_mass[*n as usize] = 0.0;
-        }
+        self.free_mass = free_of(&self.mass, &self.driven);
         self.set_free_inertias();
     }
+}
+
+/// Values by node, 0 where it is driven; empty when none is.
+pub(super) fn free_of(of_nodes: &[f64], driven: &[u32]) -> Vec<f64> {
+    if driven.is_empty() {
+        return Vec::new();
+    }
+    let mut free = of_nodes.to_vec();
+    for n in driven {
+        free[*n as usize] = 0.0;
+    }
+    free
+}
+
+/// What [`free_of`] has given, or all values where that is empty.
+pub(super) fn free_or_all<'a>(free: &'a [f64], all: &'a [f64]) -> &'a [f64] {
+    if free.is_empty() { all } else { free }
 }
 
 impl Moving {

@@ -55,6 +55,8 @@ pub(super) struct Workspace {
     pub(super) area: Buffer<{ AREA_ROWS * LANES }>,
     /// `[4][3][LANES]` pressure (N).
     pub(super) load: Buffer<{ 12 * LANES }>,
+    /// `[PF_ENERGIES][LANES]` (J).
+    energy: Buffer<{ PF_ENERGIES * LANES }>,
 }
 
 impl Workspace {
@@ -66,6 +68,7 @@ impl Workspace {
             moment: Buffer([0.0; 12 * LANES]),
             area: Buffer([0.0; AREA_ROWS * LANES]),
             load: Buffer([0.0; 12 * LANES]),
+            energy: Buffer([0.0; PF_ENERGIES * LANES]),
         }
     }
 }
@@ -75,6 +78,8 @@ pub(super) struct PatchWorkspace {
     position: Buffer<{ MOST_PATCH_NODES * 3 * LANES }>,
     /// `[patch_nodes][3][LANES]` (N).
     pub(super) force: Buffer<{ MOST_PATCH_NODES * 3 * LANES }>,
+    /// `[LANES]` (J).
+    energy: Buffer<LANES>,
 }
 
 impl PatchWorkspace {
@@ -82,6 +87,7 @@ impl PatchWorkspace {
         Self {
             position: Buffer([0.0; MOST_PATCH_NODES * 3 * LANES]),
             force: Buffer([0.0; MOST_PATCH_NODES * 3 * LANES]),
+            energy: Buffer([0.0; LANES]),
         }
     }
 }
@@ -166,7 +172,7 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Work
     raw.history = batch.history.as_mut_ptr();
     raw.material_history = batch.material_history.as_mut_ptr();
     raw.force = work.force.0.as_mut_ptr();
-    raw.energy = batch.energy.as_mut_ptr();
+    raw.energy = work.energy.0.as_mut_ptr();
     if present.fields {
         batch.fields = Aligned::zeros(sheet.element.sizes.fields * LANES);
         raw.fields = batch.fields.as_mut_ptr();
@@ -186,13 +192,33 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Work
         let rows = work.force.0.chunks_exact_mut(LANES);
         for row in rows
             .chain(work.moment.0.chunks_exact_mut(LANES))
-            .chain(batch.energy.chunks_exact_mut(LANES))
+            .chain(work.energy.0.chunks_exact_mut(LANES))
         {
             for (value, layers) in row.iter_mut().zip(&batch.layers) {
                 *value *= layers;
             }
         }
     }
+    for (sum, row) in batch
+        .energy
+        .iter_mut()
+        .zip(work.energy.0.chunks_exact(LANES))
+    {
+        *sum = sum_of(&row[..batch.count as usize]);
+    }
+}
+
+/// Sum of a row, eight lanes at a time.
+#[inline]
+fn sum_of(row: &[f64]) -> f64 {
+    let (eights, rest) = row.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for eight in eights {
+        for (sum, value) in sums.iter_mut().zip(eight) {
+            *sum += value;
+        }
+    }
+    sums.iter().chain(rest).sum()
 }
 
 /// Positions `[patch_nodes][3][LANES]` of a batch of patches; unused slots repeat the centre.
@@ -213,12 +239,13 @@ pub(super) fn run_patch(batch: &mut PatchBatch, present: Present<'_>, work: &mut
     raw.constants = batch.constants.as_ptr().cast_mut();
     raw.history = batch.history.as_mut_ptr();
     raw.force = work.force.0.as_mut_ptr();
-    raw.energy = batch.energy.as_mut_ptr();
+    raw.energy = work.energy.0.as_mut_ptr();
     if present.fields {
         batch.fields = Aligned::zeros(sheet.element.sizes.patch_fields * LANES);
         raw.fields = batch.fields.as_mut_ptr();
     }
     batch.status = sheet.element.patch_forces(&raw);
+    batch.energy = sum_of(&work.energy.0[..batch.count as usize]);
 }
 
 /// Forces `[4][3][LANES]` of a pressure (Pa) by lane on the cells' nodes, from [`cell_areas`].
@@ -273,7 +300,7 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<
         return vec![0.0; batch.count as usize];
     }
     (0..batch.count as usize)
-        .map(|l| step[l] * batch.mass_factor[l].sqrt())
+        .map(|l| step[l] * batch.mass_factor.get(l).map_or(1.0, |f| f.sqrt()))
         .collect()
 }
 

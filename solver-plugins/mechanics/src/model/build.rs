@@ -236,7 +236,7 @@ impl Model {
             constants: Arc::default(),
             history: Aligned::zeros((s.patch_history + bending_history) * LANES),
             fields: Aligned::default(),
-            energy: Aligned::zeros(LANES),
+            energy: 0.0,
             status: PF_OK,
         };
         let mut constants = Aligned::zeros(s.patch_constants * LANES);
@@ -320,6 +320,7 @@ impl Model {
             batch.constants = shared.keep(constants);
             let batch_layers = std::mem::take(&mut batch.layers);
             let layers = |l: usize| batch_layers.get(l).copied().unwrap_or(1.0);
+            let mut factors = [1.0; LANES];
             for l in 0..batch.count as usize {
                 let critical = step[l] * self.settings.safety;
                 if !(critical > 0.0 && critical.is_finite()) {
@@ -333,7 +334,7 @@ impl Model {
                     .powi(2)
                     .max(least[cells[l] as usize] / areal_mass)
                     .max(1.0);
-                batch.mass_factor[l] = factor;
+                factors[l] = factor;
                 for k in 0..4 {
                     let own = mass[k * LANES + l] * layers(l);
                     let node = batch.nodes[k][l] as usize;
@@ -348,6 +349,9 @@ impl Model {
                 }
             }
             batch.layers = batch_layers;
+            if factors != [1.0; LANES] {
+                batch.mass_factor = factors.to_vec();
+            }
         }
         Ok(())
     }
@@ -558,8 +562,8 @@ fn element_batch(
         nodes,
         pressed: (0..LANES).filter(|_| is_pressed).map(shares).collect(),
         layers: if layered { layers } else { Vec::new() },
-        mass_factor: [1.0; LANES],
-        energy: Aligned::zeros(PF_ENERGIES * LANES),
+        mass_factor: Vec::new(),
+        energy: [0.0; PF_ENERGIES],
         constants: Arc::default(),
         history: Aligned::zeros(s.history * LANES),
         material_history: Aligned::zeros(s.material_points * membrane_history * LANES),

@@ -187,7 +187,7 @@ impl Model {
                     if std::mem::replace(&mut seen[i], true) || self.x[i][k] == 0.0 {
                         continue;
                     }
-                    let mut item = RigidItem::new(*n, 0.0);
+                    let mut item = RigidItem::new(*n);
                     item.stiffness = PLANE_STIFFNESS * self.mass[i] / dt2;
                     item.damping =
                         2.0 * settings.damping_ratio * (item.stiffness * self.mass[i]).sqrt();
@@ -200,7 +200,7 @@ impl Model {
                     ..*settings
                 };
                 self.rigid_contacts
-                    .push(RigidContact::new(name, surface, 0.0, &without, items));
+                    .push(RigidContact::new(name, surface, 0.0, 0.0, &without, items));
             }
         }
     }

@@ -111,7 +111,7 @@ pub struct Model {
     cell_place: Vec<CellPlace>,
     sums: Sums,
     patch_sums: Sums,
-    /// `[n]` mass of a node (kg); 0: driven.
+    /// `[n]` masses (kg), 0 for driven nodes; empty when none is.
     free_mass: Vec<f64>,
     /// `[n]` forces on the nodes in the last step (N).
     force: Vec<V>,

@@ -10,13 +10,12 @@ impl Model {
         l.kinetic = self.work.kinetic;
         l.contact = self.contact.stored;
         for batch in self.blocks.iter().flat_map(|b| &b.batches) {
-            let row = |r: usize| &batch.energy[r * LANES..r * LANES + batch.count as usize];
-            l.membrane += row(PF_ENERGY_MEMBRANE).iter().sum::<f64>();
-            l.bending += row(PF_ENERGY_BENDING).iter().sum::<f64>();
-            l.hourglass += row(PF_ENERGY_HOURGLASS).iter().sum::<f64>();
+            l.membrane += batch.energy[PF_ENERGY_MEMBRANE];
+            l.bending += batch.energy[PF_ENERGY_BENDING];
+            l.hourglass += batch.energy[PF_ENERGY_HOURGLASS];
         }
         for batch in self.patches.iter().flat_map(|b| &b.batches) {
-            l.bending += batch.energy[..batch.count as usize].iter().sum::<f64>();
+            l.bending += batch.energy;
         }
         l
     }
@@ -25,15 +24,13 @@ impl Model {
     pub fn sheet_energies(&self) -> Vec<SheetEnergy> {
         let mut of = vec![SheetEnergy::default(); self.sheets.len()];
         for batch in self.blocks.iter().flat_map(|b| &b.batches) {
-            let row = |r: usize| &batch.energy[r * LANES..r * LANES + batch.count as usize];
             let e = &mut of[batch.sheet as usize];
-            e.membrane += row(PF_ENERGY_MEMBRANE).iter().sum::<f64>();
-            e.bending += row(PF_ENERGY_BENDING).iter().sum::<f64>();
-            e.hourglass += row(PF_ENERGY_HOURGLASS).iter().sum::<f64>();
+            e.membrane += batch.energy[PF_ENERGY_MEMBRANE];
+            e.bending += batch.energy[PF_ENERGY_BENDING];
+            e.hourglass += batch.energy[PF_ENERGY_HOURGLASS];
         }
         for batch in self.patches.iter().flat_map(|b| &b.batches) {
-            of[batch.sheet as usize].bending +=
-                batch.energy[..batch.count as usize].iter().sum::<f64>();
+            of[batch.sheet as usize].bending += batch.energy;
         }
         let spin = self.rotations.as_deref();
         let mut counted = vec![false; self.x.len()];

@@ -4,7 +4,7 @@
 //! gyroscopic term: `I dw/dt = moment`. Elements turn their own directors by the spin; the model keeps
 //! no orientation.
 
-use super::advance::Turns;
+use super::advance::{Turns, free_of, free_or_all};
 use super::*;
 
 /// Rotational state; per-node arrays in the model's numbering.
@@ -13,7 +13,7 @@ pub(super) struct Rotations {
     pub(super) spin: Vec<V>,
     /// `[n]` rotary inertias (kg m2); 0: the node does not rotate.
     pub(super) inertia: Vec<f64>,
-    /// `[n]` inertia of a node (kg m2); 0: it does not rotate, or is driven.
+    /// The same with 0 for driven nodes; empty when none is.
     free_inertia: Vec<f64>,
 }
 
@@ -43,10 +43,7 @@ impl Model {
         let Some(r) = self.rotations.as_deref_mut() else {
             return;
         };
-        r.free_inertia.clone_from(&r.inertia);
-        for n in &self.driven {
-            r.free_inertia[*n as usize] = 0.0;
-        }
+        r.free_inertia = free_of(&r.inertia, &self.driven);
         for (n, fixed) in self.supports.fixed.iter().enumerate() {
             r.fix(n, *fixed);
         }
@@ -73,7 +70,8 @@ impl Model {
     fn turn_all(&self, r: &mut Rotations) -> NodeWork {
         let moving = self.moving(false);
         let (sums, loads, factor) = (&self.sums, &self.loads.moment, self.load_factor);
-        let (inertia, fixed) = (&r.free_inertia, &self.supports.fixed);
+        let inertia = free_or_all(&r.free_inertia, &r.inertia);
+        let fixed = &self.supports.fixed;
         let works: Vec<NodeWork> = r
             .spin
             .par_chunks_mut(NODE_CHUNK)
