@@ -48,6 +48,11 @@ impl RigidSurface for ToolSurface {
     fn distance(&self, point: V) -> (f64, V) {
         self.0.distance_and_gradient(point)
     }
+
+    /// A field of the whole tool is too large for the cache.
+    fn is_costly(&self) -> bool {
+        true
+    }
 }
 
 /// A sheet of the stack with what the contacts and the output need.

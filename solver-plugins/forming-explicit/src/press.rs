@@ -243,7 +243,7 @@ fn add_contacts(
                 0.0.into()
             };
             let nodes = model.sheets[k].nodes.iter();
-            let contact = RigidContact::new(
+            let mut contact = RigidContact::new(
                 format!("{part}/{}", sheet.scene.name),
                 surface.clone(),
                 offset,
@@ -251,6 +251,7 @@ fn add_contacts(
                 &settings,
                 nodes.map(|n| RigidItem::new(*n)).collect(),
             );
+            contact.moves = *part != "die";
             model.rigid_contacts.push(contact);
         }
     }

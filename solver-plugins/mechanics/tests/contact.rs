@@ -1,13 +1,22 @@
 //! Contact against what it must be: gradients of its own energy, balance, Coulomb's law.
 
 use plyflow_mechanics::contact::{
-    ContactSettings, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem, Surface,
+    ContactSettings, Pace, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem, Surface,
 };
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
 use std::sync::Arc;
 
 const OFFSET: f64 = 4e-4;
+
+/// Of nodes that never sleep for long.
+fn pace(dt: f64) -> Pace {
+    Pace {
+        dt,
+        speed: 100.0,
+        acceleration: 1e6,
+    }
+}
 
 /// Two by two cells of 8 mm, folded along x = 0 by `fold` (rad, positive: a valley) and warped a little; one
 /// slave above at `place` and `height` over the middle line of the fold.
@@ -50,7 +59,7 @@ fn evaluate(mesh: &QuadMesh, x: &[V], cell: u32) -> (f64, Vec<V>) {
     let mut energy = 0.0;
     // The first search starts afar; the second is at the place.
     for _ in 0..2 {
-        energy = c.compute(&surface, &v, 1e-6, 1.0).stored;
+        energy = c.compute(&surface, &v, pace(1e-6)).stored;
     }
     let mut f = vec![[0.0; 3]; x.len()];
     c.scatter(&mesh.cells, &mut f);
@@ -170,7 +179,7 @@ fn slide(angle: f64, friction: f64) -> f64 {
     let start = scale(normal, -mass * g * angle.cos() / 1e5);
     let (mut x, mut v) = (vec![start], vec![[0.0; 3]]);
     for _ in 0..10_000 {
-        c.compute(&x, &v, dt, 1e-3);
+        c.compute(&x, &v, pace(dt));
         let f = add(c.items[0].force, [0.0, 0.0, -mass * g]);
         v[0] = add(v[0], scale(f, dt / mass));
         x[0] = add(x[0], scale(v[0], dt));

@@ -1,7 +1,7 @@
 //! Rigid surfaces: distances of the open plate, and surfaces that move.
 
 use plyflow_mechanics::contact::{
-    ContactSettings, OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface,
+    ContactSettings, OpenPlate, Pace, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface,
 };
 use plyflow_mechanics::history::constant_speed_way;
 use plyflow_mechanics::vec3::{V, add, dot, norm, scale};
@@ -73,6 +73,7 @@ fn a_rising_floor_lifts_a_weight_and_does_its_work() {
     };
     let floor = Arc::new(Plane { height: 0.0 });
     let mut contact = RigidContact::new("floor".into(), floor, 0.0, 0.3, &settings, vec![item]);
+    contact.moves = true;
     // The floor also drifts sideways: friction takes the weight along. It stops more gently than a weight falls, so
     // that the weight stays on it.
     let way = |t: f64| {
@@ -81,6 +82,11 @@ fn a_rising_floor_lifts_a_weight_and_does_its_work() {
     };
     let (mut x, mut v) = (vec![[0.0, 0.0, -mass * gravity / 1e5]], vec![[0.0; 3]]);
     let start = x[0];
+    let pace = Pace {
+        dt,
+        speed: 100.0,
+        acceleration: 1e6,
+    };
     let (mut external, mut lost, mut stored) = (0.0, 0.0, None);
     for i in 0..10_000 {
         let t = f64::from(i) * dt;
@@ -89,7 +95,7 @@ fn a_rising_floor_lifts_a_weight_and_does_its_work() {
             shift: way(t),
             velocity: scale(add(way(t), scale(before, -1.0)), 1.0 / dt),
         };
-        let energy = contact.compute(&x, &v, dt, 1e-3);
+        let energy = contact.compute(&x, &v, pace);
         stored.get_or_insert(energy.stored);
         lost += energy.friction + energy.damping;
         external += dot(contact.items[0].force, contact.motion.velocity) * dt;

@@ -11,8 +11,8 @@
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::proximity::{Blocks, Candidate, Reach};
 use super::sheets::*;
-use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, scatter, touch};
-use super::{ContactEnergy, ContactSettings};
+use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, relative_speed, scatter, touch};
+use super::{ContactEnergy, ContactSettings, Pace};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, dot, norm, scale, sub};
 use rayon::prelude::*;
@@ -147,13 +147,13 @@ impl SelfContact {
     }
 
     /// Follows the pairs, after a search if one is due, and computes the force of every slave. `stride` (m): the
-    /// furthest that any node has moved in the last step; `reach` (m) as of [`super::SheetContact::compute`].
+    /// furthest that any node has moved in the last step.
     pub(crate) fn compute(
         &mut self,
         s: &Surface<'_>,
         v: &[V],
-        dt: f64,
-        (stride, reach): (f64, f64),
+        pace: Pace,
+        stride: f64,
         bearing: Bearing<'_>,
     ) -> ContactEnergy {
         if self.slaves.is_empty() {
@@ -163,8 +163,8 @@ impl SelfContact {
             self.search(s, bearing);
         }
         match self.friction.clone() {
-            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, dt, reach),
-            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, dt, reach),
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, pace),
         }
     }
 
@@ -173,11 +173,10 @@ impl SelfContact {
         friction: &F,
         s: &Surface<'_>,
         v: &[V],
-        dt: f64,
-        reach: f64,
+        pace: Pace,
     ) -> ContactEnergy {
         let law = Law {
-            dt,
+            dt: pace.dt,
             offset: self.offset,
             friction,
             slip_factor: self.settings.slip_factor,
@@ -189,7 +188,7 @@ impl SelfContact {
             for item in items {
                 let own = undeformed[item.slave.node as usize];
                 let open = |cell: u32| is_far(s.cells[cell as usize], undeformed, own, near);
-                if let Some(energy) = follow(item, s, v, reach, &law, open) {
+                if let Some(energy) = follow(item, s, v, &pace, &law, open) {
                     sum.add(&energy);
                     touched = true;
                 }
@@ -387,7 +386,7 @@ fn follow<F: Coulomb>(
     pair: &mut FoldItem,
     s: &Surface<'_>,
     v: &[V],
-    reach: f64,
+    pace: &Pace,
     law: &Law<'_, F>,
     open: impl Fn(u32) -> bool,
 ) -> Option<ContactEnergy> {
@@ -441,7 +440,7 @@ fn follow<F: Coulomb>(
     if pull.gap > 0.0 && item.multiplier == 0.0 {
         item.part();
         item.direction = pull.first;
-        pair.sleep = (pull.gap / reach).min(50.0) as u32;
+        pair.sleep = pace.steps(pull.gap, relative_speed(item, s, v), 50.0) as u32;
         None
     } else {
         item.plain = plain;

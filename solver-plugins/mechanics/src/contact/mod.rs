@@ -33,6 +33,31 @@ pub(crate) fn content(offset: f64) -> f64 {
     (0.005 * offset).min(1e-6)
 }
 
+/// How fast things may come nearer to each other, for nodes that sleep until they can touch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Step (s).
+    pub dt: f64,
+    /// Bound of a relative speed (m/s), whatever it is now.
+    pub speed: f64,
+    /// Bound of a relative acceleration (m/s2); infinite where there is none.
+    pub acceleration: f64,
+}
+
+impl Pace {
+    /// Steps in which a gap (m) cannot close, at the relative speed `now` (m/s): the better of what the two bounds say, at
+    /// most `most`. Small gaps at rest last by the acceleration, large ones by the speed.
+    #[inline]
+    pub(crate) fn steps(&self, gap: f64, now: f64, most: f64) -> u64 {
+        let mut time = gap / self.speed;
+        let a = self.acceleration;
+        if a.is_finite() {
+            time = time.max(((now * now + 2.0 * a * gap).sqrt() - now) / a);
+        }
+        (time / self.dt).min(most) as u64
+    }
+}
+
 /// Number of the call up to which a node sleeps: `cycle + steps`. In 32 bits, for every node has one; a run of more calls
 /// (seven weeks at a millisecond each) finds its nodes awake.
 #[inline]

@@ -1,7 +1,7 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
-use super::{ContactEnergy, ContactSettings, content, friction_force, normal_force, waking};
+use super::{ContactEnergy, ContactSettings, Pace, content, friction_force, normal_force, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
 use rayon::prelude::*;
@@ -13,6 +13,11 @@ pub trait RigidSurface: Send + Sync {
     /// Signed distance (m, positive outside) and its gradient at a point. Far from the surface the
     /// distance may be any positive lower bound of the true one.
     fn distance(&self, point: V) -> (f64, V);
+
+    /// Whether to ask for a distance costs so much that a node in touch had better keep its tangent plane for some steps.
+    fn is_costly(&self) -> bool {
+        false
+    }
 }
 
 /// The plane z = `height`, solid below.
@@ -134,6 +139,8 @@ pub struct RigidContact {
     pub surface: Arc<dyn RigidSurface>,
     /// Its motion.
     pub motion: RigidMotion,
+    /// Whether it moves, or will: what accelerates the nodes then says nothing of when they meet it.
+    pub moves: bool,
     /// Distance that the nodes keep from the surface (m).
     pub offset: f64,
     /// Coulomb coefficient.
@@ -147,8 +154,28 @@ pub struct RigidContact {
     /// By item: call of [`RigidContact::compute`] before which the node cannot reach the surface. Apart from the items,
     /// so that to pass over one that sleeps touches four bytes and not a cache line or two.
     wakes: Vec<u32>,
+    /// By item; empty unless the surface is costly.
+    planes: Vec<TangentPlane>,
     spans: Vec<Span>,
     cycle: u64,
+}
+
+/// The surface as a node saw it that touches or may at the next step: `gap = gradient . x - level`, x less the surface's
+/// shift. The level is NaN of a node that sleeps.
+///
+/// Until it looks again ([`INTERVAL`]) it slides by some tens of micrometres at most. Over those a fillet of 10 mm departs
+/// from its tangent plane by less than a tenth of a micrometre, the penetration with which a multiplier is content.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct TangentPlane {
+    gradient: V,
+    level: f64,
+}
+
+impl TangentPlane {
+    const NONE: Self = Self {
+        gradient: [0.0; 3],
+        level: f64::NAN,
+    };
 }
 
 impl RigidContact {
@@ -165,23 +192,25 @@ impl RigidContact {
             name,
             surface,
             motion: RigidMotion::default(),
+            moves: false,
             offset,
             friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
             items,
             wakes: Vec::new(),
+            planes: Vec::new(),
             spans: Vec::new(),
             cycle: 0,
         }
     }
 
-    /// Computes the force of every item from positions (m) and velocities (m/s). `reach` (m): twice the
-    /// furthest that any node moves in a step, and the surface too.
-    pub fn compute(&mut self, x: &[V], v: &[V], dt: f64, reach: f64) -> ContactEnergy {
+    /// Computes the force of every item from positions (m) and velocities (m/s). `pace`: of the nodes; the surface's own
+    /// speed comes on top.
+    pub fn compute(&mut self, x: &[V], v: &[V], pace: Pace) -> ContactEnergy {
         match self.friction.clone() {
-            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), x, v, dt, reach),
-            FrictionLaw::Varying(law) => self.compute_with(&*law, x, v, dt, reach),
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), x, v, pace),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, x, v, pace),
         }
     }
 
@@ -190,56 +219,53 @@ impl RigidContact {
         friction: &F,
         x: &[V],
         v: &[V],
-        dt: f64,
-        reach: f64,
+        pace: Pace,
     ) -> ContactEnergy {
-        let surface = self.surface.as_ref();
         let motion = self.motion;
-        let reach = reach + 2.0 * norm(motion.velocity) * dt;
-        let offset = self.offset;
-        let law = Law {
-            dt,
-            friction,
-            x,
-            offset,
-            slip_factor: self.slip_factor,
-            augmentation: self.augmentation,
+        let looking = Looking {
+            surface: self.surface.as_ref(),
+            motion,
+            pace: Pace {
+                speed: pace.speed + 2.0 * norm(motion.velocity),
+                acceleration: if self.moves {
+                    f64::INFINITY
+                } else {
+                    pace.acceleration
+                },
+                ..pace
+            },
+            cycle: self.cycle,
+            v,
+            law: Law {
+                dt: pace.dt,
+                friction,
+                x,
+                offset: self.offset,
+                slip_factor: self.slip_factor,
+                augmentation: self.augmentation,
+            },
         };
-        let cycle = self.cycle;
         self.cycle += 1;
         self.wakes.resize(self.items.len(), 0);
         self.spans
             .resize_with(self.items.len().div_ceil(SPAN), Span::default);
-        self.items
-            .par_chunks_mut(SPAN)
+        let costly = self.surface.is_costly();
+        if costly {
+            self.planes.resize(self.items.len(), TangentPlane::NONE);
+        }
+        let items = self.items.par_chunks_mut(SPAN);
+        let spans = items
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
-            .zip_eq(self.spans.par_iter_mut())
-            .for_each(|((items, wakes), span)| {
-                if cycle < u64::from(span.wake) {
-                    return;
-                }
-                *span = Span {
-                    wake: u32::MAX,
-                    ..Span::default()
-                };
-                for (item, wake) in items.iter_mut().zip(wakes) {
-                    if cycle >= u64::from(*wake) {
-                        let n = item.node as usize;
-                        let (distance, gradient) = surface.distance(sub(x[n], motion.shift));
-                        let gap = distance - offset;
-                        if gap <= 0.0 || item.multiplier > 0.0 {
-                            let relative = sub(v[n], motion.velocity);
-                            span.energy.add(&touch(item, gap, gradient, relative, &law));
-                            span.force = add(span.force, item.force);
-                            span.touches = true;
-                        } else {
-                            item.part();
-                            *wake = waking(cycle, 1 + (gap / reach).min(200.0) as u64);
-                        }
-                    }
-                    span.wake = span.wake.min(*wake);
-                }
-            });
+            .zip_eq(self.spans.par_iter_mut());
+        if costly {
+            spans.zip_eq(self.planes.par_chunks_mut(SPAN)).for_each(
+                |(((items, wakes), span), planes)| {
+                    looking.at_span(items, wakes, span, planes);
+                },
+            );
+        } else {
+            spans.for_each(|((items, wakes), span)| looking.at_span(items, wakes, span, &mut []));
+        }
         let mut total = ContactEnergy::default();
         for span in self.spans.iter().filter(|s| s.touches) {
             total.add(&span.energy);
@@ -264,6 +290,7 @@ impl RigidContact {
         a.value(&mut self.motion)?;
         a.value(&mut self.cycle)?;
         a.value(&mut self.wakes)?;
+        a.value(&mut self.planes)?;
         a.value(&mut self.spans)?;
         a.values(&mut self.items)
     }
@@ -289,6 +316,83 @@ struct Span {
     force: V,
     energy: ContactEnergy,
 }
+
+/// What a look at the items of a surface needs.
+struct Looking<'a, F> {
+    surface: &'a dyn RigidSurface,
+    motion: RigidMotion,
+    pace: Pace,
+    cycle: u64,
+    v: &'a [V],
+    law: Law<'a, F>,
+}
+
+impl<F: Coulomb> Looking<'_, F> {
+    /// Forces of those items of a span that are awake. `planes`: by item, or none.
+    fn at_span(
+        &self,
+        items: &mut [RigidItem],
+        wakes: &mut [u32],
+        span: &mut Span,
+        planes: &mut [TangentPlane],
+    ) {
+        if self.cycle < u64::from(span.wake) {
+            return;
+        }
+        *span = Span {
+            wake: u32::MAX,
+            ..Span::default()
+        };
+        for (k, (item, wake)) in items.iter_mut().zip(wakes).enumerate() {
+            if self.cycle >= u64::from(*wake) {
+                let mut plane = planes.get_mut(k);
+                let (gap, gradient) = self.gap(item, plane.as_deref_mut());
+                let relative = sub(self.v[item.node as usize], self.motion.velocity);
+                if gap <= 0.0 || item.multiplier > 0.0 {
+                    let energy = touch(item, gap, gradient, relative, &self.law);
+                    span.energy.add(&energy);
+                    span.force = add(span.force, item.force);
+                    span.touches = true;
+                } else {
+                    item.part();
+                    let steps = self.pace.steps(gap, norm(relative), 200.0);
+                    *wake = waking(self.cycle, 1 + steps);
+                    if steps > 0
+                        && let Some(plane) = plane
+                    {
+                        plane.level = f64::NAN;
+                    }
+                }
+            }
+            span.wake = span.wake.min(*wake);
+        }
+    }
+
+    /// Gap of an item (m) and its gradient; from the plane while the item keeps it.
+    fn gap(&self, item: &RigidItem, plane: Option<&mut TangentPlane>) -> (f64, V) {
+        let n = item.node as usize;
+        let x = sub(self.law.x[n], self.motion.shift);
+        if let Some(plane) = &plane
+            && !(self.cycle + n as u64).is_multiple_of(INTERVAL)
+        {
+            let gap = dot(plane.gradient, x) - plane.level;
+            // No plane, or a node that has just come: look.
+            if gap > 0.0 || item.normal_force > 0.0 {
+                return (gap, plane.gradient);
+            }
+        }
+        let (distance, gradient) = self.surface.distance(x);
+        let gap = distance - self.law.offset;
+        if let Some(plane) = plane {
+            let level = dot(gradient, x) - gap;
+            *plane = TangentPlane { gradient, level };
+        }
+        (gap, gradient)
+    }
+}
+
+/// How often (steps) an item that is awake asks a costly surface for its distance.
+const INTERVAL: u64 = 8;
 
 struct Law<'a, F> {
     dt: f64,

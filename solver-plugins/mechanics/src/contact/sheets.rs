@@ -7,8 +7,10 @@
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
 use super::friction::{Constant, Coulomb, FrictionLaw};
-use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, scatter, touch};
-use super::{ContactEnergy, ContactSettings, waking};
+use super::slave::{
+    Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
+};
+use super::{ContactEnergy, ContactSettings, Pace, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
 use crate::mirror::{Image, mirrored_in, reflect};
@@ -313,11 +315,11 @@ impl SheetContact {
         }
     }
 
-    /// Computes the force of every slave. `reach` (m): twice the furthest that any node moves in a step.
-    pub fn compute(&mut self, s: &Surface<'_>, v: &[V], dt: f64, reach: f64) -> ContactEnergy {
+    /// Computes the force of every slave from positions and velocities (m/s).
+    pub fn compute(&mut self, s: &Surface<'_>, v: &[V], pace: Pace) -> ContactEnergy {
         match self.friction.clone() {
-            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, dt, reach),
-            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, dt, reach),
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, pace),
         }
     }
 
@@ -326,12 +328,11 @@ impl SheetContact {
         friction: &F,
         s: &Surface<'_>,
         v: &[V],
-        dt: f64,
-        reach: f64,
+        pace: Pace,
     ) -> ContactEnergy {
         let side = self.side;
         let law = Law {
-            dt,
+            dt: pace.dt,
             friction,
             offset: self.offset,
             slip_factor: self.slip_factor,
@@ -356,7 +357,7 @@ impl SheetContact {
                 };
                 for (item, wake) in items.iter_mut().zip(wakes) {
                     if cycle >= u64::from(*wake) {
-                        match follow(item, s, v, side, reach, &law) {
+                        match follow(item, s, v, side, &pace, &law) {
                             Met::Touch(energy) => {
                                 span.energy.add(&energy);
                                 span.touches = true;
@@ -422,15 +423,21 @@ fn follow<F: Coulomb>(
     s: &Surface<'_>,
     v: &[V],
     side: f64,
-    reach: f64,
+    pace: &Pace,
     law: &Law<'_, F>,
 ) -> Met {
     if item.cell == NONE {
         return Met::Never;
     }
     item.turn = item.turn.wrapping_add(1);
-    if item.active && item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
-        return Met::Touch(hold(item, s, v, law));
+    if item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
+        if item.active {
+            return Met::Touch(hold(item, s, v, law));
+        }
+        let gap = held_gap(item, s, law.offset);
+        if gap > 0.0 {
+            return apart(item, gap, s, v, pace, true);
+        }
     }
     // In touch, the place moves by far less than a cell in a step: one iteration follows it.
     let iterations = if item.active { 1 } else { 3 };
@@ -442,14 +449,28 @@ fn follow<F: Coulomb>(
     };
     // A slave that comes from beside cannot be deep inside at once: it has got behind the rim.
     let behind = !item.active && pull.gap < -0.5 * law.offset;
-    let apart = pull.gap > 0.0 && item.multiplier == 0.0;
-    if behind || apart {
-        item.part();
-        return Met::Apart((pull.gap.max(0.0) / reach).min(50.0) as u64);
+    item.direction = pull.first;
+    if behind || (pull.gap > 0.0 && item.multiplier == 0.0) {
+        return apart(item, pull.gap.max(0.0), s, v, pace, plain);
     }
     item.plain = plain;
-    item.direction = pull.first;
     Met::Touch(touch(item, s, v, &pull, &found, law))
+}
+
+/// A slave that does not touch. One that is so near that it looks again at once keeps its place, as one in touch does.
+#[inline]
+fn apart(
+    item: &mut SlaveItem,
+    gap: f64,
+    s: &Surface<'_>,
+    v: &[V],
+    pace: &Pace,
+    plain: bool,
+) -> Met {
+    let steps = pace.steps(gap, relative_speed(item, s, v), 50.0);
+    item.part();
+    item.plain = plain && steps == 0;
+    Met::Apart(steps)
 }
 
 /// Gap and direction of a slave whose closest point is found, and whether it may keep both for some steps; `None`: it lies

@@ -160,6 +160,27 @@ pub(super) struct Pull {
     pub(super) second: V,
 }
 
+/// Weights of the place that a slave keeps, and the way from there to the slave (m).
+#[inline]
+fn held_arm(item: &SlaveItem, s: &Surface<'_>) -> ([f64; 4], V) {
+    let weights = item.weights();
+    let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
+    (weights, sub(s.x[item.node as usize], combine(weights, &x)))
+}
+
+/// Gap (m) of a slave that keeps its place in its cell and its direction.
+#[inline]
+pub(super) fn held_gap(item: &SlaveItem, s: &Surface<'_>, offset: f64) -> f64 {
+    dot(held_arm(item, s).1, item.direction) - offset
+}
+
+/// How fast (m/s) a slave moves against the place of the master that it was seen to be nearest to.
+#[inline]
+pub(super) fn relative_speed(item: &SlaveItem, s: &Surface<'_>, v: &[V]) -> f64 {
+    let master = s.cells[item.cell as usize].map(|n| v[n as usize]);
+    norm(sub(v[item.node as usize], combine(item.weights(), &master)))
+}
+
 /// Force of a slave that keeps its place in its cell and its direction. (The distance to a point that stands
 /// still would not do: pressed at a tenth of a millimetre from it, the slave is a pendulum on its head.)
 #[inline]
@@ -169,9 +190,7 @@ pub(super) fn hold<F: Coulomb>(
     v: &[V],
     law: &Law<'_, F>,
 ) -> ContactEnergy {
-    let weights = item.weights();
-    let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
-    let arm = sub(s.x[item.node as usize], combine(weights, &x));
+    let (weights, arm) = held_arm(item, s);
     let n = item.direction;
     let pull = Pull {
         gap: dot(arm, n) - law.offset,

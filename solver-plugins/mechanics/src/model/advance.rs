@@ -115,6 +115,7 @@ impl Model {
         }
         self.rotate();
         self.max_speed = self.work.speed.sqrt();
+        self.max_acceleration = self.work.change.sqrt() / dt;
         self.ledger.external += self.work.external;
         self.ledger.damping += self.work.damping;
         self.time += dt;
@@ -155,6 +156,8 @@ impl Model {
             self.v[n] = next;
             self.work.count(self.mass[n], n, next);
             self.work.speed = self.work.speed.max(dot(next, next));
+            let change = sub(next, *v);
+            self.work.change = self.work.change.max(dot(change, change));
         }
     }
 
@@ -260,6 +263,7 @@ impl Moving {
             external: sums.done.iter().sum::<f64>() * self.dt,
             damping: sums.lost.iter().sum::<f64>() * self.damping * self.dt,
             speed: sums.speed.iter().fold(0.0, |m, s| m.max(*s)),
+            change: sums.change.iter().fold(0.0, |m, s| m.max(*s)),
             bad: None,
         }
     }
@@ -295,12 +299,14 @@ impl Moving {
             let free = to(&mut per_mass[3 * k..]);
             *free = fixed.translation(*free);
         }
+        let mut change = [0.0; N];
         for i in 0..N {
             f[i] += contact[i] + q[i];
             contact[i] = 0.0;
             let old = v[i];
             let new = (self.lo * old + self.kick * per_mass[i] * f[i]) * self.hi;
             v[i] = new;
+            change[i] = new - old;
             x[i] += new * self.dt;
             sums.kinetic[i] += mass[i] * (new * new);
             let mean = 0.5 * (new + old);
@@ -309,10 +315,12 @@ impl Moving {
             sums.done[i] += if mass[i] > 0.0 { q[i] * mean } else { 0.0 };
         }
         for k in 0..N / 3 {
-            let v2 =
-                v[3 * k] * v[3 * k] + v[3 * k + 1] * v[3 * k + 1] + v[3 * k + 2] * v[3 * k + 2];
-            let s = &mut sums.speed[k];
-            *s = if v2 > *s { v2 } else { *s };
+            let square = |a: &[f64; N]| {
+                a[3 * k] * a[3 * k] + a[3 * k + 1] * a[3 * k + 1] + a[3 * k + 2] * a[3 * k + 2]
+            };
+            let raise = |to: &mut f64, by: f64| *to = if by > *to { by } else { *to };
+            raise(&mut sums.speed[k], square(v));
+            raise(&mut sums.change[k], square(&change));
         }
     }
 }
@@ -355,4 +363,6 @@ struct Works {
     done: [f64; GROUP],
     /// Largest squares of the speed (m2/s2).
     speed: [f64; GROUP / 3],
+    /// Largest squares of its change in the step (m2/s2).
+    change: [f64; GROUP / 3],
 }

@@ -71,6 +71,7 @@ impl Model {
             driven: Vec::new(),
             drive: None,
             max_speed: 0.0,
+            max_acceleration: 0.0,
             contact: ContactEnergy::default(),
             interfaces: Vec::new(),
             work: NodeWork::default(),

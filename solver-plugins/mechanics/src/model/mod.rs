@@ -140,6 +140,8 @@ pub struct Model {
     driven: Vec<u32>,
     drive: Option<Box<dyn Drive>>,
     max_speed: f64,
+    /// Largest acceleration in the last step (m/s2).
+    max_acceleration: f64,
     contact: ContactEnergy,
     /// By contact, rigid ones, sheets on sheets, sheets on themselves: stored at present, lost so far (J).
     interfaces: Vec<ContactEnergy>,
@@ -154,13 +156,16 @@ struct CellPlace {
     lane: u16,
 }
 
-/// Sums over nodes of one step (J), and the largest speed (m/s).
+/// Sums over nodes of one step (J), and the largest speed and change of speed.
 #[derive(Debug, Clone, Copy, Default)]
 struct NodeWork {
     kinetic: f64,
     external: f64,
     damping: f64,
+    /// Squared (m2/s2).
     speed: f64,
+    /// Squared (m2/s2).
+    change: f64,
     bad: Option<u32>,
 }
 
@@ -200,6 +205,7 @@ impl NodeWork {
         self.external += o.external;
         self.damping += o.damping;
         self.speed = self.speed.max(o.speed);
+        self.change = self.change.max(o.change);
         self.bad = self.bad.or(o.bad);
         self
     }
@@ -257,9 +263,14 @@ impl Model {
 
     /// Forces of all contacts. Those of one are added to the nodes, by one thread, while those of the next are computed.
     fn contacts(&mut self) {
-        // Speeds may grow while a node sleeps: 5 m/s is more than a film picks up under 1 bar over the
-        // gaps for which a node sleeps more than a few steps.
-        let reach = 2.0 * (2.0 * self.max_speed).max(5.0) * self.dt;
+        // Both bodies may move so, and speeds and accelerations may grow while a node sleeps. 5 m/s is more than a film
+        // picks up under 1 bar over the gaps for which a node sleeps more than a few steps; 10 km/s2 is what 1 bar
+        // does to 10 kg/m2.
+        let pace = Pace {
+            dt: self.dt,
+            speed: 2.0 * (2.0 * self.max_speed).max(5.0),
+            acceleration: 2.0 * (2.0 * self.max_acceleration).max(1e4),
+        };
         let mut total = ContactEnergy::default();
         let n = self.rigid_contacts.len() + self.sheet_contacts.len() + self.self_contacts.len();
         self.interfaces.resize_with(n, ContactEnergy::default);
@@ -278,7 +289,7 @@ impl Model {
         let force = &mut self.contact_force;
         let mut ready = Ready::Nothing;
         for contact in &mut self.rigid_contacts {
-            let compute = || contact.compute(&self.x, &self.v, self.dt, reach);
+            let compute = || contact.compute(&self.x, &self.v, pace);
             count(rayon::join(compute, || ready.scatter(cells, force)).0);
             // What moves the surface does this work on the sheets.
             let (resultant, velocity) = (contact.resultant(), contact.motion.velocity);
@@ -292,7 +303,7 @@ impl Model {
             normals: &self.normals,
         };
         for contact in &mut self.sheet_contacts {
-            let compute = || contact.compute(&surface, &self.v, self.dt, reach);
+            let compute = || contact.compute(&surface, &self.v, pace);
             count(rayon::join(compute, || ready.scatter(cells, force)).0);
             ready = Ready::Sheet(contact);
         }
@@ -302,8 +313,8 @@ impl Model {
             step: self.settings.target_step,
         };
         for contact in &mut self.self_contacts {
-            let ways = (self.max_speed * self.last_dt, reach);
-            let compute = || contact.compute(&surface, &self.v, self.dt, ways, bearing);
+            let stride = self.max_speed * self.last_dt;
+            let compute = || contact.compute(&surface, &self.v, pace, stride, bearing);
             count(rayon::join(compute, || ready.scatter(cells, force)).0);
             ready = Ready::Fold(contact);
         }
