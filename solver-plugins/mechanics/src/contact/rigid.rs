@@ -14,7 +14,7 @@ pub trait RigidSurface: Send + Sync {
     /// distance may be any positive lower bound of the true one.
     fn distance(&self, point: V) -> (f64, V);
 
-    /// Whether to ask for a distance costs so much that a node in touch had better keep its tangent plane for some steps.
+    /// Whether to ask for a distance costs so much that nodes in touch, or nearly so, keep their tangent planes for some steps.
     fn is_costly(&self) -> bool {
         false
     }
