@@ -38,7 +38,7 @@ const LEAST_STIFFNESS: f64 = 0.02;
 pub struct FoldItem {
     /// Slave, place and forces.
     pub slave: SlaveItem,
-    /// +1: the slave lies on the side of the master cell's normal; -1: on the other. Never changes in touch.
+    /// +1: the slave lies on the side of the master cell's normal; -1: on the other. In touch it changes only around a crease.
     pub side: f64,
     /// Steps for which it is passed over.
     sleep: u32,
@@ -409,7 +409,12 @@ fn follow<F: Coulomb>(
         // Apart, it lies where it is seen to lie.
         pair.side = if dot(first.arm, up) < 0.0 { -1.0 } else { 1.0 };
     }
-    let height = pair.side * dot(first.arm, up);
+    let mut height = pair.side * dot(first.arm, up);
+    if height < -0.5 * distance && dot(first.arm, item.direction) > 0.5 * distance {
+        // The cell is another one and faces the other way, but the slave lies where it lay: it has come around a crease.
+        pair.side = -pair.side;
+        height = -height;
+    }
     let through = height < -0.5 * distance;
     if through && (!item.active || height < -offset) {
         item.part();
@@ -446,5 +451,74 @@ fn follow<F: Coulomb>(
         item.plain = plain;
         item.direction = pull.first;
         Some(touch(item, s, v, &pull, &found, law))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::NONE;
+
+    /// Two cells folded flat onto each other along y at x = 0: the upper one faces up, the lower one down.
+    const X: [V; 7] = [
+        [-1e-2, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 1e-2, 0.0],
+        [-1e-2, 1e-2, 0.0],
+        [-1e-2, 0.0, -1e-4],
+        [-1e-2, 1e-2, -1e-4],
+        // The slave, above the crease.
+        [0.0, 5e-3, 0.9e-3],
+    ];
+
+    /// Follows a slave in touch (0.1 mm deep) that was last seen in `direction` of the upper cell and is now found on the
+    /// lower one.
+    fn found_below(direction: V, slave: V) -> FoldItem {
+        let mut x = X;
+        x[6] = slave;
+        let surface = Surface {
+            cells: &[[0, 1, 2, 3], [1, 4, 5, 2]],
+            neighbours: &[[NONE, 1, NONE, NONE], [NONE, NONE, NONE, 0]],
+            x: &x,
+            normals: &x,
+        };
+        let mut item = SlaveItem::new(6, 1, [-1.0, 0.0]);
+        (item.active, item.guarded, item.direction) = (true, true, direction);
+        (item.penetration, item.stiffness) = (1e-4, 1e3);
+        let mut pair = FoldItem {
+            slave: item,
+            side: 1.0,
+            sleep: 0,
+        };
+        let pace = Pace {
+            dt: 1e-6,
+            speed: 10.0,
+            acceleration: f64::INFINITY,
+        };
+        let law = Law {
+            dt: 1e-6,
+            offset: 1e-3,
+            friction: &Constant(0.0),
+            slip_factor: 0.5,
+            augmentation: 0.0,
+        };
+        follow(&mut pair, &surface, &[[0.0; 3]; 7], &pace, &law, |_| true);
+        pair
+    }
+
+    #[test]
+    fn a_slave_that_comes_around_a_crease_has_not_passed_through() {
+        let pair = found_below([0.0, 0.0, 1.0], X[6]);
+        assert_eq!((pair.slave.cell, pair.side), (1, -1.0));
+        assert!((pair.slave.penetration - 1e-4).abs() < 1e-12);
+        assert!((pair.slave.force[2] - 0.1).abs() < 1e-9, "{pair:?}");
+    }
+
+    #[test]
+    fn a_slave_that_has_passed_through_is_pushed_back_the_way_it_came() {
+        // It was below the lower cell and is now above it.
+        let pair = found_below([0.0, 0.0, -1.0], [-5e-3, 5e-3, 0.2e-3]);
+        assert_eq!(pair.side, 1.0);
+        assert!(pair.slave.penetration > 1e-3, "{pair:?}");
     }
 }
