@@ -1,7 +1,10 @@
-//! Principal curvatures by the iterative quadric fit (thesis 4.3.2, eqs 4.3-4.11).
+//! Principal curvatures by the iterative quadric fit (thesis 4.3.2, eqs 4.3-4.11), with terms of third and fourth order
+//! beside the quadric (`docs/decisions/0021`).
 
 use crate::topology::Topology;
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 
 /// Curvature of a surface at a node. Signs: positive where the surface bends towards its normal (a valley
 /// seen from the normal's side), negative on a crest.
@@ -17,9 +20,8 @@ pub struct Curvature {
     pub min_direction: Vec3,
     /// Unit normal after convergence.
     pub normal: Vec3,
-    /// How many rings of neighbours the fit took; 0: even three rings do not determine it, and the
-    /// curvatures are given as zero.
-    pub rings: usize,
+    /// Whether the neighbours determine a quadric; if not, the curvatures are given as zero.
+    pub determined: bool,
 }
 
 /// The normal has converged when it moves by less than this (rad). The curvature's error is of second
@@ -27,20 +29,25 @@ pub struct Curvature {
 const CONVERGED: f64 = 1e-9;
 /// Folded neighbourhoods may never converge; after this many fits the last one counts.
 const MOST_FITS: usize = 30;
-/// The least squares problem counts as determined when the smallest diagonal of its triangular factor, with
-/// columns of unit length, exceeds this. A regular interior quad ring has 0.7, a structured boundary node
-/// 0; a slightly irregular boundary node (0.1) is determined on paper but multiplies errors by ten.
-const DETERMINED_BY_ONE_RING: f64 = 0.2;
-/// The same for more rings: one-sided neighbourhoods stay near 0.1 however many rings they have.
-const DETERMINED: f64 = 0.03;
+/// Rings of neighbours that a fit takes. A neighbour counts by the inverse sixth power of its distance, so that the third ring
+/// decides only what the first leaves open.
+const RINGS: usize = 3;
+/// Weight of the terms of third and fourth order being small, in units of the distance of the nearest neighbours.
+const SMOOTHNESS: f64 = 0.05;
+/// The quadric counts as determined when the smallest diagonal of the triangular factor of its weighted least squares
+/// problem, with columns of unit length, exceeds this. A regular interior quad ring has 0.7, a corner 0.05, a strip one cell
+/// wide 0.
+const DETERMINED: f64 = 0.01;
+
+/// Terms of the quadric, and all of the polynomial.
+const QUADRIC: usize = 5;
+const TERMS: usize = 14;
 
 /// Curvature at every node of a mesh with its nodes at `points` (`[nodes]`, m).
-///
-/// The fit takes the one-ring, and the second (or third) ring where that does not determine the quadric: at
-/// a structured boundary node its rank is 4 of 5, at a corner less.
 pub fn curvatures(topology: &Topology, points: &[Vec3]) -> Vec<Curvature> {
     let normals = topology.normals(points);
     (0..topology.nodes())
+        .into_par_iter()
         .map(|i| at_node(topology, points, i, normals[i]))
         .collect()
 }
@@ -53,7 +60,7 @@ fn at_node(topology: &Topology, points: &[Vec3], node: usize, normal: Vec3) -> C
         max_direction: e1,
         min_direction: e2,
         normal,
-        rings: 0,
+        determined: false,
     };
     if norm(normal) == 0.0 {
         return Curvature {
@@ -62,30 +69,21 @@ fn at_node(topology: &Topology, points: &[Vec3], node: usize, normal: Vec3) -> C
             ..none
         };
     }
-    for rings in 1..=3 {
-        let offsets: Vec<Vec3> = topology
-            .rings(node, rings)
-            .into_iter()
-            .map(|i| sub(points[i as usize], points[node]))
-            .collect();
-        if let Some(found) = iterate(&offsets, normal, rings) {
-            return found;
-        }
-    }
-    none
+    let offsets: Vec<Vec3> = topology
+        .rings(node, RINGS)
+        .into_iter()
+        .map(|i| sub(points[i as usize], points[node]))
+        .filter(|&o| norm(o) > 0.0)
+        .collect();
+    iterate(&offsets, normal).unwrap_or(none)
 }
 
 /// Repeats the fit in the frame of the last normal until the normal stays.
-fn iterate(offsets: &[Vec3], mut normal: Vec3, rings: usize) -> Option<Curvature> {
-    let size = offsets.iter().map(|&o| norm(o)).sum::<f64>() / offsets.len() as f64;
-    if offsets.len() < 5 || size <= 0.0 {
-        return None;
-    }
-    let limit = if rings == 1 {
-        DETERMINED_BY_ONE_RING
-    } else {
-        DETERMINED
-    };
+fn iterate(offsets: &[Vec3], mut normal: Vec3) -> Option<Curvature> {
+    let mut lengths: Vec<f64> = offsets.iter().map(|&o| norm(o)).collect();
+    lengths.sort_by(f64::total_cmp);
+    let nearest = lengths.get(..4)?;
+    let size = nearest.iter().sum::<f64>() / nearest.len() as f64;
     let mut last = None;
     for _ in 0..MOST_FITS {
         let [e1, e2] = tangents(normal);
@@ -93,7 +91,7 @@ fn iterate(offsets: &[Vec3], mut normal: Vec3, rings: usize) -> Option<Curvature
             .iter()
             .map(|&o| [dot(o, e1) / size, dot(o, e2) / size, dot(o, normal) / size])
             .collect();
-        let Some(q) = fit_quadric(&local, limit) else {
+        let Some(q) = fit(&local) else {
             break;
         };
         last = Some((q, normal));
@@ -105,11 +103,11 @@ fn iterate(offsets: &[Vec3], mut normal: Vec3, rings: usize) -> Option<Curvature
         }
         normal = new;
     }
-    last.map(|(q, normal)| principal(q, size, normal, rings))
+    last.map(|(q, normal)| principal(q, size, normal))
 }
 
 /// Eq. 4.11, and the directions from the second derivatives (at convergence d = e = 0).
-fn principal([a, b, c, d, e]: [f64; 5], size: f64, normal: Vec3, rings: usize) -> Curvature {
+fn principal([a, b, c, d, e]: [f64; QUADRIC], size: f64, normal: Vec3) -> Curvature {
     let w = 1.0 + d * d + e * e;
     let gauss = (4.0 * a * c - b * b) / (w * w);
     let mean = (a + c + a * e * e + c * d * d - b * d * e) / w.powf(1.5);
@@ -134,7 +132,7 @@ fn principal([a, b, c, d, e]: [f64; 5], size: f64, normal: Vec3, rings: usize) -
         max_direction: add(scale(e1, cos), scale(e2, sin)),
         min_direction: add(scale(e1, -sin), scale(e2, cos)),
         normal,
-        rings,
+        determined: true,
     }
 }
 
@@ -150,67 +148,51 @@ fn tangents(n: Vec3) -> [Vec3; 2] {
     [e1, cross(n, e1)]
 }
 
-/// Least squares fit of z = a x2 + b xy + c y2 + d x + e y (eq. 4.9) by modified Gram-Schmidt with column
-/// pivoting; `None` when the points do not determine it.
-fn fit_quadric(points: &[Vec3], limit: f64) -> Option<[f64; 5]> {
-    let n = points.len();
-    let mut columns: [Vec<f64>; 5] = std::array::from_fn(|_| Vec::with_capacity(n));
-    for &[x, y, _] in points {
-        for (column, value) in columns.iter_mut().zip([x * x, x * y, y * y, x, y]) {
-            column.push(value);
-        }
+/// Weighted least squares fit of z = a x2 + b xy + c y2 + d x + e y (eq. 4.9) + terms of third and fourth order, which
+/// take up what the surface has of them and are held small where the points do not determine them. Gives the quadric;
+/// `None` when the points do not determine that.
+fn fit(points: &[Vec3]) -> Option<[f64; QUADRIC]> {
+    let mut gram = SMatrix::<f64, TERMS, TERMS>::zeros();
+    let mut rhs = SVector::<f64, TERMS>::zeros();
+    for &[x, y, z] in points {
+        let row = SVector::from(terms(x, y));
+        let weight = (x * x + y * y + z * z).powi(-3);
+        gram.ger(weight, &row, &row, 1.0);
+        rhs.axpy(weight * z, &row, 1.0);
     }
-    let mut rhs: Vec<f64> = points.iter().map(|p| p[2]).collect();
-    let mut lengths = [0.0; 5];
-    for (column, length) in columns.iter_mut().zip(&mut lengths) {
-        *length = inner(column, column).sqrt();
-        if *length < 1e-12 {
-            return None;
-        }
-        column.iter_mut().for_each(|v| *v /= *length);
+    let mut quadric = gram.fixed_view::<QUADRIC, QUADRIC>(0, 0).into_owned();
+    let lengths = quadric.diagonal().map(f64::sqrt);
+    if lengths.min() <= 0.0 {
+        return None;
     }
-    let mut order = [0, 1, 2, 3, 4];
-    let mut r = [[0.0; 5]; 5];
-    let mut projected = [0.0; 5];
-    for k in 0..5 {
-        let left = |j: usize| inner(&columns[order[j]], &columns[order[j]]);
-        let pivot = (k..5)
-            .max_by(|&i, &j| left(i).total_cmp(&left(j)))
-            .unwrap_or(k);
-        order.swap(k, pivot);
-        for row in &mut r {
-            row.swap(k, pivot);
-        }
-        let length = inner(&columns[order[k]], &columns[order[k]]).sqrt();
-        if length < limit {
-            return None;
-        }
-        r[k][k] = length;
-        let q: Vec<f64> = columns[order[k]].iter().map(|v| v / length).collect();
-        for j in k + 1..5 {
-            let along = inner(&q, &columns[order[j]]);
-            r[k][j] = along;
-            columns[order[j]]
-                .iter_mut()
-                .zip(&q)
-                .for_each(|(v, q)| *v -= along * q);
-        }
-        projected[k] = inner(&q, &rhs);
-        rhs.iter_mut()
-            .zip(&q)
-            .for_each(|(v, q)| *v -= projected[k] * q);
+    quadric.component_div_assign(&(lengths * lengths.transpose()));
+    let least = quadric.cholesky()?.l_dirty().diagonal().min();
+    if least < DETERMINED {
+        return None;
     }
-    let mut solution = [0.0; 5];
-    for k in (0..5).rev() {
-        let known: f64 = (k + 1..5).map(|j| r[k][j] * solution[order[j]]).sum();
-        solution[order[k]] = (projected[k] - known) / r[k][k];
+    for k in QUADRIC..TERMS {
+        gram[(k, k)] += SMOOTHNESS * SMOOTHNESS;
     }
-    for (s, length) in solution.iter_mut().zip(lengths) {
-        *s /= length;
-    }
-    Some(solution)
+    let solution = gram.cholesky()?.solve(&rhs);
+    Some(std::array::from_fn(|k| solution[k]))
 }
 
-fn inner(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+fn terms(x: f64, y: f64) -> [f64; TERMS] {
+    let (x2, xy, y2) = (x * x, x * y, y * y);
+    [
+        x2,
+        xy,
+        y2,
+        x,
+        y, //
+        x2 * x,
+        x2 * y,
+        x * y2,
+        y2 * y, //
+        x2 * x2,
+        x2 * xy,
+        x2 * y2,
+        xy * y2,
+        y2 * y2,
+    ]
 }

@@ -3,16 +3,21 @@
 
 use plyflow_surface::vector::Vec3;
 
-/// Structured quads over [-a, a]^2 with `n` cells a side; inner nodes moved by up to `jitter` cells.
-pub fn grid(n: usize, a: f64, jitter: f64) -> (Vec<[f64; 2]>, Vec<u32>) {
-    let h = 2.0 * a / n as f64;
+/// The same numbers in [-1, 1) in every run.
+pub fn random() -> impl FnMut() -> f64 {
     let mut state = 12345u64;
-    let mut random = move || {
+    move || {
         state = state
             .wrapping_mul(6364136223846793005)
             .wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
-    };
+    }
+}
+
+/// Structured quads over [-a, a]^2 with `n` cells a side; inner nodes moved by up to `jitter` cells.
+pub fn grid(n: usize, a: f64, jitter: f64) -> (Vec<[f64; 2]>, Vec<u32>) {
+    let h = 2.0 * a / n as f64;
+    let mut random = random();
     let mut points = Vec::new();
     for j in 0..=n {
         for i in 0..=n {
