@@ -1,14 +1,13 @@
 //! Step plugin `comparison`: measures wrinkles, bridging and shear in the local runs, and in the global run
 //! and a reference at the same places, with what each cost.
 
-mod measure;
 mod models;
 mod table;
 
-pub use measure::{Defect, Kind, Ply, Settings, Tool, measure, quantiles};
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
+use plyflow_defects::{Defect, Kind, Ply, Settings, quantiles};
 use plyflow_sdk::{Host, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::QuadLocator;
 use serde_json::{Value, json};
@@ -107,12 +106,9 @@ fn write_bodies(host: &Host, models: &[Model], table: &[Entry]) -> Result<(), St
     let name = |m: &Model, p: &Ply| format!("{}_{}", m.name.replace('.', "_"), p.name);
     for (_, m) in &local {
         for p in &m.plies {
-            let cells: Vec<u32> = (0..p.topology.cells())
-                .flat_map(|c| p.topology.cell(c))
-                .copied()
-                .collect();
+            let (_, cells) = p.topology.connectivity();
             let about = json!({"model": m.name, "ply": p.name});
-            host.define_mesh(&name(m, p), &p.formed, 4, &cells, &about)?;
+            host.define_mesh(&name(m, p), &p.formed, 4, cells, &about)?;
         }
     }
     if local.iter().all(|(_, m)| m.plies.is_empty()) {
@@ -259,11 +255,8 @@ fn distance_error(model: &Model, reference: &Model) -> Option<f64> {
         let Some(r) = reference.plies.iter().find(|r| r.name == p.name) else {
             continue;
         };
-        let cells: Vec<u32> = (0..r.topology.cells())
-            .flat_map(|c| r.topology.cell(c))
-            .copied()
-            .collect();
-        let Some(locator) = QuadLocator::new(&r.undeformed, &cells) else {
+        let (_, cells) = r.topology.connectivity();
+        let Some(locator) = QuadLocator::new(&r.undeformed, cells) else {
             continue;
         };
         for (at, d) in p

@@ -1,6 +1,6 @@
 //! Reading the models that are compared.
 
-use crate::measure::{Ply, Settings, Tool};
+use plyflow_defects::{Ply, Settings, Tool};
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::{Surface, Topology, triangles};
 use serde::{Deserialize, Serialize};
@@ -177,16 +177,17 @@ fn read(
             return Err(what.into());
         }
         let (undeformed, cells) = host.mesh(&input, body)?;
-        plies.push(Ply::new(
+        let mut ply = Ply::new(
             sheet.name.clone(),
             Topology::new(undeformed.len(), 4, &cells),
             undeformed,
             host.frame_points(&input, body, frame)?,
-            host.frame_field(&input, body, frame, "shear_angle")?,
             tool,
             sheet.offset,
             settings.foot_margin,
-        ));
+        );
+        ply.shear_angle = host.frame_field(&input, body, frame, "shear_angle")?;
+        plies.push(ply);
     }
     let name = match (role, zone) {
         (Role::Local, Some((_, zone))) => format!("local.{}", zone.name),

@@ -1,7 +1,7 @@
 //! The table of defects: numbering, and which defect of one model is which of another.
 
-use crate::measure::{Defect, Kind, Settings, measure};
 use crate::models::{Model, Role, Zone};
+use plyflow_defects::{Defect, Kind, Settings, measure};
 use serde_json::{Value, json};
 
 /// A defect with its place in the table.
@@ -38,8 +38,8 @@ impl Entry {
             "curvature_max": d.curvature_max,
             "radius": if d.curvature_max > 0.0 { json!(1.0 / d.curvature_max) } else { Value::Null },
             "direction": d.direction,
-            "shear_min": d.shear[0],
-            "shear_max": d.shear[1],
+            "shear_min": d.shear.map(|s| s[0]),
+            "shear_max": d.shear.map(|s| s[1]),
             "touches_cut": self.touches_cut,
         })
     }

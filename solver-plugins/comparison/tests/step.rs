@@ -1,6 +1,7 @@
 //! The comparison of models whose wrinkles and bridging are known.
 
-use plyflow_comparison::{Comparison, quantiles};
+use plyflow_comparison::Comparison;
+use plyflow_defects::quantiles;
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;

@@ -8,6 +8,7 @@ mod curvature;
 mod distribution;
 mod locate;
 mod ridge;
+mod section;
 mod topology;
 pub mod vector;
 
@@ -17,6 +18,7 @@ pub use curvature::{Curvature, curvatures};
 pub use distribution::{bin_width, density, weighted_mean, weighted_quantiles};
 pub use locate::{Location, QuadLocator};
 pub use ridge::{Ridge, ridge_line};
+pub use section::{line_length, plane_section};
 pub use topology::{Topology, triangles};
 
 #[cfg(feature = "memory-host")]

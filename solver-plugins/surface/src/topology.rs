@@ -114,6 +114,11 @@ impl Topology {
         self.cells.len() / self.nodes_per_cell
     }
 
+    /// Nodes of a cell, and the nodes of all cells one after the other.
+    pub fn connectivity(&self) -> (usize, &[u32]) {
+        (self.nodes_per_cell, &self.cells)
+    }
+
     /// Nodes of a cell, in its order.
     pub fn cell(&self, c: usize) -> &[u32] {
         &self.cells[c * self.nodes_per_cell..(c + 1) * self.nodes_per_cell]

@@ -1,6 +1,7 @@
 //! Wrinkles and bridging of one formed ply.
 
-use plyflow_surface::vector::{Vec3, sub};
+use crate::cause::Cause;
+use plyflow_surface::vector::Vec3;
 use plyflow_surface::{
     Curvature, NodalDistance, Surface, Topology, curvatures, nodal_distances, ridge_line,
     tool_crests,
@@ -23,19 +24,21 @@ pub struct Settings {
     pub minimum_bridging_area: f64,
 }
 
-/// A formed ply of one model.
+/// A formed ply: of a simulation, or scanned.
 #[derive(Debug, Clone)]
 pub struct Ply {
     /// Name of the sheet.
     pub name: String,
-    /// Mesh of quads.
+    /// Its mesh, quads or triangles.
     pub topology: Topology,
-    /// `[nodes]` (m).
+    /// `[nodes]` in the flat ply (m); of a scan, which knows none, where they are.
     pub undeformed: Vec<Vec3>,
     /// `[nodes]` (m).
     pub formed: Vec<Vec3>,
-    /// `[cells]` (rad).
+    /// `[cells]` (rad); empty when it is not known.
     pub shear_angle: Vec<f64>,
+    /// `[cells]` the smaller of the two strains along fibres; empty when they are not known.
+    pub fibre_strain: Vec<f64>,
     /// `[nodes]`.
     pub distance: Vec<NodalDistance>,
     /// `[nodes]`.
@@ -47,7 +50,8 @@ pub struct Ply {
 /// A tool and its own crests.
 #[derive(Debug, Clone)]
 pub struct Tool {
-    surface: Surface,
+    /// Its surface.
+    pub surface: Surface,
     crests: Vec<f64>,
 }
 
@@ -61,13 +65,12 @@ impl Tool {
 
 impl Ply {
     /// Takes distances and curvatures of a ply whose mid-plane lies `offset` (m) from the tool when all sheets
-    /// lie on it.
+    /// lie on it. Nothing is known of its strains ([`Ply::shear_angle`], [`Ply::fibre_strain`]).
     pub fn new(
         name: String,
         topology: Topology,
         undeformed: Vec<Vec3>,
         formed: Vec<Vec3>,
-        shear_angle: Vec<f64>,
         tool: &Tool,
         offset: f64,
         foot_margin: f64,
@@ -80,11 +83,22 @@ impl Ply {
             topology,
             undeformed,
             formed,
-            shear_angle,
+            shear_angle: Vec::new(),
+            fibre_strain: Vec::new(),
             distance,
             curvature,
             tool_crest,
         }
+    }
+
+    /// The mean of a cell field (`[cells]`) at a node; `None` when the field is empty.
+    pub fn at_node(&self, field: &[f64], node: u32) -> Option<f64> {
+        let cells = self.topology.cells_of(node as usize);
+        let sum: f64 = cells
+            .iter()
+            .map(|&c| field.get(c as usize))
+            .sum::<Option<f64>>()?;
+        (!cells.is_empty()).then(|| sum / cells.len() as f64)
     }
 }
 
@@ -116,8 +130,16 @@ pub struct Defect {
     pub curvature_max: f64,
     /// Wrinkles: direction of the ridge in the undeformed plane, from x, in (-pi/2, pi/2] (rad).
     pub direction: f64,
-    /// Shear angles of the cells it touches (rad).
-    pub shear: [f64; 2],
+    /// Smallest and largest shear angle of the cells it touches (rad).
+    pub shear: Option<[f64; 2]>,
+    /// Wrinkles: the crest line on the formed ply (m), from one end to the other.
+    pub ridge: Vec<Vec3>,
+    /// Wrinkles: the nodes along it.
+    pub ridge_nodes: Vec<u32>,
+    /// Wrinkles: the mean shear angle along it (rad).
+    pub ridge_shear: Option<f64>,
+    /// Wrinkles: what most likely brought it about, once that was looked into ([`crate::find_causes`]).
+    pub cause: Option<Cause>,
 }
 
 /// Wrinkles (longest first), then bridging (largest first), among the nodes `inside` (`[nodes]`).
@@ -165,13 +187,13 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     }
     let areas = ply.topology.node_areas(&ply.undeformed);
     let mut found = Vec::new();
-    for (w, (_, ridge)) in wrinkles.iter().enumerate() {
+    for (w, (_, ridge)) in wrinkles.into_iter().enumerate() {
         let nodes = (0..n as u32).filter(|&i| owner[i as usize] == w).collect();
-        let ends = [ridge.nodes[0], ridge.nodes[ridge.nodes.len() - 1]]
-            .map(|i| ply.undeformed[i as usize]);
         let mut defect = describe(ply, Kind::Wrinkle, nodes, &areas);
         defect.length = ridge.length;
-        defect.direction = direction(sub(ends[1], ends[0]));
+        defect.direction = direction(ply, &ridge.nodes);
+        defect.ridge_shear = mean_along(ply, &ply.shear_angle, &ridge.nodes);
+        (defect.ridge, defect.ridge_nodes) = (ridge.points, ridge.nodes);
         found.push(defect);
     }
     found.sort_by(|a, b| b.length.total_cmp(&a.length));
@@ -183,6 +205,13 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     bridging.sort_by(|a, b| b.area.total_cmp(&a.area));
     found.extend(bridging);
     found
+}
+
+/// The mean over nodes of a cell field; `None` when the field is empty.
+pub(crate) fn mean_along(ply: &Ply, field: &[f64], nodes: &[u32]) -> Option<f64> {
+    let values = nodes.iter().map(|&i| ply.at_node(field, i));
+    let sum: f64 = values.sum::<Option<f64>>()?;
+    (!nodes.is_empty()).then(|| sum / nodes.len() as f64)
 }
 
 fn amplitude(ply: &Ply, nodes: &[u32]) -> f64 {
@@ -199,15 +228,13 @@ fn curvature(ply: &Ply, nodes: &[u32]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn direction(v: Vec3) -> f64 {
-    let angle = v[1].atan2(v[0]);
-    if angle > PI / 2.0 {
-        angle - PI
-    } else if angle <= -PI / 2.0 {
-        angle + PI
-    } else {
-        angle
-    }
+/// Direction of the line of least squares through nodes in the flat ply, from x, in (-pi/2, pi/2] (rad).
+fn direction(ply: &Ply, nodes: &[u32]) -> f64 {
+    let places = || nodes.iter().map(|&i| ply.undeformed[i as usize]);
+    let mean = [0, 1].map(|k| places().map(|p| p[k]).sum::<f64>() / nodes.len() as f64);
+    let moment =
+        |a: usize, b: usize| -> f64 { places().map(|p| (p[a] - mean[a]) * (p[b] - mean[b])).sum() };
+    0.5 * (2.0 * moment(0, 1)).atan2(moment(0, 0) - moment(1, 1))
 }
 
 fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, areas: &[f64]) -> Defect {
@@ -219,13 +246,16 @@ fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, areas: &[f64]) -> Defect {
             .sum::<f64>()
             / area
     };
-    let mut shear = [f64::INFINITY, f64::NEG_INFINITY];
-    for &i in &nodes {
-        for &c in ply.topology.cells_of(i as usize) {
-            let g = ply.shear_angle[c as usize];
-            shear = [shear[0].min(g), shear[1].max(g)];
-        }
-    }
+    let cells = nodes
+        .iter()
+        .flat_map(|&i| ply.topology.cells_of(i as usize));
+    let shear = cells.filter_map(|&c| ply.shear_angle.get(c as usize)).fold(
+        None,
+        |range: Option<[f64; 2]>, &g| {
+            let [low, high] = range.unwrap_or([g; 2]);
+            Some([low.min(g), high.max(g)])
+        },
+    );
     Defect {
         kind,
         length: 0.0,
@@ -236,6 +266,10 @@ fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, areas: &[f64]) -> Defect {
         direction: 0.0,
         shear,
         nodes,
+        ridge: Vec::new(),
+        ridge_nodes: Vec::new(),
+        ridge_shear: None,
+        cause: None,
     }
 }
 

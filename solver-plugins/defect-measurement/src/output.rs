@@ -1,0 +1,265 @@
+//! The artifact: bodies with their fields, tables of defects, sections, distributions.
+
+use crate::Measured;
+use crate::read::Run;
+use plyflow_defects::align::Alignment;
+use plyflow_defects::{Defect, Kind};
+use plyflow_sdk::{Host, On, StepError};
+use plyflow_surface::vector::Vec3;
+use plyflow_surface::{
+    bin_width, density, plane_section, triangles, weighted_mean, weighted_quantiles,
+};
+use serde_json::{Value, json};
+
+/// Columns of the table of defects: label, SI unit.
+const COLUMNS: [(&str, &str); 12] = [
+    ("defect", ""),
+    ("on", ""),
+    ("type", ""),
+    ("likely cause", ""),
+    ("length", "m"),
+    ("amplitude", "m"),
+    ("least radius", "m"),
+    ("area", "m2"),
+    ("direction", "rad"),
+    ("x", "m"),
+    ("y", "m"),
+    ("mean shear", "rad"),
+];
+
+/// Quantiles of the distance that are told.
+const QUANTILES: [(&str, f64); 4] = [("q50", 0.5), ("q90", 0.9), ("q99", 0.99), ("largest", 1.0)];
+
+/// Writes what was measured.
+pub struct Output<'a> {
+    host: &'a Host,
+    run: &'a Run,
+    measured: &'a [Measured],
+    plots: Vec<Value>,
+    sections: Vec<Value>,
+}
+
+impl<'a> Output<'a> {
+    /// Of plies and scan on the tool of a run.
+    pub fn new(host: &'a Host, run: &'a Run, measured: &'a [Measured]) -> Self {
+        Self {
+            host,
+            run,
+            measured,
+            plots: Vec::new(),
+            sections: Vec::new(),
+        }
+    }
+
+    /// Plies and scan as they are formed, with distance, curvature and number of the defect (0 where there is none).
+    pub fn bodies(&mut self) -> Result<(), StepError> {
+        let host = self.host;
+        for m in self.measured {
+            let (corners, cells) = m.ply.topology.connectivity();
+            let about = json!({"ply": m.ply.name, "simulated": m.simulated});
+            host.define_mesh(&m.ply.name, &m.ply.undeformed, corners, cells, &about)?;
+        }
+        host.begin_frame(self.run.time)?;
+        for m in self.measured {
+            let p = &m.ply;
+            host.write_points(&p.name, &p.formed)?;
+            let field = |name: &str, unit: &str, values: &[f64]| {
+                host.write_field(&p.name, On::Points, name, 1, unit, values)
+            };
+            let distance: Vec<f64> = p.distance.iter().map(|d| d.value).collect();
+            field("nodal_distance", "m", &distance)?;
+            let curvature: Vec<f64> = p.curvature.iter().map(|k| k.max).collect();
+            field("curvature_max", "1/m", &curvature)?;
+            let mut number = vec![0.0; p.formed.len()];
+            for (k, d) in m.defects.iter().enumerate() {
+                d.nodes
+                    .iter()
+                    .for_each(|&i| number[i as usize] = (k + 1) as f64);
+            }
+            field("defect", "1", &number)?;
+            if !p.shear_angle.is_empty() {
+                host.write_field(&p.name, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
+            }
+        }
+        host.end_frame()
+    }
+
+    /// Results and densities of the distance from the tool, by area.
+    pub fn distances(&mut self) -> Result<(), StepError> {
+        let host = self.host;
+        let mut series = Vec::new();
+        for m in self.measured {
+            let p = &m.ply;
+            let areas = p.topology.node_areas(&p.undeformed);
+            let judged = p.distance.iter().zip(&areas);
+            let weights: Vec<f64> = judged
+                .map(|(d, a)| if d.judged { *a } else { 0.0 })
+                .collect();
+            let values: Vec<f64> = p.distance.iter().map(|d| d.value.abs()).collect();
+            let mean = weighted_mean(&values, &weights);
+            host.result(&format!("distance_mean.{}", p.name), mean, "m")?;
+            let found = weighted_quantiles(&values, &weights, &QUANTILES.map(|q| q.1));
+            for ((name, _), value) in QUANTILES.iter().zip(&found) {
+                host.result(&format!("distance_{name}.{}", p.name), *value, "m")?;
+            }
+            let range = found[QUANTILES.len() - 1].max(1e-6);
+            let width = bin_width(range);
+            let count = (range / width).ceil() as usize;
+            let centres: Vec<f64> = (0..count).map(|k| (k as f64 + 0.5) * width).collect();
+            let [x, y] = ["value", "density"].map(|n| format!("distributions/{}/{n}", p.name));
+            host.write_f64(&x, &[count], "m", &centres)?;
+            host.write_f64(
+                &y,
+                &[count],
+                "1/m",
+                &density(&values, &weights, width, count),
+            )?;
+            series.push(json!({"label": p.name, "x": x, "y": y}));
+        }
+        self.plots.push(json!({
+            "name": "distance_density", "title": "Distance from the tool, by area",
+            "x": {"label": "distance", "unit": "mm"}, "y": {"label": "probability density", "unit": "1/mm"},
+            "series": series,
+        }));
+        Ok(())
+    }
+
+    /// Cuts tool, plies and scan by the vertical plane through two places (x, y in m); of each the longest line counts.
+    pub fn section(&mut self, label: &str, from: [f64; 2], to: [f64; 2]) -> Result<(), StepError> {
+        let host = self.host;
+        let number = self.sections.len();
+        let tool = &self.run.tool.surface;
+        let mut lines = vec![(
+            "tool",
+            plane_section(tool.points(), tool.triangles(), from, to),
+        )];
+        for m in self.measured {
+            let (corners, cells) = m.ply.topology.connectivity();
+            let facets = triangles(corners, cells);
+            lines.push((&m.ply.name, plane_section(&m.ply.formed, &facets, from, to)));
+        }
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        let station = |p: &Vec3| {
+            ((p[0] - from[0]) * (to[0] - from[0]) + (p[1] - from[1]) * (to[1] - from[1])) / length
+        };
+        let mut series = Vec::new();
+        for (name, found) in &lines {
+            let Some(line) = found.first() else { continue };
+            let [x, y] =
+                ["station", "height"].map(|n| format!("sections/section_{number}/{name}/{n}"));
+            let stations: Vec<f64> = line.iter().map(station).collect();
+            let heights: Vec<f64> = line.iter().map(|p| p[2]).collect();
+            host.write_f64(&x, &[line.len()], "m", &stations)?;
+            host.write_f64(&y, &[line.len()], "m", &heights)?;
+            series.push(json!({"label": name, "x": x, "y": y}));
+        }
+        if series.len() < 2 {
+            return Err(format!(
+                "sections: '{label}' from {from:?} to {to:?} m meets no ply; take places above the plies"
+            )
+            .into());
+        }
+        self.sections
+            .push(json!({"label": label, "from": from, "to": to, "lines": series.clone()}));
+        self.plots.push(json!({
+            "name": format!("section_{number}"), "title": format!("Section {label}"),
+            "x": {"label": "along the section", "unit": "mm"}, "y": {"label": "height", "unit": "mm"}, "series": series,
+        }));
+        Ok(())
+    }
+
+    /// Counts, sums by ply, and the attributes.
+    pub fn finish(self, alignment: Option<&Alignment>) -> Result<(), StepError> {
+        let host = self.host;
+        let simulated = || self.measured.iter().filter(|m| m.simulated);
+        let count = |kind| simulated().flat_map(|m| of(m, kind)).count() as f64;
+        host.result("wrinkle_count", count(Kind::Wrinkle), "1")?;
+        host.result("bridging_count", count(Kind::Bridging), "1")?;
+        let (mut rows, mut list) = (Vec::new(), Vec::new());
+        for m in self.measured {
+            let name = &m.ply.name;
+            let length = of(m, Kind::Wrinkle).fold(0.0, |s, d| s + d.length);
+            let amplitude = of(m, Kind::Wrinkle).fold(0.0, |s: f64, d| s.max(d.amplitude));
+            let area = of(m, Kind::Bridging).fold(0.0, |s, d| s + d.area);
+            host.result(&format!("wrinkle_length.{name}"), length, "m")?;
+            host.result(&format!("wrinkle_amplitude.{name}"), amplitude, "m")?;
+            host.result(&format!("bridging_area.{name}"), area, "m2")?;
+            for (k, d) in m.defects.iter().enumerate() {
+                rows.push(row(name, k + 1, d));
+                list.push(entry(m, k + 1, d));
+            }
+        }
+        if let Some(a) = alignment {
+            host.result("scan_rms", a.rms, "m")?;
+            host.result("scan_freedoms", a.decided as f64, "1")?;
+        }
+        let columns = COLUMNS.map(|(label, unit)| json!({"label": label, "unit": unit}));
+        let maps = [
+            ("nodal_distance", "Distance from the tool", "mm"),
+            ("curvature_max", "Largest curvature", "1/mm"),
+        ];
+        let maps = maps.map(|(field, title, unit)| {
+            let panels = simulated().map(|m| json!({"label": m.ply.name, "body": m.ply.name, "field": field}));
+            json!({"name": field, "title": title, "unit": unit, "panels": panels.collect::<Vec<_>>()})
+        });
+        host.write_attributes(&json!({
+            "defects": list, "sections": self.sections, "plots": self.plots, "maps": maps,
+            "alignment": alignment.map(alignment_json),
+            "tables": [{"name": "defects", "title": "Defects", "columns": columns, "rows": rows}],
+        }))
+    }
+}
+
+fn of(m: &Measured, kind: Kind) -> impl Iterator<Item = &Defect> {
+    m.defects.iter().filter(move |d| d.kind == kind)
+}
+
+fn kind(d: &Defect) -> &'static str {
+    match d.kind {
+        Kind::Wrinkle => "wrinkle",
+        Kind::Bridging => "bridging",
+    }
+}
+
+/// Absent for what has no ridge.
+fn ridge_only(d: &Defect, value: f64) -> Option<f64> {
+    (d.kind == Kind::Wrinkle).then_some(value)
+}
+
+fn radius(d: &Defect) -> Option<f64> {
+    (d.curvature_max > 0.0).then(|| 1.0 / d.curvature_max)
+}
+
+fn row(name: &str, number: usize, d: &Defect) -> Value {
+    json!([
+        number.to_string(),
+        name,
+        kind(d),
+        d.cause,
+        ridge_only(d, d.length),
+        d.amplitude,
+        radius(d),
+        d.area,
+        ridge_only(d, d.direction),
+        d.centre[0],
+        d.centre[1],
+        d.ridge_shear
+    ])
+}
+
+fn entry(m: &Measured, number: usize, d: &Defect) -> Value {
+    json!({
+        "on": m.ply.name, "number": number, "type": kind(d), "cause": d.cause, "length": ridge_only(d, d.length),
+        "amplitude": d.amplitude, "radius": radius(d), "area": d.area, "direction": ridge_only(d, d.direction),
+        "centre": d.centre, "shear": d.shear, "ridge_shear": d.ridge_shear, "ridge": d.ridge,
+    })
+}
+
+/// Turn as a quaternion (i, j, k, w), shift in m: of the scan as given.
+fn alignment_json(a: &Alignment) -> Value {
+    let (q, t) = (a.motion.rotation.coords, a.motion.translation.vector);
+    json!({
+        "quaternion": [q.x, q.y, q.z, q.w], "shift": [t.x, t.y, t.z], "rms": a.rms, "passes": a.passes,
+        "freedoms": a.decided,
+    })
+}

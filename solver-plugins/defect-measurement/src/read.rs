@@ -1,0 +1,166 @@
+//! What is measured: the plies of a run, and a scan.
+
+use crate::{Align, Parameters};
+use plyflow_defects::align::{Alignment, Settings, align};
+use plyflow_defects::{Ply, Tool, scan};
+use plyflow_sdk::{Host, Input, StepError};
+use plyflow_surface::{Surface, Topology, triangles};
+use serde::Deserialize;
+use std::path::Path;
+
+/// A formed run.
+pub struct Run {
+    input: Input,
+    frame: usize,
+    /// Time of the frame (s).
+    pub time: f64,
+    /// Its tool.
+    pub tool: Tool,
+    /// The plies, from the tool upwards.
+    pub plies: Vec<Sheet>,
+    /// Distance of the outer face of the uppermost sheet from the tool (m).
+    outer: f64,
+}
+
+/// A sheet of the stack.
+#[derive(Deserialize)]
+pub struct Sheet {
+    /// Its name, that of its body too.
+    pub name: String,
+    kind: String,
+    offset: f64,
+    #[serde(default)]
+    thickness: f64,
+    fibre_1: Option<f64>,
+    fibre_2: Option<f64>,
+}
+
+impl Sheet {
+    /// Directions of both fibre families in the flat ply (rad).
+    pub fn fibres(&self) -> Option<[f64; 2]> {
+        Some([self.fibre_1?, self.fibre_2?])
+    }
+}
+
+#[derive(Deserialize)]
+struct Formed {
+    sheets: Vec<Sheet>,
+}
+
+impl Run {
+    /// Reads tool and list of plies of the input `formed`.
+    pub fn read(host: &Host) -> Result<Self, StepError> {
+        let input = host.input("formed")?;
+        let formed: Formed = host.attributes(&input)?;
+        let meshes = host.meshes(&input)?;
+        let Some(frame) = meshes.times.len().checked_sub(1) else {
+            return Err(
+                format!("'{}' has no frame: there is nothing to measure", input.step).into(),
+            );
+        };
+        let faces = formed.sheets.iter().map(|s| s.offset + 0.5 * s.thickness);
+        let outer = faces.fold(0.0, f64::max);
+        let plies: Vec<Sheet> = (formed.sheets.into_iter())
+            .filter(|s| s.kind == "ply")
+            .collect();
+        if plies.is_empty() {
+            return Err(format!(
+                "'{}' lists no sheet of kind 'ply' in its attributes",
+                input.step
+            )
+            .into());
+        }
+        let body = meshes.body("tool")?;
+        let (points, cells) = host.mesh(&input, body)?;
+        let surface = Surface::new(&points, &triangles(body.nodes_per_cell, &cells));
+        let surface = surface.ok_or_else(|| {
+            format!(
+                "body 'tool' of '{}' has no triangle with an area",
+                input.step
+            )
+        })?;
+        Ok(Self {
+            frame,
+            time: meshes.times[frame],
+            tool: Tool::new(surface),
+            plies,
+            outer,
+            input,
+        })
+    }
+
+    /// Reads a ply and takes its distances and curvatures.
+    pub fn ply(&self, host: &Host, sheet: &Sheet, foot_margin: f64) -> Result<Ply, StepError> {
+        let (input, frame) = (&self.input, self.frame);
+        let meshes = host.meshes(input)?;
+        let body = meshes.body(&sheet.name)?;
+        let (undeformed, cells) = host.mesh(input, body)?;
+        let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
+        let formed = host.frame_points(input, body, frame)?;
+        let mut ply = Ply::new(
+            sheet.name.clone(),
+            topology,
+            undeformed,
+            formed,
+            &self.tool,
+            sheet.offset,
+            foot_margin,
+        );
+        ply.shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
+        // Not every run has them: a pin-jointed net's fibres have no strain.
+        let strains = ["fibre_strain_1", "fibre_strain_2"]
+            .map(|name| host.frame_field(input, body, frame, name));
+        if let [Ok(a), Ok(b)] = strains {
+            ply.fibre_strain = a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
+        }
+        Ok(ply)
+    }
+
+    /// Fibre directions of the plies next to the one at place `k`.
+    pub fn others(&self, k: usize) -> Vec<[f64; 2]> {
+        let next = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
+        next.filter_map(|i| self.plies.get(i)?.fibres()).collect()
+    }
+}
+
+/// A scan on the tool of a run.
+pub struct Scan {
+    /// Measured as a ply.
+    pub ply: Ply,
+    /// How it was moved there.
+    pub alignment: Option<Alignment>,
+}
+
+impl Scan {
+    /// Reads and aligns a scan.
+    pub fn read(
+        run: &Run,
+        path: &str,
+        p: &Parameters,
+        foot_margin: f64,
+    ) -> Result<Self, StepError> {
+        let read = scan::read(Path::new(path), p.scan_unit).map_err(|e| e.to_string())?;
+        let (mut points, mut facets) = (read.points, read.triangles);
+        let (tool, offset) = (&run.tool.surface, p.scan_offset.unwrap_or(run.outer));
+        let mut alignment = None;
+        if p.scan_align == Align::ClosestPoints {
+            let settings = Settings {
+                offset,
+                kept: p.scan_kept,
+                most_points: 20000,
+            };
+            alignment = align(&points, tool, &settings);
+            if let Some(found) = &alignment {
+                points.iter_mut().for_each(|p| *p = found.place(*p));
+            }
+        }
+        if facets.is_empty() {
+            facets = scan::join(&points, |p| tool.closest(p).normal);
+        }
+        let topology = Topology::new(points.len(), 3, facets.as_flattened());
+        let flat = points.clone();
+        let name = "scan".to_owned();
+        let ply = Ply::new(name, topology, flat, points, &run.tool, offset, foot_margin);
+        Ok(Self { ply, alignment })
+    }
+}

@@ -1,0 +1,212 @@
+//! A ply with a known wrinkle and bridge, and a scan of it that was laid down elsewhere.
+
+use plyflow_defect_measurement::DefectMeasurement;
+use plyflow_sdk::On;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
+use plyflow_surface::vector::Vec3;
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+use std::fmt::Write;
+
+const TOP: f64 = 0.060;
+const OFFSET: f64 = 0.0003;
+const THICKNESS: f64 = 0.0004;
+/// Distance of nodes (m), and how many there are along x and y.
+const H: f64 = 0.00125;
+const N: [usize; 2] = [128, 80];
+
+/// A wrinkle 3 mm high, 14 mm wide and 60 mm long along x through (-35, 0) mm; a round blister 2 mm high, 50 mm wide at (40, 0) mm.
+fn height(x: f64, y: f64) -> f64 {
+    let bump = |s: f64, half: f64| {
+        if s.abs() < half {
+            0.5 * (1.0 + (PI * s / half).cos())
+        } else {
+            0.0
+        }
+    };
+    let fade = if (x + 0.035).abs() < 0.030 {
+        (0.5 * PI * (x + 0.035) / 0.030).cos()
+    } else {
+        0.0
+    };
+    0.003 * bump(y, 0.007) * fade + 0.002 * bump((x - 0.040).hypot(y), 0.025)
+}
+
+fn flat() -> Vec<Vec3> {
+    (0..=N[1])
+        .flat_map(|j| (0..=N[0]).map(move |i| [-0.080 + H * i as f64, -0.050 + H * j as f64, 0.2]))
+        .collect()
+}
+
+fn cells() -> Vec<u32> {
+    let at = |i: usize, j: usize| (j * (N[0] + 1) + i) as u32;
+    (0..N[1])
+        .flat_map(|j| (0..N[0]).map(move |i| (i, j)))
+        .flat_map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
+        .collect()
+}
+
+/// Two plies on each other, sheared by 0.1 rad; the upper one has the wrinkle.
+fn formed() -> MemoryArtifact {
+    let ply = |name: &str, z: f64, size: f64| {
+        let field = |name: &str, value: f64| MemoryField {
+            name: name.into(),
+            on: On::Cells,
+            components: 1,
+            values: vec![value; N[0] * N[1]],
+        };
+        let place = |p: &Vec3| [p[0], p[1], TOP + z + size * height(p[0], p[1])];
+        MemoryBody {
+            name: name.into(),
+            nodes_per_cell: 4,
+            cells: cells(),
+            frames: vec![flat().iter().map(place).collect()],
+            points: flat(),
+            fields: vec![vec![
+                field("shear_angle", 0.1),
+                field("fibre_strain_1", 1e-4),
+                field("fibre_strain_2", 2e-4),
+            ]],
+            ..Default::default()
+        }
+    };
+    let tool = MemoryBody {
+        name: "tool".into(),
+        points: [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+            .map(|[x, y]| [x, y, TOP])
+            .into(),
+        nodes_per_cell: 3,
+        cells: vec![0, 1, 2, 0, 2, 3],
+        ..Default::default()
+    };
+    let sheet = |name: &str, offset: f64, turn: f64| {
+        json!({"name": name, "kind": "ply", "offset": offset, "thickness": THICKNESS,
+               "fibre_1": turn, "fibre_2": turn + PI / 2.0})
+    };
+    MemoryArtifact {
+        kind: "forming".into(),
+        attributes: json!({"sheets": [sheet("ply_1", OFFSET, 0.0), sheet("ply_2", OFFSET + THICKNESS, PI / 4.0)]}),
+        times: vec![1.0],
+        bodies: vec![
+            tool,
+            ply("ply_1", OFFSET, 0.0),
+            ply("ply_2", OFFSET + THICKNESS, 1.0),
+        ],
+        ..Default::default()
+    }
+}
+
+fn measured(parameters: Value) -> MemoryArtifact {
+    let formed = formed();
+    run::<DefectMeasurement>(parameters, &[MemoryInput::new("formed", &formed)], &[]).unwrap()
+}
+
+#[test]
+fn plies_are_measured_with_sections_and_distribution() {
+    let out = measured(json!({"sections": [
+        {"label": "A-A'", "from": [-0.035, -0.02], "to": [-0.035, 0.02]}]}));
+    assert_eq!(out.result("wrinkle_count"), 1.0);
+    assert_eq!(out.result("bridging_count"), 1.0);
+    assert_eq!(out.result("wrinkle_length.ply_1"), 0.0);
+    assert!((out.result("wrinkle_amplitude.ply_2") - 0.003).abs() < 1e-5);
+    let area = PI * 0.0125f64.powi(2);
+    assert!((out.result("bridging_area.ply_2") / area - 1.0).abs() < 0.03);
+    assert!(out.result("distance_largest.ply_1") < 1e-12);
+    let defects = &out.attributes["defects"];
+    assert_eq!(defects[0]["cause"], "undetermined");
+    assert_eq!(
+        (&defects[0]["on"], &defects[0]["type"]),
+        (&json!("ply_2"), &json!("wrinkle"))
+    );
+    assert!((defects[0]["ridge_shear"].as_f64().unwrap() - 0.1).abs() < 1e-9);
+    assert_eq!(
+        out.attributes["tables"][0]["rows"]
+            .as_array()
+            .unwrap()
+            .len(),
+        2
+    );
+    // The highest place of the section is the crest, and its line has the arc's length.
+    let (_, heights) = &out.arrays["sections/section_0/ply_2/height"];
+    let top = heights.iter().copied().fold(0.0, f64::max);
+    assert!(
+        (top - (TOP + OFFSET + THICKNESS + 0.003)).abs() < 1e-5,
+        "{top}"
+    );
+    let (_, stations) = &out.arrays["sections/section_0/ply_2/station"];
+    assert!((stations[stations.len() - 1] - 0.04).abs() < 2.0 * H);
+    // The density is one over what is judged.
+    let (_, x) = &out.arrays["distributions/ply_2/value"];
+    let (_, y) = &out.arrays["distributions/ply_2/density"];
+    let sum: f64 = y.iter().map(|d| d * (x[1] - x[0])).sum();
+    assert!((sum - 1.0).abs() < 0.01, "{sum}");
+    let number = out.body("ply_2").last("defect");
+    assert!(number.contains(&1.0) && number.contains(&2.0));
+}
+
+#[test]
+fn causes_are_told_from_shear_bridging_and_layup() {
+    let cause = |parameters: Value| measured(parameters).attributes["defects"][0]["cause"].clone();
+    // 0.1 rad are 5.7 degrees. The crest ends 22 mm from where the blister is 1 mm high, or somewhat more.
+    assert_eq!(cause(json!({"over_shear_positive": 0.09})), "over-shear");
+    assert_eq!(cause(json!({"bridging_reach": 0.06})), "bridging");
+    let mut run_off = formed();
+    run_off.bodies[2].fields[0][1].values.fill(-2e-4);
+    let inputs = [MemoryInput::new("formed", &run_off)];
+    let out = run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap();
+    assert_eq!(
+        out.attributes["defects"][0]["cause"],
+        "inter-ply-compression"
+    );
+}
+
+/// A cloud of the outer face of the upper ply, tilted and lifted, in mm.
+#[test]
+fn a_scan_that_lies_elsewhere_is_measured_as_the_ply_that_it_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.xyz");
+    let outer = TOP + OFFSET + 1.5 * THICKNESS;
+    let (sin, cos) = 0.03f64.sin_cos();
+    let mut text = String::new();
+    for p in flat() {
+        let z = outer + height(p[0], p[1]);
+        let [x, z] = [cos * p[0] - sin * z, sin * p[0] + cos * z + 0.004];
+        writeln!(text, "{} {} {}", 1e3 * x, 1e3 * p[1], 1e3 * z).unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    let out = measured(json!({"scan": path.to_str().unwrap()}));
+    assert_eq!(out.result("wrinkle_count"), 1.0, "of the plies alone");
+    assert_eq!(out.result("scan_freedoms"), 3.0);
+    assert!(out.result("scan_rms") < 2e-5, "{}", out.result("scan_rms"));
+    for (name, unit) in [
+        ("wrinkle_length", 0.06),
+        ("wrinkle_amplitude", 0.003),
+        ("bridging_area", 5e-4),
+    ] {
+        let [ply, scan] = ["ply_2", "scan"].map(|b| out.result(&format!("{name}.{b}")));
+        assert!((scan / ply - 1.0).abs() < 0.03, "{name}: {ply} {scan}");
+        assert!(ply > 0.5 * unit, "{name}: {ply}");
+    }
+    // Left where it is, it stands off everywhere.
+    let out = measured(json!({"scan": path.to_str().unwrap(), "scan_align": "none"}));
+    assert!(out.result("distance_q50.scan") > 0.001);
+    assert!(out.attributes["alignment"].is_null());
+}
+
+#[test]
+fn what_cannot_be_measured_is_told() {
+    let formed = formed();
+    let refused = |parameters: Value, artifact: &MemoryArtifact| {
+        let inputs = [MemoryInput::new("formed", artifact)];
+        run::<DefectMeasurement>(parameters, &inputs, &[]).unwrap_err()
+    };
+    let beside = json!({"sections": [{"label": "B", "from": [0.3, 0.3], "to": [0.4, 0.3]}]});
+    assert!(refused(beside, &formed).contains("meets no ply"));
+    let point = json!({"sections": [{"label": "B", "from": [0.0, 0.0], "to": [0.0, 0.0]}]});
+    assert!(refused(point, &formed).contains("two different places"));
+    let missing = json!({"scan": "/nowhere/scan.stl"});
+    assert!(refused(missing, &formed).contains("cannot read the scan `/nowhere/scan.stl`"));
+    let mut without = formed.clone();
+    without.attributes = json!({"sheets": []});
+    assert!(refused(json!({}), &without).contains("no sheet of kind 'ply'"));
+}

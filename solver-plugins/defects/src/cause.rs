@@ -1,0 +1,96 @@
+//! What a wrinkle most likely comes from, by what the fields say about its place.
+
+use crate::measure::{Defect, Kind, Ply, mean_along};
+use plyflow_surface::vector::distance;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_PI_2;
+
+/// Likely causes, in the order in which they are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// The fabric is sheared beyond its limits along the crest (thesis 5.2.2).
+    OverShear,
+    /// Little shear, but the ply bridges close by: what it lacks there it has too much of here (thesis 5.5: AW2, BW2).
+    Bridging,
+    /// Little shear and no bridging; a ply with other fibre directions lies on or under it, and fibres are compressed
+    /// (thesis chapter 6).
+    InterPlyCompression,
+    /// None of these.
+    Undetermined,
+}
+
+/// When a cause is taken for likely.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct Limits {
+    /// Mean shear along the crest above this is over-shear (rad).
+    pub over_shear_positive: f64,
+    /// Mean shear along the crest below this is over-shear (rad).
+    pub over_shear_negative: f64,
+    /// How near bridging must be, in the flat ply (m).
+    pub bridging_reach: f64,
+    /// Fibre directions of two plies that differ by less are the same (rad).
+    pub layup_angle: f64,
+}
+
+/// Sets the causes of a ply's wrinkles. `fibres`: directions of both fibre families of the flat ply (rad); `others`:
+/// those of the plies next to it. A scan, of which neither is known, gives both empty: its wrinkles come from bridging or
+/// are undetermined.
+pub fn find_causes(
+    ply: &Ply,
+    defects: &mut [Defect],
+    fibres: Option<[f64; 2]>,
+    others: &[[f64; 2]],
+    limits: &Limits,
+) {
+    let bridging: Vec<u32> = (defects.iter())
+        .filter(|d| d.kind == Kind::Bridging)
+        .flat_map(|d| d.nodes.iter().copied())
+        .collect();
+    let crossed = fibres.is_some_and(|own| {
+        others
+            .iter()
+            .any(|other| relative_angle(own, *other) > limits.layup_angle)
+    });
+    let wrinkles = defects.iter_mut().filter(|d| d.kind == Kind::Wrinkle);
+    for wrinkle in wrinkles {
+        let over = |g: f64| g > limits.over_shear_positive || g < limits.over_shear_negative;
+        let strain = mean_along(ply, &ply.fibre_strain, &wrinkle.ridge_nodes);
+        wrinkle.cause = Some(if wrinkle.ridge_shear.is_some_and(over) {
+            Cause::OverShear
+        } else if is_near(ply, &wrinkle.ridge_nodes, &bridging, limits.bridging_reach) {
+            Cause::Bridging
+        } else if crossed && strain.is_some_and(|e| e < 0.0) {
+            Cause::InterPlyCompression
+        } else {
+            Cause::Undetermined
+        });
+    }
+}
+
+fn is_near(ply: &Ply, ridge: &[u32], bridging: &[u32], reach: f64) -> bool {
+    let at = |i: u32| ply.undeformed[i as usize];
+    // A box around the ridge first: there may be many nodes.
+    let inside = |k: usize| {
+        let along = ridge.iter().map(|&i| at(i)[k]);
+        let low = along.clone().fold(f64::INFINITY, f64::min) - reach;
+        let high = along.fold(f64::NEG_INFINITY, f64::max) + reach;
+        move |v: f64| v >= low && v <= high
+    };
+    let (in_x, in_y) = (inside(0), inside(1));
+    let candidates = bridging.iter().map(|&b| at(b));
+    candidates
+        .filter(|p| in_x(p[0]) && in_y(p[1]))
+        .any(|p| ridge.iter().any(|&r| distance(p, at(r)) <= reach))
+}
+
+/// Angle (rad, 0 to pi/4) between the fibre directions of two plies: by how much the one would have to be turned for its
+/// families to lie along the other's.
+pub fn relative_angle(a: [f64; 2], b: [f64; 2]) -> f64 {
+    let apart = |a: f64, b: f64| {
+        let d = (a - b).rem_euclid(2.0 * FRAC_PI_2);
+        d.min(2.0 * FRAC_PI_2 - d)
+    };
+    let [x, y] = [[0, 1], [1, 0]].map(|[i, j]| apart(a[0], b[i]).max(apart(a[1], b[j])));
+    x.min(y)
+}

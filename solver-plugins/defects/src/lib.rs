@@ -1,0 +1,10 @@
+//! Wrinkles and bridging of formed plies: measured, numbered by nobody yet, with their likely causes. The same for a
+//! simulated ply and for a scanned preform ([`scan`]), which may have to be aligned to the tool first ([`align`]). All lengths in m.
+
+pub mod align;
+mod cause;
+mod measure;
+pub mod scan;
+
+pub use cause::{Cause, Limits, find_causes, relative_angle};
+pub use measure::{Defect, Kind, Ply, Settings, Tool, measure, quantiles};

@@ -1,0 +1,203 @@
+//! Defects of surfaces whose answers are known: measured on a mesh, on a scan's facets and on a cloud of points.
+
+use plyflow_defects::scan::join;
+use plyflow_defects::{Cause, Defect, Kind, Limits, Ply, Settings, Tool, find_causes, measure};
+use plyflow_surface::vector::{Vec3, distance};
+use plyflow_surface::{Surface, Topology, triangles};
+use std::f64::consts::PI;
+
+/// The tool: a plane.
+const TOP: f64 = 0.060;
+/// Of the mid-plane from it.
+const OFFSET: f64 = 0.0003;
+const SETTINGS: Settings = Settings {
+    distance_threshold: 0.001,
+    curvature_threshold: 100.0,
+    foot_margin: 0.010,
+    minimum_wrinkle_length: 0.010,
+    minimum_bridging_area: 50e-6,
+};
+
+/// A wrinkle 3 mm high and 14 mm wide through (-35, 0) mm at `angle` (rad) to x that fades over 30 mm to both ends, and a round blister
+/// 2 mm high of 25 mm radius at (40, 0) mm.
+fn height(angle: f64, x: f64, y: f64) -> f64 {
+    let (sin, cos) = angle.sin_cos();
+    let (along, across) = (cos * (x + 0.035) + sin * y, -sin * (x + 0.035) + cos * y);
+    let bump = |s: f64, half: f64| {
+        if s.abs() < half {
+            0.5 * (1.0 + (PI * s / half).cos())
+        } else {
+            0.0
+        }
+    };
+    let fade = if along.abs() < 0.030 {
+        (0.5 * PI * along / 0.030).cos()
+    } else {
+        0.0
+    };
+    0.003 * bump(across, 0.007) * fade + 0.002 * bump((x - 0.040).hypot(y), 0.025)
+}
+
+/// Length of the crest where its curvature exceeds the threshold, over the surface.
+fn crest_length() -> f64 {
+    let peak = 0.0015 * (PI / 0.007f64).powi(2);
+    let half = 0.060 / PI * (SETTINGS.curvature_threshold / peak).acos();
+    let place = |i: i32| {
+        let s = half * f64::from(i) / 500.0;
+        [s, 0.0, 0.003 * (PI * s / 0.060).cos()]
+    };
+    (-500..500).map(|i| distance(place(i), place(i + 1))).sum()
+}
+
+/// Where the blister is higher than the threshold.
+const BLISTER_AREA: f64 = PI * 0.0125 * 0.0125;
+
+fn tool() -> Tool {
+    let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
+    let points = corners.map(|[x, y]| [x, y, TOP]);
+    Tool::new(Surface::new(&points, &[[0, 1, 2], [0, 2, 3]]).unwrap())
+}
+
+/// Nodes over 160 x 100 mm in the plane, inner ones moved by up to `jitter` of the distance `h` (m).
+fn flat(h: f64, jitter: f64) -> (Vec<[f64; 2]>, Vec<u32>) {
+    let [n, m] = [0.160 / h, 0.100 / h].map(|n| n.round() as usize);
+    let mut state = 1u64;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let mut points = Vec::new();
+    for j in 0..=m {
+        for i in 0..=n {
+            let rim = i == 0 || j == 0 || i == n || j == m;
+            let [dx, dy] = [0, 1].map(|_| if rim { 0.0 } else { jitter * h * random() });
+            points.push([-0.080 + h * i as f64 + dx, -0.050 + h * j as f64 + dy]);
+        }
+    }
+    let at = |i: usize, j: usize| (j * (n + 1) + i) as u32;
+    let cells = (0..m)
+        .flat_map(|j| (0..n).map(move |i| (i, j)))
+        .flat_map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
+        .collect();
+    (points, cells)
+}
+
+fn formed(flat: &[[f64; 2]], angle: f64) -> Vec<Vec3> {
+    flat.iter()
+        .map(|&[x, y]| [x, y, TOP + OFFSET + height(angle, x, y)])
+        .collect()
+}
+
+fn ply(topology: Topology, formed: Vec<Vec3>) -> Ply {
+    let undeformed = formed.iter().map(|p| [p[0], p[1], 0.0]).collect();
+    Ply::new(
+        "ply".into(),
+        topology,
+        undeformed,
+        formed,
+        &tool(),
+        OFFSET,
+        SETTINGS.foot_margin,
+    )
+}
+
+/// Errors of the wrinkle's length and amplitude and of the blister's area, over what is known.
+fn errors(found: &[Defect]) -> [f64; 3] {
+    let kinds: Vec<Kind> = found.iter().map(|d| d.kind).collect();
+    assert_eq!(kinds, [Kind::Wrinkle, Kind::Bridging]);
+    [
+        found[0].length / crest_length() - 1.0,
+        found[0].amplitude / 0.003 - 1.0,
+        found[1].area / BLISTER_AREA - 1.0,
+    ]
+}
+
+fn all(ply: &Ply) -> Vec<Defect> {
+    measure(ply, &vec![true; ply.formed.len()], &SETTINGS)
+}
+
+#[test]
+fn length_amplitude_and_area_are_within_3_percent_at_any_angle_and_on_jittered_meshes() {
+    for degrees in [0.0, 22.5, 45.0, 70.0, 90.0] {
+        for jitter in [0.0, 0.2] {
+            let angle = f64::to_radians(degrees);
+            let (points, cells) = flat(0.00125, jitter);
+            let ply = ply(
+                Topology::new(points.len(), 4, &cells),
+                formed(&points, angle),
+            );
+            let found = all(&ply);
+            let errors = errors(&found);
+            println!("{degrees} deg, jitter {jitter}: {errors:.3?}");
+            assert!(errors.iter().all(|e| e.abs() < 0.03), "{errors:?}");
+            let turned = (found[0].direction - angle).sin().abs();
+            assert!(turned < 0.03, "{degrees} {jitter}: {}", found[0].direction);
+        }
+    }
+}
+
+#[test]
+fn a_cloud_of_points_is_joined_to_the_whole_surface_and_measured_as_a_mesh_is() {
+    for jitter in [0.0, 0.3] {
+        let (points, cells) = flat(0.00125, jitter);
+        let points = formed(&points, 0.5);
+        let joined = join(&points, |_| [0.0, 0.0, 1.0]);
+        let topology = Topology::new(points.len(), 3, joined.as_flattened());
+        // A disc: nodes - edges + triangles = 1, with the rim of the mesh.
+        let rim = Topology::new(points.len(), 4, &cells).free_edges().len();
+        let edges = (3 * joined.len() + topology.free_edges().len()) / 2;
+        assert_eq!(topology.free_edges().len(), rim, "jitter {jitter}");
+        assert_eq!(points.len() + joined.len(), edges + 1, "jitter {jitter}");
+        let up = triangles(3, joined.as_flattened());
+        assert!(
+            Surface::new(&points, &up)
+                .unwrap()
+                .closest([0.0, 0.0, 1.0])
+                .signed_distance
+                > 0.0
+        );
+        let errors = errors(&all(&ply(topology, points)));
+        println!("cloud, jitter {jitter}: {errors:.3?}");
+        assert!(errors.iter().all(|e| e.abs() < 0.03), "{errors:?}");
+    }
+}
+
+/// Shear 10 degrees along the wrinkle: over-shear. Less: the blister is near, or it is not. Far from it, under a ply turned by 45
+/// degrees: pressed together if its fibres are.
+#[test]
+fn causes_follow_from_the_fields() {
+    let (points, cells) = flat(0.00125, 0.0);
+    let mut ply = ply(Topology::new(points.len(), 4, &cells), formed(&points, 0.5));
+    let limits = |reach: f64| Limits {
+        over_shear_positive: 8f64.to_radians(),
+        over_shear_negative: -50f64.to_radians(),
+        bridging_reach: reach,
+        layup_angle: 5f64.to_radians(),
+    };
+    let own = [-PI / 4.0, PI / 4.0];
+    let cause = |ply: &Ply, others: &[[f64; 2]], reach: f64| {
+        let mut found = all(ply);
+        find_causes(ply, &mut found, Some(own), others, &limits(reach));
+        assert_eq!(found[1].cause, None);
+        found[0].cause.unwrap()
+    };
+    let n = cells.len() / 4;
+    let turned = [[0.0, PI / 2.0]];
+    assert_eq!(cause(&ply, &[], 0.02), Cause::Undetermined);
+    assert_eq!(cause(&ply, &[], 0.05), Cause::Bridging);
+    ply.shear_angle = vec![0.1745; n];
+    assert_eq!(cause(&ply, &turned, 0.05), Cause::OverShear);
+    ply.shear_angle = vec![-0.1745; n];
+    ply.fibre_strain = vec![-1e-4; n];
+    assert_eq!(cause(&ply, &turned, 0.05), Cause::Bridging);
+    assert_eq!(cause(&ply, &turned, 0.02), Cause::InterPlyCompression);
+    // The same directions, named the other way round and turned by half a turn: one layup.
+    assert_eq!(
+        cause(&ply, &[[PI / 4.0, 0.75 * PI]], 0.02),
+        Cause::Undetermined
+    );
+    ply.fibre_strain = vec![1e-4; n];
+    assert_eq!(cause(&ply, &turned, 0.02), Cause::Undetermined);
+}
