@@ -8,7 +8,7 @@ pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
 use plyflow_defects::{Defect, Kind, Ply, Settings, quantiles};
-use plyflow_sdk::{Host, Log, On, Progress, Step, StepError, export_step};
+use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::QuadLocator;
 use serde_json::{Value, json};
 
@@ -25,24 +25,22 @@ impl Step for Comparison {
 
     fn run(host: &Host) -> Result<(), StepError> {
         let settings: Settings = host.parameters()?;
-        let attributes: Value = host.attributes(&host.input("zones")?)?;
-        let zones: Vec<Zone> = serde_json::from_value(attributes["zones"].clone())
-            .map_err(|e| format!("attribute `zones`: {e}"))?;
+        let (zones, superseded) = models::read_zones(host)?;
         host.progress(&Progress {
             phase: "reading",
             ..Default::default()
         });
-        let models = models::read_models(host, &zones, &settings)?;
+        let (models, passed_over) = models::read_models(host, &zones, &superseded, &settings)?;
         host.progress(&Progress {
             fraction: 0.5,
             phase: "measuring",
             ..Default::default()
         });
         let table = defect_table(&models, &zones, &settings);
-        for e in table.iter().filter(|e| e.touches_cut) {
+        for e in table.iter().filter(|e| e.touches_cut()) {
             let zone = &zones[e.zone].name;
             let text = format!(
-                "{} reaches the cut of zone {zone}: the zone is too small for it; raise `scale`",
+                "{} reaches the cut of zone {zone}: the zone is too small for it; raise `scale`, or let zone-extraction draw it again (docs/guide/zones.md)",
                 e.id
             );
             host.log(Log::Warn, &text);
@@ -57,7 +55,7 @@ impl Step for Comparison {
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
         write_reference_errors(host, &models, &table)?;
-        write_costs(host, &models)
+        write_costs(host, &models, &passed_over)
     }
 }
 
@@ -283,8 +281,15 @@ fn distance_error(model: &Model, reference: &Model) -> Option<f64> {
     (count > 0.0).then(|| (sum / count).sqrt())
 }
 
-fn write_costs(host: &Host, models: &[Model]) -> Result<(), StepError> {
-    let (mut wall, mut cpu) = (0.0, 0.0);
+/// What the runs cost; `passed_over` are those of zones that were drawn again, which count in the whole.
+fn write_costs(host: &Host, models: &[Model], passed_over: &[Input]) -> Result<(), StepError> {
+    let sum = |get: fn(&Input) -> f64| passed_over.iter().map(get).fold(0.0, |s, c| s + c);
+    let mut wall = sum(|i| i.cost.wall_seconds);
+    let mut cpu = sum(|i| i.cost.cpu_seconds);
+    if !passed_over.is_empty() {
+        host.measured("cost.superseded.wall_seconds", wall, "s")?;
+        host.measured("cost.superseded.cpu_seconds", cpu, "s")?;
+    }
     for m in models {
         let c = &m.input.cost;
         host.measured(

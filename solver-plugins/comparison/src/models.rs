@@ -16,6 +16,51 @@ pub struct Zone {
     pub bounds: [f64; 4],
     /// Left, right, bottom, top.
     pub free_sides: [bool; 4],
+    /// Zones that it takes the place of.
+    #[serde(default)]
+    pub replaces: Vec<String>,
+}
+
+impl Zone {
+    fn area(&self) -> f64 {
+        let [x0, y0, x1, y1] = self.bounds;
+        (x1 - x0) * (y1 - y0)
+    }
+
+    /// Whether an attribute `zone` is this one: of its name and, if it tells one, its box.
+    fn is(&self, told: &Value) -> bool {
+        let bounds: Option<[f64; 4]> = serde_json::from_value(told["box"].clone()).ok();
+        let near = |b: [f64; 4]| b.iter().zip(self.bounds).all(|(a, b)| (a - b).abs() < 1e-9);
+        told["name"] == self.name.as_str() && bounds.is_none_or(near)
+    }
+}
+
+/// The zones that count, by name, and those in whose places they are: of one name the largest counts, and none that
+/// another one replaces.
+pub fn read_zones(host: &Host) -> Result<(Vec<Zone>, Vec<Zone>), StepError> {
+    let mut all = Vec::new();
+    for input in host.inputs_of("zones")? {
+        let attributes: Value = host.attributes(&input)?;
+        let zones: Vec<Zone> = serde_json::from_value(attributes["zones"].clone())
+            .map_err(|e| format!("attribute `zones` of '{}': {e}", input.step))?;
+        all.extend(zones);
+    }
+    let replaced: Vec<String> = all.iter().flat_map(|z| z.replaces.clone()).collect();
+    // One name after the other, the largest first; A to Z before AA.
+    all.sort_by(|a, b| {
+        let by_name = (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name));
+        by_name.then(b.area().total_cmp(&a.area()))
+    });
+    let (mut current, mut superseded) = (Vec::<Zone>::new(), Vec::new());
+    for zone in all {
+        let taken = current.last().is_some_and(|z| z.name == zone.name);
+        if taken || replaced.contains(&zone.name) {
+            superseded.push(zone);
+        } else {
+            current.push(zone);
+        }
+    }
+    Ok((current, superseded))
 }
 
 /// Which part a model plays.
@@ -69,22 +114,27 @@ struct Sheet {
     offset: f64,
 }
 
-/// Global, local and reference models in that order, local ones in the order of their zones.
+/// Global, local and reference models in that order, local ones in the order of their zones; and the local runs of zones that are
+/// `superseded`, which are not measured.
 ///
 /// # Errors
 /// When an input lacks something, or a local run belongs to no zone or to one that another has.
 pub fn read_models(
     host: &Host,
     zones: &[Zone],
+    superseded: &[Zone],
     settings: &Settings,
-) -> Result<Vec<Model>, StepError> {
+) -> Result<(Vec<Model>, Vec<Input>), StepError> {
     let global = host.input("global")?;
     let tool = read_tool(host, &global)?;
     let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
-    let mut local = Vec::new();
+    let (mut local, mut passed_over) = (Vec::new(), Vec::new());
     for input in host.inputs_of("local")? {
         host.check_cancelled()?;
-        let zone = zone_of(host, &input, zones)?;
+        let Some(zone) = zone_of(host, &input, zones, superseded)? else {
+            passed_over.push(input);
+            continue;
+        };
         if local.iter().any(|m: &Model| m.zone == Some(zone)) {
             return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
         }
@@ -110,26 +160,34 @@ pub fn read_models(
         let tool = read_tool(host, &input)?;
         models.push(read(host, input, Role::Reference, None, &tool, settings)?);
     }
-    Ok(models)
+    Ok((models, passed_over))
 }
 
-/// The zone that a local run names, or else the one at its place in the fan-out.
-fn zone_of(host: &Host, input: &Input, zones: &[Zone]) -> Result<usize, StepError> {
+/// The zone that a local run names, or else the one at its place in the fan-out; `None` for a superseded one.
+fn zone_of(
+    host: &Host,
+    input: &Input,
+    zones: &[Zone],
+    superseded: &[Zone],
+) -> Result<Option<usize>, StepError> {
     let formed: Formed = host.attributes(input)?;
     let named = formed.zone["name"].as_str();
     let index = match named {
-        Some(name) => zones.iter().position(|z| z.name == name),
+        Some(_) => zones.iter().position(|z| z.is(&formed.zone)),
         None => input
             .item
             .last()
             .map(|&i| i as usize)
             .filter(|&i| i < zones.len()),
     };
-    index.ok_or_else(|| {
+    if index.is_none() && superseded.iter().any(|z| z.is(&formed.zone)) {
+        return Ok(None);
+    }
+    index.map(Some).ok_or_else(|| {
         let names: Vec<&str> = zones.iter().map(|z| z.name.as_str()).collect();
         let what = named.map_or("names no zone".to_owned(), |n| format!("is of zone '{n}'"));
         format!(
-            "local run '{}' {:?} {what}; the zones are: {}",
+            "local run '{}' {:?} {what} (or of a box that no zone of that name has); the zones are: {}",
             input.step,
             input.item,
             names.join(", ")

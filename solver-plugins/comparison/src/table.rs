@@ -15,13 +15,19 @@ pub struct Entry {
     pub zone: usize,
     /// Name of the ply.
     pub ply: String,
-    /// Local models: whether it reaches the zone's cut, so that its zone is too small.
-    pub touches_cut: bool,
+    /// Local models: whether it reaches the left, right, bottom and top side of the zone's cut, so that its zone is too
+    /// small. Never a free side.
+    pub cut_sides: [bool; 4],
     /// What was measured.
     pub defect: Defect,
 }
 
 impl Entry {
+    /// Whether it reaches any side of the cut.
+    pub fn touches_cut(&self) -> bool {
+        self.cut_sides.contains(&true)
+    }
+
     /// As in the data model.
     pub fn to_json(&self, models: &[Model], zones: &[Zone]) -> Value {
         let d = &self.defect;
@@ -40,7 +46,8 @@ impl Entry {
             "direction": d.direction,
             "shear_min": d.shear.map(|s| s[0]),
             "shear_max": d.shear.map(|s| s[1]),
-            "touches_cut": self.touches_cut,
+            "touches_cut": self.touches_cut(),
+            "cut_sides": self.cut_sides,
         })
     }
 }
@@ -106,14 +113,14 @@ fn entries_of(
                         (ply.undeformed[i as usize][d] - level).abs() < 1.01 * model.element_size
                     })
             };
-            let touches_cut = model.role == Role::Local && (0..4).any(near);
+            let cut_sides = [0, 1, 2, 3].map(|side| model.role == Role::Local && near(side));
             let id = String::new();
             found.push(Entry {
                 id,
                 model: m,
                 zone,
                 ply: ply.name.clone(),
-                touches_cut,
+                cut_sides,
                 defect,
             });
         }

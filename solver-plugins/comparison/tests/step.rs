@@ -381,6 +381,44 @@ fn a_local_run_of_no_zone_or_of_a_taken_one_is_refused() {
 }
 
 #[test]
+fn a_zone_that_was_drawn_again_counts_in_its_largest_form_and_the_cost_of_all() {
+    // A was too small and B too near it: the new A takes the place of both.
+    let small = json!({"name": "A", "box": [-0.060, -0.020, -0.010, 0.020], "free_sides": vec![false; 4], "plies": []});
+    let beside = json!({"name": "B", "box": [0.0, -0.020, 0.060, 0.020], "free_sides": vec![false; 4], "plies": []});
+    let mut again = zone_a();
+    again["replaces"] = json!(["B"]);
+    let (global, grown) = (global(), zones(json!([again])));
+    let first = zones(json!([small, beside]));
+    let of = |zone: &Value| {
+        let mut run_off = local(1.0);
+        run_off.attributes["zone"] = zone.clone();
+        run_off
+    };
+    let locals = [of(&small), of(&beside), of(&again)];
+    let mut inputs = vec![
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &first),
+        MemoryInput::new("zones", &grown),
+    ];
+    inputs.extend(locals.iter().map(|l| MemoryInput {
+        cost: [20.0, 10.0, 0.0],
+        ..MemoryInput::new("local", l)
+    }));
+    let out = compare(&inputs);
+    assert_eq!(out.result("zone_count"), 1.0);
+    assert_eq!(out.result("wrinkle_count"), 1.0);
+    assert_eq!(out.attributes["models"].as_array().unwrap().len(), 2);
+    assert_eq!(out.measured["cost.superseded.cpu_seconds"].0, 20.0);
+    assert_eq!(out.measured["cost.total.cpu_seconds"].0, 30.0);
+    // A local run of no box that is known is refused still.
+    let mut other = of(&small);
+    other.attributes["zone"]["box"] = json!([0.0, 0.0, 0.01, 0.01]);
+    inputs[3] = MemoryInput::new("local", &other);
+    let error = run::<Comparison>(json!({}), &inputs, &[]).unwrap_err();
+    assert!(error.contains("zone 'A'"), "{error}");
+}
+
+#[test]
 fn a_ply_that_stands_off_a_fillet_as_curved_as_the_tool_is_bridging_and_not_a_wrinkle() {
     // Half a cylinder of 10 mm radius; the ply 2 mm above it has 83 1/m, the threshold is 50 1/m.
     let arc = |r: f64, n: usize, columns: usize| {

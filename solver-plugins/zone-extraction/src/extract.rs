@@ -17,6 +17,8 @@ pub struct Settings {
     pub maximum_fraction: f64,
     /// Zones drawn by hand, `[x0, y0, x1, y1]` (m).
     pub boxes: Vec<Vec<f64>>,
+    /// By how much a side of a zone that a defect reaches is moved out, over the zone's size across it.
+    pub growth: f64,
 }
 
 /// A flagged cell.
@@ -103,12 +105,11 @@ pub fn extract(
         let mut plies: Vec<usize> = cells.iter().filter(inside).map(|c| c.ply).collect();
         plies.sort_unstable();
         plies.dedup();
-        let edges = [(0, 0), (2, 2), (1, 1), (3, 3)];
         Zone {
             name: name(i),
             bounds,
             defect_box,
-            free_sides: edges.map(|(a, b)| bounds[a] == blank[b]),
+            free_sides: free_sides(bounds, blank),
             plies,
             // A fold: the sum of nothing is -0 in Rust.
             flagged_area: cells.iter().filter(inside).fold(0.0, |sum, c| sum + c.area),
@@ -205,14 +206,26 @@ fn grown(defect: Rectangle, blank: Rectangle, s: &Settings) -> Rectangle {
         let half = 0.5 * ((defect[d + 2] - defect[d]) * s.scale).max(s.minimum_size);
         b[d] = tidy(centre - half);
         b[d + 2] = tidy(centre + half);
-        if b[d] < blank[d] + s.join_distance {
+    }
+    onto_edges(b, blank, s.join_distance)
+}
+
+/// A box with its sides that lie beyond the blank's edge, or nearer to it than `gap` (m), moved onto it.
+pub(crate) fn onto_edges(mut b: Rectangle, blank: Rectangle, gap: f64) -> Rectangle {
+    for d in 0..2 {
+        if b[d] < blank[d] + gap {
             b[d] = blank[d];
         }
-        if b[d + 2] > blank[d + 2] - s.join_distance {
+        if b[d + 2] > blank[d + 2] - gap {
             b[d + 2] = blank[d + 2];
         }
     }
     b
+}
+
+/// Left, right, bottom, top: whether the side lies on the edge of the blank.
+pub(crate) fn free_sides(bounds: Rectangle, blank: Rectangle) -> [bool; 4] {
+    [0, 2, 1, 3].map(|k| bounds[k] == blank[k])
 }
 
 /// To 0.1 um, so that people can read it.
@@ -220,12 +233,13 @@ pub(crate) fn tidy(length: f64) -> f64 {
     (length * 1e7).round() / 1e7
 }
 
-/// Replaces overlapping zones by one around both of their defects, until none overlap.
+/// Replaces zones that overlap, or nearly touch, by one around both of their defects, until none do: a strip so narrow between
+/// two cuts would be driven from both sides and belong to neither.
 fn merge(zones: &mut Vec<(Rectangle, Rectangle)>, blank: Rectangle, settings: &Settings) {
     let first_pair = |zones: &[(Rectangle, Rectangle)]| {
         (0..zones.len()).find_map(|i| {
             (i + 1..zones.len())
-                .find(|&j| overlap(zones[i].1, zones[j].1))
+                .find(|&j| near(zones[i].1, zones[j].1, settings.join_distance))
                 .map(|j| (i, j))
         })
     };
@@ -271,7 +285,7 @@ fn drawn(
         .collect()
 }
 
-fn hull(a: Rectangle, b: Rectangle) -> Rectangle {
+pub(crate) fn hull(a: Rectangle, b: Rectangle) -> Rectangle {
     [
         a[0].min(b[0]),
         a[1].min(b[1]),
@@ -282,5 +296,11 @@ fn hull(a: Rectangle, b: Rectangle) -> Rectangle {
 
 /// Whether two boxes share area.
 fn overlap(a: Rectangle, b: Rectangle) -> bool {
-    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
+    near(a, b, 0.0)
+}
+
+/// Whether two boxes lie less than `gap` (m) apart.
+pub(crate) fn near(a: Rectangle, b: Rectangle, gap: f64) -> bool {
+    let gap = gap - 1e-9 * f64::from(gap > 0.0);
+    a[0] < b[2] + gap && b[0] < a[2] + gap && a[1] < b[3] + gap && b[1] < a[3] + gap
 }

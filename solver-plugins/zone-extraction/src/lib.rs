@@ -1,13 +1,16 @@
 //! Step plugin `zone-extraction`: boxes around connected defects, where finer runs look closer.
 
 mod extract;
+mod grow;
 
 pub use extract::{ExtractError, FlaggedCell, Rectangle, Settings, Zone, area, extract};
+pub use grow::{AtCut, Drawn, grow};
 
 use extract::tidy;
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use plyflow_surface::Topology;
 use plyflow_surface::vector::Vec3;
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 /// The step.
@@ -20,42 +23,125 @@ impl Step for ZoneExtraction {
 
     fn run(host: &Host) -> Result<(), StepError> {
         let settings: Settings = host.parameters()?;
-        let (plies, cells, blank) = read(host)?;
-        let zones = extract(&cells, blank, &settings)?;
-        let covered = zones.iter().fold(0.0, |sum, z| sum + area(z.bounds));
-        let fraction = covered / area(blank);
-        if fraction > settings.maximum_fraction {
-            host.log(
-                Log::Warn,
-                &format!(
-                    "the zones cover {:.0} % of the blank (warning above {:.0} %): local runs will cost nearly as much \
-                     as a fine run of everything; raise the thresholds of the detection or draw `boxes` by hand",
-                    100.0 * fraction,
-                    100.0 * settings.maximum_fraction
-                ),
-            );
+        let wired = |port: &str| Ok::<_, StepError>(!host.inputs_of(port)?.is_empty());
+        match [wired("defects")?, wired("zones")?, wired("comparison")?] {
+            [true, false, false] => first(host, &settings),
+            [false, true, true] => again(host, &settings),
+            _ => Err("give either `defects`, for the zones of a run, or `zones` and `comparison`, to draw those again that are too small".into()),
         }
-        if zones.is_empty() {
-            host.log(Log::Info, "no defect is large enough for a zone");
-        }
-        let mut list = Vec::new();
-        for zone in &zones {
-            let mut entry = serde_json::to_value(zone)?;
-            entry["plies"] = zone
-                .plies
-                .iter()
-                .map(|&p| Value::from(plies[p].as_str()))
-                .collect();
-            list.push(entry);
-        }
-        host.write_attributes(&json!({
-            "zones": list, "scale": settings.scale, "blank": blank, "ply_fraction": fraction,
-        }))?;
-        let names: Vec<String> = zones.iter().map(|z| z.name.clone()).collect();
-        host.collection(&names)?;
-        host.result("zone_count", zones.len() as f64, "1")?;
-        host.result("ply_fraction", fraction, "1")
     }
+}
+
+/// Zones around the defects of a run.
+fn first(host: &Host, settings: &Settings) -> Result<(), StepError> {
+    let (plies, cells, blank) = read(host)?;
+    let zones = extract(&cells, blank, settings)?;
+    if zones.is_empty() {
+        host.log(Log::Info, "no defect is large enough for a zone");
+    }
+    let mut list = Vec::new();
+    for zone in &zones {
+        let mut entry = serde_json::to_value(zone)?;
+        entry["plies"] = zone
+            .plies
+            .iter()
+            .map(|&p| Value::from(plies[p].as_str()))
+            .collect();
+        list.push((zone.name.clone(), zone.bounds, entry));
+    }
+    write(host, settings, blank, list)
+}
+
+#[derive(Deserialize)]
+struct Previous {
+    zones: Vec<Drawn>,
+    blank: Rectangle,
+}
+
+#[derive(Deserialize)]
+struct Compared {
+    models: Vec<Model>,
+    defects: Vec<Found>,
+}
+
+#[derive(Deserialize)]
+struct Model {
+    name: String,
+    role: String,
+}
+
+#[derive(Deserialize)]
+struct Found {
+    model: String,
+    #[serde(flatten)]
+    defect: AtCut,
+}
+
+/// Those of the zones again, larger, whose local runs show a defect at the cut.
+fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
+    let previous: Previous = host.attributes(&host.input("zones")?)?;
+    let compared: Compared = host.attributes(&host.input("comparison")?)?;
+    let is_local = |name: &str| {
+        let mut models = compared.models.iter();
+        models.any(|m| m.name == name && m.role == "local")
+    };
+    let defects: Vec<AtCut> = (compared.defects.iter())
+        .filter(|f| is_local(&f.model))
+        .map(|f| f.defect.clone())
+        .collect();
+    let grown = grow(&previous.zones, &defects, previous.blank, settings);
+    if grown.is_empty() {
+        host.log(
+            Log::Info,
+            "no defect reaches a cut: every zone is large enough",
+        );
+    }
+    let mut list = Vec::new();
+    for (zone, why) in grown {
+        let mm = zone.bounds.map(|b| (1e4 * b).round() / 10.0);
+        let names: Vec<&str> = zone.replaces.iter().map(String::as_str).collect();
+        let with = if names.is_empty() {
+            String::new()
+        } else {
+            format!(" with {}", names.join(", "))
+        };
+        let text = format!(
+            "zone {}{with} is drawn again as {mm:?} mm: {why} reached its cut",
+            zone.name
+        );
+        host.log(Log::Info, &text);
+        list.push((zone.name.clone(), zone.bounds, serde_json::to_value(&zone)?));
+    }
+    write(host, settings, previous.blank, list)
+}
+
+/// Writes zones: name, box, and as in the data model.
+fn write(
+    host: &Host,
+    settings: &Settings,
+    blank: Rectangle,
+    zones: Vec<(String, Rectangle, Value)>,
+) -> Result<(), StepError> {
+    let covered = zones.iter().fold(0.0, |sum, z| sum + area(z.1));
+    let fraction = covered / area(blank);
+    if fraction > settings.maximum_fraction {
+        host.log(
+            Log::Warn,
+            &format!(
+                "the zones cover {:.0} % of the blank (warning above {:.0} %): local runs will cost nearly as much \
+                 as a fine run of everything; raise the thresholds of the detection or draw `boxes` by hand",
+                100.0 * fraction,
+                100.0 * settings.maximum_fraction
+            ),
+        );
+    }
+    let (names, list): (Vec<String>, Vec<Value>) = zones.into_iter().map(|z| (z.0, z.2)).unzip();
+    host.write_attributes(&json!({
+        "zones": list, "scale": settings.scale, "blank": blank, "ply_fraction": fraction,
+    }))?;
+    host.collection(&names)?;
+    host.result("zone_count", names.len() as f64, "1")?;
+    host.result("ply_fraction", fraction, "1")
 }
 
 /// Names of the plies, their flagged cells, and the box around all of them.

@@ -3,7 +3,7 @@
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
-use plyflow_zone_extraction::{FlaggedCell, Settings, ZoneExtraction, extract};
+use plyflow_zone_extraction::{AtCut, Drawn, FlaggedCell, Settings, ZoneExtraction, extract, grow};
 use serde_json::{Value, json};
 
 const BLANK: [f64; 4] = [-0.240, -0.150, 0.240, 0.150];
@@ -16,6 +16,7 @@ fn settings() -> Settings {
         minimum_size: 0.040,
         maximum_fraction: 0.6,
         boxes: Vec::new(),
+        growth: 0.25,
     }
 }
 
@@ -242,4 +243,116 @@ fn artifact_follows_the_data_model_and_warns_when_zones_cover_too_much() {
     let out = run::<ZoneExtraction>(json!({}), &[MemoryInput::new("defects", &all)], &[]).unwrap();
     assert!((out.result("ply_fraction") - 1.0).abs() < 1e-12);
     assert!(out.log[0].contains("100 %"), "{:?}", out.log);
+}
+
+fn drawn(name: &str, bounds: [f64; 4]) -> Drawn {
+    Drawn {
+        name: name.into(),
+        bounds,
+        defect_box: bounds,
+        free_sides: [false; 4],
+        plies: vec!["ply_1".into()],
+        flagged_area: 1e-3,
+        replaces: Vec::new(),
+    }
+}
+
+fn at_cut(id: &str, zone: &str, cut_sides: [bool; 4]) -> AtCut {
+    AtCut {
+        id: id.into(),
+        zone: zone.into(),
+        cut_sides,
+    }
+}
+
+#[test]
+fn zones_that_lie_nearer_than_the_join_distance_are_one() {
+    // Boxes of 57.5 mm with 5 and 15 mm between them.
+    for (gap, count) in [(0.005, 1), (0.015, 2)] {
+        let at = 0.0575 + gap;
+        let mut cells = patch(0, [-0.100, -0.020, -0.050, 0.030]);
+        let shifted = cells.clone().into_iter().map(|mut c| {
+            c.bounds[0] += at;
+            c.bounds[2] += at;
+            c
+        });
+        cells.extend(shifted);
+        // What is left between the cells, 12.5 mm and more, parts the defects.
+        assert_eq!(extract(&cells, BLANK, &settings()).unwrap().len(), count);
+    }
+}
+
+#[test]
+fn a_zone_grows_on_the_sides_that_a_defect_reaches_and_onto_the_edge() {
+    let zones = [
+        drawn("A", [-0.230, -0.040, -0.150, 0.040]),
+        drawn("B", [0.050, 0.0, 0.150, 0.050]),
+        drawn("C", [0.0, -0.140, 0.040, -0.100]),
+    ];
+    let defects = [
+        at_cut("AW1", "A", [true, false, false, false]),
+        at_cut("CW1", "C", [false, true, false, false]),
+        at_cut("CW2", "C", [false, false, false, true]),
+        at_cut("BW1", "B", [false; 4]),
+    ];
+    let found = grow(&zones, &defects, BLANK, &settings());
+    let names: Vec<&str> = found.iter().map(|f| f.0.name.as_str()).collect();
+    assert_eq!(names, ["A", "C"]);
+    assert!(close(found[0].0.bounds, [-0.240, -0.040, -0.150, 0.040]));
+    assert_eq!(found[0].0.free_sides, [true, false, false, false]);
+    assert!(close(found[1].0.bounds, [0.0, -0.140, 0.050, -0.090]));
+    assert_eq!(found[1].1, "CW1, CW2");
+    assert!(found.iter().all(|f| f.0.replaces.is_empty()));
+    assert_eq!(grow(&zones, &[], BLANK, &settings()), []);
+}
+
+#[test]
+fn zones_that_meet_as_one_grows_become_one() {
+    let zones = [
+        drawn("A", [0.0, 0.0, 0.100, 0.050]),
+        drawn("B", [0.120, 0.010, 0.160, 0.080]),
+        drawn("C", [0.165, 0.010, 0.200, 0.080]),
+    ];
+    let defects = [at_cut("AW1", "A", [false, true, false, false])];
+    let found = grow(&zones, &defects, BLANK, &settings());
+    assert_eq!(found.len(), 1);
+    let zone = &found[0].0;
+    assert!(close(zone.bounds, [0.0, 0.0, 0.200, 0.080]), "{zone:?}");
+    assert_eq!(
+        (zone.name.as_str(), &zone.replaces[..]),
+        ("A", &["B".to_owned(), "C".to_owned()][..])
+    );
+    assert_eq!(zone.plies, ["ply_1"]);
+    assert!((zone.flagged_area - 3e-3).abs() < 1e-15);
+}
+
+#[test]
+fn the_step_gives_only_what_is_drawn_again_and_wants_one_way_of_two() {
+    let attributes = json!({"zones": [drawn("A", [0.0, 0.0, 0.100, 0.050]), drawn("B", [-0.2, -0.1, -0.1, 0.1])], "blank": BLANK});
+    let zones = MemoryArtifact {
+        kind: "zones".into(),
+        attributes,
+        ..Default::default()
+    };
+    let defect = |model: &str, zone: &str| json!({"id": "W", "model": model, "zone": zone, "cut_sides": [false, true, false, false]});
+    let comparison = MemoryArtifact {
+        kind: "comparison".into(),
+        attributes: json!({
+            "models": [{"name": "global", "role": "global"}, {"name": "local.A", "role": "local"}],
+            "defects": [defect("global", "B"), defect("local.A", "A")]}),
+        ..Default::default()
+    };
+    let inputs = [
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("comparison", &comparison),
+    ];
+    let out = run::<ZoneExtraction>(json!({"growth": 0.5}), &inputs, &[]).unwrap();
+    assert_eq!(out.result("zone_count"), 1.0);
+    assert_eq!(out.attributes["zones"][0]["name"], "A");
+    assert_eq!(
+        out.attributes["zones"][0]["box"],
+        json!([0.0, 0.0, 0.150, 0.050])
+    );
+    let error = run::<ZoneExtraction>(json!({}), &inputs[..1], &[]).unwrap_err();
+    assert!(error.contains("give either `defects`"), "{error}");
 }
