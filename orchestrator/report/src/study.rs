@@ -69,6 +69,31 @@ pub(crate) struct Zone {
     pub(crate) free_sides: [bool; 4],
     pub(crate) plies: Vec<String>,
     pub(crate) flagged_area: f64,
+    /// Names of zones in whose places it is.
+    pub(crate) replaces: Vec<String>,
+}
+
+impl Zone {
+    fn is(&self, told: &Value) -> bool {
+        let bounds: Option<[f64; 4]> = serde_json::from_value(told["box"].clone()).ok();
+        told["name"] == self.name.as_str() && bounds.is_none_or(|b| b == self.bounds)
+    }
+}
+
+/// Zones and the lists in which some are drawn again: a zone takes the place of the one of its name, and of those that it
+/// replaces.
+fn current(lists: impl Iterator<Item = Vec<Zone>>) -> Vec<Zone> {
+    let mut all: Vec<Zone> = Vec::new();
+    for again in lists {
+        let gone = |z: &Zone| {
+            let by = |a: &Zone| a.name == z.name || a.replaces.contains(&z.name);
+            again.iter().any(by)
+        };
+        all.retain(|z| !gone(z));
+        all.extend(again);
+    }
+    all.sort_by(|a, b| (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name)));
+    all
 }
 
 /// Attributes of a detection.
@@ -270,19 +295,29 @@ impl Reader<'_> {
             global: self.run(global),
             ..Study::default()
         };
-        let zones_at = detection.and_then(|d| self.takers("zones", d).first().copied());
+        // The zones of the detection, those drawn again after a first look, and so on.
+        let mut zones_at: Vec<usize> = Vec::new();
+        let mut from = detection;
+        while let Some(at) = from.and_then(|d| self.takers("zones", d).first().copied()) {
+            zones_at.push(at);
+            from = Some(at);
+        }
         if let Some(at) = detection {
             study.detection = self.attributes(at);
         }
-        if let Some(at) = zones_at {
+        if !zones_at.is_empty() {
             #[derive(Deserialize, Default)]
             struct Zones {
                 zones: Vec<Zone>,
             }
-            study.zones = self.attributes::<Zones>(at).map(|z| z.zones);
+            let lists: Vec<Zones> = (zones_at.iter())
+                .filter_map(|at| self.attributes(*at))
+                .collect();
+            study.zones = Some(current(lists.into_iter().map(|z| z.zones)));
         }
-        let comparison = zones_at
-            .and_then(|z| self.takers("comparison", z).first().copied())
+        // What compares the last of them; or, while that has not run, an earlier one.
+        let comparison = (zones_at.iter().rev())
+            .find_map(|z| self.takers("comparison", *z).first().copied())
             .filter(|c| {
                 self.all.facts[*c]
                     .as_ref()
@@ -292,7 +327,12 @@ impl Reader<'_> {
             study.comparison = self.attributes(at);
         }
         self.read_global(&mut study, global, detection);
-        let locals = zones_at.map(|z| self.local_runs(z)).unwrap_or_default();
+        let mut locals: Vec<usize> = zones_at.iter().flat_map(|z| self.local_runs(*z)).collect();
+        let zones = study.zones.clone().unwrap_or_default();
+        locals.retain(|at| {
+            let facts = self.all.facts[*at].as_ref();
+            facts.is_some_and(|f| zones.iter().any(|z| z.is(&f.attributes["zone"])))
+        });
         self.read_locals(&mut study, &locals, comparison);
         let reference = comparison.and_then(|c| {
             let key = self.all.facts[c]
@@ -406,5 +446,32 @@ impl Reader<'_> {
                 plies,
             });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_zone_drawn_again_takes_the_place_of_its_own_and_of_those_that_it_replaces() {
+        let zone = |name: &str, to: f64, replaces: &[&str]| Zone {
+            name: name.into(),
+            bounds: [0.0, 0.0, to, to],
+            replaces: replaces.iter().map(|r| (*r).to_owned()).collect(),
+            ..Zone::default()
+        };
+        let first = vec![
+            zone("A", 1.0, &[]),
+            zone("B", 1.0, &[]),
+            zone("C", 1.0, &[]),
+        ];
+        let lists = [first, vec![zone("B", 2.0, &["A"])], Vec::new()];
+        let found = current(lists.into_iter());
+        let names: Vec<&str> = found.iter().map(|z| z.name.as_str()).collect();
+        assert_eq!(names, ["B", "C"]);
+        assert!(found[0].is(&json!({"name": "B", "box": [0.0, 0.0, 2.0, 2.0]})));
+        assert!(!found[0].is(&json!({"name": "B", "box": [0.0, 0.0, 1.0, 1.0]})));
     }
 }
