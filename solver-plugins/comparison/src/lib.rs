@@ -1,13 +1,15 @@
 //! Step plugin `comparison`: measures wrinkles, bridging and shear in the local runs, and in the global run
 //! and a reference at the same places, with what each cost.
 
+mod fidelity;
 mod models;
 mod table;
 
+pub use fidelity::Fidelity;
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
-use plyflow_defects::{Defect, Kind, Ply, Settings, quantiles};
+use plyflow_defects::{Kind, Ply, Settings, quantiles};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::QuadLocator;
 use serde_json::{Value, json};
@@ -55,6 +57,7 @@ impl Step for Comparison {
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
         write_reference_errors(host, &models, &table)?;
+        fidelity::write(host, &models, &zones, &table, &settings)?;
         write_costs(host, &models, &passed_over)
     }
 }
@@ -207,35 +210,12 @@ fn write_reference_errors(host: &Host, models: &[Model], table: &[Entry]) -> Res
     else {
         return Ok(());
     };
-    let mut errors: [Vec<f64>; 2] = Default::default();
     for e in table.iter().filter(|e| e.model == index) {
-        let twin = table
-            .iter()
-            .find(|l| l.id == e.id && models[l.model].role == Role::Local);
-        let wrinkle = e.defect.kind == Kind::Wrinkle;
-        let value = |d: &Defect| if wrinkle { d.length } else { d.area };
-        let (name, unit) = if wrinkle {
-            ("wrinkle_length", "m")
-        } else {
-            ("bridging_area", "m2")
+        let (name, value, unit) = match e.defect.kind {
+            Kind::Wrinkle => ("wrinkle_length", e.defect.length, "m"),
+            Kind::Bridging => ("bridging_area", e.defect.area, "m2"),
         };
-        host.result(
-            &format!("reference_{name}.{}", e.id),
-            value(&e.defect),
-            unit,
-        )?;
-        if let Some(twin) = twin {
-            let (ours, theirs) = (value(&twin.defect), value(&e.defect));
-            errors[usize::from(!wrinkle)].push((ours - theirs).abs() / theirs);
-        }
-    }
-    for (name, errors) in ["wrinkle_length_error", "bridging_area_error"]
-        .iter()
-        .zip(&errors)
-    {
-        if !errors.is_empty() {
-            host.result(name, errors.iter().sum::<f64>() / errors.len() as f64, "1")?;
-        }
+        host.result(&format!("reference_{name}.{}", e.id), value, unit)?;
     }
     for m in models.iter().filter(|m| m.role != Role::Reference) {
         if let Some(error) = distance_error(m, reference) {

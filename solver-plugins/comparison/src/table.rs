@@ -55,6 +55,16 @@ impl Entry {
 /// Two defects are the same when their centres lie within this (m) or within half of the longer ridge.
 const SAME_DEFECT: f64 = 0.015;
 
+/// Distance of the centres of two defects in the flat ply (m).
+pub fn apart(a: &Defect, b: &Defect) -> f64 {
+    (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1])
+}
+
+/// How far apart the centres of two defects may be (m) that are the same.
+pub fn same_within(a: &Defect, b: &Defect) -> f64 {
+    SAME_DEFECT.max(0.5 * a.length.max(b.length))
+}
+
 /// Nodes on the side of a zone lie in it, however their places were rounded (m).
 const ROUNDING: f64 = 1e-6;
 
@@ -158,11 +168,6 @@ fn number(entries: &mut Vec<Entry>, found: Vec<Entry>, locals: &[Entry], zones: 
 
 /// The id of the nearest local defect of the same zone, ply and kind that is not taken yet.
 fn twin(entry: &Entry, locals: &[Entry], taken: &[String]) -> Option<String> {
-    let apart = |l: &Entry| {
-        let (a, b) = (l.defect.centre, entry.defect.centre);
-        (a[0] - b[0]).hypot(a[1] - b[1])
-    };
-    let reach = |l: &Entry| SAME_DEFECT.max(0.5 * l.defect.length.max(entry.defect.length));
     locals
         .iter()
         .filter(|l| {
@@ -170,8 +175,8 @@ fn twin(entry: &Entry, locals: &[Entry], taken: &[String]) -> Option<String> {
                 && l.ply == entry.ply
                 && l.defect.kind == entry.defect.kind
                 && !taken.contains(&l.id)
-                && apart(l) <= reach(l)
+                && apart(&l.defect, &entry.defect) <= same_within(&l.defect, &entry.defect)
         })
-        .min_by(|a, b| apart(a).total_cmp(&apart(b)))
+        .min_by(|a, b| apart(&a.defect, &entry.defect).total_cmp(&apart(&b.defect, &entry.defect)))
         .map(|l| l.id.clone())
 }

@@ -277,6 +277,55 @@ fn the_reference_takes_the_ids_of_the_same_defects_and_errors_are_relative_to_it
         1.0,
         "the reference is not counted"
     );
+    // Amplitudes of 3 and 3.6 mm; the same shear; the global run has neither.
+    assert!((out.result("wrinkle_amplitude_error") - 0.6 / 3.6).abs() < 1e-3);
+    assert!(out.result("wrinkle_length_error") < 0.1);
+    for kind in ["wrinkles", "bridging"] {
+        let count = |what: &str, suffix: &str| out.result(&format!("{what}_{kind}{suffix}"));
+        assert_eq!((count("missed", ""), count("false", "")), (0.0, 0.0));
+        assert_eq!(
+            (count("missed", ".global"), count("false", ".global")),
+            (1.0, 0.0)
+        );
+    }
+    assert!(!out.results.contains_key("wrinkle_length_error.global"));
+    assert!(out.result("shear_quantile_error.local.A") < 0.002);
+    assert!(out.result("shear_quantile_error.global") > 0.05);
+}
+
+#[test]
+fn what_the_reference_has_outside_of_all_zones_is_missed_and_what_it_has_not_is_false() {
+    // The zone holds the blister alone; the local run shows a wrinkle there that nobody else has.
+    let zone = json!({"name": "A", "box": [0.010, -0.050, 0.080, 0.050], "free_sides": vec![false; 4], "plies": ["ply_1"]});
+    let odd = |x: f64, y: f64| height(1.0)(x, y) + height(1.0)(x - 0.078, y - 0.035);
+    let bounds = [0.010, -0.050, 0.080, 0.050];
+    let local = formed(
+        vec![ply("ply_1", bounds, 0.00125, OFFSET, odd)],
+        0.00125,
+        zone.clone(),
+    );
+    let reference = formed(
+        vec![ply(
+            "ply_1",
+            [-0.12, -0.08, 0.12, 0.08],
+            0.00125,
+            OFFSET,
+            height(1.0),
+        )],
+        0.00125,
+        Value::Null,
+    );
+    let (global, zones) = (global(), zones(json!([zone])));
+    let out = compare(&[
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        MemoryInput::new("reference", &reference),
+    ]);
+    assert_eq!(out.result("missed_wrinkles"), 1.0);
+    assert!(out.result("false_wrinkles") >= 1.0);
+    assert_eq!(out.result("missed_bridging"), 0.0);
+    assert!(out.result("bridging_area_error") < 0.03);
 }
 
 #[test]

@@ -1,0 +1,172 @@
+//! How far a model is from the reference: the coarse run by itself, and the fine runs of the zones.
+
+use crate::QUANTILES;
+use crate::models::{Model, Role, Zone};
+use crate::table::{Entry, apart, same_within};
+use plyflow_defects::{Defect, Kind, Ply, Settings, measure, quantiles};
+use plyflow_sdk::{Host, StepError};
+
+/// A defect and the name of its ply.
+type Found<'a> = (&'a str, &'a Defect);
+
+/// What one kind of model has of the reference's defects.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Fidelity {
+    /// Relative errors of the lengths of wrinkles that both have.
+    pub length: Vec<f64>,
+    /// Of their amplitudes.
+    pub amplitude: Vec<f64>,
+    /// Of the areas of bridging that both have.
+    pub area: Vec<f64>,
+    /// Wrinkles, and places of bridging, that the reference has alone.
+    pub missed: [usize; 2],
+    /// Those that it has not.
+    pub wrong: [usize; 2],
+}
+
+impl Fidelity {
+    /// Pairs the defects of one ply and kind whose centres are near enough, the nearest first.
+    pub fn of(ours: &[Found<'_>], theirs: &[Found<'_>]) -> Self {
+        let mut near: Vec<(f64, usize, usize)> = Vec::new();
+        for (i, (ply, a)) in ours.iter().enumerate() {
+            for (j, (other, b)) in theirs.iter().enumerate() {
+                if ply == other && a.kind == b.kind && apart(a, b) <= same_within(a, b) {
+                    near.push((apart(a, b), i, j));
+                }
+            }
+        }
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let mut pair = vec![None; ours.len()];
+        let mut taken = vec![false; theirs.len()];
+        for (_, i, j) in near {
+            if pair[i].is_none() && !taken[j] {
+                (pair[i], taken[j]) = (Some(j), true);
+            }
+        }
+        let mut found = Self::default();
+        let index = |d: &Defect| usize::from(d.kind == Kind::Bridging);
+        for ((_, a), j) in ours.iter().zip(&pair) {
+            let Some(j) = j else {
+                found.wrong[index(a)] += 1;
+                continue;
+            };
+            let b = theirs[*j].1;
+            let error = |a: f64, b: f64| (a - b).abs() / b;
+            if a.kind == Kind::Wrinkle {
+                found.length.push(error(a.length, b.length));
+                found.amplitude.push(error(a.amplitude, b.amplitude));
+            } else {
+                found.area.push(error(a.area, b.area));
+            }
+        }
+        for ((_, b), _) in theirs.iter().zip(&taken).filter(|(_, t)| !**t) {
+            found.missed[index(b)] += 1;
+        }
+        found
+    }
+
+    fn write(&self, host: &Host, suffix: &str) -> Result<(), StepError> {
+        let errors = [
+            ("wrinkle_length_error", &self.length),
+            ("wrinkle_amplitude_error", &self.amplitude),
+            ("bridging_area_error", &self.area),
+        ];
+        for (name, errors) in errors.into_iter().filter(|e| !e.1.is_empty()) {
+            let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+            host.result(&format!("{name}{suffix}"), mean, "1")?;
+        }
+        for (k, kind) in ["wrinkles", "bridging"].iter().enumerate() {
+            host.result(
+                &format!("missed_{kind}{suffix}"),
+                self.missed[k] as f64,
+                "1",
+            )?;
+            host.result(&format!("false_{kind}{suffix}"), self.wrong[k] as f64, "1")?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes how the local runs (as they are in the `table`), and the global run by itself, stand beside the reference, all of
+/// whose defects count, wherever they are; and by model how far its shear angles are from the reference's.
+pub fn write(
+    host: &Host,
+    models: &[Model],
+    zones: &[Zone],
+    table: &[Entry],
+    settings: &Settings,
+) -> Result<(), StepError> {
+    let Some(reference) = models.iter().find(|m| m.role == Role::Reference) else {
+        return Ok(());
+    };
+    let theirs = everywhere(reference, settings);
+    let theirs = named(&theirs);
+    let local: Vec<Found<'_>> = (table.iter())
+        .filter(|e| models[e.model].role == Role::Local)
+        .map(|e| (e.ply.as_str(), &e.defect))
+        .collect();
+    Fidelity::of(&local, &theirs).write(host, "")?;
+    for model in models.iter().filter(|m| m.role == Role::Global) {
+        let ours = everywhere(model, settings);
+        Fidelity::of(&named(&ours), &theirs).write(host, ".global")?;
+    }
+    for model in models.iter().filter(|m| m.role != Role::Reference) {
+        let within = model.zone.map(|z| zones[z].bounds);
+        let errors = model.plies.iter().filter_map(|p| {
+            let other = reference.plies.iter().find(|r| r.name == p.name)?;
+            shear_error(p, other, within)
+        });
+        if let Some(worst) = errors.reduce(f64::max) {
+            host.result(
+                &format!("shear_quantile_error.{}", model.name),
+                worst,
+                "rad",
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn everywhere(model: &Model, settings: &Settings) -> Vec<(String, Vec<Defect>)> {
+    let all = |p: &Ply| measure(p, &vec![true; p.formed.len()], settings);
+    (model.plies.iter())
+        .map(|p| (p.name.clone(), all(p)))
+        .collect()
+}
+
+fn named(found: &[(String, Vec<Defect>)]) -> Vec<Found<'_>> {
+    found
+        .iter()
+        .flat_map(|(ply, defects)| defects.iter().map(move |d| (ply.as_str(), d)))
+        .collect()
+}
+
+/// Largest difference of the quantiles of two plies' shear angles (rad), of the second within a box (m) of the flat ply.
+fn shear_error(ours: &Ply, theirs: &Ply, within: Option<[f64; 4]>) -> Option<f64> {
+    let inside = |c: &usize| {
+        let corners = theirs.topology.cell(*c);
+        let centre = |d: usize| {
+            let sum: f64 = corners
+                .iter()
+                .map(|&i| theirs.undeformed[i as usize][d])
+                .sum();
+            sum / corners.len() as f64
+        };
+        within.is_none_or(|b| (0..2).all(|d| (b[d]..=b[d + 2]).contains(&centre(d))))
+    };
+    let angles: Vec<f64> = (0..theirs.topology.cells())
+        .filter(inside)
+        .map(|c| theirs.shear_angle[c])
+        .collect();
+    if angles.is_empty() || ours.shear_angle.is_empty() {
+        return None;
+    }
+    let (a, b) = (
+        quantiles(&ours.shear_angle, &QUANTILES),
+        quantiles(&angles, &QUANTILES),
+    );
+    a.iter()
+        .zip(&b)
+        .map(|(a, b)| (a - b).abs())
+        .reduce(f64::max)
+}
