@@ -6,6 +6,7 @@
 //! unknown kinds get a page with their steps, results and costs.
 
 mod colour;
+mod fidelity;
 mod field;
 mod input;
 mod locate;

@@ -2,6 +2,7 @@
 
 mod costs;
 mod energy;
+mod fidelity;
 mod maps;
 mod provenance;
 mod steps;
@@ -49,6 +50,7 @@ pub(crate) fn page(
                 main {
                     @for study in &studies { (study) }
                     (steps)
+                    (fidelity::section(input))
                     (tables::expectations(input))
                     (costs::section(input, material))
                     (energy::section(material))
@@ -125,6 +127,7 @@ fn contents(material: &Material, input: &ReportInput) -> Markup {
             "#plots",
             steps::heading(material),
         ),
+        (fidelity::has(input), "#fidelity", "Speed against error"),
         (
             !input.expectations.is_empty(),
             "#expectations",

@@ -4,6 +4,7 @@ mod common;
 
 use camino::{Utf8Path, Utf8PathBuf};
 use common::{Study, whole};
+use plyflow_model::job::NamedResult;
 use plyflow_report::{ReportInput, is_current, summary, write_report};
 
 fn folder() -> (tempfile::TempDir, Utf8PathBuf) {
@@ -238,4 +239,54 @@ fn the_terminal_table_names_defects_missed_expectations_and_the_report() {
         assert!(text.contains(part), "{part} in\n{text}");
     }
     assert!(text.ends_with("report: out/report.html\n"));
+}
+
+#[test]
+fn what_was_compared_with_a_reference_shows_its_speed_against_its_error() {
+    let (_dir, folder) = folder();
+    let mut input = whole(&folder);
+    assert!(!page(&input, &folder).contains("Speed against error"));
+    let comparison = input
+        .instances
+        .iter_mut()
+        .find(|i| i.record.kind == "comparison");
+    let results = &mut comparison.unwrap().record.results;
+    let told = [
+        ("cost.global.cpu_seconds", 100.0),
+        ("cost.global.wall_seconds", 60.0),
+        ("cost.total.cpu_seconds", 900.0),
+        ("cost.total.wall_seconds", 500.0),
+        ("cost.reference.cpu_seconds", 7200.0),
+        ("cost.reference.wall_seconds", 3700.0),
+        ("defect_error", 0.071),
+        ("defect_error.global", 0.64),
+        ("wrinkle_length_error", 0.06),
+        ("missed_wrinkles", 0.0),
+        ("false_wrinkles", 1.0),
+        ("missed_bridging", 0.0),
+        ("false_bridging", 2.0),
+    ];
+    results.retain(|r| told.iter().all(|t| t.0 != r.name));
+    results.extend(told.map(|(name, value)| NamedResult {
+        name: name.into(),
+        value,
+        unit: "1".into(),
+        measured: name.starts_with("cost"),
+    }));
+    let page = page(&input, &folder);
+    assert_well_formed(&page);
+    assert_self_contained(&page);
+    for text in [
+        "Speed against error",
+        "coarse run and zones",
+        "12.5 %",
+        "7.1 %",
+        "For an error of 10 % or less: compare: coarse run and zones (12.5 % of the reference's CPU time).",
+        "For an error of 5 % or less there is none but the reference.",
+        "CPU time over the reference's (%)",
+    ] {
+        let text = text.replace('\'', "&#39;");
+        let plain = text.replace("&#39;", "'");
+        assert!(page.contains(&text) || page.contains(&plain), "{plain}");
+    }
 }

@@ -65,7 +65,19 @@ impl Fidelity {
         found
     }
 
+    /// Mean over the reference's defects of the error of length or area, a missed one counting as 1; `None` when it has no
+    /// defect.
+    pub fn error(&self) -> Option<f64> {
+        let both = self.length.iter().chain(&self.area);
+        let missed = self.missed.iter().sum::<usize>();
+        let count = both.clone().count() + missed;
+        (count > 0).then(|| (both.sum::<f64>() + missed as f64) / count as f64)
+    }
+
     fn write(&self, host: &Host, suffix: &str) -> Result<(), StepError> {
+        if let Some(error) = self.error() {
+            host.result(&format!("defect_error{suffix}"), error, "1")?;
+        }
         let errors = [
             ("wrinkle_length_error", &self.length),
             ("wrinkle_amplitude_error", &self.amplitude),

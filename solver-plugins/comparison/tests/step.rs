@@ -289,6 +289,9 @@ fn the_reference_takes_the_ids_of_the_same_defects_and_errors_are_relative_to_it
         );
     }
     assert!(!out.results.contains_key("wrinkle_length_error.global"));
+    assert_eq!(out.result("defect_error.global"), 1.0);
+    let mean = 0.5 * (out.result("wrinkle_length_error") + out.result("bridging_area_error"));
+    assert!((out.result("defect_error") - mean).abs() < 1e-12);
     assert!(out.result("shear_quantile_error.local.A") < 0.002);
     assert!(out.result("shear_quantile_error.global") > 0.05);
 }
