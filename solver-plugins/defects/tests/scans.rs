@@ -82,10 +82,9 @@ fn what_the_surface_does_not_decide_stays() {
     assert_eq!(found.decided, 3);
     for p in &scan {
         let q = found.place(*p);
-        assert!(
-            (q[2] - 0.001).abs() < 1e-9 && distance(*p, q) < 0.011,
-            "{p:?} {q:?}"
-        );
+        assert!((q[2] - 0.001).abs() < 1e-9, "{p:?} {q:?}");
+        // Turned down about the middle, it moves along the plane by a hair; nothing shifts or turns it there.
+        assert!((q[0] - p[0]).hypot(q[1] - p[1]) < 1e-3, "{p:?} {q:?}");
     }
     assert_eq!(align(&scan[..5], &plane, &settings), None);
 }
