@@ -113,6 +113,8 @@ impl MemoryArtifact {
 pub struct MemoryInput<'a> {
     /// Port.
     pub port: &'a str,
+    /// Name of the step that it comes from.
+    pub step: &'a str,
     /// The artifact.
     pub artifact: &'a MemoryArtifact,
     /// Its fan-out index path.
@@ -122,10 +124,11 @@ pub struct MemoryInput<'a> {
 }
 
 impl<'a> MemoryInput<'a> {
-    /// An input without fan-out and cost.
+    /// An input without fan-out and cost, from a step that is called as the port is.
     pub fn new(port: &'a str, artifact: &'a MemoryArtifact) -> Self {
         Self {
             port,
+            step: port,
             artifact,
             item: &[],
             cost: [0.0; 3],

@@ -125,7 +125,7 @@ unsafe extern "C" fn inputs(host: *mut c_void) -> pf_str {
     let s = unsafe { state(host) };
     let list: Value = (s.inputs.iter().enumerate())
         .map(|(handle, i)| {
-            json!({"handle": handle, "port": i.port, "step": i.port, "kind": i.artifact.kind, "item": i.item,
+            json!({"handle": handle, "port": i.port, "step": i.step, "kind": i.artifact.kind, "item": i.item,
                    "cost": {"wall_seconds": i.cost[0], "cpu_seconds": i.cost[1], "peak_memory": i.cost[2]}})
         })
         .collect();

@@ -1,0 +1,171 @@
+//! Step plugin `mesh-comparison`: shear angles over the element size (thesis 5.5.1, mesh sensitivity).
+
+use plyflow_sdk::{Host, Input, Step, StepError, export_step};
+use plyflow_surface::{Topology, weighted_quantiles};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// The step.
+pub struct MeshComparison;
+
+export_step!(MeshComparison);
+
+#[derive(Deserialize)]
+struct Formed {
+    sheets: Vec<Sheet>,
+    element_size: f64,
+    elements: u64,
+}
+
+#[derive(Deserialize)]
+struct Sheet {
+    name: String,
+    kind: String,
+}
+
+/// What is told of the shear angles: name, title, share of the area that has less.
+const TOLD: [(&str, &str, f64); 5] = [
+    ("shear_min", "smallest", 0.0),
+    ("shear_q25", "25 %", 0.25),
+    ("shear_q50", "median", 0.5),
+    ("shear_q75", "75 %", 0.75),
+    ("shear_max", "largest", 1.0),
+];
+const QUARTILES: [usize; 3] = [1, 2, 3];
+const EXTREMES: [usize; 2] = [0, 4];
+
+struct Run {
+    input: Input,
+    element_size: f64,
+    elements: u64,
+    /// As [`TOLD`] (rad).
+    shear: [f64; 5],
+}
+
+impl Step for MeshComparison {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let mut runs = Vec::new();
+        for input in host.inputs_of("runs")? {
+            host.check_cancelled()?;
+            runs.push(read(host, input)?);
+        }
+        runs.sort_by(|a, b| {
+            let by_size = b.element_size.total_cmp(&a.element_size);
+            by_size.then(a.input.step.cmp(&b.input.step))
+        });
+        let [.., next, finest] = &runs[..] else {
+            let n = runs.len();
+            return Err(format!("{n} run is given; a comparison needs two or more").into());
+        };
+        if next.element_size == finest.element_size {
+            return Err(format!(
+                "'{}' and '{}' are both the finest, with {} mm; leave one out",
+                next.input.step,
+                finest.input.step,
+                1e3 * finest.element_size
+            )
+            .into());
+        }
+        write(host, &runs, finest)
+    }
+}
+
+fn read(host: &Host, input: Input) -> Result<Run, StepError> {
+    let formed: Formed = host.attributes(&input)?;
+    let meshes = host.meshes(&input)?;
+    let Some(frame) = meshes.times.len().checked_sub(1) else {
+        return Err(format!("'{}' has no frame", input.step).into());
+    };
+    let (mut angles, mut areas) = (Vec::new(), Vec::new());
+    for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
+        let body = meshes.body(&sheet.name)?;
+        let (undeformed, cells) = host.mesh(&input, body)?;
+        let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
+        areas.extend(topology.cell_areas(&undeformed));
+        angles.extend(host.frame_field(&input, body, frame, "shear_angle")?);
+    }
+    if angles.is_empty() {
+        return Err(format!("'{}' has no ply", input.step).into());
+    }
+    let shear = weighted_quantiles(&angles, &areas, &TOLD.map(|t| t.2));
+    Ok(Run {
+        element_size: formed.element_size,
+        elements: formed.elements,
+        shear: std::array::from_fn(|k| shear[k]),
+        input,
+    })
+}
+
+/// Largest difference of some of what is told, over the finest's largest magnitude of them.
+fn error(run: &Run, finest: &Run, of: &[usize]) -> f64 {
+    let most = |get: &dyn Fn(usize) -> f64| of.iter().map(|&k| get(k).abs()).fold(0.0, f64::max);
+    let apart = most(&|k| run.shear[k] - finest.shear[k]);
+    let scale = most(&|k| finest.shear[k]);
+    if apart == 0.0 {
+        0.0
+    } else {
+        apart / scale.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Slope of log y over log x by least squares; `None` for fewer than two places.
+fn slope(places: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> = places.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let n = logs.len() as f64;
+    let mean = |get: fn(&(f64, f64)) -> f64| logs.iter().map(get).sum::<f64>() / n;
+    let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
+    let spread: f64 = logs.iter().map(|p| (p.0 - mx).powi(2)).sum();
+    let both: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+    (logs.len() > 1 && spread > 0.0).then(|| both / spread)
+}
+
+fn write(host: &Host, runs: &[Run], finest: &Run) -> Result<(), StepError> {
+    let mut rows = Vec::new();
+    let mut falling = Vec::new();
+    for run in runs {
+        let step = &run.input.step;
+        for ((name, _, _), value) in TOLD.iter().zip(run.shear) {
+            host.result(&format!("{name}.{step}"), value, "rad")?;
+        }
+        let quartiles = error(run, finest, &QUARTILES);
+        let extremes = error(run, finest, &EXTREMES);
+        host.result(&format!("quartile_error.{step}"), quartiles, "1")?;
+        host.result(&format!("extreme_error.{step}"), extremes, "1")?;
+        let cost = &run.input.cost;
+        host.measured(&format!("cost.{step}.cpu_seconds"), cost.cpu_seconds, "s")?;
+        host.measured(&format!("cost.{step}.wall_seconds"), cost.wall_seconds, "s")?;
+        if extremes > 0.0 {
+            falling.push((run.element_size, extremes));
+        }
+        let mut row = vec![json!(step), json!(run.element_size), json!(run.elements)];
+        row.extend(run.shear.map(Value::from));
+        row.extend([quartiles, extremes].map(Value::from));
+        rows.push(Value::from(row));
+    }
+    if let Some(order) = slope(&falling) {
+        host.result("extreme_order", order, "1")?;
+    }
+    let sizes: Vec<f64> = runs.iter().map(|r| r.element_size).collect();
+    host.write_f64("study/element_size", &[runs.len()], "m", &sizes)?;
+    let mut series = Vec::new();
+    for (k, (name, title, _)) in TOLD.iter().enumerate() {
+        let values: Vec<f64> = runs.iter().map(|r| r.shear[k]).collect();
+        let path = format!("study/{name}");
+        host.write_f64(&path, &[runs.len()], "rad", &values)?;
+        series.push(json!({"label": title, "x": "study/element_size", "y": path}));
+    }
+    let head = [("run", ""), ("element size", "m"), ("elements", "")];
+    let told = TOLD.map(|t| (t.1, "rad"));
+    let errors = [("quartiles' error", ""), ("extremes' error", "")];
+    let columns: Vec<Value> = (head.iter().chain(&told).chain(&errors))
+        .map(|(label, unit)| json!({"label": label, "unit": unit}))
+        .collect();
+    host.write_attributes(&json!({
+        "finest": finest.input.step,
+        "tables": [{"name": "meshes", "title": "Shear angles over the element size", "columns": columns, "rows": rows}],
+        "plots": [{"name": "shear", "title": "Shear angles over the element size",
+                   "x": {"label": "element size", "unit": "mm"}, "y": {"label": "shear angle", "unit": "deg"}, "series": series}],
+    }))
+}

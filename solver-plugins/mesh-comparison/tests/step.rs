@@ -1,0 +1,100 @@
+//! Runs whose shear angles are known.
+
+use plyflow_mesh_comparison::MeshComparison;
+use plyflow_sdk::On;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
+use serde_json::json;
+
+/// A strip of `n` cells over 0.1 m with shear angles g(x) (rad), each cell with that of its middle.
+fn strip(n: usize, g: impl Fn(f64) -> f64) -> MemoryArtifact {
+    let h = 0.1 / n as f64;
+    let points: Vec<[f64; 3]> = (0..=n)
+        .flat_map(|i| [[h * i as f64, 0.0, 0.0], [h * i as f64, 0.01, 0.0]])
+        .collect();
+    let cells = (0..n as u32)
+        .flat_map(|i| [2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1])
+        .collect();
+    let values = (0..n).map(|i| g(h * (i as f64 + 0.5))).collect();
+    let ply = MemoryBody {
+        name: "ply_1".into(),
+        nodes_per_cell: 4,
+        cells,
+        frames: vec![points.clone()],
+        points,
+        fields: vec![vec![MemoryField {
+            name: "shear_angle".into(),
+            on: On::Cells,
+            components: 1,
+            values,
+        }]],
+        ..Default::default()
+    };
+    MemoryArtifact {
+        kind: "forming".into(),
+        attributes: json!({"element_size": h, "elements": n,
+            "sheets": [{"name": "film", "kind": "diaphragm"}, {"name": "ply_1", "kind": "ply"}]}),
+        times: vec![1.0],
+        bodies: vec![ply],
+        ..Default::default()
+    }
+}
+
+fn compare(runs: &[MemoryArtifact]) -> Result<MemoryArtifact, String> {
+    let steps = ["a", "b", "c", "d"];
+    let inputs: Vec<MemoryInput<'_>> = (runs.iter().zip(steps))
+        .map(|(r, step)| MemoryInput {
+            step,
+            cost: [2.0, 3.0, 0.0],
+            ..MemoryInput::new("runs", r)
+        })
+        .collect();
+    run::<MeshComparison>(json!({}), &inputs, &[])
+}
+
+#[test]
+fn quartiles_extremes_and_their_order_are_those_of_the_angles() {
+    // Shear grows evenly from -0.4 to 0.4 rad: cells of h miss the extremes by 4 h.
+    let linear = |x: f64| 8.0 * x - 0.4;
+    let runs = [100, 25, 50, 1000].map(|n| strip(n, linear));
+    let out = compare(&runs).unwrap();
+    let (_, sizes) = &out.arrays["study/element_size"];
+    let sorted: Vec<bool> = sizes.windows(2).map(|w| w[0] > w[1]).collect();
+    assert_eq!(sorted, [true; 3]);
+    let (_, largest) = &out.arrays["study/shear_max"];
+    for (h, g) in sizes.iter().zip(largest) {
+        assert!((g - (0.4 - 4.0 * h)).abs() < 1e-12);
+    }
+    let (_, quarter) = &out.arrays["study/shear_q25"];
+    assert!(
+        quarter.iter().all(|q| (q + 0.2).abs() < 0.02),
+        "{quarter:?}"
+    );
+    // Less the finest's own error, 1.0 becomes 1.06.
+    let order = out.result("extreme_order");
+    assert!((1.0..1.1).contains(&order), "{order}");
+    assert_eq!(
+        (
+            out.result("quartile_error.d"),
+            out.result("extreme_error.d")
+        ),
+        (0.0, 0.0)
+    );
+    assert!((out.result("extreme_error.b") - (0.016 - 4e-4) / (0.4 - 4e-4)).abs() < 1e-9);
+    assert_eq!(out.measured["cost.c.cpu_seconds"], (3.0, "s".into()));
+    assert_eq!(out.attributes["finest"], "d");
+    assert_eq!(
+        out.attributes["tables"][0]["rows"]
+            .as_array()
+            .unwrap()
+            .len(),
+        4
+    );
+}
+
+#[test]
+fn one_run_and_two_of_the_finest_size_are_refused() {
+    let error = compare(&[strip(10, |x| x)]).unwrap_err();
+    assert!(error.contains("two or more"), "{error}");
+    let error = compare(&[strip(10, |x| x), strip(20, |x| x), strip(20, |x| x)]).unwrap_err();
+    assert!(error.contains("leave one out"), "{error}");
+}
