@@ -35,8 +35,8 @@ const RINGS: usize = 3;
 /// Weight of the terms of third and fourth order being small, in units of the distance of the nearest neighbours.
 const SMOOTHNESS: f64 = 0.05;
 /// The quadric counts as determined when the smallest diagonal of the triangular factor of its weighted least squares
-/// problem, with columns of unit length, exceeds this. A regular interior quad ring has 0.7, a corner 0.05, a strip one cell
-/// wide 0.
+/// problem, with columns of unit length, exceeds this. An inner node of a regular mesh has 0.97, one at a corner 0.32, in
+/// a strip two cells wide 0.27, in one that is one cell wide 0.
 const DETERMINED: f64 = 0.01;
 
 /// Terms of the quadric, and all of the polynomial.
