@@ -3,6 +3,7 @@
 use crate::output::cell_strain;
 use crate::run::{Forming, HistoryRow};
 use plyflow_mechanics::vec3::{V, norm};
+use plyflow_model::scene::SheetKind;
 use std::fmt::Write;
 
 /// Share of [`open_shares`] from which on a ledger counts as opening.
@@ -79,12 +80,25 @@ pub(crate) fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> Strin
     let kinetic = history.last().map_or(0.0, |r| {
         r.ledger.kinetic / r.ledger.internal().max(f64::MIN_POSITIVE)
     });
-    let (cause, remedy) = match (&cell, &deep) {
-        (Some(c), _) if c.shear.is_nan() || c.shear.abs() > 65f64.to_radians() => (
+    let (cause, remedy) = likely(cell.as_ref(), deep.as_ref().map(|d| d.share), kinetic);
+    let _ = write!(text, " Likely cause: {cause}. What to try: {remedy}.");
+    text
+}
+
+/// The likely cause and what to try, by the element that sets the step, the deepest contact over the thinnest sheet, and the kinetic
+/// over the internal energy.
+fn likely(cell: Option<&Weakest>, deep: Option<f64>, kinetic: f64) -> (&'static str, &'static str) {
+    let collapsed = |c: &Weakest| c.shear.is_nan() || c.shear.abs() > 65f64.to_radians();
+    match (cell, deep) {
+        (Some(c), _) if collapsed(c) && c.is_film => (
+            "a film is drawn out or folded beyond what its mesh can follow",
+            "smaller element_size or diaphragm_element_size, longer drawing_time, or a larger hourglass_floor of diaphragm_element",
+        ),
+        (Some(c), _) if collapsed(c) => (
             "the ply has gathered until an element collapsed: a fold narrower than the mesh",
             "smaller element_size, element s4 instead of rf4, a larger hourglass_floor, or a holder that leaves less room",
         ),
-        (_, Some(d)) if d.share > 0.5 => (
+        (_, Some(share)) if share > 0.5 => (
             "a sheet is on its way through its neighbour",
             "smaller time_step, larger least_areal_mass (stiffer contact), longer process times",
         ),
@@ -96,9 +110,7 @@ pub(crate) fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> Strin
             "a step above the critical one",
             "smaller step_safety or time_step, less contact_damping",
         ),
-    };
-    let _ = write!(text, " Likely cause: {cause}. What to try: {remedy}.");
-    text
+    }
 }
 
 fn millimetres(x: V) -> String {
@@ -117,6 +129,8 @@ fn centre(points: &[V], nodes: &[u32]) -> V {
 struct Weakest {
     /// Shear angle (rad); NaN when it cannot be told.
     shear: f64,
+    /// Of a diaphragm, not of a ply.
+    is_film: bool,
     text: String,
 }
 
@@ -138,6 +152,7 @@ fn weakest(forming: &Forming) -> Option<Weakest> {
     );
     Some(Weakest {
         shear,
+        is_film: scene.kind == SheetKind::Diaphragm,
         text: format!(
             " The step is set by an element of '{}' at {} (before forming {}): {:.3} us, shear {:.0} deg, fibre strain {:.1} %.",
             body.name,
@@ -211,6 +226,27 @@ mod tests {
             interfaces: Vec::new(),
         };
         (0..rows).map(row).collect()
+    }
+
+    #[test]
+    fn an_element_that_collapses_comes_before_deep_contacts_and_a_film_is_no_ply() {
+        let cell = |shear: f64, is_film: bool| Weakest {
+            shear,
+            is_film,
+            text: String::new(),
+        };
+        let cause =
+            |cell: &Weakest, deep: f64, kinetic: f64| likely(Some(cell), Some(deep), kinetic).0;
+        assert!(cause(&cell(-1.3, false), 4.0, 1.0).contains("the ply has gathered"));
+        assert!(cause(&cell(-1.3, true), 4.0, 1.0).contains("a film"));
+        assert!(
+            likely(Some(&cell(f64::NAN, true)), None, 0.0)
+                .1
+                .contains("diaphragm_element_size")
+        );
+        assert!(cause(&cell(0.5, true), 4.0, 1.0).contains("through its neighbour"));
+        assert!(cause(&cell(0.5, true), 0.1, 1.0).contains("too fast"));
+        assert!(likely(None, None, 0.0).0.contains("above the critical"));
     }
 
     #[test]
