@@ -1,4 +1,4 @@
-//! Wrinkles and bridging of formed plies: measured, numbered by nobody yet, with their likely causes. The same for a
+//! Wrinkles and bridging of formed plies: measured, with their likely causes. The same for a
 //! simulated ply and for a scanned preform ([`scan`]), which may have to be aligned to the tool first ([`align`]). All lengths in m.
 
 pub mod align;
