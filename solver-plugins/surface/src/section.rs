@@ -23,7 +23,6 @@ pub fn plane_section(
         if side == 0.0 { f64::MIN_POSITIVE } else { side }
     };
     let station = |p: &Vec3| axis[0] * (p[0] - from[0]) + axis[1] * (p[1] - from[1]);
-    type Edge = (u32, u32);
     let mut places: BTreeMap<Edge, Vec3> = BTreeMap::new();
     let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
     for t in triangles {
@@ -46,6 +45,21 @@ pub fn plane_section(
             }
         }
     }
+    let mut lines = joined(&places, &next);
+    for line in &mut lines {
+        if station(&line[0]) > station(&line[line.len() - 1]) {
+            line.reverse();
+        }
+    }
+    lines.sort_by(|a, b| line_length(b).total_cmp(&line_length(a)));
+    lines
+}
+
+/// An edge of the surface: its lower and its higher node.
+type Edge = (u32, u32);
+
+/// The lines of two places or more through cut edges: where each is cut, and the edges that it is joined with.
+fn joined(places: &BTreeMap<Edge, Vec3>, next: &BTreeMap<Edge, Vec<Edge>>) -> Vec<Vec<Vec3>> {
     let mut lines = Vec::new();
     // Open lines from their ends first, then what is closed.
     let ends = next.iter().filter(|(_, n)| n.len() == 1).map(|(e, _)| *e);
@@ -59,13 +73,9 @@ pub fn plane_section(
             at = next[&edge].iter().copied().find(|e| !seen.contains(e));
         }
         if line.len() > 1 {
-            if station(&line[0]) > station(&line[line.len() - 1]) {
-                line.reverse();
-            }
             lines.push(line);
         }
     }
-    lines.sort_by(|a, b| line_length(b).total_cmp(&line_length(a)));
     lines
 }
 

@@ -381,6 +381,23 @@ pub(super) fn is_far(cell: [u32; 4], undeformed: &[V], own: V, near: f64) -> boo
     })
 }
 
+/// On which side of the cell that is closest now (its normal: `up`) a slave lies that was on `side` of the last one.
+#[inline]
+fn side_of(side: f64, item: &SlaveItem, first: &Closest, up: V, offset: f64) -> f64 {
+    let (distance, along) = (first.distance2.sqrt(), dot(first.arm, up));
+    if !item.active && distance > offset {
+        // Apart, it lies where it is seen to lie.
+        return if along < 0.0 { -1.0 } else { 1.0 };
+    }
+    // The cell is another one and faces the other way, but the slave lies where it lay: it has come around a crease.
+    let stays = dot(first.arm, item.direction) > 0.5 * distance;
+    if side * along < -0.5 * distance && stays {
+        -side
+    } else {
+        side
+    }
+}
+
 /// Follows a pair and computes its force; its energy in touch.
 fn follow<F: Coulomb>(
     pair: &mut FoldItem,
@@ -405,16 +422,8 @@ fn follow<F: Coulomb>(
     (item.cell, item.xi) = (first.cell, first.xi);
     let up = cell_normal(s, first.cell, first.xi);
     let distance = first.distance2.sqrt();
-    if !item.active && distance > offset {
-        // Apart, it lies where it is seen to lie.
-        pair.side = if dot(first.arm, up) < 0.0 { -1.0 } else { 1.0 };
-    }
-    let mut height = pair.side * dot(first.arm, up);
-    if height < -0.5 * distance && dot(first.arm, item.direction) > 0.5 * distance {
-        // The cell is another one and faces the other way, but the slave lies where it lay: it has come around a crease.
-        pair.side = -pair.side;
-        height = -height;
-    }
+    pair.side = side_of(pair.side, item, first, up, offset);
+    let height = pair.side * dot(first.arm, up);
     let through = height < -0.5 * distance;
     if through && (!item.active || height < -offset) {
         item.part();
