@@ -1,7 +1,7 @@
 //! Motion of the nodes on a cut, and how well their straight edges follow the coarse run.
 
 use crate::grid::{Grid, SAME_PLACE, SIDES};
-use plyflow_surface::vector::{Vec3, distance};
+use plyflow_surface::vector::{Vec3, add, cross, distance, sub, unit};
 use plyflow_surface::{Location, QuadLocator, Topology};
 
 /// How far outside of the coarse mesh a node may lie (m): rounding of outlines.
@@ -69,6 +69,24 @@ impl Placed {
         self.locations
             .iter()
             .map(|l| l.interpolate(coarse))
+            .collect()
+    }
+
+    /// Unit normals of the coarse surface at the driven nodes (`[k]`), on the side that is up in the flat sheet: cells'
+    /// normals averaged by area at the coarse nodes and interpolated, so that they are continuous along the cut.
+    pub fn normals(&self, coarse: &[Vec3], cells: &[u32]) -> Vec<Vec3> {
+        let mut at_nodes = vec![[0.0; 3]; coarse.len()];
+        for cell in cells.chunks_exact(4) {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| coarse[cell[i] as usize]);
+            // Half the cross product of the diagonals is the area of a quad, times its normal.
+            let normal = cross(sub(c, a), sub(d, b));
+            for &i in cell {
+                at_nodes[i as usize] = add(at_nodes[i as usize], normal);
+            }
+        }
+        let normals: Vec<Vec3> = at_nodes.into_iter().map(unit).collect();
+        (self.locations.iter())
+            .map(|l| unit(l.interpolate(&normals)))
             .collect()
     }
 

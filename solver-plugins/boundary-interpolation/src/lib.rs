@@ -42,6 +42,8 @@ struct Driven {
     fine: Placed,
     /// `[f][k][3]` (m).
     position: Vec<f64>,
+    /// `[f][k][3]`; plies only, films do not rotate.
+    normal: Vec<f64>,
     error: f64,
 }
 
@@ -154,7 +156,8 @@ fn drive(
         .into());
     }
     let (points, cells) = host.mesh(input, body)?;
-    let grid = if sheet.kind == "ply" {
+    let ply = sheet.kind == "ply";
+    let grid = if ply {
         let outline = sheet.outline.unwrap_or_else(|| corners(around(&points)));
         ply_part(zone, &outline, &sheet.holes, p.element_size).map_err(|what| {
             format!(
@@ -170,7 +173,8 @@ fn drive(
     let Some(grid) = grid else { return Ok(None) };
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
-    let (mut position, mut error, mut start) = (Vec::new(), 0.0f64, 0.0f64);
+    let (mut position, mut normal) = (Vec::new(), Vec::new());
+    let (mut error, mut start) = (0.0f64, 0.0f64);
     for frame in 0..meshes.times.len() {
         let coarse = host.frame_points(input, body, frame)?;
         let driven = fine.positions(&coarse);
@@ -185,6 +189,9 @@ fn drive(
                 .fold(0.0, f64::max);
         }
         position.extend(driven.into_iter().flatten());
+        if ply {
+            normal.extend(fine.normals(&coarse, &cells).into_iter().flatten());
+        }
     }
     if start > START_TOLERANCE {
         let name = &sheet.name;
@@ -199,6 +206,7 @@ fn drive(
         name: sheet.name,
         fine,
         position,
+        normal,
         error,
     }))
 }
@@ -234,19 +242,23 @@ fn write(host: &Host, times: &[f64], sheets: &[Driven]) -> Result<(), StepError>
             &[k],
             &s.fine.driven_nodes,
         )?;
-        host.write_f64(
-            &format!("{}/position", s.name),
-            &[f, k, 3],
-            "m",
-            &s.position,
-        )?;
-        let velocity = spline_slopes(times, &s.position, 3 * k);
-        host.write_f64(
-            &format!("{}/velocity", s.name),
-            &[f, k, 3],
-            "m/s",
-            &velocity,
-        )?;
+        let motion = [
+            ("position", "m", "velocity", "m/s", &s.position),
+            ("normal", "1", "normal_rate", "1/s", &s.normal),
+        ];
+        for (what, unit, rate, rate_unit, values) in motion {
+            if values.is_empty() {
+                continue;
+            }
+            let slopes = spline_slopes(times, values, 3 * k);
+            host.write_f64(&format!("{}/{what}", s.name), &[f, k, 3], unit, values)?;
+            host.write_f64(
+                &format!("{}/{rate}", s.name),
+                &[f, k, 3],
+                rate_unit,
+                &slopes,
+            )?;
+        }
     }
     Ok(())
 }

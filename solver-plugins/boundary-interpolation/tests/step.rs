@@ -4,7 +4,7 @@ use plyflow_boundary_interpolation::{
     BoundaryInterpolation, film_grid, linear, ply_grid, ply_part, spline_slopes,
 };
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
-use plyflow_surface::vector::Vec3;
+use plyflow_surface::vector::{Vec3, unit};
 use serde_json::{Value, json};
 
 #[test]
@@ -333,6 +333,48 @@ fn driven_nodes_follow_the_coarse_motion_in_place_and_velocity() {
     assert!(!out.arrays.contains_key("frame_height"));
     assert_eq!(out.attributes["sheets"].as_array().unwrap().len(), 2);
     assert!(out.log.is_empty(), "{:?}", out.log);
+}
+
+#[test]
+fn normals_at_the_cut_are_those_of_the_coarse_surface_and_turn_with_it() {
+    let out = interpolate(&coarse(0.0), json!({"element_size": 0.004}), &[0, 1]).unwrap();
+    let body = out.body("ply_1");
+    let (shape, nodes) = &out.arrays["ply_1/driven_nodes"];
+    let k = shape[0];
+    let (_, normal) = &out.arrays["ply_1/normal"];
+    let (_, rate) = &out.arrays["ply_1/normal_rate"];
+    // Of the motion above: d/dx x d/dy of it.
+    let exact = |[x, y, _]: Vec3, t: f64| {
+        let s = t * t * (3.0 - 2.0 * t);
+        unit([2.0 * s * y, 2.0 * s * x - 0.2 * s * s * y, 1.0])
+    };
+    for (f, &t) in TIMES.iter().enumerate() {
+        for (i, &node) in nodes.iter().enumerate() {
+            let (start, at) = (body.points[node as usize], (f * k + i) * 3);
+            let (n, [a, b]) = (
+                exact(start, t),
+                [t - 1e-6, t + 1e-6].map(|t| exact(start, t)),
+            );
+            for d in 0..3 {
+                assert!(
+                    (normal[at + d] - n[d]).abs() < 1e-4,
+                    "{} {}",
+                    normal[at + d],
+                    n[d]
+                );
+                let slope = (b[d] - a[d]) / 2e-6;
+                assert!(
+                    (rate[at + d] - slope).abs() < 5e-3,
+                    "{} {slope}",
+                    rate[at + d]
+                );
+            }
+        }
+    }
+    assert!(
+        !out.arrays.contains_key("film_low/normal"),
+        "films do not rotate"
+    );
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! Step plugin `comparison`: measures wrinkles, bridging and shear in the local runs, and in the global run
 //! and a reference at the same places, with what each cost.
 
+mod cut;
 mod fidelity;
 mod models;
 mod table;
 
+pub use cut::{Layer, Passage, Strip, Work, traction};
 pub use fidelity::Fidelity;
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
@@ -53,11 +55,15 @@ impl Step for Comparison {
                 "there is no zone: nothing was refined, the global run stands alone",
             );
         }
-        write_attributes(host, &models, &zones, &table)?;
+        let passages = cut::passages(host, &models, &zones)?;
+        let layers = cut::layers(&models, &zones);
+        let cut = json!({"work": passages, "layers": layers});
+        write_attributes(host, &models, &zones, &table, &cut)?;
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
         write_reference_errors(host, &models, &table)?;
         fidelity::write(host, &models, &zones, &table, &settings)?;
+        cut::write(host, &passages, &layers, &zones)?;
         write_costs(host, &models, &passed_over)
     }
 }
@@ -67,6 +73,7 @@ fn write_attributes(
     models: &[Model],
     zones: &[Zone],
     table: &[Entry],
+    cut: &Value,
 ) -> Result<(), StepError> {
     let list: Vec<Value> = (models.iter())
         .map(|m| {
@@ -85,7 +92,7 @@ fn write_attributes(
     let defects: Vec<Value> = table.iter().map(|e| e.to_json(models, zones)).collect();
     host.write_attributes(&json!({
         "zones": zones.iter().map(|z| &z.name).collect::<Vec<_>>(),
-        "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES,
+        "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES, "cut": cut,
     }))
 }
 

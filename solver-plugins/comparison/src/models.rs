@@ -5,6 +5,7 @@ use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::{Surface, Topology, triangles};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// A zone, as its step wrote it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -92,6 +93,8 @@ pub struct Model {
     pub element_cycles: f64,
     /// Plies in the order of the stack.
     pub plies: Vec<Ply>,
+    /// Direction of the first fibres of each ply that tells it, in the flat ply (rad), by its name.
+    pub axes: BTreeMap<String, f64>,
     /// Where it came from, for its cost.
     pub input: Input,
 }
@@ -112,6 +115,7 @@ struct Sheet {
     name: String,
     kind: String,
     offset: f64,
+    fibre_1: Option<f64>,
 }
 
 /// Global, local and reference models in that order, local ones in the order of their zones; and the local runs of zones that are
@@ -264,6 +268,9 @@ fn read(
             .map(|b| b.cells)
             .sum(),
         element_cycles: formed.element_cycles,
+        axes: (formed.sheets.iter())
+            .filter_map(|s| Some((s.name.clone(), s.fibre_1?)))
+            .collect(),
         plies,
         input,
     })

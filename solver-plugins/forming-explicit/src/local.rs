@@ -4,11 +4,11 @@ use crate::assembly::{self, Components, Placed, ToolSurface};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
 use crate::run::{Body, Forming};
-use plyflow_mechanics::history::{hermite, locate};
+use plyflow_mechanics::history::{hermite, hermite_rate, locate};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Drive, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::V;
+use plyflow_mechanics::vec3::{V, cross, dot, scale};
 use plyflow_model::scene::{Process, SheetKind};
 use std::sync::Arc;
 
@@ -26,6 +26,10 @@ pub struct LocalSheet {
     pub position: Vec<Vec<V>>,
     /// `[frames][k]` velocities (m/s).
     pub velocity: Vec<Vec<V>>,
+    /// `[frames][k]` normals of the coarse surface; empty when the artifact has none, and then rotations are free.
+    pub normal: Vec<Vec<V>>,
+    /// `[frames][k]` their rates (1/s); as `normal`.
+    pub normal_rate: Vec<Vec<V>>,
 }
 
 /// What a boundary artifact gives.
@@ -51,6 +55,8 @@ struct CutDrive {
     time: Vec<f64>,
     position: Vec<Vec<V>>,
     velocity: Vec<Vec<V>>,
+    /// By frame and driven node; by driven node `None` where the coarse run tells no normal.
+    normal: Vec<Vec<Option<[V; 2]>>>,
 }
 
 impl Drive for CutDrive {
@@ -61,7 +67,26 @@ impl Drive for CutDrive {
         let (u, v) = (self.velocity[i][k], self.velocity[i + 1][k]);
         [0, 1, 2].map(|c| w[0] * p[c] + w[1] * q[c] + w[2] * u[c] + w[3] * v[c])
     }
+
+    /// Turns the node as the coarse surface's normal n turns, `n x n' / n^2`, and not about it.
+    fn spin(&self, k: usize, t: f64) -> Option<V> {
+        let (i, s) = locate(&self.time, t);
+        let h = self.time[i + 1] - self.time[i];
+        if t < self.time[0] || t > self.time[self.time.len() - 1] {
+            return self.normal[i][k].map(|_| [0.0; 3]);
+        }
+        let ([p, u], [q, v]) = (self.normal[i][k]?, self.normal[i + 1][k]?);
+        let mix =
+            |w: [f64; 4]| [0, 1, 2].map(|c| w[0] * p[c] + w[1] * q[c] + w[2] * u[c] + w[3] * v[c]);
+        let (n, rate) = (mix(hermite(s, h)), mix(hermite_rate(s, h)));
+        // Normals of neighbouring frames that are opposite tell no way to turn.
+        let square = dot(n, n).max(MIN_NORMAL);
+        Some(scale(cross(n, rate), 1.0 / square))
+    }
 }
+
+/// Least square of a normal between two frames.
+const MIN_NORMAL: f64 = 0.01;
 
 /// Builds the model of a zone.
 ///
@@ -103,6 +128,7 @@ pub fn build_local(
         vec![Vec::new(); frames],
         vec![Vec::new(); frames],
     );
+    let mut normal = vec![Vec::new(); frames];
     for (k, sheet) in stack.iter().enumerate() {
         let local = input
             .sheets
@@ -135,6 +161,13 @@ pub fn build_local(
         for f in 0..frames {
             position[f].extend_from_slice(&local.position[f]);
             velocity[f].extend_from_slice(&local.velocity[f]);
+            let known = |k: usize| {
+                Some([
+                    *local.normal.get(f)?.get(k)?,
+                    *local.normal_rate.get(f)?.get(k)?,
+                ])
+            };
+            normal[f].extend((0..local.driven.len()).map(known));
         }
         // Driven nodes push no one: they stand where the coarse run says, with its penetration.
         let slaves = nodes
@@ -173,6 +206,7 @@ pub fn build_local(
         time: input.time.clone(),
         position,
         velocity,
+        normal,
     };
     model.set_driven(driven, Box::new(drive));
     Ok(Forming {
@@ -192,4 +226,42 @@ pub fn build_local(
         zone: Some(input.zone),
         element_size: input.element_size,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_driven_node_turns_as_the_coarse_surface_does() {
+        // The normal turns in the xz plane by a(t), faster and faster, over 1 s and 11 frames.
+        let angle = |t: f64| 1.2 * t * t;
+        let time: Vec<f64> = (0..11).map(|f| 0.1 * f64::from(f)).collect();
+        let at = |t: &f64| {
+            let (s, c) = angle(*t).sin_cos();
+            let rate = 2.4 * t;
+            vec![Some([[s, 0.0, c], [rate * c, 0.0, -rate * s]]), None]
+        };
+        let drive = CutDrive {
+            position: vec![vec![[0.0; 3]; 2]; 11],
+            velocity: vec![vec![[0.0; 3]; 2]; 11],
+            normal: time.iter().map(at).collect(),
+            time,
+        };
+        let (mut turned, steps) = (0.0, 1000);
+        for k in 0..steps {
+            let t = (f64::from(k) + 0.5) / f64::from(steps);
+            let [x, y, z] = drive.spin(0, t).unwrap();
+            assert!(x.abs() < 1e-12 && z.abs() < 1e-12);
+            assert!((y - 2.4 * t).abs() < 2e-3, "{y} rad/s at {t} s");
+            turned += y / f64::from(steps);
+        }
+        assert!((turned - angle(1.0)).abs() < 1e-5, "{turned} rad");
+        assert_eq!(
+            drive.spin(0, 1.5),
+            Some([0.0; 3]),
+            "after the last frame it rests"
+        );
+        assert_eq!(drive.spin(1, 0.5), None, "no normal: free");
+    }
 }

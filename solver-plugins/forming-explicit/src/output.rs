@@ -243,6 +243,12 @@ fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
                 })
                 .collect())
         };
+        // Written by older versions without normals.
+        let known = |what: &str| {
+            let path = format!("{}/{what}", body.name);
+            let there = host.array_info(input, &path).is_some();
+            if there { vectors(what) } else { Ok(Vec::new()) }
+        };
         sheets.push(LocalSheet {
             name: body.name.clone(),
             points,
@@ -252,6 +258,8 @@ fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
                 .collect(),
             position: vectors("position")?,
             velocity: vectors("velocity")?,
+            normal: known("normal")?,
+            normal_rate: known("normal_rate")?,
             driven,
         });
     }

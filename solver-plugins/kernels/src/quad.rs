@@ -16,8 +16,8 @@ use plyflow_sdk::{ElementBatch, MaterialRef, MembraneBatch};
 
 /// Rows of constants: b11, b21, b12, b22 (1/m), h1, h2 (m), area (m2), k, k_n (N/m).
 pub const CONSTANTS: usize = 9;
-/// Rows of fields: shear angle (rad), two fibre strains, largest principal stretch.
-pub const FIELDS: usize = 4;
+/// Rows of fields: shear angle (rad), two fibre strains, largest principal stretch, S11, S22, S12 (N/m).
+pub const FIELDS: usize = 7;
 /// Most lanes in a batch.
 pub const MAX_LANES: usize = 64;
 /// Hourglass stiffness may not exceed this part of the material's largest tangent: more than the
@@ -295,7 +295,7 @@ fn forces_with(batch: &mut ElementBatch<'_>, material: &MaterialRef, mut s: View
         critical_step_of(&batch.constants, n, material.sizes().areal_mass, &s, step);
     }
     if let Some(fields) = batch.fields.as_deref_mut() {
-        fields_of(n, s.metric, fields);
+        fields_of(n, s.metric, s.stress, fields);
     }
     PF_OK
 }
@@ -448,7 +448,8 @@ fn largest(a: f64, b: f64, c: f64) -> f64 {
     0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt()
 }
 
-fn fields_of(n: usize, metric: &[f64], fields: &mut [f64]) {
+/// Fields from the metric (C11, C22, C12) and the membrane resultants (S11, S22, S12), `[3][lanes]` each.
+pub(crate) fn fields_of(n: usize, metric: &[f64], stress: &[f64], fields: &mut [f64]) {
     for l in 0..n {
         let (c11, c22, c12) = (metric[l], metric[n + l], metric[2 * n + l]);
         let product = (c11 * c22).sqrt().max(f64::MIN_POSITIVE);
@@ -457,4 +458,5 @@ fn fields_of(n: usize, metric: &[f64], fields: &mut [f64]) {
         fields[2 * n + l] = c22.sqrt() - 1.0;
         fields[3 * n + l] = largest(c11, c22, c12).max(0.0).sqrt();
     }
+    fields[4 * n..7 * n].copy_from_slice(&stress[..3 * n]);
 }

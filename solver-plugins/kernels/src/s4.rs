@@ -548,16 +548,12 @@ impl S4 {
 }
 
 fn fields_of(n: usize, s: &forces::View<'_>, fields: &mut [f64]) {
+    quad::fields_of(n, s.metric, s.stress, fields);
     for l in 0..n {
-        let (c11, c22, c12) = (s.metric[l], s.metric[n + l], s.metric[2 * n + l]);
-        let product = (c11 * c22).sqrt().max(f64::MIN_POSITIVE);
-        fields[l] = (c12 / product).clamp(-1.0, 1.0).asin();
-        fields[n + l] = c11.sqrt() - 1.0;
-        fields[2 * n + l] = c22.sqrt() - 1.0;
-        fields[3 * n + l] = bounds::largest(c11, c22, c12).max(0.0).sqrt();
-        fields[4 * n + l] = s.curvature[l] / c11.max(f64::MIN_POSITIVE);
-        fields[5 * n + l] = s.curvature[n + l] / c22.max(f64::MIN_POSITIVE);
-        fields[6 * n + l] = s.moment[l];
-        fields[7 * n + l] = s.moment[n + l];
+        for a in 0..2 {
+            let stretch = s.metric[a * n + l].max(f64::MIN_POSITIVE);
+            fields[(quad::FIELDS + a) * n + l] = s.curvature[a * n + l] / stretch;
+            fields[(quad::FIELDS + 2 + a) * n + l] = s.moment[a * n + l];
+        }
     }
 }

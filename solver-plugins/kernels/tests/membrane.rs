@@ -198,6 +198,33 @@ fn picture_frame_of_one_element_needs_the_measured_force() {
     }
 }
 
+#[test]
+fn membrane_forces_among_the_fields_are_those_that_the_nodes_feel() {
+    let m = fabric(&woven("fibre-energy")).unwrap();
+    let e = El::new::<M4>("{}", &m).unwrap();
+    let square = [
+        [0.0, 0.0, 0.0],
+        [SIZE, 0.0, 0.0],
+        [SIZE, SIZE, 0.0],
+        [0.0, SIZE, 0.0],
+    ];
+    let mut batch = e.initialise(&[square; 8], &[[1.0, 0.0, 0.0]; 8]);
+    // Longer along e1 by 0.2 %, sheared by 0.3 rad, and stood up.
+    let now = square.map(|[x, y, _]| [1.002 * x + y * 0.3f64.sin(), 0.0, y * 0.3f64.cos()]);
+    let f = e.forces(&mut batch, &[now; 8]);
+    let [s11, s22, s12] = [4, 5, 6].map(|row| f.fields[row * 8]);
+    assert!(s11 > 100.0 && s12.abs() > 1.0, "{s11} {s22} {s12} N/m");
+    // Over the sides with the normals e1 and e2: P = F S, and F's columns are the sides over their lengths.
+    let column = |i: usize| now[i].map(|c| c / SIZE);
+    let (g1, g2) = (column(1), column(3));
+    for k in 0..3 {
+        let right = f.force[(3 + k) * 8] + f.force[(6 + k) * 8];
+        let upper = f.force[(6 + k) * 8] + f.force[(9 + k) * 8];
+        assert!((right - SIZE * (s11 * g1[k] + s12 * g2[k])).abs() < 1e-9 * s11);
+        assert!((upper - SIZE * (s12 * g1[k] + s22 * g2[k])).abs() < 1e-9 * s11);
+    }
+}
+
 /// Largest frequency (1/s) of an element with its masses, by differences and power iteration.
 fn exact_frequency(e: &El, batch: &mut Elements, x: &Quad, mass: f64) -> f64 {
     let h = 1e-9;

@@ -310,14 +310,14 @@ fn patch_of_distorted_elements_carries_constant_curvature_and_twist_exactly() {
                     );
                 }
                 for (l, a) in (0..9).flat_map(|l| [(l, 0), (l, 1)]) {
-                    let got = q.out.fields[(4 + a) * 16 + l];
+                    let got = q.out.fields[(7 + a) * 16 + l];
                     assert!(
                         (got - k[a]).abs() < 1e-8,
                         "curvature_{} {got}, not {}",
                         a + 1,
                         k[a]
                     );
-                    let moment = q.out.fields[(6 + a) * 16 + l];
+                    let moment = q.out.fields[(9 + a) * 16 + l];
                     assert!(
                         (moment - 0.005 * k[a]).abs() < 5e-11,
                         "bending_moment_{} {moment}",

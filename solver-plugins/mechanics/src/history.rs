@@ -49,6 +49,17 @@ pub fn hermite(s: f64, h: f64) -> [f64; 4] {
     ]
 }
 
+/// Rates (1/s times the value) of [`hermite`]'s weights: those of the interpolation's slope.
+pub fn hermite_rate(s: f64, h: f64) -> [f64; 4] {
+    let s2 = s * s;
+    [
+        6.0 * (s2 - s) / h,
+        6.0 * (s - s2) / h,
+        3.0 * s2 - 4.0 * s + 1.0,
+        3.0 * s2 - 2.0 * s,
+    ]
+}
+
 /// Linear interpolation of `values` at `times`.
 pub fn linear(times: &[f64], values: &[f64], t: f64) -> f64 {
     if times.len() < 2 {
@@ -71,6 +82,17 @@ mod tests {
             assert!((f(t + h) - 2.0 * f(t) + f(t - h)).abs() / (h * h) < 1e-2);
         }
         assert_eq!((f(0.0), f(2.0), f(4.0)), (0.0, 0.5, 1.0));
+    }
+
+    #[test]
+    fn hermite_rate_is_the_slope_of_hermite() {
+        let (h, d) = (0.3, 1e-6);
+        for s in [0.0, 0.2, 0.7, 1.0] {
+            let (a, b) = (hermite(s - d / h, h), hermite(s + d / h, h));
+            for (rate, k) in hermite_rate(s, h).into_iter().zip(0..) {
+                assert!((rate - (b[k] - a[k]) / (2.0 * d)).abs() < 1e-6);
+            }
+        }
     }
 
     #[test]
