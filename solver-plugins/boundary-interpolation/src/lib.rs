@@ -3,12 +3,11 @@
 
 mod cut;
 mod grid;
-mod spline;
 
 pub use cut::Placed;
 pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
-pub use spline::{linear, spline_slopes};
 
+use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
 use plyflow_surface::vector::{Vec3, distance};
 use serde::Deserialize;

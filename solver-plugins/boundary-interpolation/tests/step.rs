@@ -1,8 +1,7 @@
 //! The step on a coarse motion that is known, and the splines and meshes it is made of.
 
-use plyflow_boundary_interpolation::{
-    BoundaryInterpolation, film_grid, linear, ply_grid, ply_part, spline_slopes,
-};
+use plyflow_boundary_interpolation::{BoundaryInterpolation, film_grid, ply_grid, ply_part};
+use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
 use plyflow_surface::vector::{Vec3, unit};
 use serde_json::{Value, json};

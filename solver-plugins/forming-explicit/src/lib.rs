@@ -17,7 +17,7 @@ pub mod run;
 pub mod symmetry;
 
 pub use global::build_global;
-pub use local::{LocalInput, build_local};
+pub use local::{Feedback, LocalInput, LocalSheet, build_local, feed_back};
 
 use plyflow_sdk::{Host, Step, StepError};
 

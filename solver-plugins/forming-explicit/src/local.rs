@@ -6,9 +6,10 @@ use crate::process::{Cycle, Load};
 use crate::run::{Body, Forming};
 use plyflow_mechanics::history::{hermite, hermite_rate, locate};
 use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::model::{Drive, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::{V, cross, dot, scale};
+use plyflow_mechanics::vec3::{V, cross, dot, norm, scale, sub};
 use plyflow_model::scene::{Process, SheetKind};
 use std::sync::Arc;
 
@@ -50,13 +51,42 @@ pub struct LocalInput {
     pub element_size: f64,
 }
 
-/// Cubic Hermite motion of the cut.
+/// Cubic Hermite motion of given nodes through the frames of another run.
 struct CutDrive {
     time: Vec<f64>,
+    /// `[frames][driven]` (m).
     position: Vec<Vec<V>>,
+    /// `[frames][driven]` (m/s).
     velocity: Vec<Vec<V>>,
-    /// By frame and driven node; by driven node `None` where the coarse run tells no normal.
+    /// `[frames][driven]`; `None` where the other run tells no normal.
     normal: Vec<Vec<Option<[V; 2]>>>,
+}
+
+impl CutDrive {
+    fn new(time: Vec<f64>) -> Self {
+        let none = || vec![Vec::new(); time.len()];
+        Self {
+            position: none(),
+            velocity: none(),
+            normal: vec![Vec::new(); time.len()],
+            time,
+        }
+    }
+
+    /// Adds the driven nodes of a sheet, in their order.
+    fn add(&mut self, sheet: &LocalSheet) {
+        for f in 0..self.time.len() {
+            self.position[f].extend_from_slice(&sheet.position[f]);
+            self.velocity[f].extend_from_slice(&sheet.velocity[f]);
+            let known = |k: usize| {
+                Some([
+                    *sheet.normal.get(f)?.get(k)?,
+                    *sheet.normal_rate.get(f)?.get(k)?,
+                ])
+            };
+            self.normal[f].extend((0..sheet.driven.len()).map(known));
+        }
+    }
 }
 
 impl Drive for CutDrive {
@@ -123,12 +153,8 @@ pub fn build_local(
     let frames = input.time.len();
     let mut points = Vec::new();
     let (mut specs, mut bodies, mut placed) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut driven, mut position, mut velocity) = (
-        Vec::new(),
-        vec![Vec::new(); frames],
-        vec![Vec::new(); frames],
-    );
-    let mut normal = vec![Vec::new(); frames];
+    let mut driven = Vec::new();
+    let mut drive = CutDrive::new(input.time.clone());
     for (k, sheet) in stack.iter().enumerate() {
         let local = input
             .sheets
@@ -158,17 +184,7 @@ pub fn build_local(
             free[*n as usize] = false;
             driven.push(first + n);
         }
-        for f in 0..frames {
-            position[f].extend_from_slice(&local.position[f]);
-            velocity[f].extend_from_slice(&local.velocity[f]);
-            let known = |k: usize| {
-                Some([
-                    *local.normal.get(f)?.get(k)?,
-                    *local.normal_rate.get(f)?.get(k)?,
-                ])
-            };
-            normal[f].extend((0..local.driven.len()).map(known));
-        }
+        drive.add(local);
         // Driven nodes push no one: they stand where the coarse run says, with its penetration.
         let slaves = nodes
             .iter()
@@ -202,12 +218,6 @@ pub fn build_local(
         p,
         Arc::new(ToolSurface(grid)),
     )?;
-    let drive = CutDrive {
-        time: input.time.clone(),
-        position,
-        velocity,
-        normal,
-    };
     model.set_driven(driven, Box::new(drive));
     Ok(Forming {
         model,
@@ -227,6 +237,64 @@ pub fn build_local(
         element_size: input.element_size,
     })
 }
+
+/// What an artifact feeds back: where nodes of the coarse plies go.
+pub struct Feedback {
+    /// Times of the frames (s).
+    pub time: Vec<f64>,
+    /// Plies, any order, with the meshes of the coarse run.
+    pub sheets: Vec<LocalSheet>,
+}
+
+/// Drives nodes of the plies of a whole scene as fine runs have moved them.
+///
+/// # Errors
+/// A text for the user: what was fed back is of other meshes, or has too few frames.
+pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), String> {
+    if input.time.len() < 2 {
+        return Err("the feedback has fewer than two frames".into());
+    }
+    if forming.model.planes() != Planes::default() {
+        return Err("what is fed back is of the whole scene, and this scene is computed beside mirror planes: leave out its `symmetry`".into());
+    }
+    let mut nodes = Vec::new();
+    let mut drive = CutDrive::new(input.time);
+    for sheet in &input.sheets {
+        let body = (forming.bodies.iter()).find(|b| b.name == sheet.name && is_ply(forming, b));
+        let body = body.ok_or_else(|| {
+            format!(
+                "what is fed back moves '{}', which is no ply of this scene",
+                sheet.name
+            )
+        })?;
+        let own = forming.reference_points(body);
+        let near = |(a, b): (&V, &V)| norm(sub(*a, *b)) < SAME_PLACE;
+        if own.len() != sheet.points.len() || !own.iter().zip(&sheet.points).all(near) {
+            return Err(format!(
+                "what is fed back was made for another mesh of ply '{}' ({} nodes; this run has {}): give this run the scene and \
+                 the `element_size` of the coarse run that it came from",
+                sheet.name,
+                sheet.points.len(),
+                own.len()
+            ));
+        }
+        let all = &forming.model.sheets[body.sheet].nodes;
+        nodes.extend(sheet.driven.iter().map(|n| all[*n as usize]));
+        drive.add(sheet);
+    }
+    forming.model.drive_also(nodes, Box::new(drive));
+    Ok(())
+}
+
+fn is_ply(forming: &Forming, body: &Body) -> bool {
+    forming
+        .stack
+        .iter()
+        .any(|s| s.scene.name == body.name && s.scene.kind == SheetKind::Ply)
+}
+
+/// Places nearer than this are the same (m).
+const SAME_PLACE: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

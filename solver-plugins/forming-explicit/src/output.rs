@@ -2,7 +2,7 @@
 
 use crate::assembly::Components;
 use crate::checkpoint::{Part, Recorder};
-use crate::local::{LocalInput, LocalSheet};
+use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use crate::penetration::Penetration;
 use crate::run::{Body, Course, Forming, Observer, Outcome};
@@ -138,10 +138,18 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
     });
     let components = HostComponents(host);
     let boundary = host.inputs_of("boundary")?;
+    let feedback = host.inputs_of("feedback")?;
+    if !(boundary.is_empty() || feedback.is_empty()) {
+        return Err("give `boundary`, for the run of a zone, or `feedback`, for the whole scene again, not both".into());
+    }
     let mut forming = match boundary.first() {
         None => crate::build_global(p, &components)?,
         Some(input) => crate::build_local(p, read_boundary(host, input)?, &components)?,
     };
+    if let Some(input) = feedback.first() {
+        let (time, sheets) = read_motion(host, input)?;
+        crate::local::feed_back(&mut forming, Feedback { time, sheets })?;
+    }
     let mut fields = Vec::new();
     for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
         let film = sheet.scene.kind == SheetKind::Diaphragm;
@@ -217,9 +225,23 @@ fn define(host: &Host, forming: &Forming, body: &Body) -> Result<(), StepError> 
 
 fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
     let attributes: serde_json::Value = host.attributes(input)?;
-    let meshes = host.meshes(input)?;
     let series = |name: &str| host.array_f64(input, name).map(|(v, _)| v);
-    let time = series("time")?;
+    let (time, sheets) = read_motion(host, input)?;
+    Ok(LocalInput {
+        cavity: series("cavity_pressure")?,
+        bag: series("bag_pressure")?,
+        frame: series("frame_height")?,
+        time,
+        sheets,
+        zone: attributes["zone"].clone(),
+        element_size: attributes["element_size"].as_f64().unwrap_or(0.0),
+    })
+}
+
+/// Times and driven sheets of a boundary artifact.
+fn read_motion(host: &Host, input: &Input) -> Result<(Vec<f64>, Vec<LocalSheet>), StepError> {
+    let meshes = host.meshes(input)?;
+    let (time, _) = host.array_f64(input, "time")?;
     let mut sheets = Vec::new();
     for body in &meshes.bodies {
         let (points, cells) = host.mesh(input, body)?;
@@ -263,15 +285,7 @@ fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
             driven,
         });
     }
-    Ok(LocalInput {
-        cavity: series("cavity_pressure")?,
-        bag: series("bag_pressure")?,
-        frame: series("frame_height")?,
-        time,
-        sheets,
-        zone: attributes["zone"].clone(),
-        element_size: attributes["element_size"].as_f64().unwrap_or(0.0),
-    })
+    Ok((time, sheets))
 }
 
 fn write_history(host: &Host, outcome: &Outcome, press: bool) -> Result<(), StepError> {

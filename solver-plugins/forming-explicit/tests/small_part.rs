@@ -6,8 +6,14 @@
 
 mod common;
 
-use common::{fabric, form};
+use common::{BuiltIn, Silent, fabric, form};
 use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::run::{Forming, Observer};
+use plyflow_forming_explicit::{Feedback, LocalSheet, build_global, feed_back};
+use plyflow_mechanics::energy::Ledger;
+use plyflow_mechanics::history::spline_slopes;
+use plyflow_mechanics::vec3::{V, norm, sub};
+use plyflow_sdk::StepError;
 use serde_json::json;
 
 fn parameters() -> Parameters {
@@ -134,4 +140,124 @@ fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
     assert!((on_ply - (1.5 * film + ply)).abs() < 1e-4, "{on_ply}");
     let in_hole = height([-20.0e-3, -5.0e-3], 0.008);
     assert!((in_hole - (0.5 * film + 3e-4)).abs() < 1e-4, "{in_hole}");
+}
+
+/// Keeps where the plies are at the frames.
+#[derive(Default)]
+struct Film {
+    time: Vec<f64>,
+    /// `[frames][bodies][nodes]` (m).
+    points: Vec<Vec<Vec<V>>>,
+}
+
+impl Observer for Film {
+    fn frame(&mut self, forming: &Forming, time: f64) -> Result<(), StepError> {
+        self.time.push(time);
+        let bodies = forming.bodies.iter().map(|b| forming.points(b));
+        self.points.push(bodies.collect());
+        Ok(())
+    }
+    fn tick(&mut self, _: &Forming, _: &Ledger, _: f64) -> Result<(), StepError> {
+        Ok(())
+    }
+}
+
+/// The nodes of one ply that `wanted` picks, with the motion that a run gave them, moved by `extra` (m) along x as time goes.
+fn fed(
+    forming: &Forming,
+    film: &Film,
+    body: usize,
+    wanted: impl Fn(V) -> bool,
+    extra: f64,
+) -> LocalSheet {
+    let b = &forming.bodies[body];
+    let points = forming.reference_points(b);
+    let driven: Vec<u32> = (0..points.len() as u32)
+        .filter(|n| wanted(points[*n as usize]))
+        .collect();
+    let end = film.time[film.time.len() - 1];
+    let position: Vec<Vec<V>> = (film.points.iter().zip(&film.time))
+        .map(|(frame, t)| {
+            let at = |n: &u32| {
+                let [x, y, z] = frame[body][*n as usize];
+                [x + extra * (t / end).powi(2), y, z]
+            };
+            driven.iter().map(at).collect()
+        })
+        .collect();
+    let flat: Vec<f64> = position.iter().flatten().flatten().copied().collect();
+    let slopes = spline_slopes(&film.time, &flat, 3 * driven.len());
+    let rows = slopes.chunks_exact(3 * driven.len());
+    LocalSheet {
+        name: b.name.clone(),
+        cells: b.cells.clone(),
+        points,
+        velocity: rows.map(|r| r.as_chunks().0.to_vec()).collect(),
+        position,
+        driven,
+        normal: Vec::new(),
+        normal_rate: Vec::new(),
+    }
+}
+
+#[test]
+fn a_run_that_is_fed_its_own_motion_repeats_itself_and_one_that_is_fed_more_follows() {
+    let mut p = parameters();
+    p.frames = 100;
+    let mut film = Film::default();
+    let mut first = build_global(&p, &BuiltIn).unwrap();
+    first.run(&p.control(), &mut film).unwrap();
+    let deep = |[x, y, _]: V| x.abs() < 0.03 && y.abs() < 0.02;
+    let again = |extra: f64| {
+        let mut forming = build_global(&p, &BuiltIn).unwrap();
+        let sheets = vec![fed(&first, &film, 1, deep, extra)];
+        let time = film.time.clone();
+        feed_back(&mut forming, Feedback { time, sheets }).unwrap();
+        let outcome = forming.run(&p.control(), &mut Silent).unwrap();
+        assert!(
+            outcome.health.peak_drift_ratio < 0.05,
+            "{:?}",
+            outcome.health
+        );
+        let way = |body: usize, n: usize| {
+            let [a, b] = [&first, &forming].map(|f| f.points(&f.bodies[body])[n]);
+            norm(sub(a, b))
+        };
+        let driven = fed(&first, &film, 1, deep, 0.0).driven;
+        let at_driven = driven
+            .iter()
+            .map(|n| way(1, *n as usize))
+            .fold(0.0, f64::max);
+        let nodes = first.points(&first.bodies[1]).len();
+        let free = (0..nodes).filter(|n| !driven.contains(&(*n as u32)));
+        let mean = |list: Vec<f64>| list.iter().sum::<f64>() / list.len() as f64;
+        (at_driven, mean(free.map(|n| way(1, n)).collect()))
+    };
+    let (driven, free) = again(0.0);
+    println!("its own motion: driven {driven} m, free {free} m");
+    assert!(driven < 1e-5 && free < 1e-4, "{driven} m, {free} m");
+    // 1 mm further along x: the rest of the ply is drawn along, in part.
+    let (driven, free) = again(0.001);
+    println!("1 mm more: driven {driven} m, free {free} m");
+    assert!(
+        (driven - 0.001).abs() < 1e-5 && free > 2e-4 && free < 0.0012,
+        "{driven} m, {free} m"
+    );
+
+    // What is fed back must be of the same mesh and of a ply.
+    let refused = |sheet: LocalSheet| {
+        let (mut forming, time) = (build_global(&p, &BuiltIn).unwrap(), film.time.clone());
+        feed_back(
+            &mut forming,
+            Feedback {
+                time,
+                sheets: vec![sheet],
+            },
+        )
+        .unwrap_err()
+    };
+    let mut other = fed(&first, &film, 1, deep, 0.0);
+    other.points.pop();
+    assert!(refused(other).contains("element_size"));
+    assert!(refused(fed(&first, &film, 0, deep, 0.0)).contains("no ply of this scene"));
 }

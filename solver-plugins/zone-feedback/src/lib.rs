@@ -1,0 +1,263 @@
+//! Step plugin `zone-feedback`: the motion of coarse nodes deep inside of zones, as the fine runs there have it.
+//!
+//! Driven by it, a coarse run feels what a wrinkle does to its surroundings (a ply that buckles draws in more), and its motion
+//! drives the cuts of the next fine runs: overlapping Schwarz iterations (Schwarz 1870; Toselli and Widlund, Domain
+//! Decomposition Methods, 2005, ch. 1), the overlap being the strip between the cuts and the driven nodes.
+
+use plyflow_mechanics::history::{hermite, locate, spline_slopes};
+use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
+use plyflow_surface::vector::{Vec3, distance};
+use plyflow_surface::{Location, QuadLocator};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// The step.
+pub struct ZoneFeedback;
+
+export_step!(ZoneFeedback);
+
+#[derive(Deserialize)]
+struct Parameters {
+    overlap: Option<f64>,
+}
+
+/// How many coarse elements the overlap is wide when it is not told.
+const OVERLAP: f64 = 2.0;
+/// Places nearer than this are the same (m).
+const SAME_PLACE: f64 = 1e-6;
+
+/// A zone as its fine run tells it.
+#[derive(Deserialize)]
+struct Zone {
+    name: String,
+    /// `[x0, y0, x1, y1]` (m).
+    #[serde(rename = "box")]
+    bounds: [f64; 4],
+    /// Left, right, bottom, top.
+    free_sides: [bool; 4],
+}
+
+impl Zone {
+    /// Whether a place of the flat ply lies in the zone and at least `overlap` (m) from its cut sides.
+    fn holds(&self, at: Vec3, overlap: f64) -> bool {
+        (0..4).all(|side| {
+            let (d, outward) = (side / 2, if side % 2 == 0 { -1.0 } else { 1.0 });
+            let inside = outward * (self.bounds[d + 2 * (side % 2)] - at[d]);
+            let least = if self.free_sides[side] { 0.0 } else { overlap };
+            inside >= least - SAME_PLACE
+        })
+    }
+}
+
+struct Fine {
+    input: Input,
+    meshes: Meshes,
+    zone: Zone,
+}
+
+#[derive(Deserialize)]
+struct Coarse {
+    scene: Value,
+    sheets: Vec<Sheet>,
+    #[serde(default)]
+    element_size: f64,
+    #[serde(default)]
+    symmetry: Vec<String>,
+    #[serde(default)]
+    zone: Value,
+}
+
+#[derive(Deserialize)]
+struct Sheet {
+    name: String,
+    kind: String,
+}
+
+/// The driven nodes of one ply.
+#[derive(Default)]
+struct Driven {
+    /// With their positions by frame (`[f]`, m).
+    nodes: Vec<(u32, Vec<Vec3>)>,
+    /// By node: distance from where the coarse run has it at the end (m).
+    change: Vec<f64>,
+}
+
+impl Step for ZoneFeedback {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let p: Parameters = host.parameters()?;
+        let formed = host.input("formed")?;
+        let coarse: Coarse = host.attributes(&formed)?;
+        check(&formed, &coarse)?;
+        let overlap = p.overlap.unwrap_or(OVERLAP * coarse.element_size);
+        if overlap <= 0.0 {
+            let step = &formed.step;
+            return Err(format!("'{step}' does not tell its element size; give `overlap`").into());
+        }
+        let meshes = host.meshes(&formed)?;
+        if meshes.times.len() < 2 {
+            let (step, n) = (&formed.step, meshes.times.len());
+            return Err(format!("'{step}' has {n} frames; a motion needs at least 2").into());
+        }
+        let fine = fine_runs(host)?;
+        host.write_f64("time", &[meshes.times.len()], "s", &meshes.times)?;
+        let mut change = Vec::new();
+        for sheet in coarse.sheets.iter().filter(|s| s.kind == "ply") {
+            host.progress(&Progress {
+                phase: "reading the fine motion",
+                ..Default::default()
+            });
+            let driven = drive(host, &formed, &meshes, &sheet.name, &fine, overlap)?;
+            write(host, &formed, &meshes, &sheet.name, &driven)?;
+            change.extend(driven.change);
+        }
+        if change.is_empty() {
+            host.log(
+                Log::Info,
+                "no coarse node lies deep enough in a zone: nothing is fed back",
+            );
+        }
+        host.write_attributes(&json!({
+            "zone": null, "scene": coarse.scene, "frames": meshes.times.len(), "element_size": coarse.element_size,
+            "overlap": overlap, "fed_back": fine.iter().map(|f| &f.zone.name).collect::<Vec<_>>(),
+        }))?;
+        let squares: f64 = change.iter().map(|c| c * c).sum();
+        let mean = (squares / change.len().max(1) as f64).sqrt();
+        host.result("driven_nodes", change.len() as f64, "1")?;
+        host.result("feedback_change", mean, "m")?;
+        let largest = change.iter().copied().fold(0.0, f64::max);
+        host.result("feedback_change_max", largest, "m")
+    }
+}
+
+fn check(formed: &Input, coarse: &Coarse) -> Result<(), StepError> {
+    let step = &formed.step;
+    if !coarse.zone.is_null() {
+        return Err(format!(
+            "`formed`: '{step}' is the run of a zone; the coarse run of the whole scene is expected"
+        )
+        .into());
+    }
+    if !coarse.symmetry.is_empty() {
+        let text = format!(
+            "'{step}' was computed beside mirror planes; feeding back is for scenes without `symmetry`. Leave it out of the scene"
+        );
+        return Err(text.into());
+    }
+    Ok(())
+}
+
+fn fine_runs(host: &Host) -> Result<Vec<Fine>, StepError> {
+    let mut list = Vec::new();
+    for input in host.inputs_of("local")? {
+        let attributes: Value = host.attributes(&input)?;
+        let zone: Zone = serde_json::from_value(attributes["zone"].clone()).map_err(|e| {
+            let step = &input.step;
+            format!("`local`: '{step}' is no run of a zone (attribute `zone`: {e})")
+        })?;
+        let meshes = host.meshes(&input)?;
+        if meshes.times.len() < 2 {
+            let (step, n) = (&input.step, meshes.times.len());
+            return Err(format!("'{step}' has {n} frames; a motion needs at least 2").into());
+        }
+        list.push(Fine {
+            input,
+            meshes,
+            zone,
+        });
+    }
+    Ok(list)
+}
+
+/// Motion of the nodes of a coarse ply that lie deep in a zone, at the coarse frames.
+fn drive(
+    host: &Host,
+    formed: &Input,
+    meshes: &Meshes,
+    ply: &str,
+    fine: &[Fine],
+    overlap: f64,
+) -> Result<Driven, StepError> {
+    let body = meshes.body(ply)?;
+    let (points, _) = host.mesh(formed, body)?;
+    let last = host.frame_points(formed, body, meshes.times.len() - 1)?;
+    let mut taken = vec![false; points.len()];
+    let mut driven = Driven::default();
+    for run in fine {
+        host.check_cancelled()?;
+        // A ply need not reach into every zone.
+        let Ok(own) = run.meshes.body(ply) else {
+            continue;
+        };
+        let (flat, cells) = host.mesh(&run.input, own)?;
+        let Some(locator) = QuadLocator::new(&flat, &cells) else {
+            continue;
+        };
+        let mut places: Vec<(u32, Location)> = Vec::new();
+        for (i, at) in points.iter().enumerate() {
+            if taken[i] || !run.zone.holds(*at, overlap) {
+                continue;
+            }
+            if let Some(place) = locator.locate(at[0], at[1], SAME_PLACE) {
+                taken[i] = true;
+                places.push((i as u32, place));
+            }
+        }
+        let mut values = Vec::new();
+        for frame in 0..run.meshes.times.len() {
+            let now = host.frame_points(&run.input, own, frame)?;
+            values.extend(places.iter().flat_map(|(_, at)| at.interpolate(&now)));
+        }
+        let motion = resampled(&run.meshes.times, &values, &meshes.times, 3 * places.len());
+        for (k, (i, _)) in places.iter().enumerate() {
+            let at = |f: usize| [0, 1, 2].map(|d| motion[(f * places.len() + k) * 3 + d]);
+            let way: Vec<Vec3> = (0..meshes.times.len()).map(at).collect();
+            let end = way[way.len() - 1];
+            driven.change.push(distance(end, last[*i as usize]));
+            driven.nodes.push((*i, way));
+        }
+    }
+    driven.nodes.sort_by_key(|(i, _)| *i);
+    Ok(driven)
+}
+
+/// Values (`[f][columns]`) known at `times` by their C2 spline at other times; beyond the ends those of the ends.
+fn resampled(times: &[f64], values: &[f64], at: &[f64], columns: usize) -> Vec<f64> {
+    let slopes = spline_slopes(times, values, columns);
+    let mut out = Vec::with_capacity(at.len() * columns);
+    for &t in at {
+        let (i, s) = locate(times, t);
+        let w = hermite(s, times[i + 1] - times[i]);
+        let row = |list: &[f64], i: usize, c: usize| list[i * columns + c];
+        out.extend((0..columns).map(|c| {
+            w[0] * row(values, i, c)
+                + w[1] * row(values, i + 1, c)
+                + w[2] * row(&slopes, i, c)
+                + w[3] * row(&slopes, i + 1, c)
+        }));
+    }
+    out
+}
+
+/// Writes one ply as boundary artifacts hold it.
+fn write(
+    host: &Host,
+    formed: &Input,
+    meshes: &Meshes,
+    ply: &str,
+    driven: &Driven,
+) -> Result<(), StepError> {
+    let (points, cells) = host.mesh(formed, meshes.body(ply)?)?;
+    host.define_mesh(ply, &points, 4, &cells, &json!({}))?;
+    let (f, k) = (meshes.times.len(), driven.nodes.len());
+    let nodes: Vec<u32> = driven.nodes.iter().map(|(i, _)| *i).collect();
+    host.write_u32(&format!("{ply}/driven_nodes"), &[k], &nodes)?;
+    let frames = 0..f;
+    let position: Vec<f64> = frames
+        .flat_map(|frame| driven.nodes.iter().flat_map(move |(_, way)| way[frame]))
+        .collect();
+    let velocity = spline_slopes(&meshes.times, &position, 3 * k);
+    host.write_f64(&format!("{ply}/position"), &[f, k, 3], "m", &position)?;
+    host.write_f64(&format!("{ply}/velocity"), &[f, k, 3], "m/s", &velocity)
+}

@@ -1,0 +1,148 @@
+//! The step on fine motions that are known.
+
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
+use plyflow_surface::vector::Vec3;
+use plyflow_zone_feedback::ZoneFeedback;
+use serde_json::{Value, json};
+
+const BLANK: [f64; 4] = [-0.20, -0.10, 0.20, 0.10];
+/// Reaches the blank's right edge.
+const ZONE: [f64; 4] = [0.06, -0.06, 0.20, 0.06];
+const COARSE: f64 = 0.01;
+
+/// Bilinear in space, cubic in time and at rest in the beginning.
+fn motion(p: Vec3, t: f64, draw_in: f64) -> Vec3 {
+    let s = t * t * (3.0 - 2.0 * t);
+    [
+        p[0] - draw_in * s,
+        p[1] + 0.1 * s * p[0],
+        p[2] - s * (0.05 + 2.0 * p[0] * p[1]),
+    ]
+}
+
+fn formed(b: [f64; 4], size: f64, times: &[f64], draw_in: f64, zone: Value) -> MemoryArtifact {
+    let n = [0, 1].map(|d| ((b[d + 2] - b[d]) / size).round() as usize);
+    let mut points = Vec::new();
+    for j in 0..=n[1] {
+        for i in 0..=n[0] {
+            points.push([b[0] + size * i as f64, b[1] + size * j as f64, 0.1]);
+        }
+    }
+    let node = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
+    let corners = |(i, j): (usize, usize)| {
+        [
+            node(i, j),
+            node(i + 1, j),
+            node(i + 1, j + 1),
+            node(i, j + 1),
+        ]
+    };
+    let cells = (0..n[1]).flat_map(|j| (0..n[0]).map(move |i| (i, j)));
+    let at = |t: &f64| points.iter().map(|p| motion(*p, *t, draw_in)).collect();
+    MemoryArtifact {
+        kind: "forming".into(),
+        attributes: json!({
+            "scene": "s", "element_size": size, "zone": zone, "symmetry": [],
+            "sheets": [{"name": "film", "kind": "diaphragm"}, {"name": "ply_1", "kind": "ply"}],
+        }),
+        times: times.to_vec(),
+        bodies: vec![MemoryBody {
+            name: "ply_1".into(),
+            nodes_per_cell: 4,
+            cells: cells.flat_map(corners).collect(),
+            frames: times.iter().map(at).collect(),
+            points,
+            ..Default::default()
+        }],
+        ..Default::default()
+    }
+}
+
+const COARSE_TIMES: [f64; 5] = [0.0, 0.26, 0.5, 0.74, 1.0];
+
+fn coarse() -> MemoryArtifact {
+    formed(BLANK, COARSE, &COARSE_TIMES, 0.0, Value::Null)
+}
+
+fn fine(draw_in: f64) -> MemoryArtifact {
+    let zone = json!({"name": "A", "box": ZONE, "free_sides": [false, true, false, false]});
+    formed(ZONE, 0.004, &[0.0, 0.2, 0.4, 0.6, 0.8, 1.0], draw_in, zone)
+}
+
+fn feed_back(
+    parameters: Value,
+    coarse: &MemoryArtifact,
+    fine: &[&MemoryArtifact],
+) -> Result<MemoryArtifact, String> {
+    let mut inputs = vec![MemoryInput::new("formed", coarse)];
+    inputs.extend(fine.iter().map(|f| MemoryInput::new("local", f)));
+    run::<ZoneFeedback>(parameters, &inputs, &[])
+}
+
+#[test]
+fn coarse_nodes_deep_in_a_zone_follow_the_fine_run_at_the_coarse_frames() {
+    let (coarse, fine) = (coarse(), fine(0.003));
+    let out = feed_back(json!({}), &coarse, &[&fine]).unwrap();
+    let (shape, nodes) = &out.arrays["ply_1/driven_nodes"];
+    // Two elements from the cuts at x = 60 mm and y = +-60 mm, up to the free edge: 80 to 200 and -40 to 40 mm.
+    let k = shape[0];
+    assert_eq!(k, 13 * 9);
+    let (_, position) = &out.arrays["ply_1/position"];
+    let (_, velocity) = &out.arrays["ply_1/velocity"];
+    for (f, &t) in COARSE_TIMES.iter().enumerate() {
+        for (i, &node) in nodes.iter().enumerate() {
+            let start = coarse.bodies[0].points[node as usize];
+            assert!(start[0] > 0.079 && start[1].abs() < 0.041);
+            let (a, b) = (
+                motion(start, t - 1e-6, 0.003),
+                motion(start, t + 1e-6, 0.003),
+            );
+            for (d, expected) in motion(start, t, 0.003).into_iter().enumerate() {
+                let at = (f * k + i) * 3 + d;
+                assert!((position[at] - expected).abs() < 1e-12);
+                assert!((velocity[at] - (b[d] - a[d]) / 2e-6).abs() < 1e-7);
+            }
+        }
+    }
+    // The fine run has drawn in 3 mm more.
+    assert!((out.result("feedback_change") - 0.003).abs() < 1e-12);
+    assert!((out.result("feedback_change_max") - 0.003).abs() < 1e-12);
+    assert_eq!(out.attributes["fed_back"], json!(["A"]));
+    let wider = feed_back(json!({"overlap": 0.05}), &coarse, &[&fine]).unwrap();
+    assert_eq!(wider.result("driven_nodes"), (10 * 3) as f64);
+}
+
+#[test]
+fn zones_that_share_nodes_drive_each_once() {
+    let (coarse, one, two) = (coarse(), fine(0.003), fine(0.001));
+    let out = feed_back(json!({}), &coarse, &[&one, &two]).unwrap();
+    assert_eq!(out.result("driven_nodes"), (13 * 9) as f64);
+    assert!(
+        (out.result("feedback_change") - 0.003).abs() < 1e-12,
+        "the first has them"
+    );
+}
+
+#[test]
+fn what_cannot_be_fed_back_is_named() {
+    let (coarse, fine) = (coarse(), fine(0.0));
+    let out = feed_back(json!({}), &coarse, &[]).unwrap();
+    assert_eq!(out.result("driven_nodes"), 0.0);
+    assert!(
+        out.log
+            .iter()
+            .any(|text| text.contains("nothing is fed back"))
+    );
+    let text = feed_back(json!({}), &fine, &[]).unwrap_err();
+    assert!(text.contains("run of a zone"), "{text}");
+    let text = feed_back(json!({}), &coarse, &[&coarse]).unwrap_err();
+    assert!(text.contains("no run of a zone"), "{text}");
+    let mut half = coarse.clone();
+    half.attributes["symmetry"] = json!(["x"]);
+    let text = feed_back(json!({}), &half, &[]).unwrap_err();
+    assert!(text.contains("symmetry"), "{text}");
+    let mut still = coarse.clone();
+    still.times.truncate(1);
+    let text = feed_back(json!({}), &still, &[]).unwrap_err();
+    assert!(text.contains("1 frames"), "{text}");
+}
