@@ -2,7 +2,7 @@
 
 use crate::QUANTILES;
 use crate::models::{Model, Role, Zone};
-use crate::table::{Entry, apart, same_within};
+use crate::table::{apart, same_within, unlike};
 use plyflow_defects::{Defect, Kind, Ply, Settings, measure, quantiles};
 use plyflow_sdk::{Host, StepError};
 
@@ -24,14 +24,24 @@ pub struct Fidelity {
     pub wrong: [usize; 2],
 }
 
+/// What is found down to this share of the least sizes may be the other of a pair, so that a defect just below a least size is
+/// not taken for one that is not there.
+const PAIRED_DOWN_TO: f64 = 0.5;
+
 impl Fidelity {
-    /// Pairs the defects of one ply and kind whose centres are near enough, the nearest first.
-    pub fn of(ours: &[Found<'_>], theirs: &[Found<'_>]) -> Self {
+    /// Pairs the defects of one ply and kind whose centres are near enough, the most alike first. Both lists go down to
+    /// [`PAIRED_DOWN_TO`] of the least sizes in `settings`; what lies below these counts only beside one that does not.
+    pub fn of(ours: &[Found<'_>], theirs: &[Found<'_>], settings: &Settings) -> Self {
+        let counts = |d: &Defect| match d.kind {
+            Kind::Wrinkle => d.length >= settings.minimum_wrinkle_length,
+            Kind::Bridging => d.area >= settings.minimum_bridging_area,
+        };
         let mut near: Vec<(f64, usize, usize)> = Vec::new();
         for (i, (ply, a)) in ours.iter().enumerate() {
             for (j, (other, b)) in theirs.iter().enumerate() {
-                if ply == other && a.kind == b.kind && apart(a, b) <= same_within(a, b) {
-                    near.push((apart(a, b), i, j));
+                let same = ply == other && a.kind == b.kind && apart(a, b) <= same_within(a, b);
+                if same && (counts(a) || counts(b)) {
+                    near.push((unlike(a, b), i, j));
                 }
             }
         }
@@ -47,7 +57,7 @@ impl Fidelity {
         let index = |d: &Defect| usize::from(d.kind == Kind::Bridging);
         for ((_, a), j) in ours.iter().zip(&pair) {
             let Some(j) = j else {
-                found.wrong[index(a)] += 1;
+                found.wrong[index(a)] += usize::from(counts(a));
                 continue;
             };
             let b = theirs[*j].1;
@@ -60,7 +70,7 @@ impl Fidelity {
             }
         }
         for ((_, b), _) in theirs.iter().zip(&taken).filter(|(_, t)| !**t) {
-            found.missed[index(b)] += 1;
+            found.missed[index(b)] += usize::from(counts(b));
         }
         found
     }
@@ -99,28 +109,23 @@ impl Fidelity {
     }
 }
 
-/// Writes how the local runs (as they are in the `table`), and the global run by itself, stand beside the reference, all of
+/// Writes how the local runs together, and the global run by itself, stand beside the reference, all of
 /// whose defects count, wherever they are; and by model how far its shear angles are from the reference's.
 pub fn write(
     host: &Host,
     models: &[Model],
     zones: &[Zone],
-    table: &[Entry],
     settings: &Settings,
 ) -> Result<(), StepError> {
     let Some(reference) = models.iter().find(|m| m.role == Role::Reference) else {
         return Ok(());
     };
-    let theirs = everywhere(reference, settings);
+    let theirs = everywhere(&[reference], settings);
     let theirs = named(&theirs);
-    let local: Vec<Found<'_>> = (table.iter())
-        .filter(|e| models[e.model].role == Role::Local)
-        .map(|e| (e.ply.as_str(), &e.defect))
-        .collect();
-    Fidelity::of(&local, &theirs).write(host, "")?;
-    for model in models.iter().filter(|m| m.role == Role::Global) {
-        let ours = everywhere(model, settings);
-        Fidelity::of(&named(&ours), &theirs).write(host, ".global")?;
+    for (role, suffix) in [(Role::Local, ""), (Role::Global, ".global")] {
+        let models: Vec<&Model> = models.iter().filter(|m| m.role == role).collect();
+        let ours = everywhere(&models, settings);
+        Fidelity::of(&named(&ours), &theirs, settings).write(host, suffix)?;
     }
     for model in models.iter().filter(|m| m.role != Role::Reference) {
         let within = model.zone.map(|z| zones[z].bounds);
@@ -139,9 +144,15 @@ pub fn write(
     Ok(())
 }
 
-fn everywhere(model: &Model, settings: &Settings) -> Vec<(String, Vec<Defect>)> {
-    let all = |p: &Ply| measure(p, &vec![true; p.formed.len()], settings);
-    (model.plies.iter())
+/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need.
+fn everywhere(models: &[&Model], settings: &Settings) -> Vec<(String, Vec<Defect>)> {
+    let lower = Settings {
+        minimum_wrinkle_length: PAIRED_DOWN_TO * settings.minimum_wrinkle_length,
+        minimum_bridging_area: PAIRED_DOWN_TO * settings.minimum_bridging_area,
+        ..*settings
+    };
+    let all = |p: &Ply| measure(p, &vec![true; p.formed.len()], &lower);
+    (models.iter().flat_map(|m| &m.plies))
         .map(|p| (p.name.clone(), all(p)))
         .collect()
 }

@@ -62,7 +62,7 @@ impl Step for Comparison {
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
         write_reference_errors(host, &models, &table)?;
-        fidelity::write(host, &models, &zones, &table, &settings)?;
+        fidelity::write(host, &models, &zones, &settings)?;
         cut::write(host, &passages, &layers, &zones)?;
         write_costs(host, &models, &passed_over)
     }

@@ -60,6 +60,12 @@ pub fn apart(a: &Defect, b: &Defect) -> f64 {
     (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1])
 }
 
+/// How unlike two defects of one kind are (m): by place, length and width. Of several that may be the same, the most alike is.
+pub fn unlike(a: &Defect, b: &Defect) -> f64 {
+    let width = (a.area.sqrt() - b.area.sqrt()).abs();
+    apart(a, b) + 0.5 * (a.length - b.length).abs() + 0.5 * width
+}
+
 /// How far apart the centres of two defects may be (m) that are the same.
 pub fn same_within(a: &Defect, b: &Defect) -> f64 {
     SAME_DEFECT.max(0.5 * a.length.max(b.length))
@@ -166,7 +172,7 @@ fn number(entries: &mut Vec<Entry>, found: Vec<Entry>, locals: &[Entry], zones: 
     }
 }
 
-/// The id of the nearest local defect of the same zone, ply and kind that is not taken yet.
+/// The id of the most alike local defect of the same zone, ply and kind that is not taken yet.
 fn twin(entry: &Entry, locals: &[Entry], taken: &[String]) -> Option<String> {
     locals
         .iter()
@@ -177,6 +183,8 @@ fn twin(entry: &Entry, locals: &[Entry], taken: &[String]) -> Option<String> {
                 && !taken.contains(&l.id)
                 && apart(&l.defect, &entry.defect) <= same_within(&l.defect, &entry.defect)
         })
-        .min_by(|a, b| apart(&a.defect, &entry.defect).total_cmp(&apart(&b.defect, &entry.defect)))
+        .min_by(|a, b| {
+            unlike(&a.defect, &entry.defect).total_cmp(&unlike(&b.defect, &entry.defect))
+        })
         .map(|l| l.id.clone())
 }

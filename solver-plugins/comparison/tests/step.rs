@@ -143,10 +143,10 @@ fn compare(inputs: &[MemoryInput<'_>]) -> MemoryArtifact {
     run::<Comparison>(json!({}), inputs, &[]).unwrap()
 }
 
-/// Length of the wrinkle's crest where its curvature exceeds 100 1/m.
+/// Length of the wrinkle's crest where its curvature exceeds half of 100 1/m and it stands off by more than 1 mm.
 fn crest_length() -> f64 {
     let peak = 0.0015 * (PI / 0.007f64).powi(2);
-    let half = 0.060 / PI * (100.0 / peak).acos();
+    let half = 0.060 / PI * (50.0 / peak).max(1.0 / 3.0).acos();
     let z = |s: f64| 0.003 * (PI * s / 0.060).cos();
     (0..1000)
         .map(|i| {

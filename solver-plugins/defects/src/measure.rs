@@ -16,6 +16,8 @@ pub struct Settings {
     pub distance_threshold: f64,
     /// Curvature of a crest, beyond that of the tool beneath it, above which it is a wrinkle's (1/m).
     pub curvature_threshold: f64,
+    /// Share of it down to which a crest goes on (0 to 1).
+    pub crest_hold: f64,
     /// Nodes nearer to the tool's foot are not judged (m).
     pub foot_margin: f64,
     /// Shorter ridges are no wrinkles (m).
@@ -145,9 +147,10 @@ pub struct Defect {
 /// Wrinkles (longest first), then bridging (largest first), among the nodes `inside` (`[nodes]`).
 ///
 /// A wrinkle is a connected set of nodes that stand off the tool by more than the distance threshold and whose
-/// principal curvature of largest magnitude is that of a crest, beyond the tool's own there by more than the
-/// curvature threshold; its length
-/// is that of its ridge. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
+/// principal curvature of largest magnitude is that of a crest, beyond the tool's own there by more than
+/// `crest_hold` of the curvature threshold, at one of them at least by more than all of it (thresholds with hysteresis,
+/// Canny 1986: a crest whose curvature wavers about one threshold would fall to pieces), with single nodes between
+/// two such pieces where the ply is convex as well; its length is that of its ridge. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
 /// curvature reaches: pi sqrt(amplitude / (2 curvature)) along the surface. What else stands off the tool
 /// is bridging.
 pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
@@ -158,17 +161,27 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
             inside[i] && d.judged && d.value > settings.distance_threshold
         })
         .collect();
-    let limit = |i: usize| ply.tool_crest[i] - settings.curvature_threshold;
-    let crest: Vec<bool> = (0..n)
-        .map(|i| off[i] && ply.curvature[i].max < limit(i))
+    let limit = |i: usize, share: f64| ply.tool_crest[i] - share * settings.curvature_threshold;
+    let hold = settings.crest_hold;
+    let curved: Vec<bool> = (0..n)
+        .map(|i| off[i] && ply.curvature[i].max < limit(i, hold))
+        .collect();
+    let crest = without_gaps(ply, &off, curved);
+    let margin: Vec<f64> = (ply.distance.iter())
+        .map(|d| d.value - settings.distance_threshold)
         .collect();
     let mut wrinkles = Vec::new();
     for nodes in ply.topology.node_components(&crest) {
+        let beyond = |&i: &u32| ply.curvature[i as usize].max < limit(i as usize, 1.0);
+        if !nodes.iter().any(beyond) {
+            continue;
+        }
         let bound = nodes
             .iter()
-            .map(|&i| -limit(i as usize))
+            .map(|&i| -limit(i as usize, hold))
             .fold(f64::INFINITY, f64::min);
-        let ridge = ridge_line(&ply.topology, &ply.formed, &ply.curvature, &nodes, bound);
+        let (topology, formed) = (&ply.topology, &ply.formed);
+        let ridge = ridge_line(topology, formed, &ply.curvature, &nodes, bound, &margin);
         if let Some(ridge) = ridge.filter(|r| r.length >= settings.minimum_wrinkle_length) {
             wrinkles.push((nodes, ridge));
         }
@@ -205,6 +218,27 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     bridging.sort_by(|a, b| b.area.total_cmp(&a.area));
     found.extend(bridging);
     found
+}
+
+/// Crests and the single nodes between pieces of one: such a node stands off, is convex too, and touches two pieces. (Between
+/// two crests that lie side by side the ply is concave.)
+fn without_gaps(ply: &Ply, off: &[bool], mut crest: Vec<bool>) -> Vec<bool> {
+    let mut piece = vec![usize::MAX; crest.len()];
+    for (p, nodes) in ply.topology.node_components(&crest).iter().enumerate() {
+        nodes.iter().for_each(|&i| piece[i as usize] = p);
+    }
+    for i in 0..crest.len() {
+        if !off[i] || piece[i] != usize::MAX || ply.curvature[i].max >= 0.0 {
+            continue;
+        }
+        let ring = ply.topology.ring(i).iter();
+        let mut touched = ring
+            .map(|&k| piece[k as usize])
+            .filter(|&p| p != usize::MAX);
+        let first = touched.next();
+        crest[i] = touched.any(|p| Some(p) != first);
+    }
+    crest
 }
 
 /// The mean over nodes of a cell field; `None` when the field is empty.

@@ -20,14 +20,16 @@ pub struct Ridge {
 /// region. Each node is then moved across the ridge to the top of the parabola through the curvatures
 /// of its ring, and the line is smoothed once (1/4, 1/2, 1/4): both keep the steps of a mesh that lies at an
 /// angle to the ridge from lengthening the line. At an end where the node ahead is curved less than
-/// `threshold` (1/m, the bound of the region) the line goes on to where the curvature between them falls to
-/// it. `None` for an empty region.
+/// `threshold` (1/m, the bound of the region), or has a negative `margin` (`[nodes]`, what else bounds the region, at
+/// least 0 inside; empty: nothing else), the line goes on to where the first of them falls to its bound between
+/// the two. `None` for an empty region.
 pub fn ridge_line(
     topology: &Topology,
     points: &[Vec3],
     curvature: &[Curvature],
     region: &[u32],
     threshold: f64,
+    margin: &[f64],
 ) -> Option<Ridge> {
     let strength = |i: u32| curvature[i as usize].max.abs();
     // Of equals the lowest index, for the same line in every run.
@@ -44,6 +46,7 @@ pub fn ridge_line(
         curvature,
         inside: &inside,
         threshold,
+        margin,
     };
     let (mut nodes, first_tip) = walk.from(start, scale(along, -1.0));
     nodes.reverse();
@@ -75,10 +78,11 @@ struct Walk<'a> {
     curvature: &'a [Curvature],
     inside: &'a [bool],
     threshold: f64,
+    margin: &'a [f64],
 }
 
 impl Walk<'_> {
-    /// Nodes after `start`, and the way from the last one on to where the curvature falls to the threshold.
+    /// Nodes after `start`, and the way from the last one on to the bound of the region.
     fn from(&self, start: u32, mut heading: Vec3) -> (Vec<u32>, Vec3) {
         let mut path = Vec::new();
         let mut visited = vec![start];
@@ -142,11 +146,19 @@ impl Walk<'_> {
         let Some(next) = self.ahead(at, heading, outside) else {
             return [0.0; 3];
         };
-        let (here, there) = (self.strength(at), self.strength(next));
-        if there >= self.threshold || here <= there {
+        // Where between the two a measure falls to zero, if it does.
+        let fall =
+            |here: f64, there: f64| (there < 0.0 && here > there).then(|| here / (here - there));
+        let beyond = |i: u32| self.strength(i) - self.threshold;
+        let margin = |i: u32| self.margin.get(i as usize).copied().unwrap_or(0.0);
+        let ends = [
+            fall(beyond(at), beyond(next)),
+            fall(margin(at), margin(next)),
+        ];
+        let Some(share) = ends.into_iter().flatten().reduce(f64::min) else {
             return [0.0; 3];
-        }
-        let share = ((here - self.threshold) / (here - there)).clamp(0.0, 1.0);
+        };
+        let share = share.clamp(0.0, 1.0);
         scale(heading, share * dot(self.way(at, next), heading))
     }
 }

@@ -145,7 +145,7 @@ fn ridge_length_does_not_depend_on_the_angle_between_mesh_and_wrinkle() {
             let chosen: Vec<bool> = k.iter().map(|k| k.max < -threshold).collect();
             let regions = t.node_components(&chosen);
             let region = regions.iter().max_by_key(|r| r.len()).unwrap();
-            let ridge = ridge_line(&t, &points, &k, region, threshold).unwrap();
+            let ridge = ridge_line(&t, &points, &k, region, threshold, &[]).unwrap();
             let error = (ridge.length / expected - 1.0).abs();
             assert!(
                 error < 0.05,
@@ -180,7 +180,7 @@ fn ridge_of_a_wavy_crest_follows_its_curve() {
         .collect();
     let regions = t.node_components(&chosen);
     let region = regions.iter().max_by_key(|r| r.len()).unwrap();
-    let ridge = ridge_line(&t, &points, &k, region, 80.0).unwrap();
+    let ridge = ridge_line(&t, &points, &k, region, 80.0, &[]).unwrap();
     let expected: f64 = (-300..300)
         .map(|i| {
             let (a, b) = (i as f64 * 1e-4, (i + 1) as f64 * 1e-4);
