@@ -10,6 +10,7 @@ use maud::{Markup, PreEscaped, html};
 /// regl 2.1.1 (MIT), see `vendor/README.md`.
 const REGL: &str = include_str!("../../vendor/regl/regl.min.js");
 const REGL_LICENCE: &str = include_str!("../../vendor/regl/LICENSE");
+const SCENE: &str = include_str!("../script/scene3d.js");
 const VIEW: &str = include_str!("../script/view3d.js");
 const PAGE: &str = include_str!("../script/page.js");
 
@@ -27,6 +28,7 @@ pub(super) fn scripts(view: bool) -> Markup {
         script { (PreEscaped(PAGE)) }
         @if view {
             script { (PreEscaped(format!("/*!{REGL_LICENCE}*/\n"))) (PreEscaped(REGL)) }
+            script { (PreEscaped(SCENE)) }
             script { (PreEscaped(VIEW)) }
         }
     }
@@ -53,6 +55,9 @@ pub(super) fn section(
                 div class="stage" {
                     canvas tabindex="0" role="img" aria-label="Formed plies in 3D. Arrow keys turn, plus and minus zoom, 0 resets." {}
                     div class="labels" aria-hidden="true" {}
+                    svg class="triad3d" viewBox="-45 -45 90 90" width="90" height="90" aria-hidden="true" {
+                        @for name in ["x", "y", "z"] { g { path class="triad-halo" {} path class="triad" {} text class="over" text-anchor="middle" { (name) } } }
+                    }
                 }
                 @for (k, legend) in legends.iter().enumerate() {
                     div class="legend3d" data-field=(k) hidden[k > 0] {

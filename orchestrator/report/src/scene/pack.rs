@@ -1,6 +1,6 @@
 //! Arrays of a scene as text: whole numbers, differences of neighbours, deflated, base64.
 //!
-//! The script of the page reads them in the order in which they were written (`script/view3d.js`).
+//! The script of the page reads them in the order in which they were written (`script/scene3d.js`).
 
 use crate::raster::Vec3;
 use base64::Engine;
