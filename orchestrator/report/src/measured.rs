@@ -53,7 +53,8 @@ pub(crate) fn read(path: &Utf8Path, facts: &Facts, instance: usize) -> Result<Me
 
 type Cells = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 4]>);
 
-/// Flat and formed points of the body of a defect, and the cells of which half of the nodes bear its number.
+/// Flat and formed points of the body of a defect, and the cells of which half of the nodes bear its number;
+/// where there is none, those of which one does.
 fn cells_of(artifact: &Artifact, given: &Given) -> Result<Option<Cells>, String> {
     let Ok(body) = artifact.body(&given.on) else {
         return Ok(None);
@@ -69,16 +70,20 @@ fn cells_of(artifact: &Artifact, given: &Given) -> Result<Option<Cells>, String>
     let formed = artifact.frame_points(&given.on, frame).map_err(text)?;
     let number = artifact.frame_field(&given.on, frame, On::Points, "defect");
     let number = number.map_err(text)?;
-    let mine = |c: &&[u32; 4]| {
-        let bears = |i: &&u32| (number[**i as usize] - f64::from(given.number)).abs() < 0.5;
-        c.iter().filter(bears).count() >= 2
+    let bears = |i: &u32| (number[*i as usize] - f64::from(given.number)).abs() < 0.5;
+    let with = |least: usize| -> Vec<[u32; 4]> {
+        let mine = |c: &&[u32; 4]| c.iter().filter(|i| bears(i)).count() >= least;
+        cells
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .filter(mine)
+            .copied()
+            .collect()
     };
-    let cells: Vec<[u32; 4]> = cells
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .filter(mine)
-        .copied()
-        .collect();
-    Ok((!cells.is_empty()).then_some((flat, formed, cells)))
+    let mut found = with(2);
+    if found.is_empty() {
+        found = with(1);
+    }
+    Ok((!found.is_empty()).then_some((flat, formed, found)))
 }

@@ -253,7 +253,7 @@ fn ring(ply: &Ply, d: &Defect) -> Option<Place> {
 }
 
 /// Mean normal of formed cells, on the side that was up when they were flat; up when they face all sides.
-fn normal(flat: &[Vec3], formed: &[Vec3], cells: &[[u32; 4]]) -> Vec3 {
+pub(crate) fn normal(flat: &[Vec3], formed: &[Vec3], cells: &[[u32; 4]]) -> Vec3 {
     let twice = |points: &[Vec3], cell: &[u32; 4]| {
         let [a, b, c, d] = cell.map(|i| points[i as usize]);
         let (e, f) = (

@@ -5,7 +5,7 @@ mod thin;
 
 use crate::field::{Field, Legend};
 use crate::locate::Locator;
-use crate::place::Place;
+use crate::place::{Place, normal};
 use crate::raster::Vec3;
 use crate::read::Ply;
 use crate::study::{Study, Zone};
@@ -78,6 +78,8 @@ struct Part {
 struct ToldOutline {
     zone: String,
     ply: String,
+    /// Mean normal of the ply in the zone.
+    normal: Vec3,
     lines: Vec<usize>,
 }
 
@@ -156,16 +158,8 @@ pub(crate) fn scene(
     }
     let outlines = outlines(&mut stream, &extent, study);
     let defects = defects(&mut stream, &extent, places);
-    let names = |of: &dyn Fn(&ToldBody) -> Option<String>| {
-        let mut names: Vec<String> = Vec::new();
-        for name in told.iter().filter_map(of) {
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-        names
-    };
-    let (plies, shown) = (names(&|b| b.ply.clone()), names(&|b| b.zone.clone()));
+    let plies = distinct(told.iter().filter_map(|b| b.ply.clone()));
+    let shown = distinct(told.iter().filter_map(|b| b.zone.clone()));
     let tool = told.iter().any(|b| b.ply.is_none());
     let told = Told {
         extent,
@@ -183,6 +177,17 @@ pub(crate) fn scene(
         tool,
         notes,
     }))
+}
+
+/// Names in the order in which they first come.
+fn distinct(all: impl Iterator<Item = String>) -> Vec<String> {
+    let mut names = Vec::new();
+    for name in all {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 fn bodies(study: &Study) -> Vec<Body<'_>> {
@@ -297,17 +302,31 @@ fn outlines(stream: &mut Stream, extent: &Extent, study: &Study) -> Vec<ToldOutl
         let locator = Locator::new(&ply.flat, &ply.cells);
         for zone in study.zones.iter().flatten() {
             let lines = outline(&locator, ply, zone);
+            if lines.is_empty() {
+                continue;
+            }
             for line in &lines {
                 stream.points(extent, line.iter().copied());
             }
             all.push(ToldOutline {
                 zone: zone.name.clone(),
                 ply: ply.name.clone(),
+                normal: normal(&ply.flat, &ply.formed, &inside(ply, zone)),
                 lines: lines.iter().map(Vec::len).collect(),
             });
         }
     }
     all
+}
+
+/// Cells with a corner in a zone.
+fn inside(ply: &Ply, zone: &Zone) -> Vec<[u32; 4]> {
+    let within = |i: &u32| {
+        let p = ply.flat[*i as usize];
+        (0..2).all(|d| (zone.bounds[d]..=zone.bounds[d + 2]).contains(&p[d]))
+    };
+    let any = |c: &&[u32; 4]| c.iter().any(within);
+    ply.cells.iter().filter(any).copied().collect()
 }
 
 /// The parts of a zone's outline that lie on a ply.
