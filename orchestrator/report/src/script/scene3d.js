@@ -169,6 +169,7 @@ const Scene3d = (() => {
 
   // Reads a scene and sends it to a canvas.
   async function open(told, canvas) {
+    if (!document.createElement('canvas').getContext('webgl')) throw new Error('no WebGL');
     const data = unpack(told, await inflated(told.data));
     // The buffer is kept so that a reader can save the picture.
     const regl = createREGL({ canvas, extensions: ['OES_element_index_uint'], attributes: { preserveDrawingBuffer: true } });

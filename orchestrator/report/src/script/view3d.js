@@ -113,7 +113,9 @@
       this.paint.within(camera, () => {
         for (const body of scene.bodies.filter((b) => this.visible(b))) {
           const place = body.fields.get(show.field);
-          const how = { place, coloured: Boolean(place), colours: scene.stripes[show.field], lift: body.ply ? this.told.lift : 0 };
+          // Where both are drawn, at the rim of a zone, the finer ply is seen.
+          const lift = body.ply ? this.told.lift + (body.zone ? 0.0008 : 0) : 0;
+          const how = { place, coloured: Boolean(place), colours: scene.stripes[show.field], lift };
           for (const part of body.parts.filter((p) => !show.zone.has(p.zone))) this.paint.surface({ ...body, ...part, ...how });
         }
         for (const outline of this.outlines()) this.stroke(outline.ribbon, 1.2, [0, 0, 0], 0.15);
