@@ -23,10 +23,11 @@ demo: build ## run the joggle spar: coarse run, zones, local runs, report
 	$(PLYFLOW) run $(DEMO)
 	@echo 'report: $(subst /workflow,/report,$(DEMO:.yaml=.html))'
 
-test: ## run all tests, also with VTK's own reader and a step in C
+test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	@scripts/setup tests
 	$(CARGO) test $(CARGO_FLAGS) --workspace
 	scripts/check-vtk
+	scripts/check-report
 
 test-long: ## run the tests that take many minutes
 	@scripts/setup

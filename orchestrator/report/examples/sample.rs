@@ -8,10 +8,14 @@ use camino::Utf8PathBuf;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = Utf8PathBuf::from(std::env::args().nth(1).ok_or("usage: sample FOLDER")?);
     std::fs::create_dir_all(&folder)?;
-    let study = common::whole(&folder);
+    let mut study = common::whole_study(&folder);
+    study.measurement();
     let mut coupons = common::Study::new(&folder);
     coupons.coupon();
-    for (input, name) in [(study, "report.html"), (coupons.input(), "coupon.html")] {
+    for (input, name) in [
+        (study.input(), "report.html"),
+        (coupons.input(), "coupon.html"),
+    ] {
         let out = folder.join(name);
         let size = plyflow_report::write_report(&input, &out)?;
         print!("{}", plyflow_report::summary(&input, Some(&out)));

@@ -2,7 +2,8 @@
 //! the terminal.
 //!
 //! [`write_report`] makes the page from what the engine knows ([`ReportInput`]) and what the artifacts hold. The page
-//! needs no network, no fonts and no scripts; pictures are drawn here and lie inside. Workflows with artifacts of
+//! needs no network and no fonts; pictures are drawn here and lie inside. Its scripts lie inside too: they turn the formed plies in 3D
+//! and join tables with maps; without them everything else is there. Workflows with artifacts of
 //! unknown kinds get a page with their steps, results and costs.
 
 mod colour;
@@ -11,11 +12,14 @@ mod field;
 mod input;
 mod locate;
 mod maps;
+mod measured;
 mod page;
+mod place;
 mod plot;
 mod plots;
 mod raster;
 mod read;
+mod scene;
 mod steps;
 mod study;
 mod summary;

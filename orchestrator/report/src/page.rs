@@ -5,12 +5,14 @@ mod energy;
 mod fidelity;
 mod maps;
 mod provenance;
+mod scene;
 mod steps;
 mod tables;
 
 pub(crate) use tables::{expected_text, got_text};
 
 use crate::input::ReportInput;
+use crate::place;
 use crate::study::{Material, Study};
 use crate::verdict::{self, Tone};
 use crate::view::Sharpness;
@@ -30,8 +32,13 @@ pub(crate) fn page(
     sharp: Sharpness,
 ) -> Result<String, String> {
     let mut studies = Vec::new();
+    let drawn = material
+        .studies
+        .iter()
+        .filter(|s| !s.plies.is_empty())
+        .count();
     for (n, study) in material.studies.iter().enumerate() {
-        studies.push(study_sections(study, n, sharp)?);
+        studies.push(study_sections(study, n, drawn, sharp)?);
     }
     let steps = steps::section(input, material, sharp)?;
     let page = html! {
@@ -58,6 +65,7 @@ pub(crate) fn page(
                     (provenance::section(input, material))
                 }
                 footer { "Made by " (input.program) ". This page is complete in itself: it loads nothing." }
+                (scene::scripts(drawn > 0))
             }
         }
     };
@@ -115,6 +123,7 @@ fn contents(material: &Material, input: &ReportInput) -> Markup {
     let maps = study.is_some_and(|s| !s.plies.is_empty());
     let local = material.studies.iter().any(|s| !s.locals.is_empty());
     let items = [
+        (maps, "#view-0", "3D view"),
         (maps, "#maps-0", "Maps"),
         (local, "#local-0", "Local runs"),
         (
@@ -143,14 +152,22 @@ fn contents(material: &Material, input: &ReportInput) -> Markup {
     }
 }
 
-fn study_sections(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup, String> {
-    let maps = maps::global(study, n, sharp)?;
-    let local = maps::local(study, n, sharp)?;
+fn study_sections(
+    study: &Study,
+    n: usize,
+    drawn: usize,
+    sharp: Sharpness,
+) -> Result<Markup, String> {
+    let places = place::places(study, n);
+    let view = scene::section(study, n, &places, drawn, sharp)?;
+    let maps = maps::global(study, n, &places, sharp)?;
+    let local = maps::local(study, n, &places, sharp)?;
     Ok(html! {
         @if !study.title.is_empty() { h2 class="study" { (study.title) } }
         (tables::zones(study))
+        (view)
+        (tables::defects(study, n, &places))
         (maps)
-        (tables::defects(study, n))
         (local)
     })
 }

@@ -151,6 +151,16 @@ impl Triangles {
         }
     }
 
+    /// The cells again: quads, then triangles.
+    pub(crate) fn cells(&self) -> Vec<Vec<u32>> {
+        let points = self.points as u32;
+        let whole = |t: &&[u32; 3]| t.iter().all(|i| *i < points);
+        let quads = self.centres.iter().map(|c| c.to_vec());
+        quads
+            .chain(self.corners.iter().filter(whole).map(|t| t.to_vec()))
+            .collect()
+    }
+
     /// Values at the points, with those at the centres of quads appended.
     fn extended<T: Copy>(&self, values: &[T], mean: impl Fn([T; 4]) -> T) -> Vec<T> {
         let mut all = values[..self.points].to_vec();

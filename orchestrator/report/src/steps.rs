@@ -2,6 +2,7 @@
 
 use crate::input::{Instance, ReportInput};
 use crate::maps::{self, Map};
+use crate::place::id_of_row;
 use crate::plots;
 use crate::read::{Facts, FormingFacts, History, Ply, open, shown_sheet};
 use crate::study::Run;
@@ -61,7 +62,7 @@ pub(crate) fn read(
     for (at, (instance, facts)) in input.instances.iter().zip(facts).enumerate() {
         let Some(facts) = facts else { continue };
         let mut wrong = Vec::new();
-        if let Some(mut shown) = one(instance, facts, room, &mut wrong) {
+        if let Some(mut shown) = one((instance, at), facts, room, &mut wrong) {
             shown.instance = at;
             if let Some(run) = &mut shown.run {
                 run.instance = at;
@@ -86,7 +87,7 @@ pub(crate) fn read(
 
 /// What is shown of one step, of at most as many plots and panels of maps as there is room for.
 fn one(
-    instance: &Instance,
+    (instance, at): (&Instance, usize),
     facts: &Facts,
     room: [usize; 2],
     wrong: &mut Vec<String>,
@@ -103,7 +104,7 @@ fn one(
             .map_or_else(|| instance.label(), str::to_owned),
         numbers,
         files: files(&a["files"], wrong),
-        tables: tables::drawn(a, wrong),
+        tables: tables::drawn(a, &|row| id_of_row(at, row), wrong),
         ..Shown::default()
     };
     match open(&instance.artifact) {

@@ -1,6 +1,7 @@
 //! The runs of a workflow as studies: a global run, its defects and zones, its local runs, their comparison.
 
 use crate::input::{Instance, ReportInput};
+use crate::measured::{self, Measured};
 use crate::read::{self, Facts, FormingFacts, History, Ply, Tool};
 use crate::steps::{self, Shown};
 use serde::Deserialize;
@@ -31,6 +32,8 @@ pub(crate) struct Study {
     pub(crate) comparison: Option<Comparison>,
     /// A fine run of the whole scene.
     pub(crate) reference: Option<Run>,
+    /// Measurements of the plies of the global run.
+    pub(crate) measured: Vec<Measured>,
 }
 
 /// A forming run without its meshes.
@@ -343,7 +346,22 @@ impl Reader<'_> {
             (0..self.all.facts.len()).find(|at| self.key(*at) == key)
         });
         study.reference = reference.and_then(|at| self.run(at));
+        self.read_measurements(&mut study, global);
         study
+    }
+
+    fn read_measurements(&mut self, study: &mut Study, global: usize) {
+        if !self.pictures {
+            return;
+        }
+        for at in self.takers("measurement", global) {
+            let Some(facts) = self.all.facts[at].as_ref() else {
+                continue;
+            };
+            let found = measured::read(&self.instance(at).artifact, facts, at);
+            let label = self.instance(at).label();
+            study.measured.extend(self.noted(&label, found));
+        }
     }
 
     /// Forming runs whose boundary was made for the zones of an instance.

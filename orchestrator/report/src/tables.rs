@@ -27,7 +27,13 @@ struct Column {
 }
 
 /// Draws the tables that the attributes of an artifact describe. What is wrong is said in `wrong`, one text each.
-pub(crate) fn drawn(attributes: &Value, wrong: &mut Vec<String>) -> Vec<Markup> {
+///
+/// `id` names the defect of a row of the table `defects`, as the rest of the page does.
+pub(crate) fn drawn(
+    attributes: &Value,
+    id: &dyn Fn(usize) -> String,
+    wrong: &mut Vec<String>,
+) -> Vec<Markup> {
     let all = match &attributes["tables"] {
         Value::Null => return Vec::new(),
         Value::Array(all) => all,
@@ -42,7 +48,7 @@ pub(crate) fn drawn(attributes: &Value, wrong: &mut Vec<String>) -> Vec<Markup> 
     let mut tables = Vec::new();
     for (i, value) in all.iter().enumerate() {
         match Given::deserialize(value) {
-            Ok(given) => tables.push(table(&given, wrong)),
+            Ok(given) => tables.push(table(&given, id, wrong)),
             Err(e) => {
                 let name = value["name"].as_str().unwrap_or_default();
                 wrong.push(format!("table {} '{name}' of its attributes: {e}", i + 1));
@@ -52,7 +58,7 @@ pub(crate) fn drawn(attributes: &Value, wrong: &mut Vec<String>) -> Vec<Markup> 
     tables
 }
 
-fn table(given: &Given, wrong: &mut Vec<String>) -> Markup {
+fn table(given: &Given, id: &dyn Fn(usize) -> String, wrong: &mut Vec<String>) -> Markup {
     let of = |text: String| format!("table '{}': {text}", given.name);
     let wide = given.columns.len();
     for (i, row) in given
@@ -82,7 +88,7 @@ fn table(given: &Given, wrong: &mut Vec<String>) -> Markup {
         p class="plot-title" { (given.title.as_deref().unwrap_or(&given.name)) }
         div class="scroll" { table {
             thead { tr { @for (k, c) in given.columns.iter().enumerate() { th class=(class(k)) { (heading(c)) } } } }
-            tbody { @for row in given.rows.iter().take(ROWS) { tr {
+            tbody { @for (i, row) in given.rows.iter().enumerate().take(ROWS) { tr data-defect=[(given.name == "defects").then(|| id(i))] {
                 @for (k, (c, v)) in given.columns.iter().zip(row).enumerate() { td class=(class(k)) { (cell(c, v)) } }
             } } }
         } }
@@ -118,7 +124,7 @@ mod tests {
             {"name": "no columns"},
         ]});
         let mut wrong = Vec::new();
-        let tables = drawn(&about, &mut wrong);
+        let tables = drawn(&about, &|i| i.to_string(), &mut wrong);
         let text = &tables[0].0;
         for part in ["height (mm)", ">3.1<", "a &lt;b&gt;", ">–<"] {
             assert!(text.contains(part), "{part}: {text}");
@@ -132,7 +138,7 @@ mod tests {
             wrong[1].contains("'no columns'") && wrong[1].contains("columns"),
             "{wrong:?}"
         );
-        assert!(drawn(&json!({"tables": 3}), &mut wrong).is_empty());
+        assert!(drawn(&json!({"tables": 3}), &|i| i.to_string(), &mut wrong).is_empty());
         assert!(wrong[2].contains("a number"), "{wrong:?}");
     }
 }

@@ -3,6 +3,7 @@
 use crate::colour::Rgb;
 use crate::field::Legend;
 use crate::locate::{Locator, bounds};
+use crate::place::Place;
 use crate::raster::{Camera, Canvas, Paint, Vec3};
 use crate::read::{Marked, Ply, Tool};
 use crate::study::Zone;
@@ -16,6 +17,8 @@ use std::fmt::Write;
 pub(crate) struct Mark {
     pub(crate) text: String,
     pub(crate) at: [f64; 2],
+    /// The defect that it names, on the page.
+    pub(crate) id: String,
 }
 
 /// The side from which a formed ply is seen.
@@ -54,6 +57,8 @@ pub(crate) struct FormedView<'a> {
 pub(crate) struct Overlay<'a> {
     pub(crate) zones: &'a [Zone],
     pub(crate) marks: &'a [Mark],
+    /// Defects that can be selected on the flat ply.
+    pub(crate) places: &'a [&'a Place],
 }
 
 /// A failure to make a picture, as a text.
@@ -142,12 +147,35 @@ pub(crate) fn flat(
                 rect class="zone" x=(px(x0)) y=(px(y0)) width=(px(x1 - x0)) height=(px(y1 - y0)) {}
                 (label(&zone.name, [x0 + 5.0, y0 + 16.0], "zone-name", "start"))
             }
+            @for place in overlay.places { (selectable(place, &page)) }
             @for mark in overlay.marks {
                 @let [x, y] = page(mark.at);
-                (label(&mark.text, [x, (y + 4.0).clamp(13.0, h - 3.0)], "defect-name", "middle"))
+                g data-defect=(mark.id) { (label(&mark.text, [x, (y + 4.0).clamp(13.0, h - 3.0)], "defect-name", "middle")) }
             }
         }
     })
+}
+
+/// A defect on the flat ply: unseen until it is pointed at or selected, here or in the table.
+fn selectable(place: &Place, page: &dyn Fn([f64; 2]) -> [f64; 2]) -> Markup {
+    let mut path = String::new();
+    for line in place.lines.iter().filter(|l| !l.flat.is_empty()) {
+        for (i, at) in line.flat.iter().enumerate() {
+            let [x, y] = page(*at);
+            let _ = write!(
+                path,
+                "{}{} {}",
+                if i == 0 { 'M' } else { 'L' },
+                px(x),
+                px(y)
+            );
+        }
+    }
+    html! {
+        @if !path.is_empty() {
+            g class="place" data-defect=(place.id) { title { "Defect " (place.label) } path d=(path) {} }
+        }
+    }
 }
 
 /// Numbers along the lower and left edge of the flat map, in mm.
@@ -195,7 +223,7 @@ pub(crate) fn formed(
         canvas.surface(&camera, &t.points, &t.mesh, Paint::Plain(TOOL), true, 0.0);
     }
     let paint = Paint::Field(&values, legend.scale);
-    let bias = LEAST_BIAS.max(BIAS_OF_SIDE * mean_side(ply));
+    let bias = lift(ply);
     canvas.surface(&camera, &ply.formed, &ply.triangles(), paint, true, bias);
     let image = canvas.data_url().map_err(|e| e.to_string())?;
     let view = View {
@@ -318,6 +346,11 @@ fn faces_back(ply: &Ply) -> bool {
     }
     // A hair of preference for the front, so that rounding does not choose.
     sum > 1e-4
+}
+
+/// How far (m) a formed ply is drawn before the tool.
+pub(crate) fn lift(ply: &Ply) -> f64 {
+    LEAST_BIAS.max(BIAS_OF_SIDE * mean_side(ply))
 }
 
 /// Mean length of the formed elements' first sides (m).

@@ -1,6 +1,7 @@
 //! Maps of the plies.
 
 use crate::field::{Field, Legend};
+use crate::place::{Place, id_of};
 use crate::read::Ply;
 use crate::study::{Defect, Local, Study};
 use crate::units::quantity;
@@ -18,13 +19,18 @@ fn legends(study: &Study) -> Vec<Legend> {
 }
 
 /// Maps of the global run: each quantity on each ply, flat and formed.
-pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup, String> {
+pub(super) fn global(
+    study: &Study,
+    n: usize,
+    places: &[Place],
+    sharp: Sharpness,
+) -> Result<Markup, String> {
     if study.plies.is_empty() {
         return Ok(html! {});
     }
     let overlay = Overlay {
         zones: study.zones.as_deref().unwrap_or_default(),
-        marks: &[],
+        ..Overlay::default()
     };
     let legends = legends(study);
     let has = |(l, p): &(&Legend, &Ply)| l.field.at_points(p).is_some();
@@ -33,7 +39,12 @@ pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup
         .flat_map(|l| study.plies.iter().map(move |p| (l, p)));
     let pairs: Vec<(&Legend, &Ply)> = pairs.filter(has).collect();
     let draw = |(legend, ply): &(&Legend, &Ply)| {
-        let plan = flat(ply, legend, &overlay, FLAT, sharp)?;
+        let mine: Vec<&Place> = places.iter().filter(|p| p.ply == ply.name).collect();
+        let selectable = Overlay {
+            places: &mine,
+            ..overlay.clone()
+        };
+        let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
         let view = |side| {
             let tool = study.tool.as_ref();
             let how = FormedView {
@@ -81,14 +92,19 @@ pub(super) fn global(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup
 }
 
 /// Maps of the local runs, with their defects named.
-pub(super) fn local(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup, String> {
+pub(super) fn local(
+    study: &Study,
+    n: usize,
+    places: &[Place],
+    sharp: Sharpness,
+) -> Result<Markup, String> {
     let legends = legends(study);
     let shown: Vec<&Local> = study
         .locals
         .iter()
         .filter(|l| !l.plies.is_empty())
         .collect();
-    let draw = |local: &&Local| zone(study, local, &legends, sharp);
+    let draw = |local: &&Local| zone((study, n), local, &legends, places, sharp);
     let zones = shown
         .par_iter()
         .map(draw)
@@ -111,9 +127,10 @@ pub(super) fn local(study: &Study, n: usize, sharp: Sharpness) -> Result<Markup,
 }
 
 fn zone(
-    study: &Study,
+    (study, n): (&Study, usize),
     local: &Local,
     legends: &[Legend],
+    places: &[Place],
     sharp: Sharpness,
 ) -> Result<Markup, String> {
     let defects: Vec<&Defect> = study
@@ -130,11 +147,15 @@ fn zone(
             .map(|d| Mark {
                 text: d.id.clone(),
                 at: d.centre,
+                id: id_of(n, &d.id),
             })
             .collect();
+        let here = |p: &&Place| p.ply == ply.name && p.zone.as_deref() == Some(&local.zone);
+        let mine: Vec<&Place> = places.iter().filter(here).collect();
         let overlay = Overlay {
             zones: &[],
             marks: &marks,
+            places: &mine,
         };
         let mut figures = Vec::new();
         let known = || legends.iter().filter(|l| l.field.at_points(ply).is_some());

@@ -15,7 +15,10 @@ pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
         section id="provenance" {
             h2 { "Provenance" }
             p { "To make these results again:" }
-            pre { code { (input.command) } }
+            div class="command" {
+                pre { code { (input.command) } }
+                button type="button" class="copy with-script" hidden { "Copy" }
+            }
             p class="note" { "Workflow file: " code { (input.file) } ". The same key means the same bytes." }
             @if input.instances.len() > LONGEST {
                 p class="note" { "The first " (LONGEST) " of " (input.instances.len()) " steps." }

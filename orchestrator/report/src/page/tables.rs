@@ -1,6 +1,7 @@
 //! Tables: zones, defects, expectations, results.
 
 use crate::input::{Expectation, ReportInput, label};
+use crate::place::{Place, id_of};
 use crate::study::{Comparison, Defect, Study};
 use crate::units::{fixed, number, quantity, shown};
 use maud::{Markup, html};
@@ -117,7 +118,7 @@ const MEASURES: [Measure; 5] = [
 ];
 
 /// Defects, local and global side by side.
-pub(super) fn defects(study: &Study, n: usize) -> Markup {
+pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
     let Some(c) = &study.comparison else {
         return html! {};
     };
@@ -132,7 +133,8 @@ pub(super) fn defects(study: &Study, n: usize) -> Markup {
             @if rows.is_empty() {
                 p { "No wrinkle and no bridging was found in any model." }
             } @else {
-                p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it, or bridging, which has no length. A defect that reaches the cut needs a larger zone." }
+                p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it, or bridging, which has no length. A defect that reaches the cut needs a larger zone."
+                    @if !places.is_empty() { span class="with-script" hidden { " A click on a row, or Enter, shows the defect in the 3D view and on the maps; Escape ends that." } } }
                 div class="scroll" { table class="defects" {
                     thead {
                         tr { th rowspan="2" { "id" } th rowspan="2" { "zone" } th rowspan="2" { "ply" } th rowspan="2" { "type" }
@@ -140,7 +142,8 @@ pub(super) fn defects(study: &Study, n: usize) -> Markup {
                         tr { @for _ in MEASURES { @for role in &roles { th class="n" { (role) } } } }
                     }
                     tbody { @for row in &rows {
-                        tr {
+                        @let id = id_of(n, &row.first.id);
+                        tr data-defect=[places.iter().any(|p| p.id == id).then_some(&id)] {
                             th { (row.first.id) } td { (row.first.zone) } td { (row.first.ply) } td { (row.first.kind) }
                             @for (_, measure) in MEASURES { @for (i, d) in row.models.iter().enumerate() {
                                 td class=(if i == 0 { "n first" } else { "n" }) { (d.map_or("–".to_owned(), measure)) }

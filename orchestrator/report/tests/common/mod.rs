@@ -353,6 +353,45 @@ impl Study {
         self.finish(w, ("compare", &[]), "comparison", &inputs, results);
     }
 
+    /// Defects measured on the coarse run: on ply_2 two wrinkles, the first with its crest.
+    pub fn measurement(&mut self) {
+        let mut w = self.create("measure", "measurement");
+        let sheets = plies([-HALF[0], -HALF[1], HALF[0], HALF[1]], 0.004);
+        for (name, s) in &sheets {
+            w.define_mesh(name, &s.flat, 4, &s.cells, "").unwrap();
+        }
+        w.begin_frame(1.0).unwrap();
+        for (name, s) in &sheets {
+            let number = |(i, d): (usize, &f64)| match (*d > 0.002, s.flat[3 * i] < 0.0) {
+                (true, true) => 1.0,
+                (true, false) => 2.0,
+                _ => 0.0,
+            };
+            let defect: Vec<f64> = s.distance.iter().enumerate().map(number).collect();
+            w.frame_points(name, &s.formed).unwrap();
+            w.frame_field(name, On::Points, "defect", 1, "1", &defect)
+                .unwrap();
+        }
+        w.end_frame().unwrap();
+        let r = RADIUS + 0.008;
+        let ridge: Vec<[f64; 3]> = (0..9)
+            .map(|k| (-0.055 + 0.0025 * f64::from(k)) / RADIUS)
+            .map(|a| [-0.05, r * a.sin(), r * a.cos()])
+            .collect();
+        let defect = |number: u32, ridge: &[[f64; 3]]| json!({"on": "ply_2", "number": number, "type": "wrinkle", "ridge": ridge});
+        let columns = [
+            json!({"label": "defect"}),
+            json!({"label": "length", "unit": "m"}),
+        ];
+        let table = json!({"name": "defects", "title": "Measured defects", "columns": columns,
+            "rows": [["1", 0.021], ["2", 0.018]]});
+        let about = json!({"defects": [defect(1, &ridge), defect(2, &[])], "tables": [table]});
+        w.attributes(&about.to_string()).unwrap();
+        let inputs = [("formed", "coarse")];
+        let results = vec![("wrinkle_count", 2.0, "1")];
+        self.finish(w, ("measure", &[]), "measurement", &inputs, results);
+    }
+
     /// An artifact of a kind that this crate does not know.
     pub fn stranger(&mut self) {
         let mut w = self.create("coupon", "coupon-test");
@@ -562,6 +601,11 @@ pub const ZONES: [(&str, [f64; 4]); 2] = [
 
 /// The whole way: coarse run, detection, zones, local runs, comparison.
 pub fn whole(folder: &Utf8Path) -> ReportInput {
+    whole_study(folder).input()
+}
+
+/// The same, before it is done.
+pub fn whole_study(folder: &Utf8Path) -> Study {
     let mut s = Study::new(folder);
     s.forming("coarse", None, 0.004);
     s.defects(false);
@@ -571,5 +615,5 @@ pub fn whole(folder: &Utf8Path) -> ReportInput {
         s.forming(&format!("local[{zone}]"), Some((zone, bounds)), 0.002);
     }
     s.comparison(&ZONES);
-    s.input()
+    s
 }

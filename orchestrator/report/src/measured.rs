@@ -1,0 +1,89 @@
+//! Defects that were measured on the plies of a run (`defect-measurement`).
+
+use crate::place::{Line, Place, id_of_row, of_cells};
+use crate::raster::Vec3;
+use crate::read::{Facts, open};
+use camino::Utf8Path;
+use plyflow_artifact::{Artifact, On};
+use serde::Deserialize;
+
+/// What a measurement found, in the order of its table.
+#[derive(Debug, Default)]
+pub(crate) struct Measured {
+    /// Where its defects lie.
+    pub(crate) places: Vec<Place>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Given {
+    on: String,
+    number: u32,
+    ridge: Vec<Vec3>,
+}
+
+/// Reads the defects that the attributes of a measurement list, with the nodes that the artifact gives them; those on bodies
+/// without cells of four nodes (scans) have no flat shape, and no place.
+pub(crate) fn read(path: &Utf8Path, facts: &Facts, instance: usize) -> Result<Measured, String> {
+    let list = &facts.attributes["defects"];
+    let list =
+        Vec::<Given>::deserialize(list).map_err(|e| format!("its attribute 'defects': {e}"))?;
+    let artifact = open(path)?;
+    let mut places = Vec::new();
+    for (row, given) in list.iter().enumerate() {
+        let Some((flat, formed, cells)) = cells_of(&artifact, given)? else {
+            continue;
+        };
+        let mut place = of_cells(&flat, &formed, &cells);
+        if given.ridge.len() > 1 {
+            place.lines.push(Line {
+                flat: Vec::new(),
+                formed: given.ridge.clone(),
+            });
+        }
+        places.push(Place {
+            id: id_of_row(instance, row),
+            label: given.number.to_string(),
+            ply: given.on.clone(),
+            ..place
+        });
+    }
+    Ok(Measured { places })
+}
+
+type Cells = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 4]>);
+
+/// Flat and formed points of the body of a defect, and the cells of which half of the nodes bear its number;
+/// where there is none, those of which one does.
+fn cells_of(artifact: &Artifact, given: &Given) -> Result<Option<Cells>, String> {
+    let Ok(body) = artifact.body(&given.on) else {
+        return Ok(None);
+    };
+    let Some(frame) = artifact.contents().frames.checked_sub(1) else {
+        return Ok(None);
+    };
+    if body.nodes_per_cell != 4 {
+        return Ok(None);
+    }
+    let text = |e: plyflow_artifact::ArtifactError| e.to_string();
+    let (flat, cells) = artifact.mesh(&given.on).map_err(text)?;
+    let formed = artifact.frame_points(&given.on, frame).map_err(text)?;
+    let number = artifact.frame_field(&given.on, frame, On::Points, "defect");
+    let number = number.map_err(text)?;
+    let bears = |i: &u32| (number[*i as usize] - f64::from(given.number)).abs() < 0.5;
+    let with = |least: usize| -> Vec<[u32; 4]> {
+        let mine = |c: &&[u32; 4]| c.iter().filter(|i| bears(i)).count() >= least;
+        cells
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .filter(mine)
+            .copied()
+            .collect()
+    };
+    let mut found = with(2);
+    if found.is_empty() {
+        found = with(1);
+    }
+    Ok((!found.is_empty()).then_some((flat, formed, found)))
+}

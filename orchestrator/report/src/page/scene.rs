@@ -1,0 +1,102 @@
+//! The rotatable view of the formed plies: its place on the page and its scripts.
+
+use crate::field::{Field, Legend};
+use crate::place::Place;
+use crate::scene::{Scene, scene};
+use crate::study::Study;
+use crate::view::Sharpness;
+use maud::{Markup, PreEscaped, html};
+
+/// regl 2.1.1 (MIT), see `vendor/README.md`.
+const REGL: &str = include_str!("../../vendor/regl/regl.min.js");
+const REGL_LICENCE: &str = include_str!("../../vendor/regl/LICENSE");
+const SCENE: &str = include_str!("../script/scene3d.js");
+const VIEW: &str = include_str!("../script/view3d.js");
+const PAGE: &str = include_str!("../script/page.js");
+
+/// Directions of the buttons: name, and where the viewer stands as azimuth and elevation (deg).
+const STANDARD: [(&str, [i32; 2]); 4] = [
+    ("Iso", [-50, 35]),
+    ("Top", [-90, 90]),
+    ("Side", [-90, 0]),
+    ("End", [0, 0]),
+];
+
+/// The scripts of the page; those of the view only when there is one.
+pub(super) fn scripts(view: bool) -> Markup {
+    html! {
+        script { (PreEscaped(PAGE)) }
+        @if view {
+            script { (PreEscaped(format!("/*!{REGL_LICENCE}*/\n"))) (PreEscaped(REGL)) }
+            script { (PreEscaped(SCENE)) }
+            script { (PreEscaped(VIEW)) }
+        }
+    }
+}
+
+/// The view of a study that is one of `drawn` on the page.
+pub(super) fn section(
+    study: &Study,
+    n: usize,
+    places: &[Place],
+    drawn: usize,
+    sharp: Sharpness,
+) -> Result<Markup, String> {
+    let Some(scene) = scene(study, places, drawn, sharp)? else {
+        return Ok(html! {});
+    };
+    let legends: Vec<Legend> = Field::ALL.iter().filter_map(|f| f.legend(study)).collect();
+    Ok(html! {
+        section id={ "view-" (n) } {
+            h2 { "Formed plies in 3D" }
+            p class="without-3d" { "The rotatable view needs scripts and WebGL, which this browser does not give. The maps below show the same fields." }
+            div class="view3d" hidden {
+                (controls(&scene, &legends, n))
+                div class="stage" {
+                    canvas tabindex="0" role="img" aria-label="Formed plies in 3D. Arrow keys turn, plus and minus zoom, 0 resets." {}
+                    div class="labels" aria-hidden="true" {}
+                    svg class="triad3d" viewBox="-45 -45 90 90" width="90" height="90" aria-hidden="true" {
+                        @for name in ["x", "y", "z"] { g { path class="triad-halo" {} path class="triad" {} text class="over" text-anchor="middle" { (name) } } }
+                    }
+                }
+                @for (k, legend) in legends.iter().enumerate() {
+                    div class="legend3d" data-field=(k) hidden[k > 0] {
+                        (legend.bar(&format!("view-scale-{n}-{k}")))
+                        (legend.note())
+                    }
+                }
+                p class="note" { "Drag, one finger or the arrow keys turn; Shift and drag, or two fingers, move; +, −, two fingers or the wheel (after a click) zoom; 0 resets."
+                    @if !scene.notes.is_empty() { " Shown coarser than computed: " (scene.notes.join("; ")) "." } }
+            }
+            script type="application/json" class="scene" { (PreEscaped(&scene.json)) }
+        }
+    })
+}
+
+fn controls(scene: &Scene, legends: &[Legend], n: usize) -> Markup {
+    let switch = |kind: &str, value: &str, text: &str| {
+        html! { label { input type="checkbox" checked data-show=(kind) value=(value); " " (text) } }
+    };
+    html! {
+        div class="controls" {
+            @if !legends.is_empty() {
+                label for={ "field-" (n) } { "Colour" }
+                select id={ "field-" (n) } {
+                    @for (k, l) in legends.iter().enumerate() { option value=(k) { (l.field.title()) " (" (l.unit()) ")" } }
+                }
+            }
+            span class="group" { @for (name, [azimuth, elevation]) in STANDARD {
+                button type="button" data-azimuth=(azimuth) data-elevation=(elevation) { (name) }
+            } button type="button" data-reset { "Reset" } }
+            span class="group" role="group" aria-label="Bodies" {
+                @if scene.tool { (switch("tool", "", "Tool")) }
+                @for ply in &scene.plies { (switch("ply", ply, ply)) }
+            }
+            @if !scene.zones.is_empty() {
+                span class="group" role="group" aria-label="Finer plies of zones" {
+                    "Finer in zone " @for zone in &scene.zones { (switch("zone", zone, zone)) }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! The formed plies, the finer plies of the zones and the tool of a study, as data for the rotatable view of the page.
+
+mod pack;
+mod thin;
+
+use crate::field::{Field, Legend};
+use crate::locate::Locator;
+use crate::place::{Place, normal};
+use crate::raster::Vec3;
+use crate::read::Ply;
+use crate::study::{Study, Zone};
+use crate::view::{Sharpness, lift};
+use pack::{Extent, Stream, script_json};
+use serde::Serialize;
+
+/// Points of all meshes of a page at full sharpness; about 10 bytes each on the page.
+const POINTS: f64 = 120_000.0;
+/// Meshes of fewer points than this would be stamps: they are left out.
+const LEAST: usize = 60;
+/// Points along the outline of a zone are this far apart (m).
+const OUTLINE_STEP: f64 = 4e-3;
+
+/// A scene, ready for the page.
+#[derive(Debug)]
+pub(crate) struct Scene {
+    /// What the script reads.
+    pub(crate) json: String,
+    /// Names of what can be shown and hidden.
+    pub(crate) plies: Vec<String>,
+    pub(crate) zones: Vec<String>,
+    pub(crate) tool: bool,
+    /// What is shown coarser than it is, or not at all.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What the script is told. Places are in metres; arrays lie in `data`, in the order of what is listed here.
+#[derive(Debug, Serialize)]
+struct Told {
+    extent: Extent,
+    /// All is drawn this far (m) before the tool, which mid-planes touch and straight sides cut.
+    lift: f64,
+    fields: Vec<ToldField>,
+    bodies: Vec<ToldBody>,
+    outlines: Vec<ToldOutline>,
+    defects: Vec<ToldDefect>,
+    data: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ToldField {
+    name: &'static str,
+    /// Colours of the scale, equally spaced.
+    stops: Vec<String>,
+}
+
+/// A mesh: in `data` its points, its cells and its fields.
+#[derive(Debug, Serialize)]
+struct ToldBody {
+    /// Absent: the tool.
+    ply: Option<String>,
+    /// Absent: the global run.
+    zone: Option<String>,
+    points: usize,
+    /// Cells in parts: those wholly in a zone are hidden while its own, finer ply is shown.
+    parts: Vec<Part>,
+    /// Indices of the fields that it has.
+    fields: Vec<usize>,
+}
+
+#[derive(Debug, Serialize)]
+struct Part {
+    zone: Option<String>,
+    cells: usize,
+}
+
+/// Lines on a ply: in `data` so many points a line.
+#[derive(Debug, Serialize)]
+struct ToldOutline {
+    zone: String,
+    ply: String,
+    /// Mean normal of the ply in the zone.
+    normal: Vec3,
+    lines: Vec<usize>,
+}
+
+#[derive(Debug, Serialize)]
+struct ToldDefect {
+    id: String,
+    label: String,
+    ply: String,
+    zone: Option<String>,
+    at: Vec3,
+    normal: Vec3,
+    lines: Vec<usize>,
+}
+
+/// A mesh that may be shown.
+struct Body<'a> {
+    ply: Option<&'a Ply>,
+    zone: Option<&'a str>,
+    /// Places by which it is thinned: flat ones, where it has some.
+    at: &'a [Vec3],
+    formed: &'a [Vec3],
+    cells: Vec<Vec<u32>>,
+}
+
+impl Body<'_> {
+    fn name(&self) -> String {
+        let ply = self.ply.map_or("tool", |p| p.name.as_str());
+        match self.zone {
+            Some(zone) => format!("{ply} of zone {zone}"),
+            None => ply.to_owned(),
+        }
+    }
+}
+
+/// The scene of a study that is one of `drawn` on the page; `None` without formed plies.
+///
+/// # Errors
+/// When the data cannot be packed.
+pub(crate) fn scene(
+    study: &Study,
+    places: &[Place],
+    drawn: usize,
+    sharp: Sharpness,
+) -> Result<Option<Scene>, String> {
+    if study.plies.is_empty() {
+        return Ok(None);
+    }
+    let budget = (POINTS * (sharp.0 / crate::SHARPNESS[0]).min(1.0)) as usize / drawn.max(1);
+    let (bodies, most, mut notes) = chosen(bodies(study), budget);
+    let ends = places
+        .iter()
+        .flat_map(|p| p.lines.iter().flat_map(|l| &l.formed));
+    let all = bodies.iter().flat_map(|b| b.formed).chain(ends);
+    let Some(extent) = Extent::of(all) else {
+        return Ok(None);
+    };
+    let legends: Vec<Legend> = Field::ALL.iter().filter_map(|f| f.legend(study)).collect();
+    let zones = study.zones.as_deref().unwrap_or_default();
+    let fine = |ply: &str, zone: &str| {
+        let is = |b: &Body| b.zone == Some(zone) && b.ply.is_some_and(|p| p.name == ply);
+        bodies.iter().any(is)
+    };
+    let mut stream = Stream::default();
+    let mut told = Vec::new();
+    for body in &bodies {
+        let inside: Vec<&Zone> = match (body.ply, body.zone) {
+            (Some(ply), None) => zones.iter().filter(|z| fine(&ply.name, &z.name)).collect(),
+            _ => Vec::new(),
+        };
+        let (one, thinned) = write(&mut stream, &extent, body, &inside, &legends, most);
+        if thinned {
+            let (name, left, whole) = (body.name(), one.points, body.formed.len());
+            notes.push(format!("{name} with {left} of its {whole} points"));
+        }
+        told.push(one);
+    }
+    let outlines = outlines(&mut stream, &extent, study);
+    let defects = defects(&mut stream, &extent, places);
+    let plies = distinct(told.iter().filter_map(|b| b.ply.clone()));
+    let shown = distinct(told.iter().filter_map(|b| b.zone.clone()));
+    let tool = told.iter().any(|b| b.ply.is_none());
+    let told = Told {
+        extent,
+        lift: study.plies.iter().map(lift).fold(0.0, f64::max),
+        fields: legends.iter().map(field).collect(),
+        bodies: told,
+        outlines,
+        defects,
+        data: stream.text()?,
+    };
+    Ok(Some(Scene {
+        json: script_json(&told)?,
+        plies,
+        zones: shown,
+        tool,
+        notes,
+    }))
+}
+
+/// Names in the order in which they first come.
+fn distinct(all: impl Iterator<Item = String>) -> Vec<String> {
+    let mut names = Vec::new();
+    for name in all {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+fn bodies(study: &Study) -> Vec<Body<'_>> {
+    let of_ply = |ply, zone| -> Body<'_> {
+        let ply: &Ply = ply;
+        Body {
+            ply: Some(ply),
+            zone,
+            at: &ply.flat,
+            formed: &ply.formed,
+            cells: ply.cells.iter().map(|c| c.to_vec()).collect(),
+        }
+    };
+    let tool = study.tool.iter().map(|t| Body {
+        ply: None,
+        zone: None,
+        at: &t.points,
+        formed: &t.points,
+        cells: t.mesh.cells(),
+    });
+    let global = study.plies.iter().map(|p| of_ply(p, None));
+    let locals = study.locals.iter();
+    let local = locals.flat_map(|l| l.plies.iter().map(|p| of_ply(p, Some(l.zone.as_str()))));
+    tool.chain(global).chain(local).collect()
+}
+
+/// The bodies that are shown, the most points of each, and what is left out: finer plies, when a fair share of the budget
+/// is too little for a shape.
+fn chosen(mut bodies: Vec<Body<'_>>, budget: usize) -> (Vec<Body<'_>>, usize, Vec<String>) {
+    let most = |bodies: &[Body]| {
+        let sizes: Vec<usize> = bodies.iter().map(|b| b.formed.len()).collect();
+        thin::share(&sizes, budget)
+    };
+    let mut notes = Vec::new();
+    if most(&bodies) < LEAST {
+        bodies.retain(|b| b.zone.is_none());
+        notes.push("the finer plies of the zones not at all: there are too many".to_owned());
+    }
+    let most = most(&bodies).max(LEAST);
+    (bodies, most, notes)
+}
+
+/// Writes a mesh, and says whether it was thinned.
+fn write(
+    stream: &mut Stream,
+    extent: &Extent,
+    body: &Body<'_>,
+    zones: &[&Zone],
+    legends: &[Legend],
+    most: usize,
+) -> (ToldBody, bool) {
+    let found = thin::thin(body.at, &body.cells, most);
+    let of = |values: &[Vec3], i: u32| values[found.points[i as usize] as usize];
+    stream.points(
+        extent,
+        found.points.iter().map(|i| body.formed[*i as usize]),
+    );
+    // By part: those in no zone, then those of each zone.
+    let within = |c: &Vec<u32>, z: &Zone| {
+        c.iter().all(|i| {
+            let p = of(body.at, *i);
+            (0..2).all(|d| (z.bounds[d]..=z.bounds[d + 2]).contains(&p[d]))
+        })
+    };
+    let zone_of = |c: &Vec<u32>| zones.iter().position(|z| within(c, z));
+    let places: Vec<Option<usize>> = found.cells.iter().map(zone_of).collect();
+    let mut parts = Vec::new();
+    for part in std::iter::once(None).chain((0..zones.len()).map(Some)) {
+        let cells = found.cells.iter().zip(&places).filter(|(_, p)| **p == part);
+        let cells: Vec<&[u32]> = cells.map(|(c, _)| c.as_slice()).collect();
+        stream.cells(cells.iter().copied());
+        parts.push(Part {
+            zone: part.map(|z| zones[z].name.clone()),
+            cells: cells.len(),
+        });
+    }
+    let mut fields = Vec::new();
+    for (k, legend) in legends.iter().enumerate() {
+        if let Some(values) = body.ply.and_then(|p| legend.field.at_points(p)) {
+            let place = |i: &u32| legend.scale.place(values[*i as usize]);
+            stream.places(found.points.iter().map(place));
+            fields.push(k);
+        }
+    }
+    let told = ToldBody {
+        ply: body.ply.map(|p| p.name.clone()),
+        zone: body.zone.map(str::to_owned),
+        points: found.points.len(),
+        parts,
+        fields,
+    };
+    (told, found.points.len() < body.formed.len())
+}
+
+fn field(legend: &Legend) -> ToldField {
+    ToldField {
+        name: legend.field.title(),
+        stops: legend
+            .scale
+            .palette
+            .css()
+            .into_iter()
+            .map(|s| s.1)
+            .collect(),
+    }
+}
+
+/// The outlines of the zones on the plies of the global run.
+fn outlines(stream: &mut Stream, extent: &Extent, study: &Study) -> Vec<ToldOutline> {
+    let mut all = Vec::new();
+    for ply in &study.plies {
+        let locator = Locator::new(&ply.flat, &ply.cells);
+        for zone in study.zones.iter().flatten() {
+            let lines = outline(&locator, ply, zone);
+            if lines.is_empty() {
+                continue;
+            }
+            for line in &lines {
+                stream.points(extent, line.iter().copied());
+            }
+            all.push(ToldOutline {
+                zone: zone.name.clone(),
+                ply: ply.name.clone(),
+                normal: normal(&ply.flat, &ply.formed, &inside(ply, zone)),
+                lines: lines.iter().map(Vec::len).collect(),
+            });
+        }
+    }
+    all
+}
+
+/// Cells with a corner in a zone.
+fn inside(ply: &Ply, zone: &Zone) -> Vec<[u32; 4]> {
+    let within = |i: &u32| {
+        let p = ply.flat[*i as usize];
+        (0..2).all(|d| (zone.bounds[d]..=zone.bounds[d + 2]).contains(&p[d]))
+    };
+    let any = |c: &&[u32; 4]| c.iter().any(within);
+    ply.cells.iter().filter(any).copied().collect()
+}
+
+/// The parts of a zone's outline that lie on a ply.
+fn outline(locator: &Locator<'_>, ply: &Ply, zone: &Zone) -> Vec<Vec<Vec3>> {
+    let [x0, y0, x1, y1] = zone.bounds;
+    let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]];
+    let mut lines = vec![Vec::new()];
+    for side in corners.windows(2) {
+        let length = (side[1][0] - side[0][0]).hypot(side[1][1] - side[0][1]);
+        let steps = (length / OUTLINE_STEP).ceil().max(1.0) as usize;
+        for i in 0..=steps {
+            let t = i as f64 / steps as f64;
+            let at = [0, 1].map(|d| side[0][d] + t * (side[1][d] - side[0][d]));
+            match locator.locate(at) {
+                Some((nodes, weights)) => {
+                    let part = |k: usize, d: usize| weights[k] * ply.formed[nodes[k] as usize][d];
+                    let p = [0, 1, 2].map(|d| (0..3).map(|k| part(k, d)).sum());
+                    lines.last_mut().expect("never empty").push(p);
+                }
+                None => lines.push(Vec::new()),
+            }
+        }
+    }
+    lines.retain(|l| l.len() > 1);
+    lines
+}
+
+fn defects(stream: &mut Stream, extent: &Extent, places: &[Place]) -> Vec<ToldDefect> {
+    let one = |place: &Place| {
+        for line in &place.lines {
+            stream.points(extent, line.formed.iter().copied());
+        }
+        ToldDefect {
+            id: place.id.clone(),
+            label: place.label.clone(),
+            ply: place.ply.clone(),
+            zone: place.zone.clone(),
+            at: place.at,
+            normal: place.normal,
+            lines: place.lines.iter().map(|l| l.formed.len()).collect(),
+        }
+    };
+    places.iter().map(one).collect()
+}

@@ -1,0 +1,180 @@
+// What the rotatable views draw: the data of a scene, unpacked and sent to WebGL (regl), and the shaders.
+// The data are written by scene.rs: a box, lists of bodies and lines, and one stream of arrays in the order of those lists.
+'use strict';
+const Scene3d = (() => {
+  const TOOL = [0.5, 0.53, 0.57];
+
+  async function inflated(text) {
+    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
+    return new Response(stream).arrayBuffer();
+  }
+
+  // Takes arrays off the stream; each number is the difference to the one `stride` before, modulo its type.
+  function reader(buffer) {
+    let at = 0;
+    return (Type, count, stride) => {
+      const end = at + count * Type.BYTES_PER_ELEMENT;
+      const array = new Type(buffer.slice(at, end));
+      at = end;
+      for (let i = stride; i < array.length; i++) array[i] += array[i - stride];
+      return array;
+    };
+  }
+
+  function unpack(told, buffer) {
+    const take = reader(buffer);
+    const { low, size } = told.extent;
+    const points = (n) => Float32Array.from(take(Uint16Array, 3 * n, 3), (v, i) => low[i % 3] + (v / 65535) * size[i % 3]);
+    const bodies = told.bodies.map((body) => {
+      const position = points(body.points);
+      const parts = body.parts.map((part) => ({ zone: part.zone, quads: take(Uint32Array, 4 * part.cells, 4) }));
+      const fields = new Map(body.fields.map((k) => [k, take(Uint8Array, body.points, 1)]));
+      return { ...body, position, parts, fields };
+    });
+    const lines = (list) => list.map((one) => ({ ...one, lines: one.lines.map(points) }));
+    return { ...told, bodies, outlines: lines(told.outlines), defects: lines(told.defects) };
+  }
+
+  function triangles(quads) {
+    const out = [];
+    for (let i = 0; i < quads.length; i += 4) {
+      const [a, b, c, d] = quads.subarray(i, i + 4);
+      out.push([a, b, c]);
+      if (d !== c) out.push([a, c, d]);
+    }
+    return out;
+  }
+
+  // Normals at the points: sums over the triangles around them, by area.
+  function normals(position, parts) {
+    const normal = new Float32Array(position.length);
+    for (const [a, b, c] of parts.flatMap((p) => p.triangles)) {
+      const e = [0, 1, 2].map((d) => position[3 * b + d] - position[3 * a + d]);
+      const f = [0, 1, 2].map((d) => position[3 * c + d] - position[3 * a + d]);
+      const n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+      for (const i of [a, b, c]) for (let d = 0; d < 3; d++) normal[3 * i + d] += n[d];
+    }
+    return normal;
+  }
+
+  // Segments of lines as rectangles, to be widened on the screen.
+  function ribbon(lines) {
+    const from = [], to = [], corner = [], elements = [];
+    for (const line of lines) {
+      for (let i = 3; i < line.length; i += 3) {
+        const n = from.length;
+        for (const [along, side] of [[0, -1], [0, 1], [1, -1], [1, 1]]) {
+          from.push([...line.subarray(i - 3, i)]);
+          to.push([...line.subarray(i, i + 3)]);
+          corner.push([along, side]);
+        }
+        elements.push([n, n + 1, n + 2], [n + 1, n + 3, n + 2]);
+      }
+    }
+    return { from, to, corner, elements };
+  }
+
+  // ---- drawing ----
+
+  const PROJECT = `
+    precision highp float;
+    uniform vec3 right, up, towards, target;
+    uniform vec2 scale;
+    uniform float depth, lift;
+    vec4 project(vec3 p) {
+      vec3 q = p - target;
+      return vec4(dot(q, right) * scale.x, dot(q, up) * scale.y, -(dot(q, towards) + lift) / depth, 1.0);
+    }`;
+
+  function painters(regl) {
+    const CAMERA = ['right', 'up', 'towards', 'target', 'scale', 'depth', 'pixel'];
+    const camera = Object.fromEntries(CAMERA.map((n) => [n, regl.context(n)]));
+    const surface = regl({
+      vert: `${PROJECT}
+        attribute vec3 position, normal;
+        attribute float place;
+        varying vec3 face;
+        varying float at;
+        void main() { face = normal; at = place; gl_Position = project(position); }`,
+      frag: `
+        precision highp float;
+        uniform sampler2D colours;
+        uniform vec3 right, up, towards, plain;
+        uniform bool coloured;
+        varying vec3 face;
+        varying float at;
+        void main() {
+          vec3 n = normalize(face);
+          if (dot(n, towards) < 0.0) n = -n;
+          float light = max(0.0, dot(n, normalize(-0.45 * right + 0.55 * up + 0.7 * towards)));
+          vec3 colour = coloured ? texture2D(colours, vec2(at * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb : plain;
+          gl_FragColor = vec4(colour * (0.56 + 0.44 * light), 1.0);
+        }`,
+      attributes: {
+        position: regl.prop('position'),
+        normal: regl.prop('normal'),
+        place: (_, { place }) => (place ? { buffer: place, normalized: true } : { constant: 0 }),
+      },
+      uniforms: { ...camera, colours: regl.prop('colours'), coloured: regl.prop('coloured'), plain: TOOL, lift: regl.prop('lift') },
+      elements: regl.prop('elements'),
+    });
+    const line = regl({
+      vert: `${PROJECT}
+        attribute vec3 from, to;
+        attribute vec2 corner;
+        uniform vec2 pixel;
+        uniform float width;
+        void main() {
+          vec4 a = project(from), b = project(to);
+          vec2 along = (b.xy - a.xy) / pixel;
+          along = length(along) > 0.0 ? normalize(along) : vec2(1.0, 0.0);
+          vec2 off = along * (corner.x * 2.0 - 1.0) + vec2(-along.y, along.x) * corner.y;
+          gl_Position = mix(a, b, corner.x) + vec4(off * 0.5 * width * pixel, 0.0, 0.0);
+        }`,
+      frag: 'precision highp float; uniform vec4 colour; void main() { gl_FragColor = vec4(colour.rgb * colour.a, colour.a); }',
+      attributes: { from: regl.prop('from'), to: regl.prop('to'), corner: regl.prop('corner') },
+      uniforms: { ...camera, width: regl.prop('width'), colour: regl.prop('colour'), lift: regl.prop('lift') },
+      elements: regl.prop('elements'),
+      depth: { enable: regl.prop('hide') },
+      blend: { enable: true, func: { src: 'one', dst: 'one minus src alpha' } },
+    });
+    const within = regl({ context: Object.fromEntries(CAMERA.map((n) => [n, regl.prop(n)])) });
+    return { surface, line, within };
+  }
+
+  function upload(regl, scene) {
+    const stripe = (stops) => {
+      const rgb = stops.map((s) => [1, 3, 5].map((i) => parseInt(s.slice(i, i + 2), 16)));
+      const data = new Uint8Array(4 * 256).fill(255);
+      for (let i = 0; i < 256; i++) {
+        const t = (i / 255) * (rgb.length - 1), k = Math.min(Math.floor(t), rgb.length - 2);
+        for (let c = 0; c < 3; c++) data[4 * i + c] = Math.round(rgb[k][c] + (rgb[k + 1][c] - rgb[k][c]) * (t - k));
+      }
+      return regl.texture({ width: 256, height: 1, data, mag: 'linear', min: 'linear' });
+    };
+    const bodies = scene.bodies.map((body) => {
+      const parts = body.parts.map((p) => ({ zone: p.zone, triangles: triangles(p.quads) })).filter((p) => p.triangles.length);
+      return {
+        ...body,
+        normal: regl.buffer(normals(body.position, parts)),
+        position: regl.buffer(body.position),
+        parts: parts.map((p) => ({ zone: p.zone, elements: regl.elements({ data: p.triangles, type: 'uint32' }) })),
+        fields: new Map([...body.fields].map(([k, values]) => [k, regl.buffer(values)])),
+      };
+    });
+    const ribbons = (list) => list.map((one) => ({ ...one, ribbon: ribbon(one.lines) })).filter((one) => one.ribbon.from.length);
+    return { ...scene, bodies, outlines: ribbons(scene.outlines), defects: ribbons(scene.defects), stripes: scene.fields.map((f) => stripe(f.stops)) };
+  }
+
+  // Reads a scene and sends it to a canvas.
+  async function open(told, canvas) {
+    if (!document.createElement('canvas').getContext('webgl')) throw new Error('no WebGL');
+    const data = unpack(told, await inflated(told.data));
+    // The buffer is kept so that a reader can save the picture.
+    const regl = createREGL({ canvas, extensions: ['OES_element_index_uint'], attributes: { preserveDrawingBuffer: true } });
+    return { regl, data, paint: painters(regl), scene: upload(regl, data) };
+  }
+
+  return { open };
+})();

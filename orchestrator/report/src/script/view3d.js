@@ -1,0 +1,275 @@
+// The rotatable views: camera, controls, and what is drawn when (what it is made of: scene3d.js).
+'use strict';
+(() => {
+  const HOME = { azimuth: -50, elevation: 35 };
+  const PICK = [0.86, 0, 0.55];
+  const rad = (degrees) => (degrees * Math.PI) / 180;
+  const deg = (angle) => (angle * 180) / Math.PI;
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const between = (low, v, high) => Math.max(low, Math.min(high, v));
+
+  class View {
+    constructor(element, canvas, told, { regl, data, paint, scene }) {
+      Object.assign(this, { element, canvas, told, regl, paint, scene });
+      this.plies = data.bodies.filter((b) => b.ply && !b.zone);
+      this.radius = Math.hypot(...told.extent.size) / 2;
+      this.show = { tool: true, ply: new Set(), zone: new Set(), field: 0, defect: null };
+      this.waiting = false;
+    }
+
+    // ---- camera: where the eye is, what it looks at, and half the height (m) that it sees ----
+
+    // The plies fill the view; the tool may reach out of it.
+    home(towards = HOME) {
+      const mean = [0, 0, 0], reach = [0, 0];
+      let count = 0;
+      for (const { position } of this.plies) {
+        for (let i = 0; i < position.length; i += 3, count++) for (let d = 0; d < 3; d++) mean[d] += position[i + d];
+      }
+      this.eye = { ...towards, target: mean.map((m) => m / count) };
+      const { right, up } = this.axes();
+      for (const { position } of this.plies) {
+        for (let i = 0; i < position.length; i += 3) {
+          const q = this.eye.target.map((t, d) => position[i + d] - t);
+          [right, up].forEach((axis, k) => { reach[k] = Math.max(reach[k], Math.abs(dot(q, axis))); });
+        }
+      }
+      const { clientWidth, clientHeight } = this.canvas;
+      this.eye.half = 1.08 * Math.max(reach[1], (reach[0] * clientHeight) / Math.max(clientWidth, 1));
+      this.later();
+    }
+
+    axes() {
+      const [a, e] = [rad(this.eye.azimuth), rad(this.eye.elevation)];
+      const [s, c, se, ce] = [Math.sin(a), Math.cos(a), Math.sin(e), Math.cos(e)];
+      return { right: [-s, c, 0], up: [-se * c, -se * s, ce], towards: [ce * c, ce * s, se] };
+    }
+
+    turn(azimuth, elevation) {
+      this.eye.azimuth += azimuth;
+      this.eye.elevation = between(-90, this.eye.elevation + elevation, 90);
+      this.later();
+    }
+
+    zoom(factor) {
+      this.eye.half = between(this.radius / 200, this.eye.half / factor, 4 * this.radius);
+      this.later();
+    }
+
+    move(dx, dy) {
+      const { right, up } = this.axes();
+      const metres = (2 * this.eye.half) / this.canvas.clientHeight;
+      this.eye.target = this.eye.target.map((t, d) => t + metres * (dy * up[d] - dx * right[d]));
+      this.later();
+    }
+
+    chosen() {
+      return this.scene.defects.find((d) => d.id === this.show.defect);
+    }
+
+    select(id, scroll) {
+      this.show.defect = id;
+      const defect = this.chosen();
+      if (defect) {
+        const [x, y, z] = defect.normal;
+        const far = defect.lines.flatMap((l) => [...l]).reduce((m, v, i) => Math.max(m, Math.abs(v - defect.at[i % 3])), 0);
+        this.eye = {
+          // Not along the normal: seen at a slant, a wrinkle has height.
+          azimuth: Math.hypot(x, y) > 0.05 ? deg(Math.atan2(y, x)) + 25 : HOME.azimuth,
+          elevation: between(25, deg(Math.asin(z)), 65),
+          target: defect.at.slice(),
+          half: Math.max(3 * far, this.radius / 20),
+        };
+        if (scroll) this.canvas.scrollIntoView({ block: 'nearest' });
+      }
+      this.later();
+    }
+
+    // ---- drawing ----
+
+    later() {
+      if (!this.waiting) requestAnimationFrame(() => this.draw());
+      this.waiting = true;
+    }
+
+    visible(body) {
+      const { tool, ply, zone } = this.show;
+      return body.ply ? ply.has(body.ply) && (!body.zone || zone.has(body.zone)) : tool;
+    }
+
+    draw() {
+      this.waiting = false;
+      const { canvas, eye, radius, show, scene } = this;
+      const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+      if (!w) return;
+      const ratio = window.devicePixelRatio || 1;
+      [['width', w], ['height', h]].forEach(([side, css]) => {
+        if (canvas[side] !== Math.round(css * ratio)) canvas[side] = Math.round(css * ratio);
+      });
+      this.regl.poll();
+      const scale = [h / w / eye.half, 1 / eye.half];
+      const camera = { ...this.axes(), target: eye.target, depth: 4 * radius, scale, pixel: [2 / w, 2 / h] };
+      this.regl.clear({ color: [0, 0, 0, 0], depth: 1 });
+      this.paint.within(camera, () => {
+        for (const body of scene.bodies.filter((b) => this.visible(b))) {
+          const place = body.fields.get(show.field);
+          // Where both are drawn, at the rim of a zone, the finer ply is seen.
+          const lift = body.ply ? this.told.lift + (body.zone ? 0.0008 : 0) : 0;
+          const how = { place, coloured: Boolean(place), colours: scene.stripes[show.field], lift };
+          for (const part of body.parts.filter((p) => !show.zone.has(p.zone))) this.paint.surface({ ...body, ...part, ...how });
+        }
+        for (const outline of this.outlines()) this.stroke(outline.ribbon, 1.2, [0, 0, 0], 0.15);
+        if (this.chosen()) this.stroke(this.chosen().ribbon, 3, PICK, 0.6);
+      });
+      this.labels(camera, w, h);
+      this.triad(camera);
+      this.element.dataset.ready = 'true';
+    }
+
+    // Of the zones that are shown, on the uppermost ply that is shown.
+    outlines() {
+      const top = [...this.show.ply].pop();
+      return this.scene.outlines.filter((o) => this.show.zone.has(o.zone) && o.ply === top);
+    }
+
+    // What lies behind a surface shines through.
+    stroke(ribbon, width, rgb, through) {
+      const { lift } = this.told;
+      this.paint.line({ ...ribbon, width, colour: [...rgb, through], hide: false, lift: 0 });
+      this.paint.line({ ...ribbon, width: width + 2.5, colour: [1, 1, 1, 0.85], hide: true, lift: lift + 0.0015 });
+      this.paint.line({ ...ribbon, width, colour: [...rgb, 1], hide: true, lift: lift + 0.003 });
+    }
+
+    labels({ right, up, towards, target, scale }, w, h) {
+      const at = (p) => {
+        const q = p.map((v, d) => v - target[d]);
+        return [(dot(q, right) * scale[0] + 1) * 0.5 * w, (1 - dot(q, up) * scale[1]) * 0.5 * h];
+      };
+      const defect = this.chosen();
+      const named = defect ? [[defect.label, defect.at, defect.normal]] : this.outlines().map((o) => [o.zone, [...o.lines[0].subarray(0, 3)], o.normal]);
+      this.element.querySelector('.labels').replaceChildren(...named.flatMap(([text, p, normal]) => {
+        const [x, y] = at(p);
+        if (x < 0 || y < 0 || x > w || y > h) return [];
+        const span = document.createElement('span');
+        span.textContent = text;
+        span.style.left = `${x}px`;
+        span.style.top = `${y}px`;
+        // The back of the plies.
+        span.classList.toggle('behind', dot(normal, towards) < 0);
+        return [span];
+      }));
+    }
+
+    triad({ right, up }) {
+      [...this.element.querySelectorAll('.triad3d g')].forEach((g, d) => {
+        const [dx, dy] = [26 * right[d], -26 * up[d]];
+        for (const path of g.querySelectorAll('path')) path.setAttribute('d', `M0 0L${dx} ${dy}`);
+        const name = g.querySelector('text');
+        name.setAttribute('x', 1.35 * dx);
+        name.setAttribute('y', 1.35 * dy + 4);
+      });
+    }
+  }
+
+  // ---- controls ----
+
+  function switches(view) {
+    const { element, show } = view;
+    for (const box of element.querySelectorAll('input[data-show]')) {
+      const change = () => {
+        const kind = box.dataset.show;
+        if (kind === 'tool') show.tool = box.checked;
+        else if (box.checked) show[kind].add(box.value);
+        else show[kind].delete(box.value);
+        view.later();
+      };
+      box.addEventListener('change', change);
+      change();
+    }
+    element.querySelector('select')?.addEventListener('change', ({ target }) => {
+      show.field = Number(target.value);
+      for (const bar of element.querySelectorAll('.legend3d')) bar.hidden = bar.dataset.field !== target.value;
+      view.later();
+    });
+    for (const button of element.querySelectorAll('button[data-azimuth]')) {
+      const { azimuth, elevation } = button.dataset;
+      button.addEventListener('click', () => view.home({ azimuth: Number(azimuth), elevation: Number(elevation) }));
+    }
+    element.querySelector('button[data-reset]').addEventListener('click', () => view.home());
+  }
+
+  function keysAndWheel(view) {
+    const { canvas } = view;
+    const keys = {
+      ArrowLeft: () => view.turn(-5, 0), ArrowRight: () => view.turn(5, 0), ArrowUp: () => view.turn(0, 5), ArrowDown: () => view.turn(0, -5),
+      '+': () => view.zoom(1.2), '=': () => view.zoom(1.2), '-': () => view.zoom(1 / 1.2), 0: () => view.home(),
+    };
+    canvas.addEventListener('keydown', (event) => {
+      if (!keys[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      keys[event.key]();
+    });
+    canvas.addEventListener('wheel', (event) => {
+      // A page is scrolled past a view that nobody has clicked on.
+      if (document.activeElement !== canvas) return;
+      event.preventDefault();
+      view.zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.03 : 0.0015)));
+    }, { passive: false });
+  }
+
+  function pointers(view) {
+    const { canvas } = view;
+    const down = new Map();
+    const span = () => {
+      const [a, b] = [...down.values()];
+      return Math.hypot(a[0] - b[0], a[1] - b[1]);
+    };
+    canvas.addEventListener('pointerdown', (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      down.set(event.pointerId, [event.clientX, event.clientY]);
+    });
+    canvas.addEventListener('pointermove', (event) => {
+      const last = down.get(event.pointerId);
+      if (!last) return;
+      const [dx, dy] = [event.clientX - last[0], event.clientY - last[1]];
+      const before = down.size === 2 ? span() : 0;
+      down.set(event.pointerId, [event.clientX, event.clientY]);
+      if (down.size === 2) {
+        view.zoom(Math.max(span(), 1) / Math.max(before, 1));
+        // Each of two fingers moves by half.
+        view.move(dx / 2, dy / 2);
+      } else if (event.shiftKey || event.buttons & 6) {
+        view.move(dx, dy);
+      } else {
+        view.turn(-0.4 * dx, 0.4 * dy);
+      }
+    });
+    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, (event) => down.delete(event.pointerId));
+    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+  }
+
+  async function start(section) {
+    const element = section.querySelector('.view3d');
+    const canvas = element.querySelector('canvas');
+    const told = JSON.parse(section.querySelector('script.scene').textContent);
+    const view = new View(element, canvas, told, await Scene3d.open(told, canvas));
+    section.querySelector('.without-3d').hidden = true;
+    element.hidden = false;
+    view.home();
+    switches(view);
+    keysAndWheel(view);
+    pointers(view);
+    document.addEventListener('plyflow-defect', ({ detail }) => view.select(detail.id, detail.scroll));
+    new ResizeObserver(() => view.later()).observe(canvas);
+  }
+
+  for (const script of document.querySelectorAll('script.scene')) {
+    const section = script.parentElement;
+    start(section).catch((error) => {
+      section.querySelector('.view3d').hidden = true;
+      const text = section.querySelector('.without-3d');
+      text.hidden = false;
+      text.append(` (${error.message})`);
+    });
+  }
+})();

@@ -1,0 +1,215 @@
+//! The data of the 3D view, read as the page's script reads them, and the joints of tables, maps and view.
+
+mod common;
+
+use base64::Engine;
+use camino::{Utf8Path, Utf8PathBuf};
+use common::{Study, whole, whole_study};
+use plyflow_artifact::{Artifact, On};
+use plyflow_report::{ReportInput, write_report};
+use serde_json::Value;
+use std::io::Read;
+
+fn folder() -> (tempfile::TempDir, Utf8PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = Utf8PathBuf::from_path_buf(dir.path().to_owned()).unwrap();
+    (dir, path)
+}
+
+fn page(input: &ReportInput, folder: &Utf8Path) -> String {
+    let out = folder.join("report.html");
+    write_report(input, &out).unwrap();
+    std::fs::read_to_string(&out).unwrap()
+}
+
+const BEGIN: &str = "<script type=\"application/json\" class=\"scene\">";
+
+/// The text of the first scene.
+fn json(page: &str) -> &str {
+    let from = page.find(BEGIN).expect("a scene") + BEGIN.len();
+    &page[from..from + page[from..].find("</script>").unwrap()]
+}
+
+/// A scene: what is told, and its arrays.
+struct Scene {
+    told: Value,
+    bytes: Vec<u8>,
+    at: usize,
+}
+
+impl Scene {
+    fn of(page: &str) -> Self {
+        let told: Value = serde_json::from_str(json(page)).unwrap();
+        let data = told["data"].as_str().unwrap();
+        let data = base64::engine::general_purpose::STANDARD.decode(data);
+        let mut bytes = Vec::new();
+        flate2::read::ZlibDecoder::new(data.unwrap().as_slice())
+            .read_to_end(&mut bytes)
+            .unwrap();
+        Self { told, bytes, at: 0 }
+    }
+
+    /// Whole numbers of `size` bytes, each the difference to the one `stride` before.
+    fn take(&mut self, count: u64, size: usize, stride: usize) -> Vec<u64> {
+        let count = usize::try_from(count).unwrap();
+        let bytes = &self.bytes[self.at..self.at + count * size];
+        self.at += count * size;
+        let number = |b: &[u8]| b.iter().rev().fold(0u64, |n, b| n << 8 | u64::from(*b));
+        let mut all: Vec<u64> = bytes.chunks(size).map(number).collect();
+        let modulo = 1u64 << (8 * size);
+        for i in stride..all.len() {
+            all[i] = (all[i] + all[i - stride]) % modulo;
+        }
+        all
+    }
+
+    fn points(&mut self, count: u64) -> Vec<f64> {
+        let number = |v: &Value, d: usize| v[d].as_f64().unwrap();
+        let taken = self.take(3 * count, 2, 3);
+        let extent = &self.told["extent"];
+        let place = |(i, v): (usize, &u64)| {
+            number(&extent["low"], i % 3) + *v as f64 / 65535.0 * number(&extent["size"], i % 3)
+        };
+        taken.iter().enumerate().map(place).collect()
+    }
+}
+
+fn list(value: &Value) -> Vec<Value> {
+    value.as_array().unwrap().clone()
+}
+
+#[test]
+fn a_ply_comes_back_from_the_page_as_it_lies_in_the_artifact() {
+    let (_keep, folder) = folder();
+    let page = page(&whole(&folder), &folder);
+    let mut scene = Scene::of(&page);
+    let bodies = list(&scene.told["bodies"]);
+    let of = |b: &Value| (b["ply"].clone(), b["zone"].clone());
+    assert_eq!(of(&bodies[0]), (Value::Null, Value::Null), "the tool");
+    assert_eq!(of(&bodies[1]), ("ply_1".into(), Value::Null));
+    assert_eq!(of(&bodies[6]), ("ply_2".into(), "B".into()));
+    let artifact = Artifact::open(folder.join("detect.h5").as_std_path()).unwrap();
+    let (_, cells) = artifact.mesh("ply_1").unwrap();
+    let formed = artifact.frame_points("ply_1", 0).unwrap();
+    let distance = artifact
+        .frame_field("ply_1", 0, On::Points, "nodal_distance")
+        .unwrap();
+    for (n, body) in bodies.iter().enumerate() {
+        let points = scene.points(body["points"].as_u64().unwrap());
+        let mut quads = Vec::new();
+        for part in list(&body["parts"]) {
+            let part = scene.take(4 * part["cells"].as_u64().unwrap(), 4, 4);
+            quads.extend(
+                part.chunks(4)
+                    .map(|q| [q[0], q[1], q[2], q[3]])
+                    .collect::<Vec<_>>(),
+            );
+        }
+        let fields: Vec<Vec<u64>> = list(&body["fields"])
+            .iter()
+            .map(|_| scene.take(body["points"].as_u64().unwrap(), 1, 1))
+            .collect();
+        if n != 1 {
+            continue;
+        }
+        let off = |(a, b): (&f64, &f64)| (a - b).abs();
+        let worst = points
+            .iter()
+            .zip(formed.as_flattened())
+            .map(off)
+            .fold(0.0, f64::max);
+        assert!(points.len() == 3 * formed.len() && worst < 1e-5, "{worst}");
+        // In parts by zone, but the same cells.
+        let mut expected: Vec<[u64; 4]> = (cells.as_chunks::<4>().0.iter())
+            .map(|c| c.map(u64::from))
+            .collect();
+        assert_ne!(quads, expected);
+        quads.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(quads, expected);
+        // 0 to 5 mm on the scale of the distance.
+        let place = |d: &f64| (d / 0.005).clamp(0.0, 1.0) * 255.0;
+        let wrong = |(v, d): (&u64, &f64)| (*v as f64 - place(d)).abs() > 0.6;
+        assert!(!fields[1].iter().zip(&distance).any(wrong));
+    }
+    for kind in ["outlines", "defects"] {
+        for one in list(&scene.told[kind]) {
+            for n in list(&one["lines"]) {
+                scene.points(n.as_u64().unwrap());
+            }
+        }
+    }
+    assert_eq!(scene.at, scene.bytes.len(), "all is told");
+}
+
+#[test]
+fn defects_of_comparison_and_measurement_stand_in_table_map_and_view_under_one_name() {
+    let (_keep, folder) = folder();
+    let mut study = whole_study(&folder);
+    study.measurement();
+    let measure = study.instances.len() - 1;
+    let page = page(&study.input(), &folder);
+    let scene = Scene::of(&page);
+    let defects = list(&scene.told["defects"]);
+    let names: Vec<&str> = defects.iter().map(|d| d["id"].as_str().unwrap()).collect();
+    let rows = [0, 1].map(|row| format!("step-{measure}-{row}"));
+    assert_eq!(
+        names,
+        ["0-AB1", "0-AW1", "0-BB1", "0-BW1", &rows[0], &rows[1]]
+    );
+    for name in &names {
+        let row = format!("<tr data-defect=\"{name}\">");
+        let mark = format!("<g class=\"place\" data-defect=\"{name}\">");
+        assert_eq!(page.matches(&row).count(), 1, "{name}");
+        assert!(page.contains(&mark), "{name}");
+    }
+    // The made-up waves have three humps each; the crest of the first follows their outlines.
+    let [with, without] = [4, 5].map(|k| list(&defects[k]["lines"]).len());
+    assert_eq!((with, without), (4, 3));
+    // The wrinkle of zone A lies about its middle, on the side of -y.
+    let at = &defects[1]["at"];
+    assert!((at[0].as_f64().unwrap() + 0.05).abs() < 0.006, "{at}");
+    assert!(defects[1]["normal"][1].as_f64().unwrap() < -0.3);
+}
+
+#[test]
+fn names_in_a_scene_cannot_end_its_script() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.008);
+    study.defects(false);
+    study.zones(&[("</script><b>&", common::ZONES[0].1)]);
+    let page = page(&study.input(), &folder);
+    assert!(json(&page).contains("\\u003c/script\\u003e\\u003cb\\u003e\\u0026"));
+    let told: Value = serde_json::from_str(json(&page)).unwrap();
+    assert_eq!(told["outlines"][0]["zone"], "</script><b>&");
+    assert!(!page.contains("</script><b>"));
+}
+
+#[test]
+fn a_mesh_beyond_the_budget_is_thinned_and_the_page_says_so() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.000_5);
+    let page = page(&study.input(), &folder);
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+    let whole = (480 + 1) * (320 + 1);
+    assert!(page.contains("Shown coarser than computed: ply_1 with "));
+    assert!(page.contains(&format!("of its {whole} points")));
+    let told: Value = serde_json::from_str(json(&page)).unwrap();
+    let points: u64 = list(&told["bodies"])
+        .iter()
+        .map(|b| b["points"].as_u64().unwrap())
+        .sum();
+    assert!((10_000..=120_000).contains(&points), "{points}");
+}
+
+#[test]
+fn a_page_without_plies_has_no_view_and_no_script_for_one() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.coupon();
+    let page = page(&study.input(), &folder);
+    assert!(!page.contains("createREGL") && !page.contains("view3d\""));
+    assert!(page.contains("class=\"copy with-script\""));
+}
