@@ -42,7 +42,7 @@ struct Driven {
     /// `[f][k][3]` (m).
     position: Vec<f64>,
     /// `[f][k][3]`; plies only, films do not rotate.
-    normal: Vec<f64>,
+    normal: Option<Vec<f64>>,
     error: f64,
 }
 
@@ -172,7 +172,7 @@ fn drive(
     let Some(grid) = grid else { return Ok(None) };
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
-    let (mut position, mut normal) = (Vec::new(), Vec::new());
+    let (mut position, mut normal) = (Vec::new(), ply.then(Vec::new));
     let (mut error, mut start) = (0.0f64, 0.0f64);
     for frame in 0..meshes.times.len() {
         let coarse = host.frame_points(input, body, frame)?;
@@ -188,7 +188,7 @@ fn drive(
                 .fold(0.0, f64::max);
         }
         position.extend(driven.into_iter().flatten());
-        if ply {
+        if let Some(normal) = &mut normal {
             normal.extend(fine.normals(&coarse, &cells).into_iter().flatten());
         }
     }
@@ -242,13 +242,11 @@ fn write(host: &Host, times: &[f64], sheets: &[Driven]) -> Result<(), StepError>
             &s.fine.driven_nodes,
         )?;
         let motion = [
-            ("position", "m", "velocity", "m/s", &s.position),
-            ("normal", "1", "normal_rate", "1/s", &s.normal),
+            ("position", "m", "velocity", "m/s", Some(&s.position)),
+            ("normal", "1", "normal_rate", "1/s", s.normal.as_ref()),
         ];
         for (what, unit, rate, rate_unit, values) in motion {
-            if values.is_empty() {
-                continue;
-            }
+            let Some(values) = values else { continue };
             let slopes = spline_slopes(times, values, 3 * k);
             host.write_f64(&format!("{}/{what}", s.name), &[f, k, 3], unit, values)?;
             host.write_f64(

@@ -386,6 +386,29 @@ fn a_cut_on_the_blank_s_corner_leaves_two_sides_free() {
 }
 
 #[test]
+fn a_zone_that_covers_the_whole_ply_cuts_films_alone() {
+    let whole =
+        json!([{"name": "A", "box": [-0.24, -0.15, 0.24, 0.15], "free_sides": vec![true; 4]}]);
+    let zones = MemoryArtifact {
+        kind: "zones".into(),
+        attributes: json!({"zones": whole}),
+        ..Default::default()
+    };
+    let formed = coarse(0.0);
+    let inputs = [
+        MemoryInput::new("formed", &formed),
+        MemoryInput::new("zones", &zones),
+    ];
+    let out = run::<BoundaryInterpolation>(json!({"element_size": 0.01}), &inputs, &[0]).unwrap();
+    assert_eq!(out.arrays["ply_1/driven_nodes"].0, [0]);
+    // The arrays are there all the same.
+    for what in ["position", "velocity", "normal", "normal_rate"] {
+        assert_eq!(out.arrays[&format!("ply_1/{what}")].0, [6, 0, 3], "{what}");
+    }
+    assert!(out.arrays["film_low/driven_nodes"].0[0] > 0);
+}
+
+#[test]
 fn interpolation_error_is_that_of_the_kinks_that_fine_edges_cut_off() {
     // A parabola z = 4 y2 on the film's nodes every 1.5 m / 31: slopes change by 0.39 at each. Fine cells of
     // 6.25 mm put no node at most of these kinks; the miss is slope change * a b / (a + b).
