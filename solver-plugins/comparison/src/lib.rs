@@ -268,7 +268,7 @@ fn distance_error(model: &Model, reference: &Model) -> Option<f64> {
     (count > 0.0).then(|| (sum / count).sqrt())
 }
 
-/// What the runs cost; `passed_over` are those of zones that were drawn again, which count in the whole.
+/// What the runs cost; `passed_over` are those of zones that were drawn again and of earlier passes, which count in the whole.
 fn write_costs(host: &Host, models: &[Model], passed_over: &[Input]) -> Result<(), StepError> {
     let sum = |get: fn(&Input) -> f64| passed_over.iter().map(get).fold(0.0, |s, c| s + c);
     let mut wall = sum(|i| i.cost.wall_seconds);

@@ -118,8 +118,8 @@ struct Sheet {
     fibre_1: Option<f64>,
 }
 
-/// Global, local and reference models in that order, local ones in the order of their zones; and the local runs of zones that are
-/// `superseded`, which are not measured.
+/// Global, local and reference models in that order, local ones in the order of their zones; and what was run on the way to them and is
+/// not measured: local runs of zones that are `superseded`, and `earlier` passes.
 ///
 /// # Errors
 /// When an input lacks something, or a local run belongs to no zone or to one that another has.
@@ -164,6 +164,7 @@ pub fn read_models(
         let tool = read_tool(host, &input)?;
         models.push(read(host, input, Role::Reference, None, &tool, settings)?);
     }
+    passed_over.extend(host.inputs_of("earlier")?);
     Ok((models, passed_over))
 }
 

@@ -534,6 +534,28 @@ fn a_ply_that_stands_off_a_fillet_as_curved_as_the_tool_is_bridging_and_not_a_wr
 }
 
 #[test]
+fn runs_of_earlier_passes_are_not_measured_but_paid_for() {
+    let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
+    let cost = |port, artifact, seconds: f64| MemoryInput {
+        cost: [seconds, 2.0 * seconds, 0.0],
+        ..MemoryInput::new(port, artifact)
+    };
+    let out = compare(&[
+        cost("global", &global, 10.0),
+        MemoryInput::new("zones", &zones),
+        cost("local", &local, 30.0),
+        cost("earlier", &global, 100.0),
+        cost("earlier", &local, 300.0),
+    ]);
+    assert_eq!(
+        out.measured["cost.superseded.wall_seconds"],
+        (400.0, "s".into())
+    );
+    assert_eq!(out.measured["cost.total.cpu_seconds"], (880.0, "s".into()));
+    assert_eq!(out.attributes["models"].as_array().unwrap().len(), 2);
+}
+
+#[test]
 fn quantiles_are_linear_between_ordered_values() {
     let values = [4.0, 1.0, 3.0, 2.0, 5.0];
     assert_eq!(
