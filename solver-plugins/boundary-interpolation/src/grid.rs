@@ -1,6 +1,7 @@
 //! Fine structured meshes of a zone's sheets, in the undeformed plane.
 
 use plyflow_model::outline::{sides, signed_area, winds};
+use plyflow_surface::flat_bounds;
 
 /// `[x0, y0, x1, y1]` (m).
 pub type Rectangle = [f64; 4];
@@ -44,7 +45,7 @@ pub fn ply_part(
     holes: &[Vec<[f64; 2]>],
     size: f64,
 ) -> Result<Option<Grid>, &'static str> {
-    let ply = around(outline);
+    let ply = flat_bounds(outline.iter().copied());
     let box_area = (ply[2] - ply[0]) * (ply[3] - ply[1]);
     // Only an upright rectangle fills its box.
     let rectangle = (signed_area(outline).abs() - box_area).abs() < SAME_PLACE * box_area;
@@ -82,23 +83,6 @@ fn crosses(zone: Rectangle, contour: &[[f64; 2]]) -> bool {
             to = to.min(s.max(t));
         }
         from <= to
-    })
-}
-
-fn around(outline: &[[f64; 2]]) -> Rectangle {
-    let none = [
-        f64::INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::NEG_INFINITY,
-    ];
-    outline.iter().fold(none, |b, p| {
-        [
-            b[0].min(p[0]),
-            b[1].min(p[1]),
-            b[2].max(p[0]),
-            b[3].max(p[1]),
-        ]
     })
 }
 

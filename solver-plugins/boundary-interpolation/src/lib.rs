@@ -9,6 +9,7 @@ pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
+use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::{Vec3, distance};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -157,7 +158,7 @@ fn drive(
     let (points, cells) = host.mesh(input, body)?;
     let ply = sheet.kind == "ply";
     let grid = if ply {
-        let outline = sheet.outline.unwrap_or_else(|| corners(around(&points)));
+        let outline = sheet.outline.unwrap_or_else(|| corners(bounds(&points)));
         ply_part(zone, &outline, &sheet.holes, p.element_size).map_err(|what| {
             format!(
                 "the zone at {zone:?} m crosses {what}, of ply '{}'; a local run is built where a zone lies wholly inside of such \
@@ -167,7 +168,7 @@ fn drive(
         })?
     } else {
         let size = p.film_element_size.unwrap_or(p.element_size);
-        film_grid(zone, around(&points), p.film_margin, size)
+        film_grid(zone, bounds(&points), p.film_margin, size)
     };
     let Some(grid) = grid else { return Ok(None) };
     let fine =
@@ -210,21 +211,8 @@ fn drive(
     }))
 }
 
-fn around(points: &[Vec3]) -> Rectangle {
-    let none = [
-        f64::INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::NEG_INFINITY,
-    ];
-    points.iter().fold(none, |b, p| {
-        [
-            b[0].min(p[0]),
-            b[1].min(p[1]),
-            b[2].max(p[0]),
-            b[3].max(p[1]),
-        ]
-    })
+fn bounds(points: &[Vec3]) -> Rectangle {
+    flat_bounds(points.iter().map(|p| [p[0], p[1]]))
 }
 
 fn corners(b: Rectangle) -> Vec<[f64; 2]> {

@@ -4,7 +4,7 @@ use crate::models::{Model, Role, Zone};
 use plyflow_defects::Ply;
 use plyflow_sdk::{BodyInfo, Host, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, distance, dot, sub};
-use plyflow_surface::{Location, QuadLocator};
+use plyflow_surface::{Location, QuadLocator, flat_bounds};
 use serde::Serialize;
 
 /// How far inside of the cut the material is looked at that pulls at it, over the zone's own element size.
@@ -71,23 +71,6 @@ fn pieces(zone: &Zone, around: [f64; 4], size: f64) -> Vec<Piece> {
         }
     }
     list
-}
-
-fn around(points: &[Vec3]) -> [f64; 4] {
-    let none = [
-        f64::INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::NEG_INFINITY,
-    ];
-    points.iter().fold(none, |b, p| {
-        [
-            b[0].min(p[0]),
-            b[1].min(p[1]),
-            b[2].max(p[0]),
-            b[3].max(p[1]),
-        ]
-    })
 }
 
 /// First Piola-Kirchhoff traction (N/m of undeformed length) across a line with the normal `normal` of the flat ply, in a cell
@@ -166,7 +149,11 @@ fn work(
         return Ok(None);
     };
     let mut cut = Vec::new();
-    for piece in pieces(zone, around(&ply.undeformed), size) {
+    for piece in pieces(
+        zone,
+        flat_bounds(ply.undeformed.iter().map(|p| [p[0], p[1]])),
+        size,
+    ) {
         let Some(place) = locator.locate(piece.at[0], piece.at[1], 1e-6) else {
             return Ok(None);
         };

@@ -2,7 +2,9 @@
 
 use plyflow_comparison::{Comparison, traction};
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
+use plyflow_surface::memory_host::{
+    MemoryArtifact, MemoryBody, MemoryField, MemoryInput, flat_grid, run,
+};
 use plyflow_surface::vector::Vec3;
 use serde_json::{Value, json};
 
@@ -14,28 +16,6 @@ const FRAMES: usize = 21;
 /// Green strain along x at the end.
 const STRAIN: f64 = 0.05;
 
-/// A flat grid of squares over a box.
-fn grid(b: [f64; 4], size: f64) -> (Vec<Vec3>, Vec<u32>) {
-    let n = [0, 1].map(|d| ((b[d + 2] - b[d]) / size).round() as usize);
-    let mut points = Vec::new();
-    for j in 0..=n[1] {
-        for i in 0..=n[0] {
-            points.push([b[0] + size * i as f64, b[1] + size * j as f64, 0.0]);
-        }
-    }
-    let node = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
-    let corners = |(i, j): (usize, usize)| {
-        [
-            node(i, j),
-            node(i + 1, j),
-            node(i + 1, j + 1),
-            node(i, j + 1),
-        ]
-    };
-    let cells = (0..n[1]).flat_map(|j| (0..n[0]).map(move |i| (i, j)));
-    (points, cells.flat_map(corners).collect())
-}
-
 /// S11, S22, S12 in axes at `AXIS` of a tensor that has `along_x` in x and nothing else.
 fn rotated(along_x: f64) -> [f64; 3] {
     let (s, c) = AXIS.sin_cos();
@@ -44,7 +24,7 @@ fn rotated(along_x: f64) -> [f64; 3] {
 
 /// A ply that is pulled along x (`x -> F x`) while it turns about z, with `S_xx = stiffness E_xx`.
 fn pulled(b: [f64; 4], size: f64, stiffness: f64) -> MemoryBody {
-    let (points, cells) = grid(b, size);
+    let (points, cells) = flat_grid(b, size, 0.0);
     let (mut frames, mut fields) = (Vec::new(), Vec::new());
     for f in 0..FRAMES {
         let share = f as f64 / (FRAMES - 1) as f64;

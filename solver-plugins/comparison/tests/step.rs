@@ -3,8 +3,9 @@
 use plyflow_comparison::Comparison;
 use plyflow_defects::quantiles;
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
-use plyflow_surface::vector::Vec3;
+use plyflow_surface::memory_host::{
+    MemoryArtifact, MemoryBody, MemoryField, MemoryInput, flat_grid, run,
+};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -39,25 +40,7 @@ fn height(size: f64) -> impl Fn(f64, f64) -> f64 {
 }
 
 fn ply(name: &str, b: [f64; 4], size: f64, up: f64, f: impl Fn(f64, f64) -> f64) -> MemoryBody {
-    let n = [0, 1].map(|d| ((b[d + 2] - b[d]) / size).round() as usize);
-    let mut points: Vec<Vec3> = Vec::new();
-    for j in 0..=n[1] {
-        for i in 0..=n[0] {
-            points.push([b[0] + size * i as f64, b[1] + size * j as f64, 0.2]);
-        }
-    }
-    let node = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
-    let mut cells = Vec::new();
-    for j in 0..n[1] {
-        for i in 0..n[0] {
-            cells.extend([
-                node(i, j),
-                node(i + 1, j),
-                node(i + 1, j + 1),
-                node(i, j + 1),
-            ]);
-        }
-    }
+    let (points, cells) = flat_grid(b, size, 0.2);
     let formed = points
         .iter()
         .map(|p| [p[0], p[1], TOP + up + f(p[0], p[1])])
@@ -474,7 +457,7 @@ fn a_zone_that_was_drawn_again_counts_in_its_largest_form_and_the_cost_of_all() 
 fn a_ply_that_stands_off_a_fillet_as_curved_as_the_tool_is_bridging_and_not_a_wrinkle() {
     // Half a cylinder of 10 mm radius; the ply 2 mm above it has 83 1/m, the threshold is 50 1/m.
     let arc = |r: f64, n: usize, columns: usize| {
-        let mut points: Vec<Vec3> = Vec::new();
+        let mut points = Vec::new();
         for j in 0..=n {
             for i in 0..=columns {
                 let a = PI * (1.0 - j as f64 / n as f64);

@@ -16,7 +16,7 @@ pub use closest::{Closest, Feature, Surface};
 pub use conformity::{NodalDistance, foot_height, nodal_distances, tool_crests};
 pub use curvature::{Curvature, curvatures};
 pub use distribution::{bin_width, density, weighted_mean, weighted_quantiles};
-pub use locate::{Location, QuadLocator};
+pub use locate::{Location, QuadLocator, flat_bounds};
 pub use ridge::{Ridge, ridge_line};
 pub use section::{line_length, plane_section};
 pub use topology::{Topology, triangles};

@@ -26,6 +26,24 @@ impl Location {
     }
 }
 
+/// `[x0, y0, x1, y1]` around places in the plane; from infinity to minus infinity when there is none.
+pub fn flat_bounds(places: impl IntoIterator<Item = [f64; 2]>) -> [f64; 4] {
+    let none = [
+        f64::INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    places.into_iter().fold(none, |b, p| {
+        [
+            b[0].min(p[0]),
+            b[1].min(p[1]),
+            b[2].max(p[0]),
+            b[3].max(p[1]),
+        ]
+    })
+}
+
 /// Finds cells of a quad mesh by x and y. Cells may be of any convex shape and of very different sizes
 /// (graded films).
 #[derive(Debug, Clone)]

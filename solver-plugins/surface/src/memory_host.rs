@@ -249,3 +249,27 @@ fn si(value: &Value, shape: &Shape) -> Value {
         _ => value.clone(),
     }
 }
+
+/// A flat mesh of squares with edges of about `size` (m) over a box `[x0, y0, x1, y1]` (m) at the height `z` (m), rows along x:
+/// points, and cells `[m * 4]`, counter-clockwise from above.
+pub fn flat_grid(b: [f64; 4], size: f64, z: f64) -> (Vec<Vec3>, Vec<u32>) {
+    let n = [0, 1].map(|d| ((b[d + 2] - b[d]) / size).round() as usize);
+    let (mut points, mut cells) = (Vec::new(), Vec::new());
+    for j in 0..=n[1] {
+        for i in 0..=n[0] {
+            points.push([b[0] + size * i as f64, b[1] + size * j as f64, z]);
+        }
+    }
+    let node = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
+    for j in 0..n[1] {
+        for i in 0..n[0] {
+            cells.extend([
+                node(i, j),
+                node(i + 1, j),
+                node(i + 1, j + 1),
+                node(i, j + 1),
+            ]);
+        }
+    }
+    (points, cells)
+}

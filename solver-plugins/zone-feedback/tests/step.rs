@@ -1,6 +1,6 @@
 //! The step on fine motions that are known.
 
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, flat_grid, run};
 use plyflow_surface::vector::Vec3;
 use plyflow_zone_feedback::ZoneFeedback;
 use serde_json::{Value, json};
@@ -21,23 +21,7 @@ fn motion(p: Vec3, t: f64, draw_in: f64) -> Vec3 {
 }
 
 fn formed(b: [f64; 4], size: f64, times: &[f64], draw_in: f64, zone: Value) -> MemoryArtifact {
-    let n = [0, 1].map(|d| ((b[d + 2] - b[d]) / size).round() as usize);
-    let mut points = Vec::new();
-    for j in 0..=n[1] {
-        for i in 0..=n[0] {
-            points.push([b[0] + size * i as f64, b[1] + size * j as f64, 0.1]);
-        }
-    }
-    let node = |i: usize, j: usize| (j * (n[0] + 1) + i) as u32;
-    let corners = |(i, j): (usize, usize)| {
-        [
-            node(i, j),
-            node(i + 1, j),
-            node(i + 1, j + 1),
-            node(i, j + 1),
-        ]
-    };
-    let cells = (0..n[1]).flat_map(|j| (0..n[0]).map(move |i| (i, j)));
+    let (points, cells) = flat_grid(b, size, 0.1);
     let at = |t: &f64| points.iter().map(|p| motion(*p, *t, draw_in)).collect();
     MemoryArtifact {
         kind: "forming".into(),
@@ -49,7 +33,7 @@ fn formed(b: [f64; 4], size: f64, times: &[f64], draw_in: f64, zone: Value) -> M
         bodies: vec![MemoryBody {
             name: "ply_1".into(),
             nodes_per_cell: 4,
-            cells: cells.flat_map(corners).collect(),
+            cells,
             frames: times.iter().map(at).collect(),
             points,
             ..Default::default()
