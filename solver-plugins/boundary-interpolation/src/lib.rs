@@ -8,7 +8,7 @@ pub use cut::Placed;
 pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
-use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
+use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
 use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::{Vec3, distance};
 use serde::Deserialize;
@@ -173,26 +173,8 @@ fn drive(
     let Some(grid) = grid else { return Ok(None) };
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
-    let (mut position, mut normal) = (Vec::new(), ply.then(Vec::new));
-    let (mut error, mut start) = (0.0f64, 0.0f64);
-    for frame in 0..meshes.times.len() {
-        let coarse = host.frame_points(input, body, frame)?;
-        let driven = fine.positions(&coarse);
-        error = error.max(fine.error(&driven, &coarse));
-        if frame == 0 {
-            let moved = |(&n, &d): (&u32, &Vec3)| distance(fine.points[n as usize], d);
-            start = fine
-                .driven_nodes
-                .iter()
-                .zip(&driven)
-                .map(moved)
-                .fold(0.0, f64::max);
-        }
-        position.extend(driven.into_iter().flatten());
-        if let Some(normal) = &mut normal {
-            normal.extend(fine.normals(&coarse, &cells).into_iter().flatten());
-        }
-    }
+    let motion = follow(host, input, meshes, body, &fine, ply.then_some(&cells))?;
+    let start = motion.start;
     if start > START_TOLERANCE {
         let name = &sheet.name;
         let text = format!(
@@ -205,10 +187,51 @@ fn drive(
         attributes: attributes.clone(),
         name: sheet.name,
         fine,
-        position,
-        normal,
-        error,
+        position: motion.position,
+        normal: motion.normal,
+        error: motion.error,
     }))
+}
+
+/// Where the coarse run leads a fine sheet's driven nodes.
+#[derive(Default)]
+struct Motion {
+    position: Vec<f64>,
+    normal: Option<Vec<f64>>,
+    /// Largest interpolation error (m).
+    error: f64,
+    /// Largest distance of the first frame from the undeformed mesh (m).
+    start: f64,
+}
+
+/// Follows the coarse sheet `body` through its frames; with its cells also its normals.
+fn follow(
+    host: &Host,
+    input: &Input,
+    meshes: &Meshes,
+    body: &BodyInfo,
+    fine: &Placed,
+    cells: Option<&Vec<u32>>,
+) -> Result<Motion, StepError> {
+    let mut motion = Motion {
+        normal: cells.map(|_| Vec::new()),
+        ..Motion::default()
+    };
+    for frame in 0..meshes.times.len() {
+        let coarse = host.frame_points(input, body, frame)?;
+        let driven = fine.positions(&coarse);
+        motion.error = motion.error.max(fine.error(&driven, &coarse));
+        if frame == 0 {
+            let moved = |(&n, &d): (&u32, &Vec3)| distance(fine.points[n as usize], d);
+            let nodes = fine.driven_nodes.iter().zip(&driven);
+            motion.start = nodes.map(moved).fold(0.0, f64::max);
+        }
+        motion.position.extend(driven.into_iter().flatten());
+        if let (Some(normal), Some(cells)) = (&mut motion.normal, cells) {
+            normal.extend(fine.normals(&coarse, cells).into_iter().flatten());
+        }
+    }
+    Ok(motion)
 }
 
 fn bounds(points: &[Vec3]) -> Rectangle {

@@ -123,12 +123,38 @@ impl Observer for Writer<'_> {
 /// # Errors
 /// Whatever stops it, as a text for the user.
 pub fn run(host: &Host) -> Result<(), StepError> {
-    let p: Parameters = host.parameters()?;
+    let mut p: Parameters = host.parameters()?;
+    if let Some(size) = advised_size(host)? {
+        host.log(
+            Log::Info,
+            &format!("element_size {:.3} mm, as advised", 1e3 * size),
+        );
+        p.element_size = size;
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(host.threads())
         .build()
         .map_err(|e| format!("starting {} threads: {e}", host.threads()))?;
     pool.install(|| form(host, &p))
+}
+
+/// The element size (m) that a mesh study advises, if there is one.
+fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
+    let studies = host.inputs_of("meshes")?;
+    let Some(study) = studies.first() else {
+        return Ok(None);
+    };
+    if !host.inputs_of("boundary")?.is_empty() {
+        return Err(
+            "`meshes` is for runs of a whole scene; the meshes of a zone come with its `boundary`"
+                .into(),
+        );
+    }
+    let attributes: serde_json::Value = host.attributes(study)?;
+    match attributes["advised_element_size"].as_f64() {
+        Some(size) if size > 0.0 => Ok(Some(size)),
+        _ => Err(format!("'{}' advises no element size", study.step).into()),
+    }
 }
 
 fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {

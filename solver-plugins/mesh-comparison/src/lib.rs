@@ -1,6 +1,6 @@
 //! Step plugin `mesh-comparison`: shear angles over the element size (thesis 5.5.1, mesh sensitivity).
 
-use plyflow_sdk::{Host, Input, Step, StepError, export_step};
+use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
 use plyflow_surface::{Topology, weighted_quantiles};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -9,6 +9,11 @@ use serde_json::{Value, json};
 pub struct MeshComparison;
 
 export_step!(MeshComparison);
+
+#[derive(Deserialize)]
+struct Parameters {
+    target_error: f64,
+}
 
 #[derive(Deserialize)]
 struct Formed {
@@ -46,6 +51,7 @@ impl Step for MeshComparison {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
+        let p: Parameters = host.parameters()?;
         let mut runs = Vec::new();
         for input in host.inputs_of("runs")? {
             host.check_cancelled()?;
@@ -68,7 +74,7 @@ impl Step for MeshComparison {
             )
             .into());
         }
-        write(host, &runs, finest)
+        write(host, &runs, finest, p.target_error)
     }
 }
 
@@ -121,7 +127,70 @@ fn slope(places: &[(f64, f64)]) -> Option<f64> {
     (logs.len() > 1 && spread > 0.0).then(|| both / spread)
 }
 
-fn write(host: &Host, runs: &[Run], finest: &Run) -> Result<(), StepError> {
+/// An element size for a target error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Advice {
+    /// (m).
+    pub size: f64,
+    /// Why it should not be trusted much.
+    pub doubt: Option<String>,
+}
+
+/// The largest element size whose error is at most `target`, from `measured` sizes (m) and errors, the finest first (its
+/// own error against itself is 0 and says nothing).
+///
+/// Errors are taken to grow as a power of the size between two runs (Richardson); one that is smaller than that of a finer
+/// run is raised to it, as it is so by chance. Below the finest pair the power goes on as 1, the least that a converging
+/// element has: so the advice is on the safe side. It is never coarser than the coarsest run.
+///
+/// # Panics
+/// When `measured` holds fewer than two runs.
+pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
+    let mut worst = 0.0f64;
+    let rising: Vec<(f64, f64)> = (measured[1..].iter())
+        .map(|&(size, error)| {
+            worst = worst.max(error);
+            (size, worst)
+        })
+        .collect();
+    let (finest, first) = (measured[0].0, rising[0]);
+    if first.1 > target {
+        let size = first.0 * target / first.1;
+        let doubt = (size < finest).then(|| {
+            format!(
+                "an error of {target} asks for elements finer ({:.3} mm) than those of any run; run one of about that size to see",
+                1e3 * size
+            )
+        });
+        return Advice { size, doubt };
+    }
+    for pair in rising.windows(2) {
+        let [(h0, e0), (h1, e1)] = [pair[0], pair[1]];
+        if e1 <= target {
+            continue;
+        }
+        let share = if e0 > 0.0 {
+            (target / e0).ln() / (e1 / e0).ln()
+        } else {
+            0.0
+        };
+        return Advice {
+            size: h0 * (h1 / h0).powf(share),
+            doubt: None,
+        };
+    }
+    let size = rising[rising.len() - 1].0;
+    let doubt = format!(
+        "even the coarsest run ({:.3} mm) has an error below {target}; a coarser one may do",
+        1e3 * size
+    );
+    Advice {
+        size,
+        doubt: Some(doubt),
+    }
+}
+
+fn write(host: &Host, runs: &[Run], finest: &Run, target: f64) -> Result<(), StepError> {
     let mut rows = Vec::new();
     let mut falling = Vec::new();
     for run in runs {
@@ -148,6 +217,14 @@ fn write(host: &Host, runs: &[Run], finest: &Run) -> Result<(), StepError> {
         host.result("extreme_order", order, "1")?;
     }
     let sizes: Vec<f64> = runs.iter().map(|r| r.element_size).collect();
+    let measured: Vec<(f64, f64)> = (runs.iter().rev())
+        .map(|r| (r.element_size, error(r, finest, &QUARTILES)))
+        .collect();
+    let advice = advise(&measured, target);
+    host.result("advised_element_size", advice.size, "m")?;
+    if let Some(text) = advice.doubt {
+        host.log(Log::Warn, &text);
+    }
     host.write_f64("study/element_size", &[runs.len()], "m", &sizes)?;
     let mut series = Vec::new();
     for (k, (name, title, _)) in TOLD.iter().enumerate() {
@@ -164,6 +241,8 @@ fn write(host: &Host, runs: &[Run], finest: &Run) -> Result<(), StepError> {
         .collect();
     host.write_attributes(&json!({
         "finest": finest.input.step,
+        "target_error": target,
+        "advised_element_size": advice.size,
         "tables": [{"name": "meshes", "title": "Shear angles over the element size", "columns": columns, "rows": rows}],
         "plots": [{"name": "shear", "title": "Shear angles over the element size",
                    "x": {"label": "element size", "unit": "mm"}, "y": {"label": "shear angle", "unit": "deg"}, "series": series}],

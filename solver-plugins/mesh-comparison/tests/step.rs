@@ -1,6 +1,6 @@
 //! Runs whose shear angles are known.
 
-use plyflow_mesh_comparison::MeshComparison;
+use plyflow_mesh_comparison::{MeshComparison, advise};
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::json;
@@ -97,4 +97,49 @@ fn one_run_and_two_of_the_finest_size_are_refused() {
     assert!(error.contains("two or more"), "{error}");
     let error = compare(&[strip(10, |x| x), strip(20, |x| x), strip(20, |x| x)]).unwrap_err();
     assert!(error.contains("leave one out"), "{error}");
+}
+
+#[test]
+fn advised_sizes_keep_the_target_by_the_power_law_of_the_errors() {
+    // e = 0.01 (h / 1 mm)^2 / 100, and the finest against itself.
+    let law = |h: f64| 1e4 * h * h;
+    let runs: Vec<(f64, f64)> = [0.001, 0.002, 0.004, 0.008]
+        .map(|h| (h, if h == 0.001 { 0.0 } else { law(h) }))
+        .to_vec();
+    for target in [0.05, 0.1, 0.3, 0.6] {
+        let advice = advise(&runs, target);
+        assert!(
+            (law(advice.size) / target - 1.0).abs() < 1e-9,
+            "{target}: {advice:?}"
+        );
+        assert_eq!(advice.doubt, None);
+    }
+    // Below the finest pair the error is taken to fall in proportion, which is on the safe side of its square.
+    let advice = advise(&runs, 0.03);
+    assert!((advice.size - 0.0015).abs() < 1e-12 && law(advice.size) < 0.03);
+    let doubt = advise(&runs, 0.01).doubt.unwrap();
+    assert!(doubt.contains("0.500 mm"), "{doubt}");
+    // Never coarser than what was run.
+    let advice = advise(&runs, 0.9);
+    assert_eq!(advice.size, 0.008);
+    assert!(advice.doubt.unwrap().contains("coarser one may do"));
+    // An error that is small by chance does not hide that of a finer run.
+    let chance = [(0.001, 0.0), (0.002, 0.2), (0.004, 0.01), (0.008, 0.5)];
+    let size = advise(&chance, 0.1).size;
+    assert!((size - 0.001).abs() < 1e-12, "{size}");
+    let size = advise(&chance, 0.3).size;
+    assert!(size > 0.004 && size < 0.008, "{size}");
+}
+
+#[test]
+fn the_artifact_holds_the_advice() {
+    let runs = [
+        strip(4, |x| 0.4 * x),
+        strip(8, |x| 0.4 * x),
+        strip(16, |x| 0.4 * x),
+    ];
+    let out = compare(&runs).unwrap();
+    let size = out.result("advised_element_size");
+    assert!(size > 0.0 && out.attributes["advised_element_size"] == size);
+    assert_eq!(out.attributes["target_error"], 0.1);
 }
