@@ -40,7 +40,7 @@ use view::Sharpness;
 const LARGEST: usize = 4_500_000;
 
 /// Resolutions of the pictures that are tried, the finest first.
-const SHARPNESS: [f64; 4] = [1.6, 1.2, 0.8, 0.5];
+const SHARPNESS: [f64; 6] = [1.6, 1.2, 0.8, 0.5, 0.35, 0.25];
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]

@@ -22,7 +22,7 @@ pub(super) fn line(places: &[Place]) -> Vec<Vec<[f64; 2]>> {
         if all.is_empty() {
             continue;
         }
-        let kept = by_columns(&all);
+        let kept = simplified(&by_columns(&all));
         runs.push(if kept.len() > MOST {
             by_stretches(&kept, MOST / 6)
         } else {
@@ -66,6 +66,41 @@ fn by_columns(all: &[[f64; 2]]) -> Vec<[f64; 2]> {
         kept.extend(ends.into_iter().map(|i| group[i]));
     }
     kept
+}
+
+/// Farthest that a line may lie from one of its places that is left out (px).
+const UNSEEN: f64 = 0.15;
+
+/// A line without the places that lie on the chords between others (Ramer 1972; Douglas and Peucker 1973).
+fn simplified(all: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut kept = vec![false; all.len()];
+    let Some(last) = all.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    (kept[0], kept[last]) = (true, true);
+    let mut open = vec![(0, last)];
+    while let Some((a, b)) = open.pop() {
+        let between = (a + 1..b).map(|i| (i, apart(all[i], all[a], all[b])));
+        let farthest = between.reduce(|x, y| if y.1 > x.1 { y } else { x });
+        if let Some((i, _)) = farthest.filter(|f| f.1 > UNSEEN) {
+            kept[i] = true;
+            open.extend([(a, i), (i, b)]);
+        }
+    }
+    let places = all.iter().zip(kept).filter(|(_, kept)| *kept);
+    places.map(|(p, _)| *p).collect()
+}
+
+/// Distance of a place from the stretch between two others.
+fn apart(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (u, v) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let square = u[0] * u[0] + u[1] * u[1];
+    let along = if square > 0.0 {
+        ((u[0] * v[0] + u[1] * v[1]) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (v[0] - along * u[0]).hypot(v[1] - along * u[1])
 }
 
 /// Of each of `count` stretches both ends and what lies farthest out.
@@ -144,6 +179,47 @@ mod tests {
             .map(|i| (i % 2 == 0).then_some([i as f64 * 5e-3, (i % 7) as f64]))
             .collect();
         assert!(line(&broken).iter().map(Vec::len).sum::<usize>() <= MOST);
+    }
+
+    #[test]
+    fn places_on_a_chord_are_left_out_and_the_line_stays_within_a_seventh_of_a_pixel() {
+        let all: Vec<[f64; 2]> = (0..=4000)
+            .map(|i| {
+                let x = 0.125 * f64::from(i);
+                [
+                    x,
+                    if x < 250.0 {
+                        100.0
+                    } else {
+                        100.0 + 60.0 * (0.05 * (x - 250.0)).sin()
+                    },
+                ]
+            })
+            .collect();
+        let places: Vec<Place> = all.iter().copied().map(Some).collect();
+        let runs = line(&places);
+        let kept = &runs[0];
+        assert!(
+            kept.len() < 120 && (kept[0], kept[kept.len() - 1]) == (all[0], all[4000]),
+            "{}",
+            kept.len()
+        );
+        for p in &all {
+            let near = kept
+                .windows(2)
+                .map(|w| apart(*p, w[0], w[1]))
+                .fold(f64::INFINITY, f64::min);
+            // Columns drop places between their lowest and highest.
+            assert!(near < 0.5, "{p:?}: {near} px");
+        }
+        let simple = simplified(&all);
+        let worst = all.iter().map(|p| {
+            simple
+                .windows(2)
+                .map(|w| apart(*p, w[0], w[1]))
+                .fold(f64::INFINITY, f64::min)
+        });
+        assert!(worst.fold(0.0, f64::max) <= UNSEEN);
     }
 
     #[test]
