@@ -144,14 +144,26 @@ pub fn write(
     Ok(())
 }
 
-/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need.
+/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need: bridging down to a smaller area,
+/// and ridges that are too short for a wrinkle. Those come besides what is measured there as bridging, so that what a place
+/// is does not hang on them.
 fn everywhere(models: &[&Model], settings: &Settings) -> Vec<(String, Vec<Defect>)> {
-    let lower = Settings {
-        minimum_wrinkle_length: PAIRED_DOWN_TO * settings.minimum_wrinkle_length,
+    let smaller = Settings {
         minimum_bridging_area: PAIRED_DOWN_TO * settings.minimum_bridging_area,
         ..*settings
     };
-    let all = |p: &Ply| measure(p, &vec![true; p.formed.len()], &lower);
+    let shorter = Settings {
+        minimum_wrinkle_length: PAIRED_DOWN_TO * settings.minimum_wrinkle_length,
+        ..*settings
+    };
+    let all = |p: &Ply| {
+        let inside = vec![true; p.formed.len()];
+        let mut found = measure(p, &inside, &smaller);
+        let short =
+            |d: &Defect| d.kind == Kind::Wrinkle && d.length < settings.minimum_wrinkle_length;
+        found.extend(measure(p, &inside, &shorter).into_iter().filter(short));
+        found
+    };
     (models.iter().flat_map(|m| &m.plies))
         .map(|p| (p.name.clone(), all(p)))
         .collect()

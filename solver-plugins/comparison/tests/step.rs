@@ -517,6 +517,44 @@ fn a_ply_that_stands_off_a_fillet_as_curved_as_the_tool_is_bridging_and_not_a_wr
 }
 
 #[test]
+fn a_ridge_too_short_for_a_wrinkle_is_bridging_beside_a_reference_too() {
+    // A bump 2.5 mm high whose crest is about 8 mm long where it stands off by more than 1 mm.
+    let bump = |x: f64, y: f64| {
+        let (along, across) = (x / 0.010, y / 0.012);
+        if along.abs() < 0.5 && across.abs() < 0.5 {
+            0.0025 * (PI * along).cos() * 0.5 * (1.0 + (2.0 * PI * across).cos())
+        } else {
+            0.0
+        }
+    };
+    let zones = zones(json!([zone_a()]));
+    let same = |b, zone| formed(vec![ply("ply_1", b, 0.00125, OFFSET, bump)], 0.00125, zone);
+    let (global, local) = (global(), same(ZONE, zone_a()));
+    let reference = same([-0.12, -0.08, 0.12, 0.08], Value::Null);
+    let inputs = [
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        MemoryInput::new("reference", &reference),
+    ];
+    let out = run::<Comparison>(json!({"minimum_bridging_area": 20e-6}), &inputs, &[]).unwrap();
+    assert_eq!(
+        (out.result("wrinkle_count"), out.result("bridging_count")),
+        (0.0, 1.0)
+    );
+    for name in [
+        "missed_wrinkles",
+        "false_wrinkles",
+        "missed_bridging",
+        "false_bridging",
+    ] {
+        assert_eq!(out.result(name), 0.0, "{name}");
+    }
+    assert!(out.result("bridging_area_error") < 0.1);
+    assert_eq!(out.result("missed_bridging.global"), 1.0);
+}
+
+#[test]
 fn runs_of_earlier_passes_are_not_measured_but_paid_for() {
     let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
     let cost = |port, artifact, seconds: f64| MemoryInput {

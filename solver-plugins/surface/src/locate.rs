@@ -26,7 +26,7 @@ impl Location {
     }
 }
 
-/// `[x0, y0, x1, y1]` around places in the plane; from infinity to minus infinity when there is none.
+/// `[x0, y0, x1, y1]` around places in the plane, in their unit; from infinity to minus infinity when there is none.
 pub fn flat_bounds(places: impl IntoIterator<Item = [f64; 2]>) -> [f64; 4] {
     let none = [
         f64::INFINITY,

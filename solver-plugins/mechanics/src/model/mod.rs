@@ -5,6 +5,7 @@ mod archive;
 mod batch;
 mod blocks;
 mod build;
+mod drive;
 mod mirror;
 mod query;
 mod rotation;

@@ -1,0 +1,45 @@
+//! Several drives of one model.
+
+use super::*;
+
+impl Model {
+    /// Drives further nodes, which no drive has yet, besides those that are driven already.
+    pub fn drive_also(&mut self, nodes: Vec<u32>, drive: Box<dyn Drive>) {
+        let mut all = std::mem::take(&mut self.driven);
+        let first = all.len();
+        all.extend(nodes);
+        let drive: Box<dyn Drive> = match self.drive.take() {
+            None => drive,
+            Some(old) => Box::new(Both {
+                old,
+                first,
+                new: drive,
+            }),
+        };
+        self.set_driven(all, drive);
+    }
+}
+
+/// Two drives, of nodes that lie one after the other.
+struct Both {
+    old: Box<dyn Drive>,
+    /// How many nodes the old one has.
+    first: usize,
+    new: Box<dyn Drive>,
+}
+
+impl Drive for Both {
+    fn position(&self, k: usize, t: f64) -> V {
+        match k.checked_sub(self.first) {
+            None => self.old.position(k, t),
+            Some(k) => self.new.position(k, t),
+        }
+    }
+
+    fn spin(&self, k: usize, t: f64) -> Option<V> {
+        match k.checked_sub(self.first) {
+            None => self.old.spin(k, t),
+            Some(k) => self.new.spin(k, t),
+        }
+    }
+}
