@@ -2,19 +2,23 @@
 
 use crate::input::{Instance, ReportInput};
 
-/// A way to the answer: the coarse run alone, fine runs of its zones, or the reference.
+/// A way to the answer: the coarse run alone, another run of the whole, fine runs of its zones, or the reference.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Way {
     pub(crate) name: String,
     /// CPU and wall time (s).
     pub(crate) cpu: f64,
     pub(crate) wall: f64,
+    /// Peak memory of its largest run (bytes).
+    pub(crate) memory: Option<f64>,
     /// CPU time over that of the reference.
     pub(crate) share: f64,
     /// Mean error of the reference's defects, a missed one counting as 1; see `comparison`.
     pub(crate) error: f64,
     /// Mean errors of length, amplitude and bridging area; absent when nothing was there to compare.
     pub(crate) errors: [Option<f64>; 3],
+    /// Errors of position and distance from the tool (m) and of the quantiles of the shear angle (rad).
+    pub(crate) fields: [Option<f64>; 3],
     /// Missed and false wrinkles, missed and false bridging; absent for the reference.
     pub(crate) counts: Option<[f64; 4]>,
     pub(crate) is_reference: bool,
@@ -28,6 +32,7 @@ const ERRORS: [&str; 3] = [
     "wrinkle_amplitude_error",
     "bridging_area_error",
 ];
+const FIELDS: [&str; 3] = ["position_error", "distance_error", "shear_quantile_error"];
 const COUNTS: [&str; 4] = [
     "missed_wrinkles",
     "false_wrinkles",
@@ -35,40 +40,81 @@ const COUNTS: [&str; 4] = [
     "false_bridging",
 ];
 
-/// The ways of all comparisons with a reference, the cheapest first; one of equal cost and error is told once.
-pub(crate) fn ways(input: &ReportInput) -> Vec<Way> {
-    let compared = input
-        .instances
-        .iter()
-        .filter(|i| i.record.kind == "comparison");
-    let mut all: Vec<Way> = compared.flat_map(of).collect();
-    all.sort_by(|a, b| a.cpu.total_cmp(&b.cpu).then(a.error.total_cmp(&b.error)));
-    all.dedup_by(|a, b| a.cpu == b.cpu && a.error == b.error);
+/// The ways of a study.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Ways {
+    /// The cheapest first.
+    pub(crate) list: Vec<Way>,
+    /// Whether a run of the whole measures them; else the fine runs of the zones do, in these.
+    pub(crate) of_the_whole: bool,
+}
+
+impl Ways {
+    /// What measures them.
+    pub(crate) fn yardstick(&self) -> &'static str {
+        if self.of_the_whole {
+            "reference"
+        } else {
+            "coarse run and zones"
+        }
+    }
+}
+
+/// The ways of all comparisons with a reference; one of equal cost and error is told once. Where there is none, those of the comparison
+/// whose fine runs cost most.
+pub(crate) fn ways(input: &ReportInput) -> Ways {
+    let compared = (input.instances.iter()).filter(|i| i.record.kind == "comparison");
+    let has = |i: &&Instance| value(i, "cost.reference.cpu_seconds").is_some_and(|w| w > 0.0);
+    let mut with: Vec<&Instance> = compared.clone().filter(has).collect();
+    let of_the_whole = !with.is_empty();
+    if !of_the_whole {
+        let total = |i: &Instance| value(i, TOTAL).unwrap_or(0.0);
+        let refined = compared.filter(|i| value(i, "defect_error.global").is_some());
+        with.extend(refined.max_by(|a, b| total(a).total_cmp(&total(b))));
+    }
+    let named = with.len() > 1;
+    let mut list: Vec<Way> = with.into_iter().flat_map(|i| of(i, named)).collect();
+    list.sort_by(|a, b| a.cpu.total_cmp(&b.cpu).then(a.error.total_cmp(&b.error)));
+    list.dedup_by(|a, b| a.cpu == b.cpu && a.error == b.error);
     let mut least = f64::INFINITY;
-    for way in &mut all {
+    for way in &mut list {
         way.on_front = way.error < least;
         least = least.min(way.error);
     }
-    all
+    Ways { list, of_the_whole }
 }
 
-/// The ways of one comparison; none without a reference.
-fn of(instance: &Instance) -> Vec<Way> {
-    let value = |name: &str| {
-        let mut results = instance.record.results.iter();
-        results.find(|r| r.name == name).map(|r| r.value)
-    };
-    let Some(whole) = value("cost.reference.cpu_seconds").filter(|w| *w > 0.0) else {
+const TOTAL: &str = "cost.total.cpu_seconds";
+
+fn value(instance: &Instance, name: &str) -> Option<f64> {
+    let mut results = instance.record.results.iter();
+    results.find(|r| r.name == name).map(|r| r.value)
+}
+
+/// The ways of one comparison, `named` after it or not.
+fn of(instance: &Instance, named: bool) -> Vec<Way> {
+    let value = |name: &str| value(instance, name);
+    let reference = value("cost.reference.cpu_seconds");
+    let Some(whole) = reference.or(value(TOTAL)).filter(|w| *w > 0.0) else {
         return Vec::new();
     };
-    let label = instance.label();
-    let way = |name: String, cost: &str, suffix: Option<&str>| {
-        let cpu = value(&format!("cost.{cost}.cpu_seconds"))?;
+    let label = |what: &str| {
+        if named {
+            format!("{}: {what}", instance.label())
+        } else {
+            what.to_owned()
+        }
+    };
+    // No suffix: the reference.
+    let way = |name: String, model: &str, suffix: Option<&str>| {
+        let cpu = value(&format!("cost.{model}.cpu_seconds"))?;
         let measured = |name: &str| value(&format!("{name}{}", suffix?));
+        let counts = COUNTS.map(measured);
         Some(Way {
             name,
             cpu,
-            wall: value(&format!("cost.{cost}.wall_seconds"))?,
+            wall: value(&format!("cost.{model}.wall_seconds"))?,
+            memory: value(&format!("peak_memory.{model}")),
             share: cpu / whole,
             error: if suffix.is_some() {
                 measured("defect_error")?
@@ -76,42 +122,48 @@ fn of(instance: &Instance) -> Vec<Way> {
                 0.0
             },
             errors: ERRORS.map(measured),
-            counts: suffix.and_then(|_| {
-                let counts = COUNTS.map(measured);
-                counts
-                    .iter()
-                    .all(Option::is_some)
-                    .then(|| counts.map(Option::unwrap_or_default))
-            }),
+            fields: FIELDS.map(measured),
+            counts: (counts.iter().all(Option::is_some))
+                .then(|| counts.map(Option::unwrap_or_default)),
             is_reference: suffix.is_none(),
             on_front: false,
         })
     };
-    let ways = [
-        way(
-            format!("{label}: coarse run alone"),
-            "global",
-            Some(".global"),
-        ),
-        way(format!("{label}: coarse run and zones"), "total", Some("")),
-        way("reference".to_owned(), "reference", None),
-    ];
+    let mut ways = vec![way(label("coarse run alone"), "global", Some(".global"))];
+    for result in &instance.record.results {
+        let other = result.name.strip_prefix("cost.other.");
+        if let Some(step) = other.and_then(|r| r.strip_suffix(".cpu_seconds")) {
+            let model = format!("other.{step}");
+            ways.push(way(label(step), &model, Some(&format!(".{model}"))));
+        }
+    }
+    let both = label("coarse run and zones");
+    if reference.is_some() {
+        ways.push(way(both, "total", Some("")));
+        ways.push(way("reference".to_owned(), "reference", None));
+    } else {
+        ways.push(way(both, "total", None));
+    }
     ways.into_iter().flatten().collect()
 }
 
 /// For each of the errors: the cheapest way with no more, if it is not the reference alone.
-pub(crate) fn advice(ways: &[Way], targets: &[f64]) -> Vec<String> {
+pub(crate) fn advice(ways: &Ways, targets: &[f64]) -> Vec<String> {
     let one = |target: &f64| {
         let percent = 100.0 * target;
-        let found = ways.iter().find(|w| w.error <= *target)?;
+        let found = ways.list.iter().find(|w| w.error <= *target)?;
         let share = 100.0 * found.share;
         Some(if !found.is_reference {
             format!(
-                "For an error of {percent:.0} % or less: {} ({share:.1} % of the reference's CPU time).",
-                found.name
+                "For an error of {percent:.0} % or less: {} ({share:.1} % of the CPU time of the {}).",
+                found.name,
+                ways.yardstick()
             )
         } else {
-            format!("For an error of {percent:.0} % or less there is none but the reference.")
+            format!(
+                "For an error of {percent:.0} % or less there is none but the {}.",
+                ways.yardstick()
+            )
         })
     };
     targets.iter().filter_map(one).collect()
@@ -192,7 +244,9 @@ mod tests {
             comparison("without", &[("cost.global.cpu_seconds", 1.0)]),
         ]);
         let ways = ways(&input);
-        let told: Vec<(&str, bool)> = ways.iter().map(|w| (w.name.as_str(), w.on_front)).collect();
+        assert!(ways.of_the_whole);
+        let list = &ways.list;
+        let told: Vec<(&str, bool)> = list.iter().map(|w| (w.name.as_str(), w.on_front)).collect();
         assert_eq!(
             told,
             [
@@ -204,7 +258,7 @@ mod tests {
             ]
         );
         assert_eq!(
-            (ways[2].share, ways[2].errors),
+            (list[2].share, list[2].errors),
             (0.1, [Some(0.03), None, None])
         );
         let advice = advice(&ways, &[0.1, 0.05, 0.01]);
@@ -217,5 +271,49 @@ mod tests {
             "{advice:?}"
         );
         assert!(advice[2].contains("none but the reference"), "{advice:?}");
+    }
+    #[test]
+    fn without_a_reference_the_dearest_zones_measure_the_others() {
+        let run = |total: f64, drape: f64| {
+            vec![
+                ("cost.global.cpu_seconds", 10.0),
+                ("cost.global.wall_seconds", 10.0),
+                ("cost.other.drape.cpu_seconds", 1.0),
+                ("cost.other.drape.wall_seconds", 1.0),
+                ("peak_memory.other.drape", 5e6),
+                (TOTAL, total),
+                ("cost.total.wall_seconds", total),
+                ("defect_error.global", 0.8),
+                ("defect_error.other.drape", drape),
+                ("position_error.other.drape", 0.002),
+            ]
+        };
+        let ways = ways(&input(vec![
+            comparison("first", &run(50.0, 0.7)),
+            comparison("grown", &run(80.0, 0.9)),
+        ]));
+        assert!(!ways.of_the_whole);
+        let list = &ways.list;
+        let told: Vec<(&str, f64)> = list.iter().map(|w| (w.name.as_str(), w.error)).collect();
+        assert_eq!(
+            told,
+            [
+                ("drape", 0.9),
+                ("coarse run alone", 0.8),
+                ("coarse run and zones", 0.0),
+            ]
+        );
+        assert_eq!((list[0].share, list[0].memory), (1.0 / 80.0, Some(5e6)));
+        assert_eq!(list[0].fields, [Some(0.002), None, None]);
+        let advice = advice(&ways, &[0.85, 0.1]);
+        assert!(
+            advice[0]
+                .contains("coarse run alone (12.5 % of the CPU time of the coarse run and zones)"),
+            "{advice:?}"
+        );
+        assert!(
+            advice[1].contains("none but the coarse run and zones"),
+            "{advice:?}"
+        );
     }
 }

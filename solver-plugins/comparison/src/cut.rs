@@ -1,5 +1,6 @@
 //! The cut between coarse and fine: the work that passes through it in either run, and how far its influence reaches into a zone.
 
+use crate::fields::distance_at;
 use crate::models::{Model, Role, Zone};
 use plyflow_defects::Ply;
 use plyflow_sdk::{BodyInfo, Host, Meshes, StepError};
@@ -341,11 +342,8 @@ pub fn strips(local: &Model, reference: &Model, zone: &Zone, width: f64) -> Vec<
             let sum = &mut sums[k];
             sum.position += distance(ply.formed[i], place.interpolate(&other.formed)).powi(2);
             sum.nodes += 1;
-            let nodes = place.nodes.map(|n| other.distance[n as usize]);
-            if ply.distance[i].judged && nodes.iter().all(|n| n.judged) {
-                let theirs: f64 = (nodes.iter().zip(place.weights))
-                    .map(|(n, w)| w * n.value)
-                    .sum();
+            let judged = ply.distance[i].judged;
+            if let Some(theirs) = distance_at(other, &place).filter(|_| judged) {
                 sum.standing_off += (ply.distance[i].value - theirs).powi(2);
                 sum.judged += 1;
             }

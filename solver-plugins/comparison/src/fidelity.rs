@@ -1,10 +1,11 @@
-//! How far a model is from the reference: the coarse run by itself, and the fine runs of the zones.
+//! How far the ways to the answer are from the reference: the fine runs of the zones, the coarse run by itself, and others.
 
-use crate::QUANTILES;
+use crate::fields::FieldErrors;
 use crate::models::{Model, Role, Zone};
 use crate::table::{apart, same_within, unlike};
-use plyflow_defects::{Defect, Kind, Ply, Settings, measure, quantiles};
+use plyflow_defects::{Defect, Kind, Ply, Settings, measure};
 use plyflow_sdk::{Host, StepError};
+use serde::Serialize;
 
 /// A defect and the name of its ply.
 type Found<'a> = (&'a str, &'a Defect);
@@ -109,36 +110,74 @@ impl Fidelity {
     }
 }
 
-/// Writes how the local runs together, and the global run by itself, stand beside the reference, all of
-/// whose defects count, wherever they are; and by model how far its shear angles are from the reference's.
+/// What the ways to the answer are measured by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Yardstick {
+    /// A fine run of the whole scene.
+    Reference,
+    /// Without one: the fine runs of the zones, in these.
+    Zones,
+}
+
+impl Yardstick {
+    /// The one that there is; `None` when nothing was refined.
+    pub fn of(models: &[Model]) -> Option<Self> {
+        let has = |role| models.iter().any(|m| m.role == role);
+        if has(Role::Reference) {
+            Some(Self::Reference)
+        } else {
+            has(Role::Local).then_some(Self::Zones)
+        }
+    }
+}
+
+/// Writes how far every way to the answer is from the reference: the local runs together (with the global run around them), the
+/// global run by itself, and every other run. All defects of the reference count, wherever they are. Without a reference the
+/// local runs stand in for it, and what lies outside of their zones does not count.
 pub fn write(
     host: &Host,
     models: &[Model],
     zones: &[Zone],
     settings: &Settings,
 ) -> Result<(), StepError> {
-    let Some(reference) = models.iter().find(|m| m.role == Role::Reference) else {
+    let Some(yardstick) = Yardstick::of(models) else {
         return Ok(());
     };
-    let theirs = everywhere(&[reference], settings);
+    let of = |role| -> Vec<&Model> { models.iter().filter(|m| m.role == role).collect() };
+    let (global, local) = (of(Role::Global), of(Role::Local));
+    let reference = match yardstick {
+        Yardstick::Reference => of(Role::Reference),
+        Yardstick::Zones => local.clone(),
+    };
+    let theirs = everywhere(&reference, settings);
     let theirs = named(&theirs);
-    for (role, suffix) in [(Role::Local, ""), (Role::Global, ".global")] {
-        let models: Vec<&Model> = models.iter().filter(|m| m.role == role).collect();
-        let ours = everywhere(&models, settings);
-        Fidelity::of(&named(&ours), &theirs, settings).write(host, suffix)?;
+    let counts =
+        |d: &Defect| yardstick == Yardstick::Reference || zones.iter().any(|z| z.holds(&d.centre));
+    // By suffix: whose defects count, and whose fields, the first that has a place.
+    let mut ways = vec![(".global".to_owned(), global.clone(), global.clone())];
+    for m in of(Role::Other) {
+        ways.push((format!(".{}", m.name), vec![m], vec![m]));
     }
-    for model in models.iter().filter(|m| m.role != Role::Reference) {
-        let within = model.zone.map(|z| zones[z].bounds);
-        let errors = model.plies.iter().filter_map(|p| {
-            let other = reference.plies.iter().find(|r| r.name == p.name)?;
-            shear_error(p, other, within)
-        });
-        if let Some(worst) = errors.reduce(f64::max) {
-            host.result(
-                &format!("shear_quantile_error.{}", model.name),
-                worst,
-                "rad",
-            )?;
+    if yardstick == Yardstick::Reference {
+        let both = local.iter().chain(&global).copied().collect();
+        ways.push((String::new(), local.clone(), both));
+    }
+    for (suffix, models, around) in ways {
+        host.check_cancelled()?;
+        let ours = everywhere(&models, settings);
+        let mut ours = named(&ours);
+        ours.retain(|(_, d)| counts(d));
+        Fidelity::of(&ours, &theirs, settings).write(host, &suffix)?;
+        if let Some(errors) = FieldErrors::of(&around, &reference) {
+            errors.write(host, &suffix)?;
+        }
+    }
+    if yardstick == Yardstick::Reference {
+        for m in local {
+            if let Some(errors) = FieldErrors::of(&[m], &reference) {
+                errors.write(host, &format!(".{}", m.name))?;
+            }
         }
     }
     Ok(())
@@ -174,34 +213,4 @@ fn named(found: &[(String, Vec<Defect>)]) -> Vec<Found<'_>> {
         .iter()
         .flat_map(|(ply, defects)| defects.iter().map(move |d| (ply.as_str(), d)))
         .collect()
-}
-
-/// Largest difference of the quantiles of two plies' shear angles (rad), of the second within a box (m) of the flat ply.
-fn shear_error(ours: &Ply, theirs: &Ply, within: Option<[f64; 4]>) -> Option<f64> {
-    let inside = |c: &usize| {
-        let corners = theirs.topology.cell(*c);
-        let centre = |d: usize| {
-            let sum: f64 = corners
-                .iter()
-                .map(|&i| theirs.undeformed[i as usize][d])
-                .sum();
-            sum / corners.len() as f64
-        };
-        within.is_none_or(|b| (0..2).all(|d| (b[d]..=b[d + 2]).contains(&centre(d))))
-    };
-    let angles: Vec<f64> = (0..theirs.topology.cells())
-        .filter(inside)
-        .map(|c| theirs.shear_angle[c])
-        .collect();
-    if angles.is_empty() || ours.shear_angle.is_empty() {
-        return None;
-    }
-    let (a, b) = (
-        quantiles(&ours.shear_angle, &QUANTILES),
-        quantiles(&angles, &QUANTILES),
-    );
-    a.iter()
-        .zip(&b)
-        .map(|(a, b)| (a - b).abs())
-        .reduce(f64::max)
 }

@@ -3,17 +3,18 @@
 
 mod cut;
 mod fidelity;
+mod fields;
 mod models;
 mod table;
 
 pub use cut::{Layer, Passage, Strip, Work, traction};
-pub use fidelity::Fidelity;
+pub use fidelity::{Fidelity, Yardstick};
+pub use fields::FieldErrors;
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
 use plyflow_defects::{Kind, Ply, Settings, quantiles};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
-use plyflow_surface::QuadLocator;
 use serde_json::{Value, json};
 
 /// The step.
@@ -61,7 +62,7 @@ impl Step for Comparison {
         write_attributes(host, &models, &zones, &table, &cut)?;
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
-        write_reference_errors(host, &models, &table)?;
+        write_reference_defects(host, &models, &table)?;
         fidelity::write(host, &models, &zones, &settings)?;
         cut::write(host, &passages, &layers, &zones)?;
         write_costs(host, &models, &passed_over)
@@ -93,6 +94,7 @@ fn write_attributes(
     host.write_attributes(&json!({
         "zones": zones.iter().map(|z| &z.name).collect::<Vec<_>>(),
         "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES, "cut": cut,
+        "measured_by": Yardstick::of(models),
     }))
 }
 
@@ -184,7 +186,8 @@ fn write_results(
     host.result("zone_count", zones.len() as f64, "1")?;
     host.result("wrinkle_count", count(Kind::Wrinkle), "1")?;
     host.result("bridging_count", count(Kind::Bridging), "1")?;
-    let angles = (models.iter().filter(|m| m.role != Role::Reference))
+    let angles = (models.iter())
+        .filter(|m| matches!(m.role, Role::Global | Role::Local))
         .flat_map(|m| m.plies.iter().flat_map(|p| p.shear_angle.iter().copied()));
     let [min, max] = range(&angles.collect::<Vec<_>>());
     if min <= max {
@@ -209,12 +212,12 @@ fn write_results(
     Ok(())
 }
 
-fn write_reference_errors(host: &Host, models: &[Model], table: &[Entry]) -> Result<(), StepError> {
-    let Some((index, reference)) = models
-        .iter()
-        .enumerate()
-        .find(|(_, m)| m.role == Role::Reference)
-    else {
+fn write_reference_defects(
+    host: &Host,
+    models: &[Model],
+    table: &[Entry],
+) -> Result<(), StepError> {
+    let Some(index) = models.iter().position(|m| m.role == Role::Reference) else {
         return Ok(());
     };
     for e in table.iter().filter(|e| e.model == index) {
@@ -224,48 +227,7 @@ fn write_reference_errors(host: &Host, models: &[Model], table: &[Entry]) -> Res
         };
         host.result(&format!("reference_{name}.{}", e.id), value, unit)?;
     }
-    for m in models.iter().filter(|m| m.role != Role::Reference) {
-        if let Some(error) = distance_error(m, reference) {
-            host.result(&format!("distance_error.{}", m.name), error, "m")?;
-        }
-    }
     Ok(())
-}
-
-/// Root mean square difference of the nodal distances of two models (m), at the nodes of the first, with
-/// those of the second interpolated in the undeformed plane; `None` when they share no judged place.
-fn distance_error(model: &Model, reference: &Model) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for p in &model.plies {
-        let Some(r) = reference.plies.iter().find(|r| r.name == p.name) else {
-            continue;
-        };
-        let (_, cells) = r.topology.connectivity();
-        let Some(locator) = QuadLocator::new(&r.undeformed, cells) else {
-            continue;
-        };
-        for (at, d) in p
-            .undeformed
-            .iter()
-            .zip(&p.distance)
-            .filter(|(_, d)| d.judged)
-        {
-            let Some(place) = locator.locate(at[0], at[1], 1e-6) else {
-                continue;
-            };
-            let nodes = place.nodes.map(|i| r.distance[i as usize]);
-            if nodes.iter().all(|n| n.judged) {
-                let theirs: f64 = nodes
-                    .iter()
-                    .zip(place.weights)
-                    .map(|(n, w)| w * n.value)
-                    .sum();
-                sum += (d.value - theirs).powi(2);
-                count += 1.0;
-            }
-        }
-    }
-    (count > 0.0).then(|| (sum / count).sqrt())
 }
 
 /// What the runs cost; `passed_over` are those of zones that were drawn again and of earlier passes, which count in the whole.
@@ -273,6 +235,8 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &[Input]) -> Result<(
     let sum = |get: fn(&Input) -> f64| passed_over.iter().map(get).fold(0.0, |s, c| s + c);
     let mut wall = sum(|i| i.cost.wall_seconds);
     let mut cpu = sum(|i| i.cost.cpu_seconds);
+    let earlier = passed_over.iter().map(|i| i.cost.peak_memory);
+    let mut memory = earlier.fold(0.0, f64::max);
     if !passed_over.is_empty() {
         host.measured("cost.superseded.wall_seconds", wall, "s")?;
         host.measured("cost.superseded.cpu_seconds", cpu, "s")?;
@@ -286,13 +250,15 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &[Input]) -> Result<(
         )?;
         host.measured(&format!("cost.{}.cpu_seconds", m.name), c.cpu_seconds, "s")?;
         host.measured(&format!("peak_memory.{}", m.name), c.peak_memory, "1")?;
-        if m.role != Role::Reference {
+        if matches!(m.role, Role::Global | Role::Local) {
             wall += c.wall_seconds;
             cpu += c.cpu_seconds;
+            memory = memory.max(c.peak_memory);
         }
     }
     host.measured("cost.total.wall_seconds", wall, "s")?;
     host.measured("cost.total.cpu_seconds", cpu, "s")?;
+    host.measured("peak_memory.total", memory, "1")?;
     let reference = models.iter().find(|m| m.role == Role::Reference);
     if let Some(full) = reference
         .map(|m| m.input.cost.cpu_seconds)

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
+/// Places on the side of a zone lie in it, however they were rounded (m).
+pub const ROUNDING: f64 = 1e-6;
+
 /// A zone, as its step wrote it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Zone {
@@ -23,6 +26,12 @@ pub struct Zone {
 }
 
 impl Zone {
+    /// Whether a place of the flat ply (m) lies in it or on its sides.
+    pub fn holds(&self, at: &[f64]) -> bool {
+        let [low, high] = [&self.bounds[..2], &self.bounds[2..]];
+        (0..2).all(|d| at[d] > low[d] - ROUNDING && at[d] < high[d] + ROUNDING)
+    }
+
     fn area(&self) -> f64 {
         let [x0, y0, x1, y1] = self.bounds;
         (x1 - x0) * (y1 - y0)
@@ -72,6 +81,8 @@ pub enum Role {
     Global,
     /// Fine run of a zone.
     Local,
+    /// Another run of the whole scene.
+    Other,
     /// Fine run of the whole scene.
     Reference,
 }
@@ -79,7 +90,7 @@ pub enum Role {
 /// A formed model.
 #[derive(Debug, Clone)]
 pub struct Model {
-    /// `global`, `local.A`, `reference`.
+    /// `global`, `local.A`, `other.drape`, `reference`.
     pub name: String,
     /// Its part.
     pub role: Role,
@@ -118,7 +129,7 @@ struct Sheet {
     fibre_1: Option<f64>,
 }
 
-/// Global, local and reference models in that order, local ones in the order of their zones; and what was run on the way to them and is
+/// Global, local, other and reference models in that order, local ones in the order of their zones; and what was run on the way to them and is
 /// not measured: local runs of zones that are `superseded`, and `earlier` passes.
 ///
 /// # Errors
@@ -160,9 +171,12 @@ pub fn read_models(
     }
     local.sort_by_key(|m| m.zone);
     models.extend(local);
-    for input in host.inputs_of("reference")? {
-        let tool = read_tool(host, &input)?;
-        models.push(read(host, input, Role::Reference, None, &tool, settings)?);
+    for (port, role) in [("others", Role::Other), ("reference", Role::Reference)] {
+        for input in host.inputs_of(port)? {
+            host.check_cancelled()?;
+            let tool = read_tool(host, &input)?;
+            models.push(read(host, input, role, None, &tool, settings)?);
+        }
     }
     passed_over.extend(host.inputs_of("earlier")?);
     Ok((models, passed_over))
@@ -255,6 +269,10 @@ fn read(
     let name = match (role, zone) {
         (Role::Local, Some((_, zone))) => format!("local.{}", zone.name),
         (Role::Reference, _) => "reference".to_owned(),
+        (Role::Other, _) => {
+            let item = input.item.iter().map(|i| format!("_{i}"));
+            format!("other.{}{}", input.step, item.collect::<String>())
+        }
         _ => "global".to_owned(),
     };
     Ok(Model {

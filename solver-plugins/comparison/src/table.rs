@@ -71,9 +71,6 @@ pub fn same_within(a: &Defect, b: &Defect) -> f64 {
     SAME_DEFECT.max(0.5 * a.length.max(b.length))
 }
 
-/// Nodes on the side of a zone lie in it, however their places were rounded (m).
-const ROUNDING: f64 = 1e-6;
-
 /// All defects: first those of the local models, numbered in their zone from the uppermost ply down, wrinkles
 /// by length and bridging by area; then those of the other models in the same boxes, which take the id
 /// of the local defect that they are, or the next free number.
@@ -114,9 +111,7 @@ fn entries_of(
     let mut found = Vec::new();
     // The stack is listed from the tool upwards.
     for ply in model.plies.iter().rev() {
-        let within = |p: &[f64; 3]| {
-            (0..2).all(|d| p[d] > z.bounds[d] - ROUNDING && p[d] < z.bounds[d + 2] + ROUNDING)
-        };
+        let within = |p: &[f64; 3]| z.holds(p);
         let inside: Vec<bool> = match model.role {
             Role::Local => vec![true; ply.undeformed.len()],
             _ => ply.undeformed.iter().map(within).collect(),

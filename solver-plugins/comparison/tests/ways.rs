@@ -1,0 +1,121 @@
+//! Several ways to one answer, measured by a whole reference, or by the fine runs of the zones where there is none.
+
+mod common;
+
+use common::*;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryInput};
+use serde_json::{Value, json};
+
+/// A run of the whole blank with elements of `size` (m).
+fn whole(size: f64, f: impl Fn(f64, f64) -> f64) -> MemoryArtifact {
+    formed(
+        vec![ply("ply_1", BLANK, size, OFFSET, f)],
+        size,
+        Value::Null,
+    )
+}
+
+fn other<'a>(step: &'a str, artifact: &'a MemoryArtifact, cost: f64) -> MemoryInput<'a> {
+    MemoryInput {
+        step,
+        cost: [cost, cost, 1e9 * cost],
+        ..MemoryInput::new("others", artifact)
+    }
+}
+
+#[test]
+fn every_other_run_is_measured_by_the_reference_and_costs_nothing_of_the_two_stages() {
+    let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
+    let reference = whole(0.00125, height(1.0));
+    let (flat, same) = (whole(0.008, |_, _| 0.0), whole(0.00125, height(1.0)));
+    let out = compare(&[
+        MemoryInput {
+            cost: [10.0, 10.0, 1e6],
+            ..MemoryInput::new("global", &global)
+        },
+        MemoryInput::new("zones", &zones),
+        MemoryInput {
+            cost: [30.0, 20.0, 3e6],
+            ..MemoryInput::new("local", &local)
+        },
+        other("drape", &flat, 1.0),
+        other("again", &same, 200.0),
+        MemoryInput {
+            cost: [100.0, 100.0, 1e7],
+            ..MemoryInput::new("reference", &reference)
+        },
+    ]);
+    assert_eq!(out.attributes["measured_by"], "reference");
+    for name in [
+        "defect_error",
+        "position_error",
+        "distance_error",
+        "shear_quantile_error",
+    ] {
+        assert!(out.result(&format!("{name}.other.again")) < 1e-9, "{name}");
+        assert!(out.result(&format!("{name}.other.drape")) > 1e-4, "{name}");
+    }
+    assert_eq!(out.result("missed_wrinkles.other.drape"), 1.0);
+    assert_eq!(out.result("missed_bridging.other.drape"), 1.0);
+    assert_eq!(out.measured["cost.other.drape.cpu_seconds"].0, 1.0);
+    assert_eq!(out.measured["cost.total.cpu_seconds"].0, 30.0);
+    assert_eq!(out.measured["peak_memory.total"].0, 3e6);
+    assert_eq!(out.measured["cost_saving"].0, 0.7);
+    let models = out.attributes["models"].as_array().unwrap();
+    let roles: Vec<&str> = models.iter().filter_map(|m| m["role"].as_str()).collect();
+    assert_eq!(roles, ["global", "local", "other", "other", "reference"]);
+}
+
+#[test]
+fn around_the_zones_the_global_run_counts_and_in_them_the_fine_runs() {
+    let (local, zones) = (local(1.0), zones(json!([zone_a()])));
+    let reference = whole(0.00125, height(1.0));
+    let lifted = whole(0.010, |_, _| 0.002);
+    let out = compare(&[
+        MemoryInput::new("global", &lifted),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        MemoryInput::new("reference", &reference),
+    ]);
+    // The global run is 2 mm off everywhere outside of the zone, whose defects the local run has exactly.
+    let [x0, y0, x1, y1] = [0, 1, 2, 3].map(|k| (ZONE[k] / 0.00125).round());
+    let inside = (x1 - x0 + 1.0) * (y1 - y0 + 1.0);
+    let [x0, y0, x1, y1] = [0, 1, 2, 3].map(|k| (BLANK[k] / 0.00125).round());
+    let all = (x1 - x0 + 1.0) * (y1 - y0 + 1.0);
+    let expected = 0.002 * ((all - inside) / all).sqrt();
+    for name in ["distance_error", "position_error"] {
+        assert!((out.result(name) / expected - 1.0).abs() < 1e-9, "{name}");
+        assert!(out.result(&format!("{name}.local.A")) < 1e-12);
+        assert!(out.result(&format!("{name}.global")) > out.result(name));
+    }
+}
+
+#[test]
+fn without_a_reference_the_fine_runs_measure_the_others_in_their_zones() {
+    let (local, zones) = (local(1.0), zones(json!([zone_a()])));
+    // Within the zone as the local run; far outside a wrinkle more, which nobody can judge.
+    let odd = |x: f64, y: f64| height(1.0)(x, y) + height(1.0)(x - 0.17, y - 0.08);
+    let (flat, fine) = (whole(0.010, |_, _| 0.0), whole(0.00125, odd));
+    let out = compare(&[
+        MemoryInput::new("global", &flat),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        other("fine", &fine, 1.0),
+    ]);
+    assert_eq!(out.attributes["measured_by"], "zones");
+    // One node lies on the threshold, on this or that side by rounding: its area is 0.3 % of the bridging.
+    assert!(out.result("defect_error.other.fine") < 0.002);
+    assert!(out.result("position_error.other.fine") < 1e-9);
+    for kind in ["wrinkles", "bridging"] {
+        let count = |what: &str, way: &str| out.result(&format!("{what}_{kind}.{way}"));
+        assert_eq!(count("false", "other.fine"), 0.0);
+        assert_eq!(
+            (count("missed", "global"), count("false", "global")),
+            (1.0, 0.0)
+        );
+    }
+    // The two stages are the measure: they have no error of their own.
+    assert!(!out.results.contains_key("defect_error"));
+    assert!(!out.results.contains_key("position_error"));
+    assert!(!out.measured.contains_key("cost_saving"));
+}
