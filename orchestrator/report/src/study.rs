@@ -336,6 +336,7 @@ impl Reader<'_> {
             let facts = self.all.facts[*at].as_ref();
             facts.is_some_and(|f| zones.iter().any(|z| z.is(&f.attributes["zone"])))
         });
+        let locals = self.one_of_each_zone(locals, comparison);
         self.read_locals(&mut study, &locals, comparison);
         let reference = comparison.and_then(|c| {
             let key = self.all.facts[c]
@@ -362,6 +363,29 @@ impl Reader<'_> {
             let label = self.instance(at).label();
             study.measured.extend(self.noted(&label, found));
         }
+    }
+
+    /// Of several runs of one zone (other elements, other sizes) the one that was compared, or else the finest.
+    fn one_of_each_zone(&self, runs: Vec<usize>, comparison: Option<usize>) -> Vec<usize> {
+        let facts = |at: usize| self.all.facts[at].as_ref();
+        let compared: Vec<&str> = (comparison.and_then(facts).into_iter())
+            .flat_map(|f| f.at_port("local"))
+            .collect();
+        let rank = |at: usize| {
+            let size = facts(at).and_then(|f| f.attributes["element_size"].as_f64());
+            let passed_over = !compared.contains(&self.key(at));
+            (passed_over, size.unwrap_or(f64::INFINITY))
+        };
+        let zone = |at: usize| facts(at).map(|f| &f.attributes["zone"]);
+        let mut kept: Vec<usize> = Vec::new();
+        for at in runs {
+            match kept.iter_mut().find(|k| zone(**k) == zone(at)) {
+                None => kept.push(at),
+                Some(k) if rank(at) < rank(*k) => *k = at,
+                Some(_) => {}
+            }
+        }
+        kept
     }
 
     /// Forming runs whose boundary was made for the zones of an instance.

@@ -217,6 +217,29 @@ fn local_runs_are_shown_without_a_comparison() {
 }
 
 #[test]
+fn of_several_runs_of_a_zone_the_finest_is_shown_and_with_a_comparison_the_compared_one() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.008);
+    study.defects(false);
+    study.zones(&common::ZONES[..1]);
+    study.boundary("A");
+    // In the order in which a study lists its steps.
+    study.forming("rough[A]", Some(common::ZONES[0]), 0.006);
+    study.forming("local[A]", Some(common::ZONES[0]), 0.004);
+    study.forming("fine[A]", Some(common::ZONES[0]), 0.002);
+    let mut compared = Study::new(&folder);
+    compared.instances = study.instances.clone();
+    let alone = page(&study.input(), &folder);
+    let shown = |page: &str, size: &str| page.contains(&format!("elements of {size} mm"));
+    assert_eq!(alone.matches("data:image/png;base64,").count(), 18 + 4);
+    assert!(shown(&alone, "2") && !shown(&alone, "4") && !shown(&alone, "6"));
+    compared.comparison(&common::ZONES[..1]);
+    let beside = page(&compared.input(), &folder);
+    assert!(shown(&beside, "4") && !shown(&beside, "2") && !shown(&beside, "6"));
+}
+
+#[test]
 fn unknown_kinds_are_listed_with_their_results_and_costs() {
     let (_keep, folder) = folder();
     let mut study = Study::new(&folder);

@@ -54,8 +54,20 @@ impl Step for BoundaryInterpolation {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
-        let p: Parameters = host.parameters()?;
+        let mut p: Parameters = host.parameters()?;
         let zone = own_zone(host)?;
+        if let Some(advised) = advised_size(host, &zone)? {
+            if advised < p.element_size {
+                let [advised, least] = [advised, p.element_size].map(|v| 1e3 * v);
+                let text = format!(
+                    "zone {}: {advised:.3} mm are advised, finer than `element_size`: {least} mm are taken, and the error will be larger than aimed at",
+                    zone["name"]
+                );
+                host.log(Log::Warn, &text);
+            }
+            p.element_size = advised.max(p.element_size);
+            host.result("element_size", p.element_size, "m")?;
+        }
         let bounds: Rectangle = serde_json::from_value(zone["box"].clone())
             .map_err(|e| format!("box of zone {}: {e}", zone["name"]))?;
         let input = host.input("formed")?;
@@ -133,6 +145,25 @@ fn own_zone(host: &Host) -> Result<Value, StepError> {
         )
         .into()
     })
+}
+
+/// The element size (m) that a mesh study advises for a zone, if there is one.
+fn advised_size(host: &Host, zone: &Value) -> Result<Option<f64>, StepError> {
+    let studies = host.inputs_of("meshes")?;
+    let Some(study) = studies.first() else {
+        return Ok(None);
+    };
+    let attributes: Value = host.attributes(study)?;
+    let zones = attributes["zones"].as_array().cloned().unwrap_or_default();
+    let own = zones.iter().find(|z| z["name"] == zone["name"]);
+    match own.and_then(|z| z["element_size"].as_f64()) {
+        Some(size) if size > 0.0 => Ok(Some(size)),
+        _ => Err(format!(
+            "'{}' advises no element size for zone {}; it must compare runs of this zone, not of the whole scene",
+            study.step, zone["name"]
+        )
+        .into()),
+    }
 }
 
 /// The part of a sheet in the zone and its motion; `None` when the sheet does not reach into it.

@@ -453,3 +453,53 @@ fn a_first_frame_that_is_not_the_undeformed_state_brings_a_warning() {
         out.log
     );
 }
+
+#[test]
+fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than_asked_for() {
+    let study = |zones: Value| MemoryArtifact {
+        kind: "mesh-study".into(),
+        attributes: json!({"zones": zones}),
+        ..Default::default()
+    };
+    let name = &zones().attributes["zones"][0]["name"];
+    let taken = |advised: f64, least: f64| {
+        let (formed, zones) = (coarse(0.0), zones());
+        let study = study(
+            json!([{"name": "Z", "element_size": 1.0}, {"name": name, "element_size": advised}]),
+        );
+        let inputs = [
+            MemoryInput::new("formed", &formed),
+            MemoryInput::new("zones", &zones),
+            MemoryInput::new("meshes", &study),
+        ];
+        let parameters = json!({"element_size": least});
+        let out = run::<BoundaryInterpolation>(parameters, &inputs, &[0]).unwrap();
+        assert_eq!(out.attributes["element_size"], out.result("element_size"));
+        assert_eq!(
+            out.attributes["film_element_size"],
+            out.result("element_size")
+        );
+        let warned = out
+            .log
+            .iter()
+            .any(|l| l.contains("finer than `element_size`"));
+        (out.result("element_size"), out.result("elements"), warned)
+    };
+    let (size, many, warned) = taken(0.005, 0.002);
+    assert_eq!((size, warned), (0.005, false));
+    let (size, few, warned) = taken(0.005, 0.010);
+    assert_eq!((size, warned), (0.010, true));
+    assert!(many > 3.0 * few);
+    let (formed, zones, of_the_whole) = (coarse(0.0), zones(), study(Value::Null));
+    let inputs = [
+        MemoryInput::new("formed", &formed),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("meshes", &of_the_whole),
+    ];
+    let parameters = json!({"element_size": 0.01});
+    let error = run::<BoundaryInterpolation>(parameters, &inputs, &[0]).unwrap_err();
+    assert!(
+        error.contains("advises no element size for zone"),
+        "{error}"
+    );
+}

@@ -1,8 +1,7 @@
 //! The cut between coarse and fine: the work that passes through it in either run, and how far its influence reaches into a zone.
 
-use crate::fields::distance_at;
 use crate::models::{Model, Role, Zone};
-use plyflow_defects::Ply;
+use plyflow_defects::{Ply, distance_at};
 use plyflow_sdk::{BodyInfo, Host, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, distance, dot, sub};
 use plyflow_surface::{Location, QuadLocator, flat_bounds};

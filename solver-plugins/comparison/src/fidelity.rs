@@ -1,9 +1,8 @@
 //! How far the ways to the answer are from the reference: the fine runs of the zones, the coarse run by itself, and others.
 
-use crate::fields::FieldErrors;
 use crate::models::{Model, Role, Zone};
 use crate::table::{apart, same_within, unlike};
-use plyflow_defects::{Defect, Kind, Ply, Settings, measure};
+use plyflow_defects::{Defect, FieldErrors, Kind, Ply, Settings, measure};
 use plyflow_sdk::{Host, StepError};
 use serde::Serialize;
 
@@ -169,16 +168,34 @@ pub fn write(
         let mut ours = named(&ours);
         ours.retain(|(_, d)| counts(d));
         Fidelity::of(&ours, &theirs, settings).write(host, &suffix)?;
-        if let Some(errors) = FieldErrors::of(&around, &reference) {
-            errors.write(host, &suffix)?;
-        }
+        write_fields(host, &around, &reference, &suffix)?;
     }
     if yardstick == Yardstick::Reference {
         for m in local {
-            if let Some(errors) = FieldErrors::of(&[m], &reference) {
-                errors.write(host, &format!(".{}", m.name))?;
-            }
+            write_fields(host, &[m], &reference, &format!(".{}", m.name))?;
         }
+    }
+    Ok(())
+}
+
+/// Writes how far the fields of a way are from the reference, under their names with a suffix.
+fn write_fields(
+    host: &Host,
+    way: &[&Model],
+    reference: &[&Model],
+    suffix: &str,
+) -> Result<(), StepError> {
+    let [way, reference] =
+        [way, reference].map(|all| all.iter().map(|m| &m.plies[..]).collect::<Vec<_>>());
+    let Some(errors) = FieldErrors::of(&way, &reference) else {
+        return Ok(());
+    };
+    host.result(&format!("position_error{suffix}"), errors.position, "m")?;
+    if let Some(distance) = errors.distance {
+        host.result(&format!("distance_error{suffix}"), distance, "m")?;
+    }
+    if let Some(shear) = errors.shear {
+        host.result(&format!("shear_quantile_error{suffix}"), shear, "rad")?;
     }
     Ok(())
 }

@@ -3,17 +3,15 @@
 
 mod cut;
 mod fidelity;
-mod fields;
 mod models;
 mod table;
 
 pub use cut::{Layer, Passage, Strip, Work, traction};
 pub use fidelity::{Fidelity, Yardstick};
-pub use fields::FieldErrors;
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
-use plyflow_defects::{Kind, Ply, Settings, quantiles};
+use plyflow_defects::{Kind, Ply, QUANTILES, Settings, quantiles};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use serde_json::{Value, json};
 
@@ -21,9 +19,6 @@ use serde_json::{Value, json};
 pub struct Comparison;
 
 export_step!(Comparison);
-
-/// Shear angles are told at these quantiles.
-const QUANTILES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];
 
 impl Step for Comparison {
     const MANIFEST: &'static str = include_str!("../manifest.json");

@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Places on the side of a zone lie in it, however they were rounded (m).
-pub const ROUNDING: f64 = 1e-6;
+const ROUNDING: f64 = 1e-6;
 
 /// A zone, as its step wrote it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]

@@ -108,10 +108,13 @@ impl Run {
         );
         ply.shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
         // Not every run has them: a pin-jointed net's fibres have no strain.
-        let strains = ["fibre_strain_1", "fibre_strain_2"]
-            .map(|name| host.frame_field(input, body, frame, name));
-        if let [Ok(a), Ok(b)] = strains {
-            ply.fibre_strain = a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
+        let names = ["fibre_strain_1", "fibre_strain_2"];
+        if names
+            .iter()
+            .all(|n| body.fields.iter().any(|f| f.name == *n))
+        {
+            let [a, b] = names.map(|name| host.frame_field(input, body, frame, name));
+            ply.fibre_strain = a?.iter().zip(&b?).map(|(a, b)| a.min(*b)).collect();
         }
         Ok(ply)
     }

@@ -3,8 +3,10 @@
 
 pub mod align;
 mod cause;
+mod fields;
 mod measure;
 pub mod scan;
 
 pub use cause::{Cause, Limits, find_causes, relative_angle};
+pub use fields::{FieldErrors, QUANTILES, distance_at};
 pub use measure::{Defect, Kind, Ply, Settings, Tool, measure, quantiles};

@@ -1,4 +1,9 @@
-//! Step plugin `mesh-comparison`: shear angles over the element size (thesis 5.5.1, mesh sensitivity).
+//! Step plugin `mesh-comparison`: shear angles over the element size (thesis 5.5.1, mesh sensitivity); of zones, the distance from the tool.
+
+mod advice;
+mod zones;
+
+pub use advice::{Advice, advise};
 
 use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
 use plyflow_surface::{Topology, weighted_quantiles};
@@ -20,12 +25,17 @@ struct Formed {
     sheets: Vec<Sheet>,
     element_size: f64,
     elements: u64,
+    /// Of a local run.
+    #[serde(default)]
+    zone: Value,
 }
 
 #[derive(Deserialize)]
 struct Sheet {
     name: String,
     kind: String,
+    /// (m)
+    offset: Option<f64>,
 }
 
 /// What is told of the shear angles: name, title, share of the area that has less.
@@ -52,8 +62,12 @@ impl Step for MeshComparison {
 
     fn run(host: &Host) -> Result<(), StepError> {
         let p: Parameters = host.parameters()?;
+        let inputs = host.inputs_of("runs")?;
+        if zones::given(host, &inputs)? {
+            return zones::compare(host, inputs, p.target_error);
+        }
         let mut runs = Vec::new();
-        for input in host.inputs_of("runs")? {
+        for input in inputs {
             host.check_cancelled()?;
             runs.push(read(host, input)?);
         }
@@ -125,69 +139,6 @@ fn slope(places: &[(f64, f64)]) -> Option<f64> {
     let spread: f64 = logs.iter().map(|p| (p.0 - mx).powi(2)).sum();
     let both: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
     (logs.len() > 1 && spread > 0.0).then(|| both / spread)
-}
-
-/// An element size for a target error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Advice {
-    /// (m).
-    pub size: f64,
-    /// Why it should not be trusted much.
-    pub doubt: Option<String>,
-}
-
-/// The largest element size whose error is at most `target`, from `measured` sizes (m) and errors, the finest first (its
-/// own error against itself is 0 and says nothing).
-///
-/// Errors are taken to grow as a power of the size between two runs (Richardson); one that is smaller than that of a finer
-/// run is raised to it, as it is so by chance. Below the finest pair the power goes on as 1, the least that a converging
-/// element has: so the advice is on the safe side. It is never coarser than the coarsest run.
-///
-/// # Panics
-/// When `measured` holds fewer than two runs.
-pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
-    let mut worst = 0.0f64;
-    let rising: Vec<(f64, f64)> = (measured[1..].iter())
-        .map(|&(size, error)| {
-            worst = worst.max(error);
-            (size, worst)
-        })
-        .collect();
-    let (finest, first) = (measured[0].0, rising[0]);
-    if first.1 > target {
-        let size = first.0 * target / first.1;
-        let doubt = (size < finest).then(|| {
-            format!(
-                "an error of {target} asks for elements finer ({:.3} mm) than those of any run; run one of about that size to see",
-                1e3 * size
-            )
-        });
-        return Advice { size, doubt };
-    }
-    for pair in rising.windows(2) {
-        let [(h0, e0), (h1, e1)] = [pair[0], pair[1]];
-        if e1 <= target {
-            continue;
-        }
-        let share = if e0 > 0.0 {
-            (target / e0).ln() / (e1 / e0).ln()
-        } else {
-            0.0
-        };
-        return Advice {
-            size: h0 * (h1 / h0).powf(share),
-            doubt: None,
-        };
-    }
-    let size = rising[rising.len() - 1].0;
-    let doubt = format!(
-        "even the coarsest run ({:.3} mm) has an error below {target}; a coarser one may do",
-        1e3 * size
-    );
-    Advice {
-        size,
-        doubt: Some(doubt),
-    }
 }
 
 fn write(host: &Host, runs: &[Run], finest: &Run, target: f64) -> Result<(), StepError> {

@@ -279,7 +279,9 @@ impl Study {
         w.end_frame().unwrap();
         w.attributes(&json!({"models": models, "defects": defects}).to_string())
             .unwrap();
-        let inputs = [("global", "coarse"), ("zones", "zones")];
+        let locals: Vec<String> = (zones.iter()).map(|z| format!("local[{}]", z.0)).collect();
+        let mut inputs = vec![("global", "coarse"), ("zones", "zones")];
+        inputs.extend(locals.iter().map(|l| ("local", l.as_str())));
         let results = vec![("wrinkle_count", zones.len() as f64, "1")];
         self.finish(w, ("compare", &[]), "comparison", &inputs, results);
     }

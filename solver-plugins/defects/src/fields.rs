@@ -1,11 +1,14 @@
 //! How far the positions, the distances from the tool and the shear angles of one way to the answer are from those of another.
 
-use crate::QUANTILES;
-use crate::models::{Model, ROUNDING};
-use plyflow_defects::{Ply, quantiles};
-use plyflow_sdk::{Host, StepError};
+use crate::measure::{Ply, quantiles};
 use plyflow_surface::vector::distance;
 use plyflow_surface::{Location, QuadLocator};
+
+/// Shear angles are told at these quantiles.
+pub const QUANTILES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];
+
+/// Places on the side of a mesh lie in it, however they were rounded (m).
+const ROUNDING: f64 = 1e-6;
 
 /// Errors of fields against those of a reference, at the reference's nodes and at the centres of its cells, as far as both have them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +17,8 @@ pub struct FieldErrors {
     pub position: f64,
     /// Root mean square difference of the distances from the tool (m), where both are judged; `None` when nowhere.
     pub distance: Option<f64>,
+    /// Root mean square of the reference's distances from the tool there (m): what `distance` is large or small against.
+    pub standing_off: Option<f64>,
     /// Largest difference of the quantiles ([`QUANTILES`]) of the shear angle (rad), over the plies; `None` when it is not known.
     pub shear: Option<f64>,
 }
@@ -22,8 +27,8 @@ pub struct FieldErrors {
 struct Layered<'a>(Vec<(&'a Ply, QuadLocator)>);
 
 impl<'a> Layered<'a> {
-    fn new(way: &[&'a Model], name: &str) -> Self {
-        let plies = (way.iter()).flat_map(|m| m.plies.iter().filter(|p| p.name == name));
+    fn new(way: &[&'a [Ply]], name: &str) -> Self {
+        let plies = (way.iter()).flat_map(|m| m.iter().filter(|p| p.name == name));
         let located = plies.filter_map(|p| {
             let (_, cells) = p.topology.connectivity();
             Some((p, QuadLocator::new(&p.undeformed, cells)?))
@@ -78,11 +83,13 @@ impl Squares {
 }
 
 impl FieldErrors {
-    /// Of the models of a way (the first one that has a place counts there) against those of a reference; `None` when they share no place.
-    pub fn of(way: &[&Model], reference: &[&Model]) -> Option<Self> {
-        let (mut position, mut standing_off) = (Squares::default(), Squares::default());
+    /// Of the plies of a way's runs (the first run that has a place counts there) against those of a reference's; plies of one name are
+    /// the same. `None` when they share no place.
+    pub fn of(way: &[&[Ply]], reference: &[&[Ply]]) -> Option<Self> {
+        let mut position = Squares::default();
+        let (mut apart, mut standing_off) = (Squares::default(), Squares::default());
         let mut names: Vec<&str> = Vec::new();
-        for p in reference.iter().flat_map(|m| &m.plies) {
+        for p in reference.iter().copied().flatten() {
             if !names.contains(&p.name.as_str()) {
                 names.push(&p.name);
             }
@@ -90,7 +97,7 @@ impl FieldErrors {
         let mut shear: Option<f64> = None;
         for name in names {
             let ours = Layered::new(way, name);
-            let theirs = (reference.iter()).flat_map(|m| m.plies.iter().filter(|p| p.name == name));
+            let theirs = (reference.iter()).flat_map(|m| m.iter().filter(|p| p.name == name));
             // Shear angles of both at the same places.
             let mut angles = [Vec::new(), Vec::new()];
             for ply in theirs {
@@ -101,7 +108,8 @@ impl FieldErrors {
                     position.add(distance(place.interpolate(&p.formed), ply.formed[i]));
                     let judged = ply.distance[i].judged;
                     if let Some(value) = distance_at(p, &place).filter(|_| judged) {
-                        standing_off.add(value - ply.distance[i].value);
+                        apart.add(value - ply.distance[i].value);
+                        standing_off.add(ply.distance[i].value);
                     }
                 }
                 for (c, &theirs) in ply.shear_angle.iter().enumerate() {
@@ -121,23 +129,9 @@ impl FieldErrors {
         }
         Some(Self {
             position: position.root()?,
-            distance: standing_off.root(),
+            distance: apart.root(),
+            standing_off: standing_off.root(),
             shear,
         })
-    }
-
-    /// Writes them under their names with a suffix.
-    ///
-    /// # Errors
-    /// When the host refuses a result.
-    pub fn write(&self, host: &Host, suffix: &str) -> Result<(), StepError> {
-        host.result(&format!("position_error{suffix}"), self.position, "m")?;
-        if let Some(distance) = self.distance {
-            host.result(&format!("distance_error{suffix}"), distance, "m")?;
-        }
-        if let Some(shear) = self.shear {
-            host.result(&format!("shear_quantile_error{suffix}"), shear, "rad")?;
-        }
-        Ok(())
     }
 }

@@ -1,0 +1,180 @@
+//! Local runs of zones with meshes of different fineness: how far their distances from the tool are from those of the finest.
+
+use crate::advice::advise;
+use crate::{Formed, Sheet};
+use plyflow_defects::{FieldErrors, Ply, Tool};
+use plyflow_sdk::{Host, Input, Log, Meshes, StepError};
+use plyflow_surface::{Surface, Topology, triangles};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// Nothing near the tool's foot is left out: a zone's runs all have the same places there.
+const FOOT_MARGIN: f64 = 0.0;
+
+/// A run of a zone.
+struct Run {
+    input: Input,
+    element_size: f64,
+    plies: Vec<Ply>,
+}
+
+/// Whether the runs are of zones.
+///
+/// # Errors
+/// When some are and others are of the whole.
+pub fn given(host: &Host, inputs: &[Input]) -> Result<bool, StepError> {
+    let mut of_zones = Vec::new();
+    for input in inputs {
+        of_zones.push(zone_of(host, input)?.is_some());
+    }
+    if of_zones.windows(2).any(|w| w[0] != w[1]) {
+        return Err("some of the runs are of zones and others of the whole scene; compare them in two steps".into());
+    }
+    Ok(of_zones.first() == Some(&true))
+}
+
+fn zone_of(host: &Host, input: &Input) -> Result<Option<String>, StepError> {
+    let formed: Formed = host.attributes(input)?;
+    Ok(formed.zone["name"].as_str().map(str::to_owned))
+}
+
+/// Compares the runs of every zone and advises an element size for each.
+///
+/// # Errors
+/// When a zone has fewer than two sizes, or a run cannot be read.
+pub fn compare(host: &Host, inputs: Vec<Input>, target: f64) -> Result<(), StepError> {
+    let mut by_zone: BTreeMap<(usize, String), Vec<Run>> = BTreeMap::new();
+    for input in inputs {
+        host.check_cancelled()?;
+        // A to Z before AA.
+        if let Some(zone) = zone_of(host, &input)? {
+            let runs = by_zone.entry((zone.len(), zone)).or_default();
+            runs.push(read(host, input)?);
+        }
+    }
+    let (mut rows, mut advised) = (Vec::new(), Vec::new());
+    for ((_, zone), runs) in &mut by_zone {
+        host.check_cancelled()?;
+        runs.sort_by(|a, b| a.element_size.total_cmp(&b.element_size));
+        let size = one(host, zone, runs, target, &mut rows)?;
+        advised.push(json!({"name": zone, "element_size": size}));
+    }
+    let head = [
+        ("run", ""),
+        ("zone", ""),
+        ("element size", "m"),
+        ("error", ""),
+        ("error of position", "m"),
+        ("advised size", "m"),
+    ];
+    let columns = head.map(|(label, unit)| json!({"label": label, "unit": unit}));
+    host.write_attributes(&json!({
+        "target_error": target,
+        "zones": advised,
+        "tables": [{"name": "meshes", "title": "Distances from the tool in zones over the element size", "columns": columns, "rows": rows}],
+    }))
+}
+
+/// The runs of one zone, the finest first; gives the advised size (m).
+fn one(
+    host: &Host,
+    zone: &str,
+    runs: &[Run],
+    target: f64,
+    rows: &mut Vec<Value>,
+) -> Result<f64, StepError> {
+    let [finest, next, ..] = runs else {
+        return Err(format!(
+            "zone {zone} has one run; a comparison needs two or more of different sizes"
+        )
+        .into());
+    };
+    if next.element_size == finest.element_size {
+        let (a, b) = (&finest.input.step, &next.input.step);
+        let mm = 1e3 * finest.element_size;
+        return Err(format!(
+            "'{a}' and '{b}' are both the finest of zone {zone}, with {mm} mm; leave one out"
+        )
+        .into());
+    }
+    let mut measured = Vec::new();
+    for run in runs {
+        let found = FieldErrors::of(&[&run.plies], &[&finest.plies]);
+        let told = found.and_then(|e| Some((e.position, e.distance? / e.standing_off?)));
+        let Some((position, error)) = told.filter(|t| t.1.is_finite()) else {
+            let step = &run.input.step;
+            return Err(format!(
+                "'{step}' of zone {zone} lies nowhere where '{}' stands off the tool",
+                finest.input.step
+            )
+            .into());
+        };
+        let step = &run.input.step;
+        host.result(&format!("zone_error.{step}.{zone}"), error, "1")?;
+        measured.push((run.element_size, error));
+        rows.push(json!([step, zone, run.element_size, error, position, null]));
+    }
+    let advice = advise(&measured, target);
+    host.result(&format!("advised_element_size.{zone}"), advice.size, "m")?;
+    if let Some(text) = advice.doubt {
+        host.log(Log::Warn, &format!("zone {zone}: {text}"));
+    }
+    rows.push(json!([null, zone, null, null, null, advice.size]));
+    Ok(advice.size)
+}
+
+fn read(host: &Host, input: Input) -> Result<Run, StepError> {
+    let formed: Formed = host.attributes(&input)?;
+    let meshes = host.meshes(&input)?;
+    let Some(frame) = meshes.times.len().checked_sub(1) else {
+        return Err(format!("'{}' has no frame", input.step).into());
+    };
+    let body = meshes.body("tool")?;
+    let (points, cells) = host.mesh(&input, body)?;
+    let tool = Surface::new(&points, &triangles(body.nodes_per_cell, &cells)).map(Tool::new);
+    let tool = tool.ok_or_else(|| {
+        format!(
+            "body 'tool' of '{}' has no triangle with an area",
+            input.step
+        )
+    })?;
+    let plies = formed.sheets.iter().filter(|s| s.kind == "ply");
+    let plies: Result<Vec<Ply>, StepError> = plies
+        .map(|sheet| ply(host, &input, &meshes, frame, sheet, &tool))
+        .collect();
+    Ok(Run {
+        plies: plies?,
+        element_size: formed.element_size,
+        input,
+    })
+}
+
+fn ply(
+    host: &Host,
+    input: &Input,
+    meshes: &Meshes,
+    frame: usize,
+    sheet: &Sheet,
+    tool: &Tool,
+) -> Result<Ply, StepError> {
+    let body = meshes.body(&sheet.name)?;
+    let (undeformed, cells) = host.mesh(input, body)?;
+    let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
+    let formed = host.frame_points(input, body, frame)?;
+    let name = sheet.name.clone();
+    let offset = sheet.offset.ok_or_else(|| {
+        format!(
+            "ply '{name}' of '{}' has no offset from the tool",
+            input.step
+        )
+    })?;
+    Ok(Ply::new(
+        name,
+        topology,
+        undeformed,
+        formed,
+        tool,
+        offset,
+        FOOT_MARGIN,
+    ))
+}

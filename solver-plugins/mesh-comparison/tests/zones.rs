@@ -1,0 +1,110 @@
+//! Runs of zones whose distances from the tool are known.
+
+use plyflow_mesh_comparison::MeshComparison;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, flat_grid, run};
+use serde_json::{Value, json};
+
+/// A ply of 80 x 40 mm over a flat tool that stands off it by (1 + 25 h) times a ramp, which every mesh has exactly.
+fn zone(name: &str, size: f64) -> MemoryArtifact {
+    let (points, cells) = flat_grid([0.0, 0.0, 0.08, 0.04], size, 0.3);
+    let formed = points
+        .iter()
+        .map(|p| [p[0], p[1], (1.0 + 25.0 * size) * (0.001 + 0.05 * p[0])])
+        .collect();
+    let ply = MemoryBody {
+        name: "ply_1".into(),
+        nodes_per_cell: 4,
+        cells,
+        frames: vec![formed],
+        points,
+        ..Default::default()
+    };
+    let tool = MemoryBody {
+        name: "tool".into(),
+        points: vec![
+            [-1.0, -1.0, 0.0],
+            [1.0, -1.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [-1.0, 1.0, 0.0],
+        ],
+        nodes_per_cell: 3,
+        cells: vec![0, 1, 2, 0, 2, 3],
+        ..Default::default()
+    };
+    MemoryArtifact {
+        kind: "forming".into(),
+        attributes: json!({"element_size": size, "elements": 1, "zone": {"name": name},
+            "sheets": [{"name": "ply_1", "kind": "ply", "offset": 0.0}]}),
+        times: vec![1.0],
+        bodies: vec![tool, ply],
+        ..Default::default()
+    }
+}
+
+fn compare(runs: &[(&str, &MemoryArtifact)], target: f64) -> Result<MemoryArtifact, String> {
+    let inputs: Vec<MemoryInput<'_>> = (runs.iter())
+        .map(|&(step, artifact)| MemoryInput {
+            step,
+            ..MemoryInput::new("runs", artifact)
+        })
+        .collect();
+    run::<MeshComparison>(json!({"target_error": target}), &inputs, &[])
+}
+
+#[test]
+fn every_zone_gets_a_size_from_the_errors_of_its_own_runs() {
+    let runs = [
+        zone("A", 0.008),
+        zone("B", 0.008),
+        zone("A", 0.004),
+        zone("B", 0.002),
+        zone("A", 0.002),
+    ];
+    let steps = ["coarse", "coarse", "middle", "fine", "fine"];
+    let runs: Vec<(&str, &MemoryArtifact)> = steps.into_iter().zip(&runs).collect();
+    let out = compare(&runs, 0.1).unwrap();
+    let error = |h: f64| (1.0 + 25.0 * h) / (1.0 + 25.0 * 0.002) - 1.0;
+    for (step, zone, h) in [
+        ("coarse", "A", 0.008),
+        ("middle", "A", 0.004),
+        ("coarse", "B", 0.008),
+    ] {
+        let found = out.result(&format!("zone_error.{step}.{zone}"));
+        assert!(
+            (found - error(h)).abs() < 1e-9,
+            "{step} {zone}: {found} {}",
+            error(h)
+        );
+    }
+    assert!(out.result("zone_error.fine.A") < 1e-12);
+    // A: a power between 4 and 8 mm; B: 8 mm is wrong by more than 10 %, below it in proportion.
+    let power = (0.1 / error(0.004)).ln() / (error(0.008) / error(0.004)).ln();
+    let expected = [0.004 * 2f64.powf(power), 0.008 * 0.1 / error(0.008)];
+    let zones = out.attributes["zones"].as_array().unwrap();
+    for (k, name) in ["A", "B"].into_iter().enumerate() {
+        let size = out.result(&format!("advised_element_size.{name}"));
+        assert!((size / expected[k] - 1.0).abs() < 1e-9, "{name}: {size}");
+        assert_eq!(
+            (&zones[k]["name"], &zones[k]["element_size"]),
+            (&json!(name), &json!(size))
+        );
+    }
+    assert!(!out.results.contains_key("advised_element_size"));
+}
+
+#[test]
+fn zones_with_one_run_or_mixed_with_the_whole_are_refused() {
+    let (a, b) = (zone("A", 0.008), zone("A", 0.004));
+    let lone = zone("B", 0.004);
+    let error = compare(&[("x", &a), ("y", &b), ("y", &lone)], 0.1).unwrap_err();
+    assert!(error.contains("zone B has one run"), "{error}");
+    let error = compare(&[("x", &a), ("y", &a)], 0.1).unwrap_err();
+    assert!(
+        error.contains("'x' and 'y' are both the finest of zone A, with 8 mm"),
+        "{error}"
+    );
+    let mut whole = zone("A", 0.004);
+    whole.attributes["zone"] = Value::Null;
+    let error = compare(&[("x", &a), ("y", &whole)], 0.1).unwrap_err();
+    assert!(error.contains("some of the runs are of zones"), "{error}");
+}
