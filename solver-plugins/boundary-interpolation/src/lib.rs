@@ -59,9 +59,9 @@ impl Step for BoundaryInterpolation {
         if let Some(advised) = advised_size(host, &zone)? {
             if advised < p.element_size {
                 let [advised, least] = [advised, p.element_size].map(|v| 1e3 * v);
+                let name = zone["name"].as_str().unwrap_or("?");
                 let text = format!(
-                    "zone {}: {advised:.3} mm are advised, finer than `element_size`: {least} mm are taken, and the error will be larger than aimed at",
-                    zone["name"]
+                    "zone {name}: {advised:.3} mm are advised, finer than `element_size`: {least} mm are taken, and the error will be larger than aimed at"
                 );
                 host.log(Log::Warn, &text);
             }
