@@ -272,6 +272,7 @@ mod tests {
         );
         assert!(advice[2].contains("none but the reference"), "{advice:?}");
     }
+
     #[test]
     fn without_a_reference_the_dearest_zones_measure_the_others() {
         let run = |total: f64, drape: f64| {
