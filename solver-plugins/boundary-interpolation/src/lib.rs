@@ -57,16 +57,7 @@ impl Step for BoundaryInterpolation {
         let mut p: Parameters = host.parameters()?;
         let zone = own_zone(host)?;
         if let Some(advised) = advised_size(host, &zone)? {
-            if advised < p.element_size {
-                let [advised, least] = [advised, p.element_size].map(|v| 1e3 * v);
-                let name = zone["name"].as_str().unwrap_or("?");
-                let text = format!(
-                    "zone {name}: {advised:.3} mm are advised, finer than `element_size`: {least} mm are taken, and the error will be larger than aimed at"
-                );
-                host.log(Log::Warn, &text);
-            }
-            p.element_size = advised.max(p.element_size);
-            host.result("element_size", p.element_size, "m")?;
+            p.element_size = bounded_size(host, &zone, advised, p.element_size)?;
         }
         let bounds: Rectangle = serde_json::from_value(zone["box"].clone())
             .map_err(|e| format!("box of zone {}: {e}", zone["name"]))?;
@@ -145,6 +136,21 @@ fn own_zone(host: &Host) -> Result<Value, StepError> {
         )
         .into()
     })
+}
+
+/// An advised element size, or the least that may be taken (m); tells which.
+fn bounded_size(host: &Host, zone: &Value, advised: f64, least: f64) -> Result<f64, StepError> {
+    if advised < least {
+        let name = zone["name"].as_str().unwrap_or("?");
+        let [advised, least] = [advised, least].map(|v| 1e3 * v);
+        let text = format!(
+            "zone {name}: {advised:.3} mm are advised, finer than `element_size`: {least} mm are taken, and the error will be larger than aimed at"
+        );
+        host.log(Log::Warn, &text);
+    }
+    let size = advised.max(least);
+    host.result("element_size", size, "m")?;
+    Ok(size)
 }
 
 /// The element size (m) that a mesh study advises for a zone, if there is one.
