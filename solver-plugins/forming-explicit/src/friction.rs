@@ -196,6 +196,35 @@ impl<'a> FrictionTable<'a> {
         }
     }
 
+    /// The law of a sheet that a rigid part holds through the sheets between the two: of the surfaces that could slide the one
+    /// with the least coefficient under 1 bar. `parts`: from the rigid part to the sheet or back, lower ones first; `sheet`: its
+    /// name, one end of them. A law by the angle to fibres of another sheet counts without the angle.
+    ///
+    /// # Errors
+    /// When the scene does not give one of them.
+    pub fn through(
+        &self,
+        model: &Model,
+        parts: &[&str],
+        sheet: &str,
+    ) -> Result<FrictionLaw, String> {
+        let mut least: Option<FrictionLaw> = None;
+        for two in parts.windows(2) {
+            let touching = Touching {
+                parts: [two[0], two[1]],
+                slave: sheet,
+            };
+            let law = without_fibres_of_others(self.law(model, &touching)?);
+            if least
+                .as_ref()
+                .is_none_or(|l| at_one_bar(&law) < at_one_bar(l))
+            {
+                least = Some(law);
+            }
+        }
+        Ok(least.unwrap_or_else(|| 0.0.into()))
+    }
+
     /// Class of two surfaces. In a zone that not every ply reaches, others touch than in the whole scene.
     fn class(&self, parts: [&str; 2]) -> &'static str {
         if let Some(pair) = self.pairs.iter().find(|p| same(&p.parts, parts)) {
@@ -285,6 +314,27 @@ impl<'a> FrictionTable<'a> {
             whose,
             fibres: FibreField::new(own, first_cell, &model.x, along),
         })
+    }
+}
+
+/// Coefficient under 1 bar, along the fibres or wherever its factor is 1.
+fn at_one_bar(law: &FrictionLaw) -> f64 {
+    match law {
+        FrictionLaw::Constant(c) => *c,
+        FrictionLaw::Varying(v) => v.pressure.coefficient(1e5),
+    }
+}
+
+/// A node on a rigid part has no cell of a master, whose fibres it could ask for.
+fn without_fibres_of_others(law: FrictionLaw) -> FrictionLaw {
+    match law {
+        FrictionLaw::Varying(v) if v.angle.as_ref().is_some_and(|a| a.whose == Whose::Master) => {
+            FrictionLaw::Varying(Arc::new(VaryingFriction {
+                angle: None,
+                ..(*v).clone()
+            }))
+        }
+        law => law,
     }
 }
 

@@ -61,7 +61,8 @@ impl Forming {
         };
         let rigid = m.rigid_contacts.iter().map(|c| {
             let depths = c.items.iter().map(|i| f64::from(i.penetration));
-            judge(&c.name, 0.0, depths.filter(|p| *p > 0.0).collect())
+            let touching = depths.filter(|p| *p > 0.0);
+            judge(&c.name, 0.0, touching.map(|p| p + c.slack).collect())
         });
         let sheets = m.sheet_contacts.iter().map(|c| {
             let touching = c.items.iter().filter(|i| i.active);

@@ -3,7 +3,7 @@
 //! The tool of the scene is the punch, described where it ends. It starts one stroke below, where it touches the
 //! lowest ply, and pushes the plies through the opening of the die.
 
-use crate::assembly::{self, Components, StackSheet, ToolSurface};
+use crate::assembly::{self, Components, SHARE_SQUEEZED, StackSheet, ToolSurface};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
 use crate::process::Load;
@@ -229,19 +229,17 @@ fn add_contacts(
     let top: f64 = stack.iter().map(|s| s.thickness).sum();
     for (part, surface, above) in parts {
         for (k, sheet) in stack.iter().enumerate() {
-            // Only the ply that faces the part rubs on it; the others just stay outside.
-            let (faces, offset) = if *above {
-                (k + 1 == stack.len(), top - sheet.offset)
-            } else {
-                (k == 0, sheet.offset)
-            };
+            // The ply that faces the part rubs on it; the others stay outside where its elements' chords cut through.
             let own = sheet.scene.name.as_str();
-            let parts = if *above { [own, part] } else { [part, own] };
-            let mu = if faces {
-                friction.law(model, &Touching { parts, slave: own })?
+            let names = stack.iter().map(|s| s.scene.name.as_str());
+            let (offset, chain): (f64, Vec<&str>) = if *above {
+                (top - sheet.offset, names.skip(k).chain([*part]).collect())
             } else {
-                0.0.into()
+                let up_to = std::iter::once(*part).chain(names.take(k + 1));
+                (sheet.offset, up_to.collect())
             };
+            let mu = friction.through(model, &chain, own)?;
+            let between = offset - 0.5 * sheet.thickness;
             let nodes = model.sheets[k].nodes.iter();
             let mut contact = RigidContact::new(
                 format!("{part}/{}", sheet.scene.name),
@@ -250,7 +248,8 @@ fn add_contacts(
                 mu,
                 &settings,
                 nodes.map(|n| RigidItem::new(*n)).collect(),
-            );
+            )
+            .with_slack(SHARE_SQUEEZED * between);
             contact.moves = *part != "die";
             model.rigid_contacts.push(contact);
         }

@@ -66,8 +66,9 @@ fn pairs_take_the_place_of_their_class_in_either_order() {
     assert_eq!(constant(&m, "holder/inner"), 0.2);
     assert_eq!(constant(&m, "die/outer"), 0.5);
     assert_eq!(constant(&m, "inner/outer"), 0.4);
-    // The inner ply only stays outside of the die.
-    assert_eq!(constant(&m, "die/inner"), 0.0);
+    // What holds a ply through another one rubs as the weaker of the surfaces between does.
+    assert_eq!(constant(&m, "die/inner"), 0.4);
+    assert_eq!(constant(&m, "tool/outer"), 0.2);
     // A class whose pairs are all named is not needed.
     model(
         &json!({"tool_fabric": 0.2, "pairs": [{"between": ["outer", "inner"], "coefficient": 0.4}]}),
@@ -95,6 +96,12 @@ fn laws_of_pressure_and_angle_reach_the_contacts() {
     assert_eq!(between.pressure, PressureDependence::Constant(0.3));
     // The outer ply's nodes touch the inner ply, whose fibres count.
     assert_eq!(between.angle.as_ref().unwrap().whose, Whose::Master);
+    // Through the inner ply, a law by the inner ply's fibres counts without them: the die is no sheet that has any.
+    let through = varying("die/inner");
+    assert!((through.pressure.coefficient(1e5) - at).abs() < 1e-12);
+    let weakest = varying("holder/outer");
+    assert!(weakest.angle.is_none());
+    assert_eq!(weakest.pressure.coefficient(1e5), 0.2);
     let table = varying("holder/inner");
     assert!((table.pressure.coefficient(25e3) - 0.35).abs() < 1e-12);
     let angle = table.angle.as_ref().unwrap();

@@ -208,6 +208,9 @@ fn a_holder_with_a_force_presses_with_that_force_on_two_plies() {
     };
     let (holder, punch, die) = (on("holder/"), on("tool/"), on("die/"));
     assert!((holder - 200.0).abs() < 4.0, "{holder}");
+    // It goes through both plies: the holder does not hold the upper one past the lower one.
+    let past = on("holder/ply_2");
+    assert!(past.abs() < 2.0, "{past}");
     // What pushes up is held down by the die.
     assert!(
         (holder + punch + die).abs() < 0.03 * -die,

@@ -143,6 +143,8 @@ pub struct RigidContact {
     pub moves: bool,
     /// Distance that the nodes keep from the surface (m).
     pub offset: f64,
+    /// By how much that is less than what lies between them is thick (m): nodes that sink in further count so much deeper in reports.
+    pub slack: f64,
     /// Coulomb coefficient.
     pub friction: FrictionLaw,
     /// Elastic-slip stiffness over normal stiffness.
@@ -194,6 +196,7 @@ impl RigidContact {
             motion: RigidMotion::default(),
             moves: false,
             offset,
+            slack: 0.0,
             friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
@@ -203,6 +206,13 @@ impl RigidContact {
             spans: Vec::new(),
             cycle: 0,
         }
+    }
+
+    /// Lets the nodes come nearer by `slack` (m) before the surface holds them: for a sheet that another one keeps away from it.
+    pub fn with_slack(mut self, slack: f64) -> Self {
+        self.offset -= slack;
+        self.slack = slack;
+        self
     }
 
     /// Computes the force of every item from positions (m) and velocities (m/s). `pace`: of the nodes; the surface's own
