@@ -228,3 +228,29 @@ fn a_falling_weight_is_never_found_late() {
         }
     }
 }
+
+/// A sheet that another one keeps away: nothing holds it before the slack is used up, then the penalty counts from there.
+#[test]
+fn slack_comes_before_the_force() {
+    let settings = ContactSettings {
+        augmentation: 0.0,
+        ..ContactSettings::default()
+    };
+    let pace = Pace {
+        dt: 1e-6,
+        speed: 100.0,
+        acceleration: 1e6,
+    };
+    let force = |height: f64| {
+        let mut item = RigidItem::new(0);
+        item.stiffness = 1e5;
+        let floor = Arc::new(Plane { height: 0.0 });
+        let contact = RigidContact::new("floor".into(), floor, 4e-4, 0.3, &settings, vec![item]);
+        let mut contact = contact.with_slack(2e-5);
+        assert_eq!(contact.slack, 2e-5);
+        contact.compute(&[[0.0, 0.0, height]], &[[0.0; 3]], pace);
+        contact.items[0].normal_force
+    };
+    assert_eq!(force(3.81e-4), 0.0);
+    assert!((force(3.7e-4) - 1.0).abs() < 1e-9, "{}", force(3.7e-4));
+}

@@ -14,6 +14,8 @@ const FOOT_MARGIN: f64 = 0.0;
 /// A run of a zone.
 struct Run {
     input: Input,
+    /// The zone's box in the undeformed plane, as its list has it.
+    bounds: Value,
     element_size: f64,
     plies: Vec<Ply>,
 }
@@ -41,7 +43,7 @@ fn zone_of(host: &Host, input: &Input) -> Result<Option<String>, StepError> {
 /// Compares the runs of every zone and advises an element size for each.
 ///
 /// # Errors
-/// When a zone has fewer than two sizes, or a run cannot be read.
+/// When a zone has fewer than two sizes or not one box, or a run cannot be read.
 pub fn compare(host: &Host, inputs: Vec<Input>, target: f64) -> Result<(), StepError> {
     let mut by_zone: BTreeMap<(usize, String), Vec<Run>> = BTreeMap::new();
     for input in inputs {
@@ -89,6 +91,14 @@ fn one(
         )
         .into());
     };
+    if let Some(other) = runs.iter().find(|r| r.bounds != finest.bounds) {
+        let (a, b) = (&finest.input.step, &other.input.step);
+        return Err(format!(
+            "zone {zone} of '{a}' has the box {}, that of '{b}' {}; take runs of one list of zones",
+            finest.bounds, other.bounds
+        )
+        .into());
+    }
     if next.element_size == finest.element_size {
         let (a, b) = (&finest.input.step, &next.input.step);
         let mm = 1e3 * finest.element_size;
@@ -144,6 +154,7 @@ fn read(host: &Host, input: Input) -> Result<Run, StepError> {
         .collect();
     Ok(Run {
         plies: plies?,
+        bounds: formed.zone["box"].clone(),
         element_size: formed.element_size,
         input,
     })

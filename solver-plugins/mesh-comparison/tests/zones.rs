@@ -33,7 +33,7 @@ fn zone(name: &str, size: f64) -> MemoryArtifact {
     };
     MemoryArtifact {
         kind: "forming".into(),
-        attributes: json!({"element_size": size, "elements": 1, "zone": {"name": name},
+        attributes: json!({"element_size": size, "elements": 1, "zone": {"name": name, "box": [-0.1, -0.1, 0.1, 0.1]},
             "sheets": [{"name": "ply_1", "kind": "ply", "offset": 0.0}]}),
         times: vec![1.0],
         bodies: vec![tool, ply],
@@ -93,7 +93,7 @@ fn every_zone_gets_a_size_from_the_errors_of_its_own_runs() {
 }
 
 #[test]
-fn zones_with_one_run_or_mixed_with_the_whole_are_refused() {
+fn zones_with_one_run_drawn_again_or_mixed_with_the_whole_are_refused() {
     let (a, b) = (zone("A", 0.008), zone("A", 0.004));
     let lone = zone("B", 0.004);
     let error = compare(&[("x", &a), ("y", &b), ("y", &lone)], 0.1).unwrap_err();
@@ -101,6 +101,13 @@ fn zones_with_one_run_or_mixed_with_the_whole_are_refused() {
     let error = compare(&[("x", &a), ("y", &a)], 0.1).unwrap_err();
     assert!(
         error.contains("'x' and 'y' are both the finest of zone A, with 8 mm"),
+        "{error}"
+    );
+    let mut grown = zone("A", 0.004);
+    grown.attributes["zone"]["box"] = json!([-0.2, -0.1, 0.1, 0.1]);
+    let error = compare(&[("x", &a), ("y", &grown)], 0.1).unwrap_err();
+    assert!(
+        error.contains("zone A of 'y' has the box [-0.2,") && error.contains("one list of zones"),
         "{error}"
     );
     let mut whole = zone("A", 0.004);
