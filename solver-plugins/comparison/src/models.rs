@@ -1,8 +1,7 @@
 //! Reading the models that are compared.
 
-use plyflow_defects::{Ply, Settings, Tool};
+use plyflow_defects::{Ply, Settings, Tool, of_run};
 use plyflow_sdk::{Host, Input, StepError};
-use plyflow_surface::{Surface, Topology, triangles};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -141,7 +140,7 @@ pub fn read_models(
     settings: &Settings,
 ) -> Result<(Vec<Model>, Vec<Input>), StepError> {
     let global = host.input("global")?;
-    let tool = read_tool(host, &global)?;
+    let tool = of_run::tool(host, &global)?;
     let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
     let (mut local, mut passed_over) = (Vec::new(), Vec::new());
     for input in host.inputs_of("local")? {
@@ -156,7 +155,7 @@ pub fn read_models(
         // A local run may leave its tool out; it is the global one's.
         let own = host.meshes(&input)?.body("tool").is_ok();
         let own = if own {
-            Some(read_tool(host, &input)?)
+            Some(of_run::tool(host, &input)?)
         } else {
             None
         };
@@ -174,7 +173,7 @@ pub fn read_models(
     for (port, role) in [("others", Role::Other), ("reference", Role::Reference)] {
         for input in host.inputs_of(port)? {
             host.check_cancelled()?;
-            let tool = read_tool(host, &input)?;
+            let tool = of_run::tool(host, &input)?;
             models.push(read(host, input, role, None, &tool, settings)?);
         }
     }
@@ -215,20 +214,6 @@ fn zone_of(
     })
 }
 
-fn read_tool(host: &Host, input: &Input) -> Result<Tool, StepError> {
-    let meshes = host.meshes(input)?;
-    let body = meshes.body("tool")?;
-    let (points, cells) = host.mesh(input, body)?;
-    let tool = Surface::new(&points, &triangles(body.nodes_per_cell, &cells));
-    tool.map(Tool::new).ok_or_else(|| {
-        format!(
-            "body 'tool' of '{}' has no triangle with an area",
-            input.step
-        )
-        .into()
-    })
-}
-
 fn read(
     host: &Host,
     input: Input,
@@ -239,9 +224,7 @@ fn read(
 ) -> Result<Model, StepError> {
     let formed: Formed = host.attributes(&input)?;
     let meshes = host.meshes(&input)?;
-    let Some(frame) = meshes.times.len().checked_sub(1) else {
-        return Err(format!("'{}' has no frame", input.step).into());
-    };
+    let frame = of_run::last_frame(&input, &meshes)?;
     let mut plies = Vec::new();
     for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
         let body = meshes.body(&sheet.name)?;
@@ -253,16 +236,8 @@ fn read(
             );
             return Err(what.into());
         }
-        let (undeformed, cells) = host.mesh(&input, body)?;
-        let mut ply = Ply::new(
-            sheet.name.clone(),
-            Topology::new(undeformed.len(), 4, &cells),
-            undeformed,
-            host.frame_points(&input, body, frame)?,
-            tool,
-            sheet.offset,
-            settings.foot_margin,
-        );
+        let place = (sheet.name.as_str(), sheet.offset);
+        let mut ply = of_run::ply(host, &input, frame, place, tool, settings.foot_margin)?;
         ply.shear_angle = host.frame_field(&input, body, frame, "shear_angle")?;
         plies.push(ply);
     }

@@ -6,7 +6,7 @@ pub use detect::{Detection, Ply, Summary, Thresholds, detect};
 
 use plyflow_sdk::{Host, Input, On, Progress, Step, StepError, export_step};
 use plyflow_surface::vector::Vec3;
-use plyflow_surface::{Surface, Topology, triangles};
+use plyflow_surface::{Surface, Topology, of_run};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -59,7 +59,7 @@ impl Step for DefectDetection {
             )
             .into());
         }
-        let tool = read_tool(host, &input)?;
+        let tool = of_run::rigid(host, &input, "tool")?;
         let mut judged = Vec::new();
         for (i, sheet) in plies.iter().enumerate() {
             host.check_cancelled()?;
@@ -73,20 +73,6 @@ impl Step for DefectDetection {
         }
         write(host, meshes.times[frame], &judged, &thresholds)
     }
-}
-
-fn read_tool(host: &Host, input: &Input) -> Result<Surface, StepError> {
-    let meshes = host.meshes(input)?;
-    let body = meshes.body("tool")?;
-    let (points, cells) = host.mesh(input, body)?;
-    let tool = Surface::new(&points, &triangles(body.nodes_per_cell, &cells));
-    tool.ok_or_else(|| {
-        format!(
-            "body 'tool' of '{}' has no triangle with an area",
-            input.step
-        )
-        .into()
-    })
 }
 
 fn judge(

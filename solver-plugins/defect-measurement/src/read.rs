@@ -2,9 +2,9 @@
 
 use crate::{Align, Parameters};
 use plyflow_defects::align::{Alignment, Settings, align};
-use plyflow_defects::{Ply, Tool, scan};
+use plyflow_defects::{Ply, Tool, of_run, scan};
 use plyflow_sdk::{Host, Input, StepError};
-use plyflow_surface::{Surface, Topology, triangles};
+use plyflow_surface::Topology;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -53,11 +53,7 @@ impl Run {
         let input = host.input("formed")?;
         let formed: Formed = host.attributes(&input)?;
         let meshes = host.meshes(&input)?;
-        let Some(frame) = meshes.times.len().checked_sub(1) else {
-            return Err(
-                format!("'{}' has no frame: there is nothing to measure", input.step).into(),
-            );
-        };
+        let frame = of_run::last_frame(&input, &meshes)?;
         let faces = formed.sheets.iter().map(|s| s.offset + 0.5 * s.thickness);
         let outer = faces.fold(0.0, f64::max);
         let plies: Vec<Sheet> = (formed.sheets.into_iter())
@@ -70,19 +66,10 @@ impl Run {
             )
             .into());
         }
-        let body = meshes.body("tool")?;
-        let (points, cells) = host.mesh(&input, body)?;
-        let surface = Surface::new(&points, &triangles(body.nodes_per_cell, &cells));
-        let surface = surface.ok_or_else(|| {
-            format!(
-                "body 'tool' of '{}' has no triangle with an area",
-                input.step
-            )
-        })?;
         Ok(Self {
             frame,
             time: meshes.times[frame],
-            tool: Tool::new(surface),
+            tool: of_run::tool(host, &input)?,
             plies,
             outer,
             input,
@@ -94,18 +81,8 @@ impl Run {
         let (input, frame) = (&self.input, self.frame);
         let meshes = host.meshes(input)?;
         let body = meshes.body(&sheet.name)?;
-        let (undeformed, cells) = host.mesh(input, body)?;
-        let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
-        let formed = host.frame_points(input, body, frame)?;
-        let mut ply = Ply::new(
-            sheet.name.clone(),
-            topology,
-            undeformed,
-            formed,
-            &self.tool,
-            sheet.offset,
-            foot_margin,
-        );
+        let place = (sheet.name.as_str(), sheet.offset);
+        let mut ply = of_run::ply(host, input, frame, place, &self.tool, foot_margin)?;
         ply.shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
         // Not every run has them: a pin-jointed net's fibres have no strain.
         let names = ["fibre_strain_1", "fibre_strain_2"];

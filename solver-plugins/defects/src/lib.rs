@@ -5,6 +5,8 @@ pub mod align;
 mod cause;
 mod fields;
 mod measure;
+#[cfg(feature = "steps")]
+pub mod of_run;
 pub mod scan;
 
 pub use cause::{Cause, Limits, find_causes, relative_angle};

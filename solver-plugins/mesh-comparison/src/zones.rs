@@ -1,10 +1,9 @@
 //! Local runs of zones with meshes of different fineness: how far their distances from the tool are from those of the finest.
 
+use crate::Formed;
 use crate::advice::advise;
-use crate::{Formed, Sheet};
-use plyflow_defects::{FieldErrors, Ply, Tool};
-use plyflow_sdk::{Host, Input, Log, Meshes, StepError};
-use plyflow_surface::{Surface, Topology, triangles};
+use plyflow_defects::{FieldErrors, Ply, of_run};
+use plyflow_sdk::{Host, Input, Log, StepError};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -135,57 +134,21 @@ fn one(
 
 fn read(host: &Host, input: Input) -> Result<Run, StepError> {
     let formed: Formed = host.attributes(&input)?;
-    let meshes = host.meshes(&input)?;
-    let Some(frame) = meshes.times.len().checked_sub(1) else {
-        return Err(format!("'{}' has no frame", input.step).into());
-    };
-    let body = meshes.body("tool")?;
-    let (points, cells) = host.mesh(&input, body)?;
-    let tool = Surface::new(&points, &triangles(body.nodes_per_cell, &cells)).map(Tool::new);
-    let tool = tool.ok_or_else(|| {
-        format!(
-            "body 'tool' of '{}' has no triangle with an area",
-            input.step
-        )
-    })?;
-    let plies = formed.sheets.iter().filter(|s| s.kind == "ply");
-    let plies: Result<Vec<Ply>, StepError> = plies
-        .map(|sheet| ply(host, &input, &meshes, frame, sheet, &tool))
-        .collect();
+    let frame = of_run::last_frame(&input, &host.meshes(&input)?)?;
+    let tool = of_run::tool(host, &input)?;
+    let mut plies = Vec::new();
+    for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
+        let (name, step) = (sheet.name.as_str(), &input.step);
+        let offset = sheet.offset;
+        let offset = offset
+            .ok_or_else(|| format!("ply '{name}' of '{step}' has no offset from the tool"))?;
+        let place = (name, offset);
+        plies.push(of_run::ply(host, &input, frame, place, &tool, FOOT_MARGIN)?);
+    }
     Ok(Run {
-        plies: plies?,
+        plies,
         bounds: formed.zone["box"].clone(),
         element_size: formed.element_size,
         input,
     })
-}
-
-fn ply(
-    host: &Host,
-    input: &Input,
-    meshes: &Meshes,
-    frame: usize,
-    sheet: &Sheet,
-    tool: &Tool,
-) -> Result<Ply, StepError> {
-    let body = meshes.body(&sheet.name)?;
-    let (undeformed, cells) = host.mesh(input, body)?;
-    let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
-    let formed = host.frame_points(input, body, frame)?;
-    let name = sheet.name.clone();
-    let offset = sheet.offset.ok_or_else(|| {
-        format!(
-            "ply '{name}' of '{}' has no offset from the tool",
-            input.step
-        )
-    })?;
-    Ok(Ply::new(
-        name,
-        topology,
-        undeformed,
-        formed,
-        tool,
-        offset,
-        FOOT_MARGIN,
-    ))
 }

@@ -23,3 +23,5 @@ pub use topology::{Topology, triangles};
 
 #[cfg(feature = "memory-host")]
 pub mod memory_host;
+#[cfg(feature = "steps")]
+pub mod of_run;
