@@ -1,5 +1,6 @@
 //! How deep sheets lie in each other and in rigid surfaces.
 
+use crate::assembly::SHARE_SQUEEZED;
 use crate::run::Forming;
 
 /// Penetration of one pair at present.
@@ -13,7 +14,7 @@ pub struct Penetration {
     pub q999: f64,
     /// By how much two sheets are kept further apart than they are thick (m).
     pub spare: f64,
-    /// Thickness of the thinner sheet (m).
+    /// Thickness of the thinner sheet (m); of a sheet held through others that of all these.
     pub thinner: f64,
 }
 
@@ -62,7 +63,13 @@ impl Forming {
         let rigid = m.rigid_contacts.iter().map(|c| {
             let depths = c.items.iter().map(|i| f64::from(i.penetration));
             let touching = depths.filter(|p| *p > 0.0);
-            judge(&c.name, 0.0, touching.map(|p| p + c.slack).collect())
+            let touching = touching.map(|p| p + c.slack).collect();
+            if c.slack > 0.0 {
+                // What lies between is squeezed, not the sheet itself.
+                Penetration::new(&c.name, touching, 0.0, c.slack / SHARE_SQUEEZED)
+            } else {
+                judge(&c.name, 0.0, touching)
+            }
         });
         let sheets = m.sheet_contacts.iter().map(|c| {
             let touching = c.items.iter().filter(|i| i.active);
