@@ -2,6 +2,7 @@
 
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::{ComponentChoice, Parameters};
+use crate::penetration;
 use crate::run::Body;
 use crate::symmetry::{self, Families, MirroredBody};
 use plyflow_abi::pf_component;
@@ -347,11 +348,6 @@ pub struct Placed {
     pub slaves: Vec<u32>,
 }
 
-/// A sheet that others keep away from a rigid part is held by the part itself once those are squeezed by this share of their
-/// thickness. Held at their full thickness it would share their load with them, in shares that no physics gives, and past the
-/// surfaces on which they slide (`docs/decisions/0025-loads-go-through-the-stack.md`).
-pub const SHARE_SQUEEZED: f64 = 0.05;
-
 /// Sets up all contacts of the stack. `placed` is in stack order (first and last are the films);
 /// `tool` may be absent (a scene whose zone lies off the tool).
 ///
@@ -396,10 +392,9 @@ pub fn add_contacts(
         parts.extend(stack[..=k].iter().map(|s| s.scene.name.as_str()));
         let mu = friction.through(model, &parts, &stack[k].scene.name)?;
         let contact = rigid(name("tool", k), tool.clone(), mu, k);
-        let between = stack[k].offset - 0.5 * stack[k].thickness;
         model
             .rigid_contacts
-            .push(contact.with_slack(SHARE_SQUEEZED * between));
+            .push(contact.with_slack(penetration::slack_through(&stack[..k])));
     }
     let mut pair = |slave: usize, master: usize, side: f64| -> Result<(), String> {
         let on = (master, placed[master].index);

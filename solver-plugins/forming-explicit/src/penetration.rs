@@ -1,7 +1,17 @@
 //! How deep sheets lie in each other and in rigid surfaces.
 
-use crate::assembly::SHARE_SQUEEZED;
+use crate::assembly::StackSheet;
 use crate::run::Forming;
+
+/// A sheet that others keep away from a rigid part is held by the part itself once those are squeezed by this share of their
+/// thickness. Held at their full thickness it would share their load with them, in shares that no physics gives, and past the
+/// surfaces on which they slide (`docs/decisions/0025-loads-go-through-the-stack.md`).
+const SHARE_SQUEEZED: f64 = 0.05;
+
+/// Slack (m) of a sheet that a rigid part holds through the sheets `between`.
+pub fn slack_through(between: &[StackSheet]) -> f64 {
+    SHARE_SQUEEZED * between.iter().map(|s| s.thickness).sum::<f64>()
+}
 
 /// Penetration of one pair at present.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,9 +3,10 @@
 //! The tool of the scene is the punch, described where it ends. It starts one stroke below, where it touches the
 //! lowest ply, and pushes the plies through the opening of the die.
 
-use crate::assembly::{self, Components, SHARE_SQUEEZED, StackSheet, ToolSurface};
+use crate::assembly::{self, Components, StackSheet, ToolSurface};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
+use crate::penetration;
 use crate::process::Load;
 use crate::run::{Forming, RigidBody};
 use crate::symmetry;
@@ -232,14 +233,14 @@ fn add_contacts(
             // The ply that faces the part rubs on it; the others stay outside where its elements' chords cut through.
             let own = sheet.scene.name.as_str();
             let names = stack.iter().map(|s| s.scene.name.as_str());
-            let (offset, chain): (f64, Vec<&str>) = if *above {
-                (top - sheet.offset, names.skip(k).chain([*part]).collect())
+            let (offset, between, chain): (f64, _, Vec<&str>) = if *above {
+                let down_to = names.skip(k).chain([*part]);
+                (top - sheet.offset, &stack[k + 1..], down_to.collect())
             } else {
                 let up_to = std::iter::once(*part).chain(names.take(k + 1));
-                (sheet.offset, up_to.collect())
+                (sheet.offset, &stack[..k], up_to.collect())
             };
             let mu = friction.through(model, &chain, own)?;
-            let between = offset - 0.5 * sheet.thickness;
             let nodes = model.sheets[k].nodes.iter();
             let mut contact = RigidContact::new(
                 format!("{part}/{}", sheet.scene.name),
@@ -249,7 +250,7 @@ fn add_contacts(
                 &settings,
                 nodes.map(|n| RigidItem::new(*n)).collect(),
             )
-            .with_slack(SHARE_SQUEEZED * between);
+            .with_slack(penetration::slack_through(between));
             contact.moves = *part != "die";
             model.rigid_contacts.push(contact);
         }

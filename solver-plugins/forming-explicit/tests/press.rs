@@ -217,7 +217,7 @@ fn a_holder_with_a_force_presses_with_that_force_on_two_plies() {
         "{holder} {punch} {die}"
     );
     for p in forming.penetrations() {
-        assert!(p.q999 < 4e-5, "{p:?}");
+        assert!(p.q999 < 4e-5 && p.overlap() < 0.1, "{p:?}");
     }
     // The second ply lies on the first over the dome.
     let top = |k: usize| {
