@@ -1,7 +1,7 @@
 //! Motion of the nodes on a cut, and how well their straight edges follow the coarse run.
 
 use crate::grid::{Grid, SAME_PLACE, SIDES};
-use plyflow_surface::vector::{Vec3, add, cross, distance, sub, unit};
+use plyflow_surface::vector::{Vec3, add, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{Location, QuadLocator, Topology};
 
 /// How far outside of the coarse mesh a node may lie (m): rounding of outlines.
@@ -17,7 +17,51 @@ pub struct Placed {
     /// Nodes on cut sides, ascending.
     pub driven_nodes: Vec<u32>,
     locations: Vec<Location>,
+    /// `[k]` how far the undeformed coarse surface is lifted at the driven nodes (m): none where it is flat.
+    lifted: Vec<Vec3>,
     crossings: Vec<Crossing>,
+}
+
+/// A coarse sheet as a smooth surface through its nodes.
+pub struct CoarseSheet {
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+}
+
+impl CoarseSheet {
+    /// Nodes at `points` (`[n]` m), `cells` `[m * 4]`. Normals of the cells are averaged by area at the nodes.
+    pub fn new(points: Vec<Vec3>, cells: &[u32]) -> Self {
+        let mut normals = vec![[0.0; 3]; points.len()];
+        for cell in cells.chunks_exact(4) {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| points[cell[i] as usize]);
+            // Half the cross product of the diagonals is the area of a quad, times its normal.
+            let normal = cross(sub(c, a), sub(d, b));
+            for &i in cell {
+                normals[i as usize] = add(normals[i as usize], normal);
+            }
+        }
+        let normals = normals.into_iter().map(unit).collect();
+        Self { points, normals }
+    }
+
+    /// From a place of the bilinear mesh to the smooth surface (m): half of the weighted mean of the ways to the planes through
+    /// the nodes at right angles to their normals (Phong tessellation, Boubekeur and Alexa 2008, with 1/2 instead of their 3/4).
+    /// So the sagitta of a circle's chords is made up for but for a share of the fourth power of their length. A
+    /// sheet whose normals turn by more than 60 degrees between the nodes is folded, not curved, and stays straight.
+    fn lift(&self, nodes: &[u32], weights: &[f64]) -> Vec3 {
+        let part = || nodes.iter().map(|n| *n as usize).zip(weights);
+        let flat = part().fold([0.0; 3], |sum, (n, w)| add(sum, scale(self.points[n], *w)));
+        let normal = |n: &u32| self.normals[*n as usize];
+        let pairs = nodes.iter().flat_map(|a| nodes.iter().map(move |b| (a, b)));
+        let least = pairs.fold(1.0, |c: f64, (a, b)| c.min(dot(normal(a), normal(b))));
+        // From 45 to 60 degrees it fades out, so that nothing jumps while a sheet folds.
+        let s = ((least - 0.5) / 0.2).clamp(0.0, 1.0);
+        let share = 0.5 * s * s * (3.0 - 2.0 * s);
+        part().fold([0.0; 3], |sum, (n, w)| {
+            let off = dot(sub(flat, self.points[n]), self.normals[n]);
+            sub(sum, scale(self.normals[n], share * w * off))
+        })
+    }
 }
 
 /// A place where a line of the coarse mesh crosses the cut: there the coarse displacement has a kink, and
@@ -55,7 +99,11 @@ impl Placed {
             .map(|&i| find(grid.points[i as usize]))
             .collect::<Result<_, _>>()?;
         let crossings = crossings(&grid, &driven_nodes, points, cells);
+        let undeformed = CoarseSheet::new(points.to_vec(), cells);
+        let lift = |l: &Location| undeformed.lift(&l.nodes, &l.weights);
+        let locations: Vec<Location> = locations;
         Ok(Self {
+            lifted: locations.iter().map(lift).collect(),
             grid,
             points: placed,
             driven_nodes,
@@ -64,42 +112,36 @@ impl Placed {
         })
     }
 
-    /// Positions of the driven nodes (`[k]`, m) when the coarse nodes are at `coarse`.
-    pub fn positions(&self, coarse: &[Vec3]) -> Vec<Vec3> {
-        self.locations
-            .iter()
-            .map(|l| l.interpolate(coarse))
+    /// Positions of the driven nodes (`[k]`, m) on the coarse sheet.
+    pub fn positions(&self, coarse: &CoarseSheet) -> Vec<Vec3> {
+        let nodes = self.locations.iter().zip(&self.lifted);
+        nodes
+            .map(|(l, before)| {
+                let lift = sub(coarse.lift(&l.nodes, &l.weights), *before);
+                add(l.interpolate(&coarse.points), lift)
+            })
             .collect()
     }
 
-    /// Unit normals of the coarse surface at the driven nodes (`[k]`), on the side that is up in the flat sheet: cells'
-    /// normals averaged by area at the coarse nodes and interpolated, so that they are continuous along the cut.
-    pub fn normals(&self, coarse: &[Vec3], cells: &[u32]) -> Vec<Vec3> {
-        let mut at_nodes = vec![[0.0; 3]; coarse.len()];
-        for cell in cells.chunks_exact(4) {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|i| coarse[cell[i] as usize]);
-            // Half the cross product of the diagonals is the area of a quad, times its normal.
-            let normal = cross(sub(c, a), sub(d, b));
-            for &i in cell {
-                at_nodes[i as usize] = add(at_nodes[i as usize], normal);
-            }
-        }
-        let normals: Vec<Vec3> = at_nodes.into_iter().map(unit).collect();
-        (self.locations.iter())
-            .map(|l| unit(l.interpolate(&normals)))
-            .collect()
+    /// Unit normals of the coarse sheet at the driven nodes (`[k]`), on the side that is up in the flat sheet: continuous along
+    /// the cut.
+    pub fn normals(&self, coarse: &CoarseSheet) -> Vec<Vec3> {
+        let normal = |l: &Location| unit(l.interpolate(&coarse.normals));
+        self.locations.iter().map(normal).collect()
     }
 
     /// Largest distance (m), where coarse lines cross the cut, between the fine edges with their nodes at
-    /// `driven` and the coarse mesh with its nodes at `coarse`.
-    pub fn error(&self, driven: &[Vec3], coarse: &[Vec3]) -> f64 {
+    /// `driven` and the coarse sheet.
+    pub fn error(&self, driven: &[Vec3], coarse: &CoarseSheet) -> f64 {
         let between = |a: Vec3, b: Vec3, w: f64| [0, 1, 2].map(|d| a[d] + w * (b[d] - a[d]));
         self.crossings
             .iter()
             .map(|c| {
-                let [a, b] = c.coarse.map(|i| coarse[i as usize]);
+                let [a, b] = c.coarse.map(|i| coarse.points[i as usize]);
+                let lift = coarse.lift(&c.coarse, &[1.0 - c.coarse_weight, c.coarse_weight]);
                 let [p, q] = c.fine.map(|i| driven[i]);
-                distance(between(a, b, c.coarse_weight), between(p, q, c.fine_weight))
+                let on_coarse = add(between(a, b, c.coarse_weight), lift);
+                distance(on_coarse, between(p, q, c.fine_weight))
             })
             .fold(0.0, f64::max)
     }

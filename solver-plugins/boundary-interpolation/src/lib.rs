@@ -4,7 +4,7 @@
 mod cut;
 mod grid;
 
-pub use cut::Placed;
+pub use cut::{CoarseSheet, Placed};
 pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
@@ -210,7 +210,7 @@ fn drive(
     let Some(grid) = grid else { return Ok(None) };
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
-    let motion = follow(host, input, meshes, body, &fine, ply.then_some(&cells))?;
+    let motion = follow(host, input, meshes, body, &fine, &cells, ply)?;
     let start = motion.start;
     if start > START_TOLERANCE {
         let name = &sheet.name;
@@ -241,21 +241,22 @@ struct Motion {
     start: f64,
 }
 
-/// Follows the coarse sheet `body` through its frames; with its cells also its normals.
+/// Follows the coarse sheet `body` (its `cells`) through its frames; what `turns` also in its normals.
 fn follow(
     host: &Host,
     input: &Input,
     meshes: &Meshes,
     body: &BodyInfo,
     fine: &Placed,
-    cells: Option<&Vec<u32>>,
+    cells: &[u32],
+    turns: bool,
 ) -> Result<Motion, StepError> {
     let mut motion = Motion {
-        normal: cells.map(|_| Vec::new()),
+        normal: turns.then(Vec::new),
         ..Motion::default()
     };
     for frame in 0..meshes.times.len() {
-        let coarse = host.frame_points(input, body, frame)?;
+        let coarse = CoarseSheet::new(host.frame_points(input, body, frame)?, cells);
         let driven = fine.positions(&coarse);
         motion.error = motion.error.max(fine.error(&driven, &coarse));
         if frame == 0 {
@@ -264,8 +265,8 @@ fn follow(
             motion.start = nodes.map(moved).fold(0.0, f64::max);
         }
         motion.position.extend(driven.into_iter().flatten());
-        if let (Some(normal), Some(cells)) = (&mut motion.normal, cells) {
-            normal.extend(fine.normals(&coarse, cells).into_iter().flatten());
+        if let Some(normal) = &mut motion.normal {
+            normal.extend(fine.normals(&coarse).into_iter().flatten());
         }
     }
     Ok(motion)
