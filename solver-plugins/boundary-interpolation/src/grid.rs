@@ -1,5 +1,6 @@
 //! Fine structured meshes of a zone's sheets, in the undeformed plane.
 
+use plyflow_mechanics::mesh::{even_axis, multiples_axis};
 use plyflow_model::outline::{sides, signed_area, winds};
 use plyflow_surface::flat_bounds;
 
@@ -9,7 +10,7 @@ pub type Rectangle = [f64; 4];
 /// Sides in the order left, right, bottom, top.
 pub const SIDES: usize = 4;
 
-/// Places nearer than this are the same (m).
+/// Places nearer than this (m) are the same.
 pub const SAME_PLACE: f64 = 1e-6;
 
 /// A flat mesh of quads, counter-clockwise from above.
@@ -55,13 +56,25 @@ pub fn ply_part(
     if holes.iter().any(|h| crosses(zone, h)) {
         return Err("a hole");
     }
+    if rectangle && holes.is_empty() {
+        return Ok(ply_grid(zone, ply, size));
+    }
     let middle = [0.5 * (zone[0] + zone[2]), 0.5 * (zone[1] + zone[3])];
     let material = (rectangle || winds(outline, middle)) && !holes.iter().any(|h| winds(h, middle));
-    Ok(if material {
-        ply_grid(zone, ply, size)
-    } else {
-        None
-    })
+    if !material {
+        return Ok(None);
+    }
+    let part = overlap(zone, ply);
+    if is_less_than_a_cell(part, size) {
+        return Ok(None);
+    }
+    // The mesh of the whole has no straight lines here that a zone could be cut along.
+    let axes = [0, 1].map(|d| {
+        let length = part[d + 2] - part[d];
+        let cells = (length / size - SAME_PLACE).ceil();
+        even_axis(part[d], part[d + 2], length / cells)
+    });
+    Ok(Some(cut_ply(axes, ply)))
 }
 
 /// Whether a contour has a part inside a box; one that only touches it has none.
@@ -86,53 +99,68 @@ fn crosses(zone: Rectangle, contour: &[[f64; 2]]) -> bool {
     })
 }
 
-/// The part of a rectangular ply inside a zone. Sides where the zone reaches the ply's edge (or past it) are free, the
-/// others are cut. `None` when less than one cell of the ply lies in the zone.
+/// The part of a rectangular ply in a zone, cut along lines of the mesh that the whole ply would have in elements of `size` (m):
+/// the nearest that leave the zone inside. Sides where it reaches the ply's edge are free, the others are cut. `None` when less
+/// than one cell of the ply lies in the zone.
 pub fn ply_grid(zone: Rectangle, ply: Rectangle, size: f64) -> Option<Grid> {
-    let bounds = [
-        zone[0].max(ply[0]),
-        zone[1].max(ply[1]),
-        zone[2].min(ply[2]),
-        zone[3].min(ply[3]),
-    ];
-    if bounds[2] - bounds[0] < size - SAME_PLACE || bounds[3] - bounds[1] < size - SAME_PLACE {
+    let part = overlap(zone, ply);
+    if is_less_than_a_cell(part, size) {
         return None;
     }
+    let axes = [0, 1].map(|d| {
+        let all = even_axis(ply[d], ply[d + 2], size);
+        let from = all.partition_point(|x| *x <= part[d] + SAME_PLACE) - 1;
+        let to = all.partition_point(|x| *x < part[d + 2] - SAME_PLACE);
+        all[from..=to].to_vec()
+    });
+    Some(cut_ply(axes, ply))
+}
+
+fn is_less_than_a_cell(part: Rectangle, size: f64) -> bool {
+    (0..2).any(|d| part[d + 2] - part[d] < size - SAME_PLACE)
+}
+
+/// A mesh between lines, free where these are a ply's edges.
+fn cut_ply([xs, ys]: [Vec<f64>; 2], ply: Rectangle) -> Grid {
+    let same = |line: f64, edge: f64| (line - edge).abs() < SAME_PLACE;
     let free = [
-        ply[0] >= zone[0] - SAME_PLACE,
-        ply[2] <= zone[2] + SAME_PLACE,
-        ply[1] >= zone[1] - SAME_PLACE,
-        ply[3] <= zone[3] + SAME_PLACE,
+        same(xs[0], ply[0]),
+        same(xs[xs.len() - 1], ply[2]),
+        same(ys[0], ply[1]),
+        same(ys[ys.len() - 1], ply[3]),
     ];
-    structured(bounds, size, free)
+    structured(&xs, &ys, free)
 }
 
-/// The part of a film under or over a zone: the zone and `margin` on every side, as far as the film reaches.
-/// All sides are cut.
+/// The part of a film under or over a zone: the zone and `margin` on every side, as far as the film reaches, cut along whole
+/// multiples of `size` (m), where the lines of a whole film of such elements are. All sides are cut.
 pub fn film_grid(zone: Rectangle, film: Rectangle, margin: f64, size: f64) -> Option<Grid> {
-    let bounds = [
-        (zone[0] - margin).max(film[0]),
-        (zone[1] - margin).max(film[1]),
-        (zone[2] + margin).min(film[2]),
-        (zone[3] + margin).min(film[3]),
+    let wanted = [
+        zone[0] - margin,
+        zone[1] - margin,
+        zone[2] + margin,
+        zone[3] + margin,
     ];
-    if bounds[0] >= bounds[2] || bounds[1] >= bounds[3] {
-        return None;
-    }
-    structured(bounds, size, [false; SIDES])
+    let [xs, ys] = [0, 1].map(|d| {
+        let mut lines = multiples_axis(wanted[d], wanted[d + 2], size);
+        lines.retain(|x| film[d] - SAME_PLACE <= *x && *x <= film[d + 2] + SAME_PLACE);
+        lines
+    });
+    (xs.len() > 1 && ys.len() > 1).then(|| structured(&xs, &ys, [false; SIDES]))
 }
 
-fn structured(b: Rectangle, size: f64, free: [bool; SIDES]) -> Option<Grid> {
-    // The slack keeps a side of a whole number of cells from getting one more by rounding.
-    let count = |d: usize| (((b[d + 2] - b[d]) / size - 1e-6).ceil() as usize).max(1);
-    let (nx, ny) = (count(0), count(1));
-    let at = |d: usize, i: usize, n: usize| {
-        if i == n {
-            b[d + 2]
-        } else {
-            b[d] + (b[d + 2] - b[d]) * i as f64 / n as f64
-        }
-    };
+fn overlap(a: Rectangle, b: Rectangle) -> Rectangle {
+    [
+        a[0].max(b[0]),
+        a[1].max(b[1]),
+        a[2].min(b[2]),
+        a[3].min(b[3]),
+    ]
+}
+
+/// Quads between lines (m), which ascend.
+fn structured(xs: &[f64], ys: &[f64], free: [bool; SIDES]) -> Grid {
+    let (nx, ny) = (xs.len() - 1, ys.len() - 1);
     let number = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
     let mut cells = Vec::new();
     for j in 0..ny {
@@ -145,9 +173,7 @@ fn structured(b: Rectangle, size: f64, free: [bool; SIDES]) -> Option<Grid> {
             ]);
         }
     }
-    let points = (0..=ny)
-        .flat_map(|j| (0..=nx).map(move |i| [at(0, i, nx), at(1, j, ny)]))
-        .collect();
+    let points = ys.iter().flat_map(|y| xs.iter().map(|x| [*x, *y]));
     let row = |j: usize| (0..=nx).map(|i| number(i, j)).collect::<Vec<_>>();
     let column = |i: usize| (0..=ny).map(|j| number(i, j)).collect::<Vec<_>>();
     let all = [column(0), column(nx), row(0), row(ny)];
@@ -156,10 +182,10 @@ fn structured(b: Rectangle, size: f64, free: [bool; SIDES]) -> Option<Grid> {
         .zip(free)
         .map(|(nodes, free)| (!free).then_some(nodes));
     let cuts = std::array::from_fn(|_| sides.next().flatten());
-    Some(Grid {
-        points,
+    Grid {
+        points: points.collect(),
         cells,
         cuts,
-        bounds: b,
-    })
+        bounds: [xs[0], ys[0], xs[nx], ys[ny]],
+    }
 }

@@ -4,6 +4,7 @@ use plyflow_boundary_interpolation::{
     BoundaryInterpolation, CoarseSheet, Placed, film_grid, ply_grid, ply_part,
 };
 use plyflow_mechanics::history::{linear, spline_slopes};
+use plyflow_mechanics::mesh::{QuadMesh, even_axis, graded_axis};
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
 use plyflow_surface::vector::{Vec3, distance, unit};
 use serde_json::{Value, json};
@@ -86,6 +87,39 @@ fn rectangle(b: [f64; 4]) -> Vec<[f64; 2]> {
     vec![[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]
 }
 
+fn near(a: [f64; 4], b: [f64; 4]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
+}
+
+#[test]
+fn a_zone_s_meshes_are_cut_out_of_those_of_the_whole() {
+    // Plies of 480 x 300 mm in 4 mm have lines at -240 + 4 i and -150 + 4 j mm, films of 6 mm at 6 k mm.
+    let (ply, film) = ([-0.24, -0.15, 0.24, 0.15], [-0.9, -0.75, 0.9, 0.75]);
+    let whole = QuadMesh::grid(
+        &even_axis(ply[0], ply[2], 0.004),
+        &even_axis(ply[1], ply[3], 0.004),
+    );
+    let zone = [-0.0113, 0.0221, 0.0731, 0.1475];
+    let part = ply_grid(zone, ply, 0.004).unwrap();
+    assert!(
+        near(part.bounds, [-0.012, 0.022, 0.076, 0.15]),
+        "{:?}",
+        part.bounds
+    );
+    // Of the whole's nodes, with the same bits. The zone's top is less than a cell from the edge: there it is free.
+    let of_the_whole = |p: &[f64; 2]| whole.points.iter().any(|q| [q[0], q[1]] == *p);
+    assert!(part.points.iter().all(of_the_whole));
+    assert_eq!(
+        part.cuts.each_ref().map(Option::is_some),
+        [true, true, true, false]
+    );
+    let xs = graded_axis(film[0], film[2], -0.3, 0.3, 0.006, 1.25);
+    let ys = graded_axis(film[1], film[3], -0.2, 0.2, 0.006, 1.25);
+    let part = film_grid(zone, film, 0.02, 0.006).unwrap();
+    assert!(near(part.bounds, [-0.036, 0.0, 0.096, 0.168]));
+    assert!((part.points.iter()).all(|[x, y]| xs.contains(x) && ys.contains(y)));
+}
+
 #[test]
 fn a_cut_that_lies_on_the_ply_s_edge_stays_free() {
     let ply = [-0.24, -0.15, 0.24, 0.15];
@@ -102,7 +136,7 @@ fn a_cut_that_lies_on_the_ply_s_edge_stays_free() {
     assert_eq!(grid.driven_nodes().len(), 35 + 34);
     let whole = ply_grid([-0.3, -0.2, 0.3, 0.2], ply, 0.01).unwrap();
     assert!(whole.driven_nodes().is_empty());
-    assert_eq!(whole.bounds, [-0.24, -0.15, 0.24, 0.15]);
+    assert!(near(whole.bounds, ply));
     assert!(
         ply_grid([0.239, -0.1, 0.3, 0.1], ply, 0.003).is_none(),
         "less than a cell"
@@ -112,7 +146,7 @@ fn a_cut_that_lies_on_the_ply_s_edge_stays_free() {
 #[test]
 fn a_smaller_ply_has_its_own_edges() {
     let small = ply_grid([0.0, 0.0, 0.1, 0.1], [0.03, -0.1, 0.08, 0.05], 0.005).unwrap();
-    assert_eq!(small.bounds, [0.03, 0.0, 0.08, 0.05]);
+    assert!(near(small.bounds, [0.03, 0.0, 0.08, 0.05]));
     assert_eq!(
         small.cuts.clone().map(|c| c.is_some()),
         [false, false, true, false]
@@ -135,7 +169,7 @@ fn a_zone_is_cut_out_of_a_polygon_only_where_it_lies_wholly_inside_or_outside() 
     let inside = part([0.01, 0.01, 0.05, 0.06], &ell, &hole)
         .unwrap()
         .unwrap();
-    assert_eq!(inside.bounds, [0.01, 0.01, 0.05, 0.06]);
+    assert!(near(inside.bounds, [0.01, 0.01, 0.05, 0.06]));
     assert!(inside.cuts.iter().all(|c| c.is_some()));
     // Beside the L, in its notch and in the hole there is no ply.
     for zone in [
@@ -169,21 +203,20 @@ fn a_zone_is_cut_out_of_a_polygon_only_where_it_lies_wholly_inside_or_outside() 
 fn films_reach_past_the_zone_but_not_past_themselves_and_are_cut_all_around() {
     let film = [-0.9, -0.75, 0.9, 0.75];
     let grid = film_grid([-0.24, 0.05, -0.14, 0.15], film, 0.02, 0.01).unwrap();
-    let expected = [-0.26, 0.03, -0.12, 0.17];
-    assert!(
-        grid.bounds
-            .iter()
-            .zip(expected)
-            .all(|(a, b)| (a - b).abs() < 1e-12)
-    );
+    assert!(near(grid.bounds, [-0.26, 0.03, -0.12, 0.17]));
     assert!(grid.cuts.iter().all(Option::is_some));
     assert_eq!(grid.driven_nodes().len(), 4 * 14);
-    assert_eq!(
-        film_grid([0.0, 0.0, 0.895, 0.1], film, 0.02, 0.01)
-            .unwrap()
-            .bounds[2],
-        0.9
-    );
+    let at_the_end = film_grid([0.0, 0.0, 0.895, 0.1], film, 0.02, 0.01).unwrap();
+    assert!(near(at_the_end.bounds, [-0.02, -0.02, 0.9, 0.12]));
+    // A film that is no whole number of elements wide is cut at the last line that it reaches.
+    let narrow = film_grid(
+        [0.0, 0.0, 0.895, 0.1],
+        [-0.9, -0.75, 0.897, 0.75],
+        0.02,
+        0.01,
+    )
+    .unwrap();
+    assert!(near(narrow.bounds, [-0.02, -0.02, 0.89, 0.12]));
 }
 
 const TIMES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
@@ -286,7 +319,7 @@ fn interpolate(
 
 #[test]
 fn driven_nodes_follow_the_coarse_motion_in_place_and_velocity() {
-    let out = interpolate(&coarse(0.0), json!({"element_size": 0.004}), &[0, 1]).unwrap();
+    let out = interpolate(&coarse(0.0), json!({"element_size": 0.0025}), &[0, 1]).unwrap();
     assert_eq!(out.attributes["zone"]["name"], "B");
     let body = out.body("ply_1");
     assert!(
@@ -295,7 +328,7 @@ fn driven_nodes_follow_the_coarse_motion_in_place_and_velocity() {
     );
     let (shape, nodes) = &out.arrays["ply_1/driven_nodes"];
     let k = shape[0];
-    assert_eq!(k, 4 * 25);
+    assert_eq!(k, 4 * 40);
     let (shape, position) = &out.arrays["ply_1/position"];
     let (_, velocity) = &out.arrays["ply_1/velocity"];
     assert_eq!(shape, &[6, k, 3]);
@@ -459,16 +492,16 @@ fn the_cut_lies_on_the_curved_surface_and_not_on_the_chords_of_the_coarse_mesh()
 
 #[test]
 fn interpolation_error_is_what_straight_fine_edges_cut_off() {
-    // A parabola z = 4 y2 on the film's nodes every 1.5 m / 31. Fine edges are its chords, those of 6.25 mm up to 8 a2 / 8 deep,
+    // A parabola z = 4 y2 on the film's nodes every 1.5 m / 31. Fine edges are its chords, those of 6 mm up to 8 a2 / 8 deep,
     // and more where the coarse surface is a little off the parabola.
     let error = |size: f64| {
         let sizes = json!({"element_size": size, "film_element_size": size});
         let out = interpolate(&coarse(4.0), sizes, &[1]).unwrap();
         out.result("interpolation_error")
     };
-    let (wide, narrow) = (error(0.00625), error(0.001));
-    // Kinks of straight coarse edges would be cut off by 6.0e-4.
-    assert!(wide > 2e-5 && wide < 0.4 * 6.0e-4, "{wide}");
+    let (wide, narrow) = (error(0.006), error(0.001));
+    // Kinks of straight coarse edges would be cut off by 5.8e-4.
+    assert!(wide > 2e-5 && wide < 0.4 * 5.8e-4, "{wide}");
     assert!(narrow < 0.5 * wide, "{narrow} {wide}");
 }
 

@@ -112,10 +112,8 @@ fn entries_of(
     // The stack is listed from the tool upwards.
     for ply in model.plies.iter().rev() {
         let within = |p: &[f64; 3]| z.holds(p);
-        let inside: Vec<bool> = match model.role {
-            Role::Local => vec![true; ply.undeformed.len()],
-            _ => ply.undeformed.iter().map(within).collect(),
-        };
+        // The mesh of a zone reaches past it, to the nearest lines of the whole's.
+        let inside: Vec<bool> = ply.undeformed.iter().map(within).collect();
         for defect in measure(ply, &inside, settings) {
             let near = |side: usize| {
                 let (d, level) = (side / 2, z.bounds[side / 2 + 2 * (side % 2)]);

@@ -23,7 +23,7 @@ pub struct Patch {
     pub area: f64,
 }
 
-/// Grid lines from `lo` to `hi`: spacing `size` on `[fine_lo, fine_hi]`, growing outwards by `growth` per
+/// Grid lines from `lo` to `hi`: at the whole multiples of `size` from `fine_lo` to `fine_hi`, growing outwards by `growth` per
 /// cell (geometric, stretched to end exactly at `lo` and `hi`). All in metres.
 pub fn graded_axis(
     lo: f64,
@@ -33,14 +33,17 @@ pub fn graded_axis(
     size: f64,
     growth: f64,
 ) -> Vec<f64> {
-    let fine_cells = ((fine_hi - fine_lo) / size).round().max(1.0) as usize;
-    let h = (fine_hi - fine_lo) / fine_cells as f64;
+    let mut lines = multiples_axis(fine_lo, fine_hi, size);
+    lines.retain(|x| lo <= *x && *x <= hi);
+    if lines.is_empty() {
+        lines.push(0.5 * (lo + hi));
+    }
     let outward = |length: f64| -> Vec<f64> {
-        if length <= 0.5 * h {
+        if length <= 0.5 * size {
             return Vec::new();
         }
         let mut widths = Vec::new();
-        let (mut sum, mut w) = (0.0, h);
+        let (mut sum, mut w) = (0.0, size);
         while sum < length {
             w *= growth;
             widths.push(w);
@@ -49,28 +52,36 @@ pub fn graded_axis(
         let factor = length / sum;
         widths.iter().map(|w| w * factor).collect()
     };
+    let (first, last) = (lines[0], lines[lines.len() - 1]);
     let mut xs: Vec<f64> = Vec::new();
-    let mut x = fine_lo;
-    let left = outward(fine_lo - lo);
-    for w in &left {
+    let mut x = first;
+    for w in outward(first - lo) {
         x -= w;
         xs.push(x);
     }
     xs.reverse();
-    if let Some(first) = xs.first_mut() {
-        *first = lo;
-    }
-    xs.extend(even_lines(fine_lo, fine_hi, fine_cells));
-    x = fine_hi;
-    let right = outward(hi - fine_hi);
-    for w in &right {
+    xs.extend(lines);
+    x = last;
+    for w in outward(hi - last) {
         x += w;
         xs.push(x);
     }
-    if !right.is_empty() {
-        *xs.last_mut().expect("not empty") = hi;
-    }
+    // A rest that makes no cell of its own goes to the last one.
+    xs[0] = lo;
+    *xs.last_mut().expect("not empty") = hi;
     xs
+}
+
+/// A length (m) on whole multiples of 2^-48 m (4e-15 m): differences between such lengths are exact.
+const QUANTUM: f64 = 1.0 / (1u64 << 48) as f64;
+
+/// Lines at whole multiples of `size` (m), from the last that is not above `lo` to the first that is not below `hi`, but for
+/// rounding. So meshes of different extents share their lines. They lie on whole multiples of [`QUANTUM`].
+pub fn multiples_axis(lo: f64, hi: f64, size: f64) -> Vec<f64> {
+    let step = (size / QUANTUM).round() * QUANTUM;
+    let from = (lo / step + 1e-6).floor() as i64;
+    let to = (hi / step - 1e-6).ceil() as i64;
+    (from..=to).map(|i| i as f64 * step).collect()
 }
 
 /// Evenly spaced grid lines from `lo` to `hi` with a spacing near `size` (m).
@@ -83,7 +94,6 @@ pub fn even_axis(lo: f64, hi: f64, size: f64) -> Vec<f64> {
 /// them are then exact, all elements between them have the same bits of constants, and these are kept once. From 0 on they
 /// are those of twice as many between `-hi` and `hi`: the first is exactly 0, where a mirror plane may be.
 fn even_lines(lo: f64, hi: f64, n: usize) -> impl Iterator<Item = f64> {
-    const QUANTUM: f64 = 1.0 / (1u64 << 48) as f64;
     let whole = |x: f64| (x / QUANTUM).round();
     // From the middle, so that what is symmetric stays so.
     let (middle, before) = if lo == 0.0 {
@@ -259,9 +269,31 @@ mod tests {
             let whole: Vec<f64> = even_lines(-half, half, 2 * n).collect();
             assert_eq!((part[0], &part[..]), (0.0, &whole[n..]));
             assert!((part[n] - half).abs() < 1e-11);
-            let part = graded_axis(0.0, 2.0 * half, 0.0, half, size, 1.2);
-            assert_eq!(part[..=n], whole[n..]);
         }
+    }
+
+    #[test]
+    fn axes_of_different_extents_share_their_lines() {
+        let (size, ends) = (0.006, [-0.9, 0.9]);
+        let whole = graded_axis(ends[0], ends[1], -0.3301, 0.41, size, 1.2);
+        let fine: Vec<f64> = (whole.iter())
+            .filter(|x| (-0.333..0.413).contains(*x))
+            .copied()
+            .collect();
+        // -330.1 to 410 mm need the lines from -336 to 414.
+        assert_eq!(fine, multiples_axis(-0.3301, 0.41, size)[1..125]);
+        let zone = multiples_axis(-0.0721, 0.0481, size);
+        assert_eq!(zone.len(), 23);
+        assert!(zone.iter().all(|x| whole.contains(x)));
+        // Exact multiples stay where they are; a mirror plane gets a line of exactly 0.
+        let exact = multiples_axis(-0.072, 0.048, size);
+        assert_eq!((exact[0], exact.len()), (zone[1], 21));
+        let half = graded_axis(0.0, ends[1], 0.0, 0.41, size, 1.2);
+        assert_eq!(half[0], 0.0);
+        assert!(half.windows(2).take(69).all(|w| w[1] - w[0] == half[1]));
+        // Within half a cell of the end the last line moves there.
+        let close = graded_axis(-0.098, 0.098, -0.097, 0.097, size, 1.2);
+        assert_eq!((close[0], close.len()), (-0.098, 33));
     }
 
     #[test]

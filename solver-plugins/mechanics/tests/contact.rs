@@ -66,8 +66,26 @@ fn evaluate(mesh: &QuadMesh, x: &[V], cell: u32) -> (f64, Vec<V>) {
     (energy, f)
 }
 
+/// The same cells as a bowl: four planes that meet at the slave's corner, with folds of `folds` (rad).
+fn bowl(folds: [f64; 2], place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
+    let axis = [-0.008, 0.0, 0.008];
+    let mut mesh = QuadMesh::grid(&axis, &axis);
+    let ground =
+        |x: f64, y: f64| x.abs() * (0.5 * folds[0]).tan() + y.abs() * (0.5 * folds[1]).tan();
+    for p in &mut mesh.points {
+        p[2] = ground(p[0], p[1]);
+    }
+    let mut x = mesh.points.clone();
+    x.push([place[0], place[1], height]);
+    (mesh, x)
+}
+
 fn gradient_error(fold: f64, place: [f64; 2], height: f64) -> f64 {
-    let (mesh, x) = scene(fold, place, height);
+    gradient_error_of(scene(fold, place, height))
+}
+
+fn gradient_error_of((mesh, x): (QuadMesh, Vec<V>)) -> f64 {
+    let place = x[x.len() - 1];
     let (energy, f) = evaluate(&mesh, &x, 0);
     assert!(energy > 0.0, "not in touch at {place:?}");
     let size = norm(*f.last().unwrap());
@@ -107,6 +125,62 @@ fn force_is_the_gradient_of_its_energy_in_a_valley_but_for_the_turn_of_the_fold(
     for x in [0.0, 5e-6, -8e-6, 2e-5] {
         let error = gradient_error(0.5, [x, 0.001], 0.8 * OFFSET);
         assert!(error < 0.02, "at {x}: {error}");
+    }
+}
+
+#[test]
+fn force_is_the_gradient_of_its_energy_in_the_corner_of_a_bowl_but_for_the_turn_of_the_folds() {
+    for place in [[0.0, 0.0], [3e-6, -2e-6], [1e-5, 1e-5], [-2e-5, 4e-6]] {
+        for folds in [[0.3, 0.3], [0.3, 0.15], [0.3, -0.2]] {
+            let error = gradient_error_of(bowl(folds, place, 0.8 * OFFSET));
+            assert!(error < 0.02, "folds {folds:?} at {place:?}: {error}");
+        }
+    }
+}
+
+#[test]
+fn around_the_corner_of_a_bowl_the_force_turns_smoothly_and_does_no_work() {
+    // Circles of up to the distance over which the faces share the slave, d = 0.32 mm and more.
+    for (folds, radius) in [
+        ([0.3, 0.3], 2e-6),
+        ([0.3, 0.3], 2e-5),
+        ([0.3, 0.12], 1e-5),
+        ([0.3, 0.3], 8e-5),
+        ([0.3, -0.2], 2e-5),
+    ] {
+        const STEPS: usize = 720;
+        let at = |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / STEPS as f64;
+            let place = [radius * angle.cos(), radius * angle.sin()];
+            let (mesh, x) = bowl(folds, place, 0.8 * OFFSET);
+            let (energy, f) = evaluate(&mesh, &x, 0);
+            (x[x.len() - 1], energy, f[f.len() - 1])
+        };
+        let states: Vec<_> = (0..=STEPS).map(at).collect();
+        let size = norm(states[0].2);
+        let (mut work, mut jump) = (0.0, 0.0f64);
+        for (a, b) in states.iter().zip(&states[1..]) {
+            work += 0.5 * dot(add(a.2, b.2), sub(b.0, a.0));
+            jump = jump.max(norm(sub(b.2, a.2)));
+        }
+        let aside = states
+            .iter()
+            .map(|s| s.2[0].hypot(s.2[1]))
+            .fold(0.0, f64::max);
+        assert!(
+            aside > 0.004 * size,
+            "the corner pushes aside: {}",
+            aside / size
+        );
+        assert!(
+            jump < 0.05 * aside,
+            "folds {folds:?}, {radius} m: a jump of {jump} N of {aside} N"
+        );
+        let way = std::f64::consts::TAU * radius;
+        assert!(
+            work.abs() < 1e-3 * aside * way,
+            "folds {folds:?}, {radius} m: {work} J"
+        );
     }
 }
 

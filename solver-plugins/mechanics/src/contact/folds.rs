@@ -8,6 +8,7 @@
 //! A search in space finds the pairs that may touch; it is done anew only when some node may have moved
 //! further than the margin that the last one allowed for. In between each pair is followed by walking.
 
+use super::blend::pulled;
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::proximity::{Blocks, Candidate, Reach};
 use super::sheets::*;
@@ -430,25 +431,12 @@ fn follow<F: Coulomb>(
         return None;
     }
     let pull = if through || distance < 1e-3 * offset {
-        Pull {
-            gap: height - offset,
-            share: 0.0,
-            first: scale(up, pair.side),
-            second: [0.0; 3],
-        }
+        Pull::plain(height - offset, scale(up, pair.side))
     } else {
         // Also on ridges and at the border of what the slave sees, where the foot is no perpendicular's.
-        let (d, w) = blend(first, found.second.as_ref(), offset);
-        item.plain = w == 0.0 && height > 0.999 * distance;
-        Pull {
-            gap: d - offset,
-            share: w,
-            first: scale(first.arm, (1.0 - w) / distance),
-            second: match &found.second {
-                Some(c) if w > 0.0 => scale(c.arm, w / c.distance2.sqrt()),
-                _ => [0.0; 3],
-            },
-        }
+        let (pull, alone) = pulled(&found, offset);
+        item.plain = alone && height > 0.999 * distance;
+        pull
     };
     let plain = item.plain && !through;
     if pull.gap > 0.0 && item.multiplier == 0.0 {

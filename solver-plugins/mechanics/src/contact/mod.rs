@@ -9,6 +9,7 @@
 //! over the steady part of the force (augmented Lagrangian, a little in every step): the penetration of a
 //! contact at rest dies out over 1 / augmentation steps, at no cost in step size.
 
+mod blend;
 mod folds;
 mod friction;
 mod proximity;

@@ -6,6 +6,7 @@
 //! A force along an interpolated normal is smoother to look at but is no gradient: two flat sheets under
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
+use super::blend::pulled;
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::slave::{
     Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
@@ -84,16 +85,21 @@ pub(super) struct Closest {
     pub(super) distance2: f64,
     /// Half the cell's shorter middle line (m).
     pub(super) half: f64,
-    /// The foot of the perpendicular, not a place held at a side of the cell.
-    pub(super) interior: bool,
+    /// By coordinate, whether the place is not held at a side of the cell: in both, the way to it is a perpendicular.
+    pub(super) free: [bool; 2],
     /// Whether it lies on the cell's mirror image.
     pub(super) image: Image,
 }
 
-/// The closest point of the surface, and in a concave fold the closest of the cell across it.
+/// Cells around a corner besides the one that is closest.
+pub(super) const FACES: usize = 3;
+
+/// The closest point of the surface, and in a concave fold or corner those of the cells across it.
 pub(super) struct Found {
     pub(super) first: Closest,
-    pub(super) second: Option<Closest>,
+    /// Of the cells across the sides along xi and along eta that the slave is near, and of the one between these two across
+    /// the corner, as far as the foot on them is a perpendicular's.
+    pub(super) others: [Option<Closest>; FACES],
 }
 
 /// How far a cell goes on past a free rim, in half cells: a node that sits on the rim would else balance on an
@@ -110,7 +116,7 @@ pub(super) fn closest(
     iterations: u32,
 ) -> Closest {
     let x = s.cells[cell as usize].map(|n| s.x[n as usize]);
-    let (mut half, mut interior) = (0.0, true);
+    let (mut half, mut free) = (0.0, [true; 2]);
     let [south, east, north, west] = s.neighbours[cell as usize];
     let end = |near: u32| if near == NONE { 1.0 + RIM } else { 1.0 };
     let (low, high) = ([-end(west), -end(south)], [end(east), end(north)]);
@@ -137,7 +143,7 @@ pub(super) fn closest(
             (xi[k] + (rk - g12 * other) / gkk).clamp(low[k], high[k])
         };
         let out = [next[0] != held[0], next[1] != held[1]];
-        interior = !(out[0] || out[1]);
+        free = out.map(|o| !o);
         xi = match out {
             [false, false] => held,
             [true, false] => [held[0], along(1, held[0] - xi[0])],
@@ -162,7 +168,7 @@ pub(super) fn closest(
         arm,
         distance2: dot(arm, arm),
         half,
-        interior,
+        free,
         image: [false; 2],
     }
 }
@@ -178,10 +184,10 @@ pub(super) fn cell_normal(s: &Surface<'_>, cell: u32, xi: [f64; 2]) -> V {
     ))
 }
 
-/// Where a walk over an edge enters the neighbour, coming from place `xi`.
-fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> [f64; 2] {
+/// The edge over which a walk enters the cell `to`.
+fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> usize {
     let edge = neighbours[to as usize].iter().position(|n| *n == from);
-    middle(edge.unwrap_or(3))
+    edge.unwrap_or(3)
 }
 
 /// The middle of an edge.
@@ -194,16 +200,46 @@ fn middle(edge: usize) -> [f64; 2] {
     }
 }
 
-/// Closest point to `p` of the mirror image of a cell that has an edge on the plane: the image of the closest point to
-/// the image of `p`.
-fn across(s: &Surface<'_>, cell: u32, edge: usize, p: V, plane: usize) -> Closest {
-    let image = [plane == 0, plane == 1];
-    let other = closest(s, cell, middle(edge), reflect(p, image), 3);
+/// Closest point to `p` of the mirror image of a cell: the image of the closest point to the image of `p`.
+fn across(s: &Surface<'_>, cell: u32, start: [f64; 2], p: V, image: Image) -> Closest {
+    let other = closest(s, cell, start, reflect(p, image), 3);
     Closest {
         arm: reflect(other.arm, image),
         image,
         ..other
     }
+}
+
+/// Closest point of the cell across a corner: the neighbour of both cells (or images) `a` and `b` next to `first`.
+fn around(
+    s: &Surface<'_>,
+    first: &Closest,
+    [a, b]: [&Closest; 2],
+    p: V,
+    open: impl Fn(u32) -> bool,
+) -> Option<Closest> {
+    let real = |c: &Closest| c.image == [false; 2];
+    let image = [a.image[0] != b.image[0], a.image[1] != b.image[1]];
+    let found = match (real(a), real(b)) {
+        (true, true) => {
+            let near = s.neighbours[b.cell as usize];
+            let of_both = |c: &u32| {
+                let none = *c == NONE || *c == first.cell || mirrored_in(*c).is_some();
+                !none && near.contains(c)
+            };
+            let cell = s.neighbours[a.cell as usize].into_iter().find(of_both)?;
+            if !open(cell) {
+                return None;
+            }
+            let start = middle(entry(s.neighbours, a.cell, cell));
+            closest(s, cell, start, p, 3)
+        }
+        // Images of the cell next to the one that lies at the plane, or of that itself across both.
+        (false, true) => across(s, b.cell, b.xi, p, image),
+        (true, false) => across(s, a.cell, a.xi, p, image),
+        (false, false) => across(s, first.cell, first.xi, p, image),
+    };
+    Some(found).filter(|c| c.free == [true; 2])
 }
 
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
@@ -218,8 +254,8 @@ pub(super) fn track(
     open: impl Fn(u32) -> bool,
 ) -> Found {
     let mut best = closest(s, item.cell, item.xi, p, iterations);
-    let mut second: Option<Closest> = None;
-    let every = |n: u8| item.second != NONE || item.turn.is_multiple_of(n) || !item.active;
+    let mut others = [None; FACES];
+    let every = |n: u8| item.is_between() || item.turn.is_multiple_of(n) || !item.active;
     let careful = every(8);
     // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
     // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
@@ -228,7 +264,7 @@ pub(super) fn track(
         let near = s.neighbours[best.cell as usize];
         let band = 1.0 - (reach * best.distance2.sqrt() / best.half).min(0.5);
         let here = best;
-        second = None;
+        others = [None; FACES];
         for k in 0..2 {
             let place = here.xi[k];
             if place.abs() < band || (place.abs() < 1.0 && !careful) {
@@ -243,52 +279,35 @@ pub(super) fn track(
             };
             if let Some(plane) = mirrored_in(near[edge]) {
                 // Across the plane the surface goes on as its own image, which is never closer.
-                let other = across(s, here.cell, edge, p, plane);
-                if other.interior && second.is_none_or(|c| other.distance2 < c.distance2) {
-                    second = Some(other);
-                }
+                let image = [plane == 0, plane == 1];
+                let other = across(s, here.cell, middle(edge), p, image);
+                others[k] = Some(other).filter(|c| c.free[k]);
             } else if near[edge] != NONE && open(near[edge]) {
                 let start = entry(s.neighbours, here.cell, near[edge]);
-                let mut other = closest(s, near[edge], start, p, 3);
+                let mut other = closest(s, near[edge], middle(start), p, 3);
                 if other.distance2 < best.distance2 {
                     std::mem::swap(&mut best, &mut other);
                 }
-                if other.interior && second.is_none_or(|c| other.distance2 < c.distance2) {
-                    second = Some(other);
-                }
+                // Edges 0 and 2 are held in eta, 1 and 3 in xi.
+                others[k] = Some(other).filter(|c| c.free[1 - start % 2]);
             }
         }
         if best.cell == here.cell {
             break;
         }
     }
-    // Only where both feet are perpendicular does the surface fold towards the slave.
-    let second = second.filter(|_| best.interior);
+    // Only where the ways to both cells are perpendicular across their common side does the surface fold towards the slave;
+    // along it they may end on a ridge, as on a saddle.
+    for k in 0..2 {
+        others[k] = others[k].filter(|_| best.free[k]);
+    }
+    if let [Some(a), Some(b), _] = &others {
+        others[2] = around(s, &best, [a, b], p, open);
+    }
     Found {
         first: best,
-        second,
+        others,
     }
-}
-
-/// Distance in a concave fold, and the share of the second cell. There the distance to the surface is the
-/// smaller of two, and its gradient jumps where they are equal: a node that is pressed into the fold would
-/// rattle between the two faces, and explicit steps heat such a rattle. So within
-/// e = 0.4 offset (1 - cos fold) of each other the two are blended into a smooth minimum,
-/// d = d1 - (e - (d2 - d1))^2 / 4e. Both feet are still perpendicular there, so nothing jumps at its ends.
-#[inline]
-pub(super) fn blend(first: &Closest, second: Option<&Closest>, offset: f64) -> (f64, f64) {
-    let d1 = first.distance2.sqrt();
-    let Some(second) = second else {
-        return (d1, 0.0);
-    };
-    let d2 = second.distance2.sqrt();
-    let cosine = dot(first.arm, second.arm) / (d1 * d2);
-    let e = 0.4 * offset * (1.0 - cosine);
-    let rest = e - (d2 - d1);
-    if rest <= 0.0 || e < 1e-9 * offset {
-        return (d1, 0.0);
-    }
-    (d1 - rest * rest / (4.0 * e), rest / (2.0 * e))
 }
 
 impl SheetContact {
@@ -493,25 +512,10 @@ fn pull_of(
     // negative one. Anything else lies beyond a fold.
     let at_rim = first.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM);
     if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
-        let (d, w) = blend(first, found.second.as_ref(), offset);
-        let second = match &found.second {
-            Some(c) if w > 0.0 => scale(c.arm, w / c.distance2.sqrt()),
-            _ => [0.0; 3],
-        };
-        let pull = Pull {
-            gap: d - offset,
-            share: w,
-            first: scale(first.arm, (1.0 - w) / distance),
-            second,
-        };
-        return Some((pull, w == 0.0 && !at_rim));
+        let (pull, alone) = pulled(found, offset);
+        return Some((pull, alone && !at_rim));
     }
     let through = item.active && height < -0.5 * distance && height > -offset;
-    let pull = || Pull {
-        gap: height - offset,
-        share: 0.0,
-        first: scale(up, side),
-        second: [0.0; 3],
-    };
+    let pull = || Pull::plain(height - offset, scale(up, side));
     through.then(|| (pull(), false))
 }

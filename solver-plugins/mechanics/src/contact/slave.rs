@@ -1,12 +1,34 @@
 //! One node of a sheet on another sheet: its state, its force in touch, and where that goes.
 
 use super::friction::{Coulomb, Sliding};
-use super::sheets::{Closest, Found, Surface, combine, shape};
+use super::sheets::{Closest, FACES, Found, Surface, combine, shape};
 use super::{ContactEnergy, content, friction_force, normal_force};
 use crate::mesh::NONE;
 use crate::mirror::{Image, reflect};
 use crate::vec3::{V, add, dot, norm, scale, sub, unit};
 use serde::{Deserialize, Serialize};
+
+/// A further cell of a concave fold or corner that a slave touches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Face {
+    /// Master cell (model numbering) or [`NONE`].
+    pub(super) cell: u32,
+    /// The mirror planes across which the slave touches it: its image.
+    pub(super) image: Image,
+    /// Place in the cell, -1..1.
+    pub(super) xi: [f64; 2],
+    /// Its share of the force (N).
+    pub(super) force: V,
+}
+
+impl Face {
+    const NONE: Self = Self {
+        cell: NONE,
+        image: [false; 2],
+        xi: [0.0; 2],
+        force: [0.0; 3],
+    };
+}
 
 /// One slave node.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -15,8 +37,6 @@ pub struct SlaveItem {
     pub node: u32,
     /// Master cell (model numbering) or [`NONE`].
     pub cell: u32,
-    /// The other cell of a concave fold in which the slave lies, or [`NONE`].
-    pub(super) second: u32,
     pub(super) turn: u8,
     /// The last search found one cell, on the slave's own side.
     pub(super) plain: bool,
@@ -28,8 +48,6 @@ pub struct SlaveItem {
     pub(super) direction: V,
     /// Place in the cell, -1..1.
     pub xi: [f64; 2],
-    /// Place in the second cell.
-    pub(super) second_xi: [f64; 2],
     /// Normal stiffness (N/m).
     pub stiffness: f64,
     /// Damping (N s/m).
@@ -41,10 +59,8 @@ pub struct SlaveItem {
     pub slip: V,
     /// Force on the slave (N): minus this acts on the cells' nodes.
     pub force: V,
-    /// The second cell's share of it (N).
-    pub(super) second_share: V,
-    /// The mirror planes across which the slave touches the second cell: its image.
-    pub(super) second_image: Image,
+    /// The other cells of a concave fold or corner in which the slave lies. The first without a cell ends them.
+    pub(super) others: [Face; FACES],
     /// Normal part of the force (N).
     pub normal_force: f64,
     /// Penetration (m), 0 when apart.
@@ -59,7 +75,6 @@ impl SlaveItem {
         Self {
             node,
             cell,
-            second: NONE,
             // Spread over the nodes, so that every step searches for its share of them.
             turn: (node % u32::from(SEARCH_INTERVAL)) as u8,
             plain: false,
@@ -67,19 +82,23 @@ impl SlaveItem {
             guarded: false,
             direction: [0.0; 3],
             xi,
-            second_xi: [0.0; 2],
             stiffness: 0.0,
             damping: 0.0,
             multiplier: 0.0,
             work: 0.0,
             slip: [0.0; 3],
             force: [0.0; 3],
-            second_share: [0.0; 3],
-            second_image: [false; 2],
+            others: [Face::NONE; FACES],
             normal_force: 0.0,
             penetration: 0.0,
             ignored: 0.0,
         }
+    }
+
+    /// Whether it lies in a concave fold or corner, between several cells.
+    #[inline]
+    pub(super) fn is_between(&self) -> bool {
+        self.others[0].cell != NONE
     }
 
     /// Weights of the cell's nodes.
@@ -93,11 +112,36 @@ impl SlaveItem {
         self.plain = false;
         self.multiplier = 0.0;
         self.work = 0.0;
-        self.second = NONE;
+        self.others[0].cell = NONE;
         self.slip = [0.0; 3];
         self.force = [0.0; 3];
         self.normal_force = 0.0;
         self.penetration = 0.0;
+    }
+
+    /// Lays the normal force (N) and the friction `along` (N) on the cells that pull.
+    fn share_out(&mut self, pull: &Pull, found: &Found, normal: f64, along: V) {
+        let own = 1.0 - pull.shares.iter().sum::<f64>();
+        self.force = add(scale(pull.first, normal), scale(along, own));
+        let mut count = 0;
+        for (face, c) in found.others.iter().enumerate() {
+            let share = pull.shares[face];
+            let Some(c) = c.as_ref().filter(|_| share > 0.0) else {
+                continue;
+            };
+            let force = add(scale(pull.others[face], normal), scale(along, share));
+            self.force = add(self.force, force);
+            self.others[count] = Face {
+                cell: c.cell,
+                image: c.image,
+                xi: c.xi,
+                force,
+            };
+            count += 1;
+        }
+        if count < FACES {
+            self.others[count].cell = NONE;
+        }
     }
 
     /// Takes note of a penetration `depth` (m, negative when apart) after a step `dt` (s) at the relative velocity
@@ -138,26 +182,39 @@ pub(super) fn scatter<'a>(
     }
     for item in items.filter(|i| i.active) {
         let cell = |c: u32| cells[c as usize];
-        if item.second == NONE {
-            push(cell(item.cell), item.xi, item.force, f);
-        } else {
-            let share = sub(item.force, item.second_share);
-            push(cell(item.cell), item.xi, share, f);
+        let mut own = item.force;
+        for other in item.others.iter().take_while(|o| o.cell != NONE) {
+            own = sub(own, other.force);
             // What acts on an image acts mirrored on the cell itself.
-            let mirrored = reflect(item.second_share, item.second_image);
-            push(cell(item.second), item.second_xi, mirrored, f);
+            let mirrored = reflect(other.force, other.image);
+            push(cell(other.cell), other.xi, mirrored, f);
         }
+        push(cell(item.cell), item.xi, own, f);
         let node = item.node as usize;
         f[node] = add(f[node], item.force);
     }
 }
 
-/// Gap and its gradient for the slave: `first` and `second` are minus the gradients for the two cells' points.
+/// Gap and its gradient for the slave: `first` and `others` are minus the gradients for the cells' points.
 pub(super) struct Pull {
     pub(super) gap: f64,
-    pub(super) share: f64,
     pub(super) first: V,
-    pub(super) second: V,
+    /// Shares of the other cells.
+    pub(super) shares: [f64; FACES],
+    pub(super) others: [V; FACES],
+}
+
+impl Pull {
+    /// By one cell alone, along `first`.
+    #[inline]
+    pub(super) fn plain(gap: f64, first: V) -> Self {
+        Self {
+            gap,
+            first,
+            shares: [0.0; FACES],
+            others: [[0.0; 3]; FACES],
+        }
+    }
 }
 
 /// Weights of the place that a slave keeps, and the way from there to the slave (m).
@@ -192,12 +249,7 @@ pub(super) fn hold<F: Coulomb>(
 ) -> ContactEnergy {
     let (weights, arm) = held_arm(item, s);
     let n = item.direction;
-    let pull = Pull {
-        gap: dot(arm, n) - law.offset,
-        share: 0.0,
-        first: n,
-        second: [0.0; 3],
-    };
+    let pull = Pull::plain(dot(arm, n) - law.offset, n);
     let (cell, xi) = (item.cell, item.xi);
     let first = Closest {
         cell,
@@ -206,7 +258,7 @@ pub(super) fn hold<F: Coulomb>(
         arm,
         distance2: 0.0,
         half: 0.0,
-        interior: true,
+        free: [true; 2],
         image: [false; 2],
     };
     touch(
@@ -216,7 +268,7 @@ pub(super) fn hold<F: Coulomb>(
         &pull,
         &Found {
             first,
-            second: None,
+            others: [None; FACES],
         },
         law,
     )
@@ -249,19 +301,26 @@ pub(super) fn touch<F: Coulomb>(
     let own = v[item.node as usize];
     let first = &found.first;
     let rel1 = sub(own, speed(first));
-    let (mut rel, mut vn) = (rel1, dot(rel1, pull.first));
-    let second = found.second.as_ref().filter(|_| pull.share > 0.0);
-    if let Some(c) = second {
-        let rel2 = sub(own, speed(c));
-        vn += dot(rel2, pull.second);
-        rel = add(scale(rel1, 1.0 - pull.share), scale(rel2, pull.share));
+    let (mut rel, mut vn, mut way) = (rel1, dot(rel1, pull.first), pull.first);
+    let between = pull.shares != [0.0; FACES];
+    if between {
+        rel = scale(rel1, 1.0 - pull.shares.iter().sum::<f64>());
+        for (face, c) in found.others.iter().enumerate() {
+            let (Some(c), share) = (c, pull.shares[face]) else {
+                continue;
+            };
+            let other = sub(own, speed(c));
+            vn += dot(other, pull.others[face]);
+            rel = add(rel, scale(other, share));
+            way = add(way, pull.others[face]);
+        }
     }
     let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
     let depth = -pull.gap;
     let gap = -item.admit(depth, rel, law.dt, law.offset);
     let rest = content(law.offset);
     let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
-    let n = unit(add(pull.first, pull.second));
+    let n = unit(way);
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
     let limit = law.friction.limit(&Sliding {
@@ -284,15 +343,11 @@ pub(super) fn touch<F: Coulomb>(
     );
     item.active = true;
     item.slip = f.slip;
-    item.second = NONE;
-    item.force = add(
-        scale(pull.first, normal.force),
-        scale(f.force, 1.0 - pull.share),
-    );
-    if let Some(c) = second {
-        (item.second, item.second_xi, item.second_image) = (c.cell, c.xi, c.image);
-        item.second_share = add(scale(pull.second, normal.force), scale(f.force, pull.share));
-        item.force = add(item.force, item.second_share);
+    item.others[0].cell = NONE;
+    if between {
+        item.share_out(pull, found, normal.force, f.force);
+    } else {
+        item.force = add(scale(pull.first, normal.force), f.force);
     }
     item.normal_force = normal.force;
     item.multiplier = normal.multiplier;
