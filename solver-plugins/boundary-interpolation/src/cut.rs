@@ -16,8 +16,9 @@ pub struct Placed {
     pub points: Vec<Vec3>,
     /// Nodes on cut sides, ascending.
     pub driven_nodes: Vec<u32>,
+    /// `[n]` places of all nodes on the coarse mesh.
     locations: Vec<Location>,
-    /// `[k]` how far the undeformed coarse surface is lifted at the driven nodes (m): none where it is flat.
+    /// `[n]` how far the undeformed coarse surface is lifted there (m): none where it is flat.
     lifted: Vec<Vec3>,
     crossings: Vec<Crossing>,
 }
@@ -88,20 +89,14 @@ impl Placed {
                 format!("the fine node at ({x}, {y}) m lies off the coarse mesh; is the zone inside the sheet?")
             })
         };
-        let mut placed = Vec::with_capacity(grid.points.len());
-        for &[x, y] in &grid.points {
-            let [_, _, z] = find([x, y])?.interpolate(points);
-            placed.push([x, y, z]);
-        }
+        let nodes = grid.points.iter();
+        let locations: Vec<Location> = nodes.map(|p| find(*p)).collect::<Result<_, _>>()?;
+        let height = |(l, &[x, y]): (&Location, &[f64; 2])| [x, y, l.interpolate(points)[2]];
+        let placed = locations.iter().zip(&grid.points).map(height).collect();
         let driven_nodes = grid.driven_nodes();
-        let locations = driven_nodes
-            .iter()
-            .map(|&i| find(grid.points[i as usize]))
-            .collect::<Result<_, _>>()?;
         let crossings = crossings(&grid, &driven_nodes, points, cells);
         let undeformed = CoarseSheet::new(points.to_vec(), cells);
         let lift = |l: &Location| undeformed.lift(&l.nodes, &l.weights);
-        let locations: Vec<Location> = locations;
         Ok(Self {
             lifted: locations.iter().map(lift).collect(),
             grid,
@@ -114,20 +109,27 @@ impl Placed {
 
     /// Positions of the driven nodes (`[k]`, m) on the coarse sheet.
     pub fn positions(&self, coarse: &CoarseSheet) -> Vec<Vec3> {
-        let nodes = self.locations.iter().zip(&self.lifted);
-        nodes
-            .map(|(l, before)| {
-                let lift = sub(coarse.lift(&l.nodes, &l.weights), *before);
-                add(l.interpolate(&coarse.points), lift)
-            })
-            .collect()
+        let nodes = self.driven_nodes.iter();
+        nodes.map(|n| self.position(*n as usize, coarse)).collect()
+    }
+
+    /// Positions of all nodes (`[n]`, m) on the coarse sheet.
+    pub fn everywhere(&self, coarse: &CoarseSheet) -> Vec<Vec3> {
+        let nodes = 0..self.points.len();
+        nodes.map(|n| self.position(n, coarse)).collect()
+    }
+
+    fn position(&self, node: usize, coarse: &CoarseSheet) -> Vec3 {
+        let l = &self.locations[node];
+        let lift = sub(coarse.lift(&l.nodes, &l.weights), self.lifted[node]);
+        add(l.interpolate(&coarse.points), lift)
     }
 
     /// Unit normals of the coarse sheet at the driven nodes (`[k]`), on the side that is up in the flat sheet: continuous along
     /// the cut.
     pub fn normals(&self, coarse: &CoarseSheet) -> Vec<Vec3> {
-        let normal = |l: &Location| unit(l.interpolate(&coarse.normals));
-        self.locations.iter().map(normal).collect()
+        let normal = |n: &u32| unit(self.locations[*n as usize].interpolate(&coarse.normals));
+        self.driven_nodes.iter().map(normal).collect()
     }
 
     /// Largest distance (m), where coarse lines cross the cut, between the fine edges with their nodes at

@@ -24,6 +24,7 @@ struct Parameters {
     element_size: f64,
     film_element_size: Option<f64>,
     film_margin: f64,
+    start_time: f64,
 }
 
 #[derive(Deserialize)]
@@ -44,8 +45,22 @@ struct Driven {
     position: Vec<f64>,
     /// `[f][k][3]`; plies only, films do not rotate.
     normal: Option<Vec<f64>>,
+    start: Option<Start>,
     error: f64,
 }
+
+/// Where all nodes of a sheet are when the fine run begins late.
+struct Start {
+    /// States on the way there, the last one included.
+    states: usize,
+    /// `[states][n][3]` (m).
+    path: Vec<f64>,
+    /// `[n][3]` (m/s).
+    velocity: Vec<f64>,
+}
+
+/// Most states on the way to a late start.
+const STATES: usize = 20;
 
 /// First frame and undeformed mesh may differ by this (m) before the step warns.
 const START_TOLERANCE: f64 = 1e-4;
@@ -73,6 +88,7 @@ impl Step for BoundaryInterpolation {
             )
             .into());
         }
+        let first = first_frame(&meshes.times, p.start_time, &input.step)?;
         let listed = attributes["sheets"].as_array().cloned().unwrap_or_default();
         let mut sheets = Vec::new();
         for (i, sheet) in listed.iter().enumerate() {
@@ -83,7 +99,7 @@ impl Step for BoundaryInterpolation {
                 phase: "reading the coarse motion",
                 ..Default::default()
             });
-            sheets.extend(drive(host, &input, &meshes, sheet, bounds, &p)?);
+            sheets.extend(drive(host, &input, &meshes, sheet, bounds, first, &p)?);
         }
         if sheets.is_empty() {
             return Err(format!(
@@ -92,13 +108,15 @@ impl Step for BoundaryInterpolation {
             )
             .into());
         }
-        write(host, &meshes.times, &sheets)?;
-        write_histories(host, &input, &meshes.times)?;
+        write(host, &meshes.times, first, &sheets)?;
+        let times = &meshes.times[first..];
+        write_histories(host, &input, times)?;
         let error = sheets.iter().map(|s| s.error).fold(0.0, f64::max);
         host.write_attributes(&json!({
             "zone": zone,
             "scene": attributes["scene"],
-            "frames": meshes.times.len(),
+            "frames": times.len(),
+            "start_time": times[0],
             "element_size": p.element_size,
             "film_element_size": p.film_element_size.unwrap_or(p.element_size),
             "sheets": sheets.iter().map(|s| &s.attributes).collect::<Vec<_>>(),
@@ -109,6 +127,21 @@ impl Step for BoundaryInterpolation {
         host.result("elements", count(|s| s.fine.grid.cells.len() / 4), "1")?;
         host.result("driven_nodes", count(|s| s.fine.driven_nodes.len()), "1")
     }
+}
+
+/// The last frame that is not later than `start` (s); two at least must be left from there.
+fn first_frame(times: &[f64], start: f64, step: &str) -> Result<usize, StepError> {
+    const ROUNDING: f64 = 1e-9;
+    let after = times.partition_point(|t| *t <= start + ROUNDING);
+    let first = after.saturating_sub(1);
+    if first + 2 > times.len() {
+        let end = times[times.len() - 1];
+        return Err(format!(
+            "start_time: {start} s leaves nothing of '{step}', which ends at {end} s; expected an earlier time, before anything stands off the tool"
+        )
+        .into());
+    }
+    Ok(first)
 }
 
 /// The zone at the step's own place in the fan-out.
@@ -179,6 +212,7 @@ fn drive(
     meshes: &Meshes,
     attributes: &Value,
     zone: Rectangle,
+    first: usize,
     p: &Parameters,
 ) -> Result<Option<Driven>, StepError> {
     let sheet: Sheet = serde_json::from_value(attributes.clone())
@@ -211,6 +245,7 @@ fn drive(
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
     let motion = follow(host, input, meshes, body, &fine, &cells, ply)?;
+    let begin = start(host, input, meshes, body, &fine, &cells, first)?;
     let start = motion.start;
     if start > START_TOLERANCE {
         let name = &sheet.name;
@@ -226,6 +261,7 @@ fn drive(
         fine,
         position: motion.position,
         normal: motion.normal,
+        start: begin,
         error: motion.error,
     }))
 }
@@ -272,6 +308,39 @@ fn follow(
     Ok(motion)
 }
 
+/// Where all nodes are at the frame `first`, and were before; `None` at the beginning.
+fn start(
+    host: &Host,
+    input: &Input,
+    meshes: &Meshes,
+    body: &BodyInfo,
+    fine: &Placed,
+    cells: &[u32],
+    first: usize,
+) -> Result<Option<Start>, StepError> {
+    if first == 0 {
+        return Ok(None);
+    }
+    let at = |frame: usize| -> Result<Vec<f64>, StepError> {
+        let coarse = CoarseSheet::new(host.frame_points(input, body, frame)?, cells);
+        Ok(fine.everywhere(&coarse).into_flattened())
+    };
+    let every = first.div_ceil(STATES);
+    let (mut states, mut path) = (0, Vec::new());
+    for frame in (1..=first).filter(|f| (first - f).is_multiple_of(every)) {
+        path.extend(at(frame)?);
+        states += 1;
+    }
+    let (before, after) = (at(first - 1)?, at(first + 1)?);
+    let span = meshes.times[first + 1] - meshes.times[first - 1];
+    let pairs = before.iter().zip(&after);
+    Ok(Some(Start {
+        states,
+        path,
+        velocity: pairs.map(|(a, b)| (b - a) / span).collect(),
+    }))
+}
+
 fn bounds(points: &[Vec3]) -> Rectangle {
     flat_bounds(points.iter().map(|p| [p[0], p[1]]))
 }
@@ -280,10 +349,12 @@ fn corners(b: Rectangle) -> Vec<[f64; 2]> {
     vec![[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]
 }
 
-fn write(host: &Host, times: &[f64], sheets: &[Driven]) -> Result<(), StepError> {
-    host.write_f64("time", &[times.len()], "s", times)?;
+/// Writes the motion from the frame `first` on.
+fn write(host: &Host, times: &[f64], first: usize, sheets: &[Driven]) -> Result<(), StepError> {
+    let f = times.len() - first;
+    host.write_f64("time", &[f], "s", &times[first..])?;
     for s in sheets {
-        let (k, f) = (s.fine.driven_nodes.len(), times.len());
+        let (k, n) = (s.fine.driven_nodes.len(), s.fine.points.len());
         host.define_mesh(&s.name, &s.fine.points, 4, &s.fine.grid.cells, &json!({}))?;
         host.write_u32(
             &format!("{}/driven_nodes", s.name),
@@ -297,12 +368,18 @@ fn write(host: &Host, times: &[f64], sheets: &[Driven]) -> Result<(), StepError>
         for (what, unit, rate, rate_unit, values) in motion {
             let Some(values) = values else { continue };
             let slopes = spline_slopes(times, values, 3 * k);
+            let [values, slopes] = [values, &slopes].map(|v| &v[3 * k * first..]);
             host.write_f64(&format!("{}/{what}", s.name), &[f, k, 3], unit, values)?;
+            host.write_f64(&format!("{}/{rate}", s.name), &[f, k, 3], rate_unit, slopes)?;
+        }
+        if let Some(start) = &s.start {
+            let shape = [start.states, n, 3];
+            host.write_f64(&format!("{}/path", s.name), &shape, "m", &start.path)?;
             host.write_f64(
-                &format!("{}/{rate}", s.name),
-                &[f, k, 3],
-                rate_unit,
-                &slopes,
+                &format!("{}/start_velocity", s.name),
+                &[n, 3],
+                "m/s",
+                &start.velocity,
             )?;
         }
     }

@@ -369,6 +369,49 @@ fn driven_nodes_follow_the_coarse_motion_in_place_and_velocity() {
 }
 
 #[test]
+fn a_late_start_gives_all_nodes_their_way_there_and_the_rest_of_the_motion() {
+    let whole = interpolate(&coarse(0.0), json!({"element_size": 0.005}), &[1]).unwrap();
+    let late = |t: f64| {
+        interpolate(
+            &coarse(0.0),
+            json!({"element_size": 0.005, "start_time": t}),
+            &[1],
+        )
+    };
+    assert!(!whole.arrays.contains_key("ply_1/path"));
+    // Frames lie 0.2 s apart.
+    let out = late(0.5).unwrap();
+    assert_eq!(out.arrays["time"].1, TIMES[2..]);
+    assert_eq!(out.attributes["start_time"], 0.4);
+    for what in ["position", "velocity", "normal", "normal_rate"] {
+        let name = format!("ply_1/{what}");
+        let ((shape, rest), all) = (&out.arrays[&name], &whole.arrays[&name].1);
+        assert_eq!(rest[..], all[2 * 3 * shape[1]..], "{what}");
+    }
+    assert_eq!(out.arrays["cavity_pressure"].1.len(), 4);
+    let points = &out.body("ply_1").points;
+    let (shape, path) = &out.arrays["ply_1/path"];
+    assert_eq!(shape, &[2, points.len(), 3]);
+    let velocity = &out.arrays["ply_1/start_velocity"].1;
+    for (i, p) in points.iter().enumerate() {
+        let [before, here, after] = [0.2, 0.4, 0.6].map(|t| motion(*p, t));
+        for d in 0..3 {
+            let at = |state: usize| path[(state * points.len() + i) * 3 + d];
+            // Between lines of the coarse mesh the surface is smooth, and not quite the motion's.
+            assert!((at(0) - before[d]).abs() < 2e-6 && (at(1) - here[d]).abs() < 2e-6);
+            let rate = (after[d] - before[d]) / 0.4;
+            assert!((velocity[3 * i + d] - rate).abs() < 1e-5);
+        }
+    }
+    assert_eq!(late(0.8).unwrap().arrays["time"].1, [0.8, 1.0]);
+    let refused = late(1.0).unwrap_err();
+    assert!(
+        refused.contains("start_time") && refused.contains("earlier"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn normals_at_the_cut_are_those_of_the_coarse_surface_and_turn_with_it() {
     let out = interpolate(&coarse(0.0), json!({"element_size": 0.004}), &[0, 1]).unwrap();
     let body = out.body("ply_1");

@@ -127,7 +127,7 @@ fn state(
     })
 }
 
-/// Work through the cut of a ply in one run (trapezoids over its frames); `None` when the run does not hold membrane forces or
+/// Work through the cut of a ply in one run from the time `begin` (s) on (trapezoids over its frames); `None` when the run does not hold membrane forces or
 /// does not cover the cut.
 fn work(
     host: &Host,
@@ -136,6 +136,7 @@ fn work(
     ply: &Ply,
     zone: &Zone,
     size: f64,
+    begin: f64,
 ) -> Result<Option<Work>, StepError> {
     let body = meshes.body(&ply.name)?;
     let known = |name: &&str| body.fields.iter().any(|f| f.name == **name);
@@ -161,7 +162,8 @@ fn work(
     }
     let mut sum = Work::default();
     let mut before: Option<State> = None;
-    for frame in 0..meshes.times.len() {
+    let first = meshes.times.partition_point(|t| *t < begin - 1e-9);
+    for frame in first..meshes.times.len() {
         host.check_cancelled()?;
         let now = state(host, model, ply, body, frame, &cut)?;
         if let Some(old) = &before {
@@ -203,8 +205,10 @@ pub fn passages(host: &Host, models: &[Model], zones: &[Zone]) -> Result<Vec<Pas
             let Some(other) = global.plies.iter().find(|p| p.name == ply.name) else {
                 continue;
             };
-            let fine = work(host, local, &part, ply, zone, size)?;
-            let coarse = work(host, global, &whole, other, zone, size)?;
+            // A local run may begin late.
+            let begin = part.times.first().copied().unwrap_or(0.0);
+            let fine = work(host, local, &part, ply, zone, size, begin)?;
+            let coarse = work(host, global, &whole, other, zone, size, begin)?;
             if let (Some(local), Some(global)) = (fine, coarse) {
                 list.push(Passage {
                     zone: zone.name.clone(),

@@ -381,6 +381,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         tool,
         rigid: Vec::new(),
         zone: None,
+        start: None,
         element_size: p.element_size,
     })
 }

@@ -7,6 +7,7 @@ mod checkpoint;
 mod diagnosis;
 pub mod friction;
 mod global;
+mod late;
 mod local;
 mod output;
 pub mod parameters;
@@ -17,6 +18,7 @@ pub mod run;
 pub mod symmetry;
 
 pub use global::build_global;
+pub use late::Start;
 pub use local::{Feedback, LocalInput, LocalSheet, build_local, feed_back};
 
 use plyflow_sdk::{Host, Step, StepError};

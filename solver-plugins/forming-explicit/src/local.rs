@@ -1,6 +1,7 @@
 //! The model of one zone, driven at its cut by a coarse run.
 
 use crate::assembly::{self, Components, Placed, ToolSurface};
+use crate::late::{self, Start};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
 use crate::run::{Body, Forming};
@@ -14,6 +15,7 @@ use plyflow_model::scene::{Process, SheetKind};
 use std::sync::Arc;
 
 /// A sheet of the zone as the boundary artifact holds it.
+#[derive(Debug, Clone, PartialEq)]
 pub struct LocalSheet {
     /// Name, as in the scene.
     pub name: String,
@@ -31,6 +33,8 @@ pub struct LocalSheet {
     pub normal: Vec<Vec<V>>,
     /// `[frames][k]` their rates (1/s); as `normal`.
     pub normal_rate: Vec<Vec<V>>,
+    /// Where a run that begins late begins; `None` for one that begins with the process.
+    pub start: Option<Start>,
 }
 
 /// What a boundary artifact gives.
@@ -205,19 +209,14 @@ pub fn build_local(
             element: assembly::element(components, sheet, choice)?,
         });
     }
+    let start = late::of_model(&stack, &specs, &input.sheets, input.time[0])?;
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
+    let surface = Arc::new(ToolSurface(grid));
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]]);
     let reference = points.clone();
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
-    assembly::add_contacts(
-        &mut model,
-        &stack,
-        &placed,
-        scene,
-        p,
-        Arc::new(ToolSurface(grid)),
-    )?;
+    assembly::add_contacts(&mut model, &stack, &placed, scene, p, surface)?;
     model.set_driven(driven, Box::new(drive));
     Ok(Forming {
         model,
@@ -234,6 +233,7 @@ pub fn build_local(
         tool,
         rigid: Vec::new(),
         zone: Some(input.zone),
+        start,
         element_size: input.element_size,
     })
 }

@@ -2,6 +2,7 @@
 
 use crate::assembly::Components;
 use crate::checkpoint::{Part, Recorder};
+use crate::late::Start;
 use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use crate::penetration::Penetration;
@@ -308,10 +309,27 @@ fn read_motion(host: &Host, input: &Input) -> Result<(Vec<f64>, Vec<LocalSheet>)
             velocity: vectors("velocity")?,
             normal: known("normal")?,
             normal_rate: known("normal_rate")?,
+            start: read_start(host, input, &body.name)?,
             driven,
         });
     }
     Ok((time, sheets))
+}
+
+/// Where a sheet of a boundary artifact begins, if not with the process.
+fn read_start(host: &Host, input: &Input, name: &str) -> Result<Option<Start>, StepError> {
+    let [path, velocity] = ["path", "start_velocity"].map(|what| format!("{name}/{what}"));
+    if host.array_info(input, &path).is_none() {
+        return Ok(None);
+    }
+    let (ways, shape) = host.array_f64(input, &path)?;
+    let (velocity, _) = host.array_f64(input, &velocity)?;
+    let vectors = |v: &[f64]| -> Vec<V> { v.as_chunks::<3>().0.to_vec() };
+    let row = shape[1..].iter().product::<usize>().max(1);
+    Ok(Some(Start {
+        path: ways.chunks_exact(row).map(vectors).collect(),
+        velocity: vectors(&velocity),
+    }))
 }
 
 fn write_history(host: &Host, outcome: &Outcome, press: bool) -> Result<(), StepError> {
@@ -504,6 +522,9 @@ fn write_summary(
     host.result("elements", elements as f64, "1")?;
     host.result("cycles", outcome.cycles as f64, "1")?;
     host.result("time_step", outcome.smallest_step, "s")?;
+    if let Some(shift) = outcome.start_shift {
+        host.result("start_shift", shift, "m")?;
+    }
     host.result(
         "added_mass",
         forming.copies() * m.sheets.iter().map(|s| s.added_mass).sum::<f64>(),

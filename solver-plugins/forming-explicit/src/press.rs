@@ -364,6 +364,7 @@ pub fn build_press(
         tool,
         rigid,
         zone: None,
+        start: None,
         element_size: p.element_size,
     })
 }

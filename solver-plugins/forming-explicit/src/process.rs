@@ -137,7 +137,15 @@ pub enum Load {
 }
 
 impl Load {
-    /// Whole duration (s).
+    /// When the run begins (s): 0, or where what drives it does.
+    pub fn start(&self) -> f64 {
+        match self {
+            Self::Given { time, .. } => time[0],
+            _ => 0.0,
+        }
+    }
+
+    /// When the process ends (s).
     pub fn duration(&self) -> f64 {
         match self {
             Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle.duration(),

@@ -2,6 +2,7 @@
 
 use crate::assembly::StackSheet;
 use crate::diagnosis;
+use crate::late::{self, Start};
 use crate::press::PressLoad;
 use crate::process::Load;
 use crate::symmetry::MirroredBody;
@@ -130,6 +131,8 @@ pub struct Forming {
     pub rigid: Vec<RigidBody>,
     /// The zone of a local run.
     pub zone: Option<serde_json::Value>,
+    /// Where a run that begins late begins.
+    pub start: Option<Start>,
     /// Edge of the plies' elements (m).
     pub element_size: f64,
 }
@@ -166,6 +169,8 @@ pub struct Course {
     pub history: Vec<HistoryRow>,
     /// Smallest step used (s).
     pub smallest_step: f64,
+    /// Of a run that begins late: how far fine plies went there by themselves (m).
+    pub start_shift: Option<f64>,
 }
 
 impl Default for Course {
@@ -174,6 +179,7 @@ impl Default for Course {
             frame: 0,
             history: Vec::new(),
             smallest_step: f64::INFINITY,
+            start_shift: None,
         }
     }
 }
@@ -182,7 +188,8 @@ impl Course {
     pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
         a.value(&mut self.frame)?;
         a.value(&mut self.history)?;
-        a.value(&mut self.smallest_step)
+        a.value(&mut self.smallest_step)?;
+        a.value(&mut self.start_shift)
     }
 }
 
@@ -197,6 +204,8 @@ pub struct Outcome {
     pub cycles: u64,
     /// Smallest step used (s).
     pub smallest_step: f64,
+    /// Of a run that begins late: how far (m) nodes of plies went there by themselves, 99.9 % quantile.
+    pub start_shift: Option<f64>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -320,10 +329,15 @@ impl Forming {
             kinetic_bound,
             drift_bound,
         } = control;
-        let end = self.load.duration();
-        let interval = end / frames as f64;
+        let (begin, end) = (self.load.start(), self.load.duration());
+        let interval = (end - begin) / frames as f64;
         let mut course = Course::default();
         observer.resume(self, &mut course)?;
+        let mut is_late = false;
+        if course.history.is_empty() {
+            course.start_shift = late::begin(self, target_step, safety)?;
+            is_late = course.start_shift.is_some();
+        }
         for frame in course.frame..frames {
             if frame > course.frame {
                 course.frame = frame;
@@ -340,7 +354,7 @@ impl Forming {
             }
             self.model.dt = interval / steps as f64;
             course.smallest_step = course.smallest_step.min(self.model.dt);
-            let start = interval * frame as f64;
+            let start = begin + interval * frame as f64;
             for k in 0..steps {
                 // Times from the count, not from a sum: frames fall on the same instants in every run.
                 self.model.time = start + self.model.dt * k as f64;
@@ -353,6 +367,10 @@ impl Forming {
                         return Err(diagnosis::of(self, &course.history, &what).into());
                     }
                     Err(e) => return Err(e.to_string().into()),
+                }
+                if std::mem::take(&mut is_late) {
+                    // What brought it here was work.
+                    self.model.ledger.external += self.model.energies().drift();
                 }
                 if k == 0 {
                     // Fields belong to the positions before the step; its motion is far below output
@@ -376,17 +394,20 @@ impl Forming {
         let Course {
             mut history,
             smallest_step,
+            start_shift,
             ..
         } = course;
         history.push(self.row(self.model.energies()));
         let ledgers: Vec<Ledger> = history.iter().map(|r| r.ledger).collect();
         let health = judge(&ledgers);
-        let warnings = warnings(&health, kinetic_bound);
+        let mut warnings = warnings(&health, kinetic_bound);
+        warnings.extend(start_shift.and_then(late::too_late));
         Ok(Outcome {
             history,
             health,
             cycles: self.model.cycle,
             smallest_step,
+            start_shift,
             warnings,
         })
     }

@@ -8,11 +8,13 @@ mod common;
 
 use common::{BuiltIn, Silent, fabric, form};
 use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Observer};
-use plyflow_forming_explicit::{Feedback, LocalSheet, build_global, feed_back};
+use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer};
+use plyflow_forming_explicit::{
+    Feedback, LocalInput, LocalSheet, Start, build_global, build_local, feed_back,
+};
 use plyflow_mechanics::energy::Ledger;
-use plyflow_mechanics::history::spline_slopes;
-use plyflow_mechanics::vec3::{V, norm, sub};
+use plyflow_mechanics::history::{linear, spline_slopes};
+use plyflow_mechanics::vec3::{V, norm, scale, sub};
 use plyflow_sdk::StepError;
 use serde_json::json;
 
@@ -201,6 +203,7 @@ fn fed(
         driven,
         normal: Vec::new(),
         normal_rate: Vec::new(),
+        start: None,
     }
 }
 
@@ -264,4 +267,136 @@ fn a_run_that_is_fed_its_own_motion_repeats_itself_and_one_that_is_fed_more_foll
     other.points.pop();
     assert!(refused(other).contains("element_size"));
     assert!(refused(fed(&first, &film, 0, deep, 0.0)).contains("no ply of this scene"));
+}
+
+/// The part of a body within `reach` (m) of the axes, moved as a run of the whole moved it from the frame `first` on; its nodes
+/// there are driven where the body goes on. Gives also its nodes' numbers in the body.
+fn cut_out(
+    forming: &Forming,
+    film: &Film,
+    body: usize,
+    reach: [f64; 2],
+    first: usize,
+) -> (LocalSheet, Vec<u32>) {
+    let b = &forming.bodies[body];
+    let all = forming.reference_points(b);
+    let inside = |n: &u32| (0..2).all(|d| all[*n as usize][d].abs() < reach[d]);
+    let (kept, gone): (Vec<[u32; 4]>, Vec<[u32; 4]>) =
+        b.cells.iter().partition(|c| c.iter().all(inside));
+    let mut nodes: Vec<u32> = kept.iter().flatten().copied().collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let own = |n: &u32| nodes.binary_search(n).ok().map(|k| k as u32);
+    let mut driven: Vec<u32> = gone.iter().flatten().filter_map(own).collect();
+    driven.sort_unstable();
+    driven.dedup();
+    let at = |frame: usize, k: &u32| film.points[frame][body][nodes[*k as usize] as usize];
+    let position: Vec<Vec<V>> = (0..film.time.len())
+        .map(|f| driven.iter().map(|k| at(f, k)).collect())
+        .collect();
+    let flat: Vec<f64> = position.iter().flatten().flatten().copied().collect();
+    let slopes = spline_slopes(&film.time, &flat, 3 * driven.len());
+    let every: Vec<u32> = (0..nodes.len() as u32).collect();
+    let state = |f: usize| every.iter().map(|k| at(f, k)).collect::<Vec<V>>();
+    let start = (first > 0).then(|| {
+        let span = film.time[first + 1] - film.time[first - 1];
+        let rate = |(a, b): (&V, &V)| scale(sub(*b, *a), 1.0 / span);
+        Start {
+            path: (1..=first).map(state).collect(),
+            velocity: state(first - 1)
+                .iter()
+                .zip(&state(first + 1))
+                .map(rate)
+                .collect(),
+        }
+    });
+    let sheet = LocalSheet {
+        name: b.name.clone(),
+        points: nodes.iter().map(|n| all[*n as usize]).collect(),
+        cells: kept.iter().map(|c| c.map(|n| own(&n).unwrap())).collect(),
+        position: position[first..].to_vec(),
+        velocity: slopes
+            .chunks_exact(3 * driven.len())
+            .skip(first)
+            .map(|r| r.as_chunks().0.to_vec())
+            .collect(),
+        driven,
+        normal: Vec::new(),
+        normal_rate: Vec::new(),
+        start,
+    };
+    (sheet, nodes)
+}
+
+#[test]
+fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
+    let mut p = parameters();
+    p.frames = 100;
+    let mut film = Film::default();
+    let mut whole = build_global(&p, &BuiltIn).unwrap();
+    let history = whole.run(&p.control(), &mut film).unwrap().history;
+    let zone = |first: usize| {
+        let time = film.time[first..].to_vec();
+        let of = |get: fn(&HistoryRow) -> f64| -> Vec<f64> {
+            let (t, v): (Vec<f64>, Vec<f64>) = history.iter().map(|r| (r.time, get(r))).unzip();
+            time.iter().map(|at| linear(&t, &v, *at)).collect()
+        };
+        let parts: Vec<_> = (0..4)
+            .map(|body| {
+                let wider = if body == 0 || body == 3 { 0.02 } else { 0.0 };
+                cut_out(&whole, &film, body, [0.045 + wider, 0.05 + wider], first)
+            })
+            .collect();
+        let input = LocalInput {
+            cavity: of(|r| r.cavity),
+            bag: of(|r| r.bag),
+            frame: of(|r| r.frame),
+            time,
+            sheets: parts.iter().map(|(s, _)| s.clone()).collect(),
+            zone: json!({"name": "A"}),
+            element_size: 0.007,
+        };
+        let mut forming = build_local(&p, input, &BuiltIn).unwrap();
+        let outcome = forming.run(&p.control(), &mut Silent).unwrap();
+        (forming, outcome, parts)
+    };
+    let (from_the_start, _, parts) = zone(0);
+    // Until 0.18 s the frame goes down, then the air is drawn from under the films.
+    let first = film.time.iter().position(|t| *t > 0.2).unwrap();
+    let (late, outcome, _) = zone(first);
+    assert!((outcome.history[0].time - film.time[first]).abs() < 1.3e-5);
+    let shift = outcome.start_shift.unwrap();
+    assert!(shift < 5e-4, "{shift} m");
+    assert!(
+        outcome.cycles < 10_000 + from_the_start.model.cycle / 2,
+        "{}",
+        outcome.cycles
+    );
+    let health = outcome.health;
+    assert!(
+        health.peak_drift_ratio < 0.02 && health.peak_kinetic_ratio < 0.1,
+        "{health:?}"
+    );
+    for p in late.penetrations() {
+        assert!(p.q999 < 0.1 * (p.thinner + p.spare), "{p:?}");
+    }
+    for body in 1..3 {
+        let [a, b, c] = [&late, &from_the_start, &whole].map(|f| f.points(&f.bodies[body]));
+        let nodes = &parts[body].1;
+        let mean = |other: &dyn Fn(usize) -> V| {
+            a.iter()
+                .enumerate()
+                .map(|(k, x)| norm(sub(*x, other(k))))
+                .sum::<f64>()
+                / a.len() as f64
+        };
+        let (fresh, of_the_whole) = (mean(&|k| b[k]), mean(&|k| c[nodes[k] as usize]));
+        println!(
+            "ply {body}: {fresh} m from the zone that began with the process, {of_the_whole} m from the whole"
+        );
+        assert!(
+            fresh < 1e-4 && of_the_whole < 1e-4,
+            "ply {body}: {fresh} m, {of_the_whole} m"
+        );
+    }
 }

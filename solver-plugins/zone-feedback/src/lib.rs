@@ -101,6 +101,13 @@ impl Step for ZoneFeedback {
             return Err(format!("'{step}' has {n} frames; a motion needs at least 2").into());
         }
         let fine = fine_runs(host)?;
+        if let Some(late) = fine.iter().find(|f| f.meshes.times[0] > meshes.times[0]) {
+            let (step, begin) = (&late.input.step, late.meshes.times[0]);
+            return Err(format!(
+                "`local`: '{step}' begins at {begin} s; what is fed back must be known from the beginning of the coarse run on. Leave out `start_time` of its boundary"
+            )
+            .into());
+        }
         host.write_f64("time", &[meshes.times.len()], "s", &meshes.times)?;
         let mut change = Vec::new();
         for sheet in coarse.sheets.iter().filter(|s| s.kind == "ply") {

@@ -91,6 +91,11 @@ impl Model {
         };
     }
 
+    /// Mass-proportional damping (1/s).
+    pub fn damping(&self) -> f64 {
+        self.settings.damping
+    }
+
     /// Sets the mass-proportional damping (1/s) from the next step on.
     pub fn set_damping(&mut self, damping: f64) {
         self.settings.damping = damping;

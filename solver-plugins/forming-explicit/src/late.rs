@@ -1,0 +1,180 @@
+//! A local run that begins late: at a state that the coarse run had on its way. Until something stands off or folds a zone of
+//! fine shells does what coarse membranes do, and need not be computed again.
+
+use crate::assembly::StackSheet;
+use crate::local::LocalSheet;
+use crate::run::Forming;
+use plyflow_mechanics::sheet::SheetSpec;
+use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
+use plyflow_model::scene::SheetKind;
+
+/// Where a sheet, or a model, is when it begins, and how it came there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// `[states][n]` positions (m) on the way from the undeformed state, in time; the last is the one to begin at.
+    pub path: Vec<Vec<V>>,
+    /// `[n]` velocities (m/s) there.
+    pub velocity: Vec<V>,
+}
+
+/// Steps in which elements are led from one state of the path to the next.
+const STEPS: u32 = 5;
+/// Steps in which nothing swings.
+const CREEPING: u32 = 1000;
+/// Most steps (with all loads, at the time of the start) to find the balance of fine shells there.
+const SETTLING: u32 = 3000;
+/// Kinetic over internal energy at a peak below which they have found it.
+const SETTLED: f64 = 1e-5;
+
+/// Way (m) that fine plies may go by themselves at a late start: half of what counts as a wrinkle.
+const LARGEST_SHIFT: f64 = 5e-4;
+
+/// What to tell of a start at which fine plies were already elsewhere.
+pub(crate) fn too_late(shift: f64) -> Option<String> {
+    (shift > LARGEST_SHIFT).then(|| {
+        format!(
+            "at the start fine plies went {:.2} mm by themselves from where the coarse run had them (more than {:.1} mm): they had already \
+             folded or bridged there. Take an earlier `start_time` of the boundary",
+            1e3 * shift,
+            1e3 * LARGEST_SHIFT
+        )
+    })
+}
+
+/// The start of a whole zone whose sheets begin at `time` (s): none at 0.
+///
+/// # Errors
+/// A text for the user: sheets that do not tell their start, or elements that cannot begin there.
+pub(crate) fn of_model(
+    stack: &[StackSheet],
+    specs: &[SheetSpec],
+    sheets: &[LocalSheet],
+    time: f64,
+) -> Result<Option<Start>, String> {
+    if time == 0.0 {
+        return Ok(None);
+    }
+    let mut start = Start {
+        path: Vec::new(),
+        velocity: Vec::new(),
+    };
+    for (sheet, spec) in stack.iter().zip(specs) {
+        let name = &sheet.scene.name;
+        if spec.element.sizes.history > 0 {
+            return Err(format!(
+                "sheet '{name}': its element keeps directions along its way, and a run with it begins with the process, not at \
+                 {time} s. Leave out `start_time` of the boundary, or take an element such as rf4"
+            ));
+        }
+        let found = sheets.iter().find(|s| &s.name == name);
+        let own = found.and_then(|s| s.start.as_ref()).ok_or_else(|| {
+            format!("the boundary begins at {time} s and does not tell where sheet '{name}' is then; run its step again")
+        })?;
+        start.path.resize_with(own.path.len(), Vec::new);
+        for (all, part) in start.path.iter_mut().zip(&own.path) {
+            all.extend_from_slice(part);
+        }
+        start.velocity.extend_from_slice(&own.velocity);
+    }
+    let n = start.velocity.len();
+    if start.path.is_empty() || start.path.iter().any(|p| p.len() != n) {
+        return Err("the sheets of the boundary tell ways of different lengths to where they begin; run its step again".into());
+    }
+    Ok(Some(start))
+}
+
+/// Brings a run that begins late to its start. Gives how far (m) nodes of plies that are free have gone there by themselves, 99.9 %
+/// quantile: what fine shells do that coarse membranes did not until then. `None` for a run that begins with the process.
+///
+/// # Errors
+/// A text for the user: a component failed, or the start is unstable.
+pub(crate) fn begin(forming: &mut Forming, step: f64, safety: f64) -> Result<Option<f64>, String> {
+    let Some(start) = forming.start.take() else {
+        return Ok(None);
+    };
+    let text = |e: plyflow_mechanics::MechanicsError| e.to_string();
+    for state in &start.path {
+        let from = forming.model.x.clone();
+        for k in 1..=STEPS {
+            let share = f64::from(k) / f64::from(STEPS);
+            let to = |(a, b): (&V, &V)| add(*a, scale(sub(*b, *a), share));
+            forming.model.x = from.iter().zip(state).map(to).collect();
+            forming.model.take_shape().map_err(text)?;
+        }
+    }
+    clear_tool(forming);
+    let placed = forming.model.x.clone();
+    settle(forming, step, safety)?;
+    // Nodes that were driven meanwhile have their velocity from the next step on.
+    forming.model.v.copy_from_slice(&start.velocity);
+    Ok(Some(shift(forming, &placed)))
+}
+
+/// 99.9 % quantile of how far (m) nodes of plies are from where they were `placed`.
+fn shift(forming: &Forming, placed: &[V]) -> f64 {
+    let of_plies = (forming.model.sheets.iter().zip(&forming.stack))
+        .filter(|(_, sheet)| sheet.scene.kind == SheetKind::Ply)
+        .flat_map(|(s, _)| s.nodes.iter().map(|n| *n as usize));
+    let mut ways: Vec<f64> = of_plies
+        .map(|n| norm(sub(forming.model.x[n], placed[n])))
+        .collect();
+    ways.sort_by(f64::total_cmp);
+    let at = (0.999 * ways.len() as f64) as usize;
+    ways.get(at.min(ways.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0)
+}
+
+/// Puts nodes that straight coarse edges have led into the rigid parts onto them.
+fn clear_tool(forming: &mut Forming) {
+    let model = &mut forming.model;
+    for contact in &model.rigid_contacts {
+        for item in &contact.items {
+            let x = &mut model.x[item.node as usize];
+            let (distance, out) = contact.surface.distance(*x);
+            let gap = distance - contact.offset;
+            if gap < 0.0 {
+                *x = sub(*x, scale(out, gap));
+            }
+        }
+    }
+}
+
+/// Steps at the time of the start, the nodes of the cut at rest. Contacts that get their whole load at once must not swing through
+/// each other: first nothing swings at all, for as long as multipliers take to follow; then all nodes are stopped whenever the
+/// kinetic energy has passed a peak.
+fn settle(forming: &mut Forming, step: f64, safety: f64) -> Result<(), String> {
+    let model = &mut forming.model;
+    let damping = model.damping();
+    model.dt = step.min(safety * model.critical_step().map_err(|e| e.to_string())?);
+    model.set_damping(1.0 / model.dt);
+    model.halt();
+    for _ in 0..CREEPING {
+        stand(forming)?;
+    }
+    forming.model.set_damping(damping);
+    forming.model.halt();
+    let mut before = 0.0;
+    for _ in 0..SETTLING {
+        stand(forming)?;
+        let model = &mut forming.model;
+        let kinetic = model.kinetic();
+        if kinetic >= before {
+            before = kinetic;
+            continue;
+        }
+        model.halt();
+        if before < SETTLED * model.energies().internal() {
+            break;
+        }
+        before = 0.0;
+    }
+    Ok(())
+}
+
+/// A step with the loads of the start.
+fn stand(forming: &mut Forming) -> Result<(), String> {
+    forming.model.time = forming.load.start();
+    forming.load.apply(&mut forming.model);
+    forming.model.step(false).map_err(|e| e.to_string())
+}
