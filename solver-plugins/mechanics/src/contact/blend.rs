@@ -14,6 +14,18 @@ const WIDTH: f64 = 0.4;
 /// By how much the blend of two faces that meet at a corner alone is narrower, over that of a face with its next.
 const ACROSS: f64 = 0.5;
 
+/// Width (m) of the blend of two faces.
+fn width(a: &Closest, b: &Closest, offset: f64) -> f64 {
+    WIDTH * offset * (1.0 - dot(a.arm, b.arm) / (a.distance2 * b.distance2).sqrt())
+}
+
+/// Whether a face next to the closest shares its slave. Where neither of those next to it does, none across the corner does.
+#[inline]
+pub(super) fn shares(first: &Closest, other: &Closest, offset: f64) -> bool {
+    let e = width(first, other, offset);
+    e > 1e-9 * offset && other.distance2.sqrt() - first.distance2.sqrt() < e
+}
+
 /// Pull of the cells around a slave, and whether it is that of the closest alone.
 #[inline]
 pub(super) fn pulled(found: &Found, offset: f64) -> (Pull, bool) {
@@ -51,8 +63,17 @@ fn blend(found: &Found, offset: f64) -> Option<(f64, [f64; ALL])> {
     let [a, b, c] = &found.others;
     let faces = [Some(&found.first), a.as_ref(), b.as_ref(), c.as_ref()];
     let d = faces.map(|f| f.map_or(0.0, |f| f.distance2.sqrt()));
+    let mut there = (1..ALL).filter(|i| faces[*i].is_some());
+    if let (Some(k), None) = (there.next(), there.next()) {
+        let e = faces[k].map_or(0.0, |other| width(&found.first, other, offset));
+        let rest = (e - (d[k] - d[0])).max(0.0);
+        let mut shares = [0.0; ALL];
+        shares[k] = rest / (2.0 * e);
+        shares[0] = 1.0 - shares[k];
+        return Some((-rest * rest / (4.0 * e), shares));
+    }
     let between = |i: usize, j: usize| match (faces[i], faces[j]) {
-        (Some(a), Some(b)) => WIDTH * offset * (1.0 - dot(a.arm, b.arm) / (d[i] * d[j])),
+        (Some(a), Some(b)) => width(a, b, offset),
         _ => 0.0,
     };
     let mut e = [[0.0; ALL]; ALL];
@@ -67,9 +88,6 @@ fn blend(found: &Found, offset: f64) -> Option<(f64, [f64; ALL])> {
         e[i][j] = (e[i][j] - less).max(0.0);
     }
     let widest = e.iter().flatten().fold(0.0, |m: f64, x| m.max(*x));
-    if widest < 1e-9 * offset {
-        return None;
-    }
     for i in 0..ALL {
         for j in 0..i {
             e[i][j] /= widest;

@@ -6,7 +6,7 @@
 //! A force along an interpolated normal is smoother to look at but is no gradient: two flat sheets under
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
-use super::blend::pulled;
+use super::blend::{pulled, shares};
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::slave::{
     Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
@@ -250,6 +250,7 @@ pub(super) fn track(
     s: &Surface<'_>,
     item: &SlaveItem,
     p: V,
+    offset: f64,
     iterations: u32,
     open: impl Fn(u32) -> bool,
 ) -> Found {
@@ -299,7 +300,7 @@ pub(super) fn track(
     // Only where the ways to both cells are perpendicular across their common side does the surface fold towards the slave;
     // along it they may end on a ridge, as on a saddle.
     for k in 0..2 {
-        others[k] = others[k].filter(|_| best.free[k]);
+        others[k] = others[k].filter(|c| best.free[k] && shares(&best, c, offset));
     }
     if let [Some(a), Some(b), _] = &others {
         others[2] = around(s, &best, [a, b], p, open);
@@ -460,7 +461,14 @@ fn follow<F: Coulomb>(
     }
     // In touch, the place moves by far less than a cell in a step: one iteration follows it.
     let iterations = if item.active { 1 } else { 3 };
-    let found = track(s, item, s.x[item.node as usize], iterations, |_| true);
+    let found = track(
+        s,
+        item,
+        s.x[item.node as usize],
+        law.offset,
+        iterations,
+        |_| true,
+    );
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
     let Some((pull, plain)) = pull_of(item, s, &found, side, law.offset) else {
         item.part();
