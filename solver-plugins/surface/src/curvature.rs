@@ -27,8 +27,10 @@ pub struct Curvature {
 /// The normal has converged when it moves by less than this (rad). The curvature's error is of second
 /// order in it.
 const CONVERGED: f64 = 1e-9;
-/// Folded neighbourhoods may never converge; after this many fits the last one counts.
+/// After this many fits the last one counts.
 const MOST_FITS: usize = 30;
+/// The mean of the cells' normals is no further (rad) than this from the normal of what a fit can describe.
+const LARGEST_TURN: f64 = 0.25;
 /// Rings of neighbours that a fit takes. A neighbour counts by the inverse sixth power of its distance, so that the third ring
 /// decides only what the first leaves open.
 const RINGS: usize = 3;
@@ -78,13 +80,14 @@ fn at_node(topology: &Topology, points: &[Vec3], node: usize, normal: Vec3) -> C
     iterate(&offsets, normal).unwrap_or(none)
 }
 
-/// Repeats the fit in the frame of the last normal until the normal stays.
-fn iterate(offsets: &[Vec3], mut normal: Vec3) -> Option<Curvature> {
+/// Repeats the fit in the frame of the last normal until the normal stays. On a crest sharper than the mesh resolves it does
+/// not: it tips over to the normal of one flank, from where the other flank is no height. There the first fit counts.
+fn iterate(offsets: &[Vec3], first: Vec3) -> Option<Curvature> {
     let mut lengths: Vec<f64> = offsets.iter().map(|&o| norm(o)).collect();
     lengths.sort_by(f64::total_cmp);
     let nearest = lengths.get(..4)?;
     let size = nearest.iter().sum::<f64>() / nearest.len() as f64;
-    let mut last = None;
+    let (mut normal, mut fits) = (first, Vec::new());
     for _ in 0..MOST_FITS {
         let [e1, e2] = tangents(normal);
         let local: Vec<Vec3> = offsets
@@ -94,16 +97,21 @@ fn iterate(offsets: &[Vec3], mut normal: Vec3) -> Option<Curvature> {
         let Some(q) = fit(&local) else {
             break;
         };
-        last = Some((q, normal));
+        fits.push((q, normal));
         let [_, _, _, d, e] = q;
         let new = unit(add(normal, add(scale(e1, -d), scale(e2, -e))));
         let moved = norm(sub(new, normal));
         if moved < CONVERGED {
             break;
         }
+        if dot(new, first) < LARGEST_TURN.cos() {
+            fits.truncate(1);
+            break;
+        }
         normal = new;
     }
-    last.map(|(q, normal)| principal(q, size, normal))
+    let &(q, normal) = fits.last()?;
+    Some(principal(q, size, normal))
 }
 
 /// Eq. 4.11, and the directions from the second derivatives (at convergence d = e = 0).

@@ -2,7 +2,7 @@
 
 mod common;
 
-use plyflow_surface::vector::{Vec3, distance, dot};
+use plyflow_surface::vector::{Vec3, cross, distance, dot, norm, sub};
 use plyflow_surface::{Curvature, Topology, curvatures, ridge_line};
 use std::f64::consts::PI;
 
@@ -192,4 +192,70 @@ fn ridge_of_a_wavy_crest_follows_its_curve() {
         "{} {expected}",
         ridge.length
     );
+}
+
+#[test]
+fn a_crest_as_narrow_as_the_mesh_is_one() {
+    // Across a fold that a run in 4 mm shells gave at the edge of a spar (y, z in mm): a wall, nearly upright, then a shallow flank. The turn
+    // at the crest grows from 75 degrees as the fold is lifted off the edge.
+    let flank = [[-70.0, 83.0], [-68.3, 91.0], [-66.6, 99.0], [-65.2, 103.0]];
+    let top = [
+        [-60.0, 109.2],
+        [-56.0, 109.4],
+        [-52.0, 110.5],
+        [-48.0, 110.7],
+    ];
+    let crests = [
+        [-64.3, 107.0],
+        [-64.1, 108.0],
+        [-64.0, 109.0],
+        [-63.9, 110.0],
+        [-63.8, 111.0],
+        [-63.7, 112.0],
+        [-63.6, 113.0],
+    ];
+    let lines: Vec<Vec<[f64; 2]>> = crests
+        .iter()
+        .map(|c| [&flank[..], &[*c], &top[..]].concat())
+        .collect();
+    let (rows, across) = (lines.len(), lines[0].len());
+    let points: Vec<[f64; 3]> = (0..rows)
+        .flat_map(|i| {
+            lines[i]
+                .iter()
+                .map(move |[y, z]| [4e-3 * i as f64, 1e-3 * y, 1e-3 * z])
+        })
+        .collect();
+    let node = |i: usize, j: usize| (i * across + j) as u32;
+    let cells: Vec<u32> = (0..rows - 1)
+        .flat_map(|i| (0..across - 1).map(move |j| (i, j)))
+        .flat_map(|(i, j)| {
+            [
+                node(i, j),
+                node(i + 1, j),
+                node(i + 1, j + 1),
+                node(i, j + 1),
+            ]
+        })
+        .collect();
+    let topology = Topology::new(points.len(), 4, &cells);
+    let k = curvatures(&topology, &points);
+    for i in 1..rows - 1 {
+        // The circle through a crest and the nodes beside it (Menger).
+        let [a, b, c] = [3, 4, 5].map(|j| points[node(i, j) as usize]);
+        let sides = [distance(a, b), distance(b, c), distance(c, a)];
+        let area = 0.5 * norm(cross(sub(b, a), sub(c, a)));
+        let circle = 4.0 * area / sides.iter().product::<f64>();
+        let found = &k[node(i, 4) as usize];
+        assert!(
+            found.max < -circle && found.max > -4.0 * circle,
+            "{i}: {} for {circle}",
+            found.max
+        );
+        assert!(
+            found.min_direction[0].abs() > 0.95,
+            "{i}: {:?}",
+            found.min_direction
+        );
+    }
 }
