@@ -244,8 +244,8 @@ fn drive(
     let Some(grid) = grid else { return Ok(None) };
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
-    let motion = follow(host, input, meshes, body, &fine, &cells, ply)?;
-    let begin = start(host, input, meshes, body, &fine, &cells, first)?;
+    let motion = follow(host, input, meshes, body, &fine, ply)?;
+    let begin = start(host, input, meshes, body, &fine, first)?;
     let start = motion.start;
     if start > START_TOLERANCE {
         let name = &sheet.name;
@@ -277,14 +277,13 @@ struct Motion {
     start: f64,
 }
 
-/// Follows the coarse sheet `body` (its `cells`) through its frames; what `turns` also in its normals.
+/// Follows the coarse sheet `body` through its frames; what `turns` also in its normals.
 fn follow(
     host: &Host,
     input: &Input,
     meshes: &Meshes,
     body: &BodyInfo,
     fine: &Placed,
-    cells: &[u32],
     turns: bool,
 ) -> Result<Motion, StepError> {
     let mut motion = Motion {
@@ -292,7 +291,7 @@ fn follow(
         ..Motion::default()
     };
     for frame in 0..meshes.times.len() {
-        let coarse = CoarseSheet::new(host.frame_points(input, body, frame)?, cells);
+        let coarse = fine.surface(host.frame_points(input, body, frame)?);
         let driven = fine.positions(&coarse);
         motion.error = motion.error.max(fine.error(&driven, &coarse));
         if frame == 0 {
@@ -315,14 +314,13 @@ fn start(
     meshes: &Meshes,
     body: &BodyInfo,
     fine: &Placed,
-    cells: &[u32],
     first: usize,
 ) -> Result<Option<Start>, StepError> {
     if first == 0 {
         return Ok(None);
     }
     let at = |frame: usize| -> Result<Vec<f64>, StepError> {
-        let coarse = CoarseSheet::new(host.frame_points(input, body, frame)?, cells);
+        let coarse = fine.surface(host.frame_points(input, body, frame)?);
         Ok(fine.everywhere(&coarse).into_flattened())
     };
     let every = first.div_ceil(STATES);

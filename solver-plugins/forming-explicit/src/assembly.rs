@@ -16,7 +16,7 @@ use plyflow_mechanics::mesh::{NONE, Patch, QuadMesh};
 use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, Whole, part_patches, reflect};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::V;
+use plyflow_mechanics::vec3::{V, cross, norm, sub};
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::scene::{Process, Scene, Sheet, SheetKind};
 use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
@@ -42,7 +42,7 @@ pub trait Components {
     fn material(&self, name: &str) -> Result<pf_component, String>;
 }
 
-/// The tool as the contact sees it.
+/// The tool as contacts see it.
 pub struct ToolSurface(pub SignedDistanceGrid);
 
 impl RigidSurface for ToolSurface {
@@ -54,6 +54,51 @@ impl RigidSurface for ToolSurface {
     fn is_costly(&self) -> bool {
         true
     }
+}
+
+/// A tool as sheets of different elements see it: where nodes lie when the elements are as long as the tool
+/// ([`SignedDistanceGrid::of_equal_length`]).
+pub struct ToolSurfaces {
+    distance: SignedDistanceGrid,
+    /// Size of elements (m), and what they see.
+    made: Vec<(f64, Arc<ToolSurface>)>,
+}
+
+/// Sizes of elements that differ by less than this share see the same surface.
+const SAME_SIZE: f64 = 0.05;
+
+impl ToolSurfaces {
+    /// Of a tool with this distance field.
+    pub fn new(distance: SignedDistanceGrid) -> Self {
+        Self {
+            distance,
+            made: Vec::new(),
+        }
+    }
+
+    /// What a sheet of the model sees, while it is flat.
+    pub fn of(&mut self, model: &Model, sheet: usize) -> Arc<dyn RigidSurface> {
+        let size = typical_size(model, sheet);
+        let same = |(s, _): &&(f64, _)| (s - size).abs() < SAME_SIZE * size;
+        if let Some((_, surface)) = self.made.iter().find(same) {
+            return surface.clone();
+        }
+        let surface = Arc::new(ToolSurface(self.distance.of_equal_length(size)));
+        self.made.push((size, surface.clone()));
+        surface
+    }
+}
+
+/// The side (m) of a square as large as the median element of a flat sheet.
+fn typical_size(model: &Model, sheet: usize) -> f64 {
+    let (from, to) = model.sheets[sheet].cell_range;
+    let area = |cell: &[u32; 4]| {
+        let [a, b, c, d] = cell.map(|n| model.x[n as usize]);
+        0.5 * norm(cross(sub(c, a), sub(d, b)))
+    };
+    let mut areas: Vec<f64> = model.cells[from..to].iter().map(area).collect();
+    areas.sort_by(f64::total_cmp);
+    areas.get(areas.len() / 2).map_or(0.0, |a| a.sqrt())
 }
 
 /// A sheet of the stack with what the contacts and the output need.
@@ -359,7 +404,7 @@ pub fn add_contacts(
     placed: &[Placed],
     scene: &Scene,
     p: &Parameters,
-    tool: Arc<dyn RigidSurface>,
+    tool: &mut ToolSurfaces,
 ) -> Result<(), String> {
     let friction = FrictionTable::new(scene)?;
     let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: FrictionLaw, k: usize| {
@@ -378,7 +423,7 @@ pub fn add_contacts(
     };
     let bed: Arc<dyn RigidSurface> = Arc::new(Plane { height: 0.0 });
     let name = |what: &str, k: usize| format!("{what}/{}", stack[k].scene.name);
-    for (part, surface) in [("tool", tool.clone()), ("bed", bed)] {
+    for (part, surface) in [("tool", tool.of(model, placed[0].index)), ("bed", bed)] {
         let mu = under(model, part)?;
         model
             .rigid_contacts
@@ -391,7 +436,7 @@ pub fn add_contacts(
         let mut parts = vec!["tool"];
         parts.extend(stack[..=k].iter().map(|s| s.scene.name.as_str()));
         let mu = friction.through(model, &parts, &stack[k].scene.name)?;
-        let contact = rigid(name("tool", k), tool.clone(), mu, k);
+        let contact = rigid(name("tool", k), tool.of(model, placed[k].index), mu, k);
         model
             .rigid_contacts
             .push(contact.with_slack(penetration::slack_through(&stack[..k])));

@@ -1,6 +1,6 @@
 //! The model of a whole scene.
 
-use crate::assembly::{self, Components, Placed, StackSheet, ToolSurface};
+use crate::assembly::{self, Components, Placed, StackSheet, ToolSurfaces};
 use crate::parameters::Parameters;
 use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
@@ -14,7 +14,6 @@ use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::{DoubleDiaphragm, Process};
 use plyflow_tooling::ToolMesh;
-use std::sync::Arc;
 
 /// Extent in the plane: x0, y0, x1, y1 (m).
 type Box2 = [f64; 4];
@@ -357,7 +356,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         &parts.placed,
         scene,
         p,
-        Arc::new(ToolSurface(grid)),
+        &mut ToolSurfaces::new(grid),
     )?;
     model.add_plane_contacts(&assembly::contact_settings(p));
     model.set_driven(

@@ -1,6 +1,6 @@
 //! The model of one zone, driven at its cut by a coarse run.
 
-use crate::assembly::{self, Components, Placed, ToolSurface};
+use crate::assembly::{self, Components, Placed, ToolSurfaces};
 use crate::late::{self, Start};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
@@ -12,7 +12,6 @@ use plyflow_mechanics::model::{Drive, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, cross, dot, norm, scale, sub};
 use plyflow_model::scene::{Process, SheetKind};
-use std::sync::Arc;
 
 /// A sheet of the zone as the boundary artifact holds it.
 #[derive(Debug, Clone, PartialEq)]
@@ -211,12 +210,18 @@ pub fn build_local(
     }
     let start = late::of_model(&stack, &specs, &input.sheets, input.time[0])?;
     let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
-    let surface = Arc::new(ToolSurface(grid));
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]]);
     let reference = points.clone();
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
-    assembly::add_contacts(&mut model, &stack, &placed, scene, p, surface)?;
+    assembly::add_contacts(
+        &mut model,
+        &stack,
+        &placed,
+        scene,
+        p,
+        &mut ToolSurfaces::new(grid),
+    )?;
     model.set_driven(driven, Box::new(drive));
     Ok(Forming {
         model,

@@ -7,6 +7,7 @@
 mod common;
 
 use common::{BuiltIn, Silent, fabric, form};
+use plyflow_forming_explicit::assembly::inverse_bilinear;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer};
 use plyflow_forming_explicit::{
@@ -142,8 +143,24 @@ fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
         z.iter().sum::<f64>() / z.len() as f64 - 0.02
     };
     let (film, ply) = (8e-5, 4e-4);
-    let on_ply = height([15.0e-3, -15.0e-3], 0.008);
-    assert!((on_ply - (1.5 * film + ply)).abs() < 1e-4, "{on_ply}");
+    // Its nodes hang between those of the ply: it lies on these.
+    let body = forming.bodies.iter().find(|b| b.name == "ply_1").unwrap();
+    let on_top = |p: &&V| (p[0] - 17e-3).abs() < 17e-3 && p[1].abs() < 17e-3;
+    let of_ply = forming.points(body);
+    let mut gaps = Vec::new();
+    for p in of_ply.iter().filter(on_top) {
+        let above = upper.cells.iter().filter_map(|c| {
+            let corners = c.map(|n| now[n as usize]);
+            let xi = inverse_bilinear(corners, *p)?;
+            let inside = xi.iter().all(|x| x.abs() <= 1.0);
+            let weights = plyflow_mechanics::contact::shape(xi);
+            inside.then(|| (0..4).map(|k| weights[k] * corners[k][2]).sum::<f64>())
+        });
+        gaps.push(above.fold(f64::NEG_INFINITY, f64::max) - p[2]);
+    }
+    assert!(gaps.len() > 8, "{gaps:?}");
+    let lies = |gap: &f64| (gap - 0.5 * (film + ply)).abs() < 5e-6;
+    assert!(gaps.iter().all(lies), "{gaps:?}");
     let in_hole = height([-20.0e-3, -5.0e-3], 0.008);
     assert!((in_hole - (0.5 * film + 3e-4)).abs() < 1e-4, "{in_hole}");
 }

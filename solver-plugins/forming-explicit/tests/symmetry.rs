@@ -273,7 +273,8 @@ fn a_half_between_diaphragms_is_the_whole_as_far_as_that_is_symmetric() {
     let (part, b, y) = frames(&diaphragms("rf4", &["x"]));
     assert_eq!(2 * part.model.cells.len(), whole.model.cells.len());
     // Contact looks for closest points node by node in turn, so that no whole is exactly symmetric, and a film wakes
-    // what little there is. A part can be as near to the whole as the whole is to its own mirror image.
+    // what little there is, also which way the ply buckles on the flat top. A part can be as near to the whole as the whole is to its own
+    // mirror images.
     let (mut far, mut own) = (0.0f64, 1e-7f64);
     for frame in 0..x.len() {
         for (k, (body, other)) in whole.bodies.iter().zip(&part.bodies).enumerate() {
@@ -283,12 +284,18 @@ fn a_half_between_diaphragms_is_the_whole_as_far_as_that_is_symmetric() {
             far = pairs
                 .map(|(t, p)| norm(sub(now[*t], *p)))
                 .fold(far, f64::max);
-            let image = |p: &V| [-p[0], p[1], p[2]];
-            let turned = twins(&r.iter().map(image).collect::<Vec<_>>(), &r);
-            let pairs = turned.iter().zip(now);
-            own = pairs
-                .map(|(t, p)| norm(sub(image(&now[*t]), *p)))
-                .fold(own, f64::max);
+            for axis in [0, 1] {
+                let image = |p: &V| {
+                    let mut p = *p;
+                    p[axis] = -p[axis];
+                    p
+                };
+                let turned = twins(&r.iter().map(image).collect::<Vec<_>>(), &r);
+                let pairs = turned.iter().zip(now);
+                own = pairs
+                    .map(|(t, p)| norm(sub(image(&now[*t]), *p)))
+                    .fold(own, f64::max);
+            }
         }
         assert!(far < 6.0 * own, "frame {frame}: {far} m, the whole {own} m");
     }

@@ -33,6 +33,8 @@ pub struct SignedDistanceGrid {
     tool_high: V3,
     /// B-spline coefficients (m), z fastest.
     coefficients: Vec<f32>,
+    /// How much less than the distance a value may be at most (m).
+    nearer: f64,
     blocks: [usize; 3],
     /// For each block of cells a bound of the distance in it: lower where positive, upper where negative
     /// (inside), 0 where the sign changes. z fastest.
@@ -65,9 +67,9 @@ impl SignedDistanceGrid {
             std::array::from_fn(|k| ((box_high[k] - box_low[k]) / spacing).ceil() as usize + 6);
         let tree = SurfaceTree::new(&mesh.without_bottom(reach + 8.0 * spacing));
         let samples = sample(&tree, origin, spacing, nodes);
-        let blocks = nodes.map(|n| (n - 1).div_ceil(BLOCK));
-        let bounds = block_bounds(&samples, nodes, blocks, spacing);
         let coefficients = spline_coefficients(samples, nodes);
+        let blocks = nodes.map(|n| (n - 1).div_ceil(BLOCK));
+        let bounds = block_bounds(&coefficients, nodes, blocks);
         Self {
             spacing,
             reach,
@@ -78,8 +80,54 @@ impl SignedDistanceGrid {
             tool_low,
             tool_high,
             coefficients,
+            nearer: 0.0,
             blocks,
             bounds,
+        }
+    }
+
+    /// The field on whose zero the nodes of straight elements with sides of `size` (m) lie when the elements are as long, over all, as
+    /// the surface. With their nodes on the surface itself they would take short cuts: chords of an arc of radius R are shorter than it by
+    /// a share of size^2 / (24 R^2). So the nodes lie off by size^2 / 24 times the curvature, outside of what is
+    /// convex, inside of what is hollow: the share left is of the fourth power. One offset serves two directions: for principal
+    /// curvatures k it is best, in the least squares of both shares, with sum k^3 / sum k^2. The curvatures are those of the
+    /// distance's second differences over half an element, over which an edge is spread as well.
+    pub fn of_equal_length(&self, size: f64) -> Self {
+        let reach = ((0.5 * size / self.spacing).round() as usize).max(1);
+        let step = reach as f64 * self.spacing;
+        let (nodes, from) = (self.nodes, &self.coefficients);
+        let slab = nodes[1] * nodes[2];
+        let stride = [slab, nodes[2], 1].map(|s| s * reach);
+        // Flatter than this over an element, a surface has no curvature to speak of, and its directions are noise.
+        let flat = (1e-3 / size).powi(2);
+        let shift = |k: usize| -> f64 {
+            let index = [k / slab, k / nodes[2] % nodes[1], k % nodes[2]];
+            if (0..3).any(|a| index[a] < reach || index[a] + reach >= nodes[a]) {
+                return 0.0;
+            }
+            let at = |k: usize| f64::from(from[k]);
+            let (mut sum, mut squares) = (0.0, flat);
+            for a in 0..3 {
+                let s = stride[a];
+                // Summed so that the field of a symmetric tool is its own mirror image to the bit.
+                let second = ((at(k + s) + at(k - s)) - 2.0 * at(k)) / (step * step);
+                sum += second;
+                squares += second * second;
+                let t = stride[(a + 1) % 3];
+                let mixed = (at(k + s + t) + at(k - s - t)) - (at(k + s - t) + at(k - s + t));
+                squares += 2.0 * (mixed / (4.0 * step * step)).powi(2);
+            }
+            // Of three principal curvatures one is none, across the surface.
+            size * size / 24.0 * sum * (3.0 * squares - sum * sum) / (2.0 * squares)
+        };
+        let shifts: Vec<f64> = (0..from.len()).into_par_iter().map(shift).collect();
+        let shifted = from.iter().zip(&shifts);
+        let coefficients: Vec<f32> = shifted.map(|(c, s)| (f64::from(*c) - s) as f32).collect();
+        Self {
+            bounds: block_bounds(&coefficients, nodes, self.blocks),
+            coefficients,
+            nearer: self.nearer + shifts.iter().fold(0.0, |m: f64, s| m.max(*s)),
+            ..*self
         }
     }
 
@@ -216,7 +264,7 @@ impl SignedDistanceGrid {
         });
         let d = crate::vector::norm(away);
         (
-            d,
+            (d - self.nearer).max(0.0),
             if d > 0.0 {
                 away.map(|v| v / d)
             } else {
@@ -277,10 +325,8 @@ fn sample(tree: &SurfaceTree, origin: V3, spacing: f64, nodes: [usize; 3]) -> Ve
     samples
 }
 
-fn block_bounds(samples: &[f32], nodes: [usize; 3], blocks: [usize; 3], spacing: f64) -> Vec<f32> {
-    // No point of a cell is further than this from a node, and distance changes no faster than place; the
-    // spline may differ a little, which one more tenth of a cell covers.
-    let margin = (spacing * (0.5 * 3f64.sqrt() + 0.1)) as f32;
+/// A cubic B-spline stays between the least and the largest of the coefficients that it is made of.
+fn block_bounds(coefficients: &[f32], nodes: [usize; 3], blocks: [usize; 3]) -> Vec<f32> {
     let mut bounds = vec![0f32; blocks.iter().product()];
     bounds
         .par_chunks_mut(blocks[1] * blocks[2])
@@ -288,24 +334,19 @@ fn block_bounds(samples: &[f32], nodes: [usize; 3], blocks: [usize; 3], spacing:
         .for_each(|(bx, slab)| {
             for (at, bound) in slab.iter_mut().enumerate() {
                 let b = [bx, at / blocks[2], at % blocks[2]];
-                let range: [_; 3] =
-                    std::array::from_fn(|k| b[k] * BLOCK..((b[k] + 1) * BLOCK + 1).min(nodes[k]));
+                let range: [_; 3] = std::array::from_fn(|k| {
+                    (b[k] * BLOCK).saturating_sub(1)..((b[k] + 1) * BLOCK + 2).min(nodes[k])
+                });
                 let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
                 for i in range[0].clone() {
                     for j in range[1].clone() {
                         for k in range[2].clone() {
-                            let d = samples[(i * nodes[1] + j) * nodes[2] + k];
-                            (low, high) = (low.min(d), high.max(d));
+                            let c = coefficients[(i * nodes[1] + j) * nodes[2] + k];
+                            (low, high) = (low.min(c), high.max(c));
                         }
                     }
                 }
-                *bound = if low > margin {
-                    low - margin
-                } else if high < -margin {
-                    high + margin
-                } else {
-                    0.0
-                };
+                *bound = if low > 0.0 { low } else { high.min(0.0) };
             }
         });
     bounds
