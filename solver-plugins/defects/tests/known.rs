@@ -13,7 +13,7 @@ const OFFSET: f64 = 0.0003;
 const SETTINGS: Settings = Settings {
     distance_threshold: 0.001,
     curvature_threshold: 100.0,
-    crest_hold: 0.5,
+    crest_hold: 0.3,
     foot_margin: 0.010,
     minimum_wrinkle_length: 0.010,
     minimum_bridging_area: 50e-6,
@@ -39,7 +39,7 @@ fn height(angle: f64, x: f64, y: f64) -> f64 {
     0.003 * bump(across, 0.007) * fade + 0.002 * bump((x - 0.040).hypot(y), 0.025)
 }
 
-/// Length of the crest, over the surface, where it is curved beyond half of the threshold and stands off.
+/// Length of the crest, over the surface, where it is curved beyond crest_hold of the threshold and stands off.
 fn crest_length() -> f64 {
     let peak = 0.0015 * (PI / 0.007f64).powi(2);
     let curved = SETTINGS.crest_hold * SETTINGS.curvature_threshold / peak;

@@ -3,6 +3,8 @@
 use crate::curvature::Curvature;
 use crate::topology::Topology;
 use crate::vector::{Vec3, add, distance, dot, norm, scale, sub, unit};
+use petgraph::algo::astar;
+use petgraph::graphmap::UnGraphMap;
 
 /// The crest line of a region.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,9 +17,9 @@ pub struct Ridge {
     pub length: f64,
 }
 
-/// Walks the ridge of a connected `region` (nodes of a mesh at `points`) both ways from its most curved
-/// node: each step goes along the direction of smallest curvature to the most curved node ahead inside the
-/// region. Each node is then moved across the ridge to the top of the parabola through the curvatures
+/// The ridge of a connected `region` (nodes of a mesh at `points`): the path over sides and diagonals of cells between the two
+/// ends of the region that is shortest when a length counts the more the less the ply is curved there (a minimal path, Cohen and Kimmel
+/// 1997). Each node is then moved across the ridge to the top of the parabola through the curvatures
 /// of its ring, and the line is smoothed once (1/4, 1/2, 1/4): both keep the steps of a mesh that lies at an
 /// angle to the ridge from lengthening the line. At an end where the node ahead is curved less than
 /// `threshold` (1/m, the bound of the region), or has a negative `margin` (`[nodes]`, what else bounds the region, at
@@ -31,28 +33,18 @@ pub fn ridge_line(
     threshold: f64,
     margin: &[f64],
 ) -> Option<Ridge> {
-    let strength = |i: u32| curvature[i as usize].max.abs();
-    // Of equals the lowest index, for the same line in every run.
-    let start = region
-        .iter()
-        .copied()
-        .reduce(|a, b| if strength(b) > strength(a) { b } else { a })?;
     let mut inside = vec![false; topology.nodes()];
     region.iter().for_each(|&i| inside[i as usize] = true);
-    let along = curvature[start as usize].min_direction;
-    let walk = Walk {
+    let crest_region = Region {
         topology,
         points,
         curvature,
+        nodes: region,
         inside: &inside,
         threshold,
         margin,
     };
-    let (mut nodes, first_tip) = walk.from(start, scale(along, -1.0));
-    nodes.reverse();
-    nodes.push(start);
-    let (onward, last_tip) = walk.from(start, along);
-    nodes.extend(onward);
+    let nodes = crest_region.spine()?;
     let crests: Vec<Vec3> = nodes
         .iter()
         .map(|&i| crest(topology, points, curvature, i))
@@ -62,8 +54,22 @@ pub fn ridge_line(
         let sides = add(crests[i - 1], crests[i + 1]);
         line[i] = add(scale(crests[i], 0.5), scale(sides, 0.25));
     }
-    line.insert(0, add(line[0], first_tip));
-    line.push(add(line[line.len() - 1], last_tip));
+    let (first, last) = (nodes[0], nodes[nodes.len() - 1]);
+    let axis = curvature[first as usize].min_direction;
+    // Out of the region, along the line and the ridge's own direction alike.
+    let outwards = |end: u32, before: Option<&u32>, alone: Vec3| {
+        let axis = curvature[end as usize].min_direction;
+        before.map_or(alone, |&b| {
+            let way = unit(sub(points[end as usize], points[b as usize]));
+            let along = scale(axis, if dot(axis, way) < 0.0 { -1.0 } else { 1.0 });
+            unit(add(along, way))
+        })
+    };
+    let backwards = outwards(first, nodes.get(1), scale(axis, -1.0));
+    let before = nodes.len().checked_sub(2).map(|i| &nodes[i]);
+    let onwards = outwards(last, before, axis);
+    line.insert(0, add(line[0], crest_region.tip(first, backwards)));
+    line.push(add(line[line.len() - 1], crest_region.tip(last, onwards)));
     let length = line.windows(2).map(|w| distance(w[0], w[1])).sum();
     Some(Ridge {
         points: line,
@@ -72,39 +78,18 @@ pub fn ridge_line(
     })
 }
 
-struct Walk<'a> {
+/// Connected nodes around a crest.
+struct Region<'a> {
     topology: &'a Topology,
     points: &'a [Vec3],
     curvature: &'a [Curvature],
+    nodes: &'a [u32],
     inside: &'a [bool],
     threshold: f64,
     margin: &'a [f64],
 }
 
-impl Walk<'_> {
-    /// Nodes after `start`, and the way from the last one on to the bound of the region.
-    fn from(&self, start: u32, mut heading: Vec3) -> (Vec<u32>, Vec3) {
-        let mut path = Vec::new();
-        let mut visited = vec![start];
-        let mut at = start;
-        while let Some(next) = self.next(at, heading, &visited) {
-            // The principal direction has no sign, and is rough where the ridge is weak: the heading is
-            // kept by averaging it with the way gone.
-            let way = unit(self.way(at, next));
-            let axis = self.curvature[next as usize].min_direction;
-            let axis = if dot(axis, heading) < 0.0 {
-                scale(axis, -1.0)
-            } else {
-                axis
-            };
-            heading = unit(add(scale(heading, 0.5), add(axis, scale(way, 0.5))));
-            visited.push(next);
-            path.push(next);
-            at = next;
-        }
-        (path, self.tip(at, heading))
-    }
-
+impl Region<'_> {
     fn way(&self, from: u32, to: u32) -> Vec3 {
         sub(self.points[to as usize], self.points[from as usize])
     }
@@ -113,31 +98,78 @@ impl Walk<'_> {
         self.curvature[i as usize].max.abs()
     }
 
-    /// The most curved of `nodes` within 45 degrees of the heading: wider, and the line would turn along
-    /// the rim at the end of a region.
-    fn ahead(&self, at: u32, heading: Vec3, nodes: impl Iterator<Item = u32>) -> Option<u32> {
-        nodes
-            .filter(|&i| {
-                let way = self.way(at, i);
-                dot(way, heading) > 0.7 * norm(way)
-            })
+    /// The most curved of nodes; of equals the first, for the same line in every run.
+    fn strongest(&self, nodes: impl Iterator<Item = u32>) -> Option<u32> {
+        nodes.reduce(|a, b| {
+            if self.strength(b) > self.strength(a) {
+                b
+            } else {
+                a
+            }
+        })
+    }
+
+    /// Whether the ply bends to the same side at two nodes.
+    fn alike(&self, a: u32, b: u32) -> bool {
+        self.curvature[a as usize].max * self.curvature[b as usize].max > 0.0
+    }
+
+    /// Whether no node beside it, across the ridge, is curved more (Canny's thinning): a corner of the region is no end of its crest.
+    fn on_crest(&self, i: u32) -> bool {
+        let across = self.curvature[i as usize].max_direction;
+        let beside = self.topology.ring(i as usize).iter().filter(|&&n| {
+            let way = self.way(i, n);
+            self.alike(i, n) && dot(way, across).abs() > 0.9 * norm(way)
+        });
+        beside
+            .copied()
+            .all(|n| self.strength(n) <= self.strength(i))
+    }
+
+    /// The node of the crest furthest from another.
+    fn furthest(&self, from: u32) -> u32 {
+        let lengths =
+            (self.topology).path_lengths(self.points, &[from], self.inside, f64::INFINITY);
+        let crests = self.nodes.iter().copied().filter(|i| self.on_crest(*i));
+        crests
             .reduce(|a, b| {
-                if self.strength(b) > self.strength(a) {
+                if lengths[b as usize] > lengths[a as usize] {
                     b
                 } else {
                     a
                 }
             })
+            .unwrap_or(from)
     }
 
-    /// The next node inside the region: of the first ring, or where an irregular mesh has none ahead, of
-    /// the second.
-    fn next(&self, at: u32, heading: Vec3, visited: &[u32]) -> Option<u32> {
-        (1..=2).find_map(|rings| {
-            let ring = self.topology.rings(at as usize, rings).into_iter();
-            let open = ring.filter(|i| self.inside[*i as usize] && !visited.contains(i));
-            self.ahead(at, heading, open)
-        })
+    /// Nodes along the ridge, from end to end.
+    fn spine(&self) -> Option<Vec<u32>> {
+        let start = self.strongest(self.nodes.iter().copied())?;
+        let first = self.furthest(start);
+        let last = self.furthest(first);
+        let mut graph = UnGraphMap::<u32, f64>::new();
+        for &i in self.nodes {
+            for &j in self.topology.ring(i as usize) {
+                if i < j && self.inside[j as usize] {
+                    let strength = 0.5 * (self.strength(i) + self.strength(j));
+                    graph.add_edge(i, j, norm(self.way(i, j)) / strength);
+                }
+            }
+        }
+        if first == last {
+            return Some(vec![start]);
+        }
+        let path = astar(&graph, first, |i| i == last, |(_, _, cost)| *cost, |_| 0.0);
+        path.map(|(_, nodes)| nodes)
+    }
+
+    /// The most curved of `nodes` within 45 degrees of the heading: wider, and the line would turn along
+    /// the rim at the end of a region.
+    fn ahead(&self, at: u32, heading: Vec3, nodes: impl Iterator<Item = u32>) -> Option<u32> {
+        self.strongest(nodes.filter(|&i| {
+            let way = self.way(at, i);
+            dot(way, heading) > 0.7 * norm(way)
+        }))
     }
 
     fn tip(&self, at: u32, heading: Vec3) -> Vec3 {
