@@ -204,6 +204,14 @@ impl Bending {
     /// on one side only). What they do not tell is 0.
     fn new(node: usize, points: &[Vec3], topology: &Topology, fine_area: f64) -> Self {
         let cells = topology.cells_of(node);
+        if cells.is_empty() {
+            // A node of no cell: nothing is placed on it.
+            return Self {
+                finer: 0.0,
+                around: Vec::new(),
+                next: 0,
+            };
+        }
         let areas = cells.iter().map(|c| {
             let corners = topology.cell(*c as usize);
             let [a, b, c, d] = [0, 1, 2, 3].map(|i| points[corners[i] as usize]);

@@ -5,6 +5,7 @@ use crate::parameters::{ComponentChoice, Parameters};
 use crate::penetration;
 use crate::run::Body;
 use crate::symmetry::{self, Families, MirroredBody};
+use crate::tool::ToolSurfaces;
 use plyflow_abi::pf_component;
 use plyflow_blank::Blank;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
@@ -16,10 +17,9 @@ use plyflow_mechanics::mesh::{NONE, Patch, QuadMesh};
 use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, Whole, part_patches, reflect};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::{V, cross, norm, sub};
+use plyflow_mechanics::vec3::V;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::scene::{Process, Scene, Sheet, SheetKind};
-use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
 
 /// Least distance of the mid-surfaces of two bare films in contact (m). They are 0.08 mm thick; at so small a
@@ -40,65 +40,6 @@ pub trait Components {
     /// # Errors
     /// When there is none.
     fn material(&self, name: &str) -> Result<pf_component, String>;
-}
-
-/// The tool as contacts see it.
-pub struct ToolSurface(pub SignedDistanceGrid);
-
-impl RigidSurface for ToolSurface {
-    fn distance(&self, point: V) -> (f64, V) {
-        self.0.distance_and_gradient(point)
-    }
-
-    /// A field of the whole tool is too large for the cache.
-    fn is_costly(&self) -> bool {
-        true
-    }
-}
-
-/// A tool as sheets of different elements see it: where nodes lie when the elements are as long as the tool
-/// ([`SignedDistanceGrid::of_equal_length`]).
-pub struct ToolSurfaces {
-    distance: SignedDistanceGrid,
-    /// Size of elements (m), and what they see.
-    made: Vec<(f64, Arc<ToolSurface>)>,
-}
-
-/// Sizes of elements that differ by less than this share see the same surface.
-const SAME_SIZE: f64 = 0.05;
-
-impl ToolSurfaces {
-    /// Of a tool with this distance field.
-    pub fn new(distance: SignedDistanceGrid) -> Self {
-        Self {
-            distance,
-            made: Vec::new(),
-        }
-    }
-
-    /// What a sheet of the model sees, while it is flat.
-    pub fn of(&mut self, model: &Model, sheet: usize) -> Arc<dyn RigidSurface> {
-        let size = typical_size(model, sheet);
-        let same = |(s, _): &&(f64, _)| (s - size).abs() < SAME_SIZE * size;
-        if let Some((_, surface)) = self.made.iter().find(same) {
-            return surface.clone();
-        }
-        let surface = Arc::new(ToolSurface(self.distance.of_equal_length(size)));
-        self.made.push((size, surface.clone()));
-        surface
-    }
-}
-
-/// The side (m) of a square as large as the median element of a flat sheet.
-fn typical_size(model: &Model, sheet: usize) -> f64 {
-    let (from, to) = model.sheets[sheet].cell_range;
-    let area = |cell: &[u32; 4]| {
-        let [a, b, c, d] = cell.map(|n| model.x[n as usize]);
-        0.5 * norm(cross(sub(c, a), sub(d, b)))
-    };
-    let mut areas: Vec<f64> = model.cells[from..to].iter().map(area).collect();
-    areas.sort_by(f64::total_cmp);
-    areas.get(areas.len() / 2).map_or(0.0, |a| a.sqrt())
 }
 
 /// A sheet of the stack with what the contacts and the output need.
@@ -627,15 +568,4 @@ pub fn body(
         });
     }
     Ok(body)
-}
-
-/// Tool mesh and its distance field.
-///
-/// # Errors
-/// When the tool cannot be built.
-pub fn tool(scene: &Scene, spacing: f64) -> Result<(ToolMesh, SignedDistanceGrid), String> {
-    let mesh = plyflow_tooling::build(&scene.tool).map_err(|e| e.to_string())?;
-    // Contact acts at distances of the stack's thickness; a few cells around it are plenty.
-    let grid = SignedDistanceGrid::build(&mesh, spacing, (4.0 * spacing).max(0.01));
-    Ok((mesh, grid))
 }

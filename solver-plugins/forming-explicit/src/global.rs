@@ -1,11 +1,12 @@
 //! The model of a whole scene.
 
-use crate::assembly::{self, Components, Placed, StackSheet, ToolSurfaces};
+use crate::assembly::{self, Components, Placed, StackSheet};
 use crate::parameters::Parameters;
 use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
 use crate::run::{Body, Forming};
 use crate::symmetry;
+use crate::tool::{self, ToolSurfaces};
 use plyflow_blank::Blank;
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::mirror::{Mirrors, Planes, on_outer_boundary};
@@ -330,7 +331,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         Process::Press(press) => return build_press(p, press, components),
     };
     let stack = assembly::stack(scene)?;
-    let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
+    let (tool, grid) = tool::build(scene, p.tool_grid)?;
     let planes = symmetry::planes(scene);
     symmetry::check(scene, planes, &stack, &tool)?;
     let at = layout(&stack, process, p, &tool, planes)?;

@@ -16,6 +16,7 @@ pub mod press;
 pub mod process;
 pub mod run;
 pub mod symmetry;
+mod tool;
 
 pub use global::build_global;
 pub use late::Start;

@@ -1,10 +1,11 @@
 //! The model of one zone, driven at its cut by a coarse run.
 
-use crate::assembly::{self, Components, Placed, ToolSurfaces};
+use crate::assembly::{self, Components, Placed};
 use crate::late::{self, Start};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
 use crate::run::{Body, Forming};
+use crate::tool::{self, ToolSurfaces};
 use plyflow_mechanics::history::{hermite, hermite_rate, locate};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::mirror::Planes;
@@ -209,7 +210,7 @@ pub fn build_local(
         });
     }
     let start = late::of_model(&stack, &specs, &input.sheets, input.time[0])?;
-    let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
+    let (tool, grid) = tool::build(scene, p.tool_grid)?;
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]]);
     let reference = points.clone();
     let mut model =

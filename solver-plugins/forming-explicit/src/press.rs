@@ -3,13 +3,14 @@
 //! The tool of the scene is the punch, described where it ends. It starts one stroke below, where it touches the
 //! lowest ply, and pushes the plies through the opening of the die.
 
-use crate::assembly::{self, Components, StackSheet, ToolSurface};
+use crate::assembly::{self, Components, StackSheet};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
 use crate::penetration;
 use crate::process::Load;
 use crate::run::{Forming, RigidBody};
 use crate::symmetry;
+use crate::tool::{self, ToolSurface};
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{OpenPlate, RigidContact, RigidItem, RigidMotion, RigidSurface};
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
@@ -285,7 +286,7 @@ pub fn build_press(
 ) -> Result<Forming, String> {
     let scene = &p.scene;
     let stack = assembly::stack(scene)?;
-    let (tool, grid) = assembly::tool(scene, p.tool_grid)?;
+    let (tool, grid) = tool::build(scene, p.tool_grid)?;
     let planes = symmetry::planes(scene);
     symmetry::check(scene, planes, &stack, &tool)?;
     let at = levels(press, &stack, tool.bounds()[1][2])?;

@@ -1,0 +1,78 @@
+//! The tool as the sheets of a model see it.
+
+use plyflow_mechanics::contact::RigidSurface;
+use plyflow_mechanics::model::Model;
+use plyflow_mechanics::vec3::{V, cross, norm, sub};
+use plyflow_model::scene::Scene;
+use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
+use std::sync::Arc;
+
+/// Tool mesh and its distance field.
+///
+/// # Errors
+/// When the tool cannot be built.
+pub fn build(scene: &Scene, spacing: f64) -> Result<(ToolMesh, SignedDistanceGrid), String> {
+    let mesh = plyflow_tooling::build(&scene.tool).map_err(|e| e.to_string())?;
+    // Contact acts at distances of the stack's thickness; a few cells around it are plenty.
+    let grid = SignedDistanceGrid::build(&mesh, spacing, (4.0 * spacing).max(0.01));
+    Ok((mesh, grid))
+}
+
+/// The tool as contacts see it.
+pub struct ToolSurface(pub SignedDistanceGrid);
+
+impl RigidSurface for ToolSurface {
+    fn distance(&self, point: V) -> (f64, V) {
+        self.0.distance_and_gradient(point)
+    }
+
+    /// A field of the whole tool is too large for the cache.
+    fn is_costly(&self) -> bool {
+        true
+    }
+}
+
+/// A tool as sheets of different elements see it: where nodes lie when the elements are as long as the tool
+/// ([`SignedDistanceGrid::of_equal_length`]).
+pub struct ToolSurfaces {
+    distance: SignedDistanceGrid,
+    /// Size of elements (m), and what they see.
+    made: Vec<(f64, Arc<ToolSurface>)>,
+}
+
+/// Sizes of elements that differ by less than this share see the same surface.
+const SAME_SIZE: f64 = 0.05;
+
+impl ToolSurfaces {
+    /// Of a tool with this distance field.
+    pub fn new(distance: SignedDistanceGrid) -> Self {
+        Self {
+            distance,
+            made: Vec::new(),
+        }
+    }
+
+    /// What a sheet of the model sees, while it is flat.
+    pub fn of(&mut self, model: &Model, sheet: usize) -> Arc<dyn RigidSurface> {
+        let size = typical_size(model, sheet);
+        let same = |(s, _): &&(f64, _)| (s - size).abs() < SAME_SIZE * size;
+        if let Some((_, surface)) = self.made.iter().find(same) {
+            return surface.clone();
+        }
+        let surface = Arc::new(ToolSurface(self.distance.of_equal_length(size)));
+        self.made.push((size, surface.clone()));
+        surface
+    }
+}
+
+/// The side (m) of a square as large as the median element of a flat sheet.
+fn typical_size(model: &Model, sheet: usize) -> f64 {
+    let (from, to) = model.sheets[sheet].cell_range;
+    let area = |cell: &[u32; 4]| {
+        let [a, b, c, d] = cell.map(|n| model.x[n as usize]);
+        0.5 * norm(cross(sub(c, a), sub(d, b)))
+    };
+    let mut areas: Vec<f64> = model.cells[from..to].iter().map(area).collect();
+    areas.sort_by(f64::total_cmp);
+    areas.get(areas.len() / 2).map_or(0.0, |a| a.sqrt())
+}
