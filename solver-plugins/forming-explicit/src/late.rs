@@ -4,6 +4,7 @@
 use crate::assembly::StackSheet;
 use crate::local::LocalSheet;
 use crate::run::Forming;
+use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::SheetSpec;
 use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 use plyflow_model::scene::SheetKind;
@@ -149,9 +150,16 @@ fn settle(forming: &mut Forming, step: f64, safety: f64) -> Result<(), String> {
     model.dt = step.min(safety * model.critical_step().map_err(|e| e.to_string())?);
     model.set_damping(1.0 / model.dt);
     model.halt();
+    // The coarse run's sheets, interpolated, may reach into each other where they fold.
+    let clear = |model: &mut Model, on: bool| {
+        let contacts = model.sheet_contacts.iter_mut();
+        contacts.for_each(|c| c.clearing = on);
+    };
+    clear(model, true);
     for _ in 0..CREEPING {
         stand(forming)?;
     }
+    clear(&mut forming.model, false);
     forming.model.set_damping(damping);
     forming.model.halt();
     let mut before = 0.0;

@@ -278,3 +278,46 @@ fn block_on_an_incline_slides_by_coulombs_law_above_it() {
         "{got} against {expected}"
     );
 }
+
+/// Speed (m/s) upwards at which a slave of 1e-5 kg comes out of a flat sheet, or after a millisecond, that begins at `height` over
+/// its mid-surface with `speed`; and its height then.
+fn comes_out(height: f64, speed: f64, clearing: bool) -> [f64; 2] {
+    let (mesh, mut x) = scene(0.0, [0.003, 0.002], height);
+    let normals = vec![[0.0, 0.0, 1.0]; x.len()];
+    let neighbours = mesh.neighbours();
+    let mut c = contact(x.len() as u32 - 1, 3);
+    c.clearing = clearing;
+    let (slave, dt, mass) = (x.len() - 1, 1e-6, 1e-5);
+    let mut v = vec![[0.0; 3]; x.len()];
+    v[slave][2] = speed;
+    for _ in 0..1000 {
+        let surface = Surface {
+            cells: &mesh.cells,
+            neighbours: &neighbours,
+            x: &x,
+            normals: &normals,
+        };
+        c.compute(&surface, &v, pace(dt));
+        let mut f = vec![[0.0; 3]; x.len()];
+        c.scatter(&mesh.cells, &mut f);
+        for k in 0..3 {
+            v[slave][k] += f[slave][k] / mass * dt;
+            x[slave][k] += v[slave][k] * dt;
+        }
+    }
+    [v[slave][2], x[slave][2]]
+}
+
+#[test]
+fn a_slave_that_is_found_deep_inside_is_not_flung_out() {
+    // It comes out as fast as it was, through where half of the offset is left too.
+    let [speed, height] = comes_out(0.3 * OFFSET, 0.5, false);
+    assert!(height > 1.2 * OFFSET, "{height}");
+    assert!((speed - 0.5).abs() < 0.01, "{speed}");
+    // Pressed on, it gives way no further, and comes back as fast at most.
+    let [speed, _] = comes_out(0.3 * OFFSET, -0.05, false);
+    assert!(speed > 0.0 && speed < 0.0505, "{speed}");
+    // A model that is put together by hand is cleared.
+    let [speed, height] = comes_out(0.3 * OFFSET, 0.0, true);
+    assert!(speed > 1.0 && height > OFFSET, "{speed} {height}");
+}

@@ -182,6 +182,7 @@ impl SelfContact {
             friction,
             slip_factor: self.settings.slip_factor,
             augmentation: self.settings.augmentation,
+            clearing: false,
         };
         let (undeformed, near) = (&self.undeformed, self.near);
         let follow_all = |items: &mut [FoldItem]| {
@@ -498,6 +499,7 @@ mod tests {
             friction: &Constant(0.0),
             slip_factor: 0.5,
             augmentation: 0.0,
+            clearing: false,
         };
         follow(&mut pair, &surface, &[[0.0; 3]; 7], &pace, &law, |_| true);
         pair

@@ -33,6 +33,9 @@ pub struct SheetContact {
     pub slip_factor: f64,
     /// Share of the penalty force that a step adds to the multiplier.
     pub augmentation: f64,
+    /// Whether slaves are pushed out from wherever they are: also from so deep inside of the master that motion cannot have brought
+    /// them there. That makes energy, and is for models that are put together by hand and damped.
+    pub clearing: bool,
     /// The slaves.
     pub items: Vec<SlaveItem>,
     /// By slave: call of [`SheetContact::compute`] before which it cannot touch. Apart from the items, so that to pass over one
@@ -328,6 +331,7 @@ impl SheetContact {
             friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
+            clearing: false,
             items,
             wakes: Vec::new(),
             spans: Vec::new(),
@@ -357,6 +361,7 @@ impl SheetContact {
             offset: self.offset,
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
+            clearing: self.clearing,
         };
         let cycle = self.cycle;
         self.cycle += 1;
@@ -470,16 +475,21 @@ fn follow<F: Coulomb>(
         |_| true,
     );
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
-    let Some((pull, plain)) = pull_of(item, s, &found, side, law.offset) else {
+    let Some((pull, plain)) = pull_of(item, s, &found, side, law.offset, law.clearing) else {
         item.part();
         return Met::Apart(0);
     };
-    // A slave that comes from beside cannot be deep inside at once: it has got behind the rim.
-    let behind = !item.active && pull.gap < -0.5 * law.offset;
     item.direction = pull.first;
+    // No slave gets deep inside at once.
+    let deep = !item.active && pull.gap < -0.5 * law.offset && !law.clearing;
+    // One that comes from beside has got behind the rim.
+    let behind = deep && at_rim(&found.first);
     if behind || (pull.gap > 0.0 && item.multiplier == 0.0) {
         return apart(item, pull.gap.max(0.0), s, v, pace, plain);
     }
+    // Any other was lost in a fold, and is found where it has no way to be pushed from: that would make energy from nothing, now or
+    // when it is less deep.
+    item.guarded |= deep;
     item.plain = plain;
     Met::Touch(touch(item, s, v, &pull, &found, law))
 }
@@ -500,6 +510,11 @@ fn apart(
     Met::Apart(steps)
 }
 
+/// Whether a closest point lies on a free rim.
+fn at_rim(c: &Closest) -> bool {
+    c.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM)
+}
+
 /// Gap and direction of a slave whose closest point is found, and whether it may keep both for some steps; `None`: it lies
 /// beyond a fold.
 #[inline]
@@ -509,6 +524,7 @@ fn pull_of(
     found: &Found,
     side: f64,
     offset: f64,
+    clearing: bool,
 ) -> Option<(Pull, bool)> {
     let first = &found.first;
     let nodes = s.cells[first.cell as usize];
@@ -518,12 +534,12 @@ fn pull_of(
     // At a free rim the sheet is round: there the gap is the distance, wherever the slave lies. On its
     // own side, it is so too; a slave whose mid-surface has just passed through the master's has a
     // negative one. Anything else lies beyond a fold.
-    let at_rim = first.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM);
+    let at_rim = at_rim(first);
     if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
         let (pull, alone) = pulled(found, offset);
         return Some((pull, alone && !at_rim));
     }
-    let through = item.active && height < -0.5 * distance && height > -offset;
+    let through = (item.active || clearing) && height < -0.5 * distance && height > -offset;
     let pull = || Pull::plain(height - offset, scale(up, side));
     through.then(|| (pull(), false))
 }

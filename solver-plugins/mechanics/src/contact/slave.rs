@@ -282,6 +282,8 @@ pub(super) struct Law<'a, F> {
     pub(super) friction: &'a F,
     pub(super) slip_factor: f64,
     pub(super) augmentation: f64,
+    /// Slaves are pushed out from wherever they are.
+    pub(super) clearing: bool,
 }
 
 /// Force of a slave in touch, or so lately that it still has a multiplier.
