@@ -303,7 +303,7 @@ fn elements_on_the_shifted_field_are_as_long_as_the_surface() {
 }
 
 #[test]
-fn the_shifted_field_is_that_of_the_surface_where_it_is_flat_and_halves_nothing_along_a_fillet() {
+fn the_shifted_field_is_that_of_the_surface_where_it_is_flat() {
     let mesh = spar();
     let grid = SignedDistanceGrid::build(&mesh, 3e-3, 12e-3);
     let field = grid.of_equal_length(8e-3);
