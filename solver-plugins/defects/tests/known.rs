@@ -141,6 +141,54 @@ fn length_amplitude_and_area_are_within_3_percent_at_any_angle_and_on_jittered_m
     }
 }
 
+/// A fold 3 mm high along y = 0 that widens from x = 0 on to two crests at y = +-x / 4, and fades over 45 mm to both ends.
+fn widening(x: f64, y: f64) -> f64 {
+    let half = 0.007;
+    let bump = |s: f64| {
+        if s.abs() < half {
+            0.5 * (1.0 + (PI * s / half).cos())
+        } else {
+            0.0
+        }
+    };
+    let apart = 0.25 * x.max(0.0);
+    // While both reach the middle their sum there is the higher one.
+    let highest = (2.0 * bump(apart)).max(1.0);
+    let fade = if x.abs() < 0.045 {
+        (0.5 * PI * x / 0.045).cos()
+    } else {
+        0.0
+    };
+    0.003 * fade * (bump(y - apart) + bump(y + apart)) / highest
+}
+
+#[test]
+fn a_fold_that_widens_to_two_crests_is_one_wrinkle_from_end_to_end() {
+    // Along the middle, then along either crest, to where the fold is as high as it has to be.
+    let least = SETTINGS.distance_threshold / 0.003;
+    let end = 0.045 * 2.0 / PI * least.acos();
+    let place = |i: i32| {
+        let x = end * f64::from(i) / 1000.0;
+        let y = 0.25 * x.max(0.0);
+        [x, y, widening(x, y)]
+    };
+    let known: f64 = (-1000..1000)
+        .map(|i| distance(place(i), place(i + 1)))
+        .sum();
+    for (h, jitter) in [(0.00125, 0.0), (0.00125, 0.2), (0.002, 0.0)] {
+        let (points, cells) = flat(h, jitter);
+        let formed = points
+            .iter()
+            .map(|&[x, y]| [x, y, TOP + OFFSET + widening(x, y)])
+            .collect();
+        let found = all(&ply(Topology::new(points.len(), 4, &cells), formed));
+        assert_eq!(found.len(), 1, "{h}, jitter {jitter}: {found:?}");
+        let errors = [found[0].length / known, found[0].amplitude / 0.003].map(|r| r - 1.0);
+        println!("{h}, jitter {jitter}: {errors:.3?}");
+        assert!(errors.iter().all(|e| e.abs() < 0.03), "{errors:?}");
+    }
+}
+
 #[test]
 fn a_cloud_of_points_is_joined_to_the_whole_surface_and_measured_as_a_mesh_is() {
     for jitter in [0.0, 0.3] {

@@ -35,7 +35,7 @@ const MOST: usize = 2;
 const LEAST_STIFFNESS: f64 = 0.02;
 
 /// A node on another part of its sheet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FoldItem {
     /// Slave, place and forces.
     pub slave: SlaveItem,

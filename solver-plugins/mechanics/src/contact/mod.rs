@@ -143,7 +143,7 @@ pub(crate) struct Normal {
 /// An open contact keeps its multiplier, which dies out at the rate at which it grew: to drop it at once
 /// would let the sheets fall back freely over `held / stiffness`, and a bag that rattles would gain
 /// energy in every cycle.
-#[inline]
+#[inline(always)]
 pub(crate) fn normal_force(
     gap: f64,
     vn: f64,
@@ -192,7 +192,7 @@ pub(crate) struct Tangential {
 /// `held` (N) is the spring's force so far, in the plane of contact; `vt` (m/s) the sliding velocity;
 /// `limit` (N) the coefficient times the normal force. The damper calms a node that sticks in a fold of its
 /// master, where the direction of the normal force jumps.
-#[inline]
+#[inline(always)]
 pub(crate) fn friction_force(
     held: [f64; 3],
     vt: [f64; 3],

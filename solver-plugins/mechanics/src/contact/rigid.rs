@@ -270,11 +270,11 @@ impl RigidContact {
         if costly {
             spans.zip_eq(self.planes.par_chunks_mut(SPAN)).for_each(
                 |(((items, wakes), span), planes)| {
-                    looking.at_span(items, wakes, span, planes);
+                    looking.span(items, wakes, span, planes);
                 },
             );
         } else {
-            spans.for_each(|((items, wakes), span)| looking.at_span(items, wakes, span, &mut []));
+            spans.for_each(|((items, wakes), span)| looking.span(items, wakes, span, &mut []));
         }
         let mut total = ContactEnergy::default();
         for span in self.spans.iter().filter(|s| s.touches) {
@@ -338,8 +338,9 @@ struct Looking<'a, F> {
 }
 
 impl<F: Coulomb> Looking<'_, F> {
-    /// Forces of those items of a span that are awake. `planes`: by item, or none.
-    fn at_span(
+    /// Forces of those items of a span that are awake, with the machine's wider vectors; no fused operations, so the bits are
+    /// the same on all. `planes`: by item, or none.
+    fn span(
         &self,
         items: &mut [RigidItem],
         wakes: &mut [u32],
@@ -349,6 +350,34 @@ impl<F: Coulomb> Looking<'_, F> {
         if self.cycle < u64::from(span.wake) {
             return;
         }
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx2")]
+            fn wide<F: Coulomb>(
+                looking: &Looking<'_, F>,
+                items: &mut [RigidItem],
+                wakes: &mut [u32],
+                span: &mut Span,
+                planes: &mut [TangentPlane],
+            ) {
+                looking.each(items, wakes, span, planes);
+            }
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // Checked the line above.
+                return unsafe { wide(self, items, wakes, span, planes) };
+            }
+        }
+        self.each(items, wakes, span, planes);
+    }
+
+    #[inline(always)]
+    fn each(
+        &self,
+        items: &mut [RigidItem],
+        wakes: &mut [u32],
+        span: &mut Span,
+        planes: &mut [TangentPlane],
+    ) {
         *span = Span {
             wake: u32::MAX,
             ..Span::default()
@@ -379,6 +408,7 @@ impl<F: Coulomb> Looking<'_, F> {
     }
 
     /// Gap of an item (m) and its gradient; from the plane while the item keeps it.
+    #[inline(always)]
     fn gap(&self, item: &RigidItem, plane: Option<&mut TangentPlane>) -> (f64, V) {
         let n = item.node as usize;
         let x = sub(self.law.x[n], self.motion.shift);
@@ -414,6 +444,7 @@ struct Law<'a, F> {
 }
 
 /// Force of an item in touch, or so lately that it still has a multiplier; its energy. `v`: relative to the surface.
+#[inline(always)]
 fn touch<F: Coulomb>(
     item: &mut RigidItem,
     gap: f64,

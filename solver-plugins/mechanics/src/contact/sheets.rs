@@ -204,6 +204,7 @@ fn middle(edge: usize) -> [f64; 2] {
 }
 
 /// Closest point to `p` of the mirror image of a cell: the image of the closest point to the image of `p`.
+#[inline(never)]
 fn across(s: &Surface<'_>, cell: u32, start: [f64; 2], p: V, image: Image) -> Closest {
     let other = closest(s, cell, start, reflect(p, image), 3);
     Closest {
@@ -214,6 +215,7 @@ fn across(s: &Surface<'_>, cell: u32, start: [f64; 2], p: V, image: Image) -> Cl
 }
 
 /// Closest point of the cell across a corner: the neighbour of both cells (or images) `a` and `b` next to `first`.
+#[inline(never)]
 fn around(
     s: &Surface<'_>,
     first: &Closest,
@@ -248,7 +250,7 @@ fn around(
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
 /// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
 /// neighbour closer. The walk enters only cells that are `open` to it.
-#[inline]
+#[inline(always)]
 pub(super) fn track(
     s: &Surface<'_>,
     item: &SlaveItem,
@@ -363,7 +365,14 @@ impl SheetContact {
             augmentation: self.augmentation,
             clearing: self.clearing,
         };
-        let cycle = self.cycle;
+        let following = Following {
+            surface: *s,
+            v,
+            side,
+            pace,
+            cycle: self.cycle,
+            law,
+        };
         self.cycle += 1;
         self.wakes.resize(self.items.len(), 0);
         self.spans
@@ -372,28 +381,7 @@ impl SheetContact {
             .par_chunks_mut(SPAN)
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
             .zip_eq(self.spans.par_iter_mut())
-            .for_each(|((items, wakes), span)| {
-                if cycle < u64::from(span.wake) {
-                    return;
-                }
-                *span = Span {
-                    wake: u32::MAX,
-                    ..Span::default()
-                };
-                for (item, wake) in items.iter_mut().zip(wakes) {
-                    if cycle >= u64::from(*wake) {
-                        match follow(item, s, v, side, &pace, &law) {
-                            Met::Touch(energy) => {
-                                span.energy.add(&energy);
-                                span.touches = true;
-                            }
-                            Met::Apart(steps) => *wake = waking(cycle, 1 + steps),
-                            Met::Never => *wake = u32::MAX,
-                        }
-                    }
-                    span.wake = span.wake.min(*wake);
-                }
-            });
+            .for_each(|((items, wakes), span)| following.span(items, wakes, span));
         let mut total = ContactEnergy::default();
         for span in self.spans.iter().filter(|s| s.touches) {
             total.add(&span.energy);
@@ -432,6 +420,71 @@ struct Span {
     energy: ContactEnergy,
 }
 
+/// What following the slaves of a contact needs.
+struct Following<'a, F> {
+    surface: Surface<'a>,
+    v: &'a [V],
+    side: f64,
+    pace: Pace,
+    cycle: u64,
+    law: Law<'a, F>,
+}
+
+impl<F: Coulomb> Following<'_, F> {
+    /// Forces of those slaves of a span that are awake, with the machine's wider vectors; no fused operations, so the bits are
+    /// the same on all.
+    fn span(&self, items: &mut [SlaveItem], wakes: &mut [u32], span: &mut Span) {
+        if self.cycle < u64::from(span.wake) {
+            return;
+        }
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx2")]
+            fn wide<F: Coulomb>(
+                following: &Following<'_, F>,
+                items: &mut [SlaveItem],
+                wakes: &mut [u32],
+                span: &mut Span,
+            ) {
+                following.each(items, wakes, span);
+            }
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // Checked the line above.
+                return unsafe { wide(self, items, wakes, span) };
+            }
+        }
+        self.each(items, wakes, span);
+    }
+
+    #[inline(always)]
+    fn each(&self, items: &mut [SlaveItem], wakes: &mut [u32], span: &mut Span) {
+        *span = Span {
+            wake: u32::MAX,
+            ..Span::default()
+        };
+        for (item, wake) in items.iter_mut().zip(wakes) {
+            if self.cycle >= u64::from(*wake) {
+                match follow(
+                    item,
+                    &self.surface,
+                    self.v,
+                    self.side,
+                    &self.pace,
+                    &self.law,
+                ) {
+                    Met::Touch(energy) => {
+                        span.energy.add(&energy);
+                        span.touches = true;
+                    }
+                    Met::Apart(steps) => *wake = waking(self.cycle, 1 + steps),
+                    Met::Never => *wake = u32::MAX,
+                }
+            }
+            span.wake = span.wake.min(*wake);
+        }
+    }
+}
+
 /// How a slave has been found.
 enum Met {
     Touch(ContactEnergy),
@@ -442,7 +495,7 @@ enum Met {
 }
 
 /// Follows a slave to the closest point of the surface and computes its force.
-#[inline]
+#[inline(always)]
 fn follow<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
@@ -495,7 +548,7 @@ fn follow<F: Coulomb>(
 }
 
 /// A slave that does not touch. One that is so near that it looks again at once keeps its place, as one in touch does.
-#[inline]
+#[inline(always)]
 fn apart(
     item: &mut SlaveItem,
     gap: f64,
@@ -517,7 +570,7 @@ fn at_rim(c: &Closest) -> bool {
 
 /// Gap and direction of a slave whose closest point is found, and whether it may keep both for some steps; `None`: it lies
 /// beyond a fold.
-#[inline]
+#[inline(always)]
 fn pull_of(
     item: &SlaveItem,
     s: &Surface<'_>,

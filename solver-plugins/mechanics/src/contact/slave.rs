@@ -30,8 +30,8 @@ impl Face {
     };
 }
 
-/// One slave node.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// One slave node. Kept small, since a step goes through those of all contacts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SlaveItem {
     /// Model node.
     pub node: u32,
@@ -44,6 +44,8 @@ pub struct SlaveItem {
     pub active: bool,
     /// Whether penetrations that no motion has brought about are ignored.
     pub(super) guarded: bool,
+    /// Whether it touches several cells, of a concave fold or corner.
+    between: bool,
     /// Direction from master to slave at the last search.
     pub(super) direction: V,
     /// Place in the cell, -1..1.
@@ -59,8 +61,9 @@ pub struct SlaveItem {
     pub slip: V,
     /// Force on the slave (N): minus this acts on the cells' nodes.
     pub force: V,
-    /// The other cells of a concave fold or corner in which the slave lies. The first without a cell ends them.
-    pub(super) others: [Face; FACES],
+    /// Of one that lies between several cells, those besides `cell`; the first without a cell ends them. Few ever do: the
+    /// place for them is made when it is first needed, and kept.
+    others: Option<Box<[Face; FACES]>>,
     /// Normal part of the force (N).
     pub normal_force: f64,
     /// Penetration (m), 0 when apart.
@@ -80,6 +83,7 @@ impl SlaveItem {
             plain: false,
             active: false,
             guarded: false,
+            between: false,
             direction: [0.0; 3],
             xi,
             stiffness: 0.0,
@@ -88,7 +92,7 @@ impl SlaveItem {
             work: 0.0,
             slip: [0.0; 3],
             force: [0.0; 3],
-            others: [Face::NONE; FACES],
+            others: None,
             normal_force: 0.0,
             penetration: 0.0,
             ignored: 0.0,
@@ -98,12 +102,18 @@ impl SlaveItem {
     /// Whether it lies in a concave fold or corner, between several cells.
     #[inline]
     pub(super) fn is_between(&self) -> bool {
-        self.others[0].cell != NONE
+        self.between
     }
 
     /// Weights of the cell's nodes.
     pub fn weights(&self) -> [f64; 4] {
         shape(self.xi)
+    }
+
+    /// The other cells that it touches.
+    fn others(&self) -> impl Iterator<Item = &Face> {
+        let others = self.others.iter().filter(|_| self.between);
+        others.flat_map(|o| o.iter()).take_while(|o| o.cell != NONE)
     }
 
     pub(super) fn part(&mut self) {
@@ -112,7 +122,7 @@ impl SlaveItem {
         self.plain = false;
         self.multiplier = 0.0;
         self.work = 0.0;
-        self.others[0].cell = NONE;
+        self.between = false;
         self.slip = [0.0; 3];
         self.force = [0.0; 3];
         self.normal_force = 0.0;
@@ -123,6 +133,9 @@ impl SlaveItem {
     fn share_out(&mut self, pull: &Pull, found: &Found, normal: f64, along: V) {
         let own = 1.0 - pull.shares.iter().sum::<f64>();
         self.force = add(scale(pull.first, normal), scale(along, own));
+        let others = self
+            .others
+            .get_or_insert_with(|| Box::new([Face::NONE; FACES]));
         let mut count = 0;
         for (face, c) in found.others.iter().enumerate() {
             let share = pull.shares[face];
@@ -131,7 +144,7 @@ impl SlaveItem {
             };
             let force = add(scale(pull.others[face], normal), scale(along, share));
             self.force = add(self.force, force);
-            self.others[count] = Face {
+            others[count] = Face {
                 cell: c.cell,
                 image: c.image,
                 xi: c.xi,
@@ -140,7 +153,7 @@ impl SlaveItem {
             count += 1;
         }
         if count < FACES {
-            self.others[count].cell = NONE;
+            others[count].cell = NONE;
         }
     }
 
@@ -150,7 +163,7 @@ impl SlaveItem {
     /// What motion cannot have brought about has come from the search: another face of a fold has become the
     /// closest one, or a slave has got behind a rim. To push it out would make energy from nothing. It is left
     /// standing; as the slave comes out it shrinks, and it never grows again.
-    #[inline]
+    #[inline(always)]
     fn admit(&mut self, depth: f64, rel: V, dt: f64, offset: f64) -> f64 {
         let jump = depth - self.penetration;
         if self.guarded && jump > SLACK * offset && jump > SLACK * offset + 2.0 * norm(rel) * dt {
@@ -183,7 +196,7 @@ pub(super) fn scatter<'a>(
     for item in items.filter(|i| i.active) {
         let cell = |c: u32| cells[c as usize];
         let mut own = item.force;
-        for other in item.others.iter().take_while(|o| o.cell != NONE) {
+        for other in item.others() {
             own = sub(own, other.force);
             // What acts on an image acts mirrored on the cell itself.
             let mirrored = reflect(other.force, other.image);
@@ -206,7 +219,7 @@ pub(super) struct Pull {
 
 impl Pull {
     /// By one cell alone, along `first`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn plain(gap: f64, first: V) -> Self {
         Self {
             gap,
@@ -218,7 +231,7 @@ impl Pull {
 }
 
 /// Weights of the place that a slave keeps, and the way from there to the slave (m).
-#[inline]
+#[inline(always)]
 fn held_arm(item: &SlaveItem, s: &Surface<'_>) -> ([f64; 4], V) {
     let weights = item.weights();
     let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
@@ -226,13 +239,13 @@ fn held_arm(item: &SlaveItem, s: &Surface<'_>) -> ([f64; 4], V) {
 }
 
 /// Gap (m) of a slave that keeps its place in its cell and its direction.
-#[inline]
+#[inline(always)]
 pub(super) fn held_gap(item: &SlaveItem, s: &Surface<'_>, offset: f64) -> f64 {
     dot(held_arm(item, s).1, item.direction) - offset
 }
 
 /// How fast (m/s) a slave moves against the place of the master that it was seen to be nearest to.
-#[inline]
+#[inline(always)]
 pub(super) fn relative_speed(item: &SlaveItem, s: &Surface<'_>, v: &[V]) -> f64 {
     let master = s.cells[item.cell as usize].map(|n| v[n as usize]);
     norm(sub(v[item.node as usize], combine(item.weights(), &master)))
@@ -240,7 +253,7 @@ pub(super) fn relative_speed(item: &SlaveItem, s: &Surface<'_>, v: &[V]) -> f64 
 
 /// Force of a slave that keeps its place in its cell and its direction. (The distance to a point that stands
 /// still would not do: pressed at a tenth of a millimetre from it, the slave is a pendulum on its head.)
-#[inline]
+#[inline(always)]
 pub(super) fn hold<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
@@ -249,29 +262,7 @@ pub(super) fn hold<F: Coulomb>(
 ) -> ContactEnergy {
     let (weights, arm) = held_arm(item, s);
     let n = item.direction;
-    let pull = Pull::plain(dot(arm, n) - law.offset, n);
-    let (cell, xi) = (item.cell, item.xi);
-    let first = Closest {
-        cell,
-        xi,
-        weights,
-        arm,
-        distance2: 0.0,
-        half: 0.0,
-        free: [true; 2],
-        image: [false; 2],
-    };
-    touch(
-        item,
-        s,
-        v,
-        &pull,
-        &Found {
-            first,
-            others: [None; FACES],
-        },
-        law,
-    )
+    touch_one(item, s, v, dot(arm, n) - law.offset, n, weights, law)
 }
 
 /// Constants of a contact in a step.
@@ -286,9 +277,47 @@ pub(super) struct Law<'a, F> {
     pub(super) clearing: bool,
 }
 
-/// Force of a slave in touch, or so lately that it still has a multiplier.
-#[inline]
+/// Force of a slave in touch, or so lately that it still has a multiplier, at the place `found` that it has been given.
+#[inline(always)]
 pub(super) fn touch<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    v: &[V],
+    pull: &Pull,
+    found: &Found,
+    law: &Law<'_, F>,
+) -> ContactEnergy {
+    if pull.shares == [0.0; FACES] {
+        let weights = found.first.weights;
+        touch_one(item, s, v, pull.gap, pull.first, weights, law)
+    } else {
+        touch_several(item, s, v, pull, found, law)
+    }
+}
+
+/// By its cell alone, along `direction`.
+#[inline(always)]
+fn touch_one<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    v: &[V],
+    gap: f64,
+    direction: V,
+    weights: [f64; 4],
+    law: &Law<'_, F>,
+) -> ContactEnergy {
+    let master = s.cells[item.cell as usize].map(|n| v[n as usize]);
+    let rel = sub(v[item.node as usize], combine(weights, &master));
+    let vn = dot(rel, direction);
+    let reaction = react(item, s, gap, rel, vn, direction, law);
+    item.between = false;
+    item.force = add(scale(direction, reaction.normal), reaction.along);
+    reaction.energy
+}
+
+/// By several cells.
+#[inline(never)]
+fn touch_several<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
     v: &[V],
@@ -301,24 +330,46 @@ pub(super) fn touch<F: Coulomb>(
         reflect(own, c.image)
     };
     let own = v[item.node as usize];
-    let first = &found.first;
-    let rel1 = sub(own, speed(first));
-    let (mut rel, mut vn, mut way) = (rel1, dot(rel1, pull.first), pull.first);
-    let between = pull.shares != [0.0; FACES];
-    if between {
-        rel = scale(rel1, 1.0 - pull.shares.iter().sum::<f64>());
-        for (face, c) in found.others.iter().enumerate() {
-            let (Some(c), share) = (c, pull.shares[face]) else {
-                continue;
-            };
-            let other = sub(own, speed(c));
-            vn += dot(other, pull.others[face]);
-            rel = add(rel, scale(other, share));
-            way = add(way, pull.others[face]);
-        }
+    let rel1 = sub(own, speed(&found.first));
+    let (mut vn, mut way) = (dot(rel1, pull.first), pull.first);
+    let mut rel = scale(rel1, 1.0 - pull.shares.iter().sum::<f64>());
+    for (face, c) in found.others.iter().enumerate() {
+        let (Some(c), share) = (c, pull.shares[face]) else {
+            continue;
+        };
+        let other = sub(own, speed(c));
+        vn += dot(other, pull.others[face]);
+        rel = add(rel, scale(other, share));
+        way = add(way, pull.others[face]);
     }
+    let reaction = react(item, s, pull.gap, rel, vn, way, law);
+    item.between = true;
+    item.share_out(pull, found, reaction.normal, reaction.along);
+    reaction.energy
+}
+
+/// What a contact answers.
+struct Reaction {
+    /// Normal force (N).
+    normal: f64,
+    /// Friction (N).
+    along: V,
+    energy: ContactEnergy,
+}
+
+/// Answer to a gap (m) at the relative velocity `rel` (m/s), which opens it at `vn` (m/s). `way`: normal, of any length.
+#[inline(always)]
+fn react<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    gap: f64,
+    rel: V,
+    vn: f64,
+    way: V,
+    law: &Law<'_, F>,
+) -> Reaction {
     let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
-    let depth = -pull.gap;
+    let depth = -gap;
     let gap = -item.admit(depth, rel, law.dt, law.offset);
     let rest = content(law.offset);
     let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
@@ -327,7 +378,7 @@ pub(super) fn touch<F: Coulomb>(
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
     let limit = law.friction.limit(&Sliding {
         node: item.node,
-        cell: first.cell,
+        cell: item.cell,
         x: s.x,
         normal: n,
         force: normal.force,
@@ -345,19 +396,17 @@ pub(super) fn touch<F: Coulomb>(
     );
     item.active = true;
     item.slip = f.slip;
-    item.others[0].cell = NONE;
-    if between {
-        item.share_out(pull, found, normal.force, f.force);
-    } else {
-        item.force = add(scale(pull.first, normal.force), f.force);
-    }
     item.normal_force = normal.force;
     item.multiplier = normal.multiplier;
     item.work = normal.work;
     item.penetration = depth.max(0.0);
-    ContactEnergy {
-        stored: normal.stored + f.stored,
-        friction: f.friction,
-        damping: normal.loss + f.damping,
+    Reaction {
+        normal: normal.force,
+        along: f.force,
+        energy: ContactEnergy {
+            stored: normal.stored + f.stored,
+            friction: f.friction,
+            damping: normal.loss + f.damping,
+        },
     }
 }

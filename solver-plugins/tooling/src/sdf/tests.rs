@@ -302,6 +302,71 @@ fn elements_on_the_shifted_field_are_as_long_as_the_surface() {
     }
 }
 
+/// A block, 120 mm long and 200 mm wide, with a half-round groove of `radius` (m) across its top at z = `top` (m).
+fn grooved(radius: f64, top: f64) -> ToolMesh {
+    let groove = (0..=120).map(|i| {
+        let angle = std::f64::consts::PI * f64::from(i) / 120.0;
+        [-radius * angle.cos(), top - radius * angle.sin()]
+    });
+    let edge = |x: f64| [x, top];
+    let profile: Vec<[f64; 2]> = [edge(-0.06)]
+        .into_iter()
+        .chain(groove)
+        .chain([edge(0.06)])
+        .collect();
+    let mut mesh = ToolMesh::default();
+    for &[x, z] in &profile {
+        for (y, z) in [(-0.1, 0.0), (0.1, 0.0), (0.1, z), (-0.1, z)] {
+            mesh.points.push([x, y, z]);
+        }
+    }
+    // Between two sections, and the two ends; seen from outside the corners go round against the clock.
+    let mut quad = |[a, b, c, d]: [u32; 4]| mesh.triangles.extend([[a, b, c], [a, c, d]]);
+    let last = profile.len() as u32 - 1;
+    for i in 0..last {
+        let (n, m) = (4 * i, 4 * i + 4);
+        for k in 0..4 {
+            let l = (k + 1) % 4;
+            quad([n + k, n + l, m + l, m + k]);
+        }
+    }
+    quad([3, 2, 1, 0]);
+    quad([0, 1, 2, 3].map(|k| 4 * last + k));
+    mesh
+}
+
+#[test]
+fn elements_in_a_hollow_are_as_long_as_it_too() {
+    let (radius, top) = (0.02, 0.05);
+    let mesh = grooved(radius, top);
+    assert!(mesh.is_watertight() && mesh.volume() > 0.0);
+    let grid = SignedDistanceGrid::build(&mesh, 1.5e-3, 9e-3);
+    // 100 degrees of the groove, of elements that fit in whole, along it.
+    let arc = 100f64.to_radians();
+    for elements in [4, 7] {
+        let size = radius * arc / f64::from(elements);
+        let field = grid.of_equal_length(size);
+        let length = |on: &dyn Fn(V3) -> f64| {
+            let node = |i: i32| {
+                let angle = arc * (f64::from(i) / f64::from(elements) - 0.5);
+                let down = [angle.sin(), 0.0, -angle.cos()];
+                add([0.0, 0.0, top], scale(down, on(down)))
+            };
+            let chord = |i: i32| crate::vector::norm(sub(node(i + 1), node(i)));
+            (0..elements).map(chord).sum::<f64>()
+        };
+        // Outside is towards the axis.
+        let on = |out: V3| {
+            let at = |r: f64| add([0.0, 0.0, top], scale(out, r));
+            (0..20).fold(radius, |r, _| r + field.distance_and_gradient(at(r)).0)
+        };
+        let short = radius * arc - length(&|_| radius);
+        let left = radius * arc - length(&on);
+        println!("{size}: {short} {left}");
+        assert!(left.abs() < 0.12 * short, "{size}: {left} of {short}");
+    }
+}
+
 #[test]
 fn the_shifted_field_is_that_of_the_surface_where_it_is_flat() {
     let mesh = spar();
