@@ -216,6 +216,28 @@ impl Material {
     }
 }
 
+/// The instances of which a study is made.
+struct Plan {
+    global: usize,
+    detection: Option<usize>,
+    /// The last of its lists of zones, where there are others of the same detection.
+    list: Option<usize>,
+    /// Its lists of zones: the first, those drawn again after a first look, and so on.
+    zones: Vec<usize>,
+}
+
+impl Plan {
+    /// Of a run that nothing looked at.
+    fn of_run(global: usize) -> Self {
+        Self {
+            global,
+            detection: None,
+            list: None,
+            zones: Vec::new(),
+        }
+    }
+}
+
 struct Reader<'a> {
     input: &'a ReportInput,
     all: Material,
@@ -264,23 +286,27 @@ impl Reader<'_> {
             .flatten()
             .flat_map(|f| f.at_port("reference"))
             .collect();
-        let mut plans: Vec<(usize, Option<usize>)> = Vec::new();
+        let mut plans: Vec<Plan> = Vec::new();
         for at in forming.iter().copied().filter(|at| !self.is_local(*at)) {
             let detections = self.takers("defects", at);
             if detections.is_empty() && !references.contains(self.key(at)) {
-                plans.push((at, None));
+                plans.push(Plan::of_run(at));
             }
-            plans.extend(detections.into_iter().map(|d| (at, Some(d))));
+            for detection in detections {
+                plans.extend(self.plans(at, detection));
+            }
         }
         let wide = self.pictures;
         let many = plans.len() > 1;
-        for (n, (at, detection)) in plans.iter().enumerate() {
+        for (n, plan) in plans.iter().enumerate() {
             self.pictures = wide && n < DRAWN;
-            let mut study = self.study(*at, *detection);
+            let mut study = self.study(plan);
             if many {
-                let name = |at: usize| self.input.instances[at].label();
-                study.title =
-                    detection.map_or_else(|| name(*at), |d| format!("{}, {}", name(*at), name(d)));
+                let steps = std::iter::once(plan.global)
+                    .chain(plan.detection)
+                    .chain(plan.list);
+                let names: Vec<String> = steps.map(|at| self.instance(at).label()).collect();
+                study.title = names.join(", ");
             }
             self.all.studies.push(study);
         }
@@ -293,18 +319,52 @@ impl Reader<'_> {
         }
     }
 
-    fn study(&mut self, global: usize, detection: Option<usize>) -> Study {
+    /// What a detection led to: a study for each list of zones that was drawn from it.
+    fn plans(&self, global: usize, detection: usize) -> Vec<Plan> {
+        let of_list = |zones: Vec<usize>| Plan {
+            global,
+            detection: Some(detection),
+            list: None,
+            zones,
+        };
+        let lists = self.zone_lists(detection);
+        let many = lists.len() > 1;
+        let mut plans: Vec<Plan> = lists.into_iter().map(of_list).collect();
+        for plan in plans.iter_mut().filter(|_| many) {
+            plan.list = plan.zones.last().copied();
+        }
+        plans
+    }
+
+    /// Lists of zones that were drawn from what `giver` gave, each with those drawn again after a first look, and so on; one that
+    /// is empty where none was.
+    fn zone_lists(&self, giver: usize) -> Vec<Vec<usize>> {
+        let takers = self.takers("zones", giver);
+        let is_first = |at: &&usize| {
+            let facts = self.all.facts[**at].as_ref();
+            !takers
+                .iter()
+                .any(|t| facts.is_some_and(|f| f.took(self.key(*t))))
+        };
+        let lists = takers.iter().filter(is_first).flat_map(|&at| {
+            let further = self.zone_lists(at).into_iter();
+            further.map(move |rest| std::iter::once(at).chain(rest).collect())
+        });
+        let lists: Vec<Vec<usize>> = lists.collect();
+        if lists.is_empty() {
+            vec![Vec::new()]
+        } else {
+            lists
+        }
+    }
+
+    fn study(&mut self, plan: &Plan) -> Study {
+        let (global, detection) = (plan.global, plan.detection);
         let mut study = Study {
             global: self.run(global),
             ..Study::default()
         };
-        // The zones of the detection, those drawn again after a first look, and so on.
-        let mut zones_at: Vec<usize> = Vec::new();
-        let mut from = detection;
-        while let Some(at) = from.and_then(|d| self.takers("zones", d).first().copied()) {
-            zones_at.push(at);
-            from = Some(at);
-        }
+        let zones_at = &plan.zones;
         if let Some(at) = detection {
             study.detection = self.attributes(at);
         }

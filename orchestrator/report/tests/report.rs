@@ -240,6 +240,36 @@ fn of_several_runs_of_a_zone_the_finest_is_shown_and_with_a_comparison_the_compa
 }
 
 #[test]
+fn each_list_of_zones_that_a_detection_led_to_is_a_study_and_zones_drawn_again_belong_to_theirs() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.008);
+    study.defects(false);
+    study.zones(&common::ZONES);
+    let mut more = Study::new(&folder);
+    more.instances = study.instances.clone();
+    let one = page(&study.input(), &folder);
+    more.zones_of("tight", &[("defects", "detect")], &common::ZONES[1..]);
+    let drawn_again = [("defects", "detect"), ("zones", "zones")];
+    more.zones_of("again", &drawn_again, &[("A", [-0.1, -0.08, 0.0, 0.0])]);
+    let several = page(&more.input(), &folder);
+    let titles = |page: &str| -> Vec<String> {
+        let parts = page.split("<h2 class=\"study\">").skip(1);
+        parts
+            .map(|p| p.split('<').next().unwrap().to_owned())
+            .collect()
+    };
+    assert_eq!(titles(&one), [""; 0]);
+    assert_eq!(
+        titles(&several),
+        ["coarse, detect, again", "coarse, detect, tight"]
+    );
+    // A and B of the first, the one of the second.
+    assert_eq!(several.matches("<tr><th>A</th>").count(), 1);
+    assert_eq!(several.matches("<tr><th>B</th>").count(), 2);
+}
+
+#[test]
 fn unknown_kinds_are_listed_with_their_results_and_costs() {
     let (_keep, folder) = folder();
     let mut study = Study::new(&folder);

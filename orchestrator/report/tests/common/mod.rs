@@ -179,7 +179,12 @@ impl Study {
     }
 
     pub fn zones(&mut self, zones: &[(&str, [f64; 4])]) {
-        let mut w = self.create("zones", "zones");
+        self.zones_of("zones", &[("defects", "detect")], zones);
+    }
+
+    /// Zones by a step, from what arrives at its ports.
+    pub fn zones_of(&mut self, step: &str, inputs: &[(&str, &str)], zones: &[(&str, [f64; 4])]) {
+        let mut w = self.create(step, "zones");
         let list: Vec<Value> = zones
             .iter()
             .map(|(name, b)| {
@@ -190,13 +195,7 @@ impl Study {
         w.attributes(&json!({"zones": list, "scale": 1.15}).to_string())
             .unwrap();
         let results = vec![("zone_count", zones.len() as f64, "1")];
-        self.finish(
-            w,
-            ("zones", &[]),
-            "zones",
-            &[("defects", "detect")],
-            results,
-        );
+        self.finish(w, (step, &[]), "zones", inputs, results);
     }
 
     pub fn boundary(&mut self, zone: &str) {
