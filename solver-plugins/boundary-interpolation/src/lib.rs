@@ -3,6 +3,7 @@
 
 mod cut;
 mod grid;
+mod late;
 
 pub use cut::{CoarseSheet, Placed};
 pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
@@ -24,7 +25,8 @@ struct Parameters {
     element_size: f64,
     film_element_size: Option<f64>,
     film_margin: f64,
-    start_time: f64,
+    start_time: Option<f64>,
+    start_bend: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -45,22 +47,9 @@ struct Driven {
     position: Vec<f64>,
     /// `[f][k][3]`; plies only, films do not rotate.
     normal: Option<Vec<f64>>,
-    start: Option<Start>,
+    start: Option<late::Start>,
     error: f64,
 }
-
-/// Where all nodes of a sheet are when the fine run begins late.
-struct Start {
-    /// States on the way there, the last one included.
-    states: usize,
-    /// `[states][n][3]` (m).
-    path: Vec<f64>,
-    /// `[n][3]` (m/s).
-    velocity: Vec<f64>,
-}
-
-/// Most states on the way to a late start.
-const STATES: usize = 20;
 
 /// First frame and undeformed mesh may differ by this (m) before the step warns.
 const START_TOLERANCE: f64 = 1e-4;
@@ -88,8 +77,8 @@ impl Step for BoundaryInterpolation {
             )
             .into());
         }
-        let first = first_frame(&meshes.times, p.start_time, &input.step)?;
         let listed = attributes["sheets"].as_array().cloned().unwrap_or_default();
+        let first = first_frame(host, &input, &meshes, &listed, bounds, &p)?;
         let mut sheets = Vec::new();
         for (i, sheet) in listed.iter().enumerate() {
             host.check_cancelled()?;
@@ -123,25 +112,39 @@ impl Step for BoundaryInterpolation {
             "interpolation_error": error,
         }))?;
         let count = |get: fn(&Driven) -> usize| sheets.iter().map(get).sum::<usize>() as f64;
+        host.result("start_time", times[0], "s")?;
         host.result("interpolation_error", error, "m")?;
         host.result("elements", count(|s| s.fine.grid.cells.len() / 4), "1")?;
         host.result("driven_nodes", count(|s| s.fine.driven_nodes.len()), "1")
     }
 }
 
-/// The last frame that is not later than `start` (s); two at least must be left from there.
-fn first_frame(times: &[f64], start: f64, step: &str) -> Result<usize, StepError> {
-    const ROUNDING: f64 = 1e-9;
-    let after = times.partition_point(|t| *t <= start + ROUNDING);
-    let first = after.saturating_sub(1);
-    if first + 2 > times.len() {
-        let end = times[times.len() - 1];
-        return Err(format!(
-            "start_time: {start} s leaves nothing of '{step}', which ends at {end} s; expected an earlier time, before anything stands off the tool"
-        )
-        .into());
+/// The frame of the coarse run with which the fine run begins.
+fn first_frame(
+    host: &Host,
+    input: &Input,
+    meshes: &Meshes,
+    sheets: &[Value],
+    zone: Rectangle,
+    p: &Parameters,
+) -> Result<usize, StepError> {
+    match (p.start_time, p.start_bend) {
+        (Some(_), Some(_)) => Err(
+            "`start_time` and `start_bend` are both given; expected one of them: a time, or the share of the sharpest bend by which              each zone finds its own"
+                .into(),
+        ),
+        (Some(time), None) => Ok(late::frame_at(&meshes.times, time, &input.step)?),
+        (None, Some(share)) => {
+            let plies = sheets.iter().filter(|s| s["kind"] == "ply");
+            let mut bends = Vec::new();
+            for name in plies.filter_map(|s| s["name"].as_str()) {
+                let body = meshes.body(name)?;
+                bends.push(late::sharpest_bends(host, input, body, zone, meshes.times.len())?);
+            }
+            Ok(late::frame_before_bend(&bends, share))
+        }
+        (None, None) => Ok(0),
     }
-    Ok(first)
 }
 
 /// The zone at the step's own place in the fan-out.
@@ -245,7 +248,7 @@ fn drive(
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
     let motion = follow(host, input, meshes, body, &fine, ply)?;
-    let begin = start(host, input, meshes, body, &fine, first)?;
+    let begin = late::start(host, input, meshes, body, &fine, first)?;
     let start = motion.start;
     if start > START_TOLERANCE {
         let name = &sheet.name;
@@ -305,38 +308,6 @@ fn follow(
         }
     }
     Ok(motion)
-}
-
-/// Where all nodes are at the frame `first`, and were before; `None` at the beginning.
-fn start(
-    host: &Host,
-    input: &Input,
-    meshes: &Meshes,
-    body: &BodyInfo,
-    fine: &Placed,
-    first: usize,
-) -> Result<Option<Start>, StepError> {
-    if first == 0 {
-        return Ok(None);
-    }
-    let at = |frame: usize| -> Result<Vec<f64>, StepError> {
-        let coarse = fine.surface(host.frame_points(input, body, frame)?);
-        Ok(fine.everywhere(&coarse).into_flattened())
-    };
-    let every = first.div_ceil(STATES);
-    let (mut states, mut path) = (0, Vec::new());
-    for frame in (1..=first).filter(|f| (first - f).is_multiple_of(every)) {
-        path.extend(at(frame)?);
-        states += 1;
-    }
-    let (before, after) = (at(first - 1)?, at(first + 1)?);
-    let span = meshes.times[first + 1] - meshes.times[first - 1];
-    let pairs = before.iter().zip(&after);
-    Ok(Some(Start {
-        states,
-        path,
-        velocity: pairs.map(|(a, b)| (b - a) / span).collect(),
-    }))
 }
 
 fn bounds(points: &[Vec3]) -> Rectangle {

@@ -122,49 +122,44 @@ fn write_bodies(host: &Host, models: &[Model], table: &[Entry]) -> Result<(), St
     host.begin_frame(0.0)?;
     for (index, m) in &local {
         for p in &m.plies {
-            let body = name(m, p);
-            let field = |what: &str, unit: &str, values: Vec<f64>| {
-                host.write_field(&body, On::Points, what, 1, unit, &values)
-            };
-            host.write_points(&body, &p.formed)?;
-            field(
-                "nodal_distance",
-                "m",
-                p.distance.iter().map(|d| d.value).collect(),
-            )?;
-            field(
-                "curvature_max",
-                "1/m",
-                p.curvature.iter().map(|k| k.max).collect(),
-            )?;
-            let mut kind = vec![0.0; p.formed.len()];
-            for e in table
+            let of_ply = table
                 .iter()
-                .filter(|e| e.model == *index && e.ply == p.name)
-            {
-                let value = if e.defect.kind == Kind::Wrinkle {
-                    1.0
-                } else {
-                    2.0
-                };
-                e.defect
-                    .nodes
-                    .iter()
-                    .for_each(|&i| kind[i as usize] = value);
-            }
-            field("defect", "1", kind)?;
-            host.write_field(
-                &body,
-                On::Points,
-                "undeformed",
-                3,
-                "m",
-                p.undeformed.as_flattened(),
-            )?;
-            host.write_field(&body, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
+                .filter(|e| e.model == *index && e.ply == p.name);
+            write_ply(host, &name(m, p), p, of_ply)?;
         }
     }
     host.end_frame()
+}
+
+/// Places of a ply's nodes and what was measured there.
+fn write_ply<'a>(
+    host: &Host,
+    body: &str,
+    p: &Ply,
+    defects: impl Iterator<Item = &'a Entry>,
+) -> Result<(), StepError> {
+    let field = |what: &str, components: u32, unit: &str, values: &[f64]| {
+        host.write_field(body, On::Points, what, components, unit, values)
+    };
+    host.write_points(body, &p.formed)?;
+    let distance: Vec<f64> = p.distance.iter().map(|d| d.value).collect();
+    field("nodal_distance", 1, "m", &distance)?;
+    let curvature: Vec<f64> = p.curvature.iter().map(|k| k.max).collect();
+    field("curvature_max", 1, "1/m", &curvature)?;
+    let mut kind = vec![0.0; p.formed.len()];
+    for e in defects {
+        let value = match e.defect.kind {
+            Kind::Wrinkle => 1.0,
+            Kind::Bridging => 2.0,
+        };
+        e.defect
+            .nodes
+            .iter()
+            .for_each(|&i| kind[i as usize] = value);
+    }
+    field("defect", 1, "1", &kind)?;
+    field("undeformed", 3, "m", p.undeformed.as_flattened())?;
+    host.write_field(body, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)
 }
 
 fn write_results(

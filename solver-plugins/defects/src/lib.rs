@@ -2,6 +2,7 @@
 //! simulated ply and for a scanned preform ([`scan`]), which may have to be aligned to the tool first ([`align`]). All lengths in m.
 
 pub mod align;
+mod area;
 mod cause;
 mod fields;
 mod measure;

@@ -1,5 +1,6 @@
 //! Wrinkles and bridging of one formed ply.
 
+use crate::area::{Extent, NONE, extents};
 use crate::cause::Cause;
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{
@@ -124,7 +125,7 @@ pub struct Defect {
     pub length: f64,
     /// Largest distance from the tool (m).
     pub amplitude: f64,
-    /// Undeformed area (m2).
+    /// Undeformed area (m2), to where the ply is the distance threshold from the tool.
     pub area: f64,
     /// Centre in the undeformed plane (m).
     pub centre: [f64; 2],
@@ -155,11 +156,11 @@ pub struct Defect {
 /// is bridging.
 pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     let n = ply.topology.nodes();
+    let judged: Vec<bool> = (0..n)
+        .map(|i| inside[i] && ply.distance[i].judged)
+        .collect();
     let off: Vec<bool> = (0..n)
-        .map(|i| {
-            let d = ply.distance[i];
-            inside[i] && d.judged && d.value > settings.distance_threshold
-        })
+        .map(|i| judged[i] && ply.distance[i].value > settings.distance_threshold)
         .collect();
     let limit = |i: usize, share: f64| ply.tool_crest[i] - share * settings.curvature_threshold;
     let hold = settings.crest_hold;
@@ -186,7 +187,7 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
             wrinkles.push((nodes, ridge));
         }
     }
-    let mut owner = vec![usize::MAX; n];
+    let mut set = vec![NONE; n];
     let mut nearest = vec![f64::INFINITY; n];
     for (w, (nodes, _)) in wrinkles.iter().enumerate() {
         let reach = PI * (amplitude(ply, nodes) / (2.0 * curvature(ply, nodes))).sqrt();
@@ -194,15 +195,23 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
         for i in 0..n {
             if lengths[i] < nearest[i] {
                 nearest[i] = lengths[i];
-                owner[i] = w;
+                set[i] = w;
             }
         }
     }
-    let areas = ply.topology.node_areas(&ply.undeformed);
+    let rest: Vec<bool> = (0..n).map(|i| off[i] && set[i] == NONE).collect();
+    let bridges = ply.topology.node_components(&rest);
+    for (b, nodes) in bridges.iter().enumerate() {
+        nodes
+            .iter()
+            .for_each(|&i| set[i as usize] = wrinkles.len() + b);
+    }
+    let (first_bridge, count) = (wrinkles.len(), wrinkles.len() + bridges.len());
+    let extents = extents(ply, &set, &judged, settings.distance_threshold, count);
     let mut found = Vec::new();
     for (w, (_, ridge)) in wrinkles.into_iter().enumerate() {
-        let nodes = (0..n as u32).filter(|&i| owner[i as usize] == w).collect();
-        let mut defect = describe(ply, Kind::Wrinkle, nodes, &areas);
+        let nodes = (0..n as u32).filter(|&i| set[i as usize] == w).collect();
+        let mut defect = describe(ply, Kind::Wrinkle, nodes, &extents[w]);
         defect.length = ridge.length;
         defect.direction = direction(ply, &ridge.nodes);
         defect.ridge_shear = mean_along(ply, &ply.shear_angle, &ridge.nodes);
@@ -210,9 +219,9 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
         found.push(defect);
     }
     found.sort_by(|a, b| b.length.total_cmp(&a.length));
-    let rest: Vec<bool> = (0..n).map(|i| off[i] && owner[i] == usize::MAX).collect();
-    let mut bridging: Vec<Defect> = (ply.topology.node_components(&rest).into_iter())
-        .map(|nodes| describe(ply, Kind::Bridging, nodes, &areas))
+    let mut bridging: Vec<Defect> = (bridges.into_iter())
+        .zip(&extents[first_bridge..])
+        .map(|(nodes, extent)| describe(ply, Kind::Bridging, nodes, extent))
         .filter(|d| d.area >= settings.minimum_bridging_area)
         .collect();
     bridging.sort_by(|a, b| b.area.total_cmp(&a.area));
@@ -271,15 +280,7 @@ fn direction(ply: &Ply, nodes: &[u32]) -> f64 {
     0.5 * (2.0 * moment(0, 1)).atan2(moment(0, 0) - moment(1, 1))
 }
 
-fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, areas: &[f64]) -> Defect {
-    let area: f64 = nodes.iter().map(|&i| areas[i as usize]).sum();
-    let mean = |d: usize| {
-        nodes
-            .iter()
-            .map(|&i| areas[i as usize] * ply.undeformed[i as usize][d])
-            .sum::<f64>()
-            / area
-    };
+fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, extent: &Extent) -> Defect {
     let cells = nodes
         .iter()
         .flat_map(|&i| ply.topology.cells_of(i as usize));
@@ -294,8 +295,8 @@ fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, areas: &[f64]) -> Defect {
         kind,
         length: 0.0,
         amplitude: amplitude(ply, &nodes),
-        area,
-        centre: [mean(0), mean(1)],
+        area: extent.area,
+        centre: extent.centre(),
         curvature_max: curvature(ply, &nodes),
         direction: 0.0,
         shear,

@@ -141,6 +141,25 @@ fn length_amplitude_and_area_are_within_3_percent_at_any_angle_and_on_jittered_m
     }
 }
 
+/// The place that is higher than the threshold is a disc of 12.5 mm: five elements of 5 mm across.
+#[test]
+fn areas_do_not_jump_with_the_elements_of_a_coarse_mesh() {
+    // Chords cut off a share of the square of their length.
+    for (h, most) in [(0.0025, 0.01), (0.004, 0.025), (0.005, 0.04)] {
+        for jitter in [0.0, 0.2, 0.3] {
+            let (points, cells) = flat(h, jitter);
+            let ply = ply(Topology::new(points.len(), 4, &cells), formed(&points, 0.5));
+            let found = all(&ply);
+            let blister = found.iter().find(|d| d.kind == Kind::Bridging).unwrap();
+            let error = blister.area / BLISTER_AREA - 1.0;
+            let [x, y] = blister.centre;
+            println!("{h}, jitter {jitter}: {error:.4} {x:.5} {y:.5}");
+            assert!(error.abs() < most, "{h}, jitter {jitter}: {error}");
+            assert!((x - 0.040).hypot(y) < 2e-4, "{h}, jitter {jitter}: {x} {y}");
+        }
+    }
+}
+
 /// A fold 3 mm high along y = 0 that widens from x = 0 on to two crests at y = +-x / 4, and fades over 45 mm to both ends.
 fn widening(x: f64, y: f64) -> f64 {
     let half = 0.007;

@@ -35,7 +35,7 @@ pub(crate) fn too_late(shift: f64) -> Option<String> {
     (shift > LARGEST_SHIFT).then(|| {
         format!(
             "at the start fine plies went {:.2} mm by themselves from where the coarse run had them (more than {:.1} mm): they had already \
-             folded or bridged there. Take an earlier `start_time` of the boundary",
+             folded or bridged there. Take an earlier `start_time`, or a smaller `start_bend`, of the boundary",
             1e3 * shift,
             1e3 * LARGEST_SHIFT
         )
@@ -64,7 +64,7 @@ pub(crate) fn of_model(
         if spec.element.sizes.history > 0 {
             return Err(format!(
                 "sheet '{name}': its element keeps directions along its way, and a run with it begins with the process, not at \
-                 {time} s. Leave out `start_time` of the boundary, or take an element such as rf4"
+                 {time} s. Leave out `start_time` and `start_bend` of the boundary, or take an element such as rf4"
             ));
         }
         let found = sheets.iter().find(|s| &s.name == name);

@@ -1,6 +1,6 @@
 //! The model of one zone, driven at its cut by a coarse run.
 
-use crate::assembly::{self, Components, Placed};
+use crate::assembly::{self, Components, Placed, StackSheet};
 use crate::late::{self, Start};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
@@ -12,7 +12,7 @@ use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::model::{Drive, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, cross, dot, norm, scale, sub};
-use plyflow_model::scene::{Process, SheetKind};
+use plyflow_model::scene::{Process, Scene, SheetKind};
 
 /// A sheet of the zone as the boundary artifact holds it.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,75 +140,19 @@ pub fn build_local(
             scene.process.word()
         ));
     };
-    let whole = assembly::stack(scene)?;
-    let has = |name: &str| input.sheets.iter().any(|s| s.name == name);
-    let stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
-    if stack.len() < 3 {
-        let names: Vec<&str> = input.sheets.iter().map(|s| s.name.as_str()).collect();
-        return Err(format!(
-            "the zone needs both diaphragms and at least one ply of scene '{}'; its boundary has: {}",
-            scene.name,
-            names.join(", ")
-        ));
-    }
+    let stack = stack_of(scene, &input)?;
     if input.time.len() < 2 {
         return Err("the boundary has fewer than two frames".into());
     }
     let frames = input.time.len();
-    let mut points = Vec::new();
-    let (mut specs, mut bodies, mut placed) = (Vec::new(), Vec::new(), Vec::new());
-    let mut driven = Vec::new();
-    let mut drive = CutDrive::new(input.time.clone());
-    for (k, sheet) in stack.iter().enumerate() {
-        let local = input
-            .sheets
-            .iter()
-            .find(|s| s.name == sheet.scene.name)
-            .expect("filtered");
-        let first = points.len() as u32;
-        points.extend_from_slice(&local.points);
-        let film = sheet.scene.kind == SheetKind::Diaphragm;
-        let pressed = match (film, k == 0) {
-            (true, true) => Pressed::Below,
-            (true, false) => Pressed::Above,
-            _ => Pressed::No,
-        };
-        let choice = if film {
-            &p.diaphragm_element
-        } else {
-            &p.element
-        };
-        let mesh = QuadMesh {
-            points: local.points.clone(),
-            cells: local.cells.clone(),
-        };
-        let nodes: Vec<u32> = (first..points.len() as u32).collect();
-        let mut free = vec![true; local.points.len()];
-        for n in &local.driven {
-            free[*n as usize] = false;
-            driven.push(first + n);
-        }
-        drive.add(local);
-        // Driven nodes push no one: they stand where the coarse run says, with its penetration.
-        let slaves = nodes
-            .iter()
-            .copied()
-            .filter(|n| free[(n - first) as usize])
-            .collect();
-        placed.push(Placed { index: k, slaves });
-        bodies.push(Body::new(sheet, k, local.cells.clone()));
-        specs.push(SheetSpec {
-            name: sheet.scene.name.clone(),
-            nodes,
-            layers: vec![1.0; local.cells.len()],
-            pressed: vec![pressed; local.cells.len()],
-            patches: mesh.patches(),
-            least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
-            cells: mesh.cells,
-            axis: assembly::axis(&sheet.scene),
-            element: assembly::element(components, sheet, choice)?,
-        });
-    }
+    let Sheets {
+        points,
+        specs,
+        bodies,
+        placed,
+        driven,
+        drive,
+    } = sheets_of(p, &input, &stack, components)?;
     let start = late::of_model(&stack, &specs, &input.sheets, input.time[0])?;
     let (tool, grid) = tool::build(scene, p.tool_grid)?;
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]]);
@@ -242,6 +186,96 @@ pub fn build_local(
         start,
         element_size: input.element_size,
     })
+}
+
+/// Those sheets of the scene that the zone has, bottom to top.
+fn stack_of(scene: &Scene, input: &LocalInput) -> Result<Vec<StackSheet>, String> {
+    let whole = assembly::stack(scene)?;
+    let has = |name: &str| input.sheets.iter().any(|s| s.name == name);
+    let stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
+    if stack.len() < 3 {
+        let names: Vec<&str> = input.sheets.iter().map(|s| s.name.as_str()).collect();
+        return Err(format!(
+            "the zone needs both diaphragms and at least one ply of scene '{}'; its boundary has: {}",
+            scene.name,
+            names.join(", ")
+        ));
+    }
+    Ok(stack)
+}
+
+/// The sheets of a zone, bottom to top, and what drives them.
+struct Sheets {
+    /// `[nodes]` (m), sheet by sheet.
+    points: Vec<V>,
+    specs: Vec<SheetSpec>,
+    bodies: Vec<Body>,
+    placed: Vec<Placed>,
+    /// Model nodes, in the order of `drive`.
+    driven: Vec<u32>,
+    drive: CutDrive,
+}
+
+fn sheets_of(
+    p: &Parameters,
+    input: &LocalInput,
+    stack: &[StackSheet],
+    components: &dyn Components,
+) -> Result<Sheets, String> {
+    let mut all = Sheets {
+        points: Vec::new(),
+        specs: Vec::new(),
+        bodies: Vec::new(),
+        placed: Vec::new(),
+        driven: Vec::new(),
+        drive: CutDrive::new(input.time.clone()),
+    };
+    for (index, sheet) in stack.iter().enumerate() {
+        let of_name = |s: &&LocalSheet| s.name == sheet.scene.name;
+        let local = input.sheets.iter().find(of_name).expect("filtered");
+        let first = all.points.len() as u32;
+        all.points.extend_from_slice(&local.points);
+        let film = sheet.scene.kind == SheetKind::Diaphragm;
+        let pressed = match (film, index == 0) {
+            (true, true) => Pressed::Below,
+            (true, false) => Pressed::Above,
+            _ => Pressed::No,
+        };
+        let choice = if film {
+            &p.diaphragm_element
+        } else {
+            &p.element
+        };
+        let mesh = QuadMesh {
+            points: local.points.clone(),
+            cells: local.cells.clone(),
+        };
+        let nodes: Vec<u32> = (first..all.points.len() as u32).collect();
+        let mut free = vec![true; local.points.len()];
+        for n in &local.driven {
+            free[*n as usize] = false;
+            all.driven.push(first + n);
+        }
+        all.drive.add(local);
+        // Driven nodes push no one: they stand where the coarse run says, with its penetration.
+        let is_free = |n: &u32| free[(n - first) as usize];
+        let slaves = nodes.iter().copied().filter(is_free).collect();
+        all.placed.push(Placed { index, slaves });
+        all.bodies
+            .push(Body::new(sheet, index, local.cells.clone()));
+        all.specs.push(SheetSpec {
+            name: sheet.scene.name.clone(),
+            nodes,
+            layers: vec![1.0; local.cells.len()],
+            pressed: vec![pressed; local.cells.len()],
+            patches: mesh.patches(),
+            least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
+            cells: mesh.cells,
+            axis: assembly::axis(&sheet.scene),
+            element: assembly::element(components, sheet, choice)?,
+        });
+    }
+    Ok(all)
 }
 
 /// What an artifact feeds back: where nodes of the coarse plies go.

@@ -322,94 +322,119 @@ impl Forming {
         control: &Control,
         observer: &mut dyn Observer,
     ) -> Result<Outcome, plyflow_sdk::StepError> {
-        let &Control {
-            frames,
-            target_step,
-            safety,
-            kinetic_bound,
-            drift_bound,
-        } = control;
         let (begin, end) = (self.load.start(), self.load.duration());
-        let interval = (end - begin) / frames as f64;
+        let interval = (end - begin) / control.frames as f64;
         let mut course = Course::default();
         observer.resume(self, &mut course)?;
         let mut is_late = false;
         if course.history.is_empty() {
-            course.start_shift = late::begin(self, target_step, safety)?;
+            course.start_shift = late::begin(self, control.target_step, control.safety)?;
             is_late = course.start_shift.is_some();
         }
-        for frame in course.frame..frames {
+        for frame in course.frame..control.frames {
             if frame > course.frame {
                 course.frame = frame;
                 observer.between_frames(self, &mut course);
             }
-            let critical = self.model.critical_step().map_err(|e| e.to_string())?;
-            let wanted = target_step.min(safety * critical);
-            let steps = (interval / wanted).ceil().max(1.0) as u64;
-            if wanted < 0.02 * target_step {
-                let what = format!(
-                    "the critical step has fallen to {critical:.3e} s, below 2 % of the wanted one"
-                );
-                return Err(diagnosis::of(self, &course.history, &what).into());
-            }
-            self.model.dt = interval / steps as f64;
-            course.smallest_step = course.smallest_step.min(self.model.dt);
+            let steps = self.choose_step(control, interval, &mut course)?;
             let start = begin + interval * frame as f64;
-            for k in 0..steps {
-                // Times from the count, not from a sum: frames fall on the same instants in every run.
-                self.model.time = start + self.model.dt * k as f64;
-                self.load.apply(&mut self.model);
-                match self.model.step(k == 0) {
-                    Ok(()) => {}
-                    // The diagnosis has its own cause and remedy.
-                    Err(MechanicsError::Unstable { cycle, what, .. }) => {
-                        let what = format!("the run became unstable in cycle {cycle}: {what}");
-                        return Err(diagnosis::of(self, &course.history, &what).into());
-                    }
-                    Err(e) => return Err(e.to_string().into()),
-                }
-                if std::mem::take(&mut is_late) {
-                    // What brought it here was work.
-                    self.model.ledger.external += self.model.energies().drift();
-                }
-                if k == 0 {
-                    // Fields belong to the positions before the step; its motion is far below output
-                    // precision.
-                    observer.frame(self, start)?;
-                }
-                if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
-                    let energies = self.model.energies();
-                    course.history.push(self.row(energies));
-                    if let Some(what) = diagnosis::open_ledger(&course.history, end, drift_bound) {
-                        return Err(diagnosis::of(self, &course.history, &what).into());
-                    }
-                    observer.tick(self, &energies, end)?;
-                }
-            }
+            let is_late = std::mem::take(&mut is_late);
+            self.run_frame(control, [start, end], steps, is_late, &mut course, observer)?;
         }
         self.model.time = end;
         self.load.apply(&mut self.model);
         self.model.step(true).map_err(|e| e.to_string())?;
         observer.frame(self, end)?;
+        course.history.push(self.row(self.model.energies()));
+        Ok(self.outcome(course, control.kinetic_bound))
+    }
+
+    /// Sets the step for the next frame, a whole fraction of `interval` (s), and gives their number.
+    fn choose_step(
+        &mut self,
+        control: &Control,
+        interval: f64,
+        course: &mut Course,
+    ) -> Result<u64, plyflow_sdk::StepError> {
+        let critical = self.model.critical_step().map_err(|e| e.to_string())?;
+        let wanted = control.target_step.min(control.safety * critical);
+        if wanted < 0.02 * control.target_step {
+            let what = format!(
+                "the critical step has fallen to {critical:.3e} s, below 2 % of the wanted one"
+            );
+            return Err(diagnosis::of(self, &course.history, &what).into());
+        }
+        let steps = (interval / wanted).ceil().max(1.0) as u64;
+        self.model.dt = interval / steps as f64;
+        course.smallest_step = course.smallest_step.min(self.model.dt);
+        Ok(steps)
+    }
+
+    /// The `steps` from one frame, at `start` (s), to the next. `end`: of the whole run (s). `is_late`: whether a run that begins late does so here.
+    fn run_frame(
+        &mut self,
+        control: &Control,
+        [start, end]: [f64; 2],
+        steps: u64,
+        is_late: bool,
+        course: &mut Course,
+        observer: &mut dyn Observer,
+    ) -> Result<(), plyflow_sdk::StepError> {
+        for k in 0..steps {
+            // Times from the count, not from a sum: frames fall on the same instants in every run.
+            self.model.time = start + self.model.dt * k as f64;
+            self.load.apply(&mut self.model);
+            match self.model.step(k == 0) {
+                Ok(()) => {}
+                // The diagnosis has its own cause and remedy.
+                Err(MechanicsError::Unstable { cycle, what, .. }) => {
+                    let what = format!("the run became unstable in cycle {cycle}: {what}");
+                    return Err(diagnosis::of(self, &course.history, &what).into());
+                }
+                Err(e) => return Err(e.to_string().into()),
+            }
+            if k == 0 {
+                if is_late {
+                    // What brought it here was work.
+                    self.model.ledger.external += self.model.energies().drift();
+                }
+                // Fields belong to the positions before the step; its motion is far below output
+                // precision.
+                observer.frame(self, start)?;
+            }
+            if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
+                let energies = self.model.energies();
+                course.history.push(self.row(energies));
+                if let Some(what) =
+                    diagnosis::open_ledger(&course.history, end, control.drift_bound)
+                {
+                    return Err(diagnosis::of(self, &course.history, &what).into());
+                }
+                observer.tick(self, &energies, end)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn outcome(&self, course: Course, kinetic_bound: f64) -> Outcome {
         let Course {
-            mut history,
+            history,
             smallest_step,
             start_shift,
             ..
         } = course;
-        history.push(self.row(self.model.energies()));
         let ledgers: Vec<Ledger> = history.iter().map(|r| r.ledger).collect();
         let health = judge(&ledgers);
         let mut warnings = warnings(&health, kinetic_bound);
         warnings.extend(start_shift.and_then(late::too_late));
-        Ok(Outcome {
+        Outcome {
             history,
             health,
             cycles: self.model.cycle,
             smallest_step,
             start_shift,
             warnings,
-        })
+        }
     }
 
     /// Pressure (Pa) on the face of each of a body's points that looks to the tool.

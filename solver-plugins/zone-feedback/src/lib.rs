@@ -104,7 +104,7 @@ impl Step for ZoneFeedback {
         if let Some(late) = fine.iter().find(|f| f.meshes.times[0] > meshes.times[0]) {
             let (step, begin) = (&late.input.step, late.meshes.times[0]);
             return Err(format!(
-                "`local`: '{step}' begins at {begin} s; what is fed back must be known from the beginning of the coarse run on. Leave out `start_time` of its boundary"
+                "`local`: '{step}' begins at {begin} s; what is fed back must be known from the beginning of the coarse run on. Leave out `start_time` and `start_bend` of its boundary"
             )
             .into());
         }

@@ -1,0 +1,129 @@
+//! Areas of defects, to the line at which the ply comes back to the tool.
+
+use crate::measure::Ply;
+use plyflow_surface::vector::{Vec3, add, cross, norm, scale, sub};
+
+/// Of no set.
+pub(crate) const NONE: usize = usize::MAX;
+
+/// Area of a set of nodes in the undeformed ply.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Extent {
+    /// (m2).
+    pub(crate) area: f64,
+    /// Its first moment (m3).
+    pub(crate) moment: Vec3,
+}
+
+impl Extent {
+    pub(crate) fn centre(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.moment[k] / self.area)
+    }
+
+    fn add_triangle(&mut self, [a, b, c]: [Vec3; 3]) {
+        let area = 0.5 * norm(cross(sub(b, a), sub(c, a)));
+        self.area += area;
+        self.moment = add(self.moment, scale(add(add(a, b), c), area / 3.0));
+    }
+}
+
+/// What of the ply belongs to each of `count` sets of nodes that stand off the tool by more than `threshold` (m). `set`: `[nodes]` the set
+/// of a node or [`NONE`]; `judged`: `[nodes]` whether it may belong to one.
+///
+/// The distance is linear over triangles between the middle of a cell and its sides, and the line where it is the threshold
+/// bounds a set there: whole cells of nodes would jump by a share of a cell with each node. Between sets, and towards nodes that are not
+/// judged, the bound is half way.
+pub(crate) fn extents(
+    ply: &Ply,
+    set: &[usize],
+    judged: &[bool],
+    threshold: f64,
+    count: usize,
+) -> Vec<Extent> {
+    let mut all = vec![Extent::default(); count];
+    let above = |n: u32| ply.distance[n as usize].value - threshold;
+    let of = |n: u32| set[n as usize];
+    for c in 0..ply.topology.cells() {
+        let cell = ply.topology.cell(c);
+        if cell.iter().all(|n| of(*n) == NONE) {
+            continue;
+        }
+        let share = 1.0 / cell.len() as f64;
+        let sum = |s: Vec3, n: &u32| add(s, scale(ply.undeformed[*n as usize], share));
+        let centre = (
+            cell.iter().fold([0.0; 3], sum),
+            share * cell.iter().map(|n| above(*n)).sum::<f64>(),
+        );
+        let highest = cell.iter().filter(|n| of(**n) != NONE);
+        let highest = highest.max_by(|a, b| above(**a).total_cmp(&above(**b)));
+        for (i, &a) in cell.iter().enumerate() {
+            for b in [
+                cell[(i + 1) % cell.len()],
+                cell[(i + cell.len() - 1) % cell.len()],
+            ] {
+                // The part of the corner a beside the side to b. Where a does not stand off, what does belongs to whom it comes from.
+                let owner = match (of(a), of(b)) {
+                    (NONE, _) if !judged[a as usize] => continue,
+                    (NONE, NONE) => highest.map_or(NONE, |n| of(*n)),
+                    (NONE, other) => other,
+                    (own, _) => own,
+                };
+                let (p, q) = (ply.undeformed[a as usize], ply.undeformed[b as usize]);
+                let middle = (scale(add(p, q), 0.5), 0.5 * (above(a) + above(b)));
+                add_positive(&mut all[owner], [(p, above(a)), middle, centre]);
+            }
+        }
+    }
+    all
+}
+
+/// Adds that part of a triangle in which a linear function with these values at its corners is positive.
+fn add_positive(to: &mut Extent, corners: [(Vec3, f64); 3]) {
+    let mut part = [[0.0; 3]; 4];
+    let mut n = 0;
+    for k in 0..3 {
+        let ((p, f), (q, g)) = (corners[k], corners[(k + 1) % 3]);
+        if f > 0.0 {
+            part[n] = p;
+            n += 1;
+        }
+        if (f > 0.0) != (g > 0.0) {
+            part[n] = add(p, scale(sub(q, p), f / (f - g)));
+            n += 1;
+        }
+    }
+    for k in 2..n {
+        to.add_triangle([part[0], part[k - 1], part[k]]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_positive_part_of_a_triangle_ends_where_the_function_is_zero() {
+        let corner = |x: f64, y: f64, f: f64| ([x, y, 0.0], f);
+        let part = |f: [f64; 3]| {
+            let mut e = Extent::default();
+            let corners = [
+                corner(0.0, 0.0, f[0]),
+                corner(2.0, 0.0, f[1]),
+                corner(0.0, 1.0, f[2]),
+            ];
+            add_positive(&mut e, corners);
+            (e.area, e.moment)
+        };
+        assert_eq!(part([1.0, 2.0, 3.0]).0, 1.0);
+        assert_eq!(part([-1.0, 0.0, -3.0]).0, 0.0);
+        // Half of each side from the one corner that is positive: a quarter, and its own centre.
+        let (area, moment) = part([-1.0, 1.0, -1.0]);
+        assert!((area - 0.25).abs() < 1e-15);
+        assert!(
+            (moment[0] / area - 4.0 / 3.0).abs() < 1e-12
+                && (moment[1] / area - 1.0 / 6.0).abs() < 1e-12
+        );
+        // And all but that.
+        assert!((part([1.0, -1.0, 1.0]).0 - 0.75).abs() < 1e-15);
+    }
+}
