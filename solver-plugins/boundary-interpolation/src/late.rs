@@ -5,6 +5,7 @@ use crate::grid::Rectangle;
 use plyflow_mechanics::mesh::{NONE, QuadMesh};
 use plyflow_sdk::{BodyInfo, Host, Input, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, add, cross, distance, dot, norm, scale, sub};
+use plyflow_surface::weighted_quantiles;
 
 /// Where all nodes of a sheet are when the fine run begins late.
 pub(crate) struct Start {
@@ -33,8 +34,8 @@ pub(crate) fn frame_at(times: &[f64], start: f64, step: &str) -> Result<usize, S
     Ok(first)
 }
 
-/// By frame, how sharply (1/m) a coarse ply is bent in the zone where it is bent most: the angle between cells that share an edge over
-/// the distance of their middles. `zone` in the flat ply.
+/// By frame, how sharply (1/m) a coarse ply is bent in the zone where it is bent most ([`QUANTILE`]): the angle between cells that share an
+/// edge over the distance of their middles. `zone` in the flat ply.
 ///
 /// # Errors
 /// When the frames cannot be read.
@@ -94,14 +95,23 @@ fn sharpest(points: &[Vec3], pairs: &[[[u32; 4]; 2]]) -> f64 {
         let angle = norm(cross(n, m)).atan2(dot(n, m));
         angle / distance(middle(points, a), middle(points, b))
     };
-    pairs.iter().map(bend).fold(0.0, f64::max)
+    let bends: Vec<f64> = pairs.iter().map(bend).collect();
+    weighted_quantiles(&bends, &vec![1.0; bends.len()], &[QUANTILE])[0]
 }
 
-/// The last frame before one of the plies is bent more sharply than `share` of the sharpest that it comes to. `bends`: by ply and frame.
-pub(crate) fn frame_before_bend(bends: &[Vec<f64>], share: f64) -> usize {
+/// Of the bends in a zone. The very sharpest is at an edge of the tool or in one cell of a fold, and the sharper the smaller the cells.
+const QUANTILE: f64 = 0.99;
+
+/// Share of the sharpest bend that it comes to at which a ply begins to fold that is never bent by much.
+const BEGINNING: f64 = 1.0 / 3.0;
+
+/// The last frame before one of the plies is bent more sharply than `limit` (1/m), or than [`BEGINNING`] of the sharpest that it comes to, if
+/// that is less. `bends`: by ply and frame.
+pub(crate) fn frame_before_bend(bends: &[Vec<f64>], limit: f64) -> usize {
     let of_ply = |bends: &Vec<f64>| {
         let sharpest = bends.iter().fold(0.0, |m: f64, b| m.max(*b));
-        bends.iter().position(|b| *b > share * sharpest)
+        let limit = limit.min(BEGINNING * sharpest);
+        bends.iter().position(|b| *b > limit)
     };
     let first = bends.iter().filter_map(of_ply).min();
     first.map_or(0, |f| f.saturating_sub(1))
@@ -185,11 +195,14 @@ mod tests {
             vec![1.0, 2.0, 3.0, 9.0, 30.0],
             vec![0.0, 1.0, 30.0, 90.0, 100.0],
         ];
-        assert_eq!(frame_before_bend(&bends, 0.25), 1);
-        assert_eq!(frame_before_bend(&bends[..1], 0.25), 2);
+        assert_eq!(frame_before_bend(&bends, 8.0), 1);
+        assert_eq!(frame_before_bend(&bends[..1], 8.0), 2);
+        // One that comes to less than three times of that: at a third of the sharpest.
+        assert_eq!(frame_before_bend(&bends[..1], 25.0), 3);
+        assert_eq!(frame_before_bend(&bends, 80.0), 2);
         // What is bent from the beginning, or never, is computed from the beginning.
-        assert_eq!(frame_before_bend(&[vec![5.0, 5.0]], 0.3), 0);
-        assert_eq!(frame_before_bend(&[vec![0.0, 0.0]], 0.3), 0);
-        assert_eq!(frame_before_bend(&[], 0.3), 0);
+        assert_eq!(frame_before_bend(&[vec![50.0, 50.0]], 40.0), 0);
+        assert_eq!(frame_before_bend(&[vec![0.0, 0.0]], 40.0), 0);
+        assert_eq!(frame_before_bend(&[], 40.0), 0);
     }
 }

@@ -130,18 +130,18 @@ fn first_frame(
 ) -> Result<usize, StepError> {
     match (p.start_time, p.start_bend) {
         (Some(_), Some(_)) => Err(
-            "`start_time` and `start_bend` are both given; expected one of them: a time, or the share of the sharpest bend by which              each zone finds its own"
+            "`start_time` and `start_bend` are both given; expected one of them: a time, or the bend by which each zone finds its own"
                 .into(),
         ),
         (Some(time), None) => Ok(late::frame_at(&meshes.times, time, &input.step)?),
-        (None, Some(share)) => {
+        (None, Some(bend)) => {
             let plies = sheets.iter().filter(|s| s["kind"] == "ply");
             let mut bends = Vec::new();
             for name in plies.filter_map(|s| s["name"].as_str()) {
                 let body = meshes.body(name)?;
                 bends.push(late::sharpest_bends(host, input, body, zone, meshes.times.len())?);
             }
-            Ok(late::frame_before_bend(&bends, share))
+            Ok(late::frame_before_bend(&bends, bend))
         }
         (None, None) => Ok(0),
     }
