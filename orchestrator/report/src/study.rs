@@ -296,6 +296,8 @@ impl Reader<'_> {
                 plans.extend(self.plans(at, detection));
             }
         }
+        // What was looked at comes before what was only run, as a drape.
+        plans.sort_by_key(|p| p.detection.is_none());
         let wide = self.pictures;
         let many = plans.len() > 1;
         for (n, plan) in plans.iter().enumerate() {
