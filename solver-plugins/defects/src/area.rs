@@ -100,6 +100,52 @@ fn add_positive(to: &mut Extent, corners: [(Vec3, f64); 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use plyflow_surface::{NodalDistance, Topology};
+
+    /// Four by one cells of 1 m whose nodes stand off by these distances (m), the same on both sides.
+    fn strip(distance: [f64; 5]) -> Ply {
+        let points: Vec<Vec3> = (0..10)
+            .map(|i| [f64::from(i % 5), f64::from(i / 5), 0.0])
+            .collect();
+        let cells: Vec<u32> = (0..4).flat_map(|i| [i, i + 1, i + 6, i + 5]).collect();
+        let at = |i: usize| NodalDistance {
+            value: distance[i % 5],
+            judged: true,
+            triangle: 0,
+        };
+        Ply {
+            name: "strip".into(),
+            topology: Topology::new(10, 4, &cells),
+            undeformed: points.clone(),
+            formed: points,
+            shear_angle: Vec::new(),
+            fibre_strain: Vec::new(),
+            distance: (0..10).map(at).collect(),
+            curvature: Vec::new(),
+            tool_crest: Vec::new(),
+        }
+    }
+
+    fn areas(distance: [f64; 5], set: [usize; 5], judged: [bool; 5]) -> Vec<f64> {
+        let (set, judged): (Vec<_>, Vec<_>) = (0..10).map(|i| (set[i % 5], judged[i % 5])).unzip();
+        let found = extents(&strip(distance), &set, &judged, 1.0, 2);
+        found.iter().map(|e| e.area).collect()
+    }
+
+    #[test]
+    fn sets_end_half_way_to_each_other_and_at_the_threshold_elsewhere() {
+        let all = [true; 5];
+        let near = |a: Vec<f64>, b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        // All stand off: nodes' shares, wherever the border is.
+        assert!(near(areas([2.0; 5], [0, 0, 1, 1, 1], all), [1.5, 2.5]));
+        // Falls to the threshold three quarters of a cell beyond the last node: also the share of the next one counts.
+        let falling = [2.0, 2.0, 1.75, 0.75, 0.0];
+        let set = [0, 0, 0, NONE, NONE];
+        assert!(near(areas(falling, set, all), [2.75, 0.0]));
+        // But not where that one is not judged.
+        let judged = [true, true, true, false, false];
+        assert!(near(areas(falling, set, judged), [2.5, 0.0]));
+    }
 
     #[test]
     fn the_positive_part_of_a_triangle_ends_where_the_function_is_zero() {
