@@ -1,7 +1,8 @@
 //! Areas of defects, to the line at which the ply comes back to the tool.
 
 use crate::measure::Ply;
-use plyflow_surface::vector::{Vec3, add, cross, norm, scale, sub};
+use nalgebra::{Matrix3, Vector3};
+use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Of no set.
 pub(crate) const NONE: usize = usize::MAX;
@@ -27,12 +28,58 @@ impl Extent {
     }
 }
 
+/// How often the triangles between the middle of a cell and its sides are halved.
+const HALVINGS: usize = 3;
+
+/// Directions that the neighbours of a node span by less than this, of the sum of squares of their cosines, are none of the ply's.
+const FLAT: f64 = 0.05;
+
+/// Height over the threshold at a place of the undeformed ply.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    place: Vec3,
+    /// (m).
+    height: f64,
+    /// Its gradient in the ply.
+    slope: Vec3,
+}
+
+impl Sample {
+    /// Half way to another, on the cubic that has both heights and slopes.
+    fn half_way(&self, to: &Self) -> Self {
+        let way = sub(to.place, self.place);
+        let slope = scale(add(self.slope, to.slope), 0.5);
+        let rise = to.height - self.height;
+        let steeper = 1.5 * (rise - dot(slope, way)) / dot(way, way);
+        Self {
+            place: scale(add(self.place, to.place), 0.5),
+            height: 0.5 * (self.height + to.height) + 0.125 * dot(sub(self.slope, to.slope), way),
+            slope: add(slope, scale(way, steeper)),
+        }
+    }
+
+    /// In the middle of a cell; as it is for quadratic functions.
+    fn middle(corners: &[Self]) -> Self {
+        let share = 1.0 / corners.len() as f64;
+        let mean = |of: fn(&Self) -> Vec3| {
+            scale(corners.iter().fold([0.0; 3], |s, c| add(s, of(c))), share)
+        };
+        let place = mean(|c| c.place);
+        let height = |c: &Self| c.height + 0.5 * dot(c.slope, sub(place, c.place));
+        Self {
+            place,
+            height: share * corners.iter().map(height).sum::<f64>(),
+            slope: mean(|c| c.slope),
+        }
+    }
+}
+
 /// What of the ply belongs to each of `count` sets of nodes that stand off the tool by more than `threshold` (m). `set`: `[nodes]` the set
 /// of a node or [`NONE`]; `judged`: `[nodes]` whether it may belong to one.
 ///
-/// The distance is linear over triangles between the middle of a cell and its sides, and the line where it is the threshold
-/// bounds a set there: whole cells of nodes would jump by a share of a cell with each node. Between sets, and towards nodes that are not
-/// judged, the bound is half way.
+/// A set ends where the distance is the threshold: whole cells of nodes would jump by a share of a cell with each node. Between nodes the
+/// distance is cubic, by slopes from their neighbours: chords would cut a quarter off a strip as wide as a cell. Between sets, and towards
+/// nodes that are not judged, the bound is half way.
 pub(crate) fn extents(
     ply: &Ply,
     set: &[usize],
@@ -41,44 +88,75 @@ pub(crate) fn extents(
     count: usize,
 ) -> Vec<Extent> {
     let mut all = vec![Extent::default(); count];
-    let above = |n: u32| ply.distance[n as usize].value - threshold;
     let of = |n: u32| set[n as usize];
     for c in 0..ply.topology.cells() {
         let cell = ply.topology.cell(c);
         if cell.iter().all(|n| of(*n) == NONE) {
             continue;
         }
-        let share = 1.0 / cell.len() as f64;
-        let sum = |s: Vec3, n: &u32| add(s, scale(ply.undeformed[*n as usize], share));
-        let centre = (
-            cell.iter().fold([0.0; 3], sum),
-            share * cell.iter().map(|n| above(*n)).sum::<f64>(),
-        );
-        let highest = cell.iter().filter(|n| of(**n) != NONE);
-        let highest = highest.max_by(|a, b| above(**a).total_cmp(&above(**b)));
+        let corners: Vec<Sample> = cell
+            .iter()
+            .map(|&n| sample(ply, n as usize, threshold))
+            .collect();
+        let centre = Sample::middle(&corners);
+        let highest = (0..cell.len())
+            .filter(|&i| of(cell[i]) != NONE)
+            .max_by(|&i, &j| corners[i].height.total_cmp(&corners[j].height));
         for (i, &a) in cell.iter().enumerate() {
-            for b in [
-                cell[(i + 1) % cell.len()],
-                cell[(i + cell.len() - 1) % cell.len()],
-            ] {
+            for j in [(i + 1) % cell.len(), (i + cell.len() - 1) % cell.len()] {
                 // The part of the corner a beside the side to b. Where a does not stand off, what does belongs to whom it comes from.
-                let owner = match (of(a), of(b)) {
+                let owner = match (of(a), of(cell[j])) {
                     (NONE, _) if !judged[a as usize] => continue,
-                    (NONE, NONE) => highest.map_or(NONE, |n| of(*n)),
+                    (NONE, NONE) => highest.map_or(NONE, |n| of(cell[n])),
                     (NONE, other) => other,
                     (own, _) => own,
                 };
-                let (p, q) = (ply.undeformed[a as usize], ply.undeformed[b as usize]);
-                let middle = (scale(add(p, q), 0.5), 0.5 * (above(a) + above(b)));
-                add_positive(&mut all[owner], [(p, above(a)), middle, centre]);
+                let side = corners[i].half_way(&corners[j]);
+                add_positive(&mut all[owner], &[corners[i], side, centre], HALVINGS);
             }
         }
     }
     all
 }
 
+/// At a node, with the slope that fits its neighbours best.
+fn sample(ply: &Ply, node: usize, threshold: f64) -> Sample {
+    let place = ply.undeformed[node];
+    let value = ply.distance[node].value;
+    let (mut spread, mut rise) = (Matrix3::zeros(), Vector3::zeros());
+    for &n in ply.topology.edge_neighbours(node) {
+        let way = Vector3::from(sub(ply.undeformed[n as usize], place));
+        let square = way.norm_squared();
+        if square > 0.0 {
+            spread += way * way.transpose() / square;
+            rise += way * (ply.distance[n as usize].value - value) / square;
+        }
+    }
+    let slope = spread
+        .pseudo_inverse(FLAT)
+        .map_or([0.0; 3], |i| (i * rise).into());
+    Sample {
+        place,
+        height: value - threshold,
+        slope,
+    }
+}
+
+/// Adds that part of a triangle that is higher than the threshold.
+fn add_positive(to: &mut Extent, corners: &[Sample; 3], halvings: usize) {
+    let [a, b, c] = corners;
+    if halvings == 0 {
+        add_positive_part(to, [a, b, c].map(|s| (s.place, s.height)));
+        return;
+    }
+    let [ab, bc, ca] = [a.half_way(b), b.half_way(c), c.half_way(a)];
+    for part in [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]] {
+        add_positive(to, &part, halvings - 1);
+    }
+}
+
 /// Adds that part of a triangle in which a linear function with these values at its corners is positive.
-fn add_positive(to: &mut Extent, corners: [(Vec3, f64); 3]) {
+fn add_positive_part(to: &mut Extent, corners: [(Vec3, f64); 3]) {
     let mut part = [[0.0; 3]; 4];
     let mut n = 0;
     for k in 0..3 {
@@ -139,7 +217,7 @@ mod tests {
         // All stand off: nodes' shares, wherever the border is.
         assert!(near(areas([2.0; 5], [0, 0, 1, 1, 1], all), [1.5, 2.5]));
         // Falls to the threshold three quarters of a cell beyond the last node: also the share of the next one counts.
-        let falling = [2.0, 2.0, 1.75, 0.75, 0.0];
+        let falling = [3.75, 2.75, 1.75, 0.75, -0.25];
         let set = [0, 0, 0, NONE, NONE];
         assert!(near(areas(falling, set, all), [2.75, 0.0]));
         // But not where that one is not judged.
@@ -157,7 +235,7 @@ mod tests {
                 corner(2.0, 0.0, f[1]),
                 corner(0.0, 1.0, f[2]),
             ];
-            add_positive(&mut e, corners);
+            add_positive_part(&mut e, corners);
             (e.area, e.moment)
         };
         assert_eq!(part([1.0, 2.0, 3.0]).0, 1.0);
