@@ -4,9 +4,12 @@
 mod cut;
 mod grid;
 mod late;
+mod pull;
 
 pub use cut::{CoarseSheet, Placed};
 pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
+
+use pull::{FORCES, Pull};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
@@ -27,6 +30,7 @@ struct Parameters {
     film_margin: f64,
     start_time: Option<f64>,
     start_bend: Option<f64>,
+    cut_stiffness: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -36,6 +40,7 @@ struct Sheet {
     outline: Option<Vec<[f64; 2]>>,
     #[serde(default)]
     holes: Vec<Vec<[f64; 2]>>,
+    fibre_1: Option<f64>,
 }
 
 /// A sheet of the zone with its motion.
@@ -48,7 +53,17 @@ struct Driven {
     /// `[f][k][3]`; plies only, films do not rotate.
     normal: Option<Vec<f64>>,
     start: Option<late::Start>,
+    /// Of plies whose cut gives way.
+    pull: Option<Pulls>,
     error: f64,
+}
+
+/// What the surroundings do at a cut that gives way.
+struct Pulls {
+    /// `[f][k][3]` (N).
+    force: Vec<f64>,
+    /// `[k]` (N/m).
+    stiffness: Vec<f64>,
 }
 
 /// First frame and undeformed mesh may differ by this (m) before the step warns.
@@ -248,6 +263,14 @@ fn drive(
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
     let motion = follow(host, input, meshes, body, &fine, ply)?;
+    let pull = match p.cut_stiffness.filter(|_| ply) {
+        None => None,
+        Some(stiffness) => {
+            let axis = sheet.fibre_1.unwrap_or(0.0);
+            let cut = Pull::new(&fine.grid, &fine.driven_nodes, &points, &cells, axis);
+            Some(pulls(host, input, meshes, body, &cut, stiffness)?)
+        }
+    };
     let begin = late::start(host, input, meshes, body, &fine, first)?;
     let start = motion.start;
     if start > START_TOLERANCE {
@@ -265,6 +288,7 @@ fn drive(
         position: motion.position,
         normal: motion.normal,
         start: begin,
+        pull,
         error: motion.error,
     }))
 }
@@ -310,6 +334,38 @@ fn follow(
     Ok(motion)
 }
 
+/// What the surroundings pull at a cut with, through the frames of the coarse sheet `body`. `stiffness`: theirs, of the cut's length (N/m2).
+fn pulls(
+    host: &Host,
+    input: &Input,
+    meshes: &Meshes,
+    body: &BodyInfo,
+    cut: &Pull,
+    stiffness: f64,
+) -> Result<Pulls, StepError> {
+    if let Some(missing) = FORCES
+        .iter()
+        .find(|name| body.fields.iter().all(|f| f.name != **name))
+    {
+        return Err(format!(
+            "`cut_stiffness` is given, and ply '{}' of '{}' has no field {missing}: its run must tell its membrane forces. Leave out `cut_stiffness`, or run that step again",
+            body.name, input.step
+        )
+        .into());
+    }
+    let mut force = Vec::new();
+    for frame in 0..meshes.times.len() {
+        let points = host.frame_points(input, body, frame)?;
+        let mut fields = [const { Vec::new() }; 3];
+        for (field, name) in fields.iter_mut().zip(FORCES) {
+            *field = host.frame_field(input, body, frame, name)?;
+        }
+        force.extend(cut.forces(&points, &fields).into_iter().flatten());
+    }
+    let stiffness = cut.lengths().iter().map(|l| stiffness * l).collect();
+    Ok(Pulls { force, stiffness })
+}
+
 fn bounds(points: &[Vec3]) -> Rectangle {
     flat_bounds(points.iter().map(|p| [p[0], p[1]]))
 }
@@ -340,6 +396,20 @@ fn write(host: &Host, times: &[f64], first: usize, sheets: &[Driven]) -> Result<
             let [values, slopes] = [values, &slopes].map(|v| &v[3 * k * first..]);
             host.write_f64(&format!("{}/{what}", s.name), &[f, k, 3], unit, values)?;
             host.write_f64(&format!("{}/{rate}", s.name), &[f, k, 3], rate_unit, slopes)?;
+        }
+        if let Some(pull) = &s.pull {
+            host.write_f64(
+                &format!("{}/pull", s.name),
+                &[f, k, 3],
+                "N",
+                &pull.force[3 * k * first..],
+            )?;
+            host.write_f64(
+                &format!("{}/stiffness", s.name),
+                &[k],
+                "N/m",
+                &pull.stiffness,
+            )?;
         }
         if let Some(start) = &s.start {
             let shape = [start.states, n, 3];

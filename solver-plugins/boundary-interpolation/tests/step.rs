@@ -3,7 +3,8 @@
 use plyflow_boundary_interpolation::{BoundaryInterpolation, film_grid, ply_grid, ply_part};
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis, graded_axis};
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, run};
+use plyflow_sdk::On;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::{Vec3, unit};
 use serde_json::{Value, json};
 
@@ -517,6 +518,55 @@ fn interpolation_error_is_what_straight_fine_edges_cut_off() {
     // Kinks of straight coarse edges would be cut off by 5.8e-4.
     assert!(wide > 2e-5 && wide < 0.4 * 5.8e-4, "{wide}");
     assert!(narrow < 0.5 * wide, "{narrow} {wide}");
+}
+
+#[test]
+fn a_cut_that_gives_way_is_told_what_its_surroundings_pull_with() {
+    let held = json!({"element_size": 0.005, "cut_stiffness": 3e6});
+    let mut formed = coarse(0.0);
+    let error = interpolate(&formed, held.clone(), &[1]).unwrap_err();
+    assert!(
+        error.contains("ply 'ply_1'") && error.contains("membrane_force_1"),
+        "{error}"
+    );
+    // 200 N/m along x and 50 N/m of shear, growing in time.
+    for body in &mut formed.bodies {
+        let of = |name: &str, value: f64| MemoryField {
+            name: name.into(),
+            on: On::Cells,
+            components: 1,
+            values: vec![value; body.cells.len() / 4],
+        };
+        let at = |t: &f64| {
+            vec![
+                of("membrane_force_1", 200.0 * t),
+                of("membrane_force_2", 0.0),
+                of("membrane_force_12", 50.0 * t),
+            ]
+        };
+        body.fields = TIMES.iter().map(at).collect();
+    }
+    let out = interpolate(&formed, held, &[1]).unwrap();
+    let (shape, pull) = &out.arrays["ply_1/pull"];
+    assert_eq!(shape, &out.arrays["ply_1/position"].0);
+    let k = shape[1];
+    // Zone B, 100 x 100 mm, is cut all around.
+    let (_, stiffness) = &out.arrays["ply_1/stiffness"];
+    assert_eq!(stiffness.len(), k);
+    let around: f64 = stiffness.iter().sum();
+    assert!((around / (3e6 * 0.4) - 1.0).abs() < 1e-9, "{around}");
+    let frame = |f: usize| &pull[3 * k * f..3 * k * (f + 1)];
+    assert!(frame(0).iter().all(|v| *v == 0.0));
+    // The motion is bilinear in place: at t = 1, F = [[1, 0.1], [0, 1], [-2 y, -2 x]] and the traction is F S N. Both ends of the zone are
+    // pulled at, and as S is even the sum is that of F's change across.
+    let [ex, ey] = [0.1, 0.1];
+    let expected = [0.0, 0.0, -2.0 * 2.0 * 50.0 * ex * ey];
+    let sum = (0..3).map(|c| frame(5).iter().skip(c).step_by(3).sum::<f64>());
+    for (sum, expected) in sum.zip(expected) {
+        assert!((sum - expected).abs() < 1e-6, "{sum} {expected}");
+    }
+    // Films are not pulled at.
+    assert!(!out.arrays.contains_key("film_low/pull"));
 }
 
 #[test]

@@ -6,7 +6,7 @@ mod fidelity;
 mod models;
 mod table;
 
-pub use cut::{Layer, Passage, Strip, Work, traction};
+pub use cut::{Layer, Passage, Strip, Work};
 pub use fidelity::{Fidelity, Yardstick};
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};

@@ -1,10 +1,11 @@
 //! The cut between coarse and fine against closed forms: work through it, and what is wrong beside it.
 
-use plyflow_comparison::{Comparison, traction};
+use plyflow_comparison::Comparison;
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{
     MemoryArtifact, MemoryBody, MemoryField, MemoryInput, flat_grid, run,
 };
+use plyflow_surface::traction;
 use plyflow_surface::vector::Vec3;
 use serde_json::{Value, json};
 

@@ -9,9 +9,9 @@ use crate::tool::{self, ToolSurfaces};
 use plyflow_mechanics::history::{hermite, hermite_rate, locate};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::mirror::Planes;
-use plyflow_mechanics::model::{Drive, Model};
+use plyflow_mechanics::model::{Drive, Hold, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::{V, cross, dot, norm, scale, sub};
+use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
 use plyflow_model::scene::{Process, Scene, SheetKind};
 
 /// A sheet of the zone as the boundary artifact holds it.
@@ -33,6 +33,10 @@ pub struct LocalSheet {
     pub normal: Vec<Vec<V>>,
     /// `[frames][k]` their rates (1/s); as `normal`.
     pub normal_rate: Vec<Vec<V>>,
+    /// `[frames][k]` forces of the surroundings on them (N); empty when the cut gives no way.
+    pub pull: Vec<Vec<V>>,
+    /// `[k]` how stiffly they hold (N/m); as `pull`.
+    pub stiffness: Vec<f64>,
     /// Where a run that begins late begins; `None` for one that begins with the process.
     pub start: Option<Start>,
 }
@@ -64,6 +68,10 @@ struct CutDrive {
     velocity: Vec<Vec<V>>,
     /// `[frames][driven]`; `None` where the other run tells no normal.
     normal: Vec<Vec<Option<[V; 2]>>>,
+    /// `[frames][driven]` (N); `None` where the cut gives no way.
+    pull: Vec<Vec<Option<V>>>,
+    /// `[driven]` (N/m).
+    stiffness: Vec<f64>,
 }
 
 impl CutDrive {
@@ -73,6 +81,8 @@ impl CutDrive {
             position: none(),
             velocity: none(),
             normal: vec![Vec::new(); time.len()],
+            pull: vec![Vec::new(); time.len()],
+            stiffness: Vec::new(),
             time,
         }
     }
@@ -89,7 +99,11 @@ impl CutDrive {
                 ])
             };
             self.normal[f].extend((0..sheet.driven.len()).map(known));
+            let pull = |k: usize| sheet.pull.get(f)?.get(k).copied();
+            self.pull[f].extend((0..sheet.driven.len()).map(pull));
         }
+        let stiffness = |k: usize| sheet.stiffness.get(k).copied().unwrap_or_default();
+        (self.stiffness).extend((0..sheet.driven.len()).map(stiffness));
     }
 }
 
@@ -116,6 +130,18 @@ impl Drive for CutDrive {
         // Normals of neighbouring frames that are opposite tell no way to turn.
         let square = dot(n, n).max(MIN_NORMAL);
         Some(scale(cross(n, rate), 1.0 / square))
+    }
+
+    fn hold(&self, k: usize, t: f64) -> Option<Hold> {
+        let (i, s) = locate(&self.time, t);
+        let between = |a: V, b: V| add(a, scale(sub(b, a), s));
+        let ([n, _], [m, _]) = (self.normal[i][k]?, self.normal[i + 1][k]?);
+        let normal = between(n, m);
+        Some(Hold {
+            pull: between(self.pull[i][k]?, self.pull[i + 1][k]?),
+            stiffness: self.stiffness[k],
+            normal: scale(normal, 1.0 / norm(normal).max(MIN_NORMAL.sqrt())),
+        })
     }
 }
 
@@ -354,7 +380,7 @@ mod tests {
             position: vec![vec![[0.0; 3]; 2]; 11],
             velocity: vec![vec![[0.0; 3]; 2]; 11],
             normal: time.iter().map(at).collect(),
-            time,
+            ..CutDrive::new(time)
         };
         let (mut turned, steps) = (0.0, 1000);
         for k in 0..steps {

@@ -309,6 +309,16 @@ fn read_motion(host: &Host, input: &Input) -> Result<(Vec<f64>, Vec<LocalSheet>)
             velocity: vectors("velocity")?,
             normal: known("normal")?,
             normal_rate: known("normal_rate")?,
+            pull: known("pull")?,
+            stiffness: {
+                let path = format!("{}/stiffness", body.name);
+                let there = host.array_info(input, &path).is_some();
+                if there {
+                    host.array_f64(input, &path)?.0
+                } else {
+                    Vec::new()
+                }
+            },
             start: read_start(host, input, &body.name)?,
             driven,
         });

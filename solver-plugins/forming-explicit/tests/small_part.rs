@@ -220,6 +220,8 @@ fn fed(
         driven,
         normal: Vec::new(),
         normal_rate: Vec::new(),
+        pull: Vec::new(),
+        stiffness: Vec::new(),
         start: None,
     }
 }
@@ -340,6 +342,8 @@ fn cut_out(
         driven,
         normal: Vec::new(),
         normal_rate: Vec::new(),
+        pull: Vec::new(),
+        stiffness: Vec::new(),
         start,
     };
     (sheet, nodes)

@@ -4,7 +4,7 @@ mod common;
 
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
-use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, StepSettings};
+use plyflow_mechanics::model::{Drive, Fixed, Hold, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::relax::{Tolerance, relax};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
@@ -19,6 +19,11 @@ impl Drive for Clamp {
 
 /// A strip of 0.4 x 0.1 m, 8 x 2 elements, fibres along x and y, held at x = 0; its nodes at the other end.
 fn strip() -> (Model, Vec<u32>) {
+    damped_strip(0.0)
+}
+
+/// The same, damped in proportion to its mass (1/s).
+fn damped_strip(damping: f64) -> (Model, Vec<u32>) {
     let mesh = QuadMesh::grid(&even_axis(0.0, 0.4, 0.05), &even_axis(0.0, 0.1, 0.05));
     let element = common::membrane();
     let m = mesh.cells.len();
@@ -36,7 +41,7 @@ fn strip() -> (Model, Vec<u32>) {
     let settings = StepSettings {
         target_step: 0.0,
         safety: 0.8,
-        damping: 0.0,
+        damping,
     };
     let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
     let at = |x: f64| -> Vec<u32> {
@@ -143,4 +148,58 @@ fn work_of_weight_and_loads_balances_the_energies() {
         largest = largest.max(l.drift().abs() / l.external.abs().max(1e-3));
     }
     assert!(largest < 2e-2, "{largest}");
+}
+
+/// Nodes whose surroundings pull along x and out of the plane, and hold them more stiffly the further they go.
+struct Surroundings {
+    at: Vec<V>,
+    /// (N).
+    pull: Vec<f64>,
+    /// (N/m).
+    stiffness: Vec<f64>,
+}
+
+impl Drive for Surroundings {
+    fn position(&self, k: usize, _t: f64) -> V {
+        self.at[k]
+    }
+
+    fn hold(&self, k: usize, _t: f64) -> Option<Hold> {
+        Some(Hold {
+            pull: [self.pull[k], 0.0, 3.0 * self.pull[k]],
+            stiffness: self.stiffness[k],
+            normal: [0.0, 0.0, 1.0],
+        })
+    }
+}
+
+#[test]
+fn a_held_node_goes_along_its_sheet_to_where_its_surroundings_and_the_model_balance() {
+    for stiffness in [0.0, 4e4, 1e12] {
+        let (mut model, end) = damped_strip(500.0);
+        let share = |j: usize| if j == 1 { 0.5 } else { 0.25 };
+        let total = 20.0;
+        let at = end.iter().map(|n| model.x[*n as usize]).collect();
+        let held = Surroundings {
+            at,
+            pull: (0..end.len()).map(|j| total * share(j)).collect(),
+            stiffness: (0..end.len()).map(|j| stiffness * share(j)).collect(),
+        };
+        model.drive_also(end.clone(), Box::new(held));
+        model.dt = 0.8 * model.critical_step().unwrap();
+        for _ in 0..20_000 {
+            model.step(false).unwrap();
+        }
+        // Of the strip: k w / l = 2.5e4 N/m.
+        let expected = total / (1e5 * 0.1 / 0.4 + stiffness);
+        for n in end {
+            let [x, _, z] = model.x[n as usize];
+            let u = x - 0.4;
+            assert!(
+                (u / expected - 1.0).abs() < 2e-3,
+                "{stiffness}: {u} {expected}"
+            );
+            assert_eq!(z, 0.0, "not out of its sheet");
+        }
+    }
 }

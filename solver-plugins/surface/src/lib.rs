@@ -10,6 +10,7 @@ mod locate;
 mod ridge;
 mod section;
 mod topology;
+mod traction;
 pub mod vector;
 
 pub use closest::{Closest, Feature, Surface};
@@ -20,6 +21,7 @@ pub use locate::{Location, QuadLocator, flat_bounds};
 pub use ridge::{Ridge, ridge_line};
 pub use section::{line_length, plane_section};
 pub use topology::{Topology, triangles};
+pub use traction::traction;
 
 #[cfg(feature = "memory-host")]
 pub mod memory_host;

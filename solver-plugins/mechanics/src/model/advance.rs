@@ -45,6 +45,16 @@ pub(super) struct Turns<'a> {
 /// Components whose sums are kept apart: eight nodes.
 const GROUP: usize = 24;
 
+/// Share of the way that a free node would go in a step from rest which a held one goes: it creeps to its balance and does not swing.
+const EASE: f64 = 0.05;
+
+impl Hold {
+    /// Part of a vector along the plane.
+    fn in_plane(&self, a: V) -> V {
+        sub(a, scale(self.normal, dot(a, self.normal)))
+    }
+}
+
 impl Model {
     /// Velocities and positions of the next step; works of the step.
     pub(super) fn advance(&mut self) {
@@ -143,7 +153,15 @@ impl Model {
         let dt = self.dt;
         for (k, (n, (x, v))) in self.driven.iter().zip(before).enumerate() {
             let n = *n as usize;
-            let target = drive.position(k, self.time + dt);
+            let mut target = drive.position(k, self.time + dt);
+            if let Some(hold) = drive.hold(k, self.time) {
+                let way = hold.in_plane(sub(*x, drive.position(k, self.time)));
+                let rest = sub(add(self.force[n], hold.pull), scale(way, hold.stiffness));
+                let ease = EASE * dt * dt / self.mass[n];
+                // However stiff the surroundings are, they are not overshot.
+                let ease = ease / (1.0 + ease * hold.stiffness);
+                target = add(target, add(way, scale(hold.in_plane(rest), ease)));
+            }
             let next = scale(sub(target, *x), 1.0 / dt);
             // What holds the node makes up for the forces on it: its work is external.
             let mean = scale(add(next, *v), 0.5);

@@ -42,4 +42,11 @@ impl Drive for Both {
             Some(k) => self.new.spin(k, t),
         }
     }
+
+    fn hold(&self, k: usize, t: f64) -> Option<Hold> {
+        match k.checked_sub(self.first) {
+            None => self.old.hold(k, t),
+            Some(k) => self.new.hold(k, t),
+        }
+    }
 }

@@ -50,6 +50,22 @@ pub trait Drive: Send + Sync {
     fn spin(&self, _k: usize, _t: f64) -> Option<V> {
         None
     }
+
+    /// How driven node `k` is held at time `t` (s), if it may go off its position along its sheet; `None`: it may not.
+    fn hold(&self, _k: usize, _t: f64) -> Option<Hold> {
+        None
+    }
+}
+
+/// How a driven node is held that may go off the position of its [`Drive`], in a plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hold {
+    /// Force of what surrounds the model on the node while it is at its position (N).
+    pub pull: V,
+    /// By how much that force changes with the way off it (N/m).
+    pub stiffness: f64,
+    /// Unit normal of the plane.
+    pub normal: V,
 }
 
 /// Constants of the time integration.
