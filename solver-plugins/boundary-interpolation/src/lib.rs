@@ -13,8 +13,8 @@ use pull::{FORCES, Pull};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
-use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::{Vec3, distance};
+use plyflow_surface::{flat_bounds, force_axis};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -41,6 +41,7 @@ struct Sheet {
     #[serde(default)]
     holes: Vec<Vec<[f64; 2]>>,
     fibre_1: Option<f64>,
+    fibre_2: Option<f64>,
 }
 
 /// A sheet of the zone with its motion.
@@ -266,7 +267,10 @@ fn drive(
     let pull = match p.cut_stiffness.filter(|_| ply) {
         None => None,
         Some(stiffness) => {
-            let axis = sheet.fibre_1.unwrap_or(0.0);
+            let axis = match (sheet.fibre_1, sheet.fibre_2) {
+                (Some(first), Some(second)) => force_axis(first, second),
+                _ => 0.0,
+            };
             let cut = Pull::new(&fine.grid, &fine.driven_nodes, &points, &cells, axis);
             Some(pulls(host, input, meshes, body, &cut, stiffness)?)
         }

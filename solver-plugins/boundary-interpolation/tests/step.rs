@@ -7,6 +7,7 @@ use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::{Vec3, unit};
 use serde_json::{Value, json};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 #[test]
 fn spline_gives_back_any_cubic_that_starts_at_rest() {
@@ -546,7 +547,7 @@ fn a_cut_that_gives_way_is_told_what_its_surroundings_pull_with() {
         };
         body.fields = TIMES.iter().map(at).collect();
     }
-    let out = interpolate(&formed, held, &[1]).unwrap();
+    let out = interpolate(&formed, held.clone(), &[1]).unwrap();
     let (shape, pull) = &out.arrays["ply_1/pull"];
     assert_eq!(shape, &out.arrays["ply_1/position"].0);
     let k = shape[1];
@@ -564,6 +565,20 @@ fn a_cut_that_gives_way_is_told_what_its_surroundings_pull_with() {
     let sum = (0..3).map(|c| frame(5).iter().skip(c).step_by(3).sum::<f64>());
     for (sum, expected) in sum.zip(expected) {
         assert!((sum - expected).abs() < 1e-6, "{sum} {expected}");
+    }
+    // Forces are told along the family that the other one follows counter-clockwise, whichever the scene names first.
+    for (families, same) in [
+        ([0.0, FRAC_PI_2], true),
+        ([FRAC_PI_2, 0.0], true),
+        ([FRAC_PI_2, PI], false),
+    ] {
+        let mut other = formed.clone();
+        let ply = &mut other.attributes["sheets"][1];
+        (ply["fibre_1"], ply["fibre_2"]) = (json!(families[0]), json!(families[1]));
+        let told = interpolate(&other, held.clone(), &[1]).unwrap();
+        let off = (told.arrays["ply_1/pull"].1.iter().zip(pull))
+            .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        assert_eq!(off < 1e-9, same, "{families:?}: {off} N");
     }
     // Films are not pulled at.
     assert!(!out.arrays.contains_key("film_low/pull"));

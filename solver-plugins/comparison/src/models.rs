@@ -2,6 +2,7 @@
 
 use plyflow_defects::{Ply, Settings, Tool, of_run};
 use plyflow_sdk::{Host, Input, StepError};
+use plyflow_surface::force_axis;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -126,6 +127,7 @@ struct Sheet {
     kind: String,
     offset: f64,
     fibre_1: Option<f64>,
+    fibre_2: Option<f64>,
 }
 
 /// Global, local, other and reference models in that order, local ones in the order of their zones; and what was run on the way to them and is
@@ -263,7 +265,7 @@ fn read(
             .sum(),
         element_cycles: formed.element_cycles,
         axes: (formed.sheets.iter())
-            .filter_map(|s| Some((s.name.clone(), s.fibre_1?)))
+            .filter_map(|s| Some((s.name.clone(), force_axis(s.fibre_1?, s.fibre_2?))))
             .collect(),
         plies,
         input,

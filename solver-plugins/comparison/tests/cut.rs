@@ -8,6 +8,7 @@ use plyflow_surface::memory_host::{
 use plyflow_surface::traction;
 use plyflow_surface::vector::Vec3;
 use serde_json::{Value, json};
+use std::f64::consts::FRAC_PI_2;
 
 const BLANK: [f64; 4] = [-0.24, -0.16, 0.24, 0.16];
 /// Its right side is the blank's edge.
@@ -76,7 +77,7 @@ fn formed(ply: MemoryBody, size: f64, zone: Value) -> MemoryArtifact {
     MemoryArtifact {
         kind: "forming".into(),
         attributes: json!({
-            "sheets": [{"name": "ply_1", "kind": "ply", "offset": 0.0, "fibre_1": AXIS}],
+            "sheets": [{"name": "ply_1", "kind": "ply", "offset": 0.0, "fibre_1": AXIS, "fibre_2": AXIS + FRAC_PI_2}],
             "element_size": size, "zone": zone,
         }),
         times,

@@ -298,6 +298,20 @@ fn read_motion(host: &Host, input: &Input) -> Result<(Vec<f64>, Vec<LocalSheet>)
             let there = host.array_info(input, &path).is_some();
             if there { vectors(what) } else { Ok(Vec::new()) }
         };
+        let pull = known("pull")?;
+        let stiffness = if pull.is_empty() {
+            Vec::new()
+        } else {
+            host.array_f64(input, &format!("{}/stiffness", body.name))?
+                .0
+        };
+        if !pull.is_empty() && stiffness.len() != driven.len() {
+            let (name, n, k) = (&body.name, stiffness.len(), driven.len());
+            return Err(format!(
+                "'{name}/stiffness' has {n} values for {k} driven nodes; run the boundary's step again"
+            )
+            .into());
+        }
         sheets.push(LocalSheet {
             name: body.name.clone(),
             points,
@@ -309,16 +323,8 @@ fn read_motion(host: &Host, input: &Input) -> Result<(Vec<f64>, Vec<LocalSheet>)
             velocity: vectors("velocity")?,
             normal: known("normal")?,
             normal_rate: known("normal_rate")?,
-            pull: known("pull")?,
-            stiffness: {
-                let path = format!("{}/stiffness", body.name);
-                let there = host.array_info(input, &path).is_some();
-                if there {
-                    host.array_f64(input, &path)?.0
-                } else {
-                    Vec::new()
-                }
-            },
+            pull,
+            stiffness,
             start: read_start(host, input, &body.name)?,
             driven,
         });

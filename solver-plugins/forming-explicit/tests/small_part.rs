@@ -356,7 +356,7 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
     let mut film = Film::default();
     let mut whole = build_global(&p, &BuiltIn).unwrap();
     let history = whole.run(&p.control(), &mut film).unwrap().history;
-    let zone = |first: usize| {
+    let zone = |first: usize, held: bool| {
         let time = film.time[first..].to_vec();
         let of = |get: fn(&HistoryRow) -> f64| -> Vec<f64> {
             let (t, v): (Vec<f64>, Vec<f64>) = history.iter().map(|r| (r.time, get(r))).unzip();
@@ -365,7 +365,16 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
         let parts: Vec<_> = (0..4)
             .map(|body| {
                 let wider = if body == 0 || body == 3 { 0.02 } else { 0.0 };
-                cut_out(&whole, &film, body, [0.045 + wider, 0.05 + wider], first)
+                let (mut sheet, nodes) =
+                    cut_out(&whole, &film, body, [0.045 + wider, 0.05 + wider], first);
+                if held && (1..3).contains(&body) {
+                    let (f, k) = (sheet.position.len(), sheet.driven.len());
+                    sheet.normal = vec![vec![[0.0, 0.0, 1.0]; k]; f];
+                    sheet.normal_rate = vec![vec![[0.0; 3]; k]; f];
+                    sheet.pull = vec![vec![[0.0; 3]; k]; f];
+                    sheet.stiffness = vec![1e6; k];
+                }
+                (sheet, nodes)
             })
             .collect();
         let input = LocalInput {
@@ -381,10 +390,10 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
         let outcome = forming.run(&p.control(), &mut Silent).unwrap();
         (forming, outcome, parts)
     };
-    let (from_the_start, _, parts) = zone(0);
+    let (from_the_start, _, parts) = zone(0, false);
     // Until 0.18 s the frame goes down, then the air is drawn from under the films.
     let first = film.time.iter().position(|t| *t > 0.2).unwrap();
-    let (late, outcome, _) = zone(first);
+    let (late, outcome, _) = zone(first, false);
     assert!((outcome.history[0].time - film.time[first]).abs() < 1.3e-5);
     let shift = outcome.start_shift.unwrap();
     assert!(shift < 5e-4, "{shift} m");
@@ -420,4 +429,17 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
             "ply {body}: {fresh} m, {of_the_whole} m"
         );
     }
+    // Held without a pull, the cut gives way by what the zone pulls with over the stiffness.
+    let (held, _, _) = zone(first, true);
+    let mut largest = 0.0f64;
+    for body in 1..3 {
+        let [a, b] = [&late, &held].map(|f| f.points(&f.bodies[body]));
+        for k in &parts[body].0.driven {
+            let way = sub(b[*k as usize], a[*k as usize]);
+            assert!(way[2].abs() < 1e-9, "ply {body}: {way:?}");
+            largest = largest.max(norm(way));
+        }
+    }
+    println!("held nodes went {largest} m");
+    assert!(largest > 1e-6 && largest < 2e-4, "{largest} m");
 }
