@@ -247,34 +247,18 @@ fn drive(
     }
     let (points, cells) = host.mesh(input, body)?;
     let ply = sheet.kind == "ply";
-    let grid = if ply {
-        let outline = sheet.outline.unwrap_or_else(|| corners(bounds(&points)));
-        ply_part(zone, &outline, &sheet.holes, p.element_size).map_err(|what| {
-            format!(
-                "the zone at {zone:?} m crosses {what}, of ply '{}'; a local run is built where a zone lies wholly inside of such \
-                 a ply. Draw a zone inside of it (`boxes` of zone-extraction), or run the whole ply with smaller elements",
-                sheet.name
-            )
-        })?
-    } else {
-        let size = p.film_element_size.unwrap_or(p.element_size);
-        film_grid(zone, bounds(&points), p.film_margin, size)
+    let Some(grid) = part(&sheet, bounds(&points), zone, p)? else {
+        return Ok(None);
     };
-    let Some(grid) = grid else { return Ok(None) };
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
     let motion = follow(host, input, meshes, body, &fine, ply)?;
-    let pull = match p.cut_stiffness.filter(|_| ply) {
-        None => None,
-        Some(stiffness) => {
-            let axis = match (sheet.fibre_1, sheet.fibre_2) {
-                (Some(first), Some(second)) => force_axis(first, second),
-                _ => 0.0,
-            };
-            let cut = Pull::new(&fine.grid, &fine.driven_nodes, &points, &cells, axis);
-            Some(pulls(host, input, meshes, body, &cut, stiffness)?)
-        }
+    let held = |stiffness: f64| {
+        let axis = axis(input, &sheet)?;
+        let cut = Pull::new(&fine.grid, &fine.driven_nodes, &points, &cells, axis);
+        pulls(host, input, meshes, body, &cut, stiffness)
     };
+    let pull = p.cut_stiffness.filter(|_| ply).map(held).transpose()?;
     let begin = late::start(host, input, meshes, body, &fine, first)?;
     let start = motion.start;
     if start > START_TOLERANCE {
@@ -336,6 +320,40 @@ fn follow(
         }
     }
     Ok(motion)
+}
+
+/// The part of the mesh of a sheet, of these `bounds` (m) when nothing else is told, in a zone; `None` where it does not reach.
+fn part(
+    sheet: &Sheet,
+    bounds: Rectangle,
+    zone: Rectangle,
+    p: &Parameters,
+) -> Result<Option<Grid>, StepError> {
+    if sheet.kind != "ply" {
+        let size = p.film_element_size.unwrap_or(p.element_size);
+        return Ok(film_grid(zone, bounds, p.film_margin, size));
+    }
+    let outline = sheet.outline.clone().unwrap_or_else(|| corners(bounds));
+    let grid = ply_part(zone, &outline, &sheet.holes, p.element_size).map_err(|what| {
+        format!(
+            "the zone at {zone:?} m crosses {what}, of ply '{}'; a local run is built where a zone lies wholly inside of such \
+             a ply. Draw a zone inside of it (`boxes` of zone-extraction), or run the whole ply with smaller elements",
+            sheet.name
+        )
+    })?;
+    Ok(grid)
+}
+
+/// Direction (rad, from x) of the first of the axes in which the coarse run tells a ply's membrane forces.
+fn axis(input: &Input, sheet: &Sheet) -> Result<f64, StepError> {
+    let (Some(first), Some(second)) = (sheet.fibre_1, sheet.fibre_2) else {
+        return Err(format!(
+            "`cut_stiffness` is given, and ply '{}' of '{}' does not tell where its fibres lie (`fibre_1`, `fibre_2`). Leave out `cut_stiffness`, or run that step again",
+            sheet.name, input.step
+        )
+        .into());
+    };
+    Ok(force_axis(first, second))
 }
 
 /// What the surroundings pull at a cut with, through the frames of the coarse sheet `body`. `stiffness`: theirs, of the cut's length (N/m2).

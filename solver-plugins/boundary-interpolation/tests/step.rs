@@ -1,223 +1,11 @@
-//! The step on a coarse motion that is known, and the splines and meshes it is made of.
+//! The step on a coarse motion that is known.
 
-use plyflow_boundary_interpolation::{BoundaryInterpolation, film_grid, ply_grid, ply_part};
-use plyflow_mechanics::history::{linear, spline_slopes};
-use plyflow_mechanics::mesh::{QuadMesh, even_axis, graded_axis};
+use plyflow_boundary_interpolation::BoundaryInterpolation;
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::{Vec3, unit};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
-
-#[test]
-fn spline_gives_back_any_cubic_that_starts_at_rest() {
-    let times = [0.0, 0.1, 0.35, 0.4, 1.0, 1.3];
-    let f = |t: f64| [1.0 + 2.0 * t * t - 0.7 * t * t * t, -3.0 * t * t];
-    let g = |t: f64| [4.0 * t - 2.1 * t * t, -6.0 * t];
-    let values: Vec<f64> = times.iter().flat_map(|&t| f(t)).collect();
-    for (s, e) in spline_slopes(&times, &values, 2)
-        .iter()
-        .zip(times.iter().flat_map(|&t| g(t)))
-    {
-        assert!((s - e).abs() < 1e-12, "{s} {e}");
-    }
-    for n in [2, 3] {
-        let slopes = spline_slopes(&times[..n], &values[..2 * n], 2);
-        assert!(
-            (slopes[2 * n - 1] - g(times[n - 1])[1]).abs() < 1e-12,
-            "{n} frames"
-        );
-    }
-    assert_eq!(spline_slopes(&[0.5], &[3.0], 1), [0.0]);
-}
-
-#[test]
-fn hermite_pieces_join_without_a_jump_in_acceleration() {
-    let times: Vec<f64> = (0..20)
-        .map(|i| 0.05 * i as f64 + 0.01 * ((i * 7) % 5) as f64)
-        .collect();
-    let x: Vec<f64> = times.iter().map(|t| (9.0 * t).sin() + t * t).collect();
-    let v = spline_slopes(&times, &x, 1);
-    assert_eq!(v[0], 0.0);
-    // Second derivative of the Hermite piece at its ends.
-    let ends = |i: usize| {
-        let h = times[i + 1] - times[i];
-        let d = (x[i + 1] - x[i]) / h;
-        (
-            (6.0 * d - 4.0 * v[i] - 2.0 * v[i + 1]) / h,
-            (-6.0 * d + 2.0 * v[i] + 4.0 * v[i + 1]) / h,
-        )
-    };
-    for i in 0..18 {
-        assert!(
-            (ends(i).1 - ends(i + 1).0).abs() < 1e-8,
-            "at {}",
-            times[i + 1]
-        );
-    }
-}
-
-#[test]
-fn error_of_the_spline_s_velocity_falls_with_the_third_power_of_the_frame_spacing() {
-    let error = |n: usize| {
-        let times: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
-        let x: Vec<f64> = times.iter().map(|t| (4.0 * t).cos()).collect();
-        let v = spline_slopes(&times, &x, 1);
-        times
-            .iter()
-            .zip(v)
-            .map(|(t, v)| (v + 4.0 * (4.0 * t).sin()).abs())
-            .fold(0.0, f64::max)
-    };
-    let order = (error(25) / error(50)).log2();
-    assert!(order > 2.7, "{order}");
-    assert!(error(100) < 1e-4);
-}
-
-#[test]
-fn histories_are_linear_between_and_constant_beyond_their_times() {
-    let (t, v) = ([0.0, 1.0, 3.0], [5.0, 7.0, 3.0]);
-    assert_eq!(
-        [-1.0, 0.5, 2.0, 9.0].map(|at| linear(&t, &v, at)),
-        [5.0, 6.0, 5.0, 3.0]
-    );
-}
-
-fn rectangle(b: [f64; 4]) -> Vec<[f64; 2]> {
-    vec![[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]
-}
-
-fn near(a: [f64; 4], b: [f64; 4]) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
-}
-
-#[test]
-fn a_zone_s_meshes_are_cut_out_of_those_of_the_whole() {
-    // Plies of 480 x 300 mm in 4 mm have lines at -240 + 4 i and -150 + 4 j mm, films of 6 mm at 6 k mm.
-    let (ply, film) = ([-0.24, -0.15, 0.24, 0.15], [-0.9, -0.75, 0.9, 0.75]);
-    let whole = QuadMesh::grid(
-        &even_axis(ply[0], ply[2], 0.004),
-        &even_axis(ply[1], ply[3], 0.004),
-    );
-    let zone = [-0.0113, 0.0221, 0.0731, 0.1475];
-    let part = ply_grid(zone, ply, 0.004).unwrap();
-    assert!(
-        near(part.bounds, [-0.012, 0.022, 0.076, 0.15]),
-        "{:?}",
-        part.bounds
-    );
-    // Of the whole's nodes, with the same bits. The zone's top is less than a cell from the edge: there it is free.
-    let of_the_whole = |p: &[f64; 2]| whole.points.iter().any(|q| [q[0], q[1]] == *p);
-    assert!(part.points.iter().all(of_the_whole));
-    assert_eq!(
-        part.cuts.each_ref().map(Option::is_some),
-        [true, true, true, false]
-    );
-    let xs = graded_axis(film[0], film[2], -0.3, 0.3, 0.006, 1.25);
-    let ys = graded_axis(film[1], film[3], -0.2, 0.2, 0.006, 1.25);
-    let part = film_grid(zone, film, 0.02, 0.006).unwrap();
-    assert!(near(part.bounds, [-0.036, 0.0, 0.096, 0.168]));
-    assert!((part.points.iter()).all(|[x, y]| xs.contains(x) && ys.contains(y)));
-}
-
-#[test]
-fn a_cut_that_lies_on_the_ply_s_edge_stays_free() {
-    let ply = [-0.24, -0.15, 0.24, 0.15];
-    let grid = ply_grid([-0.24, 0.05, -0.14, 0.15], ply, 0.003).unwrap();
-    assert_eq!(
-        grid.cuts.clone().map(|c| c.is_some()),
-        [false, true, true, false]
-    );
-    // 100 / 3 mm needs 34 cells.
-    assert_eq!(
-        (grid.points.len(), grid.cells.len()),
-        (35 * 35, 4 * 34 * 34)
-    );
-    assert_eq!(grid.driven_nodes().len(), 35 + 34);
-    let whole = ply_grid([-0.3, -0.2, 0.3, 0.2], ply, 0.01).unwrap();
-    assert!(whole.driven_nodes().is_empty());
-    assert!(near(whole.bounds, ply));
-    assert!(
-        ply_grid([0.239, -0.1, 0.3, 0.1], ply, 0.003).is_none(),
-        "less than a cell"
-    );
-}
-
-#[test]
-fn a_smaller_ply_has_its_own_edges() {
-    let small = ply_grid([0.0, 0.0, 0.1, 0.1], [0.03, -0.1, 0.08, 0.05], 0.005).unwrap();
-    assert!(near(small.bounds, [0.03, 0.0, 0.08, 0.05]));
-    assert_eq!(
-        small.cuts.clone().map(|c| c.is_some()),
-        [false, false, true, false]
-    );
-}
-
-#[test]
-fn a_zone_is_cut_out_of_a_polygon_only_where_it_lies_wholly_inside_or_outside() {
-    let part =
-        |zone, outline: &[[f64; 2]], holes: &[Vec<[f64; 2]>]| ply_part(zone, outline, holes, 0.005);
-    let ell = [
-        [0.0, 0.0],
-        [0.2, 0.0],
-        [0.2, 0.08],
-        [0.08, 0.08],
-        [0.08, 0.2],
-        [0.0, 0.2],
-    ];
-    let hole = vec![vec![[0.12, 0.02], [0.16, 0.02], [0.14, 0.06]]];
-    let inside = part([0.01, 0.01, 0.05, 0.06], &ell, &hole)
-        .unwrap()
-        .unwrap();
-    assert!(near(inside.bounds, [0.01, 0.01, 0.05, 0.06]));
-    assert!(inside.cuts.iter().all(|c| c.is_some()));
-    // Beside the L, in its notch and in the hole there is no ply.
-    for zone in [
-        [0.1, 0.1, 0.15, 0.15],
-        [0.3, 0.0, 0.4, 0.1],
-        [0.135, 0.025, 0.145, 0.035],
-    ] {
-        assert_eq!(part(zone, &ell, &hole), Ok(None), "{zone:?}");
-    }
-    let slanted = [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]];
-    for (zone, outline, what) in [
-        ([0.06, 0.06, 0.1, 0.1], &ell[..], "outline"),
-        ([0.09, 0.01, 0.13, 0.05], &ell[..], "hole"),
-        ([0.08, 0.08, 0.15, 0.15], &slanted[..], "outline"),
-        ([-1.0, -1.0, 1.0, 1.0], &slanted[..], "outline"),
-    ] {
-        let refused = part(zone, outline, &hole).unwrap_err();
-        assert!(refused.contains(what), "{zone:?}: {refused}");
-    }
-    // A rectangle has edges of its own, but not a hole.
-    let plate = rectangle([0.0, 0.0, 0.2, 0.1]);
-    assert!(
-        part([-0.1, -0.1, 0.05, 0.05], &plate, &hole)
-            .unwrap()
-            .is_some()
-    );
-    assert!(part([0.1, 0.0, 0.2, 0.1], &plate, &hole).is_err());
-}
-
-#[test]
-fn films_reach_past_the_zone_but_not_past_themselves_and_are_cut_all_around() {
-    let film = [-0.9, -0.75, 0.9, 0.75];
-    let grid = film_grid([-0.24, 0.05, -0.14, 0.15], film, 0.02, 0.01).unwrap();
-    assert!(near(grid.bounds, [-0.26, 0.03, -0.12, 0.17]));
-    assert!(grid.cuts.iter().all(Option::is_some));
-    assert_eq!(grid.driven_nodes().len(), 4 * 14);
-    let at_the_end = film_grid([0.0, 0.0, 0.895, 0.1], film, 0.02, 0.01).unwrap();
-    assert!(near(at_the_end.bounds, [-0.02, -0.02, 0.9, 0.12]));
-    // A film that is no whole number of elements wide is cut at the last line that it reaches.
-    let narrow = film_grid(
-        [0.0, 0.0, 0.895, 0.1],
-        [-0.9, -0.75, 0.897, 0.75],
-        0.02,
-        0.01,
-    )
-    .unwrap();
-    assert!(near(narrow.bounds, [-0.02, -0.02, 0.89, 0.12]));
-}
 
 const TIMES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 
@@ -229,6 +17,10 @@ fn motion(p: Vec3, t: f64) -> Vec3 {
         p[1] - 0.05 * s,
         p[2] - s * (0.05 + 2.0 * p[0] * p[1]),
     ]
+}
+
+fn rectangle(b: [f64; 4]) -> Vec<[f64; 2]> {
+    vec![[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]]
 }
 
 fn coarse(bend: f64) -> MemoryArtifact {
@@ -525,6 +317,13 @@ fn interpolation_error_is_what_straight_fine_edges_cut_off() {
 fn a_cut_that_gives_way_is_told_what_its_surroundings_pull_with() {
     let held = json!({"element_size": 0.005, "cut_stiffness": 3e6});
     let mut formed = coarse(0.0);
+    let error = interpolate(&formed, held.clone(), &[1]).unwrap_err();
+    assert!(
+        error.contains("ply 'ply_1'") && error.contains("fibres"),
+        "{error}"
+    );
+    let ply = &mut formed.attributes["sheets"][1];
+    (ply["fibre_1"], ply["fibre_2"]) = (json!(0.0), json!(FRAC_PI_2));
     let error = interpolate(&formed, held.clone(), &[1]).unwrap_err();
     assert!(
         error.contains("ply 'ply_1'") && error.contains("membrane_force_1"),
