@@ -224,7 +224,7 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         cycle_shown: 0,
         first_cycle: 0,
     };
-    let mut outcome = forming.run(&p.control(), &mut writer)?;
+    let mut outcome = plyflow_mechanics::team::awake(|| forming.run(&p.control(), &mut writer))?;
     outcome
         .warnings
         .extend(forming.frictionless_folds(&p.scene));

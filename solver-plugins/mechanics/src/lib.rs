@@ -27,6 +27,7 @@ pub mod mirror;
 pub mod model;
 pub mod relax;
 pub mod sheet;
+pub mod team;
 
 /// Elements per batch.
 pub const LANES: usize = 32;

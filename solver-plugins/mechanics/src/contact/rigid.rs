@@ -1,6 +1,7 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
+use super::sheets::TOGETHER;
 use super::{ContactEnergy, ContactSettings, Pace, content, friction_force, normal_force, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
@@ -266,13 +267,14 @@ impl RigidContact {
         let items = self.items.par_chunks_mut(SPAN);
         let spans = items
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
-            .zip_eq(self.spans.par_iter_mut());
+            .zip_eq(self.spans.par_iter_mut())
+            .with_max_len(TOGETHER);
         if costly {
-            spans.zip_eq(self.planes.par_chunks_mut(SPAN)).for_each(
-                |(((items, wakes), span), planes)| {
-                    looking.span(items, wakes, span, planes);
-                },
-            );
+            let spans = spans.zip_eq(self.planes.par_chunks_mut(SPAN));
+            let look = |(((items, wakes), span), planes): (_, &mut [_])| {
+                looking.span(items, wakes, span, planes);
+            };
+            spans.for_each(look);
         } else {
             spans.for_each(|((items, wakes), span)| looking.span(items, wakes, span, &mut []));
         }

@@ -381,6 +381,7 @@ impl SheetContact {
             .par_chunks_mut(SPAN)
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
             .zip_eq(self.spans.par_iter_mut())
+            .with_max_len(TOGETHER)
             .for_each(|((items, wakes), span)| following.span(items, wakes, span));
         let mut total = ContactEnergy::default();
         for span in self.spans.iter().filter(|s| s.touches) {
@@ -409,6 +410,9 @@ impl SheetContact {
 
 /// Slaves whose energies are summed, and that are passed over while all of them sleep.
 const SPAN: usize = 256;
+
+/// Spans that a thread takes at most without leaving some to the others: how much there is to do in one is not known before.
+pub(super) const TOGETHER: usize = 2;
 
 /// A run of [`SPAN`] slaves.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]

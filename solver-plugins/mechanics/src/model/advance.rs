@@ -45,6 +45,9 @@ pub(super) struct Turns<'a> {
 /// Components whose sums are kept apart: eight nodes.
 const GROUP: usize = 24;
 
+/// Chunks that a thread takes at most without leaving some to the others.
+const TOGETHER: usize = 8;
+
 /// Share of the way that a free node would go in a step from rest which a held one goes: it creeps to its balance and does not swing.
 const EASE: f64 = 0.05;
 
@@ -86,6 +89,7 @@ impl Model {
             .zip_eq(external)
             .zip_eq(self.contact_force.par_chunks_mut(NODE_CHUNK))
             .enumerate()
+            .with_max_len(TOGETHER)
             .map(|(chunk, ((((x, v), force), external), contact))| {
                 let nodes = chunk * NODE_CHUNK..chunk * NODE_CHUNK + x.len();
                 force.fill([0.0; 3]);

@@ -10,6 +10,9 @@ use super::*;
 /// Batches in a block: 16 x 16 elements.
 pub(super) const BLOCK: usize = 8;
 
+/// Blocks that a thread takes at most without leaving some to the others.
+const TOGETHER: usize = 4;
+
 /// Batches and the nodes that they share.
 pub(super) struct Block<B> {
     /// At most [`BLOCK`].
@@ -214,6 +217,7 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .zip_eq(others)
+        .with_max_len(TOGETHER)
         .for_each_init(
             Workspace::new,
             |work, ((block, force), ((moment, pressure), area))| {
@@ -275,6 +279,7 @@ pub(super) fn run_patch_blocks(
     blocks
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
+        .with_max_len(TOGETHER)
         .for_each_init(PatchWorkspace::new, |work, (block, force)| {
             force.fill(Sum::default());
             block.failed = None;

@@ -74,6 +74,7 @@ impl Model {
             max_acceleration: 0.0,
             contact: ContactEnergy::default(),
             interfaces: Vec::new(),
+            step_energies: Vec::new(),
             work: NodeWork::default(),
             x: points,
         };
@@ -385,7 +386,7 @@ impl Model {
         self.mirroring.place(&self.patch_sums)?;
         self.set_free_masses();
         self.hold_at_planes();
-        self.internal_forces(false)?;
+        self.internal_forces(false, false)?;
         self.normals();
         Ok(())
     }

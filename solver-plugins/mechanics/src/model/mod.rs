@@ -162,6 +162,8 @@ pub struct Model {
     contact: ContactEnergy,
     /// By contact, rigid ones, sheets on sheets, sheets on themselves: stored at present, lost so far (J).
     interfaces: Vec<ContactEnergy>,
+    /// The same: stored at present, lost in the last step (J).
+    step_energies: Vec<ContactEnergy>,
     work: NodeWork,
 }
 
@@ -186,23 +188,22 @@ struct NodeWork {
     bad: Option<u32>,
 }
 
-/// The contact whose forces are computed and not yet on the nodes.
-#[derive(Clone, Copy)]
-enum Ready<'a> {
-    Nothing,
-    Rigid(&'a RigidContact),
-    Sheet(&'a SheetContact),
-    Fold(&'a SelfContact),
-}
-
-impl Ready<'_> {
-    fn scatter(self, cells: &[[u32; 4]], force: &mut [V]) {
-        match self {
-            Ready::Nothing => {}
-            Ready::Rigid(contact) => contact.scatter(force),
-            Ready::Sheet(contact) => contact.scatter(cells, force),
-            Ready::Fold(contact) => contact.scatter(cells, force),
-        }
+/// Adds the forces of all contacts to `force` (N), one after the other.
+fn scatter_contacts(
+    rigid: &[RigidContact],
+    sheets: &[SheetContact],
+    folds: &[SelfContact],
+    cells: &[[u32; 4]],
+    force: &mut [V],
+) {
+    for contact in rigid {
+        contact.scatter(force);
+    }
+    for contact in sheets {
+        contact.scatter(cells, force);
+    }
+    for contact in folds {
+        contact.scatter(cells, force);
     }
 }
 
@@ -235,9 +236,9 @@ const NODE_CHUNK: usize = 256;
 const NORMAL_INTERVAL: u64 = 16;
 
 impl Model {
-    /// Internal forces, pressure and energies at the present positions. With `fields`, the elements' fields
-    /// too.
-    fn internal_forces(&mut self, fields: bool) -> Result<(), MechanicsError> {
+    /// Internal forces, pressure and energies at the present positions, and beside them the forces that contacts have
+    /// `computed` put on the nodes, by one thread. With `fields`, the elements' fields too.
+    fn internal_forces(&mut self, fields: bool, computed: bool) -> Result<(), MechanicsError> {
         let present = Present {
             sheets: &self.sheets,
             motion: Motion {
@@ -250,8 +251,25 @@ impl Model {
             areas: self.cycle.is_multiple_of(NORMAL_INTERVAL),
             fields,
         };
-        run_blocks(&mut self.blocks, &mut self.sums, present);
-        run_patch_blocks(&mut self.patches, &mut self.patch_sums, present);
+        let mut scatter = || {
+            if computed {
+                let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
+                let folds = &self.self_contacts;
+                scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
+            }
+        };
+        let mut elements = || {
+            run_blocks(&mut self.blocks, &mut self.sums, present);
+            run_patch_blocks(&mut self.patches, &mut self.patch_sums, present);
+        };
+        if rayon::current_num_threads() == 1 {
+            // While the contacts are still in the cache.
+            scatter();
+            elements();
+        } else {
+            // The first to come takes the first half of the blocks, whose nodes it also moves: they are in its cache.
+            rayon::join(elements, scatter);
+        }
         self.mirroring.hand_over(&mut self.patch_sums.force);
         let failed = self.blocks.iter().map(|b| b.failed);
         let failed = failed.chain(self.patches.iter().map(|b| b.failed));
@@ -278,8 +296,9 @@ impl Model {
         self.mirroring.level_normals(&mut self.normals);
     }
 
-    /// Forces of all contacts. Those of one are added to the nodes, by one thread, while those of the next are computed.
-    fn contacts(&mut self) {
+    /// Forces of all contacts, not yet on the nodes: one piece of parallel work, at whose end alone threads wait for each
+    /// other. With one such wait for each contact, a small bag's threads waited for a tenth of the time and more.
+    fn compute_contacts(&mut self) {
         // Both bodies may move so, and speeds and accelerations may grow while a node sleeps. 5 m/s is more than a film
         // picks up under 1 bar over the gaps for which a node sleeps more than a few steps; 10 km/s2 is what 1 bar
         // does to 10 kg/m2.
@@ -288,54 +307,63 @@ impl Model {
             speed: 2.0 * (2.0 * self.max_speed).max(5.0),
             acceleration: 2.0 * (2.0 * self.max_acceleration).max(1e4),
         };
-        let mut total = ContactEnergy::default();
-        let n = self.rigid_contacts.len() + self.sheet_contacts.len() + self.self_contacts.len();
-        self.interfaces.resize_with(n, ContactEnergy::default);
-        let mut interfaces = self.interfaces.iter_mut();
-        let mut count = |e: ContactEnergy| {
-            total.stored += e.stored;
-            total.friction += e.friction;
-            total.damping += e.damping;
-            if let Some(i) = interfaces.next() {
-                i.stored = e.stored;
-                i.friction += e.friction;
-                i.damping += e.damping;
-            }
-        };
-        let cells = &self.cells;
-        let force = &mut self.contact_force;
-        let mut ready = Ready::Nothing;
-        for contact in &mut self.rigid_contacts {
-            let compute = || contact.compute(&self.x, &self.v, pace);
-            count(rayon::join(compute, || ready.scatter(cells, force)).0);
-            // What moves the surface does this work on the sheets.
-            let (resultant, velocity) = (contact.resultant(), contact.motion.velocity);
-            self.ledger.external += dot(resultant, velocity) * self.dt;
-            ready = Ready::Rigid(contact);
-        }
         let surface = Surface {
-            cells,
+            cells: &self.cells,
             neighbours: &self.neighbours,
             x: &self.x,
             normals: &self.normals,
         };
-        for contact in &mut self.sheet_contacts {
-            let compute = || contact.compute(&surface, &self.v, pace);
-            count(rayon::join(compute, || ready.scatter(cells, force)).0);
-            ready = Ready::Sheet(contact);
-        }
         let bearing = Bearing {
             mass: &self.mass,
             room: &self.contact_room,
             step: self.settings.target_step,
         };
-        for contact in &mut self.self_contacts {
-            let stride = self.max_speed * self.last_dt;
-            let compute = || contact.compute(&surface, &self.v, pace, stride, bearing);
-            count(rayon::join(compute, || ready.scatter(cells, force)).0);
-            ready = Ready::Fold(contact);
+        let stride = self.max_speed * self.last_dt;
+        let v = &self.v;
+        let (n_rigid, n_sheets) = (self.rigid_contacts.len(), self.sheet_contacts.len());
+        let n = n_rigid + n_sheets + self.self_contacts.len();
+        self.step_energies.resize_with(n, ContactEnergy::default);
+        let (of_rigid, others) = self.step_energies.split_at_mut(n_rigid);
+        let (of_sheets, of_folds) = others.split_at_mut(n_sheets);
+        let rigid = || {
+            let contacts = self.rigid_contacts.par_iter_mut().zip_eq(of_rigid);
+            let contacts = contacts.with_max_len(1);
+            contacts.for_each(|(c, energy)| *energy = c.compute(&self.x, v, pace));
+        };
+        let sheets = || {
+            let contacts = self.sheet_contacts.par_iter_mut().zip_eq(of_sheets);
+            let contacts = contacts.with_max_len(1);
+            contacts.for_each(|(c, energy)| *energy = c.compute(&surface, v, pace));
+        };
+        let folds = || {
+            let contacts = self.self_contacts.par_iter_mut().zip_eq(of_folds);
+            let contacts = contacts.with_max_len(1);
+            contacts.for_each(|(c, energy)| {
+                *energy = c.compute(&surface, v, pace, stride, bearing);
+            });
+        };
+        rayon::join(sheets, || rayon::join(rigid, folds));
+        self.count_contacts();
+    }
+
+    /// Energies of the contacts, by contact and of all.
+    fn count_contacts(&mut self) {
+        for contact in &self.rigid_contacts {
+            // What moves the surface does this work on the sheets.
+            let (resultant, velocity) = (contact.resultant(), contact.motion.velocity);
+            self.ledger.external += dot(resultant, velocity) * self.dt;
         }
-        ready.scatter(cells, force);
+        let n = self.step_energies.len();
+        self.interfaces.resize_with(n, ContactEnergy::default);
+        let mut total = ContactEnergy::default();
+        for (i, e) in self.interfaces.iter_mut().zip(&self.step_energies) {
+            total.stored += e.stored;
+            total.friction += e.friction;
+            total.damping += e.damping;
+            i.stored = e.stored;
+            i.friction += e.friction;
+            i.damping += e.damping;
+        }
         self.ledger.friction += total.friction;
         self.ledger.damping += total.damping;
         self.contact = total;
@@ -346,7 +374,7 @@ impl Model {
     /// # Errors
     /// When a component fails.
     pub fn take_shape(&mut self) -> Result<(), MechanicsError> {
-        self.internal_forces(false)
+        self.internal_forces(false, false)
     }
 
     /// One step. With `fields`, the elements' fields at the positions before the step are kept for
@@ -355,12 +383,18 @@ impl Model {
     /// # Errors
     /// When a component fails or a velocity is not finite.
     pub fn step(&mut self, fields: bool) -> Result<(), MechanicsError> {
-        let with_normals = self.cycle.is_multiple_of(NORMAL_INTERVAL);
-        self.internal_forces(fields)?;
-        if with_normals {
+        if self.cycle.is_multiple_of(NORMAL_INTERVAL) {
+            // Contacts want the normals, and these what the elements sum.
+            self.internal_forces(fields, false)?;
             self.normals();
+            self.compute_contacts();
+            let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
+            let folds = &self.self_contacts;
+            scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
+        } else {
+            self.compute_contacts();
+            self.internal_forces(fields, true)?;
         }
-        self.contacts();
         self.advance();
         self.mirroring.follow(&mut self.x);
         let limit = self.speed_limit();
