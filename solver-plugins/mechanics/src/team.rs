@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 /// How long a thread looks for work without a pause. A step has three or four pieces of parallel work with some microseconds
 /// to some tens of them between; a thread of the pool that has gone to sleep in between takes some 25 microseconds to
 /// wake, a tenth of a piece in a small bag.
-const PATIENCE: Duration = Duration::from_micros(200);
+const PATIENCE: Duration = Duration::from_micros(40);
 
 /// Pause between two looks of a thread that has lost its patience: while a file is written, or one thread builds something.
 const PAUSE: Duration = Duration::from_micros(50);
 
 /// Looks between two looks at the clock.
-const LOOKS: u32 = 64;
+const LOOKS: u32 = 16;
 
 /// Ends the threads' waiting however the work ends.
 struct Done(Arc<AtomicBool>);
@@ -64,6 +64,9 @@ fn look_for_work(is_done: &AtomicBool) {
             looks = 0;
             if since.elapsed() > PATIENCE {
                 std::thread::sleep(PAUSE);
+            } else {
+                // Where others want the processor, the thread that looks for work must not keep the one that has it from it.
+                std::thread::yield_now();
             }
         }
     }

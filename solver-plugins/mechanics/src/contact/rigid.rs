@@ -1,8 +1,9 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
-use super::sheets::TOGETHER;
-use super::{ContactEnergy, ContactSettings, Pace, content, friction_force, normal_force, waking};
+use super::{
+    ContactEnergy, ContactSettings, Pace, TOGETHER, content, friction_force, normal_force, waking,
+};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
 use rayon::prelude::*;

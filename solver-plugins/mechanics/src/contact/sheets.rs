@@ -11,7 +11,7 @@ use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::slave::{
     Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
 };
-use super::{ContactEnergy, ContactSettings, Pace, waking};
+use super::{ContactEnergy, ContactSettings, Pace, TOGETHER, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
 use crate::mirror::{Image, mirrored_in, reflect};
@@ -410,9 +410,6 @@ impl SheetContact {
 
 /// Slaves whose energies are summed, and that are passed over while all of them sleep.
 const SPAN: usize = 256;
-
-/// Spans that a thread takes at most without leaving some to the others: how much there is to do in one is not known before.
-pub(super) const TOGETHER: usize = 2;
 
 /// A run of [`SPAN`] slaves.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
