@@ -308,6 +308,24 @@ pub struct Sheet {
     pub fibre_2: Option<Angle>,
 }
 
+/// Direction (rad, from x) of the first axis of a ply whose fibre families lie at `fibre_1` and `fibre_2` (rad): that of the family
+/// which the other follows counter-clockwise, so that the stitch lies between the first axis and the second. Elements and their
+/// membrane forces have these axes, whichever way round the scene names the families.
+///
+/// ```
+/// use plyflow_model::scene::first_axis;
+/// let deg = f64::to_radians;
+/// assert_eq!(first_axis(deg(-45.0), deg(45.0)), deg(-45.0));
+/// assert_eq!(first_axis(deg(45.0), deg(-45.0)), deg(-45.0));
+/// ```
+pub fn first_axis(fibre_1: f64, fibre_2: f64) -> f64 {
+    if (fibre_2 - fibre_1).sin() >= 0.0 {
+        fibre_1
+    } else {
+        fibre_2
+    }
+}
+
 /// A closed contour in the plane. It may run either way round and closes by itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]

@@ -12,9 +12,10 @@ pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
 use pull::{FORCES, Pull};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
+use plyflow_model::scene::first_axis;
 use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
+use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::{Vec3, distance};
-use plyflow_surface::{flat_bounds, force_axis};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -353,7 +354,7 @@ fn axis(input: &Input, sheet: &Sheet) -> Result<f64, StepError> {
         )
         .into());
     };
-    Ok(force_axis(first, second))
+    Ok(first_axis(first, second))
 }
 
 /// What the surroundings pull at a cut with, through the frames of the coarse sheet `body`. `stiffness`: theirs, of the cut's length (N/m2).

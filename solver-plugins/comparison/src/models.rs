@@ -1,8 +1,8 @@
 //! Reading the models that are compared.
 
 use plyflow_defects::{Ply, Settings, Tool, of_run};
+use plyflow_model::scene::first_axis;
 use plyflow_sdk::{Host, Input, StepError};
-use plyflow_surface::force_axis;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -265,7 +265,7 @@ fn read(
             .sum(),
         element_cycles: formed.element_cycles,
         axes: (formed.sheets.iter())
-            .filter_map(|s| Some((s.name.clone(), force_axis(s.fibre_1?, s.fibre_2?))))
+            .filter_map(|s| Some((s.name.clone(), first_axis(s.fibre_1?, s.fibre_2?))))
             .collect(),
         plies,
         input,

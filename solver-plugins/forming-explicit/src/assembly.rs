@@ -19,7 +19,7 @@ use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::material::{Material, MaterialEntry};
-use plyflow_model::scene::{Process, Scene, Sheet, SheetKind};
+use plyflow_model::scene::{Process, Scene, Sheet, SheetKind, first_axis};
 use std::sync::Arc;
 
 /// Least distance of the mid-surfaces of two bare films in contact (m). They are 0.08 mm thick; at so small a
@@ -304,16 +304,11 @@ pub fn element(
         .map_err(|e| e.to_string())
 }
 
-/// Direction of material axis e1 in the undeformed plane. Family 2 lies 90 degrees counter-clockwise from
-/// e1 = family 1; when the scene states it the other way round, the families change names so that the stitch
-/// still lies between e1 and e2.
+/// Direction of material axis e1 in the undeformed plane.
 pub fn axis(sheet: &Sheet) -> V {
     let first = sheet.fibre_1.si();
-    let second = sheet
-        .fibre_2
-        .map_or(first + std::f64::consts::FRAC_PI_2, |a| a.si());
-    let turn = (second - first).sin();
-    let e1 = if turn >= 0.0 { first } else { second };
+    let square = || first + std::f64::consts::FRAC_PI_2;
+    let e1 = first_axis(first, sheet.fibre_2.map_or_else(square, |a| a.si()));
     [e1.cos(), e1.sin(), 0.0]
 }
 

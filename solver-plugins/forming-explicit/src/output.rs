@@ -173,6 +173,17 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         None => crate::build_global(p, &components)?,
         Some(input) => crate::build_local(p, read_boundary(host, input)?, &components)?,
     };
+    let augmentation = forming.model.contact_augmentation();
+    if augmentation > 0.0 && augmentation < p.contact_augmentation {
+        host.log(
+            Log::Info,
+            &format!(
+                "contact_augmentation is {augmentation:.2e} instead of {:.2e}: some sheets have far more mass in a node than those \
+                 they touch, and would tremble",
+                p.contact_augmentation
+            ),
+        );
+    }
     if let Some(input) = feedback.first() {
         let (time, sheets) = read_motion(host, input)?;
         crate::local::feed_back(&mut forming, Feedback { time, sheets })?;

@@ -21,7 +21,7 @@ pub use locate::{Location, QuadLocator, flat_bounds};
 pub use ridge::{Ridge, ridge_line};
 pub use section::{line_length, plane_section};
 pub use topology::{Topology, triangles};
-pub use traction::{force_axis, traction};
+pub use traction::traction;
 
 #[cfg(feature = "memory-host")]
 pub mod memory_host;

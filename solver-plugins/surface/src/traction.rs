@@ -2,16 +2,6 @@
 
 use crate::vector::{Vec3, sub};
 
-/// Direction (rad, from x) of the first of the axes in which forming runs tell a ply's membrane forces, with its fibre families at `fibre_1`
-/// and `fibre_2` (rad) as its scene has them: that of the family which the other follows counter-clockwise.
-pub fn force_axis(fibre_1: f64, fibre_2: f64) -> f64 {
-    if (fibre_2 - fibre_1).sin() >= 0.0 {
-        fibre_1
-    } else {
-        fibre_2
-    }
-}
-
 /// First Piola-Kirchhoff traction (N/m of undeformed length) across a line with the normal `normal` of the flat ply, in a cell
 /// whose corners were at `then` and are at `now` (m), with resultants `s` (S11, S22, S12, N/m) in axes of which the first
 /// lies at `axis` (rad): `t = sum_AB (F e_A) S_AB (e_B . N)`, F that of the cell's centre.

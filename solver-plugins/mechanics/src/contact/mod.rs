@@ -82,6 +82,22 @@ pub struct ContactSettings {
     pub augmentation: f64,
 }
 
+/// Nodes of a coarse sheet that may ride on a single node of a finer one: those of three by three elements around it.
+const RIDING: f64 = 16.0;
+
+impl ContactSettings {
+    /// Largest augmentation with which multipliers do not feed a motion of a sheet that rests on single nodes of another one, each of
+    /// which has `mass_ratio` of the mass of a node of the first.
+    ///
+    /// A mass M on a contact of stiffness k and damping c, whose multiplier grows by a k x in each step dt, moves as M s^3 + c s^2 + k s +
+    /// a k / dt = 0, and comes to rest while a < c dt / M (Routh and Hurwitz). Stiffness and damping are those of the light node: k = f m / dt^2
+    /// and c = 2 zeta sqrt(k m). With twice as large a bound a stack with 27 times as heavy nodes trembles (decision 4).
+    pub fn largest_augmentation(&self, mass_ratio: f64) -> f64 {
+        let damping = 2.0 * self.damping_ratio * self.stiffness_factor.sqrt();
+        damping * mass_ratio / RIDING
+    }
+}
+
 impl Default for ContactSettings {
     fn default() -> Self {
         Self {
@@ -226,5 +242,77 @@ pub(crate) fn friction_force(
         friction,
         damping,
         stored: 0.5 * dot(slip, slip) / k,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Growth per step of the swinging of a mass on a contact, whose light side has the mass 1, in steps of 1: from its heights at two
+    /// passages through rest with 20 cycles between.
+    fn growth(mass: f64, augmentation: f64) -> f64 {
+        let settings = ContactSettings::default();
+        let stiffness = settings.stiffness_factor;
+        let damping = 2.0 * settings.damping_ratio * stiffness.sqrt();
+        let weight = 1.0;
+        let (mut held, mut work) = (weight, 0.0);
+        let (mut x, mut v) = (1e-3 * weight / stiffness, 0.0);
+        let period = std::f64::consts::TAU * (mass / stiffness).sqrt();
+        let (mut peaks, mut peak) = (Vec::new(), 0.0f64);
+        for step in 0..(26.0 * period) as u64 {
+            let n = normal_force(x, v, 1.0, stiffness, damping, augmentation, 0.0, held, work);
+            (held, work) = (n.multiplier, n.work);
+            v += (n.force - weight) / mass;
+            let before = x;
+            x += v;
+            peak = peak.max(x);
+            if before < 0.0 && x >= 0.0 {
+                peaks.push((step as f64, peak));
+                peak = 0.0;
+            }
+        }
+        let ((t0, p0), (t1, p1)) = (peaks[2], peaks[22]);
+        (p1 / p0).ln() / (t1 - t0)
+    }
+
+    /// Real part of the swinging roots of M s^3 + c s^2 + k s + a k = 0.
+    fn root(mass: f64, augmentation: f64) -> f64 {
+        use nalgebra::{Complex, Matrix3};
+        let k = ContactSettings::default().stiffness_factor;
+        let c = 2.0 * ContactSettings::default().damping_ratio * k.sqrt();
+        let companion = Matrix3::new(
+            -c / mass,
+            -k / mass,
+            -augmentation * k / mass,
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+        );
+        let roots = companion.complex_eigenvalues();
+        let swings = |s: &&Complex<f64>| s.im > 0.0;
+        roots.iter().find(swings).expect("swinging roots").re
+    }
+
+    #[test]
+    fn multipliers_feed_a_mass_that_rides_on_a_light_node_beyond_the_bound_and_not_below_it() {
+        let ratio = 1.0 / 27.0;
+        let mass = RIDING / ratio;
+        let bound = ContactSettings::default().largest_augmentation(ratio);
+        let damped = root(mass, 0.0);
+        for (share, sign) in [(0.0, -1.0), (0.5, -1.0), (2.0, 1.0), (4.0, 1.0)] {
+            let a = share * bound;
+            let (got, expected) = (growth(mass, a), root(mass, a));
+            assert!(got * sign > 0.0, "{share} of the bound: {got:.3e}");
+            let error = (got - expected).abs() / damped.abs();
+            assert!(
+                error < 0.03,
+                "{share} of the bound: {got:.4e}, not {expected:.4e}"
+            );
+        }
+        assert!(root(mass, bound).abs() < 1e-3 * damped.abs());
     }
 }

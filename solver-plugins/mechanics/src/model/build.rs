@@ -417,16 +417,19 @@ impl Model {
             let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
             mirroring.share(node) / (1.0 / whole(node) + 1.0 / lightest)
         };
+        let augmentation = c
+            .augmentation
+            .min(c.largest_augmentation(self.mass_ratio()));
         let mut row = vec![0.0; mass.len()];
         for contact in &mut self.rigid_contacts {
-            contact.augmentation = c.augmentation;
+            contact.augmentation = augmentation;
             for item in &mut contact.items {
                 item.stiffness = c.stiffness_factor * mass[item.node as usize] / dt2;
                 row[item.node as usize] += item.stiffness;
             }
         }
         for contact in &mut self.sheet_contacts {
-            contact.augmentation = c.augmentation;
+            contact.augmentation = augmentation;
             for item in contact
                 .items
                 .iter_mut()
@@ -462,6 +465,30 @@ impl Model {
         }
         self.bound_contact_damping();
         self.set_contact_room();
+    }
+
+    /// Largest share of the penalty force that contacts hand to their multipliers in a step, once
+    /// [`Model::set_contact_stiffness`] has set it.
+    pub fn contact_augmentation(&self) -> f64 {
+        let rigid = self.rigid_contacts.iter().map(|c| c.augmentation);
+        let sheets = self.sheet_contacts.iter().map(|c| c.augmentation);
+        rigid.chain(sheets).fold(0.0, f64::max)
+    }
+
+    /// The least share that the heaviest node of the lighter one of two sheets in contact has of the other's.
+    fn mass_ratio(&self) -> f64 {
+        let heaviest = |nodes: &mut dyn Iterator<Item = u32>| {
+            let masses = nodes.map(|n| self.mass[n as usize]);
+            masses.fold(0.0, f64::max)
+        };
+        let of_contact = |contact: &SheetContact| {
+            let items = || contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
+            let slave = heaviest(&mut items().map(|i| i.node));
+            let master = heaviest(&mut items().flat_map(|i| self.cells[i.cell as usize]));
+            (slave.min(master) > 0.0).then(|| slave.min(master) / slave.max(master))
+        };
+        let ratios = self.sheet_contacts.iter().filter_map(of_contact);
+        ratios.fold(1.0, f64::min)
     }
 
     /// Bounds the assembled damping of every node. The damper's force is that of the velocity half a step ago,
