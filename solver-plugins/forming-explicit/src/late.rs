@@ -20,8 +20,10 @@ pub struct Start {
 
 /// Steps in which elements are led from one state of the path to the next.
 const STEPS: u32 = 5;
-/// Steps in which nothing swings.
-const CREEPING: u32 = 1000;
+/// Steps in which nothing swings, at least, and at most.
+const CREEPING: [f64; 2] = [1000.0, 10000.0];
+/// The same in the steps that the contacts' multipliers take to follow to within 1 / e.
+const FOLLOWING: f64 = 3.0;
 /// Most steps (with all loads, at the time of the start) to find the balance of fine shells there.
 const SETTLING: u32 = 3000;
 /// Kinetic over internal energy at a peak below which they have found it.
@@ -156,7 +158,13 @@ fn settle(forming: &mut Forming, step: f64, safety: f64) -> Result<(), String> {
         contacts.for_each(|c| c.clearing = on);
     };
     clear(model, true);
-    for _ in 0..CREEPING {
+    let augmentation = forming.model.contact_augmentation();
+    let creeping = if augmentation > 0.0 {
+        (FOLLOWING / augmentation).clamp(CREEPING[0], CREEPING[1])
+    } else {
+        CREEPING[0]
+    };
+    for _ in 0..creeping.round() as u32 {
         stand(forming)?;
     }
     clear(&mut forming.model, false);
