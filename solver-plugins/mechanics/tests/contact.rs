@@ -1,9 +1,13 @@
 //! Contact against what it must be: gradients of its own energy, balance, Coulomb's law.
 
+mod common;
+
 use plyflow_mechanics::contact::{
     ContactSettings, Pace, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem, Surface,
 };
-use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+use plyflow_mechanics::model::{Model, StepSettings};
+use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
 use std::sync::Arc;
 
@@ -320,4 +324,68 @@ fn a_slave_that_is_found_deep_inside_is_not_flung_out() {
     // A model that is put together by hand is cleared.
     let [speed, height] = comes_out(0.3 * OFFSET, 0.0, true);
     assert!(speed > 1.0 && height > OFFSET, "{speed} {height}");
+}
+
+/// The share that contacts hand to their multipliers between a sheet of 12 x 12 mm in elements of 1 mm and one above it of elements of
+/// `size` (m), both of 1 kg/m2.
+fn augmentation(size: f64) -> f64 {
+    let meshes = [1e-3, size].map(|size| {
+        let axis = even_axis(0.0, 0.012, size);
+        QuadMesh::grid(&axis, &axis)
+    });
+    let mut points = meshes[0].points.clone();
+    let first = points.len() as u32;
+    points.extend(meshes[1].points.iter().map(|p| add(*p, [0.0, 0.0, OFFSET])));
+    let spec = |k: usize, mesh: &QuadMesh| {
+        let (m, begin) = (mesh.cells.len(), [0, first][k]);
+        SheetSpec {
+            name: format!("{k}"),
+            nodes: (begin..begin + mesh.points.len() as u32).collect(),
+            cells: mesh.cells.clone(),
+            patches: Vec::new(),
+            axis: [1.0, 0.0, 0.0],
+            layers: vec![1.0; m],
+            pressed: vec![Pressed::No; m],
+            least_areal_mass: vec![0.0; m],
+            element: common::membrane(),
+        }
+    };
+    let settings = StepSettings {
+        target_step: 5e-7,
+        safety: 0.9,
+        damping: 0.0,
+    };
+    let specs = vec![spec(0, &meshes[0]), spec(1, &meshes[1])];
+    let mut model = Model::new(points, specs, settings).unwrap();
+    let above = model.sheets[1].cell_range.0 as u32;
+    let per_side = (0.012 / size).round();
+    let items = (0..first).map(|n| {
+        let [i, j] = [0, 1].map(|k| (meshes[0].points[n as usize][k] / size).min(per_side - 0.5));
+        let cell = (j.floor() * per_side + i.floor()) as u32;
+        SlaveItem::new(n, above + cell, [0.0; 2])
+    });
+    let contact = ContactSettings::default();
+    let between = SheetContact::new(
+        "between".into(),
+        -1.0,
+        OFFSET,
+        0.0,
+        &contact,
+        items.collect(),
+    );
+    model.sheet_contacts.push(between);
+    model.set_contact_stiffness(&contact);
+    model.contact_augmentation()
+}
+
+#[test]
+fn multipliers_grow_more_slowly_where_one_sheet_has_far_more_mass_in_a_node() {
+    let default = ContactSettings::default();
+    for size in [1e-3, 2e-3] {
+        assert_eq!(augmentation(size), default.augmentation, "{size} m");
+    }
+    // A node inside carries an element's mass: 36 times the other's.
+    let expected = 2.0 * default.damping_ratio * default.stiffness_factor.sqrt() / 36.0 / 16.0;
+    let got = augmentation(6e-3);
+    assert!((got / expected - 1.0).abs() < 1e-9, "{got}, not {expected}");
 }
