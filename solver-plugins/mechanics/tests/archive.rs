@@ -35,15 +35,8 @@ fn pressed_stack() -> Model {
         points.extend(mesh.points.iter().map(|p| [p[0], p[1], z]));
         let pressed = if k == 1 { Pressed::Above } else { Pressed::No };
         specs.push(SheetSpec {
-            name: format!("sheet {k}"),
-            nodes: (k * n..(k + 1) * n).collect(),
-            cells: mesh.cells.clone(),
-            patches: Vec::new(),
-            axis: [1.0, 0.0, 0.0],
-            layers: vec![1.0; m],
             pressed: vec![pressed; m],
-            least_areal_mass: vec![0.0; m],
-            element: common::shell(),
+            ..common::sheet(&format!("sheet {k}"), &mesh, k * n, common::shell())
         });
     }
     let settings = StepSettings {

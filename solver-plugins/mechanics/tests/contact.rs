@@ -7,7 +7,6 @@ use plyflow_mechanics::contact::{
 };
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Model, StepSettings};
-use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
 use std::sync::Arc;
 
@@ -336,26 +335,13 @@ fn augmentation(size: f64) -> f64 {
     let mut points = meshes[0].points.clone();
     let first = points.len() as u32;
     points.extend(meshes[1].points.iter().map(|p| add(*p, [0.0, 0.0, OFFSET])));
-    let spec = |k: usize, mesh: &QuadMesh| {
-        let (m, begin) = (mesh.cells.len(), [0, first][k]);
-        SheetSpec {
-            name: format!("{k}"),
-            nodes: (begin..begin + mesh.points.len() as u32).collect(),
-            cells: mesh.cells.clone(),
-            patches: Vec::new(),
-            axis: [1.0, 0.0, 0.0],
-            layers: vec![1.0; m],
-            pressed: vec![Pressed::No; m],
-            least_areal_mass: vec![0.0; m],
-            element: common::membrane(),
-        }
-    };
     let settings = StepSettings {
         target_step: 5e-7,
         safety: 0.9,
         damping: 0.0,
     };
-    let specs = vec![spec(0, &meshes[0]), spec(1, &meshes[1])];
+    let spec = |k: usize| common::sheet("sheet", &meshes[k], [0, first][k], common::membrane());
+    let specs = vec![spec(0), spec(1)];
     let mut model = Model::new(points, specs, settings).unwrap();
     let above = model.sheets[1].cell_range.0 as u32;
     let per_side = (0.012 / size).round();

@@ -17,18 +17,10 @@ use std::sync::Arc;
 
 /// A sheet of the fabric; its nodes follow `first` of the model.
 fn sheet(name: &str, mesh: &QuadMesh, first: u32, axis: V, pressed: Pressed) -> SheetSpec {
-    let element = common::membrane();
-    let m = mesh.cells.len();
     SheetSpec {
-        name: name.into(),
-        nodes: (first..first + mesh.points.len() as u32).collect(),
-        cells: mesh.cells.clone(),
-        patches: Vec::new(),
         axis,
-        layers: vec![1.0; m],
-        pressed: vec![pressed; m],
-        least_areal_mass: vec![0.0; m],
-        element,
+        pressed: vec![pressed; mesh.cells.len()],
+        ..common::sheet(name, mesh, first, common::membrane())
     }
 }
 

@@ -8,7 +8,7 @@ use plyflow_mechanics::contact::{ContactSettings, SheetContact, SlaveItem};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::mirror::{Mirrors, Planes, Whole, part_patches, reflect};
 use plyflow_mechanics::model::{Model, StepSettings};
-use plyflow_mechanics::sheet::{Pressed, SheetSpec};
+use plyflow_mechanics::sheet::SheetSpec;
 use plyflow_mechanics::vec3::{V, norm, sub};
 
 const STEP: f64 = 1e-7;
@@ -27,7 +27,6 @@ fn model(planes: Planes) -> (Model, QuadMesh) {
     let mesh = part(planes);
     let element = common::rotation_free();
     let (patches, ghosts) = part_patches(&mesh, planes, element.sizes.patch_nodes);
-    let m = mesh.cells.len();
     let mut points = mesh.points.clone();
     points.extend(
         ghosts
@@ -35,15 +34,9 @@ fn model(planes: Planes) -> (Model, QuadMesh) {
             .map(|g| reflect(mesh.points[g.of as usize], g.image)),
     );
     let spec = SheetSpec {
-        name: "sheet".into(),
         nodes: (0..points.len() as u32).collect(),
-        cells: mesh.cells.clone(),
         patches,
-        axis: [1.0, 0.0, 0.0],
-        layers: vec![1.0; m],
-        pressed: vec![Pressed::No; m],
-        least_areal_mass: vec![0.0; m],
-        element,
+        ..common::sheet("sheet", &mesh, 0, element)
     };
     let settings = StepSettings {
         target_step: STEP,
@@ -181,17 +174,9 @@ fn a_ghost_of_a_node_without_a_patch_is_refused() {
     let (_, ghosts) = part_patches(&mesh, planes, 0);
     let mut points = mesh.points.clone();
     points.extend(ghosts.iter().map(|g| mesh.points[g.of as usize]));
-    let m = mesh.cells.len();
     let spec = SheetSpec {
-        name: "sheet".into(),
         nodes: (0..points.len() as u32).collect(),
-        cells: mesh.cells.clone(),
-        patches: Vec::new(),
-        axis: [1.0, 0.0, 0.0],
-        layers: vec![1.0; m],
-        pressed: vec![Pressed::No; m],
-        least_areal_mass: vec![0.0; m],
-        element: common::rotation_free(),
+        ..common::sheet("sheet", &mesh, 0, common::rotation_free())
     };
     let settings = StepSettings {
         target_step: STEP,
@@ -244,17 +229,9 @@ fn troughs(planes: Planes) -> (Model, Vec<V>) {
                 .iter()
                 .map(|p| [p[0], p[1], 0.3 * p[0].abs() + up]),
         );
-        let m = mesh.cells.len();
         specs.push(SheetSpec {
-            name: "trough".into(),
-            nodes: (first..points.len() as u32).collect(),
-            cells: mesh.cells.clone(),
-            patches: Vec::new(),
             axis: [0.0, 1.0, 0.0],
-            layers: vec![1.0; m],
-            pressed: vec![Pressed::No; m],
-            least_areal_mass: vec![0.0; m],
-            element: common::membrane(),
+            ..common::sheet("trough", mesh, first, common::membrane())
         });
     }
     let settings = StepSettings {

@@ -6,7 +6,6 @@ use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Hold, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::relax::{Tolerance, relax};
-use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 
 struct Clamp(Vec<V>);
@@ -25,19 +24,7 @@ fn strip() -> (Model, Vec<u32>) {
 /// The same, damped in proportion to its mass (1/s).
 fn damped_strip(damping: f64) -> (Model, Vec<u32>) {
     let mesh = QuadMesh::grid(&even_axis(0.0, 0.4, 0.05), &even_axis(0.0, 0.1, 0.05));
-    let element = common::membrane();
-    let m = mesh.cells.len();
-    let spec = SheetSpec {
-        name: "strip".into(),
-        nodes: (0..mesh.points.len() as u32).collect(),
-        cells: mesh.cells.clone(),
-        patches: Vec::new(),
-        axis: [1.0, 0.0, 0.0],
-        layers: vec![1.0; m],
-        pressed: vec![Pressed::No; m],
-        least_areal_mass: vec![0.0; m],
-        element,
-    };
+    let spec = common::sheet("strip", &mesh, 0, common::membrane());
     let settings = StepSettings {
         target_step: 0.0,
         safety: 0.8,

@@ -3,6 +3,8 @@
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
 use plyflow_kernels::{fabric::Fabric, m4::M4, s4::S4};
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_sdk::{Element, element_table, material_table};
 
 /// 1e5 N/m along the fibres, 1 kg/m2.
@@ -59,4 +61,21 @@ pub fn rotation_free() -> ElementInstance {
         r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0,
             "bending":{"positive":{"linear":5e-3},"negative":{"linear":5e-3}}}"#,
     )
+}
+
+/// A sheet of the whole mesh with its first axis along x; its nodes follow `first` of the model, and nothing presses on it.
+#[allow(dead_code)]
+pub fn sheet(name: &str, mesh: &QuadMesh, first: u32, element: ElementInstance) -> SheetSpec {
+    let m = mesh.cells.len();
+    SheetSpec {
+        name: name.into(),
+        nodes: (first..first + mesh.points.len() as u32).collect(),
+        cells: mesh.cells.clone(),
+        patches: Vec::new(),
+        axis: [1.0, 0.0, 0.0],
+        layers: vec![1.0; m],
+        pressed: vec![Pressed::No; m],
+        least_areal_mass: vec![0.0; m],
+        element,
+    }
 }
