@@ -321,6 +321,17 @@ pub fn step_settings(p: &Parameters) -> StepSettings {
     }
 }
 
+/// What to tell where contacts' multipliers grow more slowly than asked for.
+pub(crate) fn slower_multipliers(model: &Model, p: &Parameters) -> Option<String> {
+    let (asked, taken) = (p.contact_augmentation, model.contact_augmentation());
+    (taken > 0.0 && taken < asked).then(|| {
+        format!(
+            "contact_augmentation is {taken:.2e} instead of {asked:.2e}: some sheets have far more mass in a node than those they touch, \
+             and would tremble"
+        )
+    })
+}
+
 /// A sheet placed in a model, as the contacts see it.
 pub struct Placed {
     /// Index in [`Model::sheets`].

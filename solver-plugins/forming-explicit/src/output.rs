@@ -158,6 +158,19 @@ fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
     }
 }
 
+/// Tells the meshes of the tool and of a press's parts.
+fn define_rigid(host: &Host, forming: &Forming) -> Result<(), StepError> {
+    let about = json!({"rigid": true});
+    let tool = &forming.tool;
+    let triangles: Vec<u32> = tool.triangles.iter().flatten().copied().collect();
+    host.define_mesh("tool", &tool.points, 3, &triangles, &about)?;
+    for part in &forming.rigid {
+        let cells = part.cells.as_flattened();
+        host.define_mesh(&part.name, &part.points, 4, cells, &about)?;
+    }
+    Ok(())
+}
+
 fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
     host.progress(&Progress {
         phase: "building the model",
@@ -173,16 +186,8 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         None => crate::build_global(p, &components)?,
         Some(input) => crate::build_local(p, read_boundary(host, input)?, &components)?,
     };
-    let augmentation = forming.model.contact_augmentation();
-    if augmentation > 0.0 && augmentation < p.contact_augmentation {
-        host.log(
-            Log::Info,
-            &format!(
-                "contact_augmentation is {augmentation:.2e} instead of {:.2e}: some sheets have far more mass in a node than those \
-                 they touch, and would tremble",
-                p.contact_augmentation
-            ),
-        );
+    if let Some(what) = crate::assembly::slower_multipliers(&forming.model, p) {
+        host.log(Log::Info, &what);
     }
     if let Some(input) = feedback.first() {
         let (time, sheets) = read_motion(host, input)?;
@@ -207,24 +212,7 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         fields.push(list);
         define(host, &forming, body)?;
     }
-    let tool_cells: Vec<u32> = forming.tool.triangles.iter().flatten().copied().collect();
-    host.define_mesh(
-        "tool",
-        &forming.tool.points,
-        3,
-        &tool_cells,
-        &json!({"rigid": true}),
-    )?;
-    for part in &forming.rigid {
-        let about = json!({"rigid": true});
-        host.define_mesh(
-            &part.name,
-            &part.points,
-            4,
-            part.cells.as_flattened(),
-            &about,
-        )?;
-    }
+    define_rigid(host, &forming)?;
     let started = Instant::now();
     let mut writer = Writer {
         host,

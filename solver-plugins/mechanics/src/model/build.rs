@@ -467,14 +467,6 @@ impl Model {
         self.set_contact_room();
     }
 
-    /// Largest share of the penalty force that contacts hand to their multipliers in a step, once
-    /// [`Model::set_contact_stiffness`] has set it.
-    pub fn contact_augmentation(&self) -> f64 {
-        let rigid = self.rigid_contacts.iter().map(|c| c.augmentation);
-        let sheets = self.sheet_contacts.iter().map(|c| c.augmentation);
-        rigid.chain(sheets).fold(0.0, f64::max)
-    }
-
     /// The least share that the heaviest node of the lighter one of two sheets in contact has of the other's.
     fn mass_ratio(&self) -> f64 {
         let heaviest = |nodes: &mut dyn Iterator<Item = u32>| {

@@ -4,6 +4,14 @@ use super::*;
 use crate::energy::SheetEnergy;
 
 impl Model {
+    /// Largest share of the penalty force that contacts hand to their multipliers in a step, once
+    /// [`Model::set_contact_stiffness`] has set it.
+    pub fn contact_augmentation(&self) -> f64 {
+        let rigid = self.rigid_contacts.iter().map(|c| c.augmentation);
+        let sheets = self.sheet_contacts.iter().map(|c| c.augmentation);
+        rigid.chain(sheets).fold(0.0, f64::max)
+    }
+
     /// The ledger at the present step.
     pub fn energies(&self) -> Ledger {
         let mut l = self.ledger;
