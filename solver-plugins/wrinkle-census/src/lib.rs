@@ -78,7 +78,7 @@ impl Step for WrinkleCensus {
         let around = |radius: f64| -> Vec<Option<Hit>> {
             let place = |i: usize| {
                 let (s, c) = (TAU * i as f64 / p.samples as f64).sin_cos();
-                cut.top([x + radius * c, y + radius * s])
+                cut.seen([x + radius * c, y + radius * s], p.looks_up())
             };
             (0..p.samples).map(place).collect()
         };
@@ -217,7 +217,8 @@ fn sections(
     // Along the direction (c, s) through the place `from`, `half` to both sides.
     let line = |from: [f64; 2], [c, s]: [f64; 2], half: f64| -> (Vec<f64>, Vec<f64>) {
         let place = |i: usize| half * (2.0 * i as f64 / (p.samples - 1) as f64 - 1.0);
-        let height = |d: f64| Some((d, cut.top([from[0] + d * c, from[1] + d * s])?.height));
+        let seen = |d: f64| cut.seen([from[0] + d * c, from[1] + d * s], p.looks_up());
+        let height = |d: f64| Some((d, seen(d)?.height));
         (0..p.samples).map(place).filter_map(height).unzip()
     };
     let [x, y] = [p.centre[0], p.centre[1]];

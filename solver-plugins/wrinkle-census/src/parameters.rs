@@ -56,6 +56,11 @@ impl Parameters {
         Ok(())
     }
 
+    /// Whether the ply is looked at from below: from the side to which its wrinkles leave, so that one that lies over shows.
+    pub fn looks_up(&self) -> bool {
+        self.side == Side::Down
+    }
+
     /// What is a wrinkle.
     pub fn criteria(&self) -> Criteria {
         Criteria {

@@ -66,8 +66,9 @@ impl<'a> Cut<'a> {
         (((x - self.low[c]) / self.size).max(0.0) as usize).min(self.count[c] - 1)
     }
 
-    /// The highest place of the ply over `(x, y)` (m); `None` beside the ply.
-    pub fn top(&self, at: [f64; 2]) -> Option<Hit> {
+    /// The place of the ply at `(x, y)` (m) that is seen from above, or `from_below`: of several layers the highest or the lowest.
+    /// `None` beside the ply.
+    pub fn seen(&self, at: [f64; 2], from_below: bool) -> Option<Hit> {
         let beyond = |c: usize| {
             let along = (at[c] - self.low[c]) / self.size;
             along < 0.0 || along > self.count[c] as f64
@@ -82,7 +83,7 @@ impl<'a> Cut<'a> {
             for corners in [[0, 1, 2], [0, 2, 3]] {
                 let triangle = corners.map(|k| self.points[nodes[k] as usize]);
                 if let Some(height) = height(triangle, at)
-                    && best.is_none_or(|b| height > b.height)
+                    && best.is_none_or(|b| (height > b.height) != from_below)
                 {
                     let shear = self.shear[*cell as usize];
                     best = Some(Hit { height, shear });
@@ -119,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_upper_of_two_layers_is_met_and_nothing_beside_them() {
+    fn of_two_layers_the_one_that_is_seen_is_met_and_nothing_beside_them() {
         // A strip that is folded over: 0..2 at z = 0, back to x = 1 at z = 1.
         let points: Vec<Vec3> = [0.0, 1.0, 2.0]
             .iter()
@@ -132,9 +133,16 @@ mod tests {
             .collect();
         let shear = [0.1, 0.2, 0.3, 0.4];
         let cut = Cut::new(&points, &cells, &shear);
-        let at = |x: f64| cut.top([x, 0.4]);
-        assert_eq!(at(0.5).map(|h| (h.height, h.shear)), Some((0.0, 0.1)));
-        assert_eq!(at(1.5).map(|h| (h.height, h.shear)), Some((1.0, 0.4)));
-        assert_eq!((at(-0.1), at(2.1), cut.top([0.5, 1.2])), (None, None, None));
+        let seen = |x: f64, from_below| {
+            let hit = cut.seen([x, 0.4], from_below);
+            hit.map(|h| (h.height, h.shear))
+        };
+        for from_below in [false, true] {
+            assert_eq!(seen(0.5, from_below), Some((0.0, 0.1)));
+            let beside = [[-0.1, 0.4], [2.1, 0.4], [0.5, 1.2]];
+            assert_eq!(beside.map(|at| cut.seen(at, from_below)), [None; 3]);
+        }
+        assert_eq!(seen(1.5, false), Some((1.0, 0.4)));
+        assert_eq!(seen(1.5, true), Some((0.0, 0.2)));
     }
 }

@@ -161,6 +161,44 @@ fn wrinkles_on_the_diagonals_are_counted_by_quadrant_and_shear() {
 }
 
 #[test]
+fn a_wrinkle_that_lies_over_is_seen_from_its_own_side_alone() {
+    let mut input = formed(|_, _| 0.0);
+    // Across y: down 3 mm, 18 mm under the sheet to its right, up 1.5 mm, back, and up again. All corners are nodes.
+    let way = |s: f64| -> [f64; 2] {
+        let s = s - 9e-3;
+        let corners = [
+            [0.0, 0.0, 0.0],
+            [3e-3, 0.0, -3e-3],
+            [21e-3, 18e-3, -3e-3],
+            [24e-3, 18e-3, -1.5e-3],
+            [42e-3, 0.0, -1.5e-3],
+            [45e-3, 0.0, 0.0],
+        ];
+        if s <= 0.0 || s >= 45e-3 {
+            return [s.min(0.0) + (s - 45e-3).max(0.0), 0.0];
+        }
+        let k = corners.iter().take_while(|c| c[0] <= s).count() - 1;
+        let (a, b) = (corners[k], corners[k + 1]);
+        let part = (s - a[0]) / (b[0] - a[0]);
+        [1, 2].map(|c| a[c] + part * (b[c] - a[c]))
+    };
+    for p in &mut input.bodies[0].frames[0] {
+        let [y, z] = way(p[1] + 18e-3);
+        *p = [p[0], y - 9e-3, z];
+    }
+    let from = |side: &str| {
+        let mut with = parameters(json!([0.08]));
+        with["side"] = json!(side);
+        census(&input, with).unwrap()
+    };
+    assert_eq!(from("up").result("wrinkles"), 0.0);
+    let below = from("down");
+    assert_eq!(below.result("wrinkles"), 2.0);
+    assert!((below.result("height_largest") - 3e-3).abs() < 1e-6);
+    assert!((below.result("width_positive_shear") - 18e-3).abs() < 1e-3);
+}
+
+#[test]
 fn a_section_across_shows_the_wrinkle_that_it_cuts() {
     let mut with = parameters(json!([0.09]));
     with["cross_sections"] = json!([{"label": "A-A'", "angle": FRAC_PI_4, "offset": 0.09}, {"label": "B-B'", "angle": FRAC_PI_2, "offset": 0.09}]);
