@@ -6,7 +6,7 @@ mod grid;
 mod late;
 mod pull;
 
-pub use cut::{CoarseSheet, Placed};
+pub use cut::Placed;
 pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
 
 use pull::{FORCES, Pull};

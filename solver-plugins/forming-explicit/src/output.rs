@@ -481,12 +481,14 @@ fn write_summary(
     let penetrations = forming.penetrations();
     let mut warnings = mesh_warnings(forming);
     warnings.extend(outcome.warnings.iter().cloned());
+    warnings.extend(penetrations.iter().filter_map(Penetration::too_deep));
     let elements = m.element_count();
     let element_cycles = elements as f64 * outcome.cycles as f64;
     let penetration: serde_json::Map<String, serde_json::Value> = penetrations
         .iter()
         .map(|p| {
-            let of = json!({"max": p.largest, "q999": p.q999, "overlap": p.overlap()});
+            let of =
+                json!({"max": p.largest, "q999": p.q999, "overlap": p.overlap(), "place": p.place});
             (p.pair.clone(), of)
         })
         .collect();

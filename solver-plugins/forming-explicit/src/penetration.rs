@@ -2,6 +2,11 @@
 
 use crate::assembly::StackSheet;
 use crate::run::Forming;
+use plyflow_mechanics::contact::{RigidItem, SlaveItem};
+use plyflow_mechanics::vec3::V;
+
+/// Share of the thinner body beyond which what bodies share is told.
+const OVERLAP_BOUND: f64 = 0.1;
 
 /// A sheet that others keep away from a rigid part is held by the part itself once those are squeezed by this share of their
 /// thickness. Held at their full thickness it would share their load with them, in shares that no physics gives, and past the
@@ -20,6 +25,8 @@ pub struct Penetration {
     pub pair: String,
     /// Largest of its nodes in touch (m).
     pub largest: f64,
+    /// Where that node is (m); `None` when none touches.
+    pub place: Option<V>,
     /// 99.9 % quantile of them (m).
     pub q999: f64,
     /// By how much two sheets are kept further apart than they are thick (m).
@@ -29,14 +36,16 @@ pub struct Penetration {
 }
 
 impl Penetration {
-    fn new(pair: &str, mut depths: Vec<f64>, spare: f64, thinner: f64) -> Self {
-        depths.sort_by(f64::total_cmp);
+    /// `depths`: of the nodes in touch, how deep (m) and where (m).
+    fn new(pair: &str, mut depths: Vec<(f64, V)>, spare: f64, thinner: f64) -> Self {
+        depths.sort_by(|a, b| a.0.total_cmp(&b.0));
         let last = depths.len().saturating_sub(1);
         let at = (0.999 * depths.len() as f64) as usize;
-        let depth = |i: usize| depths.get(i).copied().unwrap_or(0.0);
+        let depth = |i: usize| depths.get(i).map_or(0.0, |d| d.0);
         Self {
             pair: pair.to_owned(),
             largest: depth(last),
+            place: depths.last().map(|d| d.1),
             q999: depth(at.min(last)),
             spare,
             thinner,
@@ -47,6 +56,24 @@ impl Penetration {
     /// by which a pair is kept further apart than it is thick.
     pub fn overlap(&self) -> f64 {
         ((self.q999 - self.spare) / self.thinner).max(0.0)
+    }
+
+    /// What to tell of bodies that share more than a tenth of the thinner one.
+    pub fn too_deep(&self) -> Option<String> {
+        let overlap = self.overlap();
+        (overlap > OVERLAP_BOUND).then(|| {
+            let place = self.place.map_or_else(String::new, |p| {
+                let [x, y, z] = p.map(|c| 1e3 * c);
+                format!(", deepest at ({x:.1}, {y:.1}, {z:.1}) mm")
+            });
+            format!(
+                "'{}' reach into each other by {:.0} % of the thinner one (99.9 % quantile, bound {:.0} %{place}): refine the mesh there, \
+                 settle for longer, or take a smaller time step",
+                self.pair,
+                100.0 * overlap,
+                100.0 * OVERLAP_BOUND
+            )
+        })
     }
 }
 
@@ -62,18 +89,20 @@ impl Forming {
                 .map(|s| s.thickness)
                 .collect()
         };
-        let judge = |pair: &str, spare: f64, depths: Vec<f64>| {
+        let judge = |pair: &str, spare: f64, depths: Vec<(f64, V)>| {
             let thinner = thickness(pair).into_iter().fold(f64::INFINITY, f64::min);
             Penetration::new(pair, depths, spare, thinner)
         };
-        let between = |pair: &str, offset: f64, depths: Vec<f64>| {
+        let between = |pair: &str, offset: f64, depths: Vec<(f64, V)>| {
             let spare = offset - 0.5 * thickness(pair).iter().sum::<f64>();
             judge(pair, spare, depths)
         };
+        let at = |node: u32| m.x[node as usize];
+        let deep = |i: &SlaveItem| (i.penetration, at(i.node));
         let rigid = m.rigid_contacts.iter().map(|c| {
-            let depths = c.items.iter().map(|i| f64::from(i.penetration));
-            let touching = depths.filter(|p| *p > 0.0);
-            let touching = touching.map(|p| p + c.slack).collect();
+            let touching = c.items.iter().filter(|i| i.penetration > 0.0);
+            let depth = |i: &RigidItem| (f64::from(i.penetration) + c.slack, at(i.node));
+            let touching = touching.map(depth).collect();
             if c.slack > 0.0 {
                 // What lies between is squeezed, not the sheet itself.
                 Penetration::new(&c.name, touching, 0.0, c.slack / SHARE_SQUEEZED)
@@ -83,11 +112,11 @@ impl Forming {
         });
         let sheets = m.sheet_contacts.iter().map(|c| {
             let touching = c.items.iter().filter(|i| i.active);
-            between(&c.name, c.offset, touching.map(|i| i.penetration).collect())
+            between(&c.name, c.offset, touching.map(deep).collect())
         });
         let selves = m.self_contacts.iter().map(|c| {
             let touching = c.items.iter().map(|i| &i.slave).filter(|i| i.active);
-            judge(&c.name, 0.0, touching.map(|i| i.penetration).collect())
+            judge(&c.name, 0.0, touching.map(deep).collect())
         });
         rigid.chain(sheets).chain(selves).collect()
     }
@@ -99,12 +128,20 @@ mod tests {
 
     #[test]
     fn what_is_kept_further_apart_than_it_is_thick_overlaps_later() {
-        let depths: Vec<f64> = (0..2000).map(|i| f64::from(i) / 1e8).collect();
+        let depths: Vec<(f64, V)> = (0..2000)
+            .map(|i| (f64::from(i) / 1e8, [0.0, 0.0, f64::from(i)]))
+            .collect();
         let close = Penetration::new("film/ply", depths.clone(), 0.0, 8e-5);
         assert_eq!((close.largest, close.q999), (1.999e-5, 1.998e-5));
         assert!((close.overlap() - 0.24975).abs() < 1e-12);
+        assert_eq!(close.place, Some([0.0, 0.0, 1999.0]));
+        let told = close.too_deep().unwrap();
+        assert!(
+            told.contains("'film/ply'") && told.contains("25 %"),
+            "{told}"
+        );
         let apart = Penetration::new("film/film", depths, 2.2e-4, 8e-5);
-        assert_eq!(apart.overlap(), 0.0);
+        assert_eq!((apart.overlap(), apart.too_deep()), (0.0, None));
         assert_eq!(
             Penetration::new("ply/ply", Vec::new(), 0.0, 1e-4).overlap(),
             0.0

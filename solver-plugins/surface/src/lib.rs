@@ -1,5 +1,5 @@
 //! Geometry of meshed surfaces that several steps share: exact closest point and signed distance,
-//! curvature, distributions, ridge lines, location in an undeformed quad mesh. All lengths in m. Everything is
+//! curvature, distributions, ridge lines, location in an undeformed quad mesh, smooth surfaces through nodes. All lengths in m. Everything is
 //! deterministic: ties go to the lowest index.
 
 mod closest;
@@ -9,6 +9,7 @@ mod distribution;
 mod locate;
 mod ridge;
 mod section;
+mod smooth;
 mod topology;
 mod traction;
 pub mod vector;
@@ -20,6 +21,7 @@ pub use distribution::{bin_width, density, weighted_mean, weighted_quantiles};
 pub use locate::{Location, QuadLocator, flat_bounds};
 pub use ridge::{Ridge, ridge_line};
 pub use section::{line_length, plane_section};
+pub use smooth::{SmoothSheet, StandOff};
 pub use topology::{Topology, triangles};
 pub use traction::traction;
 

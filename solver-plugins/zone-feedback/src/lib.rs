@@ -6,8 +6,8 @@
 
 use plyflow_mechanics::history::{hermite, locate, spline_slopes};
 use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
-use plyflow_surface::vector::{Vec3, distance};
-use plyflow_surface::{Location, QuadLocator};
+use plyflow_surface::vector::{Vec3, add, distance, scale, sub};
+use plyflow_surface::{Location, QuadLocator, SmoothSheet, StandOff, Topology, flat_bounds};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -25,6 +25,8 @@ struct Parameters {
 const OVERLAP: f64 = 2.0;
 /// Places nearer than this are the same (m).
 const SAME_PLACE: f64 = 1e-6;
+/// Share of the coarse run's time in which nodes go over from its motion to that of a zone that begins late.
+const LEADING_OVER: f64 = 0.05;
 
 /// A zone as its fine run tells it.
 #[derive(Deserialize)]
@@ -101,13 +103,6 @@ impl Step for ZoneFeedback {
             return Err(format!("'{step}' has {n} frames; a motion needs at least 2").into());
         }
         let fine = fine_runs(host)?;
-        if let Some(late) = fine.iter().find(|f| f.meshes.times[0] > meshes.times[0]) {
-            let (step, begin) = (&late.input.step, late.meshes.times[0]);
-            return Err(format!(
-                "`local`: '{step}' begins at {begin} s; what is fed back must be known from the beginning of the coarse run on. Leave out `start_time` and `start_bend` of its boundary"
-            )
-            .into());
-        }
         host.write_f64("time", &[meshes.times.len()], "s", &meshes.times)?;
         let mut change = Vec::new();
         for sheet in coarse.sheets.iter().filter(|s| s.kind == "ply") {
@@ -178,6 +173,9 @@ fn fine_runs(host: &Host) -> Result<Vec<Fine>, StepError> {
 }
 
 /// Motion of the nodes of a coarse ply that lie deep in a zone, at the coarse frames.
+///
+/// They lie off the fine run's surface by as much as coarse elements must that are as long as the material ([`StandOff`]). Until a zone begins
+/// they go as they did in the coarse run.
 fn drive(
     host: &Host,
     formed: &Input,
@@ -187,46 +185,104 @@ fn drive(
     overlap: f64,
 ) -> Result<Driven, StepError> {
     let body = meshes.body(ply)?;
-    let (points, _) = host.mesh(formed, body)?;
-    let last = host.frame_points(formed, body, meshes.times.len() - 1)?;
+    let (points, cells) = host.mesh(formed, body)?;
+    let topology = Topology::new(points.len(), 4, &cells);
+    let frames = 0..meshes.times.len();
+    let own: Vec<Vec<Vec3>> = frames
+        .map(|f| host.frame_points(formed, body, f))
+        .collect::<Result<_, _>>()?;
     let mut taken = vec![false; points.len()];
     let mut driven = Driven::default();
     for run in fine {
         host.check_cancelled()?;
         // A ply need not reach into every zone.
-        let Ok(own) = run.meshes.body(ply) else {
+        let Some(found) = on_fine(host, &points, &meshes.times, ply, run)? else {
             continue;
         };
-        let (flat, cells) = host.mesh(&run.input, own)?;
-        let Some(locator) = QuadLocator::new(&flat, &cells) else {
-            continue;
+        let stand_off = StandOff::new(&points, &topology, found.cell_area);
+        let deep = |(i, _): &(u32, Vec<Vec3>)| {
+            !taken[*i as usize] && run.zone.holds(points[*i as usize], overlap)
         };
-        let mut places: Vec<(u32, Location)> = Vec::new();
-        for (i, at) in points.iter().enumerate() {
-            if taken[i] || !run.zone.holds(*at, overlap) {
-                continue;
+        let mut ways: Vec<(u32, Vec<Vec3>)> =
+            found.ways.iter().filter(|w| deep(w)).cloned().collect();
+        let begins = run.meshes.times[0];
+        let leading = LEADING_OVER * (meshes.times[meshes.times.len() - 1] - meshes.times[0]);
+        for (f, &time) in meshes.times.iter().enumerate() {
+            let share = if begins > meshes.times[0] {
+                let s = ((time - begins) / leading).clamp(0.0, 1.0);
+                s * s * (3.0 - 2.0 * s)
+            } else {
+                1.0
+            };
+            let mut now = own[f].clone();
+            for (i, way) in &found.ways {
+                now[*i as usize] = way[f];
             }
-            if let Some(place) = locator.locate(at[0], at[1], SAME_PLACE) {
-                taken[i] = true;
-                places.push((i as u32, place));
+            let off = stand_off.to_other(&SmoothSheet::new(now, &cells));
+            for (i, way) in &mut ways {
+                let (before, fine) = (own[f][*i as usize], sub(way[f], off[*i as usize]));
+                way[f] = add(before, scale(sub(fine, before), share));
             }
         }
-        let mut values = Vec::new();
-        for frame in 0..run.meshes.times.len() {
-            let now = host.frame_points(&run.input, own, frame)?;
-            values.extend(places.iter().flat_map(|(_, at)| at.interpolate(&now)));
-        }
-        let motion = resampled(&run.meshes.times, &values, &meshes.times, 3 * places.len());
-        for (k, (i, _)) in places.iter().enumerate() {
-            let at = |f: usize| [0, 1, 2].map(|d| motion[(f * places.len() + k) * 3 + d]);
-            let way: Vec<Vec3> = (0..meshes.times.len()).map(at).collect();
-            let end = way[way.len() - 1];
-            driven.change.push(distance(end, last[*i as usize]));
-            driven.nodes.push((*i, way));
+        for (i, way) in ways {
+            taken[i as usize] = true;
+            let last = meshes.times.len() - 1;
+            driven
+                .change
+                .push(distance(way[last], own[last][i as usize]));
+            driven.nodes.push((i, way));
         }
     }
     driven.nodes.sort_by_key(|(i, _)| *i);
     Ok(driven)
+}
+
+/// Where coarse nodes lie on a ply of a fine run.
+struct OnFine {
+    /// Nodes of the coarse ply in the zone, with their places on the fine ply's smooth surface by coarse frame (`[f]`, m); before the fine run
+    /// begins where it begins.
+    ways: Vec<(u32, Vec<Vec3>)>,
+    /// Of the fine mesh, in the mean (m2).
+    cell_area: f64,
+}
+
+/// Coarse nodes at `points` (`[n]` m, flat) on a fine run's `ply`, at `times` (s); `None` without that ply.
+fn on_fine(
+    host: &Host,
+    points: &[Vec3],
+    times: &[f64],
+    ply: &str,
+    run: &Fine,
+) -> Result<Option<OnFine>, StepError> {
+    let Ok(body) = run.meshes.body(ply) else {
+        return Ok(None);
+    };
+    let (flat, cells) = host.mesh(&run.input, body)?;
+    let Some(locator) = QuadLocator::new(&flat, &cells) else {
+        return Ok(None);
+    };
+    let within = |(i, at): (usize, &Vec3)| {
+        let inside = run.zone.holds(*at, 0.0);
+        let place = inside.then(|| locator.locate(at[0], at[1], SAME_PLACE))?;
+        Some((i as u32, place?))
+    };
+    let places: Vec<(u32, Location)> = points.iter().enumerate().filter_map(within).collect();
+    let mut values = Vec::new();
+    for frame in 0..run.meshes.times.len() {
+        let now = host.frame_points(&run.input, body, frame)?;
+        let sheet = SmoothSheet::new(now, &cells);
+        values.extend(places.iter().flat_map(|(_, at)| sheet.at(at)));
+    }
+    let motion = resampled(&run.meshes.times, &values, times, 3 * places.len());
+    let way = |(k, (i, _)): (usize, &(u32, Location))| {
+        let at = |f: usize| [0, 1, 2].map(|d| motion[(f * places.len() + k) * 3 + d]);
+        (*i, (0..times.len()).map(at).collect())
+    };
+    let [x0, y0, x1, y1] = flat_bounds(flat.iter().map(|p| [p[0], p[1]]));
+    Ok(Some(OnFine {
+        ways: places.iter().enumerate().map(way).collect(),
+        cell_area: (x1 - x0) * (y1 - y0) / (cells.len() / 4) as f64,
+    }))
 }
 
 /// Values (`[f][columns]`) known at `times` by their C2 spline at other times; beyond the ends those of the ends.
