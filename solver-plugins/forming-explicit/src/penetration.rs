@@ -67,8 +67,8 @@ impl Penetration {
                 format!(", deepest at ({x:.1}, {y:.1}, {z:.1}) mm")
             });
             format!(
-                "'{}' reach into each other by {:.0} % of the thinner one (99.9 % quantile, bound {:.0} %{place}): refine the mesh there, \
-                 settle for longer, or take a smaller time step",
+                "'{}' reach into each other by {:.0} % of the thinner one (99.9 % quantile, bound {:.0} %{place}): refine the mesh there, or \
+                 take a smaller time step, with which contacts are stiffer",
                 self.pair,
                 100.0 * overlap,
                 100.0 * OVERLAP_BOUND

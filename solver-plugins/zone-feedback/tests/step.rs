@@ -102,15 +102,19 @@ fn coarse_nodes_deep_in_a_zone_follow_the_fine_run_at_the_coarse_frames() {
 }
 
 #[test]
-fn until_a_zone_begins_nodes_go_as_in_the_coarse_run() {
-    // Coarse frames at 0.26 and 0.5 s: none lies in the 5 % of the time in which nodes are led over.
-    let late_times: Vec<f64> = (0..=28).map(|k| 0.3 + 0.025 * f64::from(k)).collect();
+fn nodes_go_as_in_the_coarse_run_until_a_zone_begins_and_then_over_to_its_motion() {
+    // Led over in 5 % of the time, 0.475 to 0.525 s: the coarse frame at 0.5 s lies half way.
+    let late_times: Vec<f64> = (0..=42).map(|k| 0.475 + 0.0125 * f64::from(k)).collect();
     let (coarse, late) = (coarse(), fine_at(0.003, &late_times));
     let out = feed_back(json!({}), &coarse, &[&late]).unwrap();
     let (shape, nodes) = &out.arrays["ply_1/driven_nodes"];
     let (_, position) = &out.arrays["ply_1/position"];
     for (f, &t) in COARSE_TIMES.iter().enumerate() {
-        let draw_in = if t < 0.3 { 0.0 } else { 0.003 };
+        let draw_in = match t {
+            0.5 => 0.0015,
+            t if t < 0.475 => 0.0,
+            _ => 0.003,
+        };
         for (i, &node) in nodes.iter().enumerate() {
             let expected = motion(coarse.bodies[0].points[node as usize], t, draw_in);
             for (d, expected) in expected.into_iter().enumerate() {
