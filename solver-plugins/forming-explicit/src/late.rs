@@ -107,7 +107,11 @@ pub(crate) fn begin(forming: &mut Forming, step: f64, safety: f64) -> Result<Opt
     }
     clear_tool(forming);
     let placed = forming.model.x.clone();
+    // Fine sheets are longer than coarse edges between the same places: where held nodes are in balance with the coarse run's forces is
+    // their place, and from there they are held.
+    forming.model.loosen();
     settle(forming, step, safety)?;
+    forming.model.anchor();
     // Nodes that were driven meanwhile have their velocity from the next step on.
     forming.model.v.copy_from_slice(&start.velocity);
     Ok(Some(shift(forming, &placed)))

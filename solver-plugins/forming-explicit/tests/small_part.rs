@@ -452,27 +452,34 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
             "ply {body}: {fresh} m, {of_the_whole} m"
         );
     }
-    // Held without a pull, the cut gives way by what the zone pulls with over the stiffness.
-    let (held, ..) = zone(first, true, None);
+    // Held without a pull, the cut goes to where the zone does not pull either, and from there gives way by what it pulls with over
+    // the stiffness.
+    let (held, _, parts, at_rest) = zone(first, true, Some(0.0));
     let drift = 1.0;
-    let (_, _, parts, begun) = zone(first, true, Some(drift));
-    let (mut largest, mut gone) = (0.0f64, 0.0f64);
+    let (.., begun) = zone(first, true, Some(drift));
+    let (whole_run, ..) = zone(first, true, None);
+    let (mut largest, mut gone, mut loose) = (0.0f64, 0.0f64, 0.0f64);
     for body in 1..3 {
-        // While the start settles the cut stands still, however fast it moves from then on.
         let sheet = &parts[body].0;
         for (k, at) in sheet.driven.iter().zip(&sheet.position[0]) {
-            gone = gone.max(norm(sub(begun[body][*k as usize], *at)));
+            let k = *k as usize;
+            // While the start settles the cut does not go with its drive, however fast it moves from then on.
+            gone = gone.max(norm(sub(begun[body][k], at_rest[body][k])));
+            loose = loose.max(norm(sub(at_rest[body][k], *at)));
         }
-        let [a, b] = [&late, &held].map(|f| f.points(&f.bodies[body]));
-        for k in &parts[body].0.driven {
+        let [a, b] = [&late, &whole_run].map(|f| f.points(&f.bodies[body]));
+        for k in &sheet.driven {
             let way = sub(b[*k as usize], a[*k as usize]);
             assert!(way[2].abs() < 1e-9, "ply {body}: {way:?}");
             largest = largest.max(norm(way));
         }
     }
-    println!("held nodes went {gone} m before the start, {largest} m by the end");
+    println!(
+        "held nodes went {loose} m to their balance, {gone} m with the drive before the start, and are {largest} m off at the end"
+    );
     // The first frame is seen after a step.
     let way = drift * held.model.dt;
     assert!(gone < 2.0 * way, "{gone} m");
-    assert!(largest > 1e-6 && largest < 2e-4, "{largest} m");
+    assert!(loose > 1e-5 && loose < 2e-4, "{loose} m");
+    assert!(largest > 1e-5 && largest < 2e-4, "{largest} m");
 }

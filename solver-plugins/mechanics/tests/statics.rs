@@ -3,6 +3,8 @@
 mod common;
 
 use plyflow_mechanics::MechanicsError;
+use plyflow_mechanics::archive::Archive;
+use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Hold, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::relax::{Tolerance, relax};
@@ -144,11 +146,28 @@ struct Surroundings {
     pull: Vec<f64>,
     /// (N/m).
     stiffness: Vec<f64>,
+    /// Goes this far along x (m), from this time on and for so long (s).
+    goes: (f64, [f64; 2]),
+}
+
+impl Surroundings {
+    /// What pulls at the `end` of a strip with 20 N, and holds it with `stiffness` (N/m), over its width.
+    fn of(model: &Model, end: &[u32], stiffness: f64, goes: (f64, [f64; 2])) -> Self {
+        let share = |j: usize| if j == 1 { 0.5 } else { 0.25 };
+        Self {
+            at: end.iter().map(|n| model.x[*n as usize]).collect(),
+            pull: (0..end.len()).map(|j| 20.0 * share(j)).collect(),
+            stiffness: (0..end.len()).map(|j| stiffness * share(j)).collect(),
+            goes,
+        }
+    }
 }
 
 impl Drive for Surroundings {
-    fn position(&self, k: usize, _t: f64) -> V {
-        self.at[k]
+    fn position(&self, k: usize, t: f64) -> V {
+        let (way, [from, duration]) = self.goes;
+        let [x, y, z] = self.at[k];
+        [x + way * smooth_step(t, from, duration), y, z]
     }
 
     fn hold(&self, k: usize, _t: f64) -> Option<Hold> {
@@ -164,21 +183,14 @@ impl Drive for Surroundings {
 fn a_held_node_goes_along_its_sheet_to_where_its_surroundings_and_the_model_balance() {
     for stiffness in [0.0, 4e4, 1e12] {
         let (mut model, end) = damped_strip(500.0);
-        let share = |j: usize| if j == 1 { 0.5 } else { 0.25 };
-        let total = 20.0;
-        let at = end.iter().map(|n| model.x[*n as usize]).collect();
-        let held = Surroundings {
-            at,
-            pull: (0..end.len()).map(|j| total * share(j)).collect(),
-            stiffness: (0..end.len()).map(|j| stiffness * share(j)).collect(),
-        };
+        let held = Surroundings::of(&model, &end, stiffness, (0.0, [0.0, 1.0]));
         model.drive_also(end.clone(), Box::new(held));
         model.dt = 0.8 * model.critical_step().unwrap();
         for _ in 0..20_000 {
             model.step(false).unwrap();
         }
         // Of the strip: k w / l = 2.5e4 N/m.
-        let expected = total / (1e5 * 0.1 / 0.4 + stiffness);
+        let expected = 20.0 / (1e5 * 0.1 / 0.4 + stiffness);
         for n in end {
             let [x, _, z] = model.x[n as usize];
             let u = x - 0.4;
@@ -189,4 +201,44 @@ fn a_held_node_goes_along_its_sheet_to_where_its_surroundings_and_the_model_bala
             assert_eq!(z, 0.0, "not out of its sheet");
         }
     }
+}
+
+#[test]
+fn a_node_that_was_anchored_is_held_from_where_its_surroundings_and_the_model_were_in_balance() {
+    let (strip, stiffness, goes) = (1e5 * 0.1 / 0.4, 4e4, 3e-4);
+    let (mut model, end) = damped_strip(500.0);
+    model.dt = 0.8 * model.critical_step().unwrap();
+    let settling = 20_000.0 * model.dt;
+    let when = [2.0 * settling, 0.2 * settling];
+    let held = Surroundings::of(&model, &end, stiffness, (goes, when));
+    model.drive_also(end.clone(), Box::new(held));
+    let ends = |model: &mut Model, what: &str, expected: f64| {
+        for _ in 0..20_000 {
+            model.step(false).unwrap();
+        }
+        for n in &end {
+            let u = model.x[*n as usize][0] - 0.4;
+            assert!((u / expected - 1.0).abs() < 2e-3, "{what}: {u} {expected}");
+        }
+    };
+    // Loose, only the pull counts; anchored there, the stiffness changes nothing until the drive goes on.
+    model.loosen();
+    let pulled = 20.0 / strip;
+    ends(&mut model, "loose", pulled);
+    model.anchor();
+    ends(&mut model, "anchored", pulled);
+    // Then strip and surroundings share what it goes.
+    let gone = pulled + stiffness * goes / (strip + stiffness);
+    ends(&mut model, "gone on", gone);
+    // Another model takes all that up.
+    let mut bytes = Vec::new();
+    model.archive(&mut Archive::Save(&mut bytes)).unwrap();
+    let (mut other, end) = damped_strip(500.0);
+    let held = Surroundings::of(&other, &end, stiffness, (goes, when));
+    other.drive_also(end.clone(), Box::new(held));
+    other.archive(&mut Archive::Load(&bytes)).unwrap();
+    for m in [&mut model, &mut other] {
+        (0..100).for_each(|_| m.step(false).unwrap());
+    }
+    assert_eq!(other.x, model.x);
 }

@@ -48,16 +48,6 @@ const GROUP: usize = 24;
 /// Chunks that a thread takes at most without leaving some to the others.
 const TOGETHER: usize = 8;
 
-/// Share of the way that a free node would go in a step from rest which a held one goes: it creeps to its balance and does not swing.
-const EASE: f64 = 0.05;
-
-impl Hold {
-    /// Part of a vector along the plane.
-    fn in_plane(&self, a: V) -> V {
-        sub(a, scale(self.normal, dot(a, self.normal)))
-    }
-}
-
 impl Model {
     /// Velocities and positions of the next step; works of the step.
     pub(super) fn advance(&mut self) {
@@ -160,11 +150,9 @@ impl Model {
             let mut target = drive.position(k, self.time + dt);
             if let Some(hold) = drive.hold(k, self.time) {
                 let way = hold.in_plane(sub(*x, drive.position(k, self.time)));
-                let rest = sub(add(self.force[n], hold.pull), scale(way, hold.stiffness));
-                let ease = EASE * dt * dt / self.mass[n];
-                // However stiff the surroundings are, they are not overshot.
-                let ease = ease / (1.0 + ease * hold.stiffness);
-                target = add(target, add(way, scale(hold.in_plane(rest), ease)));
+                let creep =
+                    hold.creep(&self.anchors, k, way, self.force[n], dt * dt / self.mass[n]);
+                target = add(target, add(way, creep));
             }
             let next = scale(sub(target, *x), 1.0 / dt);
             // What holds the node makes up for the forces on it: its work is external.

@@ -26,6 +26,7 @@ impl Model {
         a.value(&mut self.body_acceleration)?;
         a.value(&mut self.max_speed)?;
         a.value(&mut self.max_acceleration)?;
+        a.value(&mut self.anchors)?;
         a.value(&mut self.ledger)?;
         a.value(&mut self.interfaces)?;
         for batch in self.blocks.iter_mut().flat_map(|b| &mut b.batches) {

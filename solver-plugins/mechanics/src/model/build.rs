@@ -69,6 +69,7 @@ impl Model {
             kick: 1.0,
             held: vec![Held::Free; n],
             driven: Vec::new(),
+            anchors: Anchors::default(),
             drive: None,
             max_speed: 0.0,
             max_acceleration: 0.0,
@@ -401,6 +402,7 @@ impl Model {
         self.supports.reaction_moment = vec![[0.0; 3]; nodes.len()];
         self.driven = nodes;
         self.drive = Some(drive);
+        self.anchors = Anchors::default();
         self.set_free_masses();
     }
 

@@ -6,6 +6,7 @@ mod batch;
 mod blocks;
 mod build;
 mod drive;
+mod hold;
 mod mirror;
 mod query;
 mod rotation;
@@ -15,6 +16,8 @@ mod transpose;
 use batch::*;
 pub(crate) use blocks::compact_order;
 use blocks::*;
+use hold::Anchors;
+pub use hold::Hold;
 use mirror::Mirroring;
 use rotation::Rotations;
 pub use support::{Fixed, NodalLoad};
@@ -55,17 +58,6 @@ pub trait Drive: Send + Sync {
     fn hold(&self, _k: usize, _t: f64) -> Option<Hold> {
         None
     }
-}
-
-/// How a driven node is held that may go off the position of its [`Drive`], in a plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hold {
-    /// Force of what surrounds the model on the node while it is at its position (N).
-    pub pull: V,
-    /// By how much that force changes with the way off it (N/m).
-    pub stiffness: f64,
-    /// Unit normal of the plane.
-    pub normal: V,
 }
 
 /// Constants of the time integration.
@@ -156,6 +148,7 @@ pub struct Model {
     held: Vec<Held>,
     driven: Vec<u32>,
     drive: Option<Box<dyn Drive>>,
+    anchors: Anchors,
     max_speed: f64,
     /// Largest acceleration in the last step (m/s2).
     max_acceleration: f64,
