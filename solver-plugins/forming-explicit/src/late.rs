@@ -107,8 +107,8 @@ pub(crate) fn begin(forming: &mut Forming, step: f64, safety: f64) -> Result<Opt
     }
     clear_tool(forming);
     let placed = forming.model.x.clone();
-    // Fine sheets are longer than coarse edges between the same places: where held nodes are in balance with the coarse run's forces is
-    // their place, and from there they are held.
+    // What the coarse run's places have wrong by now shall not pull to the end: held nodes are held from where they are in balance with
+    // its forces.
     forming.model.loosen();
     settle(forming, step, safety)?;
     forming.model.anchor();
