@@ -85,16 +85,37 @@ pub(crate) fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> Strin
     text
 }
 
+/// What to say when steps are less than half of the `known` ones (s).
+pub(crate) fn slower(forming: &Forming, known: f64) -> String {
+    let m = &forming.model;
+    let mut text = format!(
+        "steps of {:.3} us instead of {:.3} us from t = {:.5} s of {:.5} s on: what is left takes {:.1} times as long.",
+        1e6 * m.dt,
+        1e6 * known,
+        m.time,
+        forming.load.duration(),
+        known / m.dt,
+    );
+    let cell = weakest(forming);
+    if let Some(c) = &cell {
+        text.push_str(&c.text);
+        if c.collapsed() {
+            let (cause, remedy) = likely(cell.as_ref(), None, 0.0);
+            let _ = write!(text, " Likely cause: {cause}. What to try: {remedy}.");
+        }
+    }
+    text
+}
+
 /// The likely cause and what to try, by the element that sets the step, the deepest contact over the thinnest sheet, and the kinetic
 /// over the internal energy.
 fn likely(cell: Option<&Weakest>, deep: Option<f64>, kinetic: f64) -> (&'static str, &'static str) {
-    let collapsed = |c: &Weakest| c.shear.is_nan() || c.shear.abs() > 65f64.to_radians();
     match (cell, deep) {
-        (Some(c), _) if collapsed(c) && c.is_film => (
+        (Some(c), _) if c.collapsed() && c.is_film => (
             "a film is drawn out or folded beyond what its mesh can follow",
             "smaller element_size or diaphragm_element_size, longer drawing_time, or a larger hourglass_floor of diaphragm_element",
         ),
-        (Some(c), _) if collapsed(c) => (
+        (Some(c), _) if c.collapsed() => (
             "the ply has gathered until an element collapsed: a fold narrower than the mesh",
             "smaller element_size, element s4 instead of rf4, a larger hourglass_floor, or a holder that leaves less room",
         ),
@@ -132,6 +153,12 @@ struct Weakest {
     /// Of a diaphragm, not of a ply.
     is_film: bool,
     text: String,
+}
+
+impl Weakest {
+    fn collapsed(&self) -> bool {
+        self.shear.is_nan() || self.shear.abs() > 65f64.to_radians()
+    }
 }
 
 /// The element that sets the step.

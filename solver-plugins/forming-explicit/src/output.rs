@@ -92,6 +92,10 @@ impl Observer for Writer<'_> {
         Ok(())
     }
 
+    fn slower(&mut self, what: &str) {
+        self.host.log(Log::Warn, what);
+    }
+
     fn between_frames(&mut self, forming: &mut Forming, course: &mut Course) {
         self.frames.checkpoint(forming, course);
     }

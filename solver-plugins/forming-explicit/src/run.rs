@@ -171,6 +171,8 @@ pub struct Course {
     pub smallest_step: f64,
     /// Of a run that begins late: how far fine plies went there by themselves (m).
     pub start_shift: Option<f64>,
+    /// The step (s) of which the user knows; of this attempt, and not kept for another.
+    told_step: Option<f64>,
 }
 
 impl Default for Course {
@@ -180,11 +182,22 @@ impl Default for Course {
             history: Vec::new(),
             smallest_step: f64::INFINITY,
             start_shift: None,
+            told_step: None,
         }
     }
 }
 
 impl Course {
+    /// Whether steps of `dt` (s) are so much shorter than those of which the user knows that the run takes twice as long and more;
+    /// if so, how long those were.
+    fn shorter_steps(&mut self, dt: f64) -> Option<f64> {
+        let known = *self.told_step.get_or_insert(dt);
+        (dt < 0.5 * known).then(|| {
+            self.told_step = Some(dt);
+            known
+        })
+    }
+
     pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
         a.value(&mut self.frame)?;
         a.value(&mut self.history)?;
@@ -238,6 +251,8 @@ pub trait Observer {
     ) -> Result<(), plyflow_sdk::StepError> {
         Ok(())
     }
+    /// Told when the step has halved since the start, or since it was told last.
+    fn slower(&mut self, _what: &str) {}
     /// Called between two frames, where a run can be taken up again.
     fn between_frames(&mut self, _forming: &mut Forming, _course: &mut Course) {}
 }
@@ -337,6 +352,9 @@ impl Forming {
                 observer.between_frames(self, &mut course);
             }
             let steps = self.choose_step(control, interval, &mut course)?;
+            if let Some(known) = course.shorter_steps(self.model.dt) {
+                observer.slower(&diagnosis::slower(self, known));
+            }
             let start = begin + interval * frame as f64;
             let is_late = std::mem::take(&mut is_late);
             self.run_frame(control, [start, end], steps, is_late, &mut course, observer)?;
@@ -521,4 +539,22 @@ fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {
         ));
     }
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Course;
+
+    #[test]
+    fn the_user_is_told_once_for_each_time_that_the_step_halves() {
+        let mut course = Course::default();
+        let told: Vec<Option<f64>> = [2.0, 1.1, 0.9, 0.8, 0.5, 0.4, 2.0, 0.39]
+            .map(|dt| course.shorter_steps(dt))
+            .to_vec();
+        let none = None;
+        let want = [none, none, Some(2.0), none, none, Some(0.9), none, none];
+        assert_eq!(told, want);
+        // Another attempt begins anew.
+        assert_eq!(Course::default().shorter_steps(0.1), None);
+    }
 }

@@ -15,6 +15,7 @@ pub mod marlow;
 pub mod quad;
 pub mod rf4;
 pub mod s4;
+mod thickening;
 
 pub use functions::{asin, exp, polynomial};
 pub use lanes::*;

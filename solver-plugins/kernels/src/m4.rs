@@ -4,13 +4,13 @@
 use crate::quad::{self, Hourglass};
 use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef};
 
-/// Parameters of `m4` and `rf4`; see their manifests.
+/// Parameters; see the manifest.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(crate) struct Parameters {
-    pub(crate) hourglass: f64,
-    pub(crate) hourglass_floor: f64,
-    pub(crate) hourglass_normal: f64,
+struct Parameters {
+    hourglass: f64,
+    hourglass_floor: f64,
+    hourglass_normal: f64,
 }
 
 impl Default for Parameters {
@@ -23,18 +23,6 @@ impl Default for Parameters {
     }
 }
 
-impl Parameters {
-    pub(crate) fn hourglass(
-        text: &str,
-        element: &str,
-        material: &MaterialRef,
-    ) -> Result<Hourglass, String> {
-        let p: Self = serde_json::from_str(text)
-            .map_err(|e| format!("parameters of element '{element}': {e}"))?;
-        Hourglass::new(p.hourglass, p.hourglass_floor, p.hourglass_normal, material)
-    }
-}
-
 /// The formulation for one material.
 pub struct M4 {
     hourglass: Hourglass,
@@ -44,8 +32,15 @@ impl Element for M4 {
     const MANIFEST: &'static str = include_str!("../../element-m4/manifest.json");
 
     fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
+        let p: Parameters = serde_json::from_str(parameters)
+            .map_err(|e| format!("parameters of element 'm4': {e}"))?;
         Ok(Self {
-            hourglass: Parameters::hourglass(parameters, "m4", material)?,
+            hourglass: Hourglass::new(
+                p.hourglass,
+                p.hourglass_floor,
+                p.hourglass_normal,
+                material,
+            )?,
         })
     }
 

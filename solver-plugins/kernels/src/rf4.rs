@@ -17,13 +17,17 @@
 //! material's moments must not depend on the metric (Plyflow's own do not) for the force to be an
 //! exact gradient.
 //!
+//! `thickening: p`: a ply of constant volume is 1/J as thick when it is sheared to J = sqrt(det C) of its area, and its
+//! section bends with `area J^-p W_b(k)`. What is bent then resists being sheared, by the gradient's other part
+//! `-p area J^-p W_b (w_I1 a^1 + w_I2 a^2)` (because `d ln J = a^c . dx,c`). The thesis' shell has p = 2: eqs 3.5, 3.6
+//! and 3.24 give the moment J^-3 per width as it is, J^-2 per undeformed width (`docs/decisions/0031`).
+//!
 //! Orientation: a patch does not know the winding of its elements. Its normal is the one of the
 //! undeformed plane with a positive z component (or, in a vertical plane, y, else x): elements must
 //! be wound counter-clockwise about it.
 
-use crate::m4::Parameters;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
-use crate::{Lanes, WIDTH, dispatch};
+use crate::{Lanes, WIDTH, dispatch, thickening};
 use plyflow_sdk::abi::PF_OK;
 use plyflow_sdk::{BendingBatch, Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch};
 
@@ -36,17 +40,55 @@ const PATCH_CONSTANTS: usize = 2 + (PATCH_NODES - 1) * TERMS;
 /// Curvatures and moments along the two fibre families.
 const PATCH_FIELDS: usize = 4;
 
+/// Parameters; see the manifest.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Parameters {
+    hourglass: f64,
+    hourglass_floor: f64,
+    hourglass_normal: f64,
+    thickening: u32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            hourglass: 1.0,
+            hourglass_floor: 3000.0,
+            hourglass_normal: 0.01,
+            thickening: 0,
+        }
+    }
+}
+
+impl Parameters {
+    fn parse(text: &str) -> Result<Self, String> {
+        let p: Self =
+            serde_json::from_str(text).map_err(|e| format!("parameters of element 'rf4': {e}"))?;
+        thickening::check(p.thickening)?;
+        Ok(p)
+    }
+}
+
 /// The formulation for one material.
 pub struct Rf4 {
     hourglass: Hourglass,
+    thickening: u32,
 }
 
 impl Element for Rf4 {
     const MANIFEST: &'static str = include_str!("../../element-rf4/manifest.json");
 
     fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
+        let p = Parameters::parse(parameters)?;
         Ok(Self {
-            hourglass: Parameters::hourglass(parameters, "rf4", material)?,
+            hourglass: Hourglass::new(
+                p.hourglass,
+                p.hourglass_floor,
+                p.hourglass_normal,
+                material,
+            )?,
+            thickening: p.thickening,
         })
     }
 
@@ -99,20 +141,26 @@ impl Element for Rf4 {
             if bend(material, &mut history, n, 0.0, &mut s, true) != PF_OK {
                 s.tangent.fill(f64::INFINITY);
             }
-            row_sums(&batch.constants, n, &s, stiffness);
+            row_sums(&batch.constants, n, self.thickening, &s, stiffness);
         }
     }
 
     fn patch_forces(&self, batch: &mut PatchBatch<'_>, material: &MaterialRef) -> i32 {
+        let power = self.thickening;
         match batch.lanes {
-            0..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
-            17..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
-            _ => forces_with(batch, material, Scratch::<MAX_LANES>::new().view()),
+            0..=16 => forces_with(batch, material, power, Scratch::<16>::new().view()),
+            17..=32 => forces_with(batch, material, power, Scratch::<32>::new().view()),
+            _ => forces_with(batch, material, power, Scratch::<MAX_LANES>::new().view()),
         }
     }
 }
 
-fn forces_with(batch: &mut PatchBatch<'_>, material: &MaterialRef, mut s: View<'_>) -> i32 {
+fn forces_with(
+    batch: &mut PatchBatch<'_>,
+    material: &MaterialRef,
+    power: u32,
+    mut s: View<'_>,
+) -> i32 {
     let n = batch.lanes;
     derivatives(batch.position, &batch.constants, n, &mut s);
     let wanted = batch.stiffness.is_some();
@@ -120,9 +168,12 @@ fn forces_with(batch: &mut PatchBatch<'_>, material: &MaterialRef, mut s: View<'
     if code != PF_OK {
         return code;
     }
-    forces(&batch.constants, n, &s, batch.force, batch.energy);
+    if power > 0 {
+        thickening::scale(power, n, s.metric, s.moment, s.tangent, s.energy);
+    }
+    forces(&batch.constants, n, power, &s, batch.force, batch.energy);
     if let Some(stiffness) = batch.stiffness.as_deref_mut() {
-        row_sums(&batch.constants, n, &s, stiffness);
+        row_sums(&batch.constants, n, power, &s, stiffness);
     }
     if let Some(fields) = batch.fields.as_deref_mut() {
         for l in 0..n {
@@ -323,6 +374,7 @@ dispatch!(fn derivatives(position: &[f64], constants: &[f64], n: usize, s: &mut 
 dispatch!(fn forces(
     constants: &[f64],
     n: usize,
+    power: u32,
     s: &View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
@@ -390,6 +442,7 @@ fn derivatives_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s
 fn forces_kernel<V: Lanes>(
     constants: &[f64],
     n: usize,
+    power: u32,
     s: &View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
@@ -425,14 +478,32 @@ fn forces_kernel<V: Lanes>(
                 zero.store(force, (3 * i + k) * n + c);
             }
         }
+        if power > 0 {
+            let pull = V::splat(f64::from(power)) * V::load(s.energy, c) * area;
+            for k in 0..3 {
+                let (p1, p2) = (pull * row(s.dual, k), pull * row(s.dual, 3 + k));
+                let mut sum = zero;
+                for i in 1..used {
+                    let w = |t: usize| row(constants, 2 + (i - 1) * TERMS + t);
+                    let f = w(0) * p1 + w(1) * p2;
+                    sum = sum + f;
+                    let at = (3 * i + k) * n + c;
+                    (V::load(force, at) - f).store(force, at);
+                }
+                let at = k * n + c;
+                (V::load(force, at) + sum).store(force, at);
+            }
+        }
         (V::load(s.energy, c) * area).store(energy, c);
     }
 }
 
 /// For each node a bound of the sum over the patch of the norms of the 3 x 3 blocks of the second
 /// derivative of the energy: the tangent part `dM/dk dk dk` with each derivative as it is, and the
-/// geometric part `M d2k` by norms.
-fn row_sums(constants: &[f64], n: usize, s: &View<'_>, stiffness: &mut [f64]) {
+/// geometric part `M d2k` by norms. A section that thickens has `p^2 W dlnJ dlnJ - p W d2lnJ - 2 p M dk dlnJ` besides;
+/// a block of `d2lnJ` is at most twice the product of its nodes' `|dlnJ|`.
+fn row_sums(constants: &[f64], n: usize, power: u32, s: &View<'_>, stiffness: &mut [f64]) {
+    let power = f64::from(power);
     for l in 0..n {
         let area = constants[l];
         let count = (constants[n + l] as usize).clamp(1, PATCH_NODES);
@@ -466,7 +537,13 @@ fn row_sums(constants: &[f64], n: usize, s: &View<'_>, stiffness: &mut [f64]) {
                 *row += tangent * derivative(x).abs() * total;
                 *row += moment * (x[2 + a].abs() * turn + own * magnitude[2 + a]);
                 *row += 3.0 * moment * bent * own * turn;
+                *row += power * moment * (own * total + derivative(x).abs() * turn);
             }
+        }
+        let turn = dual_length[0] * magnitude[0] + dual_length[1] * magnitude[1];
+        let swell = power * (power + 2.0) * area * s.energy[l];
+        for (row, x) in rows[..count].iter_mut().zip(&w) {
+            *row += swell * (dual_length[0] * x[0].abs() + dual_length[1] * x[1].abs()) * turn;
         }
         for (i, row) in rows.iter().enumerate() {
             stiffness[i * n + l] = *row;

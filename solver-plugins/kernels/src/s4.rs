@@ -40,6 +40,9 @@
 //! Tangents across families are not in the material's contract, so it also refuses a material
 //! that couples them (an isotropic plate).
 //!
+//! `thickening: p`: the section bends with `A J^-p W_b(k)`, J = sqrt(det C), as in [`crate::rf4`]; the membrane's
+//! stress has `-p J^-p W_b C^-1` besides. The layers' twist is left as it is.
+//!
 //! # Penalty of transverse shear
 //!
 //! `K = transverse_shear * 12 D A S`, `S_ab = sum_I b_Ia b_Ib` (1/L^2 along the sides of a
@@ -63,8 +66,8 @@ mod forces;
 mod lag;
 mod rotation;
 
-use crate::WIDTH;
 use crate::quad::{self, Hourglass, MAX_LANES, Rows, material_frame};
+use crate::{WIDTH, thickening};
 use plyflow_sdk::abi::{PF_BAD_SHAPE, PF_OK};
 use plyflow_sdk::{
     BendingBatch, Constants, Element, ElementBatch, ElementSizes, MaterialRef, MembraneBatch,
@@ -122,6 +125,7 @@ struct Parameters {
     hourglass_floor: f64,
     hourglass_shear: f64,
     hourglass_director: f64,
+    thickening: u32,
 }
 
 impl Default for Parameters {
@@ -136,6 +140,7 @@ impl Default for Parameters {
             hourglass_floor: 3000.0,
             hourglass_shear: 1.0,
             hourglass_director: 0.05,
+            thickening: 0,
         }
     }
 }
@@ -155,6 +160,14 @@ impl Parameters {
         if !(modulus > 0.0 && modulus.is_finite()) {
             return Err(format!(
                 "transverse_shear_modulus: given {modulus} Pa; expected a finite value above 0"
+            ));
+        }
+        thickening::check(p.thickening)?;
+        if p.thickening > 0 && p.bending == BendingRule::LaggedTangent {
+            return Err(format!(
+                "thickening: given {} with 'bending: lagged-tangent', whose moments grow step by step and have no \
+                 energy to thicken: set 'bending: total' or 'thickening: 0'",
+                p.thickening
             ));
         }
         for (name, value) in [
@@ -488,8 +501,16 @@ impl S4 {
         if self.lagged() {
             lag::moments(n, s.curvature, s.tangent, lagged, s.moment, s.bending);
         }
+        let power = self.parameters.thickening;
+        if power > 0 {
+            thickening::scale(power, n, s.metric, s.moment, s.tangent, s.bending);
+            s.swell.copy_from_slice(s.bending);
+        }
         if let Some(layers) = &self.layers {
             forces::superpose(n, layers, &mut s);
+        }
+        if power > 0 {
+            forces::swell(power, n, &mut s);
         }
         forces::forces(
             batch.position,

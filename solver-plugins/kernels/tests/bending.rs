@@ -7,9 +7,20 @@ use plyflow_kernels::rf4::Rf4;
 
 #[test]
 fn bending_forces_are_the_gradient_of_the_bending_energy() {
+    forces_are_the_gradient("{}");
+}
+
+#[test]
+fn forces_of_sections_that_thicken_are_the_gradient_of_their_energy() {
+    for power in 1..4 {
+        forces_are_the_gradient(&format!(r#"{{"thickening": {power}}}"#));
+    }
+}
+
+fn forces_are_the_gradient(parameters: &str) {
     let mut r = Random(21);
     let m = ply();
-    let e = El::new::<Rf4>("{}", &m).unwrap();
+    let e = El::new::<Rf4>(parameters, &m).unwrap();
     for round in 0..10 {
         // Full patches, and ones of 7 and 5 nodes.
         let cut = [9, 7, 5][round % 3];
@@ -190,15 +201,91 @@ fn flat_and_rigidly_turned_patches_carry_no_force() {
     }
 }
 
+/// Fibres turned towards each other by the angle g, and then rolled on a cylinder with the curvature k along the bisector's
+/// normal: the fibres keep their length, and lie at (90 deg - g) / 2 to the cylinder's axis.
+fn sheared_and_rolled(x: &Patch, g: f64, k: f64) -> Patch {
+    let half = 0.5 * (std::f64::consts::FRAC_PI_2 - g);
+    let (across, along) = (half.sin(), half.cos());
+    x.iter()
+        .map(|[u, v, _]| {
+            let (a, b) = (across * (u - v), along * (u + v));
+            [(k * a).sin() / k, b, (1.0 - (k * a).cos()) / k]
+        })
+        .collect()
+}
+
+#[test]
+fn a_sheared_section_bends_with_the_power_of_its_thickness() {
+    // At a shear angle g the area is cos g times what it was, the thickness 1 / cos g times.
+    let m = ply();
+    let reference: Vec<Patch> = vec![grid(&mut Random(1), 0.0); 8];
+    let (g, k) = (-1.1f64, 3.0);
+    let moved: Vec<Patch> = reference
+        .iter()
+        .map(|x| sheared_and_rolled(x, -g, k))
+        .collect();
+    let run = |power: u32| {
+        let e = El::new::<Rf4>(&format!(r#"{{"thickening": {power}}}"#), &m).unwrap();
+        let mut p = e.initialise_patches(&reference, [1.0, 0.0, 0.0], SIZE * SIZE);
+        e.patch_forces(&mut p, &moved)
+    };
+    let plain = run(0);
+    // Each family bends along itself: k sin^2 of its angle to the axis (the patch is an element wide: 1 %).
+    let bent = k * (0.5 * (std::f64::consts::FRAC_PI_2 + g)).sin().powi(2);
+    assert!(
+        (plain.fields[0] / bent - 1.0).abs() < 0.01,
+        "{} {bent}",
+        plain.fields[0]
+    );
+    for power in 1..4 {
+        let thick = run(power);
+        let factor = g.cos().powi(-(power as i32));
+        for (got, want) in [
+            (thick.energy[0], factor * plain.energy[0]),
+            (thick.fields[2 * 8], factor * plain.fields[2 * 8]),
+            (thick.fields[3 * 8], factor * plain.fields[3 * 8]),
+        ] {
+            assert!((got / want - 1.0).abs() < 2e-3, "{power}: {got}, {want}");
+        }
+        assert!((thick.fields[0] - plain.fields[0]).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_power_of_thickness_that_no_section_has_is_refused() {
+    let Err(text) = El::new::<Rf4>(r#"{"thickening": 4}"#, &ply()) else {
+        panic!("accepted");
+    };
+    assert!(
+        text.contains("thickening") && text.contains("0 to 3"),
+        "{text}"
+    );
+}
+
 #[test]
 fn patch_stiffness_bounds_the_rows_of_the_exact_one() {
+    stiffness_bounds_the_rows("{}", wavy);
+}
+
+#[test]
+fn stiffness_of_sections_that_thicken_bounds_the_rows_of_the_exact_one() {
+    for power in 1..4 {
+        let parameters = format!(r#"{{"thickening": {power}}}"#);
+        stiffness_bounds_the_rows(&parameters, wavy);
+        stiffness_bounds_the_rows(&parameters, |r, x| {
+            sheared_and_rolled(x, 1.2 * r.next(), 30.0 + 20.0 * r.next())
+        });
+    }
+}
+
+fn stiffness_bounds_the_rows(parameters: &str, shape: impl Fn(&mut Random, &Patch) -> Patch) {
     let mut r = Random(24);
     let m = ply();
-    let e = El::new::<Rf4>("{}", &m).unwrap();
+    let e = El::new::<Rf4>(parameters, &m).unwrap();
     for _ in 0..10 {
         let reference: Vec<Patch> = vec![grid(&mut r, 0.2); 8];
         let mut p = e.initialise_patches(&reference, AXIS, SIZE * SIZE);
-        let moved: Vec<Patch> = vec![wavy(&mut r, &reference[0]); 8];
+        let moved: Vec<Patch> = vec![shape(&mut r, &reference[0]); 8];
         let f = e.patch_forces(&mut p, &moved);
         let h = 1e-8;
         // Blocks K_IJ by differences; their Frobenius norm bounds the spectral one by sqrt(3), so

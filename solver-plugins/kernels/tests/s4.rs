@@ -16,6 +16,9 @@ fn forces_and_moments_are_the_gradient_of_the_energy_with_total_moments() {
             soft(),
             r#"{"bending":"total","twist":"material","hourglass":0.01}"#,
         ),
+        (soft(), r#"{"thickening":1}"#),
+        (soft(), r#"{"thickening":2}"#),
+        (soft(), r#"{"thickening":3,"twist":"material"}"#),
         (plate(2e7, 0.3, 5e-4), PLATE),
     ] {
         let s = Shell::new(json, &m).unwrap();
@@ -503,6 +506,12 @@ fn what_cannot_work_is_refused_with_what_to_do() {
             "transverse_shear_modulus",
         ),
         (&ply(), r#"{"twist":"none"}"#, "layers"),
+        (&ply(), r#"{"thickening":4}"#, "0 to 3"),
+        (
+            &ply(),
+            r#"{"thickening":2,"bending":"lagged-tangent"}"#,
+            "bending: total",
+        ),
     ];
     for (m, json, word) in cases {
         let text = Shell::new(json, m)

@@ -109,6 +109,27 @@ fn pure_bending_returns_the_law_in_both_signs_and_families_at_any_shear() {
 }
 
 #[test]
+fn sections_that_thicken_bend_with_the_power_of_their_thickness() {
+    let m = ply();
+    for power in 1..4 {
+        let s = Shell::new(&format!(r#"{{"thickening": {power}}}"#), &m).unwrap();
+        for family in 0..2 {
+            for g in [0.0f64, 50.0, -60.0].map(f64::to_radians) {
+                for (k, got) in rolled(&s, family, g, 50.0 / g.cos().powi(2)) {
+                    let law = NCF[usize::from(family == 1)];
+                    let want = voce(k, law) / g.cos().powi(power);
+                    assert!(
+                        (got / want - 1.0).abs() < 0.01,
+                        "power {power}, family {}, {g} rad, {k} 1/m: {got} N, expected {want} N",
+                        family + 1
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn lagged_tangents_come_back_to_the_law_when_a_ply_is_unrolled() {
     // The work left over after rolling and unrolling is that of the finite increments alone.
     let s = Shell::new(r#"{"bending":"lagged-tangent"}"#, &ply()).unwrap();

@@ -215,7 +215,9 @@ pub(super) fn critical_step(
         let inertia = lane.inertia;
         let mixed = (mass * inertia).sqrt();
         let c = state.metric;
-        let (bending, twist) = (state.bending, state.twist);
+        let (shared, swelling) = state.thickening(s4, s.swell[l]);
+        let bending = state.bending + shared;
+        let twist = state.twist + if s4.layers.is_some() { 0.0 } else { shared };
         let [s11, s22] = state.slope.map(|v| dot(v, v));
         let bent = lane.area * lane.widest * bending * s11.max(s22);
         let twisted = lane.area * lane.widest * 0.5 * twist * (s11 + s22);
@@ -235,6 +237,7 @@ pub(super) fn critical_step(
         kinds.add([(material + twisted) * y, 0.0, rotation.twist * r]);
         kinds.add([shear * lean * lean * y, shear * z, rotation.sides * r]);
         kinds.add([bent * y, 0.0, rotation.bending * r]);
+        kinds.add([lane.area * lane.widest * swelling * y, 0.0, 0.0]);
         kinds.add([0.0, 0.0, rotation.hourglass * r]);
         // Second derivatives of the strains: curvature is bilinear in slopes of x and of d, a side's
         // shear in its ends; a turned director has d2 d = t x (t x d).
@@ -299,6 +302,25 @@ impl State {
                     t[2].max(0.0)
                 },
         }
+    }
+
+    /// Of a section that thickens, with the energy w (J/m2) of its bending: what its moments' change with the area needs of
+    /// the bending tangents (N m), by 2 p M dk dlnJ <= t dk^2 + p^2 M^2 / t dlnJ^2 with any t > 0; and its stiffness over
+    /// gradients of the displacements (N/m), |dlnJ|^2 <= 1 / (least eigenvalue of C). The second derivative of
+    /// ln J is at most 2 of these, and what its stress takes off the membrane's is given back.
+    fn thickening(&self, s4: &S4, w: f64) -> (f64, f64) {
+        let p = f64::from(s4.parameters.thickening);
+        if p == 0.0 {
+            return (0.0, 0.0);
+        }
+        let [m1, m2, m12] = self.moments;
+        let square = m1 * m1 + m2 * m2 + 2.0 * m12 * m12;
+        let shared = self.bending + square.sqrt() * s4.thickness;
+        let coupled = square / shared.max(f64::MIN_POSITIVE);
+        let [c11, c22, c12] = self.metric;
+        let least = (c11 + c22 - largest(c11, c22, c12)).max(1e-6);
+        let total = p * p * (w + coupled) + 3.0 * p * w;
+        (shared, total / least)
     }
 
     /// Cosine between the derivatives of the means of opposite sides by the displacements.

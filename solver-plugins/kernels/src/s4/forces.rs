@@ -2,7 +2,7 @@
 
 use super::rotation::{cross, dot, mix, scaled, sub, turn};
 use super::{Layers, row};
-use crate::{Lanes, WIDTH, dispatch};
+use crate::{Lanes, WIDTH, dispatch, thickening};
 
 /// What one batch of at most `N` lanes needs between the material calls. Rows of n lanes lie one
 /// after the other from the start of each field.
@@ -22,6 +22,8 @@ pub(super) struct Scratch<const N: usize> {
     moment: [[f64; N]; 3],
     tangent: [[f64; N]; 3],
     bending: [f64; N],
+    /// The bending of a section that thickens, without the layers' twist.
+    swell: [f64; N],
 }
 
 impl<const N: usize> Scratch<N> {
@@ -38,6 +40,7 @@ impl<const N: usize> Scratch<N> {
             moment: [[0.0; N]; 3],
             tangent: [[0.0; N]; 3],
             bending: [0.0; N],
+            swell: [0.0; N],
         }
     }
 
@@ -53,6 +56,7 @@ impl<const N: usize> Scratch<N> {
             moment: self.moment.as_flattened_mut(),
             tangent: self.tangent.as_flattened_mut(),
             bending: &mut self.bending,
+            swell: &mut self.swell,
         }
     }
 }
@@ -69,6 +73,7 @@ pub(super) struct View<'a> {
     pub moment: &'a mut [f64],
     pub tangent: &'a mut [f64],
     pub bending: &'a mut [f64],
+    pub swell: &'a mut [f64],
 }
 
 dispatch!(pub(super) fn kinematics(
@@ -82,6 +87,7 @@ dispatch!(pub(super) fn kinematics(
     s: &mut View<'_>,
 ) = kinematics_kernel, lanes n);
 dispatch!(pub(super) fn superpose(n: usize, layers: &Layers, s: &mut View<'_>) = superpose_kernel, lanes n);
+dispatch!(pub(super) fn swell(power: u32, n: usize, s: &mut View<'_>) = swell_kernel, lanes n);
 dispatch!(pub(super) fn forces(
     position: &[f64],
     directors: &[f64],
@@ -210,6 +216,19 @@ fn superpose_kernel<V: Lanes>(n: usize, layers: &Layers, s: &mut View<'_>) {
         let [w, wu, wd]: [V; 3] = three(s.energy, 0, n, c);
         let more = surface * ((wu - w) + (wd - w));
         (V::load(s.bending, c) + more).store(s.bending, c);
+    }
+}
+
+/// What a bent section that thickens adds to the stress: `2 d(J^-p W_b)/dC = -p J^-p W_b C^-1`.
+#[inline(always)]
+fn swell_kernel<V: Lanes>(power: u32, n: usize, s: &mut View<'_>) {
+    for c in (0..n).step_by(WIDTH) {
+        let [c11, c22, c12]: [V; 3] = three(s.metric, 0, n, c);
+        let inverse = V::splat(1.0) / (c11 * c22 - c12 * c12).max(V::splat(thickening::LEAST));
+        let pull = V::splat(f64::from(power)) * V::load(s.swell, c) * inverse;
+        let [s11, s22, s12]: [V; 3] = three(s.stress, 0, n, c);
+        let sum = [s11 - pull * c22, s22 - pull * c11, s12 + pull * c12];
+        store(&sum, s.stress, 0, n, c);
     }
 }
 
