@@ -365,5 +365,12 @@ fn results(host: &Host, waves: &[Wave], inner: f64) -> Result<(), StepError> {
             "m",
         )?;
     }
+    let sheared = |positive: bool| move |w: &Wave| (w.shear > 0.0) == positive;
+    if count(&sheared(true)) > 0.0 && count(&sheared(false)) > 0.0 {
+        let over =
+            |what: fn(&Wave) -> f64| mean(&sheared(false), what) / mean(&sheared(true), what);
+        host.result("negative_over_positive_width", over(|w| w.width), "1")?;
+        host.result("negative_over_positive_length", over(|w| w.length), "1")?;
+    }
     host.result("inner_deviation", inner, "m")
 }

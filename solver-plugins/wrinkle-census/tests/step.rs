@@ -142,6 +142,10 @@ fn wrinkles_on_the_diagonals_are_counted_by_quadrant_and_shear() {
     assert!((long - 0.1477).abs() < 4e-3, "{long}");
     let long = of("length_negative_shear");
     assert!((long - 0.1387).abs() < 4e-3, "{long}");
+    // Twice as wide, and as long as they are above.
+    assert!((of("negative_over_positive_width") - 2.0).abs() < 0.15);
+    let longer = of("negative_over_positive_length");
+    assert!((longer - 0.1387 / 0.1477).abs() < 0.04, "{longer}");
     // Cells of 3 mm on a sphere of 50 mm.
     assert!(of("inner_deviation") < 3e-4, "{}", of("inner_deviation"));
     let circles = found.attributes["circles"].as_array().unwrap();
