@@ -19,8 +19,8 @@
 //!
 //! `thickening: p`: a ply of constant volume is 1/J as thick when it is sheared to J = sqrt(det C) of its area, and its
 //! section bends with `area J^-p W_b(k)`. What is bent then resists being sheared, by the gradient's other part
-//! `-p area J^-p W_b (w_I1 a^1 + w_I2 a^2)` (because `d ln J = a^c . dx,c`). The thesis' shell has p = 2: eqs 3.5, 3.6
-//! and 3.24 give the moment J^-3 per width as it is, J^-2 per undeformed width (`docs/decisions/0031`).
+//! `-p area J^-p W_b (w_I1 a^1 + w_I2 a^2)` (because `d ln J = a^c . dx,c`). p = 2: a homogeneous section, J^-3 per width
+//! as it is, J^-2 per undeformed width (`docs/decisions/0031`).
 //!
 //! Orientation: a patch does not know the winding of its elements. Its normal is the one of the
 //! undeformed plane with a positive z component (or, in a vertical plane, y, else x): elements must

@@ -3,8 +3,8 @@
 
 use crate::{Lanes, WIDTH, dispatch};
 
-/// A homogeneous section's bending stiffness grows with the cube of its thickness.
-const MOST: u32 = 3;
+/// A homogeneous section: the cube of the thickness per width as it is, which is J of the undeformed one.
+const MOST: u32 = 2;
 /// A floor for det C, as the elements have it for their normals.
 pub(crate) const LEAST: f64 = 1e-12;
 
@@ -12,7 +12,7 @@ pub(crate) fn check(power: u32) -> Result<(), String> {
     if power > MOST {
         return Err(format!(
             "thickening: given {power}; expected 0 to {MOST} (the power of the thickness with which a section's \
-             bending grows)"
+             bending energy per undeformed area grows; {MOST}: a homogeneous one)"
         ));
     }
     Ok(())

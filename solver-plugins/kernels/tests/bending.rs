@@ -12,7 +12,7 @@ fn bending_forces_are_the_gradient_of_the_bending_energy() {
 
 #[test]
 fn forces_of_sections_that_thicken_are_the_gradient_of_their_energy() {
-    for power in 1..4 {
+    for power in 1..3 {
         forces_are_the_gradient(&format!(r#"{{"thickening": {power}}}"#));
     }
 }
@@ -237,7 +237,7 @@ fn a_sheared_section_bends_with_the_power_of_its_thickness() {
         "{} {bent}",
         plain.fields[0]
     );
-    for power in 1..4 {
+    for power in 1..3 {
         let thick = run(power);
         let factor = g.cos().powi(-(power as i32));
         for (got, want) in [
@@ -253,11 +253,11 @@ fn a_sheared_section_bends_with_the_power_of_its_thickness() {
 
 #[test]
 fn a_power_of_thickness_that_no_section_has_is_refused() {
-    let Err(text) = El::new::<Rf4>(r#"{"thickening": 4}"#, &ply()) else {
+    let Err(text) = El::new::<Rf4>(r#"{"thickening": 3}"#, &ply()) else {
         panic!("accepted");
     };
     assert!(
-        text.contains("thickening") && text.contains("0 to 3"),
+        text.contains("thickening") && text.contains("0 to 2"),
         "{text}"
     );
 }
@@ -269,7 +269,7 @@ fn patch_stiffness_bounds_the_rows_of_the_exact_one() {
 
 #[test]
 fn stiffness_of_sections_that_thicken_bounds_the_rows_of_the_exact_one() {
-    for power in 1..4 {
+    for power in 1..3 {
         let parameters = format!(r#"{{"thickening": {power}}}"#);
         stiffness_bounds_the_rows(&parameters, wavy);
         stiffness_bounds_the_rows(&parameters, |r, x| {

@@ -111,7 +111,7 @@ fn pure_bending_returns_the_law_in_both_signs_and_families_at_any_shear() {
 #[test]
 fn sections_that_thicken_bend_with_the_power_of_their_thickness() {
     let m = ply();
-    for power in 1..4 {
+    for power in 1..3 {
         let s = Shell::new(&format!(r#"{{"thickening": {power}}}"#), &m).unwrap();
         for family in 0..2 {
             for g in [0.0f64, 50.0, -60.0].map(f64::to_radians) {

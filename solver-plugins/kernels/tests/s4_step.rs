@@ -39,7 +39,7 @@ fn critical_step_bounds_the_exact_one_on_random_bent_and_skewed_elements() {
             0.4,
         ),
         (ply(), r#"{"thickening":2}"#, 0.3, 0.4),
-        (soft(), r#"{"thickening":3,"hourglass_floor":0}"#, 0.3, 0.4),
+        (soft(), r#"{"thickening":1,"hourglass_floor":0}"#, 0.3, 0.4),
         (soft(), r#"{"thickening":2,"twist":"material"}"#, 0.3, 0.4),
         (plate(1e9, 0.3, 2e-4), PLATE, 0.1, 0.2),
         (

@@ -306,8 +306,8 @@ impl State {
 
     /// Of a section that thickens, with the energy w (J/m2) of its bending: what its moments' change with the area needs of
     /// the bending tangents (N m), by 2 p M dk dlnJ <= t dk^2 + p^2 M^2 / t dlnJ^2 with any t > 0; and its stiffness over
-    /// gradients of the displacements (N/m), |dlnJ|^2 <= 1 / (least eigenvalue of C). The second derivative of
-    /// ln J is at most 2 of these, and what its stress takes off the membrane's is given back.
+    /// gradients of the displacements (N/m). dlnJ^2 = (a^c . dg_c)^2 is at most the trace of C^-1; what comes with the second derivative
+    /// of ln J, and what its stress takes off the membrane's, are at most 2 and 1 of the largest eigenvalue of C^-1.
     fn thickening(&self, s4: &S4, w: f64) -> (f64, f64) {
         let p = f64::from(s4.parameters.thickening);
         if p == 0.0 {
@@ -319,8 +319,8 @@ impl State {
         let coupled = square / shared.max(f64::MIN_POSITIVE);
         let [c11, c22, c12] = self.metric;
         let least = (c11 + c22 - largest(c11, c22, c12)).max(1e-6);
-        let total = p * p * (w + coupled) + 3.0 * p * w;
-        (shared, total / least)
+        let trace = (c11 + c22) / (c11 * c22 - c12 * c12).max(crate::thickening::LEAST);
+        (shared, p * p * (w + coupled) * trace + 3.0 * p * w / least)
     }
 
     /// Cosine between the derivatives of the means of opposite sides by the displacements.
