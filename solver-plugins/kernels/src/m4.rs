@@ -2,15 +2,17 @@
 //! M3D4R of the thesis). The mechanics stand in [`crate::quad`].
 
 use crate::quad::{self, Hourglass};
+use crate::thickening;
 use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef};
 
-/// Parameters; see the manifest.
+/// Parameters of `m4` and `rf4`; see their manifests.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct Parameters {
+pub(crate) struct Parameters {
     hourglass: f64,
     hourglass_floor: f64,
     hourglass_normal: f64,
+    pub(crate) thickening: u32,
 }
 
 impl Default for Parameters {
@@ -19,7 +21,26 @@ impl Default for Parameters {
             hourglass: 1.0,
             hourglass_floor: 3000.0,
             hourglass_normal: 0.01,
+            thickening: 0,
         }
+    }
+}
+
+impl Parameters {
+    pub(crate) fn parse(text: &str, element: &str) -> Result<Self, String> {
+        let p: Self = serde_json::from_str(text)
+            .map_err(|e| format!("parameters of element '{element}': {e}"))?;
+        thickening::check(p.thickening)?;
+        Ok(p)
+    }
+
+    pub(crate) fn hourglass(&self, material: &MaterialRef) -> Result<Hourglass, String> {
+        Hourglass::new(
+            self.hourglass,
+            self.hourglass_floor,
+            self.hourglass_normal,
+            material,
+        )
     }
 }
 
@@ -32,15 +53,15 @@ impl Element for M4 {
     const MANIFEST: &'static str = include_str!("../../element-m4/manifest.json");
 
     fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
-        let p: Parameters = serde_json::from_str(parameters)
-            .map_err(|e| format!("parameters of element 'm4': {e}"))?;
+        let p = Parameters::parse(parameters, "m4")?;
+        if p.thickening > 0 {
+            return Err(format!(
+                "thickening: given {} to the membrane 'm4', which does not bend: use 'rf4' or 's4'",
+                p.thickening
+            ));
+        }
         Ok(Self {
-            hourglass: Hourglass::new(
-                p.hourglass,
-                p.hourglass_floor,
-                p.hourglass_normal,
-                material,
-            )?,
+            hourglass: p.hourglass(material)?,
         })
     }
 

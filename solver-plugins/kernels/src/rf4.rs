@@ -26,6 +26,7 @@
 //! undeformed plane with a positive z component (or, in a vertical plane, y, else x): elements must
 //! be wound counter-clockwise about it.
 
+use crate::m4::Parameters;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
 use crate::{Lanes, WIDTH, dispatch, thickening};
 use plyflow_sdk::abi::PF_OK;
@@ -40,36 +41,6 @@ const PATCH_CONSTANTS: usize = 2 + (PATCH_NODES - 1) * TERMS;
 /// Curvatures and moments along the two fibre families.
 const PATCH_FIELDS: usize = 4;
 
-/// Parameters; see the manifest.
-#[derive(Clone, Copy, Debug, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Parameters {
-    hourglass: f64,
-    hourglass_floor: f64,
-    hourglass_normal: f64,
-    thickening: u32,
-}
-
-impl Default for Parameters {
-    fn default() -> Self {
-        Self {
-            hourglass: 1.0,
-            hourglass_floor: 3000.0,
-            hourglass_normal: 0.01,
-            thickening: 0,
-        }
-    }
-}
-
-impl Parameters {
-    fn parse(text: &str) -> Result<Self, String> {
-        let p: Self =
-            serde_json::from_str(text).map_err(|e| format!("parameters of element 'rf4': {e}"))?;
-        thickening::check(p.thickening)?;
-        Ok(p)
-    }
-}
-
 /// The formulation for one material.
 pub struct Rf4 {
     hourglass: Hourglass,
@@ -80,14 +51,9 @@ impl Element for Rf4 {
     const MANIFEST: &'static str = include_str!("../../element-rf4/manifest.json");
 
     fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
-        let p = Parameters::parse(parameters)?;
+        let p = Parameters::parse(parameters, "rf4")?;
         Ok(Self {
-            hourglass: Hourglass::new(
-                p.hourglass,
-                p.hourglass_floor,
-                p.hourglass_normal,
-                material,
-            )?,
+            hourglass: p.hourglass(material)?,
             thickening: p.thickening,
         })
     }

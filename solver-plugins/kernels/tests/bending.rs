@@ -3,7 +3,7 @@
 mod common;
 mod fabric_support;
 use common::*;
-use plyflow_kernels::rf4::Rf4;
+use plyflow_kernels::{m4::M4, rf4::Rf4};
 
 #[test]
 fn bending_forces_are_the_gradient_of_the_bending_energy() {
@@ -256,6 +256,10 @@ fn a_power_of_thickness_that_no_section_has_is_refused() {
     let Err(text) = El::new::<Rf4>(r#"{"thickening": 3}"#, &ply()) else {
         panic!("accepted");
     };
+    let Err(membrane) = El::new::<M4>(r#"{"thickening": 2}"#, &ply()) else {
+        panic!("a membrane bends");
+    };
+    assert!(membrane.contains("does not bend"), "{membrane}");
     assert!(
         text.contains("thickening") && text.contains("0 to 2"),
         "{text}"

@@ -365,12 +365,16 @@ fn results(host: &Host, waves: &[Wave], inner: f64) -> Result<(), StepError> {
             "m",
         )?;
     }
-    let sheared = |positive: bool| move |w: &Wave| (w.shear > 0.0) == positive;
-    if count(&sheared(true)) > 0.0 && count(&sheared(false)) > 0.0 {
-        let over =
-            |what: fn(&Wave) -> f64| mean(&sheared(false), what) / mean(&sheared(true), what);
-        host.result("negative_over_positive_width", over(|w| w.width), "1")?;
-        host.result("negative_over_positive_length", over(|w| w.length), "1")?;
+    for (name, what) in [
+        ("width", (|w| w.width) as fn(&Wave) -> f64),
+        ("length", |w| w.length),
+    ] {
+        let of = |positive: bool| mean(&|w| (w.shear > 0.0) == positive, what);
+        let (negative, positive) = (of(false), of(true));
+        if negative > 0.0 && positive > 0.0 {
+            let name = format!("negative_over_positive_{name}");
+            host.result(&name, negative / positive, "1")?;
+        }
     }
     host.result("inner_deviation", inner, "m")
 }
