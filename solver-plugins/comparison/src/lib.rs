@@ -249,7 +249,8 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &[Input]) -> Result<(
     host.measured("cost.total.wall_seconds", wall, "s")?;
     host.measured("cost.total.cpu_seconds", cpu, "s")?;
     host.measured("peak_memory.total", memory, "1")?;
-    let reference = models.iter().find(|m| m.role == Role::Reference);
+    // One that began late did a part of the process only: nothing is saved against that.
+    let reference = (models.iter()).find(|m| m.role == Role::Reference && !m.began_late);
     if let Some(full) = reference
         .map(|m| m.input.cost.cpu_seconds)
         .filter(|&s| s > 0.0)

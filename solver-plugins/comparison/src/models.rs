@@ -102,6 +102,8 @@ pub struct Model {
     pub elements: usize,
     /// Cells times cycles, over all sheets.
     pub element_cycles: f64,
+    /// Whether it began late: its first frame, of several, is not that of time 0.
+    pub began_late: bool,
     /// Plies in the order of the stack.
     pub plies: Vec<Ply>,
     /// Direction of the first fibres of each ply that tells it, in the flat ply (rad), by its name.
@@ -154,13 +156,7 @@ pub fn read_models(
         if local.iter().any(|m: &Model| m.zone == Some(zone)) {
             return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
         }
-        // A local run may leave its tool out; it is the global one's.
-        let own = host.meshes(&input)?.body("tool").is_ok();
-        let own = if own {
-            Some(of_run::tool(host, &input)?)
-        } else {
-            None
-        };
+        let own = own_tool(host, &input)?;
         local.push(read(
             host,
             input,
@@ -173,14 +169,34 @@ pub fn read_models(
     local.sort_by_key(|m| m.zone);
     models.extend(local);
     for (port, role) in [("others", Role::Other), ("reference", Role::Reference)] {
-        for input in host.inputs_of(port)? {
+        let inputs = host.inputs_of(port)?;
+        // A fan-out over one zone, the whole blank, may be the reference.
+        if role == Role::Reference && inputs.len() > 1 {
+            let steps: Vec<&str> = inputs.iter().map(|i| i.step.as_str()).collect();
+            return Err(format!(
+                "reference: given {} runs ({}); expected one, of the whole scene",
+                inputs.len(),
+                steps.join(", ")
+            )
+            .into());
+        }
+        for input in inputs {
             host.check_cancelled()?;
-            let tool = of_run::tool(host, &input)?;
-            models.push(read(host, input, role, None, &tool, settings)?);
+            let own = own_tool(host, &input)?;
+            let tool = own.as_ref().unwrap_or(&tool);
+            models.push(read(host, input, role, None, tool, settings)?);
         }
     }
     passed_over.extend(host.inputs_of("earlier")?);
     Ok((models, passed_over))
+}
+
+/// The tool that a run has with it. A run of a zone may leave it out; it is the global one's.
+fn own_tool(host: &Host, input: &Input) -> Result<Option<Tool>, StepError> {
+    match host.meshes(input)?.body("tool") {
+        Ok(_) => Ok(Some(of_run::tool(host, input)?)),
+        Err(_) => Ok(None),
+    }
 }
 
 /// The zone that a local run names, or else the one at its place in the fan-out; `None` for a superseded one.
@@ -264,6 +280,7 @@ fn read(
             .map(|b| b.cells)
             .sum(),
         element_cycles: formed.element_cycles,
+        began_late: meshes.times.len() > 1 && meshes.times[0] > 0.0,
         axes: (formed.sheets.iter())
             .filter_map(|s| Some((s.name.clone(), first_axis(s.fibre_1?, s.fibre_2?))))
             .collect(),

@@ -3,7 +3,8 @@
 mod common;
 
 use common::*;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryInput};
+use plyflow_comparison::Comparison;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryInput, run};
 use serde_json::{Value, json};
 
 /// A run of the whole blank with elements of `size` (m).
@@ -118,4 +119,45 @@ fn without_a_reference_the_fine_runs_measure_the_others_in_their_zones() {
     assert!(!out.results.contains_key("defect_error"));
     assert!(!out.results.contains_key("position_error"));
     assert!(!out.measured.contains_key("cost_saving"));
+}
+
+/// A whole that begins late is the run of a zone over all of the blank: a measure like another, but no measure of what is saved.
+#[test]
+fn the_run_of_a_zone_over_the_blank_is_a_reference_and_nothing_is_saved_against_half_a_process() {
+    let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
+    let blank = json!({"name": "A", "box": BLANK, "free_sides": vec![true; 4], "plies": ["ply_1"]});
+    let mut late = formed(
+        vec![ply("ply_1", BLANK, 0.00125, OFFSET, height(1.0))],
+        0.00125,
+        blank,
+    );
+    late.times = vec![0.6, 1.0];
+    for body in &mut late.bodies {
+        let last = |all: &mut Vec<Vec<_>>| all.extend(all.first().cloned());
+        last(&mut body.frames);
+        body.fields.extend(body.fields.first().cloned());
+    }
+    // It leaves its tool out, as runs of zones may.
+    late.bodies.retain(|b| b.name != "tool");
+    let cost = |port, artifact, cost| MemoryInput {
+        cost: [cost, cost, 1e6],
+        ..MemoryInput::new(port, artifact)
+    };
+    let mut inputs = vec![
+        cost("global", &global, 10.0),
+        cost("zones", &zones, 0.0),
+        cost("local", &local, 20.0),
+        cost("reference", &late, 100.0),
+    ];
+    let out = compare(&inputs);
+    assert_eq!(out.attributes["measured_by"], "reference");
+    assert!(out.result("wrinkle_length_error") < 0.01);
+    assert_eq!(out.result("missed_wrinkles.global"), 1.0);
+    assert_eq!(out.measured["cost.reference.cpu_seconds"].0, 100.0);
+    assert!(!out.measured.contains_key("cost_saving"));
+
+    inputs.push(cost("reference", &late, 100.0));
+    let error = run::<Comparison>(json!({}), &inputs, &[]).unwrap_err();
+    let message = format!("{error:?}");
+    assert!(message.contains("reference: given 2 runs"), "{message}");
 }
