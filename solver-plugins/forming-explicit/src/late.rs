@@ -3,11 +3,12 @@
 
 use crate::assembly::StackSheet;
 use crate::local::LocalSheet;
-use crate::run::Forming;
+use crate::run::{Forming, Observer};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::SheetSpec;
 use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 use plyflow_model::scene::SheetKind;
+use plyflow_sdk::StepError;
 
 /// Where a sheet, or a model, is when it begins, and how it came there.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,8 +91,13 @@ pub(crate) fn of_model(
 /// quantile: what fine shells do that coarse membranes did not until then. `None` for a run that begins with the process.
 ///
 /// # Errors
-/// A text for the user: a component failed, or the start is unstable.
-pub(crate) fn begin(forming: &mut Forming, step: f64, safety: f64) -> Result<Option<f64>, String> {
+/// A text for the user: a component failed, or the start is unstable; or the observer stops it.
+pub(crate) fn begin(
+    forming: &mut Forming,
+    step: f64,
+    safety: f64,
+    observer: &mut dyn Observer,
+) -> Result<Option<f64>, StepError> {
     let Some(start) = forming.start.take() else {
         return Ok(None);
     };
@@ -110,7 +116,7 @@ pub(crate) fn begin(forming: &mut Forming, step: f64, safety: f64) -> Result<Opt
     // What the coarse run's places have wrong by now shall not pull to the end: held nodes are held from where they are in balance with
     // its forces.
     forming.model.loosen();
-    settle(forming, step, safety)?;
+    settle(forming, step, safety, observer)?;
     forming.model.anchor();
     // Nodes that were driven meanwhile have their velocity from the next step on.
     forming.model.v.copy_from_slice(&start.velocity);
@@ -150,7 +156,12 @@ fn clear_tool(forming: &mut Forming) {
 /// Steps at the time of the start, the nodes of the cut at rest. Contacts that get their whole load at once must not swing through
 /// each other: first nothing swings at all, for as long as multipliers take to follow; then all nodes are stopped whenever the
 /// kinetic energy has passed a peak.
-fn settle(forming: &mut Forming, step: f64, safety: f64) -> Result<(), String> {
+fn settle(
+    forming: &mut Forming,
+    step: f64,
+    safety: f64,
+    observer: &mut dyn Observer,
+) -> Result<(), StepError> {
     let model = &mut forming.model;
     let damping = model.damping();
     model.dt = step.min(safety * model.critical_step().map_err(|e| e.to_string())?);
@@ -170,6 +181,7 @@ fn settle(forming: &mut Forming, step: f64, safety: f64) -> Result<(), String> {
     };
     for _ in 0..creeping.round() as u32 {
         stand(forming)?;
+        observer.settling(forming)?;
     }
     clear(&mut forming.model, false);
     forming.model.set_damping(damping);
@@ -177,6 +189,7 @@ fn settle(forming: &mut Forming, step: f64, safety: f64) -> Result<(), String> {
     let mut before = 0.0;
     for _ in 0..SETTLING {
         stand(forming)?;
+        observer.settling(forming)?;
         let model = &mut forming.model;
         let kinetic = model.kinetic();
         if kinetic >= before {

@@ -17,6 +17,7 @@ pub mod process;
 pub mod run;
 pub mod symmetry;
 mod tool;
+mod writer;
 
 pub use global::build_global;
 pub use late::Start;

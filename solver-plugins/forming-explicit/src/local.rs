@@ -42,6 +42,7 @@ pub struct LocalSheet {
 }
 
 /// What a boundary artifact gives.
+#[derive(Debug, Clone)]
 pub struct LocalInput {
     /// Times of the frames (s).
     pub time: Vec<f64>,

@@ -1,21 +1,21 @@
 //! The step behind the host: inputs, frames, attributes, results.
 
 use crate::assembly::Components;
-use crate::checkpoint::{Part, Recorder};
+use crate::checkpoint::Recorder;
 use crate::late::Start;
 use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use crate::penetration::Penetration;
-use crate::run::{Body, Course, Forming, Observer, Outcome};
+use crate::run::{Body, Forming, Outcome};
+use crate::writer::Writer;
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
-use plyflow_mechanics::component::{ElementField, element_fields};
+use plyflow_mechanics::component::element_fields;
 use plyflow_mechanics::contact::ContactEnergy;
-use plyflow_mechanics::energy::{Ledger, SheetEnergy};
-use plyflow_mechanics::vec3::{V, add};
+use plyflow_mechanics::energy::SheetEnergy;
+use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::{Host, Input, Log, Progress, StepError};
 use serde_json::json;
-use std::borrow::Cow;
 use std::time::Instant;
 
 struct HostComponents<'a>(&'a Host);
@@ -30,96 +30,6 @@ impl Components for HostComponents<'_> {
         self.0
             .component(PF_KIND_MATERIAL, name)
             .map_err(|e| format!("{e:?}"))
-    }
-}
-
-struct Writer<'a> {
-    host: &'a Host,
-    frames: Recorder<'a>,
-    fields: Vec<Vec<ElementField>>,
-    started: Instant,
-    shown: Instant,
-    cycle_shown: u64,
-    /// Where this attempt began.
-    first_cycle: u64,
-}
-
-impl Observer for Writer<'_> {
-    fn frame(&mut self, forming: &Forming, time: f64) -> Result<(), StepError> {
-        self.frames.put(&Part::Begin(time))?;
-        for (body, fields) in forming.bodies.iter().zip(&self.fields) {
-            let name = || Cow::from(&body.name);
-            let points = forming.points(body).into();
-            self.frames.put(&Part::Points(name(), points))?;
-            for f in fields {
-                let values = forming.field(body, f, fields);
-                let (field, unit) = (Cow::from(&f.name), Cow::from(&f.unit));
-                self.frames
-                    .put(&Part::Field(name(), !f.patch, field, unit, values.into()))?;
-            }
-            let pressure = forming.contact_pressure(body).into();
-            let (field, unit) = ("contact_pressure".into(), "Pa".into());
-            self.frames
-                .put(&Part::Field(name(), false, field, unit, pressure))?;
-        }
-        if forming.load.press().is_some() {
-            let moved = |points: &[V], part: &str| -> Vec<V> {
-                let shift = forming.shift(part);
-                points.iter().map(|x| add(*x, shift)).collect()
-            };
-            let tool = moved(&forming.tool.points, "tool").into();
-            self.frames.put(&Part::Points("tool".into(), tool))?;
-            for part in &forming.rigid {
-                let points = moved(&part.points, &part.name).into();
-                self.frames
-                    .put(&Part::Points(Cow::from(&part.name), points))?;
-            }
-        }
-        self.frames.put(&Part::End)
-    }
-
-    fn resume(&mut self, forming: &mut Forming, course: &mut Course) -> Result<(), StepError> {
-        if self.frames.resume(forming, course)? {
-            let model = &forming.model;
-            (self.cycle_shown, self.first_cycle) = (model.cycle, model.cycle);
-            self.host.progress(&Progress {
-                fraction: model.time / forming.load.duration(),
-                simulated_time: model.time,
-                phase: "going on from a checkpoint",
-                ..Progress::default()
-            });
-        }
-        Ok(())
-    }
-
-    fn slower(&mut self, what: &str) {
-        self.host.log(Log::Warn, what);
-    }
-
-    fn between_frames(&mut self, forming: &mut Forming, course: &mut Course) {
-        self.frames.checkpoint(forming, course);
-    }
-
-    fn tick(&mut self, forming: &Forming, e: &Ledger, end: f64) -> Result<(), StepError> {
-        self.host.check_cancelled()?;
-        let elapsed = self.shown.elapsed().as_secs_f64();
-        if elapsed > 0.2 {
-            let cycle = forming.model.cycle;
-            self.host.progress(&Progress {
-                fraction: forming.model.time / end,
-                simulated_time: forming.model.time,
-                rate: (cycle - self.cycle_shown) as f64 / elapsed,
-                energy_ratio: if e.internal() > 0.0 {
-                    e.kinetic / e.internal()
-                } else {
-                    -1.0
-                },
-                phase: forming.load.phase(forming.model.time),
-            });
-            self.shown = Instant::now();
-            self.cycle_shown = cycle;
-        }
-        Ok(())
     }
 }
 

@@ -240,6 +240,13 @@ pub trait Observer {
         energies: &Ledger,
         end: f64,
     ) -> Result<(), plyflow_sdk::StepError>;
+    /// Called often while a run that begins late finds its balance; may stop the run.
+    ///
+    /// # Errors
+    /// Stops the run.
+    fn settling(&mut self, _forming: &Forming) -> Result<(), plyflow_sdk::StepError> {
+        Ok(())
+    }
     /// Called before anything else: may put a run at its start to where an earlier attempt was.
     ///
     /// # Errors
@@ -343,7 +350,7 @@ impl Forming {
         observer.resume(self, &mut course)?;
         let mut is_late = false;
         if course.history.is_empty() {
-            course.start_shift = late::begin(self, control.target_step, control.safety)?;
+            course.start_shift = late::begin(self, control.target_step, control.safety, observer)?;
             is_late = course.start_shift.is_some();
         }
         for frame in course.frame..control.frames {

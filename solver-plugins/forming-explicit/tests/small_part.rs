@@ -173,6 +173,9 @@ struct Film {
     time: Vec<f64>,
     /// `[frames][bodies][nodes]` (m).
     points: Vec<Vec<Vec<V>>>,
+    /// How often a late start said that it is on its way, and how often it may.
+    settled: usize,
+    settles: Option<usize>,
 }
 
 impl Observer for Film {
@@ -187,6 +190,13 @@ impl Observer for Film {
     }
     fn tick(&mut self, _: &Forming, _: &Ledger, _: f64) -> Result<(), StepError> {
         Ok(())
+    }
+    fn settling(&mut self, _: &Forming) -> Result<(), StepError> {
+        self.settled += 1;
+        match self.settles {
+            Some(most) if self.settled > most => Err("stopped".into()),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -399,6 +409,20 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
             zone: json!({"name": "A"}),
             element_size: 0.007,
         };
+        if first > 0 && !held {
+            // Whoever waits for the balance sees that it is looked for, and can stop it.
+            let mut impatient = Film {
+                settles: Some(20),
+                ..Film::default()
+            };
+            let mut forming = build_local(&p, input.clone(), &BuiltIn).unwrap();
+            let Err(stopped) = forming.run(&p.control(), &mut impatient) else {
+                panic!("the start went on");
+            };
+            let message = format!("{stopped:?}");
+            assert!(message.contains("stopped"), "{message}");
+            assert_eq!((impatient.settled, impatient.time.len()), (21, 0));
+        }
         let mut forming = build_local(&p, input, &BuiltIn).unwrap();
         let mut seen = Film {
             short: drift.is_some(),
