@@ -22,8 +22,17 @@ pub(crate) struct Way {
     /// Missed and false wrinkles, missed and false bridging; absent for the reference.
     pub(crate) counts: Option<[f64; 4]>,
     pub(crate) is_reference: bool,
-    /// Whether no other way is both cheaper and better.
+    /// When it began, if that was late (s): what came before is not in its cost.
+    pub(crate) from: Option<f64>,
+    /// Whether no other way is both cheaper and better. One whose cost is not told has no place on it, unless it is the reference.
     pub(crate) on_front: bool,
+}
+
+impl Way {
+    /// Whether its cost is that of an answer.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.from.is_none() || self.is_reference
+    }
 }
 
 /// Results that make the errors and counts of a way.
@@ -77,7 +86,7 @@ pub(crate) fn ways(input: &ReportInput) -> Ways {
     list.sort_by(|a, b| a.cpu.total_cmp(&b.cpu).then(a.error.total_cmp(&b.error)));
     list.dedup_by(|a, b| a.cpu == b.cpu && a.error == b.error);
     let mut least = f64::INFINITY;
-    for way in &mut list {
+    for way in list.iter_mut().filter(|w| w.is_whole()) {
         way.on_front = way.error < least;
         least = least.min(way.error);
     }
@@ -126,6 +135,7 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
             counts: (counts.iter().all(Option::is_some))
                 .then(|| counts.map(Option::unwrap_or_default)),
             is_reference: suffix.is_none(),
+            from: value(&format!("start_time.{model}")),
             on_front: false,
         })
     };
@@ -151,7 +161,7 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
 pub(crate) fn advice(ways: &Ways, targets: &[f64]) -> Vec<String> {
     let one = |target: &f64| {
         let percent = 100.0 * target;
-        let found = ways.list.iter().find(|w| w.error <= *target)?;
+        let found = (ways.list.iter()).find(|w| w.is_whole() && w.error <= *target)?;
         let share = 100.0 * found.share;
         Some(if !found.is_reference {
             format!(
@@ -316,5 +326,34 @@ mod tests {
             advice[1].contains("none but the coarse run and zones"),
             "{advice:?}"
         );
+    }
+
+    #[test]
+    fn a_run_that_began_late_is_told_so_and_not_advised() {
+        let mut run = costs(10.0, 100.0);
+        run.extend([
+            ("defect_error", 0.08),
+            ("cost.other.late.cpu_seconds", 50.0),
+            ("cost.other.late.wall_seconds", 50.0),
+            ("defect_error.other.late", 0.02),
+            ("start_time.other.late", 0.6),
+            ("start_time.reference", 0.7),
+        ]);
+        let ways = ways(&input(vec![comparison("late", &run)]));
+        let told: Vec<(&str, Option<f64>, bool)> = (ways.list.iter())
+            .map(|w| (w.name.as_str(), w.from, w.on_front))
+            .collect();
+        assert_eq!(
+            told,
+            [
+                ("coarse run alone", None, true),
+                ("late", Some(0.6), false),
+                ("coarse run and zones", None, true),
+                ("reference", Some(0.7), true),
+            ]
+        );
+        let advice = advice(&ways, &[0.1, 0.05]);
+        assert!(advice[0].contains("coarse run and zones"), "{advice:?}");
+        assert!(advice[1].contains("none but the reference"), "{advice:?}");
     }
 }

@@ -249,8 +249,13 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &[Input]) -> Result<(
     host.measured("cost.total.wall_seconds", wall, "s")?;
     host.measured("cost.total.cpu_seconds", cpu, "s")?;
     host.measured("peak_memory.total", memory, "1")?;
-    // One that began late did a part of the process only: nothing is saved against that.
-    let reference = (models.iter()).find(|m| m.role == Role::Reference && !m.began_late);
+    // One that began late did a part of the process only: nothing is saved against that, and its cost is not that of a whole.
+    for m in (models.iter()).filter(|m| matches!(m.role, Role::Other | Role::Reference)) {
+        if let Some(time) = m.began_late {
+            host.result(&format!("start_time.{}", m.name), time, "s")?;
+        }
+    }
+    let reference = (models.iter()).find(|m| m.role == Role::Reference && m.began_late.is_none());
     if let Some(full) = reference
         .map(|m| m.input.cost.cpu_seconds)
         .filter(|&s| s > 0.0)

@@ -102,8 +102,8 @@ pub struct Model {
     pub elements: usize,
     /// Cells times cycles, over all sheets.
     pub element_cycles: f64,
-    /// Whether it began late: its first frame, of several, is not that of time 0.
-    pub began_late: bool,
+    /// Time of its first frame, of several, if that is not 0: it began late (s).
+    pub began_late: Option<f64>,
     /// Plies in the order of the stack.
     pub plies: Vec<Ply>,
     /// Direction of the first fibres of each ply that tells it, in the flat ply (rad), by its name.
@@ -280,7 +280,7 @@ fn read(
             .map(|b| b.cells)
             .sum(),
         element_cycles: formed.element_cycles,
-        began_late: meshes.times.len() > 1 && meshes.times[0] > 0.0,
+        began_late: (meshes.times.first().copied()).filter(|&t| meshes.times.len() > 1 && t > 0.0),
         axes: (formed.sheets.iter())
             .filter_map(|s| Some((s.name.clone(), first_axis(s.fibre_1?, s.fibre_2?))))
             .collect(),

@@ -155,6 +155,8 @@ fn the_run_of_a_zone_over_the_blank_is_a_reference_and_nothing_is_saved_against_
     assert_eq!(out.result("missed_wrinkles.global"), 1.0);
     assert_eq!(out.measured["cost.reference.cpu_seconds"].0, 100.0);
     assert!(!out.measured.contains_key("cost_saving"));
+    assert_eq!(out.result("start_time.reference"), 0.6);
+    assert!(!out.results.contains_key("start_time.global"));
 
     inputs.push(cost("reference", &late, 100.0));
     let error = run::<Comparison>(json!({}), &inputs, &[]).unwrap_err();

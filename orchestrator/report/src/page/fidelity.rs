@@ -28,6 +28,9 @@ pub(super) fn section(input: &ReportInput) -> Markup {
                 @if !ways.of_the_whole {
                     p { "Nobody ran the whole in fine elements here, so the fine runs of the zones are the measure, in these zones: how wrong they are themselves, and what lies outside of them, is not told." }
                 }
+                @if ways.list.iter().any(|w| w.from.is_some()) {
+                    p { "A run that began late (from …) did a part of the process: what it began from is not in its cost, so it is not marked and not advised. Shares of the CPU time of such a reference are of that part." }
+                }
                 div class="scroll" { table {
                     thead { tr {
                         th { "way" } th {}
@@ -60,7 +63,7 @@ fn row(way: &Way) -> Markup {
     let millimetres = |v: f64| fixed(1e3 * v, 2);
     html! {
         tr {
-            th { (way.name) } td { @if way.on_front { "●" } }
+            th { (way.name) @if let Some(time) = way.from { " (from " (fixed(time, 2)) " s)" } } td { @if way.on_front { "●" } }
             td class="n" { (duration(way.cpu)) } td class="n" { (duration(way.wall)) }
             td class="n" { (told(way.memory, &|v| bytes(v as u64))) }
             td class="n" { (share) } td class="n" { (percent(way.error)) }
@@ -80,7 +83,7 @@ fn plot(title: &str, y_label: &str, ways: &Ways, error: fn(&Way) -> Option<f64>)
     let mut least = f64::INFINITY;
     let mut front = Vec::new();
     for &(w, e) in &told {
-        if e < least {
+        if w.is_whole() && e < least {
             least = e;
             front.push((w, e));
         }
