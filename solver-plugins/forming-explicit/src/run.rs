@@ -523,6 +523,9 @@ impl Forming {
     }
 }
 
+/// Share of the work from which on the user is told that it is unaccounted for.
+const DRIFT: f64 = 0.01;
+
 fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {
     let mut list = Vec::new();
     if h.peak_kinetic_ratio > kinetic_bound {
@@ -533,7 +536,7 @@ fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {
             100.0 * kinetic_bound
         ));
     }
-    if h.peak_drift_ratio > 0.05 {
+    if h.peak_drift_ratio > DRIFT {
         list.push(format!(
             "{:.1} % of the external work is unaccounted for: reduce time_step or step_safety",
             100.0 * h.peak_drift_ratio
