@@ -3,11 +3,13 @@
 //! A step of its own and no part of `comparison`: that one sets local runs against a global one, zone by zone and defect by
 //! defect; here whole runs of one part stand beside each other, and what is asked is how a census changes with the material.
 
+mod against;
 mod output;
 mod run;
 mod table;
 
-pub use run::{Choice, Run};
+pub use against::relative_distance;
+pub use run::{Choice, Run, Section};
 pub use table::{never_falls, never_rises};
 
 use plyflow_sdk::{Host, Step, StepError, export_step};
@@ -22,6 +24,8 @@ export_step!(CensusComparison);
 #[derive(Deserialize)]
 struct Parameters {
     runs: Vec<Choice>,
+    /// The step of the run that the others are held against.
+    reference: Option<String>,
 }
 
 impl Step for CensusComparison {
@@ -37,6 +41,8 @@ impl Step for CensusComparison {
         host.write_attributes(&json!({
             "runs": table::list(&runs), "tables": [table], "plots": plots, "maps": maps,
         }))?;
-        table::results(host, &runs)
+        table::results(host, &runs)?;
+        p.reference
+            .map_or(Ok(()), |r| against::results(host, &runs, &r))
     }
 }

@@ -22,6 +22,17 @@ struct Census {
     ply: String,
     circles: Vec<Circle>,
     curves: Vec<Curve>,
+    #[serde(default)]
+    cross_sections: Vec<Section>,
+}
+
+/// A cross section of a census.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Section {
+    /// In plots.
+    pub label: String,
+    /// In the names of results.
+    pub result: String,
 }
 
 #[derive(Debug, Deserialize)]
@@ -81,6 +92,8 @@ pub struct Run {
     pub wrinkles: Vec<Wrinkle>,
     /// Its curves.
     pub curves: Vec<Curve>,
+    /// Its cross sections.
+    pub sections: Vec<Section>,
     /// The ply: undeformed and formed points (m), quads.
     pub flat: Vec<Vec3>,
     /// Formed.
@@ -169,6 +182,7 @@ fn one(host: &Host, input: Input, name: String, choice: Option<&Choice>) -> Resu
         bending_stiffness: choice.and_then(|c| c.bending_stiffness),
         wrinkles: first.map(|c| c.wrinkles).unwrap_or_default(),
         curves: census.curves,
+        sections: census.cross_sections,
         points: host.frame_points(&input, body, frame)?,
         name,
         input,

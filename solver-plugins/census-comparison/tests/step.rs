@@ -1,6 +1,6 @@
 //! Censuses whose numbers are known, side by side.
 
-use plyflow_census_comparison::{CensusComparison, never_falls, never_rises};
+use plyflow_census_comparison::{CensusComparison, never_falls, never_rises, relative_distance};
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
@@ -56,6 +56,7 @@ fn census(wrinkles: usize, width: f64, deviation: f64, moment: Option<f64>) -> M
         kind: "census".into(),
         attributes: json!({
             "ply": "ply_1", "circles": [{"radius": 0.08, "wrinkles": waves}],
+            "cross_sections": [{"label": "A-A'", "result": "a_a", "wrinkles": []}],
             "curves": [curve("circles", "radius 80 mm", "circle_0", "angle"),
                        curve("cross_sections", "A-A'", "cross_section_0", "distance")],
         }),
@@ -231,4 +232,36 @@ fn runs_that_do_not_fit_the_wires_are_refused() {
         same.contains("same bending_stiffness") && same.contains(&n[1]),
         "{same}"
     );
+}
+
+#[test]
+fn runs_are_held_against_one_of_them() {
+    let all = four();
+    let n = names(&all);
+    let found = compare(json!({"reference": n[3]}), &all).unwrap();
+    let of = |what: &str, k: usize| found.result(&format!("{what}.{}", n[k]));
+    assert!((of("bending_moment_ratio", 1) - 3.0).abs() < 1e-12);
+    assert!((of("deviation_ratio", 2) - 0.5).abs() < 1e-12);
+    // A membrane has no moments, and the reference is not held against itself.
+    for (what, k) in [("bending_moment_ratio", 0), ("deviation_ratio", 3)] {
+        assert!(!found.results.contains_key(&format!("{what}.{}", n[k])));
+    }
+    // Tops of 1 and 2 mm at the middle of three places: 1 mm / sqrt(3) over the 2 mm of the reference.
+    let error = |k: usize| found.result(&format!("section_error.{}.a_a", n[k]));
+    assert!((error(2) - 0.5 / 3f64.sqrt()).abs() < 1e-12, "{}", error(2));
+    assert_eq!(error(1), 0.0);
+    let told = compare(json!({"reference": "other"}), &all).unwrap_err();
+    assert!(told.contains("'other'") && told.contains(&n[0]), "{told}");
+}
+
+#[test]
+fn profiles_with_other_places_are_compared_where_both_are() {
+    // A slope against one 0.1 higher, at other places, and beyond its end: root mean square 0.1 over a height of 1.
+    let slope: Vec<[f64; 2]> = (0..=10).map(|k| [0.1 * f64::from(k); 2]).collect();
+    let other: Vec<[f64; 2]> = (0..=9)
+        .map(|k| [0.09 * f64::from(k), 0.09 * f64::from(k) + 0.1])
+        .collect();
+    assert!((relative_distance(&slope, &other).unwrap() - 0.1).abs() < 1e-12);
+    assert_eq!(relative_distance(&slope, &[]), None);
+    assert_eq!(relative_distance(&[[0.0, 1.0], [1.0, 1.0]], &slope), None);
 }

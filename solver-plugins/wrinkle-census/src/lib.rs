@@ -93,6 +93,7 @@ impl Step for WrinkleCensus {
         trace.lengths(p.circles[0], &mut counted[0]);
         let inner = inner_deviation(&p, &around)?;
         sections(host, &p, &cut, &mut plots)?;
+        let across = cross_sections(host, &p, &cut, &mut plots)?;
         let deviation = (!rests.is_empty()).then(|| deviation::deviations(&ply.points, &rests));
         let maps = fields(host, &p, &ply, deviation, &mut plots)?;
         let list: Vec<Value> = (p.circles.iter().zip(&counted))
@@ -100,7 +101,7 @@ impl Step for WrinkleCensus {
             .collect();
         host.write_attributes(&json!({
             "ply": ply.name, "circles": list, "threshold": p.threshold, "prominence": p.criteria().prominence,
-            "curves": plots.curves, "plots": plots.plots, "maps": maps,
+            "cross_sections": across, "curves": plots.curves, "plots": plots.plots, "maps": maps,
         }))?;
         results(host, &counted[0], inner)
     }
@@ -206,26 +207,43 @@ fn inner_deviation(
     Ok(largest)
 }
 
-/// Writes the sections through the axis, and those across.
+/// Half the length of a section (m): as far as the largest circle.
+fn half_length(p: &Parameters) -> f64 {
+    p.circles.iter().copied().fold(0.0, f64::max)
+}
+
+/// What a section sees at places at that distance (m) along the direction (c, s) from `from`, from `-half` to `half`; `None`
+/// beside the ply.
+fn line(
+    p: &Parameters,
+    cut: &Cut<'_>,
+    from: [f64; 2],
+    [c, s]: [f64; 2],
+) -> Vec<(f64, Option<Hit>)> {
+    let half = half_length(p);
+    let place = |i: usize| half * (2.0 * i as f64 / (p.samples - 1) as f64 - 1.0);
+    let seen = |d: f64| cut.seen([from[0] + d * c, from[1] + d * s], p.looks_up());
+    let at = |i: usize| (place(i), seen(place(i)));
+    (0..p.samples).map(at).collect()
+}
+
+/// Distances and heights (m) of what is on the ply.
+fn profile(seen: &[(f64, Option<Hit>)]) -> (Vec<f64>, Vec<f64>) {
+    let on = seen.iter().filter_map(|(d, h)| Some((*d, (*h)?.height)));
+    on.unzip()
+}
+
+/// Writes the sections through the axis.
 fn sections(
     host: &Host,
     p: &Parameters,
     cut: &Cut<'_>,
     plots: &mut Plots,
 ) -> Result<(), StepError> {
-    let reach = p.circles.iter().copied().fold(0.0, f64::max);
-    // Along the direction (c, s) through the place `from`, `half` to both sides.
-    let line = |from: [f64; 2], [c, s]: [f64; 2], half: f64| -> (Vec<f64>, Vec<f64>) {
-        let place = |i: usize| half * (2.0 * i as f64 / (p.samples - 1) as f64 - 1.0);
-        let seen = |d: f64| cut.seen([from[0] + d * c, from[1] + d * s], p.looks_up());
-        let height = |d: f64| Some((d, seen(d)?.height));
-        (0..p.samples).map(place).filter_map(height).unzip()
-    };
-    let [x, y] = [p.centre[0], p.centre[1]];
     let mut series = Vec::new();
     for (k, angle) in p.sections.iter().enumerate() {
         let (s, c) = angle.sin_cos();
-        let (along, height) = line([x, y], [c, s], reach);
+        let (along, height) = profile(&line(p, cut, [p.centre[0], p.centre[1]], [c, s]));
         let curve = Curve {
             name: format!("section_{k}"),
             label: format!("section at {:.0} deg", angle.to_degrees()),
@@ -236,11 +254,25 @@ fn sections(
     }
     let axis = ["distance from the axis", "mm"];
     plots.heights("sections", "Sections through the axis", axis, series);
-    let mut series = Vec::new();
+    Ok(())
+}
+
+/// Writes the sections across, counts the wrinkles in each by the criteria of the circles, and reports them.
+fn cross_sections(
+    host: &Host,
+    p: &Parameters,
+    cut: &Cut<'_>,
+    plots: &mut Plots,
+) -> Result<Vec<Value>, StepError> {
+    let (mut series, mut counted) = (Vec::new(), Vec::new());
     for (k, across) in p.cross_sections.iter().enumerate() {
         let (s, c) = across.angle.sin_cos();
-        let from = [x + across.offset * c, y + across.offset * s];
-        let (along, height) = line(from, [-s, c], reach);
+        let from = [
+            p.centre[0] + across.offset * c,
+            p.centre[1] + across.offset * s,
+        ];
+        let seen = line(p, cut, from, [-s, c]);
+        let (along, height) = profile(&seen);
         if along.is_empty() {
             return Err(format!(
                 "cross_sections: '{}' at {:.1} mm from the axis lies all beside the ply; take a smaller offset",
@@ -256,10 +288,33 @@ fn sections(
             y: ("height", "m", &height),
         };
         series.push(plots.curve(host, "cross_sections", &curve)?);
+        // A closed profile with a place beside the ply between its ends, which no wrinkle crosses.
+        let closed: Vec<Option<Hit>> = (seen.iter().map(|(_, h)| *h)).chain([None]).collect();
+        let spacing = 2.0 * half_length(p) / (p.samples - 1) as f64;
+        let found = waves(&closed, spacing * closed.len() as f64 / TAU, &p.criteria());
+        let highest = found.iter().map(|w| w.height.abs()).fold(0.0, f64::max);
+        let name = plain(&across.label);
+        let count = found.len() as f64;
+        host.result(&format!("section_wrinkles.{name}"), count, "1")?;
+        host.result(&format!("section_height.{name}"), highest, "m")?;
+        let list: Vec<Value> = (found.iter())
+            .map(|w| json!({"place": w.angle / TAU * spacing * closed.len() as f64 - half_length(p), "z": w.z, "height": w.height,
+                            "prominence": w.prominence, "width": w.width, "shear": w.shear}))
+            .collect();
+        counted.push(json!({"label": across.label, "result": name, "wrinkles": list}));
     }
     let axis = ["distance along the section", "mm"];
     plots.heights("cross_sections", "Sections across", axis, series);
-    Ok(())
+    Ok(counted)
+}
+
+/// A label as a part of a result's name: letters and digits, what lies between them one underscore.
+fn plain(label: &str) -> String {
+    let words = label.split(|c: char| !c.is_ascii_alphanumeric());
+    let words: Vec<String> = (words.filter(|w| !w.is_empty()))
+        .map(str::to_lowercase)
+        .collect();
+    words.join("_")
 }
 
 /// Writes the ply with its deviation and moments, and their distributions; the maps that show them.

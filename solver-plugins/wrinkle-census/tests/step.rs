@@ -228,6 +228,16 @@ fn a_section_across_shows_the_wrinkle_that_it_cuts() {
         .map(|(_, h)| *h)
         .collect();
     assert!(peak(&near) < 3e-5, "{}", peak(&near));
+    // A-A' counts it, with its height and place; what ends at the end of B-B' is no top there.
+    let section = |what: &str, name: &str| found.result(&format!("section_{what}.{name}"));
+    assert_eq!(
+        (section("wrinkles", "a_a"), section("wrinkles", "b_b")),
+        (1.0, 0.0)
+    );
+    assert!((section("height", "a_a") - 3e-3).abs() < 1e-4);
+    let listed = &found.attributes["cross_sections"][0]["wrinkles"][0];
+    assert!(listed["place"].as_f64().unwrap().abs() < 5e-4, "{listed}");
+    assert!((listed["height"].as_f64().unwrap() - 3e-3).abs() < 1e-4);
     assert!(found.attributes["plots"].to_string().contains("A-A'"));
     with["cross_sections"][0]["offset"] = json!(0.4);
     let told = census(&four_wrinkles(), with).unwrap_err();

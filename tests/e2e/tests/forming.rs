@@ -118,6 +118,56 @@ fn the_same_length_in_other_units_is_the_same_run() {
     assert_eq!(study.run(&[]), well(0, 4));
 }
 
+/// Two zones cut through what hangs over the ends of a shorter block, 25 mm apart; both grow towards each other and become one.
+#[test]
+fn zones_whose_defects_reach_their_cuts_are_drawn_again_and_run_again() {
+    let boxes = "[[-60 mm, -50 mm, 60 mm, 0 mm], [-60 mm, 20 mm, 60 mm, 50 mm]]";
+    let study = study(boxes);
+    let scene = study.path("scene.yaml");
+    let text = std::fs::read_to_string(&scene).unwrap();
+    std::fs::write(&scene, text.replace("length: 260 mm", "length: 80 mm")).unwrap();
+    let (first, _) = chain(boxes)
+        .split_once("  comparison:")
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .unwrap();
+    let measured = "{distance_threshold: 0.5 mm, minimum_bridging_area: 20 mm2, foot_margin: 0 mm}";
+    study.write(&format!(
+        "{first}
+  drawn: {{plugin: comparison, from: {{global: coarse, zones: zones, local: local}}, with: &measured {measured}}}
+  grown: {{plugin: zone-extraction, from: {{zones: zones, comparison: drawn}}}}
+  boundary_grown:
+    plugin: boundary-interpolation
+    for_each: {{zone: grown}}
+    from: {{formed: coarse, zones: grown}}
+    with: {{element_size: 10 mm}}
+  local_grown:
+    plugin: forming-explicit
+    for_each: {{zone: grown}}
+    from: {{boundary: boundary_grown}}
+    with: {{scene: scene.yaml, element: rf4, frames: 20, tool_grid: 5 mm}}
+  comparison: {{plugin: comparison, from: {{global: coarse, zones: [zones, grown], local: [local, local_grown]}}, with: *measured}}
+"
+    ));
+    assert!(study.start(&[]).wait().unwrap().success());
+    let log = study.log();
+    let at_a_cut = |step: &str| {
+        let lines = log.lines().filter(|l| l.contains("reaches the cut"));
+        lines
+            .filter(|l| l.contains(&format!("\"step\":\"{step}\"")))
+            .count()
+    };
+    // Both ends of both plies, in both zones.
+    assert_eq!((at_a_cut("drawn"), at_a_cut("comparison")), (8, 0), "{log}");
+    // The sides at y = 0 and at 20 mm go to 12.5 mm: one zone, all of the blank.
+    assert_eq!(study.values("grown", "zone_count"), [1.0]);
+    assert_eq!(study.values("grown", "ply_fraction"), [1.0]);
+    assert_eq!(study.values("drawn", "zone_count"), [2.0]);
+    assert_eq!(study.values("comparison", "zone_count"), [1.0]);
+    assert!(study.values("comparison", "cost.superseded.cpu_seconds")[0] > 0.0);
+    // Nothing is left to grow, and nothing runs again.
+    assert_eq!(study.run(&[]), well(0, 12));
+}
+
 /// Checkpoints in the study's store: their instances.
 fn checkpoints(study: &Study) -> Vec<String> {
     let folder = study.path(".plyflow/runs/study/checkpoints");
