@@ -508,4 +508,17 @@ pub struct DoubleDiaphragm {
     /// pressure; their seal lies at the frame).
     #[schemars(extend("x-minimum" = "0 mm"))]
     pub film_joint_margin: Length,
+    /// Where the weight of plies and films pulls them; left out: they have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weight: Option<WeightDirection>,
+}
+
+/// A direction in double-diaphragm forming.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WeightDirection {
+    /// Downwards, onto the tool and the bed.
+    Tool,
+    /// Upwards, away from them: a machine whose tool hangs over the films.
+    Away,
 }

@@ -7,7 +7,7 @@ use crate::assembly::{self, Components, StackSheet};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
 use crate::penetration;
-use crate::process::Load;
+use crate::process::{GRAVITY, Load};
 use crate::run::{Forming, RigidBody};
 use crate::symmetry;
 use crate::tool::{self, ToolSurface};
@@ -20,8 +20,6 @@ use plyflow_model::scene::{Hold, Press, Scene, Towards};
 use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
 
-/// Free fall (m/s2).
-const GRAVITY: f64 = 9.81;
 /// Mass of a holder that a force presses, over that of the plies: heavy enough to follow their contacts stably in
 /// explicit steps, light enough to follow the blank as it thickens.
 const HOLDER_MASS: f64 = 20.0;

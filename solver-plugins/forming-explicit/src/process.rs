@@ -5,7 +5,10 @@ use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::history::{linear, smooth_step};
 use plyflow_mechanics::model::{Drive, Model, Pressures};
 use plyflow_mechanics::vec3::V;
-use plyflow_model::scene::DoubleDiaphragm;
+use plyflow_model::scene::{DoubleDiaphragm, WeightDirection};
+
+/// Free fall (m/s2).
+pub(crate) const GRAVITY: f64 = 9.81;
 
 /// Pressures and frame height of the process.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +23,8 @@ pub struct Cycle {
     pub frame: [f64; 2],
     /// Strain by which the frame stretches the films before the bag is evacuated.
     pub pre_stretch: f64,
+    /// Acceleration of free fall along z once the weight is there (m/s2); 0: bodies have no weight.
+    pub weight: f64,
 }
 
 impl Cycle {
@@ -36,6 +41,11 @@ impl Cycle {
             ],
             frame,
             pre_stretch: p.film_pre_stretch.0,
+            weight: match p.weight {
+                None => 0.0,
+                Some(WeightDirection::Tool) => -GRAVITY,
+                Some(WeightDirection::Away) => GRAVITY,
+            },
         }
     }
 
@@ -74,6 +84,12 @@ impl Cycle {
     /// the plies.
     pub fn stretch(&self, t: f64) -> f64 {
         self.pre_stretch * smooth_step(t, 0.0, 0.5 * self.durations[0])
+    }
+
+    /// Acceleration of free fall along z at `t` (m/s2). It grows while the frame stretches the films: under a weight that is there at
+    /// once films that are still slack would fall, and swing when they are stretched.
+    pub fn fall(&self, t: f64) -> f64 {
+        self.weight * smooth_step(t, 0.0, 0.5 * self.durations[0])
     }
 
     /// Height of the frame at `t` (m).
@@ -188,9 +204,13 @@ impl Load {
         }
     }
 
-    /// Sets the model's pressures, or the places of the press's parts, for its present time.
+    /// Sets the model's pressures and weight, or the places of the press's parts, for its present time.
     pub fn apply(&mut self, model: &mut Model) {
         let t = model.time;
+        if let Self::Process { cycle, .. } | Self::Given { cycle, .. } = self {
+            // Of the bodies' own masses: what mass scaling adds has no weight.
+            model.body_acceleration[2] = cycle.fall(t);
+        }
         match self {
             Self::Press(p) => p.apply(model),
             Self::Given {

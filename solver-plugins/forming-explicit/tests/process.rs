@@ -1,0 +1,192 @@
+//! The double-diaphragm process in time: weight, pressures as histories.
+
+mod common;
+
+use common::{BuiltIn, fabric};
+use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::run::Forming;
+use plyflow_forming_explicit::{LocalInput, LocalSheet, Start, build_global, build_local};
+use plyflow_mechanics::mesh::QuadMesh;
+use serde_json::{Value, json};
+
+/// Free fall (m/s2).
+const GRAVITY: f64 = 9.81;
+/// Frame and ply (m), areal masses of film and fabric (kg/m2).
+const FRAME: [f64; 2] = [0.32, 0.28];
+const PLY: [f64; 2] = [0.12, 0.09];
+const AREAL: [f64; 2] = [0.08, 0.44];
+
+/// A ply between films over a flat block, in coarse elements; `change` is done to the process, `symmetry` to the scene.
+fn parameters(symmetry: &[&str], change: impl Fn(&mut Value)) -> Parameters {
+    let film = json!({
+        "plyflow_material": 1, "name": "film", "plugin": "material-marlow",
+        "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
+        "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
+    });
+    let diaphragm =
+        |name: &str| json!({"name": name, "kind": "diaphragm", "material": film.clone()});
+    let mut process = json!({
+        "frame_length": "0.32 m", "frame_width": "0.28 m", "clearance": "0.02 m",
+        "bag_pressure": "100000 Pa", "forming_pressure": "100000 Pa",
+        "bagging_time": "0.04 s", "lowering_time": "0.06 s", "drawing_time": "0.06 s",
+        "settling_time": "0.01 s", "film_pre_stretch": 0.01, "film_joint_margin": "0.03 m"});
+    change(&mut process);
+    let with = json!({"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01});
+    serde_json::from_value(json!({
+        "scene": {
+            "plyflow_scene": 1, "name": "block",
+            "tool": {"flat": {"length": "0.1 m", "width": "0.06 m", "height": "0.02 m", "fillet": "0.012 m",
+                              "facet_size": "0.008 m"}},
+            "sheets": [diaphragm("lower"),
+                       {"name": "ply", "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.09 m",
+                        "fibre_1": "-0.7853981633974483 rad", "fibre_2": "0.7853981633974483 rad"},
+                       diaphragm("upper")],
+            "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "diaphragm_diaphragm": 0.3},
+            "process": {"double_diaphragm": process},
+            "symmetry": symmetry
+        },
+        "element": {"plugin": "m4", "with": with},
+        "diaphragm_element": {"plugin": "m4", "with": with},
+        "element_size": 0.015, "diaphragm_growth": 1.25, "time_step": 1.2e-5, "step_safety": 0.8,
+        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
+        "contact_damping": 0.3, "contact_augmentation": 0.003, "frames": 8, "tool_grid": 0.004,
+        "kinetic_bound": 0.05, "drift_bound": 0.5
+    }))
+    .expect("the parameters fit their type")
+}
+
+/// Steps to `end` (s); `see` gets the model before and after the loads of each step are set.
+fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(&mut Forming)) {
+    let critical = forming.model.critical_step().unwrap();
+    forming.model.dt = p.time_step.min(p.step_safety * critical);
+    while forming.model.time < end {
+        forming.load.apply(&mut forming.model);
+        see(forming);
+        forming.model.step(false).unwrap();
+    }
+}
+
+/// What hangs in the frame under its weight alone: the frame's force upwards, the work of the weight, the ledger's external work.
+fn hung(symmetry: &[&str], weight: &str) -> (Forming, [f64; 3]) {
+    let mut p = parameters(symmetry, |process| {
+        process["weight"] = json!(weight);
+        process["bag_pressure"] = json!("0 Pa");
+        process["forming_pressure"] = json!("0 Pa");
+        process["bagging_time"] = json!("0.5 s");
+        process["film_pre_stretch"] = json!(0.0);
+    });
+    // Three times the films' own mass: enough to be seen, and light enough for the films to come to rest.
+    (p.least_areal_mass, p.damping) = (0.25, 60.0);
+    let mut forming = build_global(&p, &BuiltIn).unwrap();
+    let (mut before, mut fall, mut work) = (forming.model.x.clone(), 0.0, 0.0);
+    let mut add_up = |f: &mut Forming| {
+        let heights = f.model.x.iter().zip(&before).zip(f.model.own_masses());
+        work += heights
+            .map(|((x, y), m)| m * fall * (x[2] - y[2]))
+            .sum::<f64>();
+        (before, fall) = (f.model.x.clone(), f.model.body_acceleration[2]);
+    };
+    run(&mut forming, &p, 0.5, &mut add_up);
+    add_up(&mut forming);
+    let held: f64 = forming.model.reactions().iter().map(|r| r[2]).sum();
+    let external = forming.model.ledger.external;
+    let all = [held, work, external].map(|x| forming.copies() * x);
+    (forming, all)
+}
+
+#[test]
+fn the_frame_bears_the_weight_of_the_bodies_own_masses_and_its_work_is_in_the_ledger() {
+    let area = |a: [f64; 2]| a[0] * a[1];
+    let expected = GRAVITY * (2.0 * AREAL[0] * area(FRAME) + AREAL[1] * area(PLY));
+    for (symmetry, weight, sign) in [
+        (&[][..], "tool", 1.0),
+        (&["x", "y"], "tool", 1.0),
+        (&["x", "y"], "away", -1.0),
+    ] {
+        let (forming, [held, work, external]) = hung(symmetry, weight);
+        let case = format!("{symmetry:?} {weight}");
+        let own: f64 = forming.model.own_masses().iter().sum();
+        let all: f64 = forming.model.mass.iter().sum();
+        assert!(all > 2.0 * own, "{case}: mass is added, {own} {all} kg");
+        let ratio = sign * held / expected;
+        println!("{case}: {ratio} of the weight, work {work} J, in the ledger {external} J");
+        assert!(
+            (ratio - 1.0).abs() < 2e-3,
+            "{case}: {held} N of {expected} N"
+        );
+        assert!(
+            work > 0.0 && (external / work - 1.0).abs() < 1e-3,
+            "{case}: {external} J of {work} J"
+        );
+        println!("{:?}", forming.model.energies());
+    }
+}
+
+#[test]
+fn without_the_option_nothing_has_weight() {
+    let mut forming = build_global(&parameters(&[], |_| {}), &BuiltIn).unwrap();
+    forming.model.time = 0.05;
+    forming.load.apply(&mut forming.model);
+    assert_eq!(forming.model.body_acceleration, [0.0; 3]);
+}
+
+/// A zone of 60 mm in the middle of the films, held at its rim, that begins at `begin` (s).
+fn zone(p: &Parameters, begin: f64) -> Forming {
+    let axis: Vec<f64> = (0..5).map(|k| 0.015 * f64::from(k) - 0.03).collect();
+    let mesh = QuadMesh::grid(&axis, &axis);
+    let on = mesh.on_boundary();
+    let driven: Vec<u32> = (0..on.len() as u32).filter(|n| on[*n as usize]).collect();
+    let sheet = |name: &str, z: f64| {
+        let points: Vec<_> = mesh.points.iter().map(|q| [q[0], q[1], z]).collect();
+        let held: Vec<_> = driven.iter().map(|n| points[*n as usize]).collect();
+        LocalSheet {
+            name: name.into(),
+            cells: mesh.cells.clone(),
+            position: vec![held; 2],
+            velocity: vec![vec![[0.0; 3]; driven.len()]; 2],
+            normal: Vec::new(),
+            normal_rate: Vec::new(),
+            pull: Vec::new(),
+            stiffness: Vec::new(),
+            start: Some(Start {
+                path: vec![points.clone()],
+                velocity: vec![[0.0; 3]; points.len()],
+            }),
+            driven: driven.clone(),
+            points,
+        }
+    };
+    let input = LocalInput {
+        time: vec![begin, 0.17],
+        sheets: vec![
+            sheet("lower", 0.0400),
+            sheet("ply", 0.0404),
+            sheet("upper", 0.0408),
+        ],
+        cavity: vec![1e5; 2],
+        bag: vec![1e5; 2],
+        frame: vec![0.04; 2],
+        zone: Value::Null,
+        element_size: 0.015,
+    };
+    build_local(p, input, &BuiltIn).unwrap()
+}
+
+#[test]
+fn a_zone_has_the_weight_that_the_whole_has_then_however_late_it_begins() {
+    let p = parameters(&[], |process| process["weight"] = json!("tool"));
+    // Half the bagging: the weight is all there.
+    for (begin, at, share) in [(0.0, 0.01, 0.5), (0.0, 0.02, 1.0), (0.1, 0.1, 1.0)] {
+        let mut whole = build_global(&p, &BuiltIn).unwrap();
+        let mut part = zone(&p, begin);
+        for forming in [&mut whole, &mut part] {
+            forming.model.time = at;
+            forming.load.apply(&mut forming.model);
+            let fall = forming.model.body_acceleration;
+            assert!(
+                fall[2] + GRAVITY * share < 1e-12 && fall[2] + GRAVITY * share > -1e-12,
+                "{at} s: {fall:?}"
+            );
+        }
+    }
+}
