@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::scenes::{ply, press};
 use common::{BuiltIn, fabric};
 use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
@@ -11,29 +12,16 @@ use serde_json::{Value, json};
 
 /// Two plies in a press with a holder, and with this friction.
 fn parameters(friction: &Value) -> Parameters {
-    let ply = |name: &str| {
-        json!({"name": name, "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.12 m",
-               "fibre_1": "0 rad", "fibre_2": "1.5707963267948966 rad"})
-    };
-    serde_json::from_value(json!({
-        "scene": {
-            "plyflow_scene": 1, "name": "dome",
-            "tool": {"hemisphere": {"radius": "0.025 m", "facet_size": "0.004 m"}},
-            "sheets": [ply("inner"), ply("outer")],
-            "friction": friction,
-            "process": {"press": {
-                "stroke": "0.02 m", "forming_time": "0.2 s", "settling_time": "0.01 s",
-                "die": {"opening_radius": "0.027 m", "edge_radius": "0.004 m"},
-                "holder": {"hold": {"gap": "0.002 m"}}}}
-        },
-        "element": {"plugin": "m4", "with": {}},
-        "diaphragm_element": {"plugin": "m4", "with": {}},
-        "element_size": 0.012, "diaphragm_growth": 1.25, "time_step": 8e-6, "step_safety": 0.8,
-        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        "contact_damping": 0.3, "contact_augmentation": 0.0, "frames": 20, "tool_grid": 0.004,
-        "kinetic_bound": 0.05, "drift_bound": 0.5
-    }))
-    .expect("the parameters fit their type")
+    press(2, &json!({"gap": "0.002 m"}), |p| {
+        let scene = &mut p["scene"];
+        scene["tool"]["hemisphere"]["facet_size"] = json!("0.004 m");
+        scene["sheets"] = ["inner", "outer"]
+            .map(|n| ply(n, &fabric(), [0.12, 0.12], 0.0))
+            .into();
+        scene["friction"] = friction.clone();
+        p["element_size"] = json!(0.012);
+        p["tool_grid"] = json!(0.004);
+    })
 }
 
 fn model(friction: &Value) -> Model {

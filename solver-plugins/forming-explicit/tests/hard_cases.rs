@@ -3,80 +3,28 @@
 
 mod common;
 
-use common::{BuiltIn, Silent, fabric, form};
-use plyflow_forming_explicit::build_global;
+use common::{form, scenes};
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, Outcome};
 use serde_json::{Value, json};
 
-/// Friction of tool on fabric in [`press`].
-const FRICTION: f64 = 0.23;
-
-/// A ply over a hemisphere of 25 mm radius, 12 mm deep, through a hole; `change` has the last word.
+/// A ply over a hemisphere, 12 mm deep; `change` has the last word.
 fn press(change: impl FnOnce(&mut Value)) -> Parameters {
-    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 300.0, "hourglass_normal": 0.01});
-    let mut all = json!({
-        "scene": {
-            "plyflow_scene": 1, "name": "dome",
-            "tool": {"hemisphere": {"radius": "0.025 m", "facet_size": "0.001 m"}},
-            "sheets": [{"name": "ply_1", "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.12 m",
-                        "fibre_1": "-0.7853981633974483 rad", "fibre_2": "0.7853981633974483 rad"}],
-            "friction": {"tool_fabric": FRICTION, "fabric_fabric": 0.36},
-            "process": {"press": {
-                "stroke": "0.012 m", "forming_time": "0.1 s", "settling_time": "0.01 s",
-                "die": {"opening_radius": "0.027 m", "edge_radius": "0.004 m"},
-                "holder": {"hold": {"gap": "0.002 m"}}}}
-        },
-        "element": {"plugin": "m4", "with": hourglass},
-        "diaphragm_element": {"plugin": "m4", "with": {}},
-        "element_size": 0.006, "diaphragm_growth": 1.25, "time_step": 8e-6, "step_safety": 0.8,
-        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        "contact_damping": 0.3, "contact_augmentation": 0.0, "frames": 10, "tool_grid": 0.0015,
-        "kinetic_bound": 0.05, "drift_bound": 0.5
-    });
-    change(&mut all);
-    serde_json::from_value(all).expect("the parameters fit their type")
+    scenes::press(1, &json!({"gap": "0.002 m"}), |p| {
+        let press = &mut p["scene"]["process"]["press"];
+        press["stroke"] = json!("0.012 m");
+        press["forming_time"] = json!("0.1 s");
+        p["frames"] = json!(10);
+        change(p);
+    })
 }
 
-/// As many plies over a block 20 mm high, between two films, with an edge of this radius (m).
-fn bag(plies: usize, fillet: f64, element_size: f64) -> Parameters {
-    let film = json!({
-        "plyflow_material": 1, "name": "film", "plugin": "material-marlow",
-        "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
-        "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
-    });
-    let diaphragm = |name: &str| json!({"name": name, "kind": "diaphragm", "material": film});
-    let ply = |k: usize| {
-        json!({"name": format!("ply_{k}"), "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.08 m",
-               "fibre_1": "-0.7853981633974483 rad", "fibre_2": "0.7853981633974483 rad"})
-    };
-    let mut sheets = vec![diaphragm("lower")];
-    sheets.extend((1..=plies).map(ply));
-    sheets.push(diaphragm("upper"));
-    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01});
-    serde_json::from_value(json!({
-        "scene": {
-            "plyflow_scene": 1, "name": "block",
-            "tool": {"flat": {"length": "0.1 m", "width": "0.06 m", "height": "0.02 m",
-                              "fillet": format!("{fillet} m"), "facet_size": "0.008 m"}},
-            "sheets": sheets,
-            "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "fabric_fabric": 0.35,
-                         "diaphragm_diaphragm": 0.3},
-            "process": {"double_diaphragm": {
-                "frame_length": "0.4 m", "frame_width": "0.34 m", "clearance": "0.005 m",
-                "bag_pressure": "100000 Pa", "forming_pressure": "100000 Pa",
-                "bagging_time": "0.08 s", "lowering_time": "0.1 s", "drawing_time": "0.12 s",
-                "settling_time": "0.03 s", "film_pre_stretch": 0.01,
-                "film_joint_margin": "0.03 m"}}
-        },
-        "element": {"plugin": "m4", "with": hourglass},
-        "diaphragm_element": {"plugin": "m4", "with": hourglass},
-        "element_size": element_size, "diaphragm_growth": 1.25, "time_step": 1.2e-5, "step_safety": 0.8,
-        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        "contact_damping": 0.3, "contact_augmentation": 0.003, "frames": 10, "tool_grid": 0.003,
-        "kinetic_bound": 0.05, "drift_bound": 0.5
-    }))
-    .expect("the parameters fit their type")
+/// As many plies over a block, between two films, with an edge of this radius (m).
+fn bag(plies: usize, fillet: f64) -> Parameters {
+    scenes::bag(plies, |p| {
+        p["scene"]["tool"]["flat"]["fillet"] = json!(format!("{fillet} m"));
+        p["frames"] = json!(10);
+    })
 }
 
 /// All places are numbers; at most so much of the work is unaccounted for, and from 1 % on the run says so.
@@ -176,7 +124,7 @@ fn steps_up_to_the_last_fiftieth_of_what_is_stable_give_the_same_ply() {
 
 #[test]
 fn four_plies_in_a_bag_stay_in_their_order() {
-    let run = form(&bag(4, 0.012, 0.007), 2);
+    let run = form(&bag(4, 0.012), 2);
     assert_sound("four plies", &run, 0.02);
     let (forming, _) = &run;
     for p in forming.penetrations() {
@@ -192,20 +140,24 @@ fn four_plies_in_a_bag_stay_in_their_order() {
     }
 }
 
-/// Elements of 7 mm cannot follow an edge of 1 mm; what they do must stay in bounds or be told, with the place.
+/// Elements of 7 mm cannot follow an edge of 1 mm: they are torn over it, which shows in the hourglass energy, and is told.
 #[test]
-fn films_over_an_edge_of_a_millimetre_hold_or_say_where_they_fail() {
-    let p = bag(1, 0.001, 0.007);
-    let mut forming = build_global(&p, &BuiltIn).expect("it can be built");
-    match forming.run(&p.control(), &mut Silent) {
-        Ok(outcome) => {
-            assert_sound("edge of 1 mm", &(forming, outcome), 0.5);
-        }
-        Err(e) => {
-            let text = format!("{e:?}");
-            for part in ["Likely cause: ", "What to try: ", " at ("] {
-                assert!(text.contains(part), "'{part}' is not in: {text}");
-            }
-        }
+fn films_over_an_edge_of_a_millimetre_get_through_it_and_the_run_says_that_the_mesh_is_too_coarse()
+{
+    let run = form(&bag(1, 0.001), 2);
+    // Measured: 0.48 %.
+    assert_sound("edge of 1 mm", &run, 0.01);
+    let (forming, outcome) = &run;
+    // Measured: 7.8 %; 5 % is where the run warns. It is as fast as a rounded block's (small_part.rs).
+    let health = &outcome.health;
+    assert!(
+        health.hourglass_ratio > 0.05 && health.peak_kinetic_ratio < 0.1,
+        "{health:?}"
+    );
+    let told = |w: &String| w.contains("hourglass energy") && w.contains("refine the mesh");
+    assert!(outcome.warnings.iter().any(told), "{:?}", outcome.warnings);
+    // Nothing is cut by the edge: the deepest is the ply in the tool through its film, by 5 um.
+    for p in forming.penetrations() {
+        assert!(p.q999 < 0.1 * (p.thinner + p.spare), "{p:?}");
     }
 }

@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{BuiltIn, fabric, form};
+use common::scenes::press;
+use common::{BuiltIn, form};
 use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, Outcome};
@@ -12,34 +13,8 @@ use std::collections::BTreeMap;
 const RADIUS: f64 = 0.025;
 const STROKE: f64 = 0.02;
 
-fn parameters(plies: usize, holder: &Value) -> Parameters {
-    let ply = |k: usize| {
-        json!({"name": format!("ply_{k}"), "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.12 m",
-               "fibre_1": "-0.7853981633974483 rad", "fibre_2": "0.7853981633974483 rad"})
-    };
-    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 300.0, "hourglass_normal": 0.01});
-    let mut press = json!({
-        "stroke": "0.02 m", "forming_time": "0.2 s", "settling_time": "0.01 s",
-        "die": {"opening_radius": "0.027 m", "edge_radius": "0.004 m"}});
-    if !holder.is_null() {
-        press["holder"] = json!({"hold": holder});
-    }
-    serde_json::from_value(json!({
-        "scene": {
-            "plyflow_scene": 1, "name": "dome",
-            "tool": {"hemisphere": {"radius": "0.025 m", "facet_size": "0.001 m"}},
-            "sheets": (1..=plies).map(ply).collect::<Vec<_>>(),
-            "friction": {"tool_fabric": 0.23, "fabric_fabric": 0.36},
-            "process": {"press": press}
-        },
-        "element": {"plugin": "m4", "with": hourglass},
-        "diaphragm_element": {"plugin": "m4", "with": {}},
-        "element_size": 0.006, "diaphragm_growth": 1.25, "time_step": 8e-6, "step_safety": 0.8,
-        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        "contact_damping": 0.3, "contact_augmentation": 0.0, "frames": 20, "tool_grid": 0.0015,
-        "kinetic_bound": 0.05, "drift_bound": 0.5
-    }))
-    .expect("the parameters fit their type")
+fn parameters(plies: usize, hold: &Value) -> Parameters {
+    press(plies, hold, |_| {})
 }
 
 /// Distance (m) of a point from the punch's dome at its end.

@@ -14,6 +14,7 @@
 
 mod common;
 
+use common::scenes::{self, ply};
 use common::{BuiltIn, fabric};
 use plyflow_forming_explicit::assembly::inverse_bilinear;
 use plyflow_forming_explicit::build_global;
@@ -57,42 +58,15 @@ struct Seen {
 }
 
 fn parameters(bag: &Bag) -> Parameters {
-    let film = json!({
-        "plyflow_material": 1, "name": "film", "plugin": "material-marlow",
-        "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
-        "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
-    });
-    let diaphragm =
-        |name: &str| json!({"name": name, "kind": "diaphragm", "material": film.clone()});
-    let ply = |name: &str, turn: f64| {
-        json!({
-            "name": name, "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.08 m",
-            "fibre_1": format!("{} rad", turn - std::f64::consts::FRAC_PI_4),
-            "fibre_2": format!("{} rad", turn + std::f64::consts::FRAC_PI_4)
-        })
-    };
-    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01});
-    serde_json::from_value(json!({
-        "scene": {
-            "plyflow_scene": 1, "name": "quiet bag",
-            "tool": {"hemisphere": {"radius": "0.06 m", "facet_size": "0.004 m"}},
-            "sheets": [diaphragm("lower"), ply("ply_1", 0.0), ply("ply_2", std::f64::consts::FRAC_PI_4), diaphragm("upper")],
-            "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "fabric_fabric": 0.35,
-                         "diaphragm_diaphragm": 0.3},
-            "process": {"double_diaphragm": {
-                "frame_length": "0.4 m", "frame_width": "0.34 m", "clearance": "0.005 m",
-                "bag_pressure": "100000 Pa", "forming_pressure": "100000 Pa",
-                "bagging_time": "0.1 s", "lowering_time": "1 s", "drawing_time": "1 s",
-                "settling_time": "1 s", "film_pre_stretch": 0.01, "film_joint_margin": "0.03 m"}}
-        },
-        "element": {"plugin": "m4", "with": hourglass},
-        "diaphragm_element": {"plugin": "m4", "with": hourglass},
-        "element_size": 0.01, "diaphragm_element_size": bag.film, "diaphragm_growth": 1.25, "time_step": 1.2e-5, "step_safety": 0.8,
-        "least_areal_mass": 2.0, "damping": DAMPING, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        "contact_damping": 0.3, "contact_augmentation": 0.003, "frames": 1, "tool_grid": 0.003,
-        "kinetic_bound": 0.05, "drift_bound": 0.5
-    }))
-    .expect("the parameters fit their type")
+    scenes::bag(2, |p| {
+        let scene = &mut p["scene"];
+        scene["tool"] = json!({"hemisphere": {"radius": "0.06 m", "facet_size": "0.004 m"}});
+        scene["sheets"][2] = ply("ply_2", &fabric(), [0.12, 0.08], 0.0);
+        p["element_size"] = json!(0.01);
+        p["diaphragm_element_size"] = json!(bag.film);
+        p["damping"] = json!(DAMPING);
+        p["frames"] = json!(1);
+    })
 }
 
 /// The frame: it stretches the films, waits for the air to be drawn, and goes down.

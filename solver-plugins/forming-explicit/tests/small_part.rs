@@ -6,7 +6,8 @@
 
 mod common;
 
-use common::{BuiltIn, Silent, fabric, form};
+use common::scenes::bag;
+use common::{BuiltIn, Silent, form};
 use plyflow_forming_explicit::assembly::inverse_bilinear;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer};
@@ -20,44 +21,7 @@ use plyflow_sdk::StepError;
 use serde_json::json;
 
 fn parameters() -> Parameters {
-    let film = json!({
-        "plyflow_material": 1, "name": "film", "plugin": "material-marlow",
-        "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
-        "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
-    });
-    let diaphragm =
-        |name: &str| json!({"name": name, "kind": "diaphragm", "material": film.clone()});
-    let ply = |name: &str| {
-        json!({
-            "name": name, "kind": "ply", "material": fabric(), "length": "0.12 m",
-            "width": "0.08 m", "fibre_1": "-0.7853981633974483 rad",
-            "fibre_2": "0.7853981633974483 rad"
-        })
-    };
-    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01});
-    serde_json::from_value(json!({
-        "scene": {
-            "plyflow_scene": 1, "name": "block",
-            "tool": {"flat": {"length": "0.1 m", "width": "0.06 m", "height": "0.02 m",
-                              "fillet": "0.012 m", "facet_size": "0.008 m"}},
-            "sheets": [diaphragm("lower"), ply("ply_1"), ply("ply_2"), diaphragm("upper")],
-            "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "fabric_fabric": 0.35,
-                         "diaphragm_diaphragm": 0.3},
-            "process": {"double_diaphragm": {
-                "frame_length": "0.4 m", "frame_width": "0.34 m", "clearance": "0.005 m",
-                "bag_pressure": "100000 Pa", "forming_pressure": "100000 Pa",
-                "bagging_time": "0.08 s", "lowering_time": "0.1 s", "drawing_time": "0.12 s",
-                "settling_time": "0.03 s", "film_pre_stretch": 0.01,
-                "film_joint_margin": "0.03 m"}}
-        },
-        "element": {"plugin": "m4", "with": hourglass},
-        "diaphragm_element": {"plugin": "m4", "with": hourglass},
-        "element_size": 0.007, "diaphragm_growth": 1.25, "time_step": 1.2e-5, "step_safety": 0.8,
-        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        "contact_damping": 0.3, "contact_augmentation": 0.003, "frames": 40, "tool_grid": 0.003,
-        "kinetic_bound": 0.05, "drift_bound": 0.5
-    }))
-    .expect("the parameters fit their type")
+    bag(2, |_| {})
 }
 
 /// At the 99.9 % quantile of every pair, a tenth of the thickness that its bodies keep free between them: of the thinner sheet

@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{BuiltIn, fabric, form};
+use common::scenes::{diaphragm, gentle_press as press, ply};
+use common::{BuiltIn, apart, fabric, form, twins, woven};
 use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer, Outcome};
@@ -14,93 +15,13 @@ use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 use plyflow_sdk::{Element, StepError};
 use serde_json::{Value, json};
 
-/// A woven fabric: the same for both signs of shear, both families and both signs of bending.
-fn woven() -> Value {
-    json!({
-        "plyflow_material": 1, "name": "woven", "plugin": "material-fabric",
-        "thickness": "0.0003 m", "areal_mass": "0.21 kg/m2",
-        "with": {
-            "form": "fibre-energy", "fibre_modulus": 3e9, "compression_factor": 1.0,
-            "shear": {"coefficients": [0.0, 60.0, 0.0, 40.0], "limit": 1.05},
-            "bending": {"positive": {"linear": 1e-4, "asymptote": 0.01, "scale": 20.0},
-                        "negative": {"linear": 1e-4, "asymptote": 0.01, "scale": 20.0}}
-        }
-    })
-}
-
-/// The beginning of a press stroke over a small dome: elements of 6 mm, fibre family 1 at `fibre_1` (rad).
-fn press(element: &str, fibre_1: f64, symmetry: &[&str]) -> Parameters {
-    let second = fibre_1 + std::f64::consts::FRAC_PI_2;
-    let hourglass = json!({"hourglass": 1.0, "hourglass_floor": 300.0, "hourglass_normal": 0.01});
-    let with = if element == "s4" {
-        json!({})
-    } else {
-        hourglass
-    };
-    serde_json::from_value(json!({
-        "scene": {
-            "plyflow_scene": 1, "name": "dome",
-            "tool": {"hemisphere": {"radius": "0.025 m", "facet_size": "0.001 m"}},
-            "sheets": [{"name": "ply_1", "kind": "ply", "material": woven(), "length": "0.12 m",
-                        "width": "0.096 m", "fibre_1": format!("{fibre_1} rad"), "fibre_2": format!("{second} rad")}],
-            "friction": {"tool_fabric": 0.23},
-            "process": {"press": {
-                "stroke": "0.012 m", "forming_time": "0.06 s", "settling_time": "0.002 s",
-                "die": {"opening_radius": "0.027 m", "edge_radius": "0.004 m"},
-                "holder": {"hold": {"force": "100 N"}}}},
-            "symmetry": symmetry
-        },
-        "element": {"plugin": element, "with": with},
-        "diaphragm_element": {"plugin": "m4", "with": {}},
-        "element_size": 0.006, "diaphragm_growth": 1.25, "time_step": 8e-6, "step_safety": 0.8,
-        "least_areal_mass": 2.0, "damping": 50.0, "contact_stiffness": 0.3, "slip_stiffness": 0.5,
-        // The grid of the tool's distances is its own mirror image.
-        "contact_damping": 0.3, "contact_augmentation": 0.0, "frames": 4, "tool_grid": 0.00175,
-        "kinetic_bound": 0.05, "drift_bound": 0.5
-    }))
-    .expect("the parameters fit their type")
-}
-
-/// For each point of `a` the one of `b` that began at the same place.
-fn twins(a: &[V], b: &[V]) -> Vec<usize> {
-    let near = |p: &V| {
-        let by = |i: &usize, j: &usize| norm(sub(b[*i], *p)).total_cmp(&norm(sub(b[*j], *p)));
-        let best = (0..b.len()).min_by(by).unwrap();
-        assert!(norm(sub(b[best], *p)) < 1e-9, "{p:?}");
-        best
-    };
-    a.iter().map(near).collect()
-}
-
 fn last(outcome: &Outcome) -> &HistoryRow {
     outcome.history.last().unwrap()
 }
 
-/// Largest distance (m) of the points of two runs.
-fn apart(whole: &Forming, part: &Forming) -> f64 {
-    let mut worst = 0.0f64;
-    for (a, b) in whole.bodies.iter().zip(&part.bodies) {
-        assert_eq!(a.cells.len(), b.cells.len());
-        let twin = twins(&part.reference_points(b), &whole.reference_points(a));
-        let (x, y) = (whole.points(a), part.points(b));
-        assert_eq!(x.len(), y.len());
-        let far = twin.iter().zip(&y).map(|(t, p)| norm(sub(x[*t], *p)));
-        worst = far.fold(worst, f64::max);
-    }
-    worst
-}
-
 /// The beginning of drawing a ply between two films over a flat block.
 fn diaphragms(element: &str, symmetry: &[&str]) -> Parameters {
-    let film = json!({
-        "plyflow_material": 1, "name": "film", "plugin": "material-marlow",
-        "thickness": "8e-05 m", "areal_mass": "0.08 kg/m2",
-        "with": {"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, "decay": 7.545}, "limit": 5.0}
-    });
-    let diaphragm =
-        |name: &str| json!({"name": name, "kind": "diaphragm", "material": film.clone()});
-    let ply = json!({"name": "ply_1", "kind": "ply", "material": woven(), "length": "0.12 m", "width": "0.09 m",
-                     "fibre_1": "-0.7853981633974483 rad", "fibre_2": "0.7853981633974483 rad"});
+    let ply = ply("ply_1", &woven(), [0.12, 0.09], -DIAGONAL);
     let mut p = press(element, 0.0, symmetry);
     let mut scene = serde_json::to_value(&p.scene).unwrap();
     scene["tool"] = json!({"flat": {"length": "0.1 m", "width": "0.06 m", "height": "0.02 m", "fillet": "0.012 m",

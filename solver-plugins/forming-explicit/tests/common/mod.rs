@@ -1,4 +1,7 @@
-//! What the tests of whole runs share: components without a host, fabric, the run itself.
+//! What the tests of whole runs share: components without a host, scenes, the run itself. No test uses all of it.
+#![allow(dead_code)]
+
+pub mod scenes;
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
 use plyflow_forming_explicit::assembly::Components;
@@ -7,6 +10,7 @@ use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
 use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4, s4::S4};
 use plyflow_mechanics::energy::Ledger;
+use plyflow_mechanics::vec3::{V, norm, sub};
 use plyflow_sdk::{StepError, element_table, material_table};
 use serde_json::{Value, json};
 
@@ -46,7 +50,6 @@ impl Components for BuiltIn {
 }
 
 /// Follows a run without a word.
-#[allow(dead_code)]
 pub struct Silent;
 
 impl Observer for Silent {
@@ -71,8 +74,21 @@ pub fn fabric() -> Value {
     })
 }
 
+/// A woven fabric: the same for both signs of shear, both families and both signs of bending.
+pub fn woven() -> Value {
+    json!({
+        "plyflow_material": 1, "name": "woven", "plugin": "material-fabric",
+        "thickness": "0.0003 m", "areal_mass": "0.21 kg/m2",
+        "with": {
+            "form": "fibre-energy", "fibre_modulus": 3e9, "compression_factor": 1.0,
+            "shear": {"coefficients": [0.0, 60.0, 0.0, 40.0], "limit": 1.05},
+            "bending": {"positive": {"linear": 1e-4, "asymptote": 0.01, "scale": 20.0},
+                        "negative": {"linear": 1e-4, "asymptote": 0.01, "scale": 20.0}}
+        }
+    })
+}
+
 /// Builds and runs a scene to its end.
-#[allow(dead_code)]
 pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -85,4 +101,29 @@ pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
             .unwrap_or_else(|e| panic!("{e:?}"));
         (forming, outcome)
     })
+}
+
+/// For each point of `a` the one of `b` that began at the same place.
+pub fn twins(a: &[V], b: &[V]) -> Vec<usize> {
+    let near = |p: &V| {
+        let by = |i: &usize, j: &usize| norm(sub(b[*i], *p)).total_cmp(&norm(sub(b[*j], *p)));
+        let best = (0..b.len()).min_by(by).unwrap();
+        assert!(norm(sub(b[best], *p)) < 1e-9, "{p:?}");
+        best
+    };
+    a.iter().map(near).collect()
+}
+
+/// Largest distance (m) of the points of two runs.
+pub fn apart(whole: &Forming, part: &Forming) -> f64 {
+    let mut worst = 0.0f64;
+    for (a, b) in whole.bodies.iter().zip(&part.bodies) {
+        assert_eq!(a.cells.len(), b.cells.len());
+        let twin = twins(&part.reference_points(b), &whole.reference_points(a));
+        let (x, y) = (whole.points(a), part.points(b));
+        assert_eq!(x.len(), y.len());
+        let far = twin.iter().zip(&y).map(|(t, p)| norm(sub(x[*t], *p)));
+        worst = far.fold(worst, f64::max);
+    }
+    worst
 }
