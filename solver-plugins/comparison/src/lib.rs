@@ -7,11 +7,11 @@ mod models;
 mod table;
 
 pub use cut::{Layer, Passage, Strip, Work};
-pub use fidelity::{Fidelity, Yardstick};
+pub use fidelity::{Fidelity, Measured, Way, Yardstick};
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
-use plyflow_defects::{Kind, Ply, QUANTILES, Settings, quantiles};
+use plyflow_defects::{Kind, Limits, Ply, QUANTILES, Settings, quantiles};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use serde_json::{Value, json};
 
@@ -36,7 +36,7 @@ impl Step for Comparison {
             phase: "measuring",
             ..Default::default()
         });
-        let table = defect_table(&models, &zones, &settings);
+        let table = defect_table(&models, &zones, &settings, &host.parameters::<Limits>()?);
         for e in table.iter().filter(|e| e.touches_cut()) {
             let zone = &zones[e.zone].name;
             let text = format!(
@@ -54,11 +54,13 @@ impl Step for Comparison {
         let passages = cut::passages(host, &models, &zones)?;
         let layers = cut::layers(&models, &zones);
         let cut = json!({"work": passages, "layers": layers});
-        write_attributes(host, &models, &zones, &table, &cut)?;
+        let measured = fidelity::measure_ways(host, &models, &zones, &settings)?;
+        write_attributes(host, &models, &zones, &table, &cut, &measured.ways)?;
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
         write_reference_defects(host, &models, &table)?;
-        fidelity::write(host, &models, &zones, &settings)?;
+        fidelity::write(host, &measured.ways)?;
+        fidelity::write(host, &measured.local)?;
         cut::write(host, &passages, &layers, &zones)?;
         write_costs(host, &models, &passed_over)
     }
@@ -70,6 +72,7 @@ fn write_attributes(
     zones: &[Zone],
     table: &[Entry],
     cut: &Value,
+    ways: &[Way],
 ) -> Result<(), StepError> {
     let list: Vec<Value> = (models.iter())
         .map(|m| {
@@ -90,6 +93,7 @@ fn write_attributes(
         "zones": zones.iter().map(|z| &z.name).collect::<Vec<_>>(),
         "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES, "cut": cut,
         "measured_by": Yardstick::of(models),
+        "ways": ways.iter().map(Way::to_json).collect::<Vec<_>>(),
     }))
 }
 
