@@ -127,28 +127,34 @@ struct Formed {
 }
 
 /// Global, local, other and reference models in that order, local ones in the order of their zones; and what was run on the way to them and is
-/// not measured: local runs of zones that are `superseded`, and `earlier` passes.
+/// not measured: local runs of zones that are `superseded`, and `earlier` passes. Of several global runs, and of several local runs of one zone, the
+/// last is that of the last pass.
 ///
 /// # Errors
-/// When an input lacks something, or a local run belongs to no zone or to one that another has.
+/// When an input lacks something, or a local run belongs to no zone or, with one global run, to one that another has.
 pub fn read_models(
     host: &Host,
     zones: &[Zone],
     superseded: &[Zone],
     settings: &Settings,
 ) -> Result<(Vec<Model>, Vec<Input>), StepError> {
-    let global = host.input("global")?;
+    let mut passed_over = host.inputs_of("global")?;
+    let global = passed_over.pop().ok_or("global: no run arrives")?;
+    let passes = 1 + passed_over.len();
     let tool = of_run::tool(host, &global)?;
     let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
-    let (mut local, mut passed_over) = (Vec::new(), Vec::new());
+    let mut local: Vec<Model> = Vec::new();
     for input in host.inputs_of("local")? {
         host.check_cancelled()?;
         let Some(zone) = zone_of(host, &input, zones, superseded)? else {
             passed_over.push(input);
             continue;
         };
-        if local.iter().any(|m: &Model| m.zone == Some(zone)) {
-            return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
+        if let Some(k) = local.iter().position(|m| m.zone == Some(zone)) {
+            if passes == 1 {
+                return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
+            }
+            passed_over.push(local.remove(k).input);
         }
         let own = own_tool(host, &input)?;
         local.push(read(

@@ -356,6 +356,30 @@ fn without_zones_the_artifact_says_so_and_holds_the_global_run_alone() {
 }
 
 #[test]
+fn of_several_passes_the_last_is_measured_and_all_cost() {
+    let (first, second) = (local(1.0), local(0.5));
+    let (global, zones) = (global(), zones(json!([zone_a()])));
+    let costing = |cpu: f64, input| MemoryInput {
+        cost: [cpu, cpu, 0.0],
+        ..input
+    };
+    let inputs = [
+        MemoryInput::new("zones", &zones),
+        costing(1.0, MemoryInput::new("global", &global)),
+        costing(2.0, MemoryInput::new("global", &global)),
+        costing(4.0, MemoryInput::new("local", &first)),
+        costing(8.0, MemoryInput::new("local", &second)),
+    ];
+    let out = compare(&inputs);
+    let alone = compare(&[inputs[0], inputs[2], inputs[4]]);
+    assert_eq!(out.attributes["defects"], alone.attributes["defects"]);
+    assert_eq!(out.measured["cost.global.cpu_seconds"].0, 2.0);
+    assert_eq!(out.measured["cost.local.A.cpu_seconds"].0, 8.0);
+    assert_eq!(out.measured["cost.superseded.cpu_seconds"].0, 5.0);
+    assert_eq!(out.measured["cost.total.cpu_seconds"].0, 15.0);
+}
+
+#[test]
 fn a_local_run_of_no_zone_or_of_a_taken_one_is_refused() {
     let (global, local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
     let twice = [

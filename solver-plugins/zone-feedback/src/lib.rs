@@ -19,7 +19,11 @@ export_step!(ZoneFeedback);
 #[derive(Deserialize)]
 struct Parameters {
     overlap: Option<f64>,
+    tolerance: Option<f64>,
 }
+
+/// The one item of the collection when another pass is to be run.
+const AGAIN: &str = "again";
 
 /// How many coarse elements the overlap is wide when it is not told.
 const OVERLAP: f64 = 2.0;
@@ -129,7 +133,13 @@ impl Step for ZoneFeedback {
         host.result("driven_nodes", change.len() as f64, "1")?;
         host.result("feedback_change", mean, "m")?;
         let largest = change.iter().copied().fold(0.0, f64::max);
-        host.result("feedback_change_max", largest, "m")
+        host.result("feedback_change_max", largest, "m")?;
+        let at_rest = change.is_empty() || p.tolerance.is_some_and(|t| mean <= t);
+        if p.tolerance.is_some() {
+            host.result("converged", f64::from(u8::from(at_rest)), "1")?;
+        }
+        let again: Vec<String> = (!at_rest).then(|| AGAIN.to_owned()).into_iter().collect();
+        host.collection(&again)
     }
 }
 

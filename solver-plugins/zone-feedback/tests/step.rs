@@ -184,6 +184,30 @@ fn zones_that_share_nodes_drive_each_once() {
 }
 
 #[test]
+fn passes_end_when_what_they_change_is_within_the_tolerance() {
+    let (coarse, fine) = (coarse(), fine(0.003));
+    let again = |parameters: Value, fine: &[&MemoryArtifact]| {
+        let out = feed_back(parameters, &coarse, fine).unwrap();
+        (
+            out.collection.clone(),
+            out.results.get("converged").map(|r| r.0),
+        )
+    };
+    let one = || Some(vec!["again".to_owned()]);
+    assert_eq!(
+        again(json!({"tolerance": 0.0029}), &[&fine]),
+        (one(), Some(0.0))
+    );
+    assert_eq!(
+        again(json!({"tolerance": 0.0031}), &[&fine]),
+        (Some(vec![]), Some(1.0))
+    );
+    // Without one it goes on as long as there is something to feed back.
+    assert_eq!(again(json!({}), &[&fine]), (one(), None));
+    assert_eq!(again(json!({}), &[]), (Some(vec![]), None));
+}
+
+#[test]
 fn what_cannot_be_fed_back_is_named() {
     let (coarse, fine) = (coarse(), fine(0.0));
     let out = feed_back(json!({}), &coarse, &[]).unwrap();
