@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{BuiltIn, fabric};
+use common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::Forming;
+use plyflow_forming_explicit::run::{Forming, HistoryRow};
 use plyflow_forming_explicit::{LocalInput, LocalSheet, Start, build_global, build_local};
+use plyflow_mechanics::history::linear;
 use plyflow_mechanics::mesh::QuadMesh;
 use serde_json::{Value, json};
 
@@ -189,4 +190,59 @@ fn a_zone_has_the_weight_that_the_whole_has_then_however_late_it_begins() {
             );
         }
     }
+}
+
+#[test]
+fn pressures_of_a_run_follow_their_tables_and_its_ledger_closes() {
+    let rows = |rows: &[[f64; 2]]| {
+        let row = |[share, kpa]: &[f64; 2]| json!({"share": share, "pressure": format!("{} Pa", 1e3 * kpa)});
+        json!({"table": rows.iter().map(row).collect::<Vec<_>>()})
+    };
+    let bag = [[0.0, 0.0], [0.5, 0.0], [0.7, 60.0], [1.0, 100.0]];
+    let drawn = [
+        [0.0, 0.0],
+        [0.25, 10.0],
+        [0.6, 60.0],
+        [0.8, 60.0],
+        [1.0, 90.0],
+    ];
+    let mut p = parameters(&[], |process| {
+        process["weight"] = json!("tool");
+        process["bag_pressure"] = rows(&bag);
+        process["forming_pressure"] = rows(&drawn);
+        process["drawing_time"] = json!("0.12 s");
+        process["settling_time"] = json!("0.02 s");
+    });
+    p.frames = 40;
+    let (forming, outcome) = form(&p, 1);
+    let column =
+        |of: fn(&HistoryRow) -> f64| -> Vec<f64> { outcome.history.iter().map(of).collect() };
+    let (time, above, below) = (column(|r| r.time), column(|r| r.bag), column(|r| r.cavity));
+    for [share, kpa] in bag {
+        let t = 0.04 * share;
+        let (a, b) = (linear(&time, &above, t), linear(&time, &below, t));
+        assert!((a - 1e3 * kpa).abs() < 500.0, "bag {share}: {a} Pa");
+        assert!((a - b).abs() < 1e-9, "the cavity is open: {a} {b} Pa");
+    }
+    // While the film has room it gives way to less than what is drawn; the plateau finds it on tool and bed.
+    for ([share, kpa], bound) in drawn.iter().zip([500.0, 11e3, 21e3, 2e3, 1e3]) {
+        let (wanted, b) = (1e5 - 1e3 * kpa, linear(&time, &below, 0.1 + 0.12 * share));
+        println!("drawn {share}: {b} Pa of {wanted} Pa");
+        assert!(
+            (b - wanted).abs() < bound,
+            "drawn {share}: {b} Pa of {wanted} Pa"
+        );
+    }
+    let end = below[below.len() - 1];
+    assert!((end - 1e4).abs() < 100.0, "{end} Pa of 10000 Pa at the end");
+    assert!(
+        outcome.health.peak_drift_ratio < 0.01,
+        "{:?}",
+        outcome.health
+    );
+    let (again, _) = form(&p, 2);
+    assert!(
+        forming.model.x == again.model.x,
+        "two threads give other positions"
+    );
 }
