@@ -281,6 +281,8 @@ fn write_history(host: &Host, outcome: &Outcome, press: bool) -> Result<(), Step
         ("cavity_pressure", "Pa", |r| r.cavity),
         ("bag_pressure", "Pa", |r| r.bag),
         ("frame_height", "m", |r| r.frame),
+        ("time_step", "s", |r| r.time_step),
+        ("critical_step", "s", |r| r.critical_step),
     ];
     if press {
         columns.push(("punch_force", "N", |r| r.punch_force));

@@ -142,6 +142,10 @@ pub struct Forming {
 pub struct HistoryRow {
     /// Time (s).
     pub time: f64,
+    /// Step that brought it there (s).
+    pub time_step: f64,
+    /// Critical step of the elements at the last frame (s), of which that is at most the share `step_safety`.
+    pub critical_step: f64,
     /// Energies (J).
     pub ledger: Ledger,
     /// Cavity pressure (Pa).
@@ -171,6 +175,8 @@ pub struct Course {
     pub smallest_step: f64,
     /// Of a run that begins late: how far fine plies went there by themselves (m).
     pub start_shift: Option<f64>,
+    /// Critical step at the last frame (s); taken again when a run is taken up.
+    critical_step: f64,
     /// The step (s) of which the user knows; of this attempt, and not kept for another.
     told_step: Option<f64>,
 }
@@ -182,6 +188,7 @@ impl Default for Course {
             history: Vec::new(),
             smallest_step: f64::INFINITY,
             start_shift: None,
+            critical_step: f64::INFINITY,
             told_step: None,
         }
     }
@@ -317,12 +324,14 @@ impl Forming {
         self.load.archive(a)
     }
 
-    fn row(&self, ledger: Ledger) -> HistoryRow {
+    fn row(&self, ledger: Ledger, critical_step: f64) -> HistoryRow {
         let m = &self.model;
         // Of the whole.
         let n = self.copies();
         HistoryRow {
             time: m.time,
+            time_step: m.dt,
+            critical_step,
             ledger: ledger.times(n),
             cavity: m.pressures.below,
             bag: m.pressures.above,
@@ -370,7 +379,8 @@ impl Forming {
         self.load.apply(&mut self.model);
         self.model.step(true).map_err(|e| e.to_string())?;
         observer.frame(self, end)?;
-        course.history.push(self.row(self.model.energies()));
+        let last = self.row(self.model.energies(), course.critical_step);
+        course.history.push(last);
         Ok(self.outcome(course, control.kinetic_bound))
     }
 
@@ -392,6 +402,7 @@ impl Forming {
         let steps = (interval / wanted).ceil().max(1.0) as u64;
         self.model.dt = interval / steps as f64;
         course.smallest_step = course.smallest_step.min(self.model.dt);
+        course.critical_step = critical;
         Ok(steps)
     }
 
@@ -429,7 +440,9 @@ impl Forming {
             }
             if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
                 let energies = self.model.energies();
-                course.history.push(self.row(energies));
+                course
+                    .history
+                    .push(self.row(energies, course.critical_step));
                 if let Some(what) =
                     diagnosis::open_ledger(&course.history, end, control.drift_bound)
                 {

@@ -4,7 +4,7 @@ mod common;
 
 use common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, HistoryRow};
+use plyflow_forming_explicit::run::{Forming, HistoryRow, Outcome};
 use plyflow_forming_explicit::{LocalInput, LocalSheet, Start, build_global, build_local};
 use plyflow_mechanics::history::linear;
 use plyflow_mechanics::mesh::QuadMesh;
@@ -192,6 +192,30 @@ fn a_zone_has_the_weight_that_the_whole_has_then_however_late_it_begins() {
     }
 }
 
+/// The history tells the steps that were used, and what bounded them.
+fn steps_are_told(p: &Parameters, outcome: &Outcome) {
+    let rows = &outcome.history;
+    let steps: Vec<f64> = rows.iter().map(|r| r.time_step).collect();
+    let least = steps.iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(least, outcome.smallest_step);
+    for (row, dt) in rows.iter().zip(&steps) {
+        let bound = p.time_step.min(p.step_safety * row.critical_step);
+        // A whole fraction of the time between frames, of which there are hundreds.
+        assert!(*dt <= bound && *dt > 0.98 * bound, "{dt} {bound}");
+    }
+    // They add up to the process, and their number to the run's.
+    let last = &rows[rows.len() - 1];
+    let interval = (last.time - last.time_step) / p.frames as f64;
+    let of_frame = |k: usize| {
+        let inside = |r: &&HistoryRow| (r.time / interval - k as f64 - 0.5).abs() < 0.4;
+        let row = rows.iter().find(inside).expect("ten rows a frame");
+        interval / row.time_step
+    };
+    let cycles: f64 = (0..p.frames).map(of_frame).sum();
+    let done = outcome.cycles as f64 - 1.0;
+    assert!((cycles - done).abs() < 0.5, "{cycles} of {done}");
+}
+
 #[test]
 fn pressures_of_a_run_follow_their_tables_and_its_ledger_closes() {
     let rows = |rows: &[[f64; 2]]| {
@@ -233,6 +257,7 @@ fn pressures_of_a_run_follow_their_tables_and_its_ledger_closes() {
             "drawn {share}: {b} Pa of {wanted} Pa"
         );
     }
+    steps_are_told(&p, &outcome);
     let end = below[below.len() - 1];
     assert!((end - 1e4).abs() < 100.0, "{end} Pa of 10000 Pa at the end");
     assert!(
