@@ -4,10 +4,13 @@ mod common;
 
 use common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, HistoryRow, Outcome};
+use plyflow_forming_explicit::penetration::Penetration;
+use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer, Outcome};
 use plyflow_forming_explicit::{LocalInput, LocalSheet, Start, build_global, build_local};
+use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::linear;
 use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_sdk::StepError;
 use serde_json::{Value, json};
 
 /// Free fall (m/s2).
@@ -119,7 +122,6 @@ fn the_frame_bears_the_weight_of_the_bodies_own_masses_and_its_work_is_in_the_le
             work > 0.0 && (external / work - 1.0).abs() < 1e-3,
             "{case}: {external} J of {work} J"
         );
-        println!("{:?}", forming.model.energies());
     }
 }
 
@@ -192,6 +194,59 @@ fn a_zone_has_the_weight_that_the_whole_has_then_however_late_it_begins() {
     }
 }
 
+/// Penetrations of all pairs at every frame.
+#[derive(Default)]
+struct Deepest(Vec<(f64, Vec<Penetration>)>);
+
+impl Observer for Deepest {
+    fn frame(&mut self, forming: &Forming, time: f64) -> Result<(), StepError> {
+        self.0.push((time, forming.penetrations()));
+        Ok(())
+    }
+    fn tick(&mut self, _: &Forming, _: &Ledger, _: f64) -> Result<(), StepError> {
+        Ok(())
+    }
+}
+
+/// The run tells the largest penetration and quantile of every pair over its frames, and their times.
+fn peaks_are_the_largest_of_the_frames(forming: &Forming, outcome: &Outcome, seen: &Deepest) {
+    let end = forming.penetrations();
+    assert_eq!((end.len(), seen.0.len()), (outcome.peaks.len(), 41));
+    let mut passed = 0;
+    for (k, (peak, last)) in outcome.peaks.iter().zip(&end).enumerate() {
+        let largest =
+            |of: fn(&Penetration) -> f64| seen.0.iter().map(|(_, p)| of(&p[k])).fold(0.0, f64::max);
+        assert_eq!(
+            (peak.largest, peak.q999),
+            (largest(|p| p.largest), largest(|p| p.q999)),
+            "{}",
+            last.pair
+        );
+        if peak.largest > 0.0 {
+            let (_, then) = seen
+                .0
+                .iter()
+                .find(|(t, _)| *t == peak.largest_time)
+                .expect("a frame");
+            assert_eq!(
+                (then[k].largest, then[k].place),
+                (peak.largest, peak.place),
+                "{}",
+                last.pair
+            );
+            let (_, then) = seen
+                .0
+                .iter()
+                .find(|(t, _)| *t == peak.q999_time)
+                .expect("a frame");
+            assert_eq!(then[k].q999, peak.q999, "{}", last.pair);
+        }
+        passed += usize::from(peak.q999 > 1.2 * last.q999);
+        println!("{}: {peak:?}, at the end {} m", last.pair, last.q999);
+    }
+    assert!(passed > 0, "no pair was deeper on the way than at the end");
+}
+
 /// The history tells the steps that were used, and what bounded them.
 fn steps_are_told(p: &Parameters, outcome: &Outcome) {
     let rows = &outcome.history;
@@ -238,7 +293,12 @@ fn pressures_of_a_run_follow_their_tables_and_its_ledger_closes() {
         process["settling_time"] = json!("0.02 s");
     });
     p.frames = 40;
-    let (forming, outcome) = form(&p, 1);
+    let mut forming = build_global(&p, &BuiltIn).unwrap();
+    let mut seen = Deepest::default();
+    let outcome = forming
+        .run(&p.control(), &mut seen)
+        .unwrap_or_else(|e| panic!("{e:?}"));
+    peaks_are_the_largest_of_the_frames(&forming, &outcome, &seen);
     let column =
         |of: fn(&HistoryRow) -> f64| -> Vec<f64> { outcome.history.iter().map(of).collect() };
     let (time, above, below) = (column(|r| r.time), column(|r| r.bag), column(|r| r.cavity));
@@ -265,7 +325,8 @@ fn pressures_of_a_run_follow_their_tables_and_its_ledger_closes() {
         "{:?}",
         outcome.health
     );
-    let (again, _) = form(&p, 2);
+    let (again, same) = form(&p, 2);
+    assert_eq!(outcome.peaks, same.peaks);
     assert!(
         forming.model.x == again.model.x,
         "two threads give other positions"
