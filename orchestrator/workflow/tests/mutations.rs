@@ -558,6 +558,20 @@ const CASES: &[Case] = &[
     ),
     (
         S,
+        "bag_pressure: 1 bar",
+        "bag_pressure: {table: [{share: 0, pressure: 0 kPa}, {share: 1.5, pressure: 1 bar}]}",
+        0,
+        &["at most 1"],
+    ),
+    (
+        S,
+        "bag_pressure: 1 bar",
+        "bag_pressure: [0 kPa, 1 bar]",
+        0,
+        &["`bag_pressure`", "a pressure such as `1 bar`", "{table: ["],
+    ),
+    (
+        S,
         "materials/fabric.yaml",
         "materials/fabirc.yaml",
         0,

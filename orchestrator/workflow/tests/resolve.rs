@@ -88,6 +88,32 @@ fn a_scene_has_its_materials_inside_and_reads_back_as_its_type() {
 }
 
 #[test]
+fn a_table_of_pressures_is_read_in_any_unit_and_reads_back_as_its_type() {
+    let study = Study::sound();
+    study.mutate(
+        "scene.yaml",
+        "bag_pressure: 1 bar",
+        "weight: tool\n    bag_pressure: {table: [{share: 0, pressure: 0 kPa}, {share: 0.5, pressure: 60 kPa}, {share: 1, pressure: 1 bar}]}",
+    );
+    let w = (study.load()).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let scene = &step(&w, "coarse").parameters["scene"];
+    let typed: plyflow_model::scene::Scene = serde_json::from_value(scene.clone()).unwrap();
+    assert_eq!(serde_json::to_value(&typed).unwrap(), *scene);
+    use plyflow_model::scene::{PressureCourse, Process};
+    let Process::DoubleDiaphragm(process) = &typed.process else {
+        panic!("{:?}", typed.process)
+    };
+    let PressureCourse::Course(course) = &process.bag_pressure else {
+        panic!("{:?}", process.bag_pressure)
+    };
+    let rows: Vec<_> = (course.table.iter())
+        .map(|r| (r.share.0, r.pressure.si()))
+        .collect();
+    assert_eq!(rows, [(0.0, 0.0), (0.5, 6e4), (1.0, 1e5)]);
+    assert_eq!(process.bag_pressure.last(), 1e5);
+}
+
+#[test]
 fn wires_follow_the_order_of_ports_and_fan_outs_their_collections() {
     let (_study, w) = sound();
     let wire = |port: &str, from: &str| ResolvedInput {

@@ -481,12 +481,13 @@ pub struct DoubleDiaphragm {
     /// Height of the lower film over the tool's highest point at the start.
     #[schemars(extend("x-minimum" = "0 mm"))]
     pub clearance: Length,
-    /// Vacuum in the bag: pressure of the surroundings over that between the films.
+    /// Vacuum in the bag: pressure of the surroundings over that between the films. A single value comes in the second half of
+    /// bagging; a table tells its course over all of bagging.
     #[schemars(extend("x-minimum" = "0 Pa"))]
-    pub bag_pressure: Pressure,
-    /// Pressure drawn under the lower film at the end.
+    pub bag_pressure: PressureCourse,
+    /// Pressure drawn under the lower film. A single value is that at the end; a table tells its course over drawing.
     #[schemars(extend("x-minimum" = "0 Pa"))]
-    pub forming_pressure: Pressure,
+    pub forming_pressure: PressureCourse,
     /// Simulated duration of evacuating the bag.
     #[schemars(extend("x-minimum" = "0 s"))]
     pub bagging_time: Time,
@@ -511,6 +512,47 @@ pub struct DoubleDiaphragm {
     /// Where the weight of plies and films pulls them; left out: they have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<WeightDirection>,
+}
+
+/// A pressure that comes in one phase of the process.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+#[schemars(extend("x-expected" = "a pressure such as `1 bar`, or {table: [{share: 0, pressure: 0 kPa}, .., {share: 1, pressure: ..}]}"))]
+pub enum PressureCourse {
+    /// What it is at the end of the phase; it grows smoothly.
+    Value(Pressure),
+    /// Its course over the phase.
+    Course(PressureTable),
+}
+
+impl PressureCourse {
+    /// What it is at the end of the phase (Pa); 0 for a table without rows.
+    pub fn last(&self) -> f64 {
+        match self {
+            Self::Value(p) => p.si(),
+            Self::Course(c) => c.table.last().map_or(0.0, |row| row.pressure.si()),
+        }
+    }
+}
+
+/// The course of a pressure over a phase.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressureTable {
+    /// Two or more rows, from share 0 with no pressure to share 1. Between them a monotone cubic without kinks.
+    pub table: Vec<PressureAt>,
+}
+
+/// A row of the course of a pressure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressureAt {
+    /// Share of the phase that is over: growing from 0 to 1.
+    #[schemars(extend("minimum" = 0, "maximum" = 1))]
+    pub share: Number,
+    /// Pressure then.
+    #[schemars(extend("x-minimum" = "0 Pa"))]
+    pub pressure: Pressure,
 }
 
 /// A direction in double-diaphragm forming.

@@ -239,6 +239,8 @@ mod tests {
     fn history(drift: impl Fn(usize) -> f64, rows: usize) -> Vec<HistoryRow> {
         let row = |i: usize| HistoryRow {
             time: i as f64,
+            time_step: 1.0,
+            critical_step: 1.0,
             ledger: Ledger {
                 external: i as f64,
                 membrane: i as f64 + drift(i),

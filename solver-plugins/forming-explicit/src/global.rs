@@ -342,7 +342,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         ply(&mut parts, &at, k, &stack[k], &stack[0], p, components)?;
     }
     top_film(&mut parts, &at, &stack, p, components)?;
-    let cycle = Cycle::new(process, [at.bottom_z, stack[0].offset]);
+    let cycle = Cycle::new(process, [at.bottom_z, stack[0].offset])?;
     let plan = frame
         .iter()
         .map(|n| [0, 1].map(|k| parts.points[*n as usize][k]))
@@ -374,6 +374,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
             cycle,
             tool_volume: tool.volume() / planes.copies() as f64,
             sealed_volume: None,
+            pumped_volume: None,
         },
         stack,
         bodies: parts.bodies,

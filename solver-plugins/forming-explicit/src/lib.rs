@@ -4,6 +4,7 @@
 
 pub mod assembly;
 mod checkpoint;
+mod course;
 mod diagnosis;
 pub mod friction;
 mod global;

@@ -182,7 +182,7 @@ pub fn build_local(
     } = sheets_of(p, &input, &stack, components)?;
     let start = late::of_model(&stack, &specs, &input.sheets, input.time[0])?;
     let (tool, grid) = tool::build(scene, p.tool_grid)?;
-    let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]]);
+    let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]])?;
     let reference = points.clone();
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;

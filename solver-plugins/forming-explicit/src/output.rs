@@ -5,7 +5,7 @@ use crate::checkpoint::Recorder;
 use crate::late::Start;
 use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
-use crate::penetration::Penetration;
+use crate::penetration::{Penetration, PenetrationPeak};
 use crate::run::{Body, Forming, Outcome};
 use crate::writer::Writer;
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
@@ -281,6 +281,8 @@ fn write_history(host: &Host, outcome: &Outcome, press: bool) -> Result<(), Step
         ("cavity_pressure", "Pa", |r| r.cavity),
         ("bag_pressure", "Pa", |r| r.bag),
         ("frame_height", "m", |r| r.frame),
+        ("time_step", "s", |r| r.time_step),
+        ("critical_step", "s", |r| r.critical_step),
     ];
     if press {
         columns.push(("punch_force", "N", |r| r.punch_force));
@@ -398,11 +400,16 @@ fn write_summary(
     warnings.extend(penetrations.iter().filter_map(Penetration::too_deep));
     let elements = m.element_count();
     let element_cycles = elements as f64 * outcome.cycles as f64;
-    let penetration: serde_json::Map<String, serde_json::Value> = penetrations
-        .iter()
-        .map(|p| {
-            let of =
-                json!({"max": p.largest, "q999": p.q999, "overlap": p.overlap(), "place": p.place});
+    let pairs = || penetrations.iter().zip(&outcome.peaks);
+    let penetration: serde_json::Map<String, serde_json::Value> = pairs()
+        .map(|(p, peak)| {
+            let of = json!({
+                "max": p.largest, "q999": p.q999, "overlap": p.overlap(), "place": p.place,
+                "peak": {
+                    "max": peak.largest, "max_time": peak.largest_time, "place": peak.place,
+                    "q999": peak.q999, "q999_time": peak.q999_time, "overlap": p.overlap_of(peak.q999),
+                },
+            });
             (p.pair.clone(), of)
         })
         .collect();
@@ -435,6 +442,12 @@ fn write_summary(
     host.result("penetration_max", worst(|p| p.largest), "m")?;
     host.result("penetration_q999", worst(|p| p.q999), "m")?;
     host.result("overlap_ratio", worst(Penetration::overlap), "1")?;
+    let peak = |f: fn(&Penetration, &PenetrationPeak) -> f64| {
+        pairs().map(|(p, peak)| f(p, peak)).fold(0.0, f64::max)
+    };
+    host.result("penetration_peak_max", peak(|_, k| k.largest), "m")?;
+    host.result("penetration_peak_q999", peak(|_, k| k.q999), "m")?;
+    host.result("overlap_peak_ratio", peak(|p, k| p.overlap_of(k.q999)), "1")?;
     let outlined = || forming.bodies.iter().filter_map(|b| b.quality);
     if outlined().next().is_some() {
         let least =

@@ -4,6 +4,7 @@ use crate::assembly::StackSheet;
 use crate::run::Forming;
 use plyflow_mechanics::contact::{RigidItem, SlaveItem};
 use plyflow_mechanics::vec3::V;
+use serde::{Deserialize, Serialize};
 
 /// Share of the thinner body beyond which what bodies share is told.
 const OVERLAP_BOUND: f64 = 0.1;
@@ -55,7 +56,12 @@ impl Penetration {
     /// What the bodies themselves share of the thinner one's thickness, at the 99.9 % quantile: penetration beyond the distance
     /// by which a pair is kept further apart than it is thick.
     pub fn overlap(&self) -> f64 {
-        ((self.q999 - self.spare) / self.thinner).max(0.0)
+        self.overlap_of(self.q999)
+    }
+
+    /// The same of a penetration of `depth` (m).
+    pub fn overlap_of(&self, depth: f64) -> f64 {
+        ((depth - self.spare) / self.thinner).max(0.0)
     }
 
     /// What to tell of bodies that share more than a tenth of the thinner one.
@@ -74,6 +80,34 @@ impl Penetration {
                 100.0 * OVERLAP_BOUND
             )
         })
+    }
+}
+
+/// Largest penetrations of one pair over the frames of a run, and when they were.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct PenetrationPeak {
+    /// Largest of its nodes in touch (m).
+    pub largest: f64,
+    /// When that was (s).
+    pub largest_time: f64,
+    /// Where that node was (m); `None` when none touched.
+    pub place: Option<V>,
+    /// Largest 99.9 % quantile (m).
+    pub q999: f64,
+    /// When that was (s).
+    pub q999_time: f64,
+}
+
+/// Counts the penetrations `now`, at `time` (s), among the largest so far, by pair. Of equal ones the first counts.
+pub fn keep_largest(peaks: &mut Vec<PenetrationPeak>, now: &[Penetration], time: f64) {
+    peaks.resize_with(now.len(), PenetrationPeak::default);
+    for (peak, p) in peaks.iter_mut().zip(now) {
+        if p.largest > peak.largest {
+            (peak.largest, peak.largest_time, peak.place) = (p.largest, time, p.place);
+        }
+        if p.q999 > peak.q999 {
+            (peak.q999, peak.q999_time) = (p.q999, time);
+        }
     }
 }
 
@@ -125,6 +159,32 @@ impl Forming {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_every_pair_the_largest_and_their_times_are_kept() {
+        let at =
+            |depth: f64| Penetration::new("film/ply", vec![(depth, [depth, 0.0, 0.0])], 0.0, 1e-4);
+        let many = || (0..2000).map(|i| (f64::from(i) / 1e8, [1.0; 3])).collect();
+        let spread = Penetration::new("ply/ply", many(), 0.0, 1e-4);
+        let none = || Penetration::new("ply/ply", Vec::new(), 0.0, 1e-4);
+        let mut peaks = Vec::new();
+        keep_largest(&mut peaks, &[at(1e-6), none()], 0.0);
+        keep_largest(&mut peaks, &[at(3e-6), spread], 0.1);
+        keep_largest(&mut peaks, &[at(3e-6), none()], 0.2);
+        keep_largest(&mut peaks, &[at(2e-6), none()], 0.3);
+        let [film, ply] = &peaks[..] else {
+            panic!("two pairs")
+        };
+        assert_eq!(
+            (film.largest, film.largest_time, film.q999_time),
+            (3e-6, 0.1, 0.1)
+        );
+        assert_eq!(film.place, Some([3e-6, 0.0, 0.0]));
+        assert_eq!(
+            (ply.largest, ply.q999, ply.largest_time),
+            (1.999e-5, 1.998e-5, 0.1)
+        );
+    }
 
     #[test]
     fn what_is_kept_further_apart_than_it_is_thick_overlaps_later() {

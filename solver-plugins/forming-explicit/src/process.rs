@@ -2,21 +2,29 @@
 
 use crate::press::PressLoad;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
-use plyflow_mechanics::history::{linear, smooth_step};
+use plyflow_mechanics::history::{MonotoneCubic, linear, smooth_step};
 use plyflow_mechanics::model::{Drive, Model, Pressures};
 use plyflow_mechanics::vec3::V;
-use plyflow_model::scene::{DoubleDiaphragm, WeightDirection};
+use plyflow_model::scene::{DoubleDiaphragm, PressureCourse, WeightDirection};
 
 /// Free fall (m/s2).
 pub(crate) const GRAVITY: f64 = 9.81;
 
+/// Share of drawing's duration in which a pump that follows a table makes up for what the film has moved, to within 1 / e. Far
+/// longer than a span takes to snap, so that the gas that it compresses still catches it.
+const PUMP_LAG: f64 = 0.05;
+
 /// Pressures and frame height of the process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cycle {
-    /// Pressure of the surroundings over the bag's vacuum (Pa).
+    /// Pressure of the surroundings over the bag's vacuum at the end (Pa).
     pub bag: f64,
+    /// Its course (Pa) over the share of bagging; none: it rises smoothly in the second half.
+    pub bag_course: Option<MonotoneCubic>,
     /// Pressure left in the cavity at the end (Pa).
     pub cavity_end: f64,
+    /// Course of the pressure drawn (Pa) over the share of drawing; none: gas leaves smoothly.
+    pub drawn_course: Option<MonotoneCubic>,
     /// Durations of the four phases (s).
     pub durations: [f64; 4],
     /// Frame height at start and end (m), of the lower film's mid-plane.
@@ -29,10 +37,16 @@ pub struct Cycle {
 
 impl Cycle {
     /// From the scene; `frame` as in [`Cycle::frame`].
-    pub fn new(p: &DoubleDiaphragm, frame: [f64; 2]) -> Self {
-        Self {
-            bag: p.bag_pressure.si(),
-            cavity_end: (p.bag_pressure.si() - p.forming_pressure.si()).max(0.0),
+    ///
+    /// # Errors
+    /// A text for the user: a course of a pressure that is none.
+    pub fn new(p: &DoubleDiaphragm, frame: [f64; 2]) -> Result<Self, String> {
+        let bag = p.bag_pressure.last();
+        Ok(Self {
+            bag,
+            bag_course: course(&p.bag_pressure, "bag_pressure", "bagging", f64::MAX)?,
+            cavity_end: (bag - p.forming_pressure.last()).max(0.0),
+            drawn_course: course(&p.forming_pressure, "forming_pressure", "drawing", bag)?,
             durations: [
                 p.bagging_time.si(),
                 p.lowering_time.si(),
@@ -46,7 +60,7 @@ impl Cycle {
                 Some(WeightDirection::Tool) => -GRAVITY,
                 Some(WeightDirection::Away) => GRAVITY,
             },
-        }
+        })
     }
 
     /// Whole duration (s).
@@ -77,7 +91,10 @@ impl Cycle {
 
     /// Pressure of the surroundings over the bag at `t` (Pa).
     pub fn bag_pressure(&self, t: f64) -> f64 {
-        self.bag * smooth_step(t, 0.5 * self.durations[0], 0.5 * self.durations[0])
+        match &self.bag_course {
+            Some(course) => course.at(share(t, 0.0, self.durations[0])),
+            None => self.bag * smooth_step(t, 0.5 * self.durations[0], 0.5 * self.durations[0]),
+        }
     }
 
     /// Strain of the frame at `t`: it grows in the first half of bagging, before friction ties the films to
@@ -103,6 +120,83 @@ impl Cycle {
         let drawn = smooth_step(t, self.sealed_at(), self.durations[2]);
         1.0 - (1.0 - self.cavity_end / self.bag.max(1e-300)) * drawn
     }
+
+    /// Pressure (Pa) that a table wants in the cavity at `t`; `None` without a table.
+    pub fn wanted_in_cavity(&self, t: f64) -> Option<f64> {
+        let course = self.drawn_course.as_ref()?;
+        let drawn = course.at(share(t, self.sealed_at(), self.durations[2]));
+        Some((self.bag - drawn).max(0.0))
+    }
+}
+
+/// Share of a phase that is over at `t`.
+fn share(t: f64, start: f64, duration: f64) -> f64 {
+    if duration > 0.0 {
+        ((t - start) / duration).clamp(0.0, 1.0)
+    } else if t >= start {
+        1.0
+    } else {
+        0.0
+    }
+}
+
+/// The course of a pressure over the share of a phase, if a table gives it: no pressure first, at most `most` (Pa).
+fn course(
+    given: &PressureCourse,
+    name: &str,
+    phase: &str,
+    most: f64,
+) -> Result<Option<MonotoneCubic>, String> {
+    let PressureCourse::Course(course) = given else {
+        return Ok(None);
+    };
+    let place = format!("process.double_diaphragm.{name}.table");
+    let rows: Vec<[f64; 2]> = (course.table.iter())
+        .map(|row| [row.share.0, row.pressure.si()])
+        .collect();
+    let last = rows.len().saturating_sub(1);
+    if last == 0 {
+        return Err(format!(
+            "{place}: {} given; expected two or more rows, from {{share: 0, pressure: 0 kPa}} to share 1",
+            if rows.is_empty() { "no row" } else { "one row" }
+        ));
+    }
+    for (k, [at, pressure]) in rows.iter().enumerate() {
+        let wrong = |what: &str, given: String, expected: String| {
+            Err(format!(
+                "{place}[{k}].{what}: given {given}; expected {expected}"
+            ))
+        };
+        if k == 0 && *at != 0.0 {
+            return wrong("share", at.to_string(), format!("0, where {phase} begins"));
+        }
+        if k > 0 && *at <= rows[k - 1][0] {
+            let expected = format!("more than the {} of the row before", rows[k - 1][0]);
+            return wrong("share", at.to_string(), expected);
+        }
+        if k == last && *at != 1.0 {
+            return wrong(
+                "share",
+                at.to_string(),
+                format!("1 in the last row, where {phase} ends"),
+            );
+        }
+        if !(*pressure >= 0.0 && pressure.is_finite()) {
+            return wrong("pressure", format!("{pressure} Pa"), "0 Pa or more".into());
+        }
+        if k == 0 && *pressure != 0.0 {
+            let expected = format!("0 Pa, so that nothing jumps when {phase} begins");
+            return wrong("pressure", format!("{pressure} Pa"), expected);
+        }
+        if *pressure > most {
+            let expected = format!(
+                "at most {most} Pa, the bag_pressure: more than that there is not to be drawn"
+            );
+            return wrong("pressure", format!("{pressure} Pa"), expected);
+        }
+    }
+    let (times, values) = rows.iter().map(|[at, pressure]| (*at, *pressure)).unzip();
+    Ok(Some(MonotoneCubic::new(times, values)))
 }
 
 /// Stretches the films, then moves the frame straight down.
@@ -126,7 +220,8 @@ impl Drive for FrameDrive {
 
 /// Where pressures come from.
 pub enum Load {
-    /// The process itself; the cavity is a gas of prescribed mass, isothermal: p V = n R T.
+    /// The process itself; the cavity is a gas of prescribed mass, isothermal: p V = n R T. With a table of the pressure drawn a pump
+    /// changes that mass after it.
     Process {
         /// Phases.
         cycle: Cycle,
@@ -134,6 +229,8 @@ pub enum Load {
         tool_volume: f64,
         /// Volume of the cavity at sealing (m3), once it is known.
         sealed_volume: Option<f64>,
+        /// Volume (m3) at which the gas that the pump has left would have the wanted pressure; follows the cavity's.
+        pumped_volume: Option<f64>,
     },
     /// Histories of the run that drives this one.
     Given {
@@ -198,7 +295,14 @@ impl Load {
     /// What it remembers of the run.
     pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
         match self {
-            Self::Process { sealed_volume, .. } => a.value(sealed_volume),
+            Self::Process {
+                sealed_volume,
+                pumped_volume,
+                ..
+            } => {
+                a.value(sealed_volume)?;
+                a.value(pumped_volume)
+            }
             Self::Given { .. } => Ok(()),
             Self::Press(p) => p.archive(a),
         }
@@ -225,6 +329,7 @@ impl Load {
                 cycle,
                 tool_volume,
                 sealed_volume,
+                pumped_volume,
             } => {
                 let above = cycle.bag_pressure(t);
                 let mut below = above;
@@ -235,11 +340,190 @@ impl Load {
                     let v0 = *sealed_volume.get_or_insert(volume.max(1e-9));
                     // The facets of the film may cut into the tool: the gas is never squeezed below half a
                     // per cent of its volume. More than 1.2 times the surroundings would lift the seal.
-                    below = cycle.bag * cycle.gas_left(t) * v0 / volume.max(0.005 * v0);
+                    let volume = volume.max(0.005 * v0);
+                    below = match cycle.wanted_in_cavity(t) {
+                        None => cycle.bag * cycle.gas_left(t) * v0 / volume,
+                        Some(wanted) => {
+                            let left = pumped_volume.get_or_insert(volume);
+                            let lag = PUMP_LAG * cycle.durations[2];
+                            *left += (volume - *left) * model.dt / (lag + model.dt);
+                            wanted * *left / volume
+                        }
+                    };
                     below = below.min(1.2 * cycle.bag);
                 }
                 model.pressures = Pressures { below, above };
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn cycle(bag: Value, forming: Value) -> Result<Cycle, String> {
+        let process = json!({
+            "frame_length": "1 m", "frame_width": "1 m", "clearance": "0.01 m", "bag_pressure": bag, "forming_pressure": forming,
+            "bagging_time": "0.2 s", "lowering_time": "0.3 s", "drawing_time": "0.4 s", "settling_time": "0.1 s",
+            "film_joint_margin": "0.03 m"});
+        Cycle::new(&serde_json::from_value(process).unwrap(), [0.1, 0.0])
+    }
+
+    fn table(rows: &[(f64, f64)]) -> Value {
+        let rows = rows
+            .iter()
+            .map(|(share, kpa)| json!({"share": share, "pressure": format!("{} Pa", 1e3 * kpa)}));
+        json!({"table": rows.collect::<Vec<_>>()})
+    }
+
+    #[test]
+    fn pressures_follow_their_tables_over_their_phases() {
+        let bag = table(&[(0.0, 0.0), (0.25, 10.0), (0.5, 70.0), (1.0, 80.0)]);
+        let forming = table(&[(0.0, 0.0), (0.2, 40.0), (0.6, 40.0), (1.0, 75.0)]);
+        let cycle = cycle(bag, forming).unwrap();
+        for (t, kpa) in [
+            (0.0, 0.0),
+            (0.05, 10.0),
+            (0.1, 70.0),
+            (0.2, 80.0),
+            (0.45, 80.0),
+            (1.0, 80.0),
+        ] {
+            assert!((cycle.bag_pressure(t) - 1e3 * kpa).abs() < 1e-6, "{t}");
+        }
+        for (t, kpa) in [
+            (0.5, 80.0),
+            (0.58, 40.0),
+            (0.66, 40.0),
+            (0.74, 40.0),
+            (0.9, 5.0),
+            (1.0, 5.0),
+        ] {
+            let wanted = cycle.wanted_in_cavity(t).unwrap();
+            assert!((wanted - 1e3 * kpa).abs() < 1e-6, "{t}: {wanted}");
+        }
+        assert_eq!((cycle.bag, cycle.cavity_end), (8e4, 5e3));
+    }
+
+    #[test]
+    fn single_values_come_as_smooth_steps() {
+        let cycle = cycle(json!("80000 Pa"), json!("60000 Pa")).unwrap();
+        for (t, bag, gas) in [
+            (0.1, 0.0, 1.0),
+            (0.15, 4e4, 1.0),
+            (0.3, 8e4, 1.0),
+            (0.7, 8e4, 0.625),
+            (1.0, 8e4, 0.25),
+        ] {
+            let (b, g) = (cycle.bag_pressure(t), cycle.gas_left(t));
+            assert!(
+                (b - bag).abs() < 1e-9 && (g - gas).abs() < 1e-12,
+                "{t} s: {b} Pa, {g}"
+            );
+            assert_eq!(cycle.wanted_in_cavity(t), None);
+        }
+    }
+
+    #[test]
+    fn a_table_that_is_none_is_refused_with_its_row_and_what_is_expected() {
+        let good = || table(&[(0.0, 0.0), (1.0, 100.0)]);
+        for (bag, forming, parts) in [
+            (
+                table(&[(0.0, 0.0)]),
+                good(),
+                ["bag_pressure.table: one row", "two or more rows"],
+            ),
+            (
+                table(&[(0.1, 0.0), (1.0, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[0].share: given 0.1",
+                    "where bagging begins",
+                ],
+            ),
+            (
+                table(&[(0.0, 5.0), (1.0, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[0].pressure: given 5000 Pa",
+                    "0 Pa, so that",
+                ],
+            ),
+            (
+                table(&[(0.0, 0.0), (0.5, 9.0), (0.5, 9.0), (1.0, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[2].share: given 0.5",
+                    "more than the 0.5",
+                ],
+            ),
+            (
+                table(&[(0.0, 0.0), (0.9, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[1].share: given 0.9",
+                    "where bagging ends",
+                ],
+            ),
+            (
+                good(),
+                table(&[(0.0, 0.0), (0.3, -1.0), (1.0, 9.0)]),
+                [
+                    "forming_pressure.table[1].pressure: given -1000 Pa",
+                    "0 Pa or more",
+                ],
+            ),
+            (
+                good(),
+                table(&[(0.0, 0.0), (0.5, 120.0), (1.0, 9.0)]),
+                [
+                    "forming_pressure.table[1].pressure: given 120000 Pa",
+                    "at most 100000 Pa",
+                ],
+            ),
+            (
+                good(),
+                table(&[(0.0, 0.0), (0.8, 9.0)]),
+                [
+                    "forming_pressure.table[1].share: given 0.8",
+                    "where drawing ends",
+                ],
+            ),
+        ] {
+            let text = cycle(bag, forming).unwrap_err();
+            for part in parts {
+                assert!(
+                    text.contains(part) && text.contains("process.double_diaphragm"),
+                    "{part}: {text}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_pump_has_left_is_kept_in_a_checkpoint() {
+        let load = |sealed_volume, pumped_volume| Load::Process {
+            cycle: cycle(json!("80000 Pa"), table(&[(0.0, 0.0), (1.0, 60.0)])).unwrap(),
+            tool_volume: 1e-3,
+            sealed_volume,
+            pumped_volume,
+        };
+        let mut bytes = Vec::new();
+        load(Some(0.3), Some(0.2))
+            .archive(&mut Archive::Save(&mut bytes))
+            .unwrap();
+        let mut again = load(None, None);
+        again.archive(&mut Archive::Load(&bytes)).unwrap();
+        let Load::Process {
+            sealed_volume,
+            pumped_volume,
+            ..
+        } = again
+        else {
+            unreachable!()
+        };
+        assert_eq!((sealed_volume, pumped_volume), (Some(0.3), Some(0.2)));
     }
 }

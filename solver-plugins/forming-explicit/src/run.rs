@@ -1,8 +1,10 @@
 //! The time loop: frames, ledger, step control, health.
 
 use crate::assembly::StackSheet;
+pub use crate::course::Course;
 use crate::diagnosis;
 use crate::late::{self, Start};
+use crate::penetration::{PenetrationPeak, keep_largest};
 use crate::press::PressLoad;
 use crate::process::Load;
 use crate::symmetry::MirroredBody;
@@ -142,6 +144,10 @@ pub struct Forming {
 pub struct HistoryRow {
     /// Time (s).
     pub time: f64,
+    /// Step that brought it there (s).
+    pub time_step: f64,
+    /// Critical step of the elements at the last frame (s), of which that is at most the share `step_safety`.
+    pub critical_step: f64,
     /// Energies (J).
     pub ledger: Ledger,
     /// Cavity pressure (Pa).
@@ -160,52 +166,6 @@ pub struct HistoryRow {
     pub interfaces: Vec<ContactEnergy>,
 }
 
-/// How far a run has come, between two frames.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Course {
-    /// Frames written.
-    pub frame: usize,
-    /// The history so far.
-    pub history: Vec<HistoryRow>,
-    /// Smallest step used (s).
-    pub smallest_step: f64,
-    /// Of a run that begins late: how far fine plies went there by themselves (m).
-    pub start_shift: Option<f64>,
-    /// The step (s) of which the user knows; of this attempt, and not kept for another.
-    told_step: Option<f64>,
-}
-
-impl Default for Course {
-    fn default() -> Self {
-        Self {
-            frame: 0,
-            history: Vec::new(),
-            smallest_step: f64::INFINITY,
-            start_shift: None,
-            told_step: None,
-        }
-    }
-}
-
-impl Course {
-    /// Whether steps of `dt` (s) are so much shorter than those of which the user knows that the run takes twice as long and more;
-    /// if so, how long those were.
-    fn shorter_steps(&mut self, dt: f64) -> Option<f64> {
-        let known = *self.told_step.get_or_insert(dt);
-        (dt < 0.5 * known).then(|| {
-            self.told_step = Some(dt);
-            known
-        })
-    }
-
-    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        a.value(&mut self.frame)?;
-        a.value(&mut self.history)?;
-        a.value(&mut self.smallest_step)?;
-        a.value(&mut self.start_shift)
-    }
-}
-
 /// What came of a run.
 #[derive(Debug, Clone)]
 pub struct Outcome {
@@ -219,6 +179,8 @@ pub struct Outcome {
     pub smallest_step: f64,
     /// Of a run that begins late: how far (m) nodes of plies went there by themselves, 99.9 % quantile.
     pub start_shift: Option<f64>,
+    /// Largest penetrations over all frames, in the order of [`Forming::penetrations`].
+    pub peaks: Vec<PenetrationPeak>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -317,12 +279,14 @@ impl Forming {
         self.load.archive(a)
     }
 
-    fn row(&self, ledger: Ledger) -> HistoryRow {
+    fn row(&self, ledger: Ledger, critical_step: f64) -> HistoryRow {
         let m = &self.model;
         // Of the whole.
         let n = self.copies();
         HistoryRow {
             time: m.time,
+            time_step: m.dt,
+            critical_step,
             ledger: ledger.times(n),
             cavity: m.pressures.below,
             bag: m.pressures.above,
@@ -370,7 +334,9 @@ impl Forming {
         self.load.apply(&mut self.model);
         self.model.step(true).map_err(|e| e.to_string())?;
         observer.frame(self, end)?;
-        course.history.push(self.row(self.model.energies()));
+        keep_largest(&mut course.peaks, &self.penetrations(), end);
+        let last = self.row(self.model.energies(), course.critical_step);
+        course.history.push(last);
         Ok(self.outcome(course, control.kinetic_bound))
     }
 
@@ -392,6 +358,7 @@ impl Forming {
         let steps = (interval / wanted).ceil().max(1.0) as u64;
         self.model.dt = interval / steps as f64;
         course.smallest_step = course.smallest_step.min(self.model.dt);
+        course.critical_step = critical;
         Ok(steps)
     }
 
@@ -426,10 +393,13 @@ impl Forming {
                 // Fields belong to the positions before the step; its motion is far below output
                 // precision.
                 observer.frame(self, start)?;
+                keep_largest(&mut course.peaks, &self.penetrations(), start);
             }
             if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
                 let energies = self.model.energies();
-                course.history.push(self.row(energies));
+                course
+                    .history
+                    .push(self.row(energies, course.critical_step));
                 if let Some(what) =
                     diagnosis::open_ledger(&course.history, end, control.drift_bound)
                 {
@@ -446,6 +416,7 @@ impl Forming {
             history,
             smallest_step,
             start_shift,
+            peaks,
             ..
         } = course;
         let ledgers: Vec<Ledger> = history.iter().map(|r| r.ledger).collect();
@@ -458,6 +429,7 @@ impl Forming {
             cycles: self.model.cycle,
             smallest_step,
             start_shift,
+            peaks,
             warnings,
         }
     }
@@ -549,22 +521,4 @@ fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {
         ));
     }
     list
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Course;
-
-    #[test]
-    fn the_user_is_told_once_for_each_time_that_the_step_halves() {
-        let mut course = Course::default();
-        let told: Vec<Option<f64>> = [2.0, 1.1, 0.9, 0.8, 0.5, 0.4, 2.0, 0.39]
-            .map(|dt| course.shorter_steps(dt))
-            .to_vec();
-        let none = None;
-        let want = [none, none, Some(2.0), none, none, Some(0.9), none, none];
-        assert_eq!(told, want);
-        // Another attempt begins anew.
-        assert_eq!(Course::default().shorter_steps(0.1), None);
-    }
 }
