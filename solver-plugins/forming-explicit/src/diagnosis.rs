@@ -107,6 +107,11 @@ pub(crate) fn slower(forming: &Forming, known: f64) -> String {
     text
 }
 
+const TOO_LARGE_A_STEP: (&str, &str) = (
+    "a step above the critical one",
+    "smaller step_safety or time_step, more frames (the step is chosen anew at each), less contact_damping",
+);
+
 /// The likely cause and what to try, by the element that sets the step, the deepest contact over the thinnest sheet, and the kinetic
 /// over the internal energy.
 fn likely(cell: Option<&Weakest>, deep: Option<f64>, kinetic: f64) -> (&'static str, &'static str) {
@@ -123,14 +128,13 @@ fn likely(cell: Option<&Weakest>, deep: Option<f64>, kinetic: f64) -> (&'static 
             "a sheet is on its way through its neighbour",
             "smaller time_step, larger least_areal_mass (stiffer contact), longer process times",
         ),
+        // Whatever a step too large throws about is fast as well.
+        (Some(c), _) if c.over > 1.0 => TOO_LARGE_A_STEP,
         _ if kinetic > 0.5 => (
             "the process is too fast for its masses",
             "longer process times, or less least_areal_mass",
         ),
-        _ => (
-            "a step above the critical one",
-            "smaller step_safety or time_step, less contact_damping",
-        ),
+        _ => TOO_LARGE_A_STEP,
     }
 }
 
@@ -152,6 +156,8 @@ struct Weakest {
     shear: f64,
     /// Of a diaphragm, not of a ply.
     is_film: bool,
+    /// The steps that are done over the largest that it allows.
+    over: f64,
     text: String,
 }
 
@@ -180,12 +186,14 @@ fn weakest(forming: &Forming) -> Option<Weakest> {
     Some(Weakest {
         shear,
         is_film: scene.kind == SheetKind::Diaphragm,
+        over: m.dt / step,
         text: format!(
-            " The step is set by an element of '{}' at {} (before forming {}): {:.3} us, shear {:.0} deg, fibre strain {:.1} %.",
+            " The step is set by an element of '{}' at {} (before forming {}): at most {:.3} us (it is {:.3} us), shear {:.0} deg, fibre strain {:.1} %.",
             body.name,
             millimetres(centre(&m.x, &nodes)),
             millimetres(centre(&forming.reference, &nodes)),
             1e6 * step,
+            1e6 * m.dt,
             shear.to_degrees(),
             100.0 * strain,
         ),
@@ -208,7 +216,10 @@ fn deepest(forming: &Forming) -> Option<Deepest> {
     Some(Deepest {
         share: depth / thinnest,
         text: format!(
-            " Deepest contact: {name}, {:.0} um ({:.0} % of the thinnest sheet).",
+            " Deepest contact: {name}{}, {:.0} um ({:.0} % of the thinnest sheet).",
+            worst
+                .place
+                .map_or_else(String::new, |x| format!(" at {}", millimetres(x))),
             1e6 * depth,
             100.0 * depth / thinnest
         ),
@@ -262,6 +273,7 @@ mod tests {
         let cell = |shear: f64, is_film: bool| Weakest {
             shear,
             is_film,
+            over: 0.8,
             text: String::new(),
         };
         let cause =
@@ -276,6 +288,13 @@ mod tests {
         assert!(cause(&cell(0.5, true), 4.0, 1.0).contains("through its neighbour"));
         assert!(cause(&cell(0.5, true), 0.1, 1.0).contains("too fast"));
         assert!(likely(None, None, 0.0).0.contains("above the critical"));
+        // What a step too large throws about is fast and, in the end, deep.
+        let thrown = Weakest {
+            over: 2.5,
+            ..cell(0.5, false)
+        };
+        assert!(cause(&thrown, 0.1, 1.0).contains("above the critical"));
+        assert!(cause(&thrown, 4.0, 1.0).contains("through its neighbour"));
     }
 
     #[test]

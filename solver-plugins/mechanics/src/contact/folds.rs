@@ -96,6 +96,8 @@ pub struct SelfContact {
     /// Edge of a cell (m), mean.
     edge: f64,
     search: Search,
+    /// By chunk of items, of one step: its energies, and whether any touches. Kept for its room.
+    sums: Vec<(ContactEnergy, bool)>,
 }
 
 /// What bounds the penalty of new pairs.
@@ -144,6 +146,7 @@ impl SelfContact {
             margin,
             edge,
             search: Search::default(),
+            sums: Vec::new(),
         }
     }
 
@@ -197,11 +200,11 @@ impl SelfContact {
             }
             (sum, touched)
         };
-        let chunks: Vec<(ContactEnergy, bool)> =
-            self.items.par_chunks_mut(256).map(follow_all).collect();
+        let chunks = self.items.par_chunks_mut(256).map(follow_all);
+        chunks.collect_into_vec(&mut self.sums);
         let mut total = ContactEnergy::default();
-        for (energy, touched) in chunks {
-            total.add(&energy);
+        for (energy, touched) in &self.sums {
+            total.add(energy);
             self.touched |= touched;
         }
         total

@@ -59,20 +59,18 @@ impl Model {
         // None are kept while nothing acts.
         let loaded_nodes = if loaded { self.x.len() } else { 0 };
         self.external_force.resize(loaded_nodes, [0.0; 3]);
-        let before: Vec<(V, V)> = self
-            .driven
-            .iter()
-            .map(|n| (self.x[*n as usize], self.v[*n as usize]))
-            .collect();
+        let mut before = std::mem::take(&mut self.scratch.before);
+        before.clear();
+        let places = self.driven.iter().map(|n| *n as usize);
+        before.extend(places.map(|n| (self.x[n], self.v[n])));
         let (sums, patch_sums) = (&self.sums, &self.patch_sums);
         let free_mass = free_or_all(&self.free_mass, &self.mass);
         let fixed = &self.supports.fixed;
         let own_mass = &self.own_mass;
-        let mut external: Vec<&mut [V]> = self.external_force.chunks_mut(NODE_CHUNK).collect();
-        external.resize_with(self.x.len().div_ceil(NODE_CHUNK), Default::default);
+        let chunks = self.x.len().div_ceil(NODE_CHUNK);
+        let external = chunks_or_none(&mut self.external_force, NODE_CHUNK, chunks);
         let (loads, load_factor) = (&self.loads.force, self.load_factor);
-        let works: Vec<NodeWork> = self
-            .x
+        self.x
             .par_chunks_mut(NODE_CHUNK)
             .zip_eq(self.v.par_chunks_mut(NODE_CHUNK))
             .zip_eq(self.force.par_chunks_mut(NODE_CHUNK))
@@ -110,9 +108,11 @@ impl Model {
                     fixed: fixed.get(nodes).unwrap_or_default(),
                 })
             })
-            .collect();
-        self.work = works.into_iter().fold(NodeWork::default(), NodeWork::add);
+            .collect_into_vec(&mut self.scratch.works);
+        let works = self.scratch.works.iter();
+        self.work = works.fold(NodeWork::default(), |sum, w| sum.add(*w));
         self.follow(&before);
+        self.scratch.before = before;
         if !self.work.kinetic.is_finite() {
             let bad = |v: &V| !v.iter().all(|c| c.is_finite());
             self.work.bad = self.v.iter().position(bad).map(|n| n as u32);

@@ -6,6 +6,7 @@
 
 use super::transpose::{Sum, scatter};
 use super::*;
+use rayon::iter::Either;
 
 /// Batches in a block: 16 x 16 elements.
 pub(super) const BLOCK: usize = 8;
@@ -191,17 +192,25 @@ pub(super) struct Present<'a> {
     pub(super) fields: bool,
 }
 
+/// The first `n` chunks of an array, the last of which may be shorter; empty ones of an array that is empty because it is not wanted.
+pub(super) fn chunks_or_none<T: Send>(
+    array: &mut [T],
+    size: usize,
+    n: usize,
+) -> impl IndexedParallelIterator<Item = &mut [T]> {
+    if array.is_empty() {
+        Either::Right((0..n).into_par_iter().map(|_| Default::default()))
+    } else {
+        let end = array.len().min(n * size);
+        Either::Left(array[..end].par_chunks_mut(size))
+    }
+}
+
 /// Computes all batches and sums them by block.
 pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: Present<'_>) {
     let (stride, places) = (sums.stride, blocks.len() * sums.stride);
     if blocks.is_empty() {
         return;
-    }
-    // Arrays that are not wanted give no chunks.
-    fn chunks(array: &mut [Sum], stride: usize, n: usize) -> Vec<&mut [Sum]> {
-        let mut chunks: Vec<&mut [Sum]> = array.chunks_exact_mut(stride).take(n).collect();
-        chunks.resize_with(n, Default::default);
-        chunks
     }
     let n = blocks.len();
     let areas = if present.areas {
@@ -209,10 +218,9 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
     } else {
         &mut []
     };
-    let others = chunks(&mut sums.moment, stride, n)
-        .into_par_iter()
-        .zip_eq(chunks(&mut sums.pressure, stride, n))
-        .zip_eq(chunks(areas, stride, n));
+    let others = chunks_or_none(&mut sums.moment, stride, n)
+        .zip_eq(chunks_or_none(&mut sums.pressure, stride, n))
+        .zip_eq(chunks_or_none(areas, stride, n));
     blocks
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))

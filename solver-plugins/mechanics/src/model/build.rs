@@ -77,6 +77,7 @@ impl Model {
             interfaces: Vec::new(),
             step_energies: Vec::new(),
             work: NodeWork::default(),
+            scratch: Scratch::default(),
             x: points,
         };
         for spec in specs {

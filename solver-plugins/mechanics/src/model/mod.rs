@@ -158,6 +158,20 @@ pub struct Model {
     /// The same: stored at present, lost in the last step (J).
     step_energies: Vec<ContactEnergy>,
     work: NodeWork,
+    scratch: Scratch,
+}
+
+/// Kept from step to step only for their room: a step allocates nothing.
+#[derive(Default)]
+struct Scratch {
+    /// By chunk of nodes.
+    works: Vec<NodeWork>,
+    /// By driven node: position and velocity before the step.
+    before: Vec<(V, V)>,
+    /// By driven node: spin before the step.
+    spins: Vec<V>,
+    /// Parts of a volume (m3).
+    volumes: Vec<f64>,
 }
 
 /// Where the element of a cell is.

@@ -174,10 +174,9 @@ impl Model {
     }
 
     /// Volume (m3) under the cells that are pressed from below, over the plane z = 0.
-    pub fn volume_below(&self) -> f64 {
+    pub fn volume_below(&mut self) -> f64 {
         // Partial sums of fixed chunks, added in order: the same for any number of threads.
-        let parts: Vec<f64> = self
-            .cells
+        self.cells
             .par_chunks(NODE_CHUNK)
             .zip_eq(self.pressed_below.par_chunks(NODE_CHUNK))
             .map(|(cells, pressed)| {
@@ -191,7 +190,7 @@ impl Model {
                 }
                 volume
             })
-            .collect();
-        parts.into_iter().sum()
+            .collect_into_vec(&mut self.scratch.volumes);
+        self.scratch.volumes.iter().sum()
     }
 }

@@ -55,9 +55,15 @@ impl Model {
         let Some(mut r) = self.rotations.take() else {
             return;
         };
-        let before: Vec<V> = (self.driven.iter()).map(|n| r.spin[*n as usize]).collect();
-        let mut work = self.turn_all(&mut r);
+        let mut before = std::mem::take(&mut self.scratch.spins);
+        before.clear();
+        before.extend(self.driven.iter().map(|n| r.spin[*n as usize]));
+        let mut works = std::mem::take(&mut self.scratch.works);
+        self.turn_all(&mut r, &mut works);
+        let mut work = works.iter().fold(NodeWork::default(), |sum, w| sum.add(*w));
+        self.scratch.works = works;
         self.turn_driven(&mut r, &before, &mut work);
+        self.scratch.spins = before;
         if !work.kinetic.is_finite() {
             let bad = |w: &V| !w.iter().all(|c| c.is_finite());
             work.bad = work.bad.or(r.spin.iter().position(bad).map(|n| n as u32));
@@ -66,14 +72,13 @@ impl Model {
         self.rotations = Some(r);
     }
 
-    /// Spins of all nodes as if none was driven; works of those that are not.
-    fn turn_all(&self, r: &mut Rotations) -> NodeWork {
+    /// Spins of all nodes as if none was driven; works of those that are not, by chunk.
+    fn turn_all(&self, r: &mut Rotations, works: &mut Vec<NodeWork>) {
         let moving = self.moving(false);
         let (sums, loads, factor) = (&self.sums, &self.loads.moment, self.load_factor);
         let inertia = free_or_all(&r.free_inertia, &r.inertia);
         let fixed = &self.supports.fixed;
-        let works: Vec<NodeWork> = r
-            .spin
+        r.spin
             .par_chunks_mut(NODE_CHUNK)
             .enumerate()
             .map(|(chunk, spin)| {
@@ -95,8 +100,7 @@ impl Model {
                     fixed: fixed.get(nodes).unwrap_or_default(),
                 })
             })
-            .collect();
-        works.into_iter().fold(NodeWork::default(), NodeWork::add)
+            .collect_into_vec(works);
     }
 
     /// Spins of the driven nodes, which were `before`, and their works.
