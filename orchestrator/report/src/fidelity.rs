@@ -1,48 +1,113 @@
-//! Speed against error: what the ways of a study cost, and how far they are from its reference.
+//! Speed against error: what the ways of a study cost, how far they are from its reference, and which are on the Pareto front.
 
 use crate::input::{Instance, ReportInput};
 
-/// A way to the answer: the coarse run alone, another run of the whole, fine runs of its zones, or the reference.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Way {
-    pub(crate) name: String,
-    /// CPU and wall time (s).
-    pub(crate) cpu: f64,
-    pub(crate) wall: f64,
-    /// Peak memory of its largest run (bytes).
-    pub(crate) memory: Option<f64>,
-    /// CPU time over that of the reference.
-    pub(crate) share: f64,
-    /// Mean error of the reference's defects, a missed one counting as 1; see `comparison`.
-    pub(crate) error: f64,
-    /// Mean errors of length, amplitude and bridging area; absent when nothing was there to compare.
-    pub(crate) errors: [Option<f64>; 3],
-    /// Errors of position and distance from the tool (m) and of the quantiles of the shear angle (rad).
-    pub(crate) fields: [Option<f64>; 3],
-    /// Missed and false wrinkles, missed and false bridging; absent for the reference.
-    pub(crate) counts: Option<[f64; 4]>,
-    pub(crate) is_reference: bool,
-    /// When it began, if that was late (s): what came before is not in its cost.
-    pub(crate) from: Option<f64>,
-    /// Whether no other way is both cheaper and better. One whose cost is not told has no place on it, unless it is the reference.
-    pub(crate) on_front: bool,
+/// A measure of how wrong a way is: a result of `comparison`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Mean error of the reference's defects, a missed one counting as 1.
+    Defects,
+    /// Mean relative error of the lengths of wrinkles that both have.
+    Length,
+    /// The same of their amplitudes.
+    Amplitude,
+    /// Mean relative error of the areas of bridging that both have.
+    BridgingArea,
+    /// Root mean square distance of material points from where the reference has them (m).
+    Position,
+    /// Root mean square difference of the distance from the tool (m).
+    Distance,
+    /// Largest difference of the quantiles of the shear angle (rad).
+    Shear,
 }
 
-impl Way {
-    /// Whether its cost is that of an answer.
-    pub(crate) fn is_whole(&self) -> bool {
-        self.from.is_none() || self.is_reference
+impl Measure {
+    /// All, in the order of [`Way::errors`] and [`Way::on_front`].
+    pub const ALL: [Self; 7] = [
+        Self::Defects,
+        Self::Length,
+        Self::Amplitude,
+        Self::BridgingArea,
+        Self::Position,
+        Self::Distance,
+        Self::Shear,
+    ];
+
+    /// Name of the result that holds it, without the model.
+    #[must_use]
+    pub fn result(self) -> &'static str {
+        match self {
+            Self::Defects => "defect_error",
+            Self::Length => "wrinkle_length_error",
+            Self::Amplitude => "wrinkle_amplitude_error",
+            Self::BridgingArea => "bridging_area_error",
+            Self::Position => "position_error",
+            Self::Distance => "distance_error",
+            Self::Shear => "shear_quantile_error",
+        }
+    }
+
+    /// Its SI unit.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Position | Self::Distance => "m",
+            Self::Shear => "rad",
+            _ => "1",
+        }
     }
 }
 
-/// Results that make the errors and counts of a way.
-const ERRORS: [&str; 3] = [
-    "wrinkle_length_error",
-    "wrinkle_amplitude_error",
-    "bridging_area_error",
-];
-const FIELDS: [&str; 3] = ["position_error", "distance_error", "shear_quantile_error"];
-const COUNTS: [&str; 4] = [
+/// A way to the answer: the coarse run alone, another run of the whole, fine runs of its zones, or the reference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Way {
+    /// Label of the comparison that measured it.
+    pub comparison: String,
+    /// Its model in the names of that step's results: `global`, `other.drape`, `total` (coarse run and zones), `reference`.
+    pub model: String,
+    /// Name for people; with the comparison when there are several.
+    pub name: String,
+    /// CPU time (s).
+    pub cpu_seconds: f64,
+    /// Wall time (s).
+    pub wall_seconds: f64,
+    /// Peak memory of its largest run (bytes).
+    pub peak_memory: Option<f64>,
+    /// CPU time over that of the reference.
+    pub share: f64,
+    /// By [`Measure::ALL`], SI; absent when nothing was there to compare. Those of the reference are 0.
+    pub errors: [Option<f64>; 7],
+    /// Missed and false wrinkles, missed and false bridging; absent for the reference.
+    pub counts: Option<[f64; 4]>,
+    /// Whether it measures the others.
+    pub is_reference: bool,
+    /// When it began, if that was late (s): what came before is not in its cost.
+    pub start_time: Option<f64>,
+    /// By [`Measure::ALL`], whether nothing cheaper is as good. One that began late is never on the front, unless it is the reference.
+    pub on_front: [bool; 7],
+}
+
+impl Way {
+    /// One of its errors (SI).
+    #[must_use]
+    pub fn error(&self, measure: Measure) -> Option<f64> {
+        self.errors[measure as usize]
+    }
+
+    /// Whether it is on the front of a measure.
+    #[must_use]
+    pub fn is_on_front(&self, measure: Measure) -> bool {
+        self.on_front[measure as usize]
+    }
+
+    /// Whether its cost is that of an answer.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.start_time.is_none() || self.is_reference
+    }
+}
+
+/// Results that count defects of one alone, in the order of [`Way::counts`].
+pub const COUNTS: [&str; 4] = [
     "missed_wrinkles",
     "false_wrinkles",
     "missed_bridging",
@@ -51,27 +116,53 @@ const COUNTS: [&str; 4] = [
 
 /// The ways of a study.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Ways {
+pub struct Ways {
     /// The cheapest first.
-    pub(crate) list: Vec<Way>,
+    pub list: Vec<Way>,
     /// Whether a run of the whole measures them; else the fine runs of the zones do, in these.
-    pub(crate) of_the_whole: bool,
+    pub of_the_whole: bool,
 }
 
 impl Ways {
     /// What measures them.
-    pub(crate) fn yardstick(&self) -> &'static str {
+    #[must_use]
+    pub fn yardstick(&self) -> &'static str {
         if self.of_the_whole {
             "reference"
         } else {
             "coarse run and zones"
         }
     }
+
+    /// The front of a measure, the cheapest first: whose error nothing cheaper has or is below.
+    fn mark_fronts(&mut self) {
+        for (m, measure) in Measure::ALL.into_iter().enumerate() {
+            // That the reference has no error says nothing where nobody was measured.
+            if !(self.list.iter()).any(|w| !w.is_reference && w.error(measure).is_some()) {
+                (self.list.iter_mut()).for_each(|w| w.errors[m] = None);
+                continue;
+            }
+            let whole = self.list.iter().enumerate().filter(|(_, w)| w.is_whole());
+            let mut told: Vec<(usize, f64)> = whole
+                .filter_map(|(k, w)| Some((k, w.error(measure)?)))
+                .collect();
+            told.sort_by(|a, b| {
+                let cost = |k: usize| self.list[k].cpu_seconds;
+                cost(a.0).total_cmp(&cost(b.0)).then(a.1.total_cmp(&b.1))
+            });
+            let mut least = f64::INFINITY;
+            for (k, error) in told {
+                self.list[k].on_front[m] = error < least;
+                least = least.min(error);
+            }
+        }
+    }
 }
 
-/// The ways of all comparisons with a reference; one of equal cost and error is told once. Where there is none, those of the comparison
-/// whose fine runs cost most.
-pub(crate) fn ways(input: &ReportInput) -> Ways {
+/// The ways of all comparisons with a reference; one of equal cost and errors is told once. Where there is none, those of the comparison
+/// whose fine runs cost most. Costs are those of the runs' records, as `comparison` reports them.
+#[must_use]
+pub fn ways(input: &ReportInput) -> Ways {
     let compared = (input.instances.iter()).filter(|i| i.record.kind == "comparison");
     let has = |i: &&Instance| value(i, "cost.reference.cpu_seconds").is_some_and(|w| w > 0.0);
     let mut with: Vec<&Instance> = compared.clone().filter(has).collect();
@@ -83,14 +174,15 @@ pub(crate) fn ways(input: &ReportInput) -> Ways {
     }
     let named = with.len() > 1;
     let mut list: Vec<Way> = with.into_iter().flat_map(|i| of(i, named)).collect();
-    list.sort_by(|a, b| a.cpu.total_cmp(&b.cpu).then(a.error.total_cmp(&b.error)));
-    list.dedup_by(|a, b| a.cpu == b.cpu && a.error == b.error);
-    let mut least = f64::INFINITY;
-    for way in list.iter_mut().filter(|w| w.is_whole()) {
-        way.on_front = way.error < least;
-        least = least.min(way.error);
-    }
-    Ways { list, of_the_whole }
+    let first = |w: &Way| w.errors[0].unwrap_or(f64::INFINITY);
+    list.sort_by(|a, b| {
+        let by_cost = a.cpu_seconds.total_cmp(&b.cpu_seconds);
+        by_cost.then(first(a).total_cmp(&first(b)))
+    });
+    list.dedup_by(|a, b| a.cpu_seconds == b.cpu_seconds && a.errors == b.errors);
+    let mut ways = Ways { list, of_the_whole };
+    ways.mark_fronts();
+    ways
 }
 
 const TOTAL: &str = "cost.total.cpu_seconds";
@@ -116,27 +208,28 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
     };
     // No suffix: the reference.
     let way = |name: String, model: &str, suffix: Option<&str>| {
-        let cpu = value(&format!("cost.{model}.cpu_seconds"))?;
+        let cpu_seconds = value(&format!("cost.{model}.cpu_seconds"))?;
         let measured = |name: &str| value(&format!("{name}{}", suffix?));
         let counts = COUNTS.map(measured);
+        let errors = match suffix {
+            Some(_) => Measure::ALL.map(|m| measured(m.result())),
+            None => [Some(0.0); 7],
+        };
+        errors[0]?;
         Some(Way {
+            comparison: instance.label(),
+            model: model.to_owned(),
             name,
-            cpu,
-            wall: value(&format!("cost.{model}.wall_seconds"))?,
-            memory: value(&format!("peak_memory.{model}")),
-            share: cpu / whole,
-            error: if suffix.is_some() {
-                measured("defect_error")?
-            } else {
-                0.0
-            },
-            errors: ERRORS.map(measured),
-            fields: FIELDS.map(measured),
+            cpu_seconds,
+            wall_seconds: value(&format!("cost.{model}.wall_seconds"))?,
+            peak_memory: value(&format!("peak_memory.{model}")),
+            share: cpu_seconds / whole,
+            errors,
             counts: (counts.iter().all(Option::is_some))
                 .then(|| counts.map(Option::unwrap_or_default)),
             is_reference: suffix.is_none(),
-            from: value(&format!("start_time.{model}")),
-            on_front: false,
+            start_time: value(&format!("start_time.{model}")),
+            on_front: [false; 7],
         })
     };
     let mut ways = vec![way(label("coarse run alone"), "global", Some(".global"))];
@@ -161,7 +254,8 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
 pub(crate) fn advice(ways: &Ways, targets: &[f64]) -> Vec<String> {
     let one = |target: &f64| {
         let percent = 100.0 * target;
-        let found = (ways.list.iter()).find(|w| w.is_whole() && w.error <= *target)?;
+        let found = (ways.list.iter())
+            .find(|w| w.is_whole() && w.errors[0].is_some_and(|e| e <= *target))?;
         let share = 100.0 * found.share;
         Some(if !found.is_reference {
             format!(
@@ -256,7 +350,10 @@ mod tests {
         let ways = ways(&input);
         assert!(ways.of_the_whole);
         let list = &ways.list;
-        let told: Vec<(&str, bool)> = list.iter().map(|w| (w.name.as_str(), w.on_front)).collect();
+        let told: Vec<(&str, bool)> = list
+            .iter()
+            .map(|w| (w.name.as_str(), w.on_front[0]))
+            .collect();
         assert_eq!(
             told,
             [
@@ -268,8 +365,8 @@ mod tests {
             ]
         );
         assert_eq!(
-            (list[2].share, list[2].errors),
-            (0.1, [Some(0.03), None, None])
+            (list[2].share, list[2].error(Measure::Length)),
+            (0.1, Some(0.03))
         );
         let advice = advice(&ways, &[0.1, 0.05, 0.01]);
         assert!(
@@ -305,7 +402,9 @@ mod tests {
         ]));
         assert!(!ways.of_the_whole);
         let list = &ways.list;
-        let told: Vec<(&str, f64)> = list.iter().map(|w| (w.name.as_str(), w.error)).collect();
+        let told: Vec<(&str, f64)> = (list.iter())
+            .map(|w| (w.name.as_str(), w.errors[0].unwrap()))
+            .collect();
         assert_eq!(
             told,
             [
@@ -314,8 +413,12 @@ mod tests {
                 ("coarse run and zones", 0.0),
             ]
         );
-        assert_eq!((list[0].share, list[0].memory), (1.0 / 80.0, Some(5e6)));
-        assert_eq!(list[0].fields, [Some(0.002), None, None]);
+        assert_eq!(
+            (list[0].share, list[0].peak_memory),
+            (1.0 / 80.0, Some(5e6))
+        );
+        assert_eq!(list[0].error(Measure::Position), Some(0.002));
+        assert_eq!(list[0].error(Measure::Shear), None);
         let advice = advice(&ways, &[0.85, 0.1]);
         assert!(
             advice[0]
@@ -341,7 +444,7 @@ mod tests {
         ]);
         let ways = ways(&input(vec![comparison("late", &run)]));
         let told: Vec<(&str, Option<f64>, bool)> = (ways.list.iter())
-            .map(|w| (w.name.as_str(), w.from, w.on_front))
+            .map(|w| (w.name.as_str(), w.start_time, w.on_front[0]))
             .collect();
         assert_eq!(
             told,
@@ -355,5 +458,38 @@ mod tests {
         let advice = advice(&ways, &[0.1, 0.05]);
         assert!(advice[0].contains("coarse run and zones"), "{advice:?}");
         assert!(advice[1].contains("none but the reference"), "{advice:?}");
+    }
+    #[test]
+    fn every_measure_has_a_front_of_its_own_and_the_reference_stands_on_it() {
+        let mut run = costs(10.0, 100.0);
+        run.extend([
+            ("defect_error", 0.08),
+            ("cost.other.drape.cpu_seconds", 1.0),
+            ("cost.other.drape.wall_seconds", 1.0),
+            ("defect_error.other.drape", 0.9),
+            ("position_error.other.drape", 0.002),
+            ("position_error.global", 0.003),
+            ("position_error", 0.001),
+        ]);
+        let ways = ways(&input(vec![comparison("one", &run)]));
+        let told: Vec<(&str, &str, [bool; 3])> = (ways.list.iter())
+            .map(|w| {
+                let on = |m| w.is_on_front(m);
+                let fronts = [Measure::Defects, Measure::Position, Measure::Shear].map(on);
+                (w.comparison.as_str(), w.model.as_str(), fronts)
+            })
+            .collect();
+        assert_eq!(
+            told,
+            [
+                ("one", "other.drape", [true, true, false]),
+                ("one", "global", [true, false, false]),
+                ("one", "total", [true, true, false]),
+                ("one", "reference", [true, true, false]),
+            ]
+        );
+        let reference = &ways.list[3];
+        assert_eq!(reference.error(Measure::Position), Some(0.0));
+        assert_eq!(reference.error(Measure::Shear), None, "nobody was measured");
     }
 }

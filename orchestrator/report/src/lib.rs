@@ -28,6 +28,7 @@ mod units;
 mod verdict;
 mod view;
 
+pub use fidelity::{COUNTS, Measure, Way, Ways, ways};
 pub use input::{Expectation, Instance, ReportInput};
 pub use summary::summary;
 

@@ -5,6 +5,7 @@ mod check_plugin;
 mod clean;
 mod explain;
 mod extract;
+mod front;
 mod inspect;
 mod open;
 mod plan;

@@ -1,7 +1,8 @@
 //! `results`: the named numbers of what the store has, beside what the workflow expects.
 
 use super::args::{Format, ResultsArgs};
-use super::open::open;
+use super::open::{Opened, open};
+use super::report::{Found, input};
 use super::table::{bytes, number, table};
 use super::{Done, Stop, print};
 use crate::engine::Session;
@@ -268,33 +269,35 @@ fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> ser
     json!({"workflow": session.workflow.name, "results": results, "steps": costs})
 }
 
+/// A text as a cell of CSV.
+pub fn csv_text(t: &str) -> String {
+    if t.contains([',', '"', '\n']) {
+        format!("\"{}\"", t.replace('"', "\"\""))
+    } else {
+        t.to_owned()
+    }
+}
+
 fn as_csv(rows: &[Row]) -> String {
     let mut out = String::from(
         "step,item,result,value,unit,measured,expected,tolerance,minimum,maximum,verdict,source\n",
     );
-    let text = |t: &str| {
-        if t.contains([',', '"', '\n']) {
-            format!("\"{}\"", t.replace('"', "\"\""))
-        } else {
-            t.to_owned()
-        }
-    };
     let value = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
     for r in rows {
         let e = r.expected.as_ref();
         let cells = [
-            text(&r.step),
-            text(&r.item.join("/")),
-            text(&r.name),
+            csv_text(&r.step),
+            csv_text(&r.item.join("/")),
+            csv_text(&r.name),
             value(r.value),
-            text(&r.unit),
+            csv_text(&r.unit),
             r.measured.to_string(),
             value(e.and_then(|e| e.value)),
             value(e.and_then(|e| e.tolerance)),
             value(e.and_then(|e| e.minimum)),
             value(e.and_then(|e| e.maximum)),
             r.verdict().unwrap_or_default().to_owned(),
-            text(e.and_then(|e| e.source.as_deref()).unwrap_or_default()),
+            csv_text(e.and_then(|e| e.source.as_deref()).unwrap_or_default()),
         ];
         out += &(cells.join(",") + "\n");
     }
@@ -321,6 +324,9 @@ pub fn results(args: &ResultsArgs) -> Done {
             args.step.contains(&session.core.graph().steps[step].name)
         });
     }
+    if args.front {
+        return front(args, &opened, &session, records);
+    }
     match args.format {
         Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records)))?,
         Format::Csv => print(&as_csv(&rows))?,
@@ -340,6 +346,25 @@ pub fn results(args: &ResultsArgs) -> Done {
         }
     }
     if args.check { check(&rows) } else { Ok(()) }
+}
+
+/// `plyflow results --front`, of the comparisons among `records`.
+fn front(
+    args: &ResultsArgs,
+    opened: &Opened,
+    session: &Session<'_>,
+    records: Vec<(Id, Record)>,
+) -> Done {
+    let found = Found {
+        records,
+        rows: Vec::new(),
+    };
+    let ways = plyflow_report::ways(&input(opened, session, &found, &[], &args.workflow));
+    match args.format {
+        Format::Json => print(&format!("{:#}\n", super::front::as_json(&ways))),
+        Format::Csv => print(&super::front::as_csv(&ways)),
+        Format::Table => print(&super::front::as_table(&ways)),
+    }
 }
 
 /// Ends with the code for missed expectations if there are any.

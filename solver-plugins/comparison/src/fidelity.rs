@@ -5,6 +5,7 @@ use crate::table::{apart, same_within, unlike};
 use plyflow_defects::{Defect, FieldErrors, Kind, Ply, Settings, measure};
 use plyflow_sdk::{Host, StepError};
 use serde::Serialize;
+use serde_json::{Map, Value, json};
 
 /// A defect and the name of its ply.
 type Found<'a> = (&'a str, &'a Defect);
@@ -84,10 +85,10 @@ impl Fidelity {
         (count > 0).then(|| (both.sum::<f64>() + missed as f64) / count as f64)
     }
 
-    fn write(&self, host: &Host, suffix: &str) -> Result<(), StepError> {
-        if let Some(error) = self.error() {
-            host.result(&format!("defect_error{suffix}"), error, "1")?;
-        }
+    /// What it comes to: names of results, values and units, in the order in which they are reported.
+    fn told(&self) -> Vec<Told> {
+        let mut told = Vec::new();
+        told.extend(self.error().map(|e| ("defect_error", e, "1")));
         let errors = [
             ("wrinkle_length_error", &self.length),
             ("wrinkle_amplitude_error", &self.amplitude),
@@ -95,18 +96,75 @@ impl Fidelity {
         ];
         for (name, errors) in errors.into_iter().filter(|e| !e.1.is_empty()) {
             let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-            host.result(&format!("{name}{suffix}"), mean, "1")?;
+            told.push((name, mean, "1"));
         }
-        for (k, kind) in ["wrinkles", "bridging"].iter().enumerate() {
-            host.result(
-                &format!("missed_{kind}{suffix}"),
-                self.missed[k] as f64,
-                "1",
-            )?;
-            host.result(&format!("false_{kind}{suffix}"), self.wrong[k] as f64, "1")?;
-        }
-        Ok(())
+        let counts = [
+            ("missed_wrinkles", self.missed[0]),
+            ("false_wrinkles", self.wrong[0]),
+            ("missed_bridging", self.missed[1]),
+            ("false_bridging", self.wrong[1]),
+        ];
+        told.extend(counts.map(|(name, n)| (name, n as f64, "1")));
+        told
     }
+}
+
+/// Name of a result, its value and its unit.
+type Told = (&'static str, f64, &'static str);
+
+/// A way to the answer, measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Way {
+    /// Its model: `global`, `other.drape`; `total` for global and local runs together.
+    pub model: String,
+    /// Behind the names of its results: `.global`, `.other.drape`, nothing for `total`.
+    suffix: String,
+    errors: Vec<Told>,
+    elements: usize,
+    element_cycles: f64,
+    began_late: Option<f64>,
+}
+
+impl Way {
+    /// Of some models, not measured yet.
+    fn new(model: &str, suffix: &str, models: &[&Model]) -> Self {
+        Self {
+            model: model.to_owned(),
+            suffix: suffix.to_owned(),
+            errors: Vec::new(),
+            elements: models.iter().map(|m| m.elements).sum(),
+            element_cycles: models.iter().fold(0.0, |s, m| s + m.element_cycles),
+            // Of a whole only: zones that begin late stand on the global run, which is in their cost.
+            began_late: match models {
+                [whole] if matches!(whole.role, Role::Other | Role::Reference) => whole.began_late,
+                _ => None,
+            },
+        }
+    }
+
+    /// As in the data model.
+    pub fn to_json(&self) -> Value {
+        let errors: Map<String, Value> = (self.errors.iter())
+            .map(|(name, value, _)| ((*name).to_owned(), json!(value)))
+            .collect();
+        json!({
+            "model": self.model, "elements": self.elements, "element_cycles": self.element_cycles,
+            "start_time": self.began_late, "errors": errors,
+        })
+    }
+}
+
+/// Writes what was measured of the ways, and of the single local runs, as results.
+///
+/// # Errors
+/// When the host refuses a result.
+pub fn write(host: &Host, ways: &[Way]) -> Result<(), StepError> {
+    for way in ways {
+        for (name, value, unit) in &way.errors {
+            host.result(&format!("{name}{}", way.suffix), *value, unit)?;
+        }
+    }
+    Ok(())
 }
 
 /// What the ways to the answer are measured by.
@@ -131,17 +189,29 @@ impl Yardstick {
     }
 }
 
-/// Writes how far every way to the answer is from the reference: the local runs together (with the global run around them), the
+/// The ways and the single local runs, each with how far it is from the reference, in the order in which they are reported.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Measured {
+    /// Whole answers: the global run by itself, every other run, the local runs with the global run around them, and the reference.
+    pub ways: Vec<Way>,
+    /// The fields of each local run.
+    pub local: Vec<Way>,
+}
+
+/// Measures how far every way to the answer is from the reference: the local runs together (with the global run around them), the
 /// global run by itself, and every other run. All defects of the reference count, wherever they are. Without a reference the
-/// local runs stand in for it, and what lies outside of their zones does not count.
-pub fn write(
+/// local runs stand in for it, and what lies outside of their zones does not count. Nothing when nothing was refined.
+///
+/// # Errors
+/// When the run is cancelled.
+pub fn measure_ways(
     host: &Host,
     models: &[Model],
     zones: &[Zone],
     settings: &Settings,
-) -> Result<(), StepError> {
+) -> Result<Measured, StepError> {
     let Some(yardstick) = Yardstick::of(models) else {
-        return Ok(());
+        return Ok(Measured::default());
     };
     let of = |role| -> Vec<&Model> { models.iter().filter(|m| m.role == role).collect() };
     let (global, local) = (of(Role::Global), of(Role::Local));
@@ -153,51 +223,57 @@ pub fn write(
     let theirs = named(&theirs);
     let counts =
         |d: &Defect| yardstick == Yardstick::Reference || zones.iter().any(|z| z.holds(&d.centre));
-    // By suffix: whose defects count, and whose fields, the first that has a place.
-    let mut ways = vec![(".global".to_owned(), global.clone(), global.clone())];
+    let both: Vec<&Model> = local.iter().chain(&global).copied().collect();
+    // Whose defects count, and whose fields, the first that has a place.
+    let way = |model: &str, suffix: &str, all: &[&Model]| Way::new(model, suffix, all);
+    let mut ways = vec![(
+        way("global", ".global", &global),
+        global.clone(),
+        global.clone(),
+    )];
     for m in of(Role::Other) {
-        ways.push((format!(".{}", m.name), vec![m], vec![m]));
+        let suffix = format!(".{}", m.name);
+        ways.push((way(&m.name, &suffix, &[m]), vec![m], vec![m]));
     }
     if yardstick == Yardstick::Reference {
-        let both = local.iter().chain(&global).copied().collect();
-        ways.push((String::new(), local.clone(), both));
+        ways.push((way("total", "", &both), local.clone(), both.clone()));
     }
-    for (suffix, models, around) in ways {
+    let mut measured = Measured::default();
+    for (mut way, models, around) in ways {
         host.check_cancelled()?;
         let ours = everywhere(&models, settings);
         let mut ours = named(&ours);
         ours.retain(|(_, d)| counts(d));
-        Fidelity::of(&ours, &theirs, settings).write(host, &suffix)?;
-        write_fields(host, &around, &reference, &suffix)?;
+        way.errors = Fidelity::of(&ours, &theirs, settings).told();
+        way.errors.extend(fields(&around, &reference));
+        measured.ways.push(way);
     }
+    // The yardstick itself, for what it took.
+    measured.ways.push(match yardstick {
+        Yardstick::Reference => Way::new("reference", ".reference", &reference),
+        Yardstick::Zones => Way::new("total", "", &both),
+    });
     if yardstick == Yardstick::Reference {
         for m in local {
-            write_fields(host, &[m], &reference, &format!(".{}", m.name))?;
+            let mut way = Way::new(&m.name, &format!(".{}", m.name), &[m]);
+            way.errors = fields(&[m], &reference);
+            measured.local.push(way);
         }
     }
-    Ok(())
+    Ok(measured)
 }
 
-/// Writes how far the fields of a way are from the reference, under their names with a suffix.
-fn write_fields(
-    host: &Host,
-    way: &[&Model],
-    reference: &[&Model],
-    suffix: &str,
-) -> Result<(), StepError> {
+/// How far the fields of a way are from the reference.
+fn fields(way: &[&Model], reference: &[&Model]) -> Vec<Told> {
     let [way, reference] =
         [way, reference].map(|all| all.iter().map(|m| &m.plies[..]).collect::<Vec<_>>());
     let Some(errors) = FieldErrors::of(&way, &reference) else {
-        return Ok(());
+        return Vec::new();
     };
-    host.result(&format!("position_error{suffix}"), errors.position, "m")?;
-    if let Some(distance) = errors.distance {
-        host.result(&format!("distance_error{suffix}"), distance, "m")?;
-    }
-    if let Some(shear) = errors.shear {
-        host.result(&format!("shear_quantile_error{suffix}"), shear, "rad")?;
-    }
-    Ok(())
+    let mut told = vec![("position_error", errors.position, "m")];
+    told.extend(errors.distance.map(|v| ("distance_error", v, "m")));
+    told.extend(errors.shear.map(|v| ("shear_quantile_error", v, "rad")));
+    told
 }
 
 /// The defects of all plies of some models, by ply, also the smaller ones that a pair may need: bridging down to a smaller area,

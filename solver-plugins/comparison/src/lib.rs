@@ -7,7 +7,7 @@ mod models;
 mod table;
 
 pub use cut::{Layer, Passage, Strip, Work};
-pub use fidelity::{Fidelity, Yardstick};
+pub use fidelity::{Fidelity, Measured, Way, Yardstick};
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
@@ -54,11 +54,13 @@ impl Step for Comparison {
         let passages = cut::passages(host, &models, &zones)?;
         let layers = cut::layers(&models, &zones);
         let cut = json!({"work": passages, "layers": layers});
-        write_attributes(host, &models, &zones, &table, &cut)?;
+        let measured = fidelity::measure_ways(host, &models, &zones, &settings)?;
+        write_attributes(host, &models, &zones, &table, &cut, &measured.ways)?;
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
         write_reference_defects(host, &models, &table)?;
-        fidelity::write(host, &models, &zones, &settings)?;
+        fidelity::write(host, &measured.ways)?;
+        fidelity::write(host, &measured.local)?;
         cut::write(host, &passages, &layers, &zones)?;
         write_costs(host, &models, &passed_over)
     }
@@ -70,6 +72,7 @@ fn write_attributes(
     zones: &[Zone],
     table: &[Entry],
     cut: &Value,
+    ways: &[Way],
 ) -> Result<(), StepError> {
     let list: Vec<Value> = (models.iter())
         .map(|m| {
@@ -90,6 +93,7 @@ fn write_attributes(
         "zones": zones.iter().map(|z| &z.name).collect::<Vec<_>>(),
         "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES, "cut": cut,
         "measured_by": Yardstick::of(models),
+        "ways": ways.iter().map(Way::to_json).collect::<Vec<_>>(),
     }))
 }
 

@@ -65,6 +65,28 @@ fn every_other_run_is_measured_by_the_reference_and_costs_nothing_of_the_two_sta
     let models = out.attributes["models"].as_array().unwrap();
     let roles: Vec<&str> = models.iter().filter_map(|m| m["role"].as_str()).collect();
     assert_eq!(roles, ["global", "local", "other", "other", "reference"]);
+    // The ways as data, without what they cost: an artifact holds what is reproducible.
+    let ways = out.attributes["ways"].as_array().unwrap();
+    let told: Vec<&str> = ways.iter().filter_map(|w| w["model"].as_str()).collect();
+    assert_eq!(
+        told,
+        ["global", "other.drape", "other.again", "total", "reference"]
+    );
+    for (way, suffix) in ways
+        .iter()
+        .zip([".global", ".other.drape", ".other.again", ""])
+    {
+        let errors = way["errors"].as_object().unwrap();
+        assert!(errors.len() >= 8, "{way}");
+        for (name, value) in errors {
+            let result = out.result(&format!("{name}{suffix}"));
+            assert_eq!(value.as_f64(), Some(result), "{name}{suffix}");
+        }
+    }
+    assert_eq!(ways[4]["errors"], json!({}));
+    let elements: Vec<u64> = [0, 3].map(|k| ways[k]["elements"].as_u64().unwrap()).into();
+    assert_eq!(elements[1], elements[0] + 128 * 80);
+    assert!(!out.attributes.to_string().contains("seconds"));
 }
 
 #[test]
@@ -156,6 +178,9 @@ fn the_run_of_a_zone_over_the_blank_is_a_reference_and_nothing_is_saved_against_
     assert_eq!(out.measured["cost.reference.cpu_seconds"].0, 100.0);
     assert!(!out.measured.contains_key("cost_saving"));
     assert_eq!(out.result("start_time.reference"), 0.6);
+    let ways = out.attributes["ways"].as_array().unwrap();
+    assert_eq!(ways.last().unwrap()["start_time"], 0.6);
+    assert_eq!(ways[0]["start_time"], Value::Null);
     assert!(!out.results.contains_key("start_time.global"));
 
     inputs.push(cost("reference", &late, 100.0));

@@ -1,6 +1,6 @@
 //! Speed against error.
 
-use crate::fidelity::{Way, Ways, advice, ways};
+use crate::fidelity::{Measure, Way, Ways, advice, ways};
 use crate::input::ReportInput;
 use crate::plot::{Plot, Series, Style};
 use crate::units::{bytes, duration, fixed};
@@ -28,7 +28,7 @@ pub(super) fn section(input: &ReportInput) -> Markup {
                 @if !ways.of_the_whole {
                     p { "Nobody ran the whole in fine elements here, so the fine runs of the zones are the measure, in these zones: how wrong they are themselves, and what lies outside of them, is not told." }
                 }
-                @if ways.list.iter().any(|w| w.from.is_some()) {
+                @if ways.list.iter().any(|w| w.start_time.is_some()) {
                     p { "A run that began late (from …) did a part of the process: what it began from is not in its cost, so it is not marked and not advised. Shares of the CPU time of such a reference are of that part." }
                 }
                 div class="scroll" { table {
@@ -40,10 +40,11 @@ pub(super) fn section(input: &ReportInput) -> Markup {
                     } }
                     tbody { @for way in &ways.list { (row(way)) } }
                 } }
-                (plot("Error of defects over CPU time", "error (%)", &ways, |w| Some(100.0 * w.error)))
-                @if ways.list.iter().any(|w| w.fields[0].is_some()) {
-                    (plot("Error of position over CPU time", "error (mm)", &ways, |w| if w.is_reference { Some(0.0) } else { w.fields[0].map(|v| 1e3 * v) }))
+                (plot("Error of defects over CPU time", "error (%)", &ways, Measure::Defects, 100.0))
+                @if ways.list.iter().any(|w| w.error(Measure::Position).is_some()) {
+                    (plot("Error of position over CPU time", "error (mm)", &ways, Measure::Position, 1e3))
                 }
+                p class="note" { "The same as data, with the front of every error: " code { "plyflow results " (input.file) " --front --format csv" } }
                 @for text in advice(&ways, &TARGETS) { p { (text) } }
             }
         }
@@ -59,15 +60,15 @@ fn row(way: &Way) -> Markup {
     );
     let told = |v: Option<f64>, write: &dyn Fn(f64) -> String| v.map_or("–".to_owned(), write);
     let sum = |a: usize, b: usize| told(way.counts.map(|c| c[a] + c[b]), &|v| fixed(v, 0));
-    let [position, distance, shear] = way.fields;
+    let [error, length, amplitude, area, position, distance, shear] = way.errors;
     let millimetres = |v: f64| fixed(1e3 * v, 2);
     html! {
         tr {
-            th { (way.name) @if let Some(time) = way.from { " (from " (fixed(time, 2)) " s)" } } td { @if way.on_front { "●" } }
-            td class="n" { (duration(way.cpu)) } td class="n" { (duration(way.wall)) }
-            td class="n" { (told(way.memory, &|v| bytes(v as u64))) }
-            td class="n" { (share) } td class="n" { (percent(way.error)) }
-            @for v in way.errors { td class="n" { (told(v, &percent)) } }
+            th { (way.name) @if let Some(time) = way.start_time { " (from " (fixed(time, 2)) " s)" } } td { @if way.is_on_front(Measure::Defects) { "●" } }
+            td class="n" { (duration(way.cpu_seconds)) } td class="n" { (duration(way.wall_seconds)) }
+            td class="n" { (told(way.peak_memory, &|v| bytes(v as u64))) }
+            td class="n" { (share) } td class="n" { (told(error, &percent)) }
+            @for v in [length, amplitude, area] { td class="n" { (told(v, &percent)) } }
             td class="n" { (sum(0, 2)) } td class="n" { (sum(1, 3)) }
             td class="n" { (told(position, &millimetres)) } td class="n" { (told(distance, &millimetres)) }
             td class="n" { (told(shear, &|v| fixed(v.to_degrees(), 2))) }
@@ -75,19 +76,13 @@ fn row(way: &Way) -> Markup {
     }
 }
 
-/// An error of the ways over their cost, and the front of the least by it.
-fn plot(title: &str, y_label: &str, ways: &Ways, error: fn(&Way) -> Option<f64>) -> Markup {
+/// An error of the ways, times `factor`, over their cost, and its front.
+fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) -> Markup {
     let told: Vec<(&Way, f64)> = (ways.list.iter())
-        .filter_map(|w| Some((w, error(w)?)))
+        .filter_map(|w| Some((w, factor * w.error(measure)?)))
         .collect();
-    let mut least = f64::INFINITY;
-    let mut front = Vec::new();
-    for &(w, e) in &told {
-        if w.is_whole() && e < least {
-            least = e;
-            front.push((w, e));
-        }
-    }
+    let on_front = |w: &&(&Way, f64)| w.0.is_on_front(measure);
+    let front: Vec<(&Way, f64)> = told.iter().filter(on_front).copied().collect();
     let series = |name: &str, colour: usize, style: Style, of: &[(&Way, f64)]| Series {
         name: name.to_owned().into(),
         colour,

@@ -1,0 +1,213 @@
+//! `results --front`: what the ways of a study cost, how wrong they are, and which are on the Pareto front.
+//!
+//! Errors come from the artifacts' results, costs from the records beside them: so the front is put together here and is in no
+//! artifact ([decision 1](../../../docs/decisions/0001-artifacts-hold-what-is-reproducible.md)).
+
+use super::results::csv_text;
+use super::table::{bytes, number, table};
+use crate::progress::duration_text;
+use plyflow_report::{COUNTS, Measure, Way, Ways};
+use serde_json::{Value, json};
+
+/// One row for each way, SI, memory in bytes; `on_front.<error>` is `true` where nothing cheaper is as good by that error.
+pub fn as_csv(ways: &Ways) -> String {
+    let mut head: Vec<String> = [
+        "comparison",
+        "model",
+        "way",
+        "is_reference",
+        "start_time",
+        "cpu_seconds",
+        "wall_seconds",
+        "peak_memory",
+        "cpu_share",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    head.extend(Measure::ALL.map(|m| m.result().to_owned()));
+    head.extend(COUNTS.map(str::to_owned));
+    head.extend(Measure::ALL.map(|m| format!("on_front.{}", m.result())));
+    let mut out = head.join(",") + "\n";
+    let value = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
+    for w in &ways.list {
+        let mut cells = vec![
+            csv_text(&w.comparison),
+            csv_text(&w.model),
+            csv_text(&w.name),
+            w.is_reference.to_string(),
+            value(w.start_time),
+            w.cpu_seconds.to_string(),
+            w.wall_seconds.to_string(),
+            value(w.peak_memory),
+            w.share.to_string(),
+        ];
+        cells.extend(w.errors.map(value));
+        cells.extend([0, 1, 2, 3].map(|k| value(w.counts.map(|c| c[k]))));
+        cells.extend(w.on_front.map(|on| on.to_string()));
+        out += &(cells.join(",") + "\n");
+    }
+    out
+}
+
+/// A list of objects with the columns of [`as_csv`]; `errors` and `on_front` by the name of the error.
+pub fn as_json(ways: &Ways) -> Value {
+    let one = |w: &Way| {
+        let by_name = |values: [Value; 7]| -> Value {
+            let names = Measure::ALL.map(|m| m.result().to_owned());
+            names.into_iter().zip(values).collect()
+        };
+        let counts: Value = (COUNTS.iter().enumerate())
+            .map(|(k, name)| ((*name).to_owned(), json!(w.counts.map(|c| c[k]))))
+            .collect();
+        json!({
+            "comparison": w.comparison, "model": w.model, "way": w.name, "is_reference": w.is_reference,
+            "start_time": w.start_time, "cpu_seconds": w.cpu_seconds, "wall_seconds": w.wall_seconds,
+            "peak_memory": w.peak_memory, "cpu_share": w.share, "errors": by_name(w.errors.map(|e| json!(e))),
+            "counts": counts, "on_front": by_name(w.on_front.map(|on| json!(on))),
+        })
+    };
+    ways.list.iter().map(one).collect()
+}
+
+/// For people: a star stands behind an error that nothing cheaper has or is below.
+pub fn as_table(ways: &Ways) -> String {
+    if ways.list.is_empty() {
+        return "no comparison has run that measures one way by another\n".to_owned();
+    }
+    let head = [
+        "way",
+        "cpu",
+        "wall",
+        "memory",
+        "share",
+        "defects",
+        "length",
+        "amplitude",
+        "bridging",
+        "position",
+        "distance",
+        "shear",
+    ];
+    let error = |w: &Way, m: Measure| {
+        let Some(e) = w.error(m) else {
+            return String::new();
+        };
+        let text = match m.unit() {
+            "m" => format!("{:.3} mm", 1e3 * e),
+            "rad" => format!("{:.2} deg", e.to_degrees()),
+            _ => format!("{:.1} %", 100.0 * e),
+        };
+        format!("{text}{}", if w.is_on_front(m) { " *" } else { "  " })
+    };
+    let line = |w: &Way| {
+        let from = w.start_time.map(|t| format!(" (from {t:.2} s)"));
+        let mut cells = vec![
+            format!("{}{}", w.name, from.unwrap_or_default()),
+            duration_text(w.cpu_seconds),
+            duration_text(w.wall_seconds),
+            w.peak_memory.map_or(String::new(), |m| bytes(m as u64)),
+            format!("{} %", number((1e4 * w.share).round() / 100.0)),
+        ];
+        cells.extend(Measure::ALL.map(|m| error(w, m)));
+        cells
+    };
+    let lines: Vec<Vec<String>> = ways.list.iter().map(line).collect();
+    let right: Vec<usize> = (1..head.len()).collect();
+    format!(
+        "{}\nErrors against the {}. *: nothing cheaper is as good.\n",
+        table(&head, &lines, &right),
+        ways.yardstick()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn way(model: &str, cpu: f64, error: Option<f64>, on_front: bool) -> Way {
+        Way {
+            comparison: "comparison".into(),
+            model: model.into(),
+            name: format!("{model}, alone"),
+            cpu_seconds: cpu,
+            wall_seconds: 0.5 * cpu,
+            peak_memory: None,
+            share: cpu / 40.0,
+            errors: [error, None, None, None, Some(0.002), None, Some(0.01)],
+            counts: Some([1.0, 0.0, 2.0, 0.0]),
+            is_reference: false,
+            start_time: None,
+            on_front: [on_front, false, false, false, true, false, false],
+        }
+    }
+
+    fn ways() -> Ways {
+        let late = Way {
+            start_time: Some(0.6),
+            counts: None,
+            ..way("other.late", 20.0, None, false)
+        };
+        Ways {
+            list: vec![way("global", 10.0, Some(0.8), true), late],
+            of_the_whole: true,
+        }
+    }
+
+    #[test]
+    fn a_row_of_csv_has_costs_errors_counts_and_fronts_under_their_names() {
+        let text = as_csv(&ways());
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 3);
+        let head: Vec<&str> = lines[0].split(',').collect();
+        // The only comma within a cell is that of the name.
+        let cells = |line: &str| -> Vec<String> {
+            let line = line.replace(", alone", "; alone");
+            line.split(',').map(str::to_owned).collect()
+        };
+        let cell = |row: usize, name: &str| {
+            let k = head.iter().position(|h| *h == name).expect(name);
+            cells(lines[row])[k].clone()
+        };
+        for row in [1, 2] {
+            assert_eq!(cells(lines[row]).len(), head.len());
+        }
+        assert_eq!(cell(1, "way"), "\"global; alone\"");
+        let told = [
+            ("cpu_seconds", "10"),
+            ("cpu_share", "0.25"),
+            ("defect_error", "0.8"),
+            ("position_error", "0.002"),
+            ("wrinkle_length_error", ""),
+            ("missed_bridging", "2"),
+            ("on_front.defect_error", "true"),
+            ("on_front.distance_error", "false"),
+            ("start_time", ""),
+        ];
+        for (name, value) in told {
+            assert_eq!(cell(1, name), value, "{name}");
+        }
+        assert_eq!(
+            (cell(2, "start_time"), cell(2, "missed_bridging")),
+            ("0.6".into(), String::new())
+        );
+    }
+
+    #[test]
+    fn json_and_the_table_tell_the_same() {
+        let list = as_json(&ways());
+        assert_eq!(list[0]["errors"]["defect_error"], 0.8);
+        assert_eq!(list[0]["on_front"]["defect_error"], true);
+        assert_eq!(list[0]["counts"]["missed_wrinkles"], 1.0);
+        assert_eq!(list[1]["errors"]["defect_error"], Value::Null);
+        let text = as_table(&ways());
+        for part in [
+            "80.0 % *",
+            "2.000 mm *",
+            "0.57 deg\n",
+            "other.late, alone (from 0.60 s)",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert!(as_table(&Ways::default()).contains("no comparison has run"));
+    }
+}
