@@ -100,6 +100,15 @@ impl Way {
         self.on_front[measure as usize]
     }
 
+    /// Its name, with when it began if that was late: `reference (from 0.60 s)`.
+    #[must_use]
+    pub fn label(&self) -> String {
+        match self.start_time {
+            Some(time) => format!("{} (from {time:.2} s)", self.name),
+            None => self.name.clone(),
+        }
+    }
+
     /// Whether its cost is that of an answer.
     pub(crate) fn is_whole(&self) -> bool {
         self.start_time.is_none() || self.is_reference

@@ -100,9 +100,8 @@ pub fn as_table(ways: &Ways) -> String {
         format!("{text}{}", if w.is_on_front(m) { " *" } else { "  " })
     };
     let line = |w: &Way| {
-        let from = w.start_time.map(|t| format!(" (from {t:.2} s)"));
         let mut cells = vec![
-            format!("{}{}", w.name, from.unwrap_or_default()),
+            w.label(),
             duration_text(w.cpu_seconds),
             duration_text(w.wall_seconds),
             w.peak_memory.map_or(String::new(), |m| bytes(m as u64)),

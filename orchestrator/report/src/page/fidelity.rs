@@ -64,7 +64,7 @@ fn row(way: &Way) -> Markup {
     let millimetres = |v: f64| fixed(1e3 * v, 2);
     html! {
         tr {
-            th { (way.name) @if let Some(time) = way.start_time { " (from " (fixed(time, 2)) " s)" } } td { @if way.is_on_front(Measure::Defects) { "●" } }
+            th { (way.label()) } td { @if way.is_on_front(Measure::Defects) { "●" } }
             td class="n" { (duration(way.cpu_seconds)) } td class="n" { (duration(way.wall_seconds)) }
             td class="n" { (told(way.peak_memory, &|v| bytes(v as u64))) }
             td class="n" { (share) } td class="n" { (told(error, &percent)) }
@@ -96,7 +96,7 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
     };
     let mut all = vec![series("front", 0, Style::Dashed, &front)];
     all.extend(
-        (told.iter().enumerate()).map(|(k, w)| series(&w.0.name, k + 1, Style::Points, &[*w])),
+        (told.iter().enumerate()).map(|(k, w)| series(&w.0.label(), k + 1, Style::Points, &[*w])),
     );
     let x_label = format!("CPU time over that of the {} (%)", ways.yardstick());
     Plot {
@@ -111,4 +111,51 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
         size: [640.0, 300.0],
     }
     .svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn way(model: &str, share: f64, error: f64, start_time: Option<f64>) -> Way {
+        Way {
+            comparison: "comparison".into(),
+            model: model.into(),
+            name: model.into(),
+            cpu_seconds: 100.0 * share,
+            wall_seconds: 100.0 * share,
+            peak_memory: None,
+            share,
+            errors: [Some(error); 7],
+            counts: None,
+            is_reference: model == "reference",
+            start_time,
+            on_front: [start_time.is_none() || model == "reference"; 7],
+        }
+    }
+
+    #[test]
+    fn a_run_that_began_late_is_labelled_so_in_table_and_plot_and_stands_off_the_front() {
+        let ways = Ways {
+            list: vec![
+                way("coarse run alone", 0.1, 0.8, None),
+                way("late", 0.5, 0.02, Some(0.6)),
+                way("reference", 1.0, 0.0, Some(0.7)),
+            ],
+            of_the_whole: true,
+        };
+        let table: String = ways.list.iter().map(|w| row(w).0).collect();
+        let plot = plot("Error", "error (%)", &ways, Measure::Defects, 100.0).0;
+        let (aria, legend) = plot.split_once("<figcaption").unwrap();
+        for text in [&table[..], aria, legend] {
+            for label in ["late (from 0.60 s)", "reference (from 0.70 s)"] {
+                assert!(text.contains(label), "{label}: {text}");
+            }
+            assert!(!text.contains("alone (from"), "{text}");
+        }
+        // The front joins the first and the last: one line of two places.
+        let dashed = plot.split_once("class=\"line dashed c0\" d=\"").unwrap().1;
+        let path = &dashed[..dashed.find('"').unwrap()];
+        assert_eq!(path.matches(['M', 'L']).count(), 2, "{path}");
+    }
 }
