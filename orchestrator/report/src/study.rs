@@ -151,7 +151,16 @@ pub(crate) struct Defect {
     pub(crate) amplitude: f64,
     pub(crate) area: f64,
     pub(crate) centre: [f64; 2],
-    pub(crate) curvature_max: f64,
+    /// Least radius of curvature (m).
+    pub(crate) radius: Option<f64>,
+    /// Of a ridge in the flat ply, from x (rad).
+    pub(crate) direction: Option<f64>,
+    /// Likely cause of a wrinkle.
+    pub(crate) cause: Option<String>,
+    /// Mean, smallest and largest shear angle along the crest (rad).
+    pub(crate) ridge_shear: Option<f64>,
+    pub(crate) ridge_shear_min: Option<f64>,
+    pub(crate) ridge_shear_max: Option<f64>,
     pub(crate) shear_min: f64,
     pub(crate) shear_max: f64,
     pub(crate) touches_cut: bool,

@@ -150,6 +150,14 @@ fn local_and_global_measures_of_a_defect_stand_in_one_row() {
         "{}",
         row("AB1")
     );
+    for (id, text) in [
+        ("AW1", ">5.8<"),
+        ("AW1", ">-29<"),
+        ("AW1", ">2.9 (1.1 … 5.2)<"),
+        ("AW1", ">bridging</td>"),
+    ] {
+        assert!(row(id).contains(text), "{text}: {}", row(id));
+    }
     assert!(row("BW1").contains("reaches the cut") && !row("AW1").contains("reaches the cut"));
     let order: Vec<usize> = ["AW1", "AB1", "BW1", "BB1"]
         .iter()

@@ -11,7 +11,7 @@ pub use fidelity::{Fidelity, Measured, Way, Yardstick};
 pub use models::{Model, Role, Zone};
 pub use table::{Entry, defect_table};
 
-use plyflow_defects::{Kind, Ply, QUANTILES, Settings, quantiles};
+use plyflow_defects::{Kind, Limits, Ply, QUANTILES, Settings, quantiles};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use serde_json::{Value, json};
 
@@ -36,7 +36,7 @@ impl Step for Comparison {
             phase: "measuring",
             ..Default::default()
         });
-        let table = defect_table(&models, &zones, &settings);
+        let table = defect_table(&models, &zones, &settings, &host.parameters::<Limits>()?);
         for e in table.iter().filter(|e| e.touches_cut()) {
             let zone = &zones[e.zone].name;
             let text = format!(

@@ -1,6 +1,7 @@
 //! Reading the models that are compared.
 
-use plyflow_defects::{Ply, Settings, Tool, of_run};
+use plyflow_defects::of_run::{self, Sheet};
+use plyflow_defects::{Ply, Settings, Tool};
 use plyflow_model::scene::first_axis;
 use plyflow_sdk::{Host, Input, StepError};
 use serde::{Deserialize, Serialize};
@@ -106,6 +107,8 @@ pub struct Model {
     pub began_late: Option<f64>,
     /// Plies in the order of the stack.
     pub plies: Vec<Ply>,
+    /// As many: what the run tells of them.
+    pub sheets: Vec<Sheet>,
     /// Direction of the first fibres of each ply that tells it, in the flat ply (rad), by its name.
     pub axes: BTreeMap<String, f64>,
     /// Where it came from, for its cost.
@@ -121,15 +124,6 @@ struct Formed {
     element_cycles: f64,
     #[serde(default)]
     zone: Value,
-}
-
-#[derive(Deserialize)]
-struct Sheet {
-    name: String,
-    kind: String,
-    offset: f64,
-    fibre_1: Option<f64>,
-    fibre_2: Option<f64>,
 }
 
 /// Global, local, other and reference models in that order, local ones in the order of their zones; and what was run on the way to them and is
@@ -244,7 +238,11 @@ fn read(
     let meshes = host.meshes(&input)?;
     let frame = of_run::last_frame(&input, &meshes)?;
     let mut plies = Vec::new();
-    for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
+    let sheets: Vec<Sheet> = (formed.sheets.iter())
+        .filter(|s| s.is_ply())
+        .cloned()
+        .collect();
+    for sheet in &sheets {
         let body = meshes.body(&sheet.name)?;
         if body.nodes_per_cell != 4 {
             let (ply, n) = (&sheet.name, body.nodes_per_cell);
@@ -254,10 +252,10 @@ fn read(
             );
             return Err(what.into());
         }
-        let place = (sheet.name.as_str(), sheet.offset);
-        let mut ply = of_run::ply(host, &input, frame, place, tool, settings.foot_margin)?;
-        ply.shear_angle = host.frame_field(&input, body, frame, "shear_angle")?;
-        plies.push(ply);
+        let margin = settings.foot_margin;
+        plies.push(of_run::strained_ply(
+            host, &input, frame, sheet, tool, margin,
+        )?);
     }
     let name = match (role, zone) {
         (Role::Local, Some((_, zone))) => format!("local.{}", zone.name),
@@ -285,6 +283,7 @@ fn read(
             .filter_map(|s| Some((s.name.clone(), first_axis(s.fibre_1?, s.fibre_2?))))
             .collect(),
         plies,
+        sheets,
         input,
     })
 }

@@ -1,7 +1,8 @@
 //! The table of defects: numbering, and which defect of one model is which of another.
 
 use crate::models::{Model, Role, Zone};
-use plyflow_defects::{Defect, Kind, Settings, measure};
+use plyflow_defects::of_run::neighbours;
+use plyflow_defects::{Defect, Kind, Limits, Settings, find_causes, measure};
 use serde_json::{Value, json};
 
 /// A defect with its place in the table.
@@ -31,21 +32,27 @@ impl Entry {
     /// As in the data model.
     pub fn to_json(&self, models: &[Model], zones: &[Zone]) -> Value {
         let d = &self.defect;
+        let shear = d.ridge_shear.as_ref();
         json!({
             "id": self.id,
             "model": models[self.model].name,
             "zone": zones[self.zone].name,
             "ply": self.ply,
-            "type": if d.kind == Kind::Wrinkle { "wrinkle" } else { "bridging" },
+            "type": d.kind.name(),
+            "cause": d.cause,
             "length": d.length,
             "amplitude": d.amplitude,
             "area": d.area,
             "centre": d.centre,
             "curvature_max": d.curvature_max,
-            "radius": if d.curvature_max > 0.0 { json!(1.0 / d.curvature_max) } else { Value::Null },
-            "direction": d.direction,
+            "radius": d.radius(),
+            "direction": d.ridge_direction(),
             "shear_min": d.shear.map(|s| s[0]),
             "shear_max": d.shear.map(|s| s[1]),
+            "ridge_shear": shear.map(|s| s.mean),
+            "ridge_shear_min": shear.map(|s| s.min),
+            "ridge_shear_max": shear.map(|s| s.max),
+            "ridge_shear_profile": shear.map(|s| &s.profile),
             "touches_cut": self.touches_cut(),
             "cut_sides": self.cut_sides,
         })
@@ -73,8 +80,13 @@ pub fn same_within(a: &Defect, b: &Defect) -> f64 {
 
 /// All defects: first those of the local models, numbered in their zone from the uppermost ply down, wrinkles
 /// by length and bridging by area; then those of the other models in the same boxes, which take the id
-/// of the local defect that they are, or the next free number.
-pub fn defect_table(models: &[Model], zones: &[Zone], settings: &Settings) -> Vec<Entry> {
+/// of the local defect that they are, or the next free number. Causes are those of [`find_causes`], by what each model shows in the box.
+pub fn defect_table(
+    models: &[Model],
+    zones: &[Zone],
+    settings: &Settings,
+    limits: &Limits,
+) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let local = models
         .iter()
@@ -82,7 +94,7 @@ pub fn defect_table(models: &[Model], zones: &[Zone], settings: &Settings) -> Ve
         .filter(|(_, m)| m.role == Role::Local);
     for (m, model) in local {
         let zone = model.zone.unwrap_or(0);
-        let found = entries_of(models, m, zones, zone, settings);
+        let found = entries_of(models, m, zones, zone, (settings, limits));
         number(&mut entries, found, &[], zones);
     }
     let locals = entries.clone();
@@ -92,7 +104,7 @@ pub fn defect_table(models: &[Model], zones: &[Zone], settings: &Settings) -> Ve
         .filter(|(_, m)| m.role != Role::Local)
     {
         for zone in 0..zones.len() {
-            let found = entries_of(models, m, zones, zone, settings);
+            let found = entries_of(models, m, zones, zone, (settings, limits));
             number(&mut entries, found, &locals, zones);
         }
     }
@@ -104,17 +116,20 @@ fn entries_of(
     m: usize,
     zones: &[Zone],
     zone: usize,
-    settings: &Settings,
+    (settings, limits): (&Settings, &Limits),
 ) -> Vec<Entry> {
     let model = &models[m];
     let z = &zones[zone];
     let mut found = Vec::new();
     // The stack is listed from the tool upwards.
-    for ply in model.plies.iter().rev() {
+    for (k, ply) in model.plies.iter().enumerate().rev() {
         let within = |p: &[f64; 3]| z.holds(p);
         // The mesh of a zone reaches past it, to the nearest lines of the whole's.
         let inside: Vec<bool> = ply.undeformed.iter().map(within).collect();
-        for defect in measure(ply, &inside, settings) {
+        let mut measured = measure(ply, &inside, settings);
+        let (fibres, others) = (model.sheets[k].fibres(), neighbours(&model.sheets, k));
+        find_causes(ply, &mut measured, fibres, &others, limits);
+        for defect in measured {
             let near = |side: usize| {
                 let (d, level) = (side / 2, z.bounds[side / 2 + 2 * (side % 2)]);
                 !z.free_sides[side]

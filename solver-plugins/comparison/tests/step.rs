@@ -5,7 +5,8 @@ mod common;
 use common::*;
 use plyflow_comparison::Comparison;
 use plyflow_defects::quantiles;
-use plyflow_surface::memory_host::{MemoryInput, run};
+use plyflow_sdk::On;
+use plyflow_surface::memory_host::{MemoryArtifact, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -95,6 +96,80 @@ fn a_wrinkle_and_a_bridge_are_told_apart_and_measured() {
         (&model["role"], &model["zone"], &model["elements"]),
         (&json!("local"), &json!("A"), &json!(128 * 80))
     );
+}
+
+/// Shear grows along x; the crest runs along the diagonal, the blister lies beside it.
+#[test]
+fn a_wrinkle_has_its_cause_and_the_shear_along_its_crest_as_a_measurement_would_give_them() {
+    let (mut global, mut local, zones) = (global(), local(1.0), zones(json!([zone_a()])));
+    let wrinkle = |parameters: Value, global: &MemoryArtifact, local: &MemoryArtifact| {
+        let inputs = [
+            MemoryInput::new("global", global),
+            MemoryInput::new("zones", &zones),
+            MemoryInput::new("local", local),
+        ];
+        let out = run::<Comparison>(parameters, &inputs, &[]).unwrap();
+        out.attributes["defects"].as_array().unwrap().clone()
+    };
+    let found = wrinkle(json!({}), &global, &local);
+    let [aw1, ab1] = &found[..] else {
+        panic!("{found:?}")
+    };
+    assert_eq!(aw1["cause"], "undetermined");
+    for name in ["cause", "direction", "ridge_shear", "ridge_shear_profile"] {
+        assert_eq!(ab1[name], Value::Null, "{name} of bridging");
+    }
+    let number = |name: &str| aw1[name].as_f64().unwrap();
+    let (mean, min, max) = (
+        number("ridge_shear"),
+        number("ridge_shear_min"),
+        number("ridge_shear_max"),
+    );
+    assert!((mean + 0.035 / 0.8).abs() < 0.002, "{mean}");
+    let profile: Vec<[f64; 2]> = (aw1["ridge_shear_profile"].as_array().unwrap().iter())
+        .map(|p| [0, 1].map(|k| p[k].as_f64().unwrap()))
+        .collect();
+    let [first, last] = [profile[0], profile[profile.len() - 1]];
+    assert!(first[0] >= 0.0 && last[0] <= number("length"));
+    assert!(profile.windows(2).all(|w| w[0][0] < w[1][0]));
+    assert!((first[1].min(last[1]) - min).abs() < 1e-12);
+    assert!((first[1].max(last[1]) - max).abs() < 1e-12);
+    // Along the diagonal x grows by the length's part in it (the crest rises by 3 mm at most).
+    let slope = (last[1] - first[1]).abs() / (last[0] - first[0]);
+    assert!((slope * 0.8 * 2f64.sqrt() - 1.0).abs() < 0.03, "{slope}");
+
+    let cause = |parameters: Value| wrinkle(parameters, &global, &local)[0]["cause"].clone();
+    assert_eq!(cause(json!({"over_shear_negative": -0.03})), "over-shear");
+    assert_eq!(cause(json!({"bridging_reach": 0.06})), "bridging");
+    // A second ply at an angle, and fibres that are compressed along the crest.
+    for run_off in [&mut global, &mut local] {
+        let sheets = run_off.attributes["sheets"].as_array_mut().unwrap();
+        sheets[0]["fibre_1"] = json!(0.0);
+        sheets[0]["fibre_2"] = json!(PI / 2.0);
+        sheets.push(
+            json!({"name": "ply_2", "kind": "ply", "offset": OFFSET + 0.0004,
+            "fibre_1": PI / 4.0, "fibre_2": 3.0 * PI / 4.0}),
+        );
+        let mut other = run_off.bodies[1].clone();
+        other.name = "ply_2".into();
+        let flat = other
+            .points
+            .iter()
+            .map(|p| [p[0], p[1], TOP + OFFSET + 0.0004]);
+        other.frames = vec![flat.collect()];
+        let strain = run_off.bodies[1].fields[0][0].values.len();
+        for name in ["fibre_strain_1", "fibre_strain_2"] {
+            run_off.bodies[1].fields[0].push(MemoryField {
+                name: name.into(),
+                on: On::Cells,
+                components: 1,
+                values: vec![-2e-4; strain],
+            });
+        }
+        run_off.bodies.push(other);
+    }
+    let found = wrinkle(json!({}), &global, &local);
+    assert_eq!(found[0]["cause"], "inter-ply-compression");
 }
 
 #[test]

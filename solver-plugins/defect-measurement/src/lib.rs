@@ -4,6 +4,7 @@ mod output;
 mod read;
 
 use output::Output;
+use plyflow_defects::of_run::neighbours;
 use plyflow_defects::{Defect, Limits, Ply, Settings, find_causes, measure};
 use plyflow_sdk::{Host, Progress, Step, StepError, export_step};
 use serde::Deserialize;
@@ -89,7 +90,8 @@ impl Step for DefectMeasurement {
             phase(&sheet.name, 0.1 + 0.5 * k as f64 / run.plies.len() as f64)?;
             let ply = run.ply(host, sheet, settings.foot_margin)?;
             let mut defects = everywhere(&ply, &settings);
-            find_causes(&ply, &mut defects, sheet.fibres(), &run.others(k), &limits);
+            let others = neighbours(&run.plies, k);
+            find_causes(&ply, &mut defects, sheet.fibres(), &others, &limits);
             measured.push(Measured {
                 ply,
                 defects,

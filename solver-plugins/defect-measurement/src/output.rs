@@ -3,7 +3,7 @@
 use crate::Measured;
 use crate::read::Run;
 use plyflow_defects::align::Alignment;
-use plyflow_defects::{Defect, Kind};
+use plyflow_defects::{Defect, Kind, RidgeShear};
 use plyflow_sdk::{Host, On, StepError};
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{
@@ -12,7 +12,7 @@ use plyflow_surface::{
 use serde_json::{Value, json};
 
 /// Columns of the table of defects: label, SI unit.
-const COLUMNS: [(&str, &str); 12] = [
+const COLUMNS: [(&str, &str); 14] = [
     ("defect", ""),
     ("on", ""),
     ("type", ""),
@@ -24,7 +24,9 @@ const COLUMNS: [(&str, &str); 12] = [
     ("direction", "rad"),
     ("x", "m"),
     ("y", "m"),
-    ("mean shear", "rad"),
+    ("mean shear along the crest", "rad"),
+    ("smallest", "rad"),
+    ("largest", "rad"),
 ];
 
 /// Quantiles of the distance that are told.
@@ -214,44 +216,38 @@ fn of(m: &Measured, kind: Kind) -> impl Iterator<Item = &Defect> {
     m.defects.iter().filter(move |d| d.kind == kind)
 }
 
-fn kind(d: &Defect) -> &'static str {
-    match d.kind {
-        Kind::Wrinkle => "wrinkle",
-        Kind::Bridging => "bridging",
-    }
-}
-
 /// Absent for what has no ridge.
-fn ridge_only(d: &Defect, value: f64) -> Option<f64> {
-    (d.kind == Kind::Wrinkle).then_some(value)
-}
-
-fn radius(d: &Defect) -> Option<f64> {
-    (d.curvature_max > 0.0).then(|| 1.0 / d.curvature_max)
+fn length(d: &Defect) -> Option<f64> {
+    (d.kind == Kind::Wrinkle).then_some(d.length)
 }
 
 fn row(name: &str, number: usize, d: &Defect) -> Value {
+    let shear = |get: fn(&RidgeShear) -> f64| d.ridge_shear.as_ref().map(get);
     json!([
         number.to_string(),
         name,
-        kind(d),
+        d.kind.name(),
         d.cause,
-        ridge_only(d, d.length),
+        length(d),
         d.amplitude,
-        radius(d),
+        d.radius(),
         d.area,
-        ridge_only(d, d.direction),
+        d.ridge_direction(),
         d.centre[0],
         d.centre[1],
-        d.ridge_shear
+        shear(|s| s.mean),
+        shear(|s| s.min),
+        shear(|s| s.max)
     ])
 }
 
 fn entry(m: &Measured, number: usize, d: &Defect) -> Value {
+    let shear = d.ridge_shear.as_ref();
     json!({
-        "on": m.ply.name, "number": number, "type": kind(d), "cause": d.cause, "length": ridge_only(d, d.length),
-        "amplitude": d.amplitude, "radius": radius(d), "area": d.area, "direction": ridge_only(d, d.direction),
-        "centre": d.centre, "shear": d.shear, "ridge_shear": d.ridge_shear, "ridge": d.ridge,
+        "on": m.ply.name, "number": number, "type": d.kind.name(), "cause": d.cause, "length": length(d),
+        "amplitude": d.amplitude, "radius": d.radius(), "area": d.area, "direction": d.ridge_direction(),
+        "centre": d.centre, "shear": d.shear, "ridge_shear": shear.map(|s| s.mean), "ridge_shear_min": shear.map(|s| s.min),
+        "ridge_shear_max": shear.map(|s| s.max), "ridge_shear_profile": shear.map(|s| &s.profile), "ridge": d.ridge,
     })
 }
 

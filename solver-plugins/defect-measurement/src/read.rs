@@ -2,6 +2,7 @@
 
 use crate::{Align, Parameters};
 use plyflow_defects::align::{Alignment, Settings, align};
+use plyflow_defects::of_run::Sheet;
 use plyflow_defects::{Ply, Tool, of_run, scan};
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::Topology;
@@ -22,26 +23,6 @@ pub struct Run {
     outer: f64,
 }
 
-/// A sheet of the stack.
-#[derive(Deserialize)]
-pub struct Sheet {
-    /// Its name, that of its body too.
-    pub name: String,
-    kind: String,
-    offset: f64,
-    #[serde(default)]
-    thickness: f64,
-    fibre_1: Option<f64>,
-    fibre_2: Option<f64>,
-}
-
-impl Sheet {
-    /// Directions of both fibre families in the flat ply (rad).
-    pub fn fibres(&self) -> Option<[f64; 2]> {
-        Some([self.fibre_1?, self.fibre_2?])
-    }
-}
-
 #[derive(Deserialize)]
 struct Formed {
     sheets: Vec<Sheet>,
@@ -56,9 +37,7 @@ impl Run {
         let frame = of_run::last_frame(&input, &meshes)?;
         let faces = formed.sheets.iter().map(|s| s.offset + 0.5 * s.thickness);
         let outer = faces.fold(0.0, f64::max);
-        let plies: Vec<Sheet> = (formed.sheets.into_iter())
-            .filter(|s| s.kind == "ply")
-            .collect();
+        let plies: Vec<Sheet> = (formed.sheets.into_iter()).filter(Sheet::is_ply).collect();
         if plies.is_empty() {
             return Err(format!(
                 "'{}' lists no sheet of kind 'ply' in its attributes",
@@ -78,28 +57,14 @@ impl Run {
 
     /// Reads a ply and takes its distances and curvatures.
     pub fn ply(&self, host: &Host, sheet: &Sheet, foot_margin: f64) -> Result<Ply, StepError> {
-        let (input, frame) = (&self.input, self.frame);
-        let meshes = host.meshes(input)?;
-        let body = meshes.body(&sheet.name)?;
-        let place = (sheet.name.as_str(), sheet.offset);
-        let mut ply = of_run::ply(host, input, frame, place, &self.tool, foot_margin)?;
-        ply.shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
-        // Not every run has them: a pin-jointed net's fibres have no strain.
-        let names = ["fibre_strain_1", "fibre_strain_2"];
-        if names
-            .iter()
-            .all(|n| body.fields.iter().any(|f| f.name == *n))
-        {
-            let [a, b] = names.map(|name| host.frame_field(input, body, frame, name));
-            ply.fibre_strain = a?.iter().zip(&b?).map(|(a, b)| a.min(*b)).collect();
-        }
-        Ok(ply)
-    }
-
-    /// Fibre directions of the plies next to the one at place `k`.
-    pub fn others(&self, k: usize) -> Vec<[f64; 2]> {
-        let next = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
-        next.filter_map(|i| self.plies.get(i)?.fibres()).collect()
+        of_run::strained_ply(
+            host,
+            &self.input,
+            self.frame,
+            sheet,
+            &self.tool,
+            foot_margin,
+        )
     }
 }
 

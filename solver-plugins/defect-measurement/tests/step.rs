@@ -118,7 +118,11 @@ fn plies_are_measured_with_sections_and_distribution() {
         (&defects[0]["on"], &defects[0]["type"]),
         (&json!("ply_2"), &json!("wrinkle"))
     );
-    assert!((defects[0]["ridge_shear"].as_f64().unwrap() - 0.1).abs() < 1e-9);
+    for name in ["ridge_shear", "ridge_shear_min", "ridge_shear_max"] {
+        let shear = defects[0][name].as_f64().unwrap();
+        assert!((shear - 0.1).abs() < 1e-9, "{name}");
+    }
+    assert!(defects[0]["ridge_shear_profile"].as_array().unwrap().len() > 10);
     assert_eq!(
         out.attributes["tables"][0]["rows"]
             .as_array()

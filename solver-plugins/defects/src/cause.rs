@@ -56,15 +56,17 @@ pub fn find_causes(
     for wrinkle in wrinkles {
         let over = |g: f64| g > limits.over_shear_positive || g < limits.over_shear_negative;
         let strain = mean_along(ply, &ply.fibre_strain, &wrinkle.ridge_nodes);
-        wrinkle.cause = Some(if wrinkle.ridge_shear.is_some_and(over) {
-            Cause::OverShear
-        } else if is_near(ply, &wrinkle.ridge_nodes, &bridging, limits.bridging_reach) {
-            Cause::Bridging
-        } else if crossed && strain.is_some_and(|e| e < 0.0) {
-            Cause::InterPlyCompression
-        } else {
-            Cause::Undetermined
-        });
+        wrinkle.cause = Some(
+            if wrinkle.ridge_shear.as_ref().is_some_and(|s| over(s.mean)) {
+                Cause::OverShear
+            } else if is_near(ply, &wrinkle.ridge_nodes, &bridging, limits.bridging_reach) {
+                Cause::Bridging
+            } else if crossed && strain.is_some_and(|e| e < 0.0) {
+                Cause::InterPlyCompression
+            } else {
+                Cause::Undetermined
+            },
+        );
     }
 }
 

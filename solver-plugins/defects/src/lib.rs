@@ -12,4 +12,4 @@ pub mod scan;
 
 pub use cause::{Cause, Limits, find_causes, relative_angle};
 pub use fields::{FieldErrors, QUANTILES, distance_at};
-pub use measure::{Defect, Kind, Ply, Settings, Tool, measure, quantiles};
+pub use measure::{Defect, Kind, Ply, RidgeShear, Settings, Tool, measure, quantiles};

@@ -2,9 +2,9 @@
 
 use crate::area::{Extent, NONE, extents};
 use crate::cause::Cause;
-use plyflow_surface::vector::Vec3;
+use plyflow_surface::vector::{Vec3, distance};
 use plyflow_surface::{
-    Curvature, NodalDistance, Surface, Topology, curvatures, nodal_distances, ridge_line,
+    Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances, ridge_line,
     tool_crests,
 };
 use serde::Deserialize;
@@ -114,6 +114,29 @@ pub enum Kind {
     Bridging,
 }
 
+impl Kind {
+    /// Its name in artifacts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wrinkle => "wrinkle",
+            Self::Bridging => "bridging",
+        }
+    }
+}
+
+/// The shear angle along the crest of a wrinkle, at the nodes along it (rad).
+#[derive(Debug, Clone, PartialEq)]
+pub struct RidgeShear {
+    /// Mean over the nodes.
+    pub mean: f64,
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+    /// By node: place along the ridge, from its first end over the surface (m), and shear angle (rad).
+    pub profile: Vec<[f64; 2]>,
+}
+
 /// A defect of a ply.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Defect {
@@ -139,10 +162,22 @@ pub struct Defect {
     pub ridge: Vec<Vec3>,
     /// Wrinkles: the nodes along it.
     pub ridge_nodes: Vec<u32>,
-    /// Wrinkles: the mean shear angle along it (rad).
-    pub ridge_shear: Option<f64>,
+    /// Wrinkles of plies whose shear is known: the shear angle along it.
+    pub ridge_shear: Option<RidgeShear>,
     /// Wrinkles: what most likely brought it about, once that was looked into ([`crate::find_causes`]).
     pub cause: Option<Cause>,
+}
+
+impl Defect {
+    /// Least radius of curvature (m); `None` where it is flat.
+    pub fn radius(&self) -> Option<f64> {
+        (self.curvature_max > 0.0).then(|| 1.0 / self.curvature_max)
+    }
+
+    /// [`Self::direction`] of what has a ridge (rad).
+    pub fn ridge_direction(&self) -> Option<f64> {
+        (self.kind == Kind::Wrinkle).then_some(self.direction)
+    }
 }
 
 /// Wrinkles (longest first), then bridging (largest first), among the nodes `inside` (`[nodes]`).
@@ -214,7 +249,7 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
         let mut defect = describe(ply, Kind::Wrinkle, nodes, &extents[w]);
         defect.length = ridge.length;
         defect.direction = direction(ply, &ridge.nodes);
-        defect.ridge_shear = mean_along(ply, &ply.shear_angle, &ridge.nodes);
+        defect.ridge_shear = ridge_shear(ply, &ridge);
         (defect.ridge, defect.ridge_nodes) = (ridge.points, ridge.nodes);
         found.push(defect);
     }
@@ -248,6 +283,29 @@ fn without_gaps(ply: &Ply, off: &[bool], mut crest: Vec<bool>) -> Vec<bool> {
         crest[i] = touched.any(|p| Some(p) != first);
     }
     crest
+}
+
+/// The shear angle along a ridge; `None` when it is not known.
+fn ridge_shear(ply: &Ply, ridge: &Ridge) -> Option<RidgeShear> {
+    let mean = mean_along(ply, &ply.shear_angle, &ridge.nodes)?;
+    // The line begins and ends with a tip that is no node.
+    let mut station = 0.0;
+    let stations = ridge.points.windows(2).map(|w| {
+        station += distance(w[0], w[1]);
+        station
+    });
+    let angles = (ridge.nodes.iter()).map(|&i| ply.at_node(&ply.shear_angle, i));
+    let profile = stations
+        .zip(angles)
+        .map(|(s, angle)| Some([s, angle?]))
+        .collect::<Option<Vec<_>>>()?;
+    let angles = || profile.iter().map(|p| p[1]);
+    Some(RidgeShear {
+        mean,
+        min: angles().fold(f64::INFINITY, f64::min),
+        max: angles().fold(f64::NEG_INFINITY, f64::max),
+        profile,
+    })
 }
 
 /// The mean over nodes of a cell field; `None` when the field is empty.

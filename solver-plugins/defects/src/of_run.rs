@@ -1,8 +1,44 @@
-//! Tool and plies of a formed run.
+//! Tool and plies of a formed run: the same for every step that measures defects.
 
 use crate::{Ply, Tool};
 use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::{Topology, of_run};
+use serde::Deserialize;
+
+/// A sheet of the stack, as a run's attribute `sheets` has it.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Sheet {
+    /// Its name, that of its body too.
+    pub name: String,
+    kind: String,
+    /// Of its mid-surface from the tool where everything lies on it (m).
+    pub offset: f64,
+    /// (m).
+    #[serde(default)]
+    pub thickness: f64,
+    /// Direction of the first fibres in the flat ply, from x (rad).
+    pub fibre_1: Option<f64>,
+    /// Of the second (rad).
+    pub fibre_2: Option<f64>,
+}
+
+impl Sheet {
+    /// Whether it is a ply of the preform.
+    pub fn is_ply(&self) -> bool {
+        self.kind == "ply"
+    }
+
+    /// Directions of both fibre families in the flat ply (rad).
+    pub fn fibres(&self) -> Option<[f64; 2]> {
+        Some([self.fibre_1?, self.fibre_2?])
+    }
+}
+
+/// Fibre directions (rad) of the plies next to the one at place `k`, as [`crate::find_causes`] asks for them.
+pub fn neighbours(plies: &[Sheet], k: usize) -> Vec<[f64; 2]> {
+    let next = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
+    next.filter_map(|i| plies.get(i)?.fibres()).collect()
+}
 
 /// The tool of a run.
 ///
@@ -49,4 +85,31 @@ pub fn ply(
         offset,
         foot_margin,
     ))
+}
+
+/// As [`ply`], with its shear angle and, where the run has them, its fibre strains.
+///
+/// # Errors
+/// When the run has no such body or no shear angle, or they cannot be read.
+pub fn strained_ply(
+    host: &Host,
+    input: &Input,
+    frame: usize,
+    sheet: &Sheet,
+    tool: &Tool,
+    foot_margin: f64,
+) -> Result<Ply, StepError> {
+    let meshes = host.meshes(input)?;
+    let body = meshes.body(&sheet.name)?;
+    let place = (sheet.name.as_str(), sheet.offset);
+    let mut ply = ply(host, input, frame, place, tool, foot_margin)?;
+    ply.shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
+    // Not every run has them: a pin-jointed net's fibres have no strain.
+    let names = ["fibre_strain_1", "fibre_strain_2"];
+    let has = |name: &&str| body.fields.iter().any(|f| f.name == **name);
+    if names.iter().all(has) {
+        let [a, b] = names.map(|name| host.frame_field(input, body, frame, name));
+        ply.fibre_strain = a?.iter().zip(&b?).map(|(a, b)| a.min(*b)).collect();
+    }
+    Ok(ply)
 }

@@ -95,7 +95,10 @@ fn defect_rows<'a>(c: &'a Comparison, roles: &[&str]) -> Vec<Row<'a>> {
 
 type Measure = (&'static str, fn(&Defect) -> String);
 
-const MEASURES: [Measure; 5] = [
+const MEASURES: [Measure; 8] = [
+    ("likely cause", |d| {
+        d.cause.clone().unwrap_or_else(|| "–".into())
+    }),
     ("length (mm)", |d| {
         if d.is_wrinkle() {
             fixed(d.length * 1e3, 1)
@@ -105,8 +108,11 @@ const MEASURES: [Measure; 5] = [
     }),
     ("amplitude (mm)", |d| fixed(d.amplitude * 1e3, 2)),
     ("area (mm²)", |d| fixed(d.area * 1e6, 0)),
-    ("max. curvature (1/mm)", |d| {
-        fixed(d.curvature_max * 1e-3, 3)
+    ("least radius (mm)", |d| {
+        told(d.radius, |r| fixed(r * 1e3, 1))
+    }),
+    ("direction (deg)", |d| {
+        told(d.direction, |a| fixed(a.to_degrees(), 0))
     }),
     ("shear (deg)", |d| {
         format!(
@@ -115,7 +121,21 @@ const MEASURES: [Measure; 5] = [
             fixed(d.shear_max.to_degrees(), 1)
         )
     }),
+    ("shear along the crest (deg): mean (from … to)", |d| {
+        let degrees = |v: f64| fixed(v.to_degrees(), 1);
+        match (d.ridge_shear, d.ridge_shear_min, d.ridge_shear_max) {
+            (Some(mean), Some(min), Some(max)) => {
+                format!("{} ({} … {})", degrees(mean), degrees(min), degrees(max))
+            }
+            _ => "–".into(),
+        }
+    }),
 ];
+
+/// A dash for what is not known.
+fn told(value: Option<f64>, write: fn(f64) -> String) -> String {
+    value.map_or("–".to_owned(), write)
+}
 
 /// Defects, local and global side by side.
 pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
@@ -133,7 +153,7 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
             @if rows.is_empty() {
                 p { "No wrinkle and no bridging was found in any model." }
             } @else {
-                p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it, or bridging, which has no length. A defect that reaches the cut needs a larger zone."
+                p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it, or bridging, which has no crest. Directions are those of crests in the flat ply, from x. A likely cause is a reading of the fields after the fact. A defect that reaches the cut needs a larger zone."
                     @if !places.is_empty() { span class="with-script" hidden { " A click on a row, or Enter, shows the defect in the 3D view and on the maps; Escape ends that." } } }
                 div class="scroll" { table class="defects" {
                     thead {

@@ -216,7 +216,8 @@ impl Study {
             let (cx, cy) = ((bounds[0] + bounds[2]) / 2.0, (bounds[1] + bounds[3]) / 2.0);
             let defect = |model: &str, ply: &str, id: String, kind: &str, length: f64| {
                 json!({"id": id, "model": model, "zone": zone, "ply": ply, "type": kind, "length": length, "amplitude": 0.0052,
-                    "area": 4.1e-4, "centre": [cx, cy], "curvature_max": 171.0, "shear_min": -0.2, "shear_max": 0.31, "touches_cut": zone == &"B"})
+                    "area": 4.1e-4, "centre": [cx, cy], "curvature_max": 171.0, "radius": 1.0 / 171.0, "direction": if kind == "wrinkle" { json!(-0.5) } else { Value::Null },
+                    "cause": if kind == "wrinkle" { json!("bridging") } else { Value::Null }, "ridge_shear": 0.05, "ridge_shear_min": 0.02, "ridge_shear_max": 0.09, "shear_min": -0.2, "shear_max": 0.31, "touches_cut": zone == &"B"})
             };
             defects.push(defect(
                 &model,
