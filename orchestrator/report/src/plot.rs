@@ -1,9 +1,11 @@
 //! Plots over two axes and bars, as SVG.
 
 mod axis;
+mod boxes;
 mod thin;
 
 pub(crate) use axis::ticks;
+pub(crate) use boxes::Boxes;
 
 use crate::view::px;
 use axis::{Axis, LARGEST, Zero, extent};
@@ -46,6 +48,8 @@ pub(crate) struct Plot<'a> {
     pub(crate) x_label: &'a str,
     pub(crate) y_label: &'a str,
     pub(crate) series: Vec<Series<'a>>,
+    /// Box plots, behind the series.
+    pub(crate) boxes: Vec<Boxes<'a>>,
     /// Whether the vertical axis begins at zero whatever the values.
     pub(crate) from_zero: bool,
     /// A horizontal line with its name.
@@ -103,9 +107,10 @@ impl Plot<'_> {
                         path class="bound" d={ "M" (px(frame.left)) " " (px(y)) "H" (px(frame.right)) } {}
                         text class="tick bound-name" x=(px(frame.right - 4.0)) y=(px(y - 5.0)) text-anchor="end" { (name) }
                     }
+                    @for boxes in &self.boxes { (boxes.drawn(&frame)) }
                     @for (i, series) in self.series.iter().enumerate() { (self.drawn(i, series, &frame)) }
                 }
-                @if self.series.len() > 1 || self.legend_of_one { (self.legend()) }
+                @if self.series.len() + self.boxes.len() > 1 || self.legend_of_one { (self.legend()) }
             }
         }
     }
@@ -124,7 +129,8 @@ impl Plot<'_> {
             };
             format!("{} ({how})", s.name)
         };
-        let all: Vec<String> = self.series.iter().map(named).collect();
+        let boxes = self.boxes.iter().map(Boxes::description);
+        let all: Vec<String> = boxes.chain(self.series.iter().map(named)).collect();
         format!(
             "{}: {}, {}, over {}, {}. Series: {}.",
             self.title,
@@ -140,16 +146,19 @@ impl Plot<'_> {
         let drawn = |x: f64, y: f64| x.abs() < LARGEST && y.abs() < LARGEST;
         let pairs = || {
             let all = self.series.iter().flat_map(|s| s.x.iter().zip(s.y.iter()));
-            all.filter(|(x, y)| drawn(**x, **y))
+            let all = all.map(|(x, y)| (*x, *y));
+            let boxes = self.boxes.iter().flat_map(Boxes::places);
+            all.chain(boxes).filter(|(x, y)| drawn(*x, *y))
         };
         pairs().next()?;
         let near = if self.from_zero { 0.05 } else { 0.25 };
         // Also where only the other value is no number: plots of one history then lie below each other.
         let across = self.series.iter().flat_map(|s| s.x.iter().copied());
+        let across = across.chain(self.boxes.iter().flat_map(Boxes::across));
         let across = extent(across, Zero::Near(near));
         let [w, h] = self.size;
         let bottom = h - BOTTOM;
-        let y = Axis::new(self.range(pairs().map(|p| *p.1)), 7, [bottom, TOP]);
+        let y = Axis::new(self.range(pairs().map(|p| p.1)), 7, [bottom, TOP]);
         let left = LEFT.max(30.0 + CHARACTER * y.widest() as f64);
         let right = w - RIGHT;
         let x = Axis::new(across, 8, [left, right]);
@@ -244,6 +253,7 @@ impl Plot<'_> {
     fn legend(&self) -> Markup {
         html! {
             figcaption class="legend" {
+                @for b in self.boxes.iter().filter(|b| !b.name.is_empty()) { (b.key()) }
                 @for (i, s) in self.series.iter().enumerate() {
                     @let colour = s.colour % COLOURS;
                     span { svg width="26" height="10" viewBox="0 0 26 10" aria-hidden="true" {

@@ -3,8 +3,8 @@
 //! A plot comes from a plugin that anybody may have written: what is wrong with one is a warning of the report, and
 //! the rest is drawn.
 
-use crate::plot::{Plot, Series, Style};
-use maud::Markup;
+use crate::plot::{Boxes, Plot, Series, Style};
+use maud::{Markup, html};
 use plyflow_artifact::Artifact;
 use plyflow_model::units::{parse_quantity_in, parse_unit};
 use serde::Deserialize;
@@ -22,6 +22,8 @@ const SIZE: [f64; 2] = [560.0, 330.0];
 struct Given {
     name: String,
     title: Option<String>,
+    /// Stands below it.
+    note: Option<String>,
     x: GivenAxis,
     y: GivenAxis,
     series: Vec<Value>,
@@ -109,8 +111,15 @@ fn plot(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<M
             given.series.len()
         )));
     }
-    let mut series = Vec::new();
+    let (mut series, mut boxes) = (Vec::new(), Vec::new());
     for (i, value) in given.series.iter().enumerate().take(SERIES) {
+        if value["style"] == "box" {
+            match spread(value, given, artifact, i) {
+                Ok(one) => boxes.push(one),
+                Err(e) => wrong.push(of(format!("series {}: {e}", i + 1))),
+            }
+            continue;
+        }
         match one(value, given, artifact, i, wrong) {
             Ok(one) => series.push(one),
             Err(e) => wrong.push(of(format!("series {}: {e}", i + 1))),
@@ -121,8 +130,10 @@ fn plot(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<M
         title: given.title.as_deref().unwrap_or(&given.name),
         x_label: &x_label,
         y_label: &y_label,
-        legend_of_one: series.iter().any(|s| !s.name.is_empty()),
+        legend_of_one: (series.iter().any(|s| !s.name.is_empty()))
+            || boxes.iter().any(|b: &Boxes<'_>| !b.name.is_empty()),
         series,
+        boxes,
         from_zero: false,
         bound: None,
         ceiling: None,
@@ -133,7 +144,10 @@ fn plot(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<M
         wrong.push(of("it is not drawn: no series has a value".into()));
         return None;
     }
-    Some(drawn)
+    Some(match &given.note {
+        Some(note) => html! { div { (drawn) p class="note" { (note) } } },
+        None => drawn,
+    })
 }
 
 impl GivenAxis {
@@ -175,7 +189,7 @@ fn one(
         Some("points") => Style::Points,
         Some(other) => {
             wrong.push(format!(
-                "plot '{}': series {} has the style '{other}' and is drawn as a line; there are: line, dashed, points",
+                "plot '{}': series {} has the style '{other}' and is drawn as a line; there are: line, dashed, points, box",
                 plot.name,
                 number + 1
             ));
@@ -185,13 +199,7 @@ fn one(
     let x = values(artifact, &given.x, &plot.x.unit)?;
     let y = values(artifact, &given.y, &plot.y.unit)?;
     if x.len() != y.len() {
-        return Err(format!(
-            "'{}' has {} values and '{}' has {}; expected as many",
-            given.x,
-            x.len(),
-            given.y,
-            y.len()
-        ));
+        return Err(unequal(&given.x, x.len(), &given.y, y.len()));
     }
     if x.is_empty() {
         return Err(format!("'{}' is empty", given.x));
@@ -203,6 +211,46 @@ fn one(
         x: x.into(),
         y: y.into(),
     })
+}
+
+/// A series of box plots.
+#[derive(Debug, Deserialize)]
+struct GivenBoxes {
+    label: String,
+    x: String,
+    /// Lower extreme, whisker and quartile, median, upper quartile, whisker and extreme.
+    y: [String; 7],
+}
+
+fn spread(
+    value: &Value,
+    plot: &Given,
+    artifact: &Artifact,
+    number: usize,
+) -> Result<Boxes<'static>, String> {
+    let given = GivenBoxes::deserialize(value)
+        .map_err(|e| format!("{e} (`y` of the style 'box' lists seven arrays)"))?;
+    let x = values(artifact, &given.x, &plot.x.unit)?;
+    let mut spread = vec![[0.0; 7]; x.len()];
+    for (k, path) in given.y.iter().enumerate() {
+        let column = values(artifact, path, &plot.y.unit)?;
+        if column.len() != x.len() {
+            return Err(unequal(&given.x, x.len(), path, column.len()));
+        }
+        for (all, value) in spread.iter_mut().zip(column) {
+            all[k] = value;
+        }
+    }
+    Ok(Boxes {
+        name: given.label.into(),
+        colour: number,
+        x,
+        spread,
+    })
+}
+
+fn unequal(x: &str, values: usize, y: &str, others: usize) -> String {
+    format!("'{x}' has {values} values and '{y}' has {others}; expected as many")
 }
 
 /// An array of the artifact in a unit.

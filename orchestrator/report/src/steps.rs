@@ -104,7 +104,12 @@ fn one(
             .map_or_else(|| instance.label(), str::to_owned),
         numbers,
         files: files(&a["files"], wrong),
-        tables: tables::drawn(a, &|row| id_of_row(at, row), wrong),
+        tables: tables::drawn(
+            a,
+            &instance.record.results,
+            &|row| id_of_row(at, row),
+            wrong,
+        ),
         ..Shown::default()
     };
     match open(&instance.artifact) {

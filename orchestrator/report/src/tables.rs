@@ -1,8 +1,9 @@
 //! Tables that an artifact carries in its attributes, for every kind of artifact (`tables` in the data model).
 
 use crate::plots::in_words;
-use crate::units::{number, shown};
+use crate::units::{duration, number, shown};
 use maud::{Markup, html};
+use plyflow_model::job::NamedResult;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -24,13 +25,31 @@ struct Column {
     /// SI unit of its numbers.
     #[serde(default)]
     unit: String,
+    /// Where its numbers are not in the artifact, being measured: the result of the step that a row has, with `{k}` for the text of the
+    /// row's cell k.
+    measured: Option<String>,
+}
+
+impl Column {
+    /// The result that a row has in this column.
+    fn result<'a>(&self, row: &[Value], results: &'a [NamedResult]) -> Option<&'a NamedResult> {
+        let mut name = self.measured.clone()?;
+        for (k, cell) in row.iter().enumerate() {
+            let place = format!("{{{k}}}");
+            if name.contains(&place) {
+                name = name.replace(&place, cell.as_str()?);
+            }
+        }
+        results.iter().find(|r| r.name == name)
+    }
 }
 
 /// Draws the tables that the attributes of an artifact describe. What is wrong is said in `wrong`, one text each.
 ///
-/// `id` names the defect of a row of the table `defects`, as the rest of the page does.
+/// `results`: of the step, for columns of what was measured. `id` names the defect of a row of the table `defects`, as the rest of the page does.
 pub(crate) fn drawn(
     attributes: &Value,
+    results: &[NamedResult],
     id: &dyn Fn(usize) -> String,
     wrong: &mut Vec<String>,
 ) -> Vec<Markup> {
@@ -48,7 +67,7 @@ pub(crate) fn drawn(
     let mut tables = Vec::new();
     for (i, value) in all.iter().enumerate() {
         match Given::deserialize(value) {
-            Ok(given) => tables.push(table(&given, id, wrong)),
+            Ok(given) => tables.push(table(&given, results, id, wrong)),
             Err(e) => {
                 let name = value["name"].as_str().unwrap_or_default();
                 wrong.push(format!("table {} '{name}' of its attributes: {e}", i + 1));
@@ -58,7 +77,12 @@ pub(crate) fn drawn(
     tables
 }
 
-fn table(given: &Given, id: &dyn Fn(usize) -> String, wrong: &mut Vec<String>) -> Markup {
+fn table(
+    given: &Given,
+    results: &[NamedResult],
+    id: &dyn Fn(usize) -> String,
+    wrong: &mut Vec<String>,
+) -> Markup {
     let of = |text: String| format!("table '{}': {text}", given.name);
     let wide = given.columns.len();
     for (i, row) in given
@@ -78,10 +102,12 @@ fn table(given: &Given, id: &dyn Fn(usize) -> String, wrong: &mut Vec<String>) -
         wrong.push(of(format!("the first {ROWS} of its {all} rows are shown")));
     }
     let numeric = |k: usize| {
-        given
-            .rows
-            .iter()
-            .any(|r| r.get(k).is_some_and(Value::is_number))
+        let measured = given.columns.get(k).is_some_and(|c| c.measured.is_some());
+        measured
+            || given
+                .rows
+                .iter()
+                .any(|r| r.get(k).is_some_and(Value::is_number))
     };
     let class = |k: usize| if numeric(k) { "n" } else { "" };
     html! {
@@ -89,7 +115,7 @@ fn table(given: &Given, id: &dyn Fn(usize) -> String, wrong: &mut Vec<String>) -
         div class="scroll" { table {
             thead { tr { @for (k, c) in given.columns.iter().enumerate() { th class=(class(k)) { (heading(c)) } } } }
             tbody { @for (i, row) in given.rows.iter().enumerate().take(ROWS) { tr data-defect=[(given.name == "defects").then(|| id(i))] {
-                @for (k, (c, v)) in given.columns.iter().zip(row).enumerate() { td class=(class(k)) { (cell(c, v)) } }
+                @for (k, (c, v)) in given.columns.iter().zip(row).enumerate() { td class=(class(k)) { (cell(c, v, c.result(row, results))) } }
             } } }
         } }
     }
@@ -97,12 +123,20 @@ fn table(given: &Given, id: &dyn Fn(usize) -> String, wrong: &mut Vec<String>) -
 
 fn heading(c: &Column) -> String {
     match shown(&c.unit).1 {
+        // Durations are told each in its own unit.
+        "s" if c.measured.is_some() => c.label.clone(),
         "" => c.label.clone(),
         unit => format!("{} ({unit})", c.label),
     }
 }
 
-fn cell(c: &Column, value: &Value) -> String {
+fn cell(c: &Column, value: &Value, measured: Option<&NamedResult>) -> String {
+    if let Some(result) = measured {
+        return match result.unit.as_str() {
+            "s" => duration(result.value),
+            unit => number(result.value * shown(unit).0, 4),
+        };
+    }
     match value {
         Value::Null => "–".to_owned(),
         Value::String(text) => text.clone(),
@@ -124,7 +158,7 @@ mod tests {
             {"name": "no columns"},
         ]});
         let mut wrong = Vec::new();
-        let tables = drawn(&about, &|i| i.to_string(), &mut wrong);
+        let tables = drawn(&about, &[], &|i| i.to_string(), &mut wrong);
         let text = &tables[0].0;
         for part in ["height (mm)", ">3.1<", "a &lt;b&gt;", ">–<"] {
             assert!(text.contains(part), "{part}: {text}");
@@ -138,7 +172,33 @@ mod tests {
             wrong[1].contains("'no columns'") && wrong[1].contains("columns"),
             "{wrong:?}"
         );
-        assert!(drawn(&json!({"tables": 3}), &|i| i.to_string(), &mut wrong).is_empty());
+        assert!(drawn(&json!({"tables": 3}), &[], &|i| i.to_string(), &mut wrong).is_empty());
         assert!(wrong[2].contains("a number"), "{wrong:?}");
+    }
+    #[test]
+    fn what_was_measured_is_taken_from_the_results_of_the_step_by_the_texts_of_its_row() {
+        let about = json!({"tables": [{"name": "runs", "rows": [["a", "Z", null], ["b", null, null]], "columns": [
+            {"label": "run"}, {"label": "zone"},
+            {"label": "CPU", "unit": "s", "measured": "cost.{0}.{1}.cpu_seconds"}]}]});
+        let result = |name: &str, value: f64| NamedResult {
+            name: name.into(),
+            value,
+            unit: "s".into(),
+            measured: true,
+        };
+        let results = [
+            result("cost.a.Z.cpu_seconds", 75.0),
+            result("cost.b.Z.cpu_seconds", 1.0),
+        ];
+        let mut wrong = Vec::new();
+        let text = &drawn(&about, &results, &|i| i.to_string(), &mut wrong)[0].0;
+        assert!(text.contains("<th class=\"n\">CPU</th>"), "{text}");
+        assert!(text.contains(">1 min 15 s<"), "{text}");
+        // A row without a zone has none of its own.
+        assert!(
+            text.ends_with("<td class=\"n\">–</td></tr></tbody></table></div>"),
+            "{text}"
+        );
+        assert!(wrong.is_empty(), "{wrong:?}");
     }
 }

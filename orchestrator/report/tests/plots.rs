@@ -120,7 +120,7 @@ fn what_is_wrong_with_a_plot_is_a_warning_and_the_rest_is_drawn() {
                 "p",
                 vec![json!({"label": "s", "x": "t", "y": "u", "style": "doted"})]
             )]),
-            &["the style 'doted'", "line, dashed, points"],
+            &["the style 'doted'", "line, dashed, points, box"],
             true,
         ),
         (

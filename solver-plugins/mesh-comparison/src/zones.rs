@@ -16,6 +16,7 @@ struct Run {
     /// The zone's box in the undeformed plane, as its list has it.
     bounds: Value,
     element_size: f64,
+    elements: u64,
     plies: Vec<Ply>,
 }
 
@@ -64,11 +65,18 @@ pub fn compare(host: &Host, inputs: Vec<Input>, target: f64) -> Result<(), StepE
         ("run", ""),
         ("zone", ""),
         ("element size", "m"),
+        ("elements", ""),
         ("error", ""),
         ("error of position", "m"),
         ("advised size", "m"),
     ];
-    let columns = head.map(|(label, unit)| json!({"label": label, "unit": unit}));
+    let mut columns = head
+        .map(|(label, unit)| json!({"label": label, "unit": unit}))
+        .to_vec();
+    columns.insert(
+        4,
+        json!({"label": "CPU", "unit": "s", "measured": "cost.{0}.{1}.cpu_seconds"}),
+    );
     host.write_attributes(&json!({
         "target_error": target,
         "zones": advised,
@@ -121,14 +129,39 @@ fn one(
         let step = &run.input.step;
         host.result(&format!("zone_error.{step}.{zone}"), error, "1")?;
         measured.push((run.element_size, error));
-        rows.push(json!([step, zone, run.element_size, error, position, null]));
+        for (what, seconds) in [
+            ("cpu_seconds", run.input.cost.cpu_seconds),
+            ("wall_seconds", run.input.cost.wall_seconds),
+        ] {
+            host.measured(&format!("cost.{step}.{zone}.{what}"), seconds, "s")?;
+        }
+        let elements = run.elements;
+        rows.push(json!([
+            step,
+            zone,
+            run.element_size,
+            elements,
+            null,
+            error,
+            position,
+            null
+        ]));
     }
     let advice = advise(&measured, target);
     host.result(&format!("advised_element_size.{zone}"), advice.size, "m")?;
     if let Some(text) = advice.doubt {
         host.log(Log::Warn, &format!("zone {zone}: {text}"));
     }
-    rows.push(json!([null, zone, null, null, null, advice.size]));
+    rows.push(json!([
+        null,
+        zone,
+        null,
+        null,
+        null,
+        null,
+        null,
+        advice.size
+    ]));
     Ok(advice.size)
 }
 
@@ -149,6 +182,7 @@ fn read(host: &Host, input: Input) -> Result<Run, StepError> {
         plies,
         bounds: formed.zone["box"].clone(),
         element_size: formed.element_size,
+        elements: formed.elements,
         input,
     })
 }

@@ -82,6 +82,25 @@ fn quartiles_extremes_and_their_order_are_those_of_the_angles() {
     assert!((out.result("extreme_error.b") - (0.016 - 4e-4) / (0.4 - 4e-4)).abs() < 1e-9);
     assert_eq!(out.measured["cost.c.cpu_seconds"], (3.0, "s".into()));
     assert_eq!(out.attributes["finest"], "d");
+    // A box for each run, its arrays in the order of what they hold; what was measured is in the results alone.
+    let series = &out.attributes["plots"][0]["series"][0];
+    assert_eq!(series["style"], "box");
+    let paths = series["y"].as_array().unwrap();
+    assert_eq!(paths.len(), 7);
+    for run in 0..4 {
+        let value = |p: &serde_json::Value| out.arrays[p.as_str().unwrap()].1[run];
+        let spread: Vec<f64> = paths.iter().map(value).collect();
+        assert!(spread.windows(2).all(|w| w[0] <= w[1]), "{spread:?}");
+    }
+    let (_, low) = &out.arrays["study/shear_q01"];
+    assert!((low[3] + 0.4 - 0.008).abs() < 1e-3, "{low:?}");
+    let table = &out.attributes["tables"][0];
+    assert_eq!(table["columns"][3]["measured"], "cost.{0}.cpu_seconds");
+    let wide = table["columns"].as_array().unwrap().len();
+    for row in table["rows"].as_array().unwrap() {
+        assert_eq!(row.as_array().unwrap().len(), wide);
+        assert!(row[3].is_null() && row[2].as_u64() > Some(20));
+    }
     assert_eq!(
         out.attributes["tables"][0]["rows"]
             .as_array()

@@ -121,6 +121,7 @@ fn plots(run: &Run, whole: bool) -> Markup {
         x_label: "time (s)",
         y_label: "",
         series: Vec::new(),
+        boxes: Vec::new(),
         from_zero: true,
         bound: None,
         ceiling: None,

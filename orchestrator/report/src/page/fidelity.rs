@@ -104,6 +104,7 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
         x_label: &x_label,
         y_label,
         series: all,
+        boxes: Vec::new(),
         from_zero: true,
         bound: None,
         ceiling: None,

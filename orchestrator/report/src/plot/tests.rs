@@ -17,6 +17,7 @@ fn plot(series: Vec<Series<'static>>) -> Plot<'static> {
         x_label: "shear angle (deg)",
         y_label: "force (N)",
         series,
+        boxes: Vec::new(),
         from_zero: false,
         bound: None,
         ceiling: None,
@@ -213,4 +214,44 @@ fn colours_stand_out_from_the_page_and_from_each_other_also_for_the_colour_blind
             }
         }
     }
+}
+
+#[test]
+fn a_box_stands_between_its_quartiles_and_its_whiskers_and_points_where_they_are_told() {
+    let spread = [
+        [-4.0, -3.0, -1.0, 0.0, 2.0, 6.0, 8.0],
+        [-2.0, -2.0, -1.0, 1.0, 1.0, 3.0, 4.0],
+    ];
+    let mut p = plot(vec![]);
+    p.boxes = vec![Boxes {
+        name: "".into(),
+        colour: 0,
+        x: vec![5.0, 20.0],
+        spread: spread.to_vec(),
+    }];
+    let frame = p.frame().unwrap();
+    assert!(frame.y.low <= -4.0 && frame.y.high >= 8.0);
+    let svg = p.svg().into_string();
+    assert_eq!(svg.matches("<rect").count(), 2);
+    assert_eq!(svg.matches("<circle").count(), 4);
+    let at = |y: f64| px(frame.y.at(y));
+    let height = px(frame.y.at(-1.0) - frame.y.at(2.0));
+    for part in [
+        format!("y=\"{}\"", at(2.0)),
+        format!("height=\"{height}\""),
+        format!("V{}", at(6.0)),
+        format!("V{}", at(-3.0)),
+        format!("cy=\"{}\"", at(8.0)),
+        format!("cy=\"{}\"", at(-4.0)),
+    ] {
+        assert!(svg.contains(&part), "{part}: {svg}");
+    }
+    // No box reaches out of the field.
+    for (at, _) in svg.match_indices("<rect x=\"") {
+        let number = |text: &str| -> f64 { text[..text.find('"').unwrap()].parse().unwrap() };
+        let x = number(&svg[at + 9..]);
+        let width = number(svg[at..].split_once("width=\"").unwrap().1);
+        assert!(x >= frame.left && x + width <= frame.right, "{x} {width}");
+    }
+    assert!(svg.contains("Series: box plots."));
 }
