@@ -1,9 +1,10 @@
 //! The quantities that are mapped, and their colour scales.
 
 use crate::colour::{Palette, Scale, end_of_scale};
+use crate::others::{Other, at_points};
 use crate::read::Ply;
 use crate::study::Study;
-use crate::units::{number, shown};
+use crate::units::{number, quantity, shown};
 use maud::{Markup, html};
 
 /// A sheet that moved less than this (m) lies flat.
@@ -23,7 +24,7 @@ impl Field {
     /// Those of a forming run.
     pub(crate) const ALL: [Self; 3] = [Self::Shear, Self::Distance, Self::Curvature];
 
-    pub(crate) fn title(self) -> &'static str {
+    fn title(self) -> &'static str {
         match self {
             Self::Shear => "Shear angle",
             Self::Distance => "Nodal distance",
@@ -33,7 +34,7 @@ impl Field {
     }
 
     /// SI unit.
-    pub(crate) fn unit(self) -> &'static str {
+    fn unit(self) -> &'static str {
         match self {
             Self::Shear => "rad",
             Self::Distance | Self::Deflection => "m",
@@ -41,7 +42,7 @@ impl Field {
         }
     }
 
-    pub(crate) fn explanation(self) -> &'static str {
+    fn explanation(self) -> &'static str {
         match self {
             Self::Shear => {
                 "Change of the angle between the fibre families; positive stretches the stitch. \
@@ -58,28 +59,12 @@ impl Field {
     }
 
     /// Values at the points of a ply; cell values are averaged there.
-    pub(crate) fn at_points(self, ply: &Ply) -> Option<Vec<f64>> {
+    fn at_points(self, ply: &Ply) -> Option<Vec<f64>> {
         match self {
             Self::Distance => ply.distance.clone(),
             Self::Curvature => ply.curvature.clone(),
             Self::Deflection => ply.deflection.clone(),
-            Self::Shear => {
-                let cells = ply.shear.as_ref()?;
-                let mut sum = vec![0.0; ply.flat.len()];
-                let mut count = vec![0.0; ply.flat.len()];
-                for (cell, value) in ply.cells.iter().zip(cells) {
-                    for i in cell {
-                        sum[*i as usize] += value;
-                        count[*i as usize] += 1.0;
-                    }
-                }
-                Some(
-                    sum.iter()
-                        .zip(count)
-                        .map(|(s, n): (&f64, f64)| s / n.max(1.0))
-                        .collect(),
-                )
-            }
+            Self::Shear => Some(at_points(ply.shear.as_ref()?, &ply.cells, ply.flat.len())),
         }
     }
 
@@ -164,7 +149,9 @@ impl Field {
             }
         };
         Some(Legend {
-            field: self,
+            field: Some(self),
+            title: self.title().to_owned(),
+            si: self.unit().to_owned(),
             scale,
             range: range?,
             limits,
@@ -175,18 +162,112 @@ impl Field {
 /// A colour scale with what it must tell.
 #[derive(Debug, Clone)]
 pub(crate) struct Legend {
-    pub(crate) field: Field,
+    /// Absent: one of the other fields of the plies.
+    pub(crate) field: Option<Field>,
+    title: String,
+    /// SI unit.
+    si: String,
     pub(crate) scale: Scale,
     /// Smallest and largest value (SI).
     range: [f64; 2],
     limits: Vec<f64>,
 }
 
+/// Of the other fields of the plies.
+#[derive(Debug, Default)]
+pub(crate) struct Others {
+    /// Those with something to see, in the order in which the plies have them, first those of the global run.
+    pub(crate) legends: Vec<Legend>,
+    /// Titles of those that are the same everywhere, with that value.
+    pub(crate) even: Vec<String>,
+}
+
+impl Others {
+    /// Those of a study, each with one scale for all of its plies.
+    pub(crate) fn of(study: &Study) -> Self {
+        let locals = study.locals.iter().flat_map(|l| &l.plies);
+        let plies: Vec<&Ply> = study.plies.iter().chain(locals).collect();
+        let mut all = Self::default();
+        let mut seen: Vec<(&str, &str)> = Vec::new();
+        for other in plies.iter().flat_map(|p| &p.others) {
+            let name = (other.title.as_str(), other.unit.as_str());
+            if seen.contains(&name) {
+                continue;
+            }
+            seen.push(name);
+            let fields = plies.iter().flat_map(|p| &p.others);
+            let same = fields.filter(|o| (o.title.as_str(), o.unit.as_str()) == name);
+            let values: Vec<f64> = same.flat_map(|o| o.values.iter().copied()).collect();
+            let range = values
+                .iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
+                    [a.min(*v), b.max(*v)]
+                });
+            if range[0] == range[1] {
+                let value = quantity(range[0], name.1, 4);
+                all.even.push(format!("{} ({value})", other.title));
+            } else if range[0] < range[1] {
+                all.legends.push(Legend::of_other(other, &values, range));
+            }
+        }
+        all
+    }
+}
+
 impl Legend {
+    fn of_other(other: &Other, values: &[f64], range: [f64; 2]) -> Self {
+        let (factor, _) = shown(&other.unit);
+        let end = |part| end_of_scale(values.iter().copied(), part, 0.0, factor);
+        // What is nought nearly everywhere is shown to its largest.
+        let most = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        let usual = end(0.995);
+        let high = if usual < 1e-3 * most { end(1.0) } else { usual };
+        let (palette, low) = if range[0] < 0.0 {
+            (Palette::PurpleOrange, -high)
+        } else {
+            (Palette::Viridis, 0.0)
+        };
+        Self {
+            field: None,
+            title: other.title.clone(),
+            si: other.unit.clone(),
+            scale: Scale { palette, low, high },
+            range,
+            limits: Vec::new(),
+        }
+    }
+
+    /// What it is a scale of.
+    pub(crate) fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// The title with the unit of its numbers: `Shear angle (deg)`.
+    pub(crate) fn titled(&self) -> String {
+        match self.unit() {
+            "" => self.title.clone(),
+            unit => format!("{} ({unit})", self.title),
+        }
+    }
+
+    /// Its SI unit.
+    pub(crate) fn si_unit(&self) -> &str {
+        &self.si
+    }
+
+    /// Values at the points of a ply; cell values are averaged there. `None` when the ply does not have the field.
+    pub(crate) fn at_points(&self, ply: &Ply) -> Option<Vec<f64>> {
+        let Some(field) = self.field else {
+            let is = |o: &&Other| o.title == self.title && o.unit == self.si;
+            return ply.others.iter().find(is).map(|o| o.values.clone());
+        };
+        field.at_points(ply)
+    }
+
     /// Whether nothing is to be seen: all values are nought, but for rounding.
     pub(crate) fn is_flat(&self) -> bool {
         let least = match self.field {
-            Field::Deflection => LEAST_DEFLECTION,
+            Some(Field::Deflection) => LEAST_DEFLECTION,
             _ => 1e-6,
         };
         self.range.iter().all(|v| v.abs() < least)
@@ -194,28 +275,28 @@ impl Legend {
 
     /// The colour bar with ticks and limits.
     pub(crate) fn bar(&self, id: &str) -> Markup {
-        let (factor, unit) = shown(self.field.unit());
-        let what = format!("{} scale, {unit}", self.field.title());
+        let (factor, unit) = shown(&self.si);
+        let what = format!("{} scale, {unit}", self.title);
         bar(id, self.scale, factor, &self.limits, &what)
     }
 
     /// Unit of its numbers.
-    pub(crate) fn unit(&self) -> &'static str {
-        shown(self.field.unit()).1
+    pub(crate) fn unit(&self) -> &str {
+        shown(&self.si).1
     }
 
     /// What the bar is about, for the text under it.
     pub(crate) fn note(&self) -> Markup {
-        let (factor, unit) = shown(self.field.unit());
+        let (factor, unit) = shown(&self.si);
         let Scale { low, high, .. } = self.scale;
         // No more digits than the scale can show.
         let step = 10f64.powf(((high - low) * factor * 1e-3).log10().floor());
         let value = |v: f64| number((v * factor / step).round() * step, 3);
         html! {
             p class="note" {
-                b { (unit) } "; values from " (value(self.range[0])) " to " (value(self.range[1]))
+                @if unit.is_empty() { "Values" } @else { b { (unit) } "; values" } " from " (value(self.range[0])) " to " (value(self.range[1]))
                 @if self.range[0] < low || self.range[1] > high { " (colours end where the bar ends)" }
-                ". " (self.field.explanation())
+                ". " @if let Some(field) = self.field { (field.explanation()) } @else { "Plies that do not have it are grey." }
             }
         }
     }

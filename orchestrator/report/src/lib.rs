@@ -13,6 +13,7 @@ mod input;
 mod locate;
 mod maps;
 mod measured;
+mod others;
 mod page;
 mod place;
 mod plot;

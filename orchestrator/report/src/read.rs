@@ -1,5 +1,6 @@
 //! What is read from an artifact.
 
+use crate::others::{self, Other};
 use crate::raster::{Triangles, Vec3};
 use camino::Utf8Path;
 use plyflow_artifact::{Artifact, On};
@@ -232,9 +233,11 @@ pub(crate) struct Ply {
     pub(crate) deflection: Option<Vec<f64>>,
     /// Cells that the detection flagged, or that lie on a defect.
     pub(crate) marked: Vec<Marked>,
+    /// Whatever else is told of its points and cells.
+    pub(crate) others: Vec<Other>,
 }
 
-fn last_frame(artifact: &Artifact) -> Result<u64, String> {
+pub(crate) fn last_frame(artifact: &Artifact) -> Result<u64, String> {
     artifact
         .contents()
         .frames
@@ -292,6 +295,7 @@ pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Value, Ply)>, String>
             curvature: read(On::Points, "curvature_max"),
             deflection: None,
             marked,
+            others: others::of_body(&artifact, body, frame, &cells),
             cells,
         };
         all.push((body.attributes.clone(), ply));
@@ -317,6 +321,7 @@ pub(crate) fn formed_plies(path: &Utf8Path, names: &[String]) -> Result<Vec<Ply>
                 .frame_field(name, frame, On::Cells, "shear_angle")
                 .ok(),
             marked: vec![Marked::No; cells.len()],
+            others: others::of_body(&artifact, body, frame, &cells),
             cells,
             ..Ply::default()
         })

@@ -3,7 +3,7 @@
 mod pack;
 mod thin;
 
-use crate::field::{Field, Legend};
+use crate::field::{Field, Legend, Others};
 use crate::locate::Locator;
 use crate::place::{Place, normal};
 use crate::raster::Vec3;
@@ -12,9 +12,13 @@ use crate::study::{Study, Zone};
 use crate::view::{Sharpness, lift};
 use pack::{Extent, Stream, script_json};
 use serde::Serialize;
+use thin::Thinned;
 
 /// Points of all meshes of a page at full sharpness; about 10 bytes each on the page.
 const POINTS: f64 = 120_000.0;
+/// Fields besides those that are mapped take so many bytes on a page at full sharpness, at most. A value is one of 256 places on its scale,
+/// which is what a screen shows.
+const ROOM: f64 = 1_200_000.0;
 /// Meshes of fewer points than this would be stamps: they are left out.
 const LEAST: usize = 60;
 /// Points along the outline of a zone are this far apart (m).
@@ -31,6 +35,11 @@ pub(crate) struct Scene {
     pub(crate) tool: bool,
     /// What is shown coarser than it is, or not at all.
     pub(crate) notes: Vec<String>,
+    /// The fields of the menu.
+    pub(crate) legends: Vec<Legend>,
+    /// Fields that are the same everywhere, and those for which the page has no room.
+    pub(crate) even: Vec<String>,
+    pub(crate) left_out: Vec<String>,
 }
 
 /// What the script is told. Places are in metres; arrays lie in `data`, in the order of what is listed here.
@@ -48,7 +57,7 @@ struct Told {
 
 #[derive(Debug, Serialize)]
 struct ToldField {
-    name: &'static str,
+    name: String,
     /// Colours of the scale, equally spaced.
     stops: Vec<String>,
 }
@@ -127,7 +136,7 @@ pub(crate) fn scene(
     if study.plies.is_empty() {
         return Ok(None);
     }
-    let budget = (POINTS * (sharp.0 / crate::SHARPNESS[0]).min(1.0)) as usize / drawn.max(1);
+    let budget = (POINTS * share_of(sharp)) as usize / drawn.max(1);
     let (bodies, most, mut notes) = chosen(bodies(study), budget);
     let ends = places
         .iter()
@@ -136,7 +145,13 @@ pub(crate) fn scene(
     let Some(extent) = Extent::of(all) else {
         return Ok(None);
     };
-    let legends: Vec<Legend> = Field::ALL.iter().filter_map(|f| f.legend(study)).collect();
+    let thinned: Vec<Thinned> = (bodies.iter())
+        .map(|b| thin::thin(b.at, &b.cells, most))
+        .collect();
+    let mut legends: Vec<Legend> = Field::ALL.iter().filter_map(|f| f.legend(study)).collect();
+    let others = Others::of(study);
+    let room = (ROOM * share_of(sharp)) as usize / drawn.max(1);
+    let left_out = choose(&mut legends, others.legends, &bodies, &thinned, room)?;
     let zones = study.zones.as_deref().unwrap_or_default();
     let fine = |ply: &str, zone: &str| {
         let is = |b: &Body| b.zone == Some(zone) && b.ply.is_some_and(|p| p.name == ply);
@@ -144,13 +159,13 @@ pub(crate) fn scene(
     };
     let mut stream = Stream::default();
     let mut told = Vec::new();
-    for body in &bodies {
+    for (body, found) in bodies.iter().zip(&thinned) {
         let inside: Vec<&Zone> = match (body.ply, body.zone) {
             (Some(ply), None) => zones.iter().filter(|z| fine(&ply.name, &z.name)).collect(),
             _ => Vec::new(),
         };
-        let (one, thinned) = write(&mut stream, &extent, body, &inside, &legends, most);
-        if thinned {
+        let one = write(&mut stream, &extent, (body, found), &inside, &legends);
+        if one.points < body.formed.len() {
             let (name, left, whole) = (body.name(), one.points, body.formed.len());
             notes.push(format!("{name} with {left} of its {whole} points"));
         }
@@ -176,6 +191,9 @@ pub(crate) fn scene(
         zones: shown,
         tool,
         notes,
+        legends,
+        even: others.even,
+        left_out,
     }))
 }
 
@@ -230,16 +248,55 @@ fn chosen(mut bodies: Vec<Body<'_>>, budget: usize) -> (Vec<Body<'_>>, usize, Ve
     (bodies, most, notes)
 }
 
-/// Writes a mesh, and says whether it was thinned.
+/// The part of what a page holds at full sharpness.
+fn share_of(sharp: Sharpness) -> f64 {
+    (sharp.0 / crate::SHARPNESS[0]).min(1.0)
+}
+
+/// Adds `others` to the fields that are shown as long as they take no more than `room` bytes on the page together, and gives the titles of
+/// those that are left out.
+fn choose(
+    legends: &mut Vec<Legend>,
+    others: Vec<Legend>,
+    bodies: &[Body<'_>],
+    thinned: &[Thinned],
+    mut room: usize,
+) -> Result<Vec<String>, String> {
+    let mut left_out = Vec::new();
+    for legend in others {
+        let mut alone = Stream::default();
+        for (body, found) in bodies.iter().zip(thinned) {
+            shade(&mut alone, body, found, &legend);
+        }
+        let size = alone.text()?.len();
+        if size <= room {
+            room -= size;
+            legends.push(legend);
+        } else {
+            left_out.push(legend.title().to_owned());
+        }
+    }
+    Ok(left_out)
+}
+
+/// Writes a field of a mesh; `false` when the mesh does not have it.
+fn shade(stream: &mut Stream, body: &Body<'_>, found: &Thinned, legend: &Legend) -> bool {
+    let Some(values) = body.ply.and_then(|p| legend.at_points(p)) else {
+        return false;
+    };
+    let place = |i: &u32| legend.scale.place(values[*i as usize]);
+    stream.places(found.points.iter().map(place));
+    true
+}
+
+/// Writes a mesh.
 fn write(
     stream: &mut Stream,
     extent: &Extent,
-    body: &Body<'_>,
+    (body, found): (&Body<'_>, &Thinned),
     zones: &[&Zone],
     legends: &[Legend],
-    most: usize,
-) -> (ToldBody, bool) {
-    let found = thin::thin(body.at, &body.cells, most);
+) -> ToldBody {
     let of = |values: &[Vec3], i: u32| values[found.points[i as usize] as usize];
     stream.points(
         extent,
@@ -266,25 +323,22 @@ fn write(
     }
     let mut fields = Vec::new();
     for (k, legend) in legends.iter().enumerate() {
-        if let Some(values) = body.ply.and_then(|p| legend.field.at_points(p)) {
-            let place = |i: &u32| legend.scale.place(values[*i as usize]);
-            stream.places(found.points.iter().map(place));
+        if shade(stream, body, found, legend) {
             fields.push(k);
         }
     }
-    let told = ToldBody {
+    ToldBody {
         ply: body.ply.map(|p| p.name.clone()),
         zone: body.zone.map(str::to_owned),
         points: found.points.len(),
         parts,
         fields,
-    };
-    (told, found.points.len() < body.formed.len())
+    }
 }
 
 fn field(legend: &Legend) -> ToldField {
     ToldField {
-        name: legend.field.title(),
+        name: legend.title().to_owned(),
         stops: legend
             .scale
             .palette

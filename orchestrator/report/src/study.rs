@@ -2,6 +2,7 @@
 
 use crate::input::{Instance, ReportInput};
 use crate::measured::{self, Measured};
+use crate::others;
 use crate::read::{self, Facts, FormingFacts, History, Ply, Tool};
 use crate::steps::{self, Shown};
 use serde::Deserialize;
@@ -524,6 +525,10 @@ impl Reader<'_> {
             }
         };
         study.plies = plies.unwrap_or_default();
+        if detection.is_some() {
+            let added = others::add(&path, &mut study.plies);
+            self.noted(&label, added);
+        }
     }
 
     fn read_locals(&mut self, study: &mut Study, runs: &[usize], comparison: Option<usize>) {
@@ -552,6 +557,9 @@ impl Reader<'_> {
                 let path = self.instance(*at).artifact.clone();
                 let read = read::formed_plies(&path, &run.facts.plies());
                 plies = self.noted(&run.label.clone(), read).unwrap_or_default();
+            } else if self.pictures {
+                let added = others::add(&self.instance(*at).artifact, &mut plies);
+                self.noted(&run.label.clone(), added);
             }
             study.locals.push(Local {
                 zone,

@@ -108,7 +108,7 @@ pub(crate) fn flat(
     width: f64,
     sharp: Sharpness,
 ) -> Drawn {
-    let Some(values) = legend.field.at_points(ply) else {
+    let Some(values) = legend.at_points(ply) else {
         return Ok(html! {});
     };
     let (camera, size) = sharp.image(
@@ -131,7 +131,7 @@ pub(crate) fn flat(
         (Marked::Wrinkle, "marked wrinkle"),
     ];
     let marks = marks.map(|(kind, class)| (class, marked_outline(ply, kind, &page)));
-    let what = format!("{}, flat ply {}", legend.field.title(), ply.name);
+    let what = format!("{}, flat ply {}", legend.title(), ply.name);
     Ok(html! {
         svg viewBox={ "0 0 " (px(width)) " " (px(h + AXES[1])) } role="img" aria-label=(what) {
             image href=(image) x=(AXES[0]) y="0" width=(px(w)) height=(px(h)) {}
@@ -207,7 +207,7 @@ pub(crate) fn formed(
     how: FormedView<'_>,
     sharp: Sharpness,
 ) -> Drawn {
-    let Some(values) = legend.field.at_points(ply) else {
+    let Some(values) = legend.at_points(ply) else {
         return Ok(html! {});
     };
     let FormedView { tool, width, .. } = how;
@@ -242,7 +242,7 @@ pub(crate) fn formed(
         ..Zone::default()
     };
     let (w, h) = (size[0] as f64 / sharp.0, size[1] as f64 / sharp.0);
-    let what = format!("{}, formed ply {}", legend.field.title(), ply.name);
+    let what = format!("{}, formed ply {}", legend.title(), ply.name);
     Ok(html! {
         svg viewBox={ "0 0 " (px(w)) " " (px(h)) } role="img" aria-label=(what) {
             image href=(image) x="0" y="0" width=(px(w)) height=(px(h)) {}

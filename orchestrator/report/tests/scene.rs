@@ -213,3 +213,85 @@ fn a_page_without_plies_has_no_view_and_no_script_for_one() {
     assert!(!page.contains("createREGL") && !page.contains("view3d\""));
     assert!(page.contains("class=\"copy with-script\""));
 }
+
+/// The made-up runs have, besides what the maps show, a strain on cells, a pressure on points, a displacement and one thickness.
+#[test]
+fn every_field_of_the_plies_is_in_the_menu_with_its_unit_and_what_is_the_same_everywhere_is_told() {
+    let (_keep, folder) = folder();
+    let page = page(&whole(&folder), &folder);
+    let from = page.find("<select").unwrap();
+    let menu = &page[from..from + page[from..].find("</select>").unwrap()];
+    let texts: Vec<&str> = (menu.split("<option").skip(1))
+        .map(|o| o.split(['>', '<']).nth(1).unwrap())
+        .collect();
+    assert_eq!(
+        texts[..3],
+        [
+            "Shear angle (deg)",
+            "Nodal distance (mm)",
+            "Curvature (1/mm)"
+        ]
+    );
+    for text in [
+        "Fibre strain 1",
+        "Contact pressure (kPa)",
+        "Displacement, y (mm)",
+        "Displacement, z (mm)",
+        "Displacement, magnitude (mm)",
+    ] {
+        assert!(texts.contains(&text), "{text}: {texts:?}");
+    }
+    // No place of the half-pipe goes along it.
+    for (title, told) in [
+        ("Thickness", "Thickness (0.5 mm)"),
+        ("Displacement, x", "Displacement, x (0 mm)"),
+    ] {
+        assert!(!menu.contains(title) && page.contains(told), "{title}");
+    }
+    assert!(
+        texts[3].starts_with("Fibre") && texts.last() == Some(&"Defect"),
+        "{texts:?}"
+    );
+    assert!(!page.contains("Left out, as the page"));
+    // What the view has of the displacement is that of the artifact.
+    let mut scene = Scene::of(&page);
+    let names: Vec<String> = list(&scene.told["fields"])
+        .iter()
+        .map(|f| f["name"].as_str().unwrap().to_owned())
+        .collect();
+    assert_eq!(names.len(), texts.len());
+    let wanted = names
+        .iter()
+        .position(|n| n == "Displacement, magnitude")
+        .unwrap();
+    let bodies = list(&scene.told["bodies"]);
+    let artifact = Artifact::open(folder.join("coarse.h5").as_std_path()).unwrap();
+    let moved = artifact
+        .frame_field("ply_1", 1, On::Points, "displacement")
+        .unwrap();
+    let size: Vec<f64> = (moved.as_chunks::<3>().0.iter())
+        .map(|d| d.iter().map(|v| v * v).sum::<f64>().sqrt())
+        .collect();
+    for (n, body) in bodies.iter().take(2).enumerate() {
+        let count = body["points"].as_u64().unwrap();
+        scene.points(count);
+        for part in list(&body["parts"]) {
+            scene.take(4 * part["cells"].as_u64().unwrap(), 4, 4);
+        }
+        for field in list(&body["fields"]) {
+            let found = scene.take(count, 1, 1);
+            if n == 1 && field == wanted {
+                // Places on one scale from nought on: in proportion, as far as it does not end.
+                let top = size.iter().copied().fold(0.0, f64::max);
+                let at = size.iter().position(|s| *s > 0.3 * top && *s < 0.5 * top);
+                let unit = found[at.unwrap()] as f64 / size[at.unwrap()];
+                let wrong = |(v, s): (&u64, &f64)| {
+                    *v < 255 && (*v as f64 - unit * s).abs() > 1.0 + 0.02 * unit * s
+                };
+                assert!(!found.iter().zip(&size).any(wrong));
+                return;
+            }
+        }
+    }
+    panic!("ply_1 has no displacement");
+}

@@ -202,7 +202,7 @@ mod tests {
         for part in [
             "80.0 % *",
             "2.000 mm *",
-            "0.57 deg  ",
+            "0.57 deg\n",
             "other.late, alone (from 0.60 s)",
         ] {
             assert!(text.contains(part), "{part}: {text}");

@@ -29,22 +29,45 @@ struct Parameters {
 struct Section {
     label: String,
     /// `[x, y]` (m).
-    from: Vec<f64>,
+    from: Option<Vec<f64>>,
     /// `[x, y]` (m).
-    to: Vec<f64>,
+    to: Option<Vec<f64>>,
+    /// `[x, y]` (m) each, instead of both ends.
+    path: Option<Vec<Vec<f64>>>,
+    #[serde(default)]
+    on: Seen,
+}
+
+/// What the places of a section are told in.
+#[derive(Deserialize, Clone, Copy, Default, PartialEq)]
+#[serde(rename_all = "kebab-case")]
+enum Seen {
+    #[default]
+    FromAbove,
+    FlatPly,
 }
 
 impl Section {
-    /// Both ends (m).
-    fn ends(&self) -> Result<[[f64; 2]; 2], StepError> {
-        match (&self.from[..], &self.to[..]) {
-            (&[a, b], &[c, d]) if (a, b) != (c, d) => Ok([[a, b], [c, d]]),
-            _ => Err(format!(
-                "sections: '{}' goes from {:?} to {:?} m; expected two different places [x, y]",
-                self.label, self.from, self.to
+    /// The corners of its path (m).
+    fn corners(&self) -> Result<Vec<[f64; 2]>, StepError> {
+        let given = match (&self.path, &self.from, &self.to) {
+            (Some(path), None, None) => path.clone(),
+            (None, Some(from), Some(to)) => vec![from.clone(), to.clone()],
+            _ => {
+                let what = "either both ends, `from` and `to`, or a `path`";
+                return Err(format!("sections: '{}': expected {what}", self.label).into());
+            }
+        };
+        let place = |p: &Vec<f64>| <[f64; 2]>::try_from(&p[..]).ok();
+        let corners: Option<Vec<[f64; 2]>> = given.iter().map(place).collect();
+        let moves = |c: &Vec<[f64; 2]>| c.windows(2).any(|w| w[0] != w[1]);
+        corners.filter(moves).ok_or_else(|| {
+            format!(
+                "sections: '{}' goes along {given:?} m; expected two or more different places [x, y]",
+                self.label
             )
-            .into()),
-        }
+            .into()
+        })
     }
 }
 
@@ -73,7 +96,7 @@ impl Step for DefectMeasurement {
         let sections: Vec<_> = p
             .sections
             .iter()
-            .map(Section::ends)
+            .map(Section::corners)
             .collect::<Result<_, _>>()?;
         let phase = |phase, fraction| {
             host.progress(&Progress {
@@ -115,8 +138,8 @@ impl Step for DefectMeasurement {
         let mut output = Output::new(host, &run, &measured);
         output.bodies()?;
         output.distances()?;
-        for (section, [from, to]) in p.sections.iter().zip(sections) {
-            output.section(&section.label, from, to)?;
+        for (section, path) in p.sections.iter().zip(&sections) {
+            output.section(&section.label, path, section.on)?;
         }
         output.finish(alignment.as_ref())
     }

@@ -1,13 +1,13 @@
 //! The artifact: bodies with their fields, tables of defects, sections, distributions.
 
-use crate::Measured;
 use crate::read::Run;
+use crate::{Measured, Seen};
 use plyflow_defects::align::Alignment;
 use plyflow_defects::{Defect, Kind, RidgeShear};
 use plyflow_sdk::{Host, On, StepError};
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{
-    bin_width, density, plane_section, triangles, weighted_mean, weighted_quantiles,
+    bin_width, density, path_section, stations, triangles, weighted_mean, weighted_quantiles,
 };
 use serde_json::{Value, json};
 
@@ -126,46 +126,69 @@ impl<'a> Output<'a> {
         Ok(())
     }
 
-    /// Cuts tool, plies and scan by the vertical plane through two places (x, y in m); of each the longest line counts.
-    pub fn section(&mut self, label: &str, from: [f64; 2], to: [f64; 2]) -> Result<(), StepError> {
+    /// Cuts tool, plies and scan along a path (x, y in m): as they are seen from above, or the plies along a line of their material, and tool
+    /// and scan below or above where that went on the lowest ply. Of each the longest line counts.
+    pub fn section(&mut self, label: &str, path: &[[f64; 2]], on: Seen) -> Result<(), StepError> {
         let host = self.host;
         let number = self.sections.len();
-        let tool = &self.run.tool.surface;
-        let mut lines = vec![(
-            "tool",
-            plane_section(tool.points(), tool.triangles(), from, to),
-        )];
-        for m in self.measured {
+        let along = stations(path);
+        let cut = |m: &Measured, plan: &[Vec3], path: &[[f64; 2]], along: &[f64]| {
             let (corners, cells) = m.ply.topology.connectivity();
             let facets = triangles(corners, cells);
-            lines.push((&m.ply.name, plane_section(&m.ply.formed, &facets, from, to)));
-        }
-        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-        let station = |p: &Vec3| {
-            ((p[0] - from[0]) * (to[0] - from[0]) + (p[1] - from[1]) * (to[1] - from[1])) / length
+            let lines = path_section(plan, &m.ply.formed, &facets, path, along);
+            lines.into_iter().next()
         };
+        // The path as seen from above, and what its corners are told by.
+        let mut above = (path.to_vec(), along.clone());
+        if on == Seen::FlatPly {
+            let lowest = self.measured.iter().find(|m| m.simulated);
+            let line = lowest.and_then(|m| cut(m, &m.ply.undeformed, path, &along));
+            let line = line.unwrap_or_default();
+            above = (
+                line.iter().map(|p| [p.place[0], p.place[1]]).collect(),
+                line.iter().map(|p| p.station).collect(),
+            );
+        }
+        let tool = &self.run.tool.surface;
+        let (points, facets) = (tool.points(), tool.triangles());
+        let of_tool = path_section(points, points, facets, &above.0, &above.1);
+        let mut lines = vec![("tool", of_tool.into_iter().next())];
+        for m in self.measured {
+            let line = if on == Seen::FlatPly && m.simulated {
+                cut(m, &m.ply.undeformed, path, &along)
+            } else {
+                cut(m, &m.ply.formed, &above.0, &above.1)
+            };
+            lines.push((&m.ply.name, line));
+        }
         let mut series = Vec::new();
-        for (name, found) in &lines {
-            let Some(line) = found.first() else { continue };
+        for (name, line) in &lines {
+            let Some(line) = line else { continue };
             let [x, y] =
                 ["station", "height"].map(|n| format!("sections/section_{number}/{name}/{n}"));
-            let stations: Vec<f64> = line.iter().map(station).collect();
-            let heights: Vec<f64> = line.iter().map(|p| p[2]).collect();
+            let stations: Vec<f64> = line.iter().map(|p| p.station).collect();
+            let heights: Vec<f64> = line.iter().map(|p| p.place[2]).collect();
             host.write_f64(&x, &[line.len()], "m", &stations)?;
             host.write_f64(&y, &[line.len()], "m", &heights)?;
             series.push(json!({"label": name, "x": x, "y": y}));
         }
-        if series.len() < 2 {
+        let met = lines.iter().skip(1).any(|(_, line)| line.is_some());
+        if !met {
             return Err(format!(
-                "sections: '{label}' from {from:?} to {to:?} m meets no ply; take places above the plies"
+                "sections: '{label}' along {path:?} m meets no ply; take places above the plies (with `on: flat-ply`: in the flat ply)"
             )
             .into());
         }
-        self.sections
-            .push(json!({"label": label, "from": from, "to": to, "lines": series.clone()}));
+        let (seen, axis) = match on {
+            Seen::FromAbove => ("from-above", "along the section"),
+            Seen::FlatPly => ("flat-ply", "along the section in the flat ply"),
+        };
+        self.sections.push(json!({
+            "label": label, "from": path[0], "to": path[path.len() - 1], "path": path, "on": seen, "lines": series.clone(),
+        }));
         self.plots.push(json!({
             "name": format!("section_{number}"), "title": format!("Section {label}"),
-            "x": {"label": "along the section", "unit": "mm"}, "y": {"label": "height", "unit": "mm"}, "series": series,
+            "x": {"label": axis, "unit": "mm"}, "y": {"label": "height", "unit": "mm"}, "series": series,
         }));
         Ok(())
     }

@@ -148,6 +148,67 @@ fn plies_are_measured_with_sections_and_distribution() {
     assert!(number.contains(&1.0) && number.contains(&2.0));
 }
 
+/// About the blister, 15 mm from its middle, and beyond the plies.
+#[test]
+fn a_section_along_a_bend_has_the_heights_of_its_path_from_above_and_in_the_flat_ply() {
+    let arc: Vec<Value> = (0..=60)
+        .map(|k| PI * f64::from(k) / 60.0)
+        .map(|a| json!([0.040 + 0.015 * a.cos(), 0.015 * a.sin()]))
+        .collect();
+    let mut beyond = arc.clone();
+    beyond.push(json!([0.025, -0.2]));
+    let mut run_off = formed();
+    // The upper ply goes along x by 10 mm: its material is where it was, seen from above it is not.
+    for p in &mut run_off.bodies[2].frames[0] {
+        p[0] += 0.010;
+    }
+    let sections = json!([
+        {"label": "above", "path": arc},
+        {"label": "material", "path": arc, "on": "flat-ply"},
+        {"label": "beyond", "path": beyond},
+    ]);
+    let inputs = [MemoryInput::new("formed", &run_off)];
+    let out = run::<DefectMeasurement>(json!({"sections": sections}), &inputs, &[]).unwrap();
+    let line = |section: usize, body: &str| {
+        let array = |what: &str| {
+            let path = format!("sections/section_{section}/{body}/{what}");
+            out.arrays[&path].1.clone()
+        };
+        (array("station"), array("height"))
+    };
+    let (low, top) = (TOP + OFFSET, TOP + OFFSET + THICKNESS);
+    let near = |found: &[f64], height: &dyn Fn(usize) -> f64| {
+        let off = |(k, z): (usize, &f64)| (z - height(k)).abs();
+        found.iter().enumerate().map(off).fold(0.0, f64::max)
+    };
+    for section in [0, 1] {
+        for (body, z) in [("tool", TOP), ("ply_1", low)] {
+            let (s, found) = line(section, body);
+            assert!(near(&found, &|_| z) < 1e-9, "{body}");
+            assert!(s[0].abs() < 1e-9 && (s[s.len() - 1] - 0.015 * PI).abs() < 1e-4);
+        }
+    }
+    let at = |a: f64| [0.040 + 0.015 * a.cos(), 0.015 * a.sin()];
+    let (s, found) = line(1, "ply_2");
+    let blister = 0.001 * (1.0 + (PI * 0.6).cos());
+    assert!(near(&found, &|_| top + blister) < 3e-5);
+    assert!((s[s.len() - 1] - 0.015 * PI).abs() < 1e-4);
+    let (s, found) = line(0, "ply_2");
+    let moved = |k: usize| {
+        let [x, y] = at(s[k] / 0.015);
+        top + height(x - 0.010, y)
+    };
+    assert!(near(&found, &moved) < 3e-5);
+    // To the edge of the ply, at y = -50 mm.
+    let (s, _) = line(2, "ply_1");
+    assert!((s[s.len() - 1] - (0.015 * PI + 0.050)).abs() < 1e-4);
+    let told = &out.attributes["sections"][1];
+    assert_eq!(
+        (&told["on"], &told["path"]),
+        (&json!("flat-ply"), &json!(arc))
+    );
+}
+
 #[test]
 fn causes_are_told_from_shear_bridging_and_layup() {
     let cause = |parameters: Value| measured(parameters).attributes["defects"][0]["cause"].clone();
@@ -207,7 +268,12 @@ fn what_cannot_be_measured_is_told() {
     let beside = json!({"sections": [{"label": "B", "from": [0.3, 0.3], "to": [0.4, 0.3]}]});
     assert!(refused(beside, &formed).contains("meets no ply"));
     let point = json!({"sections": [{"label": "B", "from": [0.0, 0.0], "to": [0.0, 0.0]}]});
-    assert!(refused(point, &formed).contains("two different places"));
+    assert!(refused(point, &formed).contains("different places"));
+    let both = json!({"sections": [{"label": "B", "from": [0.0, 0.0], "path": [[0.0, 0.0]]}]});
+    assert!(refused(both, &formed).contains("or a `path`"));
+    let flat =
+        json!({"sections": [{"label": "B", "path": [[0.3, 0.0], [0.4, 0.0]], "on": "flat-ply"}]});
+    assert!(refused(flat, &formed).contains("in the flat ply"));
     let missing = json!({"scan": "/nowhere/scan.stl"});
     assert!(refused(missing, &formed).contains("cannot read the scan `/nowhere/scan.stl`"));
     let mut without = formed.clone();

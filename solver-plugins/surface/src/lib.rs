@@ -20,7 +20,7 @@ pub use curvature::{Curvature, curvatures};
 pub use distribution::{bin_width, density, weighted_mean, weighted_quantiles};
 pub use locate::{Location, QuadLocator, flat_bounds};
 pub use ridge::{Ridge, ridge_line};
-pub use section::{line_length, plane_section};
+pub use section::{SectionPoint, line_length, path_section, plane_section, stations};
 pub use smooth::{SmoothSheet, StandOff};
 pub use topology::{Topology, triangles};
 pub use traction::traction;

@@ -33,7 +33,7 @@ pub(super) fn global(
         ..Overlay::default()
     };
     let legends = legends(study);
-    let has = |(l, p): &(&Legend, &Ply)| l.field.at_points(p).is_some();
+    let has = |(l, p): &(&Legend, &Ply)| l.at_points(p).is_some();
     let pairs = legends
         .iter()
         .flat_map(|l| study.plies.iter().map(move |p| (l, p)));
@@ -62,7 +62,7 @@ pub(super) fn global(
         .par_iter()
         .map(draw)
         .collect::<Result<Vec<_>, String>>()?;
-    let of = |field: Field| rows.iter().filter(move |r| r.0 == field);
+    let of = |field: Option<Field>| rows.iter().filter(move |r| r.0 == field);
     Ok(html! {
         section id={ "maps-" (n) } {
             h2 { "Maps of the global run" }
@@ -75,8 +75,8 @@ pub(super) fn global(
             }
             @for legend in &legends {
                 div class="field" {
-                    h3 { (legend.field.title()) }
-                    (legend.bar(&format!("scale-{n}-{}", legend.field.unit().replace('/', "-"))))
+                    h3 { (legend.title()) }
+                    (legend.bar(&format!("scale-{n}-{}", legend.si_unit().replace('/', "-"))))
                     (legend.note())
                     @for (_, name, figures) in of(legend.field) {
                         div class="triple" {
@@ -118,7 +118,7 @@ pub(super) fn local(
             p { "Colours as in the maps of the global run. Solid outlines: wrinkles (W), dotted: bridging (B), with their id in the table of defects." }
             div class="bars-row" {
                 @for (k, legend) in legends.iter().enumerate() {
-                    div { p class="note" { (legend.field.title()) " (" (legend.unit()) ")" } (legend.bar(&format!("local-scale-{n}-{k}"))) }
+                    div { p class="note" { (legend.titled()) } (legend.bar(&format!("local-scale-{n}-{k}"))) }
                 }
             }
             @for zone in &zones { (zone) }
@@ -158,14 +158,14 @@ fn zone(
             places: &mine,
         };
         let mut figures = Vec::new();
-        let known = || legends.iter().filter(|l| l.field.at_points(ply).is_some());
+        let known = || legends.iter().filter(|l| l.at_points(ply).is_some());
         for legend in known() {
-            let title = legend.field.title();
+            let title = legend.title();
             figures.push((title.to_owned(), flat(ply, legend, &overlay, LOCAL, sharp)?));
         }
         // The formed view shows the shape; the distance tells most on it.
         let legend = known()
-            .find(|l| l.field == Field::Distance)
+            .find(|l| l.field == Some(Field::Distance))
             .or(known().next());
         if let Some(legend) = legend {
             let (side, tool) = (Side::facing(ply), study.tool.as_ref());
@@ -176,7 +176,7 @@ fn zone(
                 width: LOCAL,
             };
             let view = formed(ply, legend, &overlay, how, sharp)?;
-            figures.push((format!("{}, formed", legend.field.title()), view));
+            figures.push((format!("{}, formed", legend.title()), view));
         }
         rows.push((ply.name.clone(), marks.len(), figures));
     }

@@ -1,6 +1,5 @@
 //! The rotatable view of the formed plies: its place on the page and its scripts.
 
-use crate::field::{Field, Legend};
 use crate::place::Place;
 use crate::scene::{Scene, scene};
 use crate::study::Study;
@@ -45,13 +44,12 @@ pub(super) fn section(
     let Some(scene) = scene(study, places, drawn, sharp)? else {
         return Ok(html! {});
     };
-    let legends: Vec<Legend> = Field::ALL.iter().filter_map(|f| f.legend(study)).collect();
     Ok(html! {
         section id={ "view-" (n) } {
             h2 { "Formed plies in 3D" }
             p class="without-3d" { "The rotatable view needs scripts and WebGL, which this browser does not give. The maps below show the same fields." }
             div class="view3d" hidden {
-                (controls(&scene, &legends, n))
+                (controls(&scene, n))
                 div class="stage" {
                     canvas tabindex="0" role="img" aria-label="Formed plies in 3D. Arrow keys turn, plus and minus zoom, 0 resets." {}
                     div class="labels" aria-hidden="true" {}
@@ -59,30 +57,32 @@ pub(super) fn section(
                         @for name in ["x", "y", "z"] { g { path class="triad-halo" {} path class="triad" {} text class="over" text-anchor="middle" { (name) } } }
                     }
                 }
-                @for (k, legend) in legends.iter().enumerate() {
+                @for (k, legend) in scene.legends.iter().enumerate() {
                     div class="legend3d" data-field=(k) hidden[k > 0] {
                         (legend.bar(&format!("view-scale-{n}-{k}")))
                         (legend.note())
                     }
                 }
                 p class="note" { "Drag, one finger or the arrow keys turn; Shift and drag, or two fingers, move; +, −, two fingers or the wheel (after a click) zoom; 0 resets."
-                    @if !scene.notes.is_empty() { " Shown coarser than computed: " (scene.notes.join("; ")) "." } }
+                    @if !scene.notes.is_empty() { " Shown coarser than computed: " (scene.notes.join("; ")) "." }
+                    @if !scene.even.is_empty() { " The same everywhere and not in the menu: " (scene.even.join(", ")) "." }
+                    @if !scene.left_out.is_empty() { " Left out, as the page would grow too large: " (scene.left_out.join(", ")) "; " code { "plyflow inspect" } " tells where the artifacts lie, which ParaView opens." } }
             }
             script type="application/json" class="scene" { (PreEscaped(&scene.json)) }
         }
     })
 }
 
-fn controls(scene: &Scene, legends: &[Legend], n: usize) -> Markup {
+fn controls(scene: &Scene, n: usize) -> Markup {
     let switch = |kind: &str, value: &str, text: &str| {
         html! { label { input type="checkbox" checked data-show=(kind) value=(value); " " (text) } }
     };
     html! {
         div class="controls" {
-            @if !legends.is_empty() {
+            @if !scene.legends.is_empty() {
                 label for={ "field-" (n) } { "Colour" }
                 select id={ "field-" (n) } {
-                    @for (k, l) in legends.iter().enumerate() { option value=(k) { (l.field.title()) " (" (l.unit()) ")" } }
+                    @for (k, l) in scene.legends.iter().enumerate() { option value=(k) { (l.titled()) } }
                 }
             }
             span class="group" { @for (name, [azimuth, elevation]) in STANDARD {

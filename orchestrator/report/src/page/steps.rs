@@ -150,9 +150,9 @@ fn pictures(sheet: &Ply, n: usize, sharp: Sharpness) -> Result<Markup, String> {
             div class="row" {
                 @for (legend, figures) in &rows { @for (i, (what, figure)) in figures.iter().enumerate() {
                     figure class="map" {
-                        p class="plot-title" { (legend.field.title()) " (" (legend.unit()) ")" }
+                        p class="plot-title" { (legend.titled()) }
                         (figure)
-                        (legend.bar(&format!("step-{n}-{}-{i}", legend.field.unit())))
+                        (legend.bar(&format!("step-{n}-{}-{i}", legend.si_unit())))
                         figcaption { (sheet.name) ", " (what) ", last frame" }
                     }
                 } }

@@ -96,6 +96,9 @@ fn defect_rows<'a>(c: &'a Comparison, roles: &[&str]) -> Vec<Row<'a>> {
 type Measure = (&'static str, fn(&Defect) -> String);
 
 const MEASURES: [Measure; 8] = [
+    ("likely cause", |d| {
+        d.cause.clone().unwrap_or_else(|| "–".into())
+    }),
     ("length (mm)", |d| {
         if d.is_wrinkle() {
             fixed(d.length * 1e3, 1)
@@ -126,9 +129,6 @@ const MEASURES: [Measure; 8] = [
             }
             _ => "–".into(),
         }
-    }),
-    ("likely cause", |d| {
-        d.cause.clone().unwrap_or_else(|| "–".into())
     }),
 ];
 

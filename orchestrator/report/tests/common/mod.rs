@@ -15,6 +15,24 @@ pub struct Study {
     pub instances: Vec<Instance>,
 }
 
+/// Fields that no map shows: a scalar on cells, one on points, a vector, and one that is the same everywhere.
+fn further_fields(w: &mut ArtifactWriter, name: &str, s: &shapes::Sheet, last: bool) {
+    let n = s.flat.len() / 3;
+    let strain: Vec<f64> = s.shear.iter().map(|g| 1e-3 * g.abs()).collect();
+    let pressure: Vec<f64> = (0..n).map(|i| 2e5 * (i as f64 / n as f64)).collect();
+    let moved = s.flat.iter().zip(&s.formed).map(|(a, b)| b - a);
+    let moved: Vec<f64> = moved.map(|d| if last { d } else { 0.0 }).collect();
+    for (what, on, components, unit, values) in [
+        ("fibre_strain_1", On::Cells, 1, "1", &strain),
+        ("contact_pressure", On::Points, 1, "Pa", &pressure),
+        ("displacement", On::Points, 3, "m", &moved),
+        ("thickness", On::Points, 1, "m", &vec![0.0005; n]),
+    ] {
+        w.frame_field(name, on, what, components, unit, values)
+            .unwrap();
+    }
+}
+
 impl Study {
     pub fn new(folder: &Utf8Path) -> Self {
         Self {
@@ -106,6 +124,7 @@ impl Study {
                     .unwrap();
                 w.frame_field(name, On::Cells, "shear_angle", 1, "rad", &s.shear)
                     .unwrap();
+                further_fields(&mut w, name, s, last);
             }
             w.end_frame().unwrap();
         }
