@@ -58,6 +58,7 @@ fn held<E: Element>(mesh: &QuadMesh, to: impl Fn(V) -> V) -> Model {
         pressed: vec![Pressed::No; m],
         least_areal_mass: vec![0.0; m],
         element,
+        elsewhere: None,
     };
     let settings = StepSettings {
         target_step: 0.0,

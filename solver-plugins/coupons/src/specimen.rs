@@ -124,6 +124,7 @@ impl Specimen {
             pressed: vec![pressed; m],
             least_areal_mass: vec![0.0; m],
             element,
+            elsewhere: None,
         };
         let settings = StepSettings {
             target_step: p.time_step.unwrap_or(0.0),

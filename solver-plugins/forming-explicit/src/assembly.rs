@@ -1,20 +1,20 @@
 //! What global and local runs share: checking the stack, making components, stacking the contacts.
 
+use crate::elements;
 use crate::friction::{FrictionTable, Touching};
-use crate::parameters::{ComponentChoice, Parameters};
+use crate::parameters::Parameters;
 use crate::penetration;
 use crate::run::Body;
 use crate::symmetry::{self, Families, MirroredBody};
 use crate::tool::ToolSurfaces;
 use plyflow_abi::pf_component;
 use plyflow_blank::Blank;
-use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::contact::{
     ContactSettings, FoldSpec, FrictionLaw, Plane, RigidContact, RigidItem, RigidSurface,
     SheetContact, SlaveItem,
 };
-use plyflow_mechanics::mesh::{NONE, Patch, QuadMesh};
-use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, Whole, part_patches, reflect};
+use plyflow_mechanics::mesh::NONE;
+use plyflow_mechanics::mirror::{Mirrors, Planes, Whole};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
@@ -201,29 +201,6 @@ pub fn blank_part(sheet: &StackSheet, planes: Planes) -> Result<Blank, String> {
     part.map_err(|e| format!("ply '{}': {e}", sheet.scene.name))
 }
 
-/// Node patches of a sheet's mesh whose nodes have the numbers `nodes`, for its element. Ghosts beyond mirror planes are
-/// added to the points, to `nodes` and to `mirrors`.
-pub fn patches(
-    points: &mut Vec<V>,
-    nodes: &mut Vec<u32>,
-    mesh: &QuadMesh,
-    element: &ElementInstance,
-    mirrors: &mut Mirrors,
-) -> Vec<Patch> {
-    let most = element.sizes.patch_nodes;
-    if most == 0 || !element.material.reference().sizes().has_bending {
-        return Vec::new();
-    }
-    let (patches, ghosts) = part_patches(mesh, mirrors.planes, most);
-    for ghost in ghosts {
-        let (of, node) = (nodes[ghost.of as usize], points.len() as u32);
-        points.push(reflect(points[of as usize], ghost.image));
-        nodes.push(node);
-        mirrors.ghosts.push(Ghost { node, of, ..ghost });
-    }
-    patches
-}
-
 /// Adds a ply (its place in the stack, which is that in the model too) at height `z` (m) to the points of a model: its
 /// sheet and its body. `blank` is its part between the planes of `mirrors`.
 ///
@@ -249,14 +226,16 @@ pub fn add_ply(
     }
     let first = points.len() as u32;
     points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
-    let element = element(components, sheet, &p.element)?;
+    let element = elements::element(components, sheet, &p.element)?;
     symmetry::check_material(&element, sheet, mirrors.planes)?;
+    let elsewhere = elements::elsewhere(components, sheet, &element, &mesh, mirrors.planes, p)?;
     let body = Body {
         quality,
         ..body(sheet, index, &mesh.points, &mesh.cells, mirrors.planes)?
     };
     let mut nodes = (first..points.len() as u32).collect();
-    let patches = patches(points, &mut nodes, &mesh, &element, mirrors);
+    let bending = elements::bending_part(&mesh, elsewhere.as_ref());
+    let patches = elements::patches(points, &mut nodes, &bending, &element, mirrors);
     let spec = SheetSpec {
         name: name.clone(),
         nodes,
@@ -267,41 +246,9 @@ pub fn add_ply(
         cells: mesh.cells,
         axis: axis(&sheet.scene),
         element,
+        elsewhere,
     };
     Ok((spec, body))
-}
-
-/// Makes the element of a sheet with its material.
-///
-/// # Errors
-/// The component's own text.
-pub fn element(
-    components: &dyn Components,
-    sheet: &StackSheet,
-    choice: &ComponentChoice,
-) -> Result<ElementInstance, String> {
-    let mut with = serde_json::Value::Object(sheet.material.with.clone());
-    with["thickness"] = sheet.thickness.into();
-    with["areal_mass"] = sheet.material.areal_mass.si().into();
-    let what = format!(
-        "material '{}' of sheet '{}'",
-        sheet.material.name, sheet.scene.name
-    );
-    let found = components.material(&sheet.material.plugin)?;
-    let material = unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }
-        .map_err(|e| e.to_string())?;
-    let what = format!(
-        "element '{}' of sheet '{}'",
-        choice.plugin, sheet.scene.name
-    );
-    let found = components.element(&choice.plugin)?;
-    let parameters = if choice.with.is_null() {
-        "{}".into()
-    } else {
-        choice.with.to_string()
-    };
-    unsafe { ElementInstance::create(&found, &parameters, material, &what) }
-        .map_err(|e| e.to_string())
 }
 
 /// Direction of material axis e1 in the undeformed plane.

@@ -1,6 +1,7 @@
 //! The model of a whole scene.
 
 use crate::assembly::{self, Components, Placed, StackSheet};
+use crate::elements;
 use crate::parameters::Parameters;
 use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
@@ -159,10 +160,10 @@ fn bottom_film(
         .collect();
     let inner = nodes.iter().copied();
     let slaves = inner.filter(|n| !boundary[*n as usize]).collect();
-    let element = assembly::element(components, &stack[0], &p.diaphragm_element)?;
+    let element = elements::element(components, &stack[0], &p.diaphragm_element)?;
     symmetry::check_material(&element, &stack[0], at.planes)?;
     let (points, mirrors) = (&mut parts.points, &mut parts.mirrors);
-    let patches = assembly::patches(points, &mut nodes, mesh, &element, mirrors);
+    let patches = elements::patches(points, &mut nodes, mesh, &element, mirrors);
     let spec = SheetSpec {
         name: stack[0].scene.name.clone(),
         nodes,
@@ -187,6 +188,7 @@ fn bottom_film(
             })
             .collect(),
         element,
+        elsewhere: None,
     };
     parts.placed.push(Placed { index: 0, slaves });
     let body = assembly::body(&stack[0], 0, &mesh.points, &mesh.cells, at.planes)?;
@@ -296,10 +298,10 @@ fn top_film(
         cells: cells.clone(),
     };
     let body = assembly::body(top, last, &plan.points, &plan.cells, at.planes)?;
-    let element = assembly::element(components, top, &p.diaphragm_element)?;
+    let element = elements::element(components, top, &p.diaphragm_element)?;
     symmetry::check_material(&element, top, at.planes)?;
     let (points, mirrors) = (&mut parts.points, &mut parts.mirrors);
-    let patches = assembly::patches(points, &mut nodes, &plan, &element, mirrors);
+    let patches = elements::patches(points, &mut nodes, &plan, &element, mirrors);
     let spec = SheetSpec {
         name: top.scene.name.clone(),
         nodes,
@@ -310,6 +312,7 @@ fn top_film(
         cells,
         axis: assembly::axis(&top.scene),
         element,
+        elsewhere: None,
     };
     parts.bodies.push(body);
     parts.placed.push(Placed {

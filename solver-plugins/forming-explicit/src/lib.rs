@@ -1,11 +1,13 @@
 //! Step plugin `forming-explicit`: explicit dynamic forming of a stack of sheets over a rigid tool, between
 //! diaphragms or in a press. A
-//! global run meshes the scene itself; with a `boundary` input it is a local run of one zone.
+//! global run meshes the scene itself; with a `boundary` input it is a local run of one zone; with `zones` plies bend in these
+//! alone.
 
 pub mod assembly;
 mod checkpoint;
 mod course;
 mod diagnosis;
+pub mod elements;
 pub mod friction;
 mod global;
 mod late;

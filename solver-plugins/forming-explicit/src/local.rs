@@ -1,6 +1,7 @@
 //! The model of one zone, driven at its cut by a coarse run.
 
 use crate::assembly::{self, Components, Placed, StackSheet};
+use crate::elements;
 use crate::late::{self, Start};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
@@ -299,7 +300,8 @@ fn sheets_of(
             least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
             cells: mesh.cells,
             axis: assembly::axis(&sheet.scene),
-            element: assembly::element(components, sheet, choice)?,
+            element: elements::element(components, sheet, choice)?,
+            elsewhere: None,
         });
     }
     Ok(all)

@@ -2,6 +2,7 @@
 
 use crate::assembly::Components;
 use crate::checkpoint::Recorder;
+use crate::elements::{self, Rectangle};
 use crate::late::Start;
 use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
@@ -50,6 +51,7 @@ pub fn run(host: &Host) -> Result<(), StepError> {
         .num_threads(host.threads())
         .build()
         .map_err(|e| format!("starting {} threads: {e}", host.threads()))?;
+    p.bending_zones = bending_zones(host, &p)?;
     pool.install(|| form(host, &p))
 }
 
@@ -70,6 +72,73 @@ fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
         Some(size) if size > 0.0 => Ok(Some(size)),
         _ => Err(format!("'{}' advises no element size", study.step).into()),
     }
+}
+
+/// Boxes of the zones in which alone plies have `element`; none without the input `zones`.
+fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, StepError> {
+    let inputs = host.inputs_of("zones")?;
+    let steps: Vec<&str> = inputs.iter().map(|i| i.step.as_str()).collect();
+    match (&p.element_elsewhere, inputs.is_empty()) {
+        (None, true) => return Ok(Vec::new()),
+        (Some(choice), true) => {
+            return Err(format!(
+                "element_elsewhere: given '{}', but no `zones`; expected the zones in which plies have `element` instead. Wire the \
+                 input `zones`, or leave out `element_elsewhere`",
+                choice.plugin
+            )
+            .into());
+        }
+        (None, false) => {
+            return Err(format!(
+                "zones: given '{}', but no `element_elsewhere`; expected the plies' element outside of the zones. Give \
+                 `element_elsewhere: m4`, or do not wire `zones`",
+                steps.join(", ")
+            )
+            .into());
+        }
+        (Some(_), false) => {}
+    }
+    if !host.inputs_of("boundary")?.is_empty() {
+        return Err(
+            "zones: given beside `boundary`; expected one of them: `zones` are for the run of a whole scene in which plies bend in the \
+             zones alone, `boundary` makes the run that of one zone"
+                .into(),
+        );
+    }
+    let mut all = Vec::new();
+    for input in &inputs {
+        let attributes: serde_json::Value = host.attributes(input)?;
+        all.extend(elements::boxes(&attributes, &input.step)?);
+    }
+    if all.is_empty() {
+        let text = format!("'{}' holds no zone: no ply bends", steps.join(", "));
+        host.log(Log::Info, &text);
+    }
+    Ok(all)
+}
+
+/// Tells how much of the plies bends, where that is not everything.
+///
+/// # Errors
+/// When there are zones and no element lies in any.
+fn tell_bending(host: &Host, forming: &Forming, p: &Parameters) -> Result<(), StepError> {
+    let bending = |b: &Body| forming.model.bending_cells(b.sheet);
+    let mixed = || forming.bodies.iter().filter_map(|b| Some((b, bending(b)?)));
+    for (body, [cells, all]) in mixed() {
+        let text = format!(
+            "ply '{}': {cells} of {all} elements lie in zones and bend",
+            body.name
+        );
+        host.log(Log::Info, &text);
+    }
+    if !p.bending_zones.is_empty() && mixed().all(|(_, [cells, _])| cells == 0) {
+        return Err(
+            "zones: given, but no element of a ply has its centre in one; expected zones of this scene, not smaller than \
+             `element_size`"
+                .into(),
+        );
+    }
+    Ok(())
 }
 
 /// Tells the meshes of the tool and of a press's parts.
@@ -107,6 +176,7 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         let (time, sheets) = read_motion(host, input)?;
         crate::local::feed_back(&mut forming, Feedback { time, sheets })?;
     }
+    tell_bending(host, &forming, p)?;
     let mut fields = Vec::new();
     for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
         let film = sheet.scene.kind == SheetKind::Diaphragm;
@@ -118,6 +188,11 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         let found = host.component(PF_KIND_ELEMENT, &choice.plugin)?;
         let manifest = unsafe { found.manifest.as_str() }.unwrap_or("{}");
         let mut list = element_fields(manifest);
+        if let Some(other) = p.element_elsewhere.as_ref().filter(|_| !film) {
+            let found = host.component(PF_KIND_ELEMENT, &other.plugin)?;
+            let others = element_fields(unsafe { found.manifest.as_str() }.unwrap_or("{}"));
+            list.iter_mut().for_each(|f| f.find_elsewhere(&others));
+        }
         if film {
             list.retain(|f| f.name == "principal_stretch");
         } else {
@@ -346,6 +421,10 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value>
                 "added_mass": forming.copies() * forming.model.sheets[body.sheet].added_mass,
                 "element": choice.plugin,
             });
+            if let Some([cells, _]) = forming.model.bending_cells(body.sheet) {
+                value["element_elsewhere"] = json!(p.element_elsewhere.as_ref().map(|e| &e.plugin));
+                value["bending_elements"] = json!(forming.model.planes().copies() * cells);
+            }
             if let Ok(blank) = crate::assembly::blank(s) {
                 value["fibre_1"] = s.scene.fibre_1.si().into();
                 value["fibre_2"] = s

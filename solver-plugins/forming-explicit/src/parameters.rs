@@ -1,5 +1,6 @@
 //! The resolved parameters.
 
+use crate::elements::Rectangle;
 use crate::run::Control;
 use plyflow_model::scene::Scene;
 use serde::Deserialize;
@@ -21,6 +22,12 @@ pub struct Parameters {
     pub scene: Scene,
     /// Element of the plies.
     pub element: ComponentChoice,
+    /// Their element outside of `bending_zones`; `None`: all of them have `element`.
+    #[serde(default)]
+    pub element_elsewhere: Option<ComponentChoice>,
+    /// Where plies have `element` if they have another one elsewhere: boxes in the undeformed plane (m), from the input `zones`.
+    #[serde(skip)]
+    pub bending_zones: Vec<Rectangle>,
     /// Element of the diaphragms.
     pub diaphragm_element: ComponentChoice,
     /// Ply element edge (m).

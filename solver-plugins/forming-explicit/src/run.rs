@@ -252,7 +252,7 @@ impl Forming {
             if f.patch {
                 self.model.patch_field(body.sheet, f.row)
             } else {
-                self.model.cell_field(body.sheet, f.row)
+                self.model.mixed_cell_field(body.sheet, f.row, f.elsewhere)
             }
         };
         match &body.mirrored {

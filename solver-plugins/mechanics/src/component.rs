@@ -20,6 +20,16 @@ pub struct ElementField {
     pub patch: bool,
     /// Its row among the fields of cells, or of patches.
     pub row: usize,
+    /// Of a sheet with two elements: its row among the cells' fields of the other one, if that has it.
+    pub elsewhere: Option<usize>,
+}
+
+impl ElementField {
+    /// Finds the row of a cells' field in the sheet's other element, which has the fields `others`.
+    pub fn find_elsewhere(&mut self, others: &[Self]) {
+        let same = |f: &&Self| !f.patch && !self.patch && f.name == self.name;
+        self.elsewhere = others.iter().find(same).map(|f| f.row);
+    }
 }
 
 /// The fields that an element's manifest declares, in the order of their rows; none when it is no JSON.
@@ -39,6 +49,7 @@ pub fn element_fields(manifest: &str) -> Vec<ElementField> {
                 unit: f["unit"].as_str().unwrap_or("1").into(),
                 patch,
                 row: *count - 1,
+                elsewhere: None,
             }
         })
         .collect()

@@ -95,6 +95,17 @@ pub struct SheetSpec {
     pub least_areal_mass: Vec<f64>,
     /// The element formulation with its material.
     pub element: ElementInstance,
+    /// What takes its place in some cells, if anything does.
+    pub elsewhere: Option<Elsewhere>,
+}
+
+/// A membrane that some cells of a sheet have instead of the sheet's element. Neither patches nor rotations belong to it: the
+/// sheet's element ends at its cells as at a free edge, so the line between transmits forces and no moments.
+pub struct Elsewhere {
+    /// A formulation without patches and with three degrees of freedom per node, for the same material.
+    pub element: ElementInstance,
+    /// `[m]` whether a cell has it.
+    pub cells: Vec<bool>,
 }
 
 /// A sheet inside a model.
@@ -111,16 +122,31 @@ pub struct Sheet {
     pub patch_range: (usize, usize),
     /// The element formulation.
     pub element: ElementInstance,
+    /// That of the batches that are marked so ([`Elsewhere`]).
+    pub elsewhere: Option<ElementInstance>,
     /// Thickness (m).
     pub thickness: f64,
     /// Mass by mass scaling (kg).
     pub added_mass: f64,
 }
 
+impl Sheet {
+    /// The formulation of a batch.
+    #[inline]
+    pub fn element_of(&self, batch: &Batch) -> &ElementInstance {
+        match &self.elsewhere {
+            Some(element) if batch.elsewhere => element,
+            _ => &self.element,
+        }
+    }
+}
+
 /// [`LANES`] elements of one sheet.
 pub struct Batch {
     /// Index of the sheet.
     pub sheet: u32,
+    /// Whether they have the sheet's other formulation ([`Elsewhere`]).
+    pub elsewhere: bool,
     /// Elements that count; the rest repeat the last.
     pub count: u32,
     /// Model nodes by corner and lane.
@@ -172,7 +198,11 @@ pub struct PatchBatch {
 }
 
 /// A batch view with everything null.
-pub(crate) fn empty_element_batch(sheet: &Sheet, dt: f64, position: &[f64]) -> pf_element_batch {
+pub(crate) fn empty_element_batch(
+    element: &ElementInstance,
+    dt: f64,
+    position: &[f64],
+) -> pf_element_batch {
     let null = std::ptr::null_mut();
     pf_element_batch {
         size: size_of::<pf_element_batch>() as u64,
@@ -193,7 +223,7 @@ pub(crate) fn empty_element_batch(sheet: &Sheet, dt: f64, position: &[f64]) -> p
         mass: null,
         inertia: null,
         critical_step: null,
-        material: sheet.element.material.reference().raw(),
+        material: element.material.reference().raw(),
     }
 }
 

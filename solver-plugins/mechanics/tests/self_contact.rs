@@ -53,6 +53,7 @@ impl Strip {
             layers: vec![1.0; mesh.cells.len()],
             least_areal_mass: vec![0.0; mesh.cells.len()],
             element: self.element,
+            elsewhere: None,
         };
         let settings = StepSettings {
             target_step: 5e-6,

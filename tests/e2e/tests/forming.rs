@@ -226,6 +226,59 @@ fn a_run_killed_while_it_forms_goes_on_from_its_checkpoint_to_the_same_bytes() {
     );
 }
 
+/// The coarse run's zones, and one run of the whole `with` something, from `from`.
+fn one_model(from: &str, with: &str) -> String {
+    let chain = chain(TWO_ZONES);
+    let zones = &chain[..chain.find("  boundary:").expect("a step")];
+    format!(
+        "{zones}  one_model:\n    plugin: forming-explicit\n    from: {{{from}}}\n    with: \
+         {{scene: scene.yaml, element: rf4, {with} element_size: 10 mm, time_step: 4 us, frames: 20, tool_grid: 5 mm}}\n"
+    )
+}
+
+#[test]
+fn a_whole_that_bends_in_zones_goes_on_after_a_kill_to_the_same_bytes_on_another_number_of_cores() {
+    let wanted = one_model("zones: zones", "element_elsewhere: m4,");
+    let (undisturbed, killed) = (study("[]"), study("[]"));
+    undisturbed.write(&wanted);
+    assert_eq!(undisturbed.run(&["--jobs", "1"]), well(4, 0));
+    killed.write(&wanted);
+    let mut engine = killed.start(&["--checkpoint-every", "0 s", "--jobs", "1"]);
+    let has = |i: &String| i.starts_with("one_model");
+    wait_for("a checkpoint", || checkpoints(&killed).iter().any(has));
+    engine.kill().unwrap();
+    engine.wait().unwrap();
+    wait_for("the workers' end", || workers_of(engine.id()) == 0);
+    let mut engine = killed.start(&["--jobs", "2"]);
+    assert!(engine.wait().unwrap().success());
+    let log = killed.log();
+    assert!(log.contains("goes on from a checkpoint at t = "), "{log}");
+    assert!(undisturbed.artifacts() == killed.artifacts(), "they differ");
+}
+
+#[test]
+fn zones_and_the_element_elsewhere_are_refused_without_each_other() {
+    for (from, with, text) in [
+        (
+            "zones: zones",
+            "",
+            "zones: given 'zones', but no `element_elsewhere`",
+        ),
+        (
+            "",
+            "element_elsewhere: m4,",
+            "element_elsewhere: given 'm4', but no `zones`",
+        ),
+    ] {
+        let study = study("[]");
+        study.write(&one_model(from, with));
+        let mut engine = study.start(&[]);
+        assert!(!engine.wait().unwrap().success());
+        let log = study.log();
+        assert!(log.contains(text), "{log}");
+    }
+}
+
 #[test]
 fn a_torn_checkpoint_is_not_taken_up() {
     let study = study("[]");

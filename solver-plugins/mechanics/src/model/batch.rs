@@ -161,33 +161,33 @@ pub(super) struct Motion<'a> {
 
 /// Forces of a batch into `work`; cell areas too where they are needed.
 pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Workspace) {
-    let sheet = &present.sheets[batch.sheet as usize];
+    let element = present.sheets[batch.sheet as usize].element_of(batch);
     let motion = present.motion;
     gather(&batch.nodes, motion.x, &mut work.position.0);
     if !batch.pressed.is_empty() || present.areas {
         cell_areas_dispatch(&work.position.0, &mut work.area.0);
     }
-    let mut raw = empty_element_batch(sheet, motion.dt, &work.position.0);
+    let mut raw = empty_element_batch(element, motion.dt, &work.position.0);
     raw.constants = batch.constants.as_ptr().cast_mut();
     raw.history = batch.history.as_mut_ptr();
     raw.material_history = batch.material_history.as_mut_ptr();
     raw.force = work.force.0.as_mut_ptr();
     raw.energy = work.energy.0.as_mut_ptr();
     if present.fields {
-        batch.fields = Aligned::zeros(sheet.element.sizes.fields * LANES);
+        batch.fields = Aligned::zeros(element.sizes.fields * LANES);
         raw.fields = batch.fields.as_mut_ptr();
     }
-    if sheet.element.rotates() {
+    if element.rotates() {
         gather(&batch.nodes, motion.spin, &mut work.rates.spin.0);
         work.rates.attach(&mut raw);
-        if sheet.element.sizes.ignores_velocity {
+        if element.sizes.ignores_velocity {
             raw.velocity = std::ptr::null();
         } else {
             gather(&batch.nodes, motion.v, &mut work.rates.velocity.0);
         }
         raw.moment = work.moment.0.as_mut_ptr();
     }
-    batch.status = sheet.element.forces(&raw);
+    batch.status = element.forces(&raw);
     if !batch.layers.is_empty() {
         let rows = work.force.0.chunks_exact_mut(LANES);
         for row in rows
@@ -285,8 +285,9 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<
     let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
     let mut step = Aligned::zeros(LANES);
     let rates = Rates::zero();
-    let mut raw = empty_element_batch(sheet, 0.0, &position.0);
-    if sheet.element.rotates() {
+    let element = sheet.element_of(batch);
+    let mut raw = empty_element_batch(element, 0.0, &position.0);
+    if element.rotates() {
         rates.attach(&mut raw);
         raw.moment = moment.as_mut_ptr();
     }
@@ -296,7 +297,7 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<
     raw.force = force.as_mut_ptr();
     raw.energy = energy.as_mut_ptr();
     raw.critical_step = step.as_mut_ptr();
-    if sheet.element.forces(&raw) != PF_OK {
+    if element.forces(&raw) != PF_OK {
         return vec![0.0; batch.count as usize];
     }
     (0..batch.count as usize)

@@ -254,7 +254,8 @@ fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>, wor
         }
         let (places, count) = (&batch.places, batch.count as usize);
         scatter_all(places, count, &work.force.0, true, part.force);
-        if present.sheets[batch.sheet as usize].element.rotates() {
+        let sheet = &present.sheets[batch.sheet as usize];
+        if sheet.element_of(batch).rotates() {
             scatter_all(places, count, &work.moment.0, true, part.moment);
         }
         if !batch.pressed.is_empty() {

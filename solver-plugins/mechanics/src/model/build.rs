@@ -1,7 +1,6 @@
-//! Building a model: sheets, batches, masses, contact stiffness.
+//! Building a model: sheets, batches, masses.
 
 use super::*;
-use crate::contact::SlaveItem;
 use crate::mesh::Patch;
 use crate::mirror::{Mirrors, mirrored_in};
 use std::sync::Arc;
@@ -112,7 +111,8 @@ impl Model {
             .extend(neighbours.into_iter().map(|e| e.map(shift)));
         let material = spec.element.material.reference().sizes();
         let s = spec.element.sizes;
-        let rotates = s.dofs_per_node == 6;
+        let rotates = spec.element.rotates();
+        check_elsewhere(&spec)?;
         let centres: Vec<V> = cells
             .iter()
             .map(|c| {
@@ -122,12 +122,13 @@ impl Model {
                 )
             })
             .collect();
-        let order = compact_order(&centres, BLOCK * LANES);
+        let orders = orders(&spec, &centres);
         self.cell_place
             .resize(cell0 + cells.len(), CellPlace::default());
         let pressed = |c: usize| matches!(spec.pressed[c], Pressed::Below | Pressed::Both);
         self.pressed_below.extend((0..cells.len()).map(pressed));
-        for group in order.chunks(BLOCK * LANES) {
+        let groups = (orders.iter()).flat_map(|(e, o)| o.chunks(BLOCK * LANES).map(|g| (*e, g)));
+        for (elsewhere, group) in groups {
             let used = group.iter().flat_map(|c| cells[*c as usize]);
             let mut block = Block::new(used);
             for (b, chunk) in group.chunks(LANES).enumerate() {
@@ -138,7 +139,8 @@ impl Model {
                         lane: l as u16,
                     };
                 }
-                let batch = element_batch(sheet_index, &spec, &cells, chunk, &block);
+                let of = (sheet_index, elsewhere);
+                let batch = element_batch(of, &spec, &cells, chunk, &block);
                 block.batches.push(batch);
             }
             self.blocks.push(block);
@@ -159,11 +161,12 @@ impl Model {
             thickness: material.thickness,
             added_mass: 0.0,
             element: spec.element,
+            elsewhere: spec.elsewhere.map(|e| e.element),
         };
         self.initialise(
             &mut sheet,
             spec.axis,
-            &order,
+            &orders,
             &spec.least_areal_mass,
             material.areal_mass,
         )?;
@@ -279,7 +282,7 @@ impl Model {
         &mut self,
         sheet: &mut Sheet,
         axis: V,
-        order: &[u32],
+        orders: &[(bool, Vec<u32>)],
         least: &[f64],
         areal_mass: f64,
     ) -> Result<(), MechanicsError> {
@@ -295,10 +298,13 @@ impl Model {
         let blocks = &mut self.blocks[sheet.block_range.0..sheet.block_range.1];
         let batches = blocks.iter_mut().flat_map(|b| &mut b.batches);
         let mut shared = Shared::default();
-        for (batch, cells) in batches.zip(order.chunks(LANES)) {
+        let cells = orders.iter().flat_map(|(_, order)| order.chunks(LANES));
+        let mut added_mass = 0.0;
+        for (batch, cells) in batches.zip(cells) {
+            let element = sheet.element_of(batch);
             gather(&batch.nodes, &self.x, &mut position);
-            let mut constants = Aligned::zeros(sheet.element.sizes.constants * LANES);
-            let mut raw = empty_element_batch(sheet, 0.0, &position);
+            let mut constants = Aligned::zeros(element.sizes.constants * LANES);
+            let mut raw = empty_element_batch(element, 0.0, &position);
             raw.axis = axis.as_ptr();
             raw.constants = constants.as_mut_ptr();
             raw.history = batch.history.as_mut_ptr();
@@ -306,21 +312,21 @@ impl Model {
             mass.fill(0.0);
             inertia.fill(0.0);
             raw.mass = mass.as_mut_ptr();
-            if sheet.element.rotates() {
+            if element.rotates() {
                 raw.inertia = inertia.as_mut_ptr();
             }
-            component_status(sheet.element.initialise(&raw), &sheet.name)?;
+            component_status(element.initialise(&raw), &sheet.name)?;
             raw.axis = std::ptr::null();
             raw.mass = std::ptr::null_mut();
             raw.inertia = std::ptr::null_mut();
-            if sheet.element.rotates() {
+            if element.rotates() {
                 rates.attach(&mut raw);
                 raw.moment = moment.as_mut_ptr();
             }
             raw.force = force.as_mut_ptr();
             raw.energy = energy.as_mut_ptr();
             raw.critical_step = step.as_mut_ptr();
-            component_status(sheet.element.forces(&raw), &sheet.name)?;
+            component_status(element.forces(&raw), &sheet.name)?;
             batch.constants = shared.keep(constants);
             let batch_layers = std::mem::take(&mut batch.layers);
             let layers = |l: usize| batch_layers.get(l).copied().unwrap_or(1.0);
@@ -345,11 +351,11 @@ impl Model {
                     self.mass[node] += own * factor;
                     self.own_mass[node] += own;
                     if let Some(r) = self.rotations.as_deref_mut()
-                        && sheet.element.rotates()
+                        && element.rotates()
                     {
                         r.inertia[node] += inertia[k * LANES + l] * layers(l) * factor;
                     }
-                    sheet.added_mass += own * (factor - 1.0);
+                    added_mass += own * (factor - 1.0);
                 }
             }
             batch.layers = batch_layers;
@@ -357,6 +363,7 @@ impl Model {
                 batch.mass_factor = factors.to_vec();
             }
         }
+        sheet.added_mass = added_mass;
         Ok(())
     }
 
@@ -406,166 +413,63 @@ impl Model {
         self.anchors = Anchors::default();
         self.set_free_masses();
     }
-
-    /// Sets stiffness and damping of all contacts from the masses that they couple, and bounds the
-    /// assembled stiffness of every node: 2 sum(k) dt^2 / m stays below `2 * 0.7`, which leaves the rest of
-    /// the stability bound 4 to the elements.
-    pub fn set_contact_stiffness(&mut self, c: &ContactSettings) {
-        let dt2 = self.settings.target_step.powi(2);
-        let mass = &self.mass;
-        // Of the whole node where a mirror plane cuts it, so that contacts there are as stiff as in the whole model.
-        let mirroring = &self.mirroring;
-        let reduced = |node: u32, cell: [u32; 4]| {
-            let whole = |n: u32| mass[n as usize] / mirroring.share(n);
-            let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
-            mirroring.share(node) / (1.0 / whole(node) + 1.0 / lightest)
-        };
-        let augmentation = c
-            .augmentation
-            .min(c.largest_augmentation(self.mass_ratio()));
-        let mut row = vec![0.0; mass.len()];
-        for contact in &mut self.rigid_contacts {
-            contact.augmentation = augmentation;
-            for item in &mut contact.items {
-                item.stiffness = c.stiffness_factor * mass[item.node as usize] / dt2;
-                row[item.node as usize] += item.stiffness;
-            }
-        }
-        for contact in &mut self.sheet_contacts {
-            contact.augmentation = augmentation;
-            for item in contact
-                .items
-                .iter_mut()
-                .filter(|i| i.cell != crate::mesh::NONE)
-            {
-                let nodes = self.cells[item.cell as usize];
-                item.stiffness = c.stiffness_factor * reduced(item.node, nodes) / dt2;
-                row[item.node as usize] += item.stiffness;
-                for (k, n) in nodes.iter().enumerate() {
-                    row[*n as usize] += item.weights()[k] * item.stiffness;
-                }
-            }
-        }
-        let limit: Vec<f64> = row
-            .iter()
-            .zip(mass)
-            .map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0))
-            .collect();
-        for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
-            let m = mass[item.node as usize];
-            item.stiffness *= limit[item.node as usize];
-            item.damping = 2.0 * c.damping_ratio * (item.stiffness * m).sqrt();
-        }
-        for item in self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items) {
-            if item.cell == crate::mesh::NONE {
-                continue;
-            }
-            let nodes = self.cells[item.cell as usize];
-            let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
-            item.stiffness *= least.min(limit[item.node as usize]);
-            let reduced = reduced(item.node, nodes);
-            item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
-        }
-        self.bound_contact_damping();
-        self.set_contact_room();
-    }
-
-    /// The least share that the heaviest node of the lighter one of two sheets in contact has of the other's.
-    fn mass_ratio(&self) -> f64 {
-        let heaviest = |nodes: &mut dyn Iterator<Item = u32>| {
-            let masses = nodes.map(|n| self.mass[n as usize]);
-            masses.fold(0.0, f64::max)
-        };
-        let of_contact = |contact: &SheetContact| {
-            let items = || contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
-            let slave = heaviest(&mut items().map(|i| i.node));
-            let master = heaviest(&mut items().flat_map(|i| self.cells[i.cell as usize]));
-            (slave.min(master) > 0.0).then(|| slave.min(master) / slave.max(master))
-        };
-        let ratios = self.sheet_contacts.iter().filter_map(of_contact);
-        ratios.fold(1.0, f64::min)
-    }
-
-    /// Bounds the assembled damping of every node. The damper's force is that of the velocity half a step ago,
-    /// so that an oscillator is stable while `k dt^2 / m + 2 c dt / m < 4`. The contacts' stiffness takes
-    /// up to 1.4 of that ([`Model::set_contact_stiffness`]), their damping gets the rest: by Gershgorin's
-    /// theorem `2 sum(c) dt / m` stays below 2.6, where a damper between two sheets counts twice. (Elements take
-    /// nearly all of it along the fibres, but next to nothing across a thin sheet; along it dampers are weaker
-    /// by `slip_factor`.)
-    fn bound_contact_damping(&mut self) {
-        const BOUND: f64 = 0.5 * (4.0 - 1.4);
-        let dt = self.settings.target_step;
-        let mut row = vec![0.0; self.mass.len()];
-        for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
-            row[item.node as usize] += item.damping;
-        }
-        let on_sheets = |i: &&mut SlaveItem| i.cell != crate::mesh::NONE;
-        let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
-        for item in sheets.filter(on_sheets) {
-            row[item.node as usize] += 2.0 * item.damping;
-            for (k, n) in self.cells[item.cell as usize].iter().enumerate() {
-                row[*n as usize] += 2.0 * item.weights()[k] * item.damping;
-            }
-        }
-        let of = row.iter().zip(&self.mass);
-        let limit: Vec<f64> = of
-            .map(|(r, m)| (BOUND * m / (dt * r.max(1e-300))).min(1.0))
-            .collect();
-        for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
-            item.damping *= limit[item.node as usize];
-        }
-        let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
-        for item in sheets.filter(on_sheets) {
-            let nodes = self.cells[item.cell as usize];
-            let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
-            item.damping *= least.min(limit[item.node as usize]);
-        }
-    }
-
-    /// Adds the contact of a sheet with itself. `undeformed`: the model's points (m) with the sheet flat; what
-    /// is near in it does not touch. The other contacts' stiffness is set, or comes to be set, by
-    /// [`Model::set_contact_stiffness`].
-    pub fn add_self_contact(&mut self, spec: FoldSpec<'_>, c: &ContactSettings) {
-        let contact = SelfContact::new(spec, &self.cells, *c);
-        self.self_contacts.push(contact);
-        self.set_contact_room();
-    }
-
-    /// What the other contacts leave of `sum(rigid k) + 2 sum(sheet k) < 2 * 0.7 m / dt^2`: a rigid surface does not
-    /// move, so its springs count once. Where they leave little, a node gets a small share all the same: it does
-    /// not touch everything at once.
-    fn set_contact_room(&mut self) {
-        if self.self_contacts.is_empty() {
-            return;
-        }
-        let dt2 = self.settings.target_step.powi(2);
-        let mut used = vec![0.0; self.mass.len()];
-        for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
-            used[item.node as usize] += 0.5 * item.stiffness;
-        }
-        for item in self.sheet_contacts.iter().flat_map(|c| &c.items) {
-            if item.cell != crate::mesh::NONE {
-                used[item.node as usize] += item.stiffness;
-                for (w, n) in item.weights().iter().zip(self.cells[item.cell as usize]) {
-                    used[n as usize] += w.max(0.0) * item.stiffness;
-                }
-            }
-        }
-        let left = |(u, m): (&f64, &f64)| (0.7 * m / dt2 - u).max(0.1 * m / dt2);
-        self.contact_room = used.iter().zip(&self.mass).map(left).collect();
-    }
 }
 
-/// A batch of the cells `chunk` of a sheet; `cells` in model nodes.
+/// The cells of a sheet by formulation (whether the one of [`Elsewhere`]), each group of them in an order of its own: a block
+/// has elements of one kind, and membranes cost what membranes cost.
+fn orders(spec: &SheetSpec, centres: &[V]) -> Vec<(bool, Vec<u32>)> {
+    let kinds: &[bool] = match &spec.elsewhere {
+        None => &[false],
+        Some(_) => &[false, true],
+    };
+    let is = |c: usize| spec.elsewhere.as_ref().is_some_and(|e| e.cells[c]);
+    let order = |kind: &bool| {
+        let own: Vec<u32> = (0..centres.len() as u32)
+            .filter(|c| is(*c as usize) == *kind)
+            .collect();
+        let places: Vec<V> = own.iter().map(|c| centres[*c as usize]).collect();
+        let order = compact_order(&places, BLOCK * LANES);
+        (*kind, order.iter().map(|k| own[*k as usize]).collect())
+    };
+    kinds.iter().map(order).collect()
+}
+
+/// Whether the element of [`Elsewhere`] is a membrane, and told for every cell.
+fn check_elsewhere(spec: &SheetSpec) -> Result<(), MechanicsError> {
+    let Some(e) = &spec.elsewhere else {
+        return Ok(());
+    };
+    if e.cells.len() != spec.cells.len() {
+        return Err(MechanicsError::Input(format!(
+            "sheet '{}': which of its two elements a cell has is told for {} cells; it has {}",
+            spec.name,
+            e.cells.len(),
+            spec.cells.len()
+        )));
+    }
+    if e.element.rotates() || e.element.sizes.patch_nodes > 0 {
+        return Err(MechanicsError::Input(format!(
+            "sheet '{}': the element beside its own must be a membrane (three degrees of freedom per node, no patches), such as m4",
+            spec.name
+        )));
+    }
+    Ok(())
+}
+
+/// A batch of the cells `chunk` of a sheet, with its element or the one of [`Elsewhere`]; `cells` in model nodes.
 fn element_batch(
-    sheet: u32,
+    (sheet, elsewhere): (u32, bool),
     spec: &SheetSpec,
     cells: &[[u32; 4]],
     chunk: &[u32],
     block: &Block<Batch>,
 ) -> Batch {
-    let s = spec.element.sizes;
-    let membrane_history = spec.element.material.reference().sizes().membrane_history;
+    let element = match &spec.elsewhere {
+        Some(e) if elsewhere => &e.element,
+        _ => &spec.element,
+    };
+    let s = element.sizes;
+    let membrane_history = element.material.reference().sizes().membrane_history;
     // Lanes beyond the last element repeat it.
     let cell = |l: usize| chunk[l.min(chunk.len() - 1)] as usize;
     let nodes: [[u32; LANES]; 4] =
@@ -581,6 +485,7 @@ fn element_batch(
     let is_pressed = (0..LANES).any(|l| shares(l) != [0.0; 2]);
     Batch {
         sheet,
+        elsewhere,
         count: chunk.len() as u32,
         places: nodes.map(|n| n.map(|n| block.place(n))),
         nodes,

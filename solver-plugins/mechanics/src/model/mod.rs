@@ -10,6 +10,7 @@ mod hold;
 mod mirror;
 mod query;
 mod rotation;
+mod stiffness;
 mod support;
 mod transpose;
 

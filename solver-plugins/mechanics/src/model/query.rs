@@ -142,15 +142,32 @@ impl Model {
 
     /// Row `index` of the element fields of a sheet, per cell. Needs a step with `fields`.
     pub fn cell_field(&self, sheet: usize, index: usize) -> Vec<f64> {
+        self.mixed_cell_field(sheet, index, Some(index))
+    }
+
+    /// The same of a sheet with two elements, in one of which ([`Elsewhere`](crate::sheet::Elsewhere)) the field has another row, or none: then
+    /// it is 0 there.
+    pub fn mixed_cell_field(
+        &self,
+        sheet: usize,
+        index: usize,
+        elsewhere: Option<usize>,
+    ) -> Vec<f64> {
         let (c0, c1) = self.sheets[sheet].cell_range;
         let of = |at: &CellPlace| {
             let batch = &self.blocks[at.block as usize].batches[usize::from(at.batch)];
-            batch.fields[index * LANES + usize::from(at.lane)]
+            let row = if batch.elsewhere {
+                elsewhere
+            } else {
+                Some(index)
+            };
+            row.map_or(0.0, |r| batch.fields[r * LANES + usize::from(at.lane)])
         };
         self.cell_place[c0..c1].iter().map(of).collect()
     }
 
-    /// Row `index` of the patch fields of a sheet, per mesh-local node (0 where there is no patch).
+    /// Row `index` of the patch fields of a sheet, per mesh-local node (0 where there is no patch: at its edge and within
+    /// [`Elsewhere`](crate::sheet::Elsewhere)).
     pub fn patch_field(&self, sheet: usize, index: usize) -> Vec<f64> {
         let (b0, b1) = self.sheets[sheet].patch_range;
         let mut values = vec![0.0; self.sheets[sheet].nodes.len()];
@@ -160,6 +177,16 @@ impl Model {
             }
         }
         values
+    }
+
+    /// Of a sheet with two elements: how many cells have its own one, and how many there are.
+    pub fn bending_cells(&self, sheet: usize) -> Option<[usize; 2]> {
+        let sheet = &self.sheets[sheet];
+        sheet.elsewhere.as_ref()?;
+        let blocks = &self.blocks[sheet.block_range.0..sheet.block_range.1];
+        let batches = blocks.iter().flat_map(|b| &b.batches);
+        let own = batches.filter(|b| !b.elsewhere).map(|b| b.count as usize);
+        Some([own.sum(), sheet.cell_range.1 - sheet.cell_range.0])
     }
 
     /// Number of elements.

@@ -77,5 +77,6 @@ pub fn sheet(name: &str, mesh: &QuadMesh, first: u32, element: ElementInstance) 
         pressed: vec![Pressed::No; m],
         least_areal_mass: vec![0.0; m],
         element,
+        elsewhere: None,
     }
 }

@@ -1,0 +1,194 @@
+//! Which element a cell has: those of sheets, their node patches, and membranes beside the zones in which plies bend.
+
+use crate::assembly::{Components, StackSheet};
+use crate::parameters::{ComponentChoice, Parameters};
+use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
+use plyflow_mechanics::mesh::{Patch, QuadMesh};
+use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, part_patches, reflect};
+use plyflow_mechanics::sheet::Elsewhere;
+use plyflow_mechanics::vec3::V;
+use serde_json::Value;
+use std::sync::Arc;
+
+/// A zone's box in the undeformed plane: x0, y0, x1, y1 (m).
+pub type Rectangle = [f64; 4];
+
+/// Makes the element of a sheet with its material.
+///
+/// # Errors
+/// The component's own text.
+pub fn element(
+    components: &dyn Components,
+    sheet: &StackSheet,
+    choice: &ComponentChoice,
+) -> Result<ElementInstance, String> {
+    of_material(components, sheet, choice, material(components, sheet)?)
+}
+
+/// Makes the material of a sheet.
+fn material(
+    components: &dyn Components,
+    sheet: &StackSheet,
+) -> Result<Arc<MaterialInstance>, String> {
+    let mut with = serde_json::Value::Object(sheet.material.with.clone());
+    with["thickness"] = sheet.thickness.into();
+    with["areal_mass"] = sheet.material.areal_mass.si().into();
+    let what = format!(
+        "material '{}' of sheet '{}'",
+        sheet.material.name, sheet.scene.name
+    );
+    let found = components.material(&sheet.material.plugin)?;
+    unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }.map_err(|e| e.to_string())
+}
+
+/// Makes the element of a sheet for its material.
+fn of_material(
+    components: &dyn Components,
+    sheet: &StackSheet,
+    choice: &ComponentChoice,
+    material: Arc<MaterialInstance>,
+) -> Result<ElementInstance, String> {
+    let what = format!(
+        "element '{}' of sheet '{}'",
+        choice.plugin, sheet.scene.name
+    );
+    let found = components.element(&choice.plugin)?;
+    let parameters = if choice.with.is_null() {
+        "{}".into()
+    } else {
+        choice.with.to_string()
+    };
+    unsafe { ElementInstance::create(&found, &parameters, material, &what) }
+        .map_err(|e| e.to_string())
+}
+
+/// The boxes of the zones of an artifact (`from`: its step), from its attributes.
+///
+/// # Errors
+/// When they are not those of zones.
+pub fn boxes(attributes: &Value, from: &str) -> Result<Vec<Rectangle>, String> {
+    let zones = attributes["zones"].as_array();
+    let zones = zones.ok_or_else(|| format!("'{from}' holds no list of zones"))?;
+    let of = |zone: &Value| {
+        serde_json::from_value(zone["box"].clone())
+            .map_err(|e| format!("the box of zone {} of '{from}': {e}", zone["name"]))
+    };
+    zones.iter().map(of).collect()
+}
+
+/// Whether a place of the undeformed plane or, with mirror planes, one of its images lies in a zone: so what is computed
+/// beside a plane is what its other side would be.
+fn is_in(zones: &[Rectangle], at: V, planes: Planes) -> bool {
+    planes.images().iter().any(|image| {
+        let [x, y, _] = reflect(at, *image);
+        let holds = |b: &Rectangle| x >= b[0] && x <= b[2] && y >= b[1] && y <= b[3];
+        zones.iter().any(holds)
+    })
+}
+
+/// The membranes of a ply whose `element` is for the zones alone: where the centres of its cells lie in none. `None` for a
+/// run whose plies have one element.
+///
+/// # Errors
+/// A text for the user: an element in the zones that does not bend, or one elsewhere that does.
+pub fn elsewhere(
+    components: &dyn Components,
+    sheet: &StackSheet,
+    element: &ElementInstance,
+    mesh: &QuadMesh,
+    planes: Planes,
+    p: &Parameters,
+) -> Result<Option<Elsewhere>, String> {
+    let Some(choice) = &p.element_elsewhere else {
+        return Ok(None);
+    };
+    let bends = |e: &ElementInstance| e.sizes.patch_nodes > 0 || e.rotates();
+    if !bends(element) {
+        return Err(format!(
+            "element: given '{}', a membrane, for the plies in the zones; expected an element that bends, such as rf4, beside \
+             `element_elsewhere`",
+            p.element.plugin
+        ));
+    }
+    let other = of_material(components, sheet, choice, element.material.clone())?;
+    if bends(&other) {
+        return Err(format!(
+            "element_elsewhere: given '{}', which bends; expected a membrane, such as m4. For plies that bend everywhere \
+             leave out `element_elsewhere` and `zones`",
+            choice.plugin
+        ));
+    }
+    let centre = |c: &[u32; 4]| -> V {
+        let corners = c.map(|n| mesh.points[n as usize]);
+        [0, 1, 2].map(|k| 0.25 * corners.iter().map(|x| x[k]).sum::<f64>())
+    };
+    let cells = mesh.cells.iter();
+    let is_elsewhere = cells.map(|c| !is_in(&p.bending_zones, centre(c), planes));
+    Ok(Some(Elsewhere {
+        element: other,
+        cells: is_elsewhere.collect(),
+    }))
+}
+
+/// The part of a mesh, with all of its points, whose cells have the sheet's own element. Patches that are made of it end at
+/// its outline as at a free edge, as they do at the cut of a zone that is run by itself.
+pub fn bending_part(mesh: &QuadMesh, elsewhere: Option<&Elsewhere>) -> QuadMesh {
+    let Some(elsewhere) = elsewhere else {
+        return mesh.clone();
+    };
+    let cells = mesh.cells.iter().zip(&elsewhere.cells);
+    QuadMesh {
+        points: mesh.points.clone(),
+        cells: cells.filter(|c| !c.1).map(|c| *c.0).collect(),
+    }
+}
+
+/// Node patches of a sheet's mesh whose nodes have the numbers `nodes`, for its element. Ghosts beyond mirror planes are
+/// added to the points, to `nodes` and to `mirrors`.
+pub fn patches(
+    points: &mut Vec<V>,
+    nodes: &mut Vec<u32>,
+    mesh: &QuadMesh,
+    element: &ElementInstance,
+    mirrors: &mut Mirrors,
+) -> Vec<Patch> {
+    let most = element.sizes.patch_nodes;
+    if most == 0 || !element.material.reference().sizes().has_bending {
+        return Vec::new();
+    }
+    let (patches, ghosts) = part_patches(mesh, mirrors.planes, most);
+    for ghost in ghosts {
+        let (of, node) = (nodes[ghost.of as usize], points.len() as u32);
+        points.push(reflect(points[of as usize], ghost.image));
+        nodes.push(node);
+        mirrors.ghosts.push(Ghost { node, of, ..ghost });
+    }
+    patches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_place_counts_as_in_a_zone_with_its_mirror_images() {
+        let zones = [[0.01, 0.02, 0.03, 0.04], [-0.09, 0.0, -0.08, 0.01]];
+        let is = |x: f64, y: f64, planes: [bool; 2]| is_in(&zones, [x, y, 0.0], Planes(planes));
+        assert!(is(0.02, 0.03, [false; 2]) && is(0.01, 0.04, [false; 2]));
+        assert!(!is(0.02, 0.019, [false; 2]) && !is(0.085, 0.005, [false; 2]));
+        assert!(is(0.085, 0.005, [true, false]) && !is(0.085, 0.005, [false, true]));
+        assert!(!is_in(&[], [0.0; 3], Planes::default()));
+    }
+
+    #[test]
+    fn boxes_are_those_of_the_artifact_and_others_are_refused() {
+        let zone = |b: Value| json!({"zones": [{"name": "A", "box": b}]});
+        let read = boxes(&zone(json!([0.0, 0.1, 0.2, 0.3])), "zones");
+        assert_eq!(read, Ok(vec![[0.0, 0.1, 0.2, 0.3]]));
+        assert_eq!(boxes(&json!({"zones": []}), "zones"), Ok(Vec::new()));
+        let text = boxes(&zone(json!([0.0, 0.1])), "zones").unwrap_err();
+        assert!(text.contains("zone \"A\" of 'zones'"), "{text}");
+        assert!(boxes(&json!({}), "coarse").is_err());
+    }
+}

@@ -1,0 +1,154 @@
+//! How stiff contacts are, from the masses that they couple and the step.
+
+use super::*;
+use crate::contact::SlaveItem;
+
+impl Model {
+    /// Sets stiffness and damping of all contacts from the masses that they couple, and bounds the
+    /// assembled stiffness of every node: 2 sum(k) dt^2 / m stays below `2 * 0.7`, which leaves the rest of
+    /// the stability bound 4 to the elements.
+    pub fn set_contact_stiffness(&mut self, c: &ContactSettings) {
+        let dt2 = self.settings.target_step.powi(2);
+        let mass = &self.mass;
+        // Of the whole node where a mirror plane cuts it, so that contacts there are as stiff as in the whole model.
+        let mirroring = &self.mirroring;
+        let reduced = |node: u32, cell: [u32; 4]| {
+            let whole = |n: u32| mass[n as usize] / mirroring.share(n);
+            let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
+            mirroring.share(node) / (1.0 / whole(node) + 1.0 / lightest)
+        };
+        let augmentation = c
+            .augmentation
+            .min(c.largest_augmentation(self.mass_ratio()));
+        let mut row = vec![0.0; mass.len()];
+        for contact in &mut self.rigid_contacts {
+            contact.augmentation = augmentation;
+            for item in &mut contact.items {
+                item.stiffness = c.stiffness_factor * mass[item.node as usize] / dt2;
+                row[item.node as usize] += item.stiffness;
+            }
+        }
+        for contact in &mut self.sheet_contacts {
+            contact.augmentation = augmentation;
+            for item in contact
+                .items
+                .iter_mut()
+                .filter(|i| i.cell != crate::mesh::NONE)
+            {
+                let nodes = self.cells[item.cell as usize];
+                item.stiffness = c.stiffness_factor * reduced(item.node, nodes) / dt2;
+                row[item.node as usize] += item.stiffness;
+                for (k, n) in nodes.iter().enumerate() {
+                    row[*n as usize] += item.weights()[k] * item.stiffness;
+                }
+            }
+        }
+        let limit: Vec<f64> = row
+            .iter()
+            .zip(mass)
+            .map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0))
+            .collect();
+        for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
+            let m = mass[item.node as usize];
+            item.stiffness *= limit[item.node as usize];
+            item.damping = 2.0 * c.damping_ratio * (item.stiffness * m).sqrt();
+        }
+        for item in self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items) {
+            if item.cell == crate::mesh::NONE {
+                continue;
+            }
+            let nodes = self.cells[item.cell as usize];
+            let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
+            item.stiffness *= least.min(limit[item.node as usize]);
+            let reduced = reduced(item.node, nodes);
+            item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
+        }
+        self.bound_contact_damping();
+        self.set_contact_room();
+    }
+
+    /// The least share that the heaviest node of the lighter one of two sheets in contact has of the other's.
+    fn mass_ratio(&self) -> f64 {
+        let heaviest = |nodes: &mut dyn Iterator<Item = u32>| {
+            let masses = nodes.map(|n| self.mass[n as usize]);
+            masses.fold(0.0, f64::max)
+        };
+        let of_contact = |contact: &SheetContact| {
+            let items = || contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
+            let slave = heaviest(&mut items().map(|i| i.node));
+            let master = heaviest(&mut items().flat_map(|i| self.cells[i.cell as usize]));
+            (slave.min(master) > 0.0).then(|| slave.min(master) / slave.max(master))
+        };
+        let ratios = self.sheet_contacts.iter().filter_map(of_contact);
+        ratios.fold(1.0, f64::min)
+    }
+
+    /// Bounds the assembled damping of every node. The damper's force is that of the velocity half a step ago,
+    /// so that an oscillator is stable while `k dt^2 / m + 2 c dt / m < 4`. The contacts' stiffness takes
+    /// up to 1.4 of that ([`Model::set_contact_stiffness`]), their damping gets the rest: by Gershgorin's
+    /// theorem `2 sum(c) dt / m` stays below 2.6, where a damper between two sheets counts twice. (Elements take
+    /// nearly all of it along the fibres, but next to nothing across a thin sheet; along it dampers are weaker
+    /// by `slip_factor`.)
+    fn bound_contact_damping(&mut self) {
+        const BOUND: f64 = 0.5 * (4.0 - 1.4);
+        let dt = self.settings.target_step;
+        let mut row = vec![0.0; self.mass.len()];
+        for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
+            row[item.node as usize] += item.damping;
+        }
+        let on_sheets = |i: &&mut SlaveItem| i.cell != crate::mesh::NONE;
+        let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
+        for item in sheets.filter(on_sheets) {
+            row[item.node as usize] += 2.0 * item.damping;
+            for (k, n) in self.cells[item.cell as usize].iter().enumerate() {
+                row[*n as usize] += 2.0 * item.weights()[k] * item.damping;
+            }
+        }
+        let of = row.iter().zip(&self.mass);
+        let limit: Vec<f64> = of
+            .map(|(r, m)| (BOUND * m / (dt * r.max(1e-300))).min(1.0))
+            .collect();
+        for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
+            item.damping *= limit[item.node as usize];
+        }
+        let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
+        for item in sheets.filter(on_sheets) {
+            let nodes = self.cells[item.cell as usize];
+            let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
+            item.damping *= least.min(limit[item.node as usize]);
+        }
+    }
+
+    /// Adds the contact of a sheet with itself. `undeformed`: the model's points (m) with the sheet flat; what
+    /// is near in it does not touch. The other contacts' stiffness is set, or comes to be set, by
+    /// [`Model::set_contact_stiffness`].
+    pub fn add_self_contact(&mut self, spec: FoldSpec<'_>, c: &ContactSettings) {
+        let contact = SelfContact::new(spec, &self.cells, *c);
+        self.self_contacts.push(contact);
+        self.set_contact_room();
+    }
+
+    /// What the other contacts leave of `sum(rigid k) + 2 sum(sheet k) < 2 * 0.7 m / dt^2`: a rigid surface does not
+    /// move, so its springs count once. Where they leave little, a node gets a small share all the same: it does
+    /// not touch everything at once.
+    fn set_contact_room(&mut self) {
+        if self.self_contacts.is_empty() {
+            return;
+        }
+        let dt2 = self.settings.target_step.powi(2);
+        let mut used = vec![0.0; self.mass.len()];
+        for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
+            used[item.node as usize] += 0.5 * item.stiffness;
+        }
+        for item in self.sheet_contacts.iter().flat_map(|c| &c.items) {
+            if item.cell != crate::mesh::NONE {
+                used[item.node as usize] += item.stiffness;
+                for (w, n) in item.weights().iter().zip(self.cells[item.cell as usize]) {
+                    used[n as usize] += w.max(0.0) * item.stiffness;
+                }
+            }
+        }
+        let left = |(u, m): (&f64, &f64)| (0.7 * m / dt2 - u).max(0.1 * m / dt2);
+        self.contact_room = used.iter().zip(&self.mass).map(left).collect();
+    }
+}
