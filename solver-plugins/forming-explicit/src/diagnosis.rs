@@ -1,7 +1,7 @@
 //! Where and why a run went wrong, for the one who has to change it.
 
-use crate::output::cell_strain;
 use crate::run::{Forming, HistoryRow};
+use crate::strain::cell_strain;
 use plyflow_mechanics::vec3::{V, norm};
 use plyflow_model::scene::SheetKind;
 use std::fmt::Write;

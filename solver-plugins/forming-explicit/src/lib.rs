@@ -18,6 +18,7 @@ pub mod penetration;
 pub mod press;
 pub mod process;
 pub mod run;
+mod strain;
 pub mod symmetry;
 mod tool;
 mod writer;

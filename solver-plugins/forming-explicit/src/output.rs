@@ -8,6 +8,7 @@ use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use crate::penetration::{Penetration, PenetrationPeak};
 use crate::run::{Body, Forming, Outcome};
+use crate::strain::ply_extremes;
 use crate::writer::Writer;
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::component::element_fields;
@@ -553,50 +554,8 @@ fn write_summary(
         forming.copies() * m.sheets.iter().map(|s| s.added_mass).sum::<f64>(),
         "kg",
     )?;
+    if let Some(share) = m.spent.contact_share() {
+        host.measured("contact_share", share, "1")?;
+    }
     host.measured("element_cycle_rate", elements as f64 * rate, "1/s")
-}
-
-/// Smallest and largest shear angle (rad) and largest fibre strain by size, over the plies' elements, from
-/// the stretch of each cell's sides and diagonals in its material axes.
-fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
-    let (mut lo, mut hi, mut strain) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
-    for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
-        if sheet.scene.kind != SheetKind::Ply {
-            continue;
-        }
-        let axis = crate::assembly::axis(&sheet.scene);
-        let (now, then) = (forming.points(body), forming.reference_points(body));
-        for cell in &body.cells {
-            let (g, e) = cell_strain(
-                cell.map(|n| then[n as usize]),
-                cell.map(|n| now[n as usize]),
-                axis,
-            );
-            lo = lo.min(g);
-            hi = hi.max(g);
-            strain = strain.max(e);
-        }
-    }
-    if lo > hi {
-        (0.0, 0.0, 0.0)
-    } else {
-        (lo, hi, strain)
-    }
-}
-
-/// Shear angle (rad) and largest fibre strain by size at the centre of a cell.
-pub(crate) fn cell_strain(then: [V; 4], now: [V; 4], axis: V) -> (f64, f64) {
-    use plyflow_mechanics::vec3::{add, dot, norm, scale, sub};
-    let mid = |p: &[V; 4]| (sub(p[2], p[0]), sub(p[3], p[1]));
-    let ((a, b), (d, e)) = (mid(&then), mid(&now));
-    let det = a[0] * b[1] - a[1] * b[0];
-    let map = |u: V| {
-        let s = (u[0] * b[1] - u[1] * b[0]) / det;
-        let t = (a[0] * u[1] - a[1] * u[0]) / det;
-        add(scale(d, s), scale(e, t))
-    };
-    let (f1, f2) = (map(axis), map([-axis[1], axis[0], 0.0]));
-    let (l1, l2) = (norm(f1), norm(f2));
-    let g = (dot(f1, f2) / (l1 * l2)).clamp(-1.0, 1.0).asin();
-    (g, (l1 - 1.0).abs().max((l2 - 1.0).abs()))
 }

@@ -17,6 +17,8 @@ struct Run {
     /// Largest resident memory of it (bytes).
     memory: f64,
     drift: f64,
+    /// Share of the steps' wall time that contacts took; not a number without that result.
+    contacts: f64,
 }
 
 impl Run {
@@ -33,7 +35,7 @@ impl Run {
         let mut row = Row::new(case, self.cost(), "CPU ns per element-step");
         row.more = json!({
             "elements": self.elements, "steps": self.steps, "wall_s": self.wall, "cpu_s": self.cpu,
-            "memory_bytes": self.memory, "drift_ratio": self.drift,
+            "memory_bytes": self.memory, "drift_ratio": self.drift, "contact_share": self.contacts,
         });
         row
     }
@@ -81,6 +83,7 @@ fn run(place: &Path, workflow: &str, cores: usize) -> Run {
         cpu: spent("cpu_seconds"),
         memory: spent("peak_memory"),
         drift: value("drift_ratio"),
+        contacts: value("contact_share"),
     }
 }
 
@@ -88,6 +91,11 @@ fn run(place: &Path, workflow: &str, cores: usize) -> Run {
 fn least(times: usize, one: impl Fn() -> Run) -> Run {
     let runs = (0..times).map(|_| one());
     runs.min_by(|a, b| a.cpu.total_cmp(&b.cpu)).expect("a run")
+}
+
+/// CPU nanoseconds per element and step of what a longer run does beyond a shorter one: steps alone, without what is done once.
+fn of_steps(short: &Run, long: &Run) -> f64 {
+    1e9 * (long.cpu - short.cpu) / (long.element_steps() - short.element_steps())
 }
 
 /// A strip of fabric pulled: elements, nodes, ledger, and no contact.
@@ -139,8 +147,14 @@ pub fn solver() -> Vec<Row> {
     let strips = folder.path().join("workflows/coupons/angle-study");
     let presses = folder.path().join("workflows/peers/hemisphere-press");
     for element in ["m4", "rf4", "s4"] {
-        let one = least(2, || run(&strips, &strip(element, "3 mm", "4 ms"), 1));
+        let pulled = |time: &str| least(3, || run(&strips, &strip(element, "3 mm", time), 1));
+        let (one, longer) = (pulled("4 ms"), pulled("12 ms"));
         rows.push(one.row(format!("{element}, strip, no contact, 1 thread")));
+        rows.push(Row::new(
+            format!("{element}, strip, no contact, 1 thread, steps alone"),
+            of_steps(&one, &longer),
+            "CPU ns per element-step",
+        ));
         let with = least(1, || run(&presses, &press(element, 3.0, 1.6), 1));
         rows.push(with.row(format!("{element}, press 3 mm, 1 thread")));
         rows.push(Row::new(
@@ -160,6 +174,29 @@ pub fn solver() -> Vec<Row> {
         ));
     }
     rows.extend(by_size(&presses));
+    rows.extend(spar(&folder.path().join("workflows/joggle-spar")));
+    rows
+}
+
+/// The joggle spar's membranes of the demo, the whole process between diaphragms: by thread, and what they would do without contact.
+fn spar(place: &Path) -> Vec<Row> {
+    let workflow = "plyflow: 1\nname: bench\nsteps:\n  coarse:\n    plugin: forming-explicit\n    with: {scene: scene.yaml, element: m4, \
+                    element_size: 8 mm, time_step: 12 us, least_areal_mass: 3 kg/m2}\n";
+    let [one, two] = [1, 2].map(|cores| run(place, workflow, cores));
+    let mut rows = vec![
+        one.row("m4, joggle spar 8 mm, 1 thread".into()),
+        two.row("m4, joggle spar 8 mm, 2 threads".into()),
+    ];
+    rows.push(Row::new(
+        "m4, joggle spar 8 mm, 1 thread over 2, wall",
+        one.wall / two.wall,
+        "1",
+    ));
+    rows.push(Row::new(
+        "m4, joggle spar 8 mm, 1 thread, rate over that without contact",
+        1.0 - one.contacts,
+        "1",
+    ));
     rows
 }
 

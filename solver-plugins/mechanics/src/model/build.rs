@@ -44,6 +44,7 @@ impl Model {
             cycle: 0,
             dt: settings.target_step,
             ledger: Ledger::default(),
+            spent: Spent::default(),
             settings,
             blocks: Vec::new(),
             patches: Vec::new(),
@@ -395,7 +396,7 @@ impl Model {
         self.mirroring.place(&self.patch_sums)?;
         self.set_free_masses();
         self.hold_at_planes();
-        self.internal_forces(false, false)?;
+        self.internal_forces(false, false, &Clock::none())?;
         self.normals();
         Ok(())
     }

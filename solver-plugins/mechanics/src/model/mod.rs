@@ -10,6 +10,7 @@ mod hold;
 mod mirror;
 mod query;
 mod rotation;
+mod spent;
 mod stiffness;
 mod support;
 mod transpose;
@@ -21,6 +22,8 @@ use hold::Anchors;
 pub use hold::Hold;
 use mirror::Mirroring;
 use rotation::Rotations;
+use spent::Clock;
+pub use spent::Spent;
 pub use support::{Fixed, NodalLoad};
 use support::{Loads, Supports};
 use transpose::gather;
@@ -112,6 +115,8 @@ pub struct Model {
     pub dt: f64,
     /// Accumulated losses and external work, and the stored energies of the last ledger.
     pub ledger: Ledger,
+    /// Where the time goes.
+    pub spent: Spent,
     settings: StepSettings,
     blocks: Vec<Block<Batch>>,
     patches: Vec<Block<PatchBatch>>,
@@ -246,7 +251,12 @@ const NORMAL_INTERVAL: u64 = 16;
 impl Model {
     /// Internal forces, pressure and energies at the present positions, and beside them the forces that contacts have
     /// `computed` put on the nodes, by one thread. With `fields`, the elements' fields too.
-    fn internal_forces(&mut self, fields: bool, computed: bool) -> Result<(), MechanicsError> {
+    fn internal_forces(
+        &mut self,
+        fields: bool,
+        computed: bool,
+        clock: &Clock,
+    ) -> Result<(), MechanicsError> {
         let present = Present {
             sheets: &self.sheets,
             motion: Motion {
@@ -272,7 +282,9 @@ impl Model {
         };
         if rayon::current_num_threads() == 1 {
             // While the contacts are still in the cache.
+            let part = clock.part();
             scatter();
+            part.add_to(&mut self.spent.contacts);
             elements();
         } else {
             // The first to come takes the first half of the blocks, whose nodes it also moves: they are in its cache.
@@ -382,7 +394,7 @@ impl Model {
     /// # Errors
     /// When a component fails.
     pub fn take_shape(&mut self) -> Result<(), MechanicsError> {
-        self.internal_forces(false, false)
+        self.internal_forces(false, false, &Clock::none())
     }
 
     /// One step. With `fields`, the elements' fields at the positions before the step are kept for
@@ -391,20 +403,26 @@ impl Model {
     /// # Errors
     /// When a component fails or a velocity is not finite.
     pub fn step(&mut self, fields: bool) -> Result<(), MechanicsError> {
+        let clock = Clock::of_step(self.cycle);
         if self.cycle.is_multiple_of(NORMAL_INTERVAL) {
             // Contacts want the normals, and these what the elements sum.
-            self.internal_forces(fields, false)?;
+            self.internal_forces(fields, false, &clock)?;
+            let part = clock.part();
             self.normals();
             self.compute_contacts();
             let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
             let folds = &self.self_contacts;
             scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
+            part.add_to(&mut self.spent.contacts);
         } else {
+            let part = clock.part();
             self.compute_contacts();
-            self.internal_forces(fields, true)?;
+            part.add_to(&mut self.spent.contacts);
+            self.internal_forces(fields, true, &clock)?;
         }
         self.advance();
         self.mirroring.follow(&mut self.x);
+        clock.add_to(&mut self.spent.all);
         let limit = self.speed_limit();
         if self.work.bad.is_some() || self.max_speed > limit {
             return Err(self.unstable(limit));

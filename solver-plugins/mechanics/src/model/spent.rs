@@ -1,0 +1,51 @@
+//! Where the time of a step goes, from some of the steps.
+
+use std::time::{Duration, Instant};
+
+/// One step of so many is measured: no multiple of the steps in which normals are made or contacts look again, so that all kinds
+/// are met in their shares.
+const INTERVAL: u64 = 61;
+
+/// Wall time of the steps that were measured. It is no part of the model's state: it tells of the machine, and a run that goes on
+/// from a checkpoint begins with none.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Spent {
+    /// In contacts: looking for them, their forces, the normals that they want; with one thread also the adding of the forces to the nodes,
+    /// which with several is done beside the elements.
+    pub contacts: Duration,
+    /// In all.
+    pub all: Duration,
+}
+
+impl Spent {
+    /// Share of the time that contacts take; `None` before a step was measured.
+    pub fn contact_share(&self) -> Option<f64> {
+        (!self.all.is_zero()).then(|| self.contacts.as_secs_f64() / self.all.as_secs_f64())
+    }
+}
+
+/// The clock of one step: running in those that are measured.
+pub(super) struct Clock(Option<Instant>);
+
+impl Clock {
+    /// One that does not run.
+    pub(super) fn none() -> Self {
+        Self(None)
+    }
+
+    pub(super) fn of_step(cycle: u64) -> Self {
+        Self(cycle.is_multiple_of(INTERVAL).then(Instant::now))
+    }
+
+    /// Another one, which runs if this one does.
+    pub(super) fn part(&self) -> Self {
+        Self(self.0.map(|_| Instant::now()))
+    }
+
+    /// Adds what has passed.
+    pub(super) fn add_to(self, sum: &mut Duration) {
+        if let Some(start) = self.0 {
+            *sum += start.elapsed();
+        }
+    }
+}
