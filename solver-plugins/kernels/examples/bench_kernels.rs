@@ -52,6 +52,11 @@ fn main() {
 
 fn cases() {
     let ncf = |form: &str| fabric(&ncf(form, "")).expect("the material is valid");
+    // A linear law of a few operations: what is left is the element's own.
+    let plain = s4_support::plate(1e8, 0.3, 4e-4);
+    elements::<M4>("m4", "linear isotropic", &plain);
+    patches("linear isotropic", &plain);
+    shells("linear isotropic", "{}", &plain);
     elements::<M4>("m4", "ncf fibre-energy", &ncf("fibre-energy"));
     elements::<M4>(
         "m4",
