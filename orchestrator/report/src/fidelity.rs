@@ -224,7 +224,10 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
             Some(_) => Measure::ALL.map(|m| measured(m.result())),
             None => [Some(0.0); 7],
         };
-        errors[0]?;
+        // A reference without defects leaves the other errors to be told.
+        if errors.iter().chain(&counts).all(Option::is_none) {
+            return None;
+        }
         Some(Way {
             comparison: instance.label(),
             model: model.to_owned(),
@@ -241,7 +244,11 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
             on_front: [false; 7],
         })
     };
-    let mut ways = vec![way(label("coarse run alone"), "global", Some(".global"))];
+    let coarse = match value("passes") {
+        Some(_) => "coarse run of the last pass",
+        None => "coarse run alone",
+    };
+    let mut ways = vec![way(label(coarse), "global", Some(".global"))];
     for result in &instance.record.results {
         let other = result.name.strip_prefix("cost.other.");
         if let Some(step) = other.and_then(|r| r.strip_suffix(".cpu_seconds")) {
@@ -468,6 +475,42 @@ mod tests {
         assert!(advice[0].contains("coarse run and zones"), "{advice:?}");
         assert!(advice[1].contains("none but the reference"), "{advice:?}");
     }
+
+    #[test]
+    fn a_reference_without_defects_leaves_the_other_errors_and_a_fed_back_coarse_run_its_name() {
+        let mut run = costs(10.0, 100.0);
+        run.retain(|(name, _)| !name.starts_with("defect_error"));
+        run.extend([
+            ("position_error.global", 2e-4),
+            ("position_error", 1e-4),
+            ("passes", 2.0),
+        ]);
+        let ways = ways(&input(vec![comparison("level", &run)]));
+        let told: Vec<(&str, Option<f64>, bool)> = (ways.list.iter())
+            .map(|w| {
+                (
+                    w.name.as_str(),
+                    w.error(Measure::Position),
+                    w.is_on_front(Measure::Position),
+                )
+            })
+            .collect();
+        assert_eq!(
+            told,
+            [
+                ("coarse run of the last pass", Some(2e-4), true),
+                ("coarse run and zones", Some(1e-4), true),
+                ("reference", Some(0.0), true),
+            ]
+        );
+        assert_eq!(ways.list[0].error(Measure::Defects), None);
+        assert!(
+            advice(&ways, &[0.1])
+                .iter()
+                .all(|a| a.contains("none but the reference"))
+        );
+    }
+
     #[test]
     fn every_measure_has_a_front_of_its_own_and_the_reference_stands_on_it() {
         let mut run = costs(10.0, 100.0);

@@ -437,7 +437,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Of several runs of one zone (other elements, other sizes) the one that was compared, or else the finest.
+    /// Of several runs of one zone (other elements, other sizes, other passes) the one that was compared, of several of these the last, as
+    /// `comparison` has it; or else the finest.
     fn one_of_each_zone(&self, runs: Vec<usize>, comparison: Option<usize>) -> Vec<usize> {
         let facts = |at: usize| self.all.facts[at].as_ref();
         let compared: Vec<&str> = (comparison.and_then(facts).into_iter())
@@ -445,7 +446,9 @@ impl Reader<'_> {
             .collect();
         let rank = |at: usize| {
             let size = facts(at).and_then(|f| f.attributes["element_size"].as_f64());
-            let passed_over = !compared.contains(&self.key(at));
+            let place = compared.iter().rposition(|key| *key == self.key(at));
+            // The last place first, and what has none behind all.
+            let passed_over = place.map_or(usize::MAX, |k| compared.len() - k);
             (passed_over, size.unwrap_or(f64::INFINITY))
         };
         let zone = |at: usize| facts(at).map(|f| &f.attributes["zone"]);

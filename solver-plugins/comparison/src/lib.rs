@@ -8,7 +8,7 @@ mod table;
 
 pub use cut::{Layer, Passage, Strip, Work};
 pub use fidelity::{Fidelity, Measured, Way, Yardstick};
-pub use models::{Model, Role, Zone};
+pub use models::{Model, PassedOver, Role, Zone};
 pub use table::{Entry, defect_table};
 
 use plyflow_defects::{Kind, Limits, Ply, QUANTILES, Settings, quantiles};
@@ -224,25 +224,33 @@ fn write_reference_defects(
     Ok(())
 }
 
-/// What the runs cost; `passed_over` are those of zones that were drawn again and of earlier passes, which count in the whole.
-fn write_costs(host: &Host, models: &[Model], passed_over: &[Input]) -> Result<(), StepError> {
-    let sum = |get: fn(&Input) -> f64| passed_over.iter().map(get).fold(0.0, |s, c| s + c);
-    let mut wall = sum(|i| i.cost.wall_seconds);
-    let mut cpu = sum(|i| i.cost.cpu_seconds);
-    let earlier = passed_over.iter().map(|i| i.cost.peak_memory);
-    let mut memory = earlier.fold(0.0, f64::max);
-    if !passed_over.is_empty() {
+/// What the runs cost; those `passed_over` count in the whole, and earlier passes in the global run that stands on them.
+fn write_costs(host: &Host, models: &[Model], passed_over: &PassedOver) -> Result<(), StepError> {
+    let sum = |of: &[Input], get: fn(&Input) -> f64| of.iter().map(get).fold(0.0, |s, c| s + c);
+    let costs = |of: &[Input]| {
+        let wall = sum(of, |i| i.cost.wall_seconds);
+        [wall, sum(of, |i| i.cost.cpu_seconds)]
+    };
+    let (before, redrawn) = (costs(&passed_over.earlier), costs(&passed_over.superseded));
+    let [mut wall, mut cpu] = [0, 1].map(|k| before[k] + redrawn[k]);
+    let memories = passed_over.all().map(|i| i.cost.peak_memory);
+    let mut memory = memories.fold(0.0, f64::max);
+    if passed_over.all().next().is_some() {
         host.measured("cost.superseded.wall_seconds", wall, "s")?;
         host.measured("cost.superseded.cpu_seconds", cpu, "s")?;
     }
+    if passed_over.earlier_coarse > 0 {
+        host.result("passes", (1 + passed_over.earlier_coarse) as f64, "1")?;
+    }
     for m in models {
         let c = &m.input.cost;
-        host.measured(
-            &format!("cost.{}.wall_seconds", m.name),
-            c.wall_seconds,
-            "s",
-        )?;
-        host.measured(&format!("cost.{}.cpu_seconds", m.name), c.cpu_seconds, "s")?;
+        let on_the_way = match m.role {
+            Role::Global => before,
+            _ => [0.0; 2],
+        };
+        let of = |what: &str| format!("cost.{}.{what}_seconds", m.name);
+        host.measured(&of("wall"), c.wall_seconds + on_the_way[0], "s")?;
+        host.measured(&of("cpu"), c.cpu_seconds + on_the_way[1], "s")?;
         host.measured(&format!("peak_memory.{}", m.name), c.peak_memory, "1")?;
         if matches!(m.role, Role::Global | Role::Local) {
             wall += c.wall_seconds;

@@ -126,6 +126,24 @@ struct Formed {
     zone: Value,
 }
 
+/// Runs that are not measured, and cost.
+#[derive(Debug, Clone, Default)]
+pub struct PassedOver {
+    /// Local runs of zones that were drawn again.
+    pub superseded: Vec<Input>,
+    /// Coarse and fine runs of earlier passes, on which the global run stands.
+    pub earlier: Vec<Input>,
+    /// How many of the latter are coarse.
+    pub earlier_coarse: usize,
+}
+
+impl PassedOver {
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = &Input> {
+        self.superseded.iter().chain(&self.earlier)
+    }
+}
+
 /// Global, local, other and reference models in that order, local ones in the order of their zones; and what was run on the way to them and is
 /// not measured: local runs of zones that are `superseded`, and `earlier` passes. Of several global runs, and of several local runs of one zone, the
 /// last is that of the last pass.
@@ -137,24 +155,29 @@ pub fn read_models(
     zones: &[Zone],
     superseded: &[Zone],
     settings: &Settings,
-) -> Result<(Vec<Model>, Vec<Input>), StepError> {
-    let mut passed_over = host.inputs_of("global")?;
-    let global = passed_over.pop().ok_or("global: no run arrives")?;
-    let passes = 1 + passed_over.len();
+) -> Result<(Vec<Model>, PassedOver), StepError> {
+    let mut passed_over = PassedOver {
+        earlier: host.inputs_of("global")?,
+        ..Default::default()
+    };
+    let global = passed_over.earlier.pop();
+    let global = global.ok_or("global: no run arrives")?;
+    passed_over.earlier_coarse = passed_over.earlier.len();
+    let passes = 1 + passed_over.earlier.len();
     let tool = of_run::tool(host, &global)?;
     let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
     let mut local: Vec<Model> = Vec::new();
     for input in host.inputs_of("local")? {
         host.check_cancelled()?;
         let Some(zone) = zone_of(host, &input, zones, superseded)? else {
-            passed_over.push(input);
+            passed_over.superseded.push(input);
             continue;
         };
         if let Some(k) = local.iter().position(|m| m.zone == Some(zone)) {
             if passes == 1 {
                 return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
             }
-            passed_over.push(local.remove(k).input);
+            passed_over.earlier.push(local.remove(k).input);
         }
         let own = own_tool(host, &input)?;
         local.push(read(
@@ -187,7 +210,11 @@ pub fn read_models(
             models.push(read(host, input, role, None, tool, settings)?);
         }
     }
-    passed_over.extend(host.inputs_of("earlier")?);
+    for input in host.inputs_of("earlier")? {
+        let formed: Formed = host.attributes(&input)?;
+        passed_over.earlier_coarse += usize::from(formed.zone.is_null());
+        passed_over.earlier.push(input);
+    }
     Ok((models, passed_over))
 }
 

@@ -373,7 +373,10 @@ fn of_several_passes_the_last_is_measured_and_all_cost() {
     let out = compare(&inputs);
     let alone = compare(&[inputs[0], inputs[2], inputs[4]]);
     assert_eq!(out.attributes["defects"], alone.attributes["defects"]);
-    assert_eq!(out.measured["cost.global.cpu_seconds"].0, 2.0);
+    // The second coarse run stands on the first and on its fine run.
+    assert_eq!(out.measured["cost.global.cpu_seconds"].0, 7.0);
+    assert_eq!(out.result("passes"), 2.0);
+    assert!(!alone.results.contains_key("passes"));
     assert_eq!(out.measured["cost.local.A.cpu_seconds"].0, 8.0);
     assert_eq!(out.measured["cost.superseded.cpu_seconds"].0, 5.0);
     assert_eq!(out.measured["cost.total.cpu_seconds"].0, 15.0);

@@ -76,12 +76,16 @@ pub fn boxes(attributes: &Value, from: &str) -> Result<Vec<Rectangle>, String> {
     zones.iter().map(of).collect()
 }
 
+/// A box holds what is nearer to it than this (m): whether a centre that lies on its side counts must not hang on rounding.
+const SAME_PLACE: f64 = 1e-6;
+
 /// Whether a place of the undeformed plane or, with mirror planes, one of its images lies in a zone: so what is computed
 /// beside a plane is what its other side would be.
 fn is_in(zones: &[Rectangle], at: V, planes: Planes) -> bool {
     planes.images().iter().any(|image| {
         let [x, y, _] = reflect(at, *image);
-        let holds = |b: &Rectangle| x >= b[0] && x <= b[2] && y >= b[1] && y <= b[3];
+        let within = |v: f64, low: f64, high: f64| v >= low - SAME_PLACE && v <= high + SAME_PLACE;
+        let holds = |b: &Rectangle| within(x, b[0], b[2]) && within(y, b[1], b[3]);
         zones.iter().any(holds)
     })
 }
@@ -175,7 +179,7 @@ mod tests {
     fn a_place_counts_as_in_a_zone_with_its_mirror_images() {
         let zones = [[0.01, 0.02, 0.03, 0.04], [-0.09, 0.0, -0.08, 0.01]];
         let is = |x: f64, y: f64, planes: [bool; 2]| is_in(&zones, [x, y, 0.0], Planes(planes));
-        assert!(is(0.02, 0.03, [false; 2]) && is(0.01, 0.04, [false; 2]));
+        assert!(is(0.02, 0.03, [false; 2]) && is(0.01 - 1e-15, 0.04 + 1e-15, [false; 2]));
         assert!(!is(0.02, 0.019, [false; 2]) && !is(0.085, 0.005, [false; 2]));
         assert!(is(0.085, 0.005, [true, false]) && !is(0.085, 0.005, [false, true]));
         assert!(!is_in(&[], [0.0; 3], Planes::default()));

@@ -265,7 +265,8 @@ fn cross_sections(
     plots: &mut Plots,
 ) -> Result<Vec<Value>, StepError> {
     let (mut series, mut counted) = (Vec::new(), Vec::new());
-    for (k, across) in p.cross_sections.iter().enumerate() {
+    let names = result_names(p)?;
+    for (k, (across, name)) in p.cross_sections.iter().zip(names).enumerate() {
         let (s, c) = across.angle.sin_cos();
         let from = [
             p.centre[0] + across.offset * c,
@@ -293,7 +294,6 @@ fn cross_sections(
         let spacing = 2.0 * half_length(p) / (p.samples - 1) as f64;
         let found = waves(&closed, spacing * closed.len() as f64 / TAU, &p.criteria());
         let highest = found.iter().map(|w| w.height.abs()).fold(0.0, f64::max);
-        let name = plain(&across.label);
         let count = found.len() as f64;
         host.result(&format!("section_wrinkles.{name}"), count, "1")?;
         host.result(&format!("section_height.{name}"), highest, "m")?;
@@ -315,6 +315,25 @@ fn plain(label: &str) -> String {
         .map(str::to_lowercase)
         .collect();
     words.join("_")
+}
+
+/// The names of the results of the cross sections.
+///
+/// # Errors
+/// When a label has no letter and no digit, or two give one name.
+fn result_names(p: &Parameters) -> Result<Vec<String>, String> {
+    let mut names: Vec<String> = Vec::new();
+    for (k, across) in p.cross_sections.iter().enumerate() {
+        let (label, name) = (&across.label, plain(&across.label));
+        if name.is_empty() || names.contains(&name) {
+            return Err(format!(
+                "cross_sections[{k}].label: given '{label}'; expected a label that differs from the others in its letters (a to z) and \
+                 digits, of which the names of results are made"
+            ));
+        }
+        names.push(name);
+    }
+    Ok(names)
 }
 
 /// Writes the ply with its deviation and moments, and their distributions; the maps that show them.

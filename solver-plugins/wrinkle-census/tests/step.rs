@@ -239,6 +239,13 @@ fn a_section_across_shows_the_wrinkle_that_it_cuts() {
     assert!(listed["place"].as_f64().unwrap().abs() < 5e-4, "{listed}");
     assert!((listed["height"].as_f64().unwrap() - 3e-3).abs() < 1e-4);
     assert!(found.attributes["plots"].to_string().contains("A-A'"));
+    // Names of results are made of letters and digits.
+    for label in ["b b", "\u{3b1}-\u{3b1}'"] {
+        let mut alike = with.clone();
+        alike["cross_sections"][0]["label"] = json!(label);
+        let told = census(&four_wrinkles(), alike).unwrap_err();
+        assert!(told.contains("].label: given"), "{told}");
+    }
     with["cross_sections"][0]["offset"] = json!(0.4);
     let told = census(&four_wrinkles(), with).unwrap_err();
     assert!(told.contains("A-A'") && told.contains("400.0 mm"), "{told}");

@@ -119,9 +119,15 @@ impl Step for ZoneFeedback {
             change.extend(driven.change);
         }
         if change.is_empty() {
+            // Zones that are too small for the overlap are worth a warning, none at all is not.
+            let level = if fine.is_empty() {
+                Log::Info
+            } else {
+                Log::Warn
+            };
             host.log(
-                Log::Info,
-                "no coarse node lies deep enough in a zone: nothing is fed back",
+                level,
+                "no coarse node lies deep enough in a zone: nothing is fed back; a smaller `overlap` or larger zones would",
             );
         }
         host.write_attributes(&json!({
@@ -135,7 +141,7 @@ impl Step for ZoneFeedback {
         let largest = change.iter().copied().fold(0.0, f64::max);
         host.result("feedback_change_max", largest, "m")?;
         let at_rest = change.is_empty() || p.tolerance.is_some_and(|t| mean <= t);
-        if p.tolerance.is_some() {
+        if p.tolerance.is_some() && (!change.is_empty() || fine.is_empty()) {
             host.result("converged", f64::from(u8::from(at_rest)), "1")?;
         }
         let again: Vec<String> = (!at_rest).then(|| AGAIN.to_owned()).into_iter().collect();

@@ -205,6 +205,11 @@ fn passes_end_when_what_they_change_is_within_the_tolerance() {
     // Without one it goes on as long as there is something to feed back.
     assert_eq!(again(json!({}), &[&fine]), (one(), None));
     assert_eq!(again(json!({}), &[]), (Some(vec![]), None));
+    // Without zones there is nothing to feed back; zones that are smaller than the overlap have not come to rest.
+    let none = json!({"tolerance": 0.001});
+    assert_eq!(again(none, &[]), (Some(vec![]), Some(1.0)));
+    let deep = json!({"tolerance": 0.001, "overlap": 0.2});
+    assert_eq!(again(deep, &[&fine]), (Some(vec![]), None));
 }
 
 #[test]

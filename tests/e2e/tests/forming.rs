@@ -185,13 +185,33 @@ fn checkpoints(study: &Study) -> Vec<String> {
         .collect()
 }
 
+/// The two zones under pressures that follow tables, with weight: all that a process has to keep.
+fn heavy_with_tables() -> Study {
+    let study = study(TWO_ZONES);
+    let scene = study.path("scene.yaml");
+    let text = std::fs::read_to_string(&scene).unwrap();
+    let table = "{table: [{share: 0, pressure: 0 kPa}, {share: 0.5, pressure: 0 kPa}, {share: 1, pressure: 20 kPa}]}";
+    let changed = text
+        .replace(
+            "bag_pressure: 20 kPa",
+            &format!("weight: tool\n    bag_pressure: {table}"),
+        )
+        .replace(
+            "forming_pressure: 20 kPa",
+            &format!("forming_pressure: {table}"),
+        );
+    assert_eq!(changed.matches("table").count(), 2);
+    std::fs::write(&scene, changed).unwrap();
+    study
+}
+
 #[test]
 fn a_run_killed_while_it_forms_goes_on_from_its_checkpoint_to_the_same_bytes() {
-    let undisturbed = study(TWO_ZONES);
+    let undisturbed = heavy_with_tables();
     assert_eq!(undisturbed.run(&[]), well(8, 0));
     assert!(checkpoints(&undisturbed).is_empty(), "an hour is not over");
 
-    let study = study(TWO_ZONES);
+    let study = heavy_with_tables();
     let often = ["--checkpoint-every", "0 s", "--jobs", "1"];
     for instance in ["coarse", "local"] {
         let mut engine = study.start(&often);
