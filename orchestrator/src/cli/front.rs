@@ -72,7 +72,8 @@ pub fn as_json(ways: &Ways) -> Value {
 /// For people: a star stands behind an error that nothing cheaper has or is below.
 pub fn as_table(ways: &Ways) -> String {
     if ways.list.is_empty() {
-        return "no comparison has run (among the steps chosen) that measures one way by another\n".to_owned();
+        return "no comparison has run (among the steps chosen) that measures one way by another\n"
+            .to_owned();
     }
     let head = [
         "way",

@@ -16,3 +16,6 @@ pub mod workflow;
 pub use canonical::canonical;
 pub use manifest::Manifest;
 pub use units::{Dimension, UnitError, parse_quantity};
+
+/// Standard acceleration of free fall (m/s2), 3rd General Conference on Weights and Measures, 1901.
+pub const STANDARD_GRAVITY: f64 = 9.80665;

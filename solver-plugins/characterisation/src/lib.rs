@@ -21,4 +21,4 @@ pub mod synthetic;
 pub mod voce;
 
 /// Acceleration of free fall (m/s2) that weights are computed with.
-pub const GRAVITY: f64 = 9.80665;
+pub const GRAVITY: f64 = plyflow_model::STANDARD_GRAVITY;

@@ -191,6 +191,18 @@ pub fn read_models(
     }
     local.sort_by_key(|m| m.zone);
     models.extend(local);
+    models.extend(read_wholes(host, &tool, settings)?);
+    for input in host.inputs_of("earlier")? {
+        let formed: Formed = host.attributes(&input)?;
+        passed_over.earlier_coarse += usize::from(formed.zone.is_null());
+        passed_over.earlier.push(input);
+    }
+    Ok((models, passed_over))
+}
+
+/// Others and the reference, in that order, with their own tools or the global run's.
+fn read_wholes(host: &Host, tool: &Tool, settings: &Settings) -> Result<Vec<Model>, StepError> {
+    let mut models = Vec::new();
     for (port, role) in [("others", Role::Other), ("reference", Role::Reference)] {
         let inputs = host.inputs_of(port)?;
         // A fan-out over one zone, the whole blank, may be the reference.
@@ -206,16 +218,11 @@ pub fn read_models(
         for input in inputs {
             host.check_cancelled()?;
             let own = own_tool(host, &input)?;
-            let tool = own.as_ref().unwrap_or(&tool);
+            let tool = own.as_ref().unwrap_or(tool);
             models.push(read(host, input, role, None, tool, settings)?);
         }
     }
-    for input in host.inputs_of("earlier")? {
-        let formed: Formed = host.attributes(&input)?;
-        passed_over.earlier_coarse += usize::from(formed.zone.is_null());
-        passed_over.earlier.push(input);
-    }
-    Ok((models, passed_over))
+    Ok(models)
 }
 
 /// The tool that a run has with it. A run of a zone may leave it out; it is the global one's.

@@ -7,7 +7,7 @@ use crate::assembly::{self, Components, StackSheet};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
 use crate::penetration;
-use crate::process::{GRAVITY, Load};
+use crate::process::Load;
 use crate::run::{Forming, RigidBody};
 use crate::symmetry;
 use crate::tool::{self, ToolSurface};
@@ -16,6 +16,7 @@ use plyflow_mechanics::contact::{OpenPlate, RigidContact, RigidItem, RigidMotion
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
 use plyflow_mechanics::mirror::Mirrors;
 use plyflow_mechanics::model::Model;
+use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{Hold, Press, Scene, Towards};
 use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
@@ -314,8 +315,8 @@ pub fn build_press(
         .map_err(|e| e.to_string())?;
     model.body_acceleration[2] = match press.weight {
         None => 0.0,
-        Some(Towards::Die) => GRAVITY,
-        Some(Towards::Holder) => -GRAVITY,
+        Some(Towards::Die) => STANDARD_GRAVITY,
+        Some(Towards::Holder) => -STANDARD_GRAVITY,
     };
     let parts = rigid_parts(press, &at, grid);
     add_contacts(&mut model, &stack, &parts, scene, p)?;

@@ -5,10 +5,8 @@ use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::history::{MonotoneCubic, linear, smooth_step};
 use plyflow_mechanics::model::{Drive, Model, Pressures};
 use plyflow_mechanics::vec3::V;
+use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{DoubleDiaphragm, PressureCourse, WeightDirection};
-
-/// Free fall (m/s2).
-pub(crate) const GRAVITY: f64 = 9.81;
 
 /// Share of drawing's duration in which a pump that follows a table makes up for what the film has moved, to within 1 / e. Far
 /// longer than a span takes to snap, so that the gas that it compresses still catches it.
@@ -57,8 +55,8 @@ impl Cycle {
             pre_stretch: p.film_pre_stretch.0,
             weight: match p.weight {
                 None => 0.0,
-                Some(WeightDirection::Tool) => -GRAVITY,
-                Some(WeightDirection::Away) => GRAVITY,
+                Some(WeightDirection::Tool) => -STANDARD_GRAVITY,
+                Some(WeightDirection::Away) => STANDARD_GRAVITY,
             },
         })
     }

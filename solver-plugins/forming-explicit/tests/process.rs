@@ -14,7 +14,7 @@ use plyflow_sdk::StepError;
 use serde_json::{Value, json};
 
 /// Free fall (m/s2).
-const GRAVITY: f64 = 9.81;
+const GRAVITY: f64 = plyflow_model::STANDARD_GRAVITY;
 /// Frame and ply (m), areal masses of film and fabric (kg/m2).
 const FRAME: [f64; 2] = [0.32, 0.28];
 const PLY: [f64; 2] = [0.12, 0.09];

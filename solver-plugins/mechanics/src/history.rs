@@ -149,11 +149,6 @@ impl MonotoneCubic {
             + w[2] * self.slopes[k]
             + w[3] * self.slopes[k + 1]
     }
-
-    /// The value beyond the last time.
-    pub fn last(&self) -> f64 {
-        self.values[self.values.len() - 1]
-    }
 }
 
 /// Linear interpolation of `values` at `times`.
@@ -190,10 +185,7 @@ mod tests {
         for (t, v) in times.iter().zip(values) {
             assert!((curve.at(*t) - v).abs() < 1e-14);
         }
-        assert_eq!(
-            (curve.at(-1.0), curve.at(2.0), curve.last()),
-            (0.0, 1.0, 1.0)
-        );
+        assert_eq!((curve.at(-1.0), curve.at(2.0)), (0.0, 1.0));
         let d = 1e-7;
         let slope = |t: f64| (curve.at(t + d) - curve.at(t - d)) / (2.0 * d);
         let mut before = curve.at(0.0);
