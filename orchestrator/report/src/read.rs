@@ -121,12 +121,31 @@ pub(crate) struct Energy {
     pub(crate) hourglass_ratio: Option<f64>,
 }
 
-/// Penetration of a contact pair (m).
+/// Penetration of a contact pair at the end.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Penetration {
+    /// Largest (m).
     pub(crate) max: f64,
+    /// 99.9 % quantile (m).
     pub(crate) q999: f64,
+    /// What the bodies themselves share of the thinner one, by the quantile.
+    pub(crate) overlap: Option<f64>,
+    /// Over the whole run.
+    pub(crate) peak: Option<PenetrationPeak>,
+}
+
+/// Largest penetrations of a contact pair over a run.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct PenetrationPeak {
+    /// Largest (m), and when (s).
+    pub(crate) max: f64,
+    pub(crate) max_time: f64,
+    /// Largest 99.9 % quantile (m).
+    pub(crate) q999: f64,
+    /// The largest share of the thinner body, by that.
+    pub(crate) overlap: f64,
 }
 
 /// Histories by name, all of one length; empty when there is none.

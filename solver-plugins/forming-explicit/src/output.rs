@@ -477,10 +477,10 @@ fn write_summary(
     let penetrations = forming.penetrations();
     let mut warnings = mesh_warnings(forming);
     warnings.extend(outcome.warnings.iter().cloned());
-    warnings.extend(penetrations.iter().filter_map(Penetration::too_deep));
     let elements = m.element_count();
     let element_cycles = elements as f64 * outcome.cycles as f64;
     let pairs = || penetrations.iter().zip(&outcome.peaks);
+    warnings.extend(pairs().filter_map(|(p, peak)| p.too_deep(peak)));
     let penetration: serde_json::Map<String, serde_json::Value> = pairs()
         .map(|(p, peak)| {
             let of = json!({

@@ -64,17 +64,23 @@ impl Penetration {
         ((depth - self.spare) / self.thinner).max(0.0)
     }
 
-    /// What to tell of bodies that share more than a tenth of the thinner one.
-    pub fn too_deep(&self) -> Option<String> {
-        let overlap = self.overlap();
+    /// What to tell of bodies that share more than a tenth of the thinner one: at the end, or else when they did most.
+    pub fn too_deep(&self, peak: &PenetrationPeak) -> Option<String> {
+        let at_end = self.overlap() > OVERLAP_BOUND;
+        let (overlap, when, place) = if at_end {
+            (self.overlap(), String::new(), self.place)
+        } else {
+            let when = format!(" at {:.4} s, no longer at the end", peak.q999_time);
+            (self.overlap_of(peak.q999), when, peak.place)
+        };
         (overlap > OVERLAP_BOUND).then(|| {
-            let place = self.place.map_or_else(String::new, |p| {
+            let place = place.map_or_else(String::new, |p| {
                 let [x, y, z] = p.map(|c| 1e3 * c);
                 format!(", deepest at ({x:.1}, {y:.1}, {z:.1}) mm")
             });
             format!(
-                "'{}' reach into each other by {:.0} % of the thinner one (99.9 % quantile, bound {:.0} %{place}): refine the mesh there, or \
-                 take a smaller time step, with which contacts are stiffer",
+                "'{}' reach into each other by {:.0} % of the thinner one{when} (99.9 % quantile, bound {:.0} %{place}): refine the mesh \
+                 there, or take a smaller time step, with which contacts are stiffer",
                 self.pair,
                 100.0 * overlap,
                 100.0 * OVERLAP_BOUND
@@ -195,13 +201,26 @@ mod tests {
         assert_eq!((close.largest, close.q999), (1.999e-5, 1.998e-5));
         assert!((close.overlap() - 0.24975).abs() < 1e-12);
         assert_eq!(close.place, Some([0.0, 0.0, 1999.0]));
-        let told = close.too_deep().unwrap();
+        let none = PenetrationPeak::default();
+        let told = close.too_deep(&none).unwrap();
         assert!(
-            told.contains("'film/ply'") && told.contains("25 %"),
+            told.contains("'film/ply'") && told.contains("25 %") && !told.contains(" at 0"),
             "{told}"
         );
         let apart = Penetration::new("film/film", depths, 2.2e-4, 8e-5);
-        assert_eq!((apart.overlap(), apart.too_deep()), (0.0, None));
+        assert_eq!((apart.overlap(), apart.too_deep(&none)), (0.0, None));
+        let earlier = PenetrationPeak {
+            q999: 2.6e-4,
+            q999_time: 0.125,
+            place: Some([0.001, 0.002, 0.003]),
+            ..none
+        };
+        let told = apart.too_deep(&earlier).unwrap();
+        assert!(
+            told.contains("50 % of the thinner one at 0.1250 s, no longer at the end"),
+            "{told}"
+        );
+        assert!(told.contains("(1.0, 2.0, 3.0) mm"), "{told}");
         assert_eq!(
             Penetration::new("ply/ply", Vec::new(), 0.0, 1e-4).overlap(),
             0.0

@@ -1,9 +1,13 @@
 //! Energies, loads and contact over time.
 
 use crate::plot::{Plot, Series, Style};
+use crate::read::PenetrationPeak;
 use crate::study::{Material, Run};
 use crate::units::{fixed, number};
 use maud::{Markup, html};
+
+/// Share of the thinner body up to which bodies may reach into each other.
+const OVERLAP_BOUND: f64 = 0.1;
 
 /// Energies of a run's history; the internal one is summed.
 const ENERGIES: [(&str, &str, usize); 6] = [
@@ -193,13 +197,41 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
     let any = runs.iter().any(|(_, r)| !r.facts.penetration.is_empty());
     html! {
         @if any {
-            h3 { "Penetration at the end" }
+            h3 { "Penetration" }
+            p { "The quantile is that of the nodes in touch; the overlap is what the bodies themselves share of the thinner one, by the quantile (bound 10 %)." }
             div class="scroll" { table {
-                thead { tr { th { "run" } th { "pair" } th class="n" { "largest (mm)" } th class="n" { "99.9 % quantile (mm)" } } }
+                thead {
+                    tr { th rowspan="2" { "run" } th rowspan="2" { "pair" } th class="group" colspan="3" { "at the end" } th class="group" colspan="4" { "over the whole run" } }
+                    tr {
+                        @for _ in 0..2 { th class="n" { "largest (mm)" } th class="n" { "99.9 % (mm)" } th class="n" { "overlap" } }
+                        th class="n" { "largest at (s)" }
+                    }
+                }
                 tbody { @for (_, r) in runs { @for (i, (pair, p)) in r.facts.penetration.iter().enumerate() {
-                    tr { th { @if i == 0 { (r.label) } } td { (pair) } td class="n" { (number(p.max * 1e3, 3)) } td class="n" { (number(p.q999 * 1e3, 3)) } }
+                    tr { th { @if i == 0 { (r.label) } } td { (pair) } (depths(p.max, p.q999, p.overlap)) (peak(p.peak.as_ref())) }
                 } } }
             } }
+        }
+    }
+}
+
+/// Cells of depths (m) and of the share of the thinner body.
+fn depths(max: f64, q999: f64, overlap: Option<f64>) -> Markup {
+    let class = match overlap {
+        Some(o) if o > OVERLAP_BOUND => "n missed",
+        _ => "n",
+    };
+    html! {
+        td class="n" { (number(max * 1e3, 3)) } td class="n" { (number(q999 * 1e3, 3)) } td class=(class) { (percent(overlap)) }
+    }
+}
+
+/// Cells of the largest over a run, and when it was.
+fn peak(peak: Option<&PenetrationPeak>) -> Markup {
+    html! {
+        @match peak {
+            Some(p) => { (depths(p.max, p.q999, Some(p.overlap))) td class="n" { (fixed(p.max_time, 3)) } }
+            None => @for _ in 0..4 { td class="n" { "–" } },
         }
     }
 }

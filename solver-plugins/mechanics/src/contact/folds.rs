@@ -422,7 +422,7 @@ fn follow<F: Coulomb>(
         return Some(hold(item, s, v, law));
     }
     let p = s.x[item.node as usize];
-    let found = track(s, item, p, offset, if item.active { 1 } else { 3 }, open);
+    let found = track(s, item, look(s, item, p), p, offset, open);
     let first = &found.first;
     (item.cell, item.xi) = (first.cell, first.xi);
     let up = cell_normal(s, first.cell, first.xi);

@@ -220,18 +220,20 @@ pub(crate) fn friction_force(
     c: f64,
     limit: f64,
 ) -> Tangential {
-    use crate::vec3::{dot, norm, scale, sub};
+    use crate::vec3::{dot, scale, sub};
     let trial = sub(held, scale(vt, k * dt));
-    let size = norm(trial);
-    let (slip, friction) = if size <= limit || size == 0.0 {
+    // By squares: a contact that sticks, as most do, needs no root.
+    let (most, size) = (limit * limit, dot(trial, trial));
+    let (slip, friction) = if size <= most {
         (trial, 0.0)
     } else {
+        let size = size.sqrt();
         (scale(trial, limit / size), limit * (size - limit) / k)
     };
     let both = sub(slip, scale(vt, c));
-    let size = norm(both);
-    let force = if size > limit {
-        scale(both, limit / size)
+    let size = dot(both, both);
+    let force = if size > most {
+        scale(both, limit / size.sqrt())
     } else {
         both
     };

@@ -9,7 +9,7 @@
 use super::blend::{pulled, shares};
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::slave::{
-    Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
+    Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch, touch_at,
 };
 use super::{ContactEnergy, ContactSettings, Pace, TOGETHER, waking};
 use crate::archive::{Archive, ArchiveError};
@@ -247,33 +247,70 @@ fn around(
     Some(found).filter(|c| c.free == [true; 2])
 }
 
+/// How carefully a slave looks across the sides of its cell.
+#[derive(Clone, Copy)]
+struct Care {
+    /// Whether it looks from beside them too.
+    careful: bool,
+    /// From how many distances beside them.
+    reach: f64,
+}
+
+impl Care {
+    #[inline(always)]
+    fn of(item: &SlaveItem) -> Self {
+        let every = |n: u8| item.is_between() || item.turn.is_multiple_of(n) || !item.active;
+        Self {
+            careful: every(8),
+            // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
+            // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
+            reach: if every(16) { 4.0 } else { 1.0 },
+        }
+    }
+
+    /// Coordinate from which on a place `distance` (m) away is near the side of its cell.
+    #[inline(always)]
+    fn band(self, at: &Closest, distance: f64) -> f64 {
+        1.0 - (self.reach * distance / at.half).min(0.5)
+    }
+
+    /// Whether it looks across the side towards which the coordinate `place` points.
+    #[inline(always)]
+    fn crosses(self, place: f64, band: f64) -> bool {
+        !(place.abs() < band || (place.abs() < 1.0 && !self.careful))
+    }
+}
+
+/// The closest point of the cell in which a slave was. In touch, the place moves by far less than a cell in a step: one
+/// iteration follows it.
+#[inline(always)]
+pub(super) fn look(s: &Surface<'_>, item: &SlaveItem, p: V) -> Closest {
+    let iterations = if item.active { 1 } else { 3 };
+    closest(s, item.cell, item.xi, p, iterations)
+}
+
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
 /// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
-/// neighbour closer. The walk enters only cells that are `open` to it.
+/// neighbour closer. `best`: what [`look`] has found in its cell. The walk enters only cells that are `open` to it.
 #[inline(always)]
 pub(super) fn track(
     s: &Surface<'_>,
     item: &SlaveItem,
+    mut best: Closest,
     p: V,
     offset: f64,
-    iterations: u32,
     open: impl Fn(u32) -> bool,
 ) -> Found {
-    let mut best = closest(s, item.cell, item.xi, p, iterations);
     let mut others = [None; FACES];
-    let every = |n: u8| item.is_between() || item.turn.is_multiple_of(n) || !item.active;
-    let careful = every(8);
-    // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
-    // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
-    let reach = if every(16) { 4.0 } else { 1.0 };
+    let care = Care::of(item);
     for _ in 0..12 {
         let near = s.neighbours[best.cell as usize];
-        let band = 1.0 - (reach * best.distance2.sqrt() / best.half).min(0.5);
+        let band = care.band(&best, best.distance2.sqrt());
         let here = best;
         others = [None; FACES];
         for k in 0..2 {
             let place = here.xi[k];
-            if place.abs() < band || (place.abs() < 1.0 && !careful) {
+            if !care.crosses(place, band) {
                 continue;
             }
             // Sides 0: eta = -1, 1: xi = 1, 2: eta = 1, 3: xi = -1.
@@ -518,16 +555,15 @@ fn follow<F: Coulomb>(
             return apart(item, gap, s, v, pace, true);
         }
     }
-    // In touch, the place moves by far less than a cell in a step: one iteration follows it.
-    let iterations = if item.active { 1 } else { 3 };
-    let found = track(
-        s,
-        item,
-        s.x[item.node as usize],
-        law.offset,
-        iterations,
-        |_| true,
-    );
+    let p = s.x[item.node as usize];
+    let here = look(s, item, p);
+    if item.active && item.plain {
+        let distance = here.distance2.sqrt();
+        if stays(item, &here, distance) {
+            return stay(item, &here, distance, s, v, pace, law);
+        }
+    }
+    let found = track(s, item, here, p, law.offset, |_| true);
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
     let Some((pull, plain)) = pull_of(item, s, &found, side, law.offset, law.clearing) else {
         item.part();
@@ -546,6 +582,40 @@ fn follow<F: Coulomb>(
     item.guarded |= deep;
     item.plain = plain;
     Met::Touch(touch(item, s, v, &pull, &found, law))
+}
+
+/// Whether a slave that touches one cell, on its own side, still does so at the place `here`, `distance` (m) away: it has no need to
+/// look across the cell's sides, and has not passed through. Within a cell the way to it turns with the cell alone, so
+/// that one that has hardly turned since the last look is on the same side of it.
+#[inline(always)]
+fn stays(item: &SlaveItem, here: &Closest, distance: f64) -> bool {
+    let care = Care::of(item);
+    let band = care.band(here, distance);
+    let inside = !care.crosses(here.xi[0], band) && !care.crosses(here.xi[1], band);
+    inside && dot(here.arm, item.direction) > SAME_SIDE * distance
+}
+
+/// Cosine of the angle by which the way to a cell turns at most between two looks at the same side of it.
+const SAME_SIDE: f64 = 0.9;
+
+/// Follows a slave that [`stays`].
+#[inline(always)]
+fn stay<F: Coulomb>(
+    item: &mut SlaveItem,
+    here: &Closest,
+    distance: f64,
+    s: &Surface<'_>,
+    v: &[V],
+    pace: &Pace,
+    law: &Law<'_, F>,
+) -> Met {
+    item.xi = here.xi;
+    item.direction = scale(here.arm, 1.0 / distance);
+    let gap = distance - law.offset;
+    if gap > 0.0 && item.multiplier == 0.0 {
+        return apart(item, gap, s, v, pace, true);
+    }
+    Met::Touch(touch_at(item, s, v, here, distance, law))
 }
 
 /// A slave that does not touch. One that is so near that it looks again at once keeps its place, as one in touch does.

@@ -262,7 +262,21 @@ pub(super) fn hold<F: Coulomb>(
 ) -> ContactEnergy {
     let (weights, arm) = held_arm(item, s);
     let n = item.direction;
-    touch_one(item, s, v, dot(arm, n) - law.offset, n, weights, law)
+    touch_one(item, s, v, dot(arm, n) - law.offset, n, n, weights, law)
+}
+
+/// Force of a slave at the place `at` of its cell, `distance` (m) away, which it touches alone.
+#[inline(always)]
+pub(super) fn touch_at<F: Coulomb>(
+    item: &mut SlaveItem,
+    s: &Surface<'_>,
+    v: &[V],
+    at: &Closest,
+    distance: f64,
+    law: &Law<'_, F>,
+) -> ContactEnergy {
+    let n = item.direction;
+    touch_one(item, s, v, distance - law.offset, n, n, at.weights, law)
 }
 
 /// Constants of a contact in a step.
@@ -288,14 +302,14 @@ pub(super) fn touch<F: Coulomb>(
     law: &Law<'_, F>,
 ) -> ContactEnergy {
     if pull.shares == [0.0; FACES] {
-        let weights = found.first.weights;
-        touch_one(item, s, v, pull.gap, pull.first, weights, law)
+        let (way, weights) = (pull.first, found.first.weights);
+        touch_one(item, s, v, pull.gap, way, unit(way), weights, law)
     } else {
         touch_several(item, s, v, pull, found, law)
     }
 }
 
-/// By its cell alone, along `direction`.
+/// By its cell alone, along `direction`, whose unit vector is `normal`.
 #[inline(always)]
 fn touch_one<F: Coulomb>(
     item: &mut SlaveItem,
@@ -303,13 +317,14 @@ fn touch_one<F: Coulomb>(
     v: &[V],
     gap: f64,
     direction: V,
+    normal: V,
     weights: [f64; 4],
     law: &Law<'_, F>,
 ) -> ContactEnergy {
     let master = s.cells[item.cell as usize].map(|n| v[n as usize]);
     let rel = sub(v[item.node as usize], combine(weights, &master));
     let vn = dot(rel, direction);
-    let reaction = react(item, s, gap, rel, vn, direction, law);
+    let reaction = react(item, s, gap, rel, vn, normal, law);
     item.between = false;
     item.force = add(scale(direction, reaction.normal), reaction.along);
     reaction.energy
@@ -342,7 +357,7 @@ fn touch_several<F: Coulomb>(
         rel = add(rel, scale(other, share));
         way = add(way, pull.others[face]);
     }
-    let reaction = react(item, s, pull.gap, rel, vn, way, law);
+    let reaction = react(item, s, pull.gap, rel, vn, unit(way), law);
     item.between = true;
     item.share_out(pull, found, reaction.normal, reaction.along);
     reaction.energy
@@ -357,7 +372,7 @@ struct Reaction {
     energy: ContactEnergy,
 }
 
-/// Answer to a gap (m) at the relative velocity `rel` (m/s), which opens it at `vn` (m/s). `way`: normal, of any length.
+/// Answer to a gap (m) at the relative velocity `rel` (m/s), which opens it at `vn` (m/s). `n`: unit normal.
 #[inline(always)]
 fn react<F: Coulomb>(
     item: &mut SlaveItem,
@@ -365,7 +380,7 @@ fn react<F: Coulomb>(
     gap: f64,
     rel: V,
     vn: f64,
-    way: V,
+    n: V,
     law: &Law<'_, F>,
 ) -> Reaction {
     let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
@@ -373,7 +388,6 @@ fn react<F: Coulomb>(
     let gap = -item.admit(depth, rel, law.dt, law.offset);
     let rest = content(law.offset);
     let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
-    let n = unit(way);
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
     let limit = law.friction.limit(&Sliding {
