@@ -1,6 +1,6 @@
 //! How far the ways to the answer are from the reference: the fine runs of the zones, the coarse run by itself, and others.
 
-use crate::models::{Model, Role, Zone};
+use crate::models::{Model, PassedOver, Role, Zone};
 use crate::table::{apart, same_within, unlike};
 use plyflow_defects::{Defect, FieldErrors, Kind, Ply, Settings, measure};
 use plyflow_sdk::{Host, StepError};
@@ -200,13 +200,15 @@ pub struct Measured {
 
 /// Measures how far every way to the answer is from the reference: the local runs together (with the global run around them), the
 /// global run by itself, and every other run. All defects of the reference count, wherever they are. Without a reference the
-/// local runs stand in for it, and what lies outside of their zones does not count. Nothing when nothing was refined.
+/// local runs stand in for it, and what lies outside of their zones does not count. Nothing when nothing was refined. Runs that are `passed_over` are
+/// not measured, and count among the element cycles of what stands on them.
 ///
 /// # Errors
 /// When the run is cancelled.
 pub fn measure_ways(
     host: &Host,
     models: &[Model],
+    passed_over: &PassedOver,
     zones: &[Zone],
     settings: &Settings,
 ) -> Result<Measured, StepError> {
@@ -253,6 +255,14 @@ pub fn measure_ways(
         Yardstick::Reference => Way::new("reference", ".reference", &reference),
         Yardstick::Zones => Way::new("total", "", &both),
     });
+    // What was run on the way to them, as in their costs.
+    for way in &mut measured.ways {
+        way.element_cycles += match way.model.as_str() {
+            "global" => passed_over.earlier_cycles,
+            "total" => passed_over.earlier_cycles + passed_over.superseded_cycles,
+            _ => 0.0,
+        };
+    }
     if yardstick == Yardstick::Reference {
         for m in local {
             let mut way = Way::new(&m.name, &format!(".{}", m.name), &[m]);

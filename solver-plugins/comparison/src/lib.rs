@@ -54,7 +54,7 @@ impl Step for Comparison {
         let passages = cut::passages(host, &models, &zones)?;
         let layers = cut::layers(&models, &zones);
         let cut = json!({"work": passages, "layers": layers});
-        let measured = fidelity::measure_ways(host, &models, &zones, &settings)?;
+        let measured = fidelity::measure_ways(host, &models, &passed_over, &zones, &settings)?;
         write_attributes(host, &models, &zones, &table, &cut, &measured.ways)?;
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;

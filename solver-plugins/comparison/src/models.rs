@@ -135,6 +135,9 @@ pub struct PassedOver {
     pub earlier: Vec<Input>,
     /// How many of the latter are coarse.
     pub earlier_coarse: usize,
+    /// Cells times cycles of the superseded and of the earlier.
+    pub superseded_cycles: f64,
+    pub earlier_cycles: f64,
 }
 
 impl PassedOver {
@@ -163,6 +166,9 @@ pub fn read_models(
     let global = passed_over.earlier.pop();
     let global = global.ok_or("global: no run arrives")?;
     passed_over.earlier_coarse = passed_over.earlier.len();
+    for input in &passed_over.earlier {
+        passed_over.earlier_cycles += host.attributes::<Formed>(input)?.element_cycles;
+    }
     let passes = 1 + passed_over.earlier.len();
     let tool = of_run::tool(host, &global)?;
     let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
@@ -170,6 +176,7 @@ pub fn read_models(
     for input in host.inputs_of("local")? {
         host.check_cancelled()?;
         let Some(zone) = zone_of(host, &input, zones, superseded)? else {
+            passed_over.superseded_cycles += host.attributes::<Formed>(&input)?.element_cycles;
             passed_over.superseded.push(input);
             continue;
         };
@@ -177,7 +184,9 @@ pub fn read_models(
             if passes == 1 {
                 return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
             }
-            passed_over.earlier.push(local.remove(k).input);
+            let before = local.remove(k);
+            passed_over.earlier_cycles += before.element_cycles;
+            passed_over.earlier.push(before.input);
         }
         let own = own_tool(host, &input)?;
         local.push(read(
@@ -195,6 +204,7 @@ pub fn read_models(
     for input in host.inputs_of("earlier")? {
         let formed: Formed = host.attributes(&input)?;
         passed_over.earlier_coarse += usize::from(formed.zone.is_null());
+        passed_over.earlier_cycles += formed.element_cycles;
         passed_over.earlier.push(input);
     }
     Ok((models, passed_over))

@@ -357,8 +357,12 @@ fn without_zones_the_artifact_says_so_and_holds_the_global_run_alone() {
 
 #[test]
 fn of_several_passes_the_last_is_measured_and_all_cost() {
-    let (first, second) = (local(1.0), local(0.5));
-    let (global, zones) = (global(), zones(json!([zone_a()])));
+    let with = |cycles: f64, mut run: MemoryArtifact| {
+        run.attributes["element_cycles"] = json!(cycles);
+        run
+    };
+    let (first, second) = (with(30.0, local(1.0)), with(50.0, local(0.5)));
+    let (global, zones) = (with(7.0, global()), zones(json!([zone_a()])));
     let costing = |cpu: f64, input| MemoryInput {
         cost: [cpu, cpu, 0.0],
         ..input
@@ -380,6 +384,17 @@ fn of_several_passes_the_last_is_measured_and_all_cost() {
     assert_eq!(out.measured["cost.local.A.cpu_seconds"].0, 8.0);
     assert_eq!(out.measured["cost.superseded.cpu_seconds"].0, 5.0);
     assert_eq!(out.measured["cost.total.cpu_seconds"].0, 15.0);
+    let cycles = |out: &MemoryArtifact, way: &str| {
+        let ways = out.attributes["ways"].as_array().unwrap();
+        let way = ways.iter().find(|w| w["model"] == way).unwrap();
+        way["element_cycles"].as_f64().unwrap()
+    };
+    assert_eq!(
+        [cycles(&out, "global"), cycles(&out, "total")],
+        [44.0, 94.0]
+    );
+    let one_pass = ["global", "total"].map(|way| cycles(&alone, way));
+    assert_eq!(one_pass, [7.0, 57.0]);
 }
 
 #[test]

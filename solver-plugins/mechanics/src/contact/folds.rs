@@ -151,7 +151,8 @@ impl SelfContact {
     }
 
     /// Follows the pairs, after a search if one is due, and computes the force of every slave. `stride` (m): the
-    /// furthest that any node has moved in the last step.
+    /// furthest that any node has moved in the last step. `onto`: forces (N) to which one thread adds at once what [`SelfContact::scatter`]
+    /// would.
     pub(crate) fn compute(
         &mut self,
         s: &Surface<'_>,
@@ -159,6 +160,7 @@ impl SelfContact {
         pace: Pace,
         stride: f64,
         bearing: Bearing<'_>,
+        onto: Option<&mut [V]>,
     ) -> ContactEnergy {
         if self.slaves.is_empty() {
             return ContactEnergy::default();
@@ -167,8 +169,8 @@ impl SelfContact {
             self.search(s, bearing);
         }
         match self.friction.clone() {
-            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace),
-            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, pace),
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace, onto),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, pace, onto),
         }
     }
 
@@ -178,6 +180,7 @@ impl SelfContact {
         s: &Surface<'_>,
         v: &[V],
         pace: Pace,
+        onto: Option<&mut [V]>,
     ) -> ContactEnergy {
         let law = Law {
             dt: pace.dt,
@@ -202,6 +205,9 @@ impl SelfContact {
         };
         let chunks = self.items.par_chunks_mut(256).map(follow_all);
         chunks.collect_into_vec(&mut self.sums);
+        if let Some(f) = onto {
+            self.scatter(s.cells, f);
+        }
         let mut total = ContactEnergy::default();
         for (energy, touched) in &self.sums {
             total.add(energy);
@@ -422,7 +428,7 @@ fn follow<F: Coulomb>(
         return Some(hold(item, s, v, law));
     }
     let p = s.x[item.node as usize];
-    let found = track(s, item, look(s, item, p), p, offset, open);
+    let found = track(s, item, p, offset, if item.active { 1 } else { 3 }, open);
     let first = &found.first;
     (item.cell, item.xi) = (first.cell, first.xi);
     let up = cell_normal(s, first.cell, first.xi);

@@ -28,7 +28,7 @@ pub use sheets::{SheetContact, Surface, shape};
 pub use slave::SlaveItem;
 
 /// Runs of slaves that a thread takes at most without leaving some to the others: how much there is to do in one is not known before.
-const TOGETHER: usize = 2;
+const TOGETHER: usize = 8;
 
 /// Penetration (m) with which a multiplier is content where surfaces touch at the distance `offset` (m): half a percent
 /// of it, and at most a micrometre, so that thick sheets do not sink in further than thin ones.

@@ -226,6 +226,19 @@ impl RigidContact {
         }
     }
 
+    /// The same by one thread, which then adds the forces to `f` (N).
+    pub(crate) fn compute_onto(
+        &mut self,
+        x: &[V],
+        v: &[V],
+        pace: Pace,
+        f: &mut [V],
+    ) -> ContactEnergy {
+        let energy = self.compute(x, v, pace);
+        self.scatter(f);
+        energy
+    }
+
     fn compute_with<F: Coulomb>(
         &mut self,
         friction: &F,
@@ -316,7 +329,7 @@ impl RigidContact {
 }
 
 /// Nodes whose forces are summed, and that are passed over while all of them sleep.
-const SPAN: usize = 256;
+const SPAN: usize = 64;
 
 /// A run of [`SPAN`] nodes.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]

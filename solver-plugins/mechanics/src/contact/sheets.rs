@@ -9,7 +9,7 @@
 use super::blend::{pulled, shares};
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::slave::{
-    Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch, touch_at,
+    Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
 };
 use super::{ContactEnergy, ContactSettings, Pace, TOGETHER, waking};
 use crate::archive::{Archive, ArchiveError};
@@ -247,70 +247,33 @@ fn around(
     Some(found).filter(|c| c.free == [true; 2])
 }
 
-/// How carefully a slave looks across the sides of its cell.
-#[derive(Clone, Copy)]
-struct Care {
-    /// Whether it looks from beside them too.
-    careful: bool,
-    /// From how many distances beside them.
-    reach: f64,
-}
-
-impl Care {
-    #[inline(always)]
-    fn of(item: &SlaveItem) -> Self {
-        let every = |n: u8| item.is_between() || item.turn.is_multiple_of(n) || !item.active;
-        Self {
-            careful: every(8),
-            // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
-            // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
-            reach: if every(16) { 4.0 } else { 1.0 },
-        }
-    }
-
-    /// Coordinate from which on a place `distance` (m) away is near the side of its cell.
-    #[inline(always)]
-    fn band(self, at: &Closest, distance: f64) -> f64 {
-        1.0 - (self.reach * distance / at.half).min(0.5)
-    }
-
-    /// Whether it looks across the side towards which the coordinate `place` points.
-    #[inline(always)]
-    fn crosses(self, place: f64, band: f64) -> bool {
-        !(place.abs() < band || (place.abs() < 1.0 && !self.careful))
-    }
-}
-
-/// The closest point of the cell in which a slave was. In touch, the place moves by far less than a cell in a step: one
-/// iteration follows it.
-#[inline(always)]
-pub(super) fn look(s: &Surface<'_>, item: &SlaveItem, p: V) -> Closest {
-    let iterations = if item.active { 1 } else { 3 };
-    closest(s, item.cell, item.xi, p, iterations)
-}
-
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
 /// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
-/// neighbour closer. `best`: what [`look`] has found in its cell. The walk enters only cells that are `open` to it.
+/// neighbour closer. The walk enters only cells that are `open` to it.
 #[inline(always)]
 pub(super) fn track(
     s: &Surface<'_>,
     item: &SlaveItem,
-    mut best: Closest,
     p: V,
     offset: f64,
+    iterations: u32,
     open: impl Fn(u32) -> bool,
 ) -> Found {
+    let mut best = closest(s, item.cell, item.xi, p, iterations);
     let mut others = [None; FACES];
-    let care = Care::of(item);
+    let every = |n: u8| item.is_between() || item.turn.is_multiple_of(n) || !item.active;
+    let careful = every(8);
+    // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
+    // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
+    let reach = if every(16) { 4.0 } else { 1.0 };
     for _ in 0..12 {
         let near = s.neighbours[best.cell as usize];
-        let band = care.band(&best, best.distance2.sqrt());
+        let band = 1.0 - (reach * best.distance2.sqrt() / best.half).min(0.5);
         let here = best;
         others = [None; FACES];
         for k in 0..2 {
             let place = here.xi[k];
-            if !care.crosses(place, band) {
+            if place.abs() < band || (place.abs() < 1.0 && !careful) {
                 continue;
             }
             // Sides 0: eta = -1, 1: xi = 1, 2: eta = 1, 3: xi = -1.
@@ -380,9 +343,31 @@ impl SheetContact {
 
     /// Computes the force of every slave from positions and velocities (m/s).
     pub fn compute(&mut self, s: &Surface<'_>, v: &[V], pace: Pace) -> ContactEnergy {
+        self.compute_by_law(s, v, pace, None)
+    }
+
+    /// The same by one thread, which adds the forces to `f` (N) in the order of [`SheetContact::scatter`] while the slaves are in
+    /// its cache.
+    pub(crate) fn compute_onto(
+        &mut self,
+        s: &Surface<'_>,
+        v: &[V],
+        pace: Pace,
+        f: &mut [V],
+    ) -> ContactEnergy {
+        self.compute_by_law(s, v, pace, Some(f))
+    }
+
+    fn compute_by_law(
+        &mut self,
+        s: &Surface<'_>,
+        v: &[V],
+        pace: Pace,
+        onto: Option<&mut [V]>,
+    ) -> ContactEnergy {
         match self.friction.clone() {
-            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace),
-            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, pace),
+            FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace, onto),
+            FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, pace, onto),
         }
     }
 
@@ -392,6 +377,7 @@ impl SheetContact {
         s: &Surface<'_>,
         v: &[V],
         pace: Pace,
+        onto: Option<&mut [V]>,
     ) -> ContactEnergy {
         let side = self.side;
         let law = Law {
@@ -414,12 +400,23 @@ impl SheetContact {
         self.wakes.resize(self.items.len(), 0);
         self.spans
             .resize_with(self.items.len().div_ceil(SPAN), Span::default);
-        self.items
-            .par_chunks_mut(SPAN)
-            .zip_eq(self.wakes.par_chunks_mut(SPAN))
-            .zip_eq(self.spans.par_iter_mut())
-            .with_max_len(TOGETHER)
-            .for_each(|((items, wakes), span)| following.span(items, wakes, span));
+        if let Some(f) = onto {
+            let items = self.items.chunks_mut(SPAN);
+            let wakes = self.wakes.chunks_mut(SPAN);
+            for ((items, wakes), span) in items.zip(wakes).zip(&mut self.spans) {
+                following.span(items, wakes, span);
+                if span.touches {
+                    scatter(items.iter(), s.cells, f);
+                }
+            }
+        } else {
+            self.items
+                .par_chunks_mut(SPAN)
+                .zip_eq(self.wakes.par_chunks_mut(SPAN))
+                .zip_eq(self.spans.par_iter_mut())
+                .with_max_len(TOGETHER)
+                .for_each(|((items, wakes), span)| following.span(items, wakes, span));
+        }
         let mut total = ContactEnergy::default();
         for span in self.spans.iter().filter(|s| s.touches) {
             total.add(&span.energy);
@@ -445,8 +442,9 @@ impl SheetContact {
     }
 }
 
-/// Slaves whose energies are summed, and that are passed over while all of them sleep.
-const SPAN: usize = 256;
+/// Slaves whose energies are summed, and that are passed over while all of them sleep: so many as stay in the nearest cache until their
+/// forces are on the nodes.
+const SPAN: usize = 64;
 
 /// A run of [`SPAN`] slaves.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -555,15 +553,16 @@ fn follow<F: Coulomb>(
             return apart(item, gap, s, v, pace, true);
         }
     }
-    let p = s.x[item.node as usize];
-    let here = look(s, item, p);
-    if item.active && item.plain {
-        let distance = here.distance2.sqrt();
-        if stays(item, &here, distance) {
-            return stay(item, &here, distance, s, v, pace, law);
-        }
-    }
-    let found = track(s, item, here, p, law.offset, |_| true);
+    // In touch, the place moves by far less than a cell in a step: one iteration follows it.
+    let iterations = if item.active { 1 } else { 3 };
+    let found = track(
+        s,
+        item,
+        s.x[item.node as usize],
+        law.offset,
+        iterations,
+        |_| true,
+    );
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
     let Some((pull, plain)) = pull_of(item, s, &found, side, law.offset, law.clearing) else {
         item.part();
@@ -582,40 +581,6 @@ fn follow<F: Coulomb>(
     item.guarded |= deep;
     item.plain = plain;
     Met::Touch(touch(item, s, v, &pull, &found, law))
-}
-
-/// Whether a slave that touches one cell, on its own side, still does so at the place `here`, `distance` (m) away: it has no need to
-/// look across the cell's sides, and has not passed through. Within a cell the way to it turns with the cell alone, so
-/// that one that has hardly turned since the last look is on the same side of it.
-#[inline(always)]
-fn stays(item: &SlaveItem, here: &Closest, distance: f64) -> bool {
-    let care = Care::of(item);
-    let band = care.band(here, distance);
-    let inside = !care.crosses(here.xi[0], band) && !care.crosses(here.xi[1], band);
-    inside && dot(here.arm, item.direction) > SAME_SIDE * distance
-}
-
-/// Cosine of the angle by which the way to a cell turns at most between two looks at the same side of it.
-const SAME_SIDE: f64 = 0.9;
-
-/// Follows a slave that [`stays`].
-#[inline(always)]
-fn stay<F: Coulomb>(
-    item: &mut SlaveItem,
-    here: &Closest,
-    distance: f64,
-    s: &Surface<'_>,
-    v: &[V],
-    pace: &Pace,
-    law: &Law<'_, F>,
-) -> Met {
-    item.xi = here.xi;
-    item.direction = scale(here.arm, 1.0 / distance);
-    let gap = distance - law.offset;
-    if gap > 0.0 && item.multiplier == 0.0 {
-        return apart(item, gap, s, v, pace, true);
-    }
-    Met::Touch(touch_at(item, s, v, here, distance, law))
 }
 
 /// A slave that does not touch. One that is so near that it looks again at once keeps its place, as one in touch does.

@@ -181,30 +181,59 @@ const SLACK: f64 = 1e-2;
 /// cell: it slides by some micrometres, which changes the distance by less than a nanometre.
 pub(super) const SEARCH_INTERVAL: u8 = 4;
 
-/// Adds the forces of the items in touch to `f` (N), slaves and masters.
+/// Adds the forces of the items in touch to `f` (N), slaves and masters, with the machine's wider vectors; no fused operations, so the
+/// bits are the same on all.
 pub(super) fn scatter<'a>(
     items: impl Iterator<Item = &'a SlaveItem>,
     cells: &[[u32; 4]],
     f: &mut [V],
 ) {
-    fn push(cell: [u32; 4], xi: [f64; 2], force: V, f: &mut [V]) {
-        for (w, n) in shape(xi).iter().zip(cell) {
-            let n = n as usize;
-            f[n] = sub(f[n], scale(force, *w));
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn wide<'a>(items: impl Iterator<Item = &'a SlaveItem>, cells: &[[u32; 4]], f: &mut [V]) {
+            scatter_each(items, cells, f);
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // Checked the line above.
+            return unsafe { wide(items, cells, f) };
         }
     }
+    scatter_each(items, cells, f);
+}
+
+#[inline(always)]
+fn scatter_each<'a>(items: impl Iterator<Item = &'a SlaveItem>, cells: &[[u32; 4]], f: &mut [V]) {
     for item in items.filter(|i| i.active) {
-        let cell = |c: u32| cells[c as usize];
         let mut own = item.force;
-        for other in item.others() {
-            own = sub(own, other.force);
-            // What acts on an image acts mirrored on the cell itself.
-            let mirrored = reflect(other.force, other.image);
-            push(cell(other.cell), other.xi, mirrored, f);
+        if item.between {
+            own = scatter_others(item, cells, f);
         }
-        push(cell(item.cell), item.xi, own, f);
+        push(cells[item.cell as usize], item.xi, own, f);
         let node = item.node as usize;
         f[node] = add(f[node], item.force);
+    }
+}
+
+/// Adds what acts on the other cells of an item that lies between several to `f` (N), and gives what is left for its own.
+#[inline(never)]
+fn scatter_others(item: &SlaveItem, cells: &[[u32; 4]], f: &mut [V]) -> V {
+    let mut own = item.force;
+    for other in item.others() {
+        own = sub(own, other.force);
+        // What acts on an image acts mirrored on the cell itself.
+        let mirrored = reflect(other.force, other.image);
+        push(cells[other.cell as usize], other.xi, mirrored, f);
+    }
+    own
+}
+
+/// Takes `force` (N) off the nodes of a cell, at a place in it.
+#[inline(always)]
+fn push(cell: [u32; 4], xi: [f64; 2], force: V, f: &mut [V]) {
+    for (w, n) in shape(xi).iter().zip(cell) {
+        let n = n as usize;
+        f[n] = sub(f[n], scale(force, *w));
     }
 }
 
@@ -262,21 +291,7 @@ pub(super) fn hold<F: Coulomb>(
 ) -> ContactEnergy {
     let (weights, arm) = held_arm(item, s);
     let n = item.direction;
-    touch_one(item, s, v, dot(arm, n) - law.offset, n, n, weights, law)
-}
-
-/// Force of a slave at the place `at` of its cell, `distance` (m) away, which it touches alone.
-#[inline(always)]
-pub(super) fn touch_at<F: Coulomb>(
-    item: &mut SlaveItem,
-    s: &Surface<'_>,
-    v: &[V],
-    at: &Closest,
-    distance: f64,
-    law: &Law<'_, F>,
-) -> ContactEnergy {
-    let n = item.direction;
-    touch_one(item, s, v, distance - law.offset, n, n, at.weights, law)
+    touch_one(item, s, v, dot(arm, n) - law.offset, n, weights, law)
 }
 
 /// Constants of a contact in a step.
@@ -302,14 +317,14 @@ pub(super) fn touch<F: Coulomb>(
     law: &Law<'_, F>,
 ) -> ContactEnergy {
     if pull.shares == [0.0; FACES] {
-        let (way, weights) = (pull.first, found.first.weights);
-        touch_one(item, s, v, pull.gap, way, unit(way), weights, law)
+        let weights = found.first.weights;
+        touch_one(item, s, v, pull.gap, pull.first, weights, law)
     } else {
         touch_several(item, s, v, pull, found, law)
     }
 }
 
-/// By its cell alone, along `direction`, whose unit vector is `normal`.
+/// By its cell alone, along `direction`.
 #[inline(always)]
 fn touch_one<F: Coulomb>(
     item: &mut SlaveItem,
@@ -317,14 +332,13 @@ fn touch_one<F: Coulomb>(
     v: &[V],
     gap: f64,
     direction: V,
-    normal: V,
     weights: [f64; 4],
     law: &Law<'_, F>,
 ) -> ContactEnergy {
     let master = s.cells[item.cell as usize].map(|n| v[n as usize]);
     let rel = sub(v[item.node as usize], combine(weights, &master));
     let vn = dot(rel, direction);
-    let reaction = react(item, s, gap, rel, vn, normal, law);
+    let reaction = react(item, s, gap, rel, vn, direction, law);
     item.between = false;
     item.force = add(scale(direction, reaction.normal), reaction.along);
     reaction.energy
@@ -357,7 +371,7 @@ fn touch_several<F: Coulomb>(
         rel = add(rel, scale(other, share));
         way = add(way, pull.others[face]);
     }
-    let reaction = react(item, s, pull.gap, rel, vn, unit(way), law);
+    let reaction = react(item, s, pull.gap, rel, vn, way, law);
     item.between = true;
     item.share_out(pull, found, reaction.normal, reaction.along);
     reaction.energy
@@ -372,7 +386,7 @@ struct Reaction {
     energy: ContactEnergy,
 }
 
-/// Answer to a gap (m) at the relative velocity `rel` (m/s), which opens it at `vn` (m/s). `n`: unit normal.
+/// Answer to a gap (m) at the relative velocity `rel` (m/s), which opens it at `vn` (m/s). `way`: normal, of any length.
 #[inline(always)]
 fn react<F: Coulomb>(
     item: &mut SlaveItem,
@@ -380,7 +394,7 @@ fn react<F: Coulomb>(
     gap: f64,
     rel: V,
     vn: f64,
-    n: V,
+    way: V,
     law: &Law<'_, F>,
 ) -> Reaction {
     let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
@@ -388,6 +402,7 @@ fn react<F: Coulomb>(
     let gap = -item.admit(depth, rel, law.dt, law.offset);
     let rest = content(law.offset);
     let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
+    let n = unit(way);
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
     let limit = law.friction.limit(&Sliding {

@@ -396,7 +396,7 @@ impl Model {
         self.mirroring.place(&self.patch_sums)?;
         self.set_free_masses();
         self.hold_at_planes();
-        self.internal_forces(false, false, &Clock::none())?;
+        self.internal_forces(false, false)?;
         self.normals();
         Ok(())
     }

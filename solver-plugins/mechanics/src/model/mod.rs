@@ -251,12 +251,7 @@ const NORMAL_INTERVAL: u64 = 16;
 impl Model {
     /// Internal forces, pressure and energies at the present positions, and beside them the forces that contacts have
     /// `computed` put on the nodes, by one thread. With `fields`, the elements' fields too.
-    fn internal_forces(
-        &mut self,
-        fields: bool,
-        computed: bool,
-        clock: &Clock,
-    ) -> Result<(), MechanicsError> {
+    fn internal_forces(&mut self, fields: bool, computed: bool) -> Result<(), MechanicsError> {
         let present = Present {
             sheets: &self.sheets,
             motion: Motion {
@@ -269,27 +264,19 @@ impl Model {
             areas: self.cycle.is_multiple_of(NORMAL_INTERVAL),
             fields,
         };
-        let mut scatter = || {
+        let scatter = || {
             if computed {
                 let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
                 let folds = &self.self_contacts;
                 scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
             }
         };
-        let mut elements = || {
+        let elements = || {
             run_blocks(&mut self.blocks, &mut self.sums, present);
             run_patch_blocks(&mut self.patches, &mut self.patch_sums, present);
         };
-        if rayon::current_num_threads() == 1 {
-            // While the contacts are still in the cache.
-            let part = clock.part();
-            scatter();
-            part.add_to(&mut self.spent.contacts);
-            elements();
-        } else {
-            // The first to come takes the first half of the blocks, whose nodes it also moves: they are in its cache.
-            rayon::join(elements, scatter);
-        }
+        // The first to come takes the first half of the blocks, whose nodes it also moves: they are in its cache.
+        rayon::join(elements, scatter);
         self.mirroring.hand_over(&mut self.patch_sums.force);
         let failed = self.blocks.iter().map(|b| b.failed);
         let failed = failed.chain(self.patches.iter().map(|b| b.failed));
@@ -316,9 +303,10 @@ impl Model {
         self.mirroring.level_normals(&mut self.normals);
     }
 
-    /// Forces of all contacts, not yet on the nodes: one piece of parallel work, at whose end alone threads wait for each
-    /// other. With one such wait for each contact, a small bag's threads waited for a tenth of the time and more.
-    fn compute_contacts(&mut self) {
+    /// Forces of all contacts: one piece of parallel work, at whose end alone threads wait for each
+    /// other. With one such wait for each contact, a small bag's threads waited for a tenth of the time and more. Gives whether the forces
+    /// are on the nodes already, as one thread puts them there while the contacts are in its cache.
+    fn compute_contacts(&mut self) -> bool {
         // Both bodies may move so, and speeds and accelerations may grow while a node sleeps. 5 m/s is more than a film
         // picks up under 1 bar over the gaps for which a node sleeps more than a few steps; 10 km/s2 is what 1 bar
         // does to 10 kg/m2.
@@ -345,25 +333,40 @@ impl Model {
         self.step_energies.resize_with(n, ContactEnergy::default);
         let (of_rigid, others) = self.step_energies.split_at_mut(n_rigid);
         let (of_sheets, of_folds) = others.split_at_mut(n_sheets);
-        let rigid = || {
-            let contacts = self.rigid_contacts.par_iter_mut().zip_eq(of_rigid);
-            let contacts = contacts.with_max_len(1);
-            contacts.for_each(|(c, energy)| *energy = c.compute(&self.x, v, pace));
-        };
-        let sheets = || {
-            let contacts = self.sheet_contacts.par_iter_mut().zip_eq(of_sheets);
-            let contacts = contacts.with_max_len(1);
-            contacts.for_each(|(c, energy)| *energy = c.compute(&surface, v, pace));
-        };
-        let folds = || {
-            let contacts = self.self_contacts.par_iter_mut().zip_eq(of_folds);
-            let contacts = contacts.with_max_len(1);
-            contacts.for_each(|(c, energy)| {
-                *energy = c.compute(&surface, v, pace, stride, bearing);
-            });
-        };
-        rayon::join(sheets, || rayon::join(rigid, folds));
+        let alone = rayon::current_num_threads() == 1;
+        if alone {
+            let f = &mut self.contact_force[..];
+            for (c, energy) in self.rigid_contacts.iter_mut().zip(of_rigid) {
+                *energy = c.compute_onto(&self.x, v, pace, f);
+            }
+            for (c, energy) in self.sheet_contacts.iter_mut().zip(of_sheets) {
+                *energy = c.compute_onto(&surface, v, pace, f);
+            }
+            for (c, energy) in self.self_contacts.iter_mut().zip(of_folds) {
+                *energy = c.compute(&surface, v, pace, stride, bearing, Some(&mut *f));
+            }
+        } else {
+            let rigid = || {
+                let contacts = self.rigid_contacts.par_iter_mut().zip_eq(of_rigid);
+                let contacts = contacts.with_max_len(1);
+                contacts.for_each(|(c, energy)| *energy = c.compute(&self.x, v, pace));
+            };
+            let sheets = || {
+                let contacts = self.sheet_contacts.par_iter_mut().zip_eq(of_sheets);
+                let contacts = contacts.with_max_len(1);
+                contacts.for_each(|(c, energy)| *energy = c.compute(&surface, v, pace));
+            };
+            let folds = || {
+                let contacts = self.self_contacts.par_iter_mut().zip_eq(of_folds);
+                let contacts = contacts.with_max_len(1);
+                contacts.for_each(|(c, energy)| {
+                    *energy = c.compute(&surface, v, pace, stride, bearing, None);
+                });
+            };
+            rayon::join(sheets, || rayon::join(rigid, folds));
+        }
         self.count_contacts();
+        alone
     }
 
     /// Energies of the contacts, by contact and of all.
@@ -394,7 +397,7 @@ impl Model {
     /// # Errors
     /// When a component fails.
     pub fn take_shape(&mut self) -> Result<(), MechanicsError> {
-        self.internal_forces(false, false, &Clock::none())
+        self.internal_forces(false, false)
     }
 
     /// One step. With `fields`, the elements' fields at the positions before the step are kept for
@@ -406,19 +409,20 @@ impl Model {
         let clock = Clock::of_step(self.cycle);
         if self.cycle.is_multiple_of(NORMAL_INTERVAL) {
             // Contacts want the normals, and these what the elements sum.
-            self.internal_forces(fields, false, &clock)?;
+            self.internal_forces(fields, false)?;
             let part = clock.part();
             self.normals();
-            self.compute_contacts();
-            let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
-            let folds = &self.self_contacts;
-            scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
+            if !self.compute_contacts() {
+                let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
+                let folds = &self.self_contacts;
+                scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
+            }
             part.add_to(&mut self.spent.contacts);
         } else {
             let part = clock.part();
-            self.compute_contacts();
+            let on_nodes = self.compute_contacts();
             part.add_to(&mut self.spent.contacts);
-            self.internal_forces(fields, true, &clock)?;
+            self.internal_forces(fields, !on_nodes)?;
         }
         self.advance();
         self.mirroring.follow(&mut self.x);

@@ -28,11 +28,6 @@ impl Spent {
 pub(super) struct Clock(Option<Instant>);
 
 impl Clock {
-    /// One that does not run.
-    pub(super) fn none() -> Self {
-        Self(None)
-    }
-
     pub(super) fn of_step(cycle: u64) -> Self {
         Self(cycle.is_multiple_of(INTERVAL).then(Instant::now))
     }
