@@ -135,8 +135,9 @@ pub struct PassedOver {
     pub earlier: Vec<Input>,
     /// How many of the latter are coarse.
     pub earlier_coarse: usize,
-    /// Cells times cycles of the superseded and of the earlier.
+    /// Cells times cycles of the superseded.
     pub superseded_cycles: f64,
+    /// Cells times cycles of the earlier.
     pub earlier_cycles: f64,
 }
 
