@@ -1,5 +1,5 @@
 //! Small plugins for tests (`plugins/`, built as examples): well-behaved ones and ones that fail in every
-//! known way. `cargo build -p plyflow-faults --examples` builds them.
+//! known way.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -24,13 +24,12 @@ pub fn folder() -> &'static Path {
         cargo
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .env("CARGO_TARGET_DIR", target);
-        cargo.args([
-            "build",
-            "--quiet",
-            "--package",
-            "plyflow-faults",
-            "--examples",
-        ]);
+        // Of the whole workspace: dependencies then have the features that `cargo test --workspace` gives them, and nothing is
+        // compiled a second time.
+        cargo.args(["build", "--quiet", "--workspace"]);
+        for name in names() {
+            cargo.args(["--example", &name]);
+        }
         if profile.ends_with("release") {
             cargo.arg("--release");
         }
@@ -38,6 +37,15 @@ pub fn folder() -> &'static Path {
         assert!(status.success(), "the test plugins do not build");
         gather(&profile.join("examples"), &profile.join("test-plugins"))
     })
+}
+
+/// Names of the plugins' examples: those of their sources.
+fn names() -> Vec<String> {
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("plugins");
+    let entries = std::fs::read_dir(sources).expect("the sources of the test plugins");
+    let paths = entries.flatten().map(|e| e.path());
+    let names = paths.filter_map(|p| Some(p.file_stem()?.to_str()?.to_owned()));
+    names.collect()
 }
 
 /// Cargo keeps copies with a hash in their names beside the libraries: gathers those without.
