@@ -89,6 +89,8 @@ pub(crate) struct FormingFacts {
     pub(crate) elements: f64,
     pub(crate) energy: Energy,
     pub(crate) penetration: BTreeMap<String, Penetration>,
+    /// Share of the thinner body up to which bodies may reach into each other.
+    pub(crate) overlap_bound: Option<f64>,
     pub(crate) warnings: Vec<String>,
 }
 

@@ -170,6 +170,26 @@ fn local_and_global_measures_of_a_defect_stand_in_one_row() {
 }
 
 #[test]
+fn what_overlapped_beyond_its_bound_on_the_way_is_marked_in_the_table_of_penetrations() {
+    let (_keep, folder) = folder();
+    let page = page(&whole(&folder), &folder);
+    let (_, table) = page.split_once("<h3>Penetration</h3>").expect("a table");
+    let (table, _) = table.split_once("</table>").expect("its end");
+    assert!(table.contains("(bound 10 %)"), "{table}");
+    let row = table.split("<tr>").find(|r| r.contains("tool/ply_1"));
+    let row = row.expect("a row of the pair");
+    assert!(row.contains(r#"<td class="n">4.21 %</td>"#), "{row}");
+    assert!(
+        row.contains(r#"<td class="n missed">11.53 %</td>"#),
+        "{row}"
+    );
+    assert!(row.contains(">0.188<") && row.contains(">0.33<"), "{row}");
+    // A pair of a program from before that told peaks has none.
+    let other = table.split("<tr>").find(|r| r.contains("ply_1/ply_2"));
+    assert!(other.expect("a row").contains("–"));
+}
+
+#[test]
 fn texts_from_files_are_escaped_everywhere() {
     let (_keep, folder) = folder();
     let mut input = whole(&folder);

@@ -84,6 +84,7 @@ mod tests {
                 place: Some([1.0, 2.0, 3.0]),
                 q999: 1e-6,
                 q999_time: 0.2,
+                many: true,
             }],
             ..Course::default()
         };

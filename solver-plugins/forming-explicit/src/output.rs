@@ -6,7 +6,7 @@ use crate::elements::{self, Rectangle};
 use crate::late::Start;
 use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
-use crate::penetration::{Penetration, PenetrationPeak};
+use crate::penetration::{OVERLAP_BOUND, Penetration, PenetrationPeak};
 use crate::run::{Body, Forming, Outcome};
 use crate::strain::ply_extremes;
 use crate::writer::Writer;
@@ -510,6 +510,7 @@ fn write_summary(
             "hourglass_ratio": h.hourglass_ratio,
         },
         "penetration": penetration,
+        "overlap_bound": OVERLAP_BOUND,
         "warnings": warnings,
     }))?;
     for w in &warnings {

@@ -7,7 +7,10 @@ use plyflow_mechanics::vec3::V;
 use serde::{Deserialize, Serialize};
 
 /// Share of the thinner body beyond which what bodies share is told.
-const OVERLAP_BOUND: f64 = 0.1;
+pub const OVERLAP_BOUND: f64 = 0.1;
+
+/// Nodes in touch from which on a quantile says something of a pair: with fewer, one node at a corner is the 99.9 % quantile.
+pub const MANY: usize = 100;
 
 /// A sheet that others keep away from a rigid part is held by the part itself once those are squeezed by this share of their
 /// thickness. Held at their full thickness it would share their load with them, in shares that no physics gives, and past the
@@ -24,6 +27,8 @@ pub fn slack_through(between: &[StackSheet]) -> f64 {
 pub struct Penetration {
     /// Name of the pair.
     pub pair: String,
+    /// How many nodes touch.
+    pub nodes: usize,
     /// Largest of its nodes in touch (m).
     pub largest: f64,
     /// Where that node is (m); `None` when none touches.
@@ -45,6 +50,7 @@ impl Penetration {
         let depth = |i: usize| depths.get(i).map_or(0.0, |d| d.0);
         Self {
             pair: pair.to_owned(),
+            nodes: depths.len(),
             largest: depth(last),
             place: depths.last().map(|d| d.1),
             q999: depth(at.min(last)),
@@ -64,7 +70,8 @@ impl Penetration {
         ((depth - self.spare) / self.thinner).max(0.0)
     }
 
-    /// What to tell of bodies that share more than a tenth of the thinner one: at the end, or else when they did most.
+    /// What to tell of bodies that share more than a tenth of the thinner one: at the end, or else when they did most with
+    /// [`MANY`] nodes in touch.
     pub fn too_deep(&self, peak: &PenetrationPeak) -> Option<String> {
         let at_end = self.overlap() > OVERLAP_BOUND;
         let (overlap, when, place) = if at_end {
@@ -73,7 +80,8 @@ impl Penetration {
             let when = format!(" at {:.4} s, no longer at the end", peak.q999_time);
             (self.overlap_of(peak.q999), when, peak.place)
         };
-        (overlap > OVERLAP_BOUND).then(|| {
+        let told = overlap > OVERLAP_BOUND && (at_end || peak.many);
+        told.then(|| {
             let place = place.map_or_else(String::new, |p| {
                 let [x, y, z] = p.map(|c| 1e3 * c);
                 format!(", deepest at ({x:.1}, {y:.1}, {z:.1}) mm")
@@ -98,10 +106,12 @@ pub struct PenetrationPeak {
     pub largest_time: f64,
     /// Where that node was (m); `None` when none touched.
     pub place: Option<V>,
-    /// Largest 99.9 % quantile (m).
+    /// Largest 99.9 % quantile (m): of the frames with [`MANY`] nodes in touch where there are such, else of all.
     pub q999: f64,
     /// When that was (s).
     pub q999_time: f64,
+    /// Whether [`MANY`] nodes touched then.
+    pub many: bool,
 }
 
 /// Counts the penetrations `now`, at `time` (s), among the largest so far, by pair. Of equal ones the first counts.
@@ -111,8 +121,9 @@ pub fn keep_largest(peaks: &mut Vec<PenetrationPeak>, now: &[Penetration], time:
         if p.largest > peak.largest {
             (peak.largest, peak.largest_time, peak.place) = (p.largest, time, p.place);
         }
-        if p.q999 > peak.q999 {
-            (peak.q999, peak.q999_time) = (p.q999, time);
+        let many = p.nodes >= MANY;
+        if (many, p.q999) > (peak.many, peak.q999) {
+            (peak.q999, peak.q999_time, peak.many) = (p.q999, time, many);
         }
     }
 }
@@ -170,11 +181,12 @@ mod tests {
     fn of_every_pair_the_largest_and_their_times_are_kept() {
         let at =
             |depth: f64| Penetration::new("film/ply", vec![(depth, [depth, 0.0, 0.0])], 0.0, 1e-4);
+        let few = || Penetration::new("ply/ply", vec![(3e-5, [2.0; 3])], 0.0, 1e-4);
         let many = || (0..2000).map(|i| (f64::from(i) / 1e8, [1.0; 3])).collect();
         let spread = Penetration::new("ply/ply", many(), 0.0, 1e-4);
         let none = || Penetration::new("ply/ply", Vec::new(), 0.0, 1e-4);
         let mut peaks = Vec::new();
-        keep_largest(&mut peaks, &[at(1e-6), none()], 0.0);
+        keep_largest(&mut peaks, &[at(1e-6), few()], 0.0);
         keep_largest(&mut peaks, &[at(3e-6), spread], 0.1);
         keep_largest(&mut peaks, &[at(3e-6), none()], 0.2);
         keep_largest(&mut peaks, &[at(2e-6), none()], 0.3);
@@ -186,10 +198,10 @@ mod tests {
             (3e-6, 0.1, 0.1)
         );
         assert_eq!(film.place, Some([3e-6, 0.0, 0.0]));
-        assert_eq!(
-            (ply.largest, ply.q999, ply.largest_time),
-            (1.999e-5, 1.998e-5, 0.1)
-        );
+        // One node was deeper before many touched: the largest of all, but no quantile.
+        assert_eq!((ply.largest, ply.largest_time), (3e-5, 0.0));
+        assert_eq!((ply.q999, ply.q999_time), (1.998e-5, 0.1));
+        assert!(ply.many && !film.many);
     }
 
     #[test]
@@ -213,6 +225,7 @@ mod tests {
             q999: 2.6e-4,
             q999_time: 0.125,
             place: Some([0.001, 0.002, 0.003]),
+            many: true,
             ..none
         };
         let told = apart.too_deep(&earlier).unwrap();
@@ -221,6 +234,11 @@ mod tests {
             "{told}"
         );
         assert!(told.contains("(1.0, 2.0, 3.0) mm"), "{told}");
+        let few = PenetrationPeak {
+            many: false,
+            ..earlier
+        };
+        assert_eq!(apart.too_deep(&few), None);
         assert_eq!(
             Penetration::new("ply/ply", Vec::new(), 0.0, 1e-4).overlap(),
             0.0

@@ -6,9 +6,6 @@ use crate::study::{Material, Run};
 use crate::units::{fixed, number};
 use maud::{Markup, html};
 
-/// Share of the thinner body up to which bodies may reach into each other.
-const OVERLAP_BOUND: f64 = 0.1;
-
 /// Energies of a run's history; the internal one is summed.
 const ENERGIES: [(&str, &str, usize); 6] = [
     ("external", "external work", 0),
@@ -195,10 +192,11 @@ fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64], blank: Plot<'
 
 fn penetrations(runs: &[(bool, &Run)]) -> Markup {
     let any = runs.iter().any(|(_, r)| !r.facts.penetration.is_empty());
+    let bound = runs.iter().find_map(|(_, r)| r.facts.overlap_bound);
     html! {
         @if any {
             h3 { "Penetration" }
-            p { "The quantile is that of the nodes in touch; the overlap is what the bodies themselves share of the thinner one, by the quantile (bound 10 %)." }
+            p { "The quantile is that of the nodes in touch; the overlap is what the bodies themselves share of the thinner one, by the quantile" @if let Some(b) = bound { " (bound " (fixed(100.0 * b, 0)) " %)" } ". Over the whole run the quantile is that of the times with 100 nodes in touch and more, where there are any." }
             div class="scroll" { table {
                 thead {
                     tr { th rowspan="2" { "run" } th rowspan="2" { "pair" } th class="group" colspan="3" { "at the end" } th class="group" colspan="4" { "over the whole run" } }
@@ -208,7 +206,7 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
                     }
                 }
                 tbody { @for (_, r) in runs { @for (i, (pair, p)) in r.facts.penetration.iter().enumerate() {
-                    tr { th { @if i == 0 { (r.label) } } td { (pair) } (depths(p.max, p.q999, p.overlap)) (peak(p.peak.as_ref())) }
+                    tr { th { @if i == 0 { (r.label) } } td { (pair) } (depths(p.max, p.q999, p.overlap, r.facts.overlap_bound)) (peak(p.peak.as_ref(), r.facts.overlap_bound)) }
                 } } }
             } }
         }
@@ -216,9 +214,9 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
 }
 
 /// Cells of depths (m) and of the share of the thinner body.
-fn depths(max: f64, q999: f64, overlap: Option<f64>) -> Markup {
-    let class = match overlap {
-        Some(o) if o > OVERLAP_BOUND => "n missed",
+fn depths(max: f64, q999: f64, overlap: Option<f64>, bound: Option<f64>) -> Markup {
+    let class = match (overlap, bound) {
+        (Some(o), Some(b)) if o > b => "n missed",
         _ => "n",
     };
     html! {
@@ -227,10 +225,10 @@ fn depths(max: f64, q999: f64, overlap: Option<f64>) -> Markup {
 }
 
 /// Cells of the largest over a run, and when it was.
-fn peak(peak: Option<&PenetrationPeak>) -> Markup {
+fn peak(peak: Option<&PenetrationPeak>, bound: Option<f64>) -> Markup {
     html! {
         @match peak {
-            Some(p) => { (depths(p.max, p.q999, Some(p.overlap))) td class="n" { (fixed(p.max_time, 3)) } }
+            Some(p) => { (depths(p.max, p.q999, Some(p.overlap), bound)) td class="n" { (fixed(p.max_time, 3)) } }
             None => @for _ in 0..4 { td class="n" { "–" } },
         }
     }

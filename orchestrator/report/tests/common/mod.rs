@@ -139,7 +139,14 @@ impl Study {
             "scene": "half-pipe", "sheets": list, "element_size": size, "zone": zone_json, "cycles": 40000,
             "elements": elements, "element_cycles": 4e4 * elements as f64,
             "energy": {"peak_drift_ratio": 0.011, "peak_kinetic_ratio": 0.023, "kinetic_bound_kept": true, "hourglass_ratio": 0.002},
-            "penetration": {"tool/ply_1": {"max": 2.1e-4, "q999": 8e-5}, "ply_1/ply_2": {"max": 1e-4, "q999": 6e-5}},
+            "penetration": {
+                "tool/ply_1": {
+                    "max": 2.1e-4, "q999": 8e-5, "overlap": 0.0421,
+                    "peak": {"max": 3.3e-4, "max_time": 0.1875, "q999": 2.2e-4, "q999_time": 0.125, "overlap": 0.1153},
+                },
+                "ply_1/ply_2": {"max": 1e-4, "q999": 6e-5},
+            },
+            "overlap_bound": 0.1,
             "warnings": if zone.is_none() { json!(["the film <upper> is stretched by 61 %"]) } else { json!([]) },
         });
         w.attributes(&attributes.to_string()).unwrap();

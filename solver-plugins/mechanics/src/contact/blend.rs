@@ -1,6 +1,6 @@
 //! Concave folds and corners of a master, where a slave lies between several of its cells.
 
-use super::sheets::{Closest, FACES, Found};
+use super::search::{Closest, FACES, Found};
 use super::slave::Pull;
 use crate::vec3::{V, dot, scale};
 use nalgebra::{Matrix5, Vector5};

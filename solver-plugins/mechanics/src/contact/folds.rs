@@ -11,7 +11,7 @@
 use super::blend::pulled;
 use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::proximity::{Blocks, Candidate, Reach};
-use super::sheets::*;
+use super::search::{Closest, Surface, cell_normal, combine, shape, track};
 use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, relative_speed, scatter, touch};
 use super::{ContactEnergy, ContactSettings, Pace};
 use crate::archive::{Archive, ArchiveError};

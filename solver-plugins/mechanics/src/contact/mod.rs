@@ -14,6 +14,7 @@ mod folds;
 mod friction;
 mod proximity;
 mod rigid;
+mod search;
 mod sheets;
 mod slave;
 
@@ -24,7 +25,8 @@ pub use friction::{
     VaryingFriction, Whose,
 };
 pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
-pub use sheets::{SheetContact, Surface, shape};
+pub use search::{Surface, shape};
+pub use sheets::SheetContact;
 pub use slave::SlaveItem;
 
 /// Runs of slaves that a thread takes at most without leaving some to the others: how much there is to do in one is not known before.

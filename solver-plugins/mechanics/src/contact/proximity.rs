@@ -6,7 +6,7 @@
 //! those whose boxes overlap are looked at node by node. So a flat sheet costs a pass over its cells.
 
 use super::folds::is_far;
-use super::sheets::{Surface, closest};
+use super::search::{Surface, closest};
 use crate::mesh::area_vector;
 use crate::vec3::{V, add, dot, norm, scale, sub, unit};
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! One node of a sheet on another sheet: its state, its force in touch, and where that goes.
 
 use super::friction::{Coulomb, Sliding};
-use super::sheets::{Closest, FACES, Found, Surface, combine, shape};
+use super::search::{Closest, FACES, Found, Surface, combine, shape};
 use super::{ContactEnergy, content, friction_force, normal_force};
 use crate::mesh::NONE;
 use crate::mirror::{Image, reflect};

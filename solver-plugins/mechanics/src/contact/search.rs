@@ -1,0 +1,278 @@
+//! Closest points of a sheet's bilinear cells: of one cell, and from where a slave was over the cells around it.
+
+use super::blend::shares;
+use super::slave::SlaveItem;
+use crate::mesh::NONE;
+use crate::mirror::{Image, mirrored_in, reflect};
+use crate::vec3::{V, cross, dot, sub, unit};
+
+/// Bilinear shape functions at `xi`.
+#[inline(always)]
+pub fn shape(xi: [f64; 2]) -> [f64; 4] {
+    let (a, b) = (0.25 * (1.0 - xi[0]), 0.25 * (1.0 + xi[0]));
+    let (c, d) = (1.0 - xi[1], 1.0 + xi[1]);
+    [a * c, b * c, b * d, a * d]
+}
+
+#[inline(always)]
+pub(super) fn combine(w: [f64; 4], p: &[V; 4]) -> V {
+    let mut s = [0.0; 3];
+    for (w, p) in w.iter().zip(p) {
+        for c in 0..3 {
+            s[c] += w * p[c];
+        }
+    }
+    s
+}
+
+/// Surface of all sheets as the contact sees it.
+#[derive(Clone, Copy)]
+pub struct Surface<'a> {
+    /// `[cells][4]` model nodes.
+    pub cells: &'a [[u32; 4]],
+    /// `[cells][4]` cell across each edge, [`NONE`], or one of [`crate::mirror::MIRRORED`].
+    pub neighbours: &'a [[u32; 4]],
+    /// `[nodes]` positions (m).
+    pub x: &'a [V],
+    /// `[nodes]` unit normals.
+    pub normals: &'a [V],
+}
+
+/// Closest point of a cell to a slave.
+#[derive(Clone, Copy)]
+pub(super) struct Closest {
+    pub(super) cell: u32,
+    pub(super) xi: [f64; 2],
+    pub(super) weights: [f64; 4],
+    /// From the closest point to the slave (m).
+    pub(super) arm: V,
+    pub(super) distance2: f64,
+    /// Half the cell's shorter middle line (m).
+    pub(super) half: f64,
+    /// By coordinate, whether the place is not held at a side of the cell: in both, the way to it is a perpendicular.
+    pub(super) free: [bool; 2],
+    /// Whether it lies on the cell's mirror image.
+    pub(super) image: Image,
+}
+
+/// Cells around a corner besides the one that is closest.
+pub(super) const FACES: usize = 3;
+
+/// The closest point of the surface, and in a concave fold or corner those of the cells across it.
+pub(super) struct Found {
+    pub(super) first: Closest,
+    /// Of the cells across the sides along xi and along eta that the slave is near, and of the one between these two across
+    /// the corner, as far as the foot on them is a perpendicular's.
+    pub(super) others: [Option<Closest>; FACES],
+}
+
+/// How far a cell goes on past a free rim, in half cells: a node that sits on the rim would else balance on an
+/// edge, slide off and get under the sheet.
+pub(super) const RIM: f64 = 0.5;
+
+/// Closest point of one cell to `p` by Newton steps from `xi`, kept inside the cell.
+#[inline(always)]
+pub(super) fn closest(
+    s: &Surface<'_>,
+    cell: u32,
+    mut xi: [f64; 2],
+    p: V,
+    iterations: u32,
+) -> Closest {
+    let x = s.cells[cell as usize].map(|n| s.x[n as usize]);
+    let (mut half, mut free) = (0.0, [true; 2]);
+    let [south, east, north, west] = s.neighbours[cell as usize];
+    let end = |near: u32| if near == NONE { 1.0 + RIM } else { 1.0 };
+    let (low, high) = ([-end(west), -end(south)], [end(east), end(north)]);
+    for _ in 0..iterations {
+        let (a, b) = (0.25 * (1.0 - xi[1]), 0.25 * (1.0 + xi[1]));
+        let (c, d) = (0.25 * (1.0 - xi[0]), 0.25 * (1.0 + xi[0]));
+        let t1 = combine([-a, a, b, -b], &x);
+        let t2 = combine([-c, -d, d, c], &x);
+        let r = sub(p, combine(shape(xi), &x));
+        let (g11, g22, g12) = (dot(t1, t1), dot(t2, t2), dot(t1, t2));
+        let (r1, r2) = (dot(r, t1), dot(r, t2));
+        let det = (g11 * g22 - g12 * g12).max(1e-12 * g11 * g22);
+        let next = [
+            xi[0] + (r1 * g22 - r2 * g12) / det,
+            xi[1] + (r2 * g11 - r1 * g12) / det,
+        ];
+        let held = [
+            next[0].clamp(low[0], high[0]),
+            next[1].clamp(low[1], high[1]),
+        ];
+        // Held at one side of the cell, the best place along that side is another one.
+        let along = |k: usize, other: f64| {
+            let (gkk, rk) = if k == 0 { (g11, r1) } else { (g22, r2) };
+            (xi[k] + (rk - g12 * other) / gkk).clamp(low[k], high[k])
+        };
+        let out = [next[0] != held[0], next[1] != held[1]];
+        free = out.map(|o| !o);
+        xi = match out {
+            [false, false] => held,
+            [true, false] => [held[0], along(1, held[0] - xi[0])],
+            [false, true] => [along(0, held[1] - xi[1]), held[1]],
+            [true, true] => {
+                // In a corner's range: take the side that is overshot more, slide along it.
+                if (next[0] - held[0]).abs() > (next[1] - held[1]).abs() {
+                    [held[0], along(1, held[0] - xi[0])]
+                } else {
+                    [along(0, held[1] - xi[1]), held[1]]
+                }
+            }
+        };
+        half = g11.min(g22).sqrt();
+    }
+    let weights = shape(xi);
+    let arm = sub(p, combine(weights, &x));
+    Closest {
+        cell,
+        xi,
+        weights,
+        arm,
+        distance2: dot(arm, arm),
+        half,
+        free,
+        image: [false; 2],
+    }
+}
+
+/// Unit normal of a cell at a place in it.
+pub(super) fn cell_normal(s: &Surface<'_>, cell: u32, xi: [f64; 2]) -> V {
+    let x = s.cells[cell as usize].map(|n| s.x[n as usize]);
+    let (a, b) = (1.0 - xi[1], 1.0 + xi[1]);
+    let (c, d) = (1.0 - xi[0], 1.0 + xi[0]);
+    unit(cross(
+        combine([-a, a, b, -b], &x),
+        combine([-c, -d, d, c], &x),
+    ))
+}
+
+/// The edge over which a walk enters the cell `to`.
+fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> usize {
+    let edge = neighbours[to as usize].iter().position(|n| *n == from);
+    edge.unwrap_or(3)
+}
+
+/// The middle of an edge.
+fn middle(edge: usize) -> [f64; 2] {
+    match edge {
+        0 => [0.0, -1.0],
+        1 => [1.0, 0.0],
+        2 => [0.0, 1.0],
+        _ => [-1.0, 0.0],
+    }
+}
+
+/// Closest point to `p` of the mirror image of a cell: the image of the closest point to the image of `p`.
+#[inline(never)]
+fn across(s: &Surface<'_>, cell: u32, start: [f64; 2], p: V, image: Image) -> Closest {
+    let other = closest(s, cell, start, reflect(p, image), 3);
+    Closest {
+        arm: reflect(other.arm, image),
+        image,
+        ..other
+    }
+}
+
+/// Closest point of the cell across a corner: the neighbour of both cells (or images) `a` and `b` next to `first`.
+#[inline(never)]
+fn around(
+    s: &Surface<'_>,
+    first: &Closest,
+    [a, b]: [&Closest; 2],
+    p: V,
+    open: impl Fn(u32) -> bool,
+) -> Option<Closest> {
+    let real = |c: &Closest| c.image == [false; 2];
+    let image = [a.image[0] != b.image[0], a.image[1] != b.image[1]];
+    let found = match (real(a), real(b)) {
+        (true, true) => {
+            let near = s.neighbours[b.cell as usize];
+            let of_both = |c: &u32| {
+                let none = *c == NONE || *c == first.cell || mirrored_in(*c).is_some();
+                !none && near.contains(c)
+            };
+            let cell = s.neighbours[a.cell as usize].into_iter().find(of_both)?;
+            if !open(cell) {
+                return None;
+            }
+            let start = middle(entry(s.neighbours, a.cell, cell));
+            closest(s, cell, start, p, 3)
+        }
+        // Images of the cell next to the one that lies at the plane, or of that itself across both.
+        (false, true) => across(s, b.cell, b.xi, p, image),
+        (true, false) => across(s, a.cell, a.xi, p, image),
+        (false, false) => across(s, first.cell, first.xi, p, image),
+    };
+    Some(found).filter(|c| c.free == [true; 2])
+}
+
+/// The closest point of the surface near where the slave was: of its cell, and of the cells across those
+/// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
+/// neighbour closer. The walk enters only cells that are `open` to it.
+#[inline(always)]
+pub(super) fn track(
+    s: &Surface<'_>,
+    item: &SlaveItem,
+    p: V,
+    offset: f64,
+    iterations: u32,
+    open: impl Fn(u32) -> bool,
+) -> Found {
+    let mut best = closest(s, item.cell, item.xi, p, iterations);
+    let mut others = [None; FACES];
+    let every = |n: u8| item.is_between() || item.turn.is_multiple_of(n) || !item.active;
+    let careful = every(8);
+    // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
+    // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
+    let reach = if every(16) { 4.0 } else { 1.0 };
+    for _ in 0..12 {
+        let near = s.neighbours[best.cell as usize];
+        let band = 1.0 - (reach * best.distance2.sqrt() / best.half).min(0.5);
+        let here = best;
+        others = [None; FACES];
+        for k in 0..2 {
+            let place = here.xi[k];
+            if place.abs() < band || (place.abs() < 1.0 && !careful) {
+                continue;
+            }
+            // Sides 0: eta = -1, 1: xi = 1, 2: eta = 1, 3: xi = -1.
+            let edge = match (k, place > 0.0) {
+                (0, true) => 1,
+                (0, false) => 3,
+                (_, true) => 2,
+                (_, false) => 0,
+            };
+            if let Some(plane) = mirrored_in(near[edge]) {
+                // Across the plane the surface goes on as its own image, which is never closer.
+                let image = [plane == 0, plane == 1];
+                let other = across(s, here.cell, middle(edge), p, image);
+                others[k] = Some(other).filter(|c| c.free[k]);
+            } else if near[edge] != NONE && open(near[edge]) {
+                let start = entry(s.neighbours, here.cell, near[edge]);
+                let mut other = closest(s, near[edge], middle(start), p, 3);
+                if other.distance2 < best.distance2 {
+                    std::mem::swap(&mut best, &mut other);
+                }
+                // Edges 0 and 2 are held in eta, 1 and 3 in xi.
+                others[k] = Some(other).filter(|c| c.free[1 - start % 2]);
+            }
+        }
+        if best.cell == here.cell {
+            break;
+        }
+    }
+    // Only where the ways to both cells are perpendicular across their common side does the surface fold towards the slave;
+    // along it they may end on a ridge, as on a saddle.
+    for k in 0..2 {
+        others[k] = others[k].filter(|c| best.free[k] && shares(&best, c, offset));
+    }
+    if let [Some(a), Some(b), _] = &others {
+        others[2] = around(s, &best, [a, b], p, open);
+    }
+    Found {
+        first: best,
+        others,
+    }
+}
