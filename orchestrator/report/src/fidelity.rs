@@ -5,7 +5,7 @@ use crate::input::{Instance, ReportInput};
 /// A measure of how wrong a way is: a result of `comparison`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
-    /// Mean error of the reference's defects, a missed one counting as 1.
+    /// Mean error of the reference's defects and of false ones, a missed and a false one counting as 1.
     Defects,
     /// Mean relative error of the lengths of wrinkles that both have.
     Length,

@@ -76,13 +76,13 @@ impl Fidelity {
         found
     }
 
-    /// Mean over the reference's defects of the error of length or area, a missed one counting as 1; `None` when it has no
-    /// defect.
+    /// Mean over the defects of both of the error of length or area, one that only the reference has or has not counting as
+    /// 1; `None` when neither has one.
     pub fn error(&self) -> Option<f64> {
         let both = self.length.iter().chain(&self.area);
-        let missed = self.missed.iter().sum::<usize>();
-        let count = both.clone().count() + missed;
-        (count > 0).then(|| (both.sum::<f64>() + missed as f64) / count as f64)
+        let alone = self.missed.iter().chain(&self.wrong).sum::<usize>();
+        let count = both.clone().count() + alone;
+        (count > 0).then(|| (both.sum::<f64>() + alone as f64) / count as f64)
     }
 
     /// What it comes to: names of results, values and units, in the order in which they are reported.

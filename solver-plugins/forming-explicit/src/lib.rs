@@ -7,6 +7,7 @@ pub mod assembly;
 mod checkpoint;
 mod course;
 mod diagnosis;
+pub mod draw_in;
 pub mod elements;
 pub mod friction;
 mod global;

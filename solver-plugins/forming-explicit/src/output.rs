@@ -544,6 +544,11 @@ fn write_summary(
     host.result("shear_max", hi, "rad")?;
     host.result("shear_min", lo, "rad")?;
     host.result("fibre_strain_max", strain, "1")?;
+    if forming.zone.is_none() {
+        let ways = forming.draw_in();
+        host.result("draw_in_max", ways.rim, "m")?;
+        host.result("corner_draw_in_max", ways.corner, "m")?;
+    }
     host.result("elements", elements as f64, "1")?;
     host.result("cycles", outcome.cycles as f64, "1")?;
     host.result("time_step", outcome.smallest_step, "s")?;

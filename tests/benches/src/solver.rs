@@ -174,6 +174,7 @@ pub fn solver() -> Vec<Row> {
         ));
     }
     rows.extend(by_size(&presses));
+    rows.push(whole_stroke(&presses));
     rows.extend(spar(&folder.path().join("workflows/joggle-spar")));
     rows
 }
@@ -198,6 +199,16 @@ fn spar(place: &Path) -> Vec<Row> {
         "1",
     ));
     rows
+}
+
+/// The peer's case as its workflow has it, the whole stroke: the wall time that its goal is about.
+fn whole_stroke(place: &Path) -> Row {
+    let workflow = std::fs::read_to_string(place.join("workflow.yaml")).expect("the peer's case");
+    let run = run(place, &workflow, 2);
+    let mut row = run.row(String::new());
+    row.case = "s4, press 2 mm, whole stroke, 2 threads, wall".into();
+    (row.value, row.unit) = (run.wall, "s");
+    row
 }
 
 /// Cost of the same share of the stroke by element size, and the exponent between neighbours.

@@ -22,7 +22,7 @@ pub(super) fn section(input: &ReportInput) -> Markup {
             section id="fidelity" {
                 h2 { "Speed against error" }
                 p {
-                    "Error: the mean over all defects of the " (ways.yardstick()) " of the relative error of a wrinkle's length or a bridging's area; a missed one counts as 100 %. "
+                    "Error: the mean over all defects of the " (ways.yardstick()) ", and false ones, of the relative error of a wrinkle's length or a bridging's area; a missed and a false one count as 100 %. "
                     "Position, distance: root mean square over the plies; shear: of its quantiles. A mark: no other way is both cheaper and better."
                 }
                 @if !ways.of_the_whole {
