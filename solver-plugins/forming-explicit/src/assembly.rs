@@ -159,7 +159,6 @@ pub fn add_self_contact(
     if !p.self_contact || first == end {
         return Ok(());
     }
-    let undeformed = model.x.clone();
     let mut slaves = slaves.to_vec();
     slaves.sort_unstable();
     let name = &stack[ply].scene.name;
@@ -178,7 +177,7 @@ pub fn add_self_contact(
         cell_range: model.sheets[index].cell_range,
         thickness: stack[ply].thickness,
         friction,
-        undeformed: &undeformed,
+        undeformed: model.start().clone(),
     };
     model.add_self_contact(spec, &contact_settings(p));
     Ok(())

@@ -1,7 +1,7 @@
 //! How far the rims of plies are drawn in.
 
 use crate::run::Forming;
-use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_mechanics::mesh::NONE;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::SheetKind;
 
@@ -10,49 +10,51 @@ use plyflow_model::scene::SheetKind;
 pub struct DrawIn {
     /// Of all nodes there.
     pub rim: f64,
-    /// Of corners, the nodes of a single cell.
+    /// Of corners, between two free sides of one cell.
     pub corner: f64,
 }
 
 impl DrawIn {
-    /// Of one mesh, from its points `now` (m).
-    pub fn of(mesh: &QuadMesh, now: &[V]) -> Self {
-        let around = mesh.cells_of_nodes();
-        let mut most = Self::default();
-        let ends = mesh.points.iter().zip(now).zip(mesh.on_boundary());
-        for (((then, now), _), cells) in ends.zip(&around).filter(|((_, rim), _)| *rim) {
-            let way = (now[0] - then[0]).hypot(now[1] - then[1]);
-            most.rim = most.rim.max(way);
-            if cells.len() == 1 {
-                most.corner = most.corner.max(way);
+    /// Counts a sheet: `cells` and what lies across their edges (`[cells][4]`), its points `then` and `now` (m).
+    fn count(&mut self, cells: &[[u32; 4]], neighbours: &[[u32; 4]], then: &[V], now: &[V]) {
+        for (cell, near) in cells.iter().zip(neighbours) {
+            // Edge e goes from node e to the next one.
+            for (e, node) in cell.iter().enumerate() {
+                let (before, after) = (near[(e + 3) % 4] == NONE, near[e] == NONE);
+                if !before && !after {
+                    continue;
+                }
+                let (then, now) = (then[*node as usize], now[*node as usize]);
+                let way = (now[0] - then[0]).hypot(now[1] - then[1]);
+                self.rim = self.rim.max(way);
+                if before && after {
+                    self.corner = self.corner.max(way);
+                }
+            }
+        }
+    }
+}
+
+impl Forming {
+    /// Of all plies. Beside mirror planes the part that is computed tells it of all.
+    pub fn draw_in(&self) -> DrawIn {
+        let m = &self.model;
+        let mut most = DrawIn::default();
+        for (body, sheet) in self.bodies.iter().zip(&self.stack) {
+            if sheet.scene.kind == SheetKind::Ply {
+                let (start, end) = m.sheets[body.sheet].cell_range;
+                let (cells, near) = (&m.cells[start..end], &m.neighbours()[start..end]);
+                most.count(cells, near, &self.reference, &m.x);
             }
         }
         most
     }
 }
 
-impl Forming {
-    /// Of all plies.
-    pub fn draw_in(&self) -> DrawIn {
-        let sheets = self.bodies.iter().zip(&self.stack);
-        let plies = sheets.filter(|(_, s)| s.scene.kind == SheetKind::Ply);
-        let each = plies.map(|(body, _)| {
-            let mesh = QuadMesh {
-                points: self.reference_points(body),
-                cells: body.cells.clone(),
-            };
-            DrawIn::of(&mesh, &self.points(body))
-        });
-        each.fold(DrawIn::default(), |a, b| DrawIn {
-            rim: a.rim.max(b.rim),
-            corner: a.corner.max(b.corner),
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use plyflow_mechanics::mesh::QuadMesh;
 
     #[test]
     fn rims_and_corners_are_told_by_their_ways_in_plan() {
@@ -73,7 +75,8 @@ mod tests {
         // The middle of a side more than its ends, and a node inside most of all.
         now[5][0] += 0.001;
         now[7][1] += 0.5;
-        let found = DrawIn::of(&mesh, &now);
+        let mut found = DrawIn::default();
+        found.count(&mesh.cells, &mesh.neighbours(), &mesh.points, &now);
         assert!((found.rim - 0.003).abs() < 1e-12 && (found.corner - 0.002).abs() < 1e-12);
     }
 }

@@ -350,7 +350,6 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         .iter()
         .map(|n| [0, 1].map(|k| parts.points[*n as usize][k]))
         .collect();
-    let reference = parts.points.clone();
     let settings = assembly::step_settings(p);
     let mut model = Model::mirrored(parts.points, parts.specs, settings, parts.mirrors)
         .map_err(|e| e.to_string())?;
@@ -371,6 +370,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         }),
     );
     debug_assert!(at.tool_top > 0.0);
+    let reference = model.start().clone();
     Ok(Forming {
         model,
         load: Load::Process {

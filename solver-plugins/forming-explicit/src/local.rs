@@ -184,7 +184,6 @@ pub fn build_local(
     let start = late::of_model(&stack, &specs, &input.sheets, input.time[0])?;
     let (tool, grid) = tool::build(scene, p.tool_grid)?;
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]])?;
-    let reference = points.clone();
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
     assembly::add_contacts(
@@ -196,6 +195,7 @@ pub fn build_local(
         &mut ToolSurfaces::new(grid),
     )?;
     model.set_driven(driven, Box::new(drive));
+    let reference = model.start().clone();
     Ok(Forming {
         model,
         load: Load::Given {

@@ -310,7 +310,6 @@ pub fn build_press(
         bodies.push(body);
         specs.push(spec);
     }
-    let reference = points.clone();
     let mut model = Model::mirrored(points, specs, assembly::step_settings(p), mirrors)
         .map_err(|e| e.to_string())?;
     model.body_acceleration[2] = match press.weight {
@@ -351,6 +350,7 @@ pub fn build_press(
         held,
     };
     load.apply(&mut model);
+    let reference = model.start().clone();
     let reach = bodies_reach(&reference);
     let (die, holder) = plates(press, &at);
     let mut rigid = vec![RigidBody::plate("die", &die, reach)];

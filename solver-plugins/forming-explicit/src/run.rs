@@ -18,6 +18,7 @@ use plyflow_mechanics::vec3::{V, dot, norm};
 use plyflow_model::scene::Scene;
 use plyflow_tooling::ToolMesh;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Ledger entries per frame.
 const LEDGER_PER_FRAME: u64 = 10;
@@ -126,7 +127,7 @@ pub struct Forming {
     /// Bodies of the artifact, bottom to top.
     pub bodies: Vec<Body>,
     /// `[n]` points at the start (m).
-    pub reference: Vec<V>,
+    pub reference: Arc<[V]>,
     /// The tool.
     pub tool: ToolMesh,
     /// What else is rigid, to be looked at.
@@ -443,7 +444,7 @@ impl Forming {
             |c: &&RigidContact| !c.name.starts_with("die/") && !c.name.starts_with("symmetry_");
         for c in m.rigid_contacts.iter().filter(facing) {
             for i in &c.items {
-                force[i.node as usize] += i.normal_force;
+                force[i.node as usize] += f64::from(i.normal_force);
             }
         }
         for c in &m.sheet_contacts {

@@ -13,16 +13,29 @@ pub fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
             continue;
         }
         let axis = crate::assembly::axis(&sheet.scene);
-        let (now, then) = (forming.points(body), forming.reference_points(body));
-        for cell in &body.cells {
-            let (g, e) = cell_strain(
-                cell.map(|n| then[n as usize]),
-                cell.map(|n| now[n as usize]),
-                axis,
-            );
+        let mut count = |then: [V; 4], now: [V; 4]| {
+            let (g, e) = cell_strain(then, now, axis);
             lo = lo.min(g);
             hi = hi.max(g);
             strain = strain.max(e);
+        };
+        if body.mirrored.is_some() {
+            let (now, then) = (forming.points(body), forming.reference_points(body));
+            for cell in &body.cells {
+                count(
+                    cell.map(|n| then[n as usize]),
+                    cell.map(|n| now[n as usize]),
+                );
+            }
+        } else {
+            // A large sheet's points are not copied for this: it is where a run's memory would be largest.
+            let (start, end) = forming.model.sheets[body.sheet].cell_range;
+            for cell in &forming.model.cells[start..end] {
+                count(
+                    cell.map(|n| forming.reference[n as usize]),
+                    cell.map(|n| forming.model.x[n as usize]),
+                );
+            }
         }
     }
     if lo > hi {

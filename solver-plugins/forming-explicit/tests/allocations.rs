@@ -88,7 +88,7 @@ fn assert_frugal(what: &str, p: &Parameters, threads: usize, warm: usize) {
         let touching = |f: f64| f > 0.0;
         let on_rigid = rigid
             .flat_map(|c| &c.items)
-            .filter(|i| touching(i.normal_force));
+            .filter(|i| touching(i.normal_force.into()));
         let between = forming.model.sheet_contacts.iter().flat_map(|c| &c.items);
         let between = between.filter(|i| i.active).count();
         let sheets = forming.model.sheets.len();

@@ -43,7 +43,7 @@ fn held_in_the_middle(forming: &Forming, sheet: &str) -> f64 {
     let items = contact.unwrap_or_else(|| panic!("no {name}")).items.iter();
     items
         .filter(|i| middle(i.node))
-        .map(|i| i.normal_force)
+        .map(|i| f64::from(i.normal_force))
         .sum()
 }
 

@@ -184,7 +184,7 @@ fn shells_with_rotations_bend_in_a_zone_beside_membranes_whose_nodes_do_not_turn
     let health = &outcome.health;
     assert!(health.peak_drift_ratio < 0.01, "{health:?}");
     let spins = forming.model.spins().unwrap();
-    let points = &forming.reference;
+    let points = &*forming.reference;
     let turning = |left: bool| {
         let own = spins.iter().zip(points).filter(|s| (s.1[0] < 1e-9) == left);
         own.filter(|s| *s.0 != [0.0; 3]).count()

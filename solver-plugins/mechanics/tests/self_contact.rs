@@ -68,7 +68,7 @@ impl Strip {
             cell_range: model.sheets[0].cell_range,
             thickness: THICKNESS,
             friction: self.friction.into(),
-            undeformed: &mesh.points,
+            undeformed: mesh.points.as_slice().into(),
         };
         model.add_self_contact(contact, &self.contact);
         (model, mesh.points)

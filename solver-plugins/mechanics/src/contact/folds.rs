@@ -57,7 +57,7 @@ struct Search {
 }
 
 /// What a self-contact is made of.
-pub struct FoldSpec<'a> {
+pub struct FoldSpec {
     /// Name of the pair, for reports.
     pub name: String,
     /// Slaves: model nodes in increasing order.
@@ -69,7 +69,7 @@ pub struct FoldSpec<'a> {
     /// Coulomb coefficient.
     pub friction: FrictionLaw,
     /// `[nodes]` positions in the flat, undeformed sheet (m).
-    pub undeformed: &'a [V],
+    pub undeformed: Arc<[V]>,
 }
 
 /// A sheet on itself.
@@ -113,7 +113,7 @@ pub(crate) struct Bearing<'a> {
 
 impl SelfContact {
     /// A sheet on itself; `cells` are the model's.
-    pub(crate) fn new(spec: FoldSpec<'_>, cells: &[[u32; 4]], settings: ContactSettings) -> Self {
+    pub(crate) fn new(spec: FoldSpec, cells: &[[u32; 4]], settings: ContactSettings) -> Self {
         let (c0, c1) = spec.cell_range;
         let own = &cells[c0..c1];
         let at = |n: u32| spec.undeformed[n as usize];
@@ -128,7 +128,7 @@ impl SelfContact {
             spec.cell_range,
             cells,
             &spec.slaves,
-            spec.undeformed,
+            &spec.undeformed,
             reach / edge,
         );
         Self {
@@ -140,7 +140,7 @@ impl SelfContact {
             touched: false,
             searches: 0,
             slaves: spec.slaves,
-            undeformed: spec.undeformed.into(),
+            undeformed: spec.undeformed,
             blocks,
             near: NEAR * spec.thickness,
             margin,
@@ -294,11 +294,11 @@ impl SelfContact {
         kept.append(&mut fresh);
         kept.sort_by_key(|i| i.slave.node);
         self.items = kept;
-        self.search = Search {
-            x: self.slaves.iter().map(|n| s.x[*n as usize]).collect(),
-            travelled: 0.0,
-            room: 0.25 * self.margin,
-        };
+        self.search.x.clear();
+        let now = self.slaves.iter().map(|n| s.x[*n as usize]);
+        self.search.x.extend(now);
+        self.search.travelled = 0.0;
+        self.search.room = 0.25 * self.margin;
         self.searches += 1;
     }
 

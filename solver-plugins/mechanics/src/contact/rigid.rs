@@ -92,19 +92,20 @@ pub struct RigidItem {
     pub node: u32,
     /// Penetration (m), 0 when apart; for reports.
     pub penetration: f32,
+    /// Damping (N s/m). Like the normal force it is of single precision, where its last digits do not matter, to save memory:
+    /// every node has an item for each rigid part.
+    pub damping: f32,
     /// Normal stiffness (N/m).
     pub stiffness: f64,
-    /// Damping (N s/m).
-    pub damping: f64,
     /// Multiplier: the steady part of the normal force (N).
     pub multiplier: f64,
     work: f64,
+    /// Normal part of the force on the node in the last step (N); for reports.
+    pub normal_force: f32,
     /// Friction force held by the slip spring (N).
     pub slip: V,
     /// Force on the node in the last step (N).
     pub force: V,
-    /// Normal part of it (N).
-    pub normal_force: f64,
 }
 
 impl RigidItem {
@@ -468,7 +469,7 @@ fn touch<F: Coulomb>(
     v: V,
     law: &Law<'_, F>,
 ) -> ContactEnergy {
-    let (k, c) = (item.stiffness, item.damping);
+    let (k, c) = (item.stiffness, f64::from(item.damping));
     let vn = dot(v, g);
     let (held, work) = (item.multiplier, item.work);
     let rest = content(law.offset);
@@ -508,7 +509,7 @@ fn touch<F: Coulomb>(
         energy.friction = f.friction;
         energy.damping += f.damping;
     }
-    item.normal_force = normal.force;
+    item.normal_force = normal.force as f32;
     item.multiplier = normal.multiplier;
     item.work = normal.work;
     item.penetration = (-gap).max(0.0) as f32;

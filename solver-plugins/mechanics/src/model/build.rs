@@ -32,6 +32,7 @@ impl Model {
         let mut model = Self {
             v: vec![[0.0; 3]; n],
             mass: vec![0.0; n],
+            start: points.as_slice().into(),
             normals: vec![[0.0, 0.0, 1.0]; n],
             sheets: Vec::new(),
             cells: Vec::new(),

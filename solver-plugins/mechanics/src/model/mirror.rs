@@ -189,8 +189,8 @@ impl Model {
                     }
                     let mut item = RigidItem::new(*n);
                     item.stiffness = PLANE_STIFFNESS * self.mass[i] / dt2;
-                    item.damping =
-                        2.0 * settings.damping_ratio * (item.stiffness * self.mass[i]).sqrt();
+                    let critical = 2.0 * (item.stiffness * self.mass[i]).sqrt();
+                    item.damping = (settings.damping_ratio * critical) as f32;
                     items.push(item);
                 }
                 let name = format!("symmetry_{}/{}", ["x", "y"][k], sheet.name);

@@ -36,6 +36,7 @@ use crate::vec3::{V, add, dot, norm, scale, sub};
 use crate::{LANES, MechanicsError};
 use plyflow_abi::*;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// How a node is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,6 +93,8 @@ pub struct Model {
     pub v: Vec<V>,
     /// `[n]` masses (kg).
     pub mass: Vec<f64>,
+    /// `[n]` positions with which it was built (m); shared, so that what needs them keeps no copy of its own.
+    start: Arc<[V]>,
     /// `[n]` unit normals of the sheets.
     pub normals: Vec<V>,
     /// Sheets from the tool upwards.

@@ -12,6 +12,17 @@ impl Model {
         rigid.chain(sheets).fold(0.0, f64::max)
     }
 
+    /// `[n]` positions with which it was built (m).
+    pub fn start(&self) -> &Arc<[V]> {
+        &self.start
+    }
+
+    /// `[cells][4]` what lies across each edge of a cell: a cell, [`crate::mesh::NONE`] at a rim, or one of
+    /// [`crate::mirror::MIRRORED`].
+    pub fn neighbours(&self) -> &[[u32; 4]] {
+        &self.neighbours
+    }
+
     /// The ledger at the present step.
     pub fn energies(&self) -> Ledger {
         let mut l = self.ledger;

@@ -51,7 +51,7 @@ impl Model {
         for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
             let m = mass[item.node as usize];
             item.stiffness *= limit[item.node as usize];
-            item.damping = 2.0 * c.damping_ratio * (item.stiffness * m).sqrt();
+            item.damping = (2.0 * c.damping_ratio * (item.stiffness * m).sqrt()) as f32;
         }
         for item in self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items) {
             if item.cell == crate::mesh::NONE {
@@ -94,7 +94,7 @@ impl Model {
         let dt = self.settings.target_step;
         let mut row = vec![0.0; self.mass.len()];
         for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
-            row[item.node as usize] += item.damping;
+            row[item.node as usize] += f64::from(item.damping);
         }
         let on_sheets = |i: &&mut SlaveItem| i.cell != crate::mesh::NONE;
         let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
@@ -109,7 +109,8 @@ impl Model {
             .map(|(r, m)| (BOUND * m / (dt * r.max(1e-300))).min(1.0))
             .collect();
         for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
-            item.damping *= limit[item.node as usize];
+            let limited = f64::from(item.damping) * limit[item.node as usize];
+            item.damping = limited as f32;
         }
         let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
         for item in sheets.filter(on_sheets) {
@@ -122,7 +123,7 @@ impl Model {
     /// Adds the contact of a sheet with itself. `undeformed`: the model's points (m) with the sheet flat; what
     /// is near in it does not touch. The other contacts' stiffness is set, or comes to be set, by
     /// [`Model::set_contact_stiffness`].
-    pub fn add_self_contact(&mut self, spec: FoldSpec<'_>, c: &ContactSettings) {
+    pub fn add_self_contact(&mut self, spec: FoldSpec, c: &ContactSettings) {
         let contact = SelfContact::new(spec, &self.cells, *c);
         self.self_contacts.push(contact);
         self.set_contact_room();
