@@ -55,6 +55,7 @@ impl Forming {
 mod tests {
     use super::*;
     use plyflow_mechanics::mesh::QuadMesh;
+    use plyflow_mechanics::mirror::MIRRORED;
 
     #[test]
     fn rims_and_corners_are_told_by_their_ways_in_plan() {
@@ -78,5 +79,15 @@ mod tests {
         let mut found = DrawIn::default();
         found.count(&mesh.cells, &mesh.neighbours(), &mesh.points, &now);
         assert!((found.rim - 0.003).abs() < 1e-12 && (found.corner - 0.002).abs() < 1e-12);
+        // Where a mirror plane bounds what is computed, the sheet goes on: no rim on its left and right, and no corner.
+        let mut near = mesh.neighbours();
+        for cell in [0, 4] {
+            near[cell][3] = MIRRORED[0];
+            near[cell + 3][1] = MIRRORED[0];
+        }
+        let mut part = DrawIn::default();
+        part.count(&mesh.cells, &near, &mesh.points, &now);
+        assert!((part.rim - 0.002).abs() < 1e-12, "{part:?}");
+        assert_eq!(part.corner, 0.0);
     }
 }
