@@ -7,6 +7,7 @@
 use super::transpose::{Sum, scatter};
 use super::*;
 use rayon::iter::Either;
+use std::cell::RefCell;
 
 /// Batches in a block: 16 x 16 elements.
 pub(super) const BLOCK: usize = 8;
@@ -240,14 +241,38 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
         );
 }
 
+thread_local! {
+    /// Of the block that a thread computes; kept so that no step asks for memory.
+    static OWN: RefCell<OwnMotion> = RefCell::default();
+}
+
 fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>, work: &mut Workspace) {
+    OWN.with_borrow_mut(|own| run_block_with(block, part, present, own, work));
+}
+
+fn run_block_with(
+    block: &mut Block<Batch>,
+    part: Part<'_>,
+    present: Present<'_>,
+    own: &mut OwnMotion,
+    work: &mut Workspace,
+) {
+    let elements = block
+        .batches
+        .iter()
+        .map(|b| present.sheets[b.sheet as usize].element_of(b));
+    let mut rates = [false; 2];
+    for element in elements.filter(|e| e.rotates()) {
+        rates = [rates[0] || !element.sizes.ignores_velocity, true];
+    }
+    own.take(&block.nodes, part.force.len(), present.motion, rates);
     part.force.fill(Sum::default());
     part.moment.fill(Sum::default());
     part.pressure.fill(Sum::default());
     part.area.fill(Sum::default());
     block.failed = None;
     for batch in &mut block.batches {
-        run_batch(batch, present, work);
+        run_batch(batch, present, own, work);
         if batch.status != PF_OK {
             block.failed = block.failed.or(Some((batch.status, batch.sheet)));
             continue;
@@ -292,16 +317,19 @@ pub(super) fn run_patch_blocks(
         .for_each_init(PatchWorkspace::new, |work, (block, force)| {
             force.fill(Sum::default());
             block.failed = None;
-            for batch in &mut block.batches {
-                run_patch(batch, present, work);
-                if batch.status != PF_OK {
-                    block.failed = block.failed.or(Some((batch.status, batch.sheet)));
-                    continue;
+            OWN.with_borrow_mut(|own| {
+                own.take(&block.nodes, force.len(), present.motion, [false; 2]);
+                for batch in &mut block.batches {
+                    run_patch(batch, present, own, work);
+                    if batch.status != PF_OK {
+                        block.failed = block.failed.or(Some((batch.status, batch.sheet)));
+                        continue;
+                    }
+                    // Unused nodes of a patch repeat its centre and have no force.
+                    let count = batch.count as usize;
+                    scatter_all(&batch.places, count, &work.force.0, true, force);
                 }
-                // Unused nodes of a patch repeat its centre and have no force.
-                let count = batch.count as usize;
-                scatter_all(&batch.places, count, &work.force.0, true, force);
-            }
+            });
         });
 }
 
