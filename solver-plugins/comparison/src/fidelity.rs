@@ -1,8 +1,8 @@
 //! How far the ways to the answer are from the reference: the fine runs of the zones, the coarse run by itself, and others.
 
 use crate::models::{Model, PassedOver, Role, Zone};
-use crate::table::{apart, same_within, unlike};
-use plyflow_defects::{Defect, FieldErrors, Kind, Ply, Settings, measure};
+use plyflow_defects::pairs::{PairErrors, Pairs, apart, measure_for_pairs};
+use plyflow_defects::{Defect, FieldErrors, Settings};
 use plyflow_sdk::{Host, StepError};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -10,103 +10,13 @@ use serde_json::{Map, Value, json};
 /// A defect and the name of its ply.
 type Found<'a> = (&'a str, &'a Defect);
 
-/// What one kind of model has of the reference's defects.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Fidelity {
-    /// Relative errors of the lengths of wrinkles that both have.
-    pub length: Vec<f64>,
-    /// Of their amplitudes.
-    pub amplitude: Vec<f64>,
-    /// Of the areas of bridging that both have.
-    pub area: Vec<f64>,
-    /// Wrinkles, and places of bridging, that the reference has alone.
-    pub missed: [usize; 2],
-    /// Those that it has not.
-    pub wrong: [usize; 2],
-}
-
-/// What is found down to this share of the least sizes may be the other of a pair, so that a defect just below a least size is
-/// not taken for one that is not there.
-const PAIRED_DOWN_TO: f64 = 0.5;
-
-impl Fidelity {
-    /// Pairs the defects of one ply and kind whose centres are near enough, the most alike first. Both lists go down to
-    /// [`PAIRED_DOWN_TO`] of the least sizes in `settings`; what lies below these counts only beside one that does not.
-    pub fn of(ours: &[Found<'_>], theirs: &[Found<'_>], settings: &Settings) -> Self {
-        let counts = |d: &Defect| match d.kind {
-            Kind::Wrinkle => d.length >= settings.minimum_wrinkle_length,
-            Kind::Bridging => d.area >= settings.minimum_bridging_area,
-        };
-        let mut near: Vec<(f64, usize, usize)> = Vec::new();
-        for (i, (ply, a)) in ours.iter().enumerate() {
-            for (j, (other, b)) in theirs.iter().enumerate() {
-                let same = ply == other && a.kind == b.kind && apart(a, b) <= same_within(a, b);
-                if same && (counts(a) || counts(b)) {
-                    near.push((unlike(a, b), i, j));
-                }
-            }
-        }
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        let mut pair = vec![None; ours.len()];
-        let mut taken = vec![false; theirs.len()];
-        for (_, i, j) in near {
-            if pair[i].is_none() && !taken[j] {
-                (pair[i], taken[j]) = (Some(j), true);
-            }
-        }
-        let mut found = Self::default();
-        let index = |d: &Defect| usize::from(d.kind == Kind::Bridging);
-        for ((_, a), j) in ours.iter().zip(&pair) {
-            let Some(j) = j else {
-                found.wrong[index(a)] += usize::from(counts(a));
-                continue;
-            };
-            let b = theirs[*j].1;
-            let error = |a: f64, b: f64| (a - b).abs() / b;
-            if a.kind == Kind::Wrinkle {
-                found.length.push(error(a.length, b.length));
-                found.amplitude.push(error(a.amplitude, b.amplitude));
-            } else {
-                found.area.push(error(a.area, b.area));
-            }
-        }
-        for ((_, b), _) in theirs.iter().zip(&taken).filter(|(_, t)| !**t) {
-            found.missed[index(b)] += usize::from(counts(b));
-        }
-        found
-    }
-
-    /// Mean over the defects of both of the error of length or area, one that only the reference has or has not counting as
-    /// 1; `None` when neither has one.
-    pub fn error(&self) -> Option<f64> {
-        let both = self.length.iter().chain(&self.area);
-        let alone = self.missed.iter().chain(&self.wrong).sum::<usize>();
-        let count = both.clone().count() + alone;
-        (count > 0).then(|| (both.sum::<f64>() + alone as f64) / count as f64)
-    }
-
-    /// What it comes to: names of results, values and units, in the order in which they are reported.
-    fn told(&self) -> Vec<Told> {
-        let mut told = Vec::new();
-        told.extend(self.error().map(|e| ("defect_error", e, "1")));
-        let errors = [
-            ("wrinkle_length_error", &self.length),
-            ("wrinkle_amplitude_error", &self.amplitude),
-            ("bridging_area_error", &self.area),
-        ];
-        for (name, errors) in errors.into_iter().filter(|e| !e.1.is_empty()) {
-            let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-            told.push((name, mean, "1"));
-        }
-        let counts = [
-            ("missed_wrinkles", self.missed[0]),
-            ("false_wrinkles", self.wrong[0]),
-            ("missed_bridging", self.missed[1]),
-            ("false_bridging", self.wrong[1]),
-        ];
-        told.extend(counts.map(|(name, n)| (name, n as f64, "1")));
-        told
-    }
+/// What some models have of the reference's defects: names of results, values and units, in the order in which they are reported.
+fn defects(ours: &[Found<'_>], theirs: &[Found<'_>], settings: &Settings) -> Vec<Told> {
+    let [a, b] = [ours, theirs].map(|all| all.iter().map(|f| f.1).collect::<Vec<_>>());
+    let on_one_ply = |i: usize, j: usize| (ours[i].0 == theirs[j].0).then(|| apart(a[i], b[j]));
+    let pairs = Pairs::of(&a, &b, settings, on_one_ply);
+    let told = PairErrors::of(&a, &b, &pairs).told();
+    told.into_iter().map(|(name, v)| (name, v, "1")).collect()
 }
 
 /// Name of a result, its value and its unit.
@@ -246,7 +156,7 @@ pub fn measure_ways(
         let ours = everywhere(&models, settings);
         let mut ours = named(&ours);
         ours.retain(|(_, d)| counts(d));
-        way.errors = Fidelity::of(&ours, &theirs, settings).told();
+        way.errors = defects(&ours, &theirs, settings);
         way.errors.extend(fields(&around, &reference));
         measured.ways.push(way);
     }
@@ -286,28 +196,10 @@ fn fields(way: &[&Model], reference: &[&Model]) -> Vec<Told> {
     told
 }
 
-/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need: bridging down to a smaller area,
-/// and ridges that are too short for a wrinkle. Those come besides what is measured there as bridging, so that what a place
-/// is does not hang on them.
+/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need.
 fn everywhere(models: &[&Model], settings: &Settings) -> Vec<(String, Vec<Defect>)> {
-    let smaller = Settings {
-        minimum_bridging_area: PAIRED_DOWN_TO * settings.minimum_bridging_area,
-        ..*settings
-    };
-    let shorter = Settings {
-        minimum_wrinkle_length: PAIRED_DOWN_TO * settings.minimum_wrinkle_length,
-        ..*settings
-    };
-    let all = |p: &Ply| {
-        let inside = vec![true; p.formed.len()];
-        let mut found = measure(p, &inside, &smaller);
-        let short =
-            |d: &Defect| d.kind == Kind::Wrinkle && d.length < settings.minimum_wrinkle_length;
-        found.extend(measure(p, &inside, &shorter).into_iter().filter(short));
-        found
-    };
     (models.iter().flat_map(|m| &m.plies))
-        .map(|p| (p.name.clone(), all(p)))
+        .map(|p| (p.name.clone(), measure_for_pairs(p, settings)))
         .collect()
 }
 

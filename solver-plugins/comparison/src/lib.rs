@@ -7,7 +7,7 @@ mod models;
 mod table;
 
 pub use cut::{Layer, Passage, Strip, Work};
-pub use fidelity::{Fidelity, Measured, Way, Yardstick};
+pub use fidelity::{Measured, Way, Yardstick};
 pub use models::{Model, PassedOver, Role, Zone};
 pub use table::{Entry, defect_table};
 

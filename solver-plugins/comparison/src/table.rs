@@ -2,6 +2,7 @@
 
 use crate::models::{Model, Role, Zone};
 use plyflow_defects::of_run::neighbours;
+use plyflow_defects::pairs::{apart, same_within, unlike};
 use plyflow_defects::{Defect, Kind, Limits, Settings, find_causes, measure};
 use serde_json::{Value, json};
 
@@ -57,25 +58,6 @@ impl Entry {
             "cut_sides": self.cut_sides,
         })
     }
-}
-
-/// Two defects are the same when their centres lie within this (m) or within half of the longer ridge.
-const SAME_DEFECT: f64 = 0.015;
-
-/// Distance of the centres of two defects in the flat ply (m).
-pub fn apart(a: &Defect, b: &Defect) -> f64 {
-    (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1])
-}
-
-/// How unlike two defects of one kind are (m): by place, length and width. Of several that may be the same, the most alike is.
-pub fn unlike(a: &Defect, b: &Defect) -> f64 {
-    let width = (a.area.sqrt() - b.area.sqrt()).abs();
-    apart(a, b) + 0.5 * (a.length - b.length).abs() + 0.5 * width
-}
-
-/// How far apart the centres of two defects may be (m) that are the same.
-pub fn same_within(a: &Defect, b: &Defect) -> f64 {
-    SAME_DEFECT.max(0.5 * a.length.max(b.length))
 }
 
 /// All defects: first those of the local models, numbered in their zone from the uppermost ply down, wrinkles
@@ -192,7 +174,11 @@ fn twin(entry: &Entry, locals: &[Entry], taken: &[String]) -> Option<String> {
                 && apart(&l.defect, &entry.defect) <= same_within(&l.defect, &entry.defect)
         })
         .min_by(|a, b| {
-            unlike(&a.defect, &entry.defect).total_cmp(&unlike(&b.defect, &entry.defect))
+            let [a, b] = [a, b].map(|l| {
+                let d = apart(&l.defect, &entry.defect);
+                unlike(&l.defect, &entry.defect, d)
+            });
+            a.total_cmp(&b)
         })
         .map(|l| l.id.clone())
 }

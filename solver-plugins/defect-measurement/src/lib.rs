@@ -1,8 +1,10 @@
 //! Step plugin `defect-measurement`: what a metrologist measures on a preform, on a simulated one and on a scan alike.
 
+mod agreement;
 mod output;
 mod read;
 
+use agreement::Agreement;
 use output::Output;
 use plyflow_defects::of_run::neighbours;
 use plyflow_defects::{Defect, Limits, Ply, Settings, find_causes, measure};
@@ -23,6 +25,7 @@ struct Parameters {
     scan_offset: Option<f64>,
     scan_align: Align,
     scan_kept: f64,
+    scan_ply: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -121,10 +124,15 @@ impl Step for DefectMeasurement {
                 simulated: true,
             });
         }
-        let mut alignment = None;
+        let (mut alignment, mut agreement) = (None, None);
         if let Some(path) = &p.scan {
             phase("scan", 0.6)?;
+            let shown = run.shown(p.scan_ply.as_deref())?;
             let scan = read::Scan::read(&run, path, &p, settings.foot_margin)?;
+            phase("scan and ply", 0.8)?;
+            let above = scan.offset - run.plies[shown].offset;
+            let ply = &measured[shown].ply;
+            agreement = Agreement::of(ply, &scan.ply, &run.tool, above, &settings);
             let mut defects = everywhere(&scan.ply, &settings);
             find_causes(&scan.ply, &mut defects, None, &[], &limits);
             measured.push(Measured {
@@ -135,12 +143,13 @@ impl Step for DefectMeasurement {
             alignment = scan.alignment;
         }
         phase("writing", 0.9)?;
-        let mut output = Output::new(host, &run, &measured);
+        let mut output = Output::new(host, &run, &measured, agreement.as_ref());
         output.bodies()?;
         output.distances()?;
         for (section, path) in p.sections.iter().zip(&sections) {
             output.section(&section.label, path, section.on)?;
         }
+        output.agreement()?;
         output.finish(alignment.as_ref())
     }
 }

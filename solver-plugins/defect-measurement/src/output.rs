@@ -1,5 +1,6 @@
 //! The artifact: bodies with their fields, tables of defects, sections, distributions.
 
+use crate::agreement::{self, Agreement};
 use crate::read::Run;
 use crate::{Measured, Seen};
 use plyflow_defects::align::Alignment;
@@ -29,6 +30,24 @@ const COLUMNS: [(&str, &str); 14] = [
     ("largest", "rad"),
 ];
 
+/// Columns of the table of a scan's and a ply's defects.
+const BOTH: [(&str, &str); 11] = [
+    ("type", ""),
+    ("in the simulation", ""),
+    ("in the scan", ""),
+    ("length", "m"),
+    ("scanned", "m"),
+    ("amplitude", "m"),
+    ("scanned", "m"),
+    ("area", "m2"),
+    ("scanned", "m2"),
+    ("x", "m"),
+    ("y", "m"),
+];
+
+/// Name of the scan's body.
+pub const SCAN: &str = "scan";
+
 /// Quantiles of the distance that are told.
 const QUANTILES: [(&str, f64); 4] = [("q50", 0.5), ("q90", 0.9), ("q99", 0.99), ("largest", 1.0)];
 
@@ -37,17 +56,24 @@ pub struct Output<'a> {
     host: &'a Host,
     run: &'a Run,
     measured: &'a [Measured],
+    agreement: Option<&'a Agreement>,
     plots: Vec<Value>,
     sections: Vec<Value>,
 }
 
 impl<'a> Output<'a> {
     /// Of plies and scan on the tool of a run.
-    pub fn new(host: &'a Host, run: &'a Run, measured: &'a [Measured]) -> Self {
+    pub fn new(
+        host: &'a Host,
+        run: &'a Run,
+        measured: &'a [Measured],
+        agreement: Option<&'a Agreement>,
+    ) -> Self {
         Self {
             host,
             run,
             measured,
+            agreement,
             plots: Vec::new(),
             sections: Vec::new(),
         }
@@ -79,6 +105,9 @@ impl<'a> Output<'a> {
                     .for_each(|&i| number[i as usize] = (k + 1) as f64);
             }
             field("defect", "1", &number)?;
+            if let Some(a) = self.agreement.filter(|_| !m.simulated) {
+                field("deviation", "m", &a.deviation)?;
+            }
             if !p.shear_angle.is_empty() {
                 host.write_field(&p.name, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
             }
@@ -193,6 +222,68 @@ impl<'a> Output<'a> {
         Ok(())
     }
 
+    /// Results of what the ply has of the scan.
+    pub fn agreement(&self) -> Result<(), StepError> {
+        let (Some(a), host) = (self.agreement, self.host) else {
+            return Ok(());
+        };
+        for (name, value) in a.errors.told() {
+            host.result(name, value, "1")?;
+        }
+        host.result("deviation_mean", a.mean, "m")?;
+        host.result("deviation_rms", a.root_mean_square, "m")?;
+        for ((name, _), value) in agreement::QUANTILES.iter().zip(&a.quantiles) {
+            host.result(&format!("deviation_{name}"), *value, "m")?;
+        }
+        Ok(())
+    }
+
+    /// A row for each defect of the ply or the scan, those of both first; and the same for programs.
+    fn beside_each_other(&self, a: &Agreement) -> (Vec<Value>, Vec<Value>) {
+        let both = a.pairs.both.iter().map(|&(i, j)| (Some(i), Some(j)));
+        let missed = a.pairs.missed.iter().map(|&j| (None, Some(j)));
+        let wrong = a.pairs.wrong.iter().map(|&i| (Some(i), None));
+        let (mut rows, mut list) = (Vec::new(), Vec::new());
+        for (i, j) in both.chain(missed).chain(wrong) {
+            let ours = i.map(|i| &a.simulated[i]);
+            let theirs = j.map(|j| &a.scanned[j]);
+            let Some(one) = theirs.or(ours) else { continue };
+            let numbers = [(ours, a.ply.as_str()), (theirs, SCAN)].map(|(d, name)| {
+                let of = self.measured.iter().find(|m| m.ply.name == name);
+                d.zip(of).and_then(|(d, m)| number(m, d))
+            });
+            let told = |n: Option<usize>, d: Option<&Defect>| match (n, d) {
+                (Some(n), _) => n.to_string(),
+                (None, Some(_)) => "below the least size".to_owned(),
+                (None, None) => "none".to_owned(),
+            };
+            let amplitude = |d: &Defect| d.amplitude;
+            let area = |d: &Defect| d.area;
+            let (a1, a2) = (ours.map(amplitude), theirs.map(amplitude));
+            let (s1, s2) = (ours.map(area), theirs.map(area));
+            let (l1, l2) = (ours.and_then(length), theirs.and_then(length));
+            let (from_ply, from_scan) = (told(numbers[0], ours), told(numbers[1], theirs));
+            rows.push(json!([
+                one.kind.name(),
+                from_ply,
+                from_scan,
+                l1,
+                l2,
+                a1,
+                a2,
+                s1,
+                s2,
+                one.centre[0],
+                one.centre[1],
+            ]));
+            list.push(json!({
+                "type": one.kind.name(), "simulated": numbers[0], "scanned": numbers[1], "length": [l1, l2],
+                "amplitude": [a1, a2], "area": [s1, s2], "centre": one.centre,
+            }));
+        }
+        (rows, list)
+    }
+
     /// Counts, sums by ply, and the attributes.
     pub fn finish(self, alignment: Option<&Alignment>) -> Result<(), StepError> {
         let host = self.host;
@@ -218,21 +309,51 @@ impl<'a> Output<'a> {
             host.result("scan_rms", a.rms, "m")?;
             host.result("scan_freedoms", a.decided as f64, "1")?;
         }
-        let columns = COLUMNS.map(|(label, unit)| json!({"label": label, "unit": unit}));
-        let maps = [
-            ("nodal_distance", "Distance from the tool", "mm"),
-            ("curvature_max", "Largest curvature", "1/mm"),
+        let columns = |of: &[(&str, &str)]| -> Vec<Value> {
+            let column = |(label, unit): &(&str, &str)| json!({"label": label, "unit": unit});
+            of.iter().map(column).collect()
+        };
+        let mut tables = vec![
+            json!({"name": "defects", "title": "Defects", "columns": columns(&COLUMNS), "rows": rows}),
         ];
-        let maps = maps.map(|(field, title, unit)| {
-            let panels = simulated().map(|m| json!({"label": m.ply.name, "body": m.ply.name, "field": field}));
-            json!({"name": field, "title": title, "unit": unit, "panels": panels.collect::<Vec<_>>()})
+        let agreement = self.agreement.map(|a| {
+            let (rows, list) = self.beside_each_other(a);
+            let title = format!("{} and the scan", a.ply);
+            tables.push(json!({"name": "agreement", "title": title, "columns": columns(&BOTH), "rows": rows}));
+            json!({"ply": a.ply, "defects": list})
         });
+        let scan = || self.measured.iter().filter(|m| !m.simulated);
+        let map = |(field, title, unit): (&str, &str, &str), of: Vec<&Measured>| {
+            let panels = of
+                .iter()
+                .map(|m| json!({"label": m.ply.name, "body": m.ply.name, "field": field}));
+            json!({"name": field, "title": title, "unit": unit, "panels": panels.collect::<Vec<_>>()})
+        };
+        let mut maps = vec![
+            map(
+                ("nodal_distance", "Distance from the tool", "mm"),
+                simulated().chain(scan()).collect(),
+            ),
+            map(
+                ("curvature_max", "Largest curvature", "1/mm"),
+                simulated().collect(),
+            ),
+        ];
+        if let Some(a) = self.agreement {
+            let title = format!("Height of the scan over {}", a.ply);
+            maps.push(map(("deviation", &title, "mm"), scan().collect()));
+        }
         host.write_attributes(&json!({
             "defects": list, "sections": self.sections, "plots": self.plots, "maps": maps,
-            "alignment": alignment.map(alignment_json),
-            "tables": [{"name": "defects", "title": "Defects", "columns": columns, "rows": rows}],
+            "alignment": alignment.map(alignment_json), "agreement": agreement, "tables": tables,
         }))
     }
+}
+
+/// Number of a defect in the table, by its nodes; `None` for one below the least sizes.
+fn number(m: &Measured, d: &Defect) -> Option<usize> {
+    let same = |o: &Defect| o.kind == d.kind && o.nodes == d.nodes;
+    m.defects.iter().position(same).map(|k| k + 1)
 }
 
 fn of(m: &Measured, kind: Kind) -> impl Iterator<Item = &Defect> {

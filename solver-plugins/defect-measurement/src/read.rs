@@ -1,5 +1,6 @@
 //! What is measured: the plies of a run, and a scan.
 
+use crate::output::SCAN;
 use crate::{Align, Parameters};
 use plyflow_defects::align::{Alignment, Settings, align};
 use plyflow_defects::of_run::Sheet;
@@ -55,6 +56,19 @@ impl Run {
         })
     }
 
+    /// Index of the ply that a scan shows: the one of that name, or the uppermost.
+    pub fn shown(&self, name: Option<&str>) -> Result<usize, StepError> {
+        let Some(name) = name else {
+            return Ok(self.plies.len() - 1);
+        };
+        let place = self.plies.iter().position(|s| s.name == name);
+        place.ok_or_else(|| {
+            let all: Vec<&str> = self.plies.iter().map(|s| s.name.as_str()).collect();
+            let all = all.join(", ");
+            format!("scan_ply: the run has no ply '{name}'; its plies are: {all}").into()
+        })
+    }
+
     /// Reads a ply and takes its distances and curvatures.
     pub fn ply(&self, host: &Host, sheet: &Sheet, foot_margin: f64) -> Result<Ply, StepError> {
         of_run::strained_ply(
@@ -74,6 +88,8 @@ pub struct Scan {
     pub ply: Ply,
     /// How it was moved there.
     pub alignment: Option<Alignment>,
+    /// Distance of the scanned surface from the tool where everything lies on it (m).
+    pub offset: f64,
 }
 
 impl Scan {
@@ -104,8 +120,12 @@ impl Scan {
         }
         let topology = Topology::new(points.len(), 3, facets.as_flattened());
         let flat = points.clone();
-        let name = "scan".to_owned();
+        let name = SCAN.to_owned();
         let ply = Ply::new(name, topology, flat, points, &run.tool, offset, foot_margin);
-        Ok(Self { ply, alignment })
+        Ok(Self {
+            ply,
+            alignment,
+            offset,
+        })
     }
 }

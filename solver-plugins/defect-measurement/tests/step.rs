@@ -15,21 +15,27 @@ const THICKNESS: f64 = 0.0004;
 const H: f64 = 0.00125;
 const N: [usize; 2] = [128, 80];
 
-/// A wrinkle 3 mm high, 14 mm wide and 60 mm long along x through (-35, 0) mm; a round blister 2 mm high, 50 mm wide at (40, 0) mm.
-fn height(x: f64, y: f64) -> f64 {
-    let bump = |s: f64, half: f64| {
-        if s.abs() < half {
-            0.5 * (1.0 + (PI * s / half).cos())
-        } else {
-            0.0
-        }
-    };
+fn bump(s: f64, half: f64) -> f64 {
+    if s.abs() < half {
+        0.5 * (1.0 + (PI * s / half).cos())
+    } else {
+        0.0
+    }
+}
+
+/// A wrinkle of height 1, 14 mm wide and 60 mm long along x through (-35, 0) mm.
+fn wrinkle(x: f64, y: f64) -> f64 {
     let fade = if (x + 0.035).abs() < 0.030 {
         (0.5 * PI * (x + 0.035) / 0.030).cos()
     } else {
         0.0
     };
-    0.003 * bump(y, 0.007) * fade + 0.002 * bump((x - 0.040).hypot(y), 0.025)
+    bump(y, 0.007) * fade
+}
+
+/// A wrinkle 3 mm high, 14 mm wide and 60 mm long along x through (-35, 0) mm; a round blister 2 mm high, 50 mm wide at (40, 0) mm.
+fn height(x: f64, y: f64) -> f64 {
+    0.003 * wrinkle(x, y) + 0.002 * bump((x - 0.040).hypot(y), 0.025)
 }
 
 fn flat() -> Vec<Vec3> {
@@ -258,6 +264,131 @@ fn a_scan_that_lies_elsewhere_is_measured_as_the_ply_that_it_shows() {
     assert!(out.attributes["alignment"].is_null());
 }
 
+/// A scan in mm, as a file of points, of heights over the outer face of the upper ply.
+fn scan_file(folder: &tempfile::TempDir, height: impl Fn(f64, f64) -> f64, wider: f64) -> String {
+    let path = folder.path().join("scan.xyz");
+    let outer = TOP + OFFSET + 1.5 * THICKNESS;
+    let mut text = String::new();
+    for p in flat() {
+        let [x, y] = [wider * p[0], p[1]];
+        writeln!(
+            text,
+            "{} {} {}",
+            1e3 * x,
+            1e3 * y,
+            1e3 * (outer + height(x, y))
+        )
+        .unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// The wrinkle is a fifth higher, another lies beside it, and where the ply bridges the scan does not.
+#[test]
+fn defects_of_a_scan_are_paired_with_those_of_the_ply_that_it_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let seen = |x: f64, y: f64| 0.0036 * wrinkle(x, y) + 0.003 * wrinkle(x, y - 0.030);
+    let scan = scan_file(&folder, seen, 1.0);
+    let out = measured(json!({"scan": scan, "scan_align": "none"}));
+    let count = |name: &str| out.result(name);
+    assert_eq!(
+        [count("missed_wrinkles"), count("false_wrinkles")],
+        [1.0, 0.0]
+    );
+    assert_eq!(
+        [count("missed_bridging"), count("false_bridging")],
+        [0.0, 1.0]
+    );
+    let amplitude = out.result("wrinkle_amplitude_error");
+    assert!((amplitude - 1.0 / 6.0).abs() < 0.005, "{amplitude}");
+    // The crest is off the tool by 1 mm for cos > 1/3 and 1/3.6 of its length, or as far as it is curved enough.
+    let length = out.result("wrinkle_length_error");
+    assert!(length > 0.005 && length < 0.06, "{length}");
+    assert!((out.result("defect_error") - (2.0 + length) / 3.0).abs() < 1e-12);
+    // Heights over the simulated face, which is smooth there but for the mesh.
+    let difference = |p: &Vec3| seen(p[0], p[1]) - height(p[0], p[1]);
+    let deviation = out.body("scan").last("deviation");
+    for (found, p) in deviation.iter().zip(&flat()) {
+        // Beside crests the closest place is not the one below, and at the rim there is none.
+        if seen(p[0], p[1]) == 0.0 && height(p[0], p[1]) == 0.0
+            || (p[0] - 0.040).hypot(p[1]) < 0.002
+        {
+            assert!((found - difference(p)).abs() < 2e-5, "{p:?} {found}");
+        }
+    }
+    let largest = out.result("deviation_largest");
+    assert!((largest - 0.003).abs() < 2e-5, "{largest}");
+    assert!(out.result("deviation_q50") < 1e-9);
+    // By area of the scan, whose flanks are steeper than they look from above.
+    let mean = |f: &dyn Fn(&Vec3) -> f64| flat().iter().map(f).sum::<f64>() / flat().len() as f64;
+    let (signed, size) = (mean(&difference), mean(&|p| difference(p).abs()));
+    let found = out.result("deviation_mean");
+    assert!(
+        (found - signed).abs() < 0.1 * size,
+        "{found} {signed} {size}"
+    );
+    let told = &out.attributes["agreement"];
+    assert_eq!(told["ply"], "ply_2");
+    let told = told["defects"].as_array().unwrap();
+    let numbers: Vec<_> = told
+        .iter()
+        .map(|d| [&d["simulated"], &d["scanned"]])
+        .collect();
+    assert_eq!(numbers.len(), 3);
+    assert_eq!(numbers[0], [&json!(1), &json!(1)], "the wrinkle of both");
+    assert_eq!([numbers[1][0], numbers[2][1]], [&Value::Null; 2]);
+    let maps = out.attributes["maps"].as_array().unwrap();
+    let shows = |map: &Value, field: &str| {
+        let panels = map["panels"].as_array().unwrap();
+        panels
+            .iter()
+            .any(|p| p["body"] == "scan" && p["field"] == field)
+    };
+    assert!(shows(&maps[0], "nodal_distance") && shows(&maps[2], "deviation"));
+    let rows = out.attributes["tables"][1]["rows"].as_array().unwrap();
+    assert_eq!([&rows[1][1], &rows[2][2]], [&json!("none"), &json!("none")]);
+}
+
+#[test]
+fn what_a_scan_has_beyond_the_ply_does_not_count_and_the_ply_can_be_named() {
+    let folder = tempfile::tempdir().unwrap();
+    // Half as long again as the ply: a wrinkle and a blister that the ply has, and another wrinkle 15 mm off its end.
+    let seen = |x: f64, y: f64| height(x, y) + 0.003 * wrinkle(y - 0.035, x - 0.095);
+    let scan = scan_file(&folder, seen, 1.5);
+    let agrees = |parameters: Value| {
+        let out = measured(parameters);
+        let names = [
+            "missed_wrinkles",
+            "false_wrinkles",
+            "missed_bridging",
+            "false_bridging",
+        ];
+        (names.map(|n| out.result(n)), out)
+    };
+    let (alone, out) = agrees(json!({"scan": scan, "scan_align": "none"}));
+    assert_eq!(alone, [0.0; 4]);
+    assert!(
+        out.result("defect_error") < 0.03,
+        "{}",
+        out.result("defect_error")
+    );
+    assert!(out.result("deviation_largest") < 1e-4);
+    // The lower ply is flat: all that the scan shows is missed there.
+    let (alone, out) = agrees(json!({"scan": scan, "scan_align": "none", "scan_ply": "ply_1"}));
+    assert_eq!(alone, [1.0, 0.0, 1.0, 0.0]);
+    assert_eq!(out.attributes["agreement"]["ply"], "ply_1");
+    assert!((out.result("deviation_largest") - 0.003).abs() < 2e-5);
+    // Wound the other way round, a ply has the same upper side.
+    let mut run_off = formed();
+    for cell in run_off.bodies[2].cells.as_chunks_mut::<4>().0 {
+        cell.reverse();
+    }
+    let inputs = [MemoryInput::new("formed", &run_off)];
+    let out = run::<DefectMeasurement>(json!({"scan": scan, "scan_align": "none"}), &inputs, &[]);
+    assert!(out.unwrap().result("deviation_largest") < 1e-4);
+}
+
 #[test]
 fn what_cannot_be_measured_is_told() {
     let formed = formed();
@@ -276,6 +407,14 @@ fn what_cannot_be_measured_is_told() {
     assert!(refused(flat, &formed).contains("in the flat ply"));
     let missing = json!({"scan": "/nowhere/scan.stl"});
     assert!(refused(missing, &formed).contains("cannot read the scan `/nowhere/scan.stl`"));
+    let folder = tempfile::tempdir().unwrap();
+    let scan = scan_file(&folder, height, 1.0);
+    let named = json!({"scan": scan, "scan_ply": "ply_7"});
+    let told = refused(named, &formed);
+    assert!(
+        told.contains("no ply 'ply_7'; its plies are: ply_1, ply_2"),
+        "{told}"
+    );
     let mut without = formed.clone();
     without.attributes = json!({"sheets": []});
     assert!(refused(json!({}), &without).contains("no sheet of kind 'ply'"));

@@ -8,6 +8,7 @@ mod fields;
 mod measure;
 #[cfg(feature = "steps")]
 pub mod of_run;
+pub mod pairs;
 pub mod scan;
 
 pub use cause::{Cause, Limits, find_causes, relative_angle};
