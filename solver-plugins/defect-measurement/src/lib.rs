@@ -3,6 +3,7 @@
 mod agreement;
 mod output;
 mod read;
+mod sections;
 
 use agreement::Agreement;
 use output::Output;
@@ -143,11 +144,12 @@ impl Step for DefectMeasurement {
             alignment = scan.alignment;
         }
         phase("writing", 0.9)?;
+        let beside = read::Beside::read(host)?;
         let mut output = Output::new(host, &run, &measured, agreement.as_ref());
         output.bodies()?;
         output.distances()?;
         for (section, path) in p.sections.iter().zip(&sections) {
-            output.section(&section.label, path, section.on)?;
+            output.section(&section.label, path, section.on, &beside)?;
         }
         output.agreement()?;
         output.finish(alignment.as_ref())

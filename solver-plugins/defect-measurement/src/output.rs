@@ -1,15 +1,13 @@
 //! The artifact: bodies with their fields, tables of defects, sections, distributions.
 
 use crate::agreement::{self, Agreement};
-use crate::read::Run;
+use crate::read::{Beside, Run};
+use crate::sections::{Section, Sheet};
 use crate::{Measured, Seen};
 use plyflow_defects::align::Alignment;
 use plyflow_defects::{Defect, Kind, RidgeShear};
 use plyflow_sdk::{Host, On, StepError};
-use plyflow_surface::vector::Vec3;
-use plyflow_surface::{
-    bin_width, density, path_section, stations, triangles, weighted_mean, weighted_quantiles,
-};
+use plyflow_surface::{bin_width, density, weighted_mean, weighted_quantiles};
 use serde_json::{Value, json};
 
 /// Columns of the table of defects: label, SI unit.
@@ -155,70 +153,29 @@ impl<'a> Output<'a> {
         Ok(())
     }
 
-    /// Cuts tool, plies and scan along a path (x, y in m): as they are seen from above, or the plies along a line of their material, and tool
-    /// and scan below or above where that went on the lowest ply. Of each the longest line counts.
-    pub fn section(&mut self, label: &str, path: &[[f64; 2]], on: Seen) -> Result<(), StepError> {
-        let host = self.host;
+    /// Cuts tool, plies, scan and the plies of runs beside along a path (x, y in m).
+    pub fn section(
+        &mut self,
+        label: &str,
+        path: &[[f64; 2]],
+        on: Seen,
+        beside: &[Beside],
+    ) -> Result<(), StepError> {
         let number = self.sections.len();
-        let along = stations(path);
-        let cut = |m: &Measured, plan: &[Vec3], path: &[[f64; 2]], along: &[f64]| {
-            let (corners, cells) = m.ply.topology.connectivity();
-            let facets = triangles(corners, cells);
-            let lines = path_section(plan, &m.ply.formed, &facets, path, along);
-            lines.into_iter().next()
+        let measured = self
+            .measured
+            .iter()
+            .map(|m| Sheet::measured(&m.ply, m.simulated));
+        let sheets: Vec<Sheet<'_>> = measured.chain(beside.iter().map(Beside::sheet)).collect();
+        let section = Section {
+            label,
+            path,
+            on,
+            number,
         };
-        // The path as seen from above, and what its corners are told by.
-        let mut above = (path.to_vec(), along.clone());
-        if on == Seen::FlatPly {
-            let lowest = self.measured.iter().find(|m| m.simulated);
-            let line = lowest.and_then(|m| cut(m, &m.ply.undeformed, path, &along));
-            let line = line.unwrap_or_default();
-            above = (
-                line.iter().map(|p| [p.place[0], p.place[1]]).collect(),
-                line.iter().map(|p| p.station).collect(),
-            );
-        }
-        let tool = &self.run.tool.surface;
-        let (points, facets) = (tool.points(), tool.triangles());
-        let of_tool = path_section(points, points, facets, &above.0, &above.1);
-        let mut lines = vec![("tool", of_tool.into_iter().next())];
-        for m in self.measured {
-            let line = if on == Seen::FlatPly && m.simulated {
-                cut(m, &m.ply.undeformed, path, &along)
-            } else {
-                cut(m, &m.ply.formed, &above.0, &above.1)
-            };
-            lines.push((&m.ply.name, line));
-        }
-        let mut series = Vec::new();
-        for (name, line) in &lines {
-            let Some(line) = line else { continue };
-            let [x, y] =
-                ["station", "height"].map(|n| format!("sections/section_{number}/{name}/{n}"));
-            let stations: Vec<f64> = line.iter().map(|p| p.station).collect();
-            let heights: Vec<f64> = line.iter().map(|p| p.place[2]).collect();
-            host.write_f64(&x, &[line.len()], "m", &stations)?;
-            host.write_f64(&y, &[line.len()], "m", &heights)?;
-            series.push(json!({"label": name, "x": x, "y": y}));
-        }
-        let met = lines.iter().skip(1).any(|(_, line)| line.is_some());
-        if !met {
-            return Err(format!(
-                "sections: '{label}' along {path:?} m meets no ply; take places above the plies (with `on: flat-ply`: in the flat ply)"
-            )
-            .into());
-        }
-        let (seen, axis) = match on {
-            Seen::FromAbove => ("from-above", "along the section"),
-            Seen::FlatPly => ("flat-ply", "along the section in the flat ply"),
-        };
-        self.sections.push(json!({
-            "label": label, "from": path[0], "to": path[path.len() - 1], "path": path, "on": seen, "lines": series.clone(),
-        }));
-        self.plots.push(json!({
-            "name": format!("section_{number}"), "title": format!("Section {label}"),
-            "x": {"label": axis, "unit": "mm"}, "y": {"label": "height", "unit": "mm"}, "series": series,
-        }));
+        let (told, plot) = section.write(self.host, &self.run.tool.surface, &sheets)?;
+        self.sections.push(told);
+        self.plots.push(plot);
         Ok(())
     }
 

@@ -1,13 +1,15 @@
 //! What is measured: the plies of a run, and a scan.
 
 use crate::output::SCAN;
-use crate::{Align, Parameters};
+use crate::{Align, Parameters, sections};
 use plyflow_defects::align::{Alignment, Settings, align};
 use plyflow_defects::of_run::Sheet;
 use plyflow_defects::{Ply, Tool, of_run, scan};
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::Topology;
+use plyflow_surface::vector::Vec3;
 use serde::Deserialize;
+use serde_json::Value;
 use std::path::Path;
 
 /// A formed run.
@@ -27,6 +29,9 @@ pub struct Run {
 #[derive(Deserialize)]
 struct Formed {
     sheets: Vec<Sheet>,
+    /// Of a run of a zone.
+    #[serde(default)]
+    zone: Value,
 }
 
 impl Run {
@@ -79,6 +84,56 @@ impl Run {
             &self.tool,
             foot_margin,
         )
+    }
+}
+
+/// A ply of a run beside the one that is measured, which its sections show too.
+pub struct Beside {
+    label: String,
+    name: String,
+    undeformed: Vec<Vec3>,
+    formed: Vec<Vec3>,
+    topology: Topology,
+}
+
+impl Beside {
+    /// Reads the plies of all inputs `beside` in their last frames.
+    pub fn read(host: &Host) -> Result<Vec<Self>, StepError> {
+        let mut all = Vec::new();
+        for input in host.inputs_of("beside")? {
+            let formed: Formed = host.attributes(&input)?;
+            let meshes = host.meshes(&input)?;
+            let frame = of_run::last_frame(&input, &meshes)?;
+            let items: String = input.item.iter().map(|i| format!("_{i}")).collect();
+            let run = format!("{}{items}", input.step);
+            for sheet in formed.sheets.iter().filter(|s| s.is_ply()) {
+                let body = meshes.body(&sheet.name)?;
+                let (undeformed, cells) = host.mesh(&input, body)?;
+                let ply = &sheet.name;
+                all.push(Self {
+                    label: match formed.zone["name"].as_str() {
+                        Some(zone) => format!("{ply}, zone {zone}"),
+                        None => format!("{ply} of {run}"),
+                    },
+                    name: format!("{run}/{ply}"),
+                    topology: Topology::new(undeformed.len(), body.nodes_per_cell, &cells),
+                    formed: host.frame_points(&input, body, frame)?,
+                    undeformed,
+                });
+            }
+        }
+        Ok(all)
+    }
+
+    /// As sections cut it.
+    pub fn sheet(&self) -> sections::Sheet<'_> {
+        sections::Sheet {
+            label: self.label.clone(),
+            name: self.name.clone(),
+            flat: Some(&self.undeformed),
+            formed: &self.formed,
+            topology: &self.topology,
+        }
     }
 }
 

@@ -216,6 +216,58 @@ fn a_section_along_a_bend_has_the_heights_of_its_path_from_above_and_in_the_flat
 }
 
 #[test]
+fn sections_show_runs_beside_as_far_as_they_meet_them() {
+    let whole = formed();
+    // Of a zone, 1 mm higher; and a run whose plies lie elsewhere.
+    let mut zone = formed();
+    zone.attributes["zone"] = json!({"name": "B"});
+    let mut elsewhere = formed();
+    for (run, shift) in [(&mut zone, [0.0, 0.001]), (&mut elsewhere, [0.5, 0.0])] {
+        for p in run.bodies[1..].iter_mut().flat_map(|b| &mut b.frames[0]) {
+            *p = [p[0] + shift[0], p[1], p[2] + shift[1]];
+        }
+    }
+    let inputs = [
+        MemoryInput::new("formed", &whole),
+        MemoryInput::new("beside", &zone),
+        MemoryInput {
+            step: "other",
+            item: &[1],
+            ..MemoryInput::new("beside", &elsewhere)
+        },
+    ];
+    let sections = json!({"sections": [
+        {"label": "A-A'", "from": [-0.035, -0.02], "to": [-0.035, 0.02]},
+        {"label": "material", "from": [0.0, -0.02], "to": [0.0, 0.02], "on": "flat-ply"}]});
+    let out = run::<DefectMeasurement>(sections, &inputs, &[]).unwrap();
+    let labels = |section: usize| -> Vec<String> {
+        let lines = out.attributes["sections"][section]["lines"]
+            .as_array()
+            .unwrap();
+        lines
+            .iter()
+            .map(|l| l["label"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    let own = ["tool", "ply_1", "ply_2", "ply_1, zone B", "ply_2, zone B"];
+    assert_eq!(labels(0), own);
+    // Along the material every run has the line.
+    assert_eq!(labels(1)[..5], own);
+    assert_eq!(labels(1)[5..], ["ply_1 of other_1", "ply_2 of other_1"]);
+    let lines = out.attributes["sections"][0]["lines"].as_array().unwrap();
+    let top = |k: usize| {
+        let (_, heights) = &out.arrays[lines[k]["y"].as_str().unwrap()];
+        heights.iter().copied().fold(0.0, f64::max)
+    };
+    assert!((top(4) - top(2) - 0.001).abs() < 1e-9);
+    assert_eq!(
+        out.result("wrinkle_count"),
+        1.0,
+        "of the run that is measured alone"
+    );
+}
+
+#[test]
 fn causes_are_told_from_shear_bridging_and_layup() {
     let cause = |parameters: Value| measured(parameters).attributes["defects"][0]["cause"].clone();
     // 0.1 rad are 5.7 degrees. The crest ends 22 mm from where the blister is 1 mm high, or somewhat more.
