@@ -164,6 +164,30 @@ fn middle(edge: usize) -> [f64; 2] {
     }
 }
 
+/// Whether a cell comes nearer to `p` from its side `edge` inwards: from the place on the side, which is straight, that is closest to
+/// `p`. Where it does not, that place is the cell's closest (of a flat cell, whose distance from a point is convex).
+#[inline(always)]
+fn leads_into(s: &Surface<'_>, cell: u32, edge: usize, p: V) -> bool {
+    // The side from its southern or western end on, what is opposite to both ends, and the sides of the cell at these.
+    const ENDS: [[usize; 6]; 4] = [
+        [0, 1, 3, 2, 3, 1],
+        [1, 2, 0, 3, 0, 2],
+        [3, 2, 0, 1, 3, 1],
+        [0, 3, 1, 2, 0, 2],
+    ];
+    let [a, b, over_a, over_b, low, high] = ENDS[edge];
+    let nodes = s.cells[cell as usize];
+    let [a, b, over_a, over_b] = [a, b, over_a, over_b].map(|k| s.x[nodes[k] as usize]);
+    let near = s.neighbours[cell as usize];
+    let past = |side: usize| if near[side] == NONE { 0.5 * RIM } else { 0.0 };
+    let (along, to) = (sub(b, a), sub(p, a));
+    let t = (dot(to, along) / dot(along, along)).clamp(-past(low), 1.0 + past(high));
+    let [inwards_a, inwards_b] = [sub(over_a, a), sub(over_b, b)];
+    let inwards: V = std::array::from_fn(|c| inwards_a[c] + t * (inwards_b[c] - inwards_a[c]));
+    let arm: V = std::array::from_fn(|c| to[c] - t * along[c]);
+    dot(arm, inwards) > 0.0
+}
+
 /// Closest point to `p` of the mirror image of a cell: the image of the closest point to the image of `p`.
 #[inline(never)]
 fn across(s: &Surface<'_>, cell: u32, start: [f64; 2], p: V, image: Image) -> Closest {
@@ -251,6 +275,10 @@ pub(super) fn track(
                 others[k] = Some(other).filter(|c| c.free[k]);
             } else if near[edge] != NONE && open(near[edge]) {
                 let start = entry(s.neighbours, here.cell, near[edge]);
+                // On a surface that does not fold towards the slave, which is most of all, the common side decides.
+                if !leads_into(s, near[edge], start, p) {
+                    continue;
+                }
                 let mut other = closest(s, near[edge], middle(start), p, 3);
                 if other.distance2 < best.distance2 {
                     std::mem::swap(&mut best, &mut other);

@@ -1,6 +1,5 @@
 //! Calls of element formulations on batches, and the cells' areas.
 
-use super::transpose::{Sum, gather_places};
 use super::*;
 use crate::component::MOST_PATCH_NODES;
 
@@ -60,8 +59,8 @@ pub(super) struct Workspace {
     energy: Buffer<{ PF_ENERGIES * LANES }>,
 }
 
-impl Workspace {
-    pub(super) fn new() -> Self {
+impl Default for Workspace {
+    fn default() -> Self {
         Self {
             position: Buffer([0.0; 12 * LANES]),
             rates: Rates::zero(),
@@ -83,8 +82,8 @@ pub(super) struct PatchWorkspace {
     energy: Buffer<LANES>,
 }
 
-impl PatchWorkspace {
-    pub(super) fn new() -> Self {
+impl Default for PatchWorkspace {
+    fn default() -> Self {
         Self {
             position: Buffer([0.0; MOST_PATCH_NODES * 3 * LANES]),
             force: Buffer([0.0; MOST_PATCH_NODES * 3 * LANES]),
@@ -160,52 +159,11 @@ pub(super) struct Motion<'a> {
     pub(super) dt: f64,
 }
 
-/// The motion of a block's nodes by their places in it: what its batches gather lies together and aligned, in the
-/// nearest cache.
-#[derive(Default)]
-pub(super) struct OwnMotion {
-    x: Vec<Sum>,
-    v: Vec<Sum>,
-    spin: Vec<Sum>,
-}
-
-impl OwnMotion {
-    /// Takes the motion of `nodes`, of which no block has more than `most`; velocities and spins where they are wanted.
-    pub(super) fn take(
-        &mut self,
-        nodes: &[u32],
-        most: usize,
-        motion: Motion<'_>,
-        [velocities, spins]: [bool; 2],
-    ) {
-        let fill = |to: &mut Vec<Sum>, from: &[V]| {
-            to.clear();
-            to.reserve(most);
-            to.extend(nodes.iter().map(|n| {
-                let [x, y, z] = from[*n as usize];
-                Sum([x, y, z, 0.0])
-            }));
-        };
-        fill(&mut self.x, motion.x);
-        if velocities {
-            fill(&mut self.v, motion.v);
-        }
-        if spins {
-            fill(&mut self.spin, motion.spin);
-        }
-    }
-}
-
-/// Forces of a batch into `work`; cell areas too where they are needed. `own`: motion of its block's nodes.
-pub(super) fn run_batch(
-    batch: &mut Batch,
-    present: Present<'_>,
-    own: &OwnMotion,
-    work: &mut Workspace,
-) {
+/// Forces of a batch into `work`; cell areas too where they are needed.
+pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Workspace) {
     let element = present.sheets[batch.sheet as usize].element_of(batch);
     let motion = present.motion;
-    gather_places(&batch.places, &own.x, &mut work.position.0);
+    gather(&batch.nodes, motion.x, &mut work.position.0);
     if !batch.pressed.is_empty() || present.areas {
         cell_areas_dispatch(&work.position.0, &mut work.area.0);
     }
@@ -220,12 +178,12 @@ pub(super) fn run_batch(
         raw.fields = batch.fields.as_mut_ptr();
     }
     if element.rotates() {
-        gather_places(&batch.places, &own.spin, &mut work.rates.spin.0);
+        gather(&batch.nodes, motion.spin, &mut work.rates.spin.0);
         work.rates.attach(&mut raw);
         if element.sizes.ignores_velocity {
             raw.velocity = std::ptr::null();
         } else {
-            gather_places(&batch.places, &own.v, &mut work.rates.velocity.0);
+            gather(&batch.nodes, motion.v, &mut work.rates.velocity.0);
         }
         raw.moment = work.moment.0.as_mut_ptr();
     }
@@ -263,31 +221,20 @@ fn sum_of(row: &[f64]) -> f64 {
     sums.iter().chain(rest).sum()
 }
 
-/// Positions `[patch_nodes][3][LANES]` of a batch of patches.
+/// Positions `[patch_nodes][3][LANES]` of a batch of patches; unused slots repeat the centre.
 fn gather_patches(sheet: &Sheet, batch: &PatchBatch, x: &[V], position: &mut [f64]) {
-    gather(&batch.nodes, x, position);
-    repeat_centre(sheet, batch, position);
-}
-
-/// Unused slots of a batch of patches repeat the centre.
-fn repeat_centre(sheet: &Sheet, batch: &PatchBatch, position: &mut [f64]) {
     let rows = 3 * LANES * batch.nodes.len();
     let width = 3 * LANES * sheet.element.sizes.patch_nodes;
+    gather(&batch.nodes, x, &mut position[..rows]);
     for start in (rows..width).step_by(3 * LANES) {
         position.copy_within(..3 * LANES, start);
     }
 }
 
-/// Forces of a batch of patches into `work`. `own`: motion of its block's nodes.
-pub(super) fn run_patch(
-    batch: &mut PatchBatch,
-    present: Present<'_>,
-    own: &OwnMotion,
-    work: &mut PatchWorkspace,
-) {
+/// Forces of a batch of patches into `work`.
+pub(super) fn run_patch(batch: &mut PatchBatch, present: Present<'_>, work: &mut PatchWorkspace) {
     let sheet = &present.sheets[batch.sheet as usize];
-    gather_places(&batch.places, &own.x, &mut work.position.0);
-    repeat_centre(sheet, batch, &mut work.position.0);
+    gather_patches(sheet, batch, present.motion.x, &mut work.position.0);
     let mut raw = empty_patch_batch(sheet, present.motion.dt, &work.position.0);
     raw.constants = batch.constants.as_ptr().cast_mut();
     raw.history = batch.history.as_mut_ptr();

@@ -227,52 +227,32 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .zip_eq(others)
         .with_max_len(TOGETHER)
-        .for_each_init(
-            Workspace::new,
-            |work, ((block, force), ((moment, pressure), area))| {
-                let part = Part {
-                    force,
-                    moment,
-                    pressure,
-                    area,
-                };
-                run_block(block, part, present, work);
-            },
-        );
+        .for_each(|((block, force), ((moment, pressure), area))| {
+            let part = Part {
+                force,
+                moment,
+                pressure,
+                area,
+            };
+            WORK.with_borrow_mut(|work| run_block(block, part, present, work));
+        });
 }
 
 thread_local! {
-    /// Of the block that a thread computes; kept so that no step asks for memory.
-    static OWN: RefCell<OwnMotion> = RefCell::default();
+    /// What a thread computes blocks in, kept from step to step: neither asked for nor cleared anew.
+    static WORK: RefCell<Box<Workspace>> = RefCell::default();
+    /// The same for blocks of patches.
+    static PATCH_WORK: RefCell<Box<PatchWorkspace>> = RefCell::default();
 }
 
 fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>, work: &mut Workspace) {
-    OWN.with_borrow_mut(|own| run_block_with(block, part, present, own, work));
-}
-
-fn run_block_with(
-    block: &mut Block<Batch>,
-    part: Part<'_>,
-    present: Present<'_>,
-    own: &mut OwnMotion,
-    work: &mut Workspace,
-) {
-    let elements = block
-        .batches
-        .iter()
-        .map(|b| present.sheets[b.sheet as usize].element_of(b));
-    let mut rates = [false; 2];
-    for element in elements.filter(|e| e.rotates()) {
-        rates = [rates[0] || !element.sizes.ignores_velocity, true];
-    }
-    own.take(&block.nodes, part.force.len(), present.motion, rates);
     part.force.fill(Sum::default());
     part.moment.fill(Sum::default());
     part.pressure.fill(Sum::default());
     part.area.fill(Sum::default());
     block.failed = None;
     for batch in &mut block.batches {
-        run_batch(batch, present, own, work);
+        run_batch(batch, present, work);
         if batch.status != PF_OK {
             block.failed = block.failed.or(Some((batch.status, batch.sheet)));
             continue;
@@ -314,23 +294,29 @@ pub(super) fn run_patch_blocks(
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .with_max_len(TOGETHER)
-        .for_each_init(PatchWorkspace::new, |work, (block, force)| {
-            force.fill(Sum::default());
-            block.failed = None;
-            OWN.with_borrow_mut(|own| {
-                own.take(&block.nodes, force.len(), present.motion, [false; 2]);
-                for batch in &mut block.batches {
-                    run_patch(batch, present, own, work);
-                    if batch.status != PF_OK {
-                        block.failed = block.failed.or(Some((batch.status, batch.sheet)));
-                        continue;
-                    }
-                    // Unused nodes of a patch repeat its centre and have no force.
-                    let count = batch.count as usize;
-                    scatter_all(&batch.places, count, &work.force.0, true, force);
-                }
-            });
+        .for_each(|(block, force)| {
+            PATCH_WORK.with_borrow_mut(|work| run_patch_block(block, force, present, work));
         });
+}
+
+fn run_patch_block(
+    block: &mut Block<PatchBatch>,
+    force: &mut [Sum],
+    present: Present<'_>,
+    work: &mut PatchWorkspace,
+) {
+    force.fill(Sum::default());
+    block.failed = None;
+    for batch in &mut block.batches {
+        run_patch(batch, present, work);
+        if batch.status != PF_OK {
+            block.failed = block.failed.or(Some((batch.status, batch.sheet)));
+            continue;
+        }
+        // Unused nodes of a patch repeat its centre and have no force.
+        let count = batch.count as usize;
+        scatter_all(&batch.places, count, &work.force.0, true, force);
+    }
 }
 
 /// Adds or takes off the rows `[node][3][LANES]` at the places of the first `count` lanes.

@@ -29,24 +29,6 @@ pub(super) fn gather(nodes: &[[u32; LANES]], x: &[V], out: &mut [f64]) {
     }
 }
 
-/// Writes `[node][3][LANES]` of the nodes at `places` of `of`, the vectors of a block's nodes.
-#[inline]
-pub(super) fn gather_places(places: &[[u16; LANES]], of: &[Sum], out: &mut [f64]) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // Checked the line above.
-        return unsafe { wide::gather_places(places, of, out) };
-    }
-    for (places, rows) in places.iter().zip(out.chunks_exact_mut(3 * LANES)) {
-        let (a, rest) = rows.split_at_mut(LANES);
-        let (b, c) = rest.split_at_mut(LANES);
-        for l in 0..LANES {
-            let [x, y, z, _] = of[places[l] as usize].0;
-            (a[l], b[l], c[l]) = (x, y, z);
-        }
-    }
-}
-
 /// Adds, or takes off when `minus`, the rows `[3][LANES]` at the places of the first `count` lanes.
 #[inline]
 pub(super) fn scatter(
@@ -87,38 +69,20 @@ mod wide {
                 let at = |i: usize| unsafe {
                     _mm256_maskload_pd(x[nodes[l + i] as usize].as_ptr(), three)
                 };
-                write([at(0), at(1), at(2), at(3)], rows, l);
+                let (a, b, c, d) = (at(0), at(1), at(2), at(3));
+                let (ab_xz, cd_xz) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+                let (ab_y, cd_y) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+                let row = [
+                    _mm256_permute2f128_pd::<0x20>(ab_xz, cd_xz),
+                    _mm256_permute2f128_pd::<0x20>(ab_y, cd_y),
+                    _mm256_permute2f128_pd::<0x31>(ab_xz, cd_xz),
+                ];
+                for (k, row) in row.into_iter().enumerate() {
+                    let to = &mut rows[k * LANES + l..k * LANES + l + 4];
+                    // Four places, as sliced.
+                    unsafe { _mm256_storeu_pd(to.as_mut_ptr(), row) };
+                }
             }
-        }
-    }
-
-    #[target_feature(enable = "avx2")]
-    pub(super) fn gather_places(places: &[[u16; LANES]], of: &[Sum], out: &mut [f64]) {
-        for (places, rows) in places.iter().zip(out.chunks_exact_mut(3 * LANES)) {
-            for l in (0..LANES).step_by(4) {
-                // Four components, aligned to their 32 bytes.
-                let at =
-                    |i: usize| unsafe { _mm256_load_pd(of[places[l + i] as usize].0.as_ptr()) };
-                write([at(0), at(1), at(2), at(3)], rows, l);
-            }
-        }
-    }
-
-    /// Writes the first three components of four lanes to the rows `[3][LANES]`, from lane `l` on.
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    fn write([a, b, c, d]: [__m256d; 4], rows: &mut [f64], l: usize) {
-        let (ab_xz, cd_xz) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
-        let (ab_y, cd_y) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
-        let row = [
-            _mm256_permute2f128_pd::<0x20>(ab_xz, cd_xz),
-            _mm256_permute2f128_pd::<0x20>(ab_y, cd_y),
-            _mm256_permute2f128_pd::<0x31>(ab_xz, cd_xz),
-        ];
-        for (k, row) in row.into_iter().enumerate() {
-            let to = &mut rows[k * LANES + l..k * LANES + l + 4];
-            // Four places, as sliced.
-            unsafe { _mm256_storeu_pd(to.as_mut_ptr(), row) };
         }
     }
 
@@ -180,10 +144,6 @@ mod tests {
             }
         }
         let places: [u16; LANES] = std::array::from_fn(|l| ((7 * l) % 20) as u16);
-        let own: Vec<Sum> = x.iter().map(|p| Sum([p[0], p[1], p[2], 9.0])).collect();
-        let mut again = vec![f64::NAN; 3 * LANES];
-        gather_places(&[places], &own, &mut again);
-        assert_eq!(again, out[3 * LANES..]);
         for (count, minus) in [(LANES, false), (LANES, true), (13, true)] {
             let mut sums = vec![Sum([0.5; 4]); 20];
             scatter(&places, count, &out[..3 * LANES], minus, &mut sums);
