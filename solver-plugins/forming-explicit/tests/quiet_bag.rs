@@ -250,3 +250,19 @@ fn a_draped_bag_stays_quiet_for_a_second() {
 fn a_draped_bag_stays_quiet_whose_plies_have_their_nodes_under_those_of_the_films() {
     assert_quiet("node on node", &draped(0.01, 0.05), BOUND);
 }
+
+/// Which meshes rest on each other decides how nodes lie in cells, and a contact that is nearly right fails in some of them alone
+/// (`docs/decisions/0020`). In the coarser ones some 1e-7 of the work goes on swinging, neither growing nor dying in so short a time.
+#[test]
+#[ignore = "minutes: make test-long"]
+fn draped_bags_stay_quiet_whatever_the_mesh_of_the_films() {
+    for k in 0..16 {
+        let film = 0.010 + 0.00025 * f64::from(k);
+        let seen = watch(&draped(film, 0.05));
+        let share = seen.kinetic.map(|k| k / seen.work);
+        let what = format!("films of {:.2} mm", 1e3 * film);
+        println!("{what}: {share:?}, {}", seen.least_distance);
+        assert!(share.iter().all(|s| *s < BOUND), "{what}: {share:?}");
+        assert!(seen.least_distance > 0.9, "{what}: {}", seen.least_distance);
+    }
+}
