@@ -304,3 +304,63 @@ pub(super) fn track(
         others,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vec3::{add, norm, scale};
+
+    /// Two skew cells that meet at a fold, and slaves around it: against the neighbour's nearest place of many.
+    #[test]
+    fn a_neighbour_is_left_out_only_where_its_nearest_place_is_on_the_common_side() {
+        let mut left_out = 0;
+        for k in 0..600u32 {
+            // Spread evenly: parts of multiples of irrational numbers, -1 to 1.
+            let r = |m: u32| 2.0 * (f64::from(k) * f64::from(m).sqrt()).fract() - 1.0;
+            let (fold, skew) = (2.6 * r(2), 0.4 * r(3));
+            // The first cell lies in x < 0, the second is turned about the side x = 0 by the fold.
+            let (c, s) = (fold.cos(), fold.sin());
+            let x: Vec<V> = vec![
+                [-1.0, skew, 0.0],
+                [0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [-1.0, 1.0 + skew, 0.0],
+                [c, -skew, s],
+                [c, 1.0 - skew, s],
+            ];
+            // The neighbour's corners begin at each of its own in turn, so that every side is the common one.
+            let around = [1, 4, 5, 2];
+            let turn = (k % 4) as usize;
+            let cell: [u32; 4] = std::array::from_fn(|i| around[(i + turn) % 4]);
+            // The side from the first cell is the last of `around`.
+            let edge = (3 + 4 - turn) % 4;
+            let far = 7;
+            let surface = Surface {
+                cells: &[[0, 1, 2, 3], cell],
+                neighbours: &[[far; 4]; 2],
+                x: &x,
+                normals: &[],
+            };
+            let p = [0.5 * r(5) - 0.3, 0.5 + 0.8 * r(7), 0.4 * r(11)];
+            let place = |u: f64, t: f64| -> V {
+                let low = add(scale(x[1], 1.0 - u), scale(x[4], u));
+                let high = add(scale(x[2], 1.0 - u), scale(x[5], u));
+                add(scale(low, 1.0 - t), scale(high, t))
+            };
+            let parts = 0..=100;
+            let nearest = |inwards: f64| {
+                let along = parts.clone().map(|t| place(inwards, f64::from(t) / 100.0));
+                along.fold(f64::INFINITY, |m, at| m.min(norm(sub(p, at))))
+            };
+            let on_side = nearest(0.0);
+            let inside = (parts.clone().map(|u| nearest(f64::from(u) / 100.0)))
+                .fold(f64::INFINITY, f64::min);
+            if !leads_into(&surface, 1, edge, p) {
+                left_out += 1;
+                // The place on the side is exact, those that it is held against are not.
+                assert!(inside > on_side - 1e-9, "{k}: {inside} {on_side}");
+            }
+        }
+        assert!((150..450).contains(&left_out), "{left_out}");
+    }
+}
