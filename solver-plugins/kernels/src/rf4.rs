@@ -38,24 +38,6 @@ pub const PATCH_NODES: usize = 12;
 const TERMS: usize = 5;
 /// Area, count, then `[node - 1][term]` weights.
 const PATCH_CONSTANTS: usize = 2 + (PATCH_NODES - 1) * TERMS;
-
-/// Where the constants of the [`WIDTH`] lanes from `c` on begin: `[lanes / WIDTH][constants][WIDTH]`, so that what is
-/// read together lies together, in the order in which it is read.
-#[inline(always)]
-fn chunk(c: usize) -> usize {
-    c * PATCH_CONSTANTS
-}
-
-/// Where constant `row` of a lane is.
-fn place(row: usize, lane: usize) -> usize {
-    chunk(lane - lane % WIDTH) + row * WIDTH + lane % WIDTH
-}
-
-/// Row of a weight of node `i`, which is not the centre.
-#[inline(always)]
-fn weight(i: usize, term: usize) -> usize {
-    2 + (i - 1) * TERMS + term
-}
 /// Curvatures and moments along the two fibre families.
 const PATCH_FIELDS: usize = 4;
 
@@ -109,11 +91,11 @@ impl Element for Rf4 {
             });
             let axis: V3 = core::array::from_fn(|k| batch.axis[k * n + l]);
             let weights = fit(&x[..count], axis);
-            batch.constants[place(0, l)] = batch.area[l];
-            batch.constants[place(1, l)] = count as f64;
+            batch.constants[l] = batch.area[l];
+            batch.constants[n + l] = count as f64;
             for (i, w) in weights.iter().enumerate() {
                 for (t, value) in w.iter().enumerate() {
-                    batch.constants[place(weight(i + 1, t), l)] = *value;
+                    batch.constants[(2 + i * TERMS + t) * n + l] = *value;
                 }
             }
         }
@@ -367,8 +349,8 @@ dispatch!(fn forces(
 /// Nodes in use in a chunk: the most of its lanes (a lane's own unused nodes have zero weights and
 /// sit on the centre, so they add exact zeros).
 #[inline(always)]
-fn used(constants: &[f64], c: usize) -> usize {
-    constants[chunk(c) + WIDTH..chunk(c) + 2 * WIDTH]
+fn used(constants: &[f64], n: usize, c: usize) -> usize {
+    constants[n + c..n + c + WIDTH]
         .iter()
         .fold(1.0f64, |m, x| m.max(*x)) as usize
 }
@@ -382,14 +364,14 @@ fn derivatives_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s
             V::load(position, 2 * n + c),
         ];
         let mut x = [[V::splat(0.0); 3]; TERMS];
-        for i in 1..used(constants, c).min(PATCH_NODES) {
+        for i in 1..used(constants, n, c).min(PATCH_NODES) {
             let d: [V; 3] = [
                 V::load(position, 3 * i * n + c) - centre[0],
                 V::load(position, (3 * i + 1) * n + c) - centre[1],
                 V::load(position, (3 * i + 2) * n + c) - centre[2],
             ];
             for t in 0..TERMS {
-                let w = V::load(constants, chunk(c) + weight(i, t) * WIDTH);
+                let w = V::load(constants, (2 + (i - 1) * TERMS + t) * n + c);
                 for k in 0..3 {
                     x[t][k] = x[t][k] + w * d[k];
                 }
@@ -433,7 +415,7 @@ fn forces_kernel<V: Lanes>(
 ) {
     let zero = V::splat(0.0);
     for c in (0..n).step_by(WIDTH) {
-        let area = V::load(constants, chunk(c));
+        let area = V::load(constants, c);
         let m11 = V::load(s.moment, c) * area;
         let m22 = V::load(s.moment, n + c) * area;
         let m12 = V::load(s.moment, 2 * n + c) * area * V::splat(2.0);
@@ -447,9 +429,9 @@ fn forces_kernel<V: Lanes>(
         }
         let normal = [row(s.dual, 6), row(s.dual, 7), row(s.dual, 8)];
         let mut sum = zero;
-        let used = used(constants, c).min(PATCH_NODES);
+        let used = used(constants, n, c).min(PATCH_NODES);
         for i in 1..used {
-            let w = |t: usize| V::load(constants, chunk(c) + weight(i, t) * WIDTH);
+            let w = |t: usize| row(constants, 2 + (i - 1) * TERMS + t);
             let f = (w(2) * m11 + w(3) * m22 + w(4) * m12) - (w(0) * p1 + w(1) * p2);
             sum = sum + f;
             for k in 0..3 {
@@ -468,7 +450,7 @@ fn forces_kernel<V: Lanes>(
                 let (p1, p2) = (pull * row(s.dual, k), pull * row(s.dual, 3 + k));
                 let mut sum = zero;
                 for i in 1..used {
-                    let w = |t: usize| V::load(constants, chunk(c) + weight(i, t) * WIDTH);
+                    let w = |t: usize| row(constants, 2 + (i - 1) * TERMS + t);
                     let f = w(0) * p1 + w(1) * p2;
                     sum = sum + f;
                     let at = (3 * i + k) * n + c;
@@ -489,8 +471,8 @@ fn forces_kernel<V: Lanes>(
 fn row_sums(constants: &[f64], n: usize, power: u32, s: &View<'_>, stiffness: &mut [f64]) {
     let power = f64::from(power);
     for l in 0..n {
-        let area = constants[place(0, l)];
-        let count = (constants[place(1, l)] as usize).clamp(1, PATCH_NODES);
+        let area = constants[l];
+        let count = (constants[n + l] as usize).clamp(1, PATCH_NODES);
         let three =
             |from: &[f64], r: usize| -> V3 { core::array::from_fn(|k| from[(3 * r + k) * n + l]) };
         let dot = |a: V3, b: V3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -500,7 +482,7 @@ fn row_sums(constants: &[f64], n: usize, power: u32, s: &View<'_>, stiffness: &m
         let mut w = [[0.0; TERMS]; PATCH_NODES];
         for i in 1..count {
             for t in 0..TERMS {
-                w[i][t] = constants[place(weight(i, t), l)];
+                w[i][t] = constants[(2 + (i - 1) * TERMS + t) * n + l];
                 w[0][t] -= w[i][t];
             }
         }
