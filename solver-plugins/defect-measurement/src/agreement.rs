@@ -3,7 +3,7 @@
 use plyflow_defects::pairs::{PairErrors, Pairs, measure_for_pairs};
 use plyflow_defects::{Defect, Ply, Settings, Tool};
 use plyflow_surface::vector::{Vec3, add, distance, dot, scale};
-use plyflow_surface::{Surface, triangles, weighted_mean, weighted_quantiles};
+use plyflow_surface::{Closest, Surface, triangles, weighted_mean, weighted_quantiles};
 
 /// Quantiles of the magnitude of the deviation that are told.
 pub const QUANTILES: [(&str, f64); 4] =
@@ -37,11 +37,8 @@ impl Agreement {
     pub fn of(ply: &Ply, scan: &Ply, tool: &Tool, above: f64, settings: &Settings) -> Option<Self> {
         let (corners, cells) = ply.topology.connectivity();
         let face = Surface::new(&ply.formed, &triangles(corners, cells))?;
-        let closest: Vec<_> = scan.formed.iter().map(|p| face.closest(*p)).collect();
-        // A mesh says by its winding which side is up; the tool says it for certain.
-        let along =
-            |c: &plyflow_surface::Closest| dot(c.normal, tool.surface.closest(c.point).normal);
-        let side = closest.iter().map(along).sum::<f64>().signum();
+        let closest: Vec<Closest> = scan.formed.iter().map(|p| face.closest(*p)).collect();
+        let side = upper_side(&closest, tool);
         let areas = scan.topology.node_areas(&scan.formed);
         let judged = |i: usize| scan.distance[i].judged && !closest[i].on_free_edge;
         let weights: Vec<f64> = (0..areas.len())
@@ -95,6 +92,13 @@ impl Agreement {
             deviation,
         })
     }
+}
+
+/// +1 where the normals of a ply's closest places point away from the tool, -1 where they point to it: a mesh says by its winding which
+/// side is up, the tool says it for certain.
+fn upper_side(closest: &[Closest], tool: &Tool) -> f64 {
+    let along = |c: &Closest| dot(c.normal, tool.surface.closest(c.point).normal);
+    closest.iter().map(along).sum::<f64>().signum()
 }
 
 /// A ply of which no more is known than of a scan.

@@ -97,11 +97,8 @@ impl Step for DefectMeasurement {
         let settings: Settings = host.parameters()?;
         let limits: Limits = host.parameters()?;
         let p: Parameters = host.parameters()?;
-        let sections: Vec<_> = p
-            .sections
-            .iter()
-            .map(Section::corners)
-            .collect::<Result<_, _>>()?;
+        let corners = p.sections.iter().map(Section::corners);
+        let sections = corners.collect::<Result<Vec<_>, _>>()?;
         let phase = |phase, fraction| {
             host.progress(&Progress {
                 phase,

@@ -279,6 +279,15 @@ impl<'a> Output<'a> {
             tables.push(json!({"name": "agreement", "title": title, "columns": columns(&BOTH), "rows": rows}));
             json!({"ply": a.ply, "defects": list})
         });
+        host.write_attributes(&json!({
+            "defects": list, "sections": self.sections, "plots": self.plots, "maps": self.maps(),
+            "alignment": alignment.map(alignment_json), "agreement": agreement, "tables": tables,
+        }))
+    }
+
+    /// Maps of plies and scan.
+    fn maps(&self) -> Vec<Value> {
+        let simulated = || self.measured.iter().filter(|m| m.simulated);
         let scan = || self.measured.iter().filter(|m| !m.simulated);
         let map = |(field, title, unit): (&str, &str, &str), of: Vec<&Measured>| {
             let panels = of
@@ -300,10 +309,7 @@ impl<'a> Output<'a> {
             let title = format!("Height of the scan over {}", a.ply);
             maps.push(map(("deviation", &title, "mm"), scan().collect()));
         }
-        host.write_attributes(&json!({
-            "defects": list, "sections": self.sections, "plots": self.plots, "maps": maps,
-            "alignment": alignment.map(alignment_json), "agreement": agreement, "tables": tables,
-        }))
+        maps
     }
 }
 
