@@ -5,7 +5,6 @@ use crate::assembly::StackSheet;
 use crate::local::LocalSheet;
 use crate::run::{Forming, Observer};
 use plyflow_mechanics::model::Model;
-use plyflow_mechanics::sheet::SheetSpec;
 use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::StepError;
@@ -48,10 +47,9 @@ pub(crate) fn too_late(shift: f64) -> Option<String> {
 /// The start of a whole zone whose sheets begin at `time` (s): none at 0.
 ///
 /// # Errors
-/// A text for the user: sheets that do not tell their start, or elements that cannot begin there.
+/// A text for the user: sheets that do not tell their start.
 pub(crate) fn of_model(
     stack: &[StackSheet],
-    specs: &[SheetSpec],
     sheets: &[LocalSheet],
     time: f64,
 ) -> Result<Option<Start>, String> {
@@ -62,14 +60,8 @@ pub(crate) fn of_model(
         path: Vec::new(),
         velocity: Vec::new(),
     };
-    for (sheet, spec) in stack.iter().zip(specs) {
+    for sheet in stack {
         let name = &sheet.scene.name;
-        if spec.element.sizes.history > 0 {
-            return Err(format!(
-                "sheet '{name}': its element keeps directions along its way, and a run with it begins with the process, not at \
-                 {time} s. Leave out `start_time` and `start_bend` of the boundary, or take an element such as rf4"
-            ));
-        }
         let found = sheets.iter().find(|s| &s.name == name);
         let own = found.and_then(|s| s.start.as_ref()).ok_or_else(|| {
             format!("the boundary begins at {time} s and does not tell where sheet '{name}' is then; run its step again")
@@ -107,8 +99,8 @@ pub(crate) fn begin(
         for k in 1..=STEPS {
             let share = f64::from(k) / f64::from(STEPS);
             let to = |(a, b): (&V, &V)| add(*a, scale(sub(*b, *a), share));
-            forming.model.x = from.iter().zip(state).map(to).collect();
-            forming.model.take_shape().map_err(text)?;
+            let x = from.iter().zip(state).map(to).collect();
+            forming.model.lead(x).map_err(text)?;
         }
     }
     clear_tool(forming);

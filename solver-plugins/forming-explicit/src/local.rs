@@ -181,7 +181,7 @@ pub fn build_local(
         driven,
         drive,
     } = sheets_of(p, &input, &stack, components)?;
-    let start = late::of_model(&stack, &specs, &input.sheets, input.time[0])?;
+    let start = late::of_model(&stack, &input.sheets, input.time[0])?;
     let (tool, grid) = tool::build(scene, p.tool_grid)?;
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]])?;
     let mut model =

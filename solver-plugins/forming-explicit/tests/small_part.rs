@@ -10,7 +10,7 @@ use common::scenes::bag;
 use common::{BuiltIn, Silent, form};
 use plyflow_forming_explicit::assembly::inverse_bilinear;
 use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer};
+use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer, Outcome};
 use plyflow_forming_explicit::{
     Feedback, LocalInput, LocalSheet, Start, build_global, build_local, feed_back,
 };
@@ -328,110 +328,146 @@ fn cut_out(
     (sheet, nodes)
 }
 
-#[test]
-fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
-    let mut p = parameters();
-    p.frames = 100;
-    let mut film = Film::default();
-    let mut whole = build_global(&p, &BuiltIn).unwrap();
-    let history = whole.run(&p.control(), &mut film).unwrap().history;
-    // `drift`: further speed (m/s) of the plies' cut along x from the start on, of a run that ends with its first frame.
-    let zone = |first: usize, held: bool, drift: Option<f64>| {
-        let time = film.time[first..].to_vec();
+/// A run of the whole part, of which zones are cut out.
+struct Whole {
+    p: Parameters,
+    forming: Forming,
+    film: Film,
+    history: Vec<HistoryRow>,
+}
+
+/// What became of a zone.
+struct Zone {
+    forming: Forming,
+    /// `None` of a run that ended with its first frame.
+    outcome: Option<Outcome>,
+    /// By body: its sheet and its nodes' numbers in the whole's.
+    parts: Vec<(LocalSheet, Vec<u32>)>,
+    /// `[bodies][nodes]` (m) at its first frame.
+    first: Vec<Vec<V>>,
+}
+
+impl Whole {
+    fn formed(mut p: Parameters) -> Self {
+        p.frames = 100;
+        let mut film = Film::default();
+        let mut forming = build_global(&p, &BuiltIn).unwrap();
+        let history = forming.run(&p.control(), &mut film).unwrap().history;
+        Self {
+            p,
+            forming,
+            film,
+            history,
+        }
+    }
+
+    /// The frame after which a zone may begin: until 0.18 s the frame goes down, then the air is drawn from under the films.
+    fn late(&self) -> usize {
+        self.film.time.iter().position(|t| *t > 0.2).unwrap()
+    }
+
+    /// A zone from the frame `first` on, whose plies' cut is `held` or placed and goes on at a further `drift` (m/s) along x.
+    fn zone(&self, first: usize, held: bool, drift: f64) -> LocalInput {
+        let time = self.film.time[first..].to_vec();
         let of = |get: fn(&HistoryRow) -> f64| -> Vec<f64> {
-            let (t, v): (Vec<f64>, Vec<f64>) = history.iter().map(|r| (r.time, get(r))).unzip();
+            let (t, v): (Vec<f64>, Vec<f64>) =
+                self.history.iter().map(|r| (r.time, get(r))).unzip();
             time.iter().map(|at| linear(&t, &v, *at)).collect()
         };
-        let parts: Vec<_> = (0..4)
-            .map(|body| {
-                let wider = if body == 0 || body == 3 { 0.02 } else { 0.0 };
-                let (mut sheet, nodes) =
-                    cut_out(&whole, &film, body, [0.045 + wider, 0.05 + wider], first);
-                if held && (1..3).contains(&body) {
-                    let (f, k) = (sheet.position.len(), sheet.driven.len());
-                    sheet.normal = vec![vec![[0.0, 0.0, 1.0]; k]; f];
-                    sheet.normal_rate = vec![vec![[0.0; 3]; k]; f];
-                    sheet.pull = vec![vec![[0.0; 3]; k]; f];
-                    sheet.stiffness = vec![1e6; k];
-                }
-                for (at, since) in sheet.position.iter_mut().zip(&time) {
-                    let way = drift.unwrap_or(0.0) * (since - time[0]);
-                    at.iter_mut().for_each(|x| x[0] += way);
-                }
-                for v in sheet.velocity.iter_mut().flatten() {
-                    v[0] += drift.unwrap_or(0.0);
-                }
-                (sheet, nodes)
-            })
-            .collect();
-        let input = LocalInput {
+        let sheet = |body: usize| {
+            let (mut sheet, _) = self.part(body, first);
+            if held && (1..3).contains(&body) {
+                let (f, k) = (sheet.position.len(), sheet.driven.len());
+                sheet.normal = vec![vec![[0.0, 0.0, 1.0]; k]; f];
+                sheet.normal_rate = vec![vec![[0.0; 3]; k]; f];
+                sheet.pull = vec![vec![[0.0; 3]; k]; f];
+                sheet.stiffness = vec![1e6; k];
+            }
+            for (at, since) in sheet.position.iter_mut().zip(&time) {
+                at.iter_mut()
+                    .for_each(|x| x[0] += drift * (since - time[0]));
+            }
+            for v in sheet.velocity.iter_mut().flatten() {
+                v[0] += drift;
+            }
+            sheet
+        };
+        LocalInput {
             cavity: of(|r| r.cavity),
             bag: of(|r| r.bag),
             frame: of(|r| r.frame),
+            sheets: (0..4).map(sheet).collect(),
             time,
-            sheets: parts.iter().map(|(s, _)| s.clone()).collect(),
             zone: json!({"name": "A"}),
             element_size: 0.007,
-        };
-        if first > 0 && !held {
-            // Whoever waits for the balance sees that it is looked for, and can stop it.
-            let mut impatient = Film {
-                settles: Some(20),
-                ..Film::default()
-            };
-            let mut forming = build_local(&p, input.clone(), &BuiltIn).unwrap();
-            let Err(stopped) = forming.run(&p.control(), &mut impatient) else {
-                panic!("the start went on");
-            };
-            let message = format!("{stopped:?}");
-            assert!(message.contains("stopped"), "{message}");
-            assert_eq!((impatient.settled, impatient.time.len()), (21, 0));
         }
-        let mut forming = build_local(&p, input, &BuiltIn).unwrap();
+    }
+
+    fn part(&self, body: usize, first: usize) -> (LocalSheet, Vec<u32>) {
+        let wider = if body == 0 || body == 3 { 0.02 } else { 0.0 };
+        cut_out(
+            &self.forming,
+            &self.film,
+            body,
+            [0.045 + wider, 0.05 + wider],
+            first,
+        )
+    }
+
+    /// Runs a zone, to its end or (`short`) to its first frame.
+    fn run(&self, input: LocalInput, first: usize, short: bool) -> Zone {
+        let mut forming = build_local(&self.p, input, &BuiltIn).unwrap();
         let mut seen = Film {
-            short: drift.is_some(),
+            short,
             ..Film::default()
         };
-        let run = forming.run(&p.control(), &mut seen);
-        let outcome = if seen.short {
-            run.ok()
-        } else {
-            Some(run.unwrap())
+        let run = forming.run(&self.p.control(), &mut seen);
+        let outcome = if short { run.ok() } else { Some(run.unwrap()) };
+        Zone {
+            forming,
+            outcome,
+            parts: (0..4).map(|body| self.part(body, first)).collect(),
+            first: seen.points.swap_remove(0),
+        }
+    }
+
+    /// Mean distances (m) of a zone's ply from that of another zone and from the whole's.
+    fn distances(&self, zone: &Zone, other: &Zone, body: usize) -> [f64; 2] {
+        let of = |f: &Forming| f.points(&f.bodies[body]);
+        let [a, b, c] = [&zone.forming, &other.forming, &self.forming].map(of);
+        let nodes = &zone.parts[body].1;
+        let mean = |place: &dyn Fn(usize) -> V| {
+            let ways = a.iter().enumerate().map(|(k, x)| norm(sub(*x, place(k))));
+            ways.sum::<f64>() / a.len() as f64
         };
-        (forming, outcome, parts, seen.points.swap_remove(0))
-    };
-    let (from_the_start, _, parts, _) = zone(0, false, None);
-    // Until 0.18 s the frame goes down, then the air is drawn from under the films.
-    let first = film.time.iter().position(|t| *t > 0.2).unwrap();
-    let (late, outcome, ..) = zone(first, false, None);
-    let outcome = outcome.expect("a whole run");
-    assert!((outcome.history[0].time - film.time[first]).abs() < 1.3e-5);
+        [mean(&|k| b[k]), mean(&|k| c[nodes[k] as usize])]
+    }
+}
+
+/// Runs a zone from the process' beginning and one from the late frame on, and holds the second against the first and the whole.
+fn begun_late(whole: &Whole) -> Zone {
+    let from_the_start = whole.run(whole.zone(0, false, 0.0), 0, false);
+    let first = whole.late();
+    let late = whole.run(whole.zone(first, false, 0.0), first, false);
+    let outcome = late.outcome.as_ref().expect("a whole run");
+    assert!((outcome.history[0].time - whole.film.time[first]).abs() < 1.3e-5);
     let shift = outcome.start_shift.unwrap();
     assert!(shift < 5e-4, "{shift} m");
     assert!(
-        outcome.cycles < 10_000 + from_the_start.model.cycle / 2,
+        outcome.cycles < 10_000 + from_the_start.forming.model.cycle / 2,
         "{}",
         outcome.cycles
     );
-    let health = outcome.health;
+    let health = &outcome.health;
     assert!(
         health.peak_drift_ratio < 0.02 && health.peak_kinetic_ratio < 0.1,
         "{health:?}"
     );
-    for p in late.penetrations() {
+    for p in late.forming.penetrations() {
         assert!(p.q999 < 0.1 * (p.thinner + p.spare), "{p:?}");
     }
     for body in 1..3 {
-        let [a, b, c] = [&late, &from_the_start, &whole].map(|f| f.points(&f.bodies[body]));
-        let nodes = &parts[body].1;
-        let mean = |other: &dyn Fn(usize) -> V| {
-            a.iter()
-                .enumerate()
-                .map(|(k, x)| norm(sub(*x, other(k))))
-                .sum::<f64>()
-                / a.len() as f64
-        };
-        let (fresh, of_the_whole) = (mean(&|k| b[k]), mean(&|k| c[nodes[k] as usize]));
+        let [fresh, of_the_whole] = whole.distances(&late, &from_the_start, body);
         println!(
             "ply {body}: {fresh} m from the zone that began with the process, {of_the_whole} m from the whole"
         );
@@ -440,22 +476,54 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
             "ply {body}: {fresh} m, {of_the_whole} m"
         );
     }
+    late
+}
+
+#[test]
+fn a_zone_of_shells_with_rotations_that_begins_late_ends_as_one_that_begins_with_the_process() {
+    begun_late(&Whole::formed(bag(2, |p| {
+        p["element"] = json!({"plugin": "s4", "with": {}});
+        for k in 1..3 {
+            let law = json!({"linear": 2e-3});
+            p["scene"]["sheets"][k]["material"]["with"]["bending"] =
+                json!({"positive": law, "negative": law});
+        }
+    })));
+}
+
+#[test]
+fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
+    let whole = Whole::formed(parameters());
+    let first = whole.late();
+    // Whoever waits for the balance sees that it is looked for, and can stop it.
+    let mut impatient = Film {
+        settles: Some(20),
+        ..Film::default()
+    };
+    let mut forming = build_local(&whole.p, whole.zone(first, false, 0.0), &BuiltIn).unwrap();
+    let Err(stopped) = forming.run(&whole.p.control(), &mut impatient) else {
+        panic!("the start went on");
+    };
+    let message = format!("{stopped:?}");
+    assert!(message.contains("stopped"), "{message}");
+    assert_eq!((impatient.settled, impatient.time.len()), (21, 0));
+    let late = begun_late(&whole);
     // Held without a pull, the cut goes to where the zone does not pull either, and from there gives way by what it pulls with over
     // the stiffness.
-    let (held, _, parts, at_rest) = zone(first, true, Some(0.0));
     let drift = 1.0;
-    let (.., begun) = zone(first, true, Some(drift));
-    let (whole_run, ..) = zone(first, true, None);
+    let held = whole.run(whole.zone(first, true, 0.0), first, true);
+    let drifting = whole.run(whole.zone(first, true, drift), first, true);
+    let to_the_end = whole.run(whole.zone(first, true, 0.0), first, false);
     let (mut largest, mut gone, mut loose) = (0.0f64, 0.0f64, 0.0f64);
     for body in 1..3 {
-        let sheet = &parts[body].0;
+        let sheet = &held.parts[body].0;
         for (k, at) in sheet.driven.iter().zip(&sheet.position[0]) {
             let k = *k as usize;
             // While the start settles the cut does not go with its drive, however fast it moves from then on.
-            gone = gone.max(norm(sub(begun[body][k], at_rest[body][k])));
-            loose = loose.max(norm(sub(at_rest[body][k], *at)));
+            gone = gone.max(norm(sub(drifting.first[body][k], held.first[body][k])));
+            loose = loose.max(norm(sub(held.first[body][k], *at)));
         }
-        let [a, b] = [&late, &whole_run].map(|f| f.points(&f.bodies[body]));
+        let [a, b] = [&late, &to_the_end].map(|z| z.forming.points(&z.forming.bodies[body]));
         for k in &sheet.driven {
             let way = sub(b[*k as usize], a[*k as usize]);
             assert!(way[2].abs() < 1e-9, "ply {body}: {way:?}");
@@ -466,7 +534,7 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
         "held nodes went {loose} m to their balance, {gone} m with the drive before the start, and are {largest} m off at the end"
     );
     // The first frame is seen after a step.
-    let way = drift * held.model.dt;
+    let way = drift * held.forming.model.dt;
     assert!(gone < 2.0 * way, "{gone} m");
     assert!(loose > 1e-5 && loose < 2e-4, "{loose} m");
     assert!(largest > 1e-5 && largest < 2e-4, "{largest} m");

@@ -242,3 +242,59 @@ fn a_node_that_was_anchored_is_held_from_where_its_surroundings_and_the_model_we
     }
     assert_eq!(other.x, model.x);
 }
+
+#[test]
+fn a_shell_that_is_led_to_a_cylinder_has_the_bending_energy_of_one() {
+    // Without a step, over frames, from flat to a part of a cylinder about y, while the whole turns about y, z and x.
+    let (radius, frames) = (0.1, 24);
+    let mesh = QuadMesh::grid(&even_axis(-0.15, 0.15, 0.01), &even_axis(0.0, 0.1, 0.02));
+    // Rolled to `share` of the curvature 1 / radius, and turned by as much about the three axes one after the other.
+    let shape = |share: f64, bent: f64| -> Vec<V> {
+        let turn = |v: V, a: usize, angle: f64| {
+            let (s, c) = angle.sin_cos();
+            let (i, j) = ((a + 1) % 3, (a + 2) % 3);
+            let mut w = v;
+            w[i] = c * v[i] - s * v[j];
+            w[j] = s * v[i] + c * v[j];
+            w
+        };
+        let k = bent / radius;
+        let rolled = |[x, y, _]: V| {
+            let across = if k == 0.0 { x } else { (k * x).sin() / k };
+            let up = if k == 0.0 {
+                0.0
+            } else {
+                (1.0 - (k * x).cos()) / k
+            };
+            let v = turn(turn([across, y, up], 1, 1.9 * share), 2, 1.3 * share);
+            turn(v, 0, -0.8 * share)
+        };
+        mesh.points.iter().map(|p| rolled(*p)).collect()
+    };
+    let bending = |bent: f64| {
+        let spec = common::sheet("strip", &mesh, 0, common::stiff_shell());
+        let settings = StepSettings {
+            target_step: 0.0,
+            safety: 0.8,
+            damping: 0.0,
+        };
+        let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
+        for f in 1..=frames {
+            let share = f64::from(f) / f64::from(frames);
+            model.lead(shape(share, bent * share)).unwrap();
+        }
+        assert!(model.spins().unwrap().iter().all(|w| *w == [0.0; 3]));
+        model.energies().bending
+    };
+    // Moment 5e-3 N m per radian and metre of width; the free ends' directors are half a cell off.
+    let area = 0.3 * 0.1;
+    let theory = 0.5 * 5e-3 / (radius * radius) * area;
+    let rolled = bending(1.0);
+    assert!(
+        (rolled / theory - 1.0).abs() < 0.05,
+        "{rolled} J instead of {theory} J"
+    );
+    // Turned alone it keeps none.
+    let turned = bending(0.0);
+    assert!(turned < 1e-12 * theory, "{turned} J");
+}

@@ -395,14 +395,6 @@ impl Model {
         self.contact = total;
     }
 
-    /// Brings the elements to the positions as they are: forces, energies, and what they keep of the way there.
-    ///
-    /// # Errors
-    /// When a component fails.
-    pub fn take_shape(&mut self) -> Result<(), MechanicsError> {
-        self.internal_forces(false, false)
-    }
-
     /// One step. With `fields`, the elements' fields at the positions before the step are kept for
     /// [`Model::cell_field`] and [`Model::patch_field`].
     ///

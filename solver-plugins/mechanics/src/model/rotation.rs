@@ -6,6 +6,7 @@
 
 use super::advance::{Turns, free_of, free_or_all};
 use super::*;
+use crate::vec3::cross;
 
 /// Rotational state; per-node arrays in the model's numbering.
 pub(super) struct Rotations {
@@ -33,6 +34,45 @@ impl Rotations {
 }
 
 impl Model {
+    /// Puts the nodes at `x` (`[n]`, m) at once, and brings the elements there: forces, energies, and what they keep of the way. Nodes
+    /// that rotate turn as the sheets' normals there turn, and not about them. To elements
+    /// and materials it takes 1 s.
+    ///
+    /// # Errors
+    /// When a component fails.
+    pub fn lead(&mut self, x: Vec<V>) -> Result<(), MechanicsError> {
+        if let Some(mut r) = self.rotations.take() {
+            let (from, to) = (self.normals_at(&self.x), self.normals_at(&x));
+            r.spin = from
+                .iter()
+                .zip(&to)
+                .map(|(n, m)| turn_between(*n, *m))
+                .collect();
+            self.rotations = Some(r);
+        }
+        self.x = x;
+        let dt = std::mem::replace(&mut self.last_dt, 1.0);
+        let done = self.internal_forces(false, false);
+        self.last_dt = dt;
+        if let Some(r) = self.rotations.as_deref_mut() {
+            r.spin.fill([0.0; 3]);
+        }
+        done
+    }
+
+    /// `[n]` sums of the directed areas (m2) of the cells around the nodes, were these at `x`.
+    fn normals_at(&self, x: &[V]) -> Vec<V> {
+        let mut normals = vec![[0.0; 3]; x.len()];
+        for cell in &self.cells {
+            let area = area_vector(cell.map(|n| x[n as usize]));
+            for n in cell {
+                let normal = &mut normals[*n as usize];
+                *normal = add(*normal, area);
+            }
+        }
+        normals
+    }
+
     /// `[n]` spins (rad/s) at the half step; `None` when no sheet's nodes rotate.
     pub fn spins(&self) -> Option<&[V]> {
         self.rotations.as_deref().map(|r| r.spin.as_slice())
@@ -135,6 +175,17 @@ impl Model {
             };
         }
     }
+}
+
+/// The smallest rotation (rad, along its axis) that brings the direction of `from` to that of `to`; none where one of them has no
+/// direction, or they are opposite and there are many.
+fn turn_between(from: V, to: V) -> V {
+    let axis = cross(from, to);
+    let sine = norm(axis);
+    if sine == 0.0 {
+        return [0.0; 3];
+    }
+    scale(axis, sine.atan2(dot(from, to)) / sine)
 }
 
 /// What turns a driven node whose drive leaves its rotation free.
