@@ -8,6 +8,7 @@ use crate::engine::core::{Id, State};
 use crate::engine::{Session, input_keys};
 use crate::exit;
 use crate::plan::{Change, changes};
+use camino::Utf8Path;
 use serde_json::json;
 use std::io::IsTerminal;
 
@@ -159,6 +160,18 @@ fn why(session: &Session<'_>, id: Id) -> String {
 
 pub(super) fn or_none(text: &str) -> &str {
     if text.is_empty() { "(none)" } else { text }
+}
+
+/// What to say when the store has nothing of a workflow `file` as it is now.
+pub(super) fn nothing_yet(session: &Session<'_>, file: &Utf8Path) -> String {
+    let mut all = (0..session.core.instances().len()).map(|id| difference(session, id));
+    if all.all(|d| matches!(d, Difference::Never)) {
+        return format!("nothing has been run yet; start with: plyflow run {file}");
+    }
+    format!(
+        "nothing of what was run is of this workflow as it is now: parameters, files or plugins have changed since, or artifacts are gone. \
+         What changed: plyflow plan {file}; run it again: plyflow run {file}"
+    )
 }
 
 /// How an instance differs from the last run.

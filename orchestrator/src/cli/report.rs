@@ -2,6 +2,7 @@
 
 use super::args::{ReportArgs, Workflow};
 use super::open::{Opened, open};
+use super::plan::nothing_yet;
 use super::results::{Row, records, rows};
 use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
@@ -20,10 +21,7 @@ pub fn report(args: &ReportArgs) -> Done {
     let session = opened.look()?;
     let found = Found::read(&session);
     if found.records.is_empty() {
-        let text = format!(
-            "nothing has been run yet; start with: plyflow run {}",
-            args.workflow.workflow
-        );
+        let text = nothing_yet(&session, &args.workflow.workflow);
         return Err(Stop::new(exit::USAGE, text));
     }
     let path = args

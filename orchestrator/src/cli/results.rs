@@ -2,6 +2,7 @@
 
 use super::args::{Format, ResultsArgs};
 use super::open::{Opened, open};
+use super::plan::nothing_yet;
 use super::report::{Found, input};
 use super::table::{bytes, number, table};
 use super::{Done, Stop, print};
@@ -331,10 +332,8 @@ pub fn results(args: &ResultsArgs) -> Done {
         Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records)))?,
         Format::Csv => print(&as_csv(&rows))?,
         Format::Table if records.is_empty() => {
-            let file = &args.workflow.workflow;
-            print(&format!(
-                "nothing has been run yet; start with: plyflow run {file}\n"
-            ))?;
+            let text = nothing_yet(&session, &args.workflow.workflow);
+            print(&format!("{text}\n"))?;
         }
         Format::Table => {
             let text = format!(

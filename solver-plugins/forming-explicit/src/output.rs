@@ -6,7 +6,7 @@ use crate::elements::{self, Rectangle};
 use crate::late::Start;
 use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
-use crate::penetration::{OVERLAP_BOUND, Penetration, PenetrationPeak};
+use crate::penetration::{OVERLAP_BOUND, Penetration, PenetrationPeak, too_deep_on_the_way};
 use crate::run::{Body, Forming, Outcome};
 use crate::strain::ply_extremes;
 use crate::writer::Writer;
@@ -465,23 +465,21 @@ fn mesh_warnings(forming: &Forming) -> Vec<String> {
     forming.bodies.iter().filter_map(poor).collect()
 }
 
-fn write_summary(
-    host: &Host,
-    p: &Parameters,
-    forming: &Forming,
-    outcome: &Outcome,
-    rate: f64,
-) -> Result<(), StepError> {
-    let h = &outcome.health;
-    let m = &forming.model;
-    let penetrations = forming.penetrations();
+/// All that a user should know of a run that came to its end.
+fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<String> {
     let mut warnings = mesh_warnings(forming);
     warnings.extend(outcome.warnings.iter().cloned());
-    let elements = m.element_count();
-    let element_cycles = elements as f64 * outcome.cycles as f64;
-    let pairs = || penetrations.iter().zip(&outcome.peaks);
-    warnings.extend(pairs().filter_map(|(p, peak)| p.too_deep(peak)));
-    let penetration: serde_json::Map<String, serde_json::Value> = pairs()
+    warnings.extend(now.iter().filter_map(Penetration::too_deep));
+    warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
+    warnings
+}
+
+/// Penetrations by pair, at the end and largest on the way.
+fn penetration_attributes(
+    now: &[Penetration],
+    peaks: &[PenetrationPeak],
+) -> serde_json::Map<String, serde_json::Value> {
+    (now.iter().zip(peaks))
         .map(|(p, peak)| {
             let of = json!({
                 "max": p.largest, "q999": p.q999, "overlap": p.overlap(), "place": p.place,
@@ -492,7 +490,22 @@ fn write_summary(
             });
             (p.pair.clone(), of)
         })
-        .collect();
+        .collect()
+}
+
+fn write_summary(
+    host: &Host,
+    p: &Parameters,
+    forming: &Forming,
+    outcome: &Outcome,
+    rate: f64,
+) -> Result<(), StepError> {
+    let h = &outcome.health;
+    let m = &forming.model;
+    let penetrations = forming.penetrations();
+    let warnings = warnings(forming, outcome, &penetrations);
+    let elements = m.element_count();
+    let element_cycles = elements as f64 * outcome.cycles as f64;
     host.write_attributes(&json!({
         "scene": p.scene.name,
         "sheets": sheet_attributes(forming, p),
@@ -509,26 +522,60 @@ fn write_summary(
             "kinetic_bound_kept": h.peak_kinetic_ratio <= p.kinetic_bound,
             "hourglass_ratio": h.hourglass_ratio,
         },
-        "penetration": penetration,
+        "penetration": penetration_attributes(&penetrations, &outcome.peaks),
         "overlap_bound": OVERLAP_BOUND,
         "warnings": warnings,
     }))?;
     for w in &warnings {
         host.log(Log::Warn, w);
     }
-    let worst = |f: fn(&Penetration) -> f64| penetrations.iter().map(f).fold(0.0, f64::max);
+    write_health(host, outcome, &penetrations)?;
+    write_shape(host, forming)?;
+    host.result("elements", elements as f64, "1")?;
+    host.result("cycles", outcome.cycles as f64, "1")?;
+    host.result("time_step", outcome.smallest_step, "s")?;
+    if let Some(shift) = outcome.start_shift {
+        host.result("start_shift", shift, "m")?;
+    }
+    host.result(
+        "added_mass",
+        forming.copies() * m.sheets.iter().map(|s| s.added_mass).sum::<f64>(),
+        "kg",
+    )?;
+    for (name, part) in [
+        ("contact_share", m.spent.contacts),
+        ("element_share", m.spent.elements),
+        ("node_share", m.spent.nodes),
+        ("load_share", m.spent.loads),
+    ] {
+        if let Some(share) = m.spent.share(part) {
+            host.measured(name, share, "1")?;
+        }
+    }
+    host.measured("element_cycle_rate", elements as f64 * rate, "1/s")
+}
+
+/// How far to trust the run: energies and penetrations.
+fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<(), StepError> {
+    let h = &outcome.health;
+    let worst = |f: fn(&Penetration) -> f64| now.iter().map(f).fold(0.0, f64::max);
+    let peak = |f: fn(&Penetration, &PenetrationPeak) -> f64| {
+        let pairs = now.iter().zip(&outcome.peaks);
+        pairs.map(|(p, peak)| f(p, peak)).fold(0.0, f64::max)
+    };
     host.result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
     host.result("drift_ratio", h.peak_drift_ratio, "1")?;
     host.result("hourglass_ratio", h.hourglass_ratio, "1")?;
     host.result("penetration_max", worst(|p| p.largest), "m")?;
     host.result("penetration_q999", worst(|p| p.q999), "m")?;
     host.result("overlap_ratio", worst(Penetration::overlap), "1")?;
-    let peak = |f: fn(&Penetration, &PenetrationPeak) -> f64| {
-        pairs().map(|(p, peak)| f(p, peak)).fold(0.0, f64::max)
-    };
     host.result("penetration_peak_max", peak(|_, k| k.largest), "m")?;
     host.result("penetration_peak_q999", peak(|_, k| k.q999), "m")?;
-    host.result("overlap_peak_ratio", peak(|p, k| p.overlap_of(k.q999)), "1")?;
+    host.result("overlap_peak_ratio", peak(|p, k| p.overlap_of(k.q999)), "1")
+}
+
+/// What the plies came to, and the quality of what they are meshed with.
+fn write_shape(host: &Host, forming: &Forming) -> Result<(), StepError> {
     let outlined = || forming.bodies.iter().filter_map(|b| b.quality);
     if outlined().next().is_some() {
         let least =
@@ -549,19 +596,5 @@ fn write_summary(
         host.result("draw_in_max", ways.rim, "m")?;
         host.result("corner_draw_in_max", ways.corner, "m")?;
     }
-    host.result("elements", elements as f64, "1")?;
-    host.result("cycles", outcome.cycles as f64, "1")?;
-    host.result("time_step", outcome.smallest_step, "s")?;
-    if let Some(shift) = outcome.start_shift {
-        host.result("start_shift", shift, "m")?;
-    }
-    host.result(
-        "added_mass",
-        forming.copies() * m.sheets.iter().map(|s| s.added_mass).sum::<f64>(),
-        "kg",
-    )?;
-    if let Some(share) = m.spent.contact_share() {
-        host.measured("contact_share", share, "1")?;
-    }
-    host.measured("element_cycle_rate", elements as f64 * rate, "1/s")
+    Ok(())
 }

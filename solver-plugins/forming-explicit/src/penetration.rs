@@ -70,31 +70,64 @@ impl Penetration {
         ((depth - self.spare) / self.thinner).max(0.0)
     }
 
-    /// What to tell of bodies that share more than a tenth of the thinner one: at the end, or else when they did most with
-    /// [`MANY`] nodes in touch.
-    pub fn too_deep(&self, peak: &PenetrationPeak) -> Option<String> {
-        let at_end = self.overlap() > OVERLAP_BOUND;
-        let (overlap, when, place) = if at_end {
-            (self.overlap(), String::new(), self.place)
-        } else {
-            let when = format!(" at {:.4} s, no longer at the end", peak.q999_time);
-            (self.overlap_of(peak.q999), when, peak.place)
-        };
-        let told = overlap > OVERLAP_BOUND && (at_end || peak.many);
-        told.then(|| {
-            let place = place.map_or_else(String::new, |p| {
-                let [x, y, z] = p.map(|c| 1e3 * c);
-                format!(", deepest at ({x:.1}, {y:.1}, {z:.1}) mm")
-            });
+    /// What to tell of bodies that share more than a tenth of the thinner one at the end.
+    pub fn too_deep(&self) -> Option<String> {
+        (self.overlap() > OVERLAP_BOUND).then(|| {
             format!(
-                "'{}' reach into each other by {:.0} % of the thinner one{when} (99.9 % quantile, bound {:.0} %{place}): refine the mesh \
-                 there, or take a smaller time step, with which contacts are stiffer",
+                "'{}' reach into each other by {:.0} % of the thinner one (99.9 % quantile, bound {:.0} %{}): {REMEDY}",
                 self.pair,
-                100.0 * overlap,
-                100.0 * OVERLAP_BOUND
+                100.0 * self.overlap(),
+                100.0 * OVERLAP_BOUND,
+                self.place.map_or_else(String::new, |p| format!(", deepest at {}", in_mm(p)))
             )
         })
     }
+
+    /// By how much bodies shared more than a tenth of the thinner one when they did most with [`MANY`] nodes in touch, if they do
+    /// so no longer.
+    fn was_too_deep(&self, peak: &PenetrationPeak) -> Option<f64> {
+        let then = self.overlap_of(peak.q999);
+        let gone = self.overlap() <= OVERLAP_BOUND;
+        (gone && peak.many && then > OVERLAP_BOUND).then_some(then)
+    }
+}
+
+const REMEDY: &str =
+    "refine the mesh there, or take a smaller time step, with which contacts are stiffer";
+
+/// A place (m) for a reader.
+fn in_mm(place: V) -> String {
+    let [x, y, z] = place.map(|c| 1e3 * c);
+    format!("({x:.1}, {y:.1}, {z:.1}) mm")
+}
+
+/// What to tell of all pairs that were too deep on the way and are no longer at the end, the deepest first.
+pub fn too_deep_on_the_way(now: &[Penetration], peaks: &[PenetrationPeak]) -> Option<String> {
+    let pairs = now.iter().zip(peaks);
+    let mut deep: Vec<_> = pairs
+        .filter_map(|(p, peak)| Some((p.was_too_deep(peak)?, p, peak)))
+        .collect();
+    deep.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let told = |(overlap, p, peak): &(f64, &Penetration, &PenetrationPeak)| {
+        let place = peak
+            .place
+            .map_or_else(String::new, |x| format!(", deepest at {}", in_mm(x)));
+        format!(
+            "'{}' by {:.0} % at {:.4} s{place}",
+            p.pair,
+            100.0 * overlap,
+            peak.q999_time
+        )
+    };
+    let all: Vec<String> = deep.iter().map(told).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "on the way, but no longer at the end, bodies reached into each other by more than {:.0} % of the thinner one (99.9 % quantiles): \
+             {}. Where that matters {REMEDY}",
+            100.0 * OVERLAP_BOUND,
+            all.join("; ")
+        )
+    })
 }
 
 /// Largest penetrations of one pair over the frames of a run, and when they were.
@@ -213,35 +246,52 @@ mod tests {
         assert_eq!((close.largest, close.q999), (1.999e-5, 1.998e-5));
         assert!((close.overlap() - 0.24975).abs() < 1e-12);
         assert_eq!(close.place, Some([0.0, 0.0, 1999.0]));
-        let none = PenetrationPeak::default();
-        let told = close.too_deep(&none).unwrap();
+        let told = close.too_deep().unwrap();
         assert!(
             told.contains("'film/ply'") && told.contains("25 %") && !told.contains(" at 0"),
             "{told}"
         );
         let apart = Penetration::new("film/film", depths, 2.2e-4, 8e-5);
-        assert_eq!((apart.overlap(), apart.too_deep(&none)), (0.0, None));
-        let earlier = PenetrationPeak {
-            q999: 2.6e-4,
-            q999_time: 0.125,
-            place: Some([0.001, 0.002, 0.003]),
-            many: true,
-            ..none
-        };
-        let told = apart.too_deep(&earlier).unwrap();
-        assert!(
-            told.contains("50 % of the thinner one at 0.1250 s, no longer at the end"),
-            "{told}"
-        );
-        assert!(told.contains("(1.0, 2.0, 3.0) mm"), "{told}");
-        let few = PenetrationPeak {
-            many: false,
-            ..earlier
-        };
-        assert_eq!(apart.too_deep(&few), None);
+        assert_eq!((apart.overlap(), apart.too_deep()), (0.0, None));
         assert_eq!(
             Penetration::new("ply/ply", Vec::new(), 0.0, 1e-4).overlap(),
             0.0
         );
+    }
+
+    #[test]
+    fn all_that_was_too_deep_on_the_way_is_told_at_once() {
+        let peak = |q999: f64, many: bool| PenetrationPeak {
+            q999,
+            q999_time: 0.125,
+            place: Some([0.001, 0.002, 0.003]),
+            many,
+            ..PenetrationPeak::default()
+        };
+        let pair =
+            |name: &str, depth: f64| Penetration::new(name, vec![(depth, [0.0; 3])], 0.0, 8e-5);
+        let now = ["bed/film", "film/ply", "ply/ply", "film/film", "tool/film"]
+            .map(|name| pair(name, if name == "film/film" { 2e-5 } else { 0.0 }));
+        // Of these the third is within the bound, the fourth still too deep at the end, the last of a few nodes only.
+        let peaks = [
+            (1.2e-5, true),
+            (4e-5, true),
+            (7e-6, true),
+            (4e-5, true),
+            (4e-5, false),
+        ];
+        let peaks = peaks.map(|(q999, many)| peak(q999, many));
+        let told = too_deep_on_the_way(&now, &peaks).unwrap();
+        let deepest = told.find("'film/ply' by 50 % at 0.1250 s, deepest at (1.0, 2.0, 3.0) mm");
+        let next = told.find("'bed/film' by 15 % at 0.1250 s");
+        assert!(deepest.is_some() && deepest < next, "{told}");
+        assert!(
+            ["ply/ply", "film/film", "tool/film"]
+                .iter()
+                .all(|n| !told.contains(n)),
+            "{told}"
+        );
+        assert!(now[3].too_deep().is_some());
+        assert_eq!(too_deep_on_the_way(&now[2..3], &peaks[2..3]), None);
     }
 }

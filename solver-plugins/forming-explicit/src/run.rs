@@ -13,7 +13,7 @@ use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, SheetEnergy, judge};
-use plyflow_mechanics::model::Model;
+use plyflow_mechanics::model::{Clock, Model};
 use plyflow_mechanics::vec3::{V, dot, norm};
 use plyflow_model::scene::Scene;
 use plyflow_tooling::ToolMesh;
@@ -376,7 +376,9 @@ impl Forming {
         for k in 0..steps {
             // Times from the count, not from a sum: frames fall on the same instants in every run.
             self.model.time = start + self.model.dt * k as f64;
+            let clock = Clock::of_step(self.model.cycle);
             self.load.apply(&mut self.model);
+            self.model.spent.count_loads(clock);
             match self.model.step(k == 0) {
                 Ok(()) => {}
                 // The diagnosis has its own cause and remedy.

@@ -6,6 +6,14 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+/// Where the time of a step goes: what the result is called and what it is.
+const PARTS: [(&str, &str); 4] = [
+    ("contact_share", "contacts"),
+    ("element_share", "elements"),
+    ("node_share", "nodes"),
+    ("load_share", "loads"),
+];
+
 /// One run of a step that computes elements.
 #[derive(Clone)]
 struct Run {
@@ -17,8 +25,8 @@ struct Run {
     /// Largest resident memory of it (bytes).
     memory: f64,
     drift: f64,
-    /// Share of the steps' wall time that contacts took; not a number without that result.
-    contacts: f64,
+    /// Shares of the steps' wall time, in the order of [`PARTS`]; not numbers without such results.
+    shares: [f64; PARTS.len()],
 }
 
 impl Run {
@@ -31,11 +39,21 @@ impl Run {
         1e9 * self.cpu / self.element_steps()
     }
 
+    fn contact_share(&self) -> f64 {
+        self.shares[0]
+    }
+
+    /// Where the time of its steps went.
+    fn profile<'a>(&'a self, case: &'a str) -> impl Iterator<Item = Row> + 'a {
+        let rows = PARTS.iter().zip(self.shares);
+        rows.map(move |((_, part), share)| Row::new(format!("{case}, share of {part}"), share, "1"))
+    }
+
     fn row(&self, case: String) -> Row {
         let mut row = Row::new(case, self.cost(), "CPU ns per element-step");
         row.more = json!({
             "elements": self.elements, "steps": self.steps, "wall_s": self.wall, "cpu_s": self.cpu,
-            "memory_bytes": self.memory, "drift_ratio": self.drift, "contact_share": self.contacts,
+            "memory_bytes": self.memory, "drift_ratio": self.drift, "contact_share": self.contact_share(),
         });
         row
     }
@@ -83,7 +101,7 @@ fn run(place: &Path, workflow: &str, cores: usize) -> Run {
         cpu: spent("cpu_seconds"),
         memory: spent("peak_memory"),
         drift: value("drift_ratio"),
-        contacts: value("contact_share"),
+        shares: PARTS.map(|(result, _)| value(result)),
     }
 }
 
@@ -166,6 +184,7 @@ pub fn solver() -> Vec<Row> {
     for element in ["rf4", "s4"] {
         let of = |cores| least(1, || run(&presses, &press(element, 2.0, 1.08), cores));
         let (one, two) = (of(1), of(2));
+        rows.extend(one.profile(&format!("{element}, press 2 mm, 1 thread")));
         rows.push(two.row(format!("{element}, press 2 mm, 2 threads")));
         rows.push(Row::new(
             format!("{element}, press 2 mm, 1 thread over 2, wall"),
@@ -176,6 +195,7 @@ pub fn solver() -> Vec<Row> {
     rows.extend(by_size(&presses));
     rows.push(whole_stroke(&presses));
     rows.extend(spar(&folder.path().join("workflows/joggle-spar")));
+    rows.extend(at_rest(&folder.path().join("workflows/flat-tool")));
     rows
 }
 
@@ -195,10 +215,45 @@ fn spar(place: &Path) -> Vec<Row> {
     ));
     rows.push(Row::new(
         "m4, joggle spar 8 mm, 1 thread, rate over that without contact",
-        1.0 - one.contacts,
+        1.0 - one.contact_share(),
         "1",
     ));
+    rows.extend(one.profile("m4, joggle spar 8 mm, 1 thread"));
     rows
+}
+
+/// The bag over a flat block, formed and then at rest for longer: what contacts cost while nothing slides.
+fn at_rest(place: &Path) -> Vec<Row> {
+    let scene = std::fs::read_to_string(place.join("scene.yaml")).expect("the flat tool's scene");
+    let rest = |time: &str| {
+        let longer = scene.replace("settling_time: 40 ms", &format!("settling_time: {time}"));
+        std::fs::write(place.join("scene-bench.yaml"), longer).expect("a scene");
+        let workflow = "plyflow: 1\nname: bench\nsteps:\n  coarse:\n    plugin: forming-explicit\n    with: {scene: scene-bench.yaml, element: \
+                        m4, element_size: 8 mm, time_step: 12 us, least_areal_mass: 3 kg/m2}\n";
+        run(place, workflow, 1)
+    };
+    let (short, long) = (rest("40 ms"), rest("340 ms"));
+    assert!(
+        long.steps > 1.3 * short.steps,
+        "the scene has another settling time"
+    );
+    let share = |of: fn(&Run) -> f64| {
+        (of(&long) * long.wall - of(&short) * short.wall) / (long.wall - short.wall)
+    };
+    let case = "m4, flat tool 8 mm, 1 thread";
+    vec![
+        long.row(case.into()),
+        Row::new(
+            format!("{case}, at rest"),
+            of_steps(&short, &long),
+            "CPU ns per element-step",
+        ),
+        Row::new(
+            format!("{case}, at rest, share of contacts"),
+            share(Run::contact_share),
+            "1",
+        ),
+    ]
 }
 
 /// The peer's case as its workflow has it, the whole stroke: the wall time that its goal is about.

@@ -229,3 +229,29 @@ steps:
         assert!(String::from_utf8_lossy(&output.stderr).contains("valu3"));
     }
 }
+
+#[test]
+fn results_of_an_older_workflow_are_told_apart_from_none() {
+    let steps = "
+steps:
+  first: {plugin: trivial, with: {value: 2}}
+";
+    let study = Study::new(steps);
+    let said = |word: &str| {
+        let out = study.call(&[word]);
+        String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned()
+    };
+    for word in ["results", "report"] {
+        let text = said(word);
+        assert!(text.contains("nothing has been run yet"), "{text}");
+    }
+    assert_eq!(study.run(&[]), well(1, 0));
+    study.write(&steps.replace('2', "3"));
+    for word in ["results", "report"] {
+        let text = said(word);
+        assert!(
+            text.contains("as it is now") && text.contains("plyflow plan"),
+            "{text}"
+        );
+    }
+}

@@ -22,8 +22,7 @@ use hold::Anchors;
 pub use hold::Hold;
 use mirror::Mirroring;
 use rotation::Rotations;
-use spent::Clock;
-pub use spent::Spent;
+pub use spent::{Clock, Spent};
 pub use support::{Fixed, NodalLoad};
 use support::{Loads, Supports};
 use transpose::gather;
@@ -404,7 +403,9 @@ impl Model {
         let clock = Clock::of_step(self.cycle);
         if self.cycle.is_multiple_of(NORMAL_INTERVAL) {
             // Contacts want the normals, and these what the elements sum.
+            let part = clock.part();
             self.internal_forces(fields, false)?;
+            part.add_to(&mut self.spent.elements);
             let part = clock.part();
             self.normals();
             if !self.compute_contacts() {
@@ -417,10 +418,14 @@ impl Model {
             let part = clock.part();
             let on_nodes = self.compute_contacts();
             part.add_to(&mut self.spent.contacts);
+            let part = clock.part();
             self.internal_forces(fields, !on_nodes)?;
+            part.add_to(&mut self.spent.elements);
         }
+        let part = clock.part();
         self.advance();
         self.mirroring.follow(&mut self.x);
+        part.add_to(&mut self.spent.nodes);
         clock.add_to(&mut self.spent.all);
         let limit = self.speed_limit();
         if self.work.bad.is_some() || self.max_speed > limit {

@@ -13,22 +13,36 @@ pub struct Spent {
     /// In contacts: looking for them, their forces, the normals that they want; with one thread also the adding of the forces to the nodes,
     /// which with several is done beside the elements.
     pub contacts: Duration,
+    /// In elements and patches, from gathering their nodes to adding up their forces.
+    pub elements: Duration,
+    /// In moving the nodes and what drives them.
+    pub nodes: Duration,
+    /// In what loads and guides the model before each step, such as the cavity of a bag.
+    pub loads: Duration,
     /// In all.
     pub all: Duration,
 }
 
 impl Spent {
-    /// Share of the time that contacts take; `None` before a step was measured.
-    pub fn contact_share(&self) -> Option<f64> {
-        (!self.all.is_zero()).then(|| self.contacts.as_secs_f64() / self.all.as_secs_f64())
+    /// Share of the time that a `part` of it takes; `None` before a step was measured.
+    pub fn share(&self, part: Duration) -> Option<f64> {
+        (!self.all.is_zero()).then(|| part.as_secs_f64() / self.all.as_secs_f64())
+    }
+
+    /// Counts what a clock that was started before the loads has seen: they come before the step.
+    pub fn count_loads(&mut self, clock: Clock) {
+        let before = self.loads;
+        clock.add_to(&mut self.loads);
+        self.all += self.loads - before;
     }
 }
 
 /// The clock of one step: running in those that are measured.
-pub(super) struct Clock(Option<Instant>);
+pub struct Clock(Option<Instant>);
 
 impl Clock {
-    pub(super) fn of_step(cycle: u64) -> Self {
+    /// That of the step which is to come, when so many have been done.
+    pub fn of_step(cycle: u64) -> Self {
         Self(cycle.is_multiple_of(INTERVAL).then(Instant::now))
     }
 
