@@ -1,7 +1,7 @@
 //! Measures the built program from outside and appends one JSON row per case to a file under
 //! `docs/benchmarks`, named after the machine's processor.
 //!
-//! `plyflow-benches [engine] [kernels] [solver] [limits] [study]`: these groups, or all.
+//! `plyflow-benches [engine] [kernels] [solver] [profile] [limits] [study]`: these groups, or all.
 
 mod cases;
 mod limits;
@@ -15,10 +15,11 @@ type Group = (&'static str, fn() -> Vec<cases::Row>);
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let groups: [Group; 5] = [
+    let groups: [Group; 6] = [
         ("engine", cases::engine),
         ("kernels", cases::kernels),
         ("solver", solver::solver),
+        ("profile", solver::profile),
         ("limits", limits::limits),
         ("study", cases::study),
     ];
@@ -26,7 +27,8 @@ fn main() {
         .iter()
         .find(|w| groups.iter().all(|g| g.0 != w.as_str()))
     {
-        eprintln!("unknown group '{odd}'; there are: engine, kernels, solver, limits, study");
+        let names = groups.map(|g| g.0).join(", ");
+        eprintln!("unknown group '{odd}'; there are: {names}");
         std::process::exit(2);
     }
     let class = machine::class();

@@ -184,7 +184,6 @@ pub fn solver() -> Vec<Row> {
     for element in ["rf4", "s4"] {
         let of = |cores| least(1, || run(&presses, &press(element, 2.0, 1.08), cores));
         let (one, two) = (of(1), of(2));
-        rows.extend(one.profile(&format!("{element}, press 2 mm, 1 thread")));
         rows.push(two.row(format!("{element}, press 2 mm, 2 threads")));
         rows.push(Row::new(
             format!("{element}, press 2 mm, 1 thread over 2, wall"),
@@ -195,15 +194,39 @@ pub fn solver() -> Vec<Row> {
     rows.extend(by_size(&presses));
     rows.push(whole_stroke(&presses));
     rows.extend(spar(&folder.path().join("workflows/joggle-spar")));
-    rows.extend(at_rest(&folder.path().join("workflows/flat-tool")));
     rows
+}
+
+/// Where the time of a step goes, one thread: in a press, in a bag, and in a bag at rest.
+pub fn profile() -> Vec<Row> {
+    let folder = copy(0.2);
+    let place = |name: &str| folder.path().join("workflows").join(name);
+    let mut rows = Vec::new();
+    for element in ["rf4", "s4"] {
+        let one = run(
+            &place("peers/hemisphere-press"),
+            &press(element, 2.0, 1.08),
+            1,
+        );
+        rows.extend(one.profile(&format!("{element}, press 2 mm, 1 thread")));
+    }
+    let one = run(&place("joggle-spar"), &membranes("scene.yaml"), 1);
+    rows.extend(one.profile("m4, joggle spar 8 mm, 1 thread"));
+    rows.extend(at_rest(&place("flat-tool")));
+    rows
+}
+
+/// The demo's membranes over a scene.
+fn membranes(scene: &str) -> String {
+    format!(
+        "plyflow: 1\nname: bench\nsteps:\n  coarse:\n    plugin: forming-explicit\n    with: {{scene: {scene}, element: m4, \
+         element_size: 8 mm, time_step: 12 us, least_areal_mass: 3 kg/m2}}\n"
+    )
 }
 
 /// The joggle spar's membranes of the demo, the whole process between diaphragms: by thread, and what they would do without contact.
 fn spar(place: &Path) -> Vec<Row> {
-    let workflow = "plyflow: 1\nname: bench\nsteps:\n  coarse:\n    plugin: forming-explicit\n    with: {scene: scene.yaml, element: m4, \
-                    element_size: 8 mm, time_step: 12 us, least_areal_mass: 3 kg/m2}\n";
-    let [one, two] = [1, 2].map(|cores| run(place, workflow, cores));
+    let [one, two] = [1, 2].map(|cores| run(place, &membranes("scene.yaml"), cores));
     let mut rows = vec![
         one.row("m4, joggle spar 8 mm, 1 thread".into()),
         two.row("m4, joggle spar 8 mm, 2 threads".into()),
@@ -218,7 +241,6 @@ fn spar(place: &Path) -> Vec<Row> {
         1.0 - one.contact_share(),
         "1",
     ));
-    rows.extend(one.profile("m4, joggle spar 8 mm, 1 thread"));
     rows
 }
 
@@ -228,9 +250,7 @@ fn at_rest(place: &Path) -> Vec<Row> {
     let rest = |time: &str| {
         let longer = scene.replace("settling_time: 40 ms", &format!("settling_time: {time}"));
         std::fs::write(place.join("scene-bench.yaml"), longer).expect("a scene");
-        let workflow = "plyflow: 1\nname: bench\nsteps:\n  coarse:\n    plugin: forming-explicit\n    with: {scene: scene-bench.yaml, element: \
-                        m4, element_size: 8 mm, time_step: 12 us, least_areal_mass: 3 kg/m2}\n";
-        run(place, workflow, 1)
+        run(place, &membranes("scene-bench.yaml"), 1)
     };
     let (short, long) = (rest("40 ms"), rest("340 ms"));
     assert!(
