@@ -5,39 +5,57 @@
 pub struct Advice {
     /// (m).
     pub size: f64,
+    /// Estimated error of the finest run itself.
+    pub finest_error: f64,
     /// Why it should not be trusted much.
     pub doubt: Option<String>,
 }
 
-/// The largest element size whose error is at most `target`, from `measured` sizes (m) and errors, the finest first (its
-/// own error against itself is 0 and says nothing).
+/// Orders of convergence that are believed: the least of a converging element, and that of linear elements for smooth results. A
+/// higher one among few runs is chance, and would make the finest run look better than it is.
+const ORDERS: [f64; 2] = [1.0, 2.0];
+
+/// The largest element size whose error is at most `target`, from `measured` sizes (m) and differences from the finest run over its
+/// values, the finest first (its own is 0 and says nothing).
 ///
-/// Errors are taken to grow as a power of the size between two runs (Richardson); one that is smaller than that of a finer
-/// run is raised to it, as it is so by chance. Below the finest pair the power goes on as 1, the least that a converging
-/// element has: so the advice is on the safe side. It is never coarser than the coarsest run.
+/// The finest run has an error too. By Richardson's extrapolation (as in Roache's grid convergence index, J. Fluids Eng. 116, 1994) differences are
+/// `C (h^p - h0^p)`, with h0 of the finest: the finest three runs tell p, within [`ORDERS`], two runs take the least; so `C h0^p` is
+/// the finest run's error, and comes on top of every difference. A difference that is smaller than that of a finer run is raised to
+/// it, as it is so by chance. Between two runs the error is a power of the size; below the finest it falls in proportion, the least
+/// that a converging element does: so the advice is on the safe side. It is never coarser than the coarsest run.
 ///
 /// # Panics
 /// When `measured` holds fewer than two runs.
 pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
     let mut worst = 0.0f64;
     let rising: Vec<(f64, f64)> = (measured[1..].iter())
-        .map(|&(size, error)| {
-            worst = worst.max(error);
+        .map(|&(size, difference)| {
+            worst = worst.max(difference);
             (size, worst)
         })
         .collect();
-    let (finest, first) = (measured[0].0, rising[0]);
-    if first.1 > target {
-        let size = first.0 * target / first.1;
-        let doubt = (size < finest).then(|| {
-            format!(
-                "an error of {target} asks for elements finer ({:.3} mm) than those of any run; run one of about that size to see",
-                1e3 * size
-            )
-        });
-        return Advice { size, doubt };
+    let finest = measured[0].0;
+    let p = order(finest, &rising);
+    let (next, difference) = rising[0];
+    let own = difference / ((next / finest).powf(p) - 1.0);
+    let advice = |size: f64, doubt: Option<String>| Advice {
+        size,
+        finest_error: own,
+        doubt,
+    };
+    if own > target {
+        let size = finest * target / own;
+        let doubt = format!(
+            "the finest run ({:.3} mm) has an error of some {own:.2} itself, and {target} asks for elements of {:.3} mm; run one of about that \
+             size to see",
+            1e3 * finest,
+            1e3 * size
+        );
+        return advice(size, Some(doubt));
     }
-    for pair in rising.windows(2) {
+    let errors = rising.iter().map(|(size, d)| (*size, d + own));
+    let errors: Vec<(f64, f64)> = std::iter::once((finest, own)).chain(errors).collect();
+    for pair in errors.windows(2) {
         let [(h0, e0), (h1, e1)] = [pair[0], pair[1]];
         if e1 <= target {
             continue;
@@ -47,18 +65,35 @@ pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
         } else {
             0.0
         };
-        return Advice {
-            size: h0 * (h1 / h0).powf(share),
-            doubt: None,
-        };
+        return advice(h0 * (h1 / h0).powf(share), None);
     }
-    let size = rising[rising.len() - 1].0;
+    let size = errors[errors.len() - 1].0;
     let doubt = format!(
         "even the coarsest run ({:.3} mm) has an error below {target}; a coarser one may do",
         1e3 * size
     );
-    Advice {
-        size,
-        doubt: Some(doubt),
+    advice(size, Some(doubt))
+}
+
+/// The order p of the differences from the finest run (`rising`, by size), from those of the next two.
+fn order(finest: f64, rising: &[(f64, f64)]) -> f64 {
+    let [least, most] = ORDERS;
+    let [(h1, d1), (h2, d2), ..] = rising else {
+        return least;
+    };
+    if *d1 <= 0.0 {
+        return least;
     }
+    // Grows with p.
+    let ratio = |p: f64| ((h2 / finest).powf(p) - 1.0) / ((h1 / finest).powf(p) - 1.0);
+    let (mut low, mut high) = (least, most);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if ratio(middle) < d2 / d1 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
 }

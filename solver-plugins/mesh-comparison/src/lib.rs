@@ -176,6 +176,7 @@ fn write(host: &Host, runs: &[Run], finest: &Run, target: f64) -> Result<(), Ste
         .map(|r| (r.element_size, error(r, finest, &QUARTILES)))
         .collect();
     let advice = advise(&measured, target);
+    host.result("finest_error", advice.finest_error, "1")?;
     host.result("advised_element_size", advice.size, "m")?;
     if let Some(text) = advice.doubt {
         host.log(Log::Warn, &text);

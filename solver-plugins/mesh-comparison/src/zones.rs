@@ -148,6 +148,7 @@ fn one(
         ]));
     }
     let advice = advise(&measured, target);
+    host.result(&format!("finest_error.{zone}"), advice.finest_error, "1")?;
     host.result(&format!("advised_element_size.{zone}"), advice.size, "m")?;
     if let Some(text) = advice.doubt {
         host.log(Log::Warn, &format!("zone {zone}: {text}"));

@@ -120,34 +120,46 @@ fn one_run_and_two_of_the_finest_size_are_refused() {
 
 #[test]
 fn advised_sizes_keep_the_target_by_the_power_law_of_the_errors() {
-    // e = 0.01 (h / 1 mm)^2 / 100, and the finest against itself.
-    let law = |h: f64| 1e4 * h * h;
-    let runs: Vec<(f64, f64)> = [0.001, 0.002, 0.004, 0.008]
-        .map(|h| (h, if h == 0.001 { 0.0 } else { law(h) }))
-        .to_vec();
-    for target in [0.05, 0.1, 0.3, 0.6] {
-        let advice = advise(&runs, target);
-        assert!(
-            (law(advice.size) / target - 1.0).abs() < 1e-9,
-            "{target}: {advice:?}"
-        );
-        assert_eq!(advice.doubt, None);
+    // An error of 1 % (h / 1 mm)^p, of which the differences from the finest run are known.
+    for p in [1.0, 1.4, 2.0] {
+        let law = |h: f64| 0.01 * (h / 0.001).powf(p);
+        let runs = [0.001, 0.002, 0.004, 0.008].map(|h| (h, law(h) - law(0.001)));
+        for target in [0.02, 0.03, 0.05, 0.075] {
+            let advice = advise(&runs, target);
+            assert!(
+                (law(advice.size) / target - 1.0).abs() < 1e-9,
+                "{target}: {advice:?}"
+            );
+            assert!((advice.finest_error / 0.01 - 1.0).abs() < 1e-9);
+            assert_eq!(advice.doubt, None);
+        }
+        // Below the finest run the error is taken to fall in proportion, which is on the safe side of its square.
+        let advice = advise(&runs, 0.005);
+        assert!((advice.size - 0.0005).abs() < 1e-12 && law(advice.size) < 0.005 + 1e-12);
+        assert!(advice.doubt.unwrap().contains("0.500 mm"));
+        // Never coarser than what was run.
+        let advice = advise(&runs, 0.9);
+        assert_eq!(advice.size, 0.008);
+        assert!(advice.doubt.unwrap().contains("coarser one may do"));
+        // Two runs tell no order: the finest has all of their difference once more, when it halves the size.
+        let two = advise(&runs[..2], 0.9);
+        assert!((two.finest_error - runs[1].1).abs() < 1e-12 && two.finest_error > 0.01 - 1e-12);
     }
-    // Below the finest pair the error is taken to fall in proportion, which is on the safe side of its square.
-    let advice = advise(&runs, 0.03);
-    assert!((advice.size - 0.0015).abs() < 1e-12 && law(advice.size) < 0.03);
-    let doubt = advise(&runs, 0.01).doubt.unwrap();
-    assert!(doubt.contains("0.500 mm"), "{doubt}");
-    // Never coarser than what was run.
-    let advice = advise(&runs, 0.9);
-    assert_eq!(advice.size, 0.008);
-    assert!(advice.doubt.unwrap().contains("coarser one may do"));
-    // An error that is small by chance does not hide that of a finer run.
+    // An order of four among three runs is not believed.
+    let steep = [(0.001, 0.0), (0.002, 0.015), (0.004, 0.255)];
+    assert!((advise(&steep, 0.1).finest_error - 0.005).abs() < 1e-9);
+    // A difference that is small by chance does not hide that of a finer run, nor make it steeper.
     let chance = [(0.001, 0.0), (0.002, 0.2), (0.004, 0.01), (0.008, 0.5)];
-    let size = advise(&chance, 0.1).size;
-    assert!((size - 0.001).abs() < 1e-12, "{size}");
-    let size = advise(&chance, 0.3).size;
+    let small = advise(&chance, 0.1);
+    assert!(
+        (small.finest_error - 0.2).abs() < 1e-9 && (small.size - 0.0005).abs() < 1e-12,
+        "{small:?}"
+    );
+    let size = advise(&chance, 0.5).size;
     assert!(size > 0.004 && size < 0.008, "{size}");
+    // Runs that do not differ have no error to tell.
+    let same = advise(&[(0.001, 0.0), (0.002, 0.0)], 0.1);
+    assert_eq!((same.size, same.finest_error), (0.002, 0.0));
 }
 
 #[test]
