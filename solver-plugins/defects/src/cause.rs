@@ -16,6 +16,9 @@ pub enum Cause {
     /// Little shear and no bridging; a ply with other fibre directions lies on or under it, and fibres are compressed
     /// (thesis chapter 6).
     InterPlyCompression,
+    /// None of these, but one fibre family is compressed along the crest: the ply has been pushed together along its yarns (thesis 4.4.3: where
+    /// positive shear meets negative).
+    FibreCompression,
     /// None of these.
     Undetermined,
 }
@@ -32,6 +35,10 @@ pub struct Limits {
     /// Fibre directions of two plies that differ by less are the same (rad).
     pub layup_angle: f64,
 }
+
+/// Mean strain along a crest, of the more compressed family, from which on compression is a cause by itself: some hundred N/m in carbon
+/// fabrics, more than what is left over anywhere.
+const LEAST_COMPRESSION: f64 = -1e-4;
 
 /// Sets the causes of a ply's wrinkles. `fibres`: directions of both fibre families of the flat ply (rad); `others`:
 /// those of the plies next to it. A scan, of which neither is known, gives both empty: its wrinkles come from bridging or
@@ -63,6 +70,8 @@ pub fn find_causes(
                 Cause::Bridging
             } else if crossed && strain.is_some_and(|e| e < 0.0) {
                 Cause::InterPlyCompression
+            } else if strain.is_some_and(|e| e < LEAST_COMPRESSION) {
+                Cause::FibreCompression
             } else {
                 Cause::Undetermined
             },

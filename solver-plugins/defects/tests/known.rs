@@ -269,7 +269,7 @@ fn a_cloud_of_points_is_joined_to_the_whole_surface_and_measured_as_a_mesh_is() 
 }
 
 /// Shear 10 degrees along the wrinkle: over-shear. Less: the blister is near, or it is not. Far from it, under a ply turned by 45
-/// degrees: pressed together if its fibres are.
+/// degrees: pressed together if its fibres are; alone, if they are by more than next to nothing.
 #[test]
 fn causes_follow_from_the_fields() {
     let (points, cells) = flat(0.00125, 0.0);
@@ -302,6 +302,10 @@ fn causes_follow_from_the_fields() {
         cause(&ply, &[[PI / 4.0, 0.75 * PI]], 0.02),
         Cause::Undetermined
     );
+    // Without a turned ply it takes more.
+    ply.fibre_strain = vec![-2e-4; n];
+    assert_eq!(cause(&ply, &[], 0.02), Cause::FibreCompression);
+    assert_eq!(cause(&ply, &[], 0.05), Cause::Bridging);
     ply.fibre_strain = vec![1e-4; n];
     assert_eq!(cause(&ply, &turned, 0.02), Cause::Undetermined);
 }
