@@ -273,7 +273,7 @@ typedef struct pf_element_batch {
   uint64_t size;
   uint32_t lanes;
   uint32_t reserved;
-  double dt;               /* s, step just done (0 in the first call) */
+  double dt;               /* s, step just done (0 in the first call); where a run begins late it is led there in few steps, some of a frame each */
   const double *position;  /* [nodes][3][lanes] m (reference positions in initialise) */
   const double *velocity;  /* [nodes][3][lanes] m/s at the half step; NULL in initialise, with 3 dofs per node, and with ignores_velocity */
   const double *spin;      /* [nodes][3][lanes] rad/s or NULL */

@@ -162,11 +162,19 @@ pub(super) fn or_none(text: &str) -> &str {
     if text.is_empty() { "(none)" } else { text }
 }
 
-/// What to say when the store has nothing of a workflow `file` as it is now.
-pub(super) fn nothing_yet(session: &Session<'_>, file: &Utf8Path) -> String {
-    let mut all = (0..session.core.instances().len()).map(|id| difference(session, id));
-    if all.all(|d| matches!(d, Difference::Never)) {
-        return format!("nothing has been run yet; start with: plyflow run {file}");
+/// What to say when the store has nothing of a workflow `file` as it is now, or nothing of some of its `steps` (of all if there are none).
+pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], file: &Utf8Path) -> String {
+    let core = &session.core;
+    let name = |id: &Id| &core.graph().steps[core.instances()[*id].step].name;
+    let wanted = |id: &Id| steps.is_empty() || steps.contains(name(id));
+    let mut of_these = (0..core.instances().len()).filter(wanted);
+    if of_these.all(|id| matches!(difference(session, id), Difference::Never)) {
+        let what = if steps.is_empty() {
+            "nothing has been run yet; start with"
+        } else {
+            "these steps have not been run yet; run them with"
+        };
+        return format!("{what}: plyflow run {file}");
     }
     format!(
         "nothing of what was run is of this workflow as it is now: parameters, files or plugins have changed since, or artifacts are gone. \

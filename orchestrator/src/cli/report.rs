@@ -21,7 +21,7 @@ pub fn report(args: &ReportArgs) -> Done {
     let session = opened.look()?;
     let found = Found::read(&session);
     if found.records.is_empty() {
-        let text = nothing_yet(&session, &args.workflow.workflow);
+        let text = nothing_yet(&session, &[], &args.workflow.workflow);
         return Err(Stop::new(exit::USAGE, text));
     }
     let path = args

@@ -332,7 +332,7 @@ pub fn results(args: &ResultsArgs) -> Done {
         Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records)))?,
         Format::Csv => print(&as_csv(&rows))?,
         Format::Table if records.is_empty() => {
-            let text = nothing_yet(&session, &args.workflow.workflow);
+            let text = nothing_yet(&session, &args.step, &args.workflow.workflow);
             print(&format!("{text}\n"))?;
         }
         Format::Table => {

@@ -13,11 +13,11 @@ pub enum Cause {
     OverShear,
     /// Little shear, but the ply bridges close by: what it lacks there it has too much of here (thesis 5.5: AW2, BW2).
     Bridging,
-    /// Little shear and no bridging; a ply with other fibre directions lies on or under it, and fibres are compressed
+    /// Little shear and no bridging; a ply with other fibre directions lies on or under it, and fibres are compressed on the crest
     /// (thesis chapter 6).
     InterPlyCompression,
-    /// None of these, but one fibre family is compressed along the crest: the ply has been pushed together along its yarns (thesis 4.4.3: where
-    /// positive shear meets negative).
+    /// None of these, but fibres are compressed on the crest, of whichever family they are more: the ply has been pushed together along
+    /// its yarns (thesis 4.4.3: where positive shear meets negative).
     FibreCompression,
     /// None of these.
     Undetermined,
@@ -34,11 +34,9 @@ pub struct Limits {
     pub bridging_reach: f64,
     /// Fibre directions of two plies that differ by less are the same (rad).
     pub layup_angle: f64,
+    /// Strain from which on fibres are compressed, as a positive number.
+    pub fibre_compression: f64,
 }
-
-/// Mean strain along a crest, of the more compressed family, from which on compression is a cause by itself: some hundred N/m in carbon
-/// fabrics, more than what is left over anywhere.
-const LEAST_COMPRESSION: f64 = -1e-4;
 
 /// Sets the causes of a ply's wrinkles. `fibres`: directions of both fibre families of the flat ply (rad); `others`:
 /// those of the plies next to it. A scan, of which neither is known, gives both empty: its wrinkles come from bridging or
@@ -63,14 +61,15 @@ pub fn find_causes(
     for wrinkle in wrinkles {
         let over = |g: f64| g > limits.over_shear_positive || g < limits.over_shear_negative;
         let strain = mean_along(ply, &ply.fibre_strain, &wrinkle.ridge_nodes);
+        let compressed = strain.is_some_and(|e| e < -limits.fibre_compression);
         wrinkle.cause = Some(
             if wrinkle.ridge_shear.as_ref().is_some_and(|s| over(s.mean)) {
                 Cause::OverShear
             } else if is_near(ply, &wrinkle.ridge_nodes, &bridging, limits.bridging_reach) {
                 Cause::Bridging
-            } else if crossed && strain.is_some_and(|e| e < 0.0) {
+            } else if crossed && compressed {
                 Cause::InterPlyCompression
-            } else if strain.is_some_and(|e| e < LEAST_COMPRESSION) {
+            } else if compressed {
                 Cause::FibreCompression
             } else {
                 Cause::Undetermined

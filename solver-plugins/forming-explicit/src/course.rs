@@ -84,6 +84,7 @@ mod tests {
                 place: Some([1.0, 2.0, 3.0]),
                 q999: 1e-6,
                 q999_time: 0.2,
+                q999_place: Some([4.0, 5.0, 6.0]),
                 many: true,
             }],
             ..Course::default()

@@ -4,18 +4,32 @@
 use crate::assembly::StackSheet;
 use crate::local::LocalSheet;
 use crate::run::{Forming, Observer};
-use plyflow_mechanics::model::Model;
+use plyflow_mechanics::model::{Clock, Model};
 use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::StepError;
 
-/// Where a sheet, or a model, is when it begins, and how it came there.
+/// Where a sheet is when its zone begins late, and how it came there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     /// `[states][n]` positions (m) on the way from the undeformed state, in time; the last is the one to begin at.
     pub path: Vec<Vec<V>>,
     /// `[n]` velocities (m/s) there.
     pub velocity: Vec<V>,
+}
+
+/// The same of a whole model.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Beginning {
+    /// `[states][n]`, as [`Start::path`].
+    path: Vec<Vec<V>>,
+    /// `[n]`, as [`Start::velocity`].
+    velocity: Vec<V>,
+    /// Nodes of the cut, and the normals (of any length) that the coarse surface has there: the zone's own elements are only on one
+    /// side of them.
+    normals: Vec<(u32, V)>,
+    /// When it begins (s).
+    time: f64,
 }
 
 /// Steps in which elements are led from one state of the path to the next.
@@ -52,24 +66,36 @@ pub(crate) fn of_model(
     stack: &[StackSheet],
     sheets: &[LocalSheet],
     time: f64,
-) -> Result<Option<Start>, String> {
+) -> Result<Option<Beginning>, String> {
     if time == 0.0 {
         return Ok(None);
     }
-    let mut start = Start {
+    let mut start = Beginning {
         path: Vec::new(),
         velocity: Vec::new(),
+        normals: Vec::new(),
+        time,
     };
     for sheet in stack {
         let name = &sheet.scene.name;
-        let found = sheets.iter().find(|s| &s.name == name);
-        let own = found.and_then(|s| s.start.as_ref()).ok_or_else(|| {
+        let told = |s: &&LocalSheet| &s.name == name && s.start.is_some();
+        let found = sheets
+            .iter()
+            .find(told)
+            .and_then(|s| Some((s, s.start.as_ref()?)));
+        let (cut, own) = found.ok_or_else(|| {
             format!("the boundary begins at {time} s and does not tell where sheet '{name}' is then; run its step again")
         })?;
         start.path.resize_with(own.path.len(), Vec::new);
         for (all, part) in start.path.iter_mut().zip(&own.path) {
             all.extend_from_slice(part);
         }
+        let first = start.velocity.len() as u32;
+        let normals = cut.normal.first().into_iter().flatten();
+        let of_cut = cut.driven.iter().zip(normals);
+        start
+            .normals
+            .extend(of_cut.map(|(n, normal)| (first + n, *normal)));
         start.velocity.extend_from_slice(&own.velocity);
     }
     let n = start.velocity.len();
@@ -94,13 +120,16 @@ pub(crate) fn begin(
         return Ok(None);
     };
     let text = |e: plyflow_mechanics::MechanicsError| e.to_string();
-    for state in &start.path {
+    let interval = start.time / (start.path.len() as f64 * f64::from(STEPS));
+    for (s, state) in start.path.iter().enumerate() {
         let from = forming.model.x.clone();
         for k in 1..=STEPS {
             let share = f64::from(k) / f64::from(STEPS);
             let to = |(a, b): (&V, &V)| add(*a, scale(sub(*b, *a), share));
             let x = from.iter().zip(state).map(to).collect();
-            forming.model.lead(x).map_err(text)?;
+            let arrives = s + 1 == start.path.len() && k == STEPS;
+            let normals = if arrives { &start.normals[..] } else { &[] };
+            forming.model.lead(x, interval, normals).map_err(text)?;
         }
     }
     clear_tool(forming);
@@ -201,7 +230,9 @@ fn settle(
 fn stand(forming: &mut Forming) -> Result<(), String> {
     let start = forming.load.start();
     forming.model.time = start;
+    let clock = Clock::of_step(forming.model.cycle);
     forming.load.apply(&mut forming.model);
+    forming.model.spent.count_loads(clock);
     forming.model.time = start - forming.model.dt;
     forming.model.step(false).map_err(|e| e.to_string())
 }

@@ -485,7 +485,7 @@ fn penetration_attributes(
                 "max": p.largest, "q999": p.q999, "overlap": p.overlap(), "place": p.place,
                 "peak": {
                     "max": peak.largest, "max_time": peak.largest_time, "place": peak.place,
-                    "q999": peak.q999, "q999_time": peak.q999_time, "overlap": p.overlap_of(peak.q999),
+                    "q999": peak.q999, "q999_time": peak.q999_time, "q999_place": peak.q999_place, "overlap": p.overlap_of(peak.q999),
                 },
             });
             (p.pair.clone(), of)

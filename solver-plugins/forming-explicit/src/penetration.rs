@@ -110,7 +110,7 @@ pub fn too_deep_on_the_way(now: &[Penetration], peaks: &[PenetrationPeak]) -> Op
     deep.sort_by(|a, b| b.0.total_cmp(&a.0));
     let told = |(overlap, p, peak): &(f64, &Penetration, &PenetrationPeak)| {
         let place = peak
-            .place
+            .q999_place
             .map_or_else(String::new, |x| format!(", deepest at {}", in_mm(x)));
         format!(
             "'{}' by {:.0} % at {:.4} s{place}",
@@ -123,7 +123,7 @@ pub fn too_deep_on_the_way(now: &[Penetration], peaks: &[PenetrationPeak]) -> Op
     (!all.is_empty()).then(|| {
         format!(
             "on the way, but no longer at the end, bodies reached into each other by more than {:.0} % of the thinner one (99.9 % quantiles): \
-             {}. Where that matters {REMEDY}",
+             {}. Where that matters, {REMEDY}",
             100.0 * OVERLAP_BOUND,
             all.join("; ")
         )
@@ -143,6 +143,8 @@ pub struct PenetrationPeak {
     pub q999: f64,
     /// When that was (s).
     pub q999_time: f64,
+    /// Where its deepest node was then (m).
+    pub q999_place: Option<V>,
     /// Whether [`MANY`] nodes touched then.
     pub many: bool,
 }
@@ -157,6 +159,7 @@ pub fn keep_largest(peaks: &mut Vec<PenetrationPeak>, now: &[Penetration], time:
         let many = p.nodes >= MANY;
         if (many, p.q999) > (peak.many, peak.q999) {
             (peak.q999, peak.q999_time, peak.many) = (p.q999, time, many);
+            peak.q999_place = p.place;
         }
     }
 }
@@ -264,7 +267,8 @@ mod tests {
         let peak = |q999: f64, many: bool| PenetrationPeak {
             q999,
             q999_time: 0.125,
-            place: Some([0.001, 0.002, 0.003]),
+            place: Some([0.0; 3]),
+            q999_place: Some([0.001, 0.002, 0.003]),
             many,
             ..PenetrationPeak::default()
         };

@@ -3,7 +3,7 @@
 use crate::assembly::StackSheet;
 pub use crate::course::Course;
 use crate::diagnosis;
-use crate::late::{self, Start};
+use crate::late::{self, Beginning};
 use crate::penetration::{PenetrationPeak, keep_largest};
 use crate::press::PressLoad;
 use crate::process::Load;
@@ -135,7 +135,7 @@ pub struct Forming {
     /// The zone of a local run.
     pub zone: Option<serde_json::Value>,
     /// Where a run that begins late begins.
-    pub start: Option<Start>,
+    pub(crate) start: Option<Beginning>,
     /// Edge of the plies' elements (m).
     pub element_size: f64,
 }

@@ -281,7 +281,7 @@ fn a_shell_that_is_led_to_a_cylinder_has_the_bending_energy_of_one() {
         let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
         for f in 1..=frames {
             let share = f64::from(f) / f64::from(frames);
-            model.lead(shape(share, bent * share)).unwrap();
+            model.lead(shape(share, bent * share), 0.01, &[]).unwrap();
         }
         assert!(model.spins().unwrap().iter().all(|w| *w == [0.0; 3]));
         model.energies().bending

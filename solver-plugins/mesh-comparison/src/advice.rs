@@ -20,21 +20,23 @@ const ORDERS: [f64; 2] = [1.0, 2.0];
 ///
 /// The finest run has an error too. By Richardson's extrapolation (as in Roache's grid convergence index, J. Fluids Eng. 116, 1994) differences are
 /// `C (h^p - h0^p)`, with h0 of the finest: the finest three runs tell p, within [`ORDERS`], two runs take the least; so `C h0^p` is
-/// the finest run's error, and comes on top of every difference. A difference that is smaller than that of a finer run is raised to
+/// the finest run's error, and comes on top of every difference. (That index multiplies it by 3 for two runs, of which it takes a higher order, and by
+/// 1.25 for three; here the least order stands for that.) Runs that converge more slowly than with order 1, or not at all, are wrong by more. A difference that is smaller than that of a finer run is raised to
 /// it, as it is so by chance. Between two runs the error is a power of the size; below the finest it falls in proportion, the least
-/// that a converging element does: so the advice is on the safe side. It is never coarser than the coarsest run.
+/// that a converging element does. The advice is never coarser than the coarsest run.
 ///
 /// # Panics
 /// When `measured` holds fewer than two runs.
 pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
-    let mut worst = 0.0f64;
-    let rising: Vec<(f64, f64)> = (measured[1..].iter())
-        .map(|&(size, difference)| {
-            worst = worst.max(difference);
-            (size, worst)
-        })
-        .collect();
     let finest = measured[0].0;
+    let mut rising: Vec<(f64, f64)> = Vec::new();
+    for &(size, difference) in &measured[1..] {
+        let worst = rising.last().map_or(0.0, |r| r.1).max(difference);
+        match rising.last_mut() {
+            Some(same) if same.0 == size => same.1 = worst,
+            _ => rising.push((size, worst)),
+        }
+    }
     let p = order(finest, &rising);
     let (next, difference) = rising[0];
     let own = difference / ((next / finest).powf(p) - 1.0);
@@ -46,9 +48,10 @@ pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
     if own > target {
         let size = finest * target / own;
         let doubt = format!(
-            "the finest run ({:.3} mm) has an error of some {own:.2} itself, and {target} asks for elements of {:.3} mm; run one of about that \
+            "the finest run ({:.3} mm) has an error of some {} % itself, and {target} asks for elements of {:.3} mm; run one of about that \
              size to see",
             1e3 * finest,
+            rounded(100.0 * own),
             1e3 * size
         );
         return advice(size, Some(doubt));
@@ -73,6 +76,12 @@ pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
         1e3 * size
     );
     advice(size, Some(doubt))
+}
+
+/// Two significant digits.
+fn rounded(x: f64) -> f64 {
+    let unit = 10f64.powf(x.abs().max(1e-12).log10().floor() - 1.0);
+    (x / unit).round() * unit
 }
 
 /// The order p of the differences from the finest run (`rising`, by size), from those of the next two.

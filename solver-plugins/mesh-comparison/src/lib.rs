@@ -203,6 +203,7 @@ fn write(host: &Host, runs: &[Run], finest: &Run, target: f64) -> Result<(), Ste
         "finest": finest.input.step,
         "target_error": target,
         "advised_element_size": advice.size,
+        "finest_error": advice.finest_error,
         "tables": [{"name": "meshes", "title": "Shear angles over the element size", "columns": columns, "rows": rows}],
         "plots": [{"name": "shear", "title": "Shear angles over the element size",
                    "note": "By undeformed area of all plies. Box: 25 to 75 %; bar: median; whiskers: 1 and 99 %; points: smallest and largest.",

@@ -1,7 +1,7 @@
 //! Local runs of zones with meshes of different fineness: how far their distances from the tool are from those of the finest.
 
 use crate::Formed;
-use crate::advice::advise;
+use crate::advice::{Advice, advise};
 use plyflow_defects::{FieldErrors, Ply, of_run};
 use plyflow_sdk::{Host, Input, Log, StepError};
 use serde_json::{Value, json};
@@ -58,8 +58,10 @@ pub fn compare(host: &Host, inputs: Vec<Input>, target: f64) -> Result<(), StepE
     for ((_, zone), runs) in &mut by_zone {
         host.check_cancelled()?;
         runs.sort_by(|a, b| a.element_size.total_cmp(&b.element_size));
-        let size = one(host, zone, runs, target, &mut rows)?;
-        advised.push(json!({"name": zone, "element_size": size}));
+        let advice = one(host, zone, runs, target, &mut rows)?;
+        advised.push(
+            json!({"name": zone, "element_size": advice.size, "finest_error": advice.finest_error}),
+        );
     }
     let head = [
         ("run", ""),
@@ -84,14 +86,14 @@ pub fn compare(host: &Host, inputs: Vec<Input>, target: f64) -> Result<(), StepE
     }))
 }
 
-/// The runs of one zone, the finest first; gives the advised size (m).
+/// The runs of one zone, the finest first; gives the advice for it.
 fn one(
     host: &Host,
     zone: &str,
     runs: &[Run],
     target: f64,
     rows: &mut Vec<Value>,
-) -> Result<f64, StepError> {
+) -> Result<Advice, StepError> {
     let [finest, next, ..] = runs else {
         return Err(format!(
             "zone {zone} has one run; a comparison needs two or more of different sizes"
@@ -150,7 +152,7 @@ fn one(
     let advice = advise(&measured, target);
     host.result(&format!("finest_error.{zone}"), advice.finest_error, "1")?;
     host.result(&format!("advised_element_size.{zone}"), advice.size, "m")?;
-    if let Some(text) = advice.doubt {
+    if let Some(text) = &advice.doubt {
         host.log(Log::Warn, &format!("zone {zone}: {text}"));
     }
     rows.push(json!([
@@ -163,7 +165,7 @@ fn one(
         null,
         advice.size
     ]));
-    Ok(advice.size)
+    Ok(advice)
 }
 
 fn read(host: &Host, input: Input) -> Result<Run, StepError> {

@@ -157,6 +157,10 @@ fn advised_sizes_keep_the_target_by_the_power_law_of_the_errors() {
     );
     let size = advise(&chance, 0.5).size;
     assert!(size > 0.004 && size < 0.008, "{size}");
+    // Of two runs of one size the worse one counts.
+    let twice = [(0.001, 0.0), (0.002, 0.01), (0.002, 0.03), (0.004, 0.09)];
+    let once = [(0.001, 0.0), (0.002, 0.03), (0.004, 0.09)];
+    assert_eq!(advise(&twice, 0.05), advise(&once, 0.05));
     // Runs that do not differ have no error to tell.
     let same = advise(&[(0.001, 0.0), (0.002, 0.0)], 0.1);
     assert_eq!((same.size, same.finest_error), (0.002, 0.0));

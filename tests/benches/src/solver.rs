@@ -260,16 +260,16 @@ fn at_rest(place: &Path) -> Vec<Row> {
     let share = |of: fn(&Run) -> f64| {
         (of(&long) * long.wall - of(&short) * short.wall) / (long.wall - short.wall)
     };
-    let case = "m4, flat tool 8 mm, 1 thread";
+    let case = "m4, flat tool 8 mm, 300 ms of rest, 1 thread";
     vec![
         long.row(case.into()),
         Row::new(
-            format!("{case}, at rest"),
+            format!("{case}, the rest alone"),
             of_steps(&short, &long),
             "CPU ns per element-step",
         ),
         Row::new(
-            format!("{case}, at rest, share of contacts"),
+            format!("{case}, the rest alone, share of contacts"),
             share(Run::contact_share),
             "1",
         ),

@@ -235,20 +235,27 @@ fn results_of_an_older_workflow_are_told_apart_from_none() {
     let steps = "
 steps:
   first: {plugin: trivial, with: {value: 2}}
+  second: {plugin: sum, from: {in: first}}
 ";
     let study = Study::new(steps);
-    let said = |word: &str| {
-        let out = study.call(&[word]);
+    let said = |words: &[&str]| {
+        let out = study.call(words);
         String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned()
     };
     for word in ["results", "report"] {
-        let text = said(word);
+        let text = said(&[word]);
         assert!(text.contains("nothing has been run yet"), "{text}");
     }
-    assert_eq!(study.run(&[]), well(1, 0));
+    assert_eq!(study.run(&["--until", "first"]), well(1, 0));
+    let text = said(&["results", "--step", "second"]);
+    assert!(text.contains("these steps have not been run yet"), "{text}");
     study.write(&steps.replace('2', "3"));
-    for word in ["results", "report"] {
-        let text = said(word);
+    for words in [
+        &["results"][..],
+        &["report"],
+        &["results", "--step", "first"],
+    ] {
+        let text = said(words);
         assert!(
             text.contains("as it is now") && text.contains("plyflow plan"),
             "{text}"

@@ -6,6 +6,7 @@
 
 use super::advance::{Turns, free_of, free_or_all};
 use super::*;
+use crate::mirror::Planes;
 use crate::vec3::cross;
 
 /// Rotational state; per-node arrays in the model's numbering.
@@ -34,26 +35,41 @@ impl Rotations {
 }
 
 impl Model {
-    /// Puts the nodes at `x` (`[n]`, m) at once, and brings the elements there: forces, energies, and what they keep of the way. Nodes
-    /// that rotate turn as the sheets' normals there turn, and not about them. To elements
-    /// and materials it takes 1 s.
+    /// Brings the nodes to `x` (`[n]`, m) in one step of `dt` (s), and the elements with them: forces, energies, and what they keep of the
+    /// way. Nodes that rotate turn as the sheets' normals turn, and not about them; those of `normals` (node, of any length and
+    /// either sign) come to have that normal instead of their own sheet's. At the end all is at rest.
     ///
     /// # Errors
-    /// When a component fails.
-    pub fn lead(&mut self, x: Vec<V>) -> Result<(), MechanicsError> {
+    /// When a component fails, or the model is cut at mirror planes, whose other half has a share in the normals.
+    pub fn lead(&mut self, x: Vec<V>, dt: f64, normals: &[(u32, V)]) -> Result<(), MechanicsError> {
+        if self.planes() != Planes::default() {
+            return Err(MechanicsError::Input(
+                "a model that is cut at mirror planes cannot be led to a state on its way".into(),
+            ));
+        }
+        let rate = 1.0 / dt;
         if let Some(mut r) = self.rotations.take() {
-            let (from, to) = (self.normals_at(&self.x), self.normals_at(&x));
-            r.spin = from
-                .iter()
-                .zip(&to)
-                .map(|(n, m)| turn_between(*n, *m))
-                .collect();
+            let (from, mut to) = (self.normals_at(&self.x), self.normals_at(&x));
+            for (n, normal) in normals {
+                let same = dot(*normal, to[*n as usize]) >= 0.0;
+                to[*n as usize] = if same { *normal } else { scale(*normal, -1.0) };
+            }
+            for (n, spin) in r.spin.iter_mut().enumerate() {
+                *spin = scale(turn_between(from[n], to[n]), rate);
+                if let Some(fixed) = self.supports.fixed.get(n) {
+                    *spin = fixed.rotation(*spin);
+                }
+            }
             self.rotations = Some(r);
         }
+        for ((v, from), to) in self.v.iter_mut().zip(&self.x).zip(&x) {
+            *v = scale(sub(*to, *from), rate);
+        }
         self.x = x;
-        let dt = std::mem::replace(&mut self.last_dt, 1.0);
+        let before = std::mem::replace(&mut self.last_dt, dt);
         let done = self.internal_forces(false, false);
-        self.last_dt = dt;
+        self.last_dt = before;
+        self.v.fill([0.0; 3]);
         if let Some(r) = self.rotations.as_deref_mut() {
             r.spin.fill([0.0; 3]);
         }
