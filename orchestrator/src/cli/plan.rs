@@ -172,7 +172,7 @@ pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], file: &Utf8Pa
         let what = if steps.is_empty() {
             "nothing has been run yet; start with"
         } else {
-            "these steps have not been run yet; run them with"
+            "nothing of these steps is in the store; run them with"
         };
         return format!("{what}: plyflow run {file}");
     }

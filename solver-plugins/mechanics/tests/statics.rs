@@ -298,3 +298,37 @@ fn a_shell_that_is_led_to_a_cylinder_has_the_bending_energy_of_one() {
     let turned = bending(0.0);
     assert!(turned < 1e-12 * theory, "{turned} J");
 }
+
+#[test]
+fn nodes_that_are_led_come_to_the_normals_that_they_are_given() {
+    let mesh = QuadMesh::grid(&even_axis(0.0, 0.1, 0.02), &even_axis(0.0, 0.1, 0.02));
+    let led = |normal: V| {
+        let spec = common::sheet("strip", &mesh, 0, common::stiff_shell());
+        let settings = StepSettings {
+            target_step: 0.0,
+            safety: 0.8,
+            damping: 0.0,
+        };
+        let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
+        // Of the nodes at x < 0.05 alone: the flat sheet is bent between them and the others.
+        let normals: Vec<(u32, V)> = (0..mesh.points.len() as u32)
+            .filter(|n| mesh.points[*n as usize][0] < 0.05)
+            .map(|n| (n, normal))
+            .collect();
+        model.lead(mesh.points.clone(), 0.01, &normals).unwrap();
+        assert!(model.v.iter().all(|v| *v == [0.0; 3]));
+        model.energies().bending
+    };
+    let tilt = 0.01f64;
+    let bent = led([tilt.sin(), 0.0, tilt.cos()]);
+    // One column of elements, 20 mm wide, has the curvature tilt / 20 mm over 20 mm x 100 mm.
+    let theory = 0.5 * 5e-3 * (tilt / 0.02).powi(2) * 0.02 * 0.1;
+    assert!(
+        bent > 0.99 * theory && bent.is_finite(),
+        "{bent} J, at least {theory} J"
+    );
+    // Neither their length nor their sign matters.
+    let same = led([-2.0 * tilt.sin(), 0.0, -2.0 * tilt.cos()]);
+    assert!((same / bent - 1.0).abs() < 1e-9, "{same} J, {bent} J");
+    assert_eq!(led([0.0, 0.0, -3.0]), 0.0);
+}

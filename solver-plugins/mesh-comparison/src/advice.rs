@@ -18,12 +18,13 @@ const ORDERS: [f64; 2] = [1.0, 2.0];
 /// The largest element size whose error is at most `target`, from `measured` sizes (m) and differences from the finest run over its
 /// values, the finest first (its own is 0 and says nothing).
 ///
-/// The finest run has an error too. By Richardson's extrapolation (as in Roache's grid convergence index, J. Fluids Eng. 116, 1994) differences are
-/// `C (h^p - h0^p)`, with h0 of the finest: the finest three runs tell p, within [`ORDERS`], two runs take the least; so `C h0^p` is
-/// the finest run's error, and comes on top of every difference. (That index multiplies it by 3 for two runs, of which it takes a higher order, and by
-/// 1.25 for three; here the least order stands for that.) Runs that converge more slowly than with order 1, or not at all, are wrong by more. A difference that is smaller than that of a finer run is raised to
-/// it, as it is so by chance. Between two runs the error is a power of the size; below the finest it falls in proportion, the least
-/// that a converging element does. The advice is never coarser than the coarsest run.
+/// The finest run has an error too. By Richardson's extrapolation (as in Roache's grid convergence index, J. Fluids Eng. 116, 1994)
+/// differences are `C (h^p - h0^p)`, with h0 of the finest: the finest three runs tell p, within [`ORDERS`], two runs take the least.
+/// So `C h0^p` is the finest run's error, and comes on top of every difference. (That index multiplies it by 3 for two runs, of which
+/// it takes a higher order, and by 1.25 for three; here the least order stands for that.) Runs that converge more slowly than with
+/// order 1, or not at all, are wrong by more. A difference that is smaller than that of a finer run is raised to it, as it is so by
+/// chance. Between two runs the error is a power of the size; below the finest it falls in proportion, the least that a converging
+/// element does. The advice is never coarser than the coarsest run.
 ///
 /// # Panics
 /// When `measured` holds fewer than two runs.

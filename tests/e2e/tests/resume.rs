@@ -248,7 +248,7 @@ steps:
     }
     assert_eq!(study.run(&["--until", "first"]), well(1, 0));
     let text = said(&["results", "--step", "second"]);
-    assert!(text.contains("these steps have not been run yet"), "{text}");
+    assert!(text.contains("nothing of these steps is in the store"), "{text}");
     study.write(&steps.replace('2', "3"));
     for words in [
         &["results"][..],
