@@ -248,7 +248,10 @@ steps:
     }
     assert_eq!(study.run(&["--until", "first"]), well(1, 0));
     let text = said(&["results", "--step", "second"]);
-    assert!(text.contains("nothing of these steps is in the store"), "{text}");
+    assert!(
+        text.contains("nothing of these steps is in the store"),
+        "{text}"
+    );
     study.write(&steps.replace('2', "3"));
     for words in [
         &["results"][..],
