@@ -28,6 +28,7 @@ use hdf5_sys::h5t::{
 use std::ffi::{CStr, CString, c_uint, c_void};
 use std::path::Path;
 use std::sync::Once;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 const DEFAULT: hid_t = 0;
 
@@ -148,9 +149,15 @@ struct Handle(hid_t, unsafe fn(hid_t) -> i32);
 
 impl Drop for Handle {
     fn drop(&mut self) {
-        locked(|| unsafe { (self.1)(self.0) });
+        if locked(|| unsafe { (self.1)(self.0) }) < 0 {
+            CLOSE_FAILED.store(true, Ordering::Relaxed);
+        }
     }
 }
+
+/// Whether closing a handle has failed. The library keeps small parts back until then, and lets them go even when the disk does not take
+/// them; the file could be closed afterwards as if nothing had happened.
+static CLOSE_FAILED: AtomicBool = AtomicBool::new(false);
 
 macro_rules! closer {
     ($name:ident, $f:ident) => {
@@ -363,11 +370,15 @@ impl File {
         })
     }
 
-    /// Closes the file; every other handle of it must be gone.
+    /// Closes the file; every other handle of it must be gone. An error also when one of them could not be closed.
     pub(crate) fn close(self) -> Result<()> {
         let id = self.0.0;
         std::mem::forget(self);
         locked(|| checked(unsafe { H5Fclose(id) }, || "closing the artifact".into()))?;
+        if CLOSE_FAILED.swap(false, Ordering::Relaxed) {
+            let text = "a part of the artifact could not be written; is the disk full?";
+            return Err(ArtifactError::new(ErrorKind::Io, text));
+        }
         Ok(())
     }
 

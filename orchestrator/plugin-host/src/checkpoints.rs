@@ -90,14 +90,6 @@ impl<'a> Checkpoints<'a> {
             threads: cost.threads,
         }
     }
-
-    /// Removes the folder of a step that has succeeded.
-    pub(crate) fn remove(job: Option<&job::Checkpoints>) -> std::io::Result<()> {
-        match job.map(|j| std::fs::remove_dir_all(&j.folder)) {
-            Some(Err(e)) if e.kind() != std::io::ErrorKind::NotFound => Err(e),
-            _ => Ok(()),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -146,9 +138,5 @@ mod tests {
         let third = Checkpoints::new(Some(&rarely));
         third.folder(&emitter);
         assert!(third.earlier.get().unwrap().cpu_seconds > noted.cpu_seconds);
-
-        Checkpoints::remove(Some(&rarely)).unwrap();
-        assert!(!folder.exists());
-        Checkpoints::remove(Some(&rarely)).unwrap();
     }
 }

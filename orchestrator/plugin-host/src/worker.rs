@@ -1,12 +1,12 @@
 //! Running one step in this process.
 
-use crate::checkpoints::Checkpoints;
 use crate::emitter::Emitter;
 use crate::host::HostState;
 use crate::load::Plugin;
 use crate::{process, services};
 use camino::Utf8Path;
 use plyflow_abi::*;
+use plyflow_artifact::ErrorKind;
 use plyflow_model::job::{Cost, FailureKind, JOB_VERSION, Job, LogLevel, Message, Record};
 use plyflow_model::manifest::PluginKind;
 use std::io::{Read, Write};
@@ -70,10 +70,6 @@ pub fn run_job(job: &Job, events: &mut (dyn Write + Send)) -> i32 {
     }
     match outcome {
         Ok(record) => {
-            if let Err(e) = Checkpoints::remove(job.checkpoints.as_ref()) {
-                let text = format!("the checkpoints cannot be removed: {e}");
-                emitter.log(LogLevel::Debug, &text);
-            }
             emitter.send(&Message::Done {
                 record: Box::new(record),
             });
@@ -119,9 +115,11 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
             job.plugin.name
         )));
     }
-    let bytes = writer
-        .finish(&job.provenance)
-        .map_err(|e| malformed(e.message))?;
+    let bytes = writer.finish(&job.provenance).map_err(|e| match e.kind {
+        // A full disk is no fault of the plugin's.
+        ErrorKind::Io => (FailureKind::Error, e.message),
+        _ => malformed(e.message),
+    })?;
     let record = Record {
         version: JOB_VERSION,
         step: job.step.clone(),
@@ -136,12 +134,26 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
         host: process::host_name(),
         started,
     };
-    write_record(&job.record, &record).map_err(|e| {
+    let lasting = record.is_lasting();
+    write_record(&job.record, &record, lasting).map_err(|e| {
         (
             FailureKind::Error,
             format!("the record {} cannot be written: {e}", job.record),
         )
     })?;
+    if lasting {
+        std::fs::File::open(&job.artifact)
+            .and_then(|file| file.sync_all())
+            .map_err(|e| {
+                (
+                    FailureKind::Error,
+                    format!(
+                        "the artifact {} cannot be put on the disk: {e}",
+                        job.artifact
+                    ),
+                )
+            })?;
+    }
     Ok(record)
 }
 
@@ -200,8 +212,10 @@ fn judge(job: &Job, code: i32, output: &mut crate::host::Output) -> Result<(), F
     }
 }
 
-fn write_record(path: &Utf8Path, record: &Record) -> std::io::Result<()> {
+fn write_record(path: &Utf8Path, record: &Record, lasting: bool) -> std::io::Result<()> {
     let mut text = serde_json::to_string_pretty(record)?;
     text.push('\n');
-    std::fs::write(path, text)
+    let mut file = std::fs::File::create(path)?;
+    file.write_all(text.as_bytes())?;
+    if lasting { file.sync_all() } else { Ok(()) }
 }

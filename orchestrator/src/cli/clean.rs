@@ -5,6 +5,7 @@ use super::open::store_root;
 use super::table::bytes;
 use super::{Done, Stop, print};
 use crate::exit;
+use crate::plan::Key;
 use crate::store::{Journal, Lock, LockError, Store};
 use camino::Utf8Path;
 use std::collections::BTreeSet;
@@ -31,18 +32,23 @@ pub fn clean(args: &CleanArgs) -> Done {
         Lock::exclusive(&store.lock(), &format!("the store {}", store.root())).map_err(locked)?;
     let failed = || Stop::machine(format!("cleaning {}", store.root()));
     let mut used = BTreeSet::new();
+    let mut noted = None;
     if !args.all {
         for run in store.runs().map_err(failed())? {
             let journal = Journal::read(&run.journal()).map_err(failed())?;
             used.extend(journal.last_keys());
+            noted = noted.max(modified(&run.journal()));
         }
     }
+    // What has come since any journal was last written to is the work of a run that could not note it: the disk was full, or it was
+    // killed between the two. The next run finds it by its file.
+    let unnoted = |key: &Key| noted.is_some() && modified(&store.artifact(key)) > noted;
     let (mut count, mut size) = (0u64, 0u64);
     for key in store
         .keys()
         .map_err(failed())?
         .into_iter()
-        .filter(|k| !used.contains(k))
+        .filter(|k| !used.contains(k) && !unnoted(k))
     {
         count += 1;
         size += store.size(&key).unwrap_or(0);
@@ -85,6 +91,11 @@ pub fn clean(args: &CleanArgs) -> Done {
         "{verb} {count} artifact{s}{checkpoints}, {}\n",
         bytes(size)
     ))
+}
+
+/// When a file was last written to, if it is there.
+fn modified(path: &Utf8Path) -> Option<std::time::SystemTime> {
+    std::fs::metadata(path).and_then(|m| m.modified()).ok()
 }
 
 /// Size of the files in a folder (bytes).

@@ -1,14 +1,14 @@
 //! `plan`, `validate`, `graph`: what would be done.
 
-use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs};
+use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs, Workflow};
 use super::open::{self, open};
+use super::report::command;
 use super::table::table;
 use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
 use crate::engine::{Session, input_keys};
 use crate::exit;
 use crate::plan::{Change, changes};
-use camino::Utf8Path;
 use serde_json::json;
 use std::io::IsTerminal;
 
@@ -162,9 +162,10 @@ pub(super) fn or_none(text: &str) -> &str {
     if text.is_empty() { "(none)" } else { text }
 }
 
-/// What to say when the store has nothing of a workflow `file` as it is now, or nothing of some of its `steps` (of all if there are none).
-pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], file: &Utf8Path) -> String {
+/// What to say when the store has nothing of a workflow as it is now, `given` by the user, or nothing of some of its `steps` (of all if there are none).
+pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], given: &Workflow) -> String {
     let core = &session.core;
+    let again = command(given);
     let name = |id: &Id| &core.graph().steps[core.instances()[*id].step].name;
     let wanted = |id: &Id| steps.is_empty() || steps.contains(name(id));
     let mut of_these = (0..core.instances().len()).filter(wanted);
@@ -174,11 +175,12 @@ pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], file: &Utf8Pa
         } else {
             "nothing of these steps is in the store; run them with"
         };
-        return format!("{what}: plyflow run {file}");
+        return format!("{what}: {again}");
     }
     format!(
         "nothing of what was run is of this workflow as it is now: parameters, files or plugins have changed since, or artifacts are gone. \
-         What changed: plyflow plan {file}; run it again: plyflow run {file}"
+         What changed: {}; run it again: {again}",
+        again.replacen("plyflow run", "plyflow plan", 1)
     )
 }
 

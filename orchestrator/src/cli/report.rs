@@ -21,7 +21,7 @@ pub fn report(args: &ReportArgs) -> Done {
     let session = opened.look()?;
     let found = Found::read(&session);
     if found.records.is_empty() {
-        let text = nothing_yet(&session, &[], &args.workflow.workflow);
+        let text = nothing_yet(&session, &[], &args.workflow);
         return Err(Stop::new(exit::USAGE, text));
     }
     let path = args
@@ -98,7 +98,7 @@ pub fn is_written(path: &Utf8Path, fingerprint: &str) -> bool {
 }
 
 /// The command that makes the results of a workflow again, as one types it.
-fn command(given: &Workflow) -> String {
+pub(super) fn command(given: &Workflow) -> String {
     let mut words = vec![
         "plyflow".to_owned(),
         "run".into(),

@@ -40,7 +40,11 @@ impl Row {
         if e.is_some_and(|e| !e.mean_over.is_empty()) {
             format!("{} ({})", self.name, self.step)
         } else {
-            format!("{}.{}", self.step, self.name)
+            let item = match self.item.is_empty() {
+                true => String::new(),
+                false => format!("[{}]", self.item.join(",")),
+            };
+            format!("{}{item}.{}", self.step, self.name)
         }
     }
 
@@ -131,18 +135,63 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
     // What `--until` leaves out is not expected either.
     let left_out =
         |name: &String| (core.graph().steps.iter()).any(|s| s.name == *name && !s.wanted);
-    for (e, _) in expectations.iter().zip(met).filter(|(_, met)| !met) {
+    for (e, met) in expectations.iter().zip(met) {
         if left_out(&e.step) || e.mean_over.iter().any(left_out) {
             continue;
         }
-        let row = if e.mean_over.is_empty() {
-            absent(e)
-        } else {
-            mean(e, &rows)
-        };
-        rows.push(row);
+        if !e.mean_over.is_empty() {
+            let progress = e.mean_over.iter().map(|s| Progress::of(session, s));
+            rows.extend(mean(e, &rows, &progress.collect::<Vec<_>>()));
+            continue;
+        }
+        let progress = Progress::of(session, &e.step);
+        let unfinished = progress.unfinished.iter().map(|item| Row {
+            item: item.clone(),
+            ..absent(e)
+        });
+        rows.extend(unfinished);
+        let told = met || !progress.unfinished.is_empty();
+        if progress.hidden || (!told && !progress.is_nothing()) {
+            rows.push(absent(e));
+        }
     }
     rows
+}
+
+/// How far the instances of a step are.
+struct Progress {
+    /// Number of its instances that are known.
+    count: usize,
+    /// Labels of the items that have no artifact.
+    unfinished: Vec<Vec<String>>,
+    /// Whether a collection that is not there yet may bring more.
+    hidden: bool,
+}
+
+impl Progress {
+    fn of(session: &Session<'_>, name: &str) -> Self {
+        let core = &session.core;
+        let is_of = |id: &Id| core.graph().steps[core.instances()[*id].step].name == name;
+        let ids: Vec<Id> = (0..core.instances().len()).filter(is_of).collect();
+        let done = |id: &Id| matches!(core.instances()[*id].state, State::Done { .. });
+        let at = core.graph().steps.iter().position(|s| s.name == name);
+        Self {
+            count: ids.len(),
+            unfinished: (ids.iter().filter(|id| !done(id)))
+                .map(|id| core.item_labels(*id))
+                .collect(),
+            hidden: at.is_some_and(|at| !core.hidden_by(at).is_empty()),
+        }
+    }
+
+    /// Whether its collection is there and empty: no zone, or passes that have come to rest. Then there is nothing to expect.
+    fn is_nothing(&self) -> bool {
+        self.count == 0 && !self.hidden
+    }
+
+    fn is_finished(&self) -> bool {
+        self.unfinished.is_empty() && !self.hidden
+    }
 }
 
 /// An expectation whose number is not there.
@@ -158,8 +207,12 @@ fn absent(e: &Expectation) -> Row {
     }
 }
 
-/// The mean over steps and their items of what `e` is about; without a value unless every step has reported.
-fn mean(e: &Expectation, rows: &[Row]) -> Row {
+/// The mean over steps and their items of what `e` is about; without a value unless every item of every step is finished and every step
+/// that has any has reported. `None`: none of the steps has an item. `progress`: of the steps, in their order.
+fn mean(e: &Expectation, rows: &[Row], progress: &[Progress]) -> Option<Row> {
+    if progress.iter().all(Progress::is_nothing) {
+        return None;
+    }
     let mut seen: Vec<(&str, &[String])> = Vec::new();
     let mut row = Row {
         step: e.mean_over.join(", "),
@@ -178,11 +231,13 @@ fn mean(e: &Expectation, rows: &[Row]) -> Row {
             (row.unit, row.measured) = (r.unit.clone(), row.measured || r.measured);
         }
     }
-    let reported = |step: &String| seen.iter().any(|(s, _)| s == step);
-    if e.mean_over.iter().all(reported) {
+    let is_whole = |(step, progress): (&String, &Progress)| {
+        progress.is_nothing() || (progress.is_finished() && seen.iter().any(|(s, _)| s == step))
+    };
+    if e.mean_over.iter().zip(progress).all(is_whole) {
         row.value = Some(sum / seen.len() as f64);
     }
-    row
+    Some(row)
 }
 
 /// A table of numbers.
@@ -332,7 +387,7 @@ pub fn results(args: &ResultsArgs) -> Done {
         Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records)))?,
         Format::Csv => print(&as_csv(&rows))?,
         Format::Table if records.is_empty() => {
-            let text = nothing_yet(&session, &args.step, &args.workflow.workflow);
+            let text = nothing_yet(&session, &args.step, &args.workflow);
             print(&format!("{text}\n"))?;
         }
         Format::Table => {
@@ -459,13 +514,37 @@ mod tests {
             tolerance: Some(0.1),
             ..expectation()
         };
+        let done = |count| Progress {
+            count,
+            unfinished: vec![],
+            hidden: false,
+        };
+        let value_of = |rows: &[Row], progress: [Progress; 2]| {
+            mean(&e, rows, &progress).map(|row| (row.value, row.verdict()))
+        };
         let mut rows = vec![of("s", "a", 1.0), of("s", "b", 2.0), of("u", "a", 50.0)];
         assert_eq!(
-            (mean(&e, &rows).value, mean(&e, &rows).verdict()),
-            (None, Some("missed"))
+            value_of(&rows, [done(2), done(1)]),
+            Some((None, Some("missed")))
         );
         rows.extend([of("t", "a", 3.0), of("t", "a", 3.0)]);
-        let all = mean(&e, &rows);
+        // An item that is not finished, or a collection that is not there yet, leaves no mean; an empty one leaves nothing to say.
+        let unfinished = Progress {
+            unfinished: vec![vec!["b".into()]],
+            ..done(2)
+        };
+        let hidden = Progress {
+            hidden: true,
+            ..done(0)
+        };
+        for progress in [[unfinished, done(1)], [hidden, done(1)]] {
+            assert_eq!(value_of(&rows, progress), Some((None, Some("missed"))));
+        }
+        assert_eq!(value_of(&[], [done(0), done(0)]), None);
+        let of_s = [of("s", "a", 1.95), of("s", "b", 2.05)];
+        let without_t = value_of(&of_s, [done(2), done(0)]);
+        assert_eq!(without_t, Some((Some(2.0), Some("ok"))));
+        let all = mean(&e, &rows, &[done(2), done(1)]).unwrap();
         assert_eq!((all.value, all.verdict()), (Some(2.0), Some("ok")));
         assert_eq!(all.title(), "mean of n (s, t)");
     }

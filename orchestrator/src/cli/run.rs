@@ -168,9 +168,11 @@ fn conclude(
     begun: Instant,
 ) -> Done {
     let verdict = tell_results(args, opened, session, summary);
-    if !args.quiet {
-        tell(args, opened, session, summary, begun)?;
-    }
+    // Whoever reads along may have gone (`| head`); how the run went is told by the exit code all the same.
+    let told = match args.quiet {
+        true => Ok(()),
+        false => tell(args, session, summary, begun),
+    };
     if summary.interrupted {
         return Err(Stop::silent(exit::INTERRUPTED));
     }
@@ -178,7 +180,7 @@ fn conclude(
         eprint!("{}", failure_text(first, summary));
         return Err(Stop::silent(exit::STEP_FAILED));
     }
-    verdict
+    verdict.and(told)
 }
 
 /// Writes the report and prints the summary, both only when there is something new to tell; judges the
@@ -205,23 +207,18 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         eprintln!("plyflow: the report was not written: {e}");
         written = None;
     }
-    if show {
-        print(&(plyflow_report::summary(&input, written.as_deref()) + "\n"))?;
-    }
+    let told = match show {
+        true => print(&(plyflow_report::summary(&input, written.as_deref()) + "\n")),
+        false => Ok(()),
+    };
     if args.check {
-        check(&found.rows)
+        check(&found.rows).and(told)
     } else {
-        Ok(())
+        told
     }
 }
 
-fn tell(
-    args: &RunArgs,
-    opened: &Opened,
-    session: &Session<'_>,
-    summary: &Summary,
-    begun: Instant,
-) -> Done {
+fn tell(args: &RunArgs, session: &Session<'_>, summary: &Summary, begun: Instant) -> Done {
     let wall = duration_text(begun.elapsed().as_secs_f64());
     let mut parts = vec![
         format!("{} run", summary.executed),
@@ -251,9 +248,11 @@ fn tell(
     }
     print(&line)?;
     if summary.interrupted {
-        let file = &opened.workflow.file;
+        let until = args.until.iter().map(|step| format!(" --until {step}"));
         print(&format!(
-            "stopped; what is finished is kept. To go on: plyflow run {file}\n"
+            "stopped; what is finished is kept. To go on: {}{}\n",
+            report::command(&args.workflow),
+            until.collect::<String>()
         ))?;
     }
     Ok(())

@@ -3,6 +3,7 @@
 
 use super::core::{Core, Effect, Event, Id, Limits, Output, State};
 use super::executor::{Executor, Outcome, Report, Task};
+use super::unchanged::Unchanged;
 use crate::plan::{Graph, InputKey, Key};
 use crate::store::{Journal, Known, RunFolder, Store};
 use camino::Utf8PathBuf;
@@ -122,6 +123,9 @@ pub struct Session<'a> {
     pending: VecDeque<Effect>,
     jobs: HashMap<Id, (Utf8PathBuf, Utf8PathBuf)>,
     serial: u64,
+    unchanged: Unchanged,
+    /// Running instances that have been heard of since they started, with what of theirs turned out to have changed.
+    heard: HashMap<Id, Option<String>>,
     summary: Summary,
 }
 
@@ -157,6 +161,8 @@ impl<'a> Session<'a> {
             pending: VecDeque::new(),
             jobs: HashMap::new(),
             serial: 0,
+            unchanged: Unchanged::default(),
+            heard: HashMap::new(),
             summary: Summary::default(),
         })
     }
@@ -196,6 +202,11 @@ impl<'a> Session<'a> {
                         attempt,
                     } => {
                         observer.update(&self.core, id, &Update::Started { threads, attempt });
+                        self.heard.remove(&id);
+                        if let Some(reason) = self.changed(id) {
+                            self.fail(id, &reason, observer);
+                            continue;
+                        }
                         let task = self.task(id, threads);
                         executor.submit(task);
                     }
@@ -203,7 +214,8 @@ impl<'a> Session<'a> {
                     Effect::Look(_) | Effect::Skip { .. } => {}
                 }
             }
-            self.journal.tick()?;
+            // A full disk is no reason to stop steps that run: the artifacts need no journal, and it is tried again until the end.
+            let _ = self.journal.tick();
             if self.core.is_finished() {
                 break;
             }
@@ -284,7 +296,7 @@ impl<'a> Session<'a> {
         }
         let bytes = self.store.size(&key)?;
         let known = match self.journal.known(&key) {
-            Some(known) if known.bytes == bytes => known.clone(),
+            Some(known) if known.bytes == bytes && self.store.has_record(&key) => known.clone(),
             _ => {
                 let record = self.store.read_record(&key).filter(|r| r.bytes == bytes)?;
                 Known {
@@ -424,8 +436,36 @@ impl<'a> Session<'a> {
         })
     }
 
+    /// What of an instance is no longer as it was when the run began.
+    fn changed(&mut self, id: Id) -> Option<String> {
+        let step = self.core.instances()[id].step;
+        self.unchanged.first_changed(&self.workflow.steps[step])
+    }
+
+    /// When an instance is first heard of it has loaded its libraries and read its files: if they have changed since it was started, nobody
+    /// knows which it has. It is stopped now, when nothing is lost yet.
+    fn look_again(&mut self, id: Id) {
+        if !self.heard.contains_key(&id) {
+            let changed = self.changed(id);
+            if changed.is_some() {
+                self.pending.push_back(Effect::Cancel(id));
+            }
+            self.heard.insert(id, changed);
+        }
+    }
+
     fn heed(&mut self, report: Report, observer: &mut dyn Observer) {
+        if let Report::Message { id, .. } = &report {
+            self.look_again(*id);
+        }
         match report {
+            Report::Ended { id, outcome }
+                if matches!(outcome, Outcome::Done(_) | Outcome::Cancelled)
+                    && self.heard.get(&id).is_some_and(Option::is_some) =>
+            {
+                let reason = self.heard.remove(&id).flatten().unwrap_or_default();
+                self.fail(id, &reason, observer);
+            }
             Report::Message { id, message } => match &message {
                 Message::Progress(p) => observer.update(&self.core, id, &Update::Progress(p)),
                 Message::Log { level, text } => {
@@ -483,12 +523,16 @@ impl<'a> Session<'a> {
                 record.bytes
             ));
         }
-        self.store.commit(&key, &artifact, &beside).map_err(|e| {
+        let lasting = record.is_lasting();
+        (self.store.commit(&key, &artifact, &beside, lasting)).map_err(|e| {
             format!(
                 "the artifact cannot be put into the store {}: {e}",
                 self.store.root()
             )
         })?;
+        // Only now: until here they were all that a killed engine, or a power cut, would have left of the work.
+        let checkpoints = self.folder.checkpoints(&self.core.label(id), &key);
+        let _ = std::fs::remove_dir_all(checkpoints);
         Ok(Known {
             bytes: size,
             labels: record.collection.clone(),

@@ -71,6 +71,17 @@ impl Log {
     }
 }
 
+/// What becomes readable when a worker ends; its pipes no longer make a reader wait.
+fn watch(process: &Child) -> io::Result<OwnedFd> {
+    let exit = rustix::process::pidfd_open(Pid::from_child(process), PidfdFlags::empty())?;
+    let out = process.stdout.as_ref().map(AsFd::as_fd);
+    let err = process.stderr.as_ref().map(AsFd::as_fd);
+    for pipe in [out, err].into_iter().flatten() {
+        rustix::fs::fcntl_setfl(pipe, OFlags::NONBLOCK)?;
+    }
+    Ok(exit)
+}
+
 impl Local {
     /// Workers are started as `program step-worker -`. `wake`: when it becomes readable, waiting ends.
     pub fn new(program: Utf8PathBuf, wake: Option<OwnedFd>) -> Self {
@@ -90,7 +101,7 @@ impl Local {
         memory.write_all(&job)?;
         io::Seek::rewind(&mut memory)?;
         // No pre_exec: so the standard library can use posix_spawn, whatever the size of this process.
-        let process = Command::new(&self.program)
+        let mut process = Command::new(&self.program)
             .arg0("plyflow")
             .args(["step-worker", "-", "--parent"])
             .arg(std::process::id().to_string())
@@ -99,14 +110,15 @@ impl Local {
             .stderr(Stdio::piped())
             .process_group(0)
             .spawn()?;
-        let pid = Pid::from_child(&process);
-        let exit = rustix::process::pidfd_open(pid, PidfdFlags::empty())?;
-        let out = process.stdout.as_ref().map(AsFd::as_fd);
-        let err = process.stderr.as_ref().map(AsFd::as_fd);
-        for pipe in [out, err].into_iter().flatten() {
-            rustix::fs::fcntl_setfl(pipe, OFlags::NONBLOCK)?;
+        match watch(&process) {
+            Ok(exit) => Ok((process, exit)),
+            Err(e) => {
+                // Nobody would hear it: left alone it would run beside the next attempt, on the same checkpoints.
+                let _ = process.kill();
+                let _ = process.wait();
+                Err(e)
+            }
         }
-        Ok((process, exit))
     }
 
     fn poll(&mut self, timeout: Option<Duration>) -> io::Result<Vec<(usize, [bool; 3])>> {

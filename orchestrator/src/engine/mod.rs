@@ -4,6 +4,7 @@ pub mod core;
 mod drive;
 pub(crate) mod executor;
 pub(crate) mod local;
+mod unchanged;
 
 pub use drive::{Failure, Observer, Options, Session, Summary, Update, input_keys};
 pub use executor::{Executor, Outcome, Report, Task};

@@ -73,6 +73,8 @@ pub struct Journal {
     frames: usize,
     buffer: Vec<u8>,
     unsynced: Option<Instant>,
+    /// Length (bytes) of the file up to which it is whole.
+    whole: u64,
 }
 
 /// The slot of an instance: where successive runs put successive keys.
@@ -127,7 +129,9 @@ impl Journal {
             file.set_len(0)?;
             file.rewind()?;
             file.write_all(MAGIC)?;
+            journal.whole = MAGIC.len() as u64;
         } else {
+            journal.whole = whole as u64;
             if whole < length {
                 file.set_len(whole as u64)?;
             }
@@ -152,6 +156,7 @@ impl Journal {
             frames: 0,
             buffer: Vec::new(),
             unsynced: None,
+            whole: 0,
         };
         if !bytes.starts_with(MAGIC) {
             return (journal, 0);
@@ -304,13 +309,19 @@ impl Journal {
     /// Hands what is new to the kernel, and to the disk when the last time is long enough ago.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// When the file cannot be written. What is new is kept, and the next call tries again.
     pub fn tick(&mut self) -> io::Result<()> {
         let Some(file) = &mut self.file else {
             return Ok(());
         };
         if !self.buffer.is_empty() {
-            file.write_all(&self.buffer)?;
+            if let Err(e) = file.write_all(&self.buffer) {
+                // A part of it may be there (a full disk): what follows a torn frame would not be read.
+                file.set_len(self.whole)?;
+                file.seek(SeekFrom::Start(self.whole))?;
+                return Err(e);
+            }
+            self.whole += self.buffer.len() as u64;
             self.buffer.clear();
             self.unsynced.get_or_insert_with(Instant::now);
         }
@@ -339,6 +350,7 @@ impl Journal {
         let mut fresh = Self::scan(&self.path, MAGIC.to_vec()).0;
         let mut file = File::create(&path)?;
         file.write_all(MAGIC)?;
+        fresh.whole = MAGIC.len() as u64;
         let mut details = HashMap::new();
         for range in &self.cold {
             if let Ok(Entry::Detail(d)) = postcard::from_bytes(&self.bytes[range.clone()]) {

@@ -124,3 +124,25 @@ fn a_long_history_is_shed_and_the_last_state_is_kept() {
     );
     assert!(j.detail(&key(2)).is_some());
 }
+
+#[test]
+fn what_could_not_be_written_is_written_when_there_is_room_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    note(&mut j, 0, 1);
+    j.flush().unwrap();
+    // A handle that refuses to write, as a full disk does.
+    let writable = j.file.replace(File::open(at(&folder)).unwrap());
+    note(&mut j, 1, 2);
+    assert!(j.tick().is_err() && j.tick().is_err());
+    // A part may have got there.
+    let mut torn = File::options().append(true).open(at(&folder)).unwrap();
+    torn.write_all(&[7; 5]).unwrap();
+    j.file = writable;
+    note(&mut j, 2, 3);
+    j.flush().unwrap();
+    let read = Journal::read(&at(&folder)).unwrap();
+    for n in 0..3u8 {
+        assert_eq!(read.last("s", &[n.into()]), Some(key(n + 1)));
+    }
+}

@@ -173,16 +173,28 @@ impl Store {
         u64::try_from(found.st_size).ok()
     }
 
+    /// Whether there is a record of a key. A power cut may leave one without a byte.
+    pub fn has_record(&self, key: &Key) -> bool {
+        rustix::fs::stat(self.record(key).as_std_path()).is_ok_and(|found| found.st_size > 0)
+    }
+
     /// The record of a key, if it can be read.
     pub fn read_record(&self, key: &Key) -> Option<Record> {
         serde_json::from_slice(&fs::read(self.record(key)).ok()?).ok()
     }
 
-    /// Makes a finished artifact visible: the record first, so that a visible artifact has one.
+    /// Makes a finished artifact visible: the record first, so that a visible artifact has one. `lasting`: when this returns, both
+    /// outlast a power cut, as far as the worker has put their bytes on the disk.
     ///
     /// # Errors
-    /// When a file is missing or cannot be renamed.
-    pub fn commit(&self, key: &Key, artifact: &Utf8Path, record: &Utf8Path) -> io::Result<()> {
+    /// When a file is missing or cannot be renamed, or the disk refuses.
+    pub fn commit(
+        &self,
+        key: &Key,
+        artifact: &Utf8Path,
+        record: &Utf8Path,
+        lasting: bool,
+    ) -> io::Result<()> {
         let shard = usize::from(key.0[0]);
         if !self.shards.borrow()[shard] {
             let target = self.artifact(key);
@@ -190,7 +202,15 @@ impl Store {
             self.shards.borrow_mut()[shard] = true;
         }
         fs::rename(record, self.record(key))?;
-        fs::rename(artifact, self.artifact(key))
+        let target = self.artifact(key);
+        fs::rename(artifact, &target)?;
+        if lasting {
+            // Names lie in folders, which the disk keeps apart from the files.
+            for folder in target.ancestors().skip(1).take(2) {
+                fs::File::open(folder)?.sync_all()?;
+            }
+        }
+        Ok(())
     }
 
     /// Keys of all artifacts, sorted.
@@ -261,12 +281,12 @@ mod tests {
         let (a, r) = (root.join("a"), root.join("r"));
         fs::write(&a, "artifact").unwrap();
         assert!(
-            store.commit(&key, &a, &r).is_err(),
+            store.commit(&key, &a, &r, true).is_err(),
             "a missing record must stop the commit"
         );
         assert_eq!(store.size(&key), None);
         fs::write(&r, "{}").unwrap();
-        store.commit(&key, &a, &r).unwrap();
+        store.commit(&key, &a, &r, true).unwrap();
         assert_eq!(store.size(&key), Some(8));
         assert_eq!(store.keys().unwrap(), [key]);
         store.remove(&key).unwrap();

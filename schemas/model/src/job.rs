@@ -58,8 +58,8 @@ pub struct JobInput {
 /// Where a step may keep what lets a later attempt go on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoints {
-    /// A folder of this instance and key alone, made when the plugin first asks for it and removed when the step has
-    /// succeeded.
+    /// A folder of this instance and key alone, made when the plugin first asks for it. The engine removes it when the artifact
+    /// is in the store, not before: until then it is all that is left of the work if the machine stops.
     pub folder: Utf8PathBuf,
     /// Wall-clock time between two checkpoints (s).
     pub interval: f64,
@@ -151,6 +151,16 @@ pub struct Record {
     pub host: String,
     /// When the step began (s since 1970-01-01 UTC).
     pub started: f64,
+}
+
+impl Record {
+    /// Whether the step took so long (s of wall-clock time, with what earlier attempts took) that its files are put on the disk
+    /// before they count as written, and their names after they have them. Asking the disk takes some milliseconds, which would
+    /// be most of the time of a run of many small steps; what these lose when the power fails is made again in a moment.
+    #[must_use]
+    pub fn is_lasting(&self) -> bool {
+        self.cost.wall_seconds >= 1.0
+    }
 }
 
 /// Level of a log line.

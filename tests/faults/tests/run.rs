@@ -440,3 +440,101 @@ fn a_damaged_artifact_is_made_again() {
     std::fs::write(&path, "").unwrap();
     assert_eq!(study.run(&[]), (0, [1, 5, 0]));
 }
+
+impl Study {
+    /// The files of an artifact, by a part of the name of the step that its record tells.
+    fn files_of(&self, step: &str) -> Vec<(PathBuf, PathBuf)> {
+        let root = self.folder.path().join(".plyflow/artifacts");
+        let names = self.artifacts().into_keys();
+        let paths = names.map(|name| {
+            let artifact = root.join(&name[..2]).join(&name);
+            let record = artifact.with_extension("record.json");
+            (artifact, record)
+        });
+        let is_of = |(_, record): &(PathBuf, PathBuf)| {
+            let text = std::fs::read_to_string(record).unwrap();
+            text.contains(&format!("\"step\": \"{step}\""))
+        };
+        paths.filter(is_of).collect()
+    }
+}
+
+#[test]
+fn an_artifact_whose_record_a_power_cut_left_empty_is_made_again() {
+    let study = Study::new(FAN_OUT);
+    study.run(&[]);
+    let (_, record) = study.files_of("all").remove(0);
+    std::fs::write(&record, "").unwrap();
+    assert_eq!(study.run(&[]), (0, [1, 5, 0]));
+    assert_eq!(study.value("all", "sum"), 17.0);
+}
+
+#[test]
+fn clean_keeps_what_a_run_could_not_note_in_its_journal() {
+    let study = Study::new(FAN_OUT);
+    study.run(&[]);
+    // As a full disk leaves it: nothing noted, and last written to before the artifacts.
+    let journal = study.folder.path().join(".plyflow/runs/study/journal");
+    let file = std::fs::File::options().write(true).open(journal).unwrap();
+    file.set_len(8).unwrap();
+    let before = std::time::SystemTime::now() - Duration::from_secs(60);
+    file.set_modified(before).unwrap();
+    assert_eq!(study.call(&["clean"]).status.code(), Some(0));
+    assert_eq!(study.artifacts().len(), 6);
+    assert_eq!(study.run(&[]), (0, [0, 6, 0]));
+}
+
+#[test]
+fn a_plugin_built_anew_while_a_run_goes_on_makes_nothing_under_the_old_key() {
+    let study = Study::new(
+        "steps:\n  slow: {plugin: sleep, with: {seconds: 2}}\n  after: {plugin: sum, from: {in: slow}}\n",
+    );
+    let own = study.folder.path().join("plugins");
+    std::fs::create_dir(&own).unwrap();
+    for name in ["libsleep.so", "libsum.so"] {
+        std::fs::copy(plyflow_faults::folder().join(name), own.join(name)).unwrap();
+    }
+    let run = ["run", "--no-report", "--plugins", "plugins"];
+    let mut command = study.command(&run);
+    command.env_remove("PLYFLOW_PLUGINS");
+    let engine = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    until("the slow step", || workers_of(engine.id()) == 1);
+    let library = std::fs::read(own.join("libsum.so")).unwrap();
+    std::fs::write(own.join("libsum.so"), [&library[..], b"newer"].concat()).unwrap();
+    let output = engine.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4));
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        text.contains("libsum.so has changed since this run began"),
+        "{text}"
+    );
+    assert_eq!(study.artifacts().len(), 1, "the slow step is kept");
+    let again = study.command(&run).env_remove("PLYFLOW_PLUGINS").output();
+    assert_eq!(again.unwrap().status.code(), Some(0));
+    assert_eq!(study.artifacts().len(), 2);
+}
+
+#[test]
+fn an_expectation_is_of_every_item_and_of_none_where_there_is_none() {
+    let expected = format!(
+        "{FAN_OUT}expect:\n  - {{step: local, result: value, minimum: 0, source: made up}}\n"
+    );
+    let study = Study::new(&expected);
+    study.run(&[]);
+    let check = |study: &Study| study.call(&["results", "--check"]);
+    assert_eq!(check(&study).status.code(), Some(0));
+    let (artifact, _) = study.files_of("local").remove(1);
+    std::fs::remove_file(artifact).unwrap();
+    let output = check(&study);
+    assert_eq!(output.status.code(), Some(5), "an item is not there");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains("local[item-"), "{text}");
+
+    let none = Study::new(&expected.replace("items: 3", "items: 0"));
+    assert_eq!(none.run(&["--check"]).0, 0);
+    assert_eq!(check(&none).status.code(), Some(0));
+}
