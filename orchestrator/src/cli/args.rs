@@ -22,10 +22,8 @@ pub enum Command {
     /// Show what a run would do with each step, and why
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(PlanArgs),
-    /// Check a workflow and everything it names, without running anything
-    #[command(
-        after_help = "Examples:\n  plyflow validate workflow.yaml\n  plyflow validate workflow.yaml --format json   # for editors"
-    )]
+    /// Check the YAML of a workflow, its scenes, materials and expectations, without running anything
+    #[command(after_help = VALIDATE_EXAMPLES)]
     Validate(ValidateArgs),
     /// Draw the steps and their connections
     #[command(
@@ -95,6 +93,14 @@ const PLAN_EXAMPLES: &str = "\
 Examples:
   plyflow plan workflow.yaml
   plyflow plan workflow.yaml --set coarse.element=m4 --format json";
+
+const VALIDATE_EXAMPLES: &str = "\
+Examples:
+  plyflow validate workflow.yaml
+  plyflow validate workflow.yaml --format json   # for editors
+
+Found are names, keys, types, units, bounds, wires, missing files, and scenes that make no sense. What only a run finds: what
+is in STL and CSV files, curves of materials that make no law, and what depends on the mesh.";
 
 const CHECK_PLUGIN_EXAMPLES: &str = "\
 Examples:

@@ -4,6 +4,7 @@ use crate::diagnostics::{Problems, Source};
 use crate::yaml::{Kind, Node};
 use plyflow_model::outline::{ContourName, Region};
 use plyflow_model::scene::Contour;
+use plyflow_model::units::{Dimension, parse_quantity, si_number};
 
 /// Checks what a sheet says of its size and fibres.
 pub fn rules(sheet: &Node, source: &Source, problems: &mut Problems) {
@@ -47,7 +48,36 @@ fn ply(sheet: &Node, source: &Source, problems: &mut Problems) {
             _ => {}
         }
     }
+    fibres(sheet, source, problems);
     region(sheet, source, problems);
+}
+
+/// Least angle between the fibre families (deg). Nearer to each other they are one family, and no yarn lies across.
+const LEAST_CROSSING: f64 = 5.0;
+
+/// The families must cross.
+fn fibres(sheet: &Node, source: &Source, problems: &mut Problems) {
+    let read = |n: &Node| parse_quantity(n.text()?, Dimension::Angle).ok();
+    let first = sheet.get("fibre_1").map_or(Some(0.0), read);
+    let second = sheet.get("fibre_2").and_then(|n| Some((n, read(n)?)));
+    let (Some(first), Some((at, second))) = (first, second) else {
+        return;
+    };
+    // A fibre has no sense: directions 180 deg apart are the same.
+    let apart = (second - first).to_degrees().rem_euclid(180.0);
+    let apart = apart.min(180.0 - apart);
+    // To rounding of degrees in radians.
+    if apart < LEAST_CROSSING - 1e-9 {
+        let message = format!(
+            "`fibre_1` and `fibre_2` lie along each other, {} deg apart",
+            si_number((1e3 * apart).round() / 1e3)
+        );
+        let d = problems.add(source, &at.span, message);
+        d.given(at.describe()).expected(format!(
+            "a direction that crosses `fibre_1` at {LEAST_CROSSING} deg or more"
+        ));
+        d.help("the families of most fabrics cross at 90 deg: `fibre_1: -45 deg`, `fibre_2: 45 deg`, say");
+    }
 }
 
 /// Checks outline and holes against each other.

@@ -7,7 +7,8 @@
 //! of one-key mappings), and of ours `x-dimension`, `x-minimum`, `x-maximum`, `x-exclusive-minimum`
 //! (quantities), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
 
-use crate::diagnostics::{Problems, Source};
+use crate::diagnostics::{Diagnostic, Problems, Source};
+use crate::hints::{list_help, mapping_help, number_help};
 use crate::yaml::{Kind, Node, Span};
 use plyflow_model::manifest::one_of;
 use plyflow_model::units::{Dimension, parse_quantity};
@@ -232,11 +233,7 @@ impl<'a> Checker<'a> {
             } else {
                 "a plain number such as `0.3`"
             };
-            let help = node
-                .text()
-                .filter(|t| t.parse::<f64>().is_ok())
-                .map(|_| "remove the quotes".into());
-            return self.wrong_type(node, what, expected, key, help);
+            return self.wrong_type(node, what, expected, key, number_help(node, whole));
         };
         // The widths of the integers that the types hold.
         let widest = if whole {
@@ -299,7 +296,7 @@ impl<'a> Checker<'a> {
             .collect();
         let expected = format!("a mapping with {}", one_of(names.iter().map(|n| n.0)));
         if !matches!(node.kind, Kind::Map(_)) || node.entries().is_empty() {
-            return self.wrong_type(node, what, &expected, key, None);
+            return self.wrong_type(node, what, &expected, key, mapping_help(node, what));
         }
         if let Some(second) = node.entries().get(1) {
             let d = self.problems.add(
@@ -339,7 +336,7 @@ impl<'a> Checker<'a> {
 
     fn list(&mut self, node: &Node, schema: &View<'a>, what: &str, key: &Span) {
         let Kind::List(items) = &node.kind else {
-            return self.wrong_type(node, what, "a list", key, None);
+            return self.wrong_type(node, what, "a list", key, list_help(node, what));
         };
         let (low, high) = (schema.number("minItems"), schema.number("maxItems"));
         let n = items.len() as f64;
@@ -364,7 +361,7 @@ impl<'a> Checker<'a> {
 
     fn mapping(&mut self, node: &Node, schema: &View<'a>, what: &str, key: &Span) {
         if !matches!(node.kind, Kind::Map(_)) {
-            return self.wrong_type(node, what, "a mapping", key, None);
+            return self.wrong_type(node, what, "a mapping", key, mapping_help(node, what));
         }
         let properties: Vec<(&str, &'a Value)> = match schema.get("properties") {
             Some(Value::Object(p)) => p.iter().map(|(k, v)| (k.as_str(), v)).collect(),
@@ -428,7 +425,7 @@ pub fn repeated_keys(node: &Node, source: &Source, problems: &mut Problems) {
             places.insert(&entry.key, &entry.key_span)
         };
         if let Some(first) = first {
-            let line = source.text[..first.start].matches('\n').count() + 1;
+            let line = source.line(first);
             let d = problems.add(
                 source,
                 &entry.key_span,
@@ -459,20 +456,20 @@ pub fn unknown_key<'n>(
         .suggest(&entry.key, names);
 }
 
-/// Reports a value out of its bounds.
-pub fn out_of_bounds(
+/// Reports a value out of its bounds and returns the finding, to say more about it.
+pub fn out_of_bounds<'p>(
     node: &Node,
     what: &str,
     expected: String,
     source: &Source,
-    problems: &mut Problems,
-) {
+    problems: &'p mut Problems,
+) -> &'p mut Diagnostic {
     let d = problems.add(
         source,
         &node.span,
         format!("`{what}` is {}", node.describe()),
     );
-    d.given(node.describe()).expected(expected);
+    d.given(node.describe()).expected(expected)
 }
 
 /// Reads a quantity or reports why it is none.

@@ -212,6 +212,37 @@ pub struct Source {
     pub folder: Utf8PathBuf,
     /// Its text.
     pub text: Arc<String>,
+    /// What the command line puts into its tree. Places in these texts are counted on beyond the file's own, each text
+    /// from its `start`, so that a node of the tree knows by its span alone where it comes from.
+    pub set: Vec<SetText>,
+}
+
+/// A text of the command line, `STEP.PARAMETER=VALUE`.
+#[derive(Debug, Clone)]
+pub struct SetText {
+    /// Place of its first byte, beyond the end of the file.
+    pub start: usize,
+    /// As given.
+    pub text: Arc<String>,
+}
+
+impl Source {
+    /// Line (from 1) of a place in the file.
+    pub fn line(&self, span: &Span) -> usize {
+        line_column(&self.text, span.start).0
+    }
+
+    /// Adds a text of the command line and returns the place of its first byte.
+    pub fn add_set(&mut self, text: &str) -> usize {
+        let end = |s: &SetText| s.start + s.text.len();
+        // One byte apart, so that the end of one text is not the start of the next.
+        let start = self.set.last().map_or(self.text.len(), end) + 1;
+        self.set.push(SetText {
+            start,
+            text: Arc::new(text.to_owned()),
+        });
+        start
+    }
 }
 
 /// Collects findings.
@@ -229,18 +260,28 @@ impl Problems {
         span: &Span,
         message: impl Into<String>,
     ) -> &mut Diagnostic {
-        let (line, column) = line_column(&source.text, span.start);
+        let set = source.set.iter().rev().find(|s| s.start <= span.start);
+        let mut message = message.into();
+        let (file, text, span) = match set {
+            None => (source.name.clone(), &source.text, span.clone()),
+            Some(set) => {
+                message.push_str(&format!(" (given by `--set {}`)", set.text));
+                let span = span.start - set.start..span.end.max(span.start) - set.start;
+                ("--set".into(), &set.text, span)
+            }
+        };
+        let (line, column) = line_column(text, span.start);
         self.push(Diagnostic {
-            file: source.name.clone(),
+            file,
             line,
             column,
             severity: Severity::Error,
-            message: message.into(),
+            message,
             given: None,
             expected: None,
             help: None,
-            span: span.clone(),
-            text: Some(source.text.clone()),
+            span,
+            text: Some(text.clone()),
         })
     }
 

@@ -64,6 +64,7 @@ fn read(given: &str, at: &Node, from: &Source, problems: &mut Problems) -> Optio
         name: path,
         folder,
         text: Arc::new(text),
+        set: Vec::new(),
     };
     // JSON is YAML, and the YAML reader knows where everything stands; but it takes more than other programs do.
     if let Err(e) = serde_json::from_str::<serde::de::IgnoredAny>(&source.text) {

@@ -5,6 +5,7 @@ use crate::check::Checker;
 use crate::diagnostics::{Diagnostics, Problems, Source};
 use crate::evidence::{Evidence, Resolution};
 use crate::expect;
+use crate::hints::other_format;
 use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
 use crate::resolved::{FailurePolicy, ResolvedStep, ResolvedWorkflow, Resources};
@@ -48,7 +49,7 @@ pub fn load(path: &Utf8Path, catalog: &dyn Catalog) -> Result<ResolvedWorkflow, 
 /// As [`load`], with parameters from the command line in place of the file's.
 ///
 /// # Errors
-/// As [`load`]; what is wrong with an overriding value is found at the name of its step.
+/// As [`load`]; what is wrong with an overriding value is found in its own text, as in a file called `--set`.
 pub fn load_with(
     path: &Utf8Path,
     catalog: &dyn Catalog,
@@ -84,8 +85,12 @@ fn load_into(
     overrides: &[Override],
     problems: &mut Problems,
 ) -> Option<(ResolvedWorkflow, Vec<Utf8PathBuf>)> {
-    let (source, mut root) = open(path, problems)?;
-    overrides::apply(&mut root, overrides, &source, problems);
+    let (mut source, mut root) = open(path, problems)?;
+    let wanted = "a workflow file, with `plyflow: 1`, `name` and `steps`";
+    if other_format(&root, "plyflow", wanted, &source, problems) {
+        return None;
+    }
+    overrides::apply(&mut root, overrides, &mut source, problems);
     Checker::new(&WORKFLOW, &source, problems).check(&root, "the workflow");
     plugin_folders(&root, &source, problems);
     let drafts = drafts(&root, &source, catalog, problems);

@@ -1,14 +1,34 @@
 //! Parameters given on the command line in place of the file's.
 
 use crate::diagnostics::{Problems, Source};
-use crate::yaml::{Entry, Kind, Node, parse};
+use crate::yaml::{Entry, Kind, Node, Span, parse};
 
-/// `STEP.PARAMETER=VALUE`, the value written as in YAML.
+/// `STEP.PARAMETER=VALUE`, the value written as in YAML. Places are those in this text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Override {
-    step: String,
-    path: Vec<String>,
+    text: String,
+    step: Word,
+    path: Vec<Word>,
     value: Node,
+}
+
+/// A name and where it stands.
+#[derive(Debug, Clone, PartialEq)]
+struct Word {
+    name: String,
+    span: Span,
+}
+
+impl Word {
+    /// The text from `start` without the blanks around it.
+    fn at(start: usize, text: &str) -> Self {
+        let name = text.trim();
+        let start = start + (text.len() - text.trim_start().len());
+        Self {
+            name: name.to_owned(),
+            span: start..start + name.len(),
+        }
+    }
 }
 
 impl std::str::FromStr for Override {
@@ -20,39 +40,83 @@ impl std::str::FromStr for Override {
         let (target, value) = text
             .split_once('=')
             .ok_or_else(|| format!("no `=`; {wanted}"))?;
-        let mut words = target.split('.').map(|w| w.trim().to_owned());
-        let step = words.next().unwrap_or_default();
-        let path: Vec<String> = words.collect();
-        if step.is_empty() || path.is_empty() || path.iter().any(String::is_empty) {
+        let mut start = 0;
+        let mut words = target.split('.').map(|w| {
+            let word = Word::at(start, w);
+            start += w.len() + 1;
+            word
+        });
+        let step = words.next().unwrap_or_else(|| Word::at(0, ""));
+        let path: Vec<Word> = words.collect();
+        if step.name.is_empty() || path.is_empty() || path.iter().any(|w| w.name.is_empty()) {
             return Err(format!(
                 "`{target}` does not name a parameter of a step; {wanted}"
             ));
         }
-        let value = parse(value).map_err(|e| format!("the value is no YAML: {}", e.message))?;
-        Ok(Self { step, path, value })
+        let mut node = parse(value).map_err(|e| format!("the value is no YAML: {}", e.message))?;
+        shift(&mut node, target.len() + 1);
+        Ok(Self {
+            text: text.to_owned(),
+            step,
+            path,
+            value: node,
+        })
     }
 }
 
-/// Puts the overrides into the tree of a workflow. What is wrong with a value is later reported at the
-/// name of its step.
+/// Moves all places of a tree on by some bytes.
+fn shift(node: &mut Node, by: usize) {
+    let moved = |span: &Span| span.start + by..span.end + by;
+    node.span = moved(&node.span);
+    match &mut node.kind {
+        Kind::List(items) => items.iter_mut().for_each(|item| shift(item, by)),
+        Kind::Map(entries) => {
+            for entry in entries {
+                entry.key_span = moved(&entry.key_span);
+                shift(&mut entry.value, by);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Puts the overrides into the tree of a workflow. What is wrong with one is later reported in its own text.
 pub(crate) fn apply(
     root: &mut Node,
     overrides: &[Override],
-    source: &Source,
+    source: &mut Source,
     problems: &mut Problems,
 ) {
     for given in overrides {
-        let step = child(root, "steps").and_then(|steps| child(steps, &given.step));
+        let start = source.add_set(&given.text);
+        let on = |w: &Word| Word {
+            name: w.name.clone(),
+            span: w.span.start + start..w.span.end + start,
+        };
+        let wanted = on(&given.step);
+        let steps = child(root, "steps");
+        let names: Vec<String> = (steps.iter())
+            .flat_map(|s| s.entries().iter().map(|e| e.key.clone()))
+            .collect();
+        let step = steps.and_then(|steps| child(steps, &wanted.name));
         let Some(step) = step else {
-            let message = format!("--set names the step `{}`, which is not here", given.step);
-            problems.add(source, &(0..0), message);
+            let message = format!("there is no step `{}`", wanted.name);
+            let d = problems.add(source, &wanted.span, message);
+            d.given(wanted.name.as_str())
+                .suggest(&wanted.name, names.iter().map(String::as_str));
             continue;
         };
-        set(
-            step,
-            std::iter::once("with").chain(given.path.iter().map(String::as_str)),
-            &given.value,
-        );
+        let mut value = given.value.clone();
+        shift(&mut value, start);
+        // A `with` that the file lacks is not in the text either: what is missing in it is missing in the step.
+        let with = Word {
+            name: "with".into(),
+            span: step.span.start..step.span.start,
+        };
+        let path: Vec<Word> = std::iter::once(with)
+            .chain(given.path.iter().map(on))
+            .collect();
+        set(step, &path, value);
     }
 }
 
@@ -67,32 +131,31 @@ fn child<'n>(node: &'n mut Node, key: &str) -> Option<&'n mut Node> {
         .map(|e| &mut e.value)
 }
 
-fn set<'p>(node: &mut Node, mut path: impl Iterator<Item = &'p str>, value: &Node) {
-    let Some(key) = path.next() else {
-        // The value's own place is on the command line: show where it went instead.
-        let span = node.span.clone();
-        *node = Node::from_json(&value.to_json(), &span);
+fn set(node: &mut Node, path: &[Word], value: Node) {
+    let Some((word, path)) = path.split_first() else {
+        *node = value;
         return;
     };
     if !matches!(node.kind, Kind::Map(_)) {
-        node.kind = Kind::Map(Vec::new());
+        *node = Node {
+            kind: Kind::Map(Vec::new()),
+            span: word.span.clone(),
+        };
     }
-    let span = node.span.start..node.span.start;
     let Kind::Map(entries) = &mut node.kind else {
         return;
     };
     let at = entries
         .iter()
-        .rposition(|e| e.key == key)
+        .rposition(|e| e.key == word.name)
         .unwrap_or_else(|| {
-            let value = Node {
-                kind: Kind::Null,
-                span: span.clone(),
-            };
             entries.push(Entry {
-                key: key.to_owned(),
-                key_span: span,
-                value,
+                key: word.name.clone(),
+                key_span: word.span.clone(),
+                value: Node {
+                    kind: Kind::Null,
+                    span: word.span.clone(),
+                },
             });
             entries.len() - 1
         });
@@ -108,17 +171,18 @@ mod tests {
     fn an_override_replaces_or_adds_a_parameter_at_any_depth() {
         let mut root =
             parse("steps:\n  a:\n    plugin: p\n    with: {x: 1 mm}\n  b: {plugin: p}\n").unwrap();
-        let source = Source {
+        let mut source = Source {
             name: "w.yaml".into(),
             folder: "/".into(),
             text: std::sync::Arc::new(String::new()),
+            set: Vec::new(),
         };
         let mut problems = Problems::default();
         let list: Vec<Override> = ["a.x=2 mm", "b.y.z=[1, 2]"]
             .iter()
             .map(|t| t.parse().unwrap())
             .collect();
-        apply(&mut root, &list, &source, &mut problems);
+        apply(&mut root, &list, &mut source, &mut problems);
         assert_eq!(problems.count(), 0);
         let json = root.to_json();
         assert_eq!(json["steps"]["a"]["with"], json!({"x": "2 mm"}));
@@ -126,7 +190,7 @@ mod tests {
         apply(
             &mut root,
             &["c.x=1".parse().unwrap()],
-            &source,
+            &mut source,
             &mut problems,
         );
         assert_eq!(problems.count(), 1);

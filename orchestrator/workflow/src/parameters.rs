@@ -4,6 +4,7 @@
 use crate::catalog::{CatalogEntry, CatalogError, Plugins};
 use crate::check::{choice, out_of_bounds, quantity};
 use crate::diagnostics::{Problems, Source};
+use crate::hints::{list_help, number_help};
 use crate::resolved::{InputFile, PluginId};
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
@@ -186,15 +187,15 @@ impl<'a> Resolver<'a> {
         let message = format!("`{}` is {}", at.what, node.describe());
         let d = self.problems.add(at.source, span, message);
         d.given(node.describe()).expected(expected);
-        match node.kind {
+        d.help = match node.kind {
             Kind::Number(_) | Kind::Bool(_) if expected == "text" => {
-                d.help("put it in quotes");
+                Some("put it in quotes".into())
             }
-            Kind::Text(ref t) if expected.contains("number") && t.parse::<f64>().is_ok() => {
-                d.help("remove the quotes");
-            }
-            _ => {}
-        }
+            _ if expected == "a whole number" => number_help(node, true),
+            _ if expected.starts_with("a plain number") => number_help(node, false),
+            _ if expected.starts_with("a list") => list_help(node, &at.what),
+            _ => None,
+        };
         None
     }
 
@@ -208,7 +209,8 @@ impl<'a> Resolver<'a> {
 
     fn list(&mut self, node: &Node, of: &Declaration, at: &Place<'_>) -> Option<Value> {
         let Kind::List(items) = &node.kind else {
-            return self.wrong(node, at, "a list");
+            let expected = format!("a list, each item {}", of.shape.expected());
+            return self.wrong(node, at, &expected);
         };
         // All items are looked at before the first wrong one makes the list wrong.
         let resolved: Vec<Option<Value>> = items
@@ -227,7 +229,8 @@ impl<'a> Resolver<'a> {
 
     fn map(&mut self, node: &Node, of: &Declaration, at: &Place<'_>) -> Option<Value> {
         let Kind::Map(entries) = &node.kind else {
-            return self.wrong(node, at, "a mapping");
+            let expected = format!("a mapping of names, each {}", of.shape.expected());
+            return self.wrong(node, at, &expected);
         };
         let resolved: Vec<Option<(String, Value)>> = entries
             .iter()

@@ -2,6 +2,7 @@
 
 use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
+use crate::hints::other_format;
 use crate::parameters::{Place, Resolver, absolute, find, unreadable};
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
@@ -47,6 +48,7 @@ pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Opti
         name: path,
         folder,
         text: Arc::new(text),
+        set: Vec::new(),
     };
     match crate::yaml::parse(&source.text) {
         Ok(node) => {
@@ -99,6 +101,10 @@ pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Opti
 
 fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
     let before = resolver.problems.count();
+    let wanted = "a scene, with `plyflow_scene: 1`";
+    if other_format(node, "plyflow_scene", wanted, at.source, resolver.problems) {
+        return None;
+    }
     Checker::new(&SCENE, at.source, resolver.problems).check(node, "the scene");
     rules(node, at.source, resolver.problems);
     let tool = stl_file(resolver, node, at);
@@ -186,6 +192,16 @@ fn material_file(
 
 fn checked_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
     let before = resolver.problems.count();
+    let wanted = "a material, with `plyflow_material: 1`";
+    if other_format(
+        node,
+        "plyflow_material",
+        wanted,
+        at.source,
+        resolver.problems,
+    ) {
+        return None;
+    }
     Checker::new(&MATERIAL, at.source, resolver.problems).check(node, "the material");
     let sound = resolver.problems.count() == before;
     material_value(resolver, node, at, sound)
@@ -309,8 +325,9 @@ fn material_value(
 /// a broken rule.
 fn rules(scene: &Node, source: &Source, problems: &mut Problems) {
     sheet_rules(scene, source, problems);
-    friction_rules(scene, source, problems);
+    crate::friction::rules(scene, source, problems);
     symmetry_rules(scene, source, problems);
+    crate::process::rules(scene, source, problems);
     let Some(tool) = scene.get("tool") else {
         return;
     };
@@ -339,39 +356,6 @@ fn symmetry_rules(scene: &Node, source: &Source, problems: &mut Problems) {
     }
 }
 
-/// Coefficients of the surfaces that touch in this stack and process.
-fn friction_rules(scene: &Node, source: &Source, problems: &mut Problems) {
-    let (Some(entry), Some(sheets)) = (scene.entry("friction"), scene.get("sheets")) else {
-        return;
-    };
-    if !matches!(entry.value.kind, Kind::Map(_)) {
-        return;
-    }
-    let count = |kind: &str| {
-        let of = |s: &&Node| s.get("kind").and_then(Node::text) == Some(kind);
-        sheets.items().iter().filter(of).count()
-    };
-    let press = scene
-        .get("process")
-        .is_some_and(|p| p.get("press").is_some());
-    let films = count("diaphragm") > 0;
-    let why_films = "the stack has diaphragms";
-    for (name, needed, why) in [
-        ("tool_diaphragm", films, why_films),
-        ("fabric_diaphragm", films, why_films),
-        ("diaphragm_diaphragm", films, why_films),
-        ("fabric_fabric", count("ply") > 1, "plies lie on each other"),
-        ("tool_fabric", press, "a press touches the plies"),
-    ] {
-        if needed && entry.value.get(name).is_none() {
-            let message = format!("`{name}` is missing in `friction`");
-            let d = problems.add(source, &entry.key_span, message);
-            d.expected(format!("`{name}: ..`"))
-                .help(format!("it is needed because {why}"));
-        }
-    }
-}
-
 fn sheet_rules(scene: &Node, source: &Source, problems: &mut Problems) {
     let Some(entry) = scene.entry("sheets") else {
         return;
@@ -381,14 +365,16 @@ fn sheet_rules(scene: &Node, source: &Source, problems: &mut Problems) {
         d.expected("at least one sheet")
             .help("list plies and diaphragms from the tool upwards");
     }
-    let mut names: Vec<&str> = vec!["tool"];
+    // What is rigid is a body of the artifact, or a part that rubs, under its own name.
+    let mut names: Vec<&str> = vec!["tool", "bed", "die", "holder"];
     for sheet in entry.value.items() {
         if let Some(node) = sheet.get("name") {
             let name = node.text().unwrap_or_default();
             if names.contains(&name) {
                 let d = problems.add(source, &node.span, format!("the name `{name}` is taken"));
-                d.given(name)
-                    .expected("a name of its own for every sheet, other than `tool`");
+                d.given(name).expected(
+                    "a name of its own for every sheet, other than `tool`, `bed`, `die` and `holder`",
+                );
             } else if !is_word(name) {
                 let d = problems.add(source, &node.span, format!("`{name}` cannot name a body"));
                 d.given(name).expected("letters, digits, `_` and `-`");

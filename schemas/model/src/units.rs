@@ -7,7 +7,7 @@
 mod parse;
 mod quantity;
 
-pub use parse::{Unit, parse_quantity, parse_quantity_in, parse_unit};
+pub use parse::{Unit, parse_quantity, parse_quantity_in, parse_unit, plain_number};
 pub use quantity::{
     Acceleration, Angle, Area, ArealMass, Curvature, Density, Energy, Force, ForcePerLength,
     Frequency, Length, Mass, Moment, Number, Pressure, QUANTITY_PATTERN, Temperature, Time,
@@ -222,6 +222,16 @@ pub enum UnitError {
         /// Expected.
         dimension: Option<Dimension>,
     },
+    /// A comma inside the number.
+    #[error("`{text}` has a comma in its number; expected {}", expected(*.dimension))]
+    Comma {
+        /// As given.
+        text: String,
+        /// What to write: with a decimal point, and without a sign where the comma may separate thousands.
+        written: Vec<String>,
+        /// Expected.
+        dimension: Option<Dimension>,
+    },
     /// A number without unit.
     #[error("`{text}` has no unit; expected {}", expected(*.dimension))]
     MissingUnit {
@@ -265,6 +275,7 @@ impl UnitError {
     pub fn reason(&self) -> String {
         match self {
             UnitError::BadNumber { text, .. } => format!("`{text}` does not begin with a number"),
+            UnitError::Comma { text, .. } => format!("`{text}` has a comma in its number"),
             UnitError::MissingUnit { text, .. } => format!("`{text}` has no unit"),
             UnitError::UnknownUnit { text, unit, .. } if text == unit => {
                 format!("unknown unit `{unit}`")
@@ -287,6 +298,13 @@ impl UnitError {
         };
         match self {
             UnitError::BadNumber { dimension, .. } => write(*dimension),
+            UnitError::Comma { written, .. } => {
+                let written: Vec<String> = written.iter().map(|w| format!("`{w}`")).collect();
+                format!(
+                    "decimals have a point, thousands no sign: write {}",
+                    written.join(" or ")
+                )
+            }
             UnitError::MissingUnit { text, dimension } => match dimension {
                 Some(Dimension::Dimensionless) => "write a plain number".into(),
                 Some(d) => {

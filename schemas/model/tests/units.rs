@@ -123,6 +123,44 @@ fn an_unknown_unit_suggests_the_nearest_of_the_wanted_dimension() {
 }
 
 #[test]
+fn a_comma_in_a_number_is_told_with_what_to_write() {
+    for (text, help) in [
+        ("5,5 mm", "write `5.5 mm`"),
+        ("-0,250 mm", "write `-0.250 mm`"),
+        ("1,500 mm", "write `1.500 mm` or `1500 mm`"),
+        ("1,234.5 mm", "write `1234.5 mm`"),
+        ("1,234,567 mm", "write `1234567 mm`"),
+    ] {
+        let e = parse_quantity(text, Dimension::Length).unwrap_err();
+        let says = format!("`{text}` has a comma in its number");
+        assert_eq!(e.reason(), says);
+        assert!(
+            e.to_string().contains("expected a length such as `5 mm`"),
+            "{e}"
+        );
+        assert!(e.help().ends_with(help), "{text}: {}", e.help());
+    }
+    // A comma elsewhere is no part of a number.
+    let e = parse_quantity("5 mm,", Dimension::Length).unwrap_err();
+    assert!(matches!(e, UnitError::UnknownUnit { .. }), "{e}");
+}
+
+#[test]
+fn what_is_meant_by_a_plain_number_with_per_cent_or_comma_is_known() {
+    for (text, meant) in [
+        ("1 %", Some("0.01")),
+        ("12.5%", Some("0.125")),
+        ("0,5", Some("0.5")),
+        ("1,5 %", Some("0.015")),
+        ("1,000", None),
+        ("0.5 N", None),
+        ("half", None),
+    ] {
+        assert_eq!(plain_number(text).as_deref(), meant, "{text}");
+    }
+}
+
+#[test]
 fn garbage_is_refused() {
     for text in [
         "",

@@ -4,11 +4,13 @@
 mod cut;
 mod grid;
 mod late;
+mod place;
 mod pull;
 
 pub use cut::Placed;
 pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
 
+use place::Place;
 use pull::{FORCES, Pull};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
@@ -164,19 +166,46 @@ fn first_frame(
     }
 }
 
-/// The zone at the step's own place in the fan-out.
+/// The zone at the step's own place in the fan-out over the zones.
 fn own_zone(host: &Host) -> Result<Value, StepError> {
-    let input = host.input("zones")?;
+    let (input, formed) = (host.input("zones")?, host.input("formed")?);
     let attributes: Value = host.attributes(&input)?;
     let zones = attributes["zones"].as_array().cloned().unwrap_or_default();
-    let index = match host.item()?.last() {
-        Some(&i) => i as usize,
+    let item = host.item()?;
+    let run: Value = host.attributes(&formed)?;
+    let place = match place::of_zone(&item, &input.item, &formed.item) {
+        Place::One(index) => Some(index),
+        // The coarse run has all of the places: one of them is the zone's when it is the run of a zone.
+        Place::None => item.last().map(|&i| i as usize).filter(|&i| {
+            let own = &run["zone"]["name"];
+            own.is_string() && zones.get(i).is_some_and(|z| z["name"] == *own)
+        }),
+        Place::Several if zones.len() == 1 => None,
+        Place::Several => {
+            return Err(format!(
+                "which place of this step's item {item:?} is that of the zone cannot be told: it is fanned out over several collections of which '{}' (item {:?}) has \
+                 too few. Fan it out over the zones alone, or take `formed` from a run that is fanned out over all the others, and name the zone last, as in \
+                 `for_each: {{pass: feedback, zone: {}}}` with the coarse run of that pass",
+                formed.step, formed.item, input.step
+            )
+            .into());
+        }
+    };
+    let index = match place {
+        Some(index) => index,
         None if zones.len() == 1 => 0,
         None => {
+            let (step, n) = (&input.step, zones.len());
+            let remedy = if item.is_empty() {
+                format!("give it `for_each: {{zone: {step}}}`")
+            } else {
+                let over = &formed.step;
+                format!(
+                    "all places of its item {item:?} are those of '{over}'. Add `zone: {step}` to its `for_each`, as the last"
+                )
+            };
             return Err(format!(
-                "'{}' holds {} zones and this step is not fanned out over them; give it `for_each`",
-                input.step,
-                zones.len()
+                "'{step}' holds {n} zones and this step is not fanned out over them; {remedy}"
             )
             .into());
         }

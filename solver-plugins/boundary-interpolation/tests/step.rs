@@ -101,9 +101,23 @@ fn interpolate(
     parameters: Value,
     item: &[u64],
 ) -> Result<MemoryArtifact, String> {
+    of_pass(formed, parameters, item, &[])
+}
+
+/// The coarse run is that of a pass of zone-feedback.
+fn of_pass(
+    formed: &MemoryArtifact,
+    parameters: Value,
+    item: &[u64],
+    pass: &[u64],
+) -> Result<MemoryArtifact, String> {
     let zones = zones();
     let inputs = [
-        MemoryInput::new("formed", formed),
+        MemoryInput {
+            step: "coarse_2",
+            item: pass,
+            ..MemoryInput::new("formed", formed)
+        },
         MemoryInput::new("zones", &zones),
     ];
     run::<BoundaryInterpolation>(parameters, &inputs, item)
@@ -111,7 +125,7 @@ fn interpolate(
 
 #[test]
 fn driven_nodes_follow_the_coarse_motion_in_place_and_velocity() {
-    let out = interpolate(&coarse(0.0), json!({"element_size": 0.0025}), &[0, 1]).unwrap();
+    let out = interpolate(&coarse(0.0), json!({"element_size": 0.0025}), &[1]).unwrap();
     assert_eq!(out.attributes["zone"]["name"], "B");
     let body = out.body("ply_1");
     assert!(
@@ -226,7 +240,7 @@ fn a_zone_finds_the_frame_before_its_ply_is_bent() {
 
 #[test]
 fn normals_at_the_cut_are_those_of_the_coarse_surface_and_turn_with_it() {
-    let out = interpolate(&coarse(0.0), json!({"element_size": 0.004}), &[0, 1]).unwrap();
+    let out = interpolate(&coarse(0.0), json!({"element_size": 0.004}), &[1]).unwrap();
     let body = out.body("ply_1");
     let (shape, nodes) = &out.arrays["ply_1/driven_nodes"];
     let k = shape[0];
@@ -381,6 +395,48 @@ fn a_cut_that_gives_way_is_told_what_its_surroundings_pull_with() {
     }
     // Films are not pulled at.
     assert!(!out.arrays.contains_key("film_low/pull"));
+}
+
+#[test]
+fn the_zone_is_told_from_the_pass_in_whichever_order_a_step_is_fanned_out() {
+    let mut formed = coarse(0.0);
+    let size = json!({"element_size": 0.01});
+    let zone = |item: &[u64], pass: &[u64]| {
+        let out = of_pass(&formed, size.clone(), item, pass).unwrap();
+        out.attributes["zone"]["name"].clone()
+    };
+    for (zones, name) in [(0, "A"), (1, "B")] {
+        assert_eq!(
+            zone(&[0, zones], &[0]),
+            name,
+            "{{pass: feedback, zone: zones}}"
+        );
+        assert_eq!(
+            zone(&[zones, 0], &[0]),
+            name,
+            "{{zone: zones, pass: feedback}}"
+        );
+        assert_eq!(zone(&[0, zones, 0], &[0, 0]), name);
+    }
+    // Over the passes alone: zone A would be built as if it had been asked for.
+    let error = of_pass(&formed, size.clone(), &[0], &[0]).unwrap_err();
+    assert!(
+        error.contains("[0] are those of 'coarse_2'")
+            && error.contains("Add `zone: zones` to its `for_each`"),
+        "{error}"
+    );
+    // Over something of which the coarse run knows nothing.
+    let error = of_pass(&formed, size.clone(), &[0, 1], &[]).unwrap_err();
+    assert!(
+        error.contains("item [0, 1]")
+            && error.contains("`for_each: {pass: feedback, zone: zones}`"),
+        "{error}"
+    );
+    // A run of the zone itself may drive a finer one.
+    formed.attributes["zone"] = json!({"name": "B"});
+    let out = of_pass(&formed, size.clone(), &[1], &[1]).unwrap();
+    assert_eq!(out.attributes["zone"]["name"], "B");
+    assert!(of_pass(&formed, size, &[0], &[0]).is_err());
 }
 
 #[test]

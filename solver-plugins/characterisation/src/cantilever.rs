@@ -5,6 +5,9 @@ use serde::Deserialize;
 /// The angle of the standard (rad): 41.5 degrees.
 pub const STANDARD_ANGLE: f64 = 41.5 * std::f64::consts::PI / 180.0;
 
+/// Overhangs of a strip of fabric (m): what lies outside is a wrong unit.
+pub const PLAUSIBLE_OVERHANG: [f64; 2] = [1e-3, 2.0];
+
 /// How an overhang becomes a stiffness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]

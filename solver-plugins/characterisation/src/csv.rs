@@ -43,7 +43,17 @@ pub struct Table {
     pub source: String,
     /// Line in the file (from 1) of each row.
     pub lines: Vec<usize>,
-    columns: Vec<(&'static str, Vec<f64>)>,
+    columns: Vec<Values>,
+}
+
+/// A column that was read.
+#[derive(Debug, Clone, PartialEq)]
+struct Values {
+    name: &'static str,
+    /// Unit of the header.
+    unit: String,
+    /// SI.
+    values: Vec<f64>,
 }
 
 impl Table {
@@ -51,8 +61,8 @@ impl Table {
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         self.columns
             .iter()
-            .find(|c| c.0 == name)
-            .map(|c| c.1.as_slice())
+            .find(|c| c.name == name)
+            .map(|c| c.values.as_slice())
     }
 
     /// Values of a column that was asked for as required.
@@ -76,6 +86,30 @@ impl Table {
             self.source,
             self.lines.get(row).copied().unwrap_or(0)
         )
+    }
+
+    /// Refuses a length (m) outside of `range` (m), as a wrong unit in the header makes it: a law would come of it that is
+    /// wrong by powers of ten. `what` it is of.
+    ///
+    /// # Errors
+    /// Says the row, the value, the unit of the header and what is plausible.
+    pub fn plausible_length(&self, name: &str, range: [f64; 2], what: &str) -> Result<(), String> {
+        let Some(column) = self.columns.iter().find(|c| c.name == name) else {
+            return Ok(());
+        };
+        let outside = |v: &f64| !(range[0]..=range[1]).contains(&v.abs());
+        let Some(row) = column.values.iter().position(outside) else {
+            return Ok(());
+        };
+        let unit = &column.unit;
+        Err(format!(
+            "{}: column '{name} [{unit}]': {} m is not plausible for {what}; expected {} mm to {} m: is [{unit}] the unit \
+             of the numbers? If not, change it in the header, to `{name} [mm]`, say",
+            self.place(row),
+            column.values[row],
+            1e3 * range[0],
+            range[1]
+        ))
     }
 
     /// Refuses a table with too few rows.
@@ -132,12 +166,29 @@ pub fn parse(text: &str, source: &str, wanted: &[Column]) -> Result<Table, Strin
         );
         return Err(text);
     }
+    // What spreadsheets write where the comma is the decimal sign.
+    for (sign, word) in [(';', "semicolons"), ('\t', "tabs")] {
+        if header.contains(sign) && !header.contains(',') {
+            return Err(format!(
+                "{source}:{header_line}: the columns of `{}` are separated by {word}; expected commas between columns and a \
+                 point in decimals, below {}",
+                header.replace('\t', " "),
+                expected()
+            ));
+        }
+    }
     let heads: Vec<(&str, &str)> = header.split(',').map(split_head).collect();
     let picked = pick(&heads, wanted, source, header_line)?;
     let mut table = Table {
         source: source.to_owned(),
         lines: Vec::new(),
-        columns: picked.iter().map(|p| (p.1.name, Vec::new())).collect(),
+        columns: (picked.iter())
+            .map(|(_, column, unit)| Values {
+                name: column.name,
+                unit: (*unit).to_owned(),
+                values: Vec::new(),
+            })
+            .collect(),
     };
     for (line, row) in lines {
         let cells: Vec<&str> = row.split(',').map(str::trim).collect();
@@ -147,10 +198,10 @@ pub fn parse(text: &str, source: &str, wanted: &[Column]) -> Result<Table, Strin
                 "{source}:{line}: {n} values where the header names {m} columns; values are separated by commas, decimals by a point"
             ));
         }
-        for ((index, column, unit), (_, values)) in picked.iter().zip(&mut table.columns) {
+        for ((index, column, unit), into) in picked.iter().zip(&mut table.columns) {
             let value = value(cells[*index], unit, column.dimension)
                 .map_err(|e| format!("{source}:{line}: column '{}': {e}", column.name))?;
-            values.push(value);
+            into.values.push(value);
         }
         table.lines.push(line);
     }
@@ -300,6 +351,39 @@ mod tests {
     fn a_row_of_another_length_is_located() {
         let e = error("displacement [mm],force [N]\n1,2\n1,5,2\n");
         assert!(e.starts_with("t.csv:3: 3 values"), "{e}");
+    }
+
+    #[test]
+    fn semicolons_and_tabs_between_columns_are_told_with_what_to_write() {
+        for (text, word) in [
+            ("displacement [mm];force [N]\n0,5;1,2\n", "semicolons"),
+            ("# c\ndisplacement [mm]\tforce [N]\n1\t2\n", "tabs"),
+        ] {
+            let e = error(text);
+            assert!(
+                e.contains(word)
+                    && e.contains("expected commas between columns and a point in decimals"),
+                "{e}"
+            );
+            assert!(e.contains("displacement [mm],force [N]"), "{e}");
+        }
+    }
+
+    #[test]
+    fn a_length_that_is_not_plausible_is_told_with_the_unit_of_its_column() {
+        let table = |text: &str| parse(text, "t.csv", &WANTED[..1]).unwrap();
+        let judge = |t: Table| t.plausible_length("displacement", [1e-3, 2.0], "a strip");
+        assert!(judge(table("displacement [mm]\n1\n-2000\n")).is_ok());
+        for (text, says) in [
+            (
+                "displacement [m]\n1\n97.0\n",
+                "t.csv:3: column 'displacement [m]': 97 m",
+            ),
+            ("displacement [mm]\n0.097\n", "expected 1 mm to 2 m"),
+        ] {
+            let e = judge(table(text)).unwrap_err();
+            assert!(e.contains(says) && e.contains("for a strip"), "{e}");
+        }
     }
 
     #[test]

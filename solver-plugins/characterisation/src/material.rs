@@ -4,6 +4,9 @@ use plyflow_model::material::Material;
 use plyflow_sdk::{Host, StepError};
 use serde_json::{Map, Value, json};
 
+/// The plugin whose parameters a characterisation tells.
+const FABRIC: &str = "material-fabric";
+
 /// A complete material file that new numbers are put into.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Template {
@@ -18,7 +21,8 @@ impl Template {
     /// Reads a material file's text.
     ///
     /// # Errors
-    /// When it is no YAML or no material.
+    /// When it is no YAML, no material, or none of a fabric: the blocks of a characterisation are parameters of
+    /// `material-fabric`, and no other material would take them.
     pub fn parse(text: &str, origin: &str) -> Result<Self, String> {
         let mut options = serde_saphyr::Options::default();
         options.strict_booleans = true;
@@ -29,6 +33,13 @@ impl Template {
         let Value::Object(value) = value else {
             return Err(format!("{origin}: is no material file"));
         };
+        if !is_fabric(&material.plugin) {
+            return Err(format!(
+                "{origin}: its plugin is `{}`, which has no shear and bending laws of a fabric to put new numbers into; \
+                 expected a material file with `plugin: material-fabric`",
+                material.plugin
+            ));
+        }
         Ok(Self {
             value,
             origin: origin.into(),
@@ -76,6 +87,12 @@ impl Template {
             }
         }
     }
+}
+
+/// Whether a material plugin, by name or path, is `material-fabric`.
+fn is_fabric(plugin: &str) -> bool {
+    let file = plugin.rsplit('/').next().unwrap_or(plugin);
+    plugin == FABRIC || (file != plugin && file.replace('_', "-").contains(FABRIC))
 }
 
 /// The areal mass of a test: the parameter, else that of the template.
@@ -361,6 +378,19 @@ mod tests {
                 .unwrap_err()
                 .contains("x: is no material file")
         );
+        let other = |plugin: &str| {
+            let text = NCF.replace("plugin: material-fabric", &format!("plugin: {plugin}"));
+            Template::parse(&text, "x")
+        };
+        for plugin in ["material-marlow", "material-isotropic", "./libother.so"] {
+            let e = other(plugin).unwrap_err();
+            assert!(
+                e.starts_with(&format!("x: its plugin is `{plugin}`"))
+                    && e.contains("`plugin: material-fabric`"),
+                "{e}"
+            );
+        }
+        assert!(other("../target/release/libplyflow_material_fabric.so").is_ok());
         assert!(areal_mass(None, None).unwrap_err().contains("areal_mass"));
     }
 }

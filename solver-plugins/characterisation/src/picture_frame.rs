@@ -9,6 +9,13 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 /// Highest degree of a shear polynomial that `material-fabric` takes.
 pub const MAXIMUM_DEGREE: usize = 9;
+/// A force at zero shear of more than this part of the largest is taken for an offset of the load cell: the yarns' polynomial
+/// is 0 there, whatever was measured.
+pub const LARGEST_OFFSET: f64 = 0.1;
+/// Shear angle (rad) up to which a test tells the force at zero shear ..
+const START: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// .. by at least so many rows.
+const FEWEST_START_ROWS: usize = 5;
 /// A test with fewer rows is refused.
 pub const FEWEST_ROWS: usize = 20;
 
@@ -84,6 +91,35 @@ impl Test {
             ));
         }
         Ok(test)
+    }
+
+    /// Force at the square frame over the largest force, both by size: an offset of the load cell, when it is not small.
+    /// It is where a straight line through the first rows meets zero shear, so that a steep start counts for nothing.
+    /// 0 where the test begins beyond all of those rows.
+    pub fn offset(&self) -> f64 {
+        let mut rows: Vec<(f64, f64)> = (self.angle.iter().copied())
+            .zip(self.force.iter().copied())
+            .collect();
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let near = rows.partition_point(|r| r.0 <= START);
+        rows.truncate(near.max(FEWEST_START_ROWS));
+        if rows.first().is_none_or(|r| r.0 > START) {
+            return 0.0;
+        }
+        let n = rows.len() as f64;
+        let [mean_angle, mean_force] = [|r: &(f64, f64)| r.0, |r: &(f64, f64)| r.1]
+            .map(|f| rows.iter().map(f).sum::<f64>() / n);
+        let square = rows.iter().map(|r| (r.0 - mean_angle).powi(2)).sum::<f64>();
+        let product = (rows.iter())
+            .map(|r| (r.0 - mean_angle) * (r.1 - mean_force))
+            .sum::<f64>();
+        let slope = if square > 0.0 { product / square } else { 0.0 };
+        let largest = self.force.iter().fold(0.0f64, |m, f| m.max(f.abs()));
+        if largest > 0.0 {
+            (mean_force - slope * mean_angle).abs() / largest
+        } else {
+            0.0
+        }
     }
 
     fn largest_angle(&self) -> f64 {

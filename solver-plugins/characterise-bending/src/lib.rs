@@ -1,6 +1,7 @@
 //! Step plugin `characterise-bending`: the law M(k) from the profile of a revised cantilever test.
 
 use plyflow_characterisation::bending::{Bending, characterise};
+use plyflow_characterisation::cantilever::PLAUSIBLE_OVERHANG;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
@@ -115,6 +116,11 @@ fn profiles(host: &Host, p: &Parameters) -> Result<(Vec<Profile>, Vec<String>), 
                     plyflow_characterisation::profile::FEWEST_POINTS,
                     "a profile",
                 )?;
+                // Not what is small: points near the clamp are.
+                for name in ["x", "z"] {
+                    let range = [0.0, PLAUSIBLE_OVERHANG[1]];
+                    table.plausible_length(name, range, "a strip of fabric")?;
+                }
                 let (x, z) = (table.values("x")?, table.values("z")?);
                 profiles.push(Profile::new(x, z, p.clamp_tolerance, &|i| table.place(i))?);
                 names.push(table.source.clone());

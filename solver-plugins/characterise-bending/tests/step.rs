@@ -241,6 +241,10 @@ fn bad_profiles_are_refused_with_file_and_line() {
             format!("x [mm],z [mm]\n{}20,-8\n", line(0.0)),
             "bad.csv:42: the points turn back",
         ),
+        (
+            format!("x [m],z [m]\n{}", line(0.0)),
+            "bad.csv:5: column 'x [m]': 3 m is not plausible for a strip of fabric",
+        ),
     ] {
         let e = refused(&text);
         assert!(e.contains(expected), "{e}");

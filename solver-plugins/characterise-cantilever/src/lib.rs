@@ -1,7 +1,9 @@
 //! Step plugin `characterise-cantilever`: constant bending stiffness from a standard cantilever test.
 
 use plyflow_characterisation::GRAVITY;
-use plyflow_characterisation::cantilever::{Formula, mean_and_deviation, stiffness};
+use plyflow_characterisation::cantilever::{
+    Formula, PLAUSIBLE_OVERHANG, mean_and_deviation, stiffness,
+};
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
@@ -45,6 +47,7 @@ impl Step for CharacteriseCantilever {
             let b = stiffness(p.formula, *overhang, angle, weight);
             stiffnesses.push(b.map_err(|e| format!("{}: {e}", table.place(i)))?);
         }
+        table.plausible_length("overhang", PLAUSIBLE_OVERHANG, "a strip of fabric")?;
         let [mean, deviation] = mean_and_deviation(&stiffnesses);
         let n = stiffnesses.len();
         let mut out = Output::default();

@@ -57,6 +57,22 @@ fn a_linear_law_replaces_the_block_of_the_template() {
 }
 
 #[test]
+fn a_template_that_is_no_fabric_is_refused() {
+    let (_folder, path) = file("overhang [mm]\n200\n");
+    let film = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../workflows/materials/stretchlon-ht350.yaml"
+    );
+    let parameters = json!({"overhangs": path, "template": film});
+    let e = run::<CharacteriseCantilever>(parameters, &[], &[]).unwrap_err();
+    assert!(
+        e.contains("stretchlon-ht350.yaml: its plugin is `material-marlow`")
+            && e.contains("material-fabric"),
+        "{e}"
+    );
+}
+
+#[test]
 fn bad_overhangs_are_refused_with_file_and_line() {
     for (text, parameters, expected) in [
         (
@@ -80,6 +96,16 @@ fn bad_overhangs_are_refused_with_file_and_line() {
             "o.csv:2: column 'overhang'",
         ),
         ("overhang [mm]\n", json!({}), "0 rows"),
+        (
+            "overhang [m]\n0.1\n97.0\n",
+            json!({}),
+            "o.csv:3: column 'overhang [m]': 97 m is not plausible for a strip of fabric; expected 1 mm to 2 m",
+        ),
+        (
+            "overhang [mm]\n0.0970\n",
+            json!({}),
+            "o.csv:2: column 'overhang [mm]': 0.000097 m is not plausible",
+        ),
         (
             "overhang [mm],angle [deg]\n200,7.1\n",
             json!({}),

@@ -4,7 +4,7 @@ use plyflow_characterisation::Dimension;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Block, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
-use plyflow_characterisation::picture_frame::{Frame, Shear, Test, characterise};
+use plyflow_characterisation::picture_frame::{Frame, LARGEST_OFFSET, Shear, Test, characterise};
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -55,8 +55,9 @@ impl Step for CharacterisePictureFrame {
             return Err("`specimen_side` is larger than `frame_side`; the sheared part lies within the frame".into());
         }
         let mut out = Output::default();
-        let (positive, mut series) = read_tests(&mut out, &frame, &p.positive, "positive", 1.0)?;
-        let (negative, more) = read_tests(&mut out, &frame, &p.negative, "negative", -1.0)?;
+        let (positive, mut series) =
+            read_tests(host, &mut out, &frame, &p.positive, "positive", 1.0)?;
+        let (negative, more) = read_tests(host, &mut out, &frame, &p.negative, "negative", -1.0)?;
         let shear = characterise(&positive, &negative, p.stitch, p.degree, p.maximum_angle)?;
         if shear.yarns.value(0.5 * shear.limit) <= 0.0 {
             host.log(
@@ -73,6 +74,7 @@ impl Step for CharacterisePictureFrame {
 }
 
 fn read_tests(
+    host: &Host,
     out: &mut Output,
     frame: &Frame,
     paths: &[String],
@@ -83,6 +85,15 @@ fn read_tests(
     for (i, path) in paths.iter().enumerate() {
         let table = read(path, &COLUMNS)?;
         let test = Test::new(&table, frame)?;
+        if test.offset() > LARGEST_OFFSET {
+            let text = format!(
+                "{}: the force does not start at 0: at the square frame it is {:.0} % of the largest: subtract the offset \
+                 of the load cell, or the fitted law is wrong at small shear",
+                table.source,
+                100.0 * test.offset()
+            );
+            host.log(Log::Warn, &text);
+        }
         let [x, y] =
             ["shear_angle", "normalised_force"].map(|n| format!("curves/{name}_{}/{n}", i + 1));
         let signed = |v: &[f64]| v.iter().map(|v| sign * v).collect::<Vec<_>>();

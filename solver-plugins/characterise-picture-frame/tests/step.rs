@@ -11,14 +11,26 @@ const SIDE: f64 = 0.145;
 const SPECIMEN: f64 = 0.120;
 
 fn csv(folder: &Path, name: &str, law: fn(f64) -> f64, sign: f64, to: f64) -> PathBuf {
+    csv_with(folder, name, law, sign, to, (400, 0.0))
+}
+
+/// `rows` after the first; `offset` of the load cell (N).
+fn csv_with(
+    folder: &Path,
+    name: &str,
+    law: fn(f64) -> f64,
+    sign: f64,
+    to: f64,
+    (rows, offset): (i32, f64),
+) -> PathBuf {
     let last = 2.0 * SIDE * ((0.5 * (90.0 - to)).to_radians().cos() - 0.5f64.sqrt());
     let mut random = Noise::new(name.len() as u64);
-    let rows: String = (0..=400)
-        .map(|i| last * f64::from(i) / 400.0)
+    let rows: String = (0..=rows)
+        .map(|i| last * f64::from(i) / f64::from(rows))
         .map(|d| {
             (
                 d,
-                frame_force(&law, SIDE, SPECIMEN, d, sign) + 0.01 * random.normal(),
+                frame_force(&law, SIDE, SPECIMEN, d, sign) + 0.01 * random.normal() + offset,
             )
         })
         .map(|(d, f)| format!("{},{f}\n", 1e3 * d))
@@ -114,6 +126,58 @@ fn a_fabric_fitted_without_a_stitch_loses_that_of_the_template() {
     let out =
         run::<CharacterisePictureFrame>(with(&[up], &[], false, "ncf-fcim359"), &[], &[]).unwrap();
     assert!(material(&out)["with"]["stitch"].is_null());
+}
+
+#[test]
+fn the_least_template_of_the_guide_becomes_a_fabric_with_the_fitted_shear() {
+    let guide = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../docs/guide/characterisation.md"
+    );
+    let guide = std::fs::read_to_string(guide).unwrap();
+    let start = guide.find("plyflow_material: 1").unwrap();
+    let start = &guide[start..start + guide[start..].find("```").unwrap()];
+    let folder = tempfile::tempdir().unwrap();
+    let template = folder.path().join("start.yaml");
+    std::fs::write(&template, start).unwrap();
+    let up = csv(folder.path(), "up.csv", woven_shear, 1.0, 60.0);
+    let mut parameters = with(&[up], &[], false, "woven-38616");
+    parameters["template"] = json!(template);
+    let value = material(&run::<CharacterisePictureFrame>(parameters, &[], &[]).unwrap());
+    assert_eq!(value["name"], "My fabric");
+    assert_eq!(value["with"]["fibre_modulus"], "3 GPa");
+    assert!(value["with"]["shear"]["coefficients"].is_array());
+}
+
+#[test]
+fn an_offset_of_the_load_cell_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let warned = |law, to, rows_and_offset| {
+        let up = csv_with(folder.path(), "up.csv", law, 1.0, to, rows_and_offset);
+        let out = run::<CharacterisePictureFrame>(with(&[up], &[], false, "woven-38616"), &[], &[]);
+        let log = out.unwrap().log;
+        log.iter().any(|l| {
+            l.contains("up.csv: the force does not start at 0")
+                && l.contains("subtract the offset of the load cell")
+        })
+    };
+    // The largest force is about 4.5 N, noise 0.01 N. Few rows and short tests, whose start is steep, are no offset.
+    for (to, rows) in [(60.0, 400), (60.0, 20), (15.0, 400), (15.0, 20)] {
+        assert!(
+            !warned(woven_shear, to, (rows, 0.0)),
+            "{to} deg, {rows} rows"
+        );
+    }
+    for offset in [0.6, -0.6] {
+        for rows in [400, 20] {
+            assert!(
+                warned(woven_shear, 60.0, (rows, offset)),
+                "{offset} N, {rows} rows"
+            );
+        }
+    }
+    assert!(!warned(woven_shear, 60.0, (400, 0.1)));
+    assert!(!warned(ncf_shear, 55.0, (400, 0.0)));
 }
 
 #[test]

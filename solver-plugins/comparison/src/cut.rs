@@ -1,6 +1,6 @@
 //! The cut between coarse and fine: the work that passes through it in either run, and how far its influence reaches into a zone.
 
-use crate::models::{Model, Role, Zone};
+use crate::models::{Model, Role, Zone, bounds_in_whole};
 use plyflow_defects::{Ply, distance_at};
 use plyflow_sdk::{BodyInfo, Host, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, distance, dot, sub};
@@ -44,15 +44,15 @@ struct Piece {
     length: f64,
 }
 
-/// The cut of a ply that fills `around` (m) in pieces of at most `size` (m); sides at the ply's own edge are none.
-fn pieces(zone: &Zone, around: [f64; 4], size: f64) -> Vec<Piece> {
+/// The cut of a ply that fills `around` (m) in pieces of at most `size` (m). `cuts`: see [`Zone::cuts`].
+fn pieces(zone: &Zone, cuts: [bool; 4], around: [f64; 4], size: f64) -> Vec<Piece> {
     let mut b = zone.bounds;
     for d in 0..2 {
         b[d] = b[d].max(around[d]);
         b[d + 2] = b[d + 2].min(around[d + 2]);
     }
     let mut list = Vec::new();
-    for side in (0..4).filter(|s| !zone.free_sides[*s]) {
+    for side in (0..4).filter(|s| cuts[*s]) {
         // Left and right are lines of constant x, bottom and top of constant y.
         let (fixed, along, end) = (side / 2, 1 - side / 2, side % 2);
         let outward = if end == 0 { -1.0 } else { 1.0 };
@@ -112,7 +112,7 @@ fn work(
     model: &Model,
     meshes: &Meshes,
     ply: &Ply,
-    zone: &Zone,
+    (zone, cuts): (&Zone, [bool; 4]),
     size: f64,
     begin: f64,
 ) -> Result<Option<Work>, StepError> {
@@ -130,6 +130,7 @@ fn work(
     let mut cut = Vec::new();
     for piece in pieces(
         zone,
+        cuts,
         flat_bounds(ply.undeformed.iter().map(|p| [p[0], p[1]])),
         size,
     ) {
@@ -185,8 +186,9 @@ pub fn passages(host: &Host, models: &[Model], zones: &[Zone]) -> Result<Vec<Pas
             };
             // A local run may begin late.
             let begin = part.times.first().copied().unwrap_or(0.0);
-            let fine = work(host, local, &part, ply, zone, size, begin)?;
-            let coarse = work(host, global, &whole, other, zone, size, begin)?;
+            let cut = (zone, zone.cuts(bounds_in_whole(models, &ply.name)));
+            let fine = work(host, local, &part, ply, cut, size, begin)?;
+            let coarse = work(host, global, &whole, other, cut, size, begin)?;
             if let (Some(local), Some(global)) = (fine, coarse) {
                 list.push(Passage {
                     zone: zone.name.clone(),
@@ -268,7 +270,8 @@ pub fn layers(models: &[Model], zones: &[Zone]) -> Vec<Layer> {
     locals
         .filter_map(|m| {
             let zone = &zones[m.zone?];
-            let strips = strips(m, reference, zone, width);
+            let cuts = |ply: &str| zone.cuts(bounds_in_whole(models, ply));
+            let strips = strips(m, reference, zone, cuts, width);
             (!strips.is_empty()).then(|| Layer {
                 zone: zone.name.clone(),
                 strips,
@@ -291,14 +294,24 @@ pub fn write(
     for layer in layers {
         let (at, inside) = layer.strips.split_at(1);
         let zone = &layer.zone;
-        host.result(&format!("cut_error.{zone}"), over(at), "m")?;
-        host.result(&format!("inner_error.{zone}"), over(inside), "m")?;
+        for (name, strips) in [("cut_error", at), ("inner_error", inside)] {
+            if let Some(error) = over(strips) {
+                host.result(&format!("{name}.{zone}"), error, "m")?;
+            }
+        }
     }
     Ok(())
 }
 
 /// Strips of the width `width` (m) from the cut of a zone inwards, over the plies of a local run; empty when nothing is cut.
-pub fn strips(local: &Model, reference: &Model, zone: &Zone, width: f64) -> Vec<Strip> {
+/// `cuts`: [`Zone::cuts`] of a ply by its name.
+fn strips(
+    local: &Model,
+    reference: &Model,
+    zone: &Zone,
+    cuts: impl Fn(&str) -> [bool; 4],
+    width: f64,
+) -> Vec<Strip> {
     let mut sums: Vec<Sums> = Vec::new();
     for ply in &local.plies {
         let Some(other) = reference.plies.iter().find(|r| r.name == ply.name) else {
@@ -308,8 +321,9 @@ pub fn strips(local: &Model, reference: &Model, zone: &Zone, width: f64) -> Vec<
         let Some(locator) = QuadLocator::new(&other.undeformed, cells) else {
             continue;
         };
+        let cuts = cuts(&ply.name);
         for (i, at) in ply.undeformed.iter().enumerate() {
-            let Some(deep) = depth(zone, *at) else {
+            let Some(deep) = depth(zone, cuts, *at) else {
                 continue;
             };
             let Some(place) = locator.locate(at[0], at[1], 1e-6) else {
@@ -344,20 +358,16 @@ pub fn strips(local: &Model, reference: &Model, zone: &Zone, width: f64) -> Vec<
 }
 
 /// Distance of a place in the flat ply from the nearest cut side of its zone (m); `None` when no side is cut.
-fn depth(zone: &Zone, at: Vec3) -> Option<f64> {
-    let sides = (0..4).filter(|s| !zone.free_sides[*s]);
+fn depth(zone: &Zone, cuts: [bool; 4], at: Vec3) -> Option<f64> {
+    let sides = (0..4).filter(|s| cuts[*s]);
     let deep = sides.map(|s| (at[s / 2] - zone.bounds[s / 2 + 2 * (s % 2)]).abs());
     deep.reduce(f64::min)
 }
 
-/// Root mean square distance of the nodes of several strips from the reference (m).
-fn over(strips: &[Strip]) -> f64 {
+/// Root mean square distance of the nodes of several strips from the reference (m); `None` where there is no node.
+fn over(strips: &[Strip]) -> Option<f64> {
     let nodes: usize = strips.iter().map(|s| s.nodes).sum();
     let part = |s: &Strip| s.position.powi(2) * s.nodes as f64;
     let sum: f64 = strips.iter().map(part).sum();
-    if nodes == 0 {
-        0.0
-    } else {
-        (sum / nodes as f64).sqrt()
-    }
+    (nodes > 0).then(|| (sum / nodes as f64).sqrt())
 }

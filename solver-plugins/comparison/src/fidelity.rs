@@ -4,6 +4,7 @@ use crate::models::{Model, PassedOver, Role, Zone};
 use plyflow_defects::pairs::{PairErrors, Pairs, apart, measure_for_pairs};
 use plyflow_defects::{Defect, FieldErrors, Settings};
 use plyflow_sdk::{Host, StepError};
+use plyflow_surface::vector::Vec3;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -131,10 +132,9 @@ pub fn measure_ways(
         Yardstick::Reference => of(Role::Reference),
         Yardstick::Zones => local.clone(),
     };
-    let theirs = everywhere(&reference, settings);
+    let within = (yardstick == Yardstick::Zones).then_some(zones);
+    let theirs = defects_of(&reference, within, settings);
     let theirs = named(&theirs);
-    let counts =
-        |d: &Defect| yardstick == Yardstick::Reference || zones.iter().any(|z| z.holds(&d.centre));
     let both: Vec<&Model> = local.iter().chain(&global).copied().collect();
     // Whose defects count, and whose fields, the first that has a place.
     let way = |model: &str, suffix: &str, all: &[&Model]| Way::new(model, suffix, all);
@@ -153,9 +153,8 @@ pub fn measure_ways(
     let mut measured = Measured::default();
     for (mut way, models, around) in ways {
         host.check_cancelled()?;
-        let ours = everywhere(&models, settings);
-        let mut ours = named(&ours);
-        ours.retain(|(_, d)| counts(d));
+        let ours = defects_of(&models, within, settings);
+        let ours = named(&ours);
         way.errors = defects(&ours, &theirs, settings);
         way.errors.extend(fields(&around, &reference));
         measured.ways.push(way);
@@ -196,11 +195,27 @@ fn fields(way: &[&Model], reference: &[&Model]) -> Vec<Told> {
     told
 }
 
-/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need.
-fn everywhere(models: &[&Model], settings: &Settings) -> Vec<(String, Vec<Defect>)> {
-    (models.iter().flat_map(|m| &m.plies))
-        .map(|p| (p.name.clone(), measure_for_pairs(p, settings)))
-        .collect()
+/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need. `within`: the zones, when what lies outside
+/// of them does not count: a local run is measured in its own, any other one in all.
+fn defects_of(
+    models: &[&Model],
+    within: Option<&[Zone]>,
+    settings: &Settings,
+) -> Vec<(String, Vec<Defect>)> {
+    let counts = |m: &Model, at: &Vec3| match (within, m.zone) {
+        (None, _) => true,
+        // The mesh of a zone reaches past it, to the nearest lines of the whole's.
+        (Some(zones), Some(own)) => zones[own].holds(at),
+        (Some(zones), None) => zones.iter().any(|z| z.holds(at)),
+    };
+    let mut found = Vec::new();
+    for m in models {
+        for p in &m.plies {
+            let inside: Vec<bool> = p.undeformed.iter().map(|at| counts(m, at)).collect();
+            found.push((p.name.clone(), measure_for_pairs(p, &inside, settings)));
+        }
+    }
+    found
 }
 
 fn named(found: &[(String, Vec<Defect>)]) -> Vec<Found<'_>> {

@@ -4,6 +4,7 @@ use plyflow_defects::of_run::{self, Sheet};
 use plyflow_defects::{Ply, Settings, Tool};
 use plyflow_model::scene::first_axis;
 use plyflow_sdk::{Host, Input, StepError};
+use plyflow_surface::flat_bounds;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -31,6 +32,16 @@ impl Zone {
     pub fn holds(&self, at: &[f64]) -> bool {
         let [low, high] = [&self.bounds[..2], &self.bounds[2..]];
         (0..2).all(|d| at[d] > low[d] - ROUNDING && at[d] < high[d] + ROUNDING)
+    }
+
+    /// Left, right, bottom, top: whether a ply that fills `around` (`[x0, y0, x1, y1]`, m) in the whole is cut there. Not so at a free side, nor where
+    /// the ply ends at the side or inside of it: that is its own edge.
+    pub fn cuts(&self, around: [f64; 4]) -> [bool; 4] {
+        [0, 1, 2, 3].map(|side| {
+            let k = side / 2 + 2 * (side % 2);
+            let outward = if side % 2 == 0 { -1.0 } else { 1.0 };
+            !self.free_sides[side] && outward * (around[k] - self.bounds[k]) > ROUNDING
+        })
     }
 
     fn area(&self) -> f64 {
@@ -115,6 +126,16 @@ pub struct Model {
     pub input: Input,
 }
 
+/// The box around a ply in the flat mesh of the global run (`[x0, y0, x1, y1]`, m); without end when that has no such ply.
+pub fn bounds_in_whole(models: &[Model], ply: &str) -> [f64; 4] {
+    let global = models.iter().find(|m| m.role == Role::Global);
+    let found = global.and_then(|m| m.plies.iter().find(|p| p.name == ply));
+    found.map_or(
+        [-f64::INFINITY, -f64::INFINITY, f64::INFINITY, f64::INFINITY],
+        |p| flat_bounds(p.undeformed.iter().map(|p| [p[0], p[1]])),
+    )
+}
+
 #[derive(Deserialize)]
 struct Formed {
     sheets: Vec<Sheet>,
@@ -153,7 +174,7 @@ impl PassedOver {
 /// last is that of the last pass.
 ///
 /// # Errors
-/// When an input lacks something, or a local run belongs to no zone or, with one global run, to one that another has.
+/// When an input lacks something, or a local run belongs to no zone or to one that another run of the same pass has.
 pub fn read_models(
     host: &Host,
     zones: &[Zone],
@@ -174,6 +195,7 @@ pub fn read_models(
     let tool = of_run::tool(host, &global)?;
     let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
     let mut local: Vec<Model> = Vec::new();
+    let mut runs_of = vec![0; zones.len()];
     for input in host.inputs_of("local")? {
         host.check_cancelled()?;
         let Some(zone) = zone_of(host, &input, zones, superseded)? else {
@@ -181,9 +203,10 @@ pub fn read_models(
             passed_over.superseded.push(input);
             continue;
         };
+        runs_of[zone] += 1;
         if let Some(k) = local.iter().position(|m| m.zone == Some(zone)) {
-            if passes == 1 {
-                return Err(format!("two local runs belong to zone {}", zones[zone].name).into());
+            if runs_of[zone] > passes || local[k].input.step == input.step {
+                return Err(same_pass(&local[k].input, &input, &zones[zone].name, passes).into());
             }
             let before = local.remove(k);
             passed_over.earlier_cycles += before.element_cycles;
@@ -209,6 +232,22 @@ pub fn read_models(
         passed_over.earlier.push(input);
     }
     Ok((models, passed_over))
+}
+
+/// Why two runs of one zone are not of two passes. A pass is a step of its own, and has a global run.
+fn same_pass(first: &Input, second: &Input, zone: &str, passes: usize) -> String {
+    let [a, b] = [first, second].map(|i| format!("'{}' {:?}", i.step, i.item));
+    let step = &second.step;
+    let why = if first.step == *step {
+        format!(
+            "each item of '{step}' must be of another zone: fan it, and its boundary-interpolation, out over the zones"
+        )
+    } else {
+        format!(
+            "there are {passes} global runs, and a second run of a zone must be of a later pass, with one of its own: give runs that are not to be measured as `earlier`"
+        )
+    };
+    format!("local: two local runs belong to zone {zone}, {a} and {b}; {why}")
 }
 
 /// Others and the reference, in that order, with their own tools or the global run's.
@@ -244,7 +283,7 @@ fn own_tool(host: &Host, input: &Input) -> Result<Option<Tool>, StepError> {
     }
 }
 
-/// The zone that a local run names, or else the one at its place in the fan-out; `None` for a superseded one.
+/// The zone that a local run names, or else the one at its place in a fan-out over the zones alone; `None` for a superseded one.
 fn zone_of(
     host: &Host,
     input: &Input,
@@ -255,20 +294,23 @@ fn zone_of(
     let named = formed.zone["name"].as_str();
     let index = match named {
         Some(_) => zones.iter().position(|z| z.is(&formed.zone)),
-        None => input
-            .item
-            .last()
-            .map(|&i| i as usize)
-            .filter(|&i| i < zones.len()),
+        None => match input.item[..] {
+            [i] => Some(i as usize).filter(|&i| i < zones.len()),
+            // Which of several places is that of the zone the run would have to tell.
+            _ => None,
+        },
     };
     if index.is_none() && superseded.iter().any(|z| z.is(&formed.zone)) {
         return Ok(None);
     }
     index.map(Some).ok_or_else(|| {
         let names: Vec<&str> = zones.iter().map(|z| z.name.as_str()).collect();
-        let what = named.map_or("names no zone".to_owned(), |n| format!("is of zone '{n}'"));
+        let what = named.map_or(
+            "names no zone (attribute `zone`), and its item is no place in a fan-out over the zones alone".to_owned(),
+            |n| format!("is of zone '{n}' (or of a box that no zone of that name has)"),
+        );
         format!(
-            "local run '{}' {:?} {what} (or of a box that no zone of that name has); the zones are: {}",
+            "local run '{}' {:?} {what}; the zones are: {}",
             input.step,
             input.item,
             names.join(", ")

@@ -1,6 +1,6 @@
 //! The table of defects: numbering, and which defect of one model is which of another.
 
-use crate::models::{Model, Role, Zone};
+use crate::models::{Model, Role, Zone, bounds_in_whole};
 use plyflow_defects::of_run::neighbours;
 use plyflow_defects::pairs::{apart, same_within, unlike};
 use plyflow_defects::{Defect, Kind, Limits, Settings, find_causes, measure};
@@ -18,7 +18,7 @@ pub struct Entry {
     /// Name of the ply.
     pub ply: String,
     /// Local models: whether it reaches the left, right, bottom and top side of the zone's cut, so that its zone is too
-    /// small. Never a free side.
+    /// small. Never a free side, nor one at which the ply ends.
     pub cut_sides: [bool; 4],
     /// What was measured.
     pub defect: Defect,
@@ -109,12 +109,16 @@ fn entries_of(
         // The mesh of a zone reaches past it, to the nearest lines of the whole's.
         let inside: Vec<bool> = ply.undeformed.iter().map(within).collect();
         let mut measured = measure(ply, &inside, settings);
-        let (fibres, others) = (model.sheets[k].fibres(), neighbours(&model.sheets, k));
+        let (fibres, others) = (
+            model.sheets[k].fibres(),
+            neighbours(&model.sheets, &model.plies, k),
+        );
         find_causes(ply, &mut measured, fibres, &others, limits);
+        let cuts = z.cuts(bounds_in_whole(models, &ply.name));
         for defect in measured {
             let near = |side: usize| {
                 let (d, level) = (side / 2, z.bounds[side / 2 + 2 * (side % 2)]);
-                !z.free_sides[side]
+                cuts[side]
                     && defect.nodes.iter().any(|&i| {
                         (ply.undeformed[i as usize][d] - level).abs() < 1.01 * model.element_size
                     })

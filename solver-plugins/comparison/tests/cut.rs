@@ -135,6 +135,68 @@ fn work_through_the_cut_is_the_closed_forms() {
     assert!(gross >= net.abs() && (error - net.abs() / gross).abs() < 0.02);
 }
 
+/// The same ply, but it ends inside of the zone, at x = 0.2 m, where another one goes on: that is no cut of it.
+#[test]
+fn nothing_passes_through_the_own_edge_of_a_ply_that_ends_inside_of_its_zone() {
+    let stiffness = 2e4;
+    let ends = |b: [f64; 4]| [b[0], b[1], 0.2, b[3]];
+    let mut open = zone();
+    open["free_sides"] = json!(vec![false; 4]);
+    let zones = MemoryArtifact {
+        kind: "zones".into(),
+        attributes: json!({"zones": [open]}),
+        ..Default::default()
+    };
+    let global = formed(pulled(ends(BLANK), 0.02, stiffness), 0.02, Value::Null);
+    let local = formed(pulled(ends(ZONE), 0.005, stiffness), 0.005, open.clone());
+    let reference = formed(pulled(ends(BLANK), 0.005, stiffness), 0.005, Value::Null);
+    let inputs = [
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        MemoryInput::new("reference", &reference),
+    ];
+    let out = run::<Comparison>(json!({}), &inputs, &[]).unwrap();
+    // As above: all passes through the left.
+    let exact = -0.16 * 0.08 * stiffness * STRAIN * STRAIN / 2.0;
+    for name in ["cut_work.A.global", "cut_work.A"] {
+        let got = out.result(name);
+        assert!(
+            (got / exact - 1.0).abs() < 0.01,
+            "{name}: {got} J, exact {exact} J"
+        );
+    }
+    // Nor is there a strip along it: the deepest nodes lie in the middle between top and bottom, and at the edge.
+    let strips = out.attributes["cut"]["layers"][0]["strips"]
+        .as_array()
+        .unwrap();
+    let nodes: Vec<u64> = strips.iter().filter_map(|s| s["nodes"].as_u64()).collect();
+    assert_eq!(
+        nodes,
+        [
+            25 * 33 - 21 * 25,
+            21 * 25 - 17 * 17,
+            17 * 17 - 13 * 9,
+            13 * 9 - 9,
+            9
+        ]
+    );
+}
+
+#[test]
+fn a_zone_that_is_nowhere_deeper_than_the_strip_at_its_cut_has_no_inner_error() {
+    let local = formed(pulled(ZONE, 0.005, 1.0), 0.005, zone());
+    let reference = formed(pulled(BLANK, 0.005, 1.0), 0.005, Value::Null);
+    let errors = |size: f64| {
+        let global = formed(pulled(BLANK, size, 1.0), size, Value::Null);
+        let out = compare(&global, &local, Some(&reference));
+        ["cut_error.A", "inner_error.A"].map(|name| out.results.contains_key(name))
+    };
+    // 80 mm deep.
+    assert_eq!(errors(0.02), [true, true]);
+    assert_eq!(errors(0.16), [true, false]);
+}
+
 #[test]
 fn traction_is_that_of_the_deformed_cell_and_turns_with_it() {
     let then = [

@@ -340,6 +340,39 @@ fn a_defect_that_reaches_the_cut_is_marked_and_one_at_a_free_side_is_not() {
     assert!(!marked(true));
 }
 
+/// A ridge along x over all of a ply that ends one element inside of the zone's right side.
+#[test]
+fn the_edge_of_a_ply_that_ends_inside_of_its_zone_is_no_cut() {
+    let ridge = |_: f64, y: f64| 0.0015 * (1.0 + (PI * (y / 0.007).clamp(-1.0, 1.0)).cos());
+    let run_off = |b: [f64; 4], right: f64, size: f64, zone: Value| {
+        let narrow = [b[0], b[1], right, b[3]];
+        let plies = vec![
+            ply("ply_1", b, size, OFFSET, |_, _| 0.0),
+            ply("ply_2", narrow, size, OFFSET + 0.0004, ridge),
+        ];
+        formed(plies, size, zone)
+    };
+    let zones = zones(json!([zone_a()]));
+    let sides = |right: f64| {
+        let (global, local) = (
+            run_off(BLANK, right, 0.002, Value::Null),
+            run_off(ZONE, right.min(0.080), 0.002, zone_a()),
+        );
+        let inputs = [
+            MemoryInput::new("global", &global),
+            MemoryInput::new("zones", &zones),
+            MemoryInput::new("local", &local),
+        ];
+        let out = compare(&inputs);
+        assert_eq!(out.attributes["defects"][0]["id"], "AW1");
+        out.attributes["defects"][0]["cut_sides"].clone()
+    };
+    assert_eq!(sides(0.240), json!([true, true, false, false]));
+    for end in [0.080, 0.078] {
+        assert_eq!(sides(end), json!([true, false, false, false]), "{end}");
+    }
+}
+
 #[test]
 fn without_zones_the_artifact_says_so_and_holds_the_global_run_alone() {
     let (global, zones) = (global(), zones(json!([])));
@@ -377,7 +410,13 @@ fn of_several_passes_the_last_is_measured_and_all_cost() {
         costing(1.0, MemoryInput::new("global", &global)),
         costing(2.0, MemoryInput::new("global", &global)),
         costing(4.0, MemoryInput::new("local", &first)),
-        costing(8.0, MemoryInput::new("local", &second)),
+        costing(
+            8.0,
+            MemoryInput {
+                step: "local_2",
+                ..MemoryInput::new("local", &second)
+            },
+        ),
     ];
     let out = compare(&inputs);
     let alone = compare(&[inputs[0], inputs[2], inputs[4]]);
@@ -413,6 +452,52 @@ fn a_local_run_of_no_zone_or_of_a_taken_one_is_refused() {
     ];
     let error = run::<Comparison>(json!({}), &twice, &[]).unwrap_err();
     assert!(error.contains("two local runs belong to zone A"), "{error}");
+    // A second run of a zone is that of a later pass: of another step, and with a global run of its own.
+    let of = |step, item| MemoryInput {
+        step,
+        item,
+        ..MemoryInput::new("local", &local)
+    };
+    let refused = |globals: usize, locals: &[MemoryInput<'_>]| {
+        let mut inputs = vec![twice[0]; globals];
+        inputs.push(twice[1]);
+        inputs.extend(locals);
+        run::<Comparison>(json!({}), &inputs, &[]).unwrap_err()
+    };
+    let error = refused(2, &[of("local", &[0, 0]), of("local", &[1, 0])]);
+    assert!(
+        error.contains("'local' [0, 0] and 'local' [1, 0]") && error.contains("of another zone"),
+        "{error}"
+    );
+    let error = refused(1, &[of("local", &[0]), of("local_2", &[0, 0])]);
+    assert!(
+        error.contains("there are 1 global runs") && error.contains("`earlier`"),
+        "{error}"
+    );
+    let error = refused(
+        2,
+        &[of("local", &[0]), of("local_2", &[0]), of("local_3", &[0])],
+    );
+    assert!(error.contains("there are 2 global runs"), "{error}");
+    // One that names no zone is of the zone at its place, where it has one place alone.
+    let mut nameless = local.clone();
+    nameless.attributes["zone"] = Value::Null;
+    let inputs = |item| {
+        [
+            twice[0],
+            twice[1],
+            MemoryInput {
+                item,
+                ..MemoryInput::new("local", &nameless)
+            },
+        ]
+    };
+    assert_eq!(compare(&inputs(&[0])).result("wrinkle_count"), 1.0);
+    let error = run::<Comparison>(json!({}), &inputs(&[1, 0]), &[]).unwrap_err();
+    assert!(
+        error.contains("names no zone (attribute `zone`)"),
+        "{error}"
+    );
     let mut lost = local.clone();
     lost.attributes["zone"]["name"] = json!("Q");
     let inputs = [twice[0], twice[1], MemoryInput::new("local", &lost)];

@@ -6,6 +6,7 @@ use common::*;
 use plyflow_comparison::Comparison;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryInput, run};
 use serde_json::{Value, json};
+use std::f64::consts::PI;
 
 /// A run of the whole blank with elements of `size` (m).
 fn whole(size: f64, f: impl Fn(f64, f64) -> f64) -> MemoryArtifact {
@@ -100,11 +101,12 @@ fn around_the_zones_the_global_run_counts_and_in_them_the_fine_runs() {
         MemoryInput::new("local", &local),
         MemoryInput::new("reference", &reference),
     ]);
-    // The global run is 2 mm off everywhere outside of the zone, whose defects the local run has exactly.
+    // The global run is 2 mm off everywhere outside of the zone, whose defects the local run has exactly. Nodes count by their areas, those on the
+    // blank's edge by half.
     let [x0, y0, x1, y1] = [0, 1, 2, 3].map(|k| (ZONE[k] / 0.00125).round());
     let inside = (x1 - x0 + 1.0) * (y1 - y0 + 1.0);
     let [x0, y0, x1, y1] = [0, 1, 2, 3].map(|k| (BLANK[k] / 0.00125).round());
-    let all = (x1 - x0 + 1.0) * (y1 - y0 + 1.0);
+    let all = (x1 - x0) * (y1 - y0);
     let expected = 0.002 * ((all - inside) / all).sqrt();
     for name in ["distance_error", "position_error"] {
         assert!((out.result(name) / expected - 1.0).abs() < 1e-9, "{name}");
@@ -141,6 +143,36 @@ fn without_a_reference_the_fine_runs_measure_the_others_in_their_zones() {
     assert!(!out.results.contains_key("defect_error"));
     assert!(!out.results.contains_key("position_error"));
     assert!(!out.measured.contains_key("cost_saving"));
+}
+
+/// A wrinkle along x over the whole blank: what of it lies beyond the zone is neither missed, nor false, nor too long.
+#[test]
+fn without_a_reference_what_lies_outside_of_the_zones_counts_for_nobody() {
+    let ridge = |_: f64, y: f64| 0.0015 * (1.0 + (PI * (y / 0.007).clamp(-1.0, 1.0)).cos());
+    let same = whole(0.002, ridge);
+    // The zone's mesh reaches past it by an element.
+    let [x0, y0, x1, y1] = ZONE;
+    let mesh = [x0 - 0.002, y0 - 0.002, x1 + 0.002, y1 + 0.002];
+    let local = formed(
+        vec![ply("ply_1", mesh, 0.002, OFFSET, ridge)],
+        0.002,
+        zone_a(),
+    );
+    let zones = zones(json!([zone_a()]));
+    let out = compare(&[
+        MemoryInput::new("global", &same),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+    ]);
+    assert!((out.result("wrinkle_length.AW1") - 0.160).abs() < 1e-6);
+    for error in [
+        "wrinkle_length_error",
+        "wrinkle_amplitude_error",
+        "defect_error",
+    ] {
+        let found = out.result(&format!("{error}.global"));
+        assert!(found < 1e-6, "{error}: {found}");
+    }
 }
 
 /// A whole that begins late is the run of a zone over all of the blank: a measure like another, but no measure of what is saved.

@@ -7,9 +7,9 @@ mod sections;
 
 use agreement::Agreement;
 use output::Output;
-use plyflow_defects::of_run::neighbours;
+use plyflow_defects::of_run::{Sheet, neighbours};
 use plyflow_defects::{Defect, Limits, Ply, Settings, find_causes, measure};
-use plyflow_sdk::{Host, Progress, Step, StepError, export_step};
+use plyflow_sdk::{Host, Log, Progress, Step, StepError, export_step};
 use serde::Deserialize;
 
 /// The step.
@@ -109,19 +109,26 @@ impl Step for DefectMeasurement {
         };
         phase("reading", 0.0)?;
         let run = read::Run::read(host)?;
-        let mut measured = Vec::new();
+        let mut plies = Vec::new();
         for (k, sheet) in run.plies.iter().enumerate() {
-            phase(&sheet.name, 0.1 + 0.5 * k as f64 / run.plies.len() as f64)?;
-            let ply = run.ply(host, sheet, settings.foot_margin)?;
-            let mut defects = everywhere(&ply, &settings);
-            let others = neighbours(&run.plies, k);
-            find_causes(&ply, &mut defects, sheet.fibres(), &others, &limits);
-            measured.push(Measured {
-                ply,
-                defects,
-                simulated: true,
-            });
+            phase(&sheet.name, 0.1 + 0.4 * k as f64 / run.plies.len() as f64)?;
+            plies.push(run.ply(host, sheet, settings.foot_margin)?);
         }
+        phase("plies", 0.5)?;
+        // All are there first: a cause may lie in the next ply.
+        let found = |(k, sheet): (usize, &Sheet)| {
+            let mut defects = everywhere(&plies[k], &settings);
+            let others = neighbours(&run.plies, &plies, k);
+            find_causes(&plies[k], &mut defects, sheet.fibres(), &others, &limits);
+            defects
+        };
+        let found: Vec<Vec<Defect>> = run.plies.iter().enumerate().map(found).collect();
+        let with = |(ply, defects)| Measured {
+            ply,
+            defects,
+            simulated: true,
+        };
+        let mut measured: Vec<Measured> = plies.into_iter().zip(found).map(with).collect();
         let (mut alignment, mut agreement) = (None, None);
         if let Some(path) = &p.scan {
             phase("scan", 0.6)?;
@@ -130,7 +137,11 @@ impl Step for DefectMeasurement {
             phase("scan and ply", 0.8)?;
             let above = scan.offset - run.plies[shown].offset;
             let ply = &measured[shown].ply;
-            agreement = Agreement::of(ply, &scan.ply, &run.tool, above, &settings);
+            let found = Agreement::of(ply, &scan.ply, &run.tool, above, &settings)?;
+            if let Some(text) = found.partial() {
+                host.log(Log::Warn, &text);
+            }
+            agreement = Some(found);
             let mut defects = everywhere(&scan.ply, &settings);
             find_causes(&scan.ply, &mut defects, None, &[], &limits);
             measured.push(Measured {

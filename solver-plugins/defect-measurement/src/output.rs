@@ -187,6 +187,8 @@ impl<'a> Output<'a> {
         for (name, value) in a.errors.told() {
             host.result(name, value, "1")?;
         }
+        host.result("scan_judged_share", a.judged_share, "1")?;
+        host.result("scan_covered_share", a.covered_share, "1")?;
         host.result("deviation_mean", a.mean, "m")?;
         host.result("deviation_rms", a.root_mean_square, "m")?;
         for ((name, _), value) in agreement::QUANTILES.iter().zip(&a.quantiles) {

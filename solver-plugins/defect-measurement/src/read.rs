@@ -165,10 +165,16 @@ impl Scan {
                 kept: p.scan_kept,
                 most_points: 20000,
             };
-            alignment = align(&points, tool, &settings);
-            if let Some(found) = &alignment {
-                points.iter_mut().for_each(|p| *p = found.place(*p));
-            }
+            let found = align(&points, tool, &settings).ok_or_else(|| {
+                format!(
+                    "scan: fewer than six of the {} points of `{path}` lie over the tool, the others beyond its edge: it cannot be aligned. Correct `scan_unit` (one unit of \
+                     its numbers is taken for {} mm), or move the scan to within some centimetres and degrees of the tool",
+                    points.len(),
+                    1e3 * p.scan_unit
+                )
+            })?;
+            points.iter_mut().for_each(|p| *p = found.place(*p));
+            alignment = Some(found);
         }
         if facets.is_empty() {
             facets = scan::join(&points, |p| tool.closest(p).normal);

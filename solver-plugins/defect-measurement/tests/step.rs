@@ -438,7 +438,188 @@ fn what_a_scan_has_beyond_the_ply_does_not_count_and_the_ply_can_be_named() {
     }
     let inputs = [MemoryInput::new("formed", &run_off)];
     let out = run::<DefectMeasurement>(json!({"scan": scan, "scan_align": "none"}), &inputs, &[]);
-    assert!(out.unwrap().result("deviation_largest") < 1e-4);
+    let out = out.unwrap();
+    assert!(out.result("deviation_largest") < 1e-4);
+    assert_eq!(
+        [out.result("wrinkle_count"), out.result("bridging_count")],
+        [1.0, 1.0]
+    );
+    for name in [
+        "missed_wrinkles",
+        "false_wrinkles",
+        "missed_bridging",
+        "false_bridging",
+    ] {
+        assert_eq!(out.result(name), 0.0, "{name}");
+    }
+}
+
+/// Points of the outer face of the upper ply in `unit` (m), as a file, each moved by `shift` (m).
+fn moved_scan(folder: &tempfile::TempDir, unit: f64, shift: Vec3) -> String {
+    let path = folder.path().join("moved.xyz");
+    let outer = TOP + OFFSET + 1.5 * THICKNESS;
+    let mut text = String::new();
+    for p in flat() {
+        let place = [p[0], p[1], outer + height(p[0], p[1])];
+        let [x, y, z] = [0, 1, 2].map(|d| (place[d] + shift[d]) / unit);
+        writeln!(text, "{x} {y} {z}").unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_scan_that_lies_where_nothing_is_judged_is_refused_and_one_that_does_not_says_how_much_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let formed = formed();
+    let inputs = [MemoryInput::new("formed", &formed)];
+    let told = |unit: f64, shift: Vec3, align: &str| {
+        let scan = moved_scan(&folder, unit, shift);
+        run::<DefectMeasurement>(json!({"scan": scan, "scan_align": align}), &inputs, &[])
+    };
+    let refused = |unit, shift, align, with: &[&str]| {
+        let error = told(unit, shift, align).unwrap_err();
+        assert!(with.iter().all(|w| error.contains(w)), "{error}");
+    };
+    // Metres read as mm: a speck on the tool that fits it perfectly. Micrometres read as mm: a thousand times as large as the ply.
+    for align in ["closest-points", "none"] {
+        refused(
+            1.0,
+            [0.0; 3],
+            align,
+            &["it is 0.160 x 0.100", "larger unit than `scan_unit`"],
+        );
+    }
+    refused(
+        1e-6,
+        [0.0; 3],
+        "none",
+        &[
+            "of its area lies over the tool",
+            "160000.000 x",
+            "`scan_unit`",
+        ],
+    );
+    // Beside the tool, which ends 0.5 m from its middle: by three quarters, and wholly.
+    refused(
+        1e-3,
+        [0.54, 0.0, 0.0],
+        "none",
+        &["of its area lies over the tool above its foot; expected at least 50.000 %"],
+    );
+    refused(
+        1e-3,
+        [5.0, 0.0, 0.0],
+        "closest-points",
+        &[
+            "fewer than six of the 10449 points",
+            "`scan_unit`",
+            "within some centimetres",
+        ],
+    );
+    // On the tool and beside the ply.
+    refused(
+        1e-3,
+        [0.2, 0.0, 0.0],
+        "none",
+        &[
+            "lies over ply 'ply_2'; expected at least 10.000 %",
+            "`scan_ply`",
+        ],
+    );
+
+    let out = told(1e-3, [0.0; 3], "none").unwrap();
+    assert!(out.log.is_empty(), "{:?}", out.log);
+    // Nodes at the rim lie on the edge.
+    for name in ["scan_judged_share", "scan_covered_share"] {
+        let share = out.result(name);
+        assert!(share > 0.9 && share <= 1.0, "{name}: {share}");
+    }
+    // 100 of 160 mm beside each other.
+    let out = told(1e-3, [0.1, 0.0, 0.0], "none").unwrap();
+    for name in ["scan_judged_share", "scan_covered_share"] {
+        assert!((out.result(name) - 0.375).abs() < 0.02, "{name}");
+    }
+    assert!(
+        out.log[0].contains("% of ply 'ply_2': defects"),
+        "{:?}",
+        out.log
+    );
+}
+
+/// The scan shows the half with the blister.
+#[test]
+fn what_the_ply_has_beyond_a_partial_scan_does_not_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("half.xyz");
+    let outer = TOP + OFFSET + 1.5 * THICKNESS;
+    let half = flat().into_iter().filter(|p| p[0] > -1e-9);
+    let line = |p: Vec3| {
+        format!(
+            "{} {} {}\n",
+            1e3 * p[0],
+            1e3 * p[1],
+            1e3 * (outer + height(p[0], p[1]))
+        )
+    };
+    std::fs::write(&path, half.map(line).collect::<String>()).unwrap();
+    let out = measured(json!({"scan": path.to_str().unwrap(), "scan_align": "none"}));
+    assert_eq!(
+        out.result("wrinkle_count"),
+        1.0,
+        "the ply has it all the same"
+    );
+    for name in [
+        "missed_wrinkles",
+        "false_wrinkles",
+        "missed_bridging",
+        "false_bridging",
+    ] {
+        assert_eq!(out.result(name), 0.0, "{name}");
+    }
+    assert!(out.result("bridging_area_error") < 0.01);
+    assert!((out.result("scan_covered_share") - 0.5).abs() < 0.02);
+    assert!(out.result("scan_judged_share") > 0.9);
+}
+
+#[test]
+fn facets_of_a_scan_may_be_wound_either_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let outer = TOP + OFFSET + 1.5 * THICKNESS;
+    let points: Vec<Vec3> = flat()
+        .iter()
+        .map(|p| [p[0], p[1], outer + height(p[0], p[1])])
+        .collect();
+    let scanned = |inwards: bool| {
+        let path = folder.path().join("scan.stl");
+        let mut text = String::from("solid scan\n");
+        for c in cells().as_chunks::<4>().0 {
+            for mut facet in [[c[0], c[1], c[2]], [c[0], c[2], c[3]]] {
+                if inwards {
+                    facet.reverse();
+                }
+                text += "facet normal 0 0 0\nouter loop\n";
+                for [x, y, z] in facet.map(|i| points[i as usize].map(|v| 1e3 * v)) {
+                    writeln!(text, "vertex {x} {y} {z}").unwrap();
+                }
+                text += "endloop\nendfacet\n";
+            }
+        }
+        std::fs::write(&path, text + "endsolid scan\n").unwrap();
+        measured(json!({"scan": path.to_str().unwrap()}))
+    };
+    let (right, inwards) = (scanned(false), scanned(true));
+    for out in [&right, &inwards] {
+        assert_eq!(
+            [out.result("missed_wrinkles"), out.result("false_wrinkles")],
+            [0.0; 2]
+        );
+        assert!((out.result("wrinkle_amplitude.scan") - 0.003).abs() < 1e-5);
+        // It is aligned, by what wrinkle and blister pull along.
+        assert!(out.result("deviation_largest") < 1e-4);
+    }
+    let lengths = [&right, &inwards].map(|o| o.result("wrinkle_length.scan"));
+    assert!((lengths[0] - lengths[1]).abs() < 1e-6, "{lengths:?}");
 }
 
 #[test]

@@ -37,17 +37,20 @@ impl Alignment {
 }
 
 const MOST_PASSES: usize = 200;
+/// A motion has six freedoms.
+const LEAST: usize = 6;
 /// It has converged when no point moves by more than this share of the points' extent.
 const CONVERGED: f64 = 1e-9;
 /// A motion counts as decided by an eigenvalue of more than this part of the largest.
 const DECIDED: f64 = 1e-6;
 
-/// Moves `points` (m) onto the surface; `None` for fewer than six points.
+/// Moves `points` (m) onto the surface; `None` for fewer than six points, or where fewer than six lie over the surface and not beyond a free
+/// edge of it: nothing can be aligned then.
 pub fn align(points: &[Vec3], surface: &Surface, settings: &Settings) -> Option<Alignment> {
-    if points.len() < 6 {
+    if points.len() < LEAST {
         return None;
     }
-    let step = points.len().div_ceil(settings.most_points.max(6));
+    let step = points.len().div_ceil(settings.most_points.max(LEAST));
     let sample: Vec<Point3<f64>> = points.iter().step_by(step).map(|&p| p.into()).collect();
     let centre = sample.iter().fold(Vector3::zeros(), |s, p| s + p.coords) / sample.len() as f64;
     let extent = sample
@@ -67,6 +70,9 @@ pub fn align(points: &[Vec3], surface: &Surface, settings: &Settings) -> Option<
             .iter()
             .filter_map(|p| row(surface, found.motion * p, pivot, extent, settings.offset))
             .collect();
+        if rows.len() < LEAST {
+            return None;
+        }
         rows.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
         let kept = ((settings.kept * rows.len() as f64).ceil() as usize).min(rows.len());
         rows.truncate(kept);

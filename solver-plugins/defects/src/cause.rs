@@ -1,6 +1,7 @@
 //! What a wrinkle most likely comes from, by what the fields say about its place.
 
 use crate::measure::{Defect, Kind, Ply, mean_along};
+use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::distance;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -38,25 +39,41 @@ pub struct Limits {
     pub fibre_compression: f64,
 }
 
+/// A ply next to another one in the stack.
+#[derive(Debug, Clone, Copy)]
+pub struct Neighbour<'a> {
+    /// It counts where its flat mesh lies.
+    pub ply: &'a Ply,
+    /// Directions of both its fibre families in the flat ply (rad).
+    pub fibres: [f64; 2],
+}
+
+/// Places on the side of a cell lie in it, however they were rounded (m).
+const ROUNDING: f64 = 1e-6;
+
 /// Sets the causes of a ply's wrinkles. `fibres`: directions of both fibre families of the flat ply (rad); `others`:
-/// those of the plies next to it. A scan, of which neither is known, gives both empty: its wrinkles come from bridging or
+/// the plies next to it, of which each counts for the wrinkles under or over which it lies: its flat mesh holds a node of the crest. A scan, of which neither is known, gives both empty: its wrinkles come from bridging or
 /// are undetermined.
 pub fn find_causes(
     ply: &Ply,
     defects: &mut [Defect],
     fibres: Option<[f64; 2]>,
-    others: &[[f64; 2]],
+    others: &[Neighbour<'_>],
     limits: &Limits,
 ) {
     let bridging: Vec<u32> = (defects.iter())
         .filter(|d| d.kind == Kind::Bridging)
         .flat_map(|d| d.nodes.iter().copied())
         .collect();
-    let crossed = fibres.is_some_and(|own| {
-        others
-            .iter()
-            .any(|other| relative_angle(own, *other) > limits.layup_angle)
-    });
+    let crossing: Vec<&Ply> = (others.iter())
+        .filter(|o| fibres.is_some_and(|own| relative_angle(own, o.fibres) > limits.layup_angle))
+        .map(|o| o.ply)
+        .collect();
+    let crossed = |ridge: &[u32]| {
+        let flat = |&i: &u32| [0, 1].map(|k| ply.undeformed[i as usize][k]);
+        let places: Vec<[f64; 2]> = ridge.iter().map(flat).collect();
+        crossing.iter().any(|other| lies_at(other, &places))
+    };
     let wrinkles = defects.iter_mut().filter(|d| d.kind == Kind::Wrinkle);
     for wrinkle in wrinkles {
         let over = |g: f64| g > limits.over_shear_positive || g < limits.over_shear_negative;
@@ -67,7 +84,7 @@ pub fn find_causes(
                 Cause::OverShear
             } else if is_near(ply, &wrinkle.ridge_nodes, &bridging, limits.bridging_reach) {
                 Cause::Bridging
-            } else if crossed && compressed {
+            } else if compressed && crossed(&wrinkle.ridge_nodes) {
                 Cause::InterPlyCompression
             } else if compressed {
                 Cause::FibreCompression
@@ -76,6 +93,31 @@ pub fn find_causes(
             },
         );
     }
+}
+
+/// Whether a cell of a flat ply holds one of the places (m).
+fn lies_at(ply: &Ply, places: &[[f64; 2]]) -> bool {
+    let around = flat_bounds(places.iter().copied());
+    (0..ply.topology.cells()).any(|c| {
+        let at = |&i: &u32| [0, 1].map(|k| ply.undeformed[i as usize][k]);
+        let corners: Vec<[f64; 2]> = ply.topology.cell(c).iter().map(at).collect();
+        let own = flat_bounds(corners.iter().copied());
+        let apart =
+            |d: usize| own[d] > around[d + 2] + ROUNDING || own[d + 2] < around[d] - ROUNDING;
+        !(apart(0) || apart(1)) && places.iter().any(|p| holds(&corners, *p))
+    })
+}
+
+/// Whether a place lies in a convex cell, wound either way (m).
+fn holds(corners: &[[f64; 2]], p: [f64; 2]) -> bool {
+    // Distance from each side, positive to its left.
+    let distance = |(k, a): (usize, &[f64; 2])| {
+        let b = corners[(k + 1) % corners.len()];
+        let (along, to) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+        (along[0] * to[1] - along[1] * to[0]) / along[0].hypot(along[1]).max(f64::MIN_POSITIVE)
+    };
+    let distances = || corners.iter().enumerate().map(distance);
+    distances().all(|d| d > -ROUNDING) || distances().all(|d| d < ROUNDING)
 }
 
 fn is_near(ply: &Ply, ridge: &[u32], bridging: &[u32], reach: f64) -> bool {

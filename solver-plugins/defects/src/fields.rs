@@ -10,7 +10,8 @@ pub const QUANTILES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];
 /// Places on the side of a mesh lie in it, however they were rounded (m).
 const ROUNDING: f64 = 1e-6;
 
-/// Errors of fields against those of a reference, at the reference's nodes and at the centres of its cells, as far as both have them.
+/// Errors of fields against those of a reference, at the reference's nodes and at the centres of its cells, as far as both have them. Nodes count by
+/// their area in the flat ply, so that a finely meshed part of the reference counts no more than another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldErrors {
     /// Root mean square distance of material points from where the reference has them (m).
@@ -64,21 +65,21 @@ fn centre(ply: &Ply, cell: usize) -> [f64; 2] {
     })
 }
 
-/// Root mean square of what was added.
+/// Root mean square of what was added, by weight.
 #[derive(Default)]
 struct Squares {
     sum: f64,
-    count: usize,
+    weight: f64,
 }
 
 impl Squares {
-    fn add(&mut self, difference: f64) {
-        self.sum += difference * difference;
-        self.count += 1;
+    fn add(&mut self, difference: f64, weight: f64) {
+        self.sum += weight * difference * difference;
+        self.weight += weight;
     }
 
     fn root(&self) -> Option<f64> {
-        (self.count > 0).then(|| (self.sum / self.count as f64).sqrt())
+        (self.weight > 0.0).then(|| (self.sum / self.weight).sqrt())
     }
 }
 
@@ -101,15 +102,17 @@ impl FieldErrors {
             // Shear angles of both at the same places.
             let mut angles = [Vec::new(), Vec::new()];
             for ply in theirs {
+                let areas = ply.topology.node_areas(&ply.undeformed);
                 for (i, at) in ply.undeformed.iter().enumerate() {
                     let Some((p, place)) = ours.at(at[0], at[1]) else {
                         continue;
                     };
-                    position.add(distance(place.interpolate(&p.formed), ply.formed[i]));
+                    let off = distance(place.interpolate(&p.formed), ply.formed[i]);
+                    position.add(off, areas[i]);
                     let judged = ply.distance[i].judged;
                     if let Some(value) = distance_at(p, &place).filter(|_| judged) {
-                        apart.add(value - ply.distance[i].value);
-                        standing_off.add(ply.distance[i].value);
+                        apart.add(value - ply.distance[i].value, areas[i]);
+                        standing_off.add(ply.distance[i].value, areas[i]);
                     }
                 }
                 for (c, &theirs) in ply.shear_angle.iter().enumerate() {

@@ -11,6 +11,6 @@ pub mod of_run;
 pub mod pairs;
 pub mod scan;
 
-pub use cause::{Cause, Limits, find_causes, relative_angle};
+pub use cause::{Cause, Limits, Neighbour, find_causes, relative_angle};
 pub use fields::{FieldErrors, QUANTILES, distance_at};
 pub use measure::{Defect, Kind, Ply, RidgeShear, Settings, Tool, measure, quantiles};

@@ -2,7 +2,7 @@
 
 use crate::area::{Extent, NONE, extents};
 use crate::cause::Cause;
-use plyflow_surface::vector::{Vec3, distance};
+use plyflow_surface::vector::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{
     Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances, ridge_line,
     tool_crests,
@@ -68,7 +68,8 @@ impl Tool {
 
 impl Ply {
     /// Takes distances and curvatures of a ply whose mid-plane lies `offset` (m) from the tool when all sheets
-    /// lie on it. Nothing is known of its strains ([`Ply::shear_angle`], [`Ply::fibre_strain`]).
+    /// lie on it. Nothing is known of its strains ([`Ply::shear_angle`], [`Ply::fibre_strain`]). Cells may be wound either way, all alike: what is a crest
+    /// is told by the side on which the tool lies.
     pub fn new(
         name: String,
         topology: Topology,
@@ -79,7 +80,10 @@ impl Ply {
         foot_margin: f64,
     ) -> Self {
         let distance = nodal_distances(&tool.surface, &formed, offset, foot_margin);
-        let curvature = curvatures(&topology, &formed);
+        let mut curvature = curvatures(&topology, &formed);
+        if faces(&topology, &formed, &tool.surface, &distance) {
+            curvature.iter_mut().for_each(turn_over);
+        }
         let tool_crest = distance.iter().map(|d| tool.crests[d.triangle]).collect();
         Self {
             name,
@@ -103,6 +107,24 @@ impl Ply {
             .sum::<Option<f64>>()?;
         (!cells.is_empty()).then(|| sum / cells.len() as f64)
     }
+}
+
+/// Whether a ply's normals point, on the whole and by area, to the tool: its cells are wound the other way round. It is asked of the nodes that are
+/// judged alone, past a free edge the tool has no side.
+fn faces(topology: &Topology, formed: &[Vec3], tool: &Surface, distance: &[NodalDistance]) -> bool {
+    let (normals, areas) = (topology.normals(formed), topology.node_areas(formed));
+    let outwards = |i: usize| {
+        let [a, b, c] = tool.triangles()[distance[i].triangle].map(|k| tool.points()[k as usize]);
+        areas[i] * dot(normals[i], unit(cross(sub(b, a), sub(c, a))))
+    };
+    let judged = (0..formed.len()).filter(|&i| distance[i].judged);
+    judged.map(outwards).sum::<f64>() < 0.0
+}
+
+/// The curvature as seen from the other side.
+fn turn_over(seen: &mut Curvature) {
+    (seen.max, seen.min) = (-seen.max, -seen.min);
+    seen.normal = scale(seen.normal, -1.0);
 }
 
 /// Kinds of defect.

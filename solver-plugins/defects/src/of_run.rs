@@ -1,6 +1,6 @@
 //! Tool and plies of a formed run: the same for every step that measures defects.
 
-use crate::{Ply, Tool};
+use crate::{Neighbour, Ply, Tool};
 use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::{Topology, of_run};
 use serde::Deserialize;
@@ -34,10 +34,15 @@ impl Sheet {
     }
 }
 
-/// Fibre directions (rad) of the plies next to the one at place `k`, as [`crate::find_causes`] asks for them.
-pub fn neighbours(plies: &[Sheet], k: usize) -> Vec<[f64; 2]> {
+/// The plies next to the one at place `k` of which the run tells the fibre directions, as [`crate::find_causes`] asks for them. `plies`: as many
+/// as `sheets`, in the order of the stack.
+pub fn neighbours<'a>(sheets: &[Sheet], plies: &'a [Ply], k: usize) -> Vec<Neighbour<'a>> {
     let next = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
-    next.filter_map(|i| plies.get(i)?.fibres()).collect()
+    next.filter_map(|i| {
+        let (ply, fibres) = (plies.get(i)?, sheets.get(i)?.fibres()?);
+        Some(Neighbour { ply, fibres })
+    })
+    .collect()
 }
 
 /// The tool of a run.

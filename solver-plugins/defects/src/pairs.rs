@@ -26,10 +26,10 @@ pub fn same_within(a: &Defect, b: &Defect) -> f64 {
     SAME_DEFECT.max(0.5 * a.length.max(b.length))
 }
 
-/// The defects of a ply, also the smaller ones that a pair may need: bridging down to a smaller area,
+/// The defects of a ply among its nodes `inside` (`[nodes]`), also the smaller ones that a pair may need: bridging down to a smaller area,
 /// and ridges that are too short for a wrinkle. Those come besides what is measured there as bridging, so that what a place
 /// is does not hang on them.
-pub fn measure_for_pairs(ply: &Ply, settings: &Settings) -> Vec<Defect> {
+pub fn measure_for_pairs(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     let smaller = Settings {
         minimum_bridging_area: PAIRED_DOWN_TO * settings.minimum_bridging_area,
         ..*settings
@@ -38,10 +38,9 @@ pub fn measure_for_pairs(ply: &Ply, settings: &Settings) -> Vec<Defect> {
         minimum_wrinkle_length: PAIRED_DOWN_TO * settings.minimum_wrinkle_length,
         ..*settings
     };
-    let inside = vec![true; ply.formed.len()];
-    let mut found = measure(ply, &inside, &smaller);
+    let mut found = measure(ply, inside, &smaller);
     let short = |d: &Defect| d.kind == Kind::Wrinkle && d.length < settings.minimum_wrinkle_length;
-    found.extend(measure(ply, &inside, &shorter).into_iter().filter(short));
+    found.extend(measure(ply, inside, &shorter).into_iter().filter(short));
     found
 }
 

@@ -1,7 +1,9 @@
 //! Defects of surfaces whose answers are known: measured on a mesh, on a scan's facets and on a cloud of points.
 
 use plyflow_defects::scan::join;
-use plyflow_defects::{Cause, Defect, Kind, Limits, Ply, Settings, Tool, find_causes, measure};
+use plyflow_defects::{
+    Cause, Defect, FieldErrors, Kind, Limits, Neighbour, Ply, Settings, Tool, find_causes, measure,
+};
 use plyflow_surface::vector::{Vec3, distance};
 use plyflow_surface::{Surface, Topology, triangles};
 use std::f64::consts::PI;
@@ -268,6 +270,66 @@ fn a_cloud_of_points_is_joined_to_the_whole_surface_and_measured_as_a_mesh_is() 
     }
 }
 
+#[test]
+fn a_ply_that_is_wound_the_other_way_round_has_the_same_defects() {
+    let (points, cells) = flat(0.002, 0.0);
+    let measured = |cells: &[u32]| {
+        let topology = Topology::new(points.len(), 4, cells);
+        all(&ply(topology, formed(&points, 0.5)))
+    };
+    let right = measured(&cells);
+    let reversed: Vec<u32> = cells
+        .chunks(4)
+        .flat_map(|c| c.iter().rev().copied())
+        .collect();
+    let errors = errors(&measured(&reversed));
+    assert!(errors.iter().all(|e| e.abs() < 0.03), "{errors:?}");
+    for (a, b) in right.iter().zip(&measured(&reversed)) {
+        assert!(
+            (a.length - b.length).abs() < 1e-9,
+            "{} {}",
+            a.length,
+            b.length
+        );
+        assert_eq!(a.nodes, b.nodes);
+    }
+}
+
+/// Left of the middle nodes lie 1 mm apart and right of it 20 mm: half of the ply is 2 mm off however many nodes each half has.
+#[test]
+fn errors_of_fields_count_by_area() {
+    let strip = |xs: &[f64], off: &dyn Fn(f64) -> f64| {
+        let flat: Vec<Vec3> = [0.0, 0.02]
+            .iter()
+            .flat_map(|y| xs.iter().map(move |x| [*x, *y, 0.0]))
+            .collect();
+        let n = xs.len() as u32;
+        let cells: Vec<u32> = (0..n - 1)
+            .flat_map(|i| [i, i + 1, n + i + 1, n + i])
+            .collect();
+        let formed = flat
+            .iter()
+            .map(|p| [p[0], p[1], TOP + OFFSET + off(p[0])])
+            .collect();
+        let topology = Topology::new(flat.len(), 4, &cells);
+        Ply::new("ply".into(), topology, flat, formed, &tool(), OFFSET, 0.0)
+    };
+    let uneven: Vec<f64> = (-100..0)
+        .map(|i| 0.001 * f64::from(i))
+        .chain((0..=5).map(|i| 0.02 * f64::from(i)))
+        .collect();
+    let reference = [strip(&uneven, &|_| 0.0)];
+    let ours = [strip(&[-0.1, -1e-9, 0.0, 0.1], &|x| {
+        if x < -5e-10 { 0.002 } else { 0.0 }
+    })];
+    let found = FieldErrors::of(&[&ours], &[&reference]).unwrap();
+    // The node in the middle has 0.5 + 10 mm of the 200 and is not off; the last one on the left has all of its millimetre.
+    let expected = 0.002 * ((0.1 - 0.0005) / 0.2f64).sqrt();
+    for error in [found.position, found.distance.unwrap()] {
+        assert!((error / expected - 1.0).abs() < 1e-6, "{error} {expected}");
+    }
+}
+
 /// Shear 10 degrees along the wrinkle: over-shear. Less: the blister is near, or it is not. Far from it, under a ply turned by 45
 /// degrees: pressed together if its fibres are, or if they are without such a ply.
 #[test]
@@ -282,12 +344,37 @@ fn causes_follow_from_the_fields() {
         fibre_compression: 1e-4,
     };
     let own = [-PI / 4.0, PI / 4.0];
-    let cause = |ply: &Ply, others: &[[f64; 2]], reach: f64| {
+    // As large as the ply itself, but by the wrinkle alone, and beside it.
+    let other = |b: [f64; 4]| {
+        let corners = [[b[0], b[1]], [b[2], b[1]], [b[2], b[3]], [b[0], b[3]]];
+        let flat = corners.map(|[x, y]| [x, y, 0.0]);
+        let topology = Topology::new(4, 4, &[0, 1, 2, 3]);
+        Ply::new(
+            "other".into(),
+            topology,
+            flat.into(),
+            flat.into(),
+            &tool(),
+            0.0,
+            0.0,
+        )
+    };
+    let (around, beside) = (
+        other([-0.08, -0.05, 0.08, 0.05]),
+        other([0.0, -0.05, 0.08, 0.05]),
+    );
+    let cause_under = |ply: &Ply, other: &Ply, others: &[[f64; 2]], reach: f64| {
         let mut found = all(ply);
-        find_causes(ply, &mut found, Some(own), others, &limits(reach));
+        let with = |fibres: &[f64; 2]| Neighbour {
+            ply: other,
+            fibres: *fibres,
+        };
+        let others: Vec<Neighbour<'_>> = others.iter().map(with).collect();
+        find_causes(ply, &mut found, Some(own), &others, &limits(reach));
         assert_eq!(found[1].cause, None);
         found[0].cause.unwrap()
     };
+    let cause = |ply: &Ply, others: &[[f64; 2]], reach| cause_under(ply, &around, others, reach);
     let n = cells.len() / 4;
     let turned = [[0.0, PI / 2.0]];
     assert_eq!(cause(&ply, &[], 0.02), Cause::Undetermined);
@@ -298,6 +385,9 @@ fn causes_follow_from_the_fields() {
     ply.fibre_strain = vec![-2e-4; n];
     assert_eq!(cause(&ply, &turned, 0.05), Cause::Bridging);
     assert_eq!(cause(&ply, &turned, 0.02), Cause::InterPlyCompression);
+    // A ply that lies beside the wrinkle does nothing to it.
+    let alone = cause_under(&ply, &beside, &turned, 0.02);
+    assert_eq!(alone, Cause::FibreCompression);
     // The same directions, named the other way round and turned by half a turn: one layup, pressed together by itself.
     assert_eq!(
         cause(&ply, &[[PI / 4.0, 0.75 * PI]], 0.02),

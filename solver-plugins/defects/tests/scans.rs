@@ -87,6 +87,9 @@ fn what_the_surface_does_not_decide_stays() {
         assert!((q[0] - p[0]).hypot(q[1] - p[1]) < 1e-3, "{p:?} {q:?}");
     }
     assert_eq!(align(&scan[..5], &plane, &settings), None);
+    // Beyond the plane's edge there is nothing to lie on.
+    let beside: Vec<Vec3> = scan.iter().map(|p| [p[0] + 5.0, p[1], p[2]]).collect();
+    assert_eq!(align(&beside, &plane, &settings), None);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What global and local runs share: checking the stack, making components, stacking the contacts.
 
+use crate::cover::Cover;
 use crate::elements;
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
@@ -86,6 +87,7 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
         .sheets
         .iter()
         .map(|sheet| {
+            check_sheet(sheet)?;
             let MaterialEntry::Inline(material) = &sheet.material else {
                 return Err(format!(
                     "the material of sheet '{}' was not read in",
@@ -103,6 +105,33 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
             })
         })
         .collect()
+}
+
+/// How far (rad) the angle between the fibre families may be from a right one: rounding of angles that are written in degrees.
+const SQUARE: f64 = 1e-6;
+
+/// Whether the solver can compute a sheet as the scene has it.
+fn check_sheet(sheet: &Sheet) -> Result<(), String> {
+    if ["bed", "die", "holder"].contains(&sheet.name.as_str()) {
+        return Err(format!(
+            "sheet '{}' has the name of a rigid part; give it another name",
+            sheet.name
+        ));
+    }
+    if let (SheetKind::Ply, Some(second)) = (sheet.kind, sheet.fibre_2) {
+        let degrees = |angle: f64| (1e6 * angle.to_degrees()).round() / 1e6;
+        let between = second.si() - sheet.fibre_1.si();
+        if between.cos().abs() > SQUARE {
+            return Err(format!(
+                "ply '{}': given fibres at {} and {} deg; expected families that cross at a right angle before forming, such as -45 and 45 deg: \
+                 elements and material laws of forming-explicit measure shear from there. (forming-kinematic drapes other angles too)",
+                sheet.name,
+                degrees(sheet.fibre_1.si()),
+                degrees(second.si())
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Constants of all contacts.
@@ -225,7 +254,7 @@ pub fn add_ply(
     }
     let first = points.len() as u32;
     points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
-    let element = elements::element(components, sheet, &p.element)?;
+    let element = elements::of_ply(components, sheet, &p.element)?;
     symmetry::check_material(&element, sheet, mirrors.planes)?;
     let elsewhere = elements::elsewhere(components, sheet, &element, &mesh, mirrors.planes, p)?;
     let body = Body {
@@ -270,6 +299,13 @@ pub fn step_settings(p: &Parameters) -> StepSettings {
 /// What to tell where contacts' multipliers grow more slowly than asked for.
 pub(crate) fn slower_multipliers(model: &Model, p: &Parameters) -> Option<String> {
     let (asked, taken) = (p.contact_augmentation, model.contact_augmentation());
+    if taken <= 0.0 && asked > 0.0 {
+        return Some(format!(
+            "contact_augmentation is 0 instead of {asked:.2e}: without damping of contacts (contact_damping: {}) multipliers would feed every \
+             motion, so pressure is borne by the penalty alone, at larger penetrations",
+            p.contact_damping
+        ));
+    }
     (taken > 0.0 && taken < asked).then(|| {
         format!(
             "contact_augmentation is {taken:.2e} instead of {asked:.2e}: some sheets have far more mass in a node than those they touch, \
@@ -300,11 +336,12 @@ pub fn add_contacts(
     tool: &mut ToolSurfaces,
 ) -> Result<(), String> {
     let friction = FrictionTable::new(scene)?;
-    let rigid = |name: String, surface: Arc<dyn RigidSurface>, mu: FrictionLaw, k: usize| {
-        let slaves = placed[k].slaves.iter();
-        let items = slaves.map(|n| RigidItem::new(*n)).collect();
-        let (offset, settings) = (stack[k].offset, contact_settings(p));
-        RigidContact::new(name, surface, offset, mu, &settings, items)
+    let top = placed.len() - 1;
+    let plies = (1..top).map(|k| (k, placed[k].index, &placed[k].slaves[..]));
+    let cover = Cover::new(model, &plies.collect::<Vec<_>>());
+    let rigid = |name: String, surface, mu: FrictionLaw, offset: f64, nodes: &[u32]| {
+        let items = nodes.iter().map(|n| RigidItem::new(*n)).collect();
+        RigidContact::new(name, surface, offset, mu, &contact_settings(p), items)
     };
     let bottom = stack[0].scene.name.as_str();
     let under = |model: &Model, part: &str| {
@@ -318,23 +355,34 @@ pub fn add_contacts(
     let name = |what: &str, k: usize| format!("{what}/{}", stack[k].scene.name);
     for (part, surface) in [("tool", tool.of(model, placed[0].index)), ("bed", bed)] {
         let mu = under(model, part)?;
+        let (offset, nodes) = (stack[0].offset, &placed[0].slaves);
         model
             .rigid_contacts
-            .push(rigid(name(part, 0), surface, mu, 0));
+            .push(rigid(name(part, 0), surface, mu, offset, nodes));
     }
-    let top = placed.len() - 1;
     for k in 1..top {
         // The chords of the film's elements cut through convex fillets; the plies' own nodes must stay outside the tool all
         // the same. There they rub as the weakest of the surfaces below them does.
-        let mut parts = vec!["tool"];
-        parts.extend(stack[..=k].iter().map(|s| s.scene.name.as_str()));
-        let mu = friction.through(model, &parts, &stack[k].scene.name)?;
-        let contact = rigid(name("tool", k), tool.of(model, placed[k].index), mu, k);
-        model
-            .rigid_contacts
-            .push(contact.with_slack(penetration::slack_through(&stack[..k])));
+        for (plies, nodes) in cover.groups((k, &placed[k].slaves), 1..k) {
+            let below: Vec<usize> = std::iter::once(0).chain(plies).collect();
+            let mut parts = vec!["tool"];
+            parts.extend(
+                below
+                    .iter()
+                    .chain([&k])
+                    .map(|i| stack[*i].scene.name.as_str()),
+            );
+            let mu = friction.through(model, &parts, &stack[k].scene.name)?;
+            let surface = tool.of(model, placed[k].index);
+            let between: Vec<&StackSheet> = below.iter().map(|i| &stack[*i]).collect();
+            let name = name("tool", k) + &beside(stack, 1..k, &below);
+            let contact = rigid(name, surface, mu, offset_over(&between, &stack[k]), &nodes);
+            model
+                .rigid_contacts
+                .push(contact.with_slack(penetration::slack_through(&between)));
+        }
     }
-    let mut pair = |slave: usize, master: usize, side: f64| -> Result<(), String> {
+    let mut pair = |slave: usize, nodes: &[u32], master: usize, side: f64| -> Result<(), String> {
         let on = (master, placed[master].index);
         let of = |k: usize| stack[k].scene.name.as_str();
         let touching = Touching {
@@ -342,32 +390,62 @@ pub fn add_contacts(
             slave: of(slave),
         };
         let mu = friction.law(model, &touching)?;
-        add_sheet_contact(
-            model,
-            stack,
-            (slave, &placed[slave].slaves),
-            on,
-            side,
-            mu,
-            p,
-        );
+        add_sheet_contact(model, stack, (slave, nodes), on, side, mu, p);
         Ok(())
     };
+    let slaves = |k: usize| &placed[k].slaves[..];
     for k in 1..top {
-        pair(k, k - 1, 1.0)?;
+        pair(k, slaves(k), k - 1, 1.0)?;
     }
     // The plies' nodes are the slaves of both films: the two films have the same mesh, so whatever unevenness
     // node-to-surface contact makes of a uniform pressure is the same above and below, and cancels. With the
     // film above as the slave of the ply it does not, and the evacuated stack waves (tried).
     if top > 1 {
-        pair(top - 1, top, -1.0)?;
+        pair(top - 1, slaves(top - 1), top, -1.0)?;
     }
-    pair(top, 0, 1.0)?;
+    pair(top, slaves(top), 0, 1.0)?;
+    // Where plies that would lie between do not.
+    for k in 1..top {
+        for below in (0..k - 1).rev() {
+            let ply = (below > 0).then_some(below);
+            let nodes = cover.past((k, slaves(k)), below + 1..k, ply);
+            if !nodes.is_empty() {
+                pair(k, &nodes, below, 1.0)?;
+            }
+        }
+        let nodes = cover.past((k, slaves(k)), k + 1..top, None);
+        if k + 1 < top && !nodes.is_empty() {
+            pair(k, &nodes, top, -1.0)?;
+        }
+    }
     for (k, ply) in placed.iter().enumerate().take(top).skip(1) {
         add_self_contact(model, stack, (k, ply.index), &ply.slaves, p)?;
     }
     model.set_contact_stiffness(&contact_settings(p));
     Ok(())
+}
+
+/// Distance (m) of a sheet's mid-plane from what is under (or over) all the sheets `between`.
+pub fn offset_over(between: &[&StackSheet], sheet: &StackSheet) -> f64 {
+    // Summed from the tool upwards, as the stack's own offsets are.
+    let under = between.iter().fold(0.0, |sum, s| sum + s.thickness);
+    under + 0.5 * sheet.thickness
+}
+
+/// What the name of a contact of a part of a ply's nodes ends with: which of the plies `among` are not surely between.
+pub fn beside(
+    stack: &[StackSheet],
+    mut among: impl Iterator<Item = usize>,
+    between: &[usize],
+) -> String {
+    let missing: Vec<&str> = (among.by_ref())
+        .filter(|i| !between.contains(i))
+        .map(|i| stack[i].scene.name.as_str())
+        .collect();
+    match missing.is_empty() {
+        true => String::new(),
+        false => format!("/beside {}", missing.join(", ")),
+    }
 }
 
 /// Places slaves on the master in the undeformed plane. A slave beyond the master's edge gets the nearest
@@ -381,18 +459,14 @@ fn locate(model: &Model, master: usize, slaves: &[u32]) -> Vec<SlaveItem> {
             .collect();
     }
     let cells = &model.cells[c0..c1];
-    let centre = |c: usize| -> [f64; 2] {
-        let p = cells[c].map(|n| model.x[n as usize]);
-        [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]))
-    };
-    let bins = Bins::new((0..cells.len()).map(centre).collect());
+    let corners: Vec<[V; 4]> = (cells.iter().map(|c| c.map(|n| model.x[n as usize]))).collect();
+    let bins = Bins::of_cells(&corners);
     slaves
         .iter()
         .map(|n| {
             let p = model.x[*n as usize];
             let inside = bins.near(p).iter().find_map(|c| {
-                let corners = cells[*c as usize].map(|n| model.x[n as usize]);
-                let xi = inverse_bilinear(corners, p)?;
+                let xi = inverse_bilinear(corners[*c as usize], p)?;
                 (xi[0].abs() <= 1.0 + 1e-9 && xi[1].abs() <= 1.0 + 1e-9).then_some((*c, xi))
             });
             let (cell, xi) = inside.unwrap_or_else(|| (bins.nearest(p), [0.0; 2]));
@@ -429,7 +503,7 @@ pub fn inverse_bilinear(q: [V; 4], p: V) -> Option<[f64; 2]> {
 }
 
 /// Cell centres sorted into square bins.
-struct Bins {
+pub(crate) struct Bins {
     centres: Vec<[f64; 2]>,
     lo: [f64; 2],
     size: f64,
@@ -438,6 +512,12 @@ struct Bins {
 }
 
 impl Bins {
+    /// Of quads seen from above.
+    pub(crate) fn of_cells(corners: &[[V; 4]]) -> Self {
+        let centre = |p: &[V; 4]| [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]));
+        Self::new(corners.iter().map(centre).collect())
+    }
+
     fn new(centres: Vec<[f64; 2]>) -> Self {
         let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
         for c in &centres {
@@ -471,7 +551,8 @@ impl Bins {
         })
     }
 
-    fn near(&self, p: V) -> Vec<u32> {
+    /// Cells around a place.
+    pub(crate) fn near(&self, p: V) -> Vec<u32> {
         let [i, j] = self.bin([p[0], p[1]]);
         let mut found = Vec::new();
         for b in j.saturating_sub(1)..(j + 2).min(self.shape[1]) {

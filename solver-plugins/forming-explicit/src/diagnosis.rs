@@ -1,5 +1,6 @@
 //! Where and why a run went wrong, for the one who has to change it.
 
+use crate::penetration::Penetration;
 use crate::run::{Forming, HistoryRow};
 use crate::strain::cell_strain;
 use plyflow_mechanics::vec3::{V, norm};
@@ -112,7 +113,7 @@ const TOO_LARGE_A_STEP: (&str, &str) = (
     "smaller step_safety or time_step, more frames (the step is chosen anew at each), less contact_damping",
 );
 
-/// The likely cause and what to try, by the element that sets the step, the deepest contact over the thinnest sheet, and the kinetic
+/// The likely cause and what to try, by the element that sets the step, the deepest contact over the thinner body, and the kinetic
 /// over the internal energy.
 fn likely(cell: Option<&Weakest>, deep: Option<f64>, kinetic: f64) -> (&'static str, &'static str) {
     match (cell, deep) {
@@ -201,27 +202,32 @@ fn weakest(forming: &Forming) -> Option<Weakest> {
 }
 
 struct Deepest {
-    /// Over the thinnest sheet.
+    /// What the bodies share, over the thinner one.
     share: f64,
     text: String,
 }
 
 /// The contact that is deepest.
 fn deepest(forming: &Forming) -> Option<Deepest> {
+    // Bare films are kept further apart than they are thick: what they use of that is no overlap.
+    let overlap = |p: &Penetration| p.overlap_of(p.largest);
     let worst = (forming.penetrations().into_iter())
-        .max_by(|a, b| a.largest.total_cmp(&b.largest))
+        .max_by(|a, b| {
+            let by_overlap = overlap(a).total_cmp(&overlap(b));
+            by_overlap.then(a.largest.total_cmp(&b.largest))
+        })
         .filter(|p| p.largest > 0.0)?;
-    let (name, depth) = (worst.pair, worst.largest);
-    let thinnest = (forming.stack.iter()).fold(f64::INFINITY, |t, s| t.min(s.thickness));
+    let share = overlap(&worst);
     Some(Deepest {
-        share: depth / thinnest,
+        share,
         text: format!(
-            " Deepest contact: {name}{}, {:.0} um ({:.0} % of the thinnest sheet).",
+            " Deepest contact: {}{}, {:.0} um ({:.0} % of the thinner one).",
+            worst.pair,
             worst
                 .place
                 .map_or_else(String::new, |x| format!(" at {}", millimetres(x))),
-            1e6 * depth,
-            100.0 * depth / thinnest
+            1e6 * worst.largest,
+            100.0 * share
         ),
     })
 }

@@ -25,6 +25,28 @@ pub fn element(
     of_material(components, sheet, choice, material(components, sheet)?)
 }
 
+/// The element of a ply.
+///
+/// # Errors
+/// The component's own text; when the element has patches for bending and the material nothing that bends: it would be a membrane
+/// without a word.
+pub fn of_ply(
+    components: &dyn Components,
+    sheet: &StackSheet,
+    choice: &ComponentChoice,
+) -> Result<ElementInstance, String> {
+    let element = element(components, sheet, choice)?;
+    let bends = element.material.reference().sizes().has_bending;
+    if element.sizes.patch_nodes > 0 && !bends {
+        return Err(format!(
+            "element: given '{}', which bends, for ply '{}', whose material '{}' has no bending; expected a material with `bending` \
+             (`plyflow plugins {}`), or a membrane such as m4",
+            choice.plugin, sheet.scene.name, sheet.material.name, sheet.material.plugin
+        ));
+    }
+    Ok(element)
+}
+
 /// Makes the material of a sheet.
 fn material(
     components: &dyn Components,

@@ -58,6 +58,32 @@ fn pairs(scene: &Scene) -> Vec<Pair> {
     for two in sheets.windows(2) {
         found.push(pair(&two[0].name, &two[1].name, class(&two[0], &two[1])));
     }
+    // Where plies of other outlines do not lie between, sheets further apart in the stack touch.
+    let plies = || sheets.iter().filter(|s| s.kind == SheetKind::Ply);
+    let outline = |s: &Sheet| {
+        (
+            s.length,
+            s.width,
+            s.outline.clone(),
+            s.holes.clone(),
+            s.centre,
+        )
+    };
+    if plies().any(|s| plies().next().is_some_and(|f| outline(f) != outline(s))) {
+        for (i, lower) in sheets.iter().enumerate() {
+            for upper in sheets.iter().skip(i + 2) {
+                if class(lower, upper) != "diaphragm_diaphragm" {
+                    found.push(pair(&lower.name, &upper.name, class(lower, upper)));
+                }
+            }
+        }
+        if let Process::Press(press) = &scene.process {
+            let holder = press.holder.as_ref().map(|_| "holder");
+            for part in ["tool", "die"].into_iter().chain(holder) {
+                found.extend(plies().map(|ply| pair(part, &ply.name, "tool_fabric")));
+            }
+        }
+    }
     // Beyond the plies the two films meet.
     if sheets.len() > 2 && matches!(scene.process, Process::DoubleDiaphragm(_)) {
         found.push(pair(&first.name, &last.name, class(first, last)));

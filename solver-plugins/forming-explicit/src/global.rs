@@ -90,12 +90,15 @@ fn layout(
     );
     if fine[0] < -hl || fine[2] > hl || fine[1] < -hw || fine[3] > hw {
         return Err(format!(
-            "the frame ({} x {} m) is too small for the tool and the plies, which need {:.3} x \
-             {:.3} m",
+            "process.double_diaphragm: the frame ({} x {} m) is too small; expected at least {:.3} x {:.3} m: the plies with {:.0} mm of free \
+             film around them (`film_joint_margin`, at least three elements of {:.1} mm, `diaphragm_element_size` or `element_size`) and one \
+             more element, and the tool with 30 mm. Enlarge `frame_length` and `frame_width`, or take less of these",
             2.0 * hl,
             2.0 * hw,
             2.0 * fine[2].max(-fine[0]),
-            2.0 * fine[3].max(-fine[1])
+            2.0 * fine[3].max(-fine[1]),
+            1e3 * process.film_joint_margin.si().max(3.0 * film_size),
+            1e3 * film_size
         ));
     }
     // A grid line lies on every mirror plane.

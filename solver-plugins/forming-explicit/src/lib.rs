@@ -6,6 +6,7 @@
 pub mod assembly;
 mod checkpoint;
 mod course;
+mod cover;
 mod diagnosis;
 pub mod draw_in;
 pub mod elements;

@@ -269,10 +269,10 @@ fn sheets_of(
             (true, false) => Pressed::Above,
             _ => Pressed::No,
         };
-        let choice = if film {
-            &p.diaphragm_element
+        let element = if film {
+            elements::element(components, sheet, &p.diaphragm_element)?
         } else {
-            &p.element
+            elements::of_ply(components, sheet, &p.element)?
         };
         let mesh = QuadMesh {
             points: local.points.clone(),
@@ -300,7 +300,7 @@ fn sheets_of(
             least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
             cells: mesh.cells,
             axis: assembly::axis(&sheet.scene),
-            element: elements::element(components, sheet, choice)?,
+            element,
             elsewhere: None,
         });
     }

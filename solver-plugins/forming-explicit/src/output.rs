@@ -173,6 +173,9 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
     if let Some(what) = crate::assembly::slower_multipliers(&forming.model, p) {
         host.log(Log::Info, &what);
     }
+    if let Some(what) = long_process(&forming) {
+        host.log(Log::Warn, &what);
+    }
     if let Some(input) = feedback.first() {
         let (time, sheets) = read_motion(host, input)?;
         crate::local::feed_back(&mut forming, Feedback { time, sheets })?;
@@ -466,6 +469,22 @@ fn mesh_warnings(forming: &Forming) -> Vec<String> {
 }
 
 /// All that a user should know of a run that came to its end.
+/// Simulated time (s) beyond which a process is likely to have been given in the workshop's times.
+const LONG: f64 = 20.0;
+
+/// What to say of a process that takes very long.
+fn long_process(forming: &Forming) -> Option<String> {
+    let (duration, step) = (forming.load.duration(), forming.model.dt);
+    (duration > LONG && forming.zone.is_none()).then(|| {
+        format!(
+            "the process takes {duration:.0} s of simulated time, {:.1e} steps of {:.2} us: the times of a scene are those in which inertia \
+             matters no more (tenths of a second for most parts), not the workshop's; see the kinetic ratio of a run with shorter ones",
+            duration / step,
+            1e6 * step
+        )
+    })
+}
+
 fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<String> {
     let mut warnings = mesh_warnings(forming);
     warnings.extend(outcome.warnings.iter().cloned());

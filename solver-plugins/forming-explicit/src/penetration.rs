@@ -18,7 +18,7 @@ pub const MANY: usize = 100;
 const SHARE_SQUEEZED: f64 = 0.05;
 
 /// Slack (m) of a sheet that a rigid part holds through the sheets `between`.
-pub fn slack_through(between: &[StackSheet]) -> f64 {
+pub fn slack_through(between: &[&StackSheet]) -> f64 {
     SHARE_SQUEEZED * between.iter().map(|s| s.thickness).sum::<f64>()
 }
 

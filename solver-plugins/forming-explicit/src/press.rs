@@ -4,6 +4,7 @@
 //! lowest ply, and pushes the plies through the opening of the die.
 
 use crate::assembly::{self, Components, StackSheet};
+use crate::cover::Cover;
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
 use crate::penetration;
@@ -159,6 +160,25 @@ fn levels(press: &Press, stack: &[StackSheet], tool_top: f64) -> Result<Levels, 
     Ok(Levels { blank, die, holder })
 }
 
+/// Largest distance (m) from the axis of what of a surface is above a height: of its points there, and of its edges where they cross it.
+fn radius_above(tool: &ToolMesh, z: f64) -> f64 {
+    let mut radius = 0.0f64;
+    for triangle in &tool.triangles {
+        for k in 0..3 {
+            let [a, b] = [k, (k + 1) % 3].map(|k| tool.points[triangle[k] as usize]);
+            if a[2] > z {
+                radius = radius.max(a[0].hypot(a[1]));
+            }
+            if (a[2] > z) != (b[2] > z) {
+                let t = (z - a[2]) / (b[2] - a[2]);
+                let at = [0, 1].map(|c| a[c] + t * (b[c] - a[c]));
+                radius = radius.max(at[0].hypot(at[1]));
+            }
+        }
+    }
+    radius
+}
+
 /// Whether the punch ends inside its own height and goes through the openings, with the plies over it.
 fn check_passage(press: &Press, at: &Levels, tool: &ToolMesh) -> Result<(), String> {
     let [low, high] = tool.bounds().map(|b| b[2]);
@@ -171,10 +191,7 @@ fn check_passage(press: &Press, at: &Levels, tool: &ToolMesh) -> Result<(), Stri
         ));
     }
     let (die, holder) = plates(press, at);
-    let radius_above = |z: f64| {
-        let through = tool.points.iter().filter(|q| q[2] > z);
-        through.map(|q| q[0].hypot(q[1])).fold(0.0, f64::max)
-    };
+    let radius_above = |z: f64| radius_above(tool, z);
     // Below the rounding of its edge a plate leaves more room.
     let thickness = at.die - at.blank;
     let in_die = radius_above(die.height + die.edge) + thickness;
@@ -227,44 +244,60 @@ fn add_contacts(
 ) -> Result<(), String> {
     let settings = assembly::contact_settings(p);
     let friction = FrictionTable::new(scene)?;
-    let top: f64 = stack.iter().map(|s| s.thickness).sum();
+    let all = stack.len();
+    let nodes: Vec<Vec<u32>> = (0..all).map(|k| model.sheets[k].nodes.clone()).collect();
+    let plies = (0..all).map(|k| (k, k, &nodes[k][..]));
+    let cover = Cover::new(model, &plies.collect::<Vec<_>>());
     for (part, surface, above) in parts {
         for (k, sheet) in stack.iter().enumerate() {
             // The ply that faces the part rubs on it; the others stay outside where its elements' chords cut through.
             let own = sheet.scene.name.as_str();
-            let names = stack.iter().map(|s| s.scene.name.as_str());
-            let (offset, between, chain): (f64, _, Vec<&str>) = if *above {
-                let down_to = names.skip(k).chain([*part]);
-                (top - sheet.offset, &stack[k + 1..], down_to.collect())
-            } else {
-                let up_to = std::iter::once(*part).chain(names.take(k + 1));
-                (sheet.offset, &stack[..k], up_to.collect())
-            };
-            let mu = friction.through(model, &chain, own)?;
-            let nodes = model.sheets[k].nodes.iter();
-            let mut contact = RigidContact::new(
-                format!("{part}/{}", sheet.scene.name),
-                surface.clone(),
-                offset,
-                mu,
-                &settings,
-                nodes.map(|n| RigidItem::new(*n)).collect(),
-            )
-            .with_slack(penetration::slack_through(between));
-            contact.moves = *part != "die";
-            model.rigid_contacts.push(contact);
+            let among = if *above { k + 1..all } else { 0..k };
+            for (between, nodes) in cover.groups((k, &nodes[k]), among.clone()) {
+                let names = between.iter().map(|i| stack[*i].scene.name.as_str());
+                let chain: Vec<&str> = if *above {
+                    std::iter::once(own).chain(names).chain([*part]).collect()
+                } else {
+                    std::iter::once(*part).chain(names).chain([own]).collect()
+                };
+                let mu = friction.through(model, &chain, own)?;
+                let beside = assembly::beside(stack, among.clone(), &between);
+                let between: Vec<&StackSheet> = between.iter().map(|i| &stack[*i]).collect();
+                let mut contact = RigidContact::new(
+                    format!("{part}/{own}{beside}"),
+                    surface.clone(),
+                    assembly::offset_over(&between, sheet),
+                    mu,
+                    &settings,
+                    nodes.iter().map(|n| RigidItem::new(*n)).collect(),
+                )
+                .with_slack(penetration::slack_through(&between));
+                contact.moves = *part != "die";
+                model.rigid_contacts.push(contact);
+            }
         }
     }
-    for k in 1..stack.len() {
-        let [lower, upper] = [k - 1, k].map(|k| stack[k].scene.name.as_str());
+    let mut pair = |k: usize, nodes: &[u32], below: usize| -> Result<(), String> {
+        let [lower, upper] = [below, k].map(|k| stack[k].scene.name.as_str());
         let touching = Touching {
             parts: [lower, upper],
             slave: upper,
         };
-        let between = friction.law(model, &touching)?;
-        let slaves = model.sheets[k].nodes.clone();
-        let on = (k - 1, k - 1);
-        assembly::add_sheet_contact(model, stack, (k, &slaves), on, 1.0, between, p);
+        let mu = friction.law(model, &touching)?;
+        assembly::add_sheet_contact(model, stack, (k, nodes), (below, below), 1.0, mu, p);
+        Ok(())
+    };
+    for k in 1..all {
+        pair(k, &nodes[k], k - 1)?;
+    }
+    // Where plies that would lie between do not.
+    for k in 1..all {
+        for below in (0..k - 1).rev() {
+            let past = cover.past((k, &nodes[k]), below + 1..k, Some(below));
+            if !past.is_empty() {
+                pair(k, &past, below)?;
+            }
+        }
     }
     for k in 0..stack.len() {
         let slaves = model.sheets[k].nodes.clone();

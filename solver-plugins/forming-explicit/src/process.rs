@@ -40,11 +40,22 @@ impl Cycle {
     /// A text for the user: a course of a pressure that is none.
     pub fn new(p: &DoubleDiaphragm, frame: [f64; 2]) -> Result<Self, String> {
         let bag = p.bag_pressure.last();
+        let bag_course = course(&p.bag_pressure, "bag_pressure", "bagging", f64::MAX)?;
+        let drawn_course = course(&p.forming_pressure, "forming_pressure", "drawing", bag)?;
+        let drawn = p.forming_pressure.last();
+        if drawn > bag * (1.0 + 1e-9) {
+            return Err(format!(
+                "process.double_diaphragm.forming_pressure: given {:.4} bar, the vacuum in the bag is {:.4} bar (bag_pressure); expected at most \
+                 that: no more air can be drawn from under the film than there is in the bag's surroundings",
+                1e-5 * drawn,
+                1e-5 * bag
+            ));
+        }
         Ok(Self {
             bag,
-            bag_course: course(&p.bag_pressure, "bag_pressure", "bagging", f64::MAX)?,
-            cavity_end: (bag - p.forming_pressure.last()).max(0.0),
-            drawn_course: course(&p.forming_pressure, "forming_pressure", "drawing", bag)?,
+            bag_course,
+            cavity_end: (bag - drawn).max(0.0),
+            drawn_course,
             durations: [
                 p.bagging_time.si(),
                 p.lowering_time.si(),

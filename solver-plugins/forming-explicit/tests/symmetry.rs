@@ -285,7 +285,10 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    let text = refused(&p, |s| s["sheets"][0]["fibre_1"] = json!("0.5 rad"));
+    let text = refused(&p, |s| {
+        s["sheets"][0]["fibre_1"] = json!("0.5 rad");
+        s["sheets"][0]["fibre_2"] = json!(format!("{} rad", 0.5 + std::f64::consts::FRAC_PI_2));
+    });
     assert!(
         text.contains("symmetry: [x, y]") && text.contains("28.648 deg"),
         "{text}"

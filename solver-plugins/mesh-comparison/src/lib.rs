@@ -18,6 +18,7 @@ export_step!(MeshComparison);
 #[derive(Deserialize)]
 struct Parameters {
     target_error: f64,
+    foot_margin: f64,
 }
 
 #[derive(Deserialize)]
@@ -66,7 +67,7 @@ impl Step for MeshComparison {
         let p: Parameters = host.parameters()?;
         let inputs = host.inputs_of("runs")?;
         if zones::given(host, &inputs)? {
-            return zones::compare(host, inputs, p.target_error);
+            return zones::compare(host, inputs, p.target_error, p.foot_margin);
         }
         let mut runs = Vec::new();
         for input in inputs {

@@ -7,9 +7,6 @@ use plyflow_sdk::{Host, Input, Log, StepError};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Nothing near the tool's foot is left out: a zone's runs all have the same places there.
-const FOOT_MARGIN: f64 = 0.0;
-
 /// A run of a zone.
 struct Run {
     input: Input,
@@ -40,18 +37,24 @@ fn zone_of(host: &Host, input: &Input) -> Result<Option<String>, StepError> {
     Ok(formed.zone["name"].as_str().map(str::to_owned))
 }
 
-/// Compares the runs of every zone and advises an element size for each.
+/// Compares the runs of every zone and advises an element size for each. `target`: the relative error that it is for. `foot_margin`: nodes nearer to the
+/// tool's foot are not judged (m), they hang between tool and machine bed.
 ///
 /// # Errors
 /// When a zone has fewer than two sizes or not one box, or a run cannot be read.
-pub fn compare(host: &Host, inputs: Vec<Input>, target: f64) -> Result<(), StepError> {
+pub fn compare(
+    host: &Host,
+    inputs: Vec<Input>,
+    target: f64,
+    foot_margin: f64,
+) -> Result<(), StepError> {
     let mut by_zone: BTreeMap<(usize, String), Vec<Run>> = BTreeMap::new();
     for input in inputs {
         host.check_cancelled()?;
         // A to Z before AA.
         if let Some(zone) = zone_of(host, &input)? {
             let runs = by_zone.entry((zone.len(), zone)).or_default();
-            runs.push(read(host, input)?);
+            runs.push(read(host, input, foot_margin)?);
         }
     }
     let (mut rows, mut advised) = (Vec::new(), Vec::new());
@@ -123,7 +126,7 @@ fn one(
         let Some((position, error)) = told.filter(|t| t.1.is_finite()) else {
             let step = &run.input.step;
             return Err(format!(
-                "'{step}' of zone {zone} lies nowhere where '{}' stands off the tool",
+                "'{step}' of zone {zone} lies nowhere where '{}' stands off the tool, as far as both are judged (`foot_margin`)",
                 finest.input.step
             )
             .into());
@@ -168,7 +171,7 @@ fn one(
     Ok(advice)
 }
 
-fn read(host: &Host, input: Input) -> Result<Run, StepError> {
+fn read(host: &Host, input: Input, foot_margin: f64) -> Result<Run, StepError> {
     let formed: Formed = host.attributes(&input)?;
     let frame = of_run::last_frame(&input, &host.meshes(&input)?)?;
     let tool = of_run::tool(host, &input)?;
@@ -179,7 +182,7 @@ fn read(host: &Host, input: Input) -> Result<Run, StepError> {
         let offset = offset
             .ok_or_else(|| format!("ply '{name}' of '{step}' has no offset from the tool"))?;
         let place = (name, offset);
-        plies.push(of_run::ply(host, &input, frame, place, &tool, FOOT_MARGIN)?);
+        plies.push(of_run::ply(host, &input, frame, place, &tool, foot_margin)?);
     }
     Ok(Run {
         plies,

@@ -100,6 +100,43 @@ fn every_zone_gets_a_size_from_the_errors_of_its_own_runs() {
     assert!(!out.results.contains_key("advised_element_size"));
 }
 
+/// A ply on a flat top and down a wall 50 mm high, 2 (1 + 25 h) mm off both; but where it hangs past the wall's lower end it lies anywhere.
+#[test]
+fn what_hangs_at_the_tool_s_foot_is_not_judged() {
+    let run_off = |size: f64| {
+        let mut run = zone("A", size);
+        let corners = [[-1.0, 0.0], [0.06, 0.0], [0.06, -0.05]];
+        run.bodies[0].points = (corners.iter())
+            .flat_map(|[x, z]| [-1.0, 1.0].map(|y| [*x, y, *z]))
+            .collect();
+        run.bodies[0].cells = vec![0, 2, 1, 1, 2, 3, 2, 4, 3, 3, 4, 5];
+        let off = 0.002 * (1.0 + 25.0 * size);
+        let place = |p: &[f64; 3]| match p[0] {
+            x if x < 0.0601 => [x, p[1], off],
+            x if x < 0.077 => [0.06 + off, p[1], -2.4 * (x - 0.06)],
+            x => [0.06 + off + 2.5 * size, p[1], -2.4 * (x - 0.06)],
+        };
+        let ply = &mut run.bodies[1];
+        ply.frames = vec![ply.points.iter().map(place).collect()];
+        run
+    };
+    let (coarse, fine) = (run_off(0.008), run_off(0.002));
+    let error = |parameters: Value| {
+        let of = |step, run| MemoryInput {
+            step,
+            ..MemoryInput::new("runs", run)
+        };
+        let inputs = [of("coarse", &coarse), of("fine", &fine)];
+        let out = run::<MeshComparison>(parameters, &inputs, &[]).unwrap();
+        out.result("zone_error.coarse.A")
+    };
+    let known = (1.0 + 25.0 * 0.008) / (1.0 + 25.0 * 0.002) - 1.0;
+    let found = error(json!({}));
+    assert!((found - known).abs() < 1e-9, "{found} {known}");
+    let found = error(json!({"foot_margin": 0.0}));
+    assert!(found > 2.0 * known, "{found} {known}");
+}
+
 #[test]
 fn zones_with_one_run_drawn_again_or_mixed_with_the_whole_are_refused() {
     let (a, b) = (zone("A", 0.008), zone("A", 0.004));

@@ -21,8 +21,8 @@ pub(crate) struct Adjacency {
     pub crowded: Option<[u32; 2]>,
     /// First edge that two facets pass in the same direction: its points.
     pub flipped: Option<[u32; 2]>,
-    /// Number of edges with one facet only.
-    pub open_edges: usize,
+    /// Edges with one facet only: their points.
+    pub open: Vec<[u32; 2]>,
 }
 
 impl ToolMesh {
@@ -72,7 +72,7 @@ impl ToolMesh {
     /// Whether every edge has exactly two facets, which pass it in opposite directions.
     pub fn is_watertight(&self) -> bool {
         let a = self.adjacency();
-        a.crowded.is_none() && a.flipped.is_none() && a.open_edges == 0
+        a.crowded.is_none() && a.flipped.is_none() && a.open.is_empty()
     }
 
     /// Longest edge (m).
@@ -104,7 +104,7 @@ impl ToolMesh {
         };
         for group in edges.chunk_by(|p, q| (p.0, p.1) == (q.0, q.1)) {
             match group {
-                [_] => found.open_edges += 1,
+                [p] => found.open.push([p.0, p.1]),
                 [p, q] => {
                     if p.4 == q.4 {
                         found.flipped.get_or_insert([p.0, p.1]);

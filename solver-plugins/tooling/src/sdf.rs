@@ -131,6 +131,11 @@ impl SignedDistanceGrid {
         }
     }
 
+    /// Lowest and highest coordinates of the tool (m).
+    pub fn tool_bounds(&self) -> [V3; 2] {
+        [self.tool_low, self.tool_high]
+    }
+
     /// Distance between the nodes of the grid (m).
     pub fn spacing(&self) -> f64 {
         self.spacing

@@ -2,16 +2,19 @@
 
 use crate::error::ToolError;
 use crate::mesh::ToolMesh;
-use crate::vector::{V3, cross, norm, sub};
+use crate::vector::{V3, cross, dot, norm, sub};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::Path;
+
+/// How far above its lowest point, over its height, a tool may be open.
+const FOOT: f64 = 1e-3;
 
 /// Points closer than this part of the tool's diagonal are one.
 const WELD: f64 = 1e-6;
 
 /// Reads a binary or ASCII file, welds its points, drops facets without area and checks that the rest is a
-/// surface with a consistent outside. Closed surfaces must have positive volume; open ones must face up.
+/// surface with a consistent outside, open at its foot at most.
 pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, ToolError> {
     let read_error = |source| ToolError::Read {
         path: path.to_owned(),
@@ -32,13 +35,17 @@ pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, To
         ));
     }
     let mut input = BufReader::new(File::open(path).map_err(read_error)?);
+    let unreadable = |source| match no_stl(path) {
+        Some((problem, remedy)) => surface_error(problem, remedy),
+        None => read_error(source),
+    };
     let mut soup: Vec<[V3; 3]> = Vec::new();
     for (facet, triangle) in stl_io::create_stl_reader(&mut input)
-        .map_err(read_error)?
+        .map_err(unreadable)?
         .enumerate()
     {
         let corners = triangle
-            .map_err(read_error)?
+            .map_err(unreadable)?
             .vertices
             .map(|v| std::array::from_fn(|k| f64::from(v.0[k]) * unit + translate[k]));
         if corners.iter().flatten().any(|c: &f64| !c.is_finite()) {
@@ -61,6 +68,43 @@ pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, To
     }
     check(&mesh, unit, translate).map_err(|(problem, remedy)| surface_error(problem, remedy))?;
     Ok(mesh)
+}
+
+/// What a file that cannot be read is instead, and what to do.
+fn no_stl(path: &Path) -> Option<(String, &'static str)> {
+    const HEAD: usize = 84;
+    let length = std::fs::metadata(path).ok()?.len();
+    let mut head = Vec::new();
+    let file = File::open(path).ok()?;
+    file.take(HEAD as u64).read_to_end(&mut head).ok()?;
+    if head.is_empty() {
+        return Some(("it is empty".into(), "export the tool's surface again"));
+    }
+    let text = String::from_utf8_lossy(&head);
+    let text = text.trim_start();
+    for (start, what) in [
+        ("ISO-10303", "a STEP file"),
+        ("<", "HTML or XML"),
+        ("PK", "a zip archive"),
+    ] {
+        if text.starts_with(start) {
+            let problem = format!("it is {what}, no STL file");
+            return Some((problem, "export the tool's surface as STL"));
+        }
+    }
+    if text.starts_with("solid") {
+        return None;
+    }
+    // Binary: 80 bytes of text, the number of facets, 50 bytes for each.
+    let count: [u8; 4] = head.get(80..HEAD)?.try_into().ok()?;
+    let count = u64::from(u32::from_le_bytes(count));
+    let there = (length - HEAD as u64) / 50;
+    (there < count).then(|| {
+        (
+            format!("it ends after {there} of the {count} facets that it announces"),
+            "it was cut off, or is no STL file: copy or export it again",
+        )
+    })
 }
 
 /// Joins equal points; facets that lose a corner or have no area are dropped.
@@ -135,28 +179,30 @@ fn check(mesh: &ToolMesh, unit: f64, translate: V3) -> Result<(), (String, &'sta
             "make the normals consistent (in MeshLab: Re-Orient all faces coherently)",
         ));
     }
-    let remedy = "flip the facets so that they point away from the tool";
-    if adjacency.open_edges == 0 {
-        let volume = mesh.volume();
-        if volume <= 0.0 {
-            return Err((
-                format!("its facets point inwards (volume {volume:.3e} m3)"),
-                remedy,
-            ));
-        }
-    } else {
-        let up: f64 = (0..mesh.triangles.len())
-            .map(|t| mesh.area_normal(t)[2])
-            .sum();
-        if up <= 0.0 {
-            return Err((
-                format!(
-                    "it is open ({} free edges) and faces down",
-                    adjacency.open_edges
-                ),
-                remedy,
-            ));
-        }
+    // About a point at the foot: where a tool is open there, what is missing has no part in it.
+    let [low, high] = mesh.bounds();
+    let foot = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]];
+    let volume: f64 = (0..mesh.triangles.len())
+        .map(|t| dot(sub(mesh.corners(t)[0], foot), mesh.area_normal(t)) / 6.0)
+        .sum();
+    if volume <= 0.0 {
+        return Err((
+            format!("its facets point inwards (volume {volume:.3e} m3)"),
+            "flip the facets so that they point away from the tool",
+        ));
+    }
+    // A rim higher up has no outside beside it.
+    let near = low[2] + FOOT * (high[2] - low[2]);
+    let is_high = |edge: &&[u32; 2]| edge.iter().any(|p| mesh.points[*p as usize][2] > near);
+    if let Some(edge) = adjacency.open.iter().find(is_high) {
+        return Err((
+            format!(
+                "it has a hole or a free rim above its foot: {} has one facet only ({} such edges in all)",
+                place(*edge),
+                adjacency.open.iter().filter(is_high).count()
+            ),
+            "close it (in MeshLab: Close Holes), or draw its walls down to its foot",
+        ));
     }
     Ok(())
 }
@@ -250,10 +296,48 @@ mod tests {
             "{}",
             text(&double)
         );
-        let mut open = inward.clone();
-        let high = |t: &[u32; 3]| t.iter().any(|&p| mesh.points[p as usize][2] > 0.02);
-        open.triangles.retain(high);
-        assert!(text(&open).contains("faces down"), "{}", text(&open));
+        // Open at its foot either way round.
+        let wall = |t: &[u32; 3]| t.iter().any(|&p| mesh.points[p as usize][2] > 1e-9);
+        let mut open = mesh.clone();
+        open.triangles.retain(wall);
+        assert!(!open.is_watertight());
+        read(binary(&open).path(), 1e-3, [0.0; 3]).unwrap();
+        open.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        assert!(text(&open).contains("point inwards"), "{}", text(&open));
+    }
+
+    #[test]
+    fn a_hole_is_named_with_its_place_and_not_taken_for_a_wrong_side() {
+        let mesh = hemisphere(0.05, 0.01).unwrap();
+        let mut holed = mesh.clone();
+        let top = |t: &[u32; 3]| t.iter().all(|&p| mesh.points[p as usize][2] > 0.04);
+        let at = mesh.triangles.iter().position(top).unwrap();
+        holed.triangles.remove(at);
+        let error = read(binary(&holed).path(), 1e-3, [0.0; 3]).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("a hole or a free rim above its foot: the edge from (")
+                && text.contains("(3 such edges in all)")
+                && text.contains("close it"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_file_that_is_cut_off_or_something_else_is_called_so() {
+        let whole = std::fs::read(binary(&hemisphere(0.05, 0.01).unwrap()).path()).unwrap();
+        let told = |bytes: &[u8]| {
+            let mut file = tempfile::NamedTempFile::new().unwrap();
+            file.write_all(bytes).unwrap();
+            read(file.path(), 1e-3, [0.0; 3]).unwrap_err().to_string()
+        };
+        let cut = told(&whole[..84 + 50 * 7 + 20]);
+        assert!(cut.contains("it ends after 7 of the "), "{cut}");
+        let step = told(b"ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('tool'),'2;1');\n");
+        assert!(step.contains("it is a STEP file"), "{step}");
+        let page = told(b"<!DOCTYPE html>\n<html><body>Log in</body></html>\n");
+        assert!(page.contains("it is HTML or XML"), "{page}");
+        assert!(told(b"").contains("it is empty"), "{}", told(b""));
     }
 
     #[test]

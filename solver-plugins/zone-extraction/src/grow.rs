@@ -1,6 +1,6 @@
 //! Zones whose local run shows a defect at the cut: they are drawn again, larger, and run again.
 
-use crate::extract::{Rectangle, Settings, free_sides, hull, near, onto_edges, tidy};
+use crate::extract::{Rectangle, Settings, area, free_sides, hull, near, onto_edges, tidy};
 use serde::{Deserialize, Serialize};
 
 /// A zone as its step wrote it, and as it is written again.
@@ -33,6 +33,20 @@ pub struct AtCut {
     pub zone: String,
     /// Left, right, bottom, top: the sides of the cut that it reaches.
     pub cut_sides: [bool; 4],
+}
+
+/// The zones that count, by name (A to Z before AA), of several lists in any order: of one name the largest, and none that another one replaces. So
+/// `comparison` takes them too.
+pub fn current(zones: Vec<Drawn>) -> Vec<Drawn> {
+    let replaced: Vec<String> = zones.iter().flat_map(|z| z.replaces.clone()).collect();
+    let mut all = zones;
+    all.sort_by(|a, b| {
+        let by_name = (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name));
+        by_name.then(area(b.bounds).total_cmp(&area(a.bounds)))
+    });
+    all.dedup_by(|later, first| later.name == first.name);
+    all.retain(|z| !replaced.contains(&z.name));
+    all
 }
 
 /// Those of the `zones` that have a defect at their cut, drawn larger: every side that one reaches is moved out by

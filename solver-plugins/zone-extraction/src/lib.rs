@@ -4,7 +4,7 @@ mod extract;
 mod grow;
 
 pub use extract::{ExtractError, FlaggedCell, Rectangle, Settings, Zone, area, extract};
-pub use grow::{AtCut, Drawn, grow};
+pub use grow::{AtCut, Drawn, current, grow};
 
 use extract::tidy;
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
@@ -60,6 +60,9 @@ struct Previous {
 
 #[derive(Deserialize)]
 struct Compared {
+    /// Names of all zones that were compared.
+    #[serde(default)]
+    zones: Vec<String>,
     models: Vec<Model>,
     defects: Vec<Found>,
 }
@@ -79,7 +82,7 @@ struct Found {
 
 /// Those of the zones again, larger, whose local runs show a defect at the cut.
 fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
-    let previous: Previous = host.attributes(&host.input("zones")?)?;
+    let (zones, blank) = drawn_before(host)?;
     let compared: Compared = host.attributes(&host.input("comparison")?)?;
     let is_local = |name: &str| {
         let mut models = compared.models.iter();
@@ -89,7 +92,19 @@ fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
         .filter(|f| is_local(&f.model))
         .map(|f| f.defect.clone())
         .collect();
-    let grown = grow(&previous.zones, &defects, previous.blank, settings);
+    let known = |name: &&String| zones.iter().any(|z| z.name == **name);
+    let missing: Vec<&str> = (compared.zones.iter())
+        .filter(|n| !known(n))
+        .map(String::as_str)
+        .collect();
+    if !missing.is_empty() {
+        let text = format!(
+            "zones: the comparison has {} too, which none of the lists given here holds: what grows may come to lie over them. Give all lists of zones that it has",
+            missing.join(", ")
+        );
+        host.log(Log::Warn, &text);
+    }
+    let grown = grow(&zones, &defects, blank, settings);
     if grown.is_empty() {
         host.log(
             Log::Info,
@@ -112,7 +127,29 @@ fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
         host.log(Log::Info, &text);
         list.push((zone.name.clone(), zone.bounds, serde_json::to_value(&zone)?));
     }
-    write(host, settings, previous.blank, list)
+    write(host, settings, blank, list)
+}
+
+/// The zones that count of all lists given, and the box around the blank (m).
+fn drawn_before(host: &Host) -> Result<(Vec<Drawn>, Rectangle), StepError> {
+    let (mut zones, mut blank) = (Vec::new(), None);
+    for input in host.inputs_of("zones")? {
+        let previous: Previous = host.attributes(&input)?;
+        zones.extend(previous.zones);
+        let (step, given) = (input.step, previous.blank);
+        match &blank {
+            None => blank = Some((step, given)),
+            Some((first, expected)) if *expected != given => {
+                return Err(format!(
+                    "zones: '{step}' is of a blank {given:?} m, '{first}' of one {expected:?} m; give lists of zones of one coarse run"
+                )
+                .into());
+            }
+            Some(_) => {}
+        }
+    }
+    let (_, blank) = blank.ok_or("zones: no list arrives")?;
+    Ok((current(zones), blank))
 }
 
 /// Writes zones: name, box, and as in the data model.

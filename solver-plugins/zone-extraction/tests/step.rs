@@ -3,7 +3,9 @@
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
-use plyflow_zone_extraction::{AtCut, Drawn, FlaggedCell, Settings, ZoneExtraction, extract, grow};
+use plyflow_zone_extraction::{
+    AtCut, Drawn, FlaggedCell, Settings, ZoneExtraction, current, extract, grow,
+};
 use serde_json::{Value, json};
 
 const BLANK: [f64; 4] = [-0.240, -0.150, 0.240, 0.150];
@@ -324,6 +326,93 @@ fn zones_that_meet_as_one_grows_become_one() {
     );
     assert_eq!(zone.plies, ["ply_1"]);
     assert!((zone.flagged_area - 3e-3).abs() < 1e-15);
+}
+
+/// A, B and C; A has grown over B. It grows again, and comes to lie on C, which has been left alone until now.
+#[test]
+fn a_second_pass_sees_the_zones_that_the_first_one_left_alone() {
+    let list = |zones: Value, blank: [f64; 4]| MemoryArtifact {
+        kind: "zones".into(),
+        attributes: json!({"zones": zones, "blank": blank}),
+        ..Default::default()
+    };
+    let again = Drawn {
+        replaces: vec!["B".into()],
+        ..drawn("A", [0.0, 0.0, 0.100, 0.050])
+    };
+    let c = drawn("C", [0.115, 0.010, 0.200, 0.080]);
+    let first = list(
+        json!([
+            drawn("A", [0.0, 0.0, 0.050, 0.050]),
+            drawn("B", [0.055, 0.0, 0.100, 0.050]),
+            c
+        ]),
+        BLANK,
+    );
+    let grown = list(json!([again]), BLANK);
+    let comparison = MemoryArtifact {
+        kind: "comparison".into(),
+        attributes: json!({
+            "zones": ["A", "C"],
+            "models": [{"name": "local.A", "role": "local"}, {"name": "local.C", "role": "local"}],
+            "defects": [{"id": "AW1", "model": "local.A", "zone": "A", "cut_sides": [false, true, false, false]}]}),
+        ..Default::default()
+    };
+    let given = |lists: &[&MemoryArtifact]| {
+        let mut inputs: Vec<MemoryInput<'_>> =
+            lists.iter().map(|l| MemoryInput::new("zones", l)).collect();
+        inputs.push(MemoryInput::new("comparison", &comparison));
+        run::<ZoneExtraction>(json!({}), &inputs, &[])
+    };
+    for lists in [[&first, &grown], [&grown, &first]] {
+        let out = given(&lists).unwrap();
+        assert_eq!(out.collection, Some(vec!["A".to_owned()]));
+        let zone = &out.attributes["zones"][0];
+        assert_eq!(zone["box"], json!([0.0, 0.0, 0.200, 0.080]));
+        assert_eq!(zone["replaces"], json!(["C"]));
+        assert!(
+            !out.log.iter().any(|l| l.contains("none of the lists")),
+            "{:?}",
+            out.log
+        );
+    }
+    // With the last list alone it cannot know, and says so.
+    let out = given(&[&grown]).unwrap();
+    assert_eq!(
+        out.attributes["zones"][0]["box"],
+        json!([0.0, 0.0, 0.125, 0.050])
+    );
+    assert!(
+        out.log[0].contains("the comparison has C too"),
+        "{:?}",
+        out.log
+    );
+    let other = list(json!([]), [0.0, 0.0, 1.0, 1.0]);
+    let error = given(&[&first, &other]).unwrap_err();
+    assert!(error.contains("of one coarse run"), "{error}");
+}
+
+#[test]
+fn of_several_lists_the_largest_of_a_name_counts_and_none_that_is_replaced() {
+    let replacing = |name: &str, bounds: [f64; 4], others: &[&str]| Drawn {
+        replaces: others.iter().map(|o| (*o).to_owned()).collect(),
+        ..drawn(name, bounds)
+    };
+    let square = |side: f64| [0.0, 0.0, side, side];
+    let zones = vec![
+        drawn("AA", square(0.01)),
+        drawn("A", square(0.01)),
+        drawn("B", square(0.09)),
+        drawn("C", square(0.01)),
+        replacing("A", square(0.02), &["B"]),
+        drawn("A", square(0.03)),
+    ];
+    let found = current(zones);
+    let told: Vec<(&str, f64)> = found
+        .iter()
+        .map(|z| (z.name.as_str(), z.bounds[2]))
+        .collect();
+    assert_eq!(told, [("A", 0.03), ("C", 0.01), ("AA", 0.01)]);
 }
 
 #[test]

@@ -61,7 +61,8 @@ pub fn catalog() -> Fake {
               "probes": {"type": "list", "of": {"type": "object", "fields": {
                  "x": {"type": "quantity", "dimension": "length", "required": true}, "y": {"type": "quantity", "dimension": "length", "default": "0 mm"}}}, "doc": "Points."},
               "elements": {"type": "map", "of": {"type": "element"}, "doc": "By sheet."},
-              "table": {"type": "file", "doc": "A table."}
+              "table": {"type": "file", "doc": "A table."},
+              "tables": {"type": "list", "of": {"type": "file"}, "doc": "Tables."}
             },
             "inputs": {"boundary": {"kind": "boundary", "required": false, "doc": "Driven edges."}},
             "output": {"kind": "forming"},

@@ -413,6 +413,13 @@ fn read_quantity(
         dimension,
     };
     let (number, rest) = decimal(text).ok_or_else(bad)?;
+    if let Some(written) = without_comma(text, rest) {
+        return Err(UnitError::Comma {
+            text: text.chars().take(80).collect(),
+            written,
+            dimension,
+        });
+    }
     let rest = rest.trim();
     // `4/mm` reads as `4 1/mm`.
     let unit = match rest.strip_prefix('/') {
@@ -427,6 +434,40 @@ fn read_quantity(
         });
     }
     Ok((value, unit.exponents, !rest.is_empty()))
+}
+
+/// What was meant by a number with a comma, such as `5,5 mm`: `rest` is what follows the digits before it. `None`
+/// where there is no comma before a digit.
+fn without_comma(text: &str, rest: &str) -> Option<Vec<String>> {
+    let after = rest
+        .strip_prefix(',')
+        .filter(|r| r.starts_with(|c: char| c.is_ascii_digit()))?;
+    let before = text.strip_suffix(rest)?;
+    let digits = |s: &str| s.chars().take_while(char::is_ascii_digit).count();
+    let after_digits = &after[digits(after)..];
+    let mut written = Vec::new();
+    // `1,234.5` and `1,234,567` have more than one sign: no decimals then.
+    if !after_digits.starts_with(['.', ',']) {
+        written.push(format!("{before}.{after}"));
+    }
+    // Three digits may be thousands, but not after `0`.
+    if digits(after) == 3 && before.trim_start_matches(['-', '+']) != "0" {
+        written.push(format!("{before}{}", after.replace(',', "")));
+    }
+    (!written.is_empty()).then_some(written)
+}
+
+/// The plain number that a text means though it is not written as one: `1 %` is `0.01`, `0,5` is `0.5`. `None` for
+/// anything else.
+pub fn plain_number(text: &str) -> Option<String> {
+    match parse_quantity(text, Dimension::Dimensionless) {
+        Ok(value) => Some(super::si_number(value)),
+        Err(UnitError::Comma { written, .. }) => match &written[..] {
+            [one] => plain_number(one),
+            _ => None,
+        },
+        Err(_) => None,
+    }
 }
 
 /// A dimension in words: "a time", or its base units.

@@ -1,0 +1,115 @@
+//! Files of another format than the one wanted, and what the command line sets.
+
+mod common;
+
+use common::Study;
+use plyflow_workflow::Diagnostics;
+
+const W: &str = "workflow.yaml";
+const S: &str = "scene.yaml";
+const F: &str = "materials/fabric.yaml";
+
+fn findings(study: &Study) -> Diagnostics {
+    match study.load() {
+        Ok(_) => panic!("nothing was found"),
+        Err(d) => d,
+    }
+}
+
+#[test]
+fn a_scene_or_a_material_in_the_place_of_a_workflow_is_one_error() {
+    let study = Study::with_expected_file();
+    for (file, says) in [
+        (S, "this is a scene (`plyflow_scene`), not a workflow"),
+        (F, "this is a material (`plyflow_material`), not a workflow"),
+        (
+            "expected.json",
+            "this is a file of expectations (`plyflow_expected`), not a workflow",
+        ),
+    ] {
+        let found = plyflow_workflow::load(&study.path(file), &common::catalog()).unwrap_err();
+        assert_eq!(found.items.len(), 1, "{}", found.render(false));
+        let told = found.to_string();
+        assert!(
+            told.contains(says) && told.contains("give the workflow"),
+            "{told}"
+        );
+    }
+    // In the place of a scene and of a material too.
+    study.mutate(W, "scene: scene.yaml", "scene: film.yaml");
+    let found = findings(&study);
+    assert_eq!(found.items.len(), 1, "{}", found.render(false));
+    assert!(
+        found
+            .to_string()
+            .contains("a material (`plyflow_material`), not a scene"),
+        "{found}"
+    );
+    let study = Study::sound();
+    study.mutate(S, "material: film.yaml", "material: workflow.yaml");
+    let found = findings(&study);
+    assert_eq!(found.items.len(), 1, "{}", found.render(false));
+    assert!(
+        found
+            .to_string()
+            .contains("a workflow (`plyflow`), not a material"),
+        "{found}"
+    );
+}
+
+#[test]
+fn what_is_wrong_with_set_is_shown_in_its_own_text() {
+    let study = Study::sound();
+    for (set, place, says) in [
+        (
+            "coars.element_size=4 mm",
+            1,
+            &["no step `coars`", "did you mean `coarse`"][..],
+        ),
+        (
+            "coarse.elementsize=4 mm",
+            8,
+            &[
+                "`elementsize` is no parameter",
+                "did you mean `element_size`",
+            ],
+        ),
+        ("coarse.element_size=4", 21, &["`4` has no unit"]),
+        ("local.element_size=5,5 mm", 20, &["write `5.5 mm`"]),
+        (
+            "coarse.element={plugin: m4, with: {hourglas: 1}}",
+            36,
+            &["no parameter of `m4`"],
+        ),
+        (
+            "coarse.probes=[{x: 1 mm}, {x: 2}]",
+            31,
+            &["`2` has no unit"],
+        ),
+    ] {
+        let overrides = ["defects.over_shear_positive=9 deg", set].map(|t| t.parse().unwrap());
+        let found = plyflow_workflow::load_with(&study.path(W), &common::catalog(), &overrides)
+            .unwrap_err();
+        assert_eq!(found.items.len(), 1, "{}", found.render(false));
+        let told = found.to_string();
+        assert!(
+            told.starts_with(&format!("--set:1:{place}: "))
+                && told.contains(&format!("(given by `--set {set}`)")),
+            "{told}"
+        );
+        assert!(says.iter().all(|s| told.contains(s)), "{told}");
+        // The text stands under the message, with a caret.
+        let shown = found.render(false);
+        assert!(
+            shown.contains(&format!("[--set:1:{place}]")) && shown.contains(&format!("│ {set}")),
+            "{shown}"
+        );
+    }
+    // What an override leaves out is missing in the file.
+    let set = ["local.damping=0.2".parse().unwrap()];
+    study.mutate(W, ", element: rf4", "");
+    let told = plyflow_workflow::load_with(&study.path(W), &common::catalog(), &set)
+        .unwrap_err()
+        .to_string();
+    assert!(!told.contains("--set"), "{told}");
+}

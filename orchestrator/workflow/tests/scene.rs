@@ -1,0 +1,216 @@
+//! Rules of a scene as a whole: the stack and its process, pairs of friction, frame and fibres.
+
+mod common;
+
+use common::Study;
+
+const S: &str = "scene.yaml";
+
+/// The scene with other sheets and another process.
+fn scene(sheets: &[(&str, &str)], friction: &str, process: &str) -> String {
+    let sheet = |(name, kind): &(&str, &str)| match *kind {
+        "ply" => format!(
+            "  - {{name: {name}, kind: ply, material: materials/fabric.yaml, length: 48 mm, width: 30 mm, fibre_2: 90 deg}}\n"
+        ),
+        _ => format!("  - {{name: {name}, kind: {kind}, material: film.yaml}}\n"),
+    };
+    let part = |from: &str, to: &str| {
+        let start = common::SCENE.find(from).unwrap();
+        &common::SCENE[start..common::SCENE.find(to).unwrap()]
+    };
+    let process = match process {
+        "press" => {
+            "process:\n  press:\n    stroke: 50 mm\n    forming_time: 1 s\n    settling_time: 0 s\n    die: {opening_radius: 53 mm, edge_radius: 6 mm}\n".to_owned()
+        }
+        _ => common::SCENE[common::SCENE.find("process:").unwrap()..].to_owned(),
+    };
+    let sheets: String = sheets.iter().map(sheet).collect();
+    let friction = format!(
+        "{}  tool_fabric: 0.2\n{friction}",
+        part("friction:", "process:")
+    );
+    let head = &common::SCENE[..common::SCENE.find("sheets:").unwrap()];
+    format!("{head}sheets:\n{sheets}{friction}{process}")
+}
+
+/// What is found in a scene; empty when it is sound.
+fn told(text: &str) -> String {
+    let study = Study::sound();
+    study.write(S, text);
+    study
+        .load()
+        .err()
+        .map(|d| d.to_string())
+        .unwrap_or_default()
+}
+
+#[test]
+fn the_stack_is_in_the_order_of_its_process() {
+    let (film, ply) = ("diaphragm", "ply");
+    for (process, kinds, wrong) in [
+        ("double_diaphragm", &[film, ply, film][..], None),
+        ("double_diaphragm", &[film, ply, ply, ply, film], None),
+        (
+            "double_diaphragm",
+            &[ply],
+            Some((0, "a diaphragm below it")),
+        ),
+        (
+            "double_diaphragm",
+            &[film],
+            Some((0, "plies and a diaphragm above it")),
+        ),
+        (
+            "double_diaphragm",
+            &[film, film],
+            Some((1, "a ply below it")),
+        ),
+        (
+            "double_diaphragm",
+            &[film, ply, film, ply, film],
+            Some((2, "no further diaphragm here")),
+        ),
+        (
+            "double_diaphragm",
+            &[film, ply, ply],
+            Some((2, "a diaphragm above it")),
+        ),
+        ("press", &[ply], None),
+        ("press", &[ply, ply], None),
+        ("press", &[ply, film], Some((1, "plies alone"))),
+        ("press", &[film, ply, film], Some((0, "plies alone"))),
+    ] {
+        let names: Vec<String> = (0..kinds.len()).map(|i| format!("s{i}")).collect();
+        let sheets: Vec<(&str, &str)> = names
+            .iter()
+            .map(String::as_str)
+            .zip(kinds.iter().copied())
+            .collect();
+        let text = scene(&sheets, "", process);
+        let found = told(&text);
+        let Some((at, says)) = wrong else {
+            assert_eq!(found, "", "{process} {kinds:?}");
+            continue;
+        };
+        let before = text.find(&format!("name: s{at},")).unwrap();
+        let line = text[..before].matches('\n').count() + 1;
+        assert!(
+            found.contains(&format!("scene.yaml:{line}:")) && found.contains(says),
+            "{process} {kinds:?}: {found}"
+        );
+        assert_eq!(found.lines().count(), 1, "{found}");
+    }
+}
+
+#[test]
+fn pairs_of_friction_are_those_of_the_process() {
+    let of = |process: &str, pairs: &str| {
+        let sheets: &[(&str, &str)] = match process {
+            "press" => &[("a", "ply"), ("b", "ply")],
+            _ => &[("low", "diaphragm"), ("a", "ply"), ("high", "diaphragm")],
+        };
+        let pairs: String = pairs
+            .split(' ')
+            .map(|p| {
+                format!(
+                    "    - {{between: [{}], coefficient: 0.3}}\n",
+                    p.replace('+', ", ")
+                )
+            })
+            .collect();
+        told(&scene(sheets, &format!("  pairs:\n{pairs}"), process))
+    };
+    assert_eq!(
+        of("double_diaphragm", "low+tool bed+low low+a high+a low+high"),
+        ""
+    );
+    assert_eq!(of("press", "tool+a die+b a+b"), "");
+    // Where plies of another outline do not lie between.
+    let sheets = [
+        ("low", "diaphragm"),
+        ("a", "ply"),
+        ("b", "ply"),
+        ("high", "diaphragm"),
+    ];
+    let pairs = "  pairs:\n    - {between: [low, b], coefficient: 0.3}\n";
+    let equal = scene(&sheets, pairs, "double_diaphragm");
+    assert!(
+        told(&equal).contains("`low` and `b` do not rub"),
+        "{}",
+        told(&equal)
+    );
+    let shifted = equal.replacen("name: b,", "name: b, centre: [9 mm, 0 mm],", 1);
+    assert_ne!(equal, shifted);
+    assert_eq!(told(&shifted), "");
+    for (process, pair, says) in [
+        ("press", "bed+a", "called `bed`"),
+        // This press has none.
+        ("press", "holder+a", "called `holder`"),
+        ("press", "die+a", "do not rub"),
+        ("double_diaphragm", "bed+a", "do not rub"),
+        ("double_diaphragm", "a+a", "do not rub"),
+        ("double_diaphragm", "low+a a+low", "named twice"),
+    ] {
+        let found = of(process, pair);
+        assert!(found.contains(says), "{process} {pair}: {found}");
+    }
+}
+
+#[test]
+fn the_frame_holds_every_ply_where_it_lies() {
+    let study = Study::sound();
+    let found = |size: &str, frame: &str| {
+        let size = common::SCENE.replace("    length: 480 mm\n    width: 300 mm\n", size);
+        study.write(S, &size.replace("frame_width: 1.5 m", frame));
+        study
+            .load()
+            .err()
+            .map(|d| d.to_string())
+            .unwrap_or_default()
+    };
+    let rectangle = "    length: 480 mm\n    width: 300 mm\n";
+    assert_eq!(found(rectangle, "frame_width: 300 mm"), "");
+    let moved = format!("{rectangle}    centre: [0 mm, -20 mm]\n");
+    let told = found(&moved, "frame_width: 300 mm");
+    assert!(told.contains("more than the 340 mm"), "{told}");
+    let round = "    outline: {circle: {centre: [0 mm, 10 mm], radius: 160 mm}}\n";
+    let told = found(round, "frame_width: 300 mm");
+    assert!(told.contains("more than the 340 mm"), "{told}");
+}
+
+#[test]
+fn families_cross_at_five_degrees_or_more() {
+    for (first, second, sound) in [
+        ("45 deg", "-45 deg", true),
+        ("0 deg", "5 deg", true),
+        ("0 deg", "-175 deg", true),
+        ("10 deg", "14.9 deg", false),
+        ("10 deg", "190 deg", false),
+        ("-90 deg", "86 deg", false),
+    ] {
+        let study = Study::sound();
+        study.mutate(S, "fibre_1: 45 deg", &format!("fibre_1: {first}"));
+        study.mutate(S, "fibre_2: -45 deg", &format!("fibre_2: {second}"));
+        assert_eq!(study.load().is_ok(), sound, "{first}, {second}");
+    }
+}
+
+#[test]
+fn an_stl_without_its_unit_is_told_the_form() {
+    let spar = common::SCENE.find("tool:").unwrap()..common::SCENE.find("sheets:").unwrap();
+    for (tool, says) in [
+        (
+            "tool: {stl: spar.stl}\n",
+            "write `stl: {file: spar.stl, unit: 1 mm}`",
+        ),
+        (
+            "tool: spar.stl\n",
+            "write `tool: {stl: {file: spar.stl, unit: 1 mm}}`",
+        ),
+    ] {
+        let mut text = common::SCENE.to_owned();
+        text.replace_range(spar.clone(), tool);
+        let found = told(&text);
+        assert!(found.contains(says), "{found}");
+    }
+}

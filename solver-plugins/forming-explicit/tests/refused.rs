@@ -1,0 +1,157 @@
+//! Scenes that would be computed as something else than they say, or not at all: refused before the first step, with what to do.
+
+mod common;
+
+use common::scenes::{bag, press};
+use common::{BuiltIn, woven};
+use plyflow_forming_explicit::build_global;
+use plyflow_forming_explicit::parameters::Parameters;
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+fn refused(p: &Parameters) -> String {
+    build_global(p, &BuiltIn).err().expect("refused")
+}
+
+fn assert_told(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "'{part}' in: {text}");
+    }
+}
+
+#[test]
+fn families_that_do_not_cross_at_a_right_angle_are_not_taken_for_such() {
+    let with = |second: &str| bag(2, |p| p["scene"]["sheets"][1]["fibre_2"] = json!(second));
+    assert_told(
+        &refused(&with("30 deg")),
+        &["ply 'ply_1'", "-45 and 30", "right angle"],
+    );
+    assert_told(&refused(&with("-45 deg")), &["right angle"]);
+    // Either way round, and with the rounding of a number in radians.
+    for right in ["45 deg", "-135 deg", "0.785398163 rad"] {
+        build_global(&with(right), &BuiltIn).map(|_| ()).unwrap();
+    }
+}
+
+#[test]
+fn a_shell_of_a_fabric_that_does_not_bend_is_not_taken_for_a_membrane() {
+    let gap = json!({"gap": "0.003 m"});
+    let shell = |material: Option<Value>| {
+        press(1, &gap, |p| {
+            p["element"]["plugin"] = json!("rf4");
+            if let Some(material) = material {
+                p["scene"]["sheets"][0]["material"] = material;
+            }
+        })
+    };
+    assert_told(
+        &refused(&shell(None)),
+        &[
+            "element: given 'rf4'",
+            "ply 'ply_1'",
+            "'NCF' has no bending",
+            "m4",
+        ],
+    );
+    build_global(&shell(Some(woven())), &BuiltIn)
+        .map(|_| ())
+        .unwrap();
+}
+
+#[test]
+fn more_pressure_than_the_bag_has_is_not_cut_off_without_a_word() {
+    let p = bag(1, |p| {
+        p["scene"]["process"]["double_diaphragm"]["forming_pressure"] = json!("7 bar")
+    });
+    assert_told(
+        &refused(&p),
+        &[
+            "forming_pressure: given 7.0000 bar",
+            "1.0000 bar (bag_pressure)",
+        ],
+    );
+}
+
+#[test]
+fn a_frame_that_is_too_small_says_for_what() {
+    let p = bag(1, |p| p["element_size"] = json!(0.7));
+    assert_told(
+        &refused(&p),
+        &[
+            "the frame (0.4 x 0.34 m) is too small",
+            "element_size",
+            "film_joint_margin",
+            "2100 mm",
+        ],
+    );
+}
+
+#[test]
+fn names_of_rigid_parts_are_taken() {
+    let p = press(1, &json!({"gap": "0.003 m"}), |p| {
+        p["scene"]["sheets"][0]["name"] = json!("die")
+    });
+    assert_told(&refused(&p), &["sheet 'die'", "another name"]);
+}
+
+/// An ASCII file of a block of this size and lowest corner (in its units).
+fn block(size: [f64; 3], low: [f64; 3]) -> String {
+    let corner = |k: usize| [0, 1, 2].map(|d| low[d] + if k >> d & 1 == 1 { size[d] } else { 0.0 });
+    // Counter-clockwise from outside.
+    let sides = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let mut text = "solid block\n".to_owned();
+    for [a, b, c, d] in sides {
+        for facet in [[a, b, c], [a, c, d]] {
+            text += "facet normal 0 0 0\nouter loop\n";
+            for [x, y, z] in facet.map(corner) {
+                writeln!(text, "vertex {x} {y} {z}").unwrap();
+            }
+            text += "endloop\nendfacet\n";
+        }
+    }
+    text + "endsolid block\n"
+}
+
+#[test]
+fn a_tool_that_does_not_stand_on_the_bed_or_is_of_another_unit_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("block.stl");
+    let with = |low: f64, unit: &str, translate: &str| {
+        std::fs::write(&file, block([100.0, 60.0, 20.0], [-50.0, -30.0, low])).unwrap();
+        bag(1, |p| {
+            p["scene"]["tool"] = json!({"stl": {
+                "file": file.to_str().unwrap(), "unit": unit, "translate": ["0 mm", "0 mm", translate]}});
+        })
+    };
+    build_global(&with(0.0, "1 mm", "0 mm"), &BuiltIn)
+        .map(|_| ())
+        .unwrap();
+    let told = refused(&with(-20.0, "1 mm", "0 mm"));
+    assert_told(
+        &told,
+        &["lies at z = -20.000 mm", "translate: [0 mm, 0 mm, 20 mm]"],
+    );
+    assert_told(
+        &refused(&with(40.0, "1 mm", "1 mm")),
+        &["z = 41.000 mm", "-40 mm]"],
+    );
+    build_global(&with(40.0, "1 mm", "-40 mm"), &BuiltIn)
+        .map(|_| ())
+        .unwrap();
+    let metres = refused(&with(0.0, "1 m", "0 mm"));
+    assert_told(
+        &metres,
+        &[
+            "100.000 x 60.000 x 20.000 m",
+            "tool_grid",
+            "is `unit` (1 m) the length",
+        ],
+    );
+}
