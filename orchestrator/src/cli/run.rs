@@ -190,8 +190,10 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
     let any = summary.executed + summary.cached > 0;
     let path = Some(report::beside(&opened.workflow.file))
         .filter(|_| !args.no_report && any && !summary.interrupted);
+    // A step that was run again to the same key (`--force`) has other costs and the same name.
     let stale = path.as_ref().filter(|p| {
-        !report::is_written(p, &report::fingerprint(opened, session, &summary.failures))
+        summary.executed > 0
+            || !report::is_written(p, &report::fingerprint(opened, session, &summary.failures))
     });
     let show = worked && any && !args.quiet && args.log_format == LogFormat::Text;
     if stale.is_none() && !show && !args.check {

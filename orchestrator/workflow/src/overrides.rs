@@ -116,8 +116,26 @@ pub(crate) fn apply(
         let path: Vec<Word> = std::iter::once(with)
             .chain(given.path.iter().map(on))
             .collect();
-        set(step, &path, value);
+        if let Err(blocked) = set(step, &path, value) {
+            let (name, below) = (&path[blocked.at - 1].name, &path[blocked.at]);
+            let message = format!(
+                "`{name}` is {}: there is no `{}` in it to be set",
+                blocked.what, below.name
+            );
+            let d = problems.add(source, &below.span, message);
+            d.given(given.text.clone()).help(format!(
+                "give the whole of `{name}`, as in --set '{}.{name}={{..}}', or write it out in the file",
+                wanted.name
+            ));
+        }
     }
+}
+
+/// What stands where a mapping is expected on the way to what is set.
+struct Blocked {
+    /// How many words of the path lead there.
+    at: usize,
+    what: String,
 }
 
 fn child<'n>(node: &'n mut Node, key: &str) -> Option<&'n mut Node> {
@@ -131,19 +149,22 @@ fn child<'n>(node: &'n mut Node, key: &str) -> Option<&'n mut Node> {
         .map(|e| &mut e.value)
 }
 
-fn set(node: &mut Node, path: &[Word], value: Node) {
+fn set(node: &mut Node, path: &[Word], value: Node) -> Result<(), Blocked> {
     let Some((word, path)) = path.split_first() else {
         *node = value;
-        return;
+        return Ok(());
     };
-    if !matches!(node.kind, Kind::Map(_)) {
+    if node.kind == Kind::Null {
         *node = Node {
             kind: Kind::Map(Vec::new()),
             span: word.span.clone(),
         };
     }
     let Kind::Map(entries) = &mut node.kind else {
-        return;
+        return Err(Blocked {
+            at: 0,
+            what: node.describe(),
+        });
     };
     let at = entries
         .iter()
@@ -159,7 +180,7 @@ fn set(node: &mut Node, path: &[Word], value: Node) {
             });
             entries.len() - 1
         });
-    set(&mut entries[at].value, path, value);
+    set(&mut entries[at].value, path, value).map_err(|e| Blocked { at: e.at + 1, ..e })
 }
 
 #[cfg(test)]

@@ -21,6 +21,8 @@ pub(crate) struct Resolver<'a> {
     pub problems: &'a mut Problems,
     /// Components met so far, with the JSON pointer of the parameter that names them.
     pub components: Vec<(String, PluginId)>,
+    /// Plugins of materials as their files name them, which may be by a path from there, with the JSON pointer of the parameter.
+    pub material_plugins: Vec<(String, Source, String)>,
     /// Files met so far.
     pub files: Vec<InputFile>,
 }
@@ -59,6 +61,7 @@ impl<'a> Resolver<'a> {
             catalog,
             problems,
             components: Vec::new(),
+            material_plugins: Vec::new(),
             files: Vec::new(),
         }
     }

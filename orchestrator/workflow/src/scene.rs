@@ -257,14 +257,10 @@ fn override_parameters(
 ) -> Option<()> {
     let name = material["plugin"].as_str()?.to_owned();
     let (kind, catalog) = (PluginKind::Material, resolver.catalog);
-    let found = find(
-        catalog,
-        resolver.problems,
-        at.source,
-        &name,
-        &with.span,
-        kind,
-    )?;
+    // As the material's file names it: perhaps by a path from there.
+    let mut named = resolver.material_plugins.iter().rev();
+    let (_, source, plugin) = named.find(|(pointer, ..)| *pointer == at.pointer)?;
+    let found = find(catalog, resolver.problems, source, plugin, &with.span, kind)?;
     if !matches!(with.kind, Kind::Map(_)) {
         let message = format!("`with` is {}", with.describe());
         let d = resolver.problems.add(at.source, &with.span, message);
@@ -310,6 +306,8 @@ fn material_value(
     let name = plugin.text()?;
     let with = node.entry("with");
     let resolved = resolver.plugin_with(name, &plugin.span, with, PluginKind::Material, at)?;
+    let named = (at.pointer.clone(), at.source.clone(), name.to_owned());
+    resolver.material_plugins.push(named);
     if !sound {
         return None;
     }

@@ -75,6 +75,16 @@ fn what_is_wrong_with_set_is_shown_in_its_own_text() {
             ],
         ),
         ("coarse.element_size=4", 21, &["`4` has no unit"]),
+        // A file, or the short form of a component, has nothing in it that could be set.
+        (
+            "coarse.scene.process.x=1",
+            14,
+            &[
+                "`scene` is",
+                "no `process` in it",
+                "--set 'coarse.scene={..}'",
+            ],
+        ),
         ("local.element_size=5,5 mm", 20, &["write `5.5 mm`"]),
         (
             "coarse.element={plugin: m4, with: {hourglas: 1}}",

@@ -401,3 +401,42 @@ fn line_ends_and_a_byte_order_mark_of_windows_change_nothing() {
         found.render(false)
     );
 }
+
+/// A catalog in which the fabric is not on the search path, only under the folder of the materials.
+struct Own(common::Fake);
+
+impl plyflow_workflow::Catalog for Own {
+    fn find(
+        &self,
+        name: &str,
+        relative_to: &camino::Utf8Path,
+    ) -> Result<plyflow_workflow::CatalogEntry, plyflow_workflow::CatalogError> {
+        let in_place = relative_to.ends_with("materials") && name == "./mine/material-fabric";
+        if name.contains("material-fabric") && !in_place {
+            let (name, searched) = (name.to_owned(), vec![relative_to.to_owned()]);
+            return Err(plyflow_workflow::CatalogError::NotFound { name, searched });
+        }
+        self.0.find(name, relative_to)
+    }
+
+    fn names(&self, kind: plyflow_model::manifest::PluginKind) -> Vec<String> {
+        self.0.names(kind)
+    }
+}
+
+#[test]
+fn a_material_whose_plugin_is_named_by_a_path_from_its_file_may_be_varied_too() {
+    let study = Study::sound();
+    study.mutate(
+        "materials/fabric.yaml",
+        "plugin: material-fabric",
+        "plugin: ./mine/material-fabric",
+    );
+    let with = "material: {file: materials/fabric.yaml, with: {fibre_modulus: 30 MPa}}";
+    study.mutate("scene.yaml", "material: materials/fabric.yaml", with);
+    let path = study.path("workflow.yaml");
+    let w = plyflow_workflow::load_with(&path, &Own(common::catalog()), &[])
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let ply = &step(&w, "coarse").parameters["scene"]["sheets"][1];
+    assert_eq!(ply["material"]["with"]["fibre_modulus"], json!(3e7));
+}

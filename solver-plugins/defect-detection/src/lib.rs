@@ -4,7 +4,7 @@ mod detect;
 
 pub use detect::{Detection, Ply, Summary, Thresholds, detect};
 
-use plyflow_sdk::{Host, Input, On, Progress, Step, StepError, export_step};
+use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Surface, Topology, of_run};
 use serde::Deserialize;
@@ -29,6 +29,8 @@ struct Sheet {
 
 struct Judged {
     name: String,
+    /// Undeformed area (m2).
+    area: f64,
     points: Vec<Vec3>,
     cells: Vec<u32>,
     undeformed: Vec<Vec3>,
@@ -71,6 +73,9 @@ impl Step for DefectDetection {
             });
             judged.push(judge(host, &input, frame, sheet, &tool, &thresholds)?);
         }
+        for text in judged.iter().filter_map(|p| over_sheared(p, &thresholds)) {
+            host.log(Log::Warn, &text);
+        }
         write(host, meshes.times[frame], &judged, &thresholds)
     }
 }
@@ -105,13 +110,37 @@ fn judge(
         offset: sheet.offset,
     };
     let found = detect(tool, &ply, thresholds);
+    let area = topology.cell_areas(&undeformed).iter().sum();
     Ok(Judged {
+        area,
         name: sheet.name.clone(),
         points,
         cells,
         undeformed,
         shear_angle,
         found,
+    })
+}
+
+/// Share of a ply's area from which on over-shear is no local matter: the limit is probably another fabric's.
+const MUCH: f64 = 0.4;
+
+/// What to say of a ply of which most counts as over-sheared.
+fn over_sheared(ply: &Judged, limits: &Thresholds) -> Option<String> {
+    let of = &ply.found.summary;
+    let share = of.over_shear_area / ply.area;
+    (share > MUCH).then(|| {
+        format!(
+            "{:.0} % of ply '{}' counts as over-sheared (shear from {:.1} to {:.1} deg; over_shear_positive: {:.1} deg, over_shear_negative: {:.1} deg): \
+             are these the angles from which this fabric wrinkles? The defaults are those of a non-crimp fabric; the thesis' woven one begins \
+             to wrinkle at 50 deg of either sign (a bias extension test tells)",
+            100.0 * share,
+            ply.name,
+            of.shear_min.to_degrees(),
+            of.shear_max.to_degrees(),
+            limits.over_shear_positive.to_degrees(),
+            limits.over_shear_negative.to_degrees()
+        )
     })
 }
 

@@ -208,3 +208,32 @@ fn a_run_without_plies_or_frames_says_so() {
         "{error}"
     );
 }
+
+#[test]
+fn limits_of_another_fabric_are_warned_of() {
+    // A woven ply over a dome: much shear of both signs, nothing wrong with it.
+    let input = formed(
+        |_, _| OFFSET,
+        |c| f64::to_radians(if c % 2 == 0 { 20.0 } else { -20.0 }),
+    );
+    let warned = |found: &MemoryArtifact| {
+        let told: Vec<&String> = found
+            .log
+            .iter()
+            .filter(|l| l.contains("over-sheared"))
+            .collect();
+        assert!(told.len() < 2, "{told:?}");
+        told.first().map(|t| (*t).clone())
+    };
+    let text = warned(&detect(&input)).expect("half of the ply is flagged");
+    for part in [
+        "50 % of ply 'ply_1'",
+        "over_shear_positive: 8.0 deg",
+        "woven",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let limits = json!({"over_shear_positive": f64::to_radians(45.0)});
+    let found = run::<DefectDetection>(limits, &[MemoryInput::new("formed", &input)], &[]).unwrap();
+    assert_eq!(warned(&found), None);
+}
