@@ -449,9 +449,11 @@ pub struct PressPlate {
 pub struct Holder {
     /// Its opening; that of the die unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub opening_radius: Option<Length>,
     /// Radius of the rounding of its edge; that of the die unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub edge_radius: Option<Length>,
     /// How it is held.
     pub hold: Hold,
@@ -462,9 +464,9 @@ pub struct Holder {
 #[serde(rename_all = "snake_case")]
 pub enum Hold {
     /// Distance between the faces of die and holder.
-    Gap(Length),
+    Gap(#[schemars(extend("x-exclusive-minimum" = "0 mm"))] Length),
     /// Force towards the die.
-    Force(Force),
+    Force(#[schemars(extend("x-minimum" = "0 N"))] Force),
 }
 
 /// Double-diaphragm forming: the frame is lowered with the bag under vacuum until the lower film meets

@@ -30,6 +30,8 @@ pub struct Ply<'a> {
     pub shear_angle: &'a [f64],
     /// Distance of the mid-plane from the tool when all sheets lie on it (m).
     pub offset: f64,
+    /// `[nodes]` what of that is not there, because plies below end beside it (m); `None`: all is there.
+    pub missing: Option<&'a [f64]>,
 }
 
 /// What was found on a ply.
@@ -69,7 +71,10 @@ pub struct Summary {
 /// Judges a ply against the tool.
 pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detection {
     let t = thresholds;
-    let distances = nodal_distances(tool, ply.formed, ply.offset, t.foot_margin);
+    let mut distances = nodal_distances(tool, ply.formed, ply.offset, t.foot_margin);
+    for (distance, missing) in distances.iter_mut().zip(ply.missing.unwrap_or_default()) {
+        distance.value += missing;
+    }
     let poor_conformity: Vec<bool> = distances
         .iter()
         .map(|d| d.judged && d.value > t.distance_threshold)

@@ -102,7 +102,9 @@ fn judge(
     let points = host.frame_points(input, body, frame)?;
     let shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
     let topology = Topology::new(undeformed.len(), 4, &cells);
+    let missing = of_run::missing_below(host, input, &sheet.name)?;
     let ply = Ply {
+        missing: missing.as_deref(),
         topology: &topology,
         undeformed: &undeformed,
         formed: &points,

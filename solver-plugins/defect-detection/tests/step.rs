@@ -237,3 +237,45 @@ fn limits_of_another_fabric_are_warned_of() {
     let found = run::<DefectDetection>(limits, &[MemoryInput::new("formed", &input)], &[]).unwrap();
     assert_eq!(warned(&found), None);
 }
+
+#[test]
+fn a_ply_that_lies_beside_the_one_below_it_conforms_where_it_lies_on_the_film() {
+    // The upper ply is 0.4 mm lower where x > 0: the one below ends there.
+    const BELOW: f64 = 0.0004;
+    let steps = |hangs: f64| {
+        let z = move |x: f64, _: f64| OFFSET + if x > 0.0 { hangs } else { BELOW };
+        let mut run = formed(z, |_| 0.0);
+        let (points, cells) = quads([10, 10], [0.100, 0.100], 0.2);
+        let points: Vec<Vec3> = points.iter().map(|p| [p[0] - 0.05, p[1], p[2]]).collect();
+        let laid = points.iter().map(|p| [p[0], p[1], HEIGHT + OFFSET]);
+        let mut below = MemoryBody {
+            name: "ply_0".into(),
+            frames: vec![points.clone(), laid.collect()],
+            points,
+            nodes_per_cell: 4,
+            cells,
+            ..Default::default()
+        };
+        let mut shear = run.bodies[1].fields.clone();
+        for field in shear.iter_mut().flatten() {
+            field.values.truncate(100);
+        }
+        below.fields = shear;
+        run.bodies.push(below);
+        run.attributes = json!({"contact_by_place": true, "sheets": [
+            {"name": "film", "kind": "diaphragm", "offset": 0.00004, "thickness": 8e-5},
+            {"name": "ply_0", "kind": "ply", "offset": OFFSET, "thickness": BELOW},
+            {"name": "ply_1", "kind": "ply", "offset": OFFSET + BELOW, "thickness": BELOW}]});
+        run
+    };
+    let found = detect(&steps(0.0));
+    let distances = found.body("ply_1").last("nodal_distance");
+    assert!(distances.iter().all(|d| d.abs() < 1e-9), "{distances:?}");
+    // 1.2 mm above the film, and 0.8 above where a whole stack would be: it stands off.
+    assert!((detect(&steps(0.0012)).result("distance_max") - 0.0012).abs() < 1e-9);
+    assert!(detect(&steps(0.0012)).result("poor_conformity_area") > 0.005);
+    // A run that lays it on the whole stack everywhere is judged so.
+    let mut whole = steps(BELOW);
+    whole.attributes["contact_by_place"] = json!(false);
+    assert!(detect(&whole).result("distance_max").abs() < 1e-9);
+}

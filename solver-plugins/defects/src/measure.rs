@@ -109,6 +109,15 @@ impl Ply {
     }
 }
 
+impl Ply {
+    /// Takes account of plies below that do not lie under all of its nodes: by node, what (m) of its offset is not there.
+    pub fn lower(&mut self, missing: &[f64]) {
+        for (distance, missing) in self.distance.iter_mut().zip(missing) {
+            distance.value += missing;
+        }
+    }
+}
+
 /// Whether a ply's normals point, on the whole and by area, to the tool: its cells are wound the other way round. It is asked of the nodes that are
 /// judged alone, past a free edge the tool has no side.
 fn faces(topology: &Topology, formed: &[Vec3], tool: &Surface, distance: &[NodalDistance]) -> bool {

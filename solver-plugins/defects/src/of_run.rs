@@ -80,16 +80,19 @@ pub fn ply(
     let (undeformed, cells) = host.mesh(input, body)?;
     let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
     let formed = host.frame_points(input, body, frame)?;
-    let name = name.to_owned();
-    Ok(Ply::new(
-        name,
+    let mut ply = Ply::new(
+        name.to_owned(),
         topology,
         undeformed,
         formed,
         tool,
         offset,
         foot_margin,
-    ))
+    );
+    if let Some(missing) = of_run::missing_below(host, input, name)? {
+        ply.lower(&missing);
+    }
+    Ok(ply)
 }
 
 /// As [`ply`], with its shear angle and, where the run has them, its fibre strains.

@@ -528,6 +528,7 @@ fn write_summary(
     host.write_attributes(&json!({
         "scene": p.scene.name,
         "sheets": sheet_attributes(forming, p),
+        "contact_by_place": true,
         "symmetry": crate::symmetry::words(m.planes()),
         "element_size": forming.element_size,
         "zone": forming.zone,
