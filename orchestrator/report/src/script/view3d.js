@@ -126,10 +126,12 @@
       this.element.dataset.ready = 'true';
     }
 
-    // Of the zones that are shown, on the uppermost ply that is shown.
+    // Of the zones that are shown, on the uppermost ply of theirs that is shown.
     outlines() {
-      const top = [...this.show.ply].pop();
-      return this.scene.outlines.filter((o) => this.show.zone.has(o.zone) && o.ply === top);
+      const { outlines } = this.scene;
+      const tops = new Map();
+      for (const ply of this.show.ply) outlines.filter((o) => o.ply === ply).forEach((o) => tops.set(o.zone, ply));
+      return outlines.filter((o) => this.show.zone.has(o.zone) && tops.get(o.zone) === o.ply);
     }
 
     // What lies behind a surface shines through.
