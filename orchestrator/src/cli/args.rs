@@ -22,7 +22,7 @@ pub enum Command {
     /// Show what a run would do with each step, and why
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(PlanArgs),
-    /// Check the YAML of a workflow, its scenes, materials and expectations, without running anything
+    /// Check the YAML of a workflow, its scenes, materials and expectations (or of a scene or material alone), without running anything
     #[command(after_help = VALIDATE_EXAMPLES)]
     Validate(ValidateArgs),
     /// Draw the steps and their connections
@@ -98,6 +98,7 @@ const VALIDATE_EXAMPLES: &str = "\
 Examples:
   plyflow validate workflow.yaml
   plyflow validate workflow.yaml --format json   # for editors
+  plyflow validate scene.yaml                    # a scene, or a material, by itself
 
 Found are names, keys, types, units, bounds, wires, missing files, and scenes that make no sense. What only a run finds: what
 is in STL and CSV files, curves of materials that make no law, and what depends on the mesh.";

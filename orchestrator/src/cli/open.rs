@@ -10,6 +10,7 @@ use crate::progress::Quiet;
 use crate::store::{Store, resolved};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_plugin_host::{Describer, PluginCatalog};
+use plyflow_workflow::Part;
 use plyflow_workflow::resolved::ResolvedWorkflow;
 use std::io::IsTerminal;
 
@@ -168,6 +169,22 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
         store: Store::new(root),
         search_path,
     }))
+}
+
+/// Checks a scene or a material by itself; `None`: the file is neither.
+///
+/// # Errors
+/// When the plugins' folders cannot be searched.
+pub fn check_part(
+    args: &Workflow,
+) -> Result<Option<Result<Part, plyflow_workflow::Diagnostics>>, Stop> {
+    let file = &args.workflow;
+    if !file.is_file() {
+        return Ok(None);
+    }
+    let search_path = search_path(&args.places, Some(file))?;
+    let catalog = catalog(search_path, &store_root(&args.places, Some(file)))?;
+    Ok(plyflow_workflow::check_part(file, &catalog))
 }
 
 fn overrides(set: &[String]) -> Result<Vec<plyflow_workflow::Override>, Stop> {

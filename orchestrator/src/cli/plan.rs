@@ -9,6 +9,7 @@ use crate::engine::core::{Id, State};
 use crate::engine::{Session, input_keys};
 use crate::exit;
 use crate::plan::{Change, changes};
+use plyflow_workflow::Part;
 use serde_json::json;
 use std::io::IsTerminal;
 
@@ -220,18 +221,20 @@ pub fn difference(session: &Session<'_>, id: Id) -> Difference {
 /// # Errors
 /// [`exit::INVALID`] when there are findings.
 pub fn validate(args: &ValidateArgs) -> Done {
-    let outcome = open::load(&args.workflow)?;
+    let outcome = match open::check_part(&args.workflow)? {
+        Some(part) => part.map(|part| match part {
+            Part::Scene => "a scene".to_owned(),
+            Part::Material => "a material".to_owned(),
+        }),
+        None => open::load(&args.workflow)?.map(|o| {
+            let n = o.workflow.steps.len();
+            format!("{n} step{}", if n == 1 { "" } else { "s" })
+        }),
+    };
     let json = args.format == TextOrJson::Json;
     match outcome {
         Ok(_) if json => print("[]\n"),
-        Ok(o) => {
-            let n = o.workflow.steps.len();
-            let s = if n == 1 { "" } else { "s" };
-            print(&format!(
-                "{}: {n} step{s}, no errors\n",
-                args.workflow.workflow
-            ))
-        }
+        Ok(what) => print(&format!("{}: {what}, no errors\n", args.workflow.workflow)),
         Err(findings) => {
             if json {
                 print(&format!("{:#}\n", findings.to_json()))?;

@@ -23,6 +23,6 @@ pub use catalog::{Catalog, CatalogEntry, CatalogError};
 pub use diagnostics::{Diagnostic, Diagnostics, Severity};
 pub use evidence::{Evidence, Resolution};
 pub use graph::{dependencies, graph, to_dot, to_mermaid};
-pub use load::{load, load_with, plugin_search_folders, resolve};
+pub use load::{Part, check_part, load, load_with, plugin_search_folders, resolve};
 pub use overrides::Override;
 pub use resolved::ResolvedWorkflow;

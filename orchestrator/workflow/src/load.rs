@@ -58,6 +58,50 @@ pub fn load_with(
     resolve(path, catalog, overrides).map(|r| r.workflow)
 }
 
+/// A file that a workflow names, of a format of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// A scene.
+    Scene,
+    /// A material.
+    Material,
+}
+
+/// Checks a scene or a material by itself, with all that it names. `None`: the file is neither, or cannot be read.
+///
+/// # Errors
+/// All findings of one pass, each with its place.
+pub fn check_part(path: &Utf8Path, catalog: &dyn Catalog) -> Option<Result<Part, Diagnostics>> {
+    let mut problems = Problems::default();
+    let (source, root) = open(path, &mut problems)?;
+    let has = |key: &str| root.entry(key).is_some();
+    let (part, what) = match (
+        has("plyflow"),
+        has("plyflow_scene"),
+        has("plyflow_material"),
+    ) {
+        (false, true, _) => (Part::Scene, "scene"),
+        (false, false, true) => (Part::Material, "material"),
+        _ => return None,
+    };
+    let plugins = Plugins::new(catalog);
+    let mut resolver = Resolver::new(&plugins, &mut problems);
+    let place = Place {
+        source: &source,
+        pointer: format!("/{what}"),
+        what: what.into(),
+        key: root.span.clone(),
+    };
+    match part {
+        Part::Scene => crate::scene::scene_value(&mut resolver, &root, &place),
+        Part::Material => crate::scene::checked_material(&mut resolver, &root, &place),
+    };
+    Some(match problems.count() {
+        0 => Ok(part),
+        _ => Err(problems.finish()),
+    })
+}
+
 /// As [`load_with`], with all that the result rests on, so that it can be kept and used again.
 ///
 /// # Errors

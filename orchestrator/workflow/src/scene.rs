@@ -99,7 +99,8 @@ pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Opti
     }
 }
 
-fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+/// The canonical form of a scene.
+pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
     let before = resolver.problems.count();
     let wanted = "a scene, with `plyflow_scene: 1`";
     if other_format(node, "plyflow_scene", wanted, at.source, resolver.problems) {
@@ -190,7 +191,8 @@ fn material_file(
     checked_material(resolver, &node, &place)
 }
 
-fn checked_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+/// The canonical form of a material.
+pub fn checked_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
     let before = resolver.problems.count();
     let wanted = "a material, with `plyflow_material: 1`";
     if other_format(

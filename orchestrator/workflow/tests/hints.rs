@@ -123,3 +123,20 @@ fn what_is_wrong_with_set_is_shown_in_its_own_text() {
         .to_string();
     assert!(!told.contains("--set"), "{told}");
 }
+
+#[test]
+fn a_scene_or_a_material_is_checked_by_itself() {
+    use plyflow_workflow::{Part, check_part};
+    let study = Study::sound();
+    let check = |file: &str| check_part(&study.path(file), &common::catalog());
+    assert_eq!(check("scene.yaml").unwrap().unwrap(), Part::Scene);
+    let fabric = "materials/fabric.yaml";
+    assert_eq!(check(fabric).unwrap().unwrap(), Part::Material);
+    assert!(check(W).is_none());
+    study.mutate(fabric, "fibre_modulus:", "fibre_modulos:");
+    // Its own file, and the scene that names it.
+    for file in [fabric, "scene.yaml"] {
+        let told = check(file).unwrap().unwrap_err().to_string();
+        assert!(told.contains("did you mean `fibre_modulus`"), "{told}");
+    }
+}
