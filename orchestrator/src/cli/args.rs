@@ -60,9 +60,9 @@ pub enum Command {
         after_help = "Examples:\n  plyflow extract workflow.yaml bending --list\n  plyflow extract workflow.yaml bending --to materials\n  plyflow extract workflow.yaml 'local[A]' --to out --force"
     )]
     Extract(ExtractArgs),
-    /// Print the JSON Schema of a file format, for editors
+    /// Print the JSON Schema of a file format, for editors, or its keys in words
     #[command(
-        after_help = "Examples:\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
+        after_help = "Examples:\n  plyflow schema scene --format text               # all keys of a scene, with types, bounds and defaults\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
     )]
     Schema(SchemaArgs),
     /// Remove artifacts that no workflow's last run uses, or all of a store
@@ -376,6 +376,9 @@ pub struct SchemaArgs {
     /// Which
     #[arg(value_enum, default_value = "workflow")]
     pub which: SchemaKind,
+    /// Form: a JSON Schema, or the keys in words
+    #[arg(long, value_enum, default_value = "json")]
+    pub format: TextOrJson,
     #[command(flatten)]
     /// Where things are.
     pub places: Places,

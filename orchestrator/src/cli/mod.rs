@@ -7,6 +7,7 @@ mod explain;
 mod extract;
 mod front;
 mod inspect;
+mod keys;
 mod open;
 mod plan;
 mod plugins;

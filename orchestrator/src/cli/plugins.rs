@@ -2,7 +2,7 @@
 
 use super::args::{PluginsArgs, SchemaArgs, SchemaKind, TextOrJson};
 use super::open::{catalog, search_path, store_root};
-use super::{Done, Stop, print};
+use super::{Done, Stop, keys, print};
 use crate::exit;
 use camino::Utf8Path;
 use plyflow_model::schema;
@@ -172,5 +172,8 @@ pub fn schema(args: &SchemaArgs) -> Done {
             schema::workflow_with(&manifests)
         }
     };
-    print(&format!("{text:#}\n"))
+    match args.format {
+        TextOrJson::Json => print(&format!("{text:#}\n")),
+        TextOrJson::Text => print(&keys::outline(&text)),
+    }
 }
