@@ -1,17 +1,16 @@
 //! Checks of an element formulation: its calls, its buffers, its lanes.
 
+use crate::meeting::{THREADS, meet};
 use crate::shapes::{Elements, pick};
 use crate::subject::{Answer, Ask, Breaches, Masses, Motion, Refusal, State, Subject};
 use crate::{Check, Run, Seen, Sink, element_motion, patch, rules};
 use plyflow_sdk::abi::*;
-use std::sync::Barrier;
 
 /// Lanes of the sets that the mechanics are judged on.
 const LANES: usize = 16;
 /// Strain of the deformed states.
 pub(crate) const STRAIN: f64 = 0.02;
 /// Threads, and calls of each, that must not disturb each other.
-const THREADS: usize = 4;
 const CALLS: usize = 5000;
 
 /// Checks an element formulation made with `parameters` (JSON, SI numbers) for a material: its element part and,
@@ -267,23 +266,14 @@ fn threads(subject: &Subject) -> Seen {
             (state, x, a)
         })
         .collect();
-    let start = Barrier::new(THREADS);
-    let differing: usize = std::thread::scope(|scope| {
-        let workers: Vec<_> = alone
-            .iter()
-            .map(|(state, x, a)| {
-                let start = &start;
-                scope.spawn(move || {
-                    start.wait();
-                    subject.hammer(state, x, (&a.force, &a.energy), CALLS)
-                })
-            })
-            .collect();
-        workers.into_iter().map(|w| w.join().unwrap_or(CALLS)).sum()
+    let met = meet(|t, counter| {
+        let (state, x, a) = &alone[t];
+        let differing = subject.hammer(state, x, (&a.force, &a.energy), CALLS, counter);
+        (CALLS, differing)
     });
     Seen::Number {
-        measured: differing as f64,
+        measured: met.differing as f64,
         limit: 0.0,
-        what: format!("{THREADS} threads, {CALLS} batches each: {differing} differ"),
+        what: met.told(),
     }
 }

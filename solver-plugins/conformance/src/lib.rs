@@ -12,6 +12,7 @@ mod element;
 mod element_motion;
 mod linear;
 mod material;
+mod meeting;
 mod patch;
 mod rules;
 mod shapes;

@@ -2,16 +2,15 @@
 
 use crate::buffer::Guarded;
 use crate::linear::largest_eigenvalue;
+use crate::meeting::{THREADS, meet};
 use crate::shapes::pick;
 use crate::subject::{Ask, Breaches, DT};
 use crate::{Check, Run, Seen, Sequence, Sink, bending, rules, worse};
 use plyflow_sdk::abi::*;
 use std::ffi::c_void;
-use std::sync::Barrier;
 
 const LANES: usize = 16;
 const STRAIN: f64 = 0.02;
-const THREADS: usize = 4;
 const CALLS: usize = 1000;
 
 /// A material under test.
@@ -300,25 +299,15 @@ fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
             .map(|t| metrics(LANES, STRAIN, 201 + 2 * t as u64))
             .collect();
         let alone: Vec<_> = sets.iter().map(|m| all(law, m)).collect();
-        let start = Barrier::new(THREADS);
-        let differing: usize = std::thread::scope(|scope| {
-            let workers: Vec<_> = sets
-                .iter()
-                .zip(&alone)
-                .map(|(m, want)| {
-                    let (start, all) = (&start, &all);
-                    scope.spawn(move || {
-                        start.wait();
-                        (0..CALLS).filter(|_| all(law, m) != *want).count()
-                    })
-                })
-                .collect();
-            workers.into_iter().map(|w| w.join().unwrap_or(CALLS)).sum()
+        let met = meet(|t, counter| {
+            let (m, want) = (&sets[t], &alone[t]);
+            let differs = |_: &usize| counter.during(|| all(law, m)) != *want;
+            (CALLS, (0..CALLS).filter(differs).count())
         });
         Seen::Number {
-            measured: differing as f64,
+            measured: met.differing as f64,
             limit: 0.0,
-            what: format!("{THREADS} threads, {CALLS} batches each: {differing} differ"),
+            what: met.told(),
         }
     });
     run.check(rules::REST, || rest(law, &metric));

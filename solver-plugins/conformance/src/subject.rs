@@ -1,6 +1,7 @@
 //! An element under test: every call goes through guarded buffers.
 
 use crate::buffer::Guarded;
+use crate::meeting::Counter;
 use crate::shapes::{Elements, Patches};
 use plyflow_sdk::abi::*;
 use std::ffi::c_void;
@@ -403,13 +404,14 @@ impl Subject {
 
 impl Subject {
     /// Calls forces `times` times on the same state with as little around the calls as can be, so that calls of
-    /// several threads meet; how many differ from the first answer in `want` (force, energy).
+    /// several threads meet, through the `counter` of all; how many differ from the first answer in `want` (force, energy).
     pub(crate) fn hammer(
         &self,
         state: &State,
         position: &[f64],
         want: (&[f64], &[f64]),
         times: usize,
+        counter: &Counter<'_>,
     ) -> usize {
         let (vectors, lanes) = (position.len(), state.lanes);
         let turning = if self.rotates() { vectors } else { 0 };
@@ -434,7 +436,9 @@ impl Subject {
                 to.slice_mut().copy_from_slice(from);
                 let (to, from) = (&mut now.material_history, state.material_history.slice());
                 to.slice_mut().copy_from_slice(from);
-                let code = unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
+                let call =
+                    || unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
+                let code = counter.during(call);
                 code != PF_OK || !same(force.slice(), want.0) || !same(energy.slice(), want.1)
             })
             .count()
