@@ -22,7 +22,7 @@ pub enum Command {
     /// Show what a run would do with each step, and why
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(PlanArgs),
-    /// Check the YAML of a workflow and all it names, or of a scene or a material; runs nothing
+    /// Check the YAML of a workflow and all it names, or of a scene or a material
     #[command(after_help = VALIDATE_EXAMPLES)]
     Validate(ValidateArgs),
     /// Draw the steps and their connections
