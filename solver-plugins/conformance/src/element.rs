@@ -10,7 +10,7 @@ use plyflow_sdk::abi::*;
 const LANES: usize = 16;
 /// Strain of the deformed states.
 pub(crate) const STRAIN: f64 = 0.02;
-/// Threads, and calls of each, that must not disturb each other.
+/// Calls of a thread between two looks at whether enough have met.
 const CALLS: usize = 5000;
 
 /// Checks an element formulation made with `parameters` (JSON, SI numbers) for a material: its element part and,

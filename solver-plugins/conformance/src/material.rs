@@ -11,6 +11,7 @@ use std::ffi::c_void;
 
 const LANES: usize = 16;
 const STRAIN: f64 = 0.02;
+/// Calls of a thread between two looks at whether enough have met.
 const CALLS: usize = 1000;
 
 /// A material under test.

@@ -1,6 +1,6 @@
 //! What global and local runs share: checking the stack, making components, stacking the contacts.
 
-use crate::cover::Cover;
+use crate::cover::{Cover, beside, offset_over};
 use crate::elements;
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
@@ -423,29 +423,6 @@ pub fn add_contacts(
     }
     model.set_contact_stiffness(&contact_settings(p));
     Ok(())
-}
-
-/// Distance (m) of a sheet's mid-plane from what is under (or over) all the sheets `between`.
-pub fn offset_over(between: &[&StackSheet], sheet: &StackSheet) -> f64 {
-    // Summed from the tool upwards, as the stack's own offsets are.
-    let under = between.iter().fold(0.0, |sum, s| sum + s.thickness);
-    under + 0.5 * sheet.thickness
-}
-
-/// What the name of a contact of a part of a ply's nodes ends with: which of the plies `among` are not surely between.
-pub fn beside(
-    stack: &[StackSheet],
-    mut among: impl Iterator<Item = usize>,
-    between: &[usize],
-) -> String {
-    let missing: Vec<&str> = (among.by_ref())
-        .filter(|i| !between.contains(i))
-        .map(|i| stack[i].scene.name.as_str())
-        .collect();
-    match missing.is_empty() {
-        true => String::new(),
-        false => format!("/beside {}", missing.join(", ")),
-    }
 }
 
 /// Places slaves on the master in the undeformed plane. A slave beyond the master's edge gets the nearest

@@ -3,7 +3,7 @@
 //! In a stack of equal plies every sheet touches its neighbours alone. A ply that reaches out over the one below it, that lies over a hole
 //! of it or beside it touches what comes next, at the distance of what is really between.
 
-use crate::assembly::{Bins, inverse_bilinear};
+use crate::assembly::{Bins, StackSheet, inverse_bilinear};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::V;
 use std::collections::{BTreeMap, HashMap};
@@ -79,6 +79,29 @@ impl Cover {
         let mut groups: Vec<_> = groups.into_iter().collect();
         groups.sort_by_key(|g| std::cmp::Reverse(g.0.len()));
         groups
+    }
+}
+
+/// Distance (m) of a sheet's mid-plane from what is under (or over) all the sheets `between`.
+pub fn offset_over(between: &[&StackSheet], sheet: &StackSheet) -> f64 {
+    // Summed from the tool upwards, as the stack's own offsets are.
+    let under = between.iter().fold(0.0, |sum, s| sum + s.thickness);
+    under + 0.5 * sheet.thickness
+}
+
+/// What the name of a contact of a part of a ply's nodes ends with: which of the plies `among` are not surely between.
+pub fn beside(
+    stack: &[StackSheet],
+    among: impl Iterator<Item = usize>,
+    between: &[usize],
+) -> String {
+    let missing: Vec<&str> = among
+        .filter(|i| !between.contains(i))
+        .map(|i| stack[i].scene.name.as_str())
+        .collect();
+    match missing.is_empty() {
+        true => String::new(),
+        false => format!("/beside {}", missing.join(", ")),
     }
 }
 

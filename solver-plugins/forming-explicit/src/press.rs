@@ -4,7 +4,7 @@
 //! lowest ply, and pushes the plies through the opening of the die.
 
 use crate::assembly::{self, Components, StackSheet};
-use crate::cover::Cover;
+use crate::cover::{self, Cover};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
 use crate::penetration;
@@ -247,13 +247,13 @@ fn add_contacts(
     let all = stack.len();
     let nodes: Vec<Vec<u32>> = (0..all).map(|k| model.sheets[k].nodes.clone()).collect();
     let plies = (0..all).map(|k| (k, k, &nodes[k][..]));
-    let cover = Cover::new(model, &plies.collect::<Vec<_>>());
+    let covers = Cover::new(model, &plies.collect::<Vec<_>>());
     for (part, surface, above) in parts {
         for (k, sheet) in stack.iter().enumerate() {
             // The ply that faces the part rubs on it; the others stay outside where its elements' chords cut through.
             let own = sheet.scene.name.as_str();
             let among = if *above { k + 1..all } else { 0..k };
-            for (between, nodes) in cover.groups((k, &nodes[k]), among.clone()) {
+            for (between, nodes) in covers.groups((k, &nodes[k]), among.clone()) {
                 let names = between.iter().map(|i| stack[*i].scene.name.as_str());
                 let chain: Vec<&str> = if *above {
                     std::iter::once(own).chain(names).chain([*part]).collect()
@@ -261,12 +261,12 @@ fn add_contacts(
                     std::iter::once(*part).chain(names).chain([own]).collect()
                 };
                 let mu = friction.through(model, &chain, own)?;
-                let beside = assembly::beside(stack, among.clone(), &between);
+                let beside = cover::beside(stack, among.clone(), &between);
                 let between: Vec<&StackSheet> = between.iter().map(|i| &stack[*i]).collect();
                 let mut contact = RigidContact::new(
                     format!("{part}/{own}{beside}"),
                     surface.clone(),
-                    assembly::offset_over(&between, sheet),
+                    cover::offset_over(&between, sheet),
                     mu,
                     &settings,
                     nodes.iter().map(|n| RigidItem::new(*n)).collect(),
@@ -293,7 +293,7 @@ fn add_contacts(
     // Where plies that would lie between do not.
     for k in 1..all {
         for below in (0..k - 1).rev() {
-            let past = cover.past((k, &nodes[k]), below + 1..k, Some(below));
+            let past = covers.past((k, &nodes[k]), below + 1..k, Some(below));
             if !past.is_empty() {
                 pair(k, &past, below)?;
             }
