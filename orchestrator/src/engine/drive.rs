@@ -8,8 +8,8 @@ use crate::plan::{Graph, InputKey, Key};
 use crate::store::{Journal, Known, RunFolder, Store};
 use camino::Utf8PathBuf;
 use plyflow_model::job::{
-    Checkpoints, Cost, DATA_MODEL_VERSION, FailureKind, JOB_VERSION, Job, JobInput, LibraryRef,
-    LogLevel, Message, Progress, Record,
+    Checkpoints, Cost, DATA_MODEL_VERSION, JOB_VERSION, Job, JobInput, LibraryRef, LogLevel,
+    Message, Progress, Record,
 };
 use plyflow_workflow::resolved::ResolvedWorkflow;
 use std::collections::{HashMap, VecDeque};
@@ -495,7 +495,7 @@ impl<'a> Session<'a> {
                 observer.update(&self.core, id, &Update::Stopped);
                 self.take(effects, observer);
             }
-            Report::Ended { id, outcome } => self.fail(id, &reason_text(&outcome), observer),
+            Report::Ended { id, outcome } => self.fail(id, &outcome.reason(), observer),
         }
     }
 
@@ -586,39 +586,4 @@ pub fn input_keys(core: &Core<'_>, id: Id) -> Vec<InputKey> {
         })
     };
     instance.inputs.iter().filter_map(one).collect()
-}
-
-fn reason_text(outcome: &Outcome) -> String {
-    match outcome {
-        Outcome::Done(_) => "done".into(),
-        Outcome::Failed {
-            kind: FailureKind::Panic,
-            message,
-        } => format!("the plugin panicked: {message}"),
-        Outcome::Failed {
-            kind: FailureKind::Malformed,
-            message,
-        } => {
-            format!("malformed artifact: {message}")
-        }
-        Outcome::Failed { message, .. } => message.clone(),
-        Outcome::Signal(name) => {
-            let hint = match name.as_str() {
-                "SIGSEGV" | "SIGBUS" | "SIGILL" | "SIGFPE" | "SIGABRT" => {
-                    "; the defect is in the plugin or a library it uses"
-                }
-                "SIGKILL" => "; perhaps the machine ran out of memory",
-                _ => "",
-            };
-            format!("the worker crashed: {name}{hint}")
-        }
-        Outcome::Silent(code) => {
-            format!("the worker ended with status {code} without saying how it went")
-        }
-        Outcome::TimedOut(limit) => format!(
-            "stopped at its time limit of {limit} s; raise `resources: {{time_limit: ..}}` of the step if it needs longer"
-        ),
-        Outcome::Cancelled => "stopped".into(),
-        Outcome::NotStarted(text) => format!("the worker could not be started: {text}"),
-    }
 }

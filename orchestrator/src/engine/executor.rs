@@ -42,6 +42,44 @@ pub enum Outcome {
     NotStarted(String),
 }
 
+impl Outcome {
+    /// Why it ended so, in words for the user.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Done(_) => "done".into(),
+            Self::Failed {
+                kind: FailureKind::Panic,
+                message,
+            } => format!("the plugin panicked: {message}"),
+            Self::Failed {
+                kind: FailureKind::Malformed,
+                message,
+            } => {
+                format!("malformed artifact: {message}")
+            }
+            Self::Failed { message, .. } => message.clone(),
+            Self::Signal(name) => {
+                let hint = match name.as_str() {
+                    "SIGSEGV" | "SIGBUS" | "SIGILL" | "SIGFPE" | "SIGABRT" => {
+                        "; the defect is in the plugin or a library it uses"
+                    }
+                    "SIGKILL" => "; perhaps the machine ran out of memory",
+                    _ => "",
+                };
+                format!("the worker crashed: {name}{hint}")
+            }
+            Self::Silent(code) => {
+                format!("the worker ended with status {code} without saying how it went")
+            }
+            Self::TimedOut(limit) => format!(
+                "stopped at its time limit of {limit} s; raise `resources: {{time_limit: ..}}` of the step if it needs longer"
+            ),
+            Self::Cancelled => "stopped".into(),
+            Self::NotStarted(text) => format!("the worker could not be started: {text}"),
+        }
+    }
+}
+
 /// What an executor reports.
 #[derive(Debug)]
 pub enum Report {

@@ -48,8 +48,9 @@ pub fn missing_below(
         }
         let body = meshes.body(&below.name)?;
         let (points, cells) = host.mesh(input, body)?;
-        // Plies of one outline have the same mesh.
-        if points == nodes {
+        // Plies of one outline have the same mesh, one above the other.
+        let same = |(a, b): (&[f64; 3], &[f64; 3])| a[..2] == b[..2];
+        if points.len() == nodes.len() && points.iter().zip(&nodes).all(same) {
             continue;
         }
         let Some(locator) = QuadLocator::new(&points, &cells) else {
