@@ -34,6 +34,25 @@ pub(crate) fn frame_at(times: &[f64], start: f64, step: &str) -> Result<usize, S
     Ok(first)
 }
 
+/// The frame `first`, or the second one where that is the first of a run that itself began late: what moves there, and how fast, is known
+/// from frames on both sides.
+pub(crate) fn after_a_late_beginning(
+    times: &[f64],
+    first: usize,
+    step: &str,
+) -> Result<usize, String> {
+    if first > 0 || times[0] <= 0.0 {
+        return Ok(first);
+    }
+    if times.len() < 3 {
+        let (begin, n) = (times[0], times.len());
+        return Err(format!(
+            "'{step}' begins at {begin} s, in the middle of the process, and has {n} frames; to drive a zone it needs 3 or more (`frames`)"
+        ));
+    }
+    Ok(1)
+}
+
 /// By frame, how sharply (1/m) a coarse ply is bent in the zone where it is bent most ([`QUANTILE`]): the angle between cells that share an
 /// edge over the distance of their middles. `zone` in the flat ply.
 ///
@@ -204,5 +223,15 @@ mod tests {
         assert_eq!(frame_before_bend(&[vec![50.0, 50.0]], 40.0), 0);
         assert_eq!(frame_before_bend(&[vec![0.0, 0.0]], 40.0), 0);
         assert_eq!(frame_before_bend(&[], 40.0), 0);
+    }
+
+    #[test]
+    fn a_run_that_began_late_drives_from_its_second_frame_on() {
+        let from = |times: &[f64], first| after_a_late_beginning(times, first, "whole");
+        assert_eq!(from(&[0.0, 0.1, 0.2], 0), Ok(0));
+        assert_eq!(from(&[0.6, 0.7, 0.8], 0), Ok(1));
+        assert_eq!(from(&[0.6, 0.7, 0.8], 2), Ok(2));
+        let refused = from(&[0.6, 0.8], 0).unwrap_err();
+        assert!(refused.contains("begins at 0.6 s"), "{refused}");
     }
 }

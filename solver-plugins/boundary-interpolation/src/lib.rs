@@ -147,12 +147,12 @@ fn first_frame(
     zone: Rectangle,
     p: &Parameters,
 ) -> Result<usize, StepError> {
-    match (p.start_time, p.start_bend) {
-        (Some(_), Some(_)) => Err(
+    let first = match (p.start_time, p.start_bend) {
+        (Some(_), Some(_)) => return Err(
             "`start_time` and `start_bend` are both given; expected one of them: a time, or the bend by which each zone finds its own"
                 .into(),
         ),
-        (Some(time), None) => Ok(late::frame_at(&meshes.times, time, &input.step)?),
+        (Some(time), None) => late::frame_at(&meshes.times, time, &input.step)?,
         (None, Some(bend)) => {
             let plies = sheets.iter().filter(|s| s["kind"] == "ply");
             let mut bends = Vec::new();
@@ -160,10 +160,15 @@ fn first_frame(
                 let body = meshes.body(name)?;
                 bends.push(late::sharpest_bends(host, input, body, zone, meshes.times.len())?);
             }
-            Ok(late::frame_before_bend(&bends, bend))
+            late::frame_before_bend(&bends, bend)
         }
-        (None, None) => Ok(0),
-    }
+        (None, None) => 0,
+    };
+    Ok(late::after_a_late_beginning(
+        &meshes.times,
+        first,
+        &input.step,
+    )?)
 }
 
 /// The zone at the step's own place in the fan-out over the zones.
@@ -244,6 +249,14 @@ fn advised_size(host: &Host, zone: &Value) -> Result<Option<f64>, StepError> {
     let attributes: Value = host.attributes(study)?;
     let zones = attributes["zones"].as_array().cloned().unwrap_or_default();
     let own = zones.iter().find(|z| z["name"] == zone["name"]);
+    let told = own.map_or(&Value::Null, |z| &z["box"]);
+    if told.is_array() && *told != zone["box"] {
+        return Err(format!(
+            "'{}' advises an element size for zone {} with the box {told} m; here it has the box {} m. Take a study of the runs of this list of zones",
+            study.step, zone["name"], zone["box"]
+        )
+        .into());
+    }
     match own.and_then(|z| z["element_size"].as_f64()) {
         Some(size) if size > 0.0 => Ok(Some(size)),
         _ => Err(format!(
@@ -291,7 +304,7 @@ fn drive(
     let pull = p.cut_stiffness.filter(|_| ply).map(held).transpose()?;
     let begin = late::start(host, input, meshes, body, &fine, first)?;
     let start = motion.start;
-    if start > START_TOLERANCE {
+    if start > START_TOLERANCE && begin.is_none() {
         let name = &sheet.name;
         let text = format!(
             "sheet '{name}': the first frame lies {:.2} mm from the undeformed mesh; the local run starts with a jump",

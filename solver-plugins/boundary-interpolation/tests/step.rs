@@ -476,11 +476,11 @@ fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than
         ..Default::default()
     };
     let name = &zones().attributes["zones"][0]["name"];
+    let bounds = &zones().attributes["zones"][0]["box"];
     let taken = |advised: f64, least: f64| {
         let (formed, zones) = (coarse(0.0), zones());
-        let study = study(
-            json!([{"name": "Z", "element_size": 1.0}, {"name": name, "element_size": advised}]),
-        );
+        let study = study(json!([{"name": "Z", "element_size": 1.0},
+            {"name": name, "box": bounds, "element_size": advised}]));
         let inputs = [
             MemoryInput::new("formed", &formed),
             MemoryInput::new("zones", &zones),
@@ -514,6 +514,19 @@ fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than
     let error = run::<BoundaryInterpolation>(parameters, &inputs, &[0]).unwrap_err();
     assert!(
         error.contains("advises no element size for zone"),
+        "{error}"
+    );
+    let of_another =
+        study(json!([{"name": name, "box": [0.0, 0.0, 1.0, 1.0], "element_size": 0.004}]));
+    let inputs = [
+        inputs[0],
+        inputs[1],
+        MemoryInput::new("meshes", &of_another),
+    ];
+    let parameters = json!({"element_size": 0.01});
+    let error = run::<BoundaryInterpolation>(parameters, &inputs, &[0]).unwrap_err();
+    assert!(
+        error.contains("with the box [0.0,0.0,1.0,1.0] m"),
         "{error}"
     );
 }

@@ -1,10 +1,10 @@
 //! The cut between coarse and fine: the work that passes through it in either run, and how far its influence reaches into a zone.
 
-use crate::models::{Model, Role, Zone, bounds_in_whole};
+use crate::models::{Model, Role, Zone, bounds_in_whole, bounds_of};
 use plyflow_defects::{Ply, distance_at};
 use plyflow_sdk::{BodyInfo, Host, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, distance, dot, sub};
-use plyflow_surface::{Location, QuadLocator, flat_bounds, traction};
+use plyflow_surface::{Location, QuadLocator, traction};
 use serde::Serialize;
 
 /// How far inside of the cut the material is looked at that pulls at it, over the zone's own element size.
@@ -128,12 +128,7 @@ fn work(
         return Ok(None);
     };
     let mut cut = Vec::new();
-    for piece in pieces(
-        zone,
-        cuts,
-        flat_bounds(ply.undeformed.iter().map(|p| [p[0], p[1]])),
-        size,
-    ) {
+    for piece in pieces(zone, cuts, bounds_of(ply), size) {
         let Some(place) = locator.locate(piece.at[0], piece.at[1], 1e-6) else {
             return Ok(None);
         };
@@ -186,7 +181,8 @@ pub fn passages(host: &Host, models: &[Model], zones: &[Zone]) -> Result<Vec<Pas
             };
             // A local run may begin late.
             let begin = part.times.first().copied().unwrap_or(0.0);
-            let cut = (zone, zone.cuts(bounds_in_whole(models, &ply.name)));
+            let cuts = zone.cuts(bounds_in_whole(models, &ply.name), bounds_of(ply));
+            let cut = (zone, cuts);
             let fine = work(host, local, &part, ply, cut, size, begin)?;
             let coarse = work(host, global, &whole, other, cut, size, begin)?;
             if let (Some(local), Some(global)) = (fine, coarse) {
@@ -270,7 +266,7 @@ pub fn layers(models: &[Model], zones: &[Zone]) -> Vec<Layer> {
     locals
         .filter_map(|m| {
             let zone = &zones[m.zone?];
-            let cuts = |ply: &str| zone.cuts(bounds_in_whole(models, ply));
+            let cuts = |ply: &Ply| zone.cuts(bounds_in_whole(models, &ply.name), bounds_of(ply));
             let strips = strips(m, reference, zone, cuts, width);
             (!strips.is_empty()).then(|| Layer {
                 zone: zone.name.clone(),
@@ -304,12 +300,12 @@ pub fn write(
 }
 
 /// Strips of the width `width` (m) from the cut of a zone inwards, over the plies of a local run; empty when nothing is cut.
-/// `cuts`: [`Zone::cuts`] of a ply by its name.
+/// `cuts`: [`Zone::cuts`] of a ply.
 fn strips(
     local: &Model,
     reference: &Model,
     zone: &Zone,
-    cuts: impl Fn(&str) -> [bool; 4],
+    cuts: impl Fn(&Ply) -> [bool; 4],
     width: f64,
 ) -> Vec<Strip> {
     let mut sums: Vec<Sums> = Vec::new();
@@ -321,7 +317,7 @@ fn strips(
         let Some(locator) = QuadLocator::new(&other.undeformed, cells) else {
             continue;
         };
-        let cuts = cuts(&ply.name);
+        let cuts = cuts(ply);
         for (i, at) in ply.undeformed.iter().enumerate() {
             let Some(deep) = depth(zone, cuts, *at) else {
                 continue;

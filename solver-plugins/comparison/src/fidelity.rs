@@ -132,8 +132,7 @@ pub fn measure_ways(
         Yardstick::Reference => of(Role::Reference),
         Yardstick::Zones => local.clone(),
     };
-    let within = (yardstick == Yardstick::Zones).then_some(zones);
-    let theirs = defects_of(&reference, within, settings);
+    let theirs = defects_of(&reference, zones, yardstick, settings);
     let theirs = named(&theirs);
     let both: Vec<&Model> = local.iter().chain(&global).copied().collect();
     // Whose defects count, and whose fields, the first that has a place.
@@ -153,10 +152,10 @@ pub fn measure_ways(
     let mut measured = Measured::default();
     for (mut way, models, around) in ways {
         host.check_cancelled()?;
-        let ours = defects_of(&models, within, settings);
+        let ours = defects_of(&models, zones, yardstick, settings);
         let ours = named(&ours);
         way.errors = defects(&ours, &theirs, settings);
-        way.errors.extend(fields(&around, &reference));
+        way.errors.extend(fields(&around, &reference, zones));
         measured.ways.push(way);
     }
     // The yardstick itself, for what it took.
@@ -175,18 +174,19 @@ pub fn measure_ways(
     if yardstick == Yardstick::Reference {
         for m in local {
             let mut way = Way::new(&m.name, &format!(".{}", m.name), &[m]);
-            way.errors = fields(&[m], &reference);
+            way.errors = fields(&[m], &reference, zones);
             measured.local.push(way);
         }
     }
     Ok(measured)
 }
 
-/// How far the fields of a way are from the reference.
-fn fields(way: &[&Model], reference: &[&Model]) -> Vec<Told> {
-    let [way, reference] =
+/// How far the fields of a way are from the reference; from fine runs of zones that stand in for it, each in its zone.
+fn fields(way: &[&Model], reference: &[&Model], zones: &[Zone]) -> Vec<Told> {
+    let counts = |run: usize, at: &[f64]| reference[run].zone.is_none_or(|z| zones[z].holds(at));
+    let [way, plies] =
         [way, reference].map(|all| all.iter().map(|m| &m.plies[..]).collect::<Vec<_>>());
-    let Some(errors) = FieldErrors::of(&way, &reference) else {
+    let Some(errors) = FieldErrors::of(&way, &plies, counts) else {
         return Vec::new();
     };
     let mut told = vec![("position_error", errors.position, "m")];
@@ -195,18 +195,19 @@ fn fields(way: &[&Model], reference: &[&Model]) -> Vec<Told> {
     told
 }
 
-/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need. `within`: the zones, when what lies outside
-/// of them does not count: a local run is measured in its own, any other one in all.
+/// The defects of all plies of some models, by ply, also the smaller ones that a pair may need: of a local run those in its zone, and without
+/// a reference those of any other run in all zones.
 fn defects_of(
     models: &[&Model],
-    within: Option<&[Zone]>,
+    zones: &[Zone],
+    yardstick: Yardstick,
     settings: &Settings,
 ) -> Vec<(String, Vec<Defect>)> {
-    let counts = |m: &Model, at: &Vec3| match (within, m.zone) {
-        (None, _) => true,
+    let counts = |m: &Model, at: &Vec3| match (yardstick, m.zone) {
         // The mesh of a zone reaches past it, to the nearest lines of the whole's.
-        (Some(zones), Some(own)) => zones[own].holds(at),
-        (Some(zones), None) => zones.iter().any(|z| z.holds(at)),
+        (_, Some(own)) => zones[own].holds(at),
+        (Yardstick::Reference, None) => true,
+        (Yardstick::Zones, None) => zones.iter().any(|z| z.holds(at)),
     };
     let mut found = Vec::new();
     for m in models {

@@ -232,9 +232,9 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &PassedOver) -> Resul
         [wall, sum(of, |i| i.cost.cpu_seconds)]
     };
     let (before, redrawn) = (costs(&passed_over.earlier), costs(&passed_over.superseded));
+    let largest = |of: &[Input]| of.iter().map(|i| i.cost.peak_memory).fold(0.0, f64::max);
     let [mut wall, mut cpu] = [0, 1].map(|k| before[k] + redrawn[k]);
-    let memories = passed_over.all().map(|i| i.cost.peak_memory);
-    let mut memory = memories.fold(0.0, f64::max);
+    let mut memory = largest(&passed_over.earlier).max(largest(&passed_over.superseded));
     if passed_over.all().next().is_some() {
         host.measured("cost.superseded.wall_seconds", wall, "s")?;
         host.measured("cost.superseded.cpu_seconds", cpu, "s")?;
@@ -244,14 +244,15 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &PassedOver) -> Resul
     }
     for m in models {
         let c = &m.input.cost;
-        let on_the_way = match m.role {
-            Role::Global => before,
-            _ => [0.0; 2],
+        let (on_the_way, memory_before) = match m.role {
+            Role::Global => (before, largest(&passed_over.earlier)),
+            _ => ([0.0; 2], 0.0),
         };
         let of = |what: &str| format!("cost.{}.{what}_seconds", m.name);
         host.measured(&of("wall"), c.wall_seconds + on_the_way[0], "s")?;
         host.measured(&of("cpu"), c.cpu_seconds + on_the_way[1], "s")?;
-        host.measured(&format!("peak_memory.{}", m.name), c.peak_memory, "1")?;
+        let peak = c.peak_memory.max(memory_before);
+        host.measured(&format!("peak_memory.{}", m.name), peak, "1")?;
         if matches!(m.role, Role::Global | Role::Local) {
             wall += c.wall_seconds;
             cpu += c.cpu_seconds;

@@ -34,13 +34,15 @@ impl Zone {
         (0..2).all(|d| at[d] > low[d] - ROUNDING && at[d] < high[d] + ROUNDING)
     }
 
-    /// Left, right, bottom, top: whether a ply that fills `around` (`[x0, y0, x1, y1]`, m) in the whole is cut there. Not so at a free side, nor where
-    /// the ply ends at the side or inside of it: that is its own edge.
-    pub fn cuts(&self, around: [f64; 4]) -> [bool; 4] {
+    /// Left, right, bottom, top: whether a ply that fills `whole` (`[x0, y0, x1, y1]`, m) in the whole and `own` in the zone's run is cut there. Not so
+    /// at a free side, nor where the ply ends at the side or inside of it, nor where the zone's mesh, which goes on to the next line, has come to the ply's end:
+    /// that is its own edge.
+    pub fn cuts(&self, whole: [f64; 4], own: [f64; 4]) -> [bool; 4] {
         [0, 1, 2, 3].map(|side| {
             let k = side / 2 + 2 * (side % 2);
             let outward = if side % 2 == 0 { -1.0 } else { 1.0 };
-            !self.free_sides[side] && outward * (around[k] - self.bounds[k]) > ROUNDING
+            let goes_on = |from: f64| outward * (whole[k] - from) > ROUNDING;
+            !self.free_sides[side] && goes_on(self.bounds[k]) && goes_on(own[k])
         })
     }
 
@@ -132,8 +134,13 @@ pub fn bounds_in_whole(models: &[Model], ply: &str) -> [f64; 4] {
     let found = global.and_then(|m| m.plies.iter().find(|p| p.name == ply));
     found.map_or(
         [-f64::INFINITY, -f64::INFINITY, f64::INFINITY, f64::INFINITY],
-        |p| flat_bounds(p.undeformed.iter().map(|p| [p[0], p[1]])),
+        bounds_of,
     )
+}
+
+/// The box around a ply in its flat mesh (`[x0, y0, x1, y1]`, m).
+pub fn bounds_of(ply: &Ply) -> [f64; 4] {
+    flat_bounds(ply.undeformed.iter().map(|p| [p[0], p[1]]))
 }
 
 #[derive(Deserialize)]

@@ -1,6 +1,6 @@
 //! The table of defects: numbering, and which defect of one model is which of another.
 
-use crate::models::{Model, Role, Zone, bounds_in_whole};
+use crate::models::{Model, Role, Zone, bounds_in_whole, bounds_of};
 use plyflow_defects::of_run::neighbours;
 use plyflow_defects::pairs::{apart, same_within, unlike};
 use plyflow_defects::{Defect, Kind, Limits, Settings, find_causes, measure};
@@ -114,7 +114,7 @@ fn entries_of(
             neighbours(&model.sheets, &model.plies, k),
         );
         find_causes(ply, &mut measured, fibres, &others, limits);
-        let cuts = z.cuts(bounds_in_whole(models, &ply.name));
+        let cuts = z.cuts(bounds_in_whole(models, &ply.name), bounds_of(ply));
         for defect in measured {
             let near = |side: usize| {
                 let (d, level) = (side / 2, z.bounds[side / 2 + 2 * (side % 2)]);

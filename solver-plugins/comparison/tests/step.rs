@@ -340,7 +340,7 @@ fn a_defect_that_reaches_the_cut_is_marked_and_one_at_a_free_side_is_not() {
     assert!(!marked(true));
 }
 
-/// A ridge along x over all of a ply that ends one element inside of the zone's right side.
+/// A ridge along x over all of a ply that ends one element inside of the zone's right side, at it, or before the next line past it.
 #[test]
 fn the_edge_of_a_ply_that_ends_inside_of_its_zone_is_no_cut() {
     let ridge = |_: f64, y: f64| 0.0015 * (1.0 + (PI * (y / 0.007).clamp(-1.0, 1.0)).cos());
@@ -356,7 +356,13 @@ fn the_edge_of_a_ply_that_ends_inside_of_its_zone_is_no_cut() {
     let sides = |right: f64| {
         let (global, local) = (
             run_off(BLANK, right, 0.002, Value::Null),
-            run_off(ZONE, right.min(0.080), 0.002, zone_a()),
+            run_off(
+                ZONE,
+                // The zone's mesh goes on to the next line.
+                if right < 0.082 { right } else { 0.080 },
+                0.002,
+                zone_a(),
+            ),
         );
         let inputs = [
             MemoryInput::new("global", &global),
@@ -368,7 +374,7 @@ fn the_edge_of_a_ply_that_ends_inside_of_its_zone_is_no_cut() {
         out.attributes["defects"][0]["cut_sides"].clone()
     };
     assert_eq!(sides(0.240), json!([true, true, false, false]));
-    for end in [0.080, 0.078] {
+    for end in [0.080, 0.078, 0.081] {
         assert_eq!(sides(end), json!([true, false, false, false]), "{end}");
     }
 }
@@ -401,8 +407,9 @@ fn of_several_passes_the_last_is_measured_and_all_cost() {
     };
     let (first, second) = (with(30.0, local(1.0)), with(50.0, local(0.5)));
     let (global, zones) = (with(7.0, global()), zones(json!([zone_a()])));
+    // Memory here the larger, the earlier: 1 / CPU time.
     let costing = |cpu: f64, input| MemoryInput {
-        cost: [cpu, cpu, 0.0],
+        cost: [cpu, cpu, 1.0 / cpu],
         ..input
     };
     let inputs = [
@@ -423,6 +430,9 @@ fn of_several_passes_the_last_is_measured_and_all_cost() {
     assert_eq!(out.attributes["defects"], alone.attributes["defects"]);
     // The second coarse run stands on the first and on its fine run.
     assert_eq!(out.measured["cost.global.cpu_seconds"].0, 7.0);
+    assert_eq!(out.measured["peak_memory.global"].0, 1.0);
+    assert_eq!(out.measured["peak_memory.local.A"].0, 0.125);
+    assert_eq!(alone.measured["peak_memory.global"].0, 0.5);
     assert_eq!(out.result("passes"), 2.0);
     assert!(!alone.results.contains_key("passes"));
     assert_eq!(out.measured["cost.local.A.cpu_seconds"].0, 8.0);
@@ -645,6 +655,60 @@ fn a_ridge_too_short_for_a_wrinkle_is_bridging_beside_a_reference_too() {
     }
     assert!(out.result("bridging_area_error") < 0.1);
     assert_eq!(out.result("missed_bridging.global"), 1.0);
+}
+
+/// Of one ridge in two runs, one is just long enough for a wrinkle and one is not: they are a pair, and the bridging that the short one is
+/// part of is neither false nor missed.
+#[test]
+fn a_ridge_about_as_long_as_a_wrinkle_has_to_be_is_one_defect_in_both() {
+    let bump = |long: f64| {
+        move |x: f64, y: f64| {
+            let (along, across) = (x / long, y / 0.012);
+            if along.abs() < 0.5 && across.abs() < 0.5 {
+                0.0025 * (PI * along).cos() * 0.5 * (1.0 + (2.0 * PI * across).cos())
+            } else {
+                0.0
+            }
+        }
+    };
+    let zones = zones(json!([zone_a()]));
+    let global = global();
+    let of = |ours: f64, theirs: f64, least: f64| {
+        let run_of = |long, b, zone| {
+            let plies = vec![ply("ply_1", b, 0.00125, OFFSET, bump(long))];
+            formed(plies, 0.00125, zone)
+        };
+        let local = run_of(ours, ZONE, zone_a());
+        let reference = run_of(theirs, [-0.12, -0.08, 0.12, 0.08], Value::Null);
+        let inputs = [
+            MemoryInput::new("global", &global),
+            MemoryInput::new("zones", &zones),
+            MemoryInput::new("local", &local),
+            MemoryInput::new("reference", &reference),
+        ];
+        let sizes = json!({"minimum_bridging_area": 20e-6, "minimum_wrinkle_length": least});
+        run::<Comparison>(sizes, &inputs, &[]).unwrap()
+    };
+    // Without a least length: how long the two are.
+    let both = of(0.010, 0.012, 0.002);
+    let [short, long] =
+        ["wrinkle_length.AW1", "reference_wrinkle_length.AW1"].map(|name| both.result(name));
+    assert!(short < long, "{short} {long}");
+    let least = 0.5 * (short + long);
+    for [ours, theirs] in [[0.010, 0.012], [0.012, 0.010]] {
+        let out = of(ours, theirs, least);
+        let error = (short - long).abs() / if ours < theirs { long } else { short };
+        assert!((out.result("wrinkle_length_error") - error).abs() < 1e-6);
+        assert!((out.result("defect_error") - error).abs() < 1e-6);
+        for name in [
+            "missed_wrinkles",
+            "false_wrinkles",
+            "missed_bridging",
+            "false_bridging",
+        ] {
+            assert_eq!(out.result(name), 0.0, "{ours} {theirs}: {name}");
+        }
+    }
 }
 
 #[test]

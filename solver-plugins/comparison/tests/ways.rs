@@ -175,6 +175,35 @@ fn without_a_reference_what_lies_outside_of_the_zones_counts_for_nobody() {
     }
 }
 
+/// What a zone's mesh has beyond the zone is the surroundings' business, beside a reference too.
+#[test]
+fn a_wrinkle_in_the_strip_past_a_zone_is_nobodys() {
+    let ridge = |middle: f64| {
+        move |_: f64, y: f64| 0.0015 * (1.0 + (PI * ((y - middle) / 0.007).clamp(-1.0, 1.0)).cos())
+    };
+    let [x0, y0, x1, y1] = ZONE;
+    let mesh = [x0, y0, x1, y1 + 0.016];
+    let beyond = vec![ply("ply_1", mesh, 0.002, OFFSET, ridge(y1 + 0.008))];
+    let local = formed(beyond, 0.002, zone_a());
+    let (global, zones) = (global(), zones(json!([zone_a()])));
+    let flat = whole(0.002, |_, _| 0.0);
+    let out = compare(&[
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        MemoryInput::new("reference", &flat),
+    ]);
+    assert_eq!(out.result("false_wrinkles"), 0.0);
+    // Nor is it an error of the coarse run where the fine runs are the measure.
+    let out = compare(&[
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+    ]);
+    assert_eq!(out.result("missed_wrinkles.global"), 0.0);
+    assert!(out.result("position_error.global") < 1e-9);
+}
+
 /// A whole that begins late is the run of a zone over all of the blank: a measure like another, but no measure of what is saved.
 #[test]
 fn the_run_of_a_zone_over_the_blank_is_a_reference_and_nothing_is_saved_against_half_a_process() {

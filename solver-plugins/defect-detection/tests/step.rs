@@ -278,4 +278,11 @@ fn a_ply_that_lies_beside_the_one_below_it_conforms_where_it_lies_on_the_film() 
     let mut whole = steps(BELOW);
     whole.attributes["contact_by_place"] = json!(false);
     assert!(detect(&whole).result("distance_max").abs() < 1e-9);
+    // So is one of a zone in which the mesh of the ply below ends where that ply does not; with a hole there it ends.
+    let mut zone = steps(BELOW);
+    let square = |half: f64| json!([[-half, -half], [half, -half], [half, half], [-half, half]]);
+    zone.attributes["sheets"][1]["outline"] = square(0.5);
+    assert!(detect(&zone).result("distance_max").abs() < 1e-9);
+    zone.attributes["sheets"][1]["holes"] = json!([square(0.4)]);
+    assert!((detect(&zone).result("distance_max") - BELOW).abs() < 1e-9);
 }

@@ -1,8 +1,8 @@
 //! How far the positions, the distances from the tool and the shear angles of one way to the answer are from those of another.
 
-use crate::measure::{Ply, quantiles};
+use crate::measure::Ply;
 use plyflow_surface::vector::distance;
-use plyflow_surface::{Location, QuadLocator};
+use plyflow_surface::{Location, QuadLocator, weighted_quantiles};
 
 /// Shear angles are told at these quantiles.
 pub const QUANTILES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];
@@ -10,7 +10,7 @@ pub const QUANTILES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];
 /// Places on the side of a mesh lie in it, however they were rounded (m).
 const ROUNDING: f64 = 1e-6;
 
-/// Errors of fields against those of a reference, at the reference's nodes and at the centres of its cells, as far as both have them. Nodes count by
+/// Errors of fields against those of a reference, at the reference's nodes and at the centres of its cells, as far as both have them. Nodes and cells count by
 /// their area in the flat ply, so that a finely meshed part of the reference counts no more than another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldErrors {
@@ -65,6 +65,18 @@ fn centre(ply: &Ply, cell: usize) -> [f64; 2] {
     })
 }
 
+/// Area of a cell in the flat ply (m2): half of the cross product of the diagonals of a quad, of two sides of a triangle.
+fn area(ply: &Ply, cell: usize) -> f64 {
+    let corners = ply.topology.cell(cell);
+    let at = |k: usize| ply.undeformed[corners[k] as usize];
+    let way = |a: usize, b: usize| [0, 1].map(|d| at(b)[d] - at(a)[d]);
+    let ([ax, ay], [bx, by]) = match corners.len() {
+        3 => (way(0, 1), way(0, 2)),
+        _ => (way(0, 2), way(1, 3)),
+    };
+    0.5 * (ax * by - ay * bx).abs()
+}
+
 /// Root mean square of what was added, by weight.
 #[derive(Default)]
 struct Squares {
@@ -85,8 +97,12 @@ impl Squares {
 
 impl FieldErrors {
     /// Of the plies of a way's runs (the first run that has a place counts there) against those of a reference's; plies of one name are
-    /// the same. `None` when they share no place.
-    pub fn of(way: &[&[Ply]], reference: &[&[Ply]]) -> Option<Self> {
+    /// the same. `counts`: whether a place in the flat ply (m) of a run of the reference, by its index, is asked. `None` when they share no such place.
+    pub fn of(
+        way: &[&[Ply]],
+        reference: &[&[Ply]],
+        counts: impl Fn(usize, &[f64]) -> bool,
+    ) -> Option<Self> {
         let mut position = Squares::default();
         let (mut apart, mut standing_off) = (Squares::default(), Squares::default());
         let mut names: Vec<&str> = Vec::new();
@@ -98,13 +114,14 @@ impl FieldErrors {
         let mut shear: Option<f64> = None;
         for name in names {
             let ours = Layered::new(way, name);
-            let theirs = (reference.iter()).flat_map(|m| m.iter().filter(|p| p.name == name));
-            // Shear angles of both at the same places.
-            let mut angles = [Vec::new(), Vec::new()];
-            for ply in theirs {
+            let theirs = (reference.iter().enumerate())
+                .flat_map(|(run, m)| m.iter().filter(|p| p.name == name).map(move |p| (run, p)));
+            // Shear angles of both at the same places, and the areas that these stand for.
+            let (mut angles, mut cells) = ([Vec::new(), Vec::new()], Vec::new());
+            for (run, ply) in theirs {
                 let areas = ply.topology.node_areas(&ply.undeformed);
                 for (i, at) in ply.undeformed.iter().enumerate() {
-                    let Some((p, place)) = ours.at(at[0], at[1]) else {
+                    let Some((p, place)) = ours.at(at[0], at[1]).filter(|_| counts(run, at)) else {
                         continue;
                     };
                     let off = distance(place.interpolate(&p.formed), ply.formed[i]);
@@ -117,15 +134,16 @@ impl FieldErrors {
                 }
                 for (c, &theirs) in ply.shear_angle.iter().enumerate() {
                     let [x, y] = centre(ply, c);
-                    let found = ours.at(x, y);
+                    let found = ours.at(x, y).filter(|_| counts(run, &[x, y]));
                     if let Some(&value) = found.and_then(|(p, l)| p.shear_angle.get(l.cell)) {
                         angles[0].push(value);
                         angles[1].push(theirs);
+                        cells.push(area(ply, c));
                     }
                 }
             }
             if !angles[0].is_empty() {
-                let [a, b] = angles.map(|a| quantiles(&a, &QUANTILES));
+                let [a, b] = angles.map(|a| weighted_quantiles(&a, &cells, &QUANTILES));
                 let worst = (a.iter().zip(&b)).map(|(a, b)| (a - b).abs());
                 shear = worst.chain(shear).reduce(f64::max);
             }

@@ -136,6 +136,20 @@ fn turn_over(seen: &mut Curvature) {
     seen.normal = scale(seen.normal, -1.0);
 }
 
+/// The curvature with the more negative of the two principal ones first, where one is that of a crest.
+fn as_crest(seen: &Curvature) -> Curvature {
+    if seen.min >= seen.max.min(0.0) {
+        return *seen;
+    }
+    Curvature {
+        max: seen.min,
+        min: seen.max,
+        max_direction: seen.min_direction,
+        min_direction: seen.max_direction,
+        ..*seen
+    }
+}
+
 /// Kinds of defect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
@@ -213,10 +227,10 @@ impl Defect {
 
 /// Wrinkles (longest first), then bridging (largest first), among the nodes `inside` (`[nodes]`).
 ///
-/// A wrinkle is a connected set of nodes that stand off the tool by more than the distance threshold and whose
-/// principal curvature of largest magnitude is that of a crest, beyond the tool's own there by more than
-/// `crest_hold` of the curvature threshold, at one of them at least by more than all of it (thresholds with hysteresis,
-/// Canny 1986: a crest whose curvature wavers about one threshold would fall to pieces), with single nodes between
+/// A wrinkle is a connected set of nodes that stand off the tool by more than the distance threshold and where the ply is curved
+/// as a crest is (its most negative principal curvature: in a bend of the tool that is hollow along the crest the other one may be the larger),
+/// beyond the tool's own there by more than `crest_hold` of the curvature threshold, at one of them at least by more than all of it (thresholds with
+/// hysteresis, Canny 1986: a crest whose curvature wavers about one threshold would fall to pieces), with single nodes between
 /// two such pieces where the ply is convex as well; its length is that of its ridge. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
 /// curvature reaches: pi sqrt(amplitude / (2 curvature)) along the surface. What else stands off the tool
 /// is bridging.
@@ -230,8 +244,9 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
         .collect();
     let limit = |i: usize, share: f64| ply.tool_crest[i] - share * settings.curvature_threshold;
     let hold = settings.crest_hold;
+    let crested: Vec<Curvature> = ply.curvature.iter().map(as_crest).collect();
     let curved: Vec<bool> = (0..n)
-        .map(|i| off[i] && ply.curvature[i].max < limit(i, hold))
+        .map(|i| off[i] && crested[i].max < limit(i, hold))
         .collect();
     let crest = without_gaps(ply, &off, curved);
     let margin: Vec<f64> = (ply.distance.iter())
@@ -239,7 +254,7 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
         .collect();
     let mut wrinkles = Vec::new();
     for nodes in ply.topology.node_components(&crest) {
-        let beyond = |&i: &u32| ply.curvature[i as usize].max < limit(i as usize, 1.0);
+        let beyond = |&i: &u32| crested[i as usize].max < limit(i as usize, 1.0);
         if !nodes.iter().any(beyond) {
             continue;
         }
@@ -248,7 +263,7 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
             .map(|&i| -limit(i as usize, hold))
             .fold(f64::INFINITY, f64::min);
         let (topology, formed) = (&ply.topology, &ply.formed);
-        let ridge = ridge_line(topology, formed, &ply.curvature, &nodes, bound, &margin);
+        let ridge = ridge_line(topology, formed, &crested, &nodes, bound, &margin);
         if let Some(ridge) = ridge.filter(|r| r.length >= settings.minimum_wrinkle_length) {
             wrinkles.push((nodes, ridge));
         }
@@ -256,7 +271,7 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     let mut set = vec![NONE; n];
     let mut nearest = vec![f64::INFINITY; n];
     for (w, (nodes, _)) in wrinkles.iter().enumerate() {
-        let reach = PI * (amplitude(ply, nodes) / (2.0 * curvature(ply, nodes))).sqrt();
+        let reach = PI * (amplitude(ply, nodes) / (2.0 * curvature(&crested, nodes))).sqrt();
         let lengths = ply.topology.path_lengths(&ply.formed, nodes, &off, reach);
         for i in 0..n {
             if lengths[i] < nearest[i] {
@@ -353,10 +368,10 @@ fn amplitude(ply: &Ply, nodes: &[u32]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn curvature(ply: &Ply, nodes: &[u32]) -> f64 {
+fn curvature(of: &[Curvature], nodes: &[u32]) -> f64 {
     nodes
         .iter()
-        .map(|&i| ply.curvature[i as usize].max.abs())
+        .map(|&i| of[i as usize].max.abs())
         .fold(0.0, f64::max)
 }
 
@@ -386,7 +401,7 @@ fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, extent: &Extent) -> Defect {
         amplitude: amplitude(ply, &nodes),
         area: extent.area,
         centre: extent.centre(),
-        curvature_max: curvature(ply, &nodes),
+        curvature_max: curvature(&ply.curvature, &nodes),
         direction: 0.0,
         shear,
         nodes,

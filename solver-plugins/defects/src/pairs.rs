@@ -44,6 +44,17 @@ pub fn measure_for_pairs(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec
     found
 }
 
+/// Whether a place of bridging is around the ridge of a wrinkle of the same ply. (Meshes of several zones count their nodes anew: so the two must be near
+/// each other too.)
+fn has_ridge(bridging: &Defect, wrinkle: &Defect) -> bool {
+    let near = apart(bridging, wrinkle) <= SAME_DEFECT.max(bridging.area.sqrt());
+    let holds = |node: &u32| bridging.nodes.binary_search(node).is_ok();
+    bridging.kind == Kind::Bridging
+        && wrinkle.kind == Kind::Wrinkle
+        && near
+        && wrinkle.ridge_nodes.iter().all(holds)
+}
+
 /// Defects that two models share, and those that one has alone.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Pairs {
@@ -89,18 +100,30 @@ impl Pairs {
                 (pair[i], taken[j]) = (Some(j), true);
             }
         }
-        let both = pair
+        let both: Vec<(usize, usize)> = pair
             .iter()
             .enumerate()
-            .filter_map(|(i, j)| Some((i, (*j)?)));
-        let alone = |all: &[&Defect], free: &dyn Fn(usize) -> bool| {
+            .filter_map(|(i, j)| Some((i, (*j)?)))
+            .collect();
+        let alone = |all: &[&Defect], free: &dyn Fn(usize) -> bool| -> Vec<usize> {
             let places = 0..all.len();
             places.filter(|&i| free(i) && counts(all[i])).collect()
         };
+        let mut missed = alone(theirs, &|j| !taken[j]);
+        let mut wrong = alone(ours, &|i| pair[i].is_none());
+        // The bridging that a ridge too short for a wrinkle is part of is one place with it.
+        for &(i, j) in &both {
+            if !counts(ours[i]) {
+                wrong.retain(|&k| !(has_ridge(ours[k], ours[i]) && apart(k, j).is_some()));
+            }
+            if !counts(theirs[j]) {
+                missed.retain(|&k| !(has_ridge(theirs[k], theirs[j]) && apart(i, k).is_some()));
+            }
+        }
         Self {
-            both: both.collect(),
-            missed: alone(theirs, &|j| !taken[j]),
-            wrong: alone(ours, &|i| pair[i].is_none()),
+            both,
+            missed,
+            wrong,
         }
     }
 }

@@ -244,6 +244,83 @@ fn a_fold_that_widens_to_two_crests_is_one_wrinkle_from_end_to_end() {
     }
 }
 
+/// A tool along x that goes up by 30 deg to both sides of a hollow bend of this radius (m) at x = 0.
+const HOLLOW: f64 = 0.008;
+
+/// Its place and normal at `s` along it, from the middle of the bend.
+fn hollow(s: f64) -> [Vec3; 2] {
+    let angle = (s / HOLLOW).clamp(-PI / 6.0, PI / 6.0);
+    let (sin, cos) = angle.sin_cos();
+    let straight = s - angle * HOLLOW;
+    let x = HOLLOW * sin + straight * cos;
+    let z = TOP + HOLLOW * (1.0 - cos) + straight * sin;
+    [[x, 0.0, z], [-sin, 0.0, cos]]
+}
+
+/// In the bend the crest line of a wrinkle 2 mm high and 16 mm wide is curved more, and to the other side, than the crest across it: by 175 and by 154 1/m.
+#[test]
+fn a_crest_goes_on_through_a_hollow_bend_of_the_tool() {
+    let above = |s: f64, y: f64, height: f64| {
+        let [p, n] = hollow(s);
+        [p[0] + height * n[0], y, p[2] + height * n[2]]
+    };
+    let stations: Vec<f64> = (0..=600).map(|i| -0.15 + 0.0005 * f64::from(i)).collect();
+    let points: Vec<Vec3> = [-0.3, 0.3]
+        .iter()
+        .flat_map(|&y| stations.iter().map(move |&s| above(s, y, 0.0)))
+        .collect();
+    let n = stations.len() as u32;
+    let facets: Vec<[u32; 3]> = (0..n - 1)
+        .flat_map(|i| [[i, i + 1, n + i + 1], [i, n + i + 1, n + i]])
+        .collect();
+    let tool = Tool::new(Surface::new(&points, &facets).unwrap());
+    let height = |s: f64, y: f64| {
+        let fade = if s.abs() < 0.030 {
+            (0.5 * PI * s / 0.030).cos()
+        } else {
+            0.0
+        };
+        let bump = if y.abs() < 0.008 {
+            0.5 * (1.0 + (PI * y / 0.008).cos())
+        } else {
+            0.0
+        };
+        0.002 * bump * fade
+    };
+    // To where it is as high as it has to be.
+    let end = 0.060 / PI * 0.5f64.acos();
+    let place = |i: i32| {
+        let s = end * f64::from(i) / 1000.0;
+        above(s, 0.0, OFFSET + height(s, 0.0))
+    };
+    let known: f64 = (-1000..1000)
+        .map(|i| distance(place(i), place(i + 1)))
+        .sum();
+    for (h, jitter) in [(0.00125, 0.0), (0.00125, 0.2), (0.002, 0.0)] {
+        let (points, cells) = flat(h, jitter);
+        let formed: Vec<Vec3> = points
+            .iter()
+            .map(|&[s, y]| above(s, y, OFFSET + height(s, y)))
+            .collect();
+        let undeformed = points.iter().map(|&[s, y]| [s, y, 0.0]).collect();
+        let ply = Ply::new(
+            "ply".into(),
+            Topology::new(points.len(), 4, &cells),
+            undeformed,
+            formed,
+            &tool,
+            OFFSET,
+            // The bend is the lowest of this tool.
+            0.0,
+        );
+        let found = all(&ply);
+        assert_eq!(found.len(), 1, "{h}, jitter {jitter}: {found:?}");
+        let errors = [found[0].length / known, found[0].amplitude / 0.002].map(|r| r - 1.0);
+        println!("{h}, jitter {jitter}: {errors:.3?}");
+        assert!(errors.iter().all(|e| e.abs() < 0.03), "{errors:?}");
+    }
+}
+
 #[test]
 fn a_cloud_of_points_is_joined_to_the_whole_surface_and_measured_as_a_mesh_is() {
     for jitter in [0.0, 0.3] {
@@ -322,12 +399,26 @@ fn errors_of_fields_count_by_area() {
     let ours = [strip(&[-0.1, -1e-9, 0.0, 0.1], &|x| {
         if x < -5e-10 { 0.002 } else { 0.0 }
     })];
-    let found = FieldErrors::of(&[&ours], &[&reference]).unwrap();
+    let found = FieldErrors::of(&[&ours], &[&reference], |_, _| true).unwrap();
+    assert_eq!(found.shear, None);
     // The node in the middle has 0.5 + 10 mm of the 200 and is not off; the last one on the left has all of its millimetre.
     let expected = 0.002 * ((0.1 - 0.0005) / 0.2f64).sqrt();
     for error in [found.position, found.distance.unwrap()] {
         assert!((error / expected - 1.0).abs() < 1e-6, "{error} {expected}");
     }
+    // Sheared from x on: by area half of the reference and a fifth of ours, so that the 75 % quantiles are apart; by number 5 and 2 of 105 cells.
+    let sheared = |from: f64| {
+        let mut ply = strip(&uneven, &|_| 0.0);
+        let of = |c: usize| ply.undeformed[ply.topology.cell(c)[0] as usize][0] > from - 1e-9;
+        let cells = 0..ply.topology.cells();
+        ply.shear_angle = cells.map(|c| if of(c) { 0.1 } else { 0.0 }).collect();
+        [ply]
+    };
+    let (reference, ours) = (sheared(0.0), sheared(0.06));
+    let found = FieldErrors::of(&[&ours], &[&reference], |_, _| true).unwrap();
+    assert_eq!(found.shear, Some(0.1));
+    // Where nothing counts there is no error.
+    assert_eq!(FieldErrors::of(&[&ours], &[&reference], |_, _| false), None);
 }
 
 /// Shear 10 degrees along the wrinkle: over-shear. Less: the blister is near, or it is not. Far from it, under a ply turned by 45

@@ -82,8 +82,7 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
             scene.process.word()
         ));
     }
-    let mut below = 0.0;
-    scene
+    let mut stack = scene
         .sheets
         .iter()
         .map(|sheet| {
@@ -94,17 +93,25 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
                     sheet.name
                 ));
             };
-            let thickness = material.thickness.si();
-            let offset = below + 0.5 * thickness;
-            below += thickness;
             Ok(StackSheet {
                 scene: sheet.clone(),
                 material: (**material).clone(),
-                thickness,
-                offset,
+                thickness: material.thickness.si(),
+                offset: 0.0,
             })
         })
-        .collect()
+        .collect::<Result<Vec<_>, String>>()?;
+    lay(&mut stack);
+    Ok(stack)
+}
+
+/// Lays sheets one on the other, from the tool upwards: their offsets.
+pub fn lay(stack: &mut [StackSheet]) {
+    let mut below = 0.0;
+    for sheet in stack {
+        sheet.offset = below + 0.5 * sheet.thickness;
+        below += sheet.thickness;
+    }
 }
 
 /// How far (rad) the angle between the fibre families may be from a right one: rounding of angles that are written in degrees.

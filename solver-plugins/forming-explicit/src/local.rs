@@ -216,11 +216,13 @@ pub fn build_local(
     })
 }
 
-/// Those sheets of the scene that the zone has, bottom to top.
+/// Those sheets of the scene that the zone has, bottom to top, one on the other.
 fn stack_of(scene: &Scene, input: &LocalInput) -> Result<Vec<StackSheet>, String> {
     let whole = assembly::stack(scene)?;
     let has = |name: &str| input.sheets.iter().any(|s| s.name == name);
-    let stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
+    let mut stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
+    // A ply that does not reach into the zone holds nothing off the tool there.
+    assembly::lay(&mut stack);
     if stack.len() < 3 {
         let names: Vec<&str> = input.sheets.iter().map(|s| s.name.as_str()).collect();
         return Err(format!(

@@ -269,7 +269,8 @@ fn membrane_apart(material: &MaterialInstance, families: Families) -> Result<f64
                 0.01 * share
             };
             let [f1, f2] = [0, 1].map(|r| 1.0 + strain * spread(k, r));
-            let shear = 0.6 * share * spread(k, 2);
+            // As far as plies are sheared: up to 80 deg.
+            let shear = 1.4 * share * spread(k, 2);
             [f1 * f1, f2 * f2, f1 * f2 * shear.sin()]
         });
         failed(material.reference().membrane(&mut MembraneBatch {

@@ -194,6 +194,21 @@ fn a_zone_has_the_weight_that_the_whole_has_then_however_late_it_begins() {
     }
 }
 
+#[test]
+fn a_ply_that_does_not_reach_into_a_zone_holds_nothing_off_the_tool_there() {
+    let mut p = parameters(&[], |_| {});
+    let mut under = p.scene.sheets[1].clone();
+    under.name = "under".into();
+    p.scene.sheets.insert(1, under);
+    let stack = zone(&p, 0.0).stack;
+    let offsets: Vec<f64> = stack.iter().map(|s| s.offset).collect();
+    let [film, ply] = [0, 1].map(|k| stack[k].thickness);
+    assert_eq!(
+        offsets,
+        [0.5 * film, film + 0.5 * ply, film + ply + 0.5 * film]
+    );
+}
+
 /// Penetrations of all pairs at every frame.
 #[derive(Default)]
 struct Deepest(Vec<(f64, Vec<Penetration>)>);

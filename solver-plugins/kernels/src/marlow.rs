@@ -24,8 +24,7 @@ const MAX_POINTS: usize = 32;
 #[serde(deny_unknown_fields)]
 struct Parameters {
     uniaxial: Uniaxial,
-    #[serde(default = "five")]
-    limit: f64,
+    limit: Option<f64>,
     thickness: f64,
     areal_mass: f64,
 }
@@ -40,9 +39,8 @@ struct Uniaxial {
     stresses: Option<Vec<f64>>,
 }
 
-fn five() -> f64 {
-    5.0
-}
+/// Where the exponential curve ends when nothing is said.
+const LIMIT: f64 = 5.0;
 
 /// T = amplitude (exp(growth e) - exp(-decay e)) up to the limit.
 #[derive(Clone, Copy, Debug)]
@@ -220,9 +218,16 @@ impl Material for Marlow {
         let u = p.uniaxial;
         let curve = match (u.amplitude, u.growth, u.decay, u.strains, u.stresses) {
             (Some(a), Some(g), Some(d), None, None) => {
-                Curve::Exponential(Exponential::new(a, g, d, p.limit)?)
+                Curve::Exponential(Exponential::new(a, g, d, p.limit.unwrap_or(LIMIT))?)
             }
-            (None, None, None, Some(e), Some(t)) => Curve::Table(Table::new(&e, &t)?),
+            (None, None, None, Some(e), Some(t)) => {
+                if let Some(limit) = p.limit {
+                    return Err(format!(
+                        "limit: given {limit} beside 'strains' and 'stresses'; expected none: a table ends at its last point"
+                    ));
+                }
+                Curve::Table(Table::new(&e, &t)?)
+            }
             _ => {
                 return Err(
                     "uniaxial: expected either 'amplitude', 'growth' and 'decay', or \

@@ -144,6 +144,27 @@ fn table_of_25_points_returns_voces_law_and_goes_on_straight_beyond_it() {
     }
 }
 
+/// The guide's own table, and others whose last interval is the longest: the parabola through the last three points has a third of the law's slope at the
+/// end or none, and a ply that goes on without any folds at a point.
+#[test]
+fn a_table_that_flattens_goes_on_with_the_slope_of_its_law() {
+    let (b, asymptote, k0) = (1.549e-5, 0.00757, 20.0);
+    for last in [[20.0, 50.0], [20.0, 60.0], [50.0, 100.0]] {
+        let k: Vec<f64> = [0.0, 2.0, 5.0, 10.0].into_iter().chain(last).collect();
+        let y: Vec<f64> = k.iter().map(|k| voce(*k, b, asymptote, k0)).collect();
+        let law = json!({"positive": {"table": {"curvatures": k, "moments": y}}});
+        let m = build(&with_bending(law));
+        let tangent = bend(&m, [1.0, 1.0, 0.0], [1.01 * last[1], 0.0, 0.0]).tangent[0];
+        let own = b + asymptote / k0 * (-last[1] / k0).exp();
+        println!("{last:?}: {:.3} of the law's slope", tangent / own);
+        // (In the last one the law has come near to its own straight line.)
+        assert!(
+            (0.6..1.1).contains(&(tangent / own)),
+            "{last:?}: {tangent}, law {own}"
+        );
+    }
+}
+
 #[test]
 fn each_family_follows_its_own_laws_by_face_and_order() {
     let laws = |face: &str, families: &str| {

@@ -181,6 +181,35 @@ fn hypoelastic_returns_to_rest_after_a_closed_path_within_a_thousandth() {
     );
 }
 
+/// A fibre that trembles about no strain, in unequal steps: what is stored is what its stretch says, however often it went through, and is never negative.
+#[test]
+fn fibres_softer_in_compression_make_no_energy_as_they_pass_no_strain() {
+    let json = woven("hypoelastic").replace(
+        "\"fibre_modulus\":3e9",
+        "\"fibre_modulus\":3e9,\"compression_factor\":0.1",
+    );
+    let m = fabric(&json).unwrap();
+    let mut p = Point::new(&m);
+    let k = 3e9 * 3e-4;
+    for i in 0..4000 {
+        let strain = 1e-4 * (0.7 * f64::from(i)).sin();
+        let out = p.at(&m, metric(1.0 + strain, 1.0, 0.0));
+        let stiffness = if strain < 0.0 { 0.1 * k } else { k };
+        let stress = stiffness * strain;
+        assert!(
+            (out.stress[0] - stress).abs() < 1e-3 * k * 1e-4,
+            "step {i}: {} N/m, expected {stress}",
+            out.stress[0]
+        );
+        let energy = 0.5 * stiffness * strain * strain;
+        assert!(
+            (out.energy - energy).abs() < 1e-3 * 0.5 * k * 1e-8,
+            "step {i}: {} J/m2, expected {energy}",
+            out.energy
+        );
+    }
+}
+
 #[test]
 fn stitch_unloads_along_the_secant_after_its_peak() {
     let m = fabric(&ncf("fibre-energy", "")).unwrap();
@@ -540,6 +569,10 @@ fn film_tables_that_cannot_be_are_refused_with_place_and_advice() {
         ))
     };
     assert!(make("[0,0.1,1]", "[0,4e6,9e6]").is_ok());
+    let table = r#"{"strains":[0,0.1,1],"stresses":[0,4e6,9e6]}"#;
+    let limited =
+        format!(r#"{{"uniaxial":{table},"limit":5.0,"thickness":8e-5,"areal_mass":0.08}}"#);
+    assert!(film(&limited).is_err_and(|t| t.contains("limit: given 5")));
     let long = format!("{:?}", (0..33).collect::<Vec<i32>>());
     for (e, t, words) in [
         ("[0,0.1]", "[0,4e6,9e6]", ["2 strains", "3 stresses"]),

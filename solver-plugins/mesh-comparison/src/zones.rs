@@ -63,7 +63,8 @@ pub fn compare(
         runs.sort_by(|a, b| a.element_size.total_cmp(&b.element_size));
         let advice = one(host, zone, runs, target, &mut rows)?;
         advised.push(
-            json!({"name": zone, "element_size": advice.size, "finest_error": advice.finest_error}),
+            json!({"name": zone, "box": runs[0].bounds, "element_size": advice.size,
+            "finest_error": advice.finest_error}),
         );
     }
     let head = [
@@ -121,7 +122,7 @@ fn one(
     }
     let mut measured = Vec::new();
     for run in runs {
-        let found = FieldErrors::of(&[&run.plies], &[&finest.plies]);
+        let found = FieldErrors::of(&[&run.plies], &[&finest.plies], |_, _| true);
         let told = found.and_then(|e| Some((e.position, e.distance? / e.standing_off?)));
         let Some((position, error)) = told.filter(|t| t.1.is_finite()) else {
             let step = &run.input.step;

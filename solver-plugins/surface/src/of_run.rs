@@ -1,6 +1,7 @@
 //! Surfaces of the bodies of a run.
 
 use crate::{QuadLocator, Surface, triangles};
+use plyflow_model::outline::{Point, Region};
 use plyflow_sdk::{Host, Input, StepError};
 use serde::Deserialize;
 
@@ -20,9 +21,14 @@ struct Sheet {
     kind: String,
     #[serde(default)]
     thickness: f64,
+    /// Of the whole ply, whatever part of it the run has (m); some runs do not tell it.
+    #[serde(default)]
+    outline: Vec<Point>,
+    #[serde(default)]
+    holes: Vec<Vec<Point>>,
 }
 
-/// Places on the edge of a mesh lie in it, however they were rounded (m).
+/// Places on the edge of a ply lie on it, however they were rounded (m).
 const ROUNDING: f64 = 1e-6;
 
 /// By node of a ply, how much (m) of what its offset in the stack counts does not lie under it: the plies below that end beside it, or
@@ -46,18 +52,23 @@ pub fn missing_below(
         if below.kind != "ply" {
             continue;
         }
-        let body = meshes.body(&below.name)?;
-        let (points, cells) = host.mesh(input, body)?;
-        // Plies of one outline have the same mesh, one above the other.
-        let same = |(a, b): (&[f64; 3], &[f64; 3])| a[..2] == b[..2];
-        if points.len() == nodes.len() && points.iter().zip(&nodes).all(same) {
-            continue;
-        }
-        let Some(locator) = QuadLocator::new(&points, &cells) else {
-            continue;
-        };
+        // By the whole ply's outline: in a run of a zone its mesh may end before the upper one's, where the ply itself goes on.
+        let under: Box<dyn Fn(Point) -> bool> =
+            match Region::new(below.outline.clone(), below.holes.clone()) {
+                Ok(region) => Box::new(move |at| {
+                    region.contains(at) || region.distance_to_edge(at) <= ROUNDING
+                }),
+                Err(_) => {
+                    let body = meshes.body(&below.name)?;
+                    let (points, cells) = host.mesh(input, body)?;
+                    let Some(locator) = QuadLocator::new(&points, &cells) else {
+                        continue;
+                    };
+                    Box::new(move |[x, y]| locator.locate(x, y, ROUNDING).is_some())
+                }
+            };
         for (missing, at) in missing.iter_mut().zip(&nodes) {
-            if locator.locate(at[0], at[1], ROUNDING).is_none() {
+            if !under([at[0], at[1]]) {
                 *missing += below.thickness;
             }
         }

@@ -4,7 +4,9 @@
 //! Slopes at the points are those of the parabola through a point and its neighbours (three-point
 //! formula at the ends), limited to `0 .. 3 min(chords)` (Fritsch and Carlson 1980, the square of
 //! de Boor and Swartz 1977), and 0 where the table turns: between two points the curve is monotone
-//! if the points are.
+//! if the points are. The last slope of a curve that flattens goes on as the chords do, by a constant
+//! factor over a length: the curve goes on along it, and the parabola's falls to 0 before the last
+//! point where the last interval is the longer one (points closer together where the curve bends).
 
 use crate::{Lanes, WIDTH};
 
@@ -65,7 +67,13 @@ fn slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
     if chord[0] > 0.0 {
         m[0] = m[0].max(LEAST_START * chord[0]);
     }
-    m[n - 1] = end(h[n - 2], h[n - 3], chord[n - 2], chord[n - 3]);
+    let (d0, d1) = (chord[n - 2], chord[n - 3]);
+    m[n - 1] = if d0 * d1 > 0.0 && d0.abs() < d1.abs() {
+        // From the middle of the last interval to its end, of the way between the middles of the last two.
+        d0 * (d0 / d1).powf(h[n - 2] / (h[n - 2] + h[n - 3]))
+    } else {
+        end(h[n - 2], h[n - 3], d0, d1)
+    };
     for i in 1..n - 1 {
         let (a, b) = (chord[i - 1], chord[i]);
         if a * b > 0.0 {

@@ -63,6 +63,28 @@ fn membrane_of<V: Lanes, L: Law>(
     let (half, one, two) = (V::splat(0.5), V::splat(1.0), V::splat(2.0));
     let (least, end) = (V::splat(LEAST), V::splat(SINE_LIMIT));
     let sine = |c12: V, r: V| (c12 * r).max(-end).min(end);
+    let (tension, compression) = (V::splat(f.tension), V::splat(f.compression));
+    let uneven = f.tension != f.compression;
+    // A fibre's stress after a step from the stretch `o` to `l` with the strain increment `e`, and what it does meanwhile (J/m2). A step that
+    // passes l = 1 has each modulus for its own part: with one of them for all of it fibres that tremble about no strain would make energy.
+    let fibre = |n: V, l: V, o: V, e: V| {
+        let k = V::select(l.lt(one), compression, tension);
+        let (m, work) = (n + k * e, half * (n + (n + k * e)) * e);
+        if !uneven {
+            return (m, work);
+        }
+        let from_rest = |l: V| two * (l - one) / (l + one);
+        let before = V::select(o.lt(one), compression, tension);
+        let (a, b) = (from_rest(l), from_rest(o));
+        let passed = n + (k * a - before * b);
+        let through = half * (passed * a - n * b);
+        let passes = |yes: V, no: V| {
+            let (from_below, from_above) =
+                (V::select(o.lt(one), no, yes), V::select(o.lt(one), yes, no));
+            V::select(l.lt(one), from_below, from_above)
+        };
+        (passes(passed, m), passes(through, work))
+    };
     for c in (0..n).step_by(WIDTH) {
         let row = |h: &[f64], r: usize| V::load(h, r * n + c);
         let raw: [V; 3] = [row(metric, 0), row(metric, 1), row(metric, 2)];
@@ -81,11 +103,8 @@ fn membrane_of<V: Lanes, L: Law>(
         let e2 = two * (l2 - o2) / (l2 + o2);
         let ratio = s / cosine;
         let middle = half * (ratio + before / (one - before * before).sqrt());
-        let (tension, compression) = (V::splat(f.tension), V::splat(f.compression));
-        let k1 = V::select(l1.lt(one), compression, tension);
-        let k2 = V::select(l2.lt(one), compression, tension);
-        let (n1, n2) = (row(history, 3), row(history, 4));
-        let (m1, m2) = (n1 + k1 * e1, n2 + k2 * e2);
+        let (m1, w1) = fibre(row(history, 3), l1, o1, e1);
+        let (m2, w2) = fibre(row(history, 4), l2, o2, e2);
         // Shear stress of each frame.
         let (response, g, gs) = law.with_stitch(s, row(history, 9), row(history, 10));
         let q = half * response.force * cosine;
@@ -100,7 +119,7 @@ fn membrane_of<V: Lanes, L: Law>(
         let dg = (s - before) / (half * (cosine + (one - before * before).sqrt()));
         let turn = middle * (e2 - e1);
         let work = row(history, 8)
-            + half * ((n1 + m1) * e1 + (n2 + m2) * e2)
+            + (w1 + w2)
             + half * ((t1 + u1) * (dg + turn) + (t2 + u2) * (dg - turn));
         for (r, v) in [
             (0, raw[0] - one),
