@@ -95,7 +95,9 @@ pub struct JoggleSpar {
     /// Angle of the side and end walls from the vertical.
     #[schemars(extend("x-minimum" = "0 deg", "x-maximum" = "60 deg"))]
     pub draft: Angle,
-    /// Radius of the fillets between top and walls, in the section square to the edge. Where a slanted ramp
+    /// Radius of the fillets between top and walls, in the section square to the edge where a joggle's ramp is steepest. One radius is
+    /// swept along the whole spar: on the ramp the edge climbs and its section is sharper, so in the plane square to x it is larger
+    /// by 1 + the square of the ramp's largest slope, everywhere. Where a slanted ramp
     /// runs into this edge both bend the surface: there it is sharper than either, by up to 1 + sin(skew).
     #[schemars(extend("x-minimum" = "0 mm"))]
     pub fillet: Length,

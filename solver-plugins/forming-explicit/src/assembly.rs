@@ -271,6 +271,18 @@ pub fn add_ply(
     let mut nodes = (first..points.len() as u32).collect();
     let bending = elements::bending_part(&mesh, elsewhere.as_ref());
     let patches = elements::patches(points, &mut nodes, &bending, &element, mirrors);
+    if elsewhere.is_none() && element.sizes.patch_nodes > 0 && patches.is_empty() {
+        let [x0, y0, x1, y1] = blank.bounds();
+        return Err(format!(
+            "element: given '{}', which bends about the nodes inside of a ply, and ply '{name}' of {:.1} x {:.1} mm has none in elements of {:.1} mm: it would not \
+             bend. Expected two elements across it at least: an `element_size` of {:.1} mm or less, or an element with rotations such as s4",
+            p.element.plugin,
+            1e3 * (x1 - x0),
+            1e3 * (y1 - y0),
+            1e3 * p.element_size,
+            1e3 * 0.5 * (x1 - x0).min(y1 - y0)
+        ));
+    }
     let spec = SheetSpec {
         name: name.clone(),
         nodes,

@@ -7,6 +7,7 @@ use crate::late::Start;
 use crate::local::{Feedback, LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use crate::penetration::{OVERLAP_BOUND, Penetration, PenetrationPeak, too_deep_on_the_way};
+use crate::press::PressLoad;
 use crate::run::{Body, Forming, Outcome};
 use crate::strain::ply_extremes;
 use crate::writer::Writer;
@@ -490,6 +491,12 @@ fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<St
     warnings.extend(outcome.warnings.iter().cloned());
     warnings.extend(now.iter().filter_map(Penetration::too_deep));
     warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
+    if forming.load.press().is_some_and(PressLoad::holder_is_bare) {
+        warnings.push(
+            "the plies have left the holder, which its force has pressed against the die: make the blank larger or the stroke shorter, or give the holder a gap"
+                .into(),
+        );
+    }
     warnings
 }
 

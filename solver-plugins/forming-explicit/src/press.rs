@@ -55,6 +55,8 @@ impl Stroke {
 pub struct HeldByForce {
     force: f64,
     mass: f64,
+    /// Height at which it meets the die (m): nothing else stops it once the plies have left it.
+    most: f64,
     height: f64,
     velocity: f64,
 }
@@ -107,6 +109,9 @@ impl PressLoad {
         held.velocity += (force - resistance - drag) / held.mass * dt;
         let before = held.height;
         held.height += held.velocity * dt;
+        if held.height >= held.most {
+            (held.height, held.velocity) = (held.most, 0.0);
+        }
         for c in &self.holder {
             model.rigid_contacts[*c].motion = moved(held.height, before);
         }
@@ -125,6 +130,11 @@ impl PressLoad {
     pub fn punch_force(&self, model: &Model) -> f64 {
         let lift = |c: &usize| model.rigid_contacts[*c].resultant()[2];
         self.punch.iter().map(lift).sum()
+    }
+
+    /// Whether a holder that a force presses has met the die: the plies have left it.
+    pub fn holder_is_bare(&self) -> bool {
+        self.held.as_ref().is_some_and(|h| h.height >= h.most)
     }
 
     /// How far the holder has moved towards the die (m).
@@ -147,7 +157,8 @@ fn levels(press: &Press, stack: &[StackSheet], tool_top: f64) -> Result<Levels, 
     let holder = match press.holder.as_ref().map(|h| &h.hold) {
         None => None,
         Some(Hold::Force(_)) => Some(blank),
-        Some(Hold::Gap(gap)) if gap.si() >= thickness => Some(die - gap.si()),
+        // As thick as the plies but for rounding of their sum.
+        Some(Hold::Gap(gap)) if gap.si() >= thickness * (1.0 - 1e-9) => Some(die - gap.si()),
         Some(Hold::Gap(gap)) => {
             return Err(format!(
                 "process.press.holder.hold.gap: given {:.3} mm, the plies are {:.3} mm thick; expected a gap that they \
@@ -201,6 +212,21 @@ fn check_passage(press: &Press, at: &Levels, tool: &ToolMesh) -> Result<(), Stri
              ({:.2} mm) goes through",
             mm(die.opening),
             mm(in_die),
+            mm(thickness)
+        ));
+    }
+    // In its rounding a plate is the wider, the nearer to its face.
+    let room = |p: &&[f64; 3]| die.distance(**p).0 < thickness - 1e-9;
+    let above = tool.points.iter().filter(|p| p[2] > die.height);
+    if let Some([x, y, z]) = above.clone().find(room) {
+        return Err(format!(
+            "process.press: at the end the punch reaches into the die: ({:.1}, {:.1}) mm from the axis it stands {:.2} mm above the die's face, where the opening \
+             ({:.2} mm, rounded by {:.2} mm) leaves no room for it and the plies ({:.2} mm). Expected a narrower punch, a wider opening, or a longer `stroke`",
+            mm(*x),
+            mm(*y),
+            mm(z - die.height),
+            mm(die.opening),
+            mm(die.edge),
             mm(thickness)
         ));
     }
@@ -366,6 +392,7 @@ pub fn build_press(
             // What is given holds the whole.
             force: force.si() / planes.copies() as f64,
             mass: HOLDER_MASS * model.mass.iter().sum::<f64>(),
+            most: at.die - at.blank,
             height: 0.0,
             velocity: 0.0,
         }),

@@ -3,7 +3,8 @@
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::{V, cross, norm, sub};
-use plyflow_model::scene::{Process, Scene, StlTool, Tool};
+use plyflow_model::material::MaterialEntry;
+use plyflow_model::scene::{Process, Scene, Sheet, StlTool, Tool};
 use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
 
@@ -17,7 +18,13 @@ pub fn build(scene: &Scene, spacing: f64) -> Result<(ToolMesh, SignedDistanceGri
         check_foot(stl, mesh.bounds()[0][2])?;
     }
     // Contact acts at distances of the stack's thickness; a few cells around it are plenty.
-    let reach = (4.0 * spacing).max(0.01);
+    let thickness = |sheet: &Sheet| match &sheet.material {
+        MaterialEntry::Inline(material) => material.thickness.si(),
+        // None is left when a scene is built.
+        MaterialEntry::File(_) | MaterialEntry::Varied(_) => 0.0,
+    };
+    let stack: f64 = scene.sheets.iter().map(thickness).sum();
+    let reach = (4.0 * spacing).max(0.01).max(2.0 * stack);
     check_size(scene, &mesh, spacing, reach)?;
     let grid = SignedDistanceGrid::build(&mesh, spacing, reach);
     Ok((mesh, grid))

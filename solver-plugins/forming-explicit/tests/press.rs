@@ -312,6 +312,28 @@ fn what_makes_no_press_is_refused_with_what_to_do() {
     let holder = json!({"opening_radius": "0.024 m", "hold": {"gap": "0.002 m"}});
     let narrow = text("/holder", holder);
     assert!(narrow.contains("holder.opening_radius"), "{narrow}");
+    // A shallow stroke that ends within the rounding of the die's edge, wider there than the opening.
+    let mut scene = serde_json::to_value(parameters(1, &Value::Null).scene).unwrap();
+    scene["process"]["press"]["stroke"] = json!("0.003 m");
+    scene["process"]["press"]["die"] =
+        json!({"opening_radius": "0.006 m", "edge_radius": "0.005 m"});
+    let mut p = parameters(1, &Value::Null);
+    p.scene = serde_json::from_value(scene).unwrap();
+    let wide = refused(&p);
+    assert!(wide.contains("the punch reaches into the die"), "{wide}");
+    // A strip with no node inside has nothing about which rf4 bends.
+    let mut scene = serde_json::to_value(parameters(1, &Value::Null).scene).unwrap();
+    scene["sheets"][0]["width"] = json!("0.004 m");
+    scene["sheets"][0]["material"]["with"]["bending"] = json!({"positive": {"stiffness": 0.001}});
+    let mut p = parameters(1, &Value::Null);
+    p.scene = serde_json::from_value(scene).unwrap();
+    p.element.plugin = "rf4".into();
+    p.element_size = 0.004;
+    let strip = refused(&p);
+    assert!(
+        strip.contains("it would not bend") && strip.contains("of 2.0 mm or less"),
+        "{strip}"
+    );
     let mut p = parameters(1, &Value::Null);
     p.scene.friction.tool_fabric = None;
     let rough = refused(&p);
@@ -323,6 +345,26 @@ fn what_makes_no_press_is_refused_with_what_to_do() {
         film.contains("press") && film.contains("no diaphragm"),
         "{film}"
     );
+}
+
+/// Three plies of 0.4 mm are 1.2000000000000002 mm to a computer.
+#[test]
+fn a_gap_as_thick_as_the_plies_is_taken() {
+    build_global(&parameters(3, &json!({"gap": "0.0012 m"})), &BuiltIn).unwrap();
+}
+
+#[test]
+fn a_holder_that_the_plies_have_left_stops_at_the_die() {
+    let p = parameters(2, &json!({"force": "200 N"}));
+    let mut forming = build_global(&p, &BuiltIn).unwrap();
+    // No contact was computed: nothing resists.
+    (forming.model.time, forming.model.dt) = (0.1, 1e-4);
+    for _ in 0..5000 {
+        forming.load.apply(&mut forming.model);
+    }
+    let press = forming.load.press().unwrap();
+    assert!(press.holder_is_bare());
+    assert!((press.holder_travel() - 8e-4).abs() < 1e-12);
 }
 
 #[test]

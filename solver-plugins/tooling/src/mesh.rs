@@ -120,6 +120,36 @@ impl ToolMesh {
         found
     }
 
+    /// The bodies of which it consists, each with all points: facets that share edges. The order is that of their first facets.
+    pub(crate) fn shells(&self) -> Vec<ToolMesh> {
+        let adjacency = self.adjacency();
+        let mut of = vec![usize::MAX; self.triangles.len()];
+        let mut shells: Vec<ToolMesh> = Vec::new();
+        for first in 0..self.triangles.len() {
+            if of[first] != usize::MAX {
+                continue;
+            }
+            let (shell, mut open) = (shells.len(), vec![first]);
+            of[first] = shell;
+            while let Some(t) = open.pop() {
+                for next in adjacency.neighbour[t].into_iter().flatten() {
+                    if of[next as usize] == usize::MAX {
+                        of[next as usize] = shell;
+                        open.push(next as usize);
+                    }
+                }
+            }
+            shells.push(ToolMesh {
+                points: self.points.clone(),
+                triangles: Vec::new(),
+            });
+        }
+        for (t, shell) in of.iter().enumerate() {
+            shells[*shell].triangles.push(self.triangles[t]);
+        }
+        shells
+    }
+
     /// Adds a point and returns its index.
     pub(crate) fn push(&mut self, p: V3) -> u32 {
         self.points.push(p);
@@ -141,18 +171,19 @@ impl ToolMesh {
     /// wall, from both sides; with the closed body a point just inside the wall would be pushed down,
     /// through the bottom.
     pub(crate) fn without_bottom(&self, depth: f64) -> ToolMesh {
+        // Of a punch the foot may lie anywhere; single precision leaves 10 um of a file's metre.
         let [lo, hi] = self.bounds();
-        let near = 1e-9 + 1e-6 * (hi[2] - lo[2]);
-        let on_bed = |p: u32| self.points[p as usize][2].abs() <= near;
+        let near = (1e-6 * (hi[2] - lo[2])).max(1e-5);
+        let on_bed = |p: u32| self.points[p as usize][2] - lo[2] <= near;
         let mut mesh = ToolMesh {
             points: self.points.clone(),
             triangles: Vec::new(),
         };
-        mesh.triangles = self
-            .triangles
-            .iter()
-            .filter(|t| !t.iter().all(|&p| on_bed(p)))
-            .copied()
+        let is_bottom =
+            |t: usize| self.triangles[t].iter().all(|&p| on_bed(p)) && self.area_normal(t)[2] < 0.0;
+        mesh.triangles = (0..self.triangles.len())
+            .filter(|t| !is_bottom(*t))
+            .map(|t| self.triangles[t])
             .collect();
         let adjacency = mesh.adjacency();
         let mut sums = vec![[0.0; 3]; mesh.points.len()];

@@ -65,8 +65,21 @@ impl SignedDistanceGrid {
         let origin = box_low.map(|v| v - 2.0 * spacing);
         let nodes: [usize; 3] =
             std::array::from_fn(|k| ((box_high[k] - box_low[k]) / spacing).ceil() as usize + 6);
-        let tree = SurfaceTree::new(&mesh.without_bottom(reach + 8.0 * spacing));
-        let samples = sample(&tree, origin, spacing, nodes);
+        // Of bodies that stand on or in each other the nearest facet may be one inside of another: the least of their own distances is that of
+        // what they are together, outside of it and in sign.
+        let below = mesh.without_bottom(reach + 8.0 * spacing);
+        let mut samples: Option<Vec<f32>> = None;
+        for shell in below.shells() {
+            let own = sample(&SurfaceTree::new(&shell), origin, spacing, nodes);
+            samples = Some(match samples {
+                None => own,
+                Some(mut least) => {
+                    least.iter_mut().zip(own).for_each(|(a, b)| *a = a.min(b));
+                    least
+                }
+            });
+        }
+        let samples = samples.unwrap_or_default();
         let coefficients = spline_coefficients(samples, nodes);
         let blocks = nodes.map(|n| (n - 1).div_ceil(BLOCK));
         let bounds = block_bounds(&coefficients, nodes, blocks);
@@ -91,7 +104,8 @@ impl SignedDistanceGrid {
     /// a share of size^2 / (24 R^2). So the nodes lie off by size^2 / 24 times the curvature, outside of what is
     /// convex, inside of what is hollow: the share left is of the fourth power. One offset serves two directions: for principal
     /// curvatures k it is best, in the least squares of both shares, with sum k^3 / sum k^2. The curvatures are those of the
-    /// distance's second differences over half an element, over which an edge is spread as well.
+    /// distance's second differences over half an element, over which an edge is spread as well, along the surface alone: across it the distance has none,
+    /// but differences that reach to the other side of a thin wall have.
     pub fn of_equal_length(&self, size: f64) -> Self {
         let reach = ((0.5 * size / self.spacing).round() as usize).max(1);
         let step = reach as f64 * self.spacing;
@@ -106,17 +120,32 @@ impl SignedDistanceGrid {
                 return 0.0;
             }
             let at = |k: usize| f64::from(from[k]);
-            let (mut sum, mut squares) = (0.0, flat);
+            // Summed so that the field of a symmetric tool is its own mirror image to the bit.
+            let (mut second, mut mixed, mut across) = ([0.0; 3], [0.0; 3], [0.0; 3]);
             for a in 0..3 {
-                let s = stride[a];
-                // Summed so that the field of a symmetric tool is its own mirror image to the bit.
-                let second = ((at(k + s) + at(k - s)) - 2.0 * at(k)) / (step * step);
-                sum += second;
-                squares += second * second;
-                let t = stride[(a + 1) % 3];
-                let mixed = (at(k + s + t) + at(k - s - t)) - (at(k + s - t) + at(k - s + t));
-                squares += 2.0 * (mixed / (4.0 * step * step)).powi(2);
+                let (s, t) = (stride[a], stride[(a + 1) % 3]);
+                second[a] = ((at(k + s) + at(k - s)) - 2.0 * at(k)) / (step * step);
+                let both = (at(k + s + t) + at(k - s - t)) - (at(k + s - t) + at(k - s + t));
+                mixed[a] = both / (4.0 * step * step);
+                across[a] = (at(k + s) - at(k - s)) / (2.0 * step);
             }
+            let square = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];
+            let steep = square(across).sqrt();
+            // In the middle of a wall the distance has no direction.
+            if steep < 0.1 {
+                return 0.0;
+            }
+            let normal = across.map(|g| g / steep);
+            // The second derivatives along the normal, and of these the part across the surface.
+            let along: [f64; 3] = std::array::from_fn(|a| {
+                let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+                second[a] * normal[a] + (mixed[a] * normal[b] + mixed[c] * normal[c])
+            });
+            let whole = square(second) + 2.0 * square(mixed);
+            let through = (along[0] * normal[0] + along[1] * normal[1]) + along[2] * normal[2];
+            let sum = ((second[0] + second[1]) + second[2]) - through;
+            let squares =
+                flat + ((whole - 2.0 * square(along)) + through * through).max(0.5 * sum * sum);
             // Of three principal curvatures one is none, across the surface.
             size * size / 24.0 * sum * (3.0 * squares - sum * sum) / (2.0 * squares)
         };

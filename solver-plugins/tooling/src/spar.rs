@@ -244,6 +244,20 @@ fn joggle(i: usize, j: &Joggle) -> Result<JoggleShape, ToolError> {
 /// The level top must remain and the fillets must end above the bed.
 fn check_fit(spar: &JoggleSpar, sweep: &Sweep) -> Result<(), ToolError> {
     let setback = sweep.setback();
+    let [from, to] = sweep.ends;
+    if to - from < 2.1 * sweep.corner {
+        return Err(ToolError::length(
+            SPAR,
+            "length",
+            spar.length.si(),
+            format!(
+                "it must exceed {}: two rounded ends of {} and what the end walls lean in",
+                mm(spar.length.si() + 2.1 * sweep.corner - (to - from)),
+                mm(sweep.corner)
+            ),
+            "lengthen the spar, or take smaller `fillet`, `corner` and `draft`",
+        ));
+    }
     if sweep.half_width <= sweep.corner.max(setback) * 1.05 {
         return Err(ToolError::length(
             SPAR,

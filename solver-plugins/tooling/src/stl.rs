@@ -3,8 +3,9 @@
 use crate::error::ToolError;
 use crate::mesh::ToolMesh;
 use crate::vector::{V3, cross, dot, norm, sub};
+use std::borrow::Cow;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// How far above its lowest point, over its height, a tool may be open.
@@ -34,30 +35,30 @@ pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, To
             "give the length of one unit of the file, such as `1 mm`",
         ));
     }
-    let mut input = BufReader::new(File::open(path).map_err(read_error)?);
+    let bytes = std::fs::read(path).map_err(read_error)?;
     let unreadable = |source| match no_stl(path) {
         Some((problem, remedy)) => surface_error(problem, remedy),
         None => read_error(source),
     };
     let mut soup: Vec<[V3; 3]> = Vec::new();
-    for (facet, triangle) in stl_io::create_stl_reader(&mut input)
-        .map_err(unreadable)?
-        .enumerate()
-    {
-        let corners = triangle
-            .map_err(unreadable)?
-            .vertices
-            .map(|v| std::array::from_fn(|k| f64::from(v.0[k]) * unit + translate[k]));
-        if corners.iter().flatten().any(|c: &f64| !c.is_finite()) {
-            return Err(surface_error(
-                format!(
-                    "facet {} has a coordinate that is not a finite number",
-                    facet + 1
-                ),
-                "export the file again",
-            ));
+    for solid in solids(&bytes) {
+        let mut input = Cursor::new(&solid[..]);
+        for triangle in stl_io::create_stl_reader(&mut input).map_err(unreadable)? {
+            let corners = triangle
+                .map_err(unreadable)?
+                .vertices
+                .map(|v| std::array::from_fn(|k| f64::from(v.0[k]) * unit + translate[k]));
+            if corners.iter().flatten().any(|c: &f64| !c.is_finite()) {
+                return Err(surface_error(
+                    format!(
+                        "facet {} has a coordinate that is not a finite number",
+                        soup.len() + 1
+                    ),
+                    "export the file again",
+                ));
+            }
+            soup.push(corners);
         }
-        soup.push(corners);
     }
     let mesh = weld(&soup);
     if mesh.triangles.is_empty() {
@@ -68,6 +69,32 @@ pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, To
     }
     check(&mesh, unit, translate).map_err(|(problem, remedy)| surface_error(problem, remedy))?;
     Ok(mesh)
+}
+
+/// The solids of a text file, each as a file of its own (the reader takes the first alone, and asks for a name); anything else as it is.
+fn solids(bytes: &[u8]) -> Vec<Cow<'_, [u8]>> {
+    let whole = || vec![Cow::Borrowed(bytes)];
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return whole();
+    };
+    // A binary file may begin with the word too.
+    if !text.trim_start().starts_with("solid") || !text.contains("facet") {
+        return whole();
+    }
+    let mut solids: Vec<Cow<'_, [u8]>> = Vec::new();
+    let mut lines: Vec<&str> = Vec::new();
+    for line in text.lines().filter(|l| !l.trim().is_empty()) {
+        let first = lines.is_empty();
+        lines.push(if first { "solid of_a_tool" } else { line });
+        if line.trim_start().starts_with("endsolid") {
+            solids.push(Cow::Owned((lines.join("\n") + "\n").into_bytes()));
+            lines.clear();
+        }
+    }
+    if !lines.is_empty() {
+        solids.push(Cow::Owned((lines.join("\n") + "\n").into_bytes()));
+    }
+    solids
 }
 
 /// What a file that cannot be read is instead, and what to do.
@@ -182,14 +209,28 @@ fn check(mesh: &ToolMesh, unit: f64, translate: V3) -> Result<(), (String, &'sta
     // About a point at the foot: where a tool is open there, what is missing has no part in it.
     let [low, high] = mesh.bounds();
     let foot = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]];
-    let volume: f64 = (0..mesh.triangles.len())
-        .map(|t| dot(sub(mesh.corners(t)[0], foot), mesh.area_normal(t)) / 6.0)
-        .sum();
-    if volume <= 0.0 {
-        return Err((
-            format!("its facets point inwards (volume {volume:.3e} m3)"),
-            "flip the facets so that they point away from the tool",
-        ));
+    let shells = mesh.shells();
+    for shell in &shells {
+        let volume: f64 = (0..shell.triangles.len())
+            .map(|t| dot(sub(shell.corners(t)[0], foot), shell.area_normal(t)) / 6.0)
+            .sum();
+        if volume <= 0.0 {
+            let which = match shells.len() {
+                1 => "its facets point inwards".to_owned(),
+                n => {
+                    let at = shell.corners(0)[0];
+                    let q: V3 = std::array::from_fn(|k| (at[k] - translate[k]) / unit);
+                    format!(
+                        "the facets of one of its {n} bodies, that at ({:.4}, {:.4}, {:.4}) (in the file's units), point inwards",
+                        q[0], q[1], q[2]
+                    )
+                }
+            };
+            return Err((
+                format!("{which} (volume {volume:.3e} m3)"),
+                "flip the facets so that they point away from the tool; a cavity inside of a tool is to be left out",
+            ));
+        }
     }
     // A rim higher up has no outside beside it.
     let near = low[2] + FOOT * (high[2] - low[2]);
@@ -255,6 +296,40 @@ mod tests {
             assert!((back.volume() / mesh.volume() - 1.0).abs() < 1e-6);
             assert!((back.bounds()[0][2] - 0.01).abs() < 1e-9, "translation");
         }
+    }
+
+    #[test]
+    fn all_solids_of_a_text_file_are_read_and_each_must_have_its_outside() {
+        let dome = hemisphere(0.05, 0.01).unwrap();
+        let moved = |turned: bool| {
+            let mut mesh = dome.clone();
+            mesh.points.iter_mut().for_each(|p| p[0] += 0.2);
+            if turned {
+                mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+            }
+            mesh
+        };
+        let both = |second: &ToolMesh, name: &str| {
+            let mut file = tempfile::NamedTempFile::new().unwrap();
+            for mesh in [&dome, second] {
+                let text = std::fs::read_to_string(ascii(mesh).path()).unwrap();
+                write!(file, "{}\n\n", text.replace("solid tool", name)).unwrap();
+            }
+            read(file.path(), 1e-3, [0.0; 3])
+        };
+        for name in ["solid tool", "solid"] {
+            let read = both(&moved(false), name).unwrap();
+            assert_eq!(read.triangles.len(), 2 * dome.triangles.len(), "{name}");
+            assert!((read.volume() / dome.volume() - 2.0).abs() < 1e-5);
+            assert_eq!(read.shells().len(), 2);
+        }
+        // Smaller than the first, so that the volume of both is positive.
+        let mut small = moved(true);
+        small.points.iter_mut().for_each(|p| {
+            *p = [0.2 + 0.5 * (p[0] - 0.2), 0.5 * p[1], 0.5 * p[2]];
+        });
+        let text = both(&small, "solid tool").unwrap_err().to_string();
+        assert!(text.contains("of one of its 2 bodies, that at ("), "{text}");
     }
 
     #[test]

@@ -379,3 +379,95 @@ fn the_shifted_field_is_that_of_the_surface_where_it_is_flat() {
     assert!((a.0 - b.0).abs() < 1e-6, "{} {}", a.0, b.0);
     assert!(crate::vector::norm(sub(a.1, b.1)) < 1e-3, "{a:?} {b:?}");
 }
+
+/// A box over `low` to `high` (m).
+fn block(low: V3, high: V3) -> ToolMesh {
+    let mut mesh = ToolMesh::default();
+    for z in [low[2], high[2]] {
+        for [x, y] in [
+            [low[0], low[1]],
+            [high[0], low[1]],
+            [high[0], high[1]],
+            [low[0], high[1]],
+        ] {
+            mesh.points.push([x, y, z]);
+        }
+    }
+    for [a, b, c, d] in [
+        [3, 2, 1, 0],
+        [4, 5, 6, 7],
+        [0, 1, 5, 4],
+        [1, 2, 6, 5],
+        [2, 3, 7, 6],
+        [3, 0, 4, 7],
+    ] {
+        mesh.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    mesh
+}
+
+fn together(meshes: &[ToolMesh]) -> ToolMesh {
+    let mut all = ToolMesh::default();
+    for mesh in meshes {
+        let first = all.points.len() as u32;
+        all.points.extend(&mesh.points);
+        all.triangles
+            .extend(mesh.triangles.iter().map(|t| t.map(|p| first + p)));
+    }
+    all
+}
+
+/// A rib 5 mm thick and 60 mm high: differences over half an element reach through it. Its flat sides have no curvature.
+#[test]
+fn the_flat_sides_of_a_thin_wall_stay_where_they_are() {
+    let wall = block([-0.0025, -0.05, 0.0], [0.0025, 0.05, 0.06]);
+    let grid = SignedDistanceGrid::build(&wall, 3e-3, 12e-3);
+    for size in [8e-3, 10e-3, 15e-3] {
+        let field = grid.of_equal_length(size);
+        for z in [0.02, 0.03, 0.04] {
+            let p = [0.0035, 0.0, z];
+            let shift = grid.distance_and_gradient(p).0 - field.distance_and_gradient(p).0;
+            assert!(shift.abs() < 2e-5, "{size}, {z}: moved by {shift}");
+        }
+    }
+}
+
+#[test]
+fn bodies_that_stand_on_or_in_each_other_are_one_tool() {
+    let plate = block([-0.06, -0.06, 0.0], [0.06, 0.06, 0.02]);
+    // Standing on the plate, and sunk 5 mm into it.
+    for foot in [0.02, 0.015] {
+        let block = block([-0.03, -0.03, foot], [0.03, 0.03, 0.06]);
+        let grid = SignedDistanceGrid::build(&together(&[plate.clone(), block]), 2e-3, 8e-3);
+        for (p, inside) in [
+            ([0.0, 0.0, 0.021], true),
+            ([0.025, 0.0, 0.022], true),
+            ([0.0, 0.0, 0.012], true),
+            ([0.04, 0.0, 0.018], true),
+            ([0.034, 0.0, 0.024], false),
+            ([0.0, 0.0, 0.064], false),
+        ] {
+            let d = grid.distance_and_gradient(p).0;
+            assert!((d < -5e-4) == inside && d.abs() > 5e-4, "{foot}: {p:?} {d}");
+        }
+        // Square to the block's side, over the plate.
+        let (d, n) = grid.distance_and_gradient([0.034, 0.0, 0.04]);
+        assert!((d - 0.004).abs() < 1e-4 && n[0] > 0.99, "{d} {n:?}");
+    }
+}
+
+/// A punch may be described from its crown: its top at z = 0 is no bottom, and its foot need not be at 0.
+#[test]
+fn the_bottom_of_a_tool_is_its_lowest_face_wherever_that_is() {
+    let punch = block([-0.03, -0.03, -0.05], [0.03, 0.03, 0.0]);
+    let open = punch.without_bottom(0.02);
+    assert_eq!(open.bounds()[1][2], 0.0);
+    assert!((open.bounds()[0][2] + 0.07).abs() < 1e-12);
+    let grid = SignedDistanceGrid::build(&punch, 2e-3, 8e-3);
+    assert!((grid.distance_and_gradient([0.0, 0.0, 2e-4]).0 - 2e-4).abs() < 1e-5);
+    // Single precision of a file in inches: 5 um above the bed.
+    let lifted = block([-0.03, -0.03, 5e-6], [0.03, 0.03, 0.05]);
+    let grid = SignedDistanceGrid::build(&lifted, 2e-3, 8e-3);
+    let (d, n) = grid.distance_and_gradient([0.029, 0.0, 5e-4]);
+    assert!((d + 1e-3).abs() < 2e-5 && n[0] > 0.99, "{d} {n:?}");
+}
