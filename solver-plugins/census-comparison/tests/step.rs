@@ -209,6 +209,25 @@ fn a_number_that_rises_with_the_stiffness_is_told() {
 }
 
 #[test]
+fn a_run_without_wrinkles_has_no_width_that_could_fall() {
+    let all = [
+        census(4, 0.01, 1e-3, None),
+        census(2, 0.02, 1e-3, None),
+        census(0, 0.0, 1e-3, None),
+    ];
+    let n = names(&all);
+    let runs = json!([{"step": n[0], "bending_stiffness": 1e-5}, {"step": n[1], "bending_stiffness": 1e-4},
+                      {"step": n[2], "bending_stiffness": 1e-3}]);
+    let found = compare(json!({ "runs": runs }), &all).unwrap();
+    assert_eq!((found.result("falls"), found.result("grows")), (1.0, 1.0));
+    let n = names(&all[1..]);
+    let runs = json!([{"step": n[0], "bending_stiffness": 1e-4}, {"step": n[1], "bending_stiffness": 1e-3}]);
+    let found = compare(json!({ "runs": runs }), &all[1..]).unwrap();
+    assert_eq!(found.result("falls"), 1.0);
+    assert!(!found.results.contains_key("grows"));
+}
+
+#[test]
 fn runs_that_do_not_fit_the_wires_are_refused() {
     let all = [census(3, 0.02, 1e-3, None), census(5, 0.01, 1e-3, None)];
     let n = names(&all);

@@ -5,6 +5,9 @@
 
 use plyflow_model::units::{Dimension, parse_quantity, parse_unit};
 
+/// Displacements may go back by so much (m): the jitter of an encoder.
+const JITTER: f64 = 1e-4;
+
 /// A column that a reader asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Column {
@@ -112,6 +115,26 @@ impl Table {
         ))
     }
 
+    /// Refuses a displacement (m) that falls below what it was before by more than a jitter; `expected` of the file.
+    ///
+    /// # Errors
+    /// Says the row, from where to where, and what is expected.
+    pub fn goes_forward(&self, name: &str, expected: &str) -> Result<(), String> {
+        let mut farthest = f64::NEG_INFINITY;
+        for (i, s) in self.values(name)?.iter().enumerate() {
+            if *s < farthest - JITTER {
+                return Err(format!(
+                    "{}: the {name} goes back from {:.3} mm to {:.3} mm; {expected}",
+                    self.place(i),
+                    1e3 * farthest,
+                    1e3 * s
+                ));
+            }
+            farthest = farthest.max(*s);
+        }
+        Ok(())
+    }
+
     /// Refuses a table with too few rows.
     ///
     /// # Errors
@@ -145,7 +168,7 @@ pub fn read(path: &str, wanted: &[Column]) -> Result<Table, String> {
 /// Reads a text; columns that nobody asked for are passed over.
 ///
 /// # Errors
-/// A missing or repeated column, a missing, unknown or unfit unit, a row of another length, a value that is
+/// A missing or repeated column, one that is nearly an optional one, a missing, unknown or unfit unit, a row of another length, a value that is
 /// no finite number: each with `source`, line and column.
 pub fn parse(text: &str, source: &str, wanted: &[Column]) -> Result<Table, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -235,7 +258,16 @@ fn pick<'a>(
             .filter(|&i| heads[i].0 == column.name)
             .collect();
         let index = match found[..] {
-            [] if !column.required => continue,
+            [] if !column.required => {
+                if let Some((name, _)) = heads.iter().find(|h| looks_like(h.0, column.name)) {
+                    return Err(format!(
+                        "{source}:{line}: the column '{name}' is not one that is read; did you mean `{}`? If not, give it \
+                         another name",
+                        heading(column)
+                    ));
+                }
+                continue;
+            }
             [] => {
                 let names: Vec<&str> = heads.iter().map(|h| h.0).collect();
                 return Err(format!(
@@ -272,6 +304,12 @@ fn pick<'a>(
         picked.push((index, *column, unit));
     }
     Ok(picked)
+}
+
+/// Whether a header may stand for an optional column that it does not name: it would be passed over, and nobody told.
+fn looks_like(head: &str, name: &str) -> bool {
+    head.get(..name.len())
+        .is_some_and(|start| start.eq_ignore_ascii_case(name))
 }
 
 fn value(text: &str, unit: &str, dimension: Dimension) -> Result<f64, String> {
@@ -312,6 +350,33 @@ mod tests {
         assert_eq!(table.values("force").unwrap(), [2.0, 3000.0]);
         assert_eq!(table.lines, [4, 6]);
         assert!(table.column("note").is_none());
+    }
+
+    #[test]
+    fn an_optional_column_that_is_spelt_otherwise_is_not_passed_over() {
+        let wanted = [WANTED[0], Column::optional("angle", Dimension::Angle)];
+        let read = |head: &str| {
+            parse(
+                &format!("displacement [mm],{head}\n1,2\n"),
+                "t.csv",
+                &wanted,
+            )
+        };
+        for head in [
+            "Angle [deg]",
+            "ANGLE [deg]",
+            "angle (deg)",
+            "angle_1 [deg]",
+            "Angles [deg]",
+        ] {
+            let e = read(head).unwrap_err();
+            assert!(
+                e.starts_with("t.csv:1:") && e.contains("did you mean `angle ["),
+                "{e}"
+            );
+        }
+        assert!(read("angle [deg]").unwrap().column("angle").is_some());
+        assert!(read("force [N]").unwrap().column("angle").is_none());
     }
 
     #[test]

@@ -19,6 +19,7 @@ pub mod stitch;
 #[cfg(feature = "synthetic")]
 pub mod synthetic;
 pub mod voce;
+pub mod yarns;
 
 /// Acceleration of free fall (m/s2) that weights are computed with.
 pub const GRAVITY: f64 = plyflow_model::STANDARD_GRAVITY;

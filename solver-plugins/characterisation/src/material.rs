@@ -89,6 +89,37 @@ impl Template {
     }
 }
 
+impl Template {
+    /// Refuses a bending law that the material would refuse beside what the template has.
+    fn takes_bending(&self, blocks: &[Block<'_>]) -> Result<(), String> {
+        let new = |sign: &str| {
+            blocks
+                .iter()
+                .any(|b| b.0 == ["bending", sign] && b.1.is_some())
+        };
+        if !new("positive") && !new("negative") {
+            return Ok(());
+        }
+        let bending = self.value.get("with").and_then(|w| w.get("bending"));
+        let has = |key: &str| bending.is_some_and(|b| b.get(key).is_some());
+        let origin = &self.origin;
+        if has("family_1") || has("family_2") {
+            return Err(format!(
+                "{origin}: has bending laws of each family (`bending.family_1`, `bending.family_2`), and the law of this test \
+                 is one of both families: material-fabric takes either. Take these blocks out of the template, or leave \
+                 `template` out and put the fragment into a family's block by hand"
+            ));
+        }
+        if !new("positive") && !has("positive") {
+            return Err(format!(
+                "{origin}: has no `bending.positive`, and material-fabric takes `bending.negative` only beside it: evaluate the \
+                 test of positive bending first and take its file, or set `bending: positive` where both bends are alike"
+            ));
+        }
+        Ok(())
+    }
+}
+
 /// Whether a material plugin, by name or path, is `material-fabric`.
 fn is_fabric(plugin: &str) -> bool {
     let file = plugin.rsplit('/').next().unwrap_or(plugin);
@@ -131,6 +162,7 @@ pub fn file(
         emit_map(&mut text, &with, 0);
         return Ok((fragment.into(), text));
     };
+    template.takes_bending(blocks)?;
     let mut value = template.value.clone();
     let with = value.entry("with").or_insert_with(|| json!({}));
     if let Value::Object(with) = with {
@@ -341,6 +373,32 @@ mod tests {
             text.ends_with("bending:\n  positive: {linear: 1 N m}\n"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_bending_law_that_the_material_would_refuse_beside_the_template_is_refused() {
+        let bare = "plyflow_material: 1\nname: n\nplugin: material-fabric\nthickness: 0.4 mm\nareal_mass: 440 g/m2\n\
+                    with:\n  fibre_modulus: 3 GPa\n";
+        let put = |bending: &str, sign: &str| {
+            let template = Template::parse(&format!("{bare}{bending}"), "old.yaml").unwrap();
+            let law = Some(json!({"linear": "1 N m"}));
+            file(Some(&template), &[(&["bending", sign], law)], "f", &[])
+        };
+        let families = "  bending:\n    family_1: {positive: {stiffness: 1 N m}}\n    family_2: {positive: {stiffness: 1 N m}}\n";
+        for sign in ["positive", "negative"] {
+            let e = put(families, sign).unwrap_err();
+            assert!(
+                e.starts_with("old.yaml: has bending laws of each family"),
+                "{e}"
+            );
+        }
+        for bending in ["", "  bending: {families: opposite}\n"] {
+            let e = put(bending, "negative").unwrap_err();
+            assert!(e.contains("`bending.positive`"), "{e}");
+            assert!(put(bending, "positive").is_ok());
+        }
+        let both = "  bending: {positive: {stiffness: 1 N m}}\n";
+        assert!(put(both, "negative").is_ok());
     }
 
     #[test]

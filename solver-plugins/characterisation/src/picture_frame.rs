@@ -2,9 +2,9 @@
 //! and stitch.
 
 use crate::csv::Table;
-use crate::linear::{Polynomial, bayes_criterion, fit_polynomial};
 use crate::stitch::{StitchFit, fit_stitch};
 use crate::voce::rms;
+use crate::yarns::{Refused, Yarns, YarnsFit, fit_yarns};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 /// Highest degree of a shear polynomial that `material-fabric` takes.
@@ -16,6 +16,11 @@ pub const LARGEST_OFFSET: f64 = 0.1;
 const START: f64 = 2.0 * std::f64::consts::PI / 180.0;
 /// .. by at least so many rows.
 const FEWEST_START_ROWS: usize = 5;
+/// What `material-fabric` takes as the end of the fitted range (rad).
+pub const LIMITS: [f64; 2] = [
+    5.0 * std::f64::consts::PI / 180.0,
+    80.0 * std::f64::consts::PI / 180.0,
+];
 /// A test with fewer rows is refused.
 pub const FEWEST_ROWS: usize = 20;
 
@@ -60,9 +65,13 @@ impl Test {
     /// Normalises the columns `displacement` and `force` of a table.
     ///
     /// # Errors
-    /// Too few rows, a displacement that the frame cannot have, a test that hardly shears.
+    /// Too few rows, a displacement that goes back or that the frame cannot have, a test that hardly shears.
     pub fn new(table: &Table, frame: &Frame) -> Result<Self, String> {
         table.at_least(FEWEST_ROWS, "a shear curve")?;
+        table.goes_forward(
+            "displacement",
+            "one file holds one stroke, without the way back",
+        )?;
         let (displacement, force) = (table.values("displacement")?, table.values("force")?);
         let mut test = Self::default();
         for i in 0..table.rows() {
@@ -140,8 +149,12 @@ impl Test {
 #[derive(Debug, Clone)]
 pub struct Shear {
     /// Force of the yarns over the shear angle's magnitude, zero at zero.
-    pub yarns: Polynomial,
-    /// Root mean square residual of the yarns' fit over that of the forces.
+    pub yarns: Yarns,
+    /// The polynomial that would follow the data best, where the material does not take it.
+    pub refused: Option<Refused>,
+    /// Root mean square residual of the yarns' fit (N/m).
+    pub yarns_rms: f64,
+    /// The same over the root mean square of the forces.
     pub yarns_relative_rms: f64,
     /// Condition of the yarns' fit.
     pub condition: f64,
@@ -166,10 +179,11 @@ impl Shear {
 ///
 /// With a stitch the yarns are fitted to the negative tests, where it is slack, and the stitch to what the
 /// positive tests have above the yarns; without, the yarns to all tests. `degree`: of the yarns' polynomial;
-/// `None`: of 2 to 9 the one with the least Bayesian information criterion.
+/// `None`: of 2 to 9, as in [`fit_yarns`].
 ///
 /// # Errors
-/// A stitch without negative tests, data that do not determine the fit, no data below `maximum_angle` (rad).
+/// A stitch without negative tests, data that do not determine the fit or end before the stitch has failed, no data below
+/// `maximum_angle` (rad).
 pub fn characterise(
     positive: &[Test],
     negative: &[Test],
@@ -195,19 +209,33 @@ pub fn characterise(
     } else {
         join(&[positive, negative])
     };
-    let (yarns, yarns_rms, condition) = fit_yarns(&own.0, &own.1, degree)?;
-    let limit = own.0.iter().fold(0.0f64, |m, g| m.max(*g));
+    let YarnsFit {
+        yarns,
+        rms: yarns_rms,
+        condition,
+        refused,
+    } = fit_yarns(&own.0, &own.1, degree)?;
+    let farthest = |angle: &[f64]| angle.iter().fold(0.0f64, |m, g| m.max(*g));
+    let limit = farthest(&own.0);
     let stitch = if with_stitch {
         let rows = up.0.iter().zip(&up.1).filter(|(g, _)| **g <= limit);
         let (angle, rest): (Vec<f64>, Vec<f64>) =
             rows.map(|(g, f)| (*g, f - yarns.odd(*g))).unzip();
-        Some(fit_stitch(&angle, &rest)?)
+        let fit = fit_stitch(&angle, &rest)?;
+        let end = fit.stitch.angles[2];
+        // A flank drawn on past the data is a guess, and past the yarns' law the material refuses it.
+        if end > farthest(&angle) {
+            return Err(ends_early(end, farthest(&up.0), limit));
+        }
+        Some(fit)
     } else {
         None
     };
     let mut shear = Shear {
         yarns_relative_rms: yarns_rms / rms(&own.1),
+        yarns_rms,
         yarns,
+        refused,
         condition,
         stitch,
         limit,
@@ -232,27 +260,18 @@ pub fn characterise(
     Ok(shear)
 }
 
-/// Polynomial, rms residual (N/m) and condition.
-fn fit_yarns(
-    angle: &[f64],
-    force: &[f64],
-    degree: Option<usize>,
-) -> Result<(Polynomial, f64, f64), String> {
-    if angle.len() < FEWEST_ROWS {
-        return Err(format!(
-            "{} points of shear lie in the range of the fit; at least {FEWEST_ROWS} are needed",
-            angle.len()
-        ));
-    }
-    let floor = 1e-6 * rms(force);
-    let mut best: Option<(f64, Polynomial, f64, f64)> = None;
-    for d in degree.map_or(2..=MAXIMUM_DEGREE, |d| d..=d) {
-        let (polynomial, solution) = fit_polynomial(angle, force, d)?;
-        let criterion = bayes_criterion(solution.rms, floor, angle.len(), d);
-        if best.as_ref().is_none_or(|b| criterion < b.0) {
-            best = Some((criterion, polynomial, solution.rms, solution.condition));
-        }
-    }
-    best.map(|b| (b.1, b.2, b.3))
-        .ok_or_else(|| "no degree was tried".into())
+/// Which tests ended (rad) before the stitch would have failed, and what to do.
+fn ends_early(end: f64, positive: f64, negative: f64) -> String {
+    let (which, reached, why) = if negative <= positive {
+        let why = ", up to which the yarns' law holds";
+        ("negative", negative, why)
+    } else {
+        ("positive", positive, "")
+    };
+    format!(
+        "the {which} tests end at {:.1} deg{why}, before the stitch has failed: its falling flank, drawn on, ends at {:.1} deg; \
+         shear the {which} specimens further, raise `maximum_angle` if it cut them off, or set `stitch: false`",
+        reached.to_degrees(),
+        end.to_degrees()
+    )
 }

@@ -2,16 +2,14 @@
 
 use crate::csv::Table;
 
-/// Displacements may go back by so much (m): the jitter of an encoder.
-const JITTER: f64 = 1e-4;
 /// A test with fewer rows in the window is refused.
 const FEWEST_ROWS: usize = 10;
 
 /// What one pull tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pull {
-    /// Largest force before the window, over the normal force.
-    pub static_coefficient: f64,
+    /// Largest force before the window, over the normal force; `None` without rows there.
+    pub static_coefficient: Option<f64>,
     /// Mean force over the window's displacement, over the normal force.
     pub dynamic_coefficient: f64,
     /// Standard deviation of the force over the window's displacement, over the normal force: stick-slip and
@@ -25,7 +23,8 @@ pub struct Pull {
 /// length, so it does not depend on how densely the machine recorded.
 ///
 /// # Errors
-/// A displacement that goes back, a test that does not cover the window, too few rows in it.
+/// A displacement that goes back, a test that does not cover the window, too few rows in it, a mean force that is not
+/// positive.
 pub fn evaluate(table: &Table, window: [f64; 2], normal: f64) -> Result<Pull, String> {
     let [from, to] = window;
     if from.is_nan() || to.is_nan() || from < 0.0 || to <= from {
@@ -41,18 +40,7 @@ pub fn evaluate(table: &Table, window: [f64; 2], normal: f64) -> Result<Pull, St
         ));
     }
     let (s, f) = (table.values("displacement")?, table.values("force")?);
-    let mut farthest = f64::NEG_INFINITY;
-    for i in 0..s.len() {
-        if s[i] < farthest - JITTER {
-            return Err(format!(
-                "{}: the displacement goes back from {:.3} mm to {:.3} mm; one file holds one pull",
-                table.place(i),
-                1e3 * farthest,
-                1e3 * s[i]
-            ));
-        }
-        farthest = farthest.max(s[i]);
-    }
+    table.goes_forward("displacement", "one file holds one pull")?;
     let (first, last) = (
         s.first().copied().unwrap_or(0.0),
         s.last().copied().unwrap_or(0.0),
@@ -87,13 +75,19 @@ pub fn evaluate(table: &Table, window: [f64; 2], normal: f64) -> Result<Pull, St
     }
     let mean = sum / (to - from);
     let variance = squares / (to - from) - mean * mean;
-    let peak = s
-        .iter()
-        .zip(f)
-        .filter(|(v, _)| **v < from)
-        .fold(0.0f64, |m, (_, f)| m.max(*f));
+    if mean <= 0.0 {
+        return Err(format!(
+            "{}: the mean force from {:.2} mm to {:.2} mm is {mean:.4} N; a sled that is dragged is pulled with a positive \
+             one: change the sign of the load cell, or take off its offset",
+            table.source,
+            1e3 * from,
+            1e3 * to
+        ));
+    }
+    let before = s.iter().zip(f).filter(|(v, _)| **v < from);
+    let peak = before.map(|(_, f)| *f).reduce(f64::max);
     Ok(Pull {
-        static_coefficient: peak / normal,
+        static_coefficient: peak.map(|p| p / normal),
         dynamic_coefficient: mean / normal,
         scatter: variance.max(0.0).sqrt() / normal,
     })
@@ -129,7 +123,10 @@ mod tests {
         let places = (0..=4000).map(|i| 250.0 * (i as f64 / 4000.0).powf(1.3));
         let pull = evaluate(&table(places.map(|s| (s, force(s)))), [0.1, 0.2], 5.0).unwrap();
         assert!((pull.dynamic_coefficient - 0.4).abs() < 1e-5, "{pull:?}");
-        assert!((pull.static_coefficient - 0.6).abs() < 0.01, "{pull:?}");
+        assert!(
+            (pull.static_coefficient.unwrap() - 0.6).abs() < 0.01,
+            "{pull:?}"
+        );
         assert!(
             (pull.scatter - 0.5 / 2f64.sqrt() / 5.0).abs() < 1e-4,
             "{pull:?}"
@@ -160,6 +157,18 @@ mod tests {
     }
 
     #[test]
+    fn without_rows_before_the_window_there_is_no_static_coefficient() {
+        let line = table((0..=250).map(|i| (f64::from(i), 2.0)));
+        let coefficient = |from| {
+            evaluate(&line, [from, 0.2], 5.0)
+                .unwrap()
+                .static_coefficient
+        };
+        assert_eq!(coefficient(0.0), None);
+        assert_eq!(coefficient(0.1), Some(0.4));
+    }
+
+    #[test]
     fn what_is_no_pull_through_the_window_is_refused() {
         let line = |to: u32| table((0..=to).map(|i| (f64::from(i), 2.0)));
         let error = |t: &Table, window| evaluate(t, window, 5.0).unwrap_err();
@@ -168,6 +177,12 @@ mod tests {
         let back = table((0..=250).map(|i| (f64::from(if i == 120 { 80 } else { i }), 2.0)));
         assert!(error(&back, [0.1, 0.2]).starts_with("t.csv:122: the displacement goes back"));
         assert!(evaluate(&line(250), [0.1, 0.2], 0.0).is_err());
+        let push = table((0..=250).map(|i| (f64::from(i), -2.0)));
+        let e = error(&push, [0.1, 0.2]);
+        assert!(
+            e.contains("is -2.0000 N") && e.contains("sign of the load cell"),
+            "{e}"
+        );
         let thin = table((0..=5).map(|i| (f64::from(i) * 50.0, 2.0)));
         assert!(error(&thin, [0.1, 0.2]).contains("3 rows"));
     }

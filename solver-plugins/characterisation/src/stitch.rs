@@ -87,9 +87,18 @@ pub fn fit_stitch(angle: &[f64], force: &[f64]) -> Result<StitchFit, String> {
     let mut residual = misfit(&stitch);
     let mut condition = f64::INFINITY;
     for _ in 0..100 {
-        let matrix = DMatrix::from_fn(points.len(), 4, |i, j| stitch.slopes(points[i].0)[j]);
-        let solution = least_squares(&matrix, &residual)
-            .map_err(|e| format!("the stitch cannot be told from the data: {e}"))?;
+        let solve = |from: usize| {
+            let slope = |i: usize, j: usize| stitch.slopes(points[i].0)[from + j];
+            let matrix = DMatrix::from_fn(points.len(), 4 - from, slope);
+            least_squares(&matrix, &residual)
+                .map_err(|e| format!("the stitch cannot be told from the data: {e}"))
+        };
+        let mut solution = solve(0)?;
+        // An onset of 0 that wants to go below stays there, and the others are solved for without it.
+        if stitch.angles[0] <= 0.0 && solution.unknowns[0] < 0.0 {
+            solution = solve(1)?;
+            solution.unknowns.insert(0, 0.0);
+        }
         condition = solution.condition;
         let d = &solution.unknowns;
         let mut factor = 1.0;
@@ -97,7 +106,11 @@ pub fn fit_stitch(angle: &[f64], force: &[f64]) -> Result<StitchFit, String> {
         while factor > 1e-4 {
             let [a, b, c] = stitch.angles;
             let tried = Stitch {
-                angles: [a + factor * d[0], b + factor * d[1], c + factor * d[2]],
+                angles: [
+                    (a + factor * d[0]).max(0.0),
+                    b + factor * d[1],
+                    c + factor * d[2],
+                ],
                 peak: stitch.peak + factor * d[3],
             };
             let left = misfit(&tried);
@@ -213,6 +226,38 @@ mod tests {
             (fit.stitch.peak - 880.0).abs() < 1e-6 && fit.rms < 1e-6,
             "{fit:?}"
         );
+    }
+
+    #[test]
+    fn a_stitch_that_carries_from_the_start_is_fitted_to_the_end() {
+        // Force at 0 already: the onset would lie below 0, and stays at 0.
+        let given = Stitch {
+            angles: [-0.05, 0.5, 0.75],
+            peak: 880.0,
+        };
+        let g: Vec<f64> = (1..=400).map(|i| 0.95 * f64::from(i) / 400.0).collect();
+        let f: Vec<f64> = g.iter().map(|g| given.force(*g)).collect();
+        let fit = fit_stitch(&g, &f).unwrap();
+        assert_eq!(fit.stitch.angles[0], 0.0);
+        let squares = |s: &Stitch| -> f64 {
+            g.iter()
+                .zip(&f)
+                .map(|(g, f)| (f - s.force(*g)).powi(2))
+                .sum()
+        };
+        let least = squares(&fit.stitch);
+        // No other stitch with that onset fits better.
+        for j in 1..4 {
+            for by in [-1e-4, 1e-4] {
+                let mut other = fit.stitch;
+                if j < 3 {
+                    other.angles[j] += by
+                } else {
+                    other.peak *= 1.0 + by
+                }
+                assert!(squares(&other) > least, "{j} {by}: {fit:?}");
+            }
+        }
     }
 
     #[test]

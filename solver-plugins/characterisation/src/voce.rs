@@ -38,9 +38,19 @@ pub struct VoceFit {
     /// Condition of the three parameters: how much larger their relative errors may be than those of the
     /// moments, in the worst direction. Parameters at a bound are left out.
     pub condition: f64,
-    /// The curvatures do not reach far enough to tell the saturation: the law is linear over them, or
-    /// `scale` lies at the end of what was searched.
-    pub saturation_undetermined: bool,
+    /// What the curvatures tell of the saturation.
+    pub saturation: Saturation,
+}
+
+/// What the curvatures tell of the saturation of the moment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Saturation {
+    /// Its parameters.
+    Determined,
+    /// They end before it: the law is linear over them, or `scale` lies at the upper end of what was searched.
+    NotReached,
+    /// It is over before the least of them that counts: `scale` lies at the lower end of what was searched.
+    AlreadyThere,
 }
 
 /// `scale` is searched from the largest curvature over this ..
@@ -84,13 +94,21 @@ pub fn fit_voce(curvature: &[f64], moment: &[f64]) -> Result<VoceFit, String> {
         &misfit,
     );
     let (law, squares) = best_linear(curvature, moment, log_scale.exp());
+    // Without an asymptote every scale fits alike, and the search ends at its first.
+    let saturation = if law.asymptote <= 0.0 || best == SEARCH {
+        Saturation::NotReached
+    } else if best == 0 {
+        Saturation::AlreadyThere
+    } else {
+        Saturation::Determined
+    };
     let residual = (squares / moment.len() as f64).sqrt();
     Ok(VoceFit {
         law,
         rms: residual,
         relative_rms: residual / size,
         condition: parameter_condition(&law, curvature),
-        saturation_undetermined: law.asymptote <= 0.0 || best == 0 || best == SEARCH,
+        saturation,
     })
 }
 
@@ -212,7 +230,7 @@ mod tests {
         );
         assert!((fit.law.scale / NCF.scale - 1.0).abs() < 1e-6, "{fit:?}");
         assert!(
-            fit.relative_rms < 1e-7 && !fit.saturation_undetermined,
+            fit.relative_rms < 1e-7 && fit.saturation == Saturation::Determined,
             "{fit:?}"
         );
         // Over a small range the same law is much worse determined.
@@ -231,8 +249,22 @@ mod tests {
             20.0,
         );
         let fit = fit_voce(&k, &m).unwrap();
-        assert!(fit.saturation_undetermined, "{fit:?}");
+        assert_eq!(fit.saturation, Saturation::NotReached, "{fit:?}");
         assert!((fit.law.moment(10.0) / 0.04 - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_moment_that_has_saturated_before_the_first_curvature_is_told_from_one_that_does_not_saturate()
+     {
+        let law = Voce {
+            linear: 0.0,
+            asymptote: 0.03,
+            scale: 0.001,
+        };
+        let (k, m) = points(&law, 20.0);
+        let fit = fit_voce(&k, &m).unwrap();
+        assert_eq!(fit.saturation, Saturation::AlreadyThere, "{fit:?}");
+        assert!((fit.law.moment(10.0) / 0.03 - 1.0).abs() < 1e-3);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use plyflow_characterisation::bending::{Bending, characterise};
 use plyflow_characterisation::profile::{Choice, Method, Profile};
 use plyflow_characterisation::synthetic::{BENDING, PublishedBending};
+use plyflow_characterisation::voce::Saturation;
 
 const CHOICE: Choice = Choice {
     method: Method::TangentAngle,
@@ -41,19 +42,19 @@ fn report(what: &str, found: &Bending, law: &PublishedBending) -> f64 {
         "{} {what}: degree {}, rms {:.2e} mm, k to {:.3} 1/mm, M(k) off by {:.3} % rms (told {:.3} %), \
          parameters off by {:.1} {:.1} {:.1} % (told {:.1} {:.1} {:.1}), condition {:.0} of the law, {:.1e} of the fit",
         law.name,
-        found.profile.degree,
-        1e3 * found.profile.rms,
+        found.specimens[0].profile.degree,
+        1e3 * found.specimens[0].profile.rms,
         1e-3 * found.curvature.last().unwrap(),
         100.0 * error,
         100.0 * found.relative_error,
         off[0],
         off[1],
         off[2],
-        100.0 * found.parameter_error[0],
-        100.0 * found.parameter_error[1],
-        100.0 * found.parameter_error[2],
+        100.0 * found.parameter_error[0].unwrap_or(f64::NAN),
+        100.0 * found.parameter_error[1].unwrap_or(f64::NAN),
+        100.0 * found.parameter_error[2].unwrap_or(f64::NAN),
         found.voce.condition,
-        found.profile.condition
+        found.specimens[0].profile.condition
     );
     error
 }
@@ -70,11 +71,11 @@ fn the_law_of_a_strip_solved_as_an_ode_comes_back_within_one_percent() {
             .unwrap();
             let error = report(&format!("{method:?} exact"), &found, law);
             assert!(error < 0.01, "{} {method:?}: {error}", law.name);
-            assert!(found.profile.monotone);
+            assert!(found.specimens[0].profile.monotone);
             assert!(
-                (found.profile.length / law.overhang - 1.0).abs() < 1e-4,
+                (found.specimens[0].profile.length / law.overhang - 1.0).abs() < 1e-4,
                 "{}",
-                found.profile.length
+                found.specimens[0].profile.length
             );
         }
     }
@@ -85,12 +86,12 @@ fn moment_and_curvature_along_the_strip_are_those_of_the_ode() {
     for law in &BENDING {
         let found = characterise(&[profile(law, 0.0, 1)], law.weight(), &CHOICE).unwrap();
         let strip = law.strip();
-        let s = &found.profile.stations;
+        let s = &found.specimens[0].profile.stations;
         for i in s.inner(0.05) {
             let j = (s.arc[i] / law.overhang * 2000.0).round() as usize;
             let (k, m) = (strip.curvature[j], strip.moment[j]);
             assert!(
-                (found.moment[i] - m).abs() < 2e-3 * strip.moment[0],
+                (found.specimens[0].moment[i] - m).abs() < 2e-3 * strip.moment[0],
                 "{} {i}",
                 law.name
             );
@@ -115,11 +116,8 @@ fn noise_of_a_scanner_hurts_the_parameters_much_more_than_the_law() {
                 let error = report(&format!("{:.2} mm", 1e3 * noise), &found, law);
                 let linear = (found.voce.law.linear / (law.numbers[0] * 1e-3) - 1.0).abs();
                 worst = (worst.0.max(error), worst.1.max(linear));
-                assert!(
-                    (found.profile.rms / noise - 1.0).abs() < 0.15,
-                    "{}",
-                    found.profile.rms
-                );
+                let rms = found.specimens[0].profile.rms;
+                assert!((rms / noise - 1.0).abs() < 0.15, "{rms}");
                 assert!(error < 0.02, "{} {noise}: {error}", law.name);
             }
             assert!(worst.1 > 4.0 * worst.0, "{} {noise}: {worst:?}", law.name);
@@ -163,19 +161,57 @@ fn the_told_error_of_the_law_is_that_of_repeated_scans_when_the_degree_is_held()
     );
 }
 
+/// `law` with all moments times `factor`.
+fn times(law: &PublishedBending, factor: f64) -> PublishedBending {
+    let [r0, r_inf, limit] = law.numbers;
+    PublishedBending {
+        numbers: [factor * r0, factor * r_inf, limit],
+        ..*law
+    }
+}
+
 #[test]
-fn several_specimens_are_fitted_at_once() {
+fn strips_of_different_stiffness_give_their_mean_law_and_their_spread_is_told() {
+    const FACTORS: [f64; 3] = [0.82, 0.95, 1.10];
+    let law = &BENDING[1];
+    let strips: Vec<Profile> = (1..)
+        .zip(FACTORS)
+        .map(|(seed, f)| profile(&times(law, f), 0.02e-3, seed))
+        .collect();
+    let found = characterise(&strips, law.weight(), &CHOICE).unwrap();
+    let mean = FACTORS.iter().sum::<f64>() / 3.0;
+    for k in [5.0, 20.0, 40.0] {
+        let ratio = found.voce.law.moment(k) / (mean * law.moment(k));
+        println!("three strips: M at {k} 1/m is {ratio:.3} of the mean law's");
+        assert!((ratio - 1.0).abs() < 0.02, "{k}: {ratio}");
+    }
+    let squares = FACTORS.map(|f| (f / mean - 1.0).powi(2));
+    let standard_error = (squares.iter().sum::<f64>() / 2.0 / 3.0).sqrt();
+    let told = found.relative_error;
+    println!("three strips: error told {told:.4}, of the mean {standard_error:.4}");
+    assert!((told / standard_error - 1.0).abs() < 0.1, "{told}");
+}
+
+#[test]
+fn several_specimens_give_one_law() {
     let law = &BENDING[2];
     let specimens: Vec<Profile> = (1..=4).map(|seed| profile(law, 0.05e-3, seed)).collect();
-    let one = characterise(&specimens[..1], law.weight(), &CHOICE).unwrap();
     let all = characterise(&specimens, law.weight(), &CHOICE).unwrap();
     assert!(law_error(&all, law) < 0.01, "{}", law_error(&all, law));
-    assert!(
-        (all.profile.length - law.overhang).abs() < 0.05e-3,
-        "{} {}",
-        one.profile.length,
-        all.profile.length
-    );
+    for s in &all.specimens {
+        let length = s.profile.length;
+        assert!((length - law.overhang).abs() < 0.2e-3, "{length}");
+    }
+}
+
+#[test]
+fn strips_of_different_overhang_give_one_law() {
+    let law = &BENDING[1];
+    let strips: Vec<Profile> = [0.15, 0.21, 0.25]
+        .map(|overhang| profile(&PublishedBending { overhang, ..*law }, 0.0, 1))
+        .into();
+    let found = characterise(&strips, law.weight(), &CHOICE).unwrap();
+    assert!(law_error(&found, law) < 0.01, "{}", law_error(&found, law));
 }
 
 #[test]
@@ -222,7 +258,7 @@ fn a_linear_law_comes_back_and_is_said_to_have_no_saturation() {
         found.voce
     );
     assert!(
-        found.voce.condition > 100.0 || found.voce.saturation_undetermined,
+        found.voce.condition > 100.0 || found.voce.saturation != Saturation::Determined,
         "{:?}",
         found.voce
     );

@@ -7,6 +7,7 @@ use plyflow_characterisation::picture_frame::{Frame, Shear, Test, characterise};
 use plyflow_characterisation::synthetic::{
     BENDING, Elastica, Noise, elastica, frame_force, ncf_shear, overhang_at, woven_shear,
 };
+use plyflow_characterisation::yarns::Yarns;
 use plyflow_model::units::Dimension;
 
 const FRAME: Frame = Frame {
@@ -64,6 +65,14 @@ fn law_error(found: &Shear, law: fn(f64) -> f64, from: f64, to: f64) -> f64 {
     (off / size).sqrt()
 }
 
+/// Of the yarns' polynomial.
+fn degree(found: &Shear) -> usize {
+    match &found.yarns {
+        Yarns::Polynomial(p) => p.coefficients.len() - 1,
+        Yarns::Table { .. } => panic!("a table: {found:?}"),
+    }
+}
+
 #[test]
 fn angle_and_force_of_the_frame_are_those_of_energy_and_of_the_hinges() {
     // Energy gives the force of the law at the angle that the closed form of the frame gives.
@@ -106,7 +115,7 @@ fn the_woven_curve_comes_back_within_three_per_mille_in_both_signs() {
                 [(-60.0, 0.0), (0.0, 60.0)].map(|(a, b)| law_error(&found, woven_shear, a, b));
             println!(
                 "woven, noise {noise}: degree {}, off by {errors:?}, condition {:.1e}",
-                found.yarns.coefficients.len() - 1,
+                degree(&found),
                 found.condition
             );
             assert!(errors.iter().all(|e| *e < bound), "{errors:?}");
@@ -146,6 +155,19 @@ fn shear_tests_that_are_none_are_refused() {
             .unwrap_err()
             .contains("before the stitch has failed")
     );
+    // 0.75 rad, where the stitch has failed, are 43 deg.
+    for (up, down, says) in [
+        (41.0, 55.0, "the positive tests end at 41.0 deg, before"),
+        (
+            55.0,
+            41.0,
+            "the negative tests end at 41.0 deg, up to which",
+        ),
+    ] {
+        let [up, down] = [(1.0, up), (-1.0, down)].map(|(s, to)| [test(ncf_shear, s, to, 0.0, 1)]);
+        let e = characterise(&up, &down, true, None, 1.4).unwrap_err();
+        assert!(e.contains(says) && e.contains("ends at 43.0 deg"), "{e}");
+    }
     let wanted = [
         Column::required("displacement", Dimension::Length),
         Column::required("force", Dimension::Force),
@@ -162,7 +184,14 @@ fn shear_tests_that_are_none_are_refused() {
     assert!(refused("1,2\n").contains("at least 20"));
     assert!(refused(&line(0.001)).contains("shear angle of"));
     assert!(refused(&line(10.0)).starts_with("t.csv:11: a displacement of 90.000 mm does not fit"));
-    assert!(refused(&line(-1.0)).contains("does not fit"));
+    assert!(refused(&line(-1.0)).contains("one file holds one stroke"));
+    let back: String = (0..40)
+        .map(|i| format!("{},1\n", 20 - i32::abs(i - 20)))
+        .collect();
+    assert!(
+        refused(&back)
+            .starts_with("t.csv:23: the displacement goes back from 20.000 mm to 19.000 mm"),
+    );
 }
 
 /// The laws printed in table 3.2 (from the revised test) and the constants (from the standard test) are two

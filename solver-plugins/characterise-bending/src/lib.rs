@@ -1,11 +1,12 @@
 //! Step plugin `characterise-bending`: the law M(k) from the profile of a revised cantilever test.
 
-use plyflow_characterisation::bending::{Bending, characterise};
-use plyflow_characterisation::cantilever::PLAUSIBLE_OVERHANG;
+use plyflow_characterisation::bending::{Bending, Specimen, characterise};
+use plyflow_characterisation::cantilever::{PLAUSIBLE_OVERHANG, mean_and_deviation};
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
 use plyflow_characterisation::profile::{Choice, Method, Profile};
+use plyflow_characterisation::voce::Saturation;
 use plyflow_characterisation::{Dimension, GRAVITY};
 use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
 use serde::Deserialize;
@@ -52,10 +53,10 @@ impl Step for CharacteriseBending {
             overhang: p.overhang,
         };
         let found = characterise(&profiles, weight, &choice)?;
-        warn(host, &found);
+        warn(host, &found, &names);
         let mut out = Output::default();
-        write_profile(&mut out, &found, &profiles, &names);
-        write_law(&mut out, &found);
+        write_profiles(&mut out, &found, &profiles, &names);
+        write_law(&mut out, &found, &names);
         let law = found.voce.law;
         let block = json!({
             "linear": quantity(law.linear, 1e-3, "N mm"),
@@ -84,7 +85,7 @@ impl Step for CharacteriseBending {
         out.file(&name, &text);
         out.attribute("sources", json!(names));
         out.attribute("bending", json!(p.bending));
-        write_results(&mut out, &found);
+        write_results(&mut out, &found, &profiles);
         for (i, k) in p.report_at.iter().enumerate() {
             out.result(&format!("moment.{}", i + 1), law.moment(*k), "N");
         }
@@ -148,64 +149,76 @@ fn simulated(host: &Host, input: &Input, clamp_tolerance: f64) -> Result<Profile
     Ok(Profile::new(&x, &z, clamp_tolerance, &place)?)
 }
 
-fn warn(host: &Host, found: &Bending) {
-    if !found.profile.monotone {
-        host.log(
-            Log::Warn,
-            "the curvature of the fitted profile does not fall from clamp to tip, as gravity makes it: the law is \
-             doubtful; look at the plot, give a lower `degree` or raise `trim`",
-        );
+fn warn(host: &Host, found: &Bending, names: &[String]) {
+    for (specimen, name) in found.specimens.iter().zip(names) {
+        if !specimen.profile.monotone {
+            let text = format!(
+                "{name}: the curvature of the fitted profile does not fall from clamp to tip, as gravity makes it: the \
+                 law is doubtful; look at the plot, give a lower `degree` or raise `trim`"
+            );
+            host.log(Log::Warn, &text);
+        }
     }
-    if found.voce.saturation_undetermined {
-        host.log(
+    match found.voce.saturation {
+        Saturation::Determined => {}
+        Saturation::NotReached => host.log(
             Log::Warn,
             "the curvatures do not reach far enough to tell the saturation of the moment; M(k) holds over them, its \
              parameters mean little: use a longer overhang",
-        );
+        ),
+        Saturation::AlreadyThere => host.log(
+            Log::Warn,
+            "the moment is saturated already at the least curvatures that count, as if it began with a step: M(k) \
+             holds over them, `scale` and the initial stiffness mean little; look at the points near the tip, where the \
+             curvature is small, lower `trim`, and check `overhang`",
+        ),
     }
 }
 
-fn write_profile(out: &mut Output, found: &Bending, profiles: &[Profile], names: &[String]) {
-    let mut series = Vec::new();
+/// Paths of the curves of a specimen begin so: numbered only when there are several.
+fn prefix(name: &str, number: usize, specimens: usize) -> String {
+    match specimens {
+        1 => format!("curves/{name}"),
+        _ => format!("curves/{name}_{number}"),
+    }
+}
+
+fn write_profiles(out: &mut Output, found: &Bending, profiles: &[Profile], names: &[String]) {
+    let (mut hanging, mut along) = (Vec::new(), Vec::new());
+    let n = names.len();
     for (i, (profile, name)) in profiles.iter().zip(names).enumerate() {
         let [x, z] = ["x", "z"].map(|n| format!("curves/measured_{}/{n}", i + 1));
         out.curve(&x, "m", &profile.x);
-        out.curve(
-            &z,
-            "m",
-            &profile.deflection.iter().map(|y| -y).collect::<Vec<_>>(),
-        );
-        series.push(Series::new(name, &x, &z, "points"));
+        out.curve(&z, "m", &negative(&profile.deflection));
+        hanging.push(Series::new(name, &x, &z, "points"));
     }
-    let s = &found.profile.stations;
-    out.curve("curves/profile/arc", "m", &s.arc);
-    out.curve("curves/profile/x", "m", &s.x);
-    out.curve(
-        "curves/profile/z",
-        "m",
-        &s.deflection.iter().map(|y| -y).collect::<Vec<_>>(),
-    );
-    out.curve("curves/profile/curvature", "1/m", &s.curvature);
-    out.curve("curves/profile/moment", "N", &found.moment);
-    series.push(Series::new(
-        "fit",
-        "curves/profile/x",
-        "curves/profile/z",
-        "line",
-    ));
+    for (i, (specimen, name)) in found.specimens.iter().zip(names).enumerate() {
+        let s = &specimen.profile.stations;
+        let path = |what: &str| format!("{}/{what}", prefix("profile", i + 1, n));
+        out.curve(&path("arc"), "m", &s.arc);
+        out.curve(&path("x"), "m", &s.x);
+        out.curve(&path("z"), "m", &negative(&s.deflection));
+        out.curve(&path("curvature"), "1/m", &s.curvature);
+        out.curve(&path("moment"), "N", &specimen.moment);
+        let label = match n {
+            1 => "fit".to_owned(),
+            _ => format!("fit of {name}"),
+        };
+        hanging.push(Series::new(&label, &path("x"), &path("z"), "line"));
+        along.push(Series::new(
+            &label,
+            &path("arc"),
+            &path("curvature"),
+            "line",
+        ));
+    }
     out.plot(
         "profile",
         "Hanging strip",
         ("distance from the clamp", "mm"),
         ("height", "mm"),
-        &series,
+        &hanging,
     );
-    let along = [Series::new(
-        "fit",
-        "curves/profile/arc",
-        "curves/profile/curvature",
-        "line",
-    )];
     out.plot(
         "curvature",
         "Curvature along the strip",
@@ -215,18 +228,24 @@ fn write_profile(out: &mut Output, found: &Bending, profiles: &[Profile], names:
     );
 }
 
-fn write_law(out: &mut Output, found: &Bending) {
-    let s = &found.profile.stations;
-    out.curve(
-        "curves/measured_law/curvature",
-        "1/m",
-        &s.curvature[found.used.clone()],
-    );
-    out.curve(
-        "curves/measured_law/moment",
-        "N",
-        &found.moment[found.used.clone()],
-    );
+fn negative(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|v| -v).collect()
+}
+
+fn write_law(out: &mut Output, found: &Bending, names: &[String]) {
+    let (mut measured, n) = (Vec::new(), names.len());
+    for (i, (specimen, name)) in found.specimens.iter().zip(names).enumerate() {
+        let path = prefix("measured_law", i + 1, n);
+        let [k, m] = ["curvature", "moment"].map(|what| format!("{path}/{what}"));
+        let (s, used) = (&specimen.profile.stations, specimen.used.clone());
+        out.curve(&k, "1/m", &s.curvature[used.clone()]);
+        out.curve(&m, "N", &specimen.moment[used]);
+        let label = match n {
+            1 => "from the profile",
+            _ => name,
+        };
+        measured.push(Series::new(label, &k, &m, "points"));
+    }
     let of = |f: &dyn Fn(f64) -> f64| found.curvature.iter().map(|k| f(*k)).collect::<Vec<f64>>();
     let law = found.voce.law;
     out.curve("curves/law/curvature", "1/m", &found.curvature);
@@ -234,43 +253,42 @@ fn write_law(out: &mut Output, found: &Bending) {
     out.curve("curves/law/moment_error", "N", &found.moment_error);
     out.curve("curves/law/stiffness", "N m", &of(&|k| law.moment(k) / k));
     let k = ("curvature", "1/mm");
+    let voce = |y: &str| Series::new("Voce", "curves/law/curvature", y, "line");
+    measured.push(voce("curves/law/moment"));
     out.plot(
         "moment",
         "Moment over curvature",
         k,
         ("moment per width", "N"),
-        &[
-            Series::new(
-                "from the profile",
-                "curves/measured_law/curvature",
-                "curves/measured_law/moment",
-                "points",
-            ),
-            Series::new("Voce", "curves/law/curvature", "curves/law/moment", "line"),
-        ],
+        &measured,
     );
-    let secant = [Series::new(
-        "Voce",
-        "curves/law/curvature",
-        "curves/law/stiffness",
-        "line",
-    )];
     out.plot(
         "stiffness",
         "Secant bending stiffness",
         k,
         ("bending stiffness", "N mm"),
-        &secant,
+        &[voce("curves/law/stiffness")],
     );
 }
 
-fn write_results(out: &mut Output, found: &Bending) {
-    let (voce, profile) = (&found.voce, &found.profile);
+fn write_results(out: &mut Output, found: &Bending, profiles: &[Profile]) {
+    let voce = &found.voce;
     let flag = |b: bool| if b { 1.0 } else { 0.0 };
-    let [linear_error, asymptote_error, scale_error] = found.parameter_error;
-    let largest_moment = found.moment[found.used.clone()]
-        .iter()
-        .fold(0.0f64, |m, v| m.max(*v));
+    let over_specimens =
+        |f: &dyn Fn(&Specimen) -> f64| found.specimens.iter().map(f).collect::<Vec<f64>>();
+    let largest =
+        |f: &dyn Fn(&Specimen) -> f64| over_specimens(f).into_iter().fold(0.0f64, f64::max);
+    let [lengths, rms] = [
+        over_specimens(&|s| s.profile.length),
+        over_specimens(&|s| s.profile.rms),
+    ];
+    // Over the points of all specimens.
+    let count = |p: &Profile| p.x.len() as f64;
+    let squares: f64 = (rms.iter().zip(profiles))
+        .map(|(r, p)| r * r * count(p))
+        .sum();
+    let points: f64 = profiles.iter().map(count).sum();
+    let monotone = found.specimens.iter().all(|s| s.profile.monotone);
     let results = [
         ("linear", voce.law.linear, "N m"),
         ("asymptote", voce.law.asymptote, "N"),
@@ -278,13 +296,10 @@ fn write_results(out: &mut Output, found: &Bending) {
         ("initial_stiffness", voce.law.initial_stiffness(), "N m"),
         ("law_rms", voce.relative_rms, "1"),
         ("law_error", found.relative_error, "1"),
-        ("linear_error", linear_error, "1"),
-        ("asymptote_error", asymptote_error, "1"),
-        ("scale_error", scale_error, "1"),
         ("law_condition", voce.condition, "1"),
         (
             "saturation_undetermined",
-            flag(voce.saturation_undetermined),
+            flag(voce.saturation != Saturation::Determined),
             "1",
         ),
         (
@@ -292,14 +307,21 @@ fn write_results(out: &mut Output, found: &Bending) {
             found.curvature.last().copied().unwrap_or(0.0),
             "1/m",
         ),
-        ("largest_moment", largest_moment, "N"),
-        ("overhang", profile.length, "m"),
-        ("profile_rms", profile.rms, "m"),
-        ("profile_degree", profile.degree as f64, "1"),
-        ("profile_condition", profile.condition, "1"),
-        ("profile_monotone", flag(profile.monotone), "1"),
+        ("largest_moment", largest(&|s| s.largest()[1]), "N"),
+        ("specimens", found.specimens.len() as f64, "1"),
+        ("overhang", mean_and_deviation(&lengths)[0], "m"),
+        ("profile_rms", (squares / points).sqrt(), "m"),
+        ("profile_degree", largest(&|s| s.profile.degree as f64), "1"),
+        ("profile_condition", largest(&|s| s.profile.condition), "1"),
+        ("profile_monotone", flag(monotone), "1"),
     ];
     for (name, value, unit) in results {
         out.result(name, value, unit);
+    }
+    let parameters = ["linear_error", "asymptote_error", "scale_error"];
+    for (name, error) in parameters.iter().zip(found.parameter_error) {
+        if let Some(error) = error {
+            out.result(name, error, "1");
+        }
     }
 }

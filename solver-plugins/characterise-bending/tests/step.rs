@@ -109,6 +109,7 @@ fn plots_name_curves_that_are_there() {
     .unwrap();
     let plots = out.attributes["plots"].as_array().unwrap();
     assert_eq!(plots.len(), 4);
+    assert!(out.arrays.contains_key("curves/profile/curvature"));
     for series in plots.iter().flat_map(|p| p["series"].as_array().unwrap()) {
         let [x, y] = ["x", "y"].map(|a| &out.arrays[series[a].as_str().unwrap()]);
         assert_eq!(x.0, y.0);
@@ -120,6 +121,66 @@ fn plots_name_curves_that_are_there() {
         fragment.contains("# A fragment") && fragment.contains("bending:\n  positive: {"),
         "{fragment}"
     );
+}
+
+#[test]
+fn each_specimen_has_its_curves_and_their_spread_is_in_the_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let law = &BENDING[2];
+    let files: Vec<PathBuf> = [(1, 0.9), (2, 1.1)]
+        .iter()
+        .map(|(i, factor)| {
+            let [r0, r_inf, limit] = law.numbers;
+            let numbers = [factor * r0, factor * r_inf, limit];
+            let strip = PublishedBending { numbers, ..*law };
+            csv(folder.path(), &format!("s{i}.csv"), &strip, 0.02e-3, *i)
+        })
+        .collect();
+    let parameters = |files: &[PathBuf]| json!({"profiles": files, "areal_mass": law.areal_mass});
+    let out = run::<CharacteriseBending>(parameters(&files), &[], &[]).unwrap();
+    let one = run::<CharacteriseBending>(parameters(&files[..1]), &[], &[]).unwrap();
+    // Half the difference of two is the standard error of their mean: 10 %.
+    assert!((out.result("law_error") - 0.1).abs() < 0.015);
+    assert!(one.result("law_error") < 0.005);
+    assert_eq!(
+        (out.result("specimens"), one.result("specimens")),
+        (2.0, 1.0)
+    );
+    let lines = |out: &MemoryArtifact, plot: usize| {
+        let series = out.attributes["plots"][plot]["series"].as_array().unwrap();
+        series.len()
+    };
+    // Plots of the profile, of the curvature, of the moment.
+    assert_eq!([0, 1, 2].map(|p| lines(&out, p)), [4, 2, 3]);
+    assert_eq!([0, 1, 2].map(|p| lines(&one, p)), [2, 1, 2]);
+    assert!(out.arrays.contains_key("curves/profile_2/curvature"));
+}
+
+#[test]
+fn parameters_at_their_bounds_are_warned_of_and_have_no_error() {
+    let of = |numbers| {
+        let strip = PublishedBending {
+            numbers,
+            ..BENDING[1]
+        };
+        let coupon = coupon(&strip);
+        let inputs = [MemoryInput::new("profile", &coupon)];
+        run::<CharacteriseBending>(json!({"areal_mass": 0.44}), &inputs, &[]).unwrap()
+    };
+    let [r0, r_inf, limit] = BENDING[1].numbers;
+    // A constant stiffness, and a moment that is there before the strip bends.
+    for (numbers, says) in [
+        ([20.0 * r0, 0.0, limit], "use a longer overhang"),
+        ([r0, r_inf, 1e-3 * limit], "saturated already"),
+    ] {
+        let out = of(numbers);
+        assert_eq!(out.result("saturation_undetermined"), 1.0);
+        assert!(!out.results.contains_key("scale_error"));
+        let log = &out.log;
+        assert!(log.iter().any(|l| l.contains(says)), "{log:?}");
+    }
+    let out = of([r0, r_inf, limit]);
+    assert!(out.results.contains_key("scale_error"));
 }
 
 #[test]

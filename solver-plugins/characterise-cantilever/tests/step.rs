@@ -107,6 +107,11 @@ fn bad_overhangs_are_refused_with_file_and_line() {
             "o.csv:2: column 'overhang [mm]': 0.000097 m is not plausible",
         ),
         (
+            "overhang [mm],Angle [deg]\n120,7.1\n",
+            json!({"formula": "peirce"}),
+            "o.csv:1: the column 'Angle' is not one that is read; did you mean `angle [deg]`?",
+        ),
+        (
             "overhang [mm],angle [deg]\n200,7.1\n",
             json!({}),
             "o.csv:2: the standard's formula holds at 41.5 deg",

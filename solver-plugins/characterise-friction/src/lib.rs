@@ -66,7 +66,9 @@ impl Step for CharacteriseFriction {
         }
         let of = |f: fn(&Pull) -> f64| mean_and_deviation(&pulls.iter().map(f).collect::<Vec<_>>());
         let [dynamic, dynamic_deviation] = of(|p| p.dynamic_coefficient);
-        let [peak, peak_deviation] = of(|p| p.static_coefficient);
+        // Of the pulls that were recorded from before the window.
+        let peaks: Vec<f64> = pulls.iter().filter_map(|p| p.static_coefficient).collect();
+        let peak = (!peaks.is_empty()).then(|| mean_and_deviation(&peaks));
         out.curve("curves/mean/displacement", "m", &[p.from, p.to]);
         out.curve("curves/mean/coefficient", "1", &[dynamic; 2]);
         series.push(Series::new(
@@ -86,11 +88,14 @@ impl Step for CharacteriseFriction {
         out.file(
             "friction.yaml",
             &format!(
-                "# Dynamic coefficient from {} pulls, standard deviation {}; static peak {}.\n\
+                "# Dynamic coefficient from {} pulls, standard deviation {}{}.\n\
                  # A fragment: its line goes into `friction:` of a scene.\nfriction:\n  {}: {}\n",
                 pulls.len(),
                 significant(dynamic_deviation),
-                significant(peak),
+                peak.map_or_else(String::new, |p| format!(
+                    "; static peak {}",
+                    significant(p[0])
+                )),
                 p.pair,
                 significant(dynamic)
             ),
@@ -98,8 +103,10 @@ impl Step for CharacteriseFriction {
         out.attribute("pair", json!(p.pair));
         out.result("dynamic_coefficient", dynamic, "1");
         out.result("dynamic_deviation", dynamic_deviation, "1");
-        out.result("static_coefficient", peak, "1");
-        out.result("static_deviation", peak_deviation, "1");
+        if let Some([mean, deviation]) = peak {
+            out.result("static_coefficient", mean, "1");
+            out.result("static_deviation", deviation, "1");
+        }
         out.result("scatter", of(|p| p.scatter)[0], "1");
         out.result("repeats", pulls.len() as f64, "1");
         out.write(host)

@@ -86,3 +86,24 @@ fn what_is_missing_or_wrong_is_said() {
     );
     assert!(error(json!({"pulls": [], "normal_force": 5.0})).contains("`pulls` is empty"));
 }
+
+#[test]
+fn a_window_from_the_first_row_has_no_static_coefficient() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = pull(folder.path(), "p.csv", 0.4, 0.3, 1);
+    let of = |from: f64| {
+        let with = json!({"pulls": [path], "normal_force": 5.0, "from": from});
+        run::<CharacteriseFriction>(with, &[], &[]).unwrap()
+    };
+    let text = |out: &plyflow_surface::memory_host::MemoryArtifact| {
+        out.attributes["files"][0]["text"]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    };
+    let whole = of(0.0);
+    assert!(!whole.results.contains_key("static_coefficient"));
+    assert!(!text(&whole).contains("static"), "{}", text(&whole));
+    let later = of(0.1);
+    assert!(later.results.contains_key("static_coefficient") && text(&later).contains("static"));
+}

@@ -4,7 +4,10 @@ use plyflow_characterisation::Dimension;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Block, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
-use plyflow_characterisation::picture_frame::{Frame, LARGEST_OFFSET, Shear, Test, characterise};
+use plyflow_characterisation::picture_frame::{
+    Frame, LARGEST_OFFSET, LIMITS, Shear, Test, characterise,
+};
+use plyflow_characterisation::yarns::{MUCH_WORSE, Refused, Yarns};
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -32,11 +35,6 @@ const COLUMNS: [Column; 2] = [
 ];
 /// Points of a fitted curve.
 const POINTS: usize = 240;
-/// What `material-fabric` takes as the end of the fitted range (rad).
-const LIMITS: [f64; 2] = [
-    5.0 * std::f64::consts::PI / 180.0,
-    80.0 * std::f64::consts::PI / 180.0,
-];
 
 impl Step for CharacterisePictureFrame {
     const MANIFEST: &'static str = include_str!("../manifest.json");
@@ -59,11 +57,8 @@ impl Step for CharacterisePictureFrame {
             read_tests(host, &mut out, &frame, &p.positive, "positive", 1.0)?;
         let (negative, more) = read_tests(host, &mut out, &frame, &p.negative, "negative", -1.0)?;
         let shear = characterise(&positive, &negative, p.stitch, p.degree, p.maximum_angle)?;
-        if shear.yarns.value(0.5 * shear.limit) <= 0.0 {
-            host.log(
-                Log::Warn,
-                "the fitted shear force is not positive half-way: look at the data",
-            );
+        if let Some(refused) = &shear.refused {
+            warn(host, refused, &shear);
         }
         series.extend(more);
         write_fit(&mut out, &shear, !negative.is_empty(), series);
@@ -105,6 +100,34 @@ fn read_tests(
     Ok((tests, series))
 }
 
+/// Says what the material does not take, where that changes the law.
+fn warn(host: &Host, refused: &Refused, shear: &Shear) {
+    let rms = shear.yarns_rms;
+    let Refused {
+        degree,
+        rms: best,
+        why,
+        table_differs,
+    } = refused;
+    let text = match (table_differs, &shear.yarns) {
+        (Some([from, to]), _) => format!(
+            "no polynomial that was tried is one that material-fabric takes; the file has a `table`, which differs from \
+             the polynomial of degree {degree} between {:.1} and {:.1} deg, where that does not rise. Look at the data \
+             there: an offset or noise near 0, a load cell of the wrong sign, wrinkles? Of degree {degree} the material \
+             says: {why}",
+            from.to_degrees(),
+            to.to_degrees()
+        ),
+        (None, Yarns::Polynomial(p)) if rms > MUCH_WORSE * best => format!(
+            "the polynomial of degree {degree} follows the data better than the one of degree {} that is taken (residual \
+             {best:.3} and {rms:.3} N/m), but material-fabric does not take it: {why}",
+            p.coefficients.len() - 1
+        ),
+        _ => return,
+    };
+    host.log(Log::Warn, &text);
+}
+
 fn write_fit(out: &mut Output, shear: &Shear, both: bool, mut series: Vec<Series>) {
     let from = if both { -shear.limit } else { 0.0 };
     let angle: Vec<f64> = (0..=POINTS)
@@ -133,14 +156,19 @@ fn write_file(
     template: Option<&Template>,
     p: &Parameters,
 ) -> Result<(), StepError> {
-    let coefficients: Vec<Value> = shear
-        .yarns
-        .coefficients
-        .iter()
-        .map(|c| json!(quantity(*c, 1.0, "N/m")))
-        .collect();
-    let limit = shear.limit.clamp(LIMITS[0], LIMITS[1]);
-    let law = json!({"coefficients": coefficients, "limit": quantity(limit, 1.0, "rad")});
+    let all = |values: &[f64], unit: &str| -> Vec<Value> {
+        let texts = values.iter().map(|v| quantity(*v, 1.0, unit));
+        texts.map(Value::from).collect()
+    };
+    let law = match &shear.yarns {
+        Yarns::Polynomial(p) => {
+            let limit = shear.limit.clamp(LIMITS[0], LIMITS[1]);
+            json!({"coefficients": all(&p.coefficients, "N/m"), "limit": quantity(limit, 1.0, "rad")})
+        }
+        Yarns::Table { angles, forces } => {
+            json!({"table": {"angles": all(angles, "rad"), "forces": all(forces, "N/m")}})
+        }
+    };
     let stitch = shear.stitch.map(|s| {
         let angles = s.stitch.angles.map(|g| quantity(g, 1.0, "rad"));
         let forces = [0.0, s.stitch.peak, 0.0].map(|f| quantity(f, 1.0, "N/m"));
@@ -161,10 +189,14 @@ fn write_file(
 }
 
 fn write_results(out: &mut Output, shear: &Shear, both: bool) {
-    for (n, c) in shear.yarns.coefficients.iter().enumerate().skip(1) {
-        out.result(&format!("coefficient.{n}"), *c, "N/m");
+    if let Yarns::Polynomial(p) = &shear.yarns {
+        for (n, c) in p.coefficients.iter().enumerate().skip(1) {
+            out.result(&format!("coefficient.{n}"), *c, "N/m");
+        }
+        out.result("degree", (p.coefficients.len() - 1) as f64, "1");
     }
-    out.result("degree", (shear.yarns.coefficients.len() - 1) as f64, "1");
+    let table = matches!(shear.yarns, Yarns::Table { .. });
+    out.result("table", f64::from(u8::from(table)), "1");
     out.result("limit", shear.limit, "rad");
     out.result("condition", shear.condition, "1");
     out.result("yarns_rms", shear.yarns_relative_rms, "1");

@@ -146,7 +146,44 @@ fn the_least_template_of_the_guide_becomes_a_fabric_with_the_fitted_shear() {
     let value = material(&run::<CharacterisePictureFrame>(parameters, &[], &[]).unwrap());
     assert_eq!(value["name"], "My fabric");
     assert_eq!(value["with"]["fibre_modulus"], "3 GPa");
+    assert_eq!(value["with"]["bending"]["families"], "opposite");
     assert!(value["with"]["shear"]["coefficients"].is_array());
+}
+
+#[test]
+fn where_no_polynomial_is_taken_a_table_is_written_with_a_warning() {
+    // Up to a peak at 0.5 rad (29 deg), and down to a half: no polynomial of degree 9 rises over it.
+    fn peak(g: f64) -> f64 {
+        let a = g.abs();
+        if a < 0.5 {
+            200.0 * a
+        } else {
+            150.0 - 100.0 * a
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let up = csv(folder.path(), "up.csv", peak, 1.0, 57.0);
+    let mut parameters = with(&[up], &[], false, "woven-38616");
+    parameters["degree"] = json!(9);
+    let out = run::<CharacterisePictureFrame>(parameters, &[], &[]).unwrap();
+    assert_eq!(out.result("table"), 1.0);
+    assert!(!out.results.contains_key("degree"));
+    let warned = |l: &String| l.contains("`table`") && l.contains(" and 57.0 deg");
+    assert!(out.log.iter().any(warned), "{:?}", out.log);
+    let value = material(&out);
+    let shear = value["with"]["shear"].as_object().unwrap();
+    assert_eq!(shear.len(), 1);
+    let column = |name: &str, dimension| -> Vec<f64> {
+        let texts = shear["table"][name].as_array().unwrap().iter();
+        texts
+            .map(|v| parse_quantity(v.as_str().unwrap(), dimension).unwrap())
+            .collect()
+    };
+    let forces = column("forces", Dimension::ForcePerLength);
+    let angles = column("angles", Dimension::Angle);
+    assert!(forces.windows(2).all(|f| f[0] < f[1]), "{forces:?}");
+    assert!(angles.windows(2).all(|g| g[0] < g[1]), "{angles:?}");
+    assert!((angles[angles.len() - 1].to_degrees() - 57.0).abs() < 0.01);
 }
 
 #[test]

@@ -105,22 +105,28 @@ impl Curve {
         let square =
             |i: usize| (self.place[i][0] - p[0]).powi(2) + (self.place[i][1] - p[1]).powi(2);
         let (mut nearest, mut least) = (0, f64::INFINITY);
-        // The nearest station within a window, which moves along while the nearest is its last.
-        let (mut from, mut to) = (near.saturating_sub(WINDOW), (near + WINDOW).min(n - 1));
-        loop {
-            for i in from..=to {
+        let mut search = |stations: std::ops::RangeInclusive<usize>| {
+            for i in stations {
                 let d = square(i);
                 if d < least {
                     (nearest, least) = (i, d);
                 }
             }
-            if nearest == to && to < n - 1 {
-                (from, to) = (to, (to + WINDOW).min(n - 1));
-            } else if nearest == from && from > 0 && from < near {
-                (from, to) = (from.saturating_sub(WINDOW), from);
-            } else {
-                break;
-            }
+            nearest
+        };
+        // The nearest station within a window, which grows to one side while the nearest is its last there.
+        let (first, mut to) = (near.saturating_sub(WINDOW), (near + WINDOW).min(n - 1));
+        let mut found = search(first..=to);
+        while found == to && to < n - 1 {
+            let from = to;
+            to = (to + WINDOW).min(n - 1);
+            found = search(from..=to);
+        }
+        let mut from = first;
+        while found == from && from > 0 {
+            let last = from;
+            from = from.saturating_sub(WINDOW);
+            found = search(from..=last);
         }
         let mut s = nearest as f64 * h;
         for _ in 0..4 {
@@ -187,7 +193,7 @@ impl Curve {
 /// Fits; `start`: unknowns of a lower degree and the length found with them.
 pub fn fit(
     grid: &Grid,
-    profiles: &[Profile],
+    profile: &Profile,
     degree: usize,
     choice: &Choice,
     start: Option<&(Vec<f64>, f64)>,
@@ -196,12 +202,12 @@ pub fn fit(
     let basis = basis(grid, terms);
     let (mut unknowns, mut length) = match start {
         Some((unknowns, length)) => (unknowns.clone(), *length),
-        None => guess(grid, &profiles[0], terms)?,
+        None => guess(grid, profile, terms)?,
     };
     unknowns.resize(terms, 0.0);
     let given = choice.overhang;
     length = given.unwrap_or(length);
-    let (mut now, mut arc) = misfit(&curve(grid, &basis, &unknowns, length), profiles);
+    let (mut now, mut arc) = misfit(&curve(grid, &basis, &unknowns, length), profile);
     let mut left = squares(&now);
     let mut solved = None;
     for _ in 0..ITERATIONS {
@@ -225,7 +231,7 @@ pub fn fit(
                 .map(|(b, d)| b + factor * d)
                 .collect();
             let stretched = length + factor * (longer - length);
-            let (feet, reached) = misfit(&curve(grid, &basis, &tried, stretched), profiles);
+            let (feet, reached) = misfit(&curve(grid, &basis, &tried, stretched), profile);
             let sum = squares(&feet);
             // The length follows the last point, so the sum may rise a little on the way.
             if sum <= left * 1.05 + 1e-20 || factor < 0.05 {
@@ -290,19 +296,15 @@ fn squares(feet: &[Foot]) -> f64 {
     feet.iter().map(|f| f.distance * f.distance).sum()
 }
 
-/// Feet of all points, and the mean over the profiles of the arc at the last point.
-fn misfit(curve: &Curve, profiles: &[Profile]) -> (Vec<Foot>, f64) {
-    let (mut feet, mut arcs) = (Vec::new(), 0.0);
-    for p in profiles {
-        let mut near = 0;
-        for (x, y) in p.x.iter().zip(&p.deflection) {
-            let foot = curve.foot([*x, *y], near);
-            near = foot.station;
-            feet.push(foot);
-        }
-        arcs += feet.last().map_or(0.0, |f: &Foot| f.arc);
+/// Feet of all points, and the arc at the last.
+fn misfit(curve: &Curve, profile: &Profile) -> (Vec<Foot>, f64) {
+    let mut feet: Vec<Foot> = Vec::with_capacity(profile.x.len());
+    for (x, y) in profile.x.iter().zip(&profile.deflection) {
+        let near = feet.last().map_or(0, |f| f.station);
+        feet.push(curve.foot([*x, *y], near));
     }
-    (feet, arcs / profiles.len() as f64)
+    let arc = feet.last().map_or(0.0, |f| f.arc);
+    (feet, arc)
 }
 
 /// Unknowns and length from the angles of chords between points spread over the profile.
@@ -344,5 +346,23 @@ pub fn stations(grid: &Grid, unknowns: &[f64], length: f64) -> Stations {
         x,
         deflection: shape.place.iter().map(|p| p[1]).collect(),
         curvature: shape.curvature,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_foot_of_a_point_is_found_wherever_the_search_begins() {
+        let grid = Grid::new();
+        let straight = curve(&grid, &basis(&grid, 2), &[0.0; 2], 1.0);
+        let stations = grid.at.len() - 1;
+        let at = grid.at[stations / 5];
+        // Also from where the nearest station is the first or the last of a window.
+        for near in 0..=stations {
+            let foot = straight.foot([at, 0.01], near);
+            assert!((foot.arc - at).abs() < 1e-12, "{near}: {}", foot.arc);
+        }
     }
 }

@@ -9,21 +9,17 @@ pub const LEAST_DEGREE: usize = 3;
 
 pub fn fit(
     grid: &Grid,
-    profiles: &[Profile],
+    profile: &Profile,
     degree: usize,
     choice: &Choice,
 ) -> Result<ProfileFit, String> {
-    let reach = profiles
-        .iter()
-        .flat_map(|p| &p.x)
-        .fold(0.0f64, |m, x| m.max(*x));
+    let reach = profile.x.iter().fold(0.0f64, |m, x| m.max(*x));
     if reach <= 0.0 {
         return Err("no point of the profile lies outside the clamp".into());
     }
     let terms = degree - 1;
-    let points: Vec<[f64; 2]> = profiles
-        .iter()
-        .flat_map(|p| p.x.iter().zip(&p.deflection).map(|(x, y)| [x / reach, *y]))
+    let points: Vec<[f64; 2]> = (profile.x.iter().zip(&profile.deflection))
+        .map(|(x, y)| [x / reach, *y])
         .collect();
     let matrix = DMatrix::from_fn(points.len(), terms, |i, j| {
         let t = points[i][0];

@@ -214,7 +214,7 @@ pub const RIPPLE: f64 = 0.02;
 /// Misfits below this part of the length do not ask for a higher degree.
 const FLOOR: f64 = 1e-7;
 
-/// Fits all points of the profiles at once.
+/// Fits the profile of one strip.
 ///
 /// Without a given degree: of the degrees from the least to `maximum_degree` whose curvature is positive and
 /// falls from the clamp to the tip (`trim` left out at both ends; what gravity does to any strip whose
@@ -224,12 +224,12 @@ const FLOOR: f64 = 1e-7;
 /// # Errors
 /// When there are fewer points than unknowns, the given overhang is shorter than the profile or the fit does
 /// not converge.
-pub fn fit(profiles: &[Profile], choice: &Choice) -> Result<ProfileFit, String> {
+pub fn fit(profile: &Profile, choice: &Choice) -> Result<ProfileFit, String> {
     let least = match choice.method {
         Method::TangentAngle => angle::LEAST_DEGREE,
         Method::Deflection => deflection::LEAST_DEGREE,
     };
-    let points: usize = profiles.iter().map(|p| p.x.len()).sum();
+    let points = profile.x.len();
     let (from, to) = match choice.degree {
         Some(d) if d < least => {
             return Err(format!("a degree of {d} is too low; the least is {least}"));
@@ -243,9 +243,9 @@ pub fn fit(profiles: &[Profile], choice: &Choice) -> Result<ProfileFit, String> 
     let mut start: Option<(Vec<f64>, f64)> = None;
     for degree in least..=to {
         let found = match choice.method {
-            Method::TangentAngle => angle::fit(&grid, profiles, degree, choice, start.as_ref()),
+            Method::TangentAngle => angle::fit(&grid, profile, degree, choice, start.as_ref()),
             Method::Deflection if degree < from => continue,
-            Method::Deflection => deflection::fit(&grid, profiles, degree, choice),
+            Method::Deflection => deflection::fit(&grid, profile, degree, choice),
         };
         let found = match found {
             Ok(found) => found,
