@@ -10,7 +10,7 @@ pub const USAGE: u8 = 2;
 pub const INVALID: u8 = 3;
 /// At least one step failed; the rest ran as the failure policy says.
 pub const STEP_FAILED: u8 = 4;
-/// A stated expectation was missed (only with `--check`).
+/// A stated expectation was missed or could not be judged (only with `--check`).
 pub const EXPECTATION: u8 = 5;
 /// Another process runs this workflow.
 pub const LOCKED: u8 = 6;

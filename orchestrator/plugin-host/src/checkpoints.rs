@@ -2,12 +2,18 @@
 
 use crate::emitter::Emitter;
 use crate::process;
+use camino::Utf8Path;
 use plyflow_model::job::{self, Cost, LogLevel};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// The cost up to the last checkpoint, beside the plugin's files.
 const COST: &str = "plyflow-cost.json";
+
+/// What a step that was stopped has cost up to its last checkpoint in this folder; `None` when there is none.
+pub fn cost_so_far(folder: &Utf8Path) -> Option<Cost> {
+    serde_json::from_slice(&std::fs::read(folder.join(COST)).ok()?).ok()
+}
 
 /// Checkpoints of the running step.
 pub(crate) struct Checkpoints<'a> {
@@ -45,9 +51,9 @@ impl<'a> Checkpoints<'a> {
                 emitter.log(LogLevel::Warn, &text);
                 return String::new();
             }
-            let cost = std::fs::read(job.folder.join(COST)).ok();
-            let cost = cost.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-            let _ = self.earlier.set(cost.unwrap_or_default());
+            let _ = self
+                .earlier
+                .set(cost_so_far(&job.folder).unwrap_or_default());
             job.folder.to_string()
         })
     }
@@ -121,6 +127,7 @@ mod tests {
         assert_eq!(first.folder(&emitter), folder.to_str().unwrap());
         assert!(first.due());
         assert_eq!(first.with_earlier(cost(1.0, 2.0, 5)), cost(1.0, 2.0, 5));
+        assert_eq!(cost_so_far(&often.folder), None);
         first.saved(&emitter);
 
         let rarely = job(3600.0);
@@ -128,6 +135,7 @@ mod tests {
         second.folder(&emitter);
         assert!(!second.due());
         let noted = *second.earlier.get().unwrap();
+        assert_eq!(cost_so_far(&often.folder), Some(noted));
         assert!(noted.wall_seconds > 0.0 && noted.cpu_seconds > 0.0 && noted.peak_memory > 0);
         let sum = second.with_earlier(cost(1.0, 2.0, 5));
         assert_eq!(sum.wall_seconds, 1.0 + noted.wall_seconds);

@@ -17,6 +17,7 @@ mod services;
 mod worker;
 
 pub use catalog::{Describer, PluginCatalog};
+pub use checkpoints::cost_so_far;
 pub use describe::{Description, describe, describe_main};
 pub use load::{LoadError, Plugin};
 pub use worker::{run_job, worker_main};

@@ -81,9 +81,12 @@ pub struct Way {
     pub counts: Option<[f64; 4]>,
     /// Whether it measures the others.
     pub is_reference: bool,
+    /// What it is measured by, and whose costs its own is held against: the reference of this comparison, the first of those that have it. Only ways of one
+    /// are held against each other.
+    pub measured_by: String,
     /// When it began, if that was late (s): what came before is not in its cost.
     pub start_time: Option<f64>,
-    /// By [`Measure::ALL`], whether nothing cheaper is as good. One that began late is never on the front, unless it is the reference.
+    /// By [`Measure::ALL`], whether nothing cheaper is as good. One that began late is never on the front.
     pub on_front: [bool; 7],
 }
 
@@ -111,7 +114,7 @@ impl Way {
 
     /// Whether its cost is that of an answer.
     pub(crate) fn is_whole(&self) -> bool {
-        self.start_time.is_none() || self.is_reference
+        self.start_time.is_none()
     }
 }
 
@@ -143,6 +146,24 @@ impl Ways {
         }
     }
 
+    /// The ways of each reference by themselves, in the order of the comparisons.
+    #[must_use]
+    pub fn by_reference(&self) -> Vec<(&str, Self)> {
+        let mut groups: Vec<(&str, Self)> = Vec::new();
+        for way in &self.list {
+            let of = way.measured_by.as_str();
+            let at = groups.iter().position(|g| g.0 == of);
+            let at = at.unwrap_or_else(|| {
+                let list = Vec::new();
+                let of_the_whole = self.of_the_whole;
+                groups.push((of, Self { list, of_the_whole }));
+                groups.len() - 1
+            });
+            groups[at].1.list.push(way.clone());
+        }
+        groups
+    }
+
     /// The front of a measure, the cheapest first: whose error nothing cheaper has or is below.
     fn mark_fronts(&mut self) {
         for (m, measure) in Measure::ALL.into_iter().enumerate() {
@@ -168,8 +189,8 @@ impl Ways {
     }
 }
 
-/// The ways of all comparisons with a reference; one of equal cost and errors is told once. Where there is none, those of the comparison
-/// whose fine runs cost most. Costs are those of the runs' records, as `comparison` reports them.
+/// The ways of all comparisons with a reference, those of one reference together; one of equal cost and errors is told once. Where there is none,
+/// those of the comparison whose fine runs cost most. Costs are those of the runs' records, as `comparison` reports them.
 #[must_use]
 pub fn ways(input: &ReportInput) -> Ways {
     let compared = (input.instances.iter()).filter(|i| i.record.kind == "comparison");
@@ -178,20 +199,45 @@ pub fn ways(input: &ReportInput) -> Ways {
     let of_the_whole = !with.is_empty();
     if !of_the_whole {
         let total = |i: &Instance| value(i, TOTAL).unwrap_or(0.0);
-        let refined = compared.filter(|i| value(i, "defect_error.global").is_some());
+        // Told whenever something was measured, also where nobody has a defect.
+        let refined = compared.filter(|i| value(i, "missed_wrinkles.global").is_some());
         with.extend(refined.max_by(|a, b| total(a).total_cmp(&total(b))));
     }
     let named = with.len() > 1;
-    let mut list: Vec<Way> = with.into_iter().flat_map(|i| of(i, named)).collect();
-    let first = |w: &Way| w.errors[0].unwrap_or(f64::INFINITY);
-    list.sort_by(|a, b| {
-        let by_cost = a.cpu_seconds.total_cmp(&b.cpu_seconds);
-        by_cost.then(first(a).total_cmp(&first(b)))
-    });
-    list.dedup_by(|a, b| a.cpu_seconds == b.cpu_seconds && a.errors == b.errors);
-    let mut ways = Ways { list, of_the_whole };
-    ways.mark_fronts();
-    ways
+    // A reference is told by what it cost: a run has the same cost in whatever it takes part.
+    let run = |i: &Instance| {
+        let told = ["cost.reference.cpu_seconds", "start_time.reference"].map(|n| value(i, n));
+        told.map(|v| v.map(f64::to_bits))
+    };
+    let mut groups: Vec<(_, Vec<&Instance>)> = Vec::new();
+    for instance in with {
+        match groups.iter_mut().find(|g| g.0 == run(instance)) {
+            Some(group) => group.1.push(instance),
+            None => groups.push((run(instance), vec![instance])),
+        }
+    }
+    let one = |(_, instances): &(_, Vec<&Instance>)| {
+        let measured_by = instances[0].label();
+        let ways = |i: &&Instance| of(i, named, &measured_by);
+        let mut list: Vec<Way> = instances.iter().flat_map(ways).collect();
+        let first = |w: &Way| w.errors[0].unwrap_or(f64::INFINITY);
+        list.sort_by(|a, b| {
+            let by_cost = a.cpu_seconds.total_cmp(&b.cpu_seconds);
+            by_cost.then(first(a).total_cmp(&first(b)))
+        });
+        list.dedup_by(|a, b| a.cpu_seconds == b.cpu_seconds && a.errors == b.errors);
+        if groups.len() > 1 {
+            let reference = list.iter_mut().filter(|w| w.is_reference);
+            reference.for_each(|w| w.name = format!("{measured_by}: reference"));
+        }
+        let mut ways = Ways { list, of_the_whole };
+        ways.mark_fronts();
+        ways.list
+    };
+    Ways {
+        list: groups.iter().flat_map(one).collect(),
+        of_the_whole,
+    }
 }
 
 const TOTAL: &str = "cost.total.cpu_seconds";
@@ -202,7 +248,7 @@ fn value(instance: &Instance, name: &str) -> Option<f64> {
 }
 
 /// The ways of one comparison, `named` after it or not.
-fn of(instance: &Instance, named: bool) -> Vec<Way> {
+fn of(instance: &Instance, named: bool, measured_by: &str) -> Vec<Way> {
     let value = |name: &str| value(instance, name);
     let reference = value("cost.reference.cpu_seconds");
     let Some(whole) = reference.or(value(TOTAL)).filter(|w| *w > 0.0) else {
@@ -240,6 +286,7 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
             counts: (counts.iter().all(Option::is_some))
                 .then(|| counts.map(Option::unwrap_or_default)),
             is_reference: suffix.is_none(),
+            measured_by: measured_by.to_owned(),
             start_time: value(&format!("start_time.{model}")),
             on_front: [false; 7],
         })
@@ -266,12 +313,14 @@ fn of(instance: &Instance, named: bool) -> Vec<Way> {
     ways.into_iter().flatten().collect()
 }
 
-/// For each of the errors: the cheapest way with no more, if it is not the reference alone.
+/// For each of the errors: the cheapest way with no more, if it is not the reference alone. Of one reference's ways.
 pub(crate) fn advice(ways: &Ways, targets: &[f64]) -> Vec<String> {
     let one = |target: &f64| {
         let percent = 100.0 * target;
-        let found = (ways.list.iter())
-            .find(|w| w.is_whole() && w.errors[0].is_some_and(|e| e <= *target))?;
+        let good = |w: &&Way| w.errors[0].is_some_and(|e| e <= *target);
+        let found = ways.list.iter().find(|w| w.is_whole() && good(w));
+        // A reference that began late is one all the same.
+        let found = found.or(ways.list.iter().find(|w| w.is_reference && good(w)))?;
         let share = 100.0 * found.share;
         Some(if !found.is_reference {
             format!(
@@ -327,7 +376,7 @@ mod tests {
             workflow: "w".into(),
             description: None,
             file: "w.yaml".into(),
-            command: "plyflow run w.yaml".into(),
+            given: "w.yaml".into(),
             program: "plyflow".into(),
             fingerprint: "f".into(),
             instances,
@@ -346,6 +395,7 @@ mod tests {
             ("cost.reference.cpu_seconds", 1000.0),
             ("cost.reference.wall_seconds", 500.0),
             ("defect_error.global", 0.8),
+            ("missed_wrinkles.global", 1.0),
         ]
     }
 
@@ -408,6 +458,7 @@ mod tests {
                 (TOTAL, total),
                 ("cost.total.wall_seconds", total),
                 ("defect_error.global", 0.8),
+                ("missed_wrinkles.global", 0.0),
                 ("defect_error.other.drape", drape),
                 ("position_error.other.drape", 0.002),
             ]
@@ -468,12 +519,92 @@ mod tests {
                 ("coarse run alone", None, true),
                 ("late", Some(0.6), false),
                 ("coarse run and zones", None, true),
-                ("reference", Some(0.7), true),
+                ("reference", Some(0.7), false),
             ]
         );
-        let advice = advice(&ways, &[0.1, 0.05]);
-        assert!(advice[0].contains("coarse run and zones"), "{advice:?}");
-        assert!(advice[1].contains("none but the reference"), "{advice:?}");
+        let told = advice(&ways, &[0.1, 0.05]);
+        assert!(told[0].contains("coarse run and zones"), "{told:?}");
+        assert!(told[1].contains("none but the reference"), "{told:?}");
+        // Also where the part of a process that it did cost less than the zones.
+        let cheap = run.iter_mut().find(|r| r.0 == "cost.reference.cpu_seconds");
+        cheap.unwrap().1 = 60.0;
+        let cheap = super::ways(&input(vec![comparison("late", &run)]));
+        let zones = cheap.list.iter().find(|w| w.model == "total").unwrap();
+        assert!(zones.on_front[0]);
+        assert_eq!(
+            advice(&cheap, &[0.1])[0].split(" (").next(),
+            told[0].split(" (").next()
+        );
+    }
+
+    #[test]
+    fn ways_of_different_references_are_not_held_against_each_other() {
+        let of = |whole: f64, total: f64, error: f64| {
+            let mut run = costs(10.0, total);
+            run.iter_mut()
+                .filter(|r| r.0 == "cost.reference.cpu_seconds")
+                .for_each(|r| r.1 = whole);
+            run.push(("defect_error", error));
+            run
+        };
+        let ways = ways(&input(vec![
+            comparison("two", &of(9000.0, 700.0, 0.04)),
+            comparison("four", &of(600.0, 100.0, 0.05)),
+            comparison("two_s4", &of(9000.0, 800.0, 0.03)),
+        ]));
+        let told: Vec<(&str, Vec<(&str, bool)>)> = (ways.by_reference().into_iter())
+            .map(|(of, _)| {
+                let own = ways.list.iter().filter(|w| w.measured_by == of);
+                (of, own.map(|w| (&w.name[..], w.on_front[0])).collect())
+            })
+            .collect();
+        let expected = [
+            (
+                "two",
+                vec![
+                    ("two: coarse run alone", true),
+                    ("two: coarse run and zones", true),
+                    ("two_s4: coarse run and zones", true),
+                    ("two: reference", true),
+                ],
+            ),
+            (
+                "four",
+                vec![
+                    ("four: coarse run alone", true),
+                    ("four: coarse run and zones", true),
+                    ("four: reference", true),
+                ],
+            ),
+        ];
+        assert_eq!(told, expected);
+        let [two, four] = [0, 1].map(|k| advice(&ways.by_reference()[k].1, &[0.05]));
+        assert!(
+            two[0].contains("two: coarse run and zones (7.8 %"),
+            "{two:?}"
+        );
+        assert!(
+            four[0].contains("four: coarse run and zones (16.7 %"),
+            "{four:?}"
+        );
+    }
+
+    #[test]
+    fn zones_without_a_defect_are_told_beside_each_other_too() {
+        let run = [
+            ("cost.global.cpu_seconds", 10.0),
+            ("cost.global.wall_seconds", 10.0),
+            (TOTAL, 50.0),
+            ("cost.total.wall_seconds", 50.0),
+            ("missed_wrinkles.global", 0.0),
+            ("false_wrinkles.global", 0.0),
+            ("missed_bridging.global", 0.0),
+            ("false_bridging.global", 0.0),
+            ("position_error.global", 1e-4),
+        ];
+        let ways = ways(&input(vec![comparison("level", &run)]));
+        let names: Vec<&str> = ways.list.iter().map(|w| w.name.as_str()).collect();
+        assert_eq!(names, ["coarse run alone", "coarse run and zones"]);
     }
 
     #[test]

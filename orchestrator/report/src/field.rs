@@ -103,17 +103,13 @@ impl Field {
                 .iter()
                 .chain(study.locals.iter().flat_map(|l| &l.plies))
         };
-        let mut range: Option<[f64; 2]> = None;
-        for v in plies().filter_map(|p| self.stored(p)).flatten() {
-            let [a, b] = range.unwrap_or([*v, *v]);
-            range = Some([a.min(*v), b.max(*v)]);
-        }
-        let values = plies().filter_map(|p| self.stored(p)).flatten().copied();
+        let values = || plies().filter_map(|p| self.stored(p)).flatten().copied();
+        let range = range_of(values());
         let (factor, _) = shown(self.unit());
         let limits = self.limits(study);
         let scale = match self {
             Self::Shear => {
-                let end = end_of_scale(values, 0.995, 0.02, factor);
+                let end = end_of_scale(values(), 0.995, 0.02, factor);
                 Scale {
                     palette: Palette::BlueRed,
                     low: -end,
@@ -121,7 +117,7 @@ impl Field {
                 }
             }
             Self::Deflection => {
-                let end = end_of_scale(values, 1.0, LEAST_DEFLECTION, factor);
+                let end = end_of_scale(values(), 1.0, LEAST_DEFLECTION, factor);
                 Scale {
                     palette: Palette::PurpleOrange,
                     low: -end,
@@ -130,7 +126,7 @@ impl Field {
             }
             Self::Curvature => {
                 // Crests of the finest mesh are narrow; a scale that shows their peaks leaves the part pale.
-                let end = end_of_scale(values, 0.985, 10.0, factor);
+                let end = end_of_scale(values(), 0.985, 10.0, factor);
                 Scale {
                     palette: Palette::PurpleOrange,
                     low: -end,
@@ -140,7 +136,8 @@ impl Field {
             Self::Distance => {
                 // Edges that hang in the air stand centimetres off; a scale that shows them hides all else.
                 let threshold = limits.first().copied().unwrap_or(1e-3);
-                let end = end_of_scale(values, 0.995, 2.0 * threshold, factor).min(8.0 * threshold);
+                let end =
+                    end_of_scale(values(), 0.995, 2.0 * threshold, factor).min(8.0 * threshold);
                 Scale {
                     palette: Palette::Viridis,
                     low: 0.0,
@@ -157,6 +154,14 @@ impl Field {
             limits,
         })
     }
+}
+
+/// Smallest and largest of some values; `None` when there is none.
+fn range_of(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    values.fold(None, |range, v| {
+        let [a, b] = range.unwrap_or([v, v]);
+        Some([a.min(v), b.max(v)])
+    })
 }
 
 /// A colour scale with what it must tell.
@@ -287,6 +292,20 @@ impl Legend {
 
     /// What the bar is about, for the text under it.
     pub(crate) fn note(&self) -> Markup {
+        self.note_over(self.range)
+    }
+
+    /// The same where only these plies are shown, of all that share the scale.
+    pub(crate) fn note_of(&self, plies: &[Ply]) -> Markup {
+        let is = |o: &&Other| o.title == self.title && o.unit == self.si;
+        let values = plies.iter().filter_map(|p| match self.field {
+            Some(field) => field.stored(p),
+            None => p.others.iter().find(is).map(|o| o.values.as_slice()),
+        });
+        self.note_over(range_of(values.flatten().copied()).unwrap_or(self.range))
+    }
+
+    fn note_over(&self, range: [f64; 2]) -> Markup {
         let (factor, unit) = shown(&self.si);
         let Scale { low, high, .. } = self.scale;
         // No more digits than the scale can show.
@@ -294,8 +313,8 @@ impl Legend {
         let value = |v: f64| number((v * factor / step).round() * step, 3);
         html! {
             p class="note" {
-                @if unit.is_empty() { "Values" } @else { b { (unit) } "; values" } " from " (value(self.range[0])) " to " (value(self.range[1]))
-                @if self.range[0] < low || self.range[1] > high { " (colours end where the bar ends)" }
+                @if unit.is_empty() { "Values" } @else { b { (unit) } "; values" } " from " (value(range[0])) " to " (value(range[1]))
+                @if range[0] < low || range[1] > high { " (colours end where the bar ends)" }
                 ". " @if let Some(field) = self.field { (field.explanation()) } @else { "Plies that do not have it are grey." }
             }
         }

@@ -12,8 +12,8 @@ pub struct ReportInput {
     pub description: Option<String>,
     /// Its file, as the user gave it.
     pub file: Utf8PathBuf,
-    /// The command that makes these results again.
-    pub command: String,
+    /// The workflow file with the options that it was asked for with, as one types them behind a command.
+    pub given: String,
     /// This program and its version.
     pub program: String,
     /// Names the content of the report: equal fingerprints, equal content. See
@@ -27,6 +27,13 @@ pub struct ReportInput {
     pub failures: Vec<(String, String)>,
     /// Number of instances that are known and did not run.
     pub not_run: usize,
+}
+
+impl ReportInput {
+    /// A command on this workflow as one types it: `plyflow run workflow.yaml --set ..`.
+    pub(crate) fn command(&self, name: &str) -> String {
+        format!("plyflow {name} {}", self.given)
+    }
 }
 
 /// One finished step instance.
@@ -68,7 +75,7 @@ pub struct Expectation {
     pub item: Vec<String>,
     /// Name of the result.
     pub result: String,
-    /// Unit of the result; empty when the result is absent.
+    /// Unit of the result.
     pub unit: String,
     /// Value found; absent when the step did not report it.
     pub got: Option<f64>,
@@ -82,6 +89,29 @@ pub struct Expectation {
     pub maximum: Option<f64>,
     /// Where the expectation comes from.
     pub source: Option<String>,
-    /// Whether it is met.
+    /// Whether it is met; of no meaning when nothing was found.
     pub met: bool,
+}
+
+impl Expectation {
+    /// How it fared.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match (self.got, self.met) {
+            (None, _) => Verdict::NotJudged,
+            (_, true) => Verdict::Met,
+            (_, false) => Verdict::Missed,
+        }
+    }
+}
+
+/// How an expectation fared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// What was found is as expected.
+    Met,
+    /// It is not.
+    Missed,
+    /// There is no value: its step has not run, or has not reported it.
+    NotJudged,
 }

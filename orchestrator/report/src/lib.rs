@@ -7,6 +7,7 @@
 //! unknown kinds get a page with their steps, results and costs.
 
 mod colour;
+mod comparison;
 mod fidelity;
 mod field;
 mod input;
@@ -30,7 +31,7 @@ mod verdict;
 mod view;
 
 pub use fidelity::{COUNTS, Measure, Way, Ways, ways};
-pub use input::{Expectation, Instance, ReportInput};
+pub use input::{Expectation, Instance, ReportInput, Verdict};
 pub use summary::summary;
 
 use camino::{Utf8Path, Utf8PathBuf};
@@ -43,6 +44,9 @@ const LARGEST: usize = 4_500_000;
 
 /// Resolutions of the pictures that are tried, the finest first.
 const SHARPNESS: [f64; 6] = [1.6, 1.2, 0.8, 0.5, 0.35, 0.25];
+
+/// Below this the page says that it shows less than the artifacts have.
+const COARSE: f64 = 0.8;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -66,14 +70,7 @@ pub enum ReportError {
 /// # Errors
 /// When the file cannot be written or a picture not be encoded.
 pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportError> {
-    let material = Material::read(input, true);
-    let mut page = String::new();
-    for sharp in SHARPNESS {
-        page = page::page(input, &material, Sharpness(sharp)).map_err(ReportError::Picture)?;
-        if page.len() <= LARGEST {
-            break;
-        }
-    }
+    let page = drawn(input, &mut Material::read(input, true)).map_err(ReportError::Picture)?;
     let wrong = |source| ReportError::Write {
         path: out.to_owned(),
         source,
@@ -89,6 +86,26 @@ pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportEr
         wrong(e)
     })?;
     Ok(page.len() as u64)
+}
+
+/// The page with the finest pictures for which there is room.
+fn drawn(input: &ReportInput, material: &mut Material) -> Result<String, String> {
+    let (mut sharp, mut size) = (Sharpness(SHARPNESS[0]), 0);
+    let mut in_full = 0;
+    for tried in SHARPNESS {
+        sharp = Sharpness(tried);
+        let page = page::page(input, material, sharp, in_full)?;
+        size = page.len();
+        if size <= LARGEST {
+            return Ok(page);
+        }
+        in_full = in_full.max(size);
+    }
+    let [size, bound] = [size, LARGEST].map(|n| units::bytes(n as u64));
+    material.problems.push(format!(
+        "this page of {size} is larger than {bound} even with its coarsest pictures"
+    ));
+    page::page(input, material, sharp, in_full)
 }
 
 /// Whether the report at `path` is the one of a fingerprint: then it need not be written again. Reads only the

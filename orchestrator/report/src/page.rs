@@ -14,6 +14,7 @@ pub(crate) use tables::{expected_text, got_text};
 use crate::input::ReportInput;
 use crate::place;
 use crate::study::{Material, Study};
+use crate::units::bytes;
 use crate::verdict::{self, Tone};
 use crate::view::Sharpness;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -25,11 +26,12 @@ pub(crate) fn fingerprint_mark(fingerprint: &str) -> String {
     html! { meta name="plyflow-report" content=(fingerprint); }.into_string()
 }
 
-/// The whole page.
+/// The whole page. `in_full`: its size with the finest pictures (bytes), when these found no room.
 pub(crate) fn page(
     input: &ReportInput,
     material: &Material,
     sharp: Sharpness,
+    in_full: usize,
 ) -> Result<String, String> {
     let mut studies = Vec::new();
     let drawn = material
@@ -54,6 +56,7 @@ pub(crate) fn page(
             }
             body {
                 (head(input, material))
+                @if sharp.0 < crate::COARSE { (coarser(in_full)) }
                 main {
                     @for study in &studies { (study) }
                     (steps)
@@ -107,6 +110,13 @@ fn head(input: &ReportInput, material: &Material) -> Markup {
             }
             (contents(material, input))
         }
+    }
+}
+
+fn coarser(in_full: usize) -> Markup {
+    html! {
+        p class="note" id="coarser" { "Pictures and meshes are drawn coarser than they are: in full this page would have " (bytes(in_full as u64)) ". "
+            code { "plyflow inspect" } " tells where the artifacts lie, which ParaView shows whole." }
     }
 }
 

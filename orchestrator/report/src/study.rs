@@ -1,5 +1,6 @@
 //! The runs of a workflow as studies: a global run, its defects and zones, its local runs, their comparison.
 
+pub(crate) use crate::comparison::{Comparison, Defect, Model};
 use crate::input::{Instance, ReportInput};
 use crate::measured::{self, Measured};
 use crate::others;
@@ -29,8 +30,10 @@ pub(crate) struct Study {
     pub(crate) zones: Option<Vec<Zone>>,
     /// One entry per zone with something to show.
     pub(crate) locals: Vec<Local>,
-    /// What the comparison found.
+    /// What the comparison found; of several of the same zones, the first.
     pub(crate) comparison: Option<Comparison>,
+    /// Local runs that only the other comparisons of these zones have, without plies and histories.
+    pub(crate) further: Vec<Run>,
     /// A fine run of the whole scene.
     pub(crate) reference: Option<Run>,
     /// Measurements of the plies of the global run.
@@ -119,76 +122,6 @@ pub(crate) struct DetectionPly {
     pub(crate) shear_min: f64,
     pub(crate) shear_max: f64,
     pub(crate) distance_max: f64,
-}
-
-/// Attributes of a comparison.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Comparison {
-    pub(crate) models: Vec<Model>,
-    pub(crate) defects: Vec<Defect>,
-}
-
-/// A model that was compared.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Model {
-    pub(crate) name: String,
-    pub(crate) role: String,
-    pub(crate) zone: Option<String>,
-}
-
-/// A defect in one model.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Defect {
-    pub(crate) id: String,
-    pub(crate) model: String,
-    pub(crate) zone: String,
-    pub(crate) ply: String,
-    #[serde(rename = "type")]
-    pub(crate) kind: String,
-    pub(crate) length: f64,
-    pub(crate) amplitude: f64,
-    pub(crate) area: f64,
-    pub(crate) centre: [f64; 2],
-    /// Least radius of curvature (m).
-    pub(crate) radius: Option<f64>,
-    /// Of a ridge in the flat ply, from x (rad).
-    pub(crate) direction: Option<f64>,
-    /// Likely cause of a wrinkle.
-    pub(crate) cause: Option<String>,
-    /// Mean, smallest and largest shear angle along the crest (rad).
-    pub(crate) ridge_shear: Option<f64>,
-    pub(crate) ridge_shear_min: Option<f64>,
-    pub(crate) ridge_shear_max: Option<f64>,
-    pub(crate) shear_min: f64,
-    pub(crate) shear_max: f64,
-    pub(crate) touches_cut: bool,
-}
-
-impl Defect {
-    /// Whether it is a wrinkle; else it is bridging.
-    pub(crate) fn is_wrinkle(&self) -> bool {
-        self.kind == "wrinkle"
-    }
-}
-
-impl Comparison {
-    /// Role of a model by name: `global`, `local`, `reference`.
-    pub(crate) fn role(&self, model: &str) -> &str {
-        self.models
-            .iter()
-            .find(|m| m.name == model)
-            .map_or("", |m| m.role.as_str())
-    }
-
-    /// Defects of the local runs.
-    pub(crate) fn local(&self) -> impl Iterator<Item = &Defect> {
-        self.defects
-            .iter()
-            .filter(|d| self.role(&d.model) == "local")
-    }
 }
 
 /// Everything that is read for a report.
@@ -390,16 +323,16 @@ impl Reader<'_> {
                 .collect();
             study.zones = Some(current(lists.into_iter().map(|z| z.zones)));
         }
-        // What compares the last of them; or, while that has not run, an earlier one.
-        let comparison = (zones_at.iter().rev())
-            .find_map(|z| self.takers("comparison", *z).first().copied())
-            .filter(|c| {
-                self.all.facts[*c]
-                    .as_ref()
-                    .is_some_and(|f| f.took(self.key(global)))
-            });
+        let compared = self.comparisons(zones_at, global);
+        let comparison = compared.as_ref().map(|(drawn, _)| *drawn);
+        let others = compared.map(|(_, others)| others).unwrap_or_default();
         if let Some(at) = comparison {
-            study.comparison = self.attributes(at);
+            study.comparison = self.attributes(at).map(|found| Comparison {
+                label: self.instance(at).label(),
+                missed: Comparison::missed_by(&self.instance(at).record.results),
+                others: (others.iter().map(|o| self.instance(*o).label())).collect(),
+                ..found
+            });
         }
         self.read_global(&mut study, global, detection);
         let mut locals: Vec<usize> = zones_at.iter().flat_map(|z| self.local_runs(*z)).collect();
@@ -419,8 +352,41 @@ impl Reader<'_> {
             (0..self.all.facts.len()).find(|at| self.key(*at) == key)
         });
         study.reference = reference.and_then(|at| self.run(at));
+        self.read_further(&mut study, &others);
         self.read_measurements(&mut study, global);
         study
+    }
+
+    /// What compares the last of the lists of zones with the global run, or, while that has not run, an earlier one; and what else
+    /// compares the same list.
+    fn comparisons(&self, zones: &[usize], global: usize) -> Option<(usize, Vec<usize>)> {
+        zones.iter().rev().find_map(|z| {
+            let mut all = self.takers("comparison", *z);
+            let of_run = |at: &usize| {
+                let facts = self.all.facts[*at].as_ref();
+                facts.is_some_and(|f| f.took(self.key(global)))
+            };
+            let drawn = all.remove(all.iter().position(of_run)?);
+            Some((drawn, all))
+        })
+    }
+
+    /// Local runs of comparisons that are not drawn, each once.
+    fn read_further(&mut self, study: &mut Study, others: &[usize]) {
+        let facts = others.iter().filter_map(|o| self.all.facts[*o].as_ref());
+        let wanted: BTreeSet<String> = facts
+            .flat_map(|f| f.at_port("local"))
+            .map(str::to_owned)
+            .collect();
+        let shown = study.locals.iter().filter_map(|l| l.run.as_ref());
+        let shown = shown.chain(&study.reference).chain(&study.global);
+        let mut seen: BTreeSet<String> = shown.map(|r| self.key(r.instance).to_owned()).collect();
+        for at in 0..self.all.facts.len() {
+            let key = self.key(at).to_owned();
+            if wanted.contains(&key) && seen.insert(key) {
+                study.further.extend(self.run_without_history(at));
+            }
+        }
     }
 
     fn read_measurements(&mut self, study: &mut Study, global: usize) {
@@ -484,21 +450,24 @@ impl Reader<'_> {
     }
 
     fn run(&mut self, at: usize) -> Option<Run> {
-        let facts: FormingFacts = self.attributes(at)?;
-        let label = self.instance(at).label();
-        let mut history = History::default();
+        let mut run = self.run_without_history(at)?;
         if self.pictures {
             let read = History::read(&self.instance(at).artifact);
-            history = self.noted(&label, read).unwrap_or_default();
+            run.history = self.noted(&run.label, read).unwrap_or_default();
         }
+        Some(run)
+    }
+
+    fn run_without_history(&mut self, at: usize) -> Option<Run> {
+        let facts: FormingFacts = self.attributes(at)?;
         let provenance = &self.all.facts[at].as_ref()?.provenance;
         let kinetic_bound = provenance["parameters"]["kinetic_bound"].as_f64();
         Some(Run {
-            label,
+            label: self.instance(at).label(),
             instance: at,
             facts,
             kinetic_bound,
-            history,
+            history: History::default(),
         })
     }
 

@@ -1,6 +1,6 @@
 //! The table at the end of a run in the terminal.
 
-use crate::input::{Instance, ReportInput, label};
+use crate::input::{Instance, ReportInput, Verdict, label};
 use crate::page::{expected_text, got_text};
 use crate::study::{Comparison, Material, Study};
 use crate::units::{bytes, duration, fixed, number, quantity};
@@ -94,11 +94,16 @@ fn defect_table(c: &Comparison) -> String {
             ]
         })
         .collect();
-    table(
+    let mut text = table(
         &["defect", "ply", "type", "length", "amplitude", "area"],
         &rows,
         &[3, 4, 5],
-    )
+    );
+    if !text.is_empty() && !c.others.is_empty() {
+        let others = c.others.join(", ");
+        text += &format!("defects as in {}; not listed: those of {others}\n", c.label);
+    }
+    text
 }
 
 fn result_table(input: &ReportInput) -> String {
@@ -106,7 +111,11 @@ fn result_table(input: &ReportInput) -> String {
         let rows: Vec<Vec<String>> = (input.expectations.iter())
             .map(|e| {
                 let place = format!("{}.{}", label(&e.step, &e.item), e.result);
-                let verdict = if e.met { "ok" } else { "missed" };
+                let verdict = match e.verdict() {
+                    Verdict::Met => "ok",
+                    Verdict::Missed => "missed",
+                    Verdict::NotJudged => "not judged",
+                };
                 vec![place, got_text(e), expected_text(e), verdict.into()]
             })
             .collect();
@@ -139,14 +148,15 @@ fn cost_table(instances: &[Instance]) -> String {
     let mut rows = Vec::new();
     for (name, items) in steps.iter().take(LONGEST) {
         if items.len() > ITEMS {
-            rows.push(cost_row(format!("{name} x {}", items.len()), items));
+            let name = format!("{name} x {}, times added up", items.len());
+            rows.push(cost_row(name, items));
         } else {
             rows.extend(items.iter().map(|i| cost_row(i.label(), &[*i])));
         }
     }
     if instances.len() > 1 {
         rows.push(cost_row(
-            "all".into(),
+            "all, times added up".into(),
             &instances.iter().collect::<Vec<_>>(),
         ));
     }

@@ -82,6 +82,33 @@ pub(crate) fn duration(seconds: f64) -> String {
     format!("{} h {:02} min", whole / 3600, whole % 3600 / 60)
 }
 
+/// A moment (s since 1970-01-01 UTC): `2026-03-04 12:34 UTC`.
+pub(crate) fn moment(seconds: f64) -> String {
+    let minutes = (seconds / 60.0).floor() as i64;
+    let (hour, minute) = (
+        minutes.div_euclid(60).rem_euclid(24),
+        minutes.rem_euclid(60),
+    );
+    let [year, month, day] = date(minutes.div_euclid(24 * 60));
+    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
+/// Year, month and day by days since 1970-01-01. Years are counted from March on, so that a leap day is the last of its year.
+fn date(days: i64) -> [i64; 3] {
+    const DAYS_OF_400_YEARS: i64 = 146_097;
+    // From 0000-03-01 on.
+    let days = days.saturating_add(719_468);
+    let left = days.rem_euclid(DAYS_OF_400_YEARS);
+    let year = (left - left / 1460 + left / 36_524 - left / (DAYS_OF_400_YEARS - 1)) / 365;
+    let left = left - (365 * year + year / 4 - year / 100);
+    // Five months from March or August on have 153 days.
+    let month = (5 * left + 2) / 153;
+    let day = left - (153 * month + 2) / 5 + 1;
+    let since_january = (month + 2) % 12;
+    let year = 400 * days.div_euclid(DAYS_OF_400_YEARS) + year + i64::from(month > 9);
+    [year, since_january + 1, day]
+}
+
 /// A size in bytes.
 pub(crate) fn bytes(n: u64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
@@ -136,6 +163,17 @@ mod tests {
         assert_eq!(number(1.500, 4), "1.5");
         assert_eq!(number(2.0e-9, 3), "2.00e-9");
         assert_eq!(count(1_234_567.0), "1\u{202f}234\u{202f}567");
+    }
+
+    #[test]
+    fn moments_are_told_as_dates_also_about_leap_days() {
+        assert_eq!(moment(0.0), "1970-01-01 00:00 UTC");
+        assert_eq!(moment(951_782_399.9), "2000-02-28 23:59 UTC");
+        assert_eq!(moment(951_782_400.0), "2000-02-29 00:00 UTC");
+        assert_eq!(moment(951_868_800.0), "2000-03-01 00:00 UTC");
+        assert_eq!(moment(1_709_210_096.0), "2024-02-29 12:34 UTC");
+        assert_eq!(moment(1_767_225_599.0), "2025-12-31 23:59 UTC");
+        assert_eq!(moment(4_107_542_400.0), "2100-03-01 00:00 UTC");
     }
 
     #[test]

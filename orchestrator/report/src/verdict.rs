@@ -1,6 +1,6 @@
 //! What the run found, in one line, and what must not be overlooked.
 
-use crate::input::ReportInput;
+use crate::input::{ReportInput, Verdict};
 use crate::study::{Material, Run, Study};
 use crate::units::{fixed, plural, quantity};
 
@@ -48,41 +48,52 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
             n => plural(n, "bridging area", "bridging areas"),
         });
     }
-    let runs = || {
-        study
-            .global
-            .iter()
-            .chain(study.locals.iter().filter_map(|l| l.run.as_ref()))
-    };
-    let kept: Vec<bool> = runs()
-        .filter_map(|r| r.facts.energy.kinetic_bound_kept)
+    if let Some(missed) = study.comparison.as_ref().and_then(|c| c.missed_text()) {
+        tone = Tone::Found;
+        parts.push(format!("{missed} of the reference missed"));
+    }
+    let runs = runs(study);
+    let kept: Vec<bool> = (runs.iter())
+        .filter_map(|(_, r)| r.facts.energy.kinetic_bound_kept)
         .collect();
+    let is_missed = |(_, r): &&(&str, &Run)| r.facts.energy.kinetic_bound_kept == Some(false);
     if kept.iter().all(|k| *k) && !kept.is_empty() {
         parts.push("kinetic bound kept".into());
-    } else if let Some(run) = runs().find(|r| r.facts.energy.kinetic_bound_kept == Some(false)) {
+    } else if let Some((label, _)) = runs.iter().find(is_missed) {
         tone = Tone::Bad;
         let missed = kept.iter().filter(|k| !**k).count();
         parts.push(format!(
-            "kinetic bound missed by {} of {} runs (first: {})",
+            "kinetic bound missed by {} of {} runs (first: {label})",
             missed,
             kept.len(),
-            run.label
         ));
     }
-    let drift = |r: &&Run| r.facts.energy.peak_drift_ratio.unwrap_or(0.0);
-    let worst = runs().max_by(|a, b| drift(a).total_cmp(&drift(b)));
-    if let Some(run) = worst.filter(|r| drift(r) > DRIFT_BOUND) {
+    let drift = |r: &Run| r.facts.energy.peak_drift_ratio.unwrap_or(0.0);
+    let worst = (runs.iter()).max_by(|a, b| drift(a.1).total_cmp(&drift(b.1)));
+    if let Some((label, run)) = worst.filter(|(_, r)| drift(r) > DRIFT_BOUND) {
         tone = Tone::Bad;
-        let percent = fixed(100.0 * drift(&run), 0);
-        parts.push(format!(
-            "energy ledger open by up to {percent} % ({})",
-            run.label
-        ));
+        let percent = fixed(100.0 * drift(run), 0);
+        parts.push(format!("energy ledger open by up to {percent} % ({label})"));
     }
     (tone, parts.join("; "))
 }
 
-fn nothing_found(study: &Study) -> String {
+/// All runs of a study, each once, with their names for people: those drawn, those that other comparisons have, and the reference, by
+/// which all else is measured.
+fn runs(study: &Study) -> Vec<(&str, &Run)> {
+    let locals = study.locals.iter().filter_map(|l| l.run.as_ref());
+    let of_study = study.global.iter().chain(locals).chain(&study.further);
+    let mut runs: Vec<(&str, &Run)> = of_study.map(|r| (r.label.as_str(), r)).collect();
+    // The run of a zone that covers the blank may be the reference too.
+    let is_new = |r: &&Run| runs.iter().all(|(_, known)| known.instance != r.instance);
+    if let Some(run) = study.reference.as_ref().filter(is_new) {
+        runs.push(("reference", run));
+    }
+    runs
+}
+
+/// What a study without zones found.
+pub(crate) fn nothing_found(study: &Study) -> String {
     let flagged: f64 = study
         .detection
         .iter()
@@ -93,27 +104,34 @@ fn nothing_found(study: &Study) -> String {
         let area = quantity(flagged, "m2", 3);
         return format!("no zones, no local runs: {area} are flagged, too little for a zone");
     }
+    if (study.comparison.iter()).any(|c| c.missed_text().is_some()) {
+        return "no zones, no local runs".into();
+    }
     "no defects found: no zones, no local runs".into()
 }
 
-/// Expectations met and missed, failures, in words; empty when there are none.
+/// Expectations met, missed and not judged, failures, in words; empty when there are none.
 pub(crate) fn of_run(input: &ReportInput) -> (Tone, String) {
     let mut parts = Vec::new();
     let mut tone = Tone::Good;
-    let missed = input.expectations.iter().filter(|e| !e.met).count();
-    match (input.expectations.len(), missed) {
-        (0, _) => {}
-        (n, 0) => parts.push(format!(
-            "all {} met",
-            plural(n, "expectation", "expectations")
-        )),
-        (n, m) => {
-            tone = Tone::Bad;
-            parts.push(format!(
-                "{m} of {} missed",
-                plural(n, "expectation", "expectations")
-            ));
-        }
+    let count = |v| {
+        input
+            .expectations
+            .iter()
+            .filter(|e| e.verdict() == v)
+            .count()
+    };
+    let (missed, open) = (count(Verdict::Missed), count(Verdict::NotJudged));
+    let all = plural(input.expectations.len(), "expectation", "expectations");
+    if missed + open > 0 {
+        tone = Tone::Bad;
+    }
+    match (missed, open) {
+        (0, 0) if input.expectations.is_empty() => {}
+        (0, 0) => parts.push(format!("all {all} met")),
+        (m, 0) => parts.push(format!("{m} of {all} missed")),
+        (0, u) => parts.push(format!("{u} of {all} not judged")),
+        (m, u) => parts.push(format!("{m} of {all} missed, {u} not judged")),
     }
     if !input.failures.is_empty() {
         tone = Tone::Bad;

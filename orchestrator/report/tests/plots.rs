@@ -224,7 +224,7 @@ fn a_coupon_shows_its_numbers_beside_what_is_expected_its_curves_and_its_sheet()
         met: false,
         ..error.clone()
     };
-    let absent = expectation("frame", "hourglass", None, "", false);
+    let absent = expectation("frame", "hourglass", None, "m", false);
     input.expectations = vec![error, second, absent];
     let page = page(&input, &folder);
     let at = page.find("<table class=\"numbers\">").unwrap();
@@ -238,7 +238,9 @@ fn a_coupon_shows_its_numbers_beside_what_is_expected_its_curves_and_its_sheet()
         rows[1].contains("≤ 0.01") && rows[1].contains("missed") && rows[1].contains("own bound")
     );
     assert!(rows[2].contains("wrinkle_onset") && rows[2].contains("8.0214 deg"));
-    assert!(rows[3].contains("hourglass") && rows[3].contains("not reported"));
+    for text in ["hourglass", "not reported", "≤ 0.2 mm", "not judged"] {
+        assert!(rows[3].contains(text), "{text}: {}", rows[3]);
+    }
     for text in [
         "Picture frame, &quot;NCF&quot; &lt;both signs&gt;",
         "shear angle (deg)",
@@ -247,7 +249,7 @@ fn a_coupon_shows_its_numbers_beside_what_is_expected_its_curves_and_its_sheet()
         "class=\"points c2\"",
         "Deflection along z (mm)",
         "fabric, deformed, last frame",
-        "plyflow extract workflow.yaml 'frame'",
+        "plyflow extract workflow.yaml --set 'coarse.element=m4 &amp; &lt;x&gt;' 'frame'",
         "name: &lt;NCF&gt;",
         // Its energies stand with those of forming runs.
         "1.23 %",

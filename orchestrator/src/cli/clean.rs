@@ -21,8 +21,15 @@ pub fn locked(e: LockError) -> Stop {
 /// `plyflow clean`.
 ///
 /// # Errors
-/// [`exit::LOCKED`] while a run uses the store.
+/// [`exit::LOCKED`] while a run uses the store, [`exit::USAGE`] when the workflow is no file.
 pub fn clean(args: &CleanArgs) -> Done {
+    // A slip of the name, or a folder, would mean the store beside it: another study's.
+    if let Some(file) = args.workflow.as_deref().filter(|f| !f.is_file()) {
+        let text = format!(
+            "there is no workflow file {file}; name the workflow beside which the store lies, or the store itself with --store"
+        );
+        return Err(Stop::new(exit::USAGE, text));
+    }
     let root = store_root(&args.places, args.workflow.as_deref());
     if !root.is_dir() {
         return print(&format!("there is no store {root}; nothing to remove\n"));
@@ -88,8 +95,9 @@ pub fn clean(args: &CleanArgs) -> Done {
         n => format!(" and {n} old checkpoints"),
     };
     print(&format!(
-        "{verb} {count} artifact{s}{checkpoints}, {}\n",
-        bytes(size)
+        "{verb} {count} artifact{s}{checkpoints}, {}, in the store {}\n",
+        bytes(size),
+        store.root()
     ))
 }
 

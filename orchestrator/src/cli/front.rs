@@ -16,6 +16,7 @@ pub fn as_csv(ways: &Ways) -> String {
         "model",
         "way",
         "is_reference",
+        "measured_by",
         "start_time",
         "cpu_seconds",
         "wall_seconds",
@@ -35,6 +36,7 @@ pub fn as_csv(ways: &Ways) -> String {
             csv_text(&w.model),
             csv_text(&w.name),
             w.is_reference.to_string(),
+            csv_text(&w.measured_by),
             value(w.start_time),
             w.cpu_seconds.to_string(),
             w.wall_seconds.to_string(),
@@ -61,7 +63,7 @@ pub fn as_json(ways: &Ways) -> Value {
             .collect();
         json!({
             "comparison": w.comparison, "model": w.model, "way": w.name, "is_reference": w.is_reference,
-            "start_time": w.start_time, "cpu_seconds": w.cpu_seconds, "wall_seconds": w.wall_seconds,
+            "measured_by": w.measured_by, "start_time": w.start_time, "cpu_seconds": w.cpu_seconds, "wall_seconds": w.wall_seconds,
             "peak_memory": w.peak_memory, "cpu_share": w.share, "errors": by_name(w.errors.map(|e| json!(e))),
             "counts": counts, "on_front": by_name(w.on_front.map(|on| json!(on))),
         })
@@ -78,7 +80,7 @@ pub fn as_table(ways: &Ways) -> String {
     let head = [
         "way",
         "cpu",
-        "wall",
+        "wall, added up",
         "memory",
         "share",
         "defects",
@@ -111,11 +113,18 @@ pub fn as_table(ways: &Ways) -> String {
         cells.extend(Measure::ALL.map(|m| error(w, m)));
         cells
     };
-    let lines: Vec<Vec<String>> = ways.list.iter().map(line).collect();
     let right: Vec<usize> = (1..head.len()).collect();
-    format!(
-        "{}\nErrors against the {}. *: nothing cheaper is as good.\n",
-        table(&head, &lines, &right),
+    let groups = ways.by_reference();
+    let mut text = String::new();
+    for (of, ways) in &groups {
+        if groups.len() > 1 {
+            text += &format!("By the reference of {of}:\n");
+        }
+        let lines: Vec<Vec<String>> = ways.list.iter().map(line).collect();
+        text += &(table(&head, &lines, &right) + "\n");
+    }
+    text + &format!(
+        "Errors against the {}. *: nothing cheaper is as good.\n",
         ways.yardstick()
     )
 }
@@ -136,6 +145,7 @@ mod tests {
             errors: [error, None, None, None, Some(0.002), None, Some(0.01)],
             counts: Some([1.0, 0.0, 2.0, 0.0]),
             is_reference: false,
+            measured_by: "comparison".into(),
             start_time: None,
             on_front: [on_front, false, false, false, true, false, false],
         }

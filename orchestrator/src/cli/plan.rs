@@ -8,7 +8,10 @@ use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
 use crate::engine::{Session, input_keys};
 use crate::exit;
-use crate::plan::{Change, changes};
+use crate::plan::{Change, Key, changes};
+use crate::progress::duration_text;
+use plyflow_model::job::Cost;
+use plyflow_plugin_host::cost_so_far;
 use plyflow_workflow::Part;
 use serde_json::json;
 use std::io::IsTerminal;
@@ -21,6 +24,8 @@ pub struct Prospect {
     pub fate: &'static str,
     /// Why.
     pub reason: String,
+    /// What it cost when it ran last, if that is known: of what is unknown, all items together.
+    pub last: Option<Cost>,
 }
 
 /// `plyflow plan`.
@@ -35,22 +40,47 @@ pub fn plan(args: &PlanArgs) -> Done {
     if args.format == TextOrJson::Json {
         let list: Vec<_> = found
             .iter()
-            .map(|p| json!({"step": p.label, "state": p.fate, "reason": p.reason}))
+            .map(|p| {
+                json!({"step": p.label, "state": p.fate, "reason": p.reason,
+                    "last_wall_seconds": p.last.map(|c| c.wall_seconds),
+                    "last_cpu_seconds": p.last.map(|c| c.cpu_seconds)})
+            })
             .collect();
         return print(&format!("{:#}\n", json!(list)));
     }
     let rows: Vec<Vec<String>> = found
         .iter()
-        .map(|p| vec![p.label.clone(), p.fate.to_owned(), p.reason.clone()])
+        .map(|p| {
+            let wall = p.last.map(|c| duration_text(c.wall_seconds));
+            let (label, fate) = (p.label.clone(), p.fate.to_owned());
+            vec![label, fate, wall.unwrap_or_default(), p.reason.clone()]
+        })
         .collect();
+    let head = ["step", "state", "last time", "reason"];
+    print(&(table(&head, &rows, &[2]) + &sum(&found)))
+}
+
+/// How many of each fate, and what those that are not there took when they ran last.
+fn sum(found: &[Prospect]) -> String {
     let count = |fate| found.iter().filter(|p| p.fate == fate).count();
-    let sum = format!(
-        "{} to run, {} cached, {} unknown\n",
+    let mut text = format!(
+        "{} to run, {} cached, {} unknown",
         count("run"),
         count("cached"),
         count("unknown")
     );
-    print(&(table(&["step", "state", "reason"], &rows, &[]) + &sum))
+    let open = || found.iter().filter(|p| p.fate != "cached");
+    let cpu: f64 = open().filter_map(|p| p.last).map(|c| c.cpu_seconds).sum();
+    let new = open().filter(|p| p.last.is_none()).count();
+    if new < open().count() {
+        text += &format!("; last time {} of CPU time", duration_text(cpu));
+        match new {
+            0 => {}
+            1 => text += ", without one that did not run then",
+            n => text += &format!(", without {n} that did not run then"),
+        }
+    }
+    text + "\n"
 }
 
 /// What a run would do, step by step in the order of the workflow.
@@ -74,12 +104,14 @@ pub fn prospects(session: &Session<'_>) -> Vec<Prospect> {
                 label: format!("{} x N (from {})", plan.name, from.join(", ")),
                 fate: "unknown",
                 reason: format!("how many is known when {} is done", from.join(", ")),
+                last: cost_of_items(session, &plan.name, &hidden),
             });
         } else if by_step[step].is_empty() {
             found.push(Prospect {
                 label: format!("{} x 0", plan.name),
                 fate: "cached",
                 reason: "the collection it fans out over is empty".into(),
+                last: None,
             });
         }
     }
@@ -98,13 +130,58 @@ fn prospect(session: &Session<'_>, id: Id) -> Prospect {
                 .unwrap_or_default(),
         ),
         State::Unkeyed => ("unknown", waits_for(session, id)),
-        _ => ("run", why(session, id)),
+        _ => ("run", why(session, id) + &goes_on(session, id)),
     };
+    let name = &core.graph().steps[instance.step].name;
+    let last = session.journal.last(name, &instance.item);
     Prospect {
         label: core.label(id),
         fate,
         reason,
+        last: last
+            .filter(|_| fate != "cached")
+            .and_then(|key| cost_of(session, &key)),
     }
+}
+
+/// Whether an instance goes on from a checkpoint, and what it has taken up to there.
+fn goes_on(session: &Session<'_>, id: Id) -> String {
+    let folder = session.core.instances()[id]
+        .key
+        .map(|key| session.folder().checkpoints(&session.core.label(id), &key));
+    match folder.and_then(|f| cost_so_far(&f)) {
+        Some(cost) => format!(
+            "; goes on from a checkpoint, {} in",
+            duration_text(cost.wall_seconds)
+        ),
+        None => String::new(),
+    }
+}
+
+fn cost_of(session: &Session<'_>, key: &Key) -> Option<Cost> {
+    session.store.read_record(key).map(|r| r.cost)
+}
+
+/// What the items of a step that fans out over the collections of `givers` cost when they ran last, added up.
+fn cost_of_items(session: &Session<'_>, step: &str, givers: &[Id]) -> Option<Cost> {
+    let mut sum: Option<Cost> = None;
+    for giver in givers {
+        let mut item = session.core.instances()[*giver].item.clone();
+        item.push(0);
+        while let Some(cost) = session
+            .journal
+            .last(step, &item)
+            .and_then(|key| cost_of(session, &key))
+        {
+            let sum = sum.get_or_insert_default();
+            sum.wall_seconds += cost.wall_seconds;
+            sum.cpu_seconds += cost.cpu_seconds;
+            if let Some(index) = item.last_mut() {
+                *index += 1;
+            }
+        }
+    }
+    sum
 }
 
 fn waits_for(session: &Session<'_>, id: Id) -> String {
@@ -237,7 +314,8 @@ pub fn validate(args: &ValidateArgs) -> Done {
         Ok(what) => print(&format!("{}: {what}, no errors\n", args.workflow.workflow)),
         Err(findings) => {
             if json {
-                print(&format!("{:#}\n", findings.to_json()))?;
+                // A reader that has gone away must not make findings a success.
+                let _ = print(&format!("{:#}\n", findings.to_json()));
             } else {
                 eprint!("{}", findings.render(std::io::stderr().is_terminal()));
             }

@@ -3,7 +3,7 @@
 use super::args::{ReportArgs, Workflow};
 use super::open::{Opened, open};
 use super::plan::nothing_yet;
-use super::results::{Row, records, rows};
+use super::results::{OK, Row, records, rows};
 use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
 use crate::engine::{Failure, Session};
@@ -62,7 +62,7 @@ pub fn beside(workflow: &Utf8Path) -> Utf8PathBuf {
 }
 
 /// Changes with what a page shows of the same artifacts: an older page is then written again.
-const LAYOUT: &[u8] = b"page 5";
+const LAYOUT: &[u8] = b"page 6";
 
 /// Names all that a report depends on.
 pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure]) -> String {
@@ -99,11 +99,12 @@ pub fn is_written(path: &Utf8Path, fingerprint: &str) -> bool {
 
 /// The command that makes the results of a workflow again, as one types it.
 pub(super) fn command(given: &Workflow) -> String {
-    let mut words = vec![
-        "plyflow".to_owned(),
-        "run".into(),
-        given.workflow.to_string(),
-    ];
+    format!("plyflow run {}", arguments(given))
+}
+
+/// The workflow file with its options, as one types them behind a command.
+fn arguments(given: &Workflow) -> String {
+    let mut words = vec![given.workflow.to_string()];
     let places = &given.places;
     let folders = places.plugins.iter().map(|p| ("--plugins", p.as_str()));
     let store = places.store.iter().map(|p| ("--store", p.as_str()));
@@ -156,7 +157,7 @@ pub fn input(
             minimum: e.minimum,
             maximum: e.maximum,
             source: e.source.clone(),
-            met: r.verdict() == Some("ok"),
+            met: r.verdict() == Some(OK),
         })
     };
     let done = |s: State| matches!(s, State::Done { .. } | State::Failed);
@@ -164,7 +165,7 @@ pub fn input(
         workflow: opened.workflow.name.clone(),
         description: opened.workflow.description.clone(),
         file: given.workflow.clone(),
-        command: command(given),
+        given: arguments(given),
         program: format!("plyflow {}", env!("CARGO_PKG_VERSION")),
         fingerprint: fingerprint(opened, session, failures),
         instances: found.records.iter().map(instance).collect(),

@@ -14,6 +14,11 @@ use plyflow_model::job::Record;
 use plyflow_workflow::resolved::Expectation;
 use serde_json::json;
 
+/// Verdicts on what is expected.
+pub const OK: &str = "ok";
+const MISSED: &str = "missed";
+const NOT_JUDGED: &str = "not judged";
+
 /// One number, or one expectation without a number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
@@ -48,18 +53,18 @@ impl Row {
         }
     }
 
-    /// `ok` or `missed` when something is expected.
+    /// `ok`, `missed`, or `not judged` without a value; only when something is expected.
     pub fn verdict(&self) -> Option<&'static str> {
         let e = self.expected.as_ref()?;
         let Some(value) = self.value else {
-            return Some("missed");
+            return Some(NOT_JUDGED);
         };
         let near = e.value.is_none_or(|x| {
             // Without a tolerance the same number is meant, up to rounding in its text.
             (value - x).abs() <= e.tolerance.unwrap_or(1e-9 * x.abs())
         });
         let inside = e.minimum.is_none_or(|m| value >= m) && e.maximum.is_none_or(|m| value <= m);
-        Some(if near && inside { "ok" } else { "missed" })
+        Some(if near && inside { OK } else { MISSED })
     }
 }
 
@@ -201,7 +206,7 @@ fn absent(e: &Expectation) -> Row {
         item: vec![],
         name: e.result.clone(),
         value: None,
-        unit: String::new(),
+        unit: e.unit.clone(),
         measured: false,
         expected: Some(e.clone()),
     }
@@ -363,7 +368,7 @@ fn as_csv(rows: &[Row]) -> String {
 /// `plyflow results`.
 ///
 /// # Errors
-/// [`exit::EXPECTATION`] with `--check` when one is missed.
+/// [`exit::EXPECTATION`] with `--check` when one is missed or not judged.
 pub fn results(args: &ResultsArgs) -> Done {
     let opened = open(&args.workflow)?;
     opened.step_indices(&args.step)?;
@@ -383,23 +388,20 @@ pub fn results(args: &ResultsArgs) -> Done {
     if args.front {
         return front(args, &opened, &session, records);
     }
-    match args.format {
-        Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records)))?,
-        Format::Csv => print(&as_csv(&rows))?,
+    let told = match args.format {
+        Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records))),
+        Format::Csv => print(&as_csv(&rows)),
         Format::Table if records.is_empty() => {
             let text = nothing_yet(&session, &args.step, &args.workflow);
-            print(&format!("{text}\n"))?;
+            print(&format!("{text}\n"))
         }
-        Format::Table => {
-            let text = format!(
-                "{}\n{}",
-                results_table(&rows),
-                cost_table(&session, &records)
-            );
-            print(&text)?;
-        }
-    }
-    if args.check { check(&rows) } else { Ok(()) }
+        Format::Table => print(&format!(
+            "{}\n{}",
+            results_table(&rows),
+            cost_table(&session, &records)
+        )),
+    };
+    checked(told, args.check, &rows)
 }
 
 /// `plyflow results --front`, of the comparisons among `records`.
@@ -421,131 +423,33 @@ fn front(
     }
 }
 
-/// Ends with the code for missed expectations if there are any.
+/// What a command ends with that has printed what it found and judges it when asked to. Whoever reads along may have gone (`| head`); the
+/// exit code tells the verdict all the same.
 ///
 /// # Errors
-/// [`exit::EXPECTATION`].
-pub fn check(rows: &[Row]) -> Done {
-    let missed: Vec<String> = rows
-        .iter()
-        .filter(|r| r.verdict() == Some("missed"))
-        .map(Row::title)
-        .collect();
-    if missed.is_empty() {
+/// [`exit::EXPECTATION`], else what printing ended with.
+pub fn checked(told: Done, asked: bool, rows: &[Row]) -> Done {
+    if asked { check(rows).and(told) } else { told }
+}
+
+/// Ends with the code for missed expectations if there are any, or any that could not be judged.
+fn check(rows: &[Row]) -> Done {
+    let mut parts = Vec::new();
+    for (verdict, why) in [(MISSED, ""), (NOT_JUDGED, " (no value)")] {
+        let found = rows.iter().filter(|r| r.verdict() == Some(verdict));
+        let titles: Vec<String> = found.map(Row::title).collect();
+        if let n @ 1.. = titles.len() {
+            let s = if n == 1 { "" } else { "s" };
+            let titles = titles.join(", ");
+            parts.push(format!("{n} expectation{s} {verdict}{why}: {titles}"));
+        }
+    }
+    if parts.is_empty() {
         return Ok(());
     }
-    let text = format!(
-        "{} expectations missed: {}",
-        missed.len(),
-        missed.join(", ")
-    );
-    Err(Stop::new(exit::EXPECTATION, text))
+    Err(Stop::new(exit::EXPECTATION, parts.join("; ")))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn row(value: Option<f64>, e: Expectation) -> Row {
-        Row {
-            step: "s".into(),
-            item: vec![],
-            name: "n".into(),
-            value,
-            unit: "m".into(),
-            measured: false,
-            expected: Some(e),
-        }
-    }
-
-    fn expectation() -> Expectation {
-        Expectation {
-            step: "s".into(),
-            mean_over: vec![],
-            result: "n".into(),
-            value: None,
-            tolerance: None,
-            minimum: None,
-            maximum: None,
-            source: None,
-        }
-    }
-
-    #[test]
-    fn a_number_outside_its_bound_or_tolerance_is_missed() {
-        let near = Expectation {
-            value: Some(1.0),
-            tolerance: Some(0.1),
-            ..expectation()
-        };
-        assert_eq!(row(Some(1.05), near.clone()).verdict(), Some("ok"));
-        assert_eq!(row(Some(1.2), near.clone()).verdict(), Some("missed"));
-        assert_eq!(row(None, near).verdict(), Some("missed"));
-        let bound = Expectation {
-            minimum: Some(0.0),
-            maximum: Some(2.0),
-            ..expectation()
-        };
-        assert_eq!(row(Some(2.0), bound.clone()).verdict(), Some("ok"));
-        assert_eq!(row(Some(-0.1), bound).verdict(), Some("missed"));
-    }
-
-    #[test]
-    fn not_a_number_never_meets_an_expectation() {
-        let near = Expectation {
-            value: Some(1.0),
-            tolerance: Some(0.1),
-            ..expectation()
-        };
-        assert_eq!(row(Some(f64::NAN), near).verdict(), Some("missed"));
-    }
-
-    #[test]
-    fn a_mean_counts_every_item_of_its_steps_once_and_wants_all_steps() {
-        let of = |step: &str, item: &str, value: f64| Row {
-            step: step.into(),
-            item: vec![item.into()],
-            expected: None,
-            ..row(Some(value), expectation())
-        };
-        let e = Expectation {
-            mean_over: vec!["s".into(), "t".into()],
-            value: Some(2.0),
-            tolerance: Some(0.1),
-            ..expectation()
-        };
-        let done = |count| Progress {
-            count,
-            unfinished: vec![],
-            hidden: false,
-        };
-        let value_of = |rows: &[Row], progress: [Progress; 2]| {
-            mean(&e, rows, &progress).map(|row| (row.value, row.verdict()))
-        };
-        let mut rows = vec![of("s", "a", 1.0), of("s", "b", 2.0), of("u", "a", 50.0)];
-        assert_eq!(
-            value_of(&rows, [done(2), done(1)]),
-            Some((None, Some("missed")))
-        );
-        rows.extend([of("t", "a", 3.0), of("t", "a", 3.0)]);
-        // An item that is not finished, or a collection that is not there yet, leaves no mean; an empty one leaves nothing to say.
-        let unfinished = Progress {
-            unfinished: vec![vec!["b".into()]],
-            ..done(2)
-        };
-        let hidden = Progress {
-            hidden: true,
-            ..done(0)
-        };
-        for progress in [[unfinished, done(1)], [hidden, done(1)]] {
-            assert_eq!(value_of(&rows, progress), Some((None, Some("missed"))));
-        }
-        assert_eq!(value_of(&[], [done(0), done(0)]), None);
-        let of_s = [of("s", "a", 1.95), of("s", "b", 2.05)];
-        let without_t = value_of(&of_s, [done(2), done(0)]);
-        assert_eq!(without_t, Some((Some(2.0), Some("ok"))));
-        let all = mean(&e, &rows, &[done(2), done(1)]).unwrap();
-        assert_eq!((all.value, all.verdict()), (Some(2.0), Some("ok")));
-        assert_eq!(all.title(), "mean of n (s, t)");
-    }
-}
+#[path = "results_tests.rs"]
+mod tests;

@@ -4,13 +4,14 @@ use super::args::{LogFormat, RunArgs};
 use super::clean::locked;
 use super::open::{Opened, cores, open, store_root};
 use super::report;
-use super::results::check;
+use super::results::checked;
 use super::{Done, Stop, print};
 use crate::engine::core::Limits;
 use crate::engine::{Failure, Local, Observer, Options, Session, Summary};
 use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
 use crate::store::Lock;
+use camino::Utf8Path;
 use plyflow_model::units::parse_quantity_in;
 use plyflow_workflow::resolved::FailurePolicy;
 use std::io::{IsTerminal, Read};
@@ -168,10 +169,11 @@ fn conclude(
     begun: Instant,
 ) -> Done {
     let verdict = tell_results(args, opened, session, summary);
+    let old = of_earlier_run(args, &report::beside(&opened.workflow.file), summary);
     // Whoever reads along may have gone (`| head`); how the run went is told by the exit code all the same.
     let told = match args.quiet {
         true => Ok(()),
-        false => tell(args, session, summary, begun),
+        false => tell(args, session, summary, begun, old),
     };
     if summary.interrupted {
         return Err(Stop::silent(exit::INTERRUPTED));
@@ -189,7 +191,7 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
     let worked = summary.executed + summary.failures.len() + summary.skipped > 0;
     let any = summary.executed + summary.cached > 0;
     let path = Some(report::beside(&opened.workflow.file))
-        .filter(|_| !args.no_report && any && !summary.interrupted);
+        .filter(|_| !args.no_report && has_news(summary));
     // A step that was run again to the same key (`--force`) has other costs and the same name.
     let stale = path.as_ref().filter(|p| {
         summary.executed > 0
@@ -213,14 +215,27 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         true => print(&(plyflow_report::summary(&input, written.as_deref()) + "\n")),
         false => Ok(()),
     };
-    if args.check {
-        check(&found.rows).and(told)
-    } else {
-        told
-    }
+    checked(told, args.check, &found.rows)
 }
 
-fn tell(args: &RunArgs, session: &Session<'_>, summary: &Summary, begun: Instant) -> Done {
+/// Whether a report of a run would tell what is: one that was stopped goes on, and one without any artifact has nothing to show.
+fn has_news(summary: &Summary) -> bool {
+    summary.executed + summary.cached > 0 && !summary.interrupted
+}
+
+/// What to say of a report that is there although this run wrote none.
+fn of_earlier_run(args: &RunArgs, report: &Utf8Path, summary: &Summary) -> Option<String> {
+    let is_old = !args.no_report && !has_news(summary) && report.is_file();
+    is_old.then(|| format!("the report {report} is of an earlier run\n"))
+}
+
+fn tell(
+    args: &RunArgs,
+    session: &Session<'_>,
+    summary: &Summary,
+    begun: Instant,
+    old_report: Option<String>,
+) -> Done {
     let wall = duration_text(begun.elapsed().as_secs_f64());
     let mut parts = vec![
         format!("{} run", summary.executed),
@@ -248,7 +263,7 @@ fn tell(args: &RunArgs, session: &Session<'_>, summary: &Summary, begun: Instant
         eprintln!("{line}");
         return Ok(());
     }
-    print(&line)?;
+    print(&(line + &old_report.unwrap_or_default()))?;
     if summary.interrupted {
         let until = args.until.iter().map(|step| format!(" --until {step}"));
         print(&format!(
@@ -290,4 +305,36 @@ fn failure_text(first: &Failure, summary: &Summary) -> String {
 
 fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::args::{Cli, Command};
+    use super::*;
+    use clap::Parser;
+
+    #[test]
+    fn a_report_that_a_stopped_or_failed_run_leaves_is_told_to_be_of_an_earlier_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let report = Utf8Path::from_path(dir.path()).unwrap().join("report.html");
+        let told = |words: &[&str], summary: &Summary| {
+            let words = ["plyflow", "run", "w.yaml"].iter().chain(words);
+            let Command::Run(args) = Cli::try_parse_from(words).unwrap().command else {
+                panic!("another command");
+            };
+            of_earlier_run(&args, &report, summary)
+        };
+        let of = |executed, interrupted| Summary {
+            executed,
+            interrupted,
+            ..Summary::default()
+        };
+        assert_eq!(told(&[], &of(1, true)), None, "there is none");
+        std::fs::write(&report, "old").unwrap();
+        let text = Some(format!("the report {report} is of an earlier run\n"));
+        assert_eq!(told(&[], &of(1, true)), text);
+        assert_eq!(told(&[], &of(0, false)), text, "nothing succeeded");
+        assert_eq!(told(&[], &of(1, false)), None, "it was written");
+        assert_eq!(told(&["--no-report"], &of(1, true)), None);
+    }
 }

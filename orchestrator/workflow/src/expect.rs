@@ -112,7 +112,7 @@ fn entry(
     let of = |step| expectation(item, step, drafts, source, problems);
     let mut all: Vec<Expectation> = names.iter().filter_map(of).collect();
     if item.get("of").and_then(Node::text) == Some("mean") && !all.is_empty() {
-        let mut units = all.iter().filter_map(|e| unit(e, drafts));
+        let mut units = all.iter().map(|e| &e.unit);
         if let Some(first) = units.next()
             && let Some(other) = units.find(|u| *u != first)
         {
@@ -124,13 +124,6 @@ fn entry(
         all.truncate(1);
     }
     all
-}
-
-/// The unit of the result that is expected.
-fn unit<'a>(e: &Expectation, drafts: &'a [Draft<'_>]) -> Option<&'a str> {
-    let draft = drafts.iter().find(|d| d.name() == e.step)?;
-    let result = draft.plugin.as_ref()?.manifest.result(&e.result)?;
-    Some(&result.unit)
 }
 
 fn expectation(
@@ -191,6 +184,7 @@ fn expectation(
         step: name.to_owned(),
         mean_over: Vec::new(),
         result: result_name.to_owned(),
+        unit: declared.unit.clone(),
         value,
         tolerance,
         minimum,
@@ -208,7 +202,19 @@ fn value(
     problems: &mut Problems,
 ) -> Option<f64> {
     let node = &entry.value;
-    let exponents = parse_unit(unit).ok()?.exponents;
+    let exponents = match parse_unit(unit) {
+        Ok(unit) => unit.exponents,
+        // Whoever fills a catalog checks manifests first; an expectation is not dropped in silence all the same.
+        Err(e) => {
+            let message = format!(
+                "the unit that its plugin declares for `{result}` cannot be read: {}",
+                e.reason()
+            );
+            let d = problems.add(source, &node.span, message);
+            d.help("the plugin's author must put it right; `plyflow check-plugin` says where");
+            return None;
+        }
+    };
     let plain = exponents == Dimension::Dimensionless.exponents();
     let text = match &node.kind {
         Kind::Number(n) if plain => return n.as_f64(),

@@ -97,6 +97,8 @@ pub struct Expectation {
     pub mean_over: Vec<String>,
     /// Result name.
     pub result: String,
+    /// Its unit, as its plugin declares it.
+    pub unit: String,
     /// Expected value (SI), if stated.
     pub value: Option<f64>,
     /// Allowed absolute deviation from `value` (SI).

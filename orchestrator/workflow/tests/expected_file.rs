@@ -39,6 +39,8 @@ fn a_file_says_the_same_as_the_list_of_a_workflow() {
         (in_list.value, in_list.tolerance)
     );
     assert_eq!(in_file.source.as_deref(), Some("table 5.3"));
+    // The unit is the one that the plugin declares, so that a number can be shown before its result is there.
+    assert_eq!((&*in_file.unit, &*in_list.unit), ("m", "m"));
     let (in_file, in_list) = of("kinetic_ratio");
     assert_eq!(in_file.maximum, in_list.maximum);
     // The source of the file stands for entries without one.

@@ -229,6 +229,8 @@ fn a_run_killed_while_it_forms_goes_on_from_its_checkpoint_to_the_same_bytes() {
     }
     let left = checkpoints(&study);
     assert!(left.iter().any(|i| i.starts_with("local")), "{left:?}");
+    let plan = String::from_utf8(study.call(&["plan"]).stdout).unwrap();
+    assert!(plan.contains("goes on from a checkpoint, "), "{plan}");
     let mut engine = study.start(&often);
     assert!(engine.wait().unwrap().success());
     assert!(

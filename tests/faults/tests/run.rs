@@ -195,6 +195,17 @@ fn a_changed_value_runs_only_what_depends_on_it_and_plan_says_so_before() {
         "all run",
     ];
     assert_eq!(states, expected);
+    // What they cost when they ran last: of those that are to run, and of those alone.
+    for p in plan.as_array().unwrap() {
+        let cost = &p["last_cpu_seconds"];
+        assert_eq!(cost.is_f64(), p["state"] == "run", "{p}");
+    }
+    study.write(&FAN_OUT.replace("items: 3", "items: 2"));
+    let text = String::from_utf8(study.call(&["plan"]).stdout).unwrap();
+    let local = text.lines().find(|l| l.starts_with("local x N")).unwrap();
+    assert!(local.contains(" s  how many"), "{text}");
+    assert!(text.contains("1 cached, 2 unknown; last time "), "{text}");
+    study.write(&FAN_OUT.replace("value: 5", "value: 6"));
     let explained = String::from_utf8(study.call(&["explain", "local[item-1]"]).stdout).unwrap();
     assert!(explained.contains("parameter /value"), "{explained}");
     assert!(
@@ -213,6 +224,7 @@ fn an_unknown_fan_out_is_planned_as_such() {
     let study = Study::new(FAN_OUT);
     let text = String::from_utf8(study.call(&["plan"]).stdout).unwrap();
     assert!(text.contains("local x N (from zones)  unknown"), "{text}");
+    assert!(!text.contains("; last time"), "nothing ran: {text}");
 }
 
 #[test]
@@ -419,6 +431,14 @@ fn clean_keeps_what_the_last_run_uses() {
     study.run(&[]);
     study.run(&["--set", "local.value=7"]);
     assert_eq!(study.artifacts().len(), 10);
+    // A name that is no workflow's cleans nothing.
+    for slip in ["typo.yaml", "."] {
+        let slipped = study
+            .command_on(slip, &["clean", "--all"])
+            .output()
+            .unwrap();
+        assert_eq!(slipped.status.code(), Some(2), "{slip}");
+    }
     assert_eq!(study.call(&["clean"]).status.code(), Some(0));
     assert_eq!(study.artifacts().len(), 6);
     assert_eq!(study.run(&["--set", "local.value=7"]), (0, [0, 6, 0]));

@@ -17,7 +17,7 @@ fn runs(material: &Material) -> BTreeMap<usize, &Run> {
     let studies = material.studies.iter();
     let all = studies.flat_map(|s| {
         let local = s.locals.iter().filter_map(|l| l.run.as_ref());
-        s.global.iter().chain(&s.reference).chain(local)
+        (s.global.iter().chain(&s.reference).chain(local)).chain(&s.further)
     });
     let coupons = material.shown.iter().filter_map(|s| s.run.as_ref());
     all.chain(coupons).map(|r| (r.instance, r)).collect()
@@ -56,7 +56,7 @@ pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
                 } }
                 tbody { @for (at, i) in all.iter().enumerate().take(LONGEST) { (row(i, runs.get(&at).copied())) } }
                 tfoot { tr {
-                    th { "all steps" }
+                    th { "all steps, times added up" }
                     td colspan="4" { @if all.len() > LONGEST { "the first " (LONGEST) " of " (all.len()) " are listed" } }
                     td class="n" { (sum(|i| i.record.cost.wall_seconds)) } td class="n" { (sum(|i| i.record.cost.cpu_seconds)) }
                     td {} td class="n" { (bytes(memory)) } td {} td {}
@@ -72,14 +72,23 @@ fn row(i: &Instance, run: Option<&Run>) -> Markup {
     html! {
         tr {
             th { (i.label()) } td { (i.record.kind) }
-            td class="n" { @if let Some(r) = run { (count(r.facts.elements)) } }
-            td class="n" { @if let Some(r) = run { (count(r.facts.cycles)) } }
-            td class="n" { @if let Some(r) = run { (fixed(r.facts.element_cycles * 1e-6, 1)) } }
+            td class="n" { @if let Some(r) = run { (told(r.facts.elements, count)) } }
+            td class="n" { @if let Some(r) = run { (told(r.facts.cycles, count)) } }
+            td class="n" { @if let Some(r) = run { (told(r.facts.element_cycles * 1e-6, |v| fixed(v, 1))) } }
             td class="n" { (duration(c.wall_seconds)) } td class="n" { (duration(c.cpu_seconds)) }
             td class="n" { (c.threads) } td class="n" { (bytes(c.peak_memory)) }
-            td class="n" { @if let Some(r) = run { (fixed(rate(i, r) * 1e-6, 2)) } }
+            td class="n" { @if let Some(r) = run { (told(rate(i, r) * 1e-6, |v| fixed(v, 2))) } }
             td class="n" { (bytes(i.record.bytes)) }
         }
+    }
+}
+
+/// A dash for what a run does not have: a drape has no time steps.
+fn told(value: f64, write: fn(f64) -> String) -> String {
+    if value > 0.0 {
+        write(value)
+    } else {
+        "–".into()
     }
 }
 

@@ -21,7 +21,8 @@ pub(super) fn has(material: &Material) -> bool {
     !runs(material).is_empty()
 }
 
-/// All forming runs and coupons, and whether they are whole: driven by pressure and frame, not by their edges.
+/// All forming runs and coupons, and whether they are whole: driven by pressure and frame, not by their edges. Last come those that no
+/// study draws.
 fn runs(material: &Material) -> Vec<(bool, &Run)> {
     let mut runs: Vec<(bool, &Run)> = Vec::new();
     for study in &material.studies {
@@ -46,6 +47,11 @@ fn runs(material: &Material) -> Vec<(bool, &Run)> {
             .iter()
             .filter_map(|s| Some((false, s.run.as_ref()?))),
     );
+    for run in material.studies.iter().flat_map(|s| &s.further) {
+        if runs.iter().all(|(_, r)| r.instance != run.instance) {
+            runs.push((false, run));
+        }
+    }
     runs
 }
 

@@ -23,7 +23,7 @@ pub(super) fn section(input: &ReportInput) -> Markup {
                 h2 { "Speed against error" }
                 p {
                     "Error: the mean over all defects of the " (ways.yardstick()) ", and false ones, of the relative error of a wrinkle's length or a bridging's area; a missed and a false one count as 100 %. "
-                    "Position, distance: root mean square over the plies; shear: of its quantiles. A mark: no other way is both cheaper and better."
+                    "Times of several runs are added up, also of those that ran side by side. Position, distance: root mean square over the plies; shear: of its quantiles. A mark: no other way is both cheaper and better."
                 }
                 @if !ways.of_the_whole {
                     p { "Nobody ran the whole in fine elements here, so the fine runs of the zones are the measure, in these zones: how wrong they are themselves, and what lies outside of them, is not told." }
@@ -31,23 +31,37 @@ pub(super) fn section(input: &ReportInput) -> Markup {
                 @if ways.list.iter().any(|w| w.start_time.is_some()) {
                     p { "A run that began late (from …) did a part of the process: what it began from is not in its cost, so it is not marked and not advised. Shares of the CPU time of such a reference are of that part." }
                 }
-                div class="scroll" { table {
-                    thead { tr {
-                        th { "way" } th {}
-                        @for head in ["CPU", "wall", "memory", "CPU share", "error", "length", "amplitude", "bridging area", "missed", "false", "position, mm", "distance, mm", "shear, deg"] {
-                            th class="n" { (head) }
-                        }
-                    } }
-                    tbody { @for way in &ways.list { (row(way)) } }
-                } }
-                (plot("Error of defects over CPU time", "error (%)", &ways, Measure::Defects, 100.0))
-                @if ways.list.iter().any(|w| w.error(Measure::Position).is_some()) {
-                    (plot("Error of position over CPU time", "error (mm)", &ways, Measure::Position, 1e3))
+                @let groups = ways.by_reference();
+                @if groups.len() > 1 {
+                    p { "Ways are held against those of the same reference alone: a way that one reference measured says nothing of the error by another." }
                 }
-                p class="note" { "The same as data, with the front of every error: " code { "plyflow results " (input.file) " --front --format csv" } }
-                @for text in advice(&ways, &TARGETS) { p { (text) } }
+                @for (of, ways) in &groups {
+                    @if groups.len() > 1 { h3 { "By the reference of " code { (of) } } }
+                    (group(ways))
+                }
+                p class="note" { "The same as data, with the front of every error: " code { (input.command("results")) " --front --format csv" } }
             }
         }
+    }
+}
+
+/// Table, plots and advice of the ways that one reference measured.
+fn group(ways: &Ways) -> Markup {
+    html! {
+        div class="scroll" { table {
+            thead { tr {
+                th { "way" } th {}
+                @for head in ["CPU", "wall, added up", "memory", "CPU share", "error", "length", "amplitude", "bridging area", "missed", "false", "position, mm", "distance, mm", "shear, deg"] {
+                    th class="n" { (head) }
+                }
+            } }
+            tbody { @for way in &ways.list { (row(way)) } }
+        } }
+        (plot("Error of defects over CPU time", "error (%)", ways, Measure::Defects, 100.0))
+        @if ways.list.iter().any(|w| w.error(Measure::Position).is_some()) {
+            (plot("Error of position over CPU time", "error (mm)", ways, Measure::Position, 1e3))
+        }
+        @for text in advice(ways, &TARGETS) { p { (text) } }
     }
 }
 
@@ -130,8 +144,9 @@ mod tests {
             errors: [Some(error); 7],
             counts: None,
             is_reference: model == "reference",
+            measured_by: "comparison".into(),
             start_time,
-            on_front: [start_time.is_none() || model == "reference"; 7],
+            on_front: [start_time.is_none(); 7],
         }
     }
 
@@ -142,6 +157,7 @@ mod tests {
                 way("coarse run alone", 0.1, 0.8, None),
                 way("late", 0.5, 0.02, Some(0.6)),
                 way("reference", 1.0, 0.0, Some(0.7)),
+                way("coarse run and zones", 1.2, 0.01, None),
             ],
             of_the_whole: true,
         };
@@ -154,7 +170,7 @@ mod tests {
             }
             assert!(!text.contains("alone (from"), "{text}");
         }
-        // The front joins the first and the last: one line of two places.
+        // The front joins what did the whole process, the first and the last: one line of two places.
         let dashed = plot.split_once("class=\"line dashed c0\" d=\"").unwrap().1;
         let path = &dashed[..dashed.find('"').unwrap()];
         assert_eq!(path.matches(['M', 'L']).count(), 2, "{path}");

@@ -77,7 +77,7 @@ pub(super) fn global(
                 div class="field" {
                     h3 { (legend.title()) }
                     (legend.bar(&format!("scale-{n}-{}", legend.si_unit().replace('/', "-"))))
-                    (legend.note())
+                    (legend.note_of(&study.plies))
                     @for (_, name, figures) in of(legend.field) {
                         div class="triple" {
                             @for (figure, what) in figures.iter().zip(["flat", "formed", "formed"]) {

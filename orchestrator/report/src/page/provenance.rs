@@ -3,6 +3,7 @@
 use crate::input::{Instance, ReportInput};
 use crate::read::Facts;
 use crate::study::Material;
+use crate::units::moment;
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -16,10 +17,11 @@ pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
             h2 { "Provenance" }
             p { "To make these results again:" }
             div class="command" {
-                pre { code { (input.command) } }
+                pre { code { (input.command("run")) } }
                 button type="button" class="copy with-script" hidden { "Copy" }
             }
-            p class="note" { "Workflow file: " code { (input.file) } ". The same key means the same bytes." }
+            p class="note" { "Workflow file: " code { (input.file) } ". The same key means the same bytes."
+                @if let Some(text) = began(&input.instances) { " " (text) } }
             @if input.instances.len() > LONGEST {
                 p class="note" { "The first " (LONGEST) " of " (input.instances.len()) " steps." }
             }
@@ -28,6 +30,18 @@ pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
             }
         }
     }
+}
+
+/// When the steps began. It comes from the records: the page is the same whenever it is written.
+fn began(instances: &[Instance]) -> Option<String> {
+    let times = || instances.iter().map(|i| i.record.started);
+    let (first, last) = (times().reduce(f64::min)?, times().reduce(f64::max)?);
+    let (first, last) = (moment(first), moment(last));
+    Some(if first == last {
+        format!("Its steps began at {first}.")
+    } else {
+        format!("The first of its steps began at {first}, the last at {last}.")
+    })
 }
 
 fn instance(i: &Instance, facts: Option<&Facts>) -> Markup {

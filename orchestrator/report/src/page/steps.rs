@@ -1,6 +1,6 @@
 //! Steps with plots, maps and tables: coupons, characterisations and whatever else carries some.
 
-use super::tables::{expected_text, got_text};
+use super::tables::{expected_text, got_text, verdict_and_source};
 use crate::field::Field;
 use crate::input::{Expectation, Instance, ReportInput};
 use crate::read::Ply;
@@ -74,13 +74,17 @@ fn block(input: &ReportInput, shown: &Shown, sharp: Sharpness) -> Result<Markup,
 
 /// The results of a step beside what is expected of them.
 fn numbers(input: &ReportInput, instance: &Instance) -> Markup {
+    let results = &instance.record.results;
+    // What no item has reported is told with each; what another item has not, or one that is not known yet, is not of this one.
+    let of_all = |e: &&Expectation| {
+        e.item.is_empty() && e.got.is_none() && results.iter().all(|r| r.name != e.result)
+    };
     let mine: Vec<&Expectation> = (input.expectations.iter())
-        .filter(|e| e.step == instance.step && (e.item == instance.item || e.got.is_none()))
+        .filter(|e| e.step == instance.step && (e.item == instance.item || of_all(e)))
         .collect();
     let of = |name: &str| -> Vec<&Expectation> {
         mine.iter().copied().filter(|e| e.result == name).collect()
     };
-    let results = &instance.record.results;
     let absent = mine
         .iter()
         .filter(|e| !results.iter().any(|r| r.name == e.result));
@@ -113,8 +117,7 @@ fn numbers(input: &ReportInput, instance: &Instance) -> Markup {
 fn judged(e: &Expectation) -> Markup {
     html! {
         td class="n" { (expected_text(e)) }
-        td class=(if e.met { "met" } else { "missed" }) { (if e.met { "✓ met" } else { "✗ missed" }) }
-        td { (e.source.as_deref().unwrap_or_default()) }
+        (verdict_and_source(e))
     }
 }
 
@@ -163,7 +166,7 @@ fn pictures(sheet: &Ply, n: usize, sharp: Sharpness) -> Result<Markup, String> {
 
 fn files(input: &ReportInput, label: &str, files: &[TextFile]) -> Markup {
     html! {
-        p class="note" { "Files of this step, to be written with " code { "plyflow extract " (input.file) " '" (label) "'" } ":" }
+        p class="note" { "Files of this step, to be written with " code { (input.command("extract")) " '" (label) "'" } ":" }
         @for file in files {
             @let beginning: String = file.text.chars().take(LONGEST).collect();
             details {

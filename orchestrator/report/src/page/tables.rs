@@ -1,9 +1,10 @@
 //! Tables: zones, defects, expectations, results.
 
-use crate::input::{Expectation, ReportInput, label};
+use crate::input::{Expectation, ReportInput, Verdict, label};
 use crate::place::{Place, id_of};
 use crate::study::{Comparison, Defect, Study};
 use crate::units::{fixed, number, quantity, shown};
+use crate::verdict;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
@@ -19,7 +20,8 @@ pub(super) fn zones(study: &Study) -> Markup {
                 h2 { "Where to look" }
                 @if let Some(zones) = &study.zones {
                     @if zones.is_empty() {
-                        p { "No defects found: no zones, no local runs." }
+                        @let text = verdict::nothing_found(study);
+                        p { (text[..1].to_uppercase()) (text[1..]) "." }
                     } @else {
                         div class="scroll" { table {
                             thead { tr { th { "zone" } th class="n" { "x (mm)" } th class="n" { "y (mm)" } th class="n" { "size (mm)" }
@@ -147,11 +149,19 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
         roles.push("reference");
     }
     let rows = defect_rows(c, &roles);
+    let no_zones = study.zones.as_deref().unwrap_or_default().is_empty();
     html! {
         section id={ "defects-" (n) } {
             h2 { "Defects" }
-            @if rows.is_empty() {
-                p { "No wrinkle and no bridging was found in any model." }
+            p { "Step " code { (c.label) } "."
+                @if !c.others.is_empty() { " Other comparisons of the same zones are not drawn:"
+                    @for (i, other) in c.others.iter().enumerate() { @if i > 0 { "," } " " code { (other) } }
+                    ". What they found is under " a href="#results" { "All results" } ", how sound their local runs are under " a href="#energy" { "Energy and contact" } "." } }
+            // The table looks into zones alone: it says nothing of what lies outside of them.
+            @if no_zones {
+                p { "Nothing was compared: there are no zones." }
+            } @else if rows.is_empty() {
+                p { "No wrinkle and no bridging was found in the zones, in any model." }
             } @else {
                 p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it, or bridging, which has no crest. Directions are those of crests in the flat ply, from x. A likely cause is a reading of the fields after the fact. A defect that reaches the cut needs a larger zone."
                     @if !places.is_empty() { span class="with-script" hidden { " A click on a row, or Enter, shows the defect in the 3D view and on the maps; Escape ends that." } } }
@@ -172,6 +182,9 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
                         }
                     } }
                 } }
+            }
+            @if let Some(missed) = c.missed_text() {
+                p { (missed) " of the reference " strong { "missed" } ": no local run has them. Of these, what lies outside of the zones is not listed." }
             }
         }
     }
@@ -199,6 +212,16 @@ pub(crate) fn got_text(e: &Expectation) -> String {
         .map_or("not reported".into(), |v| quantity(v, &e.unit, 5))
 }
 
+/// Cells of the verdict on an expectation and of where it comes from.
+pub(super) fn verdict_and_source(e: &Expectation) -> Markup {
+    let (class, text) = match e.verdict() {
+        Verdict::Met => ("met", "✓ met"),
+        Verdict::Missed => ("missed", "✗ missed"),
+        Verdict::NotJudged => ("open", "– not judged"),
+    };
+    html! { td class=(class) { (text) } td { (e.source.as_deref().unwrap_or_default()) } }
+}
+
 /// Expectations with what was found.
 pub(super) fn expectations(input: &ReportInput) -> Markup {
     html! {
@@ -210,8 +233,7 @@ pub(super) fn expectations(input: &ReportInput) -> Markup {
                     tbody { @for e in &input.expectations { tr {
                         td { (label(&e.step, &e.item)) } td { (e.result) }
                         td class="n" { (expected_text(e)) } td class="n" { (got_text(e)) }
-                        td class=(if e.met { "met" } else { "missed" }) { (if e.met { "✓ met" } else { "✗ missed" }) }
-                        td { (e.source.as_deref().unwrap_or_default()) }
+                        (verdict_and_source(e))
                     } } }
                 } }
             }

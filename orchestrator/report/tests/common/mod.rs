@@ -13,6 +13,8 @@ use shapes::{HALF, RADIUS, plies, sheet, tool};
 pub struct Study {
     pub folder: Utf8PathBuf,
     pub instances: Vec<Instance>,
+    /// What the forming runs that follow tell of themselves.
+    pub kinetic_bound_kept: bool,
 }
 
 /// Fields that no map shows: a scalar on cells, one on points, a vector, and one that is the same everywhere.
@@ -38,6 +40,7 @@ impl Study {
         Self {
             folder: folder.to_owned(),
             instances: Vec::new(),
+            kinetic_bound_kept: true,
         }
     }
 
@@ -138,7 +141,7 @@ impl Study {
         let attributes = json!({
             "scene": "half-pipe", "sheets": list, "element_size": size, "zone": zone_json, "cycles": 40000,
             "elements": elements, "element_cycles": 4e4 * elements as f64,
-            "energy": {"peak_drift_ratio": 0.011, "peak_kinetic_ratio": 0.023, "kinetic_bound_kept": true, "hourglass_ratio": 0.002},
+            "energy": {"peak_drift_ratio": 0.011, "peak_kinetic_ratio": 0.023, "kinetic_bound_kept": self.kinetic_bound_kept, "hourglass_ratio": 0.002},
             "penetration": {
                 "tool/ply_1": {
                     "max": 2.1e-4, "q999": 8e-5, "overlap": 0.0421,
@@ -233,7 +236,18 @@ impl Study {
     }
 
     pub fn comparison(&mut self, zones: &[(&str, [f64; 4])]) {
-        let mut w = self.create("compare", "comparison");
+        self.compared("compare", ["coarse", "local"], zones, &[]);
+    }
+
+    /// A comparison by a step, of a global run and of the local runs of a step, with what else arrives at its ports.
+    pub fn compared(
+        &mut self,
+        step: &str,
+        [global, local]: [&str; 2],
+        zones: &[(&str, [f64; 4])],
+        more: &[(&str, &str)],
+    ) {
+        let mut w = self.create(step, "comparison");
         let mut defects = Vec::new();
         let mut models = vec![json!({"name": "global", "role": "global", "zone": null})];
         for (zone, bounds) in zones {
@@ -280,7 +294,10 @@ impl Study {
                 .unwrap();
             }
         }
-        w.begin_frame(0.0).unwrap();
+        // An artifact without bodies has no frame.
+        if !zones.is_empty() {
+            w.begin_frame(0.0).unwrap();
+        }
         for (zone, bounds) in zones {
             for (name, s) in plies(*bounds, 0.002) {
                 let body = format!("local_{zone}_{name}");
@@ -302,14 +319,19 @@ impl Study {
                     .unwrap();
             }
         }
-        w.end_frame().unwrap();
+        if !zones.is_empty() {
+            w.end_frame().unwrap();
+        }
         w.attributes(&json!({"models": models, "defects": defects}).to_string())
             .unwrap();
-        let locals: Vec<String> = (zones.iter()).map(|z| format!("local[{}]", z.0)).collect();
-        let mut inputs = vec![("global", "coarse"), ("zones", "zones")];
+        let locals: Vec<String> = (zones.iter())
+            .map(|z| format!("{local}[{}]", z.0))
+            .collect();
+        let mut inputs = vec![("global", global), ("zones", "zones")];
+        inputs.extend(more);
         inputs.extend(locals.iter().map(|l| ("local", l.as_str())));
         let results = vec![("wrinkle_count", zones.len() as f64, "1")];
-        self.finish(w, ("compare", &[]), "comparison", &inputs, results);
+        self.finish(w, (step, &[]), "comparison", &inputs, results);
     }
 
     /// Defects measured on the coarse run: on ply_2 two wrinkles, the first with its crest.
@@ -451,7 +473,7 @@ impl Study {
             workflow: "half-pipe <demo> & co".into(),
             description: Some("Two plies over a \"cylinder\" <tool>".into()),
             file: "workflow.yaml".into(),
-            command: "plyflow run workflow.yaml --set 'coarse.element=m4 & <x>'".into(),
+            given: "workflow.yaml --set 'coarse.element=m4 & <x>'".into(),
             program: "plyflow 0.1.0".into(),
             fingerprint: "0123abcd".into(),
             expectations: vec![
