@@ -9,7 +9,9 @@
  * handed them over; the receiver copies what it keeps. No exception, panic or longjmp may cross.
  *
  * Versioning: a host accepts a plugin whose abi_major equals its own and whose abi_minor is not
- * greater. Structs only grow at their end; `size` is the size that the writer was compiled with.
+ * greater. Structs only grow at their end; `size` is the size that whoever made the struct was compiled with. In a
+ * struct that the other side fills (pf_material_sizes, pf_element_sizes) the caller sets `size` and zeros the rest; the
+ * other side writes no more than that many bytes, and leaves `size` as it is: assign fields, never the whole struct.
  */
 #ifndef PLYFLOW_H
 #define PLYFLOW_H
@@ -21,7 +23,9 @@ extern "C" {
 #endif
 
 #define PF_ABI_MAJOR 1u
-#define PF_ABI_MINOR 1u /* 1: checkpoints, ignores_velocity */
+/* 1: checkpoints, ignores_velocity. Made more exact before its release: units of what a step writes, `measured`, `size`
+ * of the structs of sizes, dt = 0, bounds of 0 in shear, no NULL instances. */
+#define PF_ABI_MINOR 1u
 #define PF_MAGIC 0x31574F4C46594C50ull /* the bytes "PLYFLOW1" in memory on a little-endian machine */
 #define PF_SYMBOL "plyflow_plugin"
 
@@ -135,7 +139,8 @@ typedef struct pf_services {
   int32_t (*frame_field_read)(void *host, uint32_t handle, pf_str body, uint64_t frame, uint32_t on, pf_str name,
                               double *values /* [n or m][components] */, uint64_t count /* of doubles */);
 
-  /* Writing the output artifact. NaN and infinities are refused with PF_BAD_VALUE. */
+  /* Writing the output artifact. NaN and infinities are refused with PF_BAD_VALUE, and so is a unit that is not a plain
+   * one of SI ("m", "N/m", "1"; not "mm", "deg" or "%"): readers take the numbers as they are. */
   int32_t (*attributes_write)(void *host, pf_str json); /* once; a JSON object */
   int32_t (*array_write)(void *host, pf_str path, const pf_array_info *info, pf_str unit, const void *data);
   /* A body: points [n][3] at its reference position, cells [m][k], k = 3 or 4; same cells in all frames. */
@@ -148,12 +153,13 @@ typedef struct pf_services {
   int32_t (*frame_field)(void *host, pf_str body, uint32_t on, pf_str name, uint32_t components, pf_str unit,
                          const double *values, uint64_t count);
   int32_t (*frame_end)(void *host);
-  /* A named number for `plyflow results`. */
+  /* A named number for `plyflow results`, in the unit that the manifest declares for it, else PF_BAD_VALUE. What the
+   * manifest declares as `measured` is, with and without the flag. */
   int32_t (*result)(void *host, pf_str name, double value, pf_str unit, uint32_t flags);
   /* The output is a collection of n items that later steps may fan out over; `names_json`: array of n labels. */
   int32_t (*collection)(void *host, uint64_t n, pf_str names_json);
 
-  /* A component by name (search path) or path, as given in a parameter of type "component" or "material". */
+  /* A component by name (search path) or path, as given in a parameter of type "element" or "material". */
   int32_t (*find_component)(void *host, uint32_t kind, pf_str name, pf_component *component);
 
   /* Checkpoints, since ABI 1.1: so that long work that is killed goes on where it was.
@@ -178,7 +184,9 @@ typedef struct pf_step_functions {
  * tail of a body's last batch repeats its last element. The caller owns all buffers, 64-byte
  * aligned, never overlapping. No allocation inside. An instance does not change after create:
  * several threads call it at once, on different batches. The value in a lane must depend on that
- * lane alone, so that results do not depend on how a body is cut into batches.
+ * lane alone, so that results do not depend on how a body is cut into batches. An output that may be
+ * NULL is wanted or not by itself, whatever the others are. A `create` that returns PF_OK and leaves
+ * *instance NULL is refused.
  */
 
 #define PF_ERROR_TEXT 512
@@ -191,12 +199,12 @@ typedef struct pf_error {
  * they are its two fibre directions, ordered so that positive shear stretches the stitch. */
 
 typedef struct pf_material_sizes {
-  uint64_t size;
+  uint64_t size; /* set by the caller: write no more than that */
   uint32_t membrane_history; /* doubles per point */
   uint32_t bending_history;
   uint32_t has_bending; /* 0 or 1 */
   uint32_t reserved;
-  double thickness;  /* m */
+  double thickness;  /* m; this and the next are those of the parameters */
   double areal_mass; /* kg/m2 */
 } pf_material_sizes;
 
@@ -204,20 +212,22 @@ typedef struct pf_membrane_batch {
   uint64_t size;
   uint32_t lanes;
   uint32_t reserved;
-  double dt;            /* s, since the previous call */
+  double dt;            /* s, since the previous call; 0 in the first one, and wherever only a state is asked for: finite
+                           answers, those of the metric. A law that does not depend on rates gives the same for any dt */
   const double *metric; /* [3][lanes] C11, C22, C12 of C = F^T F in e1, e2 */
   double *history;      /* [membrane_history][lanes]; zeros at the start */
   double *stress;       /* [3][lanes] S11, S22, S12 (N/m), second Piola-Kirchhoff resultants:
                            dW = S11 dE11 + S22 dE22 + 2 S12 dE12, E = (C - 1)/2 */
   double *energy;       /* [lanes] W (J/m2): stored, or the work done when there is no potential */
-  double *stiffness;    /* NULL or [2][lanes] (N/m): bound of the largest tangent dS/dE; shear tangent */
+  double *stiffness;    /* NULL or [2][lanes] (N/m): bounds of the largest tangent dS/dE, above 0, and of the shear tangent
+                           dS12/d(2 E12), 0 only for a sheet that has none */
 } pf_membrane_batch;
 
 typedef struct pf_bending_batch {
   uint64_t size;
   uint32_t lanes;
   uint32_t reserved;
-  double dt;
+  double dt;               /* as above */
   const double *metric;    /* [3][lanes] as above */
   const double *curvature; /* [3][lanes] k11, k22, k12 (1/m): n . d2x/dX_a dX_b, n = x,1 x x,2 / |x,1 x x,2| */
   double *history;         /* [bending_history][lanes] */
@@ -247,8 +257,8 @@ typedef struct pf_material {
  * rotation-free shell takes its curvature there. */
 
 typedef struct pf_element_sizes {
-  uint64_t size;
-  uint32_t nodes;           /* of the element part: 3 or 4 */
+  uint64_t size;            /* set by the caller: write no more than that */
+  uint32_t nodes;           /* of the element part: 3 or 4; check-plugin takes both, Plyflow's own solver quads only */
   uint32_t dofs_per_node;   /* 3; 6 adds rotations (spin in, moment out) */
   uint32_t constants;       /* doubles per element, written by initialise */
   uint32_t history;         /* doubles per element, the element's own */

@@ -94,14 +94,12 @@ static void destroy(void *it) { free(it); }
 
 static int32_t sizes(const void *it, pf_element_sizes *s) {
   (void)it;
-  *s = (pf_element_sizes){
-      .size = sizeof *s,
-      .nodes = 4,
-      .dofs_per_node = 3,
-      .constants = CONSTANTS,
-      .material_points = 1,
-      .fields = FIELDS,
-  };
+  /* Field by field: the caller's struct may be shorter than this header's, and what is not assigned is 0 already. */
+  s->nodes = 4;
+  s->dofs_per_node = 3;
+  s->constants = CONSTANTS;
+  s->material_points = 1;
+  s->fields = FIELDS;
   return PF_OK;
 }
 

@@ -1,9 +1,8 @@
 //! The plugins on a search path.
 
 use crate::describe::{Description, describe};
-use crate::load::Plugin;
+use crate::load::{Plugin, read_manifest};
 use camino::{Utf8Path, Utf8PathBuf};
-use plyflow_model::Manifest;
 use plyflow_model::manifest::PluginKind;
 use plyflow_workflow::resolved::PluginId;
 use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
@@ -177,7 +176,7 @@ impl PluginCatalog {
             .cache()
             .libraries
             .get(path)
-            .filter(|k| k.stamp == stamp)
+            .filter(|k| k.stamp == stamp && is_readable(&k.description))
             .cloned();
         let known = match known {
             Some(known) => known,
@@ -203,9 +202,7 @@ impl PluginCatalog {
             Description::Foreign(_) => Ok(None),
             Description::Broken(reason) => Err(reason),
             Description::Plugin(text) => {
-                let manifest: Manifest = serde_json::from_str(&text).map_err(|e| {
-                    format!("its manifest does not follow schemas/manifest.md: {e}")
-                })?;
+                let manifest = read_manifest(&text)?;
                 let id = PluginId {
                     name: manifest.name.clone(),
                     version: manifest.version.clone(),
@@ -327,6 +324,14 @@ impl Catalog for PluginCatalog {
             .collect();
         names.sort();
         names
+    }
+}
+
+/// Whether a description can still be used: one that an earlier program kept may break a rule that this one has.
+fn is_readable(description: &Description) -> bool {
+    match description {
+        Description::Plugin(text) => read_manifest(text).is_ok(),
+        Description::Foreign(_) | Description::Broken(_) => true,
     }
 }
 

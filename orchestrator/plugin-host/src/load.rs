@@ -5,6 +5,7 @@ use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 use plyflow_abi::*;
 use plyflow_model::Manifest;
 use plyflow_model::manifest::PluginKind;
+use plyflow_model::units::parse_quantity_in;
 use std::ffi::c_void;
 
 /// Why a library is not a plugin that this program can use.
@@ -108,6 +109,8 @@ impl Plugin {
         if d.functions.is_null() {
             return Err("its function table is NULL".into());
         }
+        // No table has grown since ABI 1.0, so today's size is the least one for a plugin of any minor. When one grows,
+        // the least size must be that of the plugin's own `abi_minor`: else every plugin built before is refused.
         let table = unsafe { d.functions.cast::<u64>().read_unaligned() };
         if table < size as u64 {
             return Err(format!(
@@ -118,16 +121,12 @@ impl Plugin {
         check_pointers(kind, d.functions)?;
         let text: &'static str = unsafe { d.manifest.as_str() }
             .map_err(|e| format!("its manifest is not UTF-8: {e}"))?;
-        let manifest: Manifest = serde_json::from_str(text)
-            .map_err(|e| format!("its manifest does not follow schemas/manifest.md: {e}"))?;
+        let manifest = read_manifest(text)?;
         if manifest.kind != kind {
             return Err(format!(
                 "its descriptor says {kind}, its manifest says {}; they must agree",
                 manifest.kind
             ));
-        }
-        if kind == PluginKind::Step && manifest.output.is_none() {
-            return Err("its manifest has no `output`; a step writes one artifact".into());
         }
         Ok(Self {
             path: path.to_owned(),
@@ -141,6 +140,29 @@ impl Plugin {
     #[must_use]
     pub fn functions(&self) -> *const c_void {
         self.functions
+    }
+}
+
+/// Reads a manifest by all of its rules; the error is a sentence.
+pub(crate) fn read_manifest(text: &str) -> Result<Manifest, String> {
+    let manifest = Manifest::parse(text).map_err(|e| e.to_string())?;
+    let results = manifest.results.iter().map(|(name, r)| (name, &r.unit));
+    let fields = manifest.fields.iter().map(|f| (&f.name, &f.unit));
+    for (name, unit) in results.chain(fields) {
+        // Values are handed over in this unit and stored as they are.
+        check_si(unit).map_err(|e| format!("its manifest: `{name}`: {e}"))?;
+    }
+    Ok(manifest)
+}
+
+/// Whether a unit is a plain one of SI: artifacts hold no other numbers.
+pub(crate) fn check_si(unit: &str) -> Result<(), String> {
+    match parse_quantity_in(&format!("1 {unit}"), unit) {
+        Ok(1.0) => Ok(()),
+        Ok(value) => Err(format!(
+            "1 `{unit}` is {value} in SI units; expected the SI unit, and numbers in it"
+        )),
+        Err(e) => Err(e.to_string()),
     }
 }
 

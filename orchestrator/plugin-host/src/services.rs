@@ -4,11 +4,13 @@
 //! valid for the call); everything that can be checked is. No panic crosses into the plugin.
 
 use crate::host::HostState;
+use crate::load::check_si;
 use crate::process;
 use plyflow_abi::*;
 use plyflow_artifact::{ArtifactError, DType, ErrorKind, On, check_result};
 use plyflow_model::job::{LogLevel, NamedResult, Progress};
 use plyflow_model::manifest::PluginKind;
+use plyflow_model::units::parse_unit;
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -353,6 +355,11 @@ unsafe extern "C" fn frame_field_read(
 
 // ---- writing ------------------------------------------------------------------------------------
 
+/// Refuses numbers that are not in SI: readers take what is stored as it is.
+fn si(what: &str, unit: &str) -> Result<(), ArtifactError> {
+    check_si(unit).map_err(|e| error(ErrorKind::BadValue, format!("{what}: {e}")))
+}
+
 /// Runs a write on the artifact being made.
 fn write(
     host: *mut c_void,
@@ -388,6 +395,7 @@ unsafe extern "C" fn array_write(
                 format!("array '{path}': info is NULL"),
             ));
         };
+        si(&format!("array '{path}'"), unit)?;
         let dtype = dtype(info.dtype)?;
         let Some(shape) = info.shape.get(..info.rank as usize) else {
             return Err(error(
@@ -453,6 +461,7 @@ unsafe extern "C" fn frame_field(
 ) -> i32 {
     write(host, |w| {
         let (body, name, unit) = unsafe { (text(body)?, text(name)?, text(unit)?) };
+        si(&format!("field '{name}' of '{body}'"), unit)?;
         let values = unsafe { slice(values, times(count, 1)?, name) }?;
         w.frame_field(body, on(place)?, name, components, unit, values)
     })
@@ -470,13 +479,6 @@ unsafe extern "C" fn result(
     flags: u32,
 ) -> i32 {
     guard(host, PF_ERROR, |s| {
-        let declared = |name: &str| {
-            let results = &s.plugin.manifest.results;
-            results.contains_key(name)
-                || name
-                    .split_once('.')
-                    .is_some_and(|(part, _)| results.contains_key(part))
-        };
         s.write(|output| {
             let (name, unit) = unsafe { (text(name)?, text(unit)?) };
             check_result(name, value)?;
@@ -484,13 +486,24 @@ unsafe extern "C" fn result(
                 let message = format!("the result '{name}' was reported before");
                 return Err(error(ErrorKind::BadOrder, message));
             }
-            if !declared(name) {
+            si(&format!("result '{name}'"), unit)?;
+            let mut measured = flags & PF_RESULT_MEASURED != 0;
+            if let Some(declared) = s.plugin.manifest.result(name) {
+                // Workflows are checked against the manifest before anything runs.
+                if !same_unit(unit, &declared.unit) {
+                    let message = format!(
+                        "the result '{name}' was reported in `{unit}`; the plugin's manifest says `{}`",
+                        declared.unit
+                    );
+                    return Err(error(ErrorKind::BadValue, message));
+                }
+                measured |= declared.measured;
+            } else {
                 s.emitter.log(
                     LogLevel::Debug,
                     &format!("the result '{name}' is not declared in the plugin's manifest"),
                 );
             }
-            let measured = flags & PF_RESULT_MEASURED != 0;
             if let (false, Some(writer)) = (measured, output.writer.as_mut()) {
                 writer.result(name, value, unit)?;
             }
@@ -504,6 +517,11 @@ unsafe extern "C" fn result(
             Ok(())
         })
     })
+}
+
+/// Whether two texts mean the same unit: `` and `1`, `N m` and `J`.
+fn same_unit(a: &str, b: &str) -> bool {
+    matches!((parse_unit(a), parse_unit(b)), (Ok(a), Ok(b)) if a == b)
 }
 
 unsafe extern "C" fn collection(host: *mut c_void, n: u64, names: pf_str) -> i32 {

@@ -236,7 +236,7 @@ impl pf_error {
 }
 
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct pf_material_sizes {
     pub size: u64,
     pub membrane_history: u32,
@@ -245,6 +245,21 @@ pub struct pf_material_sizes {
     pub reserved: u32,
     pub thickness: f64,
     pub areal_mass: f64,
+}
+
+/// As a caller hands it over: `size` is set, and all else is 0.
+impl Default for pf_material_sizes {
+    fn default() -> Self {
+        Self {
+            size: size_of::<Self>() as u64,
+            membrane_history: 0,
+            bending_history: 0,
+            has_bending: 0,
+            reserved: 0,
+            thickness: 0.0,
+            areal_mass: 0.0,
+        }
+    }
 }
 
 #[repr(C)]
@@ -298,7 +313,7 @@ unsafe impl Sync for pf_material {}
 unsafe impl Send for pf_material {}
 
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct pf_element_sizes {
     pub size: u64,
     pub nodes: u32,
@@ -313,6 +328,27 @@ pub struct pf_element_sizes {
     pub patch_fields: u32,
     pub ignores_velocity: u32,
     pub reserved: u32,
+}
+
+/// As a caller hands it over: `size` is set, and all else is 0.
+impl Default for pf_element_sizes {
+    fn default() -> Self {
+        Self {
+            size: size_of::<Self>() as u64,
+            nodes: 0,
+            dofs_per_node: 0,
+            constants: 0,
+            history: 0,
+            material_points: 0,
+            fields: 0,
+            patch_nodes: 0,
+            patch_constants: 0,
+            patch_history: 0,
+            patch_fields: 0,
+            ignores_velocity: 0,
+            reserved: 0,
+        }
+    }
 }
 
 #[repr(C)]

@@ -1,15 +1,29 @@
 //! Checks of a material's bending part.
 
+use crate::breaches::{Ask, Breaches, DT};
 use crate::buffer::Guarded;
-use crate::material::{Law, largest, metrics, size};
+use crate::cycle::Cycles;
+use crate::law::{Law, largest, metrics, size};
+use crate::material::{LANES, zero_dt};
+use crate::meeting::{Counter, THREADS, meet, same};
 use crate::shapes::pick;
-use crate::subject::{Ask, Breaches, DT};
+use crate::slope::Energies;
 use crate::{Run, Seen, Sequence, rules, worse};
 use plyflow_sdk::abi::*;
 
-const LANES: usize = 16;
-/// Largest curvatures (1/m): a radius of 20 mm.
-const CURVATURE: f64 = 50.0;
+/// Curvatures of gentle folds (1/m): a radius of 20 mm.
+const GENTLE: f64 = 50.0;
+/// Those of sharp ones: a radius of 2 mm.
+const SHARP: f64 = 500.0;
+/// Steps from flat to a bent state: laws that integrate want small ones.
+const STEPS: usize = 60;
+/// Calls of a thread between two looks at whether enough have met.
+const CALLS: usize = 5000;
+
+/// The largest curvatures that a law is judged at (1/m): radii of less than five thicknesses are no bending of a sheet.
+fn sharp(law: &Law) -> f64 {
+    SHARP.min(0.2 / law.sizes.thickness).max(GENTLE)
+}
 
 struct Answer {
     moment: Vec<f64>,
@@ -23,23 +37,34 @@ fn start(law: &Law, lanes: usize) -> Guarded {
 }
 
 fn call(law: &Law, history: &mut Guarded, metric: &[f64], curvature: &[f64], ask: Ask) -> Answer {
+    call_after(DT, law, history, metric, curvature, ask)
+}
+
+/// Calls bending with another time since the previous call.
+fn call_after(
+    dt: f64,
+    law: &Law,
+    history: &mut Guarded,
+    metric: &[f64],
+    curvature: &[f64],
+    ask: Ask,
+) -> Answer {
     let lanes = metric.len() / 3;
-    let wanted = ask == Ask::Everything;
     let (mut c, mut k) = (Guarded::of(metric), Guarded::of(curvature));
     let mut moment = Guarded::poisoned(3 * lanes);
     let mut energy = Guarded::poisoned(lanes);
-    let mut tangent = Guarded::poisoned(if wanted { 3 * lanes } else { 0 });
+    let mut tangent = Guarded::poisoned(if ask.bound { 3 * lanes } else { 0 });
     let batch = pf_bending_batch {
         size: size_of::<pf_bending_batch>() as u64,
         lanes: lanes as u32,
         reserved: 0,
-        dt: DT,
+        dt,
         metric: c.pointer(),
         curvature: k.pointer(),
         history: history.pointer(),
         moment: moment.pointer(),
         energy: energy.pointer(),
-        tangent: if wanted {
+        tangent: if ask.bound {
             tangent.pointer()
         } else {
             std::ptr::null_mut()
@@ -64,57 +89,102 @@ fn call(law: &Law, history: &mut Guarded, metric: &[f64], curvature: &[f64], ask
     }
 }
 
-fn curvatures(lanes: usize, seed: u64) -> Vec<f64> {
+fn curvatures(lanes: usize, largest: f64, seed: u64) -> Vec<f64> {
     let mut s = Sequence(seed);
-    (0..3 * lanes).map(|_| CURVATURE * s.next()).collect()
+    (0..3 * lanes).map(|_| largest * s.next()).collect()
 }
 
-pub(crate) fn judge(run: &mut Run<'_>, law: &Law) {
+/// Flat, then bent; everything that it gave.
+fn bend(law: &Law, metric: &[f64], curvature: &[f64], ask: Ask) -> (Guarded, Answer) {
+    let mut history = start(law, metric.len() / 3);
+    let _ = call(law, &mut history, metric, &vec![0.0; metric.len()], ask);
+    let a = call(law, &mut history, metric, curvature, ask);
+    (history, a)
+}
+
+fn bits(history: &Guarded, a: &Answer, lanes: usize) -> Vec<Vec<u64>> {
+    let rows = [history.slice(), &a.moment, &a.energy, &a.tangent];
+    (0..lanes)
+        .map(|l| {
+            let of = |r: &&[f64]| -> Vec<u64> {
+                let rows = r.chunks_exact(lanes);
+                rows.map(|row| row[l].to_bits()).collect()
+            };
+            rows.iter().flat_map(of).collect()
+        })
+        .collect()
+}
+
+pub(crate) fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
     if !law.bends() {
         return;
     }
     let well = run.check(rules::BENDING, || {
         let mut all = Breaches::default();
         for lanes in [8, 24, 64] {
-            for ask in [Ask::Nothing, Ask::Everything] {
+            // Its one optional output.
+            for ask in [Ask::NOTHING, Ask::EVERYTHING] {
                 let mut history = start(law, lanes);
-                for seed in [89, 97] {
-                    let (m, k) = (metrics(lanes, 0.02, seed), curvatures(lanes, seed));
+                for (seed, largest) in [(89, GENTLE), (97, sharp(law))] {
+                    let m = metrics(lanes, 0.02, seed);
+                    let k = curvatures(lanes, largest, seed);
                     all.add(call(law, &mut history, &m, &k, ask).breaches);
                 }
             }
         }
         match all.any() {
             Some(text) => Seen::Bad(text),
-            None => Seen::Well("12 batches of 8 to 64 lanes, curvatures to 50 1/m".into()),
+            None => Seen::Well(format!(
+                "12 batches of 8 to 64 lanes, curvatures to {:.0} 1/m",
+                sharp(law)
+            )),
         }
     });
     if !well {
         run.skip(&rules::OF_BENDING, "not checked: repair the above first");
         return;
     }
+    run.check(rules::BENDING_REPEATABLE, || repeatable(law, twin));
     run.check(rules::BENDING_LANES, || lanes(law));
+    run.check(rules::BENDING_ASKING, || asking(law));
+    run.check(rules::BENDING_THREADS, || threads(law));
+    run.check(rules::BENDING_ZERO_DT, || {
+        let (m, k) = (metrics(LANES, 0.02, 107), curvatures(LANES, GENTLE, 109));
+        let flat = [0.0; 3 * LANES];
+        zero_dt(|dt| {
+            let mut history = start(law, LANES);
+            let rest = call_after(0.0, law, &mut history, &m, &flat, Ask::NOTHING);
+            let a = call_after(dt, law, &mut history, &m, &k, Ask::EVERYTHING);
+            let outputs = vec![a.moment, a.energy, a.tangent];
+            (rest.breaches, a.breaches, outputs)
+        })
+    });
     run.check(rules::BENDING_REST, || rest(law));
     run.check(rules::MOMENT, || moment(law));
+    run.check(rules::BENDING_CYCLE, || cycle(law));
     run.check(rules::BENDING_TANGENT, || tangent(law));
 }
 
+fn repeatable(law: &Law, twin: &Law) -> Seen {
+    let (m, k) = (metrics(LANES, 0.02, 101), curvatures(LANES, GENTLE, 103));
+    let all = |law: &Law| {
+        let (history, a) = bend(law, &m, &k, Ask::EVERYTHING);
+        bits(&history, &a, LANES)
+    };
+    let first = all(law);
+    if first == all(law) && first == all(twin) {
+        Seen::Well("same bits in a second call and in a second instance".into())
+    } else {
+        Seen::Bad("a second call on the same data differs".into())
+    }
+}
+
 fn lanes(law: &Law) -> Seen {
-    let (m, k) = (metrics(64, 0.02, 101), curvatures(64, 103));
+    let (m, k) = (metrics(64, 0.02, 101), curvatures(64, GENTLE, 103));
     let all = |order: &[usize]| -> Vec<Vec<u64>> {
-        let n = order.len();
-        let mut history = start(law, n);
         let (m, k) = (pick(&m, 64, order), pick(&k, 64, order));
-        let a = call(law, &mut history, &m, &k, Ask::Everything);
-        let rows = [history.slice(), &a.moment, &a.energy, &a.tangent];
-        (0..n)
-            .map(|l| {
-                let of = |r: &&[f64]| -> Vec<u64> {
-                    r.chunks_exact(n).map(|row| row[l].to_bits()).collect()
-                };
-                rows.iter().flat_map(of).collect()
-            })
-            .collect()
+        let (history, a) = bend(law, &m, &k, Ask::EVERYTHING);
+        bits(&history, &a, order.len())
     };
     let whole = all(&(0..64).collect::<Vec<_>>());
     for width in (8..=64).step_by(8) {
@@ -130,21 +200,112 @@ fn lanes(law: &Law) -> Seen {
     Seen::Well("same bits in batches of 8, 16, .. 64 lanes in other orders".into())
 }
 
+fn asking(law: &Law) -> Seen {
+    let (m, k) = (metrics(LANES, 0.02, 101), curvatures(LANES, GENTLE, 103));
+    let mut with = bend(law, &m, &k, Ask::EVERYTHING);
+    let without = bend(law, &m, &k, Ask::NOTHING);
+    with.1.tangent.clear();
+    if bits(&with.0, &with.1, LANES) == bits(&without.0, &without.1, LANES) {
+        Seen::Well("same bits with and without tangent".into())
+    } else {
+        Seen::Bad("moment, energy or history differ when tangent is NULL".into())
+    }
+}
+
+/// As [`Law::hammer`], of bending.
+fn hammer(
+    law: &Law,
+    history: &Guarded,
+    metric: &[f64],
+    curvature: &[f64],
+    want: &Answer,
+    counter: &Counter<'_>,
+) -> usize {
+    let Some(bending) = law.functions().bending else {
+        return 0;
+    };
+    let lanes = metric.len() / 3;
+    let (mut c, mut k) = (Guarded::of(metric), Guarded::of(curvature));
+    let mut now = history.clone();
+    let (mut moment, mut energy) = (Guarded::zeros(3 * lanes), Guarded::zeros(lanes));
+    let batch = pf_bending_batch {
+        size: size_of::<pf_bending_batch>() as u64,
+        lanes: lanes as u32,
+        reserved: 0,
+        dt: DT,
+        metric: c.pointer(),
+        curvature: k.pointer(),
+        history: now.pointer(),
+        moment: moment.pointer(),
+        energy: energy.pointer(),
+        tangent: std::ptr::null_mut(),
+    };
+    (0..CALLS)
+        .filter(|_| {
+            now.slice_mut().copy_from_slice(history.slice());
+            let code = counter.during(|| unsafe { bending(law.instance(), &raw const batch) });
+            code != PF_OK
+                || !same(moment.slice(), &want.moment)
+                || !same(energy.slice(), &want.energy)
+        })
+        .count()
+}
+
+fn threads(law: &Law) -> Seen {
+    let alone: Vec<_> = (0..THREADS)
+        .map(|t| {
+            let seed = 201 + 2 * t as u64;
+            let (m, k) = (metrics(LANES, 0.02, seed), curvatures(LANES, GENTLE, seed));
+            let history = bend(law, &m, &k, Ask::NOTHING).0;
+            let answer = call(law, &mut history.clone(), &m, &k, Ask::NOTHING);
+            (history, m, k, answer)
+        })
+        .collect();
+    let met = meet(|t, counter| {
+        let (history, m, k, want) = &alone[t];
+        (CALLS, hammer(law, history, m, k, want, counter))
+    });
+    met.seen()
+}
+
+/// As of the membrane: in 2000 steps to and fro, gently and sharply.
+fn cycle(law: &Law) -> Seen {
+    let mut cycles = Cycles::default();
+    let m = metrics(LANES, 0.02, 107);
+    for largest in [GENTLE, sharp(law)] {
+        let (a, b) = (
+            curvatures(LANES, largest, 109),
+            curvatures(LANES, largest, 127),
+        );
+        let mut history = start(law, LANES);
+        let at = |t: f64| {
+            let (s, c) = t.sin_cos();
+            let bent = a.iter().zip(&b);
+            bent.map(|(a, b)| s * a + (1.0 - c) * 0.5 * b).collect()
+        };
+        cycles.lead(LANES, [1.0, 1.0, 2.0], at, |k: &[f64]| {
+            let a = call(law, &mut history, &m, k, Ask::NOTHING);
+            (a.moment, a.energy)
+        });
+    }
+    cycles.seen(&format!("curvatures to {:.0} 1/m", sharp(law)))
+}
+
 fn rest(law: &Law) -> Seen {
     let m = metrics(LANES, 0.02, 107);
     let a = call(
         law,
         &mut start(law, LANES),
         &m,
-        &curvatures(LANES, 109),
-        Ask::Nothing,
+        &curvatures(LANES, GENTLE, 109),
+        Ask::NOTHING,
     );
     let flat = call(
         law,
         &mut start(law, LANES),
         &m,
         &[0.0; 3 * LANES],
-        Ask::Nothing,
+        Ask::NOTHING,
     );
     let (x, w) = (
         size(&flat.moment) / largest(&a.moment),
@@ -157,90 +318,139 @@ fn rest(law: &Law) -> Seen {
     }
 }
 
-/// For each component the answers at curvatures moved to and fro by `h`, from copies of the history.
-fn either_side(law: &Law, h: f64) -> (Answer, Vec<[Answer; 2]>) {
-    let (m, k) = (metrics(LANES, 0.02, 107), curvatures(LANES, 109));
-    let mut history = start(law, LANES);
-    let a = call(law, &mut history, &m, &k, Ask::Everything);
-    let sides = (0..3)
-        .map(|row| {
-            [h, -h].map(|by| {
-                let mut k = k.clone();
-                for x in &mut k[row * LANES..(row + 1) * LANES] {
-                    *x += by;
-                }
-                call(law, &mut history.clone(), &m, &k, Ask::Nothing)
-            })
-        })
-        .collect();
-    (a, sides)
+/// The answer at curvatures of this size, and for each component those at curvatures moved by `widths`, forwards and back,
+/// from copies of the history.
+struct Sides {
+    answer: Answer,
+    widths: [f64; 3],
+    sides: Vec<[[Answer; 3]; 2]>,
 }
 
-fn moment(law: &Law) -> Seen {
-    let h = 1e-5 * CURVATURE;
-    let (a, sides) = either_side(law, h);
+fn either_side(law: &Law, largest: f64) -> Sides {
+    let widths = [1e-5, 3e-5, 1e-4].map(|part| part * largest);
+    let (m, k) = (metrics(LANES, 0.02, 107), curvatures(LANES, largest, 109));
+    let mut history = start(law, LANES);
+    let mut answer = call(law, &mut history, &m, &[0.0; 3 * LANES], Ask::EVERYTHING);
+    for i in 1..=STEPS {
+        let part = i as f64 / STEPS as f64;
+        let now: Vec<f64> = k.iter().map(|k| part * k).collect();
+        answer = call(law, &mut history, &m, &now, Ask::EVERYTHING);
+    }
+    let moved = |row: usize, by: f64| {
+        let mut k = k.clone();
+        for x in &mut k[row * LANES..(row + 1) * LANES] {
+            *x += by;
+        }
+        call(law, &mut history.clone(), &m, &k, Ask::NOTHING)
+    };
+    let sides = (0..3)
+        .map(|row| [1.0, -1.0].map(|sign| widths.map(|h| moved(row, sign * h))))
+        .collect();
+    Sides {
+        answer,
+        widths,
+        sides,
+    }
+}
+
+/// The largest difference of what the law gives (`of` its answer) from what it should, over the component's largest, at
+/// gentle and sharp curvatures. `wanted`: of a component and a lane and of what was given there; `told` makes the text.
+fn worst(
+    law: &Law,
+    of: impl Fn(&Answer) -> &[f64],
+    wanted: impl Fn(&Sides, usize, usize, f64) -> f64,
+    told: impl Fn(usize, f64, f64) -> String,
+) -> Seen {
     let mut worst = (0.0, String::new());
-    for (row, [up, down]) in sides.iter().enumerate() {
-        let factor = if row == 2 { 0.5 } else { 1.0 };
-        for l in 0..LANES {
-            let own = largest(&a.moment[row * LANES..(row + 1) * LANES]);
-            let scale = own.max(1e-9 * largest(&a.moment));
-            let want = factor * (up.energy[l] - down.energy[l]) / (2.0 * h);
-            let got = a.moment[row * LANES + l];
-            let error = (got - want).abs() / scale;
-            if worse(error, worst.0) {
-                let name = ["M11", "M22", "M12"][row];
-                worst = (
-                    error,
-                    format!("{name} is {got:.6e} N, the energy's derivative {want:.6e} N"),
-                );
+    for largest_curvature in [GENTLE, sharp(law)] {
+        let s = either_side(law, largest_curvature);
+        let given = of(&s.answer);
+        for row in 0..3 {
+            let own = largest(&given[row * LANES..(row + 1) * LANES]);
+            let scale = own.max(1e-9 * largest(given));
+            for l in 0..LANES {
+                let got = given[row * LANES + l];
+                let want = wanted(&s, row, l, got);
+                let error = (got - want).abs() / scale;
+                if worse(error, worst.0) {
+                    worst = (error, told(row, got, want));
+                }
             }
         }
     }
-    let (m, k) = (metrics(LANES, 0.1, 113), curvatures(LANES, 109));
-    let sheared = call(law, &mut start(law, LANES), &m, &k, Ask::Nothing);
-    let differ = (0..3 * LANES).fold(0.0f64, |d, i| {
-        d.max((sheared.moment[i] - a.moment[i]).abs())
-    }) / largest(&a.moment);
-    let note = if differ > 1e-9 {
-        format!("; moments depend on the metric ({differ:.1e}): with rf4 the ledger will not close")
-    } else {
-        String::new()
-    };
     Seen::Number {
         measured: worst.0,
         limit: 1e-4,
         what: format!(
-            "off by {:.1e} of the component's largest; {}{note}",
-            worst.0, worst.1
+            "off by {:.1e} of the component's largest (curvatures to {:.0} 1/m); {}",
+            worst.0,
+            sharp(law),
+            worst.1
         ),
+    }
+}
+
+fn moment(law: &Law) -> Seen {
+    let seen = worst(
+        law,
+        |a| &a.moment,
+        |s, row, l, got| {
+            let energies = |side: &[Answer; 3]| [0, 1, 2].map(|i| side[i].energy[l]);
+            let [up, down] = &s.sides[row];
+            let energies = Energies {
+                widths: s.widths,
+                at: s.answer.energy[l],
+                up: energies(up),
+                down: energies(down),
+            };
+            energies.nearest(if row == 2 { 0.5 } else { 1.0 }, got)
+        },
+        |row, got, want| {
+            let name = ["M11", "M22", "M12"][row];
+            format!("{name} is {got:.6e} N, the energy's derivative {want:.6e} N")
+        },
+    );
+    let k = curvatures(LANES, GENTLE, 109);
+    let [a, sheared] = [(0.02, 107), (0.1, 113)]
+        .map(|(strain, seed)| bend(law, &metrics(LANES, strain, seed), &k, Ask::NOTHING).1);
+    let differ = (0..3 * LANES).fold(0.0f64, |d, i| {
+        d.max((sheared.moment[i] - a.moment[i]).abs())
+    }) / largest(&a.moment);
+    match seen {
+        Seen::Number {
+            measured,
+            limit,
+            what,
+        } if differ > 1e-9 => Seen::Number {
+            measured,
+            limit,
+            what: format!(
+                "{what}; moments depend on the metric ({differ:.1e}): with rf4 the ledger will not close"
+            ),
+        },
+        other => other,
     }
 }
 
 fn tangent(law: &Law) -> Seen {
-    let h = 1e-5 * CURVATURE;
-    let (a, sides) = either_side(law, h);
-    let mut worst = (0.0, String::new());
-    for (row, [up, down]) in sides.iter().enumerate() {
-        for l in 0..LANES {
-            let i = row * LANES + l;
-            let want = (up.moment[i] - down.moment[i]) / (2.0 * h);
-            let got = a.tangent[i];
-            let own = largest(&a.tangent[row * LANES..(row + 1) * LANES]);
-            let scale = own.max(1e-9 * largest(&a.tangent));
-            let error = (got - want).abs() / scale;
-            if worse(error, worst.0) {
-                let text = format!("component {row}: {got:.6e} N m, dM/dk is {want:.6e} N m");
-                worst = (error, text);
+    // Where something slips or fails, each side has a tangent of its own, and either is right.
+    let remembers = law.sizes.bending_history > 0;
+    worst(
+        law,
+        |a| &a.tangent,
+        |s, row, l, got| {
+            let (i, h) = (row * LANES + l, s.widths[0]);
+            let [up, down] = [0, 1].map(|side| s.sides[row][side][0].moment[i]);
+            let central = (up - down) / (2.0 * h);
+            if !remembers {
+                return central;
             }
-        }
-    }
-    Seen::Number {
-        measured: worst.0,
-        limit: 1e-4,
-        what: format!(
-            "off by {:.1e} of the component's largest; {}",
-            worst.0, worst.1
-        ),
-    }
+            let at = s.answer.moment[i];
+            let sides = [(up - at) / h, (at - down) / h];
+            let off = |x: f64| (got - x).abs();
+            let nearer = |a, b| if off(b) < off(a) { b } else { a };
+            sides.into_iter().fold(central, nearer)
+        },
+        |row, got, want| format!("component {row}: {got:.6e} N m, dM/dk is {want:.6e} N m"),
+    )
 }

@@ -1,9 +1,10 @@
 //! Checks of an element's mechanics: rest, mass, balance, frame, energy, work, critical step.
 
+use crate::breaches::{Ask, Breaches};
 use crate::element::{STRAIN, once};
 use crate::linear::{V, cross, largest_eigenvalue, rotation};
 use crate::shapes::{Elements, moved};
-use crate::subject::{Answer, Ask, Masses, Motion, State, Subject};
+use crate::subject::{Answer, Masses, Motion, State, Subject};
 use crate::{Run, Seen, Sequence, rules, worse};
 
 pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, lanes: usize) {
@@ -95,7 +96,7 @@ impl<'a> Case<'a> {
         let x = &self.elements.reference;
         let rest = self
             .subject
-            .forces(&mut state, x, Motion::default(), Ask::Nothing);
+            .forces(&mut state, x, Motion::default(), Ask::NOTHING);
         let zero = vec![0.0; rest.force.len()];
         let (force, lane) = self.difference(&rest.force, &zero, |l| self.force_scale(l));
         let (moment, _) = self.difference(&rest.moment, &zero, |l| self.moment_scale(l));
@@ -250,7 +251,7 @@ impl<'a> Case<'a> {
                 spin: Some(&spin),
             };
             of(
-                &self.subject.forces(&mut copy, &x, motion, Ask::Nothing),
+                &self.subject.forces(&mut copy, &x, motion, Ask::NOTHING),
                 sign,
             );
         }
@@ -337,7 +338,7 @@ impl<'a> Case<'a> {
         let mut before = x0.clone();
         let mut old = self
             .subject
-            .forces(&mut state, x0, Motion::default(), Ask::Nothing);
+            .forces(&mut state, x0, Motion::default(), Ask::NOTHING);
         let start: Vec<f64> = (0..n).map(|l| old.total(l)).collect();
         let (mut work, mut error, mut size) = (vec![0.0; n], vec![0.0f64; n], vec![0.0f64; n]);
         for i in 1..=N {
@@ -346,7 +347,7 @@ impl<'a> Case<'a> {
                 from: Some(&before),
                 spin: None,
             };
-            let new = self.subject.forces(&mut state, &x, motion, Ask::Nothing);
+            let new = self.subject.forces(&mut state, &x, motion, Ask::NOTHING);
             for j in 0..x.len() {
                 work[j % n] += 0.5 * (old.force[j] + new.force[j]) * (x[j] - before[j]);
             }
@@ -374,7 +375,7 @@ impl<'a> Case<'a> {
     fn critical_step(&self) -> Seen {
         let (mut largest, mut smallest) = ((0.0f64, 0, ""), f64::INFINITY);
         for (strain, name) in [(0.0, "at rest"), (STRAIN, "at 2 %"), (0.1, "at 10 %")] {
-            let (state, _, answer) = once(self.subject, self.elements, strain, Ask::Everything);
+            let (state, _, answer) = once(self.subject, self.elements, strain, Ask::EVERYTHING);
             let x = self.elements.deformed(strain, 7);
             for (l, eigenvalue) in self.eigenvalues(&state, &x).into_iter().enumerate() {
                 let step = answer.step[l];
@@ -457,9 +458,9 @@ fn path(
 ) -> Answer {
     let lanes = elements.lanes;
     let reference = &elements.reference;
-    let mut breaches = crate::subject::Breaches::default();
+    let mut breaches = Breaches::default();
     let mut before = reference.clone();
-    let mut answer = subject.forces(state, reference, Motion::default(), Ask::Nothing);
+    let mut answer = subject.forces(state, reference, Motion::default(), Ask::NOTHING);
     let axis = axis_of(q);
     for i in 1..=turning {
         let part = i as f64 / turning as f64;
@@ -472,7 +473,7 @@ fn path(
             from: Some(&before),
             spin: Some(&step),
         };
-        answer = subject.forces(state, &x, motion, Ask::Nothing);
+        answer = subject.forces(state, &x, motion, Ask::NOTHING);
         breaches.add(std::mem::take(&mut answer.breaches));
         before = x;
     }
@@ -484,7 +485,7 @@ fn path(
             from: Some(&before),
             spin: Some(&spin),
         };
-        answer = subject.forces(state, &x, motion, Ask::Nothing);
+        answer = subject.forces(state, &x, motion, Ask::NOTHING);
         breaches.add(std::mem::take(&mut answer.breaches));
         before = x;
     }

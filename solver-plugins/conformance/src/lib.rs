@@ -7,15 +7,20 @@
 //! of a check before it begins, so that a crash can be told apart from its neighbours.
 
 mod bending;
+mod breaches;
 mod buffer;
+mod cycle;
 mod element;
 mod element_motion;
+mod law;
 mod linear;
 mod material;
+mod material_law;
 mod meeting;
 mod patch;
 mod rules;
 mod shapes;
+mod slope;
 mod subject;
 
 pub use element::check_element;

@@ -32,8 +32,16 @@ pub(crate) fn turn(q: &[V; 3], v: V) -> V {
     q.map(|row| dot(row, v))
 }
 
-/// Largest eigenvalue of the symmetric part of `a` (`[n][n]`), by cyclic Jacobi rotations.
+/// Largest eigenvalue of the symmetric part of `a` (`[n][n]`).
 pub(crate) fn largest_eigenvalue(a: &[f64], n: usize) -> f64 {
+    largest_eigenpair(a, n).0
+}
+
+/// Largest eigenvalue of the symmetric part of `a` (`[n][n]`) and its unit vector, by cyclic Jacobi rotations.
+pub(crate) fn largest_eigenpair(a: &[f64], n: usize) -> (f64, Vec<f64>) {
+    let mut vectors: Vec<f64> = (0..n * n)
+        .map(|i| f64::from(u8::from(i / n == i % n)))
+        .collect();
     let mut s = vec![0.0; n * n];
     for i in 0..n {
         for j in 0..n {
@@ -61,6 +69,10 @@ pub(crate) fn largest_eigenvalue(a: &[f64], n: usize) -> f64 {
                     let (u, v) = (s[p * n + k], s[q * n + k]);
                     (s[p * n + k], s[q * n + k]) = (c * u - d * v, d * u + c * v);
                 }
+                for k in 0..n {
+                    let (u, v) = (vectors[k * n + p], vectors[k * n + q]);
+                    (vectors[k * n + p], vectors[k * n + q]) = (c * u - d * v, d * u + c * v);
+                }
             }
         }
         let scale = (0..n).fold(0.0f64, |m, i| m.max(s[i * n + i].abs()));
@@ -68,7 +80,10 @@ pub(crate) fn largest_eigenvalue(a: &[f64], n: usize) -> f64 {
             break;
         }
     }
-    (0..n).fold(f64::NEG_INFINITY, |m, i| m.max(s[i * n + i]))
+    let larger = |i: usize, j: usize| if s[i * n + i] >= s[j * n + j] { i } else { j };
+    let at = (1..n).fold(0, larger);
+    let vector = (0..n).map(|k| vectors[k * n + at]).collect();
+    (s[at * n + at], vector)
 }
 
 /// Spectral norm of a 3 x 3 matrix.
@@ -99,7 +114,12 @@ mod tests {
             }
         }
         let want = 2.0 - 2.0 * (n as f64 * std::f64::consts::PI / (n as f64 + 1.0)).cos();
-        assert!((largest_eigenvalue(&a, n) - want).abs() < 1e-12);
+        let (value, v) = largest_eigenpair(&a, n);
+        assert!((value - want).abs() < 1e-12);
+        for i in 0..n {
+            let row: f64 = (0..n).map(|j| a[i * n + j] * v[j]).sum();
+            assert!((row - value * v[i]).abs() < 1e-12, "its vector");
+        }
     }
 
     #[test]

@@ -1,13 +1,17 @@
 //! Checks of an element's patch part.
 
+use crate::breaches::{Ask, Breaches, DT};
 use crate::linear::{V, cross, norm, rotation};
+use crate::meeting::{THREADS, meet};
 use crate::shapes::{Patches, moved, pick};
-use crate::subject::{Ask, Breaches, DT, PatchAnswer, PatchState, Subject};
+use crate::subject::{PatchAnswer, PatchState, Subject};
 use crate::{Run, Seen, rules, worse};
 
 const LANES: usize = 16;
+/// Calls of a thread between two looks at whether enough have met.
+const CALLS: usize = 2000;
 
-pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject) {
+pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, twin: &Subject) {
     if subject.slots() == 0 {
         return;
     }
@@ -25,7 +29,7 @@ pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject) {
     let zones = run.check(rules::PATCH_GUARDS, || {
         for lanes in [8, 24, 64] {
             let Some(patches) = set(lanes, 53) else { break };
-            for ask in [Ask::Nothing, Ask::Everything] {
+            for ask in Ask::ALL {
                 let (_, answer) = bend(subject, &patches, ask);
                 all.add(answer.breaches);
             }
@@ -43,8 +47,12 @@ pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject) {
         run.skip(&rules::OF_PATCHES, "not checked: repair the above first");
         return;
     }
+    run.check(rules::PATCH_REPEATABLE, || {
+        repeatable(subject, twin, &patches)
+    });
     run.check(rules::PATCH_LANES, || lanes(subject));
     run.check(rules::PATCH_ASKING, || asking(subject, &patches));
+    run.check(rules::PATCH_THREADS, || threads(subject));
     let case = Case::new(subject, &patches);
     run.check(rules::PATCH_REST, || case.rest());
     run.check(rules::PATCH_BALANCE, || case.balance());
@@ -65,7 +73,7 @@ fn bend(subject: &Subject, patches: &Patches, ask: Ask) -> (PatchState, PatchAns
 
 /// Unused slots carry no force.
 fn unused(subject: &Subject, patches: &Patches) -> Seen {
-    let (_, a) = bend(subject, patches, Ask::Nothing);
+    let (_, a) = bend(subject, patches, Ask::NOTHING);
     let n = patches.lanes;
     for l in 0..n {
         for row in 3 * patches.count[l] as usize..3 * subject.slots() {
@@ -104,7 +112,7 @@ fn lanes(subject: &Subject) -> Seen {
     let run = |order: &[usize]| {
         let patches = all.picked(order);
         let (mut state, _) = subject.patch_initialise(&patches);
-        let a = subject.patch_forces(&mut state, &pick(&bent, 64, order), DT, Ask::Everything);
+        let a = subject.patch_forces(&mut state, &pick(&bent, 64, order), DT, Ask::EVERYTHING);
         (state, a)
     };
     let whole = run(&(0..64).collect::<Vec<_>>());
@@ -122,17 +130,61 @@ fn lanes(subject: &Subject) -> Seen {
     Seen::Well("same bits in batches of 8, 16, .. 64 patches in other orders".into())
 }
 
-fn asking(subject: &Subject, patches: &Patches) -> Seen {
-    let mut with = bend(subject, patches, Ask::Everything);
-    let without = bend(subject, patches, Ask::Nothing);
-    with.1.fields.clear();
-    with.1.stiffness.clear();
-    let same = (0..LANES).all(|l| bits(&with.0, &with.1, l) == bits(&without.0, &without.1, l));
-    if same {
-        Seen::Well("same bits with and without fields and stiffness".into())
-    } else {
-        Seen::Bad("forces, energies or histories differ when fields and stiffness are NULL".into())
+fn repeatable(subject: &Subject, twin: &Subject, patches: &Patches) -> Seen {
+    let first = bend(subject, patches, Ask::EVERYTHING);
+    for (which, again) in [("the same", subject), ("another", twin)] {
+        let second = bend(again, patches, Ask::EVERYTHING);
+        let differs = |l: &usize| bits(&first.0, &first.1, *l) != bits(&second.0, &second.1, *l);
+        if let Some(l) = (0..LANES).find(differs) {
+            return Seen::Bad(format!(
+                "lane {l} differs in a second call of {which} instance"
+            ));
+        }
     }
+    Seen::Well("same bits in a second call and in a second instance".into())
+}
+
+fn asking(subject: &Subject, patches: &Patches) -> Seen {
+    let all = bend(subject, patches, Ask::EVERYTHING);
+    for ask in Ask::ALL {
+        let some = bend(subject, patches, ask);
+        let mut want = all.1.clone();
+        if !ask.fields {
+            want.fields.clear();
+        }
+        if !ask.bound {
+            want.stiffness.clear();
+        }
+        let differs = (0..LANES).find(|l| bits(&all.0, &want, *l) != bits(&some.0, &some.1, *l));
+        if let Some(l) = differs {
+            let told = ask.told("stiffness");
+            return Seen::Bad(format!("lane {l}: another answer when {told}"));
+        }
+    }
+    Seen::Well("same bits with and without fields and stiffness, each alone too".into())
+}
+
+fn threads(subject: &Subject) -> Seen {
+    let set = |t| Patches::new(subject.nodes(), subject.slots(), LANES, 201 + 2 * t as u64);
+    let Some(sets) = (0..THREADS).map(set).collect::<Option<Vec<Patches>>>() else {
+        return Seen::Nothing("no patch fits".into());
+    };
+    // One thread alone, from a state at the bent position.
+    let alone: Vec<(PatchState, Vec<f64>, PatchAnswer)> = sets
+        .iter()
+        .map(|set| {
+            let state = bend(subject, set, Ask::NOTHING).0;
+            let x = set.bent(57);
+            let a = subject.patch_forces(&mut state.clone(), &x, 0.0, Ask::NOTHING);
+            (state, x, a)
+        })
+        .collect();
+    let met = meet(|t, counter| {
+        let (state, x, a) = &alone[t];
+        let differing = subject.hammer_patches(state, x, (&a.force, &a.energy), CALLS, counter);
+        (CALLS, differing)
+    });
+    met.seen()
 }
 
 struct Case<'a> {
@@ -145,7 +197,7 @@ struct Case<'a> {
 
 impl<'a> Case<'a> {
     fn new(subject: &'a Subject, patches: &'a Patches) -> Self {
-        let (state, answer) = bend(subject, patches, Ask::Everything);
+        let (state, answer) = bend(subject, patches, Ask::EVERYTHING);
         Self {
             subject,
             patches,
@@ -176,7 +228,7 @@ impl<'a> Case<'a> {
     fn rest(&self) -> Seen {
         let (mut state, _) = self.subject.patch_initialise(self.patches);
         let x = &self.patches.reference;
-        let rest = self.subject.patch_forces(&mut state, x, 0.0, Ask::Nothing);
+        let rest = self.subject.patch_forces(&mut state, x, 0.0, Ask::NOTHING);
         let (force, lane) = self.worst(&rest.force, &vec![0.0; rest.force.len()]);
         let energy = rest.energy.iter().zip(&self.answer.energy);
         let energy = energy.fold(0.0f64, |m, (rest, bent)| {
@@ -225,7 +277,7 @@ impl<'a> Case<'a> {
         let q = rotation([0.62, 1.23, 1.84]);
         let (mut state, _) = self.subject.patch_initialise(self.patches);
         let x = moved(&self.position, n, &q, [0.07, -0.13, 0.04]);
-        let turned = self.subject.patch_forces(&mut state, &x, DT, Ask::Nothing);
+        let turned = self.subject.patch_forces(&mut state, &x, DT, Ask::NOTHING);
         let want = moved(&self.answer.force, n, &q, [0.0; 3]);
         let (force, lane) = self.worst(&turned.force, &want);
         Seen::Number {
@@ -248,7 +300,7 @@ impl<'a> Case<'a> {
                 }
             }
             let mut state = self.state.clone();
-            self.subject.patch_forces(&mut state, &x, DT, Ask::Nothing)
+            self.subject.patch_forces(&mut state, &x, DT, Ask::NOTHING)
         })
     }
 

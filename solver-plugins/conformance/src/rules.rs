@@ -37,7 +37,7 @@ pub(crate) const COMPLETE: Rule = rule(
 );
 pub(crate) const FINITE: Rule = rule(
     "finite",
-    "all outputs are finite numbers, also at strains of 30 %",
+    "all outputs are finite numbers, also at strains of 30 % (of a law: and at 60 degrees of shear)",
     "look for divisions, roots and logarithms of what may be zero or negative, and for outputs that are added to instead of overwritten",
 );
 pub(crate) const REPEATABLE: Rule = rule(
@@ -107,8 +107,11 @@ pub(crate) const PATCH_COMPLETE: Rule = rule(
     "every output of the patch part is written and finite; forces of unused slots are zero",
     COMPLETE.remedy,
 );
+pub(crate) const PATCH_REPEATABLE: Rule =
+    rule("patch-repeatable", REPEATABLE.expected, REPEATABLE.remedy);
 pub(crate) const PATCH_LANES: Rule = rule("patch-batch-independence", LANES.expected, LANES.remedy);
 pub(crate) const PATCH_ASKING: Rule = rule("patch-asking", ASKING.expected, ASKING.remedy);
+pub(crate) const PATCH_THREADS: Rule = rule("patch-threads", THREADS.expected, THREADS.remedy);
 pub(crate) const PATCH_REST: Rule = rule("patch-rest", REST.expected, REST.remedy);
 pub(crate) const PATCH_BALANCE: Rule = rule("patch-balance", BALANCE.expected, BALANCE.remedy);
 pub(crate) const PATCH_FRAME: Rule = rule("patch-frame-invariance", FRAME.expected, FRAME.remedy);
@@ -120,9 +123,11 @@ pub(crate) const PATCH_STIFFNESS: Rule = rule(
 );
 
 /// The patch part, after its calls work at all.
-pub(crate) const OF_PATCHES: [Rule; 7] = [
+pub(crate) const OF_PATCHES: [Rule; 9] = [
+    PATCH_REPEATABLE,
     PATCH_LANES,
     PATCH_ASKING,
+    PATCH_THREADS,
     PATCH_REST,
     PATCH_BALANCE,
     PATCH_FRAME,
@@ -137,7 +142,7 @@ pub(crate) const STRESS: Rule = rule(
 );
 pub(crate) const CYCLE: Rule = rule(
     "cycle",
-    "a closed cycle of strain gives back no more energy than was put in",
+    "a closed cycle of strain gives back no more energy than was put in, and the energy is the work done",
     "the energy of a law with history is the work done, and damage and friction only take",
 );
 pub(crate) const TANGENT: Rule = rule(
@@ -146,8 +151,14 @@ pub(crate) const TANGENT: Rule = rule(
     "the time step rests on this bound: take the largest tangent of the state, never a mean, with the stress terms",
 );
 
-pub(crate) const OF_MATERIALS: [Rule; 8] = [
-    REPEATABLE, LANES, ASKING, THREADS, REST, STRESS, CYCLE, TANGENT,
+pub(crate) const ZERO_DT: Rule = rule(
+    "zero-dt",
+    "a call with dt = 0 gives finite numbers, and where other dt make no difference it makes none either",
+    "the first call of a run has dt = 0: divide nothing by dt, and do not leave out the update when it is 0",
+);
+
+pub(crate) const OF_MATERIALS: [Rule; 9] = [
+    REPEATABLE, LANES, ASKING, THREADS, ZERO_DT, REST, STRESS, CYCLE, TANGENT,
 ];
 
 pub(crate) const BENDING: Rule = rule(
@@ -157,6 +168,11 @@ pub(crate) const BENDING: Rule = rule(
 );
 pub(crate) const BENDING_LANES: Rule =
     rule("bending-batch-independence", LANES.expected, LANES.remedy);
+pub(crate) const BENDING_REPEATABLE: Rule =
+    rule("bending-repeatable", REPEATABLE.expected, REPEATABLE.remedy);
+pub(crate) const BENDING_ASKING: Rule = rule("bending-asking", ASKING.expected, ASKING.remedy);
+pub(crate) const BENDING_THREADS: Rule = rule("bending-threads", THREADS.expected, THREADS.remedy);
+pub(crate) const BENDING_ZERO_DT: Rule = rule("bending-zero-dt", ZERO_DT.expected, ZERO_DT.remedy);
 pub(crate) const BENDING_REST: Rule = rule(
     "bending-rest",
     "no moment and no energy at zero curvature",
@@ -172,4 +188,19 @@ pub(crate) const BENDING_TANGENT: Rule = rule(
     "tangent is dM11/dk11, dM22/dk22, dM12/dk12, by central differences",
     "differentiate the moment law of the state that the call ends in",
 );
-pub(crate) const OF_BENDING: [Rule; 4] = [BENDING_LANES, BENDING_REST, MOMENT, BENDING_TANGENT];
+pub(crate) const BENDING_CYCLE: Rule = rule(
+    "bending-cycle",
+    "a closed cycle of curvature gives back no more energy than was put in, and the energy is the work done",
+    CYCLE.remedy,
+);
+pub(crate) const OF_BENDING: [Rule; 9] = [
+    BENDING_REPEATABLE,
+    BENDING_LANES,
+    BENDING_ASKING,
+    BENDING_THREADS,
+    BENDING_ZERO_DT,
+    BENDING_REST,
+    MOMENT,
+    BENDING_CYCLE,
+    BENDING_TANGENT,
+];

@@ -1,112 +1,15 @@
 //! An element under test: every call goes through guarded buffers.
 
+mod patch;
+
+use crate::breaches::{Ask, Breaches, DT, Refusal};
 use crate::buffer::Guarded;
-use crate::meeting::Counter;
-use crate::shapes::{Elements, Patches};
+use crate::meeting::{Counter, same};
+use crate::shapes::Elements;
 use plyflow_sdk::abi::*;
 use std::ffi::c_void;
 
-/// Time step of the calls that move (s); laws that do not depend on rates do not notice.
-pub(crate) const DT: f64 = 1e-6;
-
-/// What a call did that it may not do.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Breaches {
-    /// Status other than PF_OK.
-    pub(crate) status: Option<String>,
-    /// Writes where nothing may be written.
-    pub(crate) guards: Option<String>,
-    /// Outputs that were not written.
-    pub(crate) gaps: Option<String>,
-    /// Outputs that are not finite.
-    pub(crate) finite: Option<String>,
-}
-
-impl Breaches {
-    pub(crate) fn add(&mut self, other: Self) {
-        self.status = self.status.take().or(other.status);
-        self.guards = self.guards.take().or(other.guards);
-        self.gaps = self.gaps.take().or(other.gaps);
-        self.finite = self.finite.take().or(other.finite);
-    }
-
-    /// Everything at once, for checks that are about something else.
-    pub(crate) fn any(&self) -> Option<String> {
-        let all = [&self.status, &self.guards, &self.gaps, &self.finite];
-        all.into_iter().flatten().next().cloned()
-    }
-
-    pub(crate) fn status(&mut self, call: &str, code: i32) {
-        let meaning = match code {
-            PF_OK => return,
-            PF_ERROR => "PF_ERROR",
-            PF_CANCELLED => "PF_CANCELLED",
-            PF_PANIC => "PF_PANIC: it panicked",
-            PF_NOT_FOUND => "PF_NOT_FOUND",
-            PF_BAD_SHAPE => "PF_BAD_SHAPE",
-            PF_BAD_VALUE => "PF_BAD_VALUE",
-            _ => "not a status of plyflow.h",
-        };
-        self.status
-            .get_or_insert(format!("{call} returned {code} ({meaning})"));
-    }
-
-    /// A buffer after a call: its guard zones.
-    pub(crate) fn zones(&mut self, call: &str, name: &str, b: &Guarded) {
-        if let Some(at) = b.breach() {
-            let len = b.slice().len() as isize;
-            let place = if at < 0 {
-                format!("{} doubles before its start", -at)
-            } else {
-                format!("{} doubles past its end", at - len + 1)
-            };
-            self.guards.get_or_insert(format!(
-                "{call} wrote outside of `{name}` ({len} doubles): {place}"
-            ));
-        }
-    }
-
-    /// An input after a call: unchanged.
-    pub(crate) fn unchanged(&mut self, call: &str, name: &str, b: &Guarded, before: &[f64]) {
-        self.zones(call, name, b);
-        let changed = (0..before.len()).find(|i| b.slice()[*i].to_bits() != before[*i].to_bits());
-        if let Some(at) = changed {
-            self.guards.get_or_insert(format!(
-                "{call} wrote to `{name}`, at {at}: it may only read it"
-            ));
-        }
-    }
-
-    /// An output after a call: whole and finite.
-    pub(crate) fn output(&mut self, call: &str, name: &str, b: &Guarded, lanes: usize) {
-        self.zones(call, name, b);
-        let place = |at: usize| format!("row {}, lane {} of {lanes}", at / lanes, at % lanes);
-        if let Some(at) = b.unwritten() {
-            let text = format!("{call} did not write `{name}`, {}", place(at));
-            self.gaps.get_or_insert(text);
-        }
-        if let Some(at) = b.slice().iter().position(|v| !v.is_finite()) {
-            let text = format!("{call} gave {} in `{name}`, {}", b.slice()[at], place(at));
-            self.finite.get_or_insert(text);
-        }
-    }
-}
-
-/// Why there is no instance.
-#[derive(Debug)]
-pub(crate) enum Refusal {
-    /// The element says in a text what it does not want.
-    Said(String),
-    /// It broke the contract.
-    Broken(String),
-}
-
-impl Refusal {
-    pub(crate) fn text(&self) -> &str {
-        let (Self::Said(text) | Self::Broken(text)) = self;
-        text
-    }
-}
+pub(crate) use patch::{PatchAnswer, PatchState};
 
 /// An element formulation made for a material.
 pub(crate) struct Subject {
@@ -184,13 +87,6 @@ pub(crate) struct Motion<'a> {
     pub(crate) spin: Option<&'a [f64]>,
 }
 
-/// Which optional outputs are wanted.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ask {
-    Nothing,
-    Everything,
-}
-
 impl Subject {
     /// Makes an instance and reads its sizes.
     ///
@@ -216,18 +112,12 @@ impl Subject {
             let text = "create returned 0 (PF_OK) but left the instance NULL";
             return Err(Refusal::Broken(text.into()));
         }
-        let mut of_material = pf_material_sizes {
-            size: size_of::<pf_material_sizes>() as u64,
-            ..pf_material_sizes::default()
-        };
+        let mut of_material = pf_material_sizes::default();
         unsafe { ((*material.functions).sizes)(material.instance, &raw mut of_material) };
         let mut new = Self {
             functions,
             instance,
-            sizes: pf_element_sizes {
-                size: size_of::<pf_element_sizes>() as u64,
-                ..pf_element_sizes::default()
-            },
+            sizes: pf_element_sizes::default(),
             of_material,
             material: *material,
         };
@@ -249,6 +139,11 @@ impl Subject {
 
     pub(crate) fn rotates(&self) -> bool {
         self.sizes.dofs_per_node == 6
+    }
+
+    /// Whether `forces` gets velocities: never where the element says that it does not read them.
+    fn sees_velocity(&self) -> bool {
+        self.rotates() && self.sizes.ignores_velocity == 0
     }
 
     /// Whether forces depend on what was before.
@@ -350,26 +245,29 @@ impl Subject {
         let mut force = Guarded::poisoned(vectors);
         let mut moment = Guarded::poisoned(turning);
         let mut energy = Guarded::poisoned(PF_ENERGIES * lanes);
-        let wanted = ask == Ask::Everything;
-        let rows = if wanted {
+        let rows = if ask.fields {
             self.sizes.fields as usize
         } else {
             0
         };
         let mut fields = Guarded::poisoned(rows * lanes);
-        let mut step = Guarded::poisoned(if wanted { lanes } else { 0 });
+        let mut step = Guarded::poisoned(if ask.bound { lanes } else { 0 });
         let constants = state.constants.slice().to_vec();
         let mut batch = self.batch(lanes, x.pointer(), state);
         batch.dt = if motion.from.is_some() { DT } else { 0.0 };
         batch.force = force.pointer();
         batch.energy = energy.pointer();
-        if self.rotates() {
+        if self.sees_velocity() {
             batch.velocity = v.pointer();
+        }
+        if self.rotates() {
             batch.spin = w.pointer();
             batch.moment = moment.pointer();
         }
-        if wanted {
+        if ask.fields {
             batch.fields = fields.pointer();
+        }
+        if ask.bound {
             batch.critical_step = step.pointer();
         }
         let code = unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
@@ -424,12 +322,13 @@ impl Subject {
         let mut batch = self.batch(lanes, x.pointer(), &mut now);
         batch.force = force.pointer();
         batch.energy = energy.pointer();
-        if self.rotates() {
+        if self.sees_velocity() {
             batch.velocity = v.pointer();
+        }
+        if self.rotates() {
             batch.spin = w.pointer();
             batch.moment = moment.pointer();
         }
-        let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
         (0..times)
             .filter(|_| {
                 let (to, from) = (&mut now.history, state.history.slice());
@@ -442,142 +341,5 @@ impl Subject {
                 code != PF_OK || !same(force.slice(), want.0) || !same(energy.slice(), want.1)
             })
             .count()
-    }
-}
-
-/// The buffers of a batch of patches that live from call to call.
-#[derive(Clone)]
-pub(crate) struct PatchState {
-    pub(crate) lanes: usize,
-    pub(crate) constants: Guarded,
-    pub(crate) history: Guarded,
-}
-
-/// What a call of `patch_forces` gave.
-#[derive(Clone, Debug)]
-pub(crate) struct PatchAnswer {
-    /// `[slots][3][lanes]`
-    pub(crate) force: Vec<f64>,
-    /// `[lanes]`
-    pub(crate) energy: Vec<f64>,
-    pub(crate) fields: Vec<f64>,
-    /// `[slots][lanes]`; empty when not asked for.
-    pub(crate) stiffness: Vec<f64>,
-    pub(crate) breaches: Breaches,
-}
-
-impl Subject {
-    pub(crate) fn slots(&self) -> usize {
-        self.sizes.patch_nodes as usize
-    }
-
-    fn patch_batch(
-        &self,
-        lanes: usize,
-        position: *const f64,
-        state: &mut PatchState,
-    ) -> pf_patch_batch {
-        let null = std::ptr::null_mut();
-        pf_patch_batch {
-            size: size_of::<pf_patch_batch>() as u64,
-            lanes: lanes as u32,
-            reserved: 0,
-            dt: 0.0,
-            position,
-            count: null,
-            area: null,
-            axis: null,
-            constants: state.constants.pointer(),
-            history: state.history.pointer(),
-            force: null,
-            energy: null,
-            fields: null,
-            stiffness: null,
-            material: &raw const self.material,
-        }
-    }
-
-    /// Calls patch_initialise.
-    pub(crate) fn patch_initialise(&self, patches: &Patches) -> (PatchState, Breaches) {
-        let lanes = patches.lanes;
-        let s = &self.sizes;
-        let rows = s.patch_history as usize + self.of_material.bending_history as usize;
-        let mut state = PatchState {
-            lanes,
-            constants: Guarded::poisoned(s.patch_constants as usize * lanes),
-            history: Guarded::zeros(rows * lanes),
-        };
-        let mut b = Breaches::default();
-        let Some(call) = (unsafe { (*self.functions).patch_initialise }) else {
-            return (state, b);
-        };
-        let mut position = Guarded::of(&patches.reference);
-        let mut count = Guarded::of(&patches.count);
-        let mut area = Guarded::of(&patches.area);
-        let mut axis = Guarded::of(&patches.axis);
-        let mut batch = self.patch_batch(lanes, position.pointer(), &mut state);
-        batch.count = count.pointer();
-        batch.area = area.pointer();
-        batch.axis = axis.pointer();
-        let code = unsafe { call(self.instance, &raw const batch) };
-        let call = "patch_initialise";
-        b.status(call, code);
-        b.unchanged(call, "position", &position, &patches.reference);
-        b.unchanged(call, "count", &count, &patches.count);
-        b.unchanged(call, "area", &area, &patches.area);
-        b.unchanged(call, "axis", &axis, &patches.axis);
-        b.zones(call, "history", &state.history);
-        b.output(call, "constants", &state.constants, lanes);
-        (state, b)
-    }
-
-    /// Calls patch_forces at `position` (`[slots][3][lanes]`).
-    pub(crate) fn patch_forces(
-        &self,
-        state: &mut PatchState,
-        position: &[f64],
-        dt: f64,
-        ask: Ask,
-    ) -> PatchAnswer {
-        let (slots, lanes) = (self.slots(), state.lanes);
-        let wanted = ask == Ask::Everything;
-        let asked = |rows: usize| Guarded::poisoned(if wanted { rows * lanes } else { 0 });
-        let mut x = Guarded::of(position);
-        let mut force = Guarded::poisoned(3 * slots * lanes);
-        let mut energy = Guarded::poisoned(lanes);
-        let mut fields = asked(self.sizes.patch_fields as usize);
-        let mut stiffness = asked(slots);
-        let constants = state.constants.slice().to_vec();
-        let mut batch = self.patch_batch(lanes, x.pointer(), state);
-        batch.dt = dt;
-        batch.force = force.pointer();
-        batch.energy = energy.pointer();
-        if wanted {
-            batch.fields = fields.pointer();
-            batch.stiffness = stiffness.pointer();
-        }
-        let mut b = Breaches::default();
-        let call = "patch_forces";
-        if let Some(f) = unsafe { (*self.functions).patch_forces } {
-            b.status(call, unsafe { f(self.instance, &raw const batch) });
-        }
-        b.unchanged(call, "position", &x, position);
-        b.unchanged(call, "constants", &state.constants, &constants);
-        b.zones(call, "history", &state.history);
-        for (name, buffer) in [
-            ("force", &force),
-            ("energy", &energy),
-            ("fields", &fields),
-            ("stiffness", &stiffness),
-        ] {
-            b.output(call, name, buffer, lanes);
-        }
-        PatchAnswer {
-            force: force.slice().to_vec(),
-            energy: energy.slice().to_vec(),
-            fields: fields.slice().to_vec(),
-            stiffness: stiffness.slice().to_vec(),
-            breaches: b,
-        }
     }
 }

@@ -27,9 +27,12 @@ const MEMBRANE: [&str; 13] = [
     "energy",
     "critical-step",
 ];
-const PATCH: [&str; 5] = [
+const PATCH: [&str; 8] = [
     "patch-complete",
+    "patch-repeatable",
     "patch-batch-independence",
+    "patch-asking",
+    "patch-threads",
     "patch-frame-invariance",
     "patch-energy",
     "patch-stiffness",
@@ -48,9 +51,11 @@ fn nothing_is_found_in_the_membrane_element_with_film_and_with_fabric() {
 #[test]
 fn nothing_is_found_in_the_rotation_free_shell_with_film_and_with_fabric() {
     sound(&with_film::<Rf4>("{}"), &MEMBRANE);
-    let checks = with_fabric::<Rf4>("{}", "fibre-energy");
-    sound(&checks, &MEMBRANE);
-    sound(&checks, &PATCH);
+    for with in ["{}", r#"{"thickening": 2}"#] {
+        let checks = with_fabric::<Rf4>(with, "fibre-energy");
+        sound(&checks, &MEMBRANE);
+        sound(&checks, &PATCH);
+    }
 }
 
 #[test]
@@ -59,7 +64,8 @@ fn nothing_is_found_in_the_shell_with_rotations_with_every_kind_of_law() {
     assert_eq!(refused.len(), 1, "a film has no bending");
     assert!(refused[0].seen.contains("bending"), "{}", refused[0].seen);
     let total = r#"{"bending": "total"}"#;
-    for with in ["{}", total] {
+    let thick = r#"{"bending": "total", "thickening": 2}"#;
+    for with in ["{}", total, thick] {
         for form in ["fibre-energy", "hypoelastic"] {
             let checks = with_fabric::<S4>(with, form);
             sound(&checks, &MEMBRANE);
@@ -78,6 +84,8 @@ const SIGN: u8 = 1;
 const SOFT: u8 = 2;
 const WEIGHTLESS: u8 = 3;
 const DRILLING: u8 = 4;
+/// Says that it does not read the velocity, and reads it.
+const READS_VELOCITY: u8 = 5;
 
 /// Of a batch of the most lanes.
 static STILL: [f64; 12 * 64] = [0.0; 12 * 64];
@@ -104,6 +112,9 @@ impl<const FAULT: u8> Element for Faulty<FAULT> {
     }
 
     fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
+        if FAULT == READS_VELOCITY {
+            batch.energy[0] += 0.0 * batch.velocity[0];
+        }
         if FAULT == DEAF {
             batch.spin = &STILL[..batch.spin.len()];
         }
@@ -131,4 +142,41 @@ fn each_fault_of_rotations_is_found_by_the_check_that_is_meant_for_it() {
     assert!(found::<SOFT>().contains(&"balance"));
     assert!(found::<WEIGHTLESS>().contains(&"mass"));
     assert!(found::<DRILLING>().contains(&"rest"));
+    // A slice without a velocity in it: a panic. In C it would be NULL.
+    assert!(found::<READS_VELOCITY>().contains(&"status"));
+}
+
+/// M4's sizes with three nodes: enough for the check that looks at them.
+struct Triangle(M4);
+
+impl Element for Triangle {
+    const MANIFEST: &'static str = M4::MANIFEST;
+
+    fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
+        M4::create(parameters, material).map(Self)
+    }
+
+    fn sizes(&self) -> ElementSizes {
+        ElementSizes {
+            nodes: 3,
+            ..self.0.sizes()
+        }
+    }
+
+    fn initialise(&self, _: &mut ElementBatch<'_>, _: &MaterialRef) {
+        panic!("no triangle");
+    }
+
+    fn forces(&self, _: &mut ElementBatch<'_>, _: &MaterialRef) -> i32 {
+        panic!("no triangle");
+    }
+}
+
+#[test]
+fn of_a_triangle_the_verdict_says_that_this_solver_takes_quads_only() {
+    let checks = with_film::<Triangle>("{}");
+    let sizes = checks.iter().find(|c| c.rule.name == "sizes");
+    let seen = &sizes.expect("a check of the sizes").seen;
+    assert!(seen.contains("this solver takes quads only"), "{seen}");
+    assert!(!failed(&checks).contains(&"sizes"));
 }

@@ -2,20 +2,157 @@
 
 mod common;
 
-use common::{FILM, ISOTROPIC, WOVEN, ncf, of_material, sound};
+use common::{FILM, ISOTROPIC, KINKED, TABULATED_FILM, WOVEN, ncf, of_material, sound};
+use plyflow_conformance::{Check, failed};
 use plyflow_kernels::fabric::Fabric;
 use plyflow_kernels::isotropic::Isotropic;
 use plyflow_kernels::marlow::Marlow;
+use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
 
 #[test]
 fn nothing_is_found_in_the_repository_s_own_materials() {
-    let membrane = ["guard-zones", "threads", "stress", "cycle", "stiffness"];
+    let membrane = [
+        "sizes",
+        "guard-zones",
+        "threads",
+        "zero-dt",
+        "stress",
+        "cycle",
+        "stiffness",
+    ];
+    let bending = [
+        "bending",
+        "bending-repeatable",
+        "bending-asking",
+        "bending-threads",
+        "bending-zero-dt",
+        "bending-rest",
+        "moment",
+        "bending-cycle",
+        "tangent",
+    ];
     sound(&of_material::<Marlow>(FILM), &membrane);
-    sound(&of_material::<Isotropic>(ISOTROPIC), &membrane);
-    sound(&of_material::<Fabric>(WOVEN), &membrane);
-    for form in ["fibre-energy", "hypoelastic"] {
-        let checks = of_material::<Fabric>(&ncf(form));
+    sound(&of_material::<Marlow>(TABULATED_FILM), &membrane);
+    let mut sheets = vec![
+        of_material::<Isotropic>(ISOTROPIC),
+        of_material::<Fabric>(WOVEN),
+        of_material::<Fabric>(KINKED),
+    ];
+    sheets.extend(["fibre-energy", "hypoelastic"].map(|form| of_material::<Fabric>(&ncf(form))));
+    for checks in sheets {
         sound(&checks, &membrane);
-        sound(&checks, &["bending", "bending-rest", "moment", "tangent"]);
+        sound(&checks, &bending);
     }
+}
+
+fn seen<'a>(checks: &'a [Check], name: &str) -> &'a str {
+    let found = checks.iter().find(|c| c.rule.name == name);
+    &found.expect(name).seen
+}
+
+#[test]
+fn verdicts_say_how_far_a_law_was_judged() {
+    let checks = of_material::<Fabric>(&ncf("fibre-energy"));
+    for name in ["status", "stress", "cycle", "stiffness"] {
+        let seen = seen(&checks, name);
+        assert!(seen.contains("60 degrees"), "{name}: {seen}");
+    }
+    for name in ["bending", "moment", "bending-cycle", "tangent"] {
+        let seen = seen(&checks, name);
+        assert!(seen.contains("500 1/m"), "{name}: {seen}");
+    }
+    // A radius of 2 mm is none for a sheet of 1 mm.
+    let thick = ncf("fibre-energy").replace("4e-4", "1e-3");
+    let seen = seen(&of_material::<Fabric>(&thick), "moment").to_owned();
+    assert!(seen.contains("200 1/m"), "{seen}");
+}
+
+/// A law that is stiffer in steps that take less than a millisecond.
+struct Rate(Isotropic);
+
+impl Material for Rate {
+    const MANIFEST: &'static str = Isotropic::MANIFEST;
+
+    fn create(parameters: &str) -> Result<Self, String> {
+        Isotropic::create(parameters).map(Self)
+    }
+
+    fn sizes(&self) -> MaterialSizes {
+        self.0.sizes()
+    }
+
+    fn membrane(&self, batch: &mut MembraneBatch<'_>) {
+        self.0.membrane(batch);
+        let dt = batch.dt;
+        for s in batch.stress.iter_mut() {
+            *s *= 1.0 + 1e-3 / (dt + 1e-3);
+        }
+    }
+
+    fn bending(&self, batch: &mut BendingBatch<'_>) {
+        self.0.bending(batch);
+    }
+}
+
+#[test]
+fn of_a_law_that_depends_on_rates_only_finite_numbers_are_wanted_at_no_step_and_the_verdict_says_so()
+ {
+    let checks = of_material::<Rate>(ISOTROPIC);
+    let seen = seen(&checks, "zero-dt");
+    assert!(seen.contains("depends on dt"), "{seen}");
+    assert!(!failed(&checks).contains(&"zero-dt"));
+}
+
+/// A sheet whose bending is elastic up to a moment at which its layers slip. Rows of history: curvatures and moments of the
+/// previous call, work done.
+struct Slipping(Isotropic);
+
+impl Slipping {
+    /// N m, N
+    const ELASTIC: f64 = 1e-2;
+    const SLIP: f64 = 0.02;
+}
+
+impl Material for Slipping {
+    const MANIFEST: &'static str = Isotropic::MANIFEST;
+
+    fn create(parameters: &str) -> Result<Self, String> {
+        Isotropic::create(parameters).map(Self)
+    }
+
+    fn sizes(&self) -> MaterialSizes {
+        MaterialSizes {
+            bending_history: 7,
+            ..self.0.sizes()
+        }
+    }
+
+    fn membrane(&self, batch: &mut MembraneBatch<'_>) {
+        self.0.membrane(batch);
+    }
+
+    fn bending(&self, b: &mut BendingBatch<'_>) {
+        let n = b.lanes;
+        for l in 0..n {
+            for a in 0..3 {
+                let (i, weight) = (a * n + l, if a == 2 { 2.0 } else { 1.0 });
+                let (k, old) = (b.history[i], b.history[3 * n + i]);
+                let tried = old + Self::ELASTIC * (b.curvature[i] - k);
+                let moment = tried.clamp(-Self::SLIP, Self::SLIP);
+                b.history[6 * n + l] += weight * 0.5 * (old + moment) * (b.curvature[i] - k);
+                (b.history[i], b.history[3 * n + i]) = (b.curvature[i], moment);
+                b.moment[i] = moment;
+                if let Some(tangent) = b.tangent.as_deref_mut() {
+                    tangent[i] = if tried == moment { Self::ELASTIC } else { 0.0 };
+                }
+            }
+            b.energy[l] = b.history[6 * n + l];
+        }
+    }
+}
+
+#[test]
+fn nothing_is_found_in_a_law_whose_bending_slips() {
+    let checks = of_material::<Slipping>(ISOTROPIC);
+    sound(&checks, &["moment", "bending-cycle", "tangent"]);
 }

@@ -351,8 +351,10 @@ fn membrane_kernel<V: Lanes>(
             let hessian = (cc + widest * widest) * square * inverse;
             let four = V::splat(4.0) * h;
             (four * (second * aa + rate * hessian)).store(stiffness, c);
-            // dS12 / d(2 E12) = 2 h U' / det^2 where C12 = 0; never below that at rest.
-            (factor * square)
+            // dS12 / d(2 E12) = 2 h U' / det^2 (1 + 4 C12^2 / det) + 4 h U'' C12^2 / det^4; never below that at rest.
+            let sheared = c12 * c12;
+            let turning = one + V::splat(4.0) * sheared * inverse;
+            (factor * square * turning + four * second * sheared * square * square)
                 .max(two * h * modulus.min(rate))
                 .store(stiffness, n + c);
         }

@@ -167,6 +167,10 @@ impl ElementInstance {
         if code != PF_OK {
             return Err(fail(error.get()));
         }
+        if instance.is_null() {
+            let text = "returned PF_OK from `create` but left the instance NULL";
+            return Err(fail(text.into()));
+        }
         let mut s = pf_element_sizes {
             size: size_of::<pf_element_sizes>() as u64,
             ..Default::default()
@@ -254,5 +258,87 @@ impl ElementInstance {
 impl Drop for ElementInstance {
     fn drop(&mut self) {
         unsafe { ((*self.functions).destroy)(self.instance) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plyflow_sdk::{Element, ElementBatch, Material, MaterialSizes, MembraneBatch};
+
+    struct Sheet;
+
+    impl Material for Sheet {
+        const MANIFEST: &'static str = "{}";
+
+        fn create(_: &str) -> Result<Self, String> {
+            Ok(Self)
+        }
+
+        fn sizes(&self) -> MaterialSizes {
+            MaterialSizes {
+                thickness: 1e-3,
+                areal_mass: 1.0,
+                ..Default::default()
+            }
+        }
+
+        fn membrane(&self, _: &mut MembraneBatch<'_>) {}
+    }
+
+    struct Quad;
+
+    impl Element for Quad {
+        const MANIFEST: &'static str = "{}";
+
+        fn create(_: &str, _: &MaterialRef) -> Result<Self, String> {
+            Ok(Self)
+        }
+
+        fn sizes(&self) -> ElementSizes {
+            ElementSizes {
+                nodes: 4,
+                dofs_per_node: 3,
+                ..Default::default()
+            }
+        }
+
+        fn initialise(&self, _: &mut ElementBatch<'_>, _: &MaterialRef) {}
+
+        fn forces(&self, _: &mut ElementBatch<'_>, _: &MaterialRef) -> i32 {
+            PF_OK
+        }
+    }
+
+    unsafe extern "C" fn forgetful(
+        _: pf_str,
+        _: *const pf_material,
+        _: *mut *mut c_void,
+        _: *mut pf_error,
+    ) -> i32 {
+        PF_OK
+    }
+
+    #[test]
+    fn an_element_that_says_ok_and_leaves_no_instance_is_refused() {
+        let component = |kind, functions| pf_component {
+            kind,
+            reserved: 0,
+            functions,
+            manifest: pf_str::new("{}"),
+        };
+        let sheet = plyflow_sdk::material_table::<Sheet>();
+        let sheet = component(PF_KIND_MATERIAL, (&raw const sheet).cast());
+        let material = unsafe { MaterialInstance::create(&sheet, "{}", "sheet") };
+        let material = material.expect("a material");
+        let mut quad = plyflow_sdk::element_table::<Quad>();
+        let make = |table: &pf_element_functions| {
+            let quad = component(PF_KIND_ELEMENT, std::ptr::from_ref(table).cast());
+            unsafe { ElementInstance::create(&quad, "{}", Arc::clone(&material), "quad") }
+        };
+        assert!(make(&quad).is_ok());
+        quad.create = forgetful;
+        let refused = make(&quad).map(|_| ()).expect_err("a NULL instance");
+        assert!(refused.to_string().contains("NULL"), "{refused}");
     }
 }

@@ -207,3 +207,63 @@ fn an_element_gets_slices_of_the_documented_sizes() {
     );
     unsafe { (table.destroy)(instance) };
 }
+
+/// Calls `sizes` with a struct of which only `room` bytes are there; all others must stay as they were.
+fn within<T: Copy>(room: usize, of: T, sizes: impl FnOnce(*mut T)) -> T {
+    let mut there = of;
+    let bytes = (&raw mut there).cast::<u8>();
+    unsafe {
+        bytes.write_bytes(0, room);
+        bytes.add(room).write_bytes(0xAB, size_of::<T>() - room);
+        bytes.cast::<u64>().write(room as u64);
+    }
+    sizes(&raw mut there);
+    let left = unsafe { std::slice::from_raw_parts(bytes.add(room), size_of::<T>() - room) };
+    assert!(
+        left.iter().all(|b| *b == 0xAB),
+        "beyond {room} bytes: {left:x?}"
+    );
+    assert_eq!(unsafe { bytes.cast::<u64>().read() }, room as u64);
+    there
+}
+
+#[test]
+fn no_more_of_the_sizes_is_written_than_the_caller_has_room_for() {
+    let (materials, elements) = (material_table::<Linear>(), element_table::<Spring>());
+    let instance = create("4").unwrap();
+    let raw = pf_material {
+        functions: &raw const materials,
+        instance,
+    };
+    for room in [
+        size_of::<u64>(),
+        std::mem::offset_of!(pf_material_sizes, areal_mass),
+        size_of::<pf_material_sizes>(),
+    ] {
+        let s = within(room, pf_material_sizes::default(), |s| {
+            assert_eq!(unsafe { (materials.sizes)(instance, s) }, PF_OK);
+        });
+        if room > size_of::<u64>() {
+            assert_eq!((s.membrane_history, s.thickness), (1, 0.1));
+        }
+        if room == size_of::<pf_material_sizes>() {
+            assert_eq!(s.areal_mass, 2.0);
+        }
+    }
+    let mut element = std::ptr::null_mut();
+    let (text, none) = (pf_str::new(""), std::ptr::null_mut());
+    let code = unsafe { (elements.create)(text, &raw const raw, &raw mut element, none) };
+    assert_eq!(code, PF_OK);
+    // As ABI 1.0 had it, before `ignores_velocity`.
+    let first = std::mem::offset_of!(pf_element_sizes, ignores_velocity);
+    for room in [first, size_of::<pf_element_sizes>()] {
+        let s = within(room, pf_element_sizes::default(), |s| {
+            assert_eq!(unsafe { (elements.sizes)(element, s) }, PF_OK);
+        });
+        assert_eq!((s.nodes, s.constants, s.material_points), (4, 2, 1));
+    }
+    unsafe {
+        (elements.destroy)(element);
+        (materials.destroy)(instance);
+    }
+}

@@ -108,6 +108,11 @@ fn every_fault_planted_in_an_element_is_refused_by_the_check_that_is_meant_for_i
         ("ASKING", "asking", "NULL"),
         ("BAD_STATUS", "status", "42"),
         ("MANY_FIELDS", "sizes", "3 element fields"),
+        ("STEP_IN_FIELDS", "complete", "`critical_step`"),
+        ("PATCH_RACE", "patch-threads", "differ"),
+        ("PATCH_COUNTER", "patch-repeatable", "second call"),
+        ("PATCH_ASKING", "patch-asking", "stiffness"),
+        ("PATCH_IN_FIELDS", "patch-complete", "`stiffness`"),
     ] {
         refused(folder.path(), "faulty_element", fault, by, words);
     }
@@ -168,6 +173,20 @@ fn every_fault_planted_in_a_material_is_refused_by_the_check_that_is_meant_for_i
         ("WRONG_MOMENT", "moment", "M12"),
         ("WRONG_TANGENT", "tangent", "dM/dk"),
         ("BENT_AT_REST", "bending-rest", "moment when flat"),
+        ("FIXED_SIZES", "sizes", "the parameters say"),
+        ("RACE", "threads", "differ"),
+        ("DIVIDES_BY_DT", "zero-dt", "with dt = 0: membrane gave inf"),
+        ("SKIPS_ZERO_DT", "zero-dt", "a step of dt = 0 differs"),
+        ("SHEARED_STRESS", "stress", "S12"),
+        ("SHEARED_BOUND", "stiffness", "true largest tangents"),
+        ("SHEARED_GAINS", "cycle", "closed cycles"),
+        ("NEGATIVE_BOUND", "stiffness", "bounds are positive"),
+        ("BENDING_RACE", "bending-threads", "differ"),
+        ("BENDING_COUNTER", "bending-repeatable", "second call"),
+        ("BENDING_ASKING", "bending-asking", "NULL"),
+        ("BENDING_DT", "bending-zero-dt", "a step of dt = 0 differs"),
+        ("BENDING_GAINS", "bending-cycle", "closed cycles"),
+        ("SHARP_MOMENT", "moment", "M11"),
     ] {
         refused(folder.path(), "faulty_material", fault, by, words);
     }
@@ -176,9 +195,14 @@ fn every_fault_planted_in_a_material_is_refused_by_the_check_that_is_meant_for_i
 #[test]
 fn sound_plugins_in_c_pass() {
     let folder = tempfile::tempdir().unwrap();
-    for source in ["faulty_element", "faulty_material"] {
-        let (code, said) = check(&build(folder.path(), source, "NONE"), &[]);
-        assert_eq!((code, failed(&said)), (0, vec![]), "{source}");
+    for (source, fault) in [
+        ("faulty_element", "NONE"),
+        ("faulty_material", "NONE"),
+        // A sheet without stiffness in shear, which says so.
+        ("faulty_material", "SLACK"),
+    ] {
+        let (code, said) = check(&build(folder.path(), source, fault), &[]);
+        assert_eq!((code, failed(&said)), (0, vec![]), "{source}, {fault}");
     }
 }
 
@@ -193,6 +217,7 @@ fn all_of_plyflow_s_own_components_pass() {
     assert_eq!((code, failed(&said)), (0, vec![]), "material-isotropic");
     for (plugin, file) in [
         ("material-fabric", "ncf-fcim359"),
+        ("material-fabric", "ncf-fcim359-locking"),
         ("material-fabric", "woven-38616"),
         ("material-marlow", "stretchlon-ht350"),
     ] {
@@ -213,7 +238,7 @@ fn a_step_is_judged_by_its_descriptor_and_manifest_and_the_answer_says_so() {
 
 #[test]
 fn what_is_no_plugin_is_refused_and_what_is_not_there_is_a_wrong_command() {
-    for library in ["wrong-abi", "crash-on-load", "not-a-plugin"] {
+    for library in ["wrong-abi", "crash-on-load", "not-a-plugin", "unknown-unit"] {
         let (code, said) = check(&plyflow_faults::library(library), &[]);
         assert_eq!(code, NOT_CONFORMING, "{library}");
         assert_eq!(failed(&said)[0].0, "load", "{library}");

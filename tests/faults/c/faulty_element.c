@@ -1,4 +1,5 @@
-/* The element template in C with one fault planted by -DFAULT=NAME; without it, the sound element. */
+/* The element template in C and a small patch part, with one fault planted by -DFAULT=NAME; without it, a sound element.
+ */
 
 #define plyflow_plugin sound_plugin
 #include "../../../solver-plugins/template-element-c/element.c"
@@ -29,6 +30,11 @@ enum fault {
   ASKING,         /* another force when fields are wanted */
   BAD_STATUS,     /* returns 42 */
   MANY_FIELDS,    /* one field more than the manifest names */
+  STEP_IN_FIELDS, /* writes the critical step only when fields are wanted too */
+  PATCH_RACE,     /* scratch memory of patches in a global */
+  PATCH_COUNTER,  /* the patch force depends on how often it was asked for */
+  PATCH_ASKING,   /* another patch force when the stiffness is wanted */
+  PATCH_IN_FIELDS, /* writes the patch stiffness only when fields are wanted too */
   SEGFAULT,
   ABORT,
   EXIT,
@@ -43,6 +49,10 @@ static volatile uintptr_t nowhere = 8;
 static volatile double shared[12 * MAX_LANES];
 static long calls;
 
+/* Springs from the centre of a patch to the others: W = SPRING / 4 sum (|d|^2 - |D|^2)^2, D at rest. */
+enum { SLOTS = 11 }; /* five quads around a node */
+static const double SPRING = 1e8; /* N/m3 */
+
 static int32_t faulty_sizes(const void *it, pf_element_sizes *s) {
   const int32_t code = sizes(it, s);
   if (FAULT == FEW_CONSTANTS)
@@ -51,6 +61,8 @@ static int32_t faulty_sizes(const void *it, pf_element_sizes *s) {
     s->constants += 1;
   if (FAULT == MANY_FIELDS)
     s->fields += 1;
+  s->patch_nodes = SLOTS;
+  s->patch_constants = SLOTS - 1;
   return code;
 }
 
@@ -89,6 +101,10 @@ static int32_t faulty_forces(const void *it, const pf_element_batch *b) {
     break;
   case ACCUMULATES:
     mine.force = force;
+    break;
+  case STEP_IN_FIELDS:
+    if (!b->fields)
+      mine.critical_step = NULL;
     break;
   default:
     break;
@@ -177,6 +193,59 @@ static int32_t faulty_forces(const void *it, const pf_element_batch *b) {
   return PF_OK;
 }
 
+/* The vector from the centre to node k of lane l, and its square. */
+static double spoke(const double *x, uint32_t n, uint32_t l, int k, double d[3]) {
+  for (int c = 0; c < 3; c++)
+    d[c] = x[(3 * k + c) * n + l] - x[c * n + l];
+  return dot(d, d);
+}
+
+static int32_t patch_initialise(const void *it, const pf_patch_batch *b) {
+  (void)it;
+  double d[3];
+  for (uint32_t l = 0; l < b->lanes; l++)
+    for (int k = 1; k < SLOTS; k++)
+      b->constants[(k - 1) * b->lanes + l] = spoke(b->position, b->lanes, l, k, d);
+  return PF_OK;
+}
+
+static int32_t patch_forces(const void *it, const pf_patch_batch *b) {
+  (void)it;
+  static volatile double common[3 * SLOTS * MAX_LANES];
+  const uint32_t n = b->lanes;
+  const int bounds = b->stiffness && !(FAULT == PATCH_IN_FIELDS && !b->fields);
+  memset(b->force, 0, 3 * SLOTS * n * sizeof(double));
+  for (uint32_t l = 0; l < n; l++) {
+    double energy = 0, centre = 0, d[3];
+    for (int k = 1; k < SLOTS; k++) { /* unused slots lie on the centre: d = D = 0 */
+      const double square = spoke(b->position, n, l, k, d), longer = square - b->constants[(k - 1) * n + l];
+      for (int c = 0; c < 3; c++) {
+        b->force[(3 * k + c) * n + l] += SPRING * longer * d[c];
+        b->force[c * n + l] -= SPRING * longer * d[c];
+      }
+      energy += 0.25 * SPRING * longer * longer;
+      const double row = 2 * SPRING * (fabs(longer) + 2 * square);
+      centre += row;
+      if (bounds)
+        b->stiffness[k * n + l] = row;
+    }
+    b->energy[l] = energy;
+    if (bounds)
+      b->stiffness[l] = centre;
+    if (FAULT == PATCH_ASKING && b->stiffness)
+      b->force[l] *= 1 + 1e-12;
+  }
+  if (FAULT == PATCH_COUNTER)
+    b->force[0] += 1e-9 * (double)calls++;
+  if (FAULT == PATCH_RACE) {
+    for (uint32_t i = 0; i < 3 * SLOTS * n; i++)
+      common[i] = b->force[i];
+    for (uint32_t i = 0; i < 3 * SLOTS * n; i++)
+      b->force[i] = common[i];
+  }
+  return PF_OK;
+}
+
 static const pf_element_functions FAULTY = {
     .size = sizeof FAULTY,
     .create = create,
@@ -184,6 +253,8 @@ static const pf_element_functions FAULTY = {
     .sizes = faulty_sizes,
     .initialise = faulty_initialise,
     .forces = faulty_forces,
+    .patch_initialise = patch_initialise,
+    .patch_forces = patch_forces,
 };
 
 const pf_plugin *plyflow_plugin(void) {

@@ -20,12 +20,8 @@ static PLUGIN: pf_plugin = pf_plugin {
     reserved: 0,
     manifest: pf_str::new(
         r#"{
-        "name": "wrong-kind", "version": "0.1.0", "vendor": "Plyflow tests", "kind": "material", "role": "test",
-        "summary": "A test plugin.",
-        "parameters": {},
-        "inputs": {},
-        "output": {"kind": "test"},
-        "results": {}
+        "name": "wrong-kind", "version": "0.1.0", "vendor": "Plyflow tests", "kind": "material",
+        "role": "material", "summary": "A test plugin.", "parameters": {}
     }"#,
     ),
     functions: (&raw const FUNCTIONS).cast(),

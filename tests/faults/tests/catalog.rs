@@ -77,6 +77,12 @@ fn broken_and_missing_plugins_are_told_apart() {
         }
         other => panic!("{other:?}"),
     }
+    match catalog.find("unknown-unit", Utf8Path::new("/")) {
+        Err(CatalogError::Broken { reason, .. }) => {
+            assert!(reason.contains("unit of `torque`"), "{reason}");
+        }
+        other => panic!("{other:?}"),
+    }
     match catalog.find("no-such-plugin", Utf8Path::new("/")) {
         Err(CatalogError::NotFound { searched, .. }) => assert_eq!(searched, [plugins()]),
         other => panic!("{other:?}"),
@@ -115,4 +121,32 @@ fn nothing_is_described_again_when_the_cache_knows_it() {
     std::fs::write(&cache, "{").unwrap();
     let fourth = PluginCatalog::new(folders(), Some(cache), child());
     assert!(fourth.find("sum", Utf8Path::new("/")).is_ok());
+}
+
+#[test]
+fn a_kept_manifest_that_breaks_a_rule_is_not_believed() {
+    let dir = tempfile::tempdir().unwrap();
+    let cache = Utf8PathBuf::from_path_buf(dir.path().join("plugins.json")).unwrap();
+    let only = dir.path().join("plugins");
+    std::fs::create_dir(&only).unwrap();
+    std::fs::copy(library("trivial"), only.join("libtrivial.so")).unwrap();
+    let folders = || vec![Utf8PathBuf::from_path_buf(only.clone()).unwrap()];
+    let catalog = |describer| PluginCatalog::new(folders(), Some(cache.clone()), describer);
+    let entry = catalog(child())
+        .find("trivial", Utf8Path::new("/"))
+        .unwrap();
+    for unit in ["Nm", "mm"] {
+        // As a program that did not look at units left it.
+        let kept = std::fs::read_to_string(&cache).unwrap();
+        let (old, new) = (r#"\"unit\": \"1\""#, format!(r#"\"unit\": \"{unit}\""#));
+        assert!(kept.contains(old), "{kept}");
+        std::fs::write(&cache, kept.replace(old, &new)).unwrap();
+        let refused = catalog(no_child()).find("trivial", Utf8Path::new("/"));
+        assert!(
+            matches!(refused, Err(CatalogError::Broken { .. })),
+            "{unit} is believed: {refused:?}"
+        );
+        let again = catalog(child()).find("trivial", Utf8Path::new("/"));
+        assert_eq!(again.unwrap(), entry, "{unit}");
+    }
 }

@@ -51,8 +51,12 @@ impl Study {
     }
 
     fn command(&self, words: &[&str]) -> Command {
+        self.command_on("workflow.yaml", words)
+    }
+
+    fn command_on(&self, file: &str, words: &[&str]) -> Command {
         let mut command = Command::new(program());
-        command.arg(words[0]).arg("workflow.yaml").args(&words[1..]);
+        command.arg(words[0]).arg(file).args(&words[1..]);
         command
             .current_dir(self.folder.path())
             .env("PLYFLOW_PLUGINS", plyflow_faults::folder());

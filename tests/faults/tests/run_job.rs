@@ -245,6 +245,54 @@ fn a_malformed_artifact_fails_the_step_even_if_the_plugin_ignores_it() {
 }
 
 #[test]
+fn numbers_in_other_units_than_declared_or_than_those_of_si_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let units =
+        |what: &str, unit: &str| job(&dir, "units", "test", json!({"what": what, "unit": unit}));
+    for (what, unit, expected) in [
+        (
+            "length",
+            "rad",
+            "reported in `rad`; the plugin's manifest says `m`",
+        ),
+        ("length", "mm", "1 `mm` is 0.001 in SI units"),
+        (
+            "share",
+            "m",
+            "reported in `m`; the plugin's manifest says ``",
+        ),
+        ("length.first", "s", "the plugin's manifest says `m`"),
+        ("undeclared", "deg", "result 'undeclared': 1 `deg` is 0.017"),
+        ("undeclared", "Nm", "`Nm`"),
+        (
+            "array",
+            "MPa",
+            "array 'lengths': 1 `MPa` is 1000000 in SI units",
+        ),
+        ("field", "degC", "field 'way' of 'ply': 1 `degC` is 274.15"),
+        ("field", "metre", "`metre`"),
+    ] {
+        let (kind, text) = failed(&units(what, unit));
+        assert_eq!(kind, FailureKind::Malformed, "{what} in {unit}");
+        assert!(text.contains(expected), "{what} in {unit}: {text}");
+    }
+    for (what, unit) in [
+        ("length.first", "m"),
+        ("share", "1"),
+        ("undeclared", "N m"),
+        ("array", "kg/m2"),
+        ("field", "1"),
+    ] {
+        done(&units(what, unit));
+    }
+    // Declared as measured in the manifest, reported without the flag.
+    let seconds = units("seconds", "s");
+    assert!(done(&seconds).results[0].measured);
+    let written = Artifact::open(seconds.artifact.as_std_path()).unwrap();
+    assert!(written.results().is_empty());
+}
+
+#[test]
 fn loading_is_refused_with_what_was_found_and_expected() {
     let dir = tempfile::tempdir().unwrap();
     for (plugin, expected) in [
@@ -254,6 +302,7 @@ fn loading_is_refused_with_what_was_found_and_expected() {
         ),
         ("bad-magic", "0x0000000000001234 instead of PF_MAGIC"),
         ("bad-manifest", "does not follow schemas/manifest.md"),
+        ("unknown-unit", "unit of `torque`"),
         (
             "wrong-kind",
             "its descriptor says step, its manifest says material",

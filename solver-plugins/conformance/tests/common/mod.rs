@@ -33,6 +33,21 @@ pub const WOVEN: &str = r#"{"form": "fibre-energy", "fibre_modulus": 3e9,
     "bending": {"positive": {"linear": 1.549e-5, "asymptote": 0.00757, "scale": 20.0}},
     "thickness": 3e-4, "areal_mass": 0.21}"#;
 
+/// The film's curve in a few straight pieces.
+pub const TABULATED_FILM: &str = r#"{"uniaxial": {"strains": [0.0, 0.029, 0.098, 0.255, 0.748, 1.95, 5.0],
+        "stresses": [0.0, 1.3333e6, 3.6096e6, 6.1996e6, 8.8556e6, 15.1591e6, 58.9186e6]},
+    "thickness": 8e-5, "areal_mass": 0.08}"#;
+
+/// As many kinks as a fabric can have: fibres that are soft in compression, a law for each sign of shear, a stitch that
+/// fails in negative shear, tabulated moments.
+pub const KINKED: &str = r#"{"form": "fibre-energy", "fibre_modulus": 3e9, "compression_factor": 0.1,
+    "shear": {"table": {"angles": [0.0, 0.1, 0.3, 0.6, 0.9], "forces": [0.0, 10.0, 30.0, 90.0, 300.0]},
+              "negative": {"coefficients": [0.0, 112.19, 94.73], "limit": 0.8}},
+    "stitch": {"direction": "negative", "angles": [0.06, 0.4, 0.7], "forces": [0.0, 500.0, 0.0]},
+    "bending": {"positive": {"table": {"curvatures": [0.0, 10.0, 60.0, 200.0], "moments": [0.0, 0.01, 0.03, 0.06]}},
+                "negative": {"linear": 1e-4, "asymptote": 0.03, "scale": 6.0}, "families": "opposite"},
+    "thickness": 4e-4, "areal_mass": 0.44}"#;
+
 /// Checks of a material.
 pub fn of_material<M: Material>(parameters: &str) -> Vec<Check> {
     let table = material_table::<M>();

@@ -1,0 +1,217 @@
+//! A material under test: every call goes through guarded buffers.
+
+use crate::Sequence;
+use crate::breaches::{Ask, Breaches, DT, Refusal};
+use crate::buffer::Guarded;
+use crate::meeting::{Counter, same};
+use plyflow_sdk::abi::*;
+use std::ffi::c_void;
+
+/// A material under test.
+pub(crate) struct Law {
+    functions: *const pf_material_functions,
+    instance: *mut c_void,
+    pub(crate) sizes: pf_material_sizes,
+}
+
+// The contract: several threads call one instance at once. That is what is tested.
+unsafe impl Sync for Law {}
+unsafe impl Send for Law {}
+
+impl Drop for Law {
+    fn drop(&mut self) {
+        unsafe { ((*self.functions).destroy)(self.instance) };
+    }
+}
+
+/// What a membrane call gave.
+#[derive(Clone, Debug)]
+pub(crate) struct Answer {
+    /// `[3][lanes]`
+    pub(crate) stress: Vec<f64>,
+    /// `[lanes]`
+    pub(crate) energy: Vec<f64>,
+    /// `[2][lanes]`; empty when not asked for.
+    pub(crate) stiffness: Vec<f64>,
+    pub(crate) breaches: Breaches,
+}
+
+impl Law {
+    /// Makes an instance and reads its sizes.
+    ///
+    /// # Safety
+    /// `functions` must be valid as long as the law lives.
+    pub(crate) unsafe fn create(
+        functions: *const pf_material_functions,
+        parameters: &str,
+    ) -> Result<Self, Refusal> {
+        let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
+        let text = pf_str::new(parameters);
+        let code = unsafe { ((*functions).create)(text, &raw mut instance, &raw mut error) };
+        if code != PF_OK {
+            let text = error.get();
+            return Err(match code {
+                PF_ERROR if !text.is_empty() => Refusal::Said(text),
+                _ => Refusal::Broken(format!("create returned {code} with the text '{text}'")),
+            });
+        }
+        if instance.is_null() {
+            let text = "create returned 0 (PF_OK) but left the instance NULL";
+            return Err(Refusal::Broken(text.into()));
+        }
+        let mut new = Self {
+            functions,
+            instance,
+            sizes: pf_material_sizes::default(),
+        };
+        let code = unsafe { ((*functions).sizes)(instance, &raw mut new.sizes) };
+        if code != PF_OK {
+            return Err(Refusal::Broken(format!("sizes returned {code}")));
+        }
+        Ok(new)
+    }
+
+    pub(crate) fn bends(&self) -> bool {
+        self.sizes.has_bending != 0
+    }
+
+    pub(crate) fn functions(&self) -> &pf_material_functions {
+        unsafe { &*self.functions }
+    }
+
+    pub(crate) fn instance(&self) -> *const c_void {
+        self.instance
+    }
+
+    pub(crate) fn start(&self, lanes: usize) -> Guarded {
+        Guarded::zeros(self.sizes.membrane_history as usize * lanes)
+    }
+
+    /// Calls membrane; the history advances.
+    pub(crate) fn membrane(&self, history: &mut Guarded, metric: &[f64], ask: Ask) -> Answer {
+        self.membrane_after(DT, history, metric, ask)
+    }
+
+    /// Calls membrane with another time since the previous call.
+    pub(crate) fn membrane_after(
+        &self,
+        dt: f64,
+        history: &mut Guarded,
+        metric: &[f64],
+        ask: Ask,
+    ) -> Answer {
+        let lanes = metric.len() / 3;
+        let mut c = Guarded::of(metric);
+        let mut stress = Guarded::poisoned(3 * lanes);
+        let mut energy = Guarded::poisoned(lanes);
+        let mut stiffness = Guarded::poisoned(if ask.bound { 2 * lanes } else { 0 });
+        let batch = pf_membrane_batch {
+            size: size_of::<pf_membrane_batch>() as u64,
+            lanes: lanes as u32,
+            reserved: 0,
+            dt,
+            metric: c.pointer(),
+            history: history.pointer(),
+            stress: stress.pointer(),
+            energy: energy.pointer(),
+            stiffness: if ask.bound {
+                stiffness.pointer()
+            } else {
+                std::ptr::null_mut()
+            },
+        };
+        let code = unsafe { ((*self.functions).membrane)(self.instance, &raw const batch) };
+        let mut b = Breaches::default();
+        let call = "membrane";
+        b.status(call, code);
+        b.unchanged(call, "metric", &c, metric);
+        b.zones(call, "history", history);
+        b.output(call, "stress", &stress, lanes);
+        b.output(call, "energy", &energy, lanes);
+        b.output(call, "stiffness", &stiffness, lanes);
+        Answer {
+            stress: stress.slice().to_vec(),
+            energy: energy.slice().to_vec(),
+            stiffness: stiffness.slice().to_vec(),
+            breaches: b,
+        }
+    }
+
+    /// Calls membrane `times` times from the same history with as little around the calls as can be, so that calls of
+    /// several threads meet, through the `counter` of all; how many differ from `want`.
+    pub(crate) fn hammer(
+        &self,
+        history: &Guarded,
+        metric: &[f64],
+        want: &Answer,
+        times: usize,
+        counter: &Counter<'_>,
+    ) -> usize {
+        let lanes = metric.len() / 3;
+        let (mut c, mut now) = (Guarded::of(metric), history.clone());
+        let (mut stress, mut energy) = (Guarded::zeros(3 * lanes), Guarded::zeros(lanes));
+        let batch = pf_membrane_batch {
+            size: size_of::<pf_membrane_batch>() as u64,
+            lanes: lanes as u32,
+            reserved: 0,
+            dt: DT,
+            metric: c.pointer(),
+            history: now.pointer(),
+            stress: stress.pointer(),
+            energy: energy.pointer(),
+            stiffness: std::ptr::null_mut(),
+        };
+        let membrane = unsafe { (*self.functions).membrane };
+        (0..times)
+            .filter(|_| {
+                now.slice_mut().copy_from_slice(history.slice());
+                let code = counter.during(|| unsafe { membrane(self.instance, &raw const batch) });
+                code != PF_OK
+                    || !same(stress.slice(), &want.stress)
+                    || !same(energy.slice(), &want.energy)
+            })
+            .count()
+    }
+}
+
+/// C11, C22, C12 of a random deformation of about `size`.
+pub(crate) fn metrics(lanes: usize, size: f64, seed: u64) -> Vec<f64> {
+    let mut s = Sequence(seed);
+    let mut metric = vec![0.0; 3 * lanes];
+    for l in 0..lanes {
+        let f = [1.0 + size * s.next(), size * s.next()];
+        let g = [size * s.next(), 1.0 + size * s.next()];
+        metric[l] = f[0] * f[0] + g[0] * g[0];
+        metric[lanes + l] = f[1] * f[1] + g[1] * g[1];
+        metric[2 * lanes + l] = f[0] * f[1] + g[0] * g[1];
+    }
+    metric
+}
+
+pub(crate) fn undeformed(lanes: usize) -> Vec<f64> {
+    (0..3 * lanes)
+        .map(|i| if i < 2 * lanes { 1.0 } else { 0.0 })
+        .collect()
+}
+
+/// Trellis shear: the fibres keep their lengths, and the angle between them changes by 10 to 60 degrees to either side.
+/// None of them is a round number, at which a table would have a point.
+pub(crate) fn trellis(lanes: usize) -> Vec<f64> {
+    let mut metric = undeformed(lanes);
+    let pairs = (lanes / 2).max(2) - 1;
+    for l in 0..lanes {
+        let sign = if l % 2 == 0 { 1.0 } else { -1.0 };
+        let degrees: f64 = 10.3 + 49.4 * (l / 2) as f64 / pairs as f64;
+        metric[2 * lanes + l] = sign * degrees.to_radians().sin();
+    }
+    metric
+}
+
+pub(crate) fn size(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, v| v.abs().max(m))
+}
+
+/// To divide by.
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    size(values).max(f64::MIN_POSITIVE)
+}

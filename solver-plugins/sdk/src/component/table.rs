@@ -1,0 +1,366 @@
+//! The C function tables of components: what a host calls.
+
+use super::{
+    BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,
+    MaterialSizes, MembraneBatch, PatchBatch,
+};
+use crate::panic_text;
+use plyflow_abi::*;
+use std::ffi::c_void;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+struct ElementInstance<E> {
+    element: E,
+    material: MaterialRef,
+    sizes: ElementSizes,
+}
+
+unsafe fn rows<'a>(p: *const f64, n: usize) -> &'a [f64] {
+    if p.is_null() {
+        &[]
+    } else {
+        unsafe { std::slice::from_raw_parts(p, n) }
+    }
+}
+
+unsafe fn rows_mut<'a>(p: *mut f64, n: usize) -> &'a mut [f64] {
+    if p.is_null() {
+        &mut []
+    } else {
+        unsafe { std::slice::from_raw_parts_mut(p, n) }
+    }
+}
+
+unsafe fn some_mut<'a>(p: *mut f64, n: usize) -> Option<&'a mut [f64]> {
+    if p.is_null() {
+        None
+    } else {
+        Some(unsafe { std::slice::from_raw_parts_mut(p, n) })
+    }
+}
+
+/// Constants as the first call or as a later one sees them.
+unsafe fn constants<'a>(p: *mut f64, n: usize, first: bool) -> Constants<'a> {
+    if first {
+        Constants::Open(unsafe { rows_mut(p, n) })
+    } else {
+        Constants::Fixed(unsafe { rows(p, n) })
+    }
+}
+
+unsafe fn element_batch<'a>(
+    b: &pf_element_batch,
+    s: &ElementSizes,
+    m: &MaterialSizes,
+    first: bool,
+) -> ElementBatch<'a> {
+    let lanes = b.lanes as usize;
+    let v = s.nodes * 3 * lanes;
+    unsafe {
+        ElementBatch {
+            lanes,
+            dt: b.dt,
+            position: rows(b.position, v),
+            velocity: rows(b.velocity, v),
+            spin: rows(b.spin, v),
+            axis: rows(b.axis, 3 * lanes),
+            constants: constants(b.constants, s.constants * lanes, first),
+            history: rows_mut(b.history, s.history * lanes),
+            material_history: rows_mut(
+                b.material_history,
+                s.material_points * m.membrane_history * lanes,
+            ),
+            force: rows_mut(b.force, v),
+            moment: rows_mut(b.moment, v),
+            energy: rows_mut(b.energy, PF_ENERGIES * lanes),
+            fields: some_mut(b.fields, s.fields * lanes),
+            mass: rows_mut(b.mass, s.nodes * lanes),
+            inertia: rows_mut(b.inertia, s.nodes * lanes),
+            critical_step: some_mut(b.critical_step, lanes),
+        }
+    }
+}
+
+unsafe fn patch_batch<'a>(
+    b: &pf_patch_batch,
+    s: &ElementSizes,
+    m: &MaterialSizes,
+    first: bool,
+) -> PatchBatch<'a> {
+    let lanes = b.lanes as usize;
+    let v = s.patch_nodes * 3 * lanes;
+    unsafe {
+        PatchBatch {
+            lanes,
+            dt: b.dt,
+            position: rows(b.position, v),
+            count: rows(b.count, lanes),
+            area: rows(b.area, lanes),
+            axis: rows(b.axis, 3 * lanes),
+            constants: constants(b.constants, s.patch_constants * lanes, first),
+            history: rows_mut(b.history, (s.patch_history + m.bending_history) * lanes),
+            force: rows_mut(b.force, v),
+            energy: rows_mut(b.energy, lanes),
+            fields: some_mut(b.fields, s.patch_fields * lanes),
+            stiffness: some_mut(b.stiffness, s.patch_nodes * lanes),
+        }
+    }
+}
+
+/// Fills a struct of sizes that begins with the caller's own `size`: that many bytes of it are there. A caller that was
+/// built before a field was added has no room for it.
+///
+/// # Safety
+/// `out` must point to as many bytes as its first u64 says, `T` must be a C struct that begins with that u64.
+unsafe fn hand_over<T: Copy>(given: &T, out: *mut T) {
+    let head = size_of::<u64>();
+    unsafe {
+        let room = usize::try_from(out.cast::<u64>().read()).unwrap_or(usize::MAX);
+        let bytes = size_of::<T>().min(room).saturating_sub(head);
+        std::ptr::copy_nonoverlapping(
+            std::ptr::from_ref(given).cast::<u8>().add(head),
+            out.cast::<u8>().add(head),
+            bytes,
+        );
+    }
+}
+
+fn guarded(f: impl FnOnce() -> i32) -> i32 {
+    catch_unwind(AssertUnwindSafe(f)).unwrap_or(PF_PANIC)
+}
+
+unsafe fn create_guarded<T>(
+    out: *mut *mut c_void,
+    error: *mut pf_error,
+    f: impl FnOnce() -> Result<T, String>,
+) -> i32 {
+    let (code, text) = match catch_unwind(AssertUnwindSafe(f)) {
+        Ok(Ok(value)) => {
+            unsafe { *out = Box::into_raw(Box::new(value)).cast() };
+            return PF_OK;
+        }
+        Ok(Err(text)) => (PF_ERROR, text),
+        Err(p) => (
+            PF_PANIC,
+            format!("the component panicked: {}", panic_text(p.as_ref())),
+        ),
+    };
+    if !error.is_null() {
+        unsafe { (*error).set(&text) };
+    }
+    code
+}
+
+/// The function table of an [`Element`].
+pub const fn element_table<E: Element>() -> pf_element_functions {
+    unsafe extern "C" fn create<E: Element>(
+        parameters: pf_str,
+        material: *const pf_material,
+        out: *mut *mut c_void,
+        error: *mut pf_error,
+    ) -> i32 {
+        unsafe {
+            create_guarded(out, error, || {
+                if material.is_null() {
+                    return Err("the element was given no material (NULL)".into());
+                }
+                let material = MaterialRef::new(*material)?;
+                let text = parameters.as_str().map_err(|e| e.to_string())?;
+                let element = E::create(text, &material)?;
+                let sizes = element.sizes();
+                Ok(ElementInstance {
+                    element,
+                    material,
+                    sizes,
+                })
+            })
+        }
+    }
+    unsafe extern "C" fn destroy<E: Element>(instance: *mut c_void) {
+        guarded(|| {
+            if !instance.is_null() {
+                drop(unsafe { Box::from_raw(instance.cast::<ElementInstance<E>>()) });
+            }
+            PF_OK
+        });
+    }
+    unsafe extern "C" fn sizes<E: Element>(
+        instance: *const c_void,
+        out: *mut pf_element_sizes,
+    ) -> i32 {
+        let s = unsafe { &(*instance.cast::<ElementInstance<E>>()).sizes };
+        let given = pf_element_sizes {
+            size: 0,
+            nodes: s.nodes as u32,
+            dofs_per_node: s.dofs_per_node as u32,
+            constants: s.constants as u32,
+            history: s.history as u32,
+            material_points: s.material_points as u32,
+            fields: s.fields as u32,
+            patch_nodes: s.patch_nodes as u32,
+            patch_constants: s.patch_constants as u32,
+            patch_history: s.patch_history as u32,
+            patch_fields: s.patch_fields as u32,
+            ignores_velocity: u32::from(s.ignores_velocity),
+            reserved: 0,
+        };
+        unsafe { hand_over(&given, out) };
+        PF_OK
+    }
+    unsafe extern "C" fn initialise<E: Element>(
+        instance: *const c_void,
+        batch: *const pf_element_batch,
+    ) -> i32 {
+        guarded(|| unsafe {
+            let i = &*instance.cast::<ElementInstance<E>>();
+            i.element.initialise(
+                &mut element_batch(&*batch, &i.sizes, &i.material.sizes, true),
+                &i.material,
+            );
+            PF_OK
+        })
+    }
+    unsafe extern "C" fn forces<E: Element>(
+        instance: *const c_void,
+        batch: *const pf_element_batch,
+    ) -> i32 {
+        guarded(|| unsafe {
+            let i = &*instance.cast::<ElementInstance<E>>();
+            i.element.forces(
+                &mut element_batch(&*batch, &i.sizes, &i.material.sizes, false),
+                &i.material,
+            )
+        })
+    }
+    unsafe extern "C" fn patch_initialise<E: Element>(
+        instance: *const c_void,
+        batch: *const pf_patch_batch,
+    ) -> i32 {
+        guarded(|| unsafe {
+            let i = &*instance.cast::<ElementInstance<E>>();
+            i.element.patch_initialise(
+                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes, true),
+                &i.material,
+            );
+            PF_OK
+        })
+    }
+    unsafe extern "C" fn patch_forces<E: Element>(
+        instance: *const c_void,
+        batch: *const pf_patch_batch,
+    ) -> i32 {
+        guarded(|| unsafe {
+            let i = &*instance.cast::<ElementInstance<E>>();
+            i.element.patch_forces(
+                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes, false),
+                &i.material,
+            )
+        })
+    }
+    pf_element_functions {
+        size: size_of::<pf_element_functions>() as u64,
+        create: create::<E>,
+        destroy: destroy::<E>,
+        sizes: sizes::<E>,
+        initialise: initialise::<E>,
+        forces: forces::<E>,
+        patch_initialise: Some(patch_initialise::<E>),
+        patch_forces: Some(patch_forces::<E>),
+    }
+}
+
+struct MaterialInstance<M> {
+    material: M,
+    sizes: MaterialSizes,
+}
+
+/// The function table of a [`Material`].
+pub const fn material_table<M: Material>() -> pf_material_functions {
+    unsafe extern "C" fn create<M: Material>(
+        parameters: pf_str,
+        out: *mut *mut c_void,
+        error: *mut pf_error,
+    ) -> i32 {
+        unsafe {
+            create_guarded(out, error, || {
+                let material = M::create(parameters.as_str().map_err(|e| e.to_string())?)?;
+                let sizes = material.sizes();
+                Ok(MaterialInstance { material, sizes })
+            })
+        }
+    }
+    unsafe extern "C" fn destroy<M: Material>(instance: *mut c_void) {
+        guarded(|| {
+            if !instance.is_null() {
+                drop(unsafe { Box::from_raw(instance.cast::<MaterialInstance<M>>()) });
+            }
+            PF_OK
+        });
+    }
+    unsafe extern "C" fn sizes<M: Material>(
+        instance: *const c_void,
+        out: *mut pf_material_sizes,
+    ) -> i32 {
+        let s = unsafe { &(*instance.cast::<MaterialInstance<M>>()).sizes };
+        let given = pf_material_sizes {
+            size: 0,
+            membrane_history: s.membrane_history as u32,
+            bending_history: s.bending_history as u32,
+            has_bending: u32::from(s.has_bending),
+            reserved: 0,
+            thickness: s.thickness,
+            areal_mass: s.areal_mass,
+        };
+        unsafe { hand_over(&given, out) };
+        PF_OK
+    }
+    unsafe extern "C" fn membrane<M: Material>(
+        instance: *const c_void,
+        b: *const pf_membrane_batch,
+    ) -> i32 {
+        guarded(|| unsafe {
+            let i = &*instance.cast::<MaterialInstance<M>>();
+            let b = &*b;
+            let lanes = b.lanes as usize;
+            i.material.membrane(&mut MembraneBatch {
+                lanes,
+                dt: b.dt,
+                metric: rows(b.metric, 3 * lanes),
+                history: rows_mut(b.history, i.sizes.membrane_history * lanes),
+                stress: rows_mut(b.stress, 3 * lanes),
+                energy: rows_mut(b.energy, lanes),
+                stiffness: some_mut(b.stiffness, 2 * lanes),
+            });
+            PF_OK
+        })
+    }
+    unsafe extern "C" fn bending<M: Material>(
+        instance: *const c_void,
+        b: *const pf_bending_batch,
+    ) -> i32 {
+        guarded(|| unsafe {
+            let i = &*instance.cast::<MaterialInstance<M>>();
+            let b = &*b;
+            let lanes = b.lanes as usize;
+            i.material.bending(&mut BendingBatch {
+                lanes,
+                dt: b.dt,
+                metric: rows(b.metric, 3 * lanes),
+                curvature: rows(b.curvature, 3 * lanes),
+                history: rows_mut(b.history, i.sizes.bending_history * lanes),
+                moment: rows_mut(b.moment, 3 * lanes),
+                energy: rows_mut(b.energy, lanes),
+                tangent: some_mut(b.tangent, 3 * lanes),
+            });
+            PF_OK
+        })
+    }
+    pf_material_functions {
+        size: size_of::<pf_material_functions>() as u64,
+        create: create::<M>,
+        destroy: destroy::<M>,
+        sizes: sizes::<M>,
+        membrane: membrane::<M>,
+        bending: Some(bending::<M>),
+    }
+}
