@@ -3,6 +3,7 @@
 use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs, Workflow};
 use super::open::{self, open};
 use super::report::command;
+use super::run::first_line;
 use super::table::table;
 use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
@@ -130,7 +131,13 @@ fn prospect(session: &Session<'_>, id: Id) -> Prospect {
                 .unwrap_or_default(),
         ),
         State::Unkeyed => ("unknown", waits_for(session, id)),
-        _ => ("run", why(session, id) + &goes_on(session, id)),
+        _ => (
+            "run",
+            match session.failed_before(id) {
+                Some(f) => format!("failed last time: {}", first_line(&f.reason)),
+                None => why(session, id),
+            } + &goes_on(session, id),
+        ),
     };
     let name = &core.graph().steps[instance.step].name;
     let last = session.journal.last(name, &instance.item);
@@ -246,8 +253,14 @@ pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], given: &Workf
     let again = command(given);
     let name = |id: &Id| &core.graph().steps[core.instances()[*id].step].name;
     let wanted = |id: &Id| steps.is_empty() || steps.contains(name(id));
-    let mut of_these = (0..core.instances().len()).filter(wanted);
-    if of_these.all(|id| matches!(difference(session, id), Difference::Never)) {
+    let of_these = || (0..core.instances().len()).filter(wanted);
+    if let Some(f) = of_these().find_map(|id| session.failed_before(id)) {
+        let (label, reason) = (f.label, f.reason.replace('\n', "\n  "));
+        return format!(
+            "nothing of it is in the store: {label} failed last time:\n  {reason}\nrun it again with: {again}"
+        );
+    }
+    if of_these().all(|id| matches!(difference(session, id), Difference::Never)) {
         let what = if steps.is_empty() {
             "nothing has been run yet; start with"
         } else {

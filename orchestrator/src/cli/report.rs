@@ -28,7 +28,10 @@ pub fn report(args: &ReportArgs) -> Done {
         .output
         .clone()
         .unwrap_or_else(|| beside(&opened.workflow.file));
-    let input = input(&opened, &session, &found, &[], &args.workflow);
+    let failures: Vec<Failure> = (0..session.core.instances().len())
+        .filter_map(|id| session.failed_before(id))
+        .collect();
+    let input = input(&opened, &session, &found, &failures, &args.workflow);
     let bytes = write_report(&input, &path).map_err(|e| Stop::new(exit::INTERNAL, e))?;
     print(&format!("{path}: {}\n", super::table::bytes(bytes)))
 }
@@ -160,7 +163,11 @@ pub fn input(
             met: r.verdict() == Some(OK),
         })
     };
-    let done = |s: State| matches!(s, State::Done { .. } | State::Failed);
+    let failed = |label: &str| failures.iter().any(|f| f.label == label);
+    let did_not_run = |id: &Id| {
+        let state = core.instances()[*id].state;
+        !matches!(state, State::Done { .. } | State::Failed) && !failed(&core.label(*id))
+    };
     ReportInput {
         workflow: opened.workflow.name.clone(),
         description: opened.workflow.description.clone(),
@@ -174,7 +181,7 @@ pub fn input(
             .iter()
             .map(|f| (f.label.clone(), f.reason.clone()))
             .collect(),
-        not_run: core.instances().iter().filter(|i| !done(i.state)).count(),
+        not_run: (0..core.instances().len()).filter(did_not_run).count(),
     }
 }
 

@@ -303,7 +303,7 @@ fn failure_text(first: &Failure, summary: &Summary) -> String {
     out
 }
 
-fn first_line(text: &str) -> &str {
+pub(super) fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or_default()
 }
 

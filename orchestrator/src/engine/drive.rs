@@ -560,15 +560,39 @@ impl<'a> Session<'a> {
         let again = self.core.instances()[id].state != State::Failed;
         observer.update(&self.core, id, &Update::Failed { reason, again });
         if !again {
-            let label = self.core.label(id);
-            let log = Some(self.folder.log(&label)).filter(|l| l.exists());
-            self.summary.failures.push(Failure {
-                label,
-                reason: reason.to_owned(),
-                log,
-            });
+            let instance = &self.core.instances()[id];
+            let step = &self.core.graph().steps[instance.step];
+            if let (true, Some(key)) = (self.writing, instance.key) {
+                let who = (step.name.as_str(), instance.item.as_slice());
+                self.journal.failed(who, key, reason);
+            }
+            let failure = self.failure(id, reason);
+            self.summary.failures.push(failure);
         }
         self.take(effects, observer);
+    }
+
+    fn failure(&self, id: Id, reason: &str) -> Failure {
+        let label = self.core.label(id);
+        let log = Some(self.folder.log(&label)).filter(|l| l.exists());
+        Failure {
+            label,
+            reason: reason.to_owned(),
+            log,
+        }
+    }
+
+    /// Why an instance that is not done failed when it ran last as it is now.
+    pub fn failed_before(&self, id: Id) -> Option<Failure> {
+        let instance = &self.core.instances()[id];
+        if matches!(instance.state, State::Done { .. }) {
+            return None;
+        }
+        let step = &self.core.graph().steps[instance.step].name;
+        let reason = self
+            .journal
+            .failure(step, &instance.item, instance.key.as_ref()?)?;
+        Some(self.failure(id, reason))
     }
 }
 

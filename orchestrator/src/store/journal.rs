@@ -38,6 +38,8 @@ enum Entry {
     Started { pid: u32, seconds: u64 },
     /// It ended.
     Ended { executed: u64, failed: u64 },
+    /// An instance failed for good.
+    Failed { key: Key, slot: u64, reason: String },
 }
 
 /// What went into the key of one instance.
@@ -68,6 +70,7 @@ pub struct Journal {
     bytes: Vec<u8>,
     known: HashMap<Key, Known>,
     last: HashMap<u64, Key>,
+    failed: HashMap<u64, (Key, String)>,
     cold: Vec<Range<usize>>,
     recipes: HashMap<Key, String>,
     frames: usize,
@@ -138,7 +141,7 @@ impl Journal {
             file.seek(SeekFrom::Start(whole as u64))?;
         }
         journal.file = Some(file);
-        if journal.frames > 1000 + 8 * journal.last.len() {
+        if journal.frames > 1000 + 8 * (journal.last.len() + journal.failed.len()) {
             journal.compact()?;
         }
         Ok(journal)
@@ -151,6 +154,7 @@ impl Journal {
             bytes: Vec::new(),
             known: HashMap::new(),
             last: HashMap::new(),
+            failed: HashMap::new(),
             cold: Vec::new(),
             recipes: HashMap::new(),
             frames: 0,
@@ -191,10 +195,11 @@ impl Journal {
                     labels,
                 }) => {
                     self.known.insert(key, Known { bytes, labels });
-                    self.last.insert(slot, key);
+                    self.uses(slot, key);
                 }
-                Ok(Entry::Use { key, slot }) => {
-                    self.last.insert(slot, key);
+                Ok(Entry::Use { key, slot }) => self.uses(slot, key),
+                Ok(Entry::Failed { key, slot, reason }) => {
+                    self.failed.insert(slot, (key, reason));
                 }
                 Ok(Entry::Recipe {
                     digest,
@@ -208,6 +213,13 @@ impl Journal {
         }
         self.frames += 1;
         true
+    }
+
+    fn uses(&mut self, slot: u64, key: Key) {
+        self.last.insert(slot, key);
+        if self.failed.get(&slot).is_some_and(|f| f.0 == key) {
+            self.failed.remove(&slot);
+        }
     }
 
     fn push(&mut self, entry: &Entry) {
@@ -291,6 +303,21 @@ impl Journal {
         });
     }
 
+    /// Notes why an instance with this key failed.
+    pub fn failed(&mut self, (step, item): (&str, &[u64]), key: Key, reason: &str) {
+        self.push(&Entry::Failed {
+            key,
+            slot: slot(step, item),
+            reason: reason.to_owned(),
+        });
+    }
+
+    /// Why an instance failed when it ran with this key last; `None` when it did not, or has been done since.
+    pub fn failure(&self, step: &str, item: &[u64], key: &Key) -> Option<&str> {
+        let (failed, reason) = self.failed.get(&slot(step, item))?;
+        (failed == key).then_some(reason)
+    }
+
     /// Notes that steps begin to be started.
     pub fn started(&mut self) {
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
@@ -344,7 +371,7 @@ impl Journal {
         Ok(())
     }
 
-    /// Writes a new file that holds only what the last run of each instance used.
+    /// Writes a new file that holds only what the last run of each instance used, and why it failed.
     fn compact(&mut self) -> io::Result<()> {
         let path = self.path.with_extension("new");
         let mut fresh = Self::scan(&self.path, MAGIC.to_vec()).0;
@@ -380,6 +407,12 @@ impl Journal {
                 bytes,
                 labels,
             });
+        }
+        let mut failed: Vec<_> = self.failed.iter().collect();
+        failed.sort_unstable();
+        for (slot, (key, reason)) in failed {
+            let (key, slot, reason) = (*key, *slot, reason.clone());
+            fresh.push(&Entry::Failed { key, slot, reason });
         }
         fresh.file = Some(file);
         fresh.tick()?;

@@ -126,6 +126,38 @@ fn a_long_history_is_shed_and_the_last_state_is_kept() {
 }
 
 #[test]
+fn why_an_instance_failed_is_kept_until_it_is_done_or_fails_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    for item in [0, 1, 2] {
+        j.failed(("s", &[item]), key(1 + item as u8), "no tool");
+    }
+    j.failed(("s", &[1]), key(2), "no bed");
+    j.failed(("s", &[2]), key(7), "no frame");
+    note(&mut j, 0, 9);
+    // A long history beside it, which the next writer sheds.
+    for round in 0..1200u64 {
+        note(&mut j, 8, (round % 2) as u8 + 20);
+    }
+    j.flush().unwrap();
+    for _ in 0..2 {
+        let j = Journal::read(&at(&folder)).unwrap();
+        // Done otherwise, it failed as it was all the same.
+        assert_eq!(j.failure("s", &[0], &key(1)), Some("no tool"));
+        assert_eq!(j.failure("s", &[0], &key(9)), None);
+        assert_eq!(j.failure("s", &[1], &key(2)), Some("no bed"));
+        assert_eq!(j.failure("s", &[2], &key(3)), None);
+        assert_eq!(j.failure("s", &[2], &key(7)), Some("no frame"));
+        drop(Journal::open(&at(&folder)).unwrap());
+    }
+    let mut j = Journal::open(&at(&folder)).unwrap();
+    note(&mut j, 1, 2);
+    j.flush().unwrap();
+    let j = Journal::read(&at(&folder)).unwrap();
+    assert_eq!(j.failure("s", &[1], &key(2)), None);
+}
+
+#[test]
 fn what_could_not_be_written_is_written_when_there_is_room_again() {
     let folder = tempfile::tempdir().unwrap();
     let mut j = Journal::open(&at(&folder)).unwrap();

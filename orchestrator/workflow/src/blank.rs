@@ -6,6 +6,11 @@ use plyflow_model::outline::{ContourName, Region};
 use plyflow_model::scene::Contour;
 use plyflow_model::units::{Dimension, parse_quantity, si_number};
 
+/// What only plies have.
+const OF_PLIES: [&str; 7] = [
+    "length", "width", "outline", "holes", "centre", "fibre_1", "fibre_2",
+];
+
 /// Checks what a sheet says of its size and fibres.
 pub fn rules(sheet: &Node, source: &Source, problems: &mut Problems) {
     if !matches!(sheet.kind, Kind::Map(_)) {
@@ -14,11 +19,11 @@ pub fn rules(sheet: &Node, source: &Source, problems: &mut Problems) {
     match sheet.get("kind").and_then(Node::text) {
         Some("ply") => ply(sheet, source, problems),
         Some("diaphragm") => {
-            for name in ["outline", "holes"] {
+            for name in OF_PLIES {
                 if let Some(entry) = sheet.entry(name) {
                     let message = format!("a diaphragm has no `{name}`");
                     let d = problems.add(source, &entry.key_span, message);
-                    d.help("diaphragms fill the frame of the process; only plies have a shape of their own");
+                    d.help("diaphragms fill the frame of the process and have no fibres; only plies have a shape of their own");
                 }
             }
         }

@@ -549,6 +549,20 @@ const CASES: &[Case] = &[
     (
         S,
         "name: upper-film",
+        "length: 1.8 m\n    name: upper-film",
+        0,
+        &["a diaphragm has no `length`", "frame of the process"],
+    ),
+    (
+        S,
+        "name: upper-film",
+        "fibre_1: 45 deg\n    name: upper-film",
+        0,
+        &["a diaphragm has no `fibre_1`", "no fibres"],
+    ),
+    (
+        S,
+        "name: upper-film",
         "name: lower-film",
         0,
         &["`lower-film` is taken"],

@@ -70,6 +70,38 @@ steps:
 }
 
 #[test]
+fn why_a_step_failed_is_told_afterwards_until_it_is_done() {
+    let bad = "  bad: {plugin: error}\n";
+    let steps = format!("steps:\n{bad}  after: {{plugin: sum, from: {{in: bad}}}}\n");
+    let study = Study::new(&steps);
+    let said = |words: &[&str]| {
+        let out = study.call(words);
+        String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned()
+    };
+    let cause = "the tool has no surface: give it at least one triangle";
+    assert_eq!(study.run(&[]).code, Some(4));
+    let report = said(&["report"]);
+    assert!(
+        report.contains(&format!("bad failed last time:\n  {cause}")),
+        "{report}"
+    );
+    study.write(&format!("{steps}  other: {{plugin: trivial}}\n"));
+    assert_eq!(study.run(&["--until", "other"]).code, Some(0));
+    let plan = said(&["plan"]);
+    assert!(
+        plan.contains(&format!("failed last time: {cause}")),
+        "{plan}"
+    );
+    said(&["report"]);
+    let page = std::fs::read_to_string(study.path("report.html")).unwrap();
+    assert!(page.contains(cause), "the report does not say why");
+    assert!(page.contains("1 step failed; 1 step did not run"));
+    // Another step is in its place now.
+    study.write(&steps.replace("error", "trivial"));
+    assert!(!said(&["plan"]).contains("failed last time"));
+}
+
+#[test]
 fn a_library_that_cannot_be_used_is_an_error_of_the_workflow_and_nothing_runs() {
     let ways = [
         ("wrong-abi", "ABI 99.0"),
