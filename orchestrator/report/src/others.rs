@@ -74,6 +74,17 @@ pub(crate) fn of_body(
                 });
             }
         };
+        // Of a comparison: codes of what was found there. As numbers on a scale the rim of the one kind would look like the other.
+        if name == "defect" && body.attributes["model"].is_string() {
+            for (code, kind) in [(1.0, "Wrinkle"), (2.0, "Bridging")] {
+                let is = |v: &f64| f64::from(u8::from(*v == code));
+                push(
+                    format!("{kind} (1 where one was found)"),
+                    data.iter().map(is).collect(),
+                );
+            }
+            continue;
+        }
         let title = in_words(name);
         if c == 1 {
             push(title, data);

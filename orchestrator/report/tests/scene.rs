@@ -249,7 +249,7 @@ fn every_field_of_the_plies_is_in_the_menu_with_its_unit_and_what_is_the_same_ev
         assert!(!menu.contains(title) && page.contains(told), "{title}");
     }
     assert!(
-        texts[3].starts_with("Fibre") && texts.last() == Some(&"Defect"),
+        texts[3].starts_with("Fibre") && texts.last() == Some(&"Wrinkle (1 where one was found)"),
         "{texts:?}"
     );
     assert!(!page.contains("Left out, as the page"));

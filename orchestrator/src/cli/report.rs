@@ -65,7 +65,7 @@ pub fn beside(workflow: &Utf8Path) -> Utf8PathBuf {
 }
 
 /// Changes with what a page shows of the same artifacts: an older page is then written again.
-const LAYOUT: &[u8] = b"page 6";
+const LAYOUT: &[u8] = b"page 7";
 
 /// Names all that a report depends on.
 pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure]) -> String {
