@@ -2,7 +2,7 @@
 
 use plyflow_characterisation::GRAVITY;
 use plyflow_characterisation::cantilever::{
-    Formula, PLAUSIBLE_OVERHANG, mean_and_deviation, stiffness,
+    Formula, PLAUSIBLE_OVERHANG, STANDARD_ANGLE, mean_and_deviation, stiffness,
 };
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
@@ -19,7 +19,7 @@ export_step!(CharacteriseCantilever);
 #[derive(Deserialize)]
 struct Parameters {
     overhangs: String,
-    angle: f64,
+    angle: Option<f64>,
     formula: Formula,
     areal_mass: Option<f64>,
     bending: String,
@@ -41,9 +41,22 @@ impl Step for CharacteriseCantilever {
         let table = read(&p.overhangs, &COLUMNS)?;
         table.at_least(1, "a stiffness")?;
         let overhangs = table.values("overhang")?;
+        let given = match (p.angle, p.formula) {
+            (Some(angle), _) => angle,
+            (None, Formula::Standard) => STANDARD_ANGLE,
+            (None, Formula::Peirce) if table.column("angle").is_some() => STANDARD_ANGLE,
+            (None, Formula::Peirce) => {
+                return Err(format!(
+                    "{}: the angle of the secant is not told, and 'peirce' hangs on it (the stiffness at 7.1 deg is 7.6 times that of the same \
+                     overhang at 41.5 deg); give a column `angle [deg]` or the parameter `angle`",
+                    table.source
+                )
+                .into());
+            }
+        };
         let mut stiffnesses = Vec::new();
         for (i, overhang) in overhangs.iter().enumerate() {
-            let angle = table.column("angle").map_or(p.angle, |a| a[i]);
+            let angle = table.column("angle").map_or(given, |a| a[i]);
             let b = stiffness(p.formula, *overhang, angle, weight);
             stiffnesses.push(b.map_err(|e| format!("{}: {e}", table.place(i)))?);
         }

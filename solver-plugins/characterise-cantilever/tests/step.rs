@@ -117,6 +117,11 @@ fn bad_overhangs_are_refused_with_file_and_line() {
             "o.csv:2: the standard's formula holds at 41.5 deg",
         ),
         (
+            "overhang [mm]\n200\n",
+            json!({"formula": "peirce"}),
+            "o.csv: the angle of the secant is not told",
+        ),
+        (
             "overhang [mm],angle [deg]\n200,0\n",
             json!({"formula": "peirce"}),
             "o.csv:2: an angle of 0.00 deg",
