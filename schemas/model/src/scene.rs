@@ -489,7 +489,7 @@ pub struct DoubleDiaphragm {
     /// bagging; a table tells its course over all of bagging.
     #[schemars(extend("x-minimum" = "0 Pa"))]
     pub bag_pressure: PressureCourse,
-    /// Pressure drawn under the lower film. A single value is that at the end; a table tells its course over drawing.
+    /// Pressure drawn under the lower film. A single value is that at the end, reached smoothly; a table tells its course over drawing.
     #[schemars(extend("x-minimum" = "0 Pa"))]
     pub forming_pressure: PressureCourse,
     /// Simulated duration of evacuating the bag.

@@ -130,10 +130,17 @@ impl Cycle {
         1.0 - (1.0 - self.cavity_end / self.bag.max(1e-300)) * drawn
     }
 
-    /// Pressure (Pa) that a table wants in the cavity at `t`; `None` without a table.
+    /// Pressure (Pa) that a pump is to give the cavity at `t`: after a table, or towards a pressure that stays in it. `None` where all of the gas
+    /// is drawn, or none of it: then what matters is the gas that is left, wherever its volume goes.
     pub fn wanted_in_cavity(&self, t: f64) -> Option<f64> {
-        let course = self.drawn_course.as_ref()?;
-        let drawn = course.at(share(t, self.sealed_at(), self.durations[2]));
+        let drawn = match &self.drawn_course {
+            Some(course) => course.at(share(t, self.sealed_at(), self.durations[2])),
+            // A share of the gas in a cavity that shrinks to a few hundredths of itself would have far more than this pressure.
+            None if self.cavity_end > 0.0 && self.cavity_end < self.bag => {
+                (self.bag - self.cavity_end) * smooth_step(t, self.sealed_at(), self.durations[2])
+            }
+            None => return None,
+        };
         Some((self.bag - drawn).max(0.0))
     }
 }
@@ -418,20 +425,28 @@ mod tests {
 
     #[test]
     fn single_values_come_as_smooth_steps() {
+        for (forming, left) in [("80000 Pa", [0.5, 0.0]), ("0 Pa", [1.0, 1.0])] {
+            let cycle = cycle(json!("80000 Pa"), json!(forming)).unwrap();
+            for (t, bag, gas) in [
+                (0.1, 0.0, 1.0),
+                (0.15, 4e4, 1.0),
+                (0.3, 8e4, 1.0),
+                (0.7, 8e4, left[0]),
+                (1.0, 8e4, left[1]),
+            ] {
+                let (b, g) = (cycle.bag_pressure(t), cycle.gas_left(t));
+                assert!(
+                    (b - bag).abs() < 1e-9 && (g - gas).abs() < 1e-12,
+                    "{t} s: {b} Pa, {g}"
+                );
+                assert_eq!(cycle.wanted_in_cavity(t), None);
+            }
+        }
+        // Some of the air stays: a pump sees to its pressure, however small the cavity becomes.
         let cycle = cycle(json!("80000 Pa"), json!("60000 Pa")).unwrap();
-        for (t, bag, gas) in [
-            (0.1, 0.0, 1.0),
-            (0.15, 4e4, 1.0),
-            (0.3, 8e4, 1.0),
-            (0.7, 8e4, 0.625),
-            (1.0, 8e4, 0.25),
-        ] {
-            let (b, g) = (cycle.bag_pressure(t), cycle.gas_left(t));
-            assert!(
-                (b - bag).abs() < 1e-9 && (g - gas).abs() < 1e-12,
-                "{t} s: {b} Pa, {g}"
-            );
-            assert_eq!(cycle.wanted_in_cavity(t), None);
+        for (t, wanted) in [(0.5, 8e4), (0.7, 5e4), (0.9, 2e4), (1.0, 2e4)] {
+            let w = cycle.wanted_in_cavity(t).unwrap();
+            assert!((w - wanted).abs() < 1e-9, "{t} s: {w} Pa");
         }
     }
 

@@ -286,6 +286,28 @@ fn steps_are_told(p: &Parameters, outcome: &Outcome) {
 }
 
 #[test]
+fn a_single_pressure_below_that_of_the_bag_is_what_the_cavity_ends_with() {
+    let mut p = parameters(&[], |process| {
+        process["forming_pressure"] = json!("90000 Pa");
+        process["drawing_time"] = json!("0.12 s");
+        process["settling_time"] = json!("0.02 s");
+    });
+    p.frames = 10;
+    let mut forming = build_global(&p, &BuiltIn).unwrap();
+    let outcome = forming
+        .run(&p.control(), &mut Deepest::default())
+        .unwrap_or_else(|e| panic!("{e:?}"));
+    let end = outcome.history.last().unwrap();
+    assert!((end.bag - 1e5).abs() < 1.0, "{} Pa", end.bag);
+    assert!((end.cavity - 1e4).abs() < 100.0, "{} Pa", end.cavity);
+    assert!(
+        outcome.health.peak_drift_ratio < 0.01,
+        "{:?}",
+        outcome.health
+    );
+}
+
+#[test]
 fn pressures_of_a_run_follow_their_tables_and_its_ledger_closes() {
     let rows = |rows: &[[f64; 2]]| {
         let row = |[share, kpa]: &[f64; 2]| json!({"share": share, "pressure": format!("{} Pa", 1e3 * kpa)});
