@@ -469,7 +469,6 @@ fn mesh_warnings(forming: &Forming) -> Vec<String> {
     forming.bodies.iter().filter_map(poor).collect()
 }
 
-/// All that a user should know of a run that came to its end.
 /// Simulated time (s) beyond which a process is likely to have been given in the workshop's times.
 const LONG: f64 = 20.0;
 
@@ -486,6 +485,7 @@ fn long_process(forming: &Forming) -> Option<String> {
     })
 }
 
+/// All that a user should know of a run that came to its end.
 fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<String> {
     let mut warnings = mesh_warnings(forming);
     warnings.extend(outcome.warnings.iter().cloned());

@@ -17,7 +17,7 @@ pub struct Ledger {
     pub friction: f64,
     /// Lost to damping (mass-proportional and of normal approach).
     pub damping: f64,
-    /// Done by pressure and by driven nodes.
+    /// Done by pressure, weight and loads on nodes, by driven nodes and by rigid parts that move.
     pub external: f64,
 }
 
@@ -75,7 +75,7 @@ impl Ledger {
 /// Health of a run, judged over its whole history.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergyHealth {
-    /// Largest |drift| over the largest |external work| so far.
+    /// Largest |drift| over the largest |external work|, or internal energy where that is larger.
     pub peak_drift_ratio: f64,
     /// Largest kinetic over internal, while internal is above 5 % of its largest value.
     pub peak_kinetic_ratio: f64,

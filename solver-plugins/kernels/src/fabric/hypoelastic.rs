@@ -1,7 +1,7 @@
 //! The thesis' hypoelastic form (eqs 3.10-3.23) in the metric.
 //!
 //! Each family carries its fibre stress and a shear stress in its own frame [fibre, in-plane unit
-//! normal to the other's direction]; increments are added frame by frame, and the two frames are
+//! vector square to it, on the other family's side]; increments are added frame by frame, and the two frames are
 //! superposed. With h = h0 / J (incompressible) the Kirchhoff resultants are `h0 sigma`, so
 //!
 //! `S11 = (N1 - 2 T1 s / c) / C11`, `S22 = (N2 - 2 T2 s / c) / C22`, `S12 = (T1 + T2) / (c l1 l2)`,

@@ -211,7 +211,8 @@ impl Model {
         batches.map(|b| b.count as usize).sum()
     }
 
-    /// Volume (m3) under the cells that are pressed from below, over the plane z = 0.
+    /// Volume (m3) under the cells that are pressed from below, over the plane z = 0: of a warped cell by its mean height, which is that under the
+    /// bilinear surface (whose gradient the pressure is) to second order in the cell's size.
     pub fn volume_below(&mut self) -> f64 {
         // Partial sums of fixed chunks, added in order: the same for any number of threads.
         self.cells
