@@ -12,7 +12,7 @@
 
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_sdk::abi::PF_OK;
-use plyflow_sdk::{ElementBatch, MaterialRef, MembraneBatch};
+use plyflow_sdk::{Aligned, ElementBatch, MaterialRef, MembraneBatch};
 
 /// Rows of constants: b11, b21, b12, b22 (1/m), h1, h2 (m), area (m2), k, k_n (N/m).
 pub const CONSTANTS: usize = 9;
@@ -78,7 +78,7 @@ impl Hourglass {
 pub fn stiffness_at_rest(material: &MaterialRef) -> Result<(f64, f64), String> {
     let mut metric = Rows::<{ 3 * WIDTH }>::zeros();
     metric.0[..2 * WIDTH].fill(1.0);
-    let mut history = vec![0.0; material.sizes().membrane_history * WIDTH];
+    let mut history = Aligned::zeros(material.sizes().membrane_history * WIDTH);
     let mut stress = Rows::<{ 3 * WIDTH }>::zeros();
     let mut energy = Rows::<WIDTH>::zeros();
     let mut stiffness = Rows::<{ 2 * WIDTH }>::zeros();
@@ -172,8 +172,7 @@ pub fn initialise(batch: &mut ElementBatch<'_>, material: &MaterialRef, hourglas
         }
     }
     if let Some(step) = batch.critical_step.as_deref_mut() {
-        let zeros = vec![0.0; material.sizes().membrane_history * n];
-        let mut history = zeros;
+        let mut history = Aligned::zeros(material.sizes().membrane_history * n);
         let mut scratch = Scratch::<MAX_LANES>::new();
         let mut scratch = scratch.view();
         metric_of(batch.position, &batch.constants, n, &mut scratch);

@@ -30,7 +30,9 @@ use crate::m4::Parameters;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
 use crate::{Lanes, WIDTH, dispatch, thickening};
 use plyflow_sdk::abi::PF_OK;
-use plyflow_sdk::{BendingBatch, Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch};
+use plyflow_sdk::{
+    Aligned, BendingBatch, Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch,
+};
 
 /// Most nodes of a patch, the centre first.
 pub const PATCH_NODES: usize = 12;
@@ -103,7 +105,7 @@ impl Element for Rf4 {
             let mut s = Scratch::<MAX_LANES>::new();
             let mut s = s.view();
             derivatives(batch.position, &batch.constants, n, &mut s);
-            let mut history = vec![0.0; material.sizes().bending_history * n];
+            let mut history = Aligned::zeros(material.sizes().bending_history * n);
             if bend(material, &mut history, n, 0.0, &mut s, true) != PF_OK {
                 s.tangent.fill(f64::INFINITY);
             }

@@ -70,7 +70,8 @@ use crate::quad::{self, Hourglass, MAX_LANES, Rows, material_frame};
 use crate::{WIDTH, thickening};
 use plyflow_sdk::abi::{PF_BAD_SHAPE, PF_OK};
 use plyflow_sdk::{
-    BendingBatch, Constants, Element, ElementBatch, ElementSizes, MaterialRef, MembraneBatch,
+    Aligned, BendingBatch, Constants, Element, ElementBatch, ElementSizes, MaterialRef,
+    MembraneBatch,
 };
 
 /// Rows of constants after those of [`crate::quad`].
@@ -218,7 +219,7 @@ impl Rest {
         {
             curvature.0[r * WIDTH + lane] = sign * k;
         }
-        let mut history = vec![0.0; sizes.bending_history * WIDTH];
+        let mut history = Aligned::zeros(sizes.bending_history * WIDTH);
         let mut moment = Rows::<{ 3 * WIDTH }>::zeros();
         let mut energy = Rows::<WIDTH>::zeros();
         let mut tangent = Rows::<{ 3 * WIDTH }>::zeros();

@@ -5,6 +5,7 @@ mod fabric_support;
 use common::*;
 use fabric_support::*;
 use plyflow_kernels::{Level, level, limit_level, m4::M4};
+use plyflow_sdk::Aligned;
 use serde_json::json;
 
 #[test]
@@ -384,13 +385,14 @@ fn every_instruction_set_and_every_lane_gives_the_same_bits() {
     let rows: Vec<f64> = (0..3)
         .flat_map(|k| states.iter().map(move |c| c[k]))
         .collect();
+    let rows = Aligned::from(rows.as_slice());
     for form in FORMS {
         for (name, shear, stitch) in every_shear_law() {
             let m = build(&sheet(form, &shear, stitch));
             let run = || {
-                let mut history = vec![0.0; m.0.sizes().membrane_history * 64];
-                let (mut stress, mut energy) = (vec![0.0; 192], vec![0.0; 64]);
-                let mut stiffness = vec![0.0; 128];
+                let mut history = Aligned::zeros(m.0.sizes().membrane_history * 64);
+                let (mut stress, mut energy) = (Aligned::zeros(192), Aligned::zeros(64));
+                let mut stiffness = Aligned::zeros(128);
                 m.0.membrane(&mut plyflow_sdk::MembraneBatch {
                     lanes: 64,
                     dt: 0.0,
@@ -400,7 +402,7 @@ fn every_instruction_set_and_every_lane_gives_the_same_bits() {
                     energy: &mut energy,
                     stiffness: Some(&mut stiffness),
                 });
-                (stress, energy, stiffness, history)
+                [stress, energy, stiffness, history].map(|a| a.to_vec())
             };
             let best = level();
             let wide = run();
@@ -412,10 +414,10 @@ fn every_instruction_set_and_every_lane_gives_the_same_bits() {
             // Alone, with eight copies of itself.
             for (l, c) in states.iter().enumerate() {
                 let a = Point::new(&m).at(&m, *c);
-                let together = [wide.0[l], wide.0[64 + l], wide.0[128 + l]];
+                let together = [wide[0][l], wide[0][64 + l], wide[0][128 + l]];
                 assert_eq!(
                     (a.stress, a.energy),
-                    (together, wide.1[l]),
+                    (together, wide[1][l]),
                     "{form}, {name}"
                 );
             }

@@ -4,18 +4,10 @@ use crate::LANES;
 use crate::component::ElementInstance;
 use crate::mesh::Patch;
 use plyflow_abi::*;
+pub use plyflow_sdk::Aligned;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hasher};
 use std::sync::Arc;
-
-/// One cache line of doubles; keeps batch arrays 64-byte aligned.
-#[repr(C, align(64))]
-#[derive(Clone, Copy, Default)]
-struct Line([f64; 8]);
-
-/// A zeroed, 64-byte aligned array of doubles whose length is a multiple of 8.
-#[derive(Clone, Default)]
-pub struct Aligned(Vec<Line>);
 
 /// Arrays that are never written again, each kept once: the elements of a regular mesh have the same constants.
 #[derive(Default)]
@@ -38,27 +30,6 @@ impl Shared {
         let rows = Arc::new(rows);
         kept.push(rows.clone());
         rows
-    }
-}
-
-impl Aligned {
-    /// `n` zeros, rounded up to a multiple of 8.
-    pub fn zeros(n: usize) -> Self {
-        Self(vec![Line::default(); n.div_ceil(8)])
-    }
-}
-
-impl std::ops::Deref for Aligned {
-    type Target = [f64];
-    fn deref(&self) -> &[f64] {
-        // Line is repr(C) over [f64; 8].
-        unsafe { std::slice::from_raw_parts(self.0.as_ptr().cast(), self.0.len() * 8) }
-    }
-}
-
-impl std::ops::DerefMut for Aligned {
-    fn deref_mut(&mut self) -> &mut [f64] {
-        unsafe { std::slice::from_raw_parts_mut(self.0.as_mut_ptr().cast(), self.0.len() * 8) }
     }
 }
 

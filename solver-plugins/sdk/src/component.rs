@@ -3,6 +3,7 @@
 
 mod table;
 
+use crate::aligned::are_aligned;
 use plyflow_abi::*;
 
 pub use table::{element_table, material_table};
@@ -22,9 +23,9 @@ pub struct MaterialSizes {
     pub areal_mass: f64,
 }
 
-/// One membrane call; see `pf_membrane_batch`.
+/// One membrane call; see `pf_membrane_batch`. Arrays are 64-byte aligned ([`crate::Aligned`]).
 pub struct MembraneBatch<'a> {
-    /// Lanes per row.
+    /// Lanes per row: a multiple of 8 from 8 to 64.
     pub lanes: usize,
     /// Time since the previous call (s).
     pub dt: f64,
@@ -40,9 +41,9 @@ pub struct MembraneBatch<'a> {
     pub stiffness: Option<&'a mut [f64]>,
 }
 
-/// One bending call; see `pf_bending_batch`.
+/// One bending call; see `pf_bending_batch`. Arrays are 64-byte aligned ([`crate::Aligned`]).
 pub struct BendingBatch<'a> {
-    /// Lanes per row.
+    /// Lanes per row: a multiple of 8 from 8 to 64.
     pub lanes: usize,
     /// Time since the previous call (s).
     pub dt: f64,
@@ -60,6 +61,23 @@ pub struct BendingBatch<'a> {
     pub tangent: Option<&'a mut [f64]>,
 }
 
+impl BendingBatch<'_> {
+    /// No moments, no energy, no tangents.
+    fn clear(&mut self) {
+        self.moment.fill(0.0);
+        self.energy.fill(0.0);
+        if let Some(tangent) = self.tangent.as_deref_mut() {
+            tangent.fill(0.0);
+        }
+    }
+}
+
+/// Whether a material may be given so many lanes.
+#[inline(always)]
+fn are_lanes(n: usize) -> bool {
+    n.is_multiple_of(8) && (8..=64).contains(&n)
+}
+
 /// A material law.
 pub trait Material: Sized + Send + Sync {
     /// The manifest (JSON, see `schemas/manifest.md`).
@@ -73,8 +91,10 @@ pub trait Material: Sized + Send + Sync {
     fn sizes(&self) -> MaterialSizes;
     /// Membrane resultants of a batch.
     fn membrane(&self, batch: &mut MembraneBatch<'_>);
-    /// Moments of a batch; called only when `has_bending`.
-    fn bending(&self, _batch: &mut BendingBatch<'_>) {}
+    /// Moments of a batch; asked for only with `has_bending`. Without, there are none.
+    fn bending(&self, batch: &mut BendingBatch<'_>) {
+        batch.clear();
+    }
 }
 
 /// Sizes of an element formulation; see `pf_element_sizes`.
@@ -142,7 +162,7 @@ pub struct ElementBatch<'a> {
     pub dt: f64,
     /// `[nodes][3][lanes]` (m).
     pub position: &'a [f64],
-    /// `[nodes][3][lanes]` (m/s); empty in initialise.
+    /// `[nodes][3][lanes]` (m/s); empty in initialise, with 3 degrees of freedom per node, and with `ignores_velocity`.
     pub velocity: &'a [f64],
     /// `[nodes][3][lanes]` (rad/s); empty without rotations.
     pub spin: &'a [f64],
@@ -251,7 +271,8 @@ impl MaterialRef {
     /// Membrane resultants of a batch.
     ///
     /// # Panics
-    /// When a slice is shorter than the contract says: the material would write beyond it.
+    /// When a slice is shorter than the contract says or not 64-byte aligned, or lanes are not a multiple of 8 from 8 to 64: the material
+    /// would write beyond it, or load what it must not.
     #[inline]
     pub fn membrane(&self, b: &mut MembraneBatch<'_>) -> i32 {
         assert!(
@@ -261,6 +282,13 @@ impl MaterialRef {
                 && b.energy.len() >= b.lanes
                 && b.stiffness.as_ref().is_none_or(|s| s.len() >= 2 * b.lanes),
             "a membrane batch of {} lanes has a slice that is too short",
+            b.lanes
+        );
+        assert!(
+            are_lanes(b.lanes)
+                && are_aligned([b.metric, b.history, b.stress, b.energy])
+                && b.stiffness.as_ref().is_none_or(|s| are_aligned([s])),
+            "a membrane batch of {} lanes: expected a multiple of 8 from 8 to 64, and 64-byte aligned slices",
             b.lanes
         );
         let raw = pf_membrane_batch {
@@ -277,10 +305,10 @@ impl MaterialRef {
         unsafe { ((*self.raw.functions).membrane)(self.raw.instance, &raw const raw) }
     }
 
-    /// Moments of a batch; zero work when the material has no bending.
+    /// Moments of a batch; all zero when the material has no bending.
     ///
     /// # Panics
-    /// When a slice is shorter than the contract says: the material would write beyond it.
+    /// As [`Self::membrane`].
     #[inline]
     pub fn bending(&self, b: &mut BendingBatch<'_>) -> i32 {
         assert!(
@@ -291,6 +319,13 @@ impl MaterialRef {
                 && b.energy.len() >= b.lanes
                 && b.tangent.as_ref().is_none_or(|t| t.len() >= 3 * b.lanes),
             "a bending batch of {} lanes has a slice that is too short",
+            b.lanes
+        );
+        assert!(
+            are_lanes(b.lanes)
+                && are_aligned([b.metric, b.curvature, b.history, b.moment, b.energy])
+                && b.tangent.as_ref().is_none_or(|t| are_aligned([t])),
+            "a bending batch of {} lanes: expected a multiple of 8 from 8 to 64, and 64-byte aligned slices",
             b.lanes
         );
         let raw = pf_bending_batch {
@@ -306,13 +341,12 @@ impl MaterialRef {
             tangent: pointer(&mut b.tangent),
         };
         match unsafe { (*self.raw.functions).bending } {
-            Some(bending) => unsafe { bending(self.raw.instance, &raw const raw) },
-            None => {
-                b.moment.fill(0.0);
-                b.energy.fill(0.0);
-                if let Some(t) = b.tangent.as_deref_mut() {
-                    t.fill(0.0);
-                }
+            Some(bending) if self.sizes.has_bending => unsafe {
+                bending(self.raw.instance, &raw const raw)
+            },
+            // A function that is there all the same, such as that of every material in Rust, need not write anything.
+            _ => {
+                b.clear();
                 PF_OK
             }
         }

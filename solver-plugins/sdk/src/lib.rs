@@ -8,8 +8,11 @@
 //! All quantities are SI. Array layouts are those of `plyflow.h`: batched arrays are structure of
 //! arrays with the lane running fastest.
 
+mod aligned;
 mod component;
 mod step;
+
+pub use aligned::Aligned;
 
 pub use component::{
     BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,

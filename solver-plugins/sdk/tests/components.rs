@@ -2,8 +2,8 @@
 
 use plyflow_sdk::abi::*;
 use plyflow_sdk::{
-    Element, ElementBatch, ElementSizes, Material, MaterialRef, MaterialSizes, MembraneBatch,
-    element_table, material_table,
+    Aligned, BendingBatch, Element, ElementBatch, ElementSizes, Material, MaterialRef,
+    MaterialSizes, MembraneBatch, element_table, material_table,
 };
 use std::ffi::c_void;
 
@@ -63,11 +63,11 @@ fn the_error_of_create_arrives_as_text() {
 }
 
 fn call(material: &MaterialRef, metric: f64, stress: &mut [f64]) -> (i32, f64) {
-    let (mut history, mut energy) = ([0.0; 8], [0.0; 8]);
+    let (mut history, mut energy) = (Aligned::zeros(8), Aligned::zeros(8));
     let code = material.membrane(&mut MembraneBatch {
         lanes: 8,
         dt: 0.5,
-        metric: &[metric; 24],
+        metric: &Aligned::filled(metric, 24),
         history: &mut history,
         stress,
         energy: &mut energy,
@@ -87,7 +87,7 @@ fn a_material_works_through_its_table_and_its_panics_become_a_status() {
     let material = unsafe { MaterialRef::new(raw) }.unwrap();
     assert_eq!(material.sizes().thickness, 0.1);
     assert!(!material.sizes().has_bending);
-    let mut stress = [0.0; 24];
+    let mut stress = Aligned::zeros(24);
     assert_eq!(call(&material, 1.5, &mut stress), (PF_OK, 1.5));
     assert_eq!(stress[7], 1.0);
     assert_eq!(call(&material, 1000.0, &mut stress).0, PF_PANIC);
@@ -104,7 +104,49 @@ fn a_short_slice_is_refused_before_the_material_writes() {
         instance: create("4").unwrap(),
     };
     let material = unsafe { MaterialRef::new(raw) }.unwrap();
-    call(&material, 1.0, &mut [0.0; 23]);
+    call(&material, 1.0, &mut Aligned::zeros(24)[..23]);
+}
+
+#[test]
+#[should_panic(expected = "64-byte aligned")]
+fn a_slice_that_is_not_aligned_is_refused_before_the_material_loads_it() {
+    let table = material_table::<Linear>();
+    let raw = pf_material {
+        functions: &raw const table,
+        instance: create("4").unwrap(),
+    };
+    let material = unsafe { MaterialRef::new(raw) }.unwrap();
+    call(&material, 1.0, &mut Aligned::zeros(32)[1..25]);
+}
+
+#[test]
+fn a_material_without_bending_has_no_moments_though_its_table_has_the_function() {
+    let table = material_table::<Linear>();
+    let raw = pf_material {
+        functions: &raw const table,
+        instance: create("4").unwrap(),
+    };
+    let material = unsafe { MaterialRef::new(raw) }.unwrap();
+    let (rows, mut history) = (Aligned::filled(1.0, 24), Aligned::default());
+    let [mut moment, mut tangent] = [Aligned::filled(777.0, 24), Aligned::filled(777.0, 24)];
+    let mut energy = Aligned::filled(777.0, 8);
+    let code = material.bending(&mut BendingBatch {
+        lanes: 8,
+        dt: 0.0,
+        metric: &rows,
+        curvature: &rows,
+        history: &mut history,
+        moment: &mut moment,
+        energy: &mut energy,
+        tangent: Some(&mut tangent),
+    });
+    assert_eq!(code, PF_OK);
+    assert!(
+        [&moment[..], &energy, &tangent]
+            .concat()
+            .iter()
+            .all(|x| *x == 0.0)
+    );
 }
 
 struct Spring;

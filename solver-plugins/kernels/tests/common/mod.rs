@@ -3,7 +3,7 @@
 
 use plyflow_kernels::{fabric::Fabric, marlow::Marlow};
 use plyflow_sdk::abi::*;
-use plyflow_sdk::{Element, MaterialRef, element_table, material_table};
+use plyflow_sdk::{Aligned, Element, MaterialRef, element_table, material_table};
 use std::ffi::c_void;
 use std::sync::OnceLock;
 
@@ -73,7 +73,7 @@ pub fn film(json: &str) -> Result<Mat, String> {
 
 /// One state of a membrane point, in every lane.
 pub struct Point {
-    pub history: Vec<f64>,
+    pub history: Aligned,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,15 +86,15 @@ pub struct Answer {
 impl Point {
     pub fn new(m: &Mat) -> Self {
         Self {
-            history: vec![0.0; m.0.sizes().membrane_history * LANES],
+            history: Aligned::zeros(m.0.sizes().membrane_history * LANES),
         }
     }
 
     pub fn at(&mut self, m: &Mat, metric: [f64; 3]) -> Answer {
-        let rows: Vec<f64> = metric.iter().flat_map(|x| [*x; LANES]).collect();
-        let mut stress = [0.0; 3 * LANES];
-        let mut energy = [0.0; LANES];
-        let mut stiffness = [0.0; 2 * LANES];
+        let rows = lanes_of(metric);
+        let mut stress = Aligned::zeros(3 * LANES);
+        let mut energy = Aligned::zeros(LANES);
+        let mut stiffness = Aligned::zeros(2 * LANES);
         let code = m.0.membrane(&mut plyflow_sdk::MembraneBatch {
             lanes: LANES,
             dt: 1e-6,
@@ -127,16 +127,21 @@ pub struct Moments {
     pub tangent: [f64; 3],
 }
 
+/// Three rows with one value each in every lane.
+fn lanes_of(values: [f64; 3]) -> Aligned {
+    let rows: Vec<f64> = values.iter().flat_map(|x| [*x; LANES]).collect();
+    Aligned::from(rows.as_slice())
+}
+
 pub fn bend(m: &Mat, metric: [f64; 3], curvature: [f64; 3]) -> Moments {
-    let rows = |v: [f64; 3]| -> Vec<f64> { v.iter().flat_map(|x| [*x; LANES]).collect() };
-    let mut history = vec![0.0; m.0.sizes().bending_history * LANES];
-    let (mut moment, mut tangent) = ([0.0; 3 * LANES], [0.0; 3 * LANES]);
-    let mut energy = [0.0; LANES];
+    let mut history = Aligned::zeros(m.0.sizes().bending_history * LANES);
+    let (mut moment, mut tangent) = (Aligned::zeros(3 * LANES), Aligned::zeros(3 * LANES));
+    let mut energy = Aligned::zeros(LANES);
     let code = m.0.bending(&mut plyflow_sdk::BendingBatch {
         lanes: LANES,
         dt: 0.0,
-        metric: &rows(metric),
-        curvature: &rows(curvature),
+        metric: &lanes_of(metric),
+        curvature: &lanes_of(curvature),
         history: &mut history,
         moment: &mut moment,
         energy: &mut energy,
@@ -162,7 +167,7 @@ pub struct El {
 
 pub struct Elements {
     pub constants: Vec<f64>,
-    pub material_history: Vec<f64>,
+    pub material_history: Aligned,
     pub mass: Vec<f64>,
     pub step: Vec<f64>,
     pub lanes: usize,
@@ -244,10 +249,9 @@ impl El {
             .collect();
         let mut e = Elements {
             constants: vec![0.0; self.sizes.constants as usize * n],
-            material_history: vec![
-                0.0;
-                self.sizes.material_points as usize * self.membrane_history * n
-            ],
+            material_history: Aligned::zeros(
+                self.sizes.material_points as usize * self.membrane_history * n,
+            ),
             mass: vec![0.0; 4 * n],
             step: vec![0.0; n],
             lanes: n,
@@ -323,7 +327,7 @@ impl El {
 /// Patches of `lanes` lanes.
 pub struct Patches {
     pub constants: Vec<f64>,
-    pub history: Vec<f64>,
+    pub history: Aligned,
     pub stiffness: Vec<f64>,
     pub lanes: usize,
     nodes: usize,
@@ -384,7 +388,7 @@ impl El {
         let axis: Vec<f64> = axis.iter().flat_map(|a| vec![*a; n]).collect();
         let mut p = Patches {
             constants: vec![f64::NAN; self.sizes.patch_constants as usize * n],
-            history: vec![0.0; (self.sizes.patch_history as usize + self.bending_history) * n],
+            history: Aligned::zeros((self.sizes.patch_history as usize + self.bending_history) * n),
             stiffness: vec![f64::NAN; nodes * n],
             lanes: n,
             nodes,

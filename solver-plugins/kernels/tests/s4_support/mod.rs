@@ -4,7 +4,7 @@
 use super::common::*;
 use plyflow_kernels::{isotropic::Isotropic, s4::S4};
 use plyflow_sdk::abi::*;
-use plyflow_sdk::{Element, Material, MaterialRef, element_table, material_table};
+use plyflow_sdk::{Aligned, Element, Material, MaterialRef, element_table, material_table};
 use std::ffi::c_void;
 use std::sync::OnceLock;
 
@@ -66,8 +66,8 @@ pub struct Shell {
 #[derive(Clone)]
 pub struct Batch {
     pub constants: Vec<f64>,
-    pub history: Vec<f64>,
-    pub material_history: Vec<f64>,
+    pub history: Aligned,
+    pub material_history: Aligned,
     pub mass: Vec<f64>,
     pub inertia: Vec<f64>,
     pub step: Vec<f64>,
@@ -164,8 +164,10 @@ impl Shell {
         let s = &self.sizes;
         let mut e = Batch {
             constants: vec![f64::NAN; s.constants as usize * n],
-            history: vec![0.0; s.history as usize * n],
-            material_history: vec![0.0; s.material_points as usize * self.membrane_history * n],
+            history: Aligned::zeros(s.history as usize * n),
+            material_history: Aligned::zeros(
+                s.material_points as usize * self.membrane_history * n,
+            ),
             mass: vec![f64::NAN; 4 * n],
             inertia: vec![f64::NAN; 4 * n],
             step: vec![f64::NAN; n],

@@ -252,8 +252,11 @@ impl Model {
         let mut position = Aligned::zeros(s.patch_nodes * 3 * LANES);
         gather(&batch.nodes, &self.x, &mut position);
         let count: Vec<f64> = (0..LANES).map(|l| of(l).nodes.len() as f64).collect();
+        let count = Aligned::from(count.as_slice());
         let area: Vec<f64> = (0..LANES).map(|l| of(l).area).collect();
+        let area = Aligned::from(area.as_slice());
         let axis: Vec<f64> = (0..3 * LANES).map(|k| spec.axis[k / LANES]).collect();
+        let axis = Aligned::from(axis.as_slice());
         let raw = pf_patch_batch {
             size: size_of::<pf_patch_batch>() as u64,
             lanes: LANES as u32,
@@ -289,6 +292,7 @@ impl Model {
         areal_mass: f64,
     ) -> Result<(), MechanicsError> {
         let axis: Vec<f64> = (0..3 * LANES).map(|k| axis[k / LANES]).collect();
+        let axis = Aligned::from(axis.as_slice());
         let mut position = Aligned::zeros(12 * LANES);
         let mut force = Aligned::zeros(12 * LANES);
         let mut moment = Aligned::zeros(12 * LANES);

@@ -125,6 +125,14 @@ unsafe fn hand_over<T: Copy>(given: &T, out: *mut T) {
     }
 }
 
+/// What is told in 32 bits must fit there: the host makes the buffers.
+fn fits(sizes: &[usize]) -> Result<(), String> {
+    match sizes.iter().find(|s| u32::try_from(**s).is_err()) {
+        Some(size) => Err(format!("a size of {size} is more than 32 bits tell")),
+        None => Ok(()),
+    }
+}
+
 fn guarded(f: impl FnOnce() -> i32) -> i32 {
     catch_unwind(AssertUnwindSafe(f)).unwrap_or(PF_PANIC)
 }
@@ -168,6 +176,18 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
                 let text = parameters.as_str().map_err(|e| e.to_string())?;
                 let element = E::create(text, &material)?;
                 let sizes = element.sizes();
+                fits(&[
+                    sizes.nodes,
+                    sizes.dofs_per_node,
+                    sizes.constants,
+                    sizes.history,
+                    sizes.material_points,
+                    sizes.fields,
+                    sizes.patch_nodes,
+                    sizes.patch_constants,
+                    sizes.patch_history,
+                    sizes.patch_fields,
+                ])?;
                 Ok(ElementInstance {
                     element,
                     material,
@@ -285,6 +305,7 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
             create_guarded(out, error, || {
                 let material = M::create(parameters.as_str().map_err(|e| e.to_string())?)?;
                 let sizes = material.sizes();
+                fits(&[sizes.membrane_history, sizes.bending_history])?;
                 Ok(MaterialInstance { material, sizes })
             })
         }
