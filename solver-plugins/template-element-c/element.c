@@ -73,19 +73,18 @@ static int32_t create(pf_str parameters, const pf_material *material, void **out
   (void)material; /* also given in every batch */
   /* JSON as the manifest declares it, defaults filled in, SI numbers: {"hourglass": 300.0}. pf_str has no NUL at its
    * end, so copy before searching. A plugin with more than a number or two wants a JSON library here. */
-  char text[256];
-  const size_t n = parameters.len < sizeof text - 1 ? parameters.len : sizeof text - 1;
-  memcpy(text, parameters.data, n);
-  text[n] = 0;
+  char text[256] = "";
+  if (parameters.len < sizeof text) memcpy(text, parameters.data, parameters.len);
   const char *key = strstr(text, "\"hourglass\"");
   const char *colon = key ? strchr(key, ':') : NULL;
   instance *i = malloc(sizeof *i);
-  if (!i || (key && !colon)) {
-    snprintf(error->text, sizeof error->text, "hourglass: given %s, expected a number in N/m", text);
+  if (!i || !colon) { /* never go on with a number that the user did not give */
+    snprintf(error->text, sizeof error->text, "hourglass: given %s, expected a number in N/m within %zu bytes of parameters",
+             text, sizeof text - 1);
     free(i);
     return PF_ERROR;
   }
-  i->hourglass = colon ? strtod(colon + 1, NULL) : 300.0;
+  i->hourglass = strtod(colon + 1, NULL);
   *out = i;
   return PF_OK;
 }

@@ -4,6 +4,8 @@
 //! No object times are tracked and every group keeps the order of creation (VTK iterates in it), so the
 //! bytes of a file depend only on the calls that made it.
 
+mod shape;
+
 use crate::error::{ArtifactError, ErrorKind, Result};
 use hdf5_sys::h5::{H5dont_atexit, H5open, hsize_t};
 use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Aget_type, H5Aopen, H5Aread, H5Awrite};
@@ -291,6 +293,8 @@ pub(crate) trait Location {
             let a = Handle(id, close_attribute);
             let what = || format!("reading the attribute '{name}'");
             let t = Handle(checked(H5Aget_type(a.0), what)?, close_type);
+            shape::check_single(a.0, name)?;
+            shape::check_text(t.0, name)?;
             let mut bytes = vec![0u8; H5Tget_size(t.0)];
             checked(H5Aread(a.0, t.0, bytes.as_mut_ptr().cast()), what)?;
             let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
@@ -313,6 +317,7 @@ pub(crate) trait Location {
                 return Ok(None);
             }
             let a = Handle(id, close_attribute);
+            shape::check_single(a.0, name)?;
             let mut value = 0i64;
             checked(
                 H5Aread(a.0, DType::I64.memory(), (&raw mut value).cast()),
@@ -510,13 +515,17 @@ impl File {
         })
     }
 
-    /// Opens a dataset whose type and shape are known.
+    /// Opens a dataset of a shape that it must have.
+    ///
+    /// # Errors
+    /// When there is none, or it has another: buffers are made by the shape.
     pub(crate) fn open_dataset(&self, path: &str, dtype: DType, shape: &[u64]) -> Result<Dataset> {
         let c = c_name(path)?;
         locked(|| unsafe {
             let id = H5Dopen2(self.id(), c.as_ptr(), DEFAULT);
             checked(id, || format!("opening the dataset {path}"))?;
             let handle = Handle(id, close_dataset);
+            shape::check_shape(handle.0, path, shape)?;
             Ok(Dataset {
                 handle,
                 shape: shape.to_vec(),

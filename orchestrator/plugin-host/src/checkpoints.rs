@@ -61,7 +61,8 @@ impl<'a> Checkpoints<'a> {
     /// Whether enough time has passed since the last one.
     pub(crate) fn due(&self) -> bool {
         let last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = self.folder.get().is_some_and(|f| !f.is_empty());
+        // Whoever asks for the folder only when a checkpoint is due has none yet.
+        let kept = self.folder.get().is_none_or(|f| !f.is_empty());
         kept && (self.job).is_some_and(|j| last.elapsed().as_secs_f64() >= j.interval)
     }
 

@@ -104,6 +104,12 @@ impl<'a, 'w> HostState<'a, 'w> {
             .map_err(Clone::clone)
     }
 
+    /// A reading that went well: what was refused before, the plugin has got over.
+    pub(crate) fn succeed(&self) -> i32 {
+        self.output().detail = None;
+        0
+    }
+
     /// Turns a refused reading into a status and keeps the reason.
     pub(crate) fn refuse_read(&self, error: &ArtifactError) -> i32 {
         self.output().detail = Some(error.message.clone());
@@ -114,7 +120,10 @@ impl<'a, 'w> HostState<'a, 'w> {
     pub(crate) fn write(&self, f: impl FnOnce(&mut Output) -> Result<(), ArtifactError>) -> i32 {
         let mut output = self.output();
         match f(&mut output) {
-            Ok(()) => 0,
+            Ok(()) => {
+                output.detail = None;
+                0
+            }
             Err(e) => {
                 output.detail = Some(e.message.clone());
                 if output.refused.is_none() {

@@ -5,7 +5,7 @@ use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 use plyflow_abi::*;
 use plyflow_model::Manifest;
 use plyflow_model::manifest::PluginKind;
-use plyflow_model::units::parse_quantity_in;
+use plyflow_model::units::check_si;
 use std::ffi::c_void;
 
 /// Why a library is not a plugin that this program can use.
@@ -90,6 +90,13 @@ impl Plugin {
         }
         check_head(unsafe { plugin.cast::<Head>().read_unaligned() })
             .map_err(|e| fail(false, e))?;
+        if !plugin.is_aligned() {
+            return Err(fail(
+                false,
+                "`plyflow_plugin()` returned a descriptor that is not aligned as a pf_plugin"
+                    .into(),
+            ));
+        }
         let descriptor = unsafe { &*plugin };
         Self::check(path, descriptor).map_err(|e| fail(false, e))
     }
@@ -153,17 +160,6 @@ pub(crate) fn read_manifest(text: &str) -> Result<Manifest, String> {
         check_si(unit).map_err(|e| format!("its manifest: `{name}`: {e}"))?;
     }
     Ok(manifest)
-}
-
-/// Whether a unit is a plain one of SI: artifacts hold no other numbers.
-pub(crate) fn check_si(unit: &str) -> Result<(), String> {
-    match parse_quantity_in(&format!("1 {unit}"), unit) {
-        Ok(1.0) => Ok(()),
-        Ok(value) => Err(format!(
-            "1 `{unit}` is {value} in SI units; expected the SI unit, and numbers in it"
-        )),
-        Err(e) => Err(e.to_string()),
-    }
 }
 
 fn full_text(e: &dyn std::error::Error) -> String {

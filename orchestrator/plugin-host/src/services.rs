@@ -4,13 +4,12 @@
 //! valid for the call); everything that can be checked is. No panic crosses into the plugin.
 
 use crate::host::HostState;
-use crate::load::check_si;
 use crate::process;
 use plyflow_abi::*;
 use plyflow_artifact::{ArtifactError, DType, ErrorKind, On, check_result};
 use plyflow_model::job::{LogLevel, NamedResult, Progress};
 use plyflow_model::manifest::PluginKind;
-use plyflow_model::units::parse_unit;
+use plyflow_model::units::{check_si, parse_unit};
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -86,6 +85,7 @@ unsafe fn slice<'a, T>(p: *const T, n: u64, what: &str) -> Result<&'a [T], Artif
             format!("{what}: the pointer is NULL"),
         ));
     }
+    times(n, size_of::<T>() as u64)?;
     Ok(unsafe { std::slice::from_raw_parts(p, n as usize) })
 }
 
@@ -99,6 +99,7 @@ unsafe fn slice_mut<'a, T>(p: *mut T, n: u64, what: &str) -> Result<&'a mut [T],
             format!("{what}: the pointer is NULL"),
         ));
     }
+    times(n, size_of::<T>() as u64)?;
     Ok(unsafe { std::slice::from_raw_parts_mut(p, n as usize) })
 }
 
@@ -139,7 +140,7 @@ fn on(code: u32) -> Result<On, ArtifactError> {
 
 fn read(host: *mut c_void, f: impl FnOnce(&HostState<'_, '_>) -> Result<(), ArtifactError>) -> i32 {
     guard(host, PF_ERROR, |s| match f(s) {
-        Ok(()) => PF_OK,
+        Ok(()) => s.succeed(),
         Err(e) => s.refuse_read(&e),
     })
 }

@@ -198,7 +198,15 @@ fn judge(job: &Job, code: i32, output: &mut crate::host::Output) -> Result<(), F
     }
     match code {
         PF_OK => Ok(()),
-        PF_CANCELLED => Err((FailureKind::Cancelled, "the step was stopped".into())),
+        PF_CANCELLED if process::cancelled() => {
+            Err((FailureKind::Cancelled, "the step was stopped".into()))
+        }
+        PF_CANCELLED => {
+            let text = format!(
+                "the plugin '{name}' returned PF_CANCELLED, but nobody asked it to stop: it is for when `cancelled` has said 1"
+            );
+            Err((FailureKind::Error, text + &because(said)))
+        }
         PF_PANIC => {
             let text = said.unwrap_or_else(|| format!("the plugin '{name}' panicked"));
             Err((FailureKind::Panic, text))

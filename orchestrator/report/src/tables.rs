@@ -4,6 +4,7 @@ use crate::plots::in_words;
 use crate::units::{duration, number, shown};
 use maud::{Markup, html};
 use plyflow_model::job::NamedResult;
+use plyflow_model::units::check_si;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -28,6 +29,21 @@ struct Column {
     /// Where its numbers are not in the artifact, being measured: the result of the step that a row has, with `{k}` for the text of the
     /// row's cell k.
     measured: Option<String>,
+}
+
+impl Given {
+    /// Takes the unit from columns whose unit is none of SI, and says so: in which unit their numbers are is not known then.
+    fn drop_odd_units(&mut self) -> Vec<String> {
+        let mut wrong = Vec::new();
+        for column in self.columns.iter_mut().filter(|c| !c.unit.is_empty()) {
+            if let Err(e) = check_si(&column.unit) {
+                let (table, label) = (&self.name, &column.label);
+                wrong.push(format!("table '{table}': column '{label}': {e}"));
+                column.unit.clear();
+            }
+        }
+        wrong
+    }
 }
 
 impl Column {
@@ -67,7 +83,10 @@ pub(crate) fn drawn(
     let mut tables = Vec::new();
     for (i, value) in all.iter().enumerate() {
         match Given::deserialize(value) {
-            Ok(given) => tables.push(table(&given, results, id, wrong)),
+            Ok(mut given) => {
+                wrong.extend(given.drop_odd_units());
+                tables.push(table(&given, results, id, wrong));
+            }
             Err(e) => {
                 let name = value["name"].as_str().unwrap_or_default();
                 wrong.push(format!("table {} '{name}' of its attributes: {e}", i + 1));
@@ -175,6 +194,23 @@ mod tests {
         assert!(drawn(&json!({"tables": 3}), &[], &|i| i.to_string(), &mut wrong).is_empty());
         assert!(wrong[2].contains("a number"), "{wrong:?}");
     }
+
+    #[test]
+    fn a_column_in_a_unit_that_is_none_of_si_is_told_and_shown_without_it() {
+        let about = json!({"tables": [{"name": "runs", "rows": [[0.0031, 0.0031, 2.0]], "columns": [
+            {"label": "height", "unit": "mm"}, {"label": "depth", "unit": "m"}, {"label": "way", "unit": "furlong"}]}]});
+        let mut wrong = Vec::new();
+        let text = &drawn(&about, &[], &|i| i.to_string(), &mut wrong)[0].0;
+        for part in [">height<", ">0.0031<", ">depth (mm)<", ">3.1<", ">way<"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert_eq!(wrong.len(), 2, "{wrong:?}");
+        assert!(
+            wrong[0].contains("column 'height': 1 `mm` is 0.001 in SI"),
+            "{wrong:?}"
+        );
+    }
+
     #[test]
     fn what_was_measured_is_taken_from_the_results_of_the_step_by_the_texts_of_its_row() {
         let about = json!({"tables": [{"name": "runs", "rows": [["a", "Z", null], ["b", null, null]], "columns": [

@@ -7,7 +7,7 @@
 mod parse;
 mod quantity;
 
-pub use parse::{Unit, parse_quantity, parse_quantity_in, parse_unit, plain_number};
+pub use parse::{Unit, check_si, parse_quantity, parse_quantity_in, parse_unit, plain_number};
 pub use quantity::{
     Acceleration, Angle, Area, ArealMass, Curvature, Density, Energy, Force, ForcePerLength,
     Frequency, Length, Mass, Moment, Number, Pressure, QUANTITY_PATTERN, Temperature, Time,

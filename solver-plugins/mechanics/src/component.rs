@@ -195,7 +195,25 @@ impl ElementInstance {
             sizes,
             material,
         };
-        if code != PF_OK || sizes.nodes != 4 {
+        if code != PF_OK {
+            return Err(fail(format!("did not tell its sizes (code {code})")));
+        }
+        // Fields are read by the rows that the manifest gives them.
+        let manifest = unsafe { component.manifest.as_str() }.unwrap_or("{}");
+        let declared = element_fields(manifest);
+        let count = |patch| declared.iter().filter(|f| f.patch == patch).count();
+        for (patch, told, kind) in [
+            (false, sizes.fields, "fields"),
+            (true, sizes.patch_fields, "patch fields"),
+        ] {
+            if count(patch) > told {
+                return Err(fail(format!(
+                    "declares {} {kind} in its manifest and tells {told} in its sizes; expected as many",
+                    count(patch)
+                )));
+            }
+        }
+        if sizes.nodes != 4 {
             return Err(fail(format!(
                 "has {} nodes; this solver takes quads",
                 sizes.nodes

@@ -139,6 +139,10 @@ fn judge_element(
     if code != PF_OK {
         return Err(format!("material '{}': {}", material.name, error.get()).into());
     }
+    if instance.is_null() {
+        let text = "its `create` returned PF_OK and left the instance NULL";
+        return Err(format!("material '{}': {text}", material.name).into());
+    }
     let made = pf_material {
         functions,
         instance,

@@ -13,6 +13,7 @@ use plyflow_sdk::abi::{PF_OK, pf_component};
 use plyflow_sdk::{On, Step, run_step};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 /// A field of a body in one frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -218,7 +219,7 @@ pub fn run_on<S: Step>(
         .as_ref()
         .map(|o| o.kind.clone())
         .unwrap_or_default();
-    let mut state = services::State {
+    let state = Mutex::new(services::State {
         machine: *machine,
         manifest,
         inputs: inputs.to_vec(),
@@ -231,9 +232,11 @@ pub fn run_on<S: Step>(
         },
         frame_open: false,
         failure: String::new(),
-    };
-    let services = services::table((&raw mut state).cast());
-    match unsafe { run_step::<S>(&raw const services) } {
+    });
+    let services = services::table((&raw const state).cast_mut().cast());
+    let code = unsafe { run_step::<S>(&raw const services) };
+    let state = state.into_inner().unwrap_or_else(PoisonError::into_inner);
+    match code {
         PF_OK => Ok(state.output),
         code => Err(format!("{} (code {code})", state.failure)),
     }

@@ -457,6 +457,20 @@ fn without_comma(text: &str, rest: &str) -> Option<Vec<String>> {
     (!written.is_empty()).then_some(written)
 }
 
+/// Whether a unit is a plain one of SI: artifacts hold no other numbers.
+///
+/// # Errors
+/// A sentence: what the unit is in SI, or why it is none.
+pub fn check_si(unit: &str) -> Result<(), String> {
+    match parse_quantity_in(&format!("1 {unit}"), unit) {
+        Ok(1.0) => Ok(()),
+        Ok(value) => Err(format!(
+            "1 `{unit}` is {value} in SI units; expected the SI unit, and numbers in it"
+        )),
+        Err(e) => Err(e.to_string()),
+    }
+}
+
 /// The plain number that a text means though it is not written as one: `1 %` is `0.01`, `0,5` is `0.5`. `None` for
 /// anything else.
 pub fn plain_number(text: &str) -> Option<String> {

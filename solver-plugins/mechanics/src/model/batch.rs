@@ -273,7 +273,7 @@ pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 
     steps.into_iter().fold(f64::INFINITY, f64::min)
 }
 
-/// Critical steps of a batch's elements (s); 0 where they fail. Works on copies of the histories: asking changes
+/// Critical steps of a batch's elements (s); 0 where they fail or give none. Works on copies of the histories: asking changes
 /// nothing.
 pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<f64> {
     let mut position = Buffer([0.0; 12 * LANES]);
@@ -300,12 +300,13 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<
     if element.forces(&raw) != PF_OK {
         return vec![0.0; batch.count as usize];
     }
-    (0..batch.count as usize)
-        .map(|l| step[l] * batch.mass_factor.get(l).map_or(1.0, |f| f.sqrt()))
-        .collect()
+    let bound = |l: usize| step[l] * batch.mass_factor.get(l).map_or(1.0, |f| f.sqrt());
+    // A NaN bounds nothing: comparisons would pass over it.
+    let safe = |step: f64| if step.is_nan() { 0.0 } else { step };
+    (0..batch.count as usize).map(|l| safe(bound(l))).collect()
 }
 
-/// Row sums of the bending stiffness (N/m) by model node.
+/// Row sums of the bending stiffness (N/m) by model node; infinite where a patch fails or gives none.
 pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32, f64)> {
     let width = sheet.element.sizes.patch_nodes;
     let mut position = Aligned::zeros(3 * width * LANES);
@@ -320,15 +321,20 @@ pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32
     raw.force = force.as_mut_ptr();
     raw.energy = energy.as_mut_ptr();
     raw.stiffness = stiffness.as_mut_ptr();
-    if sheet.element.patch_forces(&raw) != PF_OK {
-        return Vec::new();
-    }
+    let failed = sheet.element.patch_forces(&raw) != PF_OK;
+    let safe = |row: f64| {
+        if failed || row.is_nan() {
+            f64::INFINITY
+        } else {
+            row
+        }
+    };
     (0..batch.count as usize)
         .flat_map(|l| {
             let (nodes, stiffness) = (&batch.nodes, &stiffness);
             (0..nodes.len())
                 .filter(move |k| *k == 0 || nodes[*k][l] != nodes[0][l])
-                .map(move |k| (nodes[k][l], stiffness[k * LANES + l]))
+                .map(move |k| (nodes[k][l], safe(stiffness[k * LANES + l])))
         })
         .collect()
 }

@@ -7,6 +7,7 @@ use plyflow_sdk::On;
 use plyflow_sdk::abi::*;
 use serde_json::{Value, json};
 use std::ffi::c_void;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What a run reads and writes.
 pub(super) struct State<'a> {
@@ -31,7 +32,7 @@ impl State<'_> {
     }
 }
 
-/// The service table of a state.
+/// The service table of a `Mutex` around a state.
 pub(super) fn table(host: *mut c_void) -> pf_services {
     pf_services {
         size: size_of::<pf_services>() as u64,
@@ -68,9 +69,10 @@ pub(super) fn table(host: *mut c_void) -> pf_services {
     }
 }
 
-/// The state behind a host pointer. Every call ends its borrow before it returns.
-unsafe fn state<'a>(host: *mut c_void) -> &'a mut State<'a> {
-    unsafe { &mut *host.cast() }
+/// The state behind a host pointer, for one call at a time: services may be called from any thread.
+unsafe fn state<'a>(host: *mut c_void) -> MutexGuard<'a, State<'a>> {
+    let state = unsafe { &*host.cast::<Mutex<State<'a>>>() };
+    state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn text(s: pf_str) -> String {
@@ -117,12 +119,13 @@ unsafe extern "C" fn fail(host: *mut c_void, why: pf_str) {
 }
 
 unsafe extern "C" fn parameters(host: *mut c_void) -> pf_str {
-    let s = unsafe { state(host) };
-    s.keep(s.parameters.to_string())
+    let mut s = unsafe { state(host) };
+    let text = s.parameters.to_string();
+    s.keep(text)
 }
 
 unsafe extern "C" fn inputs(host: *mut c_void) -> pf_str {
-    let s = unsafe { state(host) };
+    let mut s = unsafe { state(host) };
     let list: Value = (s.inputs.iter().enumerate())
         .map(|(handle, i)| {
             json!({"handle": handle, "port": i.port, "step": i.step, "kind": i.artifact.kind, "item": i.item,
@@ -133,13 +136,15 @@ unsafe extern "C" fn inputs(host: *mut c_void) -> pf_str {
 }
 
 unsafe extern "C" fn own_item(host: *mut c_void) -> pf_str {
-    let s = unsafe { state(host) };
-    s.keep(json!(s.item).to_string())
+    let mut s = unsafe { state(host) };
+    let text = json!(s.item).to_string();
+    s.keep(text)
 }
 
 unsafe extern "C" fn attributes(host: *mut c_void, handle: u32) -> pf_str {
-    let s = unsafe { state(host) };
-    s.keep(s.inputs[handle as usize].artifact.attributes.to_string())
+    let mut s = unsafe { state(host) };
+    let text = s.inputs[handle as usize].artifact.attributes.to_string();
+    s.keep(text)
 }
 
 unsafe extern "C" fn array_info(
@@ -190,7 +195,7 @@ unsafe extern "C" fn array_read(
 }
 
 unsafe extern "C" fn meshes(host: *mut c_void, handle: u32) -> pf_str {
-    let s = unsafe { state(host) };
+    let mut s = unsafe { state(host) };
     let artifact = s.inputs[handle as usize].artifact;
     let bodies: Vec<Value> = (artifact.bodies.iter())
         .map(|b| {
@@ -223,7 +228,8 @@ unsafe extern "C" fn mesh_read(
     points: *mut f64,
     cells: *mut u32,
 ) -> i32 {
-    let Some(body) = find(unsafe { state(host) }, handle, name) else {
+    let s = unsafe { state(host) };
+    let Some(body) = find(&s, handle, name) else {
         return PF_NOT_FOUND;
     };
     unsafe {
@@ -241,7 +247,7 @@ unsafe extern "C" fn frame_points_read(
     points: *mut f64,
 ) -> i32 {
     let s = unsafe { state(host) };
-    let Some(body) = find(s, handle, name) else {
+    let Some(body) = find(&s, handle, name) else {
         return PF_NOT_FOUND;
     };
     if frame as usize >= s.inputs[handle as usize].artifact.times.len() {
@@ -263,7 +269,8 @@ unsafe extern "C" fn frame_field_read(
     values: *mut f64,
     count: u64,
 ) -> i32 {
-    let Some(body) = find(unsafe { state(host) }, handle, body) else {
+    let s = unsafe { state(host) };
+    let Some(body) = find(&s, handle, body) else {
         return PF_NOT_FOUND;
     };
     let name = text(name);
@@ -330,7 +337,8 @@ unsafe extern "C" fn mesh_define(
     cells: *const u32,
     attributes: pf_str,
 ) -> i32 {
-    let output = &mut unsafe { state(host) }.output;
+    let mut s = unsafe { state(host) };
+    let output = &mut s.output;
     let points = (0..n as usize)
         .map(|i| [0, 1, 2].map(|d| unsafe { *points.add(3 * i + d) }))
         .collect::<Vec<Vec3>>();
@@ -358,7 +366,7 @@ unsafe extern "C" fn mesh_define(
 }
 
 unsafe extern "C" fn frame_begin(host: *mut c_void, time: f64) -> i32 {
-    let s = unsafe { state(host) };
+    let mut s = unsafe { state(host) };
     if s.frame_open || !time.is_finite() || s.output.times.last().is_some_and(|&t| t >= time) {
         return PF_BAD_VALUE;
     }
@@ -378,7 +386,8 @@ unsafe extern "C" fn frame_points(
     n: u64,
 ) -> i32 {
     let name = text(name);
-    let bodies = &mut unsafe { state(host) }.output.bodies;
+    let mut s = unsafe { state(host) };
+    let bodies = &mut s.output.bodies;
     let Some(body) = bodies.iter_mut().find(|b| b.name == name) else {
         return PF_NOT_FOUND;
     };
@@ -409,7 +418,8 @@ unsafe extern "C" fn frame_field(
     count: u64,
 ) -> i32 {
     let body = text(body);
-    let bodies = &mut unsafe { state(host) }.output.bodies;
+    let mut s = unsafe { state(host) };
+    let bodies = &mut s.output.bodies;
     let Some(body) = bodies.iter_mut().find(|b| b.name == body) else {
         return PF_NOT_FOUND;
     };
@@ -439,7 +449,7 @@ unsafe extern "C" fn frame_field(
 }
 
 unsafe extern "C" fn frame_end(host: *mut c_void) -> i32 {
-    let s = unsafe { state(host) };
+    let mut s = unsafe { state(host) };
     if std::mem::take(&mut s.frame_open) {
         PF_OK
     } else {
@@ -454,7 +464,7 @@ unsafe extern "C" fn result(
     unit: pf_str,
     flags: u32,
 ) -> i32 {
-    let s = unsafe { state(host) };
+    let mut s = unsafe { state(host) };
     let (name, unit) = (text(name), text(unit));
     let measured = flags & PF_RESULT_MEASURED != 0;
     let declared = s
@@ -477,7 +487,7 @@ unsafe extern "C" fn result(
 }
 
 unsafe extern "C" fn collection(host: *mut c_void, n: u64, names: pf_str) -> i32 {
-    let s = unsafe { state(host) };
+    let mut s = unsafe { state(host) };
     let names: Vec<String> = serde_json::from_str(&text(names)).unwrap_or_default();
     if names.len() as u64 != n || !s.manifest.output.as_ref().is_some_and(|o| o.collection) {
         return PF_BAD_VALUE;
