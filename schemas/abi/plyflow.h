@@ -9,7 +9,7 @@
  * handed them over; the receiver copies what it keeps. No exception, panic or longjmp may cross.
  *
  * Versioning: a host accepts a plugin whose abi_major equals its own and whose abi_minor is not
- * greater. Structs only grow at their end; `size` is the size that whoever made the struct was compiled with. In a
+ * greater. Structs that have a `size` only grow at their end, the others never; `size` is the size that whoever made the struct was compiled with. In a
  * struct that the other side fills (pf_material_sizes, pf_element_sizes) the caller sets `size` and zeros the rest; the
  * other side writes no more than that many bytes, and leaves `size` as it is: assign fields, never the whole struct.
  */
@@ -41,12 +41,13 @@ typedef struct pf_str {
 
 /* Status codes returned by every function that can fail. */
 #define PF_OK 0
-#define PF_ERROR 1     /* failed; the text was given to pf_services.fail */
+#define PF_ERROR 1     /* failed. A step gives the text to pf_services.fail, `create` writes it into its pf_error; other functions of
+                          components have the status alone. From a service: called in the wrong order, or the disk failed */
 #define PF_CANCELLED 2 /* stopped because pf_services.cancelled said so */
 #define PF_PANIC 3     /* the plugin's own net caught a panic; text given to fail */
 #define PF_NOT_FOUND 4 /* no such input, array, body, field or component */
 #define PF_BAD_SHAPE 5 /* sizes of a buffer and of the data differ */
-#define PF_BAD_VALUE 6 /* NaN, infinite or out of the documented range */
+#define PF_BAD_VALUE 6 /* NaN, infinite or out of the documented range; a name, unit or time that is refused */
 
 typedef struct pf_plugin {
   uint64_t magic;     /* PF_MAGIC */
@@ -58,6 +59,12 @@ typedef struct pf_plugin {
   pf_str manifest;       /* JSON; see schemas/manifest.md */
   const void *functions; /* table of the kind */
 } pf_plugin;
+
+/* What a plugin exports. A host that includes this header finds it by name and does not call it. */
+#if defined(__GNUC__)
+__attribute__((visibility("default")))
+#endif
+const pf_plugin *plyflow_plugin(void);
 
 /* ---- arrays ------------------------------------------------------------------------------- */
 
@@ -103,21 +110,25 @@ typedef struct pf_component {
 #define PF_RESULT_MEASURED 1u /* depends on the machine (seconds, bytes): kept beside the artifact, not in it */
 
 /* ---- services: what the host does for a running step -------------------------------------- *
- * Every call takes `host` (pf_services.host) first. Not thread-safe unless it says so: call from
- * the thread that entered `run`. Strings returned by the host stay valid until `run` returns.
+ * Every call takes `host` (pf_services.host) first. Any thread of the plugin may call, until `run` returns and no later; the
+ * host does one call at a time. Strings returned by the host stay valid until `run` returns.
+ *
+ * A service that answers a status returns PF_OK or what was wrong. To ask for what may not be there (array_info, a field that is
+ * optional) and to get PF_NOT_FOUND is no failure. A write that is refused is: the step fails, whatever it does afterwards, because
+ * readers could not trust the artifact.
  */
 typedef struct pf_services {
   uint64_t size;
   void *host;
 
-  /* thread-safe */
   void (*log)(void *host, uint32_t level, pf_str text);
   void (*progress)(void *host, const pf_progress *progress);
   int32_t (*cancelled)(void *host); /* 1: the run is being stopped; return PF_CANCELLED soon */
 
   void (*fail)(void *host, pf_str text); /* the text of the error that is about to be returned */
   uint32_t (*threads)(void *host);       /* how many threads this step may use */
-  pf_str (*parameters)(void *host);      /* JSON object: the resolved `with` block, SI numbers */
+  pf_str (*parameters)(void *host);      /* JSON object: the resolved `with` block, SI numbers (in scenes and materials quantities are texts in SI
+                                            units, "0.005 m": schemas/manifest.md) */
   pf_str (*scratch)(void *host);         /* a private folder, removed after the step */
 
   /* Inputs. JSON array, in the order of the workflow:
@@ -139,7 +150,8 @@ typedef struct pf_services {
   int32_t (*frame_field_read)(void *host, uint32_t handle, pf_str body, uint64_t frame, uint32_t on, pf_str name,
                               double *values /* [n or m][components] */, uint64_t count /* of doubles */);
 
-  /* Writing the output artifact. NaN and infinities are refused with PF_BAD_VALUE, and so is a unit that is not a plain
+  /* Writing the output artifact. NaN and infinities are refused with PF_BAD_VALUE, and so is what a field, which is kept in single
+   * precision, cannot hold (beyond 3e38), and a unit that is not a plain
    * one of SI ("m", "N/m", "1"; not "mm", "deg" or "%"): readers take the numbers as they are. */
   int32_t (*attributes_write)(void *host, pf_str json); /* once; a JSON object */
   int32_t (*array_write)(void *host, pf_str path, const pf_array_info *info, pf_str unit, const void *data);
@@ -165,7 +177,7 @@ typedef struct pf_services {
   /* Checkpoints, since ABI 1.1: so that long work that is killed goes on where it was.
    * `checkpoint`: a folder that is kept until the step has succeeded. What lies in it was written by an earlier attempt
    * with the same plugin, components, parameters and inputs; a file may be torn, and none is required to be there.
-   * Empty text: this host keeps nothing. `checkpoint_due`: 1 when enough time has passed since the last one.
+   * The host keeps a small file of its own there, plyflow-cost.json. Empty text: this host keeps nothing. `checkpoint_due`: 1 when enough time has passed since the last one.
    * `checkpoint_saved`: everything is on disk; the cost of the step so far is noted, so that a later attempt adds to it.
    * The artifact must not depend on whether and when a checkpoint was made. */
   pf_str (*checkpoint)(void *host);
@@ -186,7 +198,7 @@ typedef struct pf_step_functions {
  * several threads call it at once, on different batches. The value in a lane must depend on that
  * lane alone, so that results do not depend on how a body is cut into batches. An output that may be
  * NULL is wanted or not by itself, whatever the others are. A `create` that returns PF_OK and leaves
- * *instance NULL is refused.
+ * *instance NULL is refused. No function pointer is NULL but where it says so.
  */
 
 #define PF_ERROR_TEXT 512
@@ -254,7 +266,10 @@ typedef struct pf_material {
 /* -- element --
  * An element formulation has an element part (its own nodes) and may have a patch part: one patch per
  * node that is surrounded by elements, made of that node and of the other nodes of those elements. A
- * rotation-free shell takes its curvature there. */
+ * rotation-free shell takes its curvature there. Plyflow's own solver makes patches only of materials that have bending.
+ *
+ * The material that `create` is given and that of every batch are the same one: it outlives the instance, and its functions and
+ * instance may be kept (the struct itself may lie elsewhere in each call). */
 
 typedef struct pf_element_sizes {
   uint64_t size;            /* set by the caller: write no more than that */
@@ -283,7 +298,9 @@ typedef struct pf_element_batch {
   uint64_t size;
   uint32_t lanes;
   uint32_t reserved;
-  double dt;               /* s, step just done (0 in the first call); where a run begins late it is led there in few steps, some of a frame each */
+  double dt;               /* s, step just done; 0 in the first call, and wherever only forces or the critical step of a state are asked for, with
+                              velocities and spins of 0 and a copy of the histories: it is no sign that a history is new. Where a run begins late
+                              it is led there in few steps, some of a frame each */
   const double *position;  /* [nodes][3][lanes] m (reference positions in initialise) */
   const double *velocity;  /* [nodes][3][lanes] m/s at the half step; NULL in initialise, with 3 dofs per node, and with ignores_velocity */
   const double *spin;      /* [nodes][3][lanes] rad/s or NULL */

@@ -124,7 +124,7 @@ mod tests {
 
         let often = job(0.0);
         let first = Checkpoints::new(Some(&often));
-        assert!(!first.due(), "nobody has asked where to write to");
+        assert!(first.due(), "before anyone has asked where to write to");
         assert_eq!(first.folder(&emitter), folder.to_str().unwrap());
         assert!(first.due());
         assert_eq!(first.with_earlier(cost(1.0, 2.0, 5)), cost(1.0, 2.0, 5));

@@ -214,6 +214,10 @@ fn workflow(
     }
     text += "      materials:\n";
     if !args.material.is_empty() {
+        if entry.manifest.kind == PluginKind::Material && args.with.is_some() {
+            let text = "a material is judged with the parameters of `--material` or with those of `--with`: give one of them";
+            return Err(Stop::new(exit::USAGE, text));
+        }
         for file in &args.material {
             let file = absolute(file);
             if !file.is_file() {

@@ -144,6 +144,13 @@ pub struct Field {
     pub patch: bool,
 }
 
+/// Whether artifacts may hold something of this name.
+fn is_name(name: &str) -> bool {
+    let letter = |c: char| c.is_ascii_alphabetic() || c == '_';
+    name.starts_with(letter)
+        && (name.chars()).all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c))
+}
+
 fn is_false(b: &bool) -> bool {
     !b
 }
@@ -169,6 +176,25 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// Whether any value is within.
+    fn check(&self) -> Result<(), String> {
+        let Some(most) = &self.maximum else {
+            return Ok(());
+        };
+        let over = |b: &Option<Bound>, open: bool| {
+            b.as_ref()
+                .filter(|b| b.value > most.value || (open && b.value == most.value))
+                .map(|b| b.text.clone())
+        };
+        match over(&self.minimum, false).or_else(|| over(&self.exclusive_minimum, true)) {
+            Some(least) => Err(format!(
+                "no value is over its smallest, {least}, and up to its `maximum`, {}",
+                most.text
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// What is expected, when `value` (SI) is out of bounds: `at least 0 deg`.
     pub fn broken_by(&self, value: f64) -> Option<String> {
         let says = |b: &Option<Bound>, breaks: fn(f64, f64) -> bool, words: &str| {
@@ -228,6 +254,49 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// Whether a value, written as in YAML, is one of these; the error says what is expected. Files, scenes and components are looked at where
+    /// they are used.
+    fn takes(&self, value: &Value) -> Result<(), String> {
+        let within = |number: Option<f64>, bounds: &Bounds| match number {
+            None => Err(self.expected()),
+            Some(number) => bounds.broken_by(number).map_or(Ok(()), Err),
+        };
+        let met = |yes: bool| if yes { Ok(()) } else { Err(self.expected()) };
+        let quantity = |d: Dimension| match value {
+            Value::String(text) => parse_quantity(text, d).ok(),
+            other if d == Dimension::Dimensionless => other.as_f64(),
+            _ => None,
+        };
+        match self {
+            Shape::Boolean => met(value.is_boolean()),
+            Shape::Integer(b) => within(value.as_i64().map(|n| n as f64), b),
+            Shape::Number(b) => within(quantity(Dimension::Dimensionless), b),
+            Shape::Quantity(d, b) => within(quantity(*d), b),
+            Shape::String | Shape::File => met(value.is_string()),
+            Shape::Choice(values) => met(value
+                .as_str()
+                .is_some_and(|v| values.iter().any(|w| w == v))),
+            Shape::List(of) => {
+                let items = value.as_array().ok_or_else(|| self.expected())?;
+                items.iter().try_for_each(|item| of.shape.takes(item))
+            }
+            Shape::Map(of) => {
+                let items = value.as_object().ok_or_else(|| self.expected())?;
+                items.values().try_for_each(|item| of.shape.takes(item))
+            }
+            Shape::Object(fields) => {
+                let items = value.as_object().ok_or_else(|| self.expected())?;
+                items.iter().try_for_each(|(name, item)| {
+                    let of = fields.get(name).ok_or_else(|| self.expected())?;
+                    of.shape.takes(item)
+                })
+            }
+            Shape::Scene | Shape::SheetMaterial | Shape::Component(_) => {
+                met(value.is_string() || value.is_object())
+            }
+        }
+    }
+
     /// What to write, for messages: "a length such as `5 mm`".
     pub fn expected(&self) -> String {
         match self {
@@ -392,8 +461,15 @@ impl TryFrom<RawDeclaration> for Declaration {
             other => return Err(format!("unknown parameter type `{other}`")),
         };
         raw.only(allowed)?;
-        if raw.required && raw.default.is_some() {
-            return Err("a parameter with a `default` cannot be `required`".into());
+        if let Shape::Integer(b) | Shape::Number(b) | Shape::Quantity(_, b) = &shape {
+            b.check()?;
+        }
+        if let Some(default) = &raw.default {
+            if raw.required {
+                return Err("a parameter with a `default` cannot be `required`".into());
+            }
+            let wrong = |expected| format!("`default` is {default}; expected {expected}");
+            shape.takes(default).map_err(wrong)?;
         }
         Ok(Declaration {
             doc: raw.doc,
@@ -506,6 +582,24 @@ impl Manifest {
         let is_step = self.kind == PluginKind::Step;
         if self.name.is_empty() || self.name.contains(['/', '\\', ' ']) {
             return Some("`name` must be a word without spaces and slashes".into());
+        }
+        if self.name.ends_with(".so") {
+            return Some("`name` must not end with `.so`: workflows take that for a path".into());
+        }
+        let kinds = self.output.iter().map(|o| ("`output.kind`", &o.kind));
+        let ports = self.inputs.keys().map(|port| ("a port of `inputs`", port));
+        let fields = self.fields.iter().map(|f| ("a name of `fields`", &f.name));
+        for (what, name) in kinds.chain(ports).chain(fields) {
+            if !is_name(name) {
+                return Some(format!(
+                    "{what} is `{name}`; expected a letter or `_`, then letters, digits, `_`, `-` and `.`"
+                ));
+            }
+        }
+        for (k, field) in self.fields.iter().enumerate() {
+            if self.fields[..k].iter().any(|f| f.name == field.name) {
+                return Some(format!("`fields` names `{}` twice", field.name));
+            }
         }
         if is_step && self.output.is_none() {
             return Some("a step needs `output`".into());

@@ -80,12 +80,69 @@ fn slips_in_a_manifest_are_refused() {
         ),
         ("\"output\": {\"kind\": \"defects\"},", "", "needs `output`"),
         ("\"unit\": \"m2\"", "\"unit\": \"qm\"", "qm"),
+        (
+            "\"default\": \"8 deg\"",
+            "\"default\": \"8 mm\"",
+            "expected an angle",
+        ),
+        (
+            "\"default\": \"8 deg\"",
+            "\"default\": \"98 deg\"",
+            "at most 90 deg",
+        ),
+        (
+            "\"default\": 3",
+            "\"default\": -1",
+            "`default` is -1; expected at least 0",
+        ),
+        ("\"default\": 3", "\"default\": 2.5", "a whole number"),
+        (
+            "\"default\": \"a\"",
+            "\"default\": \"z\"",
+            "one of `a`, `b`",
+        ),
+        (
+            "\"maximum\": \"90 deg\"",
+            "\"maximum\": \"-1 deg\"",
+            "no value is over",
+        ),
+        (
+            "\"kind\": \"defects\"",
+            "\"kind\": \"force curves\"",
+            "`output.kind` is `force curves`",
+        ),
+        (
+            "\"inputs\": {\"formed\"",
+            "\"inputs\": {\"2nd\"",
+            "a port of `inputs` is `2nd`",
+        ),
+        (
+            "\"name\": \"defect-detection\"",
+            "\"name\": \"weird.so\"",
+            "must not end with `.so`",
+        ),
     ] {
         let text = DETECTION.replacen(from, to, 1);
         assert_ne!(text, DETECTION, "{from}");
         let error = Manifest::parse(&text).unwrap_err().to_string();
         assert!(error.contains(says), "{error} should say {says}");
     }
+}
+
+#[test]
+fn fields_have_plain_names_each_once() {
+    let element = |fields: &str| {
+        let text = format!(
+            r#"{{"name": "e", "version": "1", "vendor": "v", "kind": "element", "role": "element", "summary": "s", "fields": [{fields}]}}"#
+        );
+        Manifest::parse(&text).map_err(|e| e.to_string())
+    };
+    let strain = r#"{"name": "strain", "unit": "1"}"#;
+    assert_eq!(element(strain).unwrap().fields.len(), 1);
+    let e = element(&format!("{strain}, {strain}")).unwrap_err();
+    assert!(e.contains("`strain` twice"), "{e}");
+    let e = element(r#"{"name": "σ max (1)", "unit": "Pa"}"#).unwrap_err();
+    assert!(e.contains("a name of `fields` is `σ max (1)`"), "{e}");
 }
 
 #[test]
