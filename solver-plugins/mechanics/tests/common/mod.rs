@@ -11,7 +11,8 @@ use plyflow_sdk::{Element, element_table, material_table};
 const FABRIC: &str =
     r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0}"#;
 
-const STITCHED: &str = r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0,
+/// One with a stitch that fails and with bending.
+pub const STITCHED: &str = r#"{"fibre_modulus":1e8,"shear":{"coefficients":[0,1000]},"thickness":1e-3,"areal_mass":1.0,
     "stitch":{"angles":[0.01,0.05,0.1],"forces":[0,880,0]},"bending":{"positive":{"linear":1e-3},"negative":{"linear":1e-3}}}"#;
 
 fn component<T>(kind: u32, table: T) -> pf_component {
@@ -24,7 +25,9 @@ fn component<T>(kind: u32, table: T) -> pf_component {
     }
 }
 
-fn instance<E: Element>(fabric: &str) -> ElementInstance {
+/// An element of a fabric given by its parameters.
+#[allow(dead_code)]
+pub fn instance<E: Element>(fabric: &str) -> ElementInstance {
     unsafe {
         let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
         let material = MaterialInstance::create(&material, fabric, "material").unwrap();
