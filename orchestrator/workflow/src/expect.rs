@@ -126,6 +126,30 @@ fn entry(
     all
 }
 
+/// The steps that are wired to one, as they are written.
+fn wired<'n>(draft: &Draft<'n>) -> Vec<&'n str> {
+    fn texts<'n>(node: &'n Node, all: &mut Vec<&'n str>) {
+        match &node.kind {
+            Kind::List(items) => items.iter().for_each(|n| texts(n, all)),
+            Kind::Map(entries) => entries.iter().for_each(|e| texts(&e.value, all)),
+            _ => all.extend(node.text()),
+        }
+    }
+    let mut all = Vec::new();
+    if let Some(from) = draft.entry.value.get("from") {
+        texts(from, &mut all);
+    }
+    all
+}
+
+fn one_of(names: impl Iterator<Item = String>) -> String {
+    let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
+    match names.len() {
+        0 => "a step in its `from`".into(),
+        _ => names.join(" or "),
+    }
+}
+
 fn expectation(
     item: &Node,
     step: &Node,
@@ -150,6 +174,20 @@ fn expectation(
             .suggest(stem, manifest.results.keys().map(String::as_str));
         return None;
     };
+    if declared.by_step {
+        let wired = wired(draft);
+        let of = result_name.split('.').nth(1);
+        if of.is_none_or(|of| !wired.contains(&of)) {
+            let message = format!(
+                "`{result_name}` is none of the results of `{name}`, which go on with the name of a step that is wired to it"
+            );
+            let stem = result_name.split('.').next().unwrap_or(result_name);
+            let d = problems.add(source, &result.span, message);
+            d.given(result_name)
+                .expected(one_of(wired.iter().map(|w| format!("{stem}.{w}"))));
+            return None;
+        }
+    }
     let mut number = |key: &str| {
         let entry = item.entry(key).filter(|e| e.value.kind != Kind::Null)?;
         value(entry, &declared.unit, result_name, source, problems)

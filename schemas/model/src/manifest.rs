@@ -126,6 +126,10 @@ pub struct ResultDeclaration {
     /// Whether it depends on the machine (seconds, bytes), so that it is kept beside the artifact.
     #[serde(default, skip_serializing_if = "is_false")]
     pub measured: bool,
+    /// Whether the name that a result of it has goes on with that of a step which is wired to the one that reports it
+    /// (`quartile_error.mesh_5`).
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub by_step: bool,
 }
 
 /// A field that an element writes.
