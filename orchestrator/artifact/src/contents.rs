@@ -85,6 +85,41 @@ pub struct Contents {
 }
 
 impl Contents {
+    /// What a file of so many bytes cannot hold of this: readers make buffers by these numbers.
+    pub(crate) fn beyond(&self, length: u64) -> Option<String> {
+        let fits = |counts: &[u64], bytes: u64| {
+            let size = counts.iter().try_fold(bytes, |n, c| n.checked_mul(*c));
+            size.is_some_and(|n| n <= length)
+        };
+        if !fits(&[self.frames], 8) {
+            return Some(format!("it has {} frames", self.frames));
+        }
+        let frames = self.frames.max(1);
+        for b in &self.bodies {
+            // Points are doubles, indices 64-bit, fields single precision.
+            if !fits(&[b.points], 24) || !fits(&[b.cells, b.nodes_per_cell.into()], 8) {
+                let (name, points, cells) = (&b.name, b.points, b.cells);
+                return Some(format!(
+                    "body '{name}' has {points} points and {cells} cells"
+                ));
+            }
+            for f in &b.fields {
+                let rows = if f.on == On::Points {
+                    b.points
+                } else {
+                    b.cells
+                };
+                if !fits(&[rows, f.components.into(), frames], 4) {
+                    let (name, c) = (&f.name, f.components);
+                    return Some(format!("field '{name}' has {c} components"));
+                }
+            }
+        }
+        None
+    }
+}
+
+impl Contents {
     /// The body of that name.
     #[must_use]
     pub fn body(&self, name: &str) -> Option<&BodyInfo> {

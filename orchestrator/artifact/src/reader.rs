@@ -99,6 +99,12 @@ impl Artifact {
         let parse = |name: &str, e: serde_json::Error| broken(format!("'{name}': {e}"));
         let contents: Contents =
             serde_json::from_str(&text("contents")?).map_err(|e| parse("contents", e))?;
+        let length = std::fs::metadata(path).map_or(0, |m| m.len());
+        if let Some(what) = contents.beyond(length) {
+            return Err(broken(format!(
+                "{what}, more than a file of {length} bytes holds"
+            )));
+        }
         let results = serde_json::from_str(&text("results")?).map_err(|e| parse("results", e))?;
         let collection = match source.text("collection")? {
             Some(t) => Some(serde_json::from_str(&t).map_err(|e| parse("collection", e))?),

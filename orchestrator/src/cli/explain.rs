@@ -103,6 +103,7 @@ fn as_json(session: &Session<'_>, id: Id) -> serde_json::Value {
         "key": instance.key.map(|k| k.hex()),
         "because": last,
         "changes": changed,
+        "failed": session.failed_before(id).map(|f| f.reason),
     })
 }
 
@@ -118,6 +119,10 @@ fn as_text(session: &Session<'_>, id: Id) -> String {
             );
         }
         _ => {}
+    }
+    if let Some(failed) = session.failed_before(id) {
+        let reason = failed.reason.replace('\n', "\n  ");
+        return format!("{label}: will run; it failed last time (key {key}):\n  {reason}\n");
     }
     match difference(session, id) {
         Difference::Never => format!("{label}: will run; it has not run before (key {key})\n"),

@@ -278,7 +278,8 @@ impl Journal {
     ) {
         let slot = slot(step, item);
         if self.known.get(&key) == Some(&artifact) {
-            if self.last.get(&slot) != Some(&key) {
+            let failed = self.failed.get(&slot).is_some_and(|f| f.0 == key);
+            if failed || self.last.get(&slot) != Some(&key) {
                 self.push(&Entry::Use { key, slot });
             }
             return;

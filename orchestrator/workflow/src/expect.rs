@@ -142,6 +142,16 @@ fn wired<'n>(draft: &Draft<'n>) -> Vec<&'n str> {
     all
 }
 
+/// Whether this is how a step, or an item of one that is fanned out (`census_0`), is called in the name of a result.
+fn is_run_of(name: &str, step: &str) -> bool {
+    let index = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    match name.strip_prefix(step).map(|rest| rest.strip_prefix('_')) {
+        Some(None) => name == step,
+        Some(Some(items)) => items.split('_').all(index),
+        None => false,
+    }
+}
+
 fn one_of(names: impl Iterator<Item = String>) -> String {
     let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
     match names.len() {
@@ -177,7 +187,7 @@ fn expectation(
     if declared.by_step {
         let wired = wired(draft);
         let of = result_name.split('.').nth(1);
-        if of.is_none_or(|of| !wired.contains(&of)) {
+        if of.is_none_or(|of| !wired.iter().any(|w| is_run_of(of, w))) {
             let message = format!(
                 "`{result_name}` is none of the results of `{name}`, which go on with the name of a step that is wired to it"
             );

@@ -51,6 +51,24 @@ fn a_result_by_step_is_expected_of_a_step_that_is_wired() {
     }
     study.mutate("workflow.yaml", "wrinkle_length.coarze", "wrinkle_length");
     assert!(load().contains("`wrinkle_length` is none of"));
+    for (to, sound) in [
+        ("wrinkle_length.coarse_0_12.a_a", true),
+        ("wrinkle_length.coarse_", false),
+        ("wrinkle_length.coarse_x", false),
+        ("wrinkle_length.coarser", false),
+    ] {
+        study.mutate(
+            "workflow.yaml",
+            "result: wrinkle_length",
+            &format!("result: {to}"),
+        );
+        assert_eq!(load().is_empty(), sound, "{to}");
+        study.mutate(
+            "workflow.yaml",
+            &format!("result: {to}"),
+            "result: wrinkle_length",
+        );
+    }
     study.mutate(
         "workflow.yaml",
         "result: wrinkle_length",

@@ -485,12 +485,24 @@ fn long_process(forming: &Forming) -> Option<String> {
     })
 }
 
+/// Strain of the fibres of plies beyond which the run warns (thesis 3.4.1).
+const LARGEST_FIBRE_STRAIN: f64 = 0.01;
+
 /// All that a user should know of a run that came to its end.
 fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<String> {
     let mut warnings = mesh_warnings(forming);
     warnings.extend(outcome.warnings.iter().cloned());
     warnings.extend(now.iter().filter_map(Penetration::too_deep));
     warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
+    let (_, _, strain) = ply_extremes(forming);
+    if strain > LARGEST_FIBRE_STRAIN {
+        warnings.push(format!(
+            "a fibre is strained by {:.1} %, more than {:.0} %: fibres of plies hardly stretch. Where it is (fibre_strain_1, fibre_strain_2) look for cells \
+             that have gathered; where it is widespread raise the material's fibre_modulus, which asks for smaller steps",
+            100.0 * strain,
+            100.0 * LARGEST_FIBRE_STRAIN
+        ));
+    }
     if forming.load.press().is_some_and(PressLoad::holder_is_bare) {
         warnings.push(
             "the plies have left the holder, which its force has pressed against the die: make the blank larger or the stroke shorter, or give the holder a gap"

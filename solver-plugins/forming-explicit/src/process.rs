@@ -8,7 +8,7 @@ use plyflow_mechanics::vec3::V;
 use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{DoubleDiaphragm, PressureCourse, WeightDirection};
 
-/// Share of drawing's duration in which a pump that follows a table makes up for what the film has moved, to within 1 / e. Far
+/// Share of drawing's duration in which a pump makes up for what the film has moved, to within 1 / e. Far
 /// longer than a span takes to snap, so that the gas that it compresses still catches it.
 const PUMP_LAG: f64 = 0.05;
 
@@ -21,7 +21,7 @@ pub struct Cycle {
     pub bag_course: Option<MonotoneCubic>,
     /// Pressure left in the cavity at the end (Pa).
     pub cavity_end: f64,
-    /// Course of the pressure drawn (Pa) over the share of drawing; none: gas leaves smoothly.
+    /// Course of the pressure drawn (Pa) over the share of drawing; none: it comes smoothly.
     pub drawn_course: Option<MonotoneCubic>,
     /// Durations of the four phases (s).
     pub durations: [f64; 4],
@@ -236,8 +236,8 @@ impl Drive for FrameDrive {
 
 /// Where pressures come from.
 pub enum Load {
-    /// The process itself; the cavity is a gas of prescribed mass, isothermal: p V = n R T. With a table of the pressure drawn a pump
-    /// changes that mass after it.
+    /// The process itself; the cavity is a gas of prescribed mass, isothermal: p V = n R T. With a table of the pressure drawn, or where
+    /// some of the air stays, a pump changes that mass.
     Process {
         /// Phases.
         cycle: Cycle,

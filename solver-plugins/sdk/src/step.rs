@@ -180,8 +180,7 @@ pub struct Host {
     services: *const pf_services,
 }
 
-// The contract makes only log, progress and cancelled thread-safe, but the host of this release locks all
-// services (orchestrator/plugin-host), so sharing a `Host` between a step's threads is sound with it.
+// The contract (plyflow.h): any thread may call services until `run` returns, and the host does one call at a time.
 unsafe impl Sync for Host {}
 
 macro_rules! call {

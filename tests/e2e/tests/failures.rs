@@ -92,6 +92,12 @@ fn why_a_step_failed_is_told_afterwards_until_it_is_done() {
         plan.contains(&format!("failed last time: {cause}")),
         "{plan}"
     );
+    let explained = said(&["explain", "bad"]);
+    assert!(
+        explained.contains(&format!("it failed last time (key")),
+        "{explained}"
+    );
+    assert!(explained.contains(cause), "{explained}");
     said(&["report"]);
     let page = std::fs::read_to_string(study.path("report.html")).unwrap();
     assert!(page.contains(cause), "the report does not say why");
