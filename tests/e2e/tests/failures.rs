@@ -94,7 +94,7 @@ fn why_a_step_failed_is_told_afterwards_until_it_is_done() {
     );
     let explained = said(&["explain", "bad"]);
     assert!(
-        explained.contains(&format!("it failed last time (key")),
+        explained.contains("it failed last time (key"),
         "{explained}"
     );
     assert!(explained.contains(cause), "{explained}");
