@@ -9,7 +9,8 @@
  * handed them over; the receiver copies what it keeps. No exception, panic or longjmp may cross.
  *
  * Versioning: a host accepts a plugin whose abi_major equals its own and whose abi_minor is not
- * greater. Structs that have a `size` only grow at their end, the others never; `size` is the size that whoever made the struct was compiled with. In a
+ * greater. Structs that have a `size` only grow at their end, the others never; `size` is the size that whoever made the
+ * struct was compiled with. In a
  * struct that the other side fills (pf_material_sizes, pf_element_sizes) the caller sets `size` and zeros the rest; the
  * other side writes no more than that many bytes, and leaves `size` as it is: assign fields, never the whole struct.
  */
@@ -177,7 +178,8 @@ typedef struct pf_services {
   /* Checkpoints, since ABI 1.1: so that long work that is killed goes on where it was.
    * `checkpoint`: a folder that is kept until the step has succeeded. What lies in it was written by an earlier attempt
    * with the same plugin, components, parameters and inputs; a file may be torn, and none is required to be there.
-   * The host keeps a small file of its own there, plyflow-cost.json. Empty text: this host keeps nothing. `checkpoint_due`: 1 when enough time has passed since the last one.
+   * The host keeps a small file of its own there, plyflow-cost.json. Empty text: this host keeps nothing.
+   * `checkpoint_due`: 1 when enough time has passed since the last one.
    * `checkpoint_saved`: everything is on disk; the cost of the step so far is noted, so that a later attempt adds to it.
    * The artifact must not depend on whether and when a checkpoint was made. */
   pf_str (*checkpoint)(void *host);

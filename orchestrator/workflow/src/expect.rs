@@ -7,6 +7,7 @@ use crate::load::Draft;
 use crate::parameters::{absolute, unreadable};
 use crate::resolved::Expectation;
 use crate::yaml::{Entry, Kind, Node};
+use plyflow_model::manifest::one_of;
 use plyflow_model::schema;
 use plyflow_model::units::{Dimension, parse_quantity_in, parse_unit};
 use serde_json::Value;
@@ -152,14 +153,6 @@ fn is_run_of(name: &str, step: &str) -> bool {
     }
 }
 
-fn one_of(names: impl Iterator<Item = String>) -> String {
-    let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
-    match names.len() {
-        0 => "a step in its `from`".into(),
-        _ => names.join(" or "),
-    }
-}
-
 fn expectation(
     item: &Node,
     step: &Node,
@@ -192,9 +185,10 @@ fn expectation(
                 "`{result_name}` is none of the results of `{name}`, which go on with the name of a step that is wired to it"
             );
             let stem = result_name.split('.').next().unwrap_or(result_name);
+            let names: Vec<String> = wired.iter().map(|w| format!("{stem}.{w}")).collect();
             let d = problems.add(source, &result.span, message);
             d.given(result_name)
-                .expected(one_of(wired.iter().map(|w| format!("{stem}.{w}"))));
+                .expected(one_of(names.iter().map(String::as_str)));
             return None;
         }
     }
