@@ -75,6 +75,12 @@ impl Comparison {
             .map_or("", |m| m.role.as_str())
     }
 
+    /// Whether the local run of a zone was compared.
+    pub(crate) fn has_local(&self, zone: &str) -> bool {
+        let is = |m: &Model| m.role == "local" && m.zone.as_deref() == Some(zone);
+        self.models.iter().any(is)
+    }
+
     /// Defects of the local runs.
     pub(crate) fn local(&self) -> impl Iterator<Item = &Defect> {
         self.defects

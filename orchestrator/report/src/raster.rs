@@ -192,7 +192,7 @@ impl Canvas {
         }
     }
 
-    /// Draws a surface, lit from the upper left when `lit`, moved by `bias` (m) towards the viewer.
+    /// Draws a surface, lit from the upper left when `lit` (colours that stand for values keep most of their lightness), moved by `bias` (m) towards the viewer.
     pub(crate) fn surface(
         &mut self,
         camera: &Camera,
@@ -205,7 +205,12 @@ impl Canvas {
         let mean = |q: [Vec3; 4]| [0, 1, 2].map(|d| (q[0][d] + q[1][d] + q[2][d] + q[3][d]) / 4.0);
         let points = mesh.extended(points, mean);
         let shade = if lit {
-            shades(&points, mesh, camera.light())
+            let dark = if matches!(paint, Paint::Plain(_)) {
+                0.42
+            } else {
+                0.75
+            };
+            shades(&points, mesh, camera.light(), dark)
         } else {
             vec![1.0; points.len()]
         };
@@ -349,8 +354,8 @@ fn samples(low: f32, high: f32, end: usize) -> (usize, usize) {
     )
 }
 
-/// Light at each point, from normals averaged over the triangles around it; both sides are lit.
-fn shades(points: &[Vec3], mesh: &Triangles, light: Vec3) -> Vec<f32> {
+/// Light at each point, from `dark` where it only grazes to 1, from normals averaged over the triangles around it; both sides are lit.
+fn shades(points: &[Vec3], mesh: &Triangles, light: Vec3, dark: f64) -> Vec<f32> {
     let mut normals = vec![[0.0; 3]; points.len()];
     for t in &mesh.corners {
         let [a, b, c] = t.map(|i| points[i as usize]);
@@ -361,7 +366,7 @@ fn shades(points: &[Vec3], mesh: &Triangles, light: Vec3) -> Vec<f32> {
     }
     normals
         .iter()
-        .map(|n| (0.42 + 0.62 * dot(unit(*n), light).abs()).min(1.0) as f32)
+        .map(|n| (dark + (1.04 - dark) * dot(unit(*n), light).abs()).min(1.0) as f32)
         .collect()
 }
 

@@ -2,7 +2,7 @@
 
 use crate::input::{ReportInput, Verdict};
 use crate::study::{Material, Run, Study};
-use crate::units::{fixed, plural, quantity};
+use crate::units::{fixed, number, plural, quantity};
 
 /// Energy that is not accounted for, over the external work, above which a run is not to be trusted.
 const DRIFT_BOUND: f64 = 0.05;
@@ -58,7 +58,7 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
         .collect();
     let is_missed = |(_, r): &&(&str, &Run)| r.facts.energy.kinetic_bound_kept == Some(false);
     if kept.iter().all(|k| *k) && !kept.is_empty() {
-        parts.push("kinetic bound kept".into());
+        parts.push(kinetic_text(&runs));
     } else if let Some((label, _)) = runs.iter().find(is_missed) {
         tone = Tone::Bad;
         let missed = kept.iter().filter(|k| !**k).count();
@@ -76,6 +76,21 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
         parts.push(format!("energy ledger open by up to {percent} % ({label})"));
     }
     (tone, parts.join("; "))
+}
+
+/// How far below their bounds the kinetic energies of runs stayed that all kept theirs.
+fn kinetic_text(runs: &[(&str, &Run)]) -> String {
+    let of_bound = |r: &Run| Some((r.facts.energy.peak_kinetic_ratio?, r.kinetic_bound?));
+    let known: Vec<(f64, f64)> = runs.iter().filter_map(|(_, r)| of_bound(r)).collect();
+    let nearest = (known.iter()).max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+    match nearest {
+        Some((ratio, bound)) => format!(
+            "kinetic energy at most {} % of internal (bound {} %)",
+            fixed(100.0 * ratio, 1),
+            number(100.0 * bound, 3)
+        ),
+        None => "kinetic bound kept".into(),
+    }
 }
 
 /// All runs of a study, each once, with their names for people: those drawn, those that other comparisons have, and the reference, by

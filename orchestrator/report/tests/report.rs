@@ -115,7 +115,7 @@ fn a_whole_study_shows_every_section_in_one_file_without_network() {
     // 3 quantities on 2 plies, flat and formed from two sides; per zone and ply 3 flat and 1 formed.
     assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 16);
     assert!(
-        page.contains("2 zones; 2 wrinkles, longest 68.4 mm; 2 bridging areas; kinetic bound kept")
+        page.contains("2 zones; 2 wrinkles, longest 68.4 mm; 2 bridging areas; kinetic energy at most 2.3 % of internal (bound 5 %)")
     );
     assert!(page.contains("1 of 3 expectations missed, 1 not judged"));
     for unit in [
@@ -220,7 +220,7 @@ fn a_run_without_zones_says_so_in_words() {
     let input = study.input();
     let page = page(&input, &folder);
     assert_well_formed(&page);
-    assert!(page.contains("no defects found: no zones, no local runs; kinetic bound kept"));
+    assert!(page.contains("no defects found: no zones, no local runs; kinetic energy at most 2.3 % of internal (bound 5 %)"));
     assert!(!page.contains("id=\"local-0\"") && !page.contains("id=\"defects-0\""));
     let text = summary(&input, None);
     assert!(
@@ -242,6 +242,47 @@ fn local_runs_are_shown_without_a_comparison() {
     assert!(page.contains("Zone A") && !page.contains("id=\"defects-0\""));
     // The shear alone is known of the local run: flat and formed, on two plies.
     assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 4);
+    // Nobody has looked for wrinkles in it.
+    assert_eq!(page.matches(": not compared").count(), 2);
+    assert!(!page.contains("no wrinkle, no bridging") && !page.contains("outlines: wrinkles"));
+}
+
+#[test]
+fn a_zone_that_the_comparison_lacks_is_not_called_free_of_wrinkles() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.008);
+    study.defects(false);
+    study.zones(&common::ZONES);
+    for (zone, bounds) in common::ZONES {
+        study.boundary(zone);
+        study.forming(&format!("local[{zone}]"), Some((zone, bounds)), 0.004);
+    }
+    study.comparison(&common::ZONES[..1]);
+    let page = page(&study.input(), &folder);
+    let (_, local) = page.split_once("id=\"local-0\"").unwrap();
+    let (a, b) = local.split_once("Zone B").unwrap();
+    assert!(a.contains(" found") && !a.contains("not compared"));
+    assert_eq!(b.matches(": not compared").count(), 2);
+}
+
+#[test]
+fn a_press_shows_the_force_of_its_punch_and_no_pressures() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.press = true;
+    study.forming("coarse", None, 0.008);
+    let page = page(&study.input(), &folder);
+    let (_, energy) = page.split_once("id=\"energy\"").unwrap();
+    for text in [
+        "Force of the punch",
+        "force (N)",
+        "punch, from its end",
+        "holder",
+    ] {
+        assert!(energy.contains(text), "{text}");
+    }
+    assert!(!energy.contains("Pressures") && !energy.contains("Frame height"));
 }
 
 #[test]

@@ -4,8 +4,10 @@ pub mod core;
 mod drive;
 pub(crate) mod executor;
 pub(crate) mod local;
+mod shown;
 mod unchanged;
 
-pub use drive::{Failure, Observer, Options, Session, Summary, Update, input_keys};
+pub use drive::{Options, Session, input_keys};
 pub use executor::{Executor, Outcome, Report, Task};
 pub use local::Local;
+pub use shown::{Failure, Observer, Summary, Update};

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 mod fits;
 pub mod schema;
+mod unique;
 
 /// What a plugin says about itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,16 +27,16 @@ pub struct Manifest {
     /// One sentence.
     pub summary: String,
     /// Name -> declaration, in the order of the manifest.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "unique::keys")]
     pub parameters: IndexMap<String, Declaration>,
     /// Steps: port -> what it takes, in the order of the manifest.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "unique::keys")]
     pub inputs: IndexMap<String, InputPort>,
     /// Steps: what it writes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<Output>,
     /// The named numbers it may report.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "unique::keys")]
     pub results: IndexMap<String, ResultDeclaration>,
     /// Elements: fields in the order of the field rows.
     #[serde(default)]
@@ -295,7 +296,11 @@ struct RawDeclaration {
     values: Option<Vec<String>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     of: Option<Box<Declaration>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "unique::keys_if_any",
+        skip_serializing_if = "Option::is_none"
+    )]
     fields: Option<IndexMap<String, Declaration>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     minimum: Option<Value>,

@@ -12,6 +12,7 @@ pub mod draw_in;
 pub mod elements;
 pub mod friction;
 mod global;
+mod inputs;
 mod late;
 mod local;
 mod output;

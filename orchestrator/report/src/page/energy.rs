@@ -6,6 +6,9 @@ use crate::study::{Material, Run};
 use crate::units::{fixed, number};
 use maud::{Markup, html};
 
+/// A column of a history, its name in the legend, its colour, and what makes the plot's unit of SI.
+type Column = (&'static str, &'static str, usize, f64);
+
 /// Energies of a run's history; the internal one is summed.
 const ENERGIES: [(&str, &str, usize); 6] = [
     ("external", "external work", 0),
@@ -63,6 +66,7 @@ pub(super) fn section(material: &Material) -> Markup {
             section id="energy" {
                 h2 { "Energy and contact" }
                 (health(&runs))
+                p class="note" { "Kinetic over internal energy counts while the internal one is above 5 % of its largest; curves end at three times the bound." }
                 @for (whole, run) in &runs {
                     @if run.history.get("time").is_some() {
                         h3 { code { (run.label) } }
@@ -141,34 +145,49 @@ fn plots(run: &Run, whole: bool) -> Markup {
         series: energies,
         ..blank.clone()
     };
-    let scaled = |(name, shown, colour, factor): (&str, &'static str, usize, f64)| {
+    let scaled = |(name, shown, colour, factor): Column| {
         let values = h.get(name)?.iter().map(|v| v * factor).collect();
         Some(over(time, shown, colour, values))
     };
-    let pressures = [
-        ("cavity_pressure", "cavity", 0, 1e-3),
-        ("bag_pressure", "bag", 1, 1e-3),
-    ];
-    let pressure = Plot {
-        title: "Pressures",
-        y_label: "pressure (kPa)",
-        series: pressures.into_iter().filter_map(scaled).collect(),
+    let drawn = |title, y_label, columns: &[Column]| Plot {
+        title,
+        y_label,
+        series: columns.iter().copied().filter_map(scaled).collect(),
         ..blank.clone()
     };
-    let height = Plot {
-        title: "Frame height",
-        y_label: "height (mm)",
-        series: scaled(("frame_height", "frame", 0, 1e3))
-            .into_iter()
-            .collect(),
-        ..blank.clone()
+    let loads: [Plot<'_>; 2] = if h.get("punch_force").is_some() {
+        let travel = [
+            ("frame_height", "punch, from its end", 0, 1e3),
+            ("holder_travel", "holder", 1, 1e3),
+        ];
+        [
+            drawn(
+                "Force of the punch",
+                "force (N)",
+                &[("punch_force", "punch", 0, 1.0)],
+            ),
+            drawn("Travel of punch and holder", "travel (mm)", &travel),
+        ]
+    } else {
+        let pressures = [
+            ("cavity_pressure", "cavity", 0, 1e-3),
+            ("bag_pressure", "bag", 1, 1e-3),
+        ];
+        [
+            drawn("Pressures", "pressure (kPa)", &pressures),
+            drawn(
+                "Frame height",
+                "height (mm)",
+                &[("frame_height", "frame", 0, 1e3)],
+            ),
+        ]
     };
     html! {
         (energy.svg())
         @if let (Some(kinetic), Some(internal)) = (h.get("kinetic"), &internal) {
             (ratio_plot(run, kinetic, internal, blank.clone()).svg())
         }
-        @if whole { (pressure.svg()) (height.svg()) }
+        @if whole { @for load in &loads { (load.svg()) } }
     }
 }
 

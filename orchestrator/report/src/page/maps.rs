@@ -71,7 +71,7 @@ pub(super) fn global(
                     ". Left: the undeformed ply, axes in mm"
                     @if study.detection.is_some() { "; dotted: what the detection flagged" }
                     @if !overlay.zones.is_empty() { "; rectangles: the zones" }
-                    ". Right: the formed ply on the tool, from both sides." }
+                    ". Right: the formed ply on the tool, from both sides, shaded by the light: values are read off the flat one." }
             }
             @for legend in &legends {
                 div class="field" {
@@ -115,7 +115,8 @@ pub(super) fn local(
     Ok(html! {
         section id={ "local-" (n) } {
             h2 { "Local runs" }
-            p { "Colours as in the maps of the global run. Solid outlines: wrinkles (W), dotted: bridging (B), with their id in the table of defects." }
+            p { "Colours as in the maps of the global run; formed plies are shaded by the light."
+                @if study.comparison.is_some() { " Solid outlines: wrinkles (W), dotted: bridging (B), with their id in the table of defects." } }
             div class="bars-row" {
                 @for (k, legend) in legends.iter().enumerate() {
                     div { p class="note" { (legend.titled()) } (legend.bar(&format!("local-scale-{n}-{k}"))) }
@@ -133,8 +134,8 @@ fn zone(
     places: &[Place],
     sharp: Sharpness,
 ) -> Result<Markup, String> {
-    let defects: Vec<&Defect> = study
-        .comparison
+    let compared = (study.comparison.as_ref()).filter(|c| c.has_local(&local.zone));
+    let defects: Vec<&Defect> = compared
         .iter()
         .flat_map(|c| c.local())
         .filter(|d| d.zone == local.zone)
@@ -189,7 +190,9 @@ fn zone(
             }
             @for (name, found, figures) in &rows {
                 h4 { (name) span class="note" { ": "
-                    @if *found == 0 { "no wrinkle, no bridging" } @else { (found) " found" } } }
+                    @if compared.is_none() { "not compared" }
+                    @else if *found == 0 { "no wrinkle, no bridging" }
+                    @else { (found) " found" } } }
                 div class="row" {
                     @for (title, figure) in figures {
                         figure class="map" { (figure) figcaption { (title) } }

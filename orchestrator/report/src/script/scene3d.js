@@ -109,7 +109,8 @@ const Scene3d = (() => {
           if (dot(n, towards) < 0.0) n = -n;
           float light = max(0.0, dot(n, normalize(-0.45 * right + 0.55 * up + 0.7 * towards)));
           vec3 colour = coloured ? texture2D(colours, vec2(at * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb : plain;
-          gl_FragColor = vec4(colour * (0.56 + 0.44 * light), 1.0);
+          // Colours that stand for values keep most of their lightness.
+          gl_FragColor = vec4(colour * mix(coloured ? 0.75 : 0.56, 1.0, light), 1.0);
         }`,
       attributes: {
         position: regl.prop('position'),

@@ -92,9 +92,19 @@
       this.waiting = true;
     }
 
+    // A chosen defect is seen on its own ply, as fine as it was found, whatever lies over it.
+    showsPly(ply) {
+      const chosen = this.chosen();
+      return chosen ? ply === chosen.ply : this.show.ply.has(ply);
+    }
+
+    showsZone(zone) {
+      return this.show.zone.has(zone) || (zone !== null && this.chosen()?.zone === zone);
+    }
+
     visible(body) {
-      const { tool, ply, zone } = this.show;
-      return body.ply ? ply.has(body.ply) && (!body.zone || zone.has(body.zone)) : tool;
+      if (!body.ply) return this.show.tool;
+      return this.showsPly(body.ply) && (!body.zone || this.showsZone(body.zone));
     }
 
     draw() {
@@ -116,7 +126,7 @@
           // Where both are drawn, at the rim of a zone, the finer ply is seen.
           const lift = body.ply ? this.told.lift + (body.zone ? 0.0008 : 0) : 0;
           const how = { place, coloured: Boolean(place), colours: scene.stripes[show.field], lift };
-          for (const part of body.parts.filter((p) => !show.zone.has(p.zone))) this.paint.surface({ ...body, ...part, ...how });
+          for (const part of body.parts.filter((p) => !this.showsZone(p.zone))) this.paint.surface({ ...body, ...part, ...how });
         }
         for (const outline of this.outlines()) this.stroke(outline.ribbon, 1.2, [0, 0, 0], 0.15);
         if (this.chosen()) this.stroke(this.chosen().ribbon, 3, PICK, 0.6);
@@ -126,12 +136,11 @@
       this.element.dataset.ready = 'true';
     }
 
-    // Of the zones that are shown, on the uppermost ply of theirs that is shown.
+    // Of all zones, on the uppermost ply of theirs that is shown.
     outlines() {
-      const { outlines } = this.scene;
-      const tops = new Map();
-      for (const ply of this.show.ply) outlines.filter((o) => o.ply === ply).forEach((o) => tops.set(o.zone, ply));
-      return outlines.filter((o) => this.show.zone.has(o.zone) && tops.get(o.zone) === o.ply);
+      const shown = this.scene.outlines.filter((o) => this.showsPly(o.ply));
+      const tops = new Map(shown.map((o) => [o.zone, o]));
+      return shown.filter((o) => tops.get(o.zone) === o);
     }
 
     // What lies behind a surface shines through.
@@ -148,7 +157,7 @@
         return [(dot(q, right) * scale[0] + 1) * 0.5 * w, (1 - dot(q, up) * scale[1]) * 0.5 * h];
       };
       const defect = this.chosen();
-      const named = defect ? [[defect.label, defect.at, defect.normal]] : this.outlines().map((o) => [o.zone, [...o.lines[0].subarray(0, 3)], o.normal]);
+      const named = defect ? [[`${defect.label}, ${defect.ply}`, defect.at, defect.normal]] : this.outlines().map((o) => [o.zone, [...o.lines[0].subarray(0, 3)], o.normal]);
       this.element.querySelector('.labels').replaceChildren(...named.flatMap(([text, p, normal]) => {
         const [x, y] = at(p);
         if (x < 0 || y < 0 || x > w || y > h) return [];

@@ -15,6 +15,8 @@ pub struct Study {
     pub instances: Vec<Instance>,
     /// What the forming runs that follow tell of themselves.
     pub kinetic_bound_kept: bool,
+    /// Whether they are of a press.
+    pub press: bool,
 }
 
 /// Fields that no map shows: a scalar on cells, one on points, a vector, and one that is the same everywhere.
@@ -41,6 +43,7 @@ impl Study {
             folder: folder.to_owned(),
             instances: Vec::new(),
             kinetic_bound_kept: true,
+            press: false,
         }
     }
 
@@ -131,7 +134,7 @@ impl Study {
             }
             w.end_frame().unwrap();
         }
-        history(&mut w);
+        history(&mut w, self.press);
         let elements: usize = sheets.iter().map(|(_, s)| s.cells.len() / 4).sum();
         let zone_json = zone.map_or(Value::Null, |(name, b)| json!({"name": name, "box": b}));
         let list: Vec<Value> = sheets
@@ -444,7 +447,7 @@ impl Study {
             let n = values.len() as u64;
             w.array(path, DType::F64, &[n], unit, &bytes).unwrap();
         }
-        history(&mut w);
+        history(&mut w, false);
         let energy = json!({"peak_drift_ratio": 0.004, "hourglass_ratio": 0.0123});
         w.attributes(
             &json!({
@@ -533,7 +536,7 @@ fn key(label: &str) -> String {
     label.bytes().map(|b| format!("{b:02x}")).collect()
 }
 
-fn history(w: &mut ArtifactWriter) {
+fn history(w: &mut ArtifactWriter, press: bool) {
     let n = 600;
     let time: Vec<f64> = (0..n).map(|i| f64::from(i) / f64::from(n - 1)).collect();
     type Column = (&'static str, &'static str, fn(f64) -> f64);
@@ -555,7 +558,12 @@ fn history(w: &mut ArtifactWriter) {
         ("bag_pressure", "Pa", |t| 1e5 * t.min(0.8) / 0.8),
         ("frame_height", "m", |t| 0.12 * (1.0 - t)),
     ];
-    for (name, unit, f) in columns {
+    let of_press: [Column; 2] = [
+        ("punch_force", "N", |t| 180.0 * t * t),
+        ("holder_travel", "m", |t| -1e-3 * t),
+    ];
+    let more = if press { &of_press[..] } else { &[] };
+    for (name, unit, f) in columns.into_iter().chain(more.iter().copied()) {
         let data: Vec<u8> = time.iter().flat_map(|t| f(*t).to_ne_bytes()).collect();
         w.array(
             &format!("history/{name}"),

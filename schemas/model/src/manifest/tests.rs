@@ -146,6 +146,29 @@ fn fields_have_plain_names_each_once() {
 }
 
 #[test]
+fn no_key_stands_twice() {
+    let step = |what: &str| {
+        let text = format!(
+            r#"{{"name": "s", "version": "1", "vendor": "v", "kind": "step", "role": "r", "summary": "s", "output": {{"kind": "k"}}, {what}}}"#
+        );
+        Manifest::parse(&text).map_err(|e| e.to_string())
+    };
+    let flag = r#""a": {"type": "boolean", "doc": "d"}"#;
+    assert!(step(&format!(r#""parameters": {{{flag}}}"#)).is_ok());
+    for what in [
+        format!(r#""parameters": {{{flag}, {flag}}}"#),
+        format!(
+            r#""parameters": {{"o": {{"type": "object", "doc": "d", "fields": {{{flag}, {flag}}}}}}}"#
+        ),
+        r#""inputs": {"a": {"kind": "k", "doc": "d"}, "a": {"kind": "k", "doc": "d"}}"#.into(),
+        r#""results": {"a": {"unit": "m", "doc": "d"}, "a": {"unit": "m", "doc": "d"}}"#.into(),
+    ] {
+        let error = step(&what).unwrap_err();
+        assert!(error.contains("`a` stands here twice"), "{what}: {error}");
+    }
+}
+
+#[test]
 fn parameters_become_json_schema() {
     let schema = schema::parameters(&Manifest::parse(DETECTION).unwrap());
     assert_eq!(schema["additionalProperties"], false);

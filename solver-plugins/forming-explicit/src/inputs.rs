@@ -1,0 +1,168 @@
+//! What the step is given by others: an element size, zones, the boundary of a zone.
+
+use crate::elements::{self, Rectangle};
+use crate::late::Start;
+use crate::local::{LocalInput, LocalSheet};
+use crate::parameters::Parameters;
+use plyflow_mechanics::vec3::V;
+use plyflow_sdk::{Host, Input, Log, StepError};
+
+/// The element size (m) that a mesh study advises, if there is one.
+pub fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
+    let studies = host.inputs_of("meshes")?;
+    let Some(study) = studies.first() else {
+        return Ok(None);
+    };
+    if !host.inputs_of("boundary")?.is_empty() {
+        return Err(
+            "`meshes` is for runs of a whole scene; the meshes of a zone come with its `boundary`"
+                .into(),
+        );
+    }
+    let attributes: serde_json::Value = host.attributes(study)?;
+    match attributes["advised_element_size"].as_f64() {
+        Some(size) if size > 0.0 => Ok(Some(size)),
+        _ => Err(format!("'{}' advises no element size", study.step).into()),
+    }
+}
+
+/// Boxes of the zones in which alone plies have `element`; none without the input `zones`.
+pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, StepError> {
+    let inputs = host.inputs_of("zones")?;
+    let steps: Vec<&str> = inputs.iter().map(|i| i.step.as_str()).collect();
+    match (&p.element_elsewhere, inputs.is_empty()) {
+        (None, true) => return Ok(Vec::new()),
+        (Some(choice), true) => {
+            return Err(format!(
+                "element_elsewhere: given '{}', but no `zones`; expected the zones in which plies have `element` instead. Wire the \
+                 input `zones`, or leave out `element_elsewhere`",
+                choice.plugin
+            )
+            .into());
+        }
+        (None, false) => {
+            return Err(format!(
+                "zones: given '{}', but no `element_elsewhere`; expected the plies' element outside of the zones. Give \
+                 `element_elsewhere: m4`, or do not wire `zones`",
+                steps.join(", ")
+            )
+            .into());
+        }
+        (Some(_), false) => {}
+    }
+    if !host.inputs_of("boundary")?.is_empty() {
+        return Err(
+            "zones: given beside `boundary`; expected one of them: `zones` are for the run of a whole scene in which plies bend in the \
+             zones alone, `boundary` makes the run that of one zone"
+                .into(),
+        );
+    }
+    let mut all = Vec::new();
+    for input in &inputs {
+        let attributes: serde_json::Value = host.attributes(input)?;
+        all.extend(elements::boxes(&attributes, &input.step)?);
+    }
+    if all.is_empty() {
+        let text = format!("'{}' holds no zone: no ply bends", steps.join(", "));
+        host.log(Log::Info, &text);
+    }
+    Ok(all)
+}
+
+pub fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
+    let attributes: serde_json::Value = host.attributes(input)?;
+    let series = |name: &str| host.array_f64(input, name).map(|(v, _)| v);
+    let (time, sheets) = read_motion(host, input)?;
+    Ok(LocalInput {
+        cavity: series("cavity_pressure")?,
+        bag: series("bag_pressure")?,
+        frame: series("frame_height")?,
+        time,
+        sheets,
+        zone: attributes["zone"].clone(),
+        element_size: attributes["element_size"].as_f64().unwrap_or(0.0),
+    })
+}
+
+/// Times and driven sheets of a boundary artifact.
+pub fn read_motion(host: &Host, input: &Input) -> Result<(Vec<f64>, Vec<LocalSheet>), StepError> {
+    let meshes = host.meshes(input)?;
+    let (time, _) = host.array_f64(input, "time")?;
+    let mut sheets = Vec::new();
+    for body in &meshes.bodies {
+        let (points, cells) = host.mesh(input, body)?;
+        let (driven, _) = host.array_u32(input, &format!("{}/driven_nodes", body.name))?;
+        let vectors = |what: &str| -> Result<Vec<Vec<V>>, StepError> {
+            let path = format!("{}/{what}", body.name);
+            let (v, shape) = host.array_f64(input, &path)?;
+            if shape != [time.len(), driven.len(), 3] {
+                return Err(format!(
+                    "'{path}' has shape {shape:?}, expected [{}, {}, 3]",
+                    time.len(),
+                    driven.len()
+                )
+                .into());
+            }
+            let row = 3 * driven.len();
+            Ok((0..time.len())
+                .map(|f| {
+                    let frame = &v[f * row..(f + 1) * row];
+                    frame.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+                })
+                .collect())
+        };
+        // Written by older versions without normals.
+        let known = |what: &str| {
+            let path = format!("{}/{what}", body.name);
+            let there = host.array_info(input, &path).is_some();
+            if there { vectors(what) } else { Ok(Vec::new()) }
+        };
+        let pull = known("pull")?;
+        let stiffness = if pull.is_empty() {
+            Vec::new()
+        } else {
+            host.array_f64(input, &format!("{}/stiffness", body.name))?
+                .0
+        };
+        if !pull.is_empty() && stiffness.len() != driven.len() {
+            let (name, n, k) = (&body.name, stiffness.len(), driven.len());
+            return Err(format!(
+                "'{name}/stiffness' has {n} values for {k} driven nodes; run the boundary's step again"
+            )
+            .into());
+        }
+        sheets.push(LocalSheet {
+            name: body.name.clone(),
+            points,
+            cells: cells
+                .chunks_exact(4)
+                .map(|c| [c[0], c[1], c[2], c[3]])
+                .collect(),
+            position: vectors("position")?,
+            velocity: vectors("velocity")?,
+            normal: known("normal")?,
+            normal_rate: known("normal_rate")?,
+            pull,
+            stiffness,
+            start: read_start(host, input, &body.name)?,
+            driven,
+        });
+    }
+    Ok((time, sheets))
+}
+
+/// Where a sheet of a boundary artifact begins, if not with the process.
+fn read_start(host: &Host, input: &Input, name: &str) -> Result<Option<Start>, StepError> {
+    let [path, velocity] = ["path", "start_velocity"].map(|what| format!("{name}/{what}"));
+    if host.array_info(input, &path).is_none() {
+        return Ok(None);
+    }
+    let (ways, shape) = host.array_f64(input, &path)?;
+    let (velocity, _) = host.array_f64(input, &velocity)?;
+    let vectors = |v: &[f64]| -> Vec<V> { v.as_chunks::<3>().0.to_vec() };
+    let row = shape[1..].iter().product::<usize>().max(1);
+    Ok(Some(Start {
+        path: ways.chunks_exact(row).map(vectors).collect(),
+        velocity: vectors(&velocity),
+    }))
+}
