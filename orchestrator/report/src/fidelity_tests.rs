@@ -41,6 +41,7 @@ fn input(instances: Vec<Instance>) -> ReportInput {
         expectations: Vec::new(),
         failures: Vec::new(),
         not_run: 0,
+        until: Vec::new(),
     }
 }
 

@@ -14,6 +14,8 @@ pub struct ReportInput {
     pub file: Utf8PathBuf,
     /// The workflow file with the options that it was asked for with, as one types them behind a command.
     pub given: String,
+    /// The steps behind which nothing was asked for (`--until`); empty for the whole workflow.
+    pub until: Vec<String>,
     /// This program and its version.
     pub program: String,
     /// Names the content of the report: equal fingerprints, equal content. See
@@ -32,7 +34,13 @@ pub struct ReportInput {
 impl ReportInput {
     /// A command on this workflow as one types it: `plyflow run workflow.yaml --set ..`.
     pub(crate) fn command(&self, name: &str) -> String {
-        format!("plyflow {name} {}", self.given)
+        let mut command = format!("plyflow {name} {}", self.given);
+        if name == "run" {
+            for step in &self.until {
+                command += &format!(" --until {step}");
+            }
+        }
+        command
     }
 }
 

@@ -148,6 +148,9 @@ pub(crate) fn of_run(input: &ReportInput) -> (Tone, String) {
         (0, u) => parts.push(format!("{u} of {all} not judged")),
         (m, u) => parts.push(format!("{m} of {all} missed, {u} not judged")),
     }
+    if !input.until.is_empty() {
+        parts.push(format!("only up to {}", input.until.join(", ")));
+    }
     if !input.failures.is_empty() {
         tone = Tone::Bad;
         parts.push(format!(

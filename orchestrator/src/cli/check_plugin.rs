@@ -132,7 +132,7 @@ fn judge(
     std::fs::write(&file, workflow(args, entry, &folder.0)?)
         .map_err(Stop::machine(format!("writing {file}")))?;
     let resolved = plyflow_workflow::resolve(&file, catalog, &[]).map_err(|findings| {
-        eprint!("{}", findings.render(std::io::stderr().is_terminal()));
+        super::warn(&findings.render(std::io::stderr().is_terminal()));
         Stop::silent(exit::INVALID)
     })?;
     let step = resolved.workflow.steps.into_iter().next();

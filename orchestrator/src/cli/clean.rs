@@ -35,6 +35,13 @@ pub fn clean(args: &CleanArgs) -> Done {
         return print(&format!("there is no store {root}; nothing to remove\n"));
     }
     let store = Store::new(root);
+    if !store.exists() {
+        let text = format!(
+            "{} is no store: no run has left its `lock` there; given with --store, expected a folder such as `.plyflow`",
+            store.root()
+        );
+        return Err(Stop::new(exit::USAGE, text));
+    }
     let _lock =
         Lock::exclusive(&store.lock(), &format!("the store {}", store.root())).map_err(locked)?;
     let failed = || Stop::machine(format!("cleaning {}", store.root()));
@@ -79,14 +86,8 @@ pub fn clean(args: &CleanArgs) -> Done {
         "removed"
     };
     if args.all && !args.dry_run {
-        // Only what a store is made of: `--store` may name a folder that holds other things too.
-        for folder in ["artifacts", "resolved", "runs"] {
-            match std::fs::remove_dir_all(store.root().join(folder)) {
-                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(failed()(e)),
-                _ => {}
-            }
-        }
-        let _ = std::fs::remove_file(store.root().join("plugins.json"));
+        // `--store` may name a folder that holds other things too.
+        store.clear().map_err(failed())?;
     }
     let s = if count == 1 { "" } else { "s" };
     let checkpoints = match old {

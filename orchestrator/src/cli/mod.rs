@@ -22,6 +22,7 @@ use crate::exit;
 use args::Command;
 use clap::{CommandFactory, Parser};
 use std::fmt::Display;
+use std::io::Write as _;
 
 /// An end of a command that is not success: what to say and the exit code.
 #[derive(Debug)]
@@ -58,6 +59,11 @@ impl Stop {
 /// What a command ends with.
 pub type Done = Result<(), Stop>;
 
+/// Writes to standard error. Whoever reads may have gone, the disk may be full: what happened is told by the exit code all the same.
+pub(crate) fn warn(text: &str) {
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
 /// Runs the command line of this process and returns the exit code.
 pub fn main() -> u8 {
     let cli = match Cli::try_parse() {
@@ -75,7 +81,7 @@ pub fn main() -> u8 {
         Ok(()) => exit::OK,
         Err(stop) => {
             if !stop.text.is_empty() {
-                eprintln!("plyflow: {}", stop.text);
+                warn(&format!("plyflow: {}\n", stop.text));
             }
             stop.code
         }

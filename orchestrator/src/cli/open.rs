@@ -125,7 +125,7 @@ pub fn open(args: &Workflow) -> Result<Opened, Stop> {
     match load(args)? {
         Ok(opened) => Ok(opened),
         Err(findings) => {
-            eprint!("{}", findings.render(std::io::stderr().is_terminal()));
+            super::warn(&findings.render(std::io::stderr().is_terminal()));
             Err(Stop::silent(exit::INVALID))
         }
     }

@@ -330,7 +330,7 @@ pub fn validate(args: &ValidateArgs) -> Done {
                 // A reader that has gone away must not make findings a success.
                 let _ = print(&format!("{:#}\n", findings.to_json()));
             } else {
-                eprint!("{}", findings.render(std::io::stderr().is_terminal()));
+                super::warn(&findings.render(std::io::stderr().is_terminal()));
             }
             Err(Stop::silent(exit::INVALID))
         }

@@ -27,11 +27,11 @@ pub fn report(args: &ReportArgs) -> Done {
     let path = args
         .output
         .clone()
-        .unwrap_or_else(|| beside(&opened.workflow.file));
+        .unwrap_or_else(|| beside(&opened.workflow.file, &[]));
     let failures: Vec<Failure> = (0..session.core.instances().len())
         .filter_map(|id| session.failed_before(id))
         .collect();
-    let input = input(&opened, &session, &found, &failures, &args.workflow);
+    let input = input(&opened, &session, &found, &failures, (&args.workflow, &[]));
     let bytes = write_report(&input, &path).map_err(|e| Stop::new(exit::INTERNAL, e))?;
     print(&format!("{path}: {}\n", super::table::bytes(bytes)))
 }
@@ -54,18 +54,24 @@ impl Found {
 }
 
 /// The report of a workflow file: `report.html` for `workflow.yaml`, `report-coarse.html` for
-/// `workflow-coarse.yaml`, `flat-report.html` for `flat.yaml`.
-pub fn beside(workflow: &Utf8Path) -> Utf8PathBuf {
+/// `workflow-coarse.yaml`, `flat-report.html` for `flat.yaml`. A run of a part (`until`) has a page of its own,
+/// `report-until-zones.html`: it must not take the place of the whole's.
+pub fn beside(workflow: &Utf8Path, until: &[String]) -> Utf8PathBuf {
     let stem = workflow.file_stem().unwrap_or("workflow");
+    let part = match until {
+        [] => String::new(),
+        [first] => format!("-until-{first}"),
+        [first, further @ ..] => format!("-until-{first}-and-{}-more", further.len()),
+    };
     let name = match stem.strip_prefix("workflow") {
-        Some(rest) => format!("report{rest}.html"),
-        None => format!("{stem}-report.html"),
+        Some(rest) => format!("report{rest}{part}.html"),
+        None => format!("{stem}-report{part}.html"),
     };
     workflow.with_file_name(name)
 }
 
 /// Changes with what a page shows of the same artifacts: an older page is then written again.
-const LAYOUT: &[u8] = b"page 7";
+const LAYOUT: &[u8] = b"page 8";
 
 /// Names all that a report depends on.
 pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure]) -> String {
@@ -126,13 +132,13 @@ fn arguments(given: &Workflow) -> String {
     words.iter().map(quoted).collect::<Vec<_>>().join(" ")
 }
 
-/// All that a report or a summary is made of. `given`: the workflow as the user asked for it.
+/// All that a report or a summary is made of. `given`, `until`: the workflow as the user asked for it.
 pub fn input(
     opened: &Opened,
     session: &Session<'_>,
     found: &Found,
     failures: &[Failure],
-    given: &Workflow,
+    (given, until): (&Workflow, &[String]),
 ) -> ReportInput {
     let core = &session.core;
     let instance = |(id, record): &(Id, Record)| {
@@ -173,6 +179,7 @@ pub fn input(
         description: opened.workflow.description.clone(),
         file: given.workflow.clone(),
         given: arguments(given),
+        until: until.to_vec(),
         program: format!("plyflow {}", env!("CARGO_PKG_VERSION")),
         fingerprint: fingerprint(opened, session, failures),
         instances: found.records.iter().map(instance).collect(),
@@ -202,9 +209,18 @@ mod tests {
 
     #[test]
     fn workflows_of_one_folder_have_reports_of_their_own() {
-        let name = |w: &str| beside(Utf8Path::new(w)).to_string();
+        let name = |w: &str| beside(Utf8Path::new(w), &[]).to_string();
         assert_eq!(name("a/workflow.yaml"), "a/report.html");
         assert_eq!(name("a/workflow-coarse.yaml"), "a/report-coarse.html");
         assert_eq!(name("a/flat.yaml"), "a/flat-report.html");
+        let part = |w: &str, until: &[&str]| {
+            let until: Vec<String> = until.iter().map(|s| (*s).to_owned()).collect();
+            beside(Utf8Path::new(w), &until).to_string()
+        };
+        assert_eq!(part("workflow.yaml", &["zones"]), "report-until-zones.html");
+        assert_eq!(
+            part("flat.yaml", &["a", "b"]),
+            "flat-report-until-a-and-1-more.html"
+        );
     }
 }

@@ -415,7 +415,7 @@ fn front(
         records,
         rows: Vec::new(),
     };
-    let ways = plyflow_report::ways(&input(opened, session, &found, &[], &args.workflow));
+    let ways = plyflow_report::ways(&input(opened, session, &found, &[], (&args.workflow, &[])));
     match args.format {
         Format::Json => print(&format!("{:#}\n", super::front::as_json(&ways))),
         Format::Csv => print(&super::front::as_csv(&ways)),

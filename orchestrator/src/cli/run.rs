@@ -5,8 +5,8 @@ use super::clean::locked;
 use super::open::{Opened, cores, open, store_root};
 use super::report;
 use super::results::checked;
-use super::{Done, Stop, print};
-use crate::engine::core::Limits;
+use super::{Done, Stop, print, warn};
+use crate::engine::core::{Instance, Limits, State};
 use crate::engine::{Failure, Local, Observer, Options, Session, Summary};
 use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
@@ -169,7 +169,11 @@ fn conclude(
     begun: Instant,
 ) -> Done {
     let verdict = tell_results(args, opened, session, summary);
-    let old = of_earlier_run(args, &report::beside(&opened.workflow.file), summary);
+    let old = of_earlier_run(
+        args,
+        &report::beside(&opened.workflow.file, &args.until),
+        summary,
+    );
     // Whoever reads along may have gone (`| head`); how the run went is told by the exit code all the same.
     let told = match args.quiet {
         true => Ok(()),
@@ -179,7 +183,7 @@ fn conclude(
         return Err(Stop::silent(exit::INTERRUPTED));
     }
     if let Some(first) = summary.failures.first() {
-        eprint!("{}", failure_text(first, summary));
+        warn(&failure_text(first, summary));
         return Err(Stop::silent(exit::STEP_FAILED));
     }
     verdict.and(told)
@@ -190,7 +194,7 @@ fn conclude(
 fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary: &Summary) -> Done {
     let worked = summary.executed + summary.failures.len() + summary.skipped > 0;
     let any = summary.executed + summary.cached > 0;
-    let path = Some(report::beside(&opened.workflow.file))
+    let path = Some(report::beside(&opened.workflow.file, &args.until))
         .filter(|_| !args.no_report && has_news(summary));
     // A step that was run again to the same key (`--force`) has other costs and the same name.
     let stale = path.as_ref().filter(|p| {
@@ -202,13 +206,19 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         return Ok(());
     }
     let found = report::Found::read(session);
-    let input = report::input(opened, session, &found, &summary.failures, &args.workflow);
+    let input = report::input(
+        opened,
+        session,
+        &found,
+        &summary.failures,
+        (&args.workflow, &args.until),
+    );
     let mut written = path.clone();
     if let Some(path) = stale
         && let Err(e) = plyflow_report::write_report(&input, path)
     {
         // The artifacts are whole: a report that cannot be written is no failed run.
-        eprintln!("plyflow: the report was not written: {e}");
+        warn(&format!("plyflow: the report was not written: {e}\n"));
         written = None;
     }
     let told = match show {
@@ -260,19 +270,29 @@ fn tell(
             "failed": summary.failures.len(), "not_run": summary.skipped,
             "interrupted": summary.interrupted, "seconds": begun.elapsed().as_secs_f64(),
         });
-        eprintln!("{line}");
+        warn(&format!("{line}\n"));
         return Ok(());
     }
     print(&(line + &old_report.unwrap_or_default()))?;
     if summary.interrupted {
         let until = args.until.iter().map(|step| format!(" --until {step}"));
+        let force = args.force.iter().filter(|step| !is_done(session, step));
+        let force = force.map(|step| format!(" --force {step}"));
         print(&format!(
             "stopped; what is finished is kept. To go on: {}{}\n",
             report::command(&args.workflow),
-            until.collect::<String>()
+            until.chain(force).collect::<String>()
         ))?;
     }
     Ok(())
+}
+
+/// Whether all that is known of a step has been run or found.
+fn is_done(session: &Session<'_>, step: &str) -> bool {
+    let core = &session.core;
+    let of = |i: &&Instance| core.graph().steps[i.step].name == step;
+    let mut all = core.instances().iter().filter(of).peekable();
+    all.peek().is_some() && all.all(|i| matches!(i.state, State::Done { .. }))
 }
 
 /// The first failure with its log, last on the screen.

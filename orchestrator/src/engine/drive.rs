@@ -70,6 +70,7 @@ impl<'a> Session<'a> {
         let folder = store.run(&workflow.name);
         let journal = if writing {
             folder.prepare()?;
+            store.take_unplaced(&folder);
             Journal::open(&folder.journal())?
         } else {
             Journal::read(&folder.journal())?
@@ -299,8 +300,16 @@ impl<'a> Session<'a> {
         if let Some(key) = instance.key
             && self.options.force.contains(&instance.step)
         {
-            // To run again means from the start.
-            let _ = std::fs::remove_dir_all(self.folder.checkpoints(&label, &key));
+            // To run again means from the start: but a forced run that was stopped goes on where it was.
+            let forced = self.folder.forced(&label, &key);
+            if !forced.exists() {
+                let checkpoints = self.folder.checkpoints(&label, &key);
+                let _ = std::fs::remove_dir_all(&checkpoints);
+                let _ = (
+                    forced.parent().map(std::fs::create_dir_all),
+                    std::fs::write(&forced, ""),
+                );
+            }
         }
         let library = |p: &plyflow_workflow::resolved::PluginId| LibraryRef {
             name: p.name.clone(),
@@ -449,15 +458,26 @@ impl<'a> Session<'a> {
             ));
         }
         let lasting = record.is_lasting();
-        (self.store.commit(&key, &artifact, &beside, lasting)).map_err(|e| {
-            format!(
-                "the artifact cannot be put into the store {}: {e}",
-                self.store.root()
-            )
-        })?;
+        if let Err(e) = self.store.commit(&key, &artifact, &beside, lasting) {
+            let root = self.store.root();
+            let kept = self
+                .store
+                .keep_unplaced(&self.folder, &key, &artifact, &beside);
+            let and = match kept {
+                Ok(()) => format!(
+                    "it is whole, lies in {} and is taken from there by the next run",
+                    self.folder.unplaced()
+                ),
+                Err(e) => format!("nor can it be put aside: {e}"),
+            };
+            return Err(format!(
+                "the artifact cannot be put into the store {root}: {e}; {and}"
+            ));
+        }
         // Only now: until here they were all that a killed engine, or a power cut, would have left of the work.
-        let checkpoints = self.folder.checkpoints(&self.core.label(id), &key);
-        let _ = std::fs::remove_dir_all(checkpoints);
+        let label = self.core.label(id);
+        let _ = std::fs::remove_dir_all(self.folder.checkpoints(&label, &key));
+        let _ = std::fs::remove_file(self.folder.forced(&label, &key));
         Ok(Known {
             bytes: size,
             labels: record.collection.clone(),
@@ -488,6 +508,8 @@ impl<'a> Session<'a> {
             let instance = &self.core.instances()[id];
             let step = &self.core.graph().steps[instance.step];
             if let (true, Some(key)) = (self.writing, instance.key) {
+                // Whoever forces it now wants it from the start.
+                let _ = std::fs::remove_file(self.folder.forced(&self.core.label(id), &key));
                 let who = (step.name.as_str(), instance.item.as_slice());
                 self.journal.failed(who, key, reason);
             }

@@ -3,8 +3,9 @@
 use camino::{Utf8Path, Utf8PathBuf};
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, Read, Seek, Write};
+use std::os::unix::fs::MetadataExt;
 
 /// A lock, held until it is dropped.
 #[derive(Debug)]
@@ -16,12 +17,12 @@ pub struct Lock {
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another process holds it.
-    #[error("{what} is in use by process {pid} (lock {path}); wait for it to end or stop it")]
+    #[error("{what} is in use by {by} (lock {path}); wait for it to end or stop it")]
     Held {
         /// What is locked.
         what: String,
-        /// Process number as written by the holder; `?` when it has not written it yet.
-        pid: String,
+        /// The processes that hold it, in words.
+        by: String,
         /// The lock file.
         path: Utf8PathBuf,
     },
@@ -36,7 +37,7 @@ pub enum LockError {
 }
 
 impl Lock {
-    /// Takes the lock alone and writes this process's number into it.
+    /// Takes the lock alone and writes this process's number into it, for people who look.
     ///
     /// # Errors
     /// When another process holds it, or on trouble with the file.
@@ -76,15 +77,9 @@ impl Lock {
         match flock(&file, how) {
             Ok(()) => {}
             Err(Errno::WOULDBLOCK) => {
-                let mut pid = String::new();
-                let _ = file.read_to_string(&mut pid);
-                let pid = match pid.trim() {
-                    "" => "?".into(),
-                    pid => pid.to_owned(),
-                };
                 return Err(LockError::Held {
                     what: what.to_owned(),
-                    pid,
+                    by: holders(&mut file),
                     path: path.to_owned(),
                 });
             }
@@ -93,11 +88,61 @@ impl Lock {
         let write = |file: &mut File| {
             file.set_len(0)?;
             file.rewind()?;
-            writeln!(file, "{}", std::process::id())
+            match alone {
+                true => writeln!(file, "{}", std::process::id()),
+                // Of those who share it none can speak for all.
+                false => Ok(()),
+            }
         };
         write(&mut file).map_err(failed)?;
         Ok(Self { _file: file })
     }
+}
+
+/// The processes that hold a lock, in words: as the kernel tells; else the one that wrote its number when it took the lock alone.
+fn holders(file: &mut File) -> String {
+    let mut pids = file.metadata().map_or(Vec::new(), |m| told_by_kernel(&m));
+    if pids.is_empty() {
+        let mut written = String::new();
+        let _ = file.read_to_string(&mut written);
+        pids.extend(written.trim().parse::<u32>().ok());
+    }
+    match &pids[..] {
+        [] => "another process".into(),
+        [pid] => format!("process {pid}"),
+        all => {
+            let all: Vec<String> = all.iter().map(u32::to_string).collect();
+            format!("processes {}", all.join(", "))
+        }
+    }
+}
+
+/// From lines of `/proc/locks`: `1: FLOCK  ADVISORY  WRITE 4242 fd:01:1234567 0 EOF`. Processes of other containers have no number here.
+fn told_by_kernel(file: &Metadata) -> Vec<u32> {
+    let device = file.dev();
+    let place = format!(
+        "{:02x}:{:02x}:{}",
+        rustix::fs::major(device),
+        rustix::fs::minor(device),
+        file.ino()
+    );
+    let text = fs::read_to_string("/proc/locks").unwrap_or_default();
+    let of_line = |line: &str| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        // Who waits for a lock has an arrow behind the number.
+        match words[..] {
+            [_, "FLOCK", _, _, pid, at, ..] if at == place => pid.parse::<u32>().ok(),
+            _ => None,
+        }
+    };
+    let mut pids: Vec<u32> = text
+        .lines()
+        .filter_map(of_line)
+        .filter(|p| *p > 0)
+        .collect();
+    pids.sort_unstable();
+    pids.dedup();
+    pids
 }
 
 #[cfg(test)]
@@ -117,6 +162,11 @@ mod tests {
         drop(first);
         let _a = Lock::shared(&path, "the store").unwrap();
         let _b = Lock::shared(&path, "the store").unwrap();
-        assert!(Lock::exclusive(&path, "the store").is_err());
+        let error = Lock::exclusive(&path, "the store").unwrap_err().to_string();
+        let own = format!("process {} ", std::process::id());
+        assert!(
+            error.contains(&own) || error.contains("another process"),
+            "{error}"
+        );
     }
 }

@@ -11,6 +11,8 @@
 //!   runs/<workflow>/logs/          logs of workers that had something to say
 //!   runs/<workflow>/tmp/           artifacts being written
 //!   runs/<workflow>/checkpoints/<instance>/<key>/   what lets a killed step go on
+//!   runs/<workflow>/checkpoints/<instance>/<key>.forced   these are of a run that was to begin anew
+//!   runs/<workflow>/unplaced/      finished artifacts that could not be put into `artifacts`, and their records
 //! ```
 
 mod journal;
@@ -69,6 +71,17 @@ impl RunFolder {
         of.join(key.hex())
     }
 
+    /// Where it stands that checkpoints are of a run that was to begin anew (`--force`).
+    pub fn forced(&self, label: &str, key: &Key) -> Utf8PathBuf {
+        let of = self.root.join("checkpoints").join(safe_name(label));
+        of.join(format!("{}.forced", key.hex()))
+    }
+
+    /// Finished artifacts that could not be put into the store.
+    pub fn unplaced(&self) -> Utf8PathBuf {
+        self.root.join("unplaced")
+    }
+
     /// Checkpoints that no command will go on from: of every instance all but those last written to.
     ///
     /// # Errors
@@ -77,6 +90,7 @@ impl RunFolder {
         let mut old = Vec::new();
         for instance in list(&self.root.join("checkpoints"))? {
             let mut of = list(&instance)?;
+            of.retain(|p| p.is_dir());
             let written = |p: &Utf8PathBuf| fs::metadata(p).and_then(|m| m.modified()).ok();
             of.sort_by_cached_key(|p| (written(p), p.clone()));
             of.pop();
@@ -140,10 +154,54 @@ impl Store {
     /// When the folder cannot be read.
     pub fn runs(&self) -> io::Result<Vec<RunFolder>> {
         let mut found = Vec::new();
-        for path in list(&self.root.join("runs"))? {
-            found.push(RunFolder { root: path });
+        for root in list(&self.root.join("runs"))? {
+            let run = RunFolder { root };
+            // The store may have been put into a folder of other things.
+            if run.lock().is_file() || run.journal().is_file() {
+                found.push(run);
+            }
         }
         Ok(found)
+    }
+
+    /// Whether there is a store: every run leaves its lock.
+    pub fn exists(&self) -> bool {
+        self.lock().is_file()
+    }
+
+    /// Removes all that runs have put here, and nothing else.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn clear(&self) -> io::Result<()> {
+        let artifacts = self.root.join("artifacts");
+        for shard in list(&artifacts)? {
+            for file in list(&shard).unwrap_or_default() {
+                let key = file.file_name().and_then(|n| n.split('.').next());
+                if key.and_then(Key::from_hex).is_some() {
+                    fs::remove_file(&file)?;
+                }
+            }
+            // Stays where something else lies in it.
+            let _ = fs::remove_dir(&shard);
+        }
+        for run in self.runs()? {
+            fs::remove_dir_all(&run.root)?;
+        }
+        let resolved = self.root.join("resolved");
+        for file in list(&resolved)? {
+            let name = file.file_name().unwrap_or_default();
+            if name.len() >= 16 && name.bytes().take(16).all(|b| b.is_ascii_hexdigit()) {
+                fs::remove_file(&file)?;
+            }
+        }
+        for folder in [artifacts, self.root.join("runs"), resolved] {
+            let _ = fs::remove_dir(folder);
+        }
+        match fs::remove_file(self.root.join("plugins.json")) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+            _ => Ok(()),
+        }
     }
 
     /// The lock that runs share and `clean` takes alone.
@@ -201,9 +259,9 @@ impl Store {
             fs::create_dir_all(target.parent().unwrap_or(&self.root))?;
             self.shards.borrow_mut()[shard] = true;
         }
-        fs::rename(record, self.record(key))?;
+        place(record, &self.record(key))?;
         let target = self.artifact(key);
-        fs::rename(artifact, &target)?;
+        place(artifact, &target)?;
         if lasting {
             // Names lie in folders, which the disk keeps apart from the files.
             for folder in target.ancestors().skip(1).take(2) {
@@ -211,6 +269,50 @@ impl Store {
             }
         }
         Ok(())
+    }
+
+    /// Puts aside what could not be committed, so that [`Store::take_unplaced`] can.
+    ///
+    /// # Errors
+    /// When it cannot be put aside either.
+    pub fn keep_unplaced(
+        &self,
+        run: &RunFolder,
+        key: &Key,
+        artifact: &Utf8Path,
+        record: &Utf8Path,
+    ) -> io::Result<()> {
+        let place = |end: &str| run.unplaced().join(format!("{}{end}", key.hex()));
+        fs::create_dir_all(run.unplaced())?;
+        match record.exists() {
+            true => fs::rename(record, place(".record.json"))?,
+            // The commit came so far.
+            false => drop(fs::copy(self.record(key), place(".record.json"))?),
+        }
+        fs::rename(artifact, place(".h5"))
+    }
+
+    /// Commits what [`Store::keep_unplaced`] has put aside; what still cannot be stays.
+    pub fn take_unplaced(&self, run: &RunFolder) {
+        for artifact in list(&run.unplaced()).unwrap_or_default() {
+            let key = artifact.file_stem().and_then(Key::from_hex);
+            if let (Some("h5"), Some(key)) = (artifact.extension(), key) {
+                let record = artifact.with_extension("record.json");
+                if self.size(&key).is_some() {
+                    let _ = (fs::remove_file(&record), fs::remove_file(&artifact));
+                } else if record.is_file() {
+                    let kept = run.unplaced().join("record");
+                    // A commit that fails between the two may take the record with it.
+                    if fs::copy(&record, &kept).is_ok()
+                        && self.commit(&key, &artifact, &kept, true).is_ok()
+                    {
+                        let _ = fs::remove_file(&record);
+                    }
+                    let _ = fs::remove_file(&kept);
+                }
+            }
+        }
+        let _ = fs::remove_dir(run.unplaced());
     }
 
     /// Keys of all artifacts, sorted.
@@ -242,6 +344,24 @@ impl Store {
             Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
             other => other,
         }
+    }
+}
+
+/// Renames a file, or copies it where the target lies on another disk: whole or not at all.
+fn place(from: &Utf8Path, to: &Utf8Path) -> io::Result<()> {
+    match fs::rename(from, to) {
+        Err(e) if e.kind() == io::ErrorKind::CrossesDevices => {
+            let beside = Utf8PathBuf::from(format!("{to}.{}", std::process::id()));
+            let copied = fs::copy(from, &beside)
+                .and_then(|_| fs::File::open(&beside)?.sync_all())
+                .and_then(|()| fs::rename(&beside, to));
+            if copied.is_err() {
+                let _ = fs::remove_file(&beside);
+            }
+            copied?;
+            fs::remove_file(from)
+        }
+        other => other,
     }
 }
 
@@ -291,5 +411,57 @@ mod tests {
         assert_eq!(store.keys().unwrap(), [key]);
         store.remove(&key).unwrap();
         assert!(store.keys().unwrap().is_empty());
+    }
+
+    #[test]
+    fn what_cannot_be_committed_is_kept_and_taken_by_the_next_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
+        let store = Store::new(root.clone());
+        let run = store.run("study");
+        let key = Key([7; 32]);
+        let (a, r) = (root.join("a"), root.join("r"));
+        fs::write(&a, "artifact").unwrap();
+        fs::write(&r, "{}").unwrap();
+        // A file where the folder should be: nothing can be put there.
+        fs::write(root.join("artifacts"), "").unwrap();
+        assert!(store.commit(&key, &a, &r, true).is_err());
+        store.keep_unplaced(&run, &key, &a, &r).unwrap();
+        store.take_unplaced(&run);
+        assert_eq!((store.size(&key), a.exists()), (None, false));
+        fs::remove_file(root.join("artifacts")).unwrap();
+        store.take_unplaced(&run);
+        assert_eq!(store.size(&key), Some(8));
+        assert!(store.has_record(&key) && !run.unplaced().exists());
+    }
+
+    #[test]
+    fn clearing_removes_what_runs_have_put_there_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
+        let store = Store::new(root.clone());
+        let key = Key([7; 32]);
+        let write = |path: Utf8PathBuf| {
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "x").unwrap();
+        };
+        let own = [
+            store.artifact(&key),
+            store.record(&key),
+            store.run("study").journal(),
+            store.run("study").tmp().join("1.h5"),
+            root.join("resolved/0123456789abcdef"),
+            root.join("plugins.json"),
+        ];
+        let others = [
+            root.join("runs/exp1/result.csv"),
+            root.join("artifacts/sub/model.bin"),
+            root.join("resolved/issues.txt"),
+            root.join("notes.txt"),
+        ];
+        own.iter().chain(&others).cloned().for_each(write);
+        store.clear().unwrap();
+        assert!(own.iter().all(|p| !p.exists()));
+        assert!(others.iter().all(|p| p.exists()));
     }
 }

@@ -7,7 +7,7 @@ use crate::diagnostics::{Problems, Source};
 use crate::hints::{list_help, number_help};
 use crate::resolved::{InputFile, PluginId};
 use crate::yaml::{Kind, Node, Span};
-use camino::{Utf8Path, Utf8PathBuf};
+use camino::{Utf8Component, Utf8Path, Utf8PathBuf};
 use indexmap::IndexMap;
 use plyflow_model::manifest::{Bounds, Declaration, PluginKind, Shape};
 use serde_json::{Map, Value, json};
@@ -437,17 +437,65 @@ pub(crate) fn find(
     None
 }
 
-/// The path, absolute, with `.` and `..` taken out (not followed through links).
+/// The path, absolute, with `.` and `..` taken out. Behind a link to a folder `..` is the folder above the one that it leads to, as
+/// the kernel has it: the path is then that of the file itself.
 pub fn absolute(folder: &Utf8Path, text: &str) -> Utf8PathBuf {
-    let mut path = Utf8PathBuf::new();
+    let mut real = Utf8PathBuf::new();
+    let mut plain = Utf8PathBuf::new();
+    let (mut back, mut all_real) = (false, true);
     for part in folder.join(text).components() {
         match part {
-            camino::Utf8Component::CurDir => {}
-            camino::Utf8Component::ParentDir => {
-                path.pop();
+            Utf8Component::CurDir => {}
+            Utf8Component::ParentDir => {
+                back = true;
+                plain.pop();
+                match real.canonicalize_utf8() {
+                    Ok(found) => real = found,
+                    Err(_) => all_real = false,
+                }
+                real.pop();
             }
-            part => path.push(part),
+            part => {
+                plain.push(part);
+                real.push(part);
+            }
         }
     }
-    path
+    // The path as it was written, unless it names another file.
+    let same = |file: &Utf8Path| file.canonicalize_utf8().ok();
+    if !back || !all_real || same(&plain) == same(&real) {
+        plain
+    } else {
+        real
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn behind_a_link_the_folder_above_is_that_of_where_it_leads() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8PathBuf::from_path_buf(folder.path().canonicalize().unwrap()).unwrap();
+        for file in ["c.csv", "real/c.csv", "real/sub/w.yaml", "plain/d.csv"] {
+            let path = root.join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "x").unwrap();
+        }
+        std::os::unix::fs::symlink("real/sub", root.join("link")).unwrap();
+        std::os::unix::fs::symlink("plain", root.join("way")).unwrap();
+        let link = root.join("link");
+        assert_eq!(absolute(&link, "../c.csv"), root.join("real/c.csv"));
+        // As it was written, where that is the same file, and where there is none.
+        assert_eq!(absolute(&link, "./w.yaml"), link.join("w.yaml"));
+        let way = root.join("way");
+        assert_eq!(absolute(&way, "x/../d.csv"), way.join("d.csv"));
+        assert_eq!(absolute(&way, "../c.csv"), root.join("c.csv"));
+        assert_eq!(absolute(&root, "none/../also/none"), root.join("also/none"));
+        assert_eq!(absolute(&root, ".."), root.parent().unwrap());
+        // Not another file of the name that a reading of the text would lead to.
+        std::fs::remove_file(root.join("real/c.csv")).unwrap();
+        assert_eq!(absolute(&link, "../c.csv"), root.join("real/c.csv"));
+    }
 }

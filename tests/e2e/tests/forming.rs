@@ -310,6 +310,26 @@ fn zones_and_the_element_elsewhere_are_refused_without_each_other() {
 }
 
 #[test]
+fn a_forced_run_begins_anew_and_goes_on_when_it_was_killed() {
+    let study = study("[]");
+    let often = ["--checkpoint-every", "0 s", "--until", "coarse"];
+    assert!(study.start(&often).wait().unwrap().success());
+    let undisturbed = study.artifacts();
+    let forced = [&often[..], &["--force", "coarse"]].concat();
+    let mut engine = study.start(&forced);
+    wait_for("a checkpoint", || !checkpoints(&study).is_empty());
+    engine.kill().unwrap();
+    engine.wait().unwrap();
+    wait_for("the workers' end", || workers_of(engine.id()) == 0);
+    for goes_on in [true, false] {
+        assert!(study.start(&forced).wait().unwrap().success());
+        let log = study.log();
+        assert_eq!(log.contains("goes on from a checkpoint"), goes_on, "{log}");
+        assert!(study.artifacts() == undisturbed, "they differ");
+    }
+}
+
+#[test]
 fn a_torn_checkpoint_is_not_taken_up() {
     let study = study("[]");
     let often = ["--checkpoint-every", "0 s", "--until", "coarse"];

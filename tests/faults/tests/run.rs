@@ -451,6 +451,51 @@ fn clean_keeps_what_the_last_run_uses() {
 }
 
 #[test]
+fn clean_leaves_alone_what_is_no_store() {
+    let study = Study::new(FAN_OUT);
+    let result = study.folder.path().join("other/runs/exp1/result.csv");
+    std::fs::create_dir_all(result.parent().unwrap()).unwrap();
+    std::fs::write(&result, "x").unwrap();
+    let output = study.call(&["clean", "--store", "other", "--all"]);
+    assert_eq!(output.status.code(), Some(2));
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains("is no store"), "{text}");
+    assert!(result.exists() && !study.folder.path().join("other/lock").exists());
+}
+
+#[test]
+fn a_run_of_a_part_has_a_page_of_its_own() {
+    let study = Study::new(FAN_OUT);
+    assert_eq!(study.call(&["run"]).status.code(), Some(0));
+    let page = |name: &str| std::fs::read_to_string(study.folder.path().join(name)).unwrap();
+    let whole = page("report.html");
+    assert!(!whole.contains("only up to"));
+    let output = study.call(&["run", "--until", "zones"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(page("report.html") == whole);
+    let part = page("report-until-zones.html");
+    assert!(part.contains("only up to zones"));
+    assert!(part.contains("plyflow run workflow.yaml --until zones"));
+}
+
+#[test]
+fn the_exit_code_tells_how_it_went_although_nothing_can_be_written() {
+    let study = Study::new("steps:\n  bad: {plugin: error}\n");
+    let full = || {
+        std::fs::File::options()
+            .write(true)
+            .open("/dev/full")
+            .unwrap()
+    };
+    for format in ["text", "json"] {
+        let words = ["run", "--no-report", "--log-format", format];
+        let mut command = study.command(&words);
+        let status = command.stdout(full()).stderr(full()).status().unwrap();
+        assert_eq!(status.code(), Some(4), "{format}");
+    }
+}
+
+#[test]
 fn a_damaged_artifact_is_made_again() {
     let study = Study::new(FAN_OUT);
     study.run(&[]);

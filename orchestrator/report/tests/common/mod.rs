@@ -487,6 +487,7 @@ impl Study {
             instances: self.instances,
             failures: vec![],
             not_run: 0,
+            until: Vec::new(),
         }
     }
 }
