@@ -97,6 +97,7 @@ impl Step for BoundaryInterpolation {
             .into());
         }
         let listed = attributes["sheets"].as_array().cloned().unwrap_or_default();
+        let joint = film_bounds(host, &input, &meshes, &listed)?;
         let first = first_frame(host, &input, &meshes, &listed, bounds, &p)?;
         let mut sheets = Vec::new();
         for (i, sheet) in listed.iter().enumerate() {
@@ -107,7 +108,15 @@ impl Step for BoundaryInterpolation {
                 phase: "reading the coarse motion",
                 ..Default::default()
             });
-            sheets.extend(drive(host, &input, &meshes, sheet, bounds, first, &p)?);
+            sheets.extend(drive(
+                host,
+                &input,
+                &meshes,
+                sheet,
+                (bounds, joint),
+                first,
+                &p,
+            )?);
         }
         if sheets.is_empty() {
             return Err(format!(
@@ -273,7 +282,7 @@ fn drive(
     input: &Input,
     meshes: &Meshes,
     attributes: &Value,
-    zone: Rectangle,
+    (zone, joint): (Rectangle, Rectangle),
     first: usize,
     p: &Parameters,
 ) -> Result<Option<Driven>, StepError> {
@@ -290,7 +299,8 @@ fn drive(
     }
     let (points, cells) = host.mesh(input, body)?;
     let ply = sheet.kind == "ply";
-    let Some(grid) = part(&sheet, bounds(&points), zone, p)? else {
+    let within = if ply { bounds(&points) } else { joint };
+    let Some(grid) = part(&sheet, within, zone, p)? else {
         return Ok(None);
     };
     let fine =
@@ -363,6 +373,30 @@ fn follow(
         }
     }
     Ok(motion)
+}
+
+/// Where both films are (m): beyond the line along which they are joined one sheet stands for both, which no film of a zone can.
+fn film_bounds(
+    host: &Host,
+    input: &Input,
+    meshes: &Meshes,
+    listed: &[Value],
+) -> Result<Rectangle, StepError> {
+    let mut common = [
+        f64::NEG_INFINITY,
+        f64::NEG_INFINITY,
+        f64::INFINITY,
+        f64::INFINITY,
+    ];
+    for sheet in listed.iter().filter(|s| s["kind"] != "ply") {
+        let body = meshes.body(sheet["name"].as_str().unwrap_or_default())?;
+        let of = bounds(&host.mesh(input, body)?.0);
+        for k in 0..2 {
+            common[k] = common[k].max(of[k]);
+            common[k + 2] = common[k + 2].min(of[k + 2]);
+        }
+    }
+    Ok(common)
 }
 
 /// The part of the mesh of a sheet, of these `bounds` (m) when nothing else is told, in a zone; `None` where it does not reach.

@@ -530,3 +530,41 @@ fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than
         "{error}"
     );
 }
+
+#[test]
+fn films_of_a_zone_end_where_the_smaller_one_is_joined_to_the_other() {
+    let mut formed = coarse(0.0);
+    let smaller = |p: &Vec3| [0.3 * p[0], 0.3 * p[1], p[2] + 0.002];
+    let lower = formed.body("film_low");
+    let top = MemoryBody {
+        name: "film_top".into(),
+        points: lower.points.iter().map(smaller).collect(),
+        frames: (lower.frames.iter())
+            .map(|f| f.iter().map(smaller).collect())
+            .collect(),
+        cells: lower.cells.clone(),
+        nodes_per_cell: 4,
+        ..Default::default()
+    };
+    formed.bodies.push(top);
+    let film =
+        json!({"name": "film_top", "kind": "diaphragm", "thickness": 0.00008, "offset": 0.0005});
+    formed.attributes["sheets"]
+        .as_array_mut()
+        .unwrap()
+        .push(film);
+    let with = |margin: f64| {
+        let p = json!({"element_size": 0.005, "film_margin": margin});
+        let out = interpolate(&formed, p, &[0]).unwrap();
+        ["film_low", "film_top"].map(|name| {
+            let x = out.body(name).points.iter().map(|p| p[0]);
+            x.fold(f64::INFINITY, f64::min)
+        })
+    };
+    // The ply ends at -0.24 m, the upper film at -0.27 m, the lower one at -0.9 m.
+    for (margin, end) in [(0.02, -0.26), (0.06, -0.27)] {
+        for x in with(margin) {
+            assert!((x - end).abs() < 1e-9, "{x} at a margin of {margin}");
+        }
+    }
+}

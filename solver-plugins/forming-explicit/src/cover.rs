@@ -101,7 +101,8 @@ pub fn beside(
         .collect();
     match missing.is_empty() {
         true => String::new(),
-        false => format!("/beside {}", missing.join(", ")),
+        // Also a part of the path of its energies in the artifact.
+        false => format!("/beside_{}", missing.join("_")),
     }
 }
 

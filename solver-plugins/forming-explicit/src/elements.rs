@@ -2,6 +2,7 @@
 
 use crate::assembly::{Components, StackSheet};
 use crate::parameters::{ComponentChoice, Parameters};
+use crate::symmetry;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::mesh::{Patch, QuadMesh};
 use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, part_patches, reflect};
@@ -44,6 +45,7 @@ pub fn of_ply(
             choice.plugin, sheet.scene.name, sheet.material.name, sheet.material.plugin
         ));
     }
+    symmetry::check_order(&element, sheet)?;
     Ok(element)
 }
 

@@ -5,7 +5,10 @@ use crate::late::Start;
 use crate::local::{LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::material::MaterialEntry;
+use plyflow_model::scene::{Scene, SheetKind};
 use plyflow_sdk::{Host, Input, Log, StepError};
+use serde_json::Value;
 
 /// The element size (m) that a mesh study advises, if there is one.
 pub fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
@@ -19,7 +22,7 @@ pub fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
                 .into(),
         );
     }
-    let attributes: serde_json::Value = host.attributes(study)?;
+    let attributes: Value = host.attributes(study)?;
     match attributes["advised_element_size"].as_f64() {
         Some(size) if size > 0.0 => Ok(Some(size)),
         _ => Err(format!("'{}' advises no element size", study.step).into()),
@@ -59,7 +62,7 @@ pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, Step
     }
     let mut all = Vec::new();
     for input in &inputs {
-        let attributes: serde_json::Value = host.attributes(input)?;
+        let attributes: Value = host.attributes(input)?;
         all.extend(elements::boxes(&attributes, &input.step)?);
     }
     if all.is_empty() {
@@ -69,8 +72,9 @@ pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, Step
     Ok(all)
 }
 
-pub fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError> {
-    let attributes: serde_json::Value = host.attributes(input)?;
+pub fn read_boundary(host: &Host, input: &Input, scene: &Scene) -> Result<LocalInput, StepError> {
+    let attributes: Value = host.attributes(input)?;
+    fits(scene, &attributes, &input.step)?;
     let series = |name: &str| host.array_f64(input, name).map(|(v, _)| v);
     let (time, sheets) = read_motion(host, input)?;
     Ok(LocalInput {
@@ -82,6 +86,63 @@ pub fn read_boundary(host: &Host, input: &Input) -> Result<LocalInput, StepError
         zone: attributes["zone"].clone(),
         element_size: attributes["element_size"].as_f64().unwrap_or(0.0),
     })
+}
+
+/// Whether a boundary is of this scene: its name, and what the run that it was made of told of its sheets.
+fn fits(scene: &Scene, boundary: &Value, step: &str) -> Result<(), String> {
+    let differs = |what: &str, there: &str, here: &str| {
+        Err(format!(
+            "scene: {what} is {here}, and {there} in the run that '{step}' was made of; expected the same scene for a zone as for the whole"
+        ))
+    };
+    if let Some(there) = boundary["scene"].as_str().filter(|n| *n != scene.name) {
+        return differs(
+            "its name",
+            &format!("'{there}'"),
+            &format!("'{}'", scene.name),
+        );
+    }
+    for told in boundary["sheets"].as_array().into_iter().flatten() {
+        let Some(name) = told["name"].as_str() else {
+            continue;
+        };
+        let Some(sheet) = scene.sheets.iter().find(|s| s.name == name) else {
+            return differs(&format!("sheet '{name}'"), "there", "not there");
+        };
+        let thickness = match &sheet.material {
+            MaterialEntry::Inline(material) => Some(material.thickness.si()),
+            _ => None,
+        };
+        let fibres = (sheet.kind == SheetKind::Ply).then_some(());
+        let here = [
+            ("thickness", "mm", 1e3, thickness),
+            (
+                "fibre_1",
+                "deg",
+                1f64.to_degrees(),
+                fibres.map(|()| sheet.fibre_1.si()),
+            ),
+            (
+                "fibre_2",
+                "deg",
+                1f64.to_degrees(),
+                fibres.and(sheet.fibre_2.map(|a| a.si())),
+            ),
+        ];
+        for (what, unit, factor, here) in here {
+            if let (Some(there), Some(here)) = (told[what].as_f64(), here)
+                && (there - here).abs() > 1e-6 * here.abs().max(1e-6)
+            {
+                let text = |v: f64| format!("{:.4} {unit}", factor * v);
+                return differs(
+                    &format!("{what} of sheet '{name}'"),
+                    &text(there),
+                    &text(here),
+                );
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Times and driven sheets of a boundary artifact.

@@ -1,6 +1,6 @@
 //! The step behind the host: frames, attributes, results.
 
-use crate::assembly::Components;
+use crate::assembly::{Components, StackSheet};
 use crate::checkpoint::Recorder;
 use crate::inputs::{advised_size, bending_zones, read_boundary, read_motion};
 use crate::local::Feedback;
@@ -105,12 +105,15 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
     }
     let mut forming = match boundary.first() {
         None => crate::build_global(p, &components)?,
-        Some(input) => crate::build_local(p, read_boundary(host, input)?, &components)?,
+        Some(input) => crate::build_local(p, read_boundary(host, input, &p.scene)?, &components)?,
     };
     if let Some(what) = crate::assembly::slower_multipliers(&forming.model, p) {
         host.log(Log::Info, &what);
     }
-    if let Some(what) = long_process(&forming) {
+    for what in long_process(&forming)
+        .into_iter()
+        .chain(unlike_films(&forming))
+    {
         host.log(Log::Warn, &what);
     }
     if let Some(input) = feedback.first() {
@@ -319,6 +322,20 @@ fn long_process(forming: &Forming) -> Option<String> {
              matters no more (tenths of a second for most parts), not the workshop's; see the kinetic ratio of a run with shorter ones",
             duration / step,
             1e6 * step
+        )
+    })
+}
+
+/// Whether two films that are one sheet where they are joined are of one material.
+fn unlike_films(forming: &Forming) -> Option<String> {
+    let film = |s: &&StackSheet| s.scene.kind == SheetKind::Diaphragm;
+    let lower = forming.stack.first().filter(film)?;
+    let upper = forming.stack.last().filter(film)?;
+    (lower.material != upper.material).then(|| {
+        format!(
+            "the films are of unlike materials, '{}' below and '{}' above; beyond the plies, where they are joined (`film_joint_margin`), both \
+             are taken for the lower one: its stiffness and mass carry the span to the frame",
+            lower.material.name, upper.material.name
         )
     })
 }

@@ -10,7 +10,7 @@ use plyflow_mechanics::mirror::{Image, Planes, Whole, reflect};
 use plyflow_mechanics::sheet::Aligned;
 use plyflow_mechanics::vec3::{V, norm, sub};
 use plyflow_model::friction::Coefficient;
-use plyflow_model::scene::{MirrorPlane, Scene};
+use plyflow_model::scene::{MirrorPlane, Scene, first_axis};
 use plyflow_sdk::{BendingBatch, MembraneBatch};
 use plyflow_tooling::{SurfaceTree, ToolMesh};
 
@@ -194,6 +194,41 @@ pub fn check_material(
         }
     }
     Ok(())
+}
+
+/// Whether the material of a ply whose fibres the scene names clockwise treats its two families alike: its first family lies along the
+/// axis that the other follows counter-clockwise ([`first_axis`](plyflow_model::scene::first_axis)), here the scene's second one.
+///
+/// # Errors
+/// When it does not, and what to write instead.
+pub fn check_order(element: &ElementInstance, sheet: &StackSheet) -> Result<(), String> {
+    let (first, second) = (&sheet.scene.fibre_1, &sheet.scene.fibre_2);
+    let Some(second) = second
+        .as_ref()
+        .filter(|s| first_axis(first.si(), s.si()) != first.si())
+    else {
+        return Ok(());
+    };
+    let material = &*element.material;
+    let in_plane = membrane_apart(material, Families::Exchanged)?;
+    let bends = material.reference().sizes().has_bending;
+    let bending = match bends {
+        true => bending_apart(material, Families::Exchanged)?,
+        false => 0.0,
+    };
+    if in_plane.max(bending) <= RESPONSE_APART {
+        return Ok(());
+    }
+    let [first, second] = [first.si(), second.si()].map(f64::to_degrees);
+    Err(format!(
+        "sheet '{}': fibre_2 ({second:.1} deg) lies clockwise from fibre_1 ({first:.1} deg), and material '{}' tells its families apart: its first \
+         would lie along fibre_2. Expected fibre_2 a quarter turn counter-clockwise from fibre_1: for the stitch on the same side write \
+         fibre_1: {second:.1} deg, fibre_2: {first:.1} deg and exchange the families in the material (`family_1` and `family_2`; with \
+         `families: opposite` the other `positive_face`); without a stitch fibre_2: {:.1} deg",
+        sheet.scene.name,
+        sheet.material.name,
+        first + 90.0
+    ))
 }
 
 /// Samples; as many lanes hold their mirror images.

@@ -2,10 +2,10 @@
 
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;
-use plyflow_mechanics::vec3::{V, cross, norm, sub};
+use plyflow_mechanics::vec3::{V, cross, dot, norm, sub};
 use plyflow_model::material::MaterialEntry;
 use plyflow_model::scene::{Process, Scene, Sheet, StlTool, Tool};
-use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
+use plyflow_tooling::{SignedDistanceGrid, SurfaceTree, ToolMesh};
 use std::sync::Arc;
 
 /// Tool mesh and its distance field.
@@ -25,8 +25,12 @@ pub fn build(scene: &Scene, spacing: f64) -> Result<(ToolMesh, SignedDistanceGri
     };
     let stack: f64 = scene.sheets.iter().map(thickness).sum();
     let reach = (4.0 * spacing).max(0.01).max(2.0 * stack);
+    check_unit(scene, &mesh, spacing)?;
     check_size(scene, &mesh, spacing, reach)?;
     let grid = SignedDistanceGrid::build(&mesh, spacing, reach);
+    if let Tool::Stl(_) = &scene.tool {
+        check_walls(&mesh, &grid)?;
+    }
     Ok((mesh, grid))
 }
 
@@ -49,6 +53,79 @@ fn check_foot(stl: &StlTool, low: f64) -> Result<(), String> {
         1e3 * y,
         1e3 * (z - low)
     ))
+}
+
+/// Whether a tool of a file is more than a speck: a wrong `unit` would leave a run without any.
+fn check_unit(scene: &Scene, mesh: &ToolMesh, spacing: f64) -> Result<(), String> {
+    let [low, high] = mesh.bounds();
+    let size: V = std::array::from_fn(|k| high[k] - low[k]);
+    let largest = size.into_iter().fold(0.0, f64::max);
+    let (Tool::Stl(stl), true) = (&scene.tool, largest < 4.0 * spacing) else {
+        return Ok(());
+    };
+    Err(format!(
+        "scene.tool.stl: {} spans {:.3} x {:.3} x {:.3} mm, less than four spacings of its distance field (`tool_grid`, {:.3} mm); expected a \
+         tool: is `unit` ({} m) the length of one unit of the file?",
+        stl.file,
+        1e3 * size[0],
+        1e3 * size[1],
+        1e3 * size[2],
+        1e3 * spacing,
+        stl.unit.si()
+    ))
+}
+
+/// Whether walls of a tool are in its distance field, which knows nothing between two of its points: of one thinner than the spacing it may have
+/// nothing, and sheets go through it.
+fn check_walls(mesh: &ToolMesh, grid: &SignedDistanceGrid) -> Result<(), String> {
+    let tree = SurfaceTree::new(mesh);
+    let spacing = grid.spacing();
+    let depth = 0.75 * spacing;
+    let corners = |t: usize| mesh.triangles[t].map(|i| mesh.points[i as usize]);
+    let vector = |[a, b, c]: [V; 3]| cross(sub(b, a), sub(c, a));
+    let foot = mesh.bounds()[0][2] + depth;
+    let (mut area, mut worst) = (0.0, None::<(f64, V)>);
+    for t in 0..mesh.triangles.len() {
+        let facet = corners(t);
+        let twice = vector(facet);
+        let size = norm(twice);
+        let middle: V = std::array::from_fn(|k| (0..3).map(|i| facet[i][k]).sum::<f64>() / 3.0);
+        if size == 0.0 || middle[2] < foot {
+            continue;
+        }
+        let normal = twice.map(|c| c / size);
+        let inside = |d: f64| -> V { std::array::from_fn(|k| middle[k] - d * normal[k]) };
+        let found = tree.closest(inside(depth));
+        let other = vector(corners(found.triangle as usize));
+        let faces_away = dot(other, normal) < -0.5 * norm(other);
+        if !faces_away || found.signed_distance.abs() > 0.99 * depth {
+            continue;
+        }
+        // The middle of the wall lies half of its thickness inside: at the least half of that has to be seen.
+        let thickness = depth - found.signed_distance;
+        let seen = -grid.distance_and_gradient(inside(0.5 * thickness)).0;
+        if seen < 0.25 * thickness {
+            area += 0.5 * size;
+            if worst.is_none_or(|(w, _)| thickness < w) {
+                worst = Some((thickness, middle));
+            }
+        }
+    }
+    match worst {
+        Some((thickness, at)) if area > 4.0 * spacing * spacing => {
+            let [x, y, z] = at.map(|c| 1e3 * c);
+            Err(format!(
+                "scene.tool.stl: walls {:.2} mm thin and more, such as at ({x:.1}, {y:.1}, {z:.1}) mm, are lost between the points of the tool's \
+                 distance field, {:.2} mm apart: sheets would go through {:.0} mm2 of them. Expected at least two spacings in a wall: \
+                 `tool_grid: {:.2} mm`, or leave such walls out of the file",
+                1e3 * thickness,
+                1e3 * spacing,
+                1e6 * area,
+                1e3 * 0.5 * thickness
+            ))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Most values (of four bytes, and eight while they are made) of a tool's distance field.

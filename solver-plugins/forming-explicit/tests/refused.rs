@@ -155,3 +155,59 @@ fn a_tool_that_does_not_stand_on_the_bed_or_is_of_another_unit_says_so() {
         ],
     );
 }
+
+#[test]
+fn a_wall_that_is_lost_between_the_points_of_the_distance_field_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("wall.stl");
+    let with = |thickness: f64, grid: f64, unit: &str| {
+        let text = block([100.0, thickness, 30.0], [-50.0, -0.3 * thickness, 0.0]);
+        std::fs::write(&file, text).unwrap();
+        bag(1, |p| {
+            p["tool_grid"] = json!(grid);
+            p["scene"]["tool"] = json!({"stl": {"file": file.to_str().unwrap(), "unit": unit}});
+        })
+    };
+    let told = refused(&with(2.0, 0.003, "1 mm"));
+    assert_told(&told, &["walls 2.00 mm thin", "`tool_grid: 1.00 mm`"]);
+    for (thickness, grid) in [(2.0, 0.001), (12.0, 0.003)] {
+        let built = build_global(&with(thickness, grid, "1 mm"), &BuiltIn);
+        built.map(|_| ()).unwrap();
+    }
+    let speck = refused(&with(2.0, 0.003, "1 um"));
+    assert_told(&speck, &["0.100 x 0.002 x 0.030 mm", "is `unit`"]);
+}
+
+#[test]
+fn fibres_named_clockwise_are_refused_where_the_material_tells_its_families_apart() {
+    let gap = json!({"gap": "0.003 m"});
+    let with = |fibres: [&str; 2], families: &str| {
+        press(1, &gap, |p| {
+            let mut material = woven();
+            let law = |stiffness: f64| json!({"positive": {"linear": stiffness}});
+            material["with"]["bending"] = match families {
+                "apart" => {
+                    json!({"family_1": law(0.02), "family_2": law(0.0002), "families": "same"})
+                }
+                _ => law(0.02),
+            };
+            let ply = &mut p["scene"]["sheets"][0];
+            ply["material"] = material;
+            [ply["fibre_1"], ply["fibre_2"]] = fibres.map(|f| json!(f));
+        })
+    };
+    let told = refused(&with(["90 deg", "0 deg"], "apart"));
+    assert_told(
+        &told,
+        &["fibre_2 (0.0 deg) lies clockwise", "fibre_2: 180.0 deg"],
+    );
+    for (fibres, families) in [
+        (["90 deg", "180 deg"], "apart"),
+        (["0 deg", "90 deg"], "apart"),
+        (["90 deg", "0 deg"], "alike"),
+    ] {
+        build_global(&with(fibres, families), &BuiltIn)
+            .map(|_| ())
+            .unwrap();
+    }
+}

@@ -32,6 +32,8 @@ pub struct Fabric {
     pub generators: Generators,
     /// Distance of the ply's mid-plane from the tool (m); also its least height over the machine bed.
     pub offset: f64,
+    /// Height of the machine bed, or in a press of what the tool stands on (m).
+    pub bed: f64,
 }
 
 /// Why a node could not be placed.
@@ -319,7 +321,9 @@ impl Net {
 
     fn land(&self, found: Result<(Vec3, Vec3), Miss>) -> Node {
         match found {
-            Ok((x, _)) if x[2] < self.fabric.offset - 1e-9 => Node::Stopped(Stop::Bed),
+            Ok((x, _)) if x[2] < self.fabric.bed + self.fabric.offset - 1e-9 => {
+                Node::Stopped(Stop::Bed)
+            }
             Ok((x, n)) => Node::Placed(x, n),
             Err(Miss::Edge) => Node::Stopped(Stop::Edge),
             Err(Miss::NoPoint) => Node::Stopped(Stop::Locked),

@@ -6,7 +6,7 @@ use crate::root::drop_on;
 use crate::surface::SmoothSurface;
 use plyflow_blank::Quality;
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_model::scene::Scene;
+use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
 use plyflow_surface::vector::distance;
 use plyflow_tooling::ToolMesh;
@@ -51,9 +51,14 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
         .ok_or("the tool has no facet with an area: give another one")?;
     let started = Instant::now();
     let mut done = Vec::new();
+    // In a press the height is free, and the tool stands on what is below it.
+    let bed = match p.scene.process {
+        Process::DoubleDiaphragm(_) => 0.0,
+        Process::Press(_) => tool.bounds()[0][2],
+    };
     for (k, ply) in plies.iter().enumerate() {
         let part = |f: f64| 0.95 * (k as f64 + f) / plies.len() as f64;
-        done.push(drape(host, &p, &surface, &tool, ply, part)?);
+        done.push(drape(host, &p, &surface, &tool, (ply, bed), part)?);
     }
     let seconds = started.elapsed().as_secs_f64();
     report(host, 0.95, "writing");
@@ -103,7 +108,7 @@ fn drape(
     p: &Parameters,
     surface: &SmoothSurface,
     tool: &ToolMesh,
-    ply: &Ply,
+    (ply, bed): (&Ply, f64),
     part: impl Fn(f64) -> f64,
 ) -> Result<Done, StepError> {
     let name = &ply.scene.name;
@@ -131,6 +136,7 @@ fn drape(
         locking: p.locking_angle,
         generators: p.generators,
         offset: ply.offset,
+        bed,
     };
     let mut net = Net::new(fabric).ok_or_else(|| {
         format!(

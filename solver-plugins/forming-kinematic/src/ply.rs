@@ -131,9 +131,10 @@ pub fn stops(net: &Net) -> Stops {
 }
 
 /// Lays the mesh on the net: bilinear in the net's cells, then back onto the surface along its normal. What the net does
-/// not reach hangs on in the plane of the nearest whole cell, not below `offset` over the bed. `None`
+/// not reach hangs on in the plane of the nearest whole cell, not below `offset` over the `bed` (m). `None`
 /// when no cell of the net is whole.
 pub fn lay(net: &Net, mesh: &QuadMesh, surface: &dyn DrapeSurface, offset: f64) -> Option<Draped> {
+    let bed = net.fabric.bed;
     let whole = rim(net);
     if whole.is_empty() {
         return None;
@@ -146,7 +147,7 @@ pub fn lay(net: &Net, mesh: &QuadMesh, surface: &dyn DrapeSurface, offset: f64) 
         on_net.push(found.is_some());
         draped.points.push(found.unwrap_or_else(|| {
             let mut x = beyond(net, nearest(&whole, at).0, at);
-            x[2] = x[2].max(offset);
+            x[2] = x[2].max(bed + offset);
             x
         }));
     }

@@ -17,6 +17,7 @@ fn fabric(turn: f64, spacing: f64, offset: f64) -> Fabric {
         start: [0.0; 2],
         spacing,
         locking: 80f64.to_radians(),
+        bed: 0.0,
         generators: Generators::Geodesic,
         offset,
     }

@@ -38,6 +38,7 @@ fn fabric(half: [f64; 2]) -> Fabric {
         start: [0.0; 2],
         spacing: 1.3e-3,
         locking: 70f64.to_radians(),
+        bed: 0.0,
         generators: Generators::Geodesic,
         offset: 0.6e-3,
     }

@@ -90,6 +90,7 @@ fn drape(
         start: [0.0; 2],
         spacing,
         locking: 80f64.to_radians(),
+        bed: 0.0,
         generators: Generators::Geodesic,
         offset,
     };

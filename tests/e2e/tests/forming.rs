@@ -330,6 +330,39 @@ fn a_forced_run_begins_anew_and_goes_on_when_it_was_killed() {
 }
 
 #[test]
+fn a_stack_of_plies_of_different_outlines_is_run_and_written() {
+    let study = study("[]");
+    let scene = std::fs::read_to_string(study.path("scene.yaml")).unwrap();
+    // The film reaches the upper ply beside the lower one.
+    std::fs::write(
+        study.path("scene.yaml"),
+        scene.replacen("120 mm", "60 mm", 1),
+    )
+    .unwrap();
+    assert_eq!(study.run(&["--until", "coarse"]), well(1, 0));
+}
+
+#[test]
+fn the_boundary_of_another_scene_is_refused() {
+    let study = study(TWO_ZONES);
+    let scene = std::fs::read_to_string(study.path("scene.yaml")).unwrap();
+    let turned = scene.replacen(
+        "fibre_1: -45 deg, fibre_2: 45 deg",
+        "fibre_1: 0 deg, fibre_2: 90 deg",
+        1,
+    );
+    std::fs::write(study.path("other.yaml"), turned).unwrap();
+    let local = "with: {scene: scene.yaml, element: rf4";
+    study.write(&chain(TWO_ZONES).replace(local, &local.replace("scene.yaml", "other.yaml")));
+    assert!(!study.start(&[]).wait().unwrap().success());
+    let log = study.log();
+    assert!(
+        log.contains("fibre_1 of sheet 'ply_1' is 0.0000 deg, and -45.0000 deg"),
+        "{log}"
+    );
+}
+
+#[test]
 fn a_torn_checkpoint_is_not_taken_up() {
     let study = study("[]");
     let often = ["--checkpoint-every", "0 s", "--until", "coarse"];
