@@ -40,6 +40,8 @@ pub(crate) struct Scene {
     /// Fields that are the same everywhere, and those for which the page has no room.
     pub(crate) even: Vec<String>,
     pub(crate) left_out: Vec<String>,
+    /// Whether there are defects to choose from.
+    pub(crate) defects: bool,
 }
 
 /// What the script is told. Places are in metres; arrays lie in `data`, in the order of what is listed here.
@@ -194,6 +196,7 @@ pub(crate) fn scene(
         legends,
         even: others.even,
         left_out,
+        defects: !places.is_empty(),
     }))
 }
 

@@ -63,7 +63,8 @@ pub(super) fn section(
                         (legend.note())
                     }
                 }
-                p class="note" { "Drag, one finger or the arrow keys turn; Shift and drag, or two fingers, move; +, −, two fingers or the wheel (after a click) zoom; 0 resets. A defect that is chosen is shown on its own ply alone. Surfaces are shaded by the light."
+                p class="note" { "Drag, one finger or the arrow keys turn; Shift and drag, or two fingers, move; +, −, two fingers or the wheel (after a click) zoom; 0 resets. Surfaces are shaded by the light."
+                    @if scene.defects { " A defect that is chosen is shown on its own ply alone." }
                     @if !scene.notes.is_empty() { " Shown coarser than computed: " (scene.notes.join("; ")) "." }
                     @if !scene.even.is_empty() { " The same everywhere and not in the menu: " (scene.even.join(", ")) "." }
                     @if !scene.left_out.is_empty() { " Left out, as the page would grow too large: " (scene.left_out.join(", ")) "; " code { "plyflow inspect" } " tells where the artifacts lie, which ParaView opens." } }

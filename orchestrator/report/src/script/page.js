@@ -39,15 +39,6 @@
   });
 
   for (const text of all('.with-script')) text.hidden = false;
-  // What is folded up on the screen is not to be had on paper.
-  let opened = [];
-  addEventListener('beforeprint', () => {
-    opened = all('details:not([open])');
-    for (const one of opened) one.open = true;
-  });
-  addEventListener('afterprint', () => {
-    for (const one of opened) one.open = false;
-  });
   for (const button of all('button.copy')) {
     button.addEventListener('click', async () => {
       const code = button.parentElement.querySelector('code');
