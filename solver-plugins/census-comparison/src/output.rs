@@ -27,9 +27,12 @@ pub fn overlaid(host: &Host, runs: &[Run]) -> Result<Vec<Value>, StepError> {
     for (plot, x_label, unit, si) in OVERLAID {
         for (k, leader) in first.iter().filter(|c| c.plot == plot).enumerate() {
             let mut series = Vec::new();
+            // Older censuses round labels: of those with one label each has its own place.
+            let before = first.iter().filter(|c| c.plot == plot).take(k);
+            let place = before.filter(|c| same_curve(leader, c)).count();
             for run in runs {
                 let same = |c: &&_| same_curve(leader, c);
-                let Some(curve) = run.curves.iter().find(same) else {
+                let Some(curve) = run.curves.iter().filter(same).nth(place) else {
                     continue;
                 };
                 let mut paths = Vec::new();

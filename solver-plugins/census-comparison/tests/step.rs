@@ -284,3 +284,38 @@ fn profiles_with_other_places_are_compared_where_both_are() {
     assert_eq!(relative_distance(&slope, &[]), None);
     assert_eq!(relative_distance(&[[0.0, 1.0], [1.0, 1.0]], &slope), None);
 }
+
+/// Two circles whose radii differ by 0.8 mm, labelled as wrinkle-census does, and as it did before.
+#[test]
+fn circles_close_to_each_other_keep_their_curves() {
+    let with_second = |height: f64, labels: [&str; 2]| {
+        let mut census = census(3, 0.02, 1e-3, None);
+        let curves = census.attributes["curves"].as_array_mut().unwrap();
+        curves[0]["label"] = json!(labels[0]);
+        curves.push(json!({"plot": "circles", "label": labels[1], "x": "curves/circle_1/angle", "y": "curves/circle_1/height"}));
+        let array = |values: &[f64]| (vec![values.len()], values.to_vec());
+        let second = [
+            ("angle", array(&[0.0, 3.0])),
+            ("height", array(&[0.0, height])),
+        ];
+        for (what, values) in second {
+            let path = format!("curves/circle_1/{what}");
+            census.arrays.insert(path, values);
+        }
+        census
+    };
+    for labels in [["radius 80.4 mm", "radius 79.6 mm"], ["radius 80 mm"; 2]] {
+        let all = [0.5, 0.7].map(|height| with_second(height, labels));
+        let found = compare(json!({}), &all).unwrap();
+        let plots = found.attributes["plots"].as_array().unwrap();
+        let shown: Vec<Vec<f64>> = (plots.iter())
+            .filter(|p| p["title"].as_str().unwrap().starts_with("radius"))
+            .map(|p| {
+                let series = p["series"].as_array().unwrap().iter();
+                let last = |s: &Value| found.arrays[s["y"].as_str().unwrap()].1[1];
+                series.map(last).collect()
+            })
+            .collect();
+        assert_eq!(shown, [[1e-3, 1e-3], [0.5, 0.7]], "{labels:?}");
+    }
+}

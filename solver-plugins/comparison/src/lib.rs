@@ -91,6 +91,8 @@ fn write_attributes(
     let defects: Vec<Value> = table.iter().map(|e| e.to_json(models, zones)).collect();
     host.write_attributes(&json!({
         "zones": zones.iter().map(|z| &z.name).collect::<Vec<_>>(),
+        // A zone that is drawn again keeps its name.
+        "zone_boxes": zones.iter().map(|z| z.bounds).collect::<Vec<_>>(),
         "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES, "cut": cut,
         "measured_by": Yardstick::of(models),
         "ways": ways.iter().map(Way::to_json).collect::<Vec<_>>(),

@@ -79,6 +79,10 @@ fn a_wrinkle_and_a_bridge_are_told_apart_and_measured() {
         "{bridge}"
     );
     assert_eq!(bridge["touches_cut"], false);
+    assert_eq!(
+        (&out.attributes["zones"], &out.attributes["zone_boxes"]),
+        (&json!(["A"]), &json!([ZONE]))
+    );
     // Measured numbers are not in the artifact proper.
     assert_eq!(out.measured["cost.local.A.cpu_seconds"], (50.0, "s".into()));
     assert_eq!(out.measured["cost.total.wall_seconds"], (40.0, "s".into()));

@@ -130,10 +130,11 @@ impl Step for DefectMeasurement {
         };
         let mut measured: Vec<Measured> = plies.into_iter().zip(found).map(with).collect();
         let (mut alignment, mut agreement) = (None, None);
-        if let Some(path) = &p.scan {
+        if p.scan.is_some() {
             phase("scan", 0.6)?;
             let shown = run.shown(p.scan_ply.as_deref())?;
-            let scan = read::Scan::read(&run, path, &p, settings.foot_margin)?;
+            let plies: Vec<&Ply> = measured.iter().map(|m| &m.ply).collect();
+            let scan = read::Scan::read(host, &run, (&plies, shown), &p, settings.foot_margin)?;
             phase("scan and ply", 0.8)?;
             let above = scan.offset - run.plies[shown].offset;
             let ply = &measured[shown].ply;

@@ -2,12 +2,13 @@
 
 use crate::output::SCAN;
 use crate::{Align, Parameters, sections};
-use plyflow_defects::align::{Alignment, Settings, align};
+use plyflow_defects::align::{Alignment, MOST_PASSES, Settings, align_where};
 use plyflow_defects::of_run::Sheet;
 use plyflow_defects::{Ply, Tool, of_run, scan};
-use plyflow_sdk::{Host, Input, StepError};
-use plyflow_surface::Topology;
+use plyflow_sdk::{Host, Input, Log, StepError};
+use plyflow_surface::of_run::Stack;
 use plyflow_surface::vector::Vec3;
+use plyflow_surface::{Closest, Surface, Topology, triangles};
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
@@ -137,6 +138,57 @@ impl Beside {
     }
 }
 
+/// The plies of a run, some of which end under a scan.
+struct Beneath<'a> {
+    stack: Stack,
+    /// From the tool upwards: their formed faces.
+    plies: Vec<(&'a Ply, Surface)>,
+}
+
+impl<'a> Beneath<'a> {
+    /// `None` where all lie everywhere, as far as the run tells. `counted`: those whose thickness is in the scan's offset, from the tool upwards.
+    fn read(host: &Host, run: &Run, counted: &[&'a Ply]) -> Result<Option<Self>, StepError> {
+        let Some(mut stack) = Stack::read(host, &run.input)? else {
+            return Ok(None);
+        };
+        if let Some(last) = counted.last() {
+            stack.up_to(&last.name);
+        }
+        let face = |ply: &&'a Ply| {
+            let (corners, cells) = ply.topology.connectivity();
+            Some((*ply, Surface::new(&ply.formed, &triangles(corners, cells))?))
+        };
+        let plies: Vec<_> = counted.iter().filter_map(face).collect();
+        Ok((!plies.is_empty()).then_some(Self { stack, plies }))
+    }
+
+    /// Thickness (m) of the plies that do not lie under a place of the scan: by the flat place of the nearest point of the uppermost ply that lies there. Where
+    /// none does, past the edge of what was simulated, the nearest edge tells: the stack goes on as it ends.
+    fn missing(&self, p: Vec3) -> f64 {
+        let mut nearest: Option<(&Ply, &Surface, Closest)> = None;
+        for (ply, face) in self.plies.iter().rev() {
+            let closest = face.closest(p);
+            if !closest.on_free_edge {
+                nearest = Some((ply, face, closest));
+                break;
+            }
+            let off = closest.signed_distance.abs();
+            if nearest.is_none_or(|(.., c)| off < c.signed_distance.abs()) {
+                nearest = Some((ply, face, closest));
+            }
+        }
+        nearest.map_or(0.0, |(ply, face, closest)| {
+            let corners = face.triangles()[closest.triangle];
+            let weights = face.weights(closest.triangle, closest.point);
+            let place = |d: usize| -> f64 {
+                let each = corners.iter().zip(weights);
+                each.map(|(&i, w)| w * ply.undeformed[i as usize][d]).sum()
+            };
+            self.stack.missing_beside(&ply.name, [place(0), place(1)])
+        })
+    }
+}
+
 /// A scan on the tool of a run.
 pub struct Scan {
     /// Measured as a ply.
@@ -148,45 +200,89 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// Reads and aligns a scan.
+    /// Reads and aligns a scan. `plies`: all of the run, from the tool upwards; `shown`: which of them it shows.
     pub fn read(
+        host: &Host,
         run: &Run,
-        path: &str,
+        (plies, shown): (&[&Ply], usize),
         p: &Parameters,
         foot_margin: f64,
     ) -> Result<Self, StepError> {
+        let path = p.scan.as_deref().unwrap_or_default();
         let read = scan::read(Path::new(path), p.scan_unit).map_err(|e| e.to_string())?;
         let (mut points, mut facets) = (read.points, read.triangles);
         let (tool, offset) = (&run.tool.surface, p.scan_offset.unwrap_or(run.outer));
+        // An offset that is given is that of the face of the ply that is shown; the plies above that are not in it.
+        let counted = match p.scan_offset {
+            Some(_) => &plies[..=shown],
+            None => plies,
+        };
+        let beneath = Beneath::read(host, run, counted)?;
+        let missing = |p: Vec3| beneath.as_ref().map_or(0.0, |b| b.missing(p));
         let mut alignment = None;
         if p.scan_align == Align::ClosestPoints {
-            let settings = Settings {
-                offset,
-                kept: p.scan_kept,
-                most_points: 20000,
-            };
-            let found = align(&points, tool, &settings).ok_or_else(|| {
-                format!(
-                    "scan: fewer than six of the {} points of `{path}` lie over the tool, the others beyond its edge: it cannot be aligned. Correct `scan_unit` (one unit of \
-                     its numbers is taken for {} mm), or move the scan to within some centimetres and degrees of the tool",
-                    points.len(),
-                    1e3 * p.scan_unit
-                )
-            })?;
+            let found = aligned(host, &points, tool, (offset, &missing), p)?;
             points.iter_mut().for_each(|p| *p = found.place(*p));
             alignment = Some(found);
         }
         if facets.is_empty() {
             facets = scan::join(&points, |p| tool.closest(p).normal);
+        } else {
+            scan::orient(&points, &mut facets, |p| {
+                Some(tool.closest(p))
+                    .filter(|c| !c.on_free_edge)
+                    .map(|c| c.normal)
+            });
         }
         let topology = Topology::new(points.len(), 3, facets.as_flattened());
         let flat = points.clone();
         let name = SCAN.to_owned();
-        let ply = Ply::new(name, topology, flat, points, &run.tool, offset, foot_margin);
+        let missing: Vec<f64> = match &beneath {
+            Some(beneath) => points.iter().map(|p| beneath.missing(*p)).collect(),
+            None => Vec::new(),
+        };
+        let mut ply = Ply::new(name, topology, flat, points, &run.tool, offset, foot_margin);
+        ply.lower(&missing);
         Ok(Self {
             ply,
             alignment,
             offset,
         })
     }
+}
+
+/// Aligns the points of a scan, which lie at `offset` (m) from the tool less what is missing beneath them.
+fn aligned(
+    host: &Host,
+    points: &[Vec3],
+    tool: &Surface,
+    (offset, missing): (f64, &dyn Fn(Vec3) -> f64),
+    p: &Parameters,
+) -> Result<Alignment, StepError> {
+    let settings = Settings {
+        offset,
+        kept: p.scan_kept,
+        most_points: 20000,
+    };
+    let found = align_where(points, tool, &settings, missing).ok_or_else(|| {
+        format!(
+            "scan: fewer than six of the {} points of `{}` lie over the tool, the others beyond its edge: it cannot be aligned. Correct `scan_unit` (one unit of \
+             its numbers is taken for {} mm), or move the scan to within some centimetres and degrees of the tool",
+            points.len(),
+            p.scan.as_deref().unwrap_or_default(),
+            1e3 * p.scan_unit
+        )
+    })?;
+    if !found.converged {
+        let text = format!(
+            "scan: it had not come to rest on the tool after {MOST_PASSES} passes, the last of which moved it by {:.4} mm ({:.4} mm root mean square off it, {} of six \
+             freedoms decided): where it lies is not certain. Move the scan nearer to where it belongs, or change `scan_kept` ({})",
+            1e3 * found.last_motion,
+            1e3 * found.rms,
+            found.decided,
+            p.scan_kept
+        );
+        host.log(Log::Warn, &text);
+    }
+    Ok(found)
 }

@@ -4,8 +4,8 @@ use crate::area::{Extent, NONE, extents};
 use crate::cause::Cause;
 use plyflow_surface::vector::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{
-    Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances, ridge_line,
-    tool_crests,
+    Crests, Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances,
+    ridge_line,
 };
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -55,13 +55,13 @@ pub struct Ply {
 pub struct Tool {
     /// Its surface.
     pub surface: Surface,
-    crests: Vec<f64>,
+    crests: Crests,
 }
 
 impl Tool {
     /// Takes the curvatures of a tool's surface.
     pub fn new(surface: Surface) -> Self {
-        let crests = tool_crests(&surface);
+        let crests = Crests::new(&surface);
         Self { surface, crests }
     }
 }
@@ -84,7 +84,9 @@ impl Ply {
         if faces(&topology, &formed, &tool.surface, &distance) {
             curvature.iter_mut().for_each(turn_over);
         }
-        let tool_crest = distance.iter().map(|d| tool.crests[d.triangle]).collect();
+        let tool_crest = (distance.iter().zip(&formed))
+            .map(|(d, p)| tool.crests.at(*p, d.triangle))
+            .collect();
         Self {
             name,
             topology,

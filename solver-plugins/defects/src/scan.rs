@@ -1,13 +1,14 @@
 //! Scanned preforms: facets from STL files, or clouds of points, which are joined to facets here.
 
 use nalgebra::{Matrix3, Vector3};
-use plyflow_surface::vector::{Vec3, cross, dot, norm, sub};
+use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub};
+use plyflow_tooling::stl::solids;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Cursor};
 use std::path::{Path, PathBuf};
 
 /// What a file holds.
@@ -50,6 +51,16 @@ pub enum ScanError {
         /// As given, at most 60 characters.
         text: String,
     },
+    /// A facet that lies nowhere.
+    #[error(
+        "the scan `{path}`: facet {facet} has a corner whose coordinates are not all finite numbers; export the scan again"
+    )]
+    Facet {
+        /// As given.
+        path: PathBuf,
+        /// From 1.
+        facet: usize,
+    },
     /// Too little to measure.
     #[error("the scan `{path}` has {found} points; at least {LEAST} are needed")]
     Few {
@@ -63,8 +74,11 @@ pub enum ScanError {
 /// A surface has at least so many points.
 const LEAST: usize = 20;
 
-/// Reads a scan whose numbers are in `unit` (m). STL: facets, corners at bit-equal places are one point. `.xyz`, `.txt`, `.asc`,
-/// `.csv`: a point a line, its first three numbers, parted by blanks, commas or semicolons; empty lines, those that begin with
+/// Corners closer than this part of the diagonal of the box around a scan are one.
+const WELD: f64 = 1e-6;
+
+/// Reads a scan whose numbers are in `unit` (m). STL: the facets of all solids; corners nearer to each other than a millionth of the scan's diagonal are
+/// one point, facets that lose a corner by that or repeat another one are left out; how they are wound is left to [`orient`]. `.xyz`, `.txt`, `.asc`, `.csv`: a point a line, its first three numbers, parted by blanks, commas or semicolons; empty lines, those that begin with
 /// `#` or `//`, and a first line of words are passed over.
 ///
 /// # Errors
@@ -94,16 +108,168 @@ fn read_stl(path: &Path, unit: f64) -> Result<Scan, ScanError> {
         path: path.to_owned(),
         source,
     };
-    let mut input = BufReader::new(File::open(path).map_err(failed)?);
-    let mesh = stl_io::read_stl(&mut input).map_err(failed)?;
-    let place = |v: &stl_io::Vertex| [0, 1, 2].map(|k| f64::from(v[k]) * unit);
+    let bytes = std::fs::read(path).map_err(failed)?;
+    let mut corners: Vec<Vec3> = Vec::new();
+    for solid in solids(&bytes) {
+        let mut input = Cursor::new(&solid[..]);
+        for facet in stl_io::create_stl_reader(&mut input).map_err(failed)? {
+            let facet = facet.map_err(failed)?.vertices;
+            if facet.iter().flat_map(|v| v.0).any(|c| !c.is_finite()) {
+                return Err(ScanError::Facet {
+                    path: path.to_owned(),
+                    facet: corners.len() / 3 + 1,
+                });
+            }
+            corners.extend(facet.map(|v| v.0.map(|c| f64::from(c) * unit)));
+        }
+    }
+    let (points, stands_for) = weld(&corners);
+    let mut seen = BTreeSet::new();
+    let mut whole = |t: &[u32; 3]| {
+        let mut sorted = *t;
+        sorted.sort_unstable();
+        let [a, b, c] = sorted;
+        a != b && b != c && seen.insert(sorted)
+    };
+    let facets = stands_for.as_chunks::<3>().0;
     Ok(Scan {
-        points: mesh.vertices.iter().map(place).collect(),
-        triangles: (mesh.faces.iter())
-            .map(|f| f.vertices.map(|i| i as u32))
-            .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
-            .collect(),
+        triangles: facets.iter().copied().filter(|t| whole(t)).collect(),
+        points,
     })
+}
+
+/// The places of corners, those within reach of an earlier one left out, and the place that each corner takes: seams, where a file gives the same
+/// place with other last digits, are closed.
+fn weld(corners: &[Vec3]) -> (Vec<Vec3>, Vec<u32>) {
+    // The equal ones first, which are most by far. Adding zero turns -0 into 0.
+    let mut first: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut places: Vec<GeomWithData<Vec3, u32>> = Vec::new();
+    let of_corner: Vec<u32> = (corners.iter())
+        .map(|p| {
+            let p = p.map(|c| c + 0.0);
+            *first.entry(p.map(f64::to_bits)).or_insert_with(|| {
+                places.push(GeomWithData::new(p, places.len() as u32));
+                places.len() as u32 - 1
+            })
+        })
+        .collect();
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for place in &places {
+        for d in 0..3 {
+            low[d] = low[d].min(place.geom()[d]);
+            high[d] = high[d].max(place.geom()[d]);
+        }
+    }
+    let near = WELD * norm(sub(high, low));
+    let tree = RTree::bulk_load(places.clone());
+    let mut points = Vec::new();
+    let mut stands_for = vec![u32::MAX; places.len()];
+    for place in &places {
+        if stands_for[place.data as usize] != u32::MAX {
+            continue;
+        }
+        for other in tree.locate_within_distance(*place.geom(), near * near) {
+            let taken = &mut stands_for[other.data as usize];
+            *taken = (*taken).min(points.len() as u32);
+        }
+        // Whatever the search's rounding makes of a distance of 0.
+        stands_for[place.data as usize] = points.len() as u32;
+        points.push(*place.geom());
+    }
+    let stands_for = of_corner.iter().map(|&i| stands_for[i as usize]);
+    (points, stands_for.collect())
+}
+
+/// Winds all facets alike, where some are wound against others: as along every side that two of them share the one goes against the other, so on what
+/// hangs together all of them; and what hangs together so that, on the whole and by area, it has its face where `outward` (a direction on the outer side at a
+/// place; `None` where none can be told) has it. Facets that are wound alike already stay, whichever way that is.
+pub fn orient(points: &[Vec3], triangles: &mut [[u32; 3]], outward: impl Fn(Vec3) -> Option<Vec3>) {
+    let pieces = pieces(triangles);
+    let alike = |p: &Piece| p.holds && p.facets.iter().all(|f| !f.1);
+    if let [one] = &pieces[..]
+        && alike(one)
+    {
+        return;
+    }
+    // Twice the area of a facet that has its face on the outer side, negative for one that has its back there.
+    let faces = |t: usize| {
+        let [a, b, c] = triangles[t].map(|i| points[i as usize]);
+        let middle = scale(add(a, add(b, c)), 1.0 / 3.0);
+        outward(middle).map_or(0.0, |n| dot(cross(sub(b, a), sub(c, a)), n))
+    };
+    let mut turned = vec![false; triangles.len()];
+    for piece in &pieces {
+        let signed = |&(t, other): &(usize, bool)| if other { -faces(t) } else { faces(t) };
+        let back = piece.facets.iter().map(signed).sum::<f64>() < 0.0;
+        for &(t, other) in &piece.facets {
+            // A band with a half turn has no sides: there each facet is for itself.
+            turned[t] = if piece.holds {
+                other != back
+            } else {
+                faces(t) < 0.0
+            };
+        }
+    }
+    if turned.iter().all(|t| *t) {
+        return;
+    }
+    for (t, turned) in triangles.iter_mut().zip(turned) {
+        if turned {
+            t.swap(1, 2);
+        }
+    }
+}
+
+/// Facets that hang together over sides that two of them share.
+struct Piece {
+    /// Index, and whether it is wound against the first one.
+    facets: Vec<(usize, bool)>,
+    /// Whether that is the same along whatever way one goes from one to the other.
+    holds: bool,
+}
+
+fn pieces(triangles: &[[u32; 3]]) -> Vec<Piece> {
+    let mut sides: Vec<(u32, u32, usize, bool)> = (triangles.iter().enumerate())
+        .flat_map(|(t, c)| {
+            [(c[0], c[1]), (c[1], c[2]), (c[2], c[0])].map(|(a, b)| (a.min(b), a.max(b), t, a < b))
+        })
+        .collect();
+    sides.sort_unstable();
+    // By facet: its neighbours, and whether they are wound against it. A side of three facets has no two sides to tell.
+    let mut next: Vec<Vec<(usize, bool)>> = vec![Vec::new(); triangles.len()];
+    for group in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        if let [(.., t, forth), (.., u, back)] = *group {
+            next[t].push((u, forth == back));
+            next[u].push((t, forth == back));
+        }
+    }
+    let mut winding: Vec<Option<bool>> = vec![None; triangles.len()];
+    let mut found = Vec::new();
+    for start in 0..triangles.len() {
+        if winding[start].is_some() {
+            continue;
+        }
+        winding[start] = Some(false);
+        let mut piece = Piece {
+            facets: vec![(start, false)],
+            holds: true,
+        };
+        let mut at = 0;
+        while let Some(&(t, own)) = piece.facets.get(at) {
+            for &(u, against) in &next[t] {
+                match winding[u] {
+                    None => {
+                        winding[u] = Some(own != against);
+                        piece.facets.push((u, own != against));
+                    }
+                    Some(there) => piece.holds &= there == (own != against),
+                }
+            }
+            at += 1;
+        }
+        found.push(piece);
+    }
+    found
 }
 
 fn read_points(path: &Path, unit: f64) -> Result<Scan, ScanError> {

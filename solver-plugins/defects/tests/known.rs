@@ -492,3 +492,51 @@ fn causes_follow_from_the_fields() {
     ply.fibre_strain = vec![1e-4; n];
     assert_eq!(cause(&ply, &turned, 0.02), Cause::Undetermined);
 }
+
+/// A block of 200 x 140 mm whose long edges are rounded by 1.5 mm, as a file has it: between these the top has two facets for every 20 mm. What is known at their
+/// corners, on the rounded edges, says nothing of their middle, where the wrinkle lies.
+#[test]
+fn a_wrinkle_over_a_large_facet_between_fillets_is_measured_as_on_a_plane() {
+    let (r, half) = (0.0015, [0.100, 0.070]);
+    let rim = (0..=9).map(|k| 0.5 * PI * f64::from(k) / 9.0);
+    let rim: Vec<[f64; 2]> = rim
+        .map(|a| [half[1] - r + r * a.cos(), r * (a.sin() - 1.0)])
+        .collect();
+    let mut profile = vec![[half[1], -0.04]];
+    profile.extend(&rim);
+    profile.extend(rim.iter().rev().map(|[y, z]| [-y, *z]));
+    profile.push([-half[1], -0.04]);
+    let points: Vec<Vec3> = (0..=10)
+        .map(|i| half[0] * (0.2 * f64::from(i) - 1.0))
+        .flat_map(|x| profile.iter().map(move |[y, z]| [x, *y, TOP + z]))
+        .collect();
+    let m = profile.len() as u32;
+    let facets: Vec<[u32; 3]> = (0..10)
+        .flat_map(|i| (0..m - 1).map(move |j| i * m + j))
+        .flat_map(|a| [[a, a + m + 1, a + m], [a, a + 1, a + m + 1]])
+        .collect();
+    let block = Tool::new(Surface::new(&points, &facets).unwrap());
+    let (plane, cells) = flat(0.00125, 0.0);
+    let bumps = formed(&plane, 0.0);
+    let on = |tool: &Tool| {
+        let topology = Topology::new(bumps.len(), 4, &cells);
+        let undeformed = bumps.iter().map(|p| [p[0], p[1], 0.0]).collect();
+        let margin = SETTINGS.foot_margin;
+        let ply = Ply::new(
+            "ply".into(),
+            topology,
+            undeformed,
+            bumps.clone(),
+            tool,
+            OFFSET,
+            margin,
+        );
+        measure(&ply, &vec![true; bumps.len()], &SETTINGS)
+    };
+    let (found, expected) = (on(&block), on(&tool()));
+    assert_eq!(found.len(), expected.len());
+    for (a, b) in found.iter().zip(&expected) {
+        assert_eq!(a.kind, b.kind);
+        assert!((a.length - b.length).abs() < 1e-6 && (a.area - b.area).abs() < 1e-9);
+    }
+}

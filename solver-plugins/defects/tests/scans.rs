@@ -1,8 +1,8 @@
 //! Reading scans and aligning them.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use plyflow_defects::align::{Settings, align};
-use plyflow_defects::scan::read;
+use plyflow_defects::align::{MOST_PASSES, Settings, align};
+use plyflow_defects::scan::{orient, read};
 use plyflow_model::scene::Tool;
 use plyflow_surface::Surface;
 use plyflow_surface::vector::{Vec3, add, cross, distance, scale, sub, unit};
@@ -141,4 +141,253 @@ fn facets_of_an_stl_share_their_corners() {
     assert!(scan.points.len() <= mesh.points.len());
     let far = scan.points.iter().map(|p| p[0]).fold(0.0, f64::max);
     assert!((far - 0.31).abs() < 1e-6, "{far}");
+}
+
+/// Facets as an ASCII STL has them, in mm.
+fn solid(header: &str, points: &[Vec3], facets: &[[u32; 3]]) -> String {
+    let mut text = format!("{header}\n");
+    for t in facets {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for [x, y, z] in t.map(|i| points[i as usize].map(|v| 1e3 * v)) {
+            text += &format!("vertex {x:?} {y:?} {z:?}\n");
+        }
+        text += "endloop\nendfacet\n";
+    }
+    text + "endsolid\n"
+}
+
+#[test]
+fn all_solids_of_a_text_file_are_read_and_none_needs_a_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.stl");
+    let mesh = spar();
+    let half = mesh.triangles.len() / 2;
+    let (first, second) = mesh.triangles.split_at(half);
+    for header in ["solid", "solid patch"] {
+        let both = solid(header, &mesh.points, first) + "\n" + &solid(header, &mesh.points, second);
+        fs::write(&path, both).unwrap();
+        let scan = read(&path, 0.001).unwrap();
+        assert_eq!(scan.triangles.len(), mesh.triangles.len(), "{header}");
+        // The patches hang together.
+        assert!(scan.points.len() <= mesh.points.len());
+    }
+}
+
+#[test]
+fn a_facet_that_lies_nowhere_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.stl");
+    let mesh = spar();
+    for wrong in [f32::NAN, f32::INFINITY] {
+        let facet = |(k, t): (usize, &[u32; 3])| {
+            let mut vertices = t.map(|i| mesh.points[i as usize].map(|v| 1e3 * v as f32));
+            if k == 6 {
+                vertices[1][2] = wrong;
+            }
+            stl_io::Triangle {
+                normal: stl_io::Normal::new([0.0; 3]),
+                vertices: vertices.map(stl_io::Vertex::new),
+            }
+        };
+        let facets: Vec<stl_io::Triangle> = mesh.triangles.iter().enumerate().map(facet).collect();
+        let mut file = fs::File::create(&path).unwrap();
+        stl_io::write_stl(&mut file, facets.iter()).unwrap();
+        let error = read(&path, 0.001).unwrap_err().to_string();
+        assert!(
+            error.contains("scan.stl`: facet 7 has") && error.contains("export the scan again"),
+            "{error}"
+        );
+    }
+}
+
+/// 20 x 10 squares of 5 mm about the origin, flat, each in two facets.
+fn sheet() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let points = (0..11)
+        .flat_map(|j| {
+            (0..21).map(move |i| {
+                [
+                    0.005 * f64::from(i) - 0.05,
+                    0.005 * f64::from(j) - 0.025,
+                    0.0,
+                ]
+            })
+        })
+        .collect();
+    let at = |i: u32, j: u32| 21 * j + i;
+    let facets = (0..10)
+        .flat_map(|j| (0..20).map(move |i| (i, j)))
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        })
+        .collect();
+    (points, facets)
+}
+
+#[test]
+fn seams_are_closed_and_facets_that_collapse_or_repeat_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.stl");
+    let (points, facets) = sheet();
+    let left = |t: &&[u32; 3]| t.iter().all(|&i| points[i as usize][0] < 1e-9);
+    let (left, right): (Vec<[u32; 3]>, Vec<[u32; 3]>) = facets.iter().partition(left);
+    // The right patch has its border at -0 and 0.00001 mm off in y; two facets more are there twice, and as thin as that.
+    let off = |p: &Vec3| {
+        if p[0].abs() < 1e-9 {
+            [-0.0, p[1] + 1e-8, -0.0]
+        } else {
+            *p
+        }
+    };
+    let mut moved: Vec<Vec3> = points.iter().map(off).collect();
+    moved.push([0.01 + 1e-8, 0.01, 0.0]);
+    moved.push([0.01, 0.01, 0.0]);
+    let [thin, other] = [moved.len() as u32 - 2, moved.len() as u32 - 1];
+    let mut with = right.clone();
+    with.extend([
+        right[3],
+        [right[4][1], right[4][0], right[4][2]],
+        [thin, other, right[0][0]],
+    ]);
+    fs::write(
+        &path,
+        solid("solid", &points, &left) + &solid("solid", &moved, &with),
+    )
+    .unwrap();
+    let scan = read(&path, 0.001).unwrap();
+    assert_eq!(
+        (scan.points.len(), scan.triangles.len()),
+        (points.len(), facets.len())
+    );
+    assert!(
+        scan.points
+            .iter()
+            .flatten()
+            .all(|c| c.to_bits() != (-0.0f64).to_bits())
+    );
+}
+
+#[test]
+fn facets_wound_against_each_other_are_wound_as_the_outside_has_it() {
+    let (points, facets) = sheet();
+    let up = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| points[i as usize]);
+        cross(sub(b, a), sub(c, a))[2] > 0.0
+    };
+    let turn = |which: &dyn Fn(usize) -> bool| -> Vec<[u32; 3]> {
+        let each = facets.iter().enumerate();
+        each.map(|(k, t)| if which(k) { [t[0], t[2], t[1]] } else { *t })
+            .collect()
+    };
+    let above = |_: Vec3| Some([0.0, 0.0, 1.0]);
+    // A patch, and single ones.
+    for which in [
+        &|k: usize| k < 150,
+        &(|k: usize| k % 7 == 3 || k > 310) as &dyn Fn(usize) -> bool,
+    ] {
+        let mut mixed = turn(which);
+        orient(&points, &mut mixed, above);
+        assert!(mixed.iter().all(up));
+        // Where only one corner knows the outside, the rest follows it.
+        let mut mixed = turn(which);
+        let corner = |p: Vec3| (p[0] < -0.04 && p[1] < -0.02).then_some([0.0, 0.0, 1.0]);
+        orient(&points, &mut mixed, corner);
+        assert!(mixed.iter().all(up));
+    }
+    // Two that do not touch, 100 mm apart.
+    let mut apart = points.clone();
+    apart.extend(points.iter().map(|p| [p[0] + 0.2, p[1], p[2]]));
+    let mut both = facets.clone();
+    both.extend(
+        turn(&|_| true)
+            .iter()
+            .map(|t| t.map(|i| i + points.len() as u32)),
+    );
+    orient(&apart, &mut both, above);
+    let right = both[facets.len()..]
+        .iter()
+        .map(|t| t.map(|i| i - points.len() as u32));
+    assert!(
+        right
+            .chain(both[..facets.len()].iter().copied())
+            .all(|t| up(&t))
+    );
+    // All alike, they stay.
+    for which in [&|_| true, &(|_| false) as &dyn Fn(usize) -> bool] {
+        let mut alike = turn(which);
+        orient(&points, &mut alike, above);
+        assert_eq!(alike, turn(which));
+    }
+}
+
+#[test]
+fn the_freedoms_are_those_of_the_surface_and_not_of_its_facets() {
+    let tool = |of: serde_json::Value| {
+        let tool: Tool = serde_json::from_value(of).unwrap();
+        plyflow_tooling::build(&tool).unwrap()
+    };
+    let settings = Settings {
+        offset: 0.0009,
+        kept: 0.9,
+        most_points: 20000,
+    };
+    let freedoms = |mesh: &plyflow_tooling::ToolMesh, seen: &dyn Fn(&Vec3) -> bool| {
+        let surface = Surface::new(&mesh.points, &mesh.triangles).unwrap();
+        let scan = above(&mesh.points, &mesh.triangles, |_| 0.0009);
+        let motion = Isometry3::new(
+            Vector3::new(0.001, -0.002, 0.001),
+            Vector3::new(0.01, -0.02, 0.01),
+        );
+        let moved: Vec<Vec3> = (scan.iter().filter(|p| seen(p)))
+            .map(|&p| (motion * Point3::from(p)).coords.into())
+            .collect();
+        let found = align(&moved, &surface, &settings).unwrap();
+        assert!(found.converged, "{found:?}");
+        assert!(found.rms < 3e-5, "{found:?}");
+        found.decided
+    };
+    for size in ["2 mm", "4 mm"] {
+        let dome = tool(serde_json::json!({"hemisphere": {"radius": "50 mm", "facet_size": size}}));
+        assert_eq!(freedoms(&dome, &|p| p[2] > 0.010), 3, "{size}");
+    }
+    // Its ends do not count for what lies on its length alone.
+    let prism = tool(serde_json::json!({"joggle_spar": {
+        "length": "620 mm", "top_width": "130 mm", "height": "110 mm", "draft": "8 deg",
+        "fillet": "14 mm", "corner": "40 mm", "facet_size": "8 mm", "joggles": []}}));
+    assert_eq!(freedoms(&prism, &|p| p[0].abs() < 0.15), 5);
+    assert_eq!(freedoms(&spar(), &|_| true), 6);
+}
+
+#[test]
+fn a_scan_that_does_not_come_to_rest_says_so() {
+    let mesh = spar();
+    let tool = Surface::new(&mesh.points, &mesh.triangles).unwrap();
+    let mut state = 7u64;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let settings = Settings {
+        offset: 0.001,
+        kept: 1.0,
+        most_points: 1000,
+    };
+    let mut restless = 0;
+    for _ in 0..8 {
+        // Dust all around the tool, of which every point counts.
+        let dust: Vec<Vec3> = (0..100)
+            .map(|_| [0.3, 0.1, 0.1].map(|s| s * random()))
+            .collect();
+        let found = align(&dust, &tool, &settings).unwrap();
+        if found.converged {
+            assert!(found.last_motion < 1e-9, "{found:?}");
+        } else {
+            assert!(found.last_motion > 1e-9, "{found:?}");
+            assert_eq!(found.passes, MOST_PASSES);
+            restless += 1;
+        }
+    }
+    assert!(restless > 0);
 }

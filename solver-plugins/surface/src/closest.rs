@@ -119,6 +119,51 @@ impl Surface {
         (self.nodes[0].low, self.nodes[0].high)
     }
 
+    /// By triangle, the unit normals of the smooth surface that it stands for, at its three corners: of the triangles at a corner, those count that are turned
+    /// against it by less than `crease` (rad), by their angles there. Beyond that lies another face, such as the end of a prism, of which its sides know nothing.
+    pub fn corner_normals(&self, crease: f64) -> Vec<[Vec3; 3]> {
+        let mut at: Vec<Vec<(u32, f64)>> = vec![Vec::new(); self.points.len()];
+        for (t, tri) in self.triangles.iter().enumerate() {
+            for i in 0..3 {
+                at[tri[i] as usize].push((t as u32, self.corner_angle(tri, i)));
+            }
+        }
+        let limit = crease.cos();
+        let smooth = |own: Vec3, corner: u32| {
+            let around = at[corner as usize].iter();
+            let sum = around.fold([0.0; 3], |sum, &(t, angle)| {
+                let normal = self.face_normals[t as usize];
+                if dot(normal, own) > limit {
+                    add(sum, scale(normal, angle))
+                } else {
+                    sum
+                }
+            });
+            unit(sum)
+        };
+        (self.triangles.iter().zip(&self.face_normals))
+            .map(|(t, own)| t.map(|corner| smooth(*own, corner)))
+            .collect()
+    }
+
+    /// Weights of the three corners of a triangle (index into [`Surface::triangles`]) at a place on it (m).
+    pub fn weights(&self, triangle: usize, place: Vec3) -> [f64; 3] {
+        let [a, b, c] = self.triangles[triangle].map(|i| self.points[i as usize]);
+        let normal = cross(sub(b, a), sub(c, a));
+        let part = |p: Vec3, q: Vec3| {
+            dot(cross(sub(p, place), sub(q, place)), normal) / dot(normal, normal)
+        };
+        [part(b, c), part(c, a), part(a, b)]
+    }
+
+    /// Angle of a triangle at its corner `i` (rad).
+    fn corner_angle(&self, tri: &[u32; 3], i: usize) -> f64 {
+        let p = self.points[tri[i] as usize];
+        let u = unit(sub(self.points[tri[(i + 1) % 3] as usize], p));
+        let v = unit(sub(self.points[tri[(i + 2) % 3] as usize], p));
+        norm(cross(u, v)).atan2(dot(u, v))
+    }
+
     fn set_edge_normals(&mut self) {
         let mut sides: Vec<(u32, u32, u32, usize)> = Vec::with_capacity(3 * self.triangles.len());
         for (t, tri) in self.triangles.iter().enumerate() {
@@ -146,10 +191,7 @@ impl Surface {
     fn set_vertex_normals(&mut self) {
         for (t, tri) in self.triangles.iter().enumerate() {
             for i in 0..3 {
-                let p = self.points[tri[i] as usize];
-                let u = unit(sub(self.points[tri[(i + 1) % 3] as usize], p));
-                let v = unit(sub(self.points[tri[(i + 2) % 3] as usize], p));
-                let angle = norm(cross(u, v)).atan2(dot(u, v));
+                let angle = self.corner_angle(tri, i);
                 let n = &mut self.vertex_normals[tri[i] as usize];
                 *n = add(*n, scale(self.face_normals[t], angle));
             }
@@ -295,7 +337,7 @@ fn box_distance(node: &Node, p: Vec3) -> f64 {
 }
 
 /// Closest point of a triangle by the regions of its plane (C. Ericson, Real-Time Collision Detection, 5.1.5).
-fn closest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (Vec3, Feature) {
+pub(crate) fn closest_on_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> (Vec3, Feature) {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let (d1, d2) = (dot(ab, ap), dot(ac, ap));
     if d1 <= 0.0 && d2 <= 0.0 {

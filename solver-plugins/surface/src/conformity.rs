@@ -2,8 +2,6 @@
 //! offset.
 
 use crate::closest::Surface;
-use crate::curvature::curvatures;
-use crate::topology::Topology;
 use crate::vector::Vec3;
 
 /// Distance of a node from the tool.
@@ -48,18 +46,5 @@ pub fn nodal_distances(
                 triangle: closest.triangle,
             }
         })
-        .collect()
-}
-
-/// How sharply the tool itself is crested at each of its triangles (1/m, zero or negative): the most negative
-/// principal curvature of its corners. What lies on a fillet of radius r is curved by -1/r without being
-/// a wrinkle.
-pub fn tool_crests(tool: &Surface) -> Vec<f64> {
-    let topology = Topology::new(tool.points().len(), 3, tool.triangles().as_flattened());
-    let found = curvatures(&topology, tool.points());
-    let crest = |i: &u32| found[*i as usize].max.min(found[*i as usize].min).min(0.0);
-    tool.triangles()
-        .iter()
-        .map(|t| t.iter().map(crest).fold(0.0, f64::min))
         .collect()
 }

@@ -4,6 +4,7 @@
 
 mod closest;
 mod conformity;
+mod crests;
 mod curvature;
 mod distribution;
 mod locate;
@@ -15,7 +16,8 @@ mod traction;
 pub mod vector;
 
 pub use closest::{Closest, Feature, Surface};
-pub use conformity::{NodalDistance, foot_height, nodal_distances, tool_crests};
+pub use conformity::{NodalDistance, foot_height, nodal_distances};
+pub use crests::{Crests, tool_crests};
 pub use curvature::{Curvature, curvatures};
 pub use distribution::{bin_width, density, weighted_mean, weighted_quantiles};
 pub use locate::{Location, QuadLocator, flat_bounds};

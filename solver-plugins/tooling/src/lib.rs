@@ -11,7 +11,7 @@ mod mesh;
 mod ramp;
 pub mod sdf;
 mod spar;
-mod stl;
+pub mod stl;
 mod sweep;
 mod tetrahedron;
 mod tree;

@@ -72,7 +72,7 @@ pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, To
 }
 
 /// The solids of a text file, each as a file of its own (the reader takes the first alone, and asks for a name); anything else as it is.
-fn solids(bytes: &[u8]) -> Vec<Cow<'_, [u8]>> {
+pub fn solids(bytes: &[u8]) -> Vec<Cow<'_, [u8]>> {
     let whole = || vec![Cow::Borrowed(bytes)];
     let Ok(text) = std::str::from_utf8(bytes) else {
         return whole();

@@ -3,7 +3,7 @@
 use crate::Ply;
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::vector::Vec3;
-use plyflow_surface::{Surface, triangles};
+use plyflow_surface::{Surface, of_run, triangles};
 
 /// What a ply rests on in a press, where the artifact has it.
 const USUAL: [&str; 2] = ["tool", "die"];
@@ -12,6 +12,8 @@ const USUAL: [&str; 2] = ["tool", "die"];
 pub struct Rest {
     surface: Surface,
     offset: f64,
+    /// By node of the ply, what (m) of that offset is not there; `None` where all of it is everywhere.
+    missing: Option<Vec<f64>>,
 }
 
 /// The surfaces `wanted` in a frame, those of the usual names that there are when nothing is wanted.
@@ -53,12 +55,17 @@ pub fn rests(
             )
         })?;
         // The die lies on the other side of the stack.
-        let offset = if name == "die" {
-            ply.stack - ply.offset
+        let (offset, missing) = if name == "die" {
+            let missing = of_run::missing_above(host, input, &ply.name)?;
+            (ply.stack - ply.offset, missing)
         } else {
-            ply.offset
+            (ply.offset, of_run::missing_below(host, input, &ply.name)?)
         };
-        all.push(Rest { surface, offset });
+        all.push(Rest {
+            surface,
+            offset,
+            missing,
+        });
     }
     Ok(all)
 }
@@ -66,10 +73,16 @@ pub fn rests(
 /// For every point the least distance from any of the surfaces less that of a ply at rest there (m; thesis eq. 4.1), not below
 /// 0: what contact lets a ply sink in is no deviation.
 pub fn deviations(points: &[Vec3], rests: &[Rest]) -> Vec<f64> {
-    let off = |p: &Vec3| {
-        let each = rests.iter();
-        let least = each.map(|r| r.surface.closest(*p).signed_distance.abs() - r.offset);
-        least.fold(f64::INFINITY, f64::min).max(0.0)
+    let off = |(i, p): (usize, &Vec3)| {
+        let from = |r: &Rest| {
+            let off = r.surface.closest(*p).signed_distance.abs() - r.offset;
+            r.missing.as_ref().map_or(off, |missing| off + missing[i])
+        };
+        rests
+            .iter()
+            .map(from)
+            .fold(f64::INFINITY, f64::min)
+            .max(0.0)
     };
-    points.iter().map(off).collect()
+    points.iter().enumerate().map(off).collect()
 }

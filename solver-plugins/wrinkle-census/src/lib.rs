@@ -148,6 +148,12 @@ fn read(host: &Host, input: &Input, frame: usize, wanted: Option<&str>) -> Resul
     })
 }
 
+/// A number as a label has it, to a thousandth and without digits that say nothing: labels are what tells curves apart, here and in other censuses.
+fn told(value: f64) -> f64 {
+    // Adding zero turns -0 into 0.
+    (1e3 * value).round() / 1e3 + 0.0
+}
+
 /// Counts the wrinkles of every circle and writes its profile.
 fn circles(
     host: &Host,
@@ -175,7 +181,7 @@ fn circles(
             .unzip();
         let curve = Curve {
             name: format!("circle_{k}"),
-            label: format!("radius {:.0} mm", 1e3 * radius),
+            label: format!("radius {} mm", told(1e3 * radius)),
             x: ("angle", "rad", &angle),
             y: ("height", "m", &height),
         };
@@ -246,7 +252,7 @@ fn sections(
         let (along, height) = profile(&line(p, cut, [p.centre[0], p.centre[1]], [c, s]));
         let curve = Curve {
             name: format!("section_{k}"),
-            label: format!("section at {:.0} deg", angle.to_degrees()),
+            label: format!("section at {} deg", told(angle.to_degrees())),
             x: ("distance", "m", &along),
             y: ("height", "m", &height),
         };

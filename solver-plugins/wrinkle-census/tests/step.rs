@@ -318,6 +318,106 @@ fn deviation_is_the_distance_from_the_nearest_surface_less_that_at_rest() {
     }
 }
 
+/// Three plies of 0.4 mm, all on what is there, under a die: the lowest ends at x = 0, the uppermost at x = 60 mm.
+#[test]
+fn plies_that_end_below_and_above_do_not_count_where_they_do_not_lie() {
+    let stacked = |ends: [f64; 2], by_place: bool| {
+        let mut input = formed(|_, _| 0.0);
+        let t = 4e-4;
+        let outline = |end: f64| json!([[-0.15, -0.15], [end, -0.15], [end, 0.15], [-0.15, 0.15]]);
+        let sheet = |name: &str, place: f64, end: f64| {
+            json!({"name": name, "kind": "ply", "thickness": t, "offset": (place + 0.5) * t,
+                   "outline": outline(end)})
+        };
+        input.attributes = json!({"contact_by_place": by_place, "sheets": [
+            sheet("below", 0.0, ends[0]), sheet("ply_1", 1.0, 0.15), sheet("above", 2.0, ends[1])]});
+        let flat = input.bodies[0].points.clone();
+        for (p, at) in input.bodies[0].frames[0].iter_mut().zip(&flat) {
+            p[2] = if at[0] < ends[0] + 1e-9 {
+                1.5 * t
+            } else {
+                0.5 * t
+            };
+        }
+        input.bodies.push(plate("tool", 0.0));
+        input
+    };
+    let mut with = parameters(json!([0.09]));
+    (with["inner_circles"], with["ply"]) = (json!([]), json!("ply_1"));
+    let deviation = |input: &MemoryArtifact| {
+        let found = census(input, with.clone()).unwrap();
+        found.body("ply_1").last("deviation").to_vec()
+    };
+    let ending = stacked([0.0, 0.06], true);
+    let largest = deviation(&ending).into_iter().fold(0.0, f64::max);
+    assert!(largest < 1e-15, "{largest}");
+    // Half of it 1 mm up, on the lower ply or beside it.
+    let mut lifted = ending.clone();
+    for p in &mut lifted.bodies[0].frames[0] {
+        p[2] += if p[1] > 0.0 { 1e-3 } else { 0.0 };
+    }
+    for (d, p) in deviation(&lifted).iter().zip(&lifted.bodies[0].frames[0]) {
+        let expected = if p[1] > 0.0 { 1e-3 } else { 0.0 };
+        assert!((d - expected).abs() < 1e-12, "{p:?}: {d}");
+    }
+    // Hard under a die that follows the stack's upper face 5 mm up.
+    let mut pressed = ending.clone();
+    pressed.bodies.truncate(1);
+    let flat = pressed.bodies[0].points.clone();
+    let up = |x: f64| {
+        if x < 0.06 + 1e-9 {
+            1.5 * 4e-4
+        } else {
+            0.5 * 4e-4
+        }
+    };
+    for (p, at) in pressed.bodies[0].frames[0].iter_mut().zip(&flat) {
+        p[2] = 5e-3 - up(at[0]);
+    }
+    pressed.bodies.push(plate("die", 5e-3));
+    let largest = deviation(&pressed).into_iter().fold(0.0, f64::max);
+    assert!(largest < 1e-15, "{largest}");
+    // Plies of one outline: as if the run did not say where they lie.
+    let [by_place, whole] = [true, false].map(|by| deviation(&stacked([0.15, 0.15], by)));
+    assert!(
+        by_place
+            .iter()
+            .zip(&whole)
+            .all(|(a, b)| a.to_bits() == b.to_bits())
+    );
+}
+
+#[test]
+fn curves_are_told_apart_by_their_labels() {
+    let mut with = parameters(json!([0.0804, 0.0796, 0.08, 0.1]));
+    with["sections"] = json!([
+        0.0,
+        FRAC_PI_4,
+        30.0002f64.to_radians(),
+        44.6f64.to_radians()
+    ]);
+    let found = census(&four_wrinkles(), with).unwrap();
+    let labels = |plot: &str| -> Vec<&str> {
+        let curves = found.attributes["curves"].as_array().unwrap();
+        let own = curves.iter().filter(|c| c["plot"] == plot);
+        own.map(|c| c["label"].as_str().unwrap()).collect()
+    };
+    let circles = [
+        "radius 80.4 mm",
+        "radius 79.6 mm",
+        "radius 80 mm",
+        "radius 100 mm",
+    ];
+    assert_eq!(labels("circles"), circles);
+    let sections = [
+        "section at 0 deg",
+        "section at 45 deg",
+        "section at 30 deg",
+        "section at 44.6 deg",
+    ];
+    assert_eq!(labels("sections"), sections);
+}
+
 #[test]
 fn moments_of_both_families_are_spread_by_area() {
     // On cells: 3 and 4 N in a fifth of the ply, 1 and 1 N in the rest.

@@ -63,6 +63,9 @@ struct Compared {
     /// Names of all zones that were compared.
     #[serde(default)]
     zones: Vec<String>,
+    /// Their boxes in the same order (m); older comparisons have none.
+    #[serde(default)]
+    zone_boxes: Vec<Rectangle>,
     models: Vec<Model>,
     defects: Vec<Found>,
 }
@@ -104,6 +107,18 @@ fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
         );
         host.log(Log::Warn, &text);
     }
+    for (name, compared) in compared.zones.iter().zip(&compared.zone_boxes) {
+        let given = zones.iter().find(|z| z.name == *name);
+        if let Some(given) = given.filter(|z| !same(z.bounds, *compared)) {
+            let text = format!(
+                "zones: zone {name} was compared with the box {:?} mm, of the lists given here the one that counts has it with {:?} mm: what reached the cut of the one says \
+                 nothing of the other. Give all lists of zones that the comparison has, and no others",
+                in_mm(*compared),
+                in_mm(given.bounds)
+            );
+            host.log(Log::Warn, &text);
+        }
+    }
     let grown = grow(&zones, &defects, blank, settings);
     if grown.is_empty() {
         host.log(
@@ -113,7 +128,7 @@ fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
     }
     let mut list = Vec::new();
     for (zone, why) in grown {
-        let mm = zone.bounds.map(|b| (1e4 * b).round() / 10.0);
+        let mm = in_mm(zone.bounds);
         let names: Vec<&str> = zone.replaces.iter().map(String::as_str).collect();
         let with = if names.is_empty() {
             String::new()
@@ -128,6 +143,16 @@ fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
         list.push((zone.name.clone(), zone.bounds, serde_json::to_value(&zone)?));
     }
     write(host, settings, blank, list)
+}
+
+/// To 0.1 mm, for people.
+fn in_mm(bounds: Rectangle) -> Rectangle {
+    bounds.map(|b| (1e4 * b).round() / 10.0)
+}
+
+/// Whether two boxes are one, however they were rounded on their ways.
+fn same(a: Rectangle, b: Rectangle) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9)
 }
 
 /// The zones that count of all lists given, and the box around the blank (m).

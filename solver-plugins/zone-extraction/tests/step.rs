@@ -392,6 +392,55 @@ fn a_second_pass_sees_the_zones_that_the_first_one_left_alone() {
     assert!(error.contains("of one coarse run"), "{error}");
 }
 
+/// A has grown since it was drawn first, or since it was compared.
+#[test]
+fn a_zone_that_was_compared_with_another_box_is_told() {
+    let list = |bounds: [f64; 4]| MemoryArtifact {
+        kind: "zones".into(),
+        attributes: json!({"zones": [drawn("A", bounds), drawn("C", [0.15, 0.0, 0.2, 0.1])], "blank": BLANK}),
+        ..Default::default()
+    };
+    let (small, grown) = ([0.0, 0.0, 0.05, 0.05], [0.0, 0.0, 0.0625, 0.05]);
+    let told = |lists: &[[f64; 4]], compared: Option<[f64; 4]>| {
+        let lists: Vec<MemoryArtifact> = lists.iter().map(|b| list(*b)).collect();
+        let mut attributes = json!({"zones": ["A", "C"], "models": [], "defects": []});
+        if let Some(bounds) = compared {
+            // As a file may have rounded it.
+            attributes["zone_boxes"] = json!([bounds.map(|b| b + 1e-12), [0.15, 0.0, 0.2, 0.1]]);
+        }
+        let comparison = MemoryArtifact {
+            kind: "comparison".into(),
+            attributes,
+            ..Default::default()
+        };
+        let mut inputs: Vec<MemoryInput<'_>> =
+            lists.iter().map(|l| MemoryInput::new("zones", l)).collect();
+        inputs.push(MemoryInput::new("comparison", &comparison));
+        let log = run::<ZoneExtraction>(json!({}), &inputs, &[]).unwrap().log;
+        log.into_iter()
+            .filter(|l| l.contains("was compared with"))
+            .collect::<Vec<_>>()
+    };
+    // The list with the larger one is left out; and one that the comparison did not have is given.
+    for (given, compared) in [(small, grown), (grown, small)] {
+        let warned = told(&[given], Some(compared));
+        assert_eq!(warned.len(), 1, "{warned:?}");
+        let [own, other] =
+            [compared, given].map(|b| format!("{:?} mm", b.map(|b| (1e4 * b).round() / 10.0)));
+        assert!(
+            warned[0].contains(&format!("zone A was compared with the box {own}")),
+            "{warned:?}"
+        );
+        assert!(
+            warned[0].contains(&other) && warned[0].contains("Give all lists"),
+            "{warned:?}"
+        );
+    }
+    assert!(told(&[small, grown], Some(grown)).is_empty());
+    // A comparison that tells no boxes.
+    assert!(told(&[small], None).is_empty());
+}
+
 #[test]
 fn of_several_lists_the_largest_of_a_name_counts_and_none_that_is_replaced() {
     let replacing = |name: &str, bounds: [f64; 4], others: &[&str]| Drawn {
