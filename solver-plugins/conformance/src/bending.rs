@@ -18,7 +18,7 @@ const SHARP: f64 = 500.0;
 /// Steps from flat to a bent state: laws that integrate want small ones.
 const STEPS: usize = 60;
 /// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 5000;
+const CALLS: usize = 500;
 
 /// The largest curvatures that a law is judged at (1/m): radii of less than five thicknesses are no bending of a sheet.
 fn sharp(law: &Law) -> f64 {

@@ -12,7 +12,7 @@ const LANES: usize = 16;
 /// Strain of the deformed states.
 pub(crate) const STRAIN: f64 = 0.02;
 /// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 5000;
+const CALLS: usize = 500;
 
 /// Checks an element formulation made with `parameters` (JSON, SI numbers) for a material: its element part and,
 /// when it has one, its patch part. `fields` are the numbers of element and patch fields in its manifest; `None`

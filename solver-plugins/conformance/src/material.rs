@@ -13,7 +13,7 @@ pub(crate) const LANES: usize = 16;
 /// Strain of the states where the calls as such are looked at.
 pub(crate) const STRAIN: f64 = 0.02;
 /// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 5000;
+const CALLS: usize = 500;
 
 /// Checks a material made with `parameters` (JSON, SI numbers, with `thickness` and `areal_mass`): its membrane part
 /// and, when it has one, its bending.

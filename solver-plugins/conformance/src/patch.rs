@@ -9,7 +9,7 @@ use crate::{Run, Seen, rules, worse};
 
 const LANES: usize = 16;
 /// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 2000;
+const CALLS: usize = 500;
 
 pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, twin: &Subject) {
     if subject.slots() == 0 {
