@@ -14,12 +14,12 @@ pub(crate) fn same(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
-/// Threads that call at once.
-pub(crate) const THREADS: usize = 4;
+/// Threads that call at once: where calls are paused more would only wait for a core.
+pub(crate) const THREADS: usize = 2;
 
 /// Calls that were paused while another one began, of all threads together, after which enough have met: what a call keeps in a
-/// global for a fiftieth of its time is disturbed in 98 of 100 checks, for a tenth practically always.
-const MEETINGS: usize = 200;
+/// global for a hundredth of its time is disturbed in 98 of 100 checks, for a tenth practically always.
+const MEETINGS: usize = 400;
 
 /// How long to wait for that on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(2);
