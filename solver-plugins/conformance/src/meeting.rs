@@ -5,8 +5,9 @@
 //! since, and scratch memory of 400 bytes in a global went through a quarter of all checks. So calls are paused in their midst.
 
 use crate::Seen;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering, compiler_fence};
-use std::sync::{Barrier, Once, mpsc};
+use std::marker::PhantomData;
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering, compiler_fence};
+use std::sync::{Barrier, Once};
 use std::time::{Duration, Instant};
 
 /// Whether two answers have the same bits.
@@ -84,14 +85,26 @@ impl Counter<'_> {
 }
 
 /// The signal that pauses a thread: one that is ignored where nobody asks for it, as runtimes with preemption take it, too.
-const PAUSES: libc::c_int = libc::SIGURG;
+const SIGNAL: libc::c_int = libc::SIGURG;
 
-/// How long a thread is paused, and how long after that the next one: time for calls of the others.
-const PAUSE: Duration = Duration::from_micros(20);
+/// Time from the end of a pause to the next, and what each further thread has more, so that they are not paused together.
+const EVERY: Duration = Duration::from_micros(30);
+const FURTHER: Duration = Duration::from_micros(7);
+
+/// How long a pause is at most where the others have cores of their own, in looks for their calls (some 20 microseconds), ...
+const LOOKS: usize = 500;
+
+/// ... and then, for the thread to leave its core to another.
+const SLEEP: libc::timespec = libc::timespec {
+    tv_sec: 0,
+    tv_nsec: 20_000,
+};
 
 thread_local! {
     /// How often this thread was paused.
     static PAUSED: AtomicUsize = const { AtomicUsize::new(0) };
+    /// How this thread is paused; null where it is not.
+    static OWN: AtomicPtr<Pauses> = const { AtomicPtr::new(std::ptr::null_mut()) };
 }
 
 /// How often this thread was paused.
@@ -104,17 +117,51 @@ fn pauses() -> usize {
     count
 }
 
-/// Pauses the thread that the signal came to, wherever it is. It calls what a handler may, and leaves `errno` as it was.
+/// What the handler needs.
+struct Pauses {
+    timer: libc::timer_t,
+    every: Duration,
+    /// Calls that have begun, of all threads.
+    begun: *const AtomicUsize,
+}
+
+impl Pauses {
+    /// Sets the timer for one pause: one that went on by itself would leave no time between pauses that are longer than it.
+    /// Async-signal-safe.
+    ///
+    /// # Safety
+    /// The timer was made and not deleted.
+    unsafe fn set(&self) {
+        let mut times: libc::itimerspec = unsafe { std::mem::zeroed() };
+        times.it_value.tv_nsec = i64::from(self.every.subsec_nanos());
+        unsafe { libc::timer_settime(self.timer, 0, &raw const times, std::ptr::null_mut()) };
+    }
+}
+
+/// Pauses the thread that the signal came to, wherever it is, until another has made a call, or had the time for it.
 extern "C" fn pause(_: libc::c_int) {
-    let time = libc::timespec {
-        tv_sec: 0,
-        tv_nsec: i64::from(PAUSE.subsec_nanos()),
+    // SAFETY: what it points to outlives the thread's timer, and it is null before and after.
+    let Some(own) = (unsafe { OWN.with(|p| p.load(Ordering::Relaxed)).as_ref() }) else {
+        return;
     };
+    // SAFETY: as above.
+    let begun = unsafe { &*own.begun };
     PAUSED.with(|p| p.fetch_add(1, Ordering::Relaxed));
-    // SAFETY: both are async-signal-safe, and `time` is whole.
+    let first = begun.load(Ordering::SeqCst);
+    // With the second call that begins the one before has ended.
+    let met = || begun.load(Ordering::SeqCst) > first + 1;
+    let alone = (0..LOOKS).all(|_| {
+        std::hint::spin_loop();
+        !met()
+    });
+    // SAFETY: all that is called here is async-signal-safe; what it interrupts finds `errno` as it was.
     unsafe {
         let errno = *libc::__errno_location();
-        libc::nanosleep(&raw const time, std::ptr::null_mut());
+        if alone {
+            let time = SLEEP;
+            libc::nanosleep(&raw const time, std::ptr::null_mut());
+        }
+        own.set();
         *libc::__errno_location() = errno;
     }
 }
@@ -127,72 +174,98 @@ fn let_pause() {
         let mut action: libc::sigaction = std::mem::zeroed();
         action.sa_sigaction = pause as extern "C" fn(libc::c_int) as libc::sighandler_t;
         action.sa_flags = libc::SA_RESTART;
-        libc::sigaction(PAUSES, &raw const action, std::ptr::null_mut());
+        libc::sigaction(SIGNAL, &raw const action, std::ptr::null_mut());
     });
 }
 
+/// Pauses the thread that made it, over and over, until it is dropped. The kernel's timer needs no thread and no core of its own.
+struct Pausing<'a> {
+    /// Where it stays, for the handler; none if the system has no such timer.
+    pauses: Option<Box<Pauses>>,
+    begun: PhantomData<&'a AtomicUsize>,
+}
+
+impl<'a> Pausing<'a> {
+    fn begin(thread: usize, begun: &'a AtomicUsize) -> Self {
+        let_pause();
+        // The first use of a thread's variables may allocate, which a handler must not.
+        let _ = pauses();
+        // SAFETY: all that is pointed to is whole and lives through the call; an event of zeros is one without fields.
+        let (made, timer) = unsafe {
+            let mut event: libc::sigevent = std::mem::zeroed();
+            event.sigev_notify = libc::SIGEV_THREAD_ID;
+            event.sigev_signo = SIGNAL;
+            event.sigev_notify_thread_id = libc::gettid();
+            let mut timer: libc::timer_t = std::ptr::null_mut();
+            let code = libc::timer_create(libc::CLOCK_MONOTONIC, &raw mut event, &raw mut timer);
+            (code == 0, timer)
+        };
+        let pauses = made.then(|| {
+            Box::new(Pauses {
+                timer,
+                every: EVERY + FURTHER * thread as u32,
+                begun,
+            })
+        });
+        if let Some(pauses) = &pauses {
+            let own = std::ptr::from_ref::<Pauses>(pauses).cast_mut();
+            OWN.with(|p| p.store(own, Ordering::Relaxed));
+            // SAFETY: just made.
+            unsafe { pauses.set() };
+        }
+        Self {
+            pauses,
+            begun: PhantomData,
+        }
+    }
+}
+
+impl Drop for Pausing<'_> {
+    fn drop(&mut self) {
+        // A signal that is still on its way pauses nothing and sets no timer.
+        OWN.with(|p| p.store(std::ptr::null_mut(), Ordering::Relaxed));
+        compiler_fence(Ordering::SeqCst);
+        if let Some(pauses) = &self.pauses {
+            // SAFETY: made by `begin`, deleted once.
+            unsafe { libc::timer_delete(pauses.timer) };
+        }
+    }
+}
+
 /// Lets every thread run `work` over and over (its number, and what its calls go through; it gives how many calls it made and how many
-/// answers differed) and pauses one after the other in its midst, until enough calls have met.
+/// answers differed), paused in its midst now and then, until enough calls have met.
 pub(crate) fn meet(work: impl Fn(usize, &Counter<'_>) -> (usize, usize) + Sync) -> Met {
-    let_pause();
-    let (begun, met, over) = (
-        AtomicUsize::new(0),
-        AtomicUsize::new(0),
-        AtomicBool::new(false),
-    );
+    let (begun, met) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let over = AtomicBool::new(false);
     let counter = Counter {
         begun: &begun,
         met: &met,
     };
-    let start = Barrier::new(THREADS);
-    let of_thread = |thread: usize, own: mpsc::Sender<libc::pthread_t>| {
-        // The first use of a thread's variables may allocate, which a handler must not.
-        let _ = pauses();
-        // SAFETY: asks for the calling thread.
-        let _ = own.send(unsafe { libc::pthread_self() });
+    let (start, clock) = (Barrier::new(THREADS), Instant::now());
+    let of_thread = |thread: usize| {
         start.wait();
+        let pausing = Pausing::begin(thread, &begun);
         let (mut calls, mut differing) = (0, 0);
         loop {
             let (made, differ) = work(thread, &counter);
             calls += made;
             differing += differ;
-            if differ > 0 {
-                // One that differs is enough.
+            // One that differs is enough. Whoever sees the end ends all: alone a thread meets nobody.
+            let found = differing > 0;
+            if found || met.load(Ordering::Relaxed) >= MEETINGS || clock.elapsed() > PATIENCE {
                 over.store(true, Ordering::Relaxed);
             }
             if over.load(Ordering::Relaxed) {
+                drop(pausing);
                 return (calls, differing);
             }
         }
     };
     let sums: Vec<(usize, usize)> = std::thread::scope(|scope| {
         let of_thread = &of_thread;
-        let (own, threads) = mpsc::channel();
         let workers: Vec<_> = (0..THREADS)
-            .map(|t| {
-                let own = own.clone();
-                scope.spawn(move || of_thread(t, own))
-            })
+            .map(|t| scope.spawn(move || of_thread(t)))
             .collect();
-        let threads: Vec<libc::pthread_t> = threads.iter().take(THREADS).collect();
-        let clock = Instant::now();
-        for thread in threads.iter().cycle() {
-            let enough = met.load(Ordering::Relaxed) >= MEETINGS || clock.elapsed() > PATIENCE;
-            // One that panicked no longer calls; its handle keeps the thread's name valid.
-            if enough
-                || workers
-                    .iter()
-                    .any(std::thread::ScopedJoinHandle::is_finished)
-            {
-                over.store(true, Ordering::Relaxed);
-            }
-            if over.load(Ordering::Relaxed) {
-                break;
-            }
-            // SAFETY: the thread is not joined before the workers are, below.
-            unsafe { libc::pthread_kill(*thread, PAUSES) };
-            std::thread::sleep(PAUSE);
-        }
         // A thread that panicked has no answer.
         workers
             .into_iter()
