@@ -12,7 +12,8 @@
  * greater. Structs that have a `size` only grow at their end, the others never; `size` is the size that whoever made the
  * struct was compiled with. In a
  * struct that the other side fills (pf_material_sizes, pf_element_sizes) the caller sets `size` and zeros the rest; the
- * other side writes no more than that many bytes, and leaves `size` as it is: assign fields, never the whole struct.
+ * other side writes no more than that many bytes, and leaves `size` as it is: assign fields, never the whole struct, and a
+ * field that says "since" a version only where `size` reaches its end.
  */
 #ifndef PLYFLOW_H
 #define PLYFLOW_H
@@ -140,11 +141,12 @@ typedef struct pf_services {
   pf_str (*item)(void *host); /* JSON: this step's own fan-out index path, e.g. [2]; [] if none */
 
   /* Reading an input artifact. `handle` as listed by inputs. */
-  pf_str (*attributes)(void *host, uint32_t handle); /* JSON object as its plugin wrote it */
+  pf_str (*attributes)(void *host, uint32_t handle); /* JSON object as its plugin wrote it; empty: no such input, or it cannot be read */
   int32_t (*array_info)(void *host, uint32_t handle, pf_str path, pf_array_info *info);
+  /* What is stored as another dtype is converted. */
   int32_t (*array_read)(void *host, uint32_t handle, pf_str path, uint32_t dtype, void *buffer, uint64_t bytes);
   /* JSON: {"times":[..],"bodies":[{"name":..,"points":n,"cells":m,"nodes_per_cell":k,"attributes":{..},
-   *        "fields":[{"name":..,"on":"points"|"cells","components":c,"unit":".."}]}]} */
+   *        "fields":[{"name":..,"on":"points"|"cells","components":c,"unit":".."}]}]}; empty as of attributes */
   pf_str (*meshes)(void *host, uint32_t handle);
   int32_t (*mesh_read)(void *host, uint32_t handle, pf_str body, double *points /* [n][3] */, uint32_t *cells /* [m][k] */);
   int32_t (*frame_points_read)(void *host, uint32_t handle, pf_str body, uint64_t frame, double *points /* [n][3] */);
@@ -300,7 +302,7 @@ typedef struct pf_element_batch {
   uint64_t size;
   uint32_t lanes;
   uint32_t reserved;
-  double dt;               /* s, step just done; 0 in the first call, and wherever only forces or the critical step of a state are asked for, with
+  double dt;               /* s, step just done; 0 in the first calls, all in one state, and wherever only forces or the critical step of a state are asked for, with
                               velocities and spins of 0 and a copy of the histories: it is no sign that a history is new. Where a run begins late
                               it is led there in few steps, some of a frame each */
   const double *position;  /* [nodes][3][lanes] m (reference positions in initialise) */
@@ -310,9 +312,9 @@ typedef struct pf_element_batch {
   double *constants;       /* [constants][lanes]; written by initialise only: batches may share them */
   double *history;         /* [history][lanes]; zeros at the start */
   double *material_history; /* [material_points * membrane_history][lanes] */
-  double *force;           /* [nodes][3][lanes] N: internal force, dW/dx; overwritten */
+  double *force;           /* [nodes][3][lanes] N: internal force, dW/dx; overwritten; NULL in initialise */
   double *moment;          /* [nodes][3][lanes] N m or NULL */
-  double *energy;          /* [PF_ENERGIES][lanes] J; overwritten */
+  double *energy;          /* [PF_ENERGIES][lanes] J; overwritten; NULL in initialise */
   double *fields;          /* NULL or [fields][lanes] */
   double *mass;            /* initialise only: [nodes][lanes] kg */
   double *inertia;         /* initialise only: [nodes][lanes] kg m2 or NULL */
@@ -331,8 +333,8 @@ typedef struct pf_patch_batch {
   const double *axis;     /* [3][lanes]; only in patch_initialise */
   double *constants;      /* [patch_constants][lanes]; written by patch_initialise only */
   double *history;        /* [patch_history + bending_history][lanes] */
-  double *force;          /* [patch_nodes][3][lanes] N; overwritten; zero in unused slots */
-  double *energy;         /* [lanes] J of bending; overwritten */
+  double *force;          /* [patch_nodes][3][lanes] N; overwritten; zero in unused slots; NULL in patch_initialise */
+  double *energy;         /* [lanes] J of bending; overwritten; NULL in patch_initialise */
   double *fields;         /* NULL or [patch_fields][lanes] */
   double *stiffness;      /* NULL or [patch_nodes][lanes] N/m: bound of each node's row sum |d2W/dxdx| */
   const pf_material *material;
@@ -345,7 +347,7 @@ typedef struct pf_element_functions {
   int32_t (*sizes)(const void *instance, pf_element_sizes *sizes);
   int32_t (*initialise)(const void *instance, const pf_element_batch *batch);
   int32_t (*forces)(const void *instance, const pf_element_batch *batch);
-  int32_t (*patch_initialise)(const void *instance, const pf_patch_batch *batch); /* NULL when patch_nodes is 0 */
+  int32_t (*patch_initialise)(const void *instance, const pf_patch_batch *batch); /* it and the next may be NULL when patch_nodes is 0 */
   int32_t (*patch_forces)(const void *instance, const pf_patch_batch *batch);
 } pf_element_functions;
 

@@ -172,6 +172,12 @@ impl Ways {
                 (self.list.iter_mut()).for_each(|w| w.errors[m] = None);
                 continue;
             }
+            if measure == Measure::Defects {
+                // That neither the way nor the reference has a defect is agreement, where others have false ones.
+                let agrees = |w: &&mut Way| w.errors[m].is_none() && w.counts == Some([0.0; 4]);
+                let agreeing = self.list.iter_mut().filter(agrees);
+                agreeing.for_each(|w| w.errors[m] = Some(0.0));
+            }
             let whole = self.list.iter().enumerate().filter(|(_, w)| w.is_whole());
             let mut told: Vec<(usize, f64)> = whole
                 .filter_map(|(k, w)| Some((k, w.error(measure)?)))

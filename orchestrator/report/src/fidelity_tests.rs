@@ -266,6 +266,40 @@ fn zones_without_a_defect_are_told_beside_each_other_too() {
 }
 
 #[test]
+fn a_way_without_a_defect_is_right_where_the_reference_has_none_and_others_have() {
+    // The coarse run bridges where nothing does; its zones and the reference know better.
+    let mut results = costs(10.0, 100.0);
+    results.retain(|r| !r.0.contains("error") && !r.0.contains("missed"));
+    for name in COUNTS {
+        results.push((name, 0.0));
+    }
+    results.extend([
+        ("missed_wrinkles.global", 0.0),
+        ("false_wrinkles.global", 0.0),
+        ("missed_bridging.global", 0.0),
+        ("false_bridging.global", 1.0),
+        ("defect_error.global", 1.0),
+    ]);
+    let ways = ways(&input(vec![comparison("c", &results)]));
+    let told: Vec<_> = (ways.list.iter())
+        .map(|w| (w.model.as_str(), w.errors[0], w.on_front[0]))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("global", Some(1.0), true),
+            ("total", Some(0.0), true),
+            ("reference", Some(0.0), false),
+        ]
+    );
+    let advice = advice(&ways, &[0.1]);
+    assert!(
+        advice[0].contains("coarse run and zones (10.0 %"),
+        "{advice:?}"
+    );
+}
+
+#[test]
 fn a_reference_without_defects_leaves_the_other_errors_and_a_fed_back_coarse_run_its_name() {
     let mut run = costs(10.0, 100.0);
     run.retain(|(name, _)| !name.starts_with("defect_error"));

@@ -125,6 +125,17 @@ impl Step for BoundaryInterpolation {
             )
             .into());
         }
+        if !sheets.iter().any(|s| s.attributes["kind"] == "ply") {
+            let millimetres = |v: f64| (1e6 * v).round() / 1e3;
+            let [x0, y0, x1, y1] = bounds.map(millimetres);
+            return Err(format!(
+                "no ply of '{}' has a whole element of {} mm in zone {} (x {x0} to {x1} mm, y {y0} to {y1} mm); expected a zone that is at least one element wide and lies on a ply. Draw it larger (`boxes` of zone-extraction), or take a smaller `element_size`",
+                input.step,
+                millimetres(p.element_size),
+                zone["name"]
+            )
+            .into());
+        }
         write(host, &meshes.times, first, &sheets)?;
         let times = &meshes.times[first..];
         write_histories(host, &input, times)?;

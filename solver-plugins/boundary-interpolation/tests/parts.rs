@@ -27,6 +27,28 @@ fn spline_gives_back_any_cubic_that_starts_at_rest() {
 }
 
 #[test]
+fn spline_of_a_motion_that_is_under_way_gives_back_any_cubic() {
+    let times = [0.6, 0.63, 0.7, 0.71, 0.8, 1.0];
+    let f = |t: f64| [2.0 - 3.0 * t + t * t - 0.7 * t * t * t, 1.0 - 2.0 * t];
+    let g = |t: f64| [-3.0 + 2.0 * t - 2.1 * t * t, -2.0];
+    let values: Vec<f64> = times.iter().flat_map(|&t| f(t)).collect();
+    for n in 2..=times.len() {
+        let slopes = spline_slopes(&times[..n], &values[..2 * n], 2);
+        for (i, &t) in times[..n].iter().enumerate() {
+            // Of fewer frames than a cubic has numbers: lines.
+            let off = [0, 1].map(|c| (slopes[2 * i + c] - g(t)[c]).abs());
+            assert!(off[1] < 1e-11 && (n < 4 || off[0] < 1e-11), "{n}: {off:?}");
+        }
+    }
+    let parabola = |t: f64| 1.0 - t + 4.0 * t * t;
+    let values = [0.6, 0.63, 0.7].map(parabola);
+    let slopes = spline_slopes(&times[..3], &values, 1);
+    for (s, t) in slopes.iter().zip(times) {
+        assert!((s - (8.0 * t - 1.0)).abs() < 1e-11, "{s}");
+    }
+}
+
+#[test]
 fn hermite_pieces_join_without_a_jump_in_acceleration() {
     let times: Vec<f64> = (0..20)
         .map(|i| 0.05 * i as f64 + 0.01 * ((i * 7) % 5) as f64)

@@ -448,6 +448,11 @@ fn a_missing_zone_and_a_still_run_are_named() {
     );
     let error = interpolate(&coarse(0.0), json!({"element_size": 0.01}), &[]).unwrap_err();
     assert!(error.contains("for_each"), "{error}");
+    let error = interpolate(&coarse(0.0), json!({"element_size": 0.11}), &[1]).unwrap_err();
+    assert!(
+        error.contains("110 mm in zone \"B\" (x 0 to 100 mm"),
+        "{error}"
+    );
     let mut still = coarse(0.0);
     still.times.truncate(1);
     let error = interpolate(&still, json!({"element_size": 0.01}), &[0]).unwrap_err();

@@ -5,8 +5,6 @@ use plyflow_sdk::{Host, StepError};
 use plyflow_surface::{bin_width, density, weighted_quantiles};
 use serde_json::{Value, json};
 
-/// Series of a plot that the report can tell apart.
-const SERIES: usize = 12;
 /// Plots of a census that are laid over each other: name, x label, unit of x, and its SI unit.
 const OVERLAID: [(&str, &str, &str, &str); 3] = [
     ("circles", "angle from x", "deg", "rad"),
@@ -44,7 +42,6 @@ pub fn overlaid(host: &Host, runs: &[Run]) -> Result<Vec<Value>, StepError> {
                 }
                 series.push(json!({"label": run.label, "x": paths[0], "y": paths[1]}));
             }
-            series.truncate(SERIES);
             plots.push(json!({
                 "name": format!("{plot}_{k}"), "title": leader.label,
                 "x": {"label": x_label, "unit": unit}, "y": {"label": "height", "unit": "mm"},
@@ -147,7 +144,6 @@ fn densities(host: &Host, runs: &[Run], q: &Quantity) -> Result<Option<Value>, S
         host.write_f64(&path, &[count], q.inverse, &density)?;
         series.push(json!({"label": run.label, "x": value, "y": path}));
     }
-    series.truncate(SERIES);
     Ok(Some(json!({
         "name": format!("{}_density", q.name), "title": format!("{}, by area", q.title),
         "x": {"label": q.title.to_lowercase(), "unit": q.shown},

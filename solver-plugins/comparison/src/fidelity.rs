@@ -164,7 +164,11 @@ pub fn measure_ways(
         Yardstick::Zones => Way::new("total", "", &both),
     });
     // What was run on the way to them, as in their costs.
+    let late = passed_over.global_began_late(models);
     for way in &mut measured.ways {
+        if matches!(way.model.as_str(), "global" | "total") {
+            way.began_late = late;
+        }
         way.element_cycles += match way.model.as_str() {
             "global" => passed_over.earlier_cycles,
             "total" => passed_over.earlier_cycles + passed_over.superseded_cycles,

@@ -264,7 +264,12 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &PassedOver) -> Resul
     host.measured("cost.total.wall_seconds", wall, "s")?;
     host.measured("cost.total.cpu_seconds", cpu, "s")?;
     host.measured("peak_memory.total", memory, "1")?;
-    // One that began late did a part of the process only: nothing is saved against that, and its cost is not that of a whole.
+    // One that began late did a part of the process only: nothing is saved by that or against that, and its cost is not that of a whole.
+    let global_late = passed_over.global_began_late(models);
+    if let Some(time) = global_late {
+        host.result("start_time.global", time, "s")?;
+        host.result("start_time.total", time, "s")?;
+    }
     for m in (models.iter()).filter(|m| matches!(m.role, Role::Other | Role::Reference)) {
         if let Some(time) = m.began_late {
             host.result(&format!("start_time.{}", m.name), time, "s")?;
@@ -273,7 +278,7 @@ fn write_costs(host: &Host, models: &[Model], passed_over: &PassedOver) -> Resul
     let reference = (models.iter()).find(|m| m.role == Role::Reference && m.began_late.is_none());
     if let Some(full) = reference
         .map(|m| m.input.cost.cpu_seconds)
-        .filter(|&s| s > 0.0)
+        .filter(|&s| s > 0.0 && global_late.is_none())
     {
         host.measured("cost_saving", 1.0 - cpu / full, "1")?;
     }

@@ -170,6 +170,13 @@ pub struct PassedOver {
 }
 
 impl PassedOver {
+    /// When the process that the global run tells began for what is in its cost, if that was late (s): what it began from is not, where no earlier
+    /// pass is given.
+    pub fn global_began_late(&self, models: &[Model]) -> Option<f64> {
+        let global = models.iter().find(|m| m.role == Role::Global)?;
+        global.began_late.filter(|_| self.earlier.is_empty())
+    }
+
     /// All of them.
     pub fn all(&self) -> impl Iterator<Item = &Input> {
         self.superseded.iter().chain(&self.earlier)

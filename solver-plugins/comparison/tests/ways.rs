@@ -244,6 +244,36 @@ fn the_run_of_a_zone_over_the_blank_is_a_reference_and_nothing_is_saved_against_
     assert_eq!(ways[0]["start_time"], Value::Null);
     assert!(!out.results.contains_key("start_time.global"));
 
+    // The global run began late: what it began from is in no cost, but where it is given.
+    let mut driving = late.clone();
+    let mut tool = global.body("tool").clone();
+    tool.frames.extend(tool.frames.first().cloned());
+    tool.fields.extend(tool.fields.first().cloned());
+    driving.bodies.push(tool);
+    inputs[0] = cost("global", &driving, 10.0);
+    inputs[3] = cost("reference", &global, 100.0);
+    let out = compare(&inputs);
+    let started = |out: &MemoryArtifact, way: &str| {
+        let ways = out.attributes["ways"].as_array().unwrap();
+        let way = ways.iter().find(|w| w["model"] == way).unwrap();
+        way["start_time"].as_f64()
+    };
+    let both = ["global", "total"];
+    assert_eq!(
+        both.map(|w| out.result(&format!("start_time.{w}"))),
+        [0.6; 2]
+    );
+    assert_eq!(both.map(|w| started(&out, w)), [Some(0.6); 2]);
+    assert!(!out.measured.contains_key("cost_saving"));
+    inputs.push(cost("earlier", &global, 5.0));
+    let out = compare(&inputs);
+    assert_eq!(both.map(|w| started(&out, w)), [None; 2]);
+    assert_eq!(out.measured["cost.global.cpu_seconds"].0, 15.0);
+    assert!((out.measured["cost_saving"].0 - 0.65).abs() < 1e-12);
+    inputs.pop();
+    inputs[0] = cost("global", &global, 10.0);
+    inputs[3] = cost("reference", &late, 100.0);
+
     inputs.push(cost("reference", &late, 100.0));
     let error = run::<Comparison>(json!({}), &inputs, &[]).unwrap_err();
     let message = format!("{error:?}");

@@ -215,10 +215,9 @@ fn asking(law: &Law) -> Seen {
 /// As [`Law::hammer`], of bending.
 fn hammer(
     law: &Law,
-    history: &Guarded,
-    metric: &[f64],
-    curvature: &[f64],
-    want: &Answer,
+    (history, metric, curvature): (&Guarded, &[f64], &[f64]),
+    ask: Ask,
+    (after, want): (&Guarded, &Answer),
     counter: &Counter<'_>,
 ) -> usize {
     let Some(bending) = law.functions().bending else {
@@ -228,6 +227,7 @@ fn hammer(
     let (mut c, mut k) = (Guarded::of(metric), Guarded::of(curvature));
     let mut now = history.clone();
     let (mut moment, mut energy) = (Guarded::zeros(3 * lanes), Guarded::zeros(lanes));
+    let mut tangent = Guarded::zeros(want.tangent.len());
     let batch = pf_bending_batch {
         size: size_of::<pf_bending_batch>() as u64,
         lanes: lanes as u32,
@@ -238,15 +238,23 @@ fn hammer(
         history: now.pointer(),
         moment: moment.pointer(),
         energy: energy.pointer(),
-        tangent: std::ptr::null_mut(),
+        tangent: if ask.bound {
+            tangent.pointer()
+        } else {
+            std::ptr::null_mut()
+        },
     };
     (0..CALLS)
         .filter(|_| {
             now.slice_mut().copy_from_slice(history.slice());
             let code = counter.during(|| unsafe { bending(law.instance(), &raw const batch) });
-            code != PF_OK
-                || !same(moment.slice(), &want.moment)
-                || !same(energy.slice(), &want.energy)
+            let outputs = [
+                (&moment, &want.moment[..]),
+                (&energy, &want.energy),
+                (&tangent, &want.tangent),
+                (&now, after.slice()),
+            ];
+            code != PF_OK || outputs.iter().any(|(got, want)| !same(got.slice(), want))
         })
         .count()
 }
@@ -257,13 +265,20 @@ fn threads(law: &Law) -> Seen {
             let seed = 201 + 2 * t as u64;
             let (m, k) = (metrics(LANES, 0.02, seed), curvatures(LANES, GENTLE, seed));
             let history = bend(law, &m, &k, Ask::NOTHING).0;
-            let answer = call(law, &mut history.clone(), &m, &k, Ask::NOTHING);
-            (history, m, k, answer)
+            let answers = Ask::HAMMERED.map(|ask| {
+                let mut after = history.clone();
+                let answer = call(law, &mut after, &m, &k, ask);
+                (ask, after, answer)
+            });
+            (history, m, k, answers)
         })
         .collect();
     let met = meet(|t, counter| {
-        let (history, m, k, want) = &alone[t];
-        (CALLS, hammer(law, history, m, k, want, counter))
+        let (history, m, k, answers) = &alone[t];
+        let differing = answers
+            .iter()
+            .map(|(ask, after, want)| hammer(law, (history, m, k), *ask, (after, want), counter));
+        (answers.len() * CALLS, differing.sum())
     });
     met.seen()
 }

@@ -102,6 +102,8 @@ pub(crate) struct Ask {
 impl Ask {
     pub(crate) const NOTHING: Self = Self::of(false, false);
     pub(crate) const EVERYTHING: Self = Self::of(true, true);
+    /// What calls of several threads ask for in turn.
+    pub(crate) const HAMMERED: [Self; 2] = [Self::NOTHING, Self::EVERYTHING];
     /// The solver asks for each alone: fields at a frame, the critical step every few steps.
     pub(crate) const ALL: [Self; 4] = [
         Self::NOTHING,

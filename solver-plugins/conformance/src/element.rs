@@ -266,20 +266,25 @@ fn threads(subject: &Subject) -> Seen {
         .map(|t| Elements::new(subject.nodes(), LANES, 101 + 2 * t as u64))
         .collect();
     // One thread alone, from a state at the deformed position.
-    let alone: Vec<(State, Vec<f64>, Answer)> = sets
+    let alone: Vec<_> = sets
         .iter()
         .map(|set| {
             let state = once(subject, set, STRAIN, Ask::NOTHING).0;
             let x = set.deformed(STRAIN, 7);
-            let rest = Motion::default();
-            let a = subject.forces(&mut state.clone(), &x, rest, Ask::NOTHING);
-            (state, x, a)
+            let answers = Ask::HAMMERED.map(|ask| {
+                let mut after = state.clone();
+                let a = subject.forces(&mut after, &x, Motion::default(), ask);
+                (ask, after, a)
+            });
+            (state, x, answers)
         })
         .collect();
     let met = meet(|t, counter| {
-        let (state, x, a) = &alone[t];
-        let differing = subject.hammer(state, x, (&a.force, &a.energy), CALLS, counter);
-        (CALLS, differing)
+        let (state, x, answers) = &alone[t];
+        let differing = answers
+            .iter()
+            .map(|(ask, after, a)| subject.hammer((state, x), *ask, (after, a), CALLS, counter));
+        (answers.len() * CALLS, differing.sum())
     });
     met.seen()
 }

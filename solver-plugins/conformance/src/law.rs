@@ -138,18 +138,19 @@ impl Law {
     }
 
     /// Calls membrane `times` times from the same history with as little around the calls as can be, so that calls of
-    /// several threads meet, through the `counter` of all; how many differ from `want`.
+    /// several threads meet, through the `counter` of all; how many differ from the history and the answer that one thread got.
     pub(crate) fn hammer(
         &self,
-        history: &Guarded,
-        metric: &[f64],
-        want: &Answer,
+        (history, metric): (&Guarded, &[f64]),
+        ask: Ask,
+        (after, want): (&Guarded, &Answer),
         times: usize,
         counter: &Counter<'_>,
     ) -> usize {
         let lanes = metric.len() / 3;
         let (mut c, mut now) = (Guarded::of(metric), history.clone());
         let (mut stress, mut energy) = (Guarded::zeros(3 * lanes), Guarded::zeros(lanes));
+        let mut stiffness = Guarded::zeros(want.stiffness.len());
         let batch = pf_membrane_batch {
             size: size_of::<pf_membrane_batch>() as u64,
             lanes: lanes as u32,
@@ -159,16 +160,24 @@ impl Law {
             history: now.pointer(),
             stress: stress.pointer(),
             energy: energy.pointer(),
-            stiffness: std::ptr::null_mut(),
+            stiffness: if ask.bound {
+                stiffness.pointer()
+            } else {
+                std::ptr::null_mut()
+            },
         };
         let membrane = unsafe { (*self.functions).membrane };
         (0..times)
             .filter(|_| {
                 now.slice_mut().copy_from_slice(history.slice());
                 let code = counter.during(|| unsafe { membrane(self.instance, &raw const batch) });
-                code != PF_OK
-                    || !same(stress.slice(), &want.stress)
-                    || !same(energy.slice(), &want.energy)
+                let outputs = [
+                    (&stress, &want.stress[..]),
+                    (&energy, &want.energy),
+                    (&stiffness, &want.stiffness),
+                    (&now, after.slice()),
+                ];
+                code != PF_OK || outputs.iter().any(|(got, want)| !same(got.slice(), want))
             })
             .count()
     }

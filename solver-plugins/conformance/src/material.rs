@@ -217,13 +217,20 @@ fn threads(law: &Law) -> Seen {
             let metric = metrics(LANES, STRAIN, 201 + 2 * t as u64);
             let mut history = law.start(LANES);
             let _ = law.membrane(&mut history, &undeformed(LANES), Ask::NOTHING);
-            let answer = law.membrane(&mut history.clone(), &metric, Ask::NOTHING);
-            (history, metric, answer)
+            let answers = Ask::HAMMERED.map(|ask| {
+                let mut after = history.clone();
+                let answer = law.membrane(&mut after, &metric, ask);
+                (ask, after, answer)
+            });
+            (history, metric, answers)
         })
         .collect();
     let met = meet(|t, counter| {
-        let (history, metric, want) = &alone[t];
-        (CALLS, law.hammer(history, metric, want, CALLS, counter))
+        let (history, metric, answers) = &alone[t];
+        let differing = answers.iter().map(|(ask, after, want)| {
+            law.hammer((history, metric), *ask, (after, want), CALLS, counter)
+        });
+        (answers.len() * CALLS, differing.sum())
     });
     met.seen()
 }

@@ -7,7 +7,7 @@
 use crate::Seen;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering, compiler_fence};
-use std::sync::{Barrier, Once};
+use std::sync::{Barrier, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Whether two answers have the same bits.
@@ -33,6 +33,8 @@ pub(crate) struct Met {
     pub(crate) meetings: usize,
     /// Calls with another answer than that of one thread alone.
     pub(crate) differing: usize,
+    /// How often a thread was paused.
+    pub(crate) pauses: usize,
 }
 
 impl Met {
@@ -54,6 +56,11 @@ impl Met {
         } else if self.meetings >= MEETINGS {
             format!(
                 "{THREADS} threads, {MEETINGS} calls and more paused while another began: none differs"
+            )
+        } else if self.pauses == 0 {
+            format!(
+                "{THREADS} threads, {} calls, none of them paused (the system gives no timer or keeps its signal back): none differs",
+                self.calls
             )
         } else {
             format!(
@@ -138,8 +145,23 @@ impl Pauses {
     }
 }
 
-/// Pauses the thread that the signal came to, wherever it is, until another has made a call, or had the time for it.
-extern "C" fn pause(_: libc::c_int) {
+/// The handler that was there before, where it takes information with the signal; 0 where there was none such.
+static BEFORE: AtomicUsize = AtomicUsize::new(0);
+
+/// Pauses the thread that the signal came to, wherever it is, until another has made a call, or had the time for it. What no timer sent goes
+/// to the handler that was there before: a plugin's runtime may use the signal between its own threads.
+extern "C" fn pause(signal: libc::c_int, info: *mut libc::siginfo_t, context: *mut libc::c_void) {
+    // SAFETY: the system gives the information.
+    if unsafe { (*info).si_code } != libc::SI_TIMER {
+        let before = BEFORE.load(Ordering::Relaxed);
+        if before > libc::SIG_IGN {
+            type Handler = extern "C" fn(libc::c_int, *mut libc::siginfo_t, *mut libc::c_void);
+            // SAFETY: it was installed with SA_SIGINFO.
+            let before = unsafe { std::mem::transmute::<usize, Handler>(before) };
+            before(signal, info, context);
+        }
+        return;
+    }
     // SAFETY: what it points to outlives the thread's timer, and it is null before and after.
     let Some(own) = (unsafe { OWN.with(|p| p.load(Ordering::Relaxed)).as_ref() }) else {
         return;
@@ -166,16 +188,49 @@ extern "C" fn pause(_: libc::c_int) {
     }
 }
 
-/// Lets the signal pause threads, from here on in this process. Where that cannot be, nothing is paused, and the check says so.
-fn let_pause() {
-    static ONCE: Once = Once::new();
-    // SAFETY: an action of zeros is one without flags and mask; the handler is a function that stays.
-    ONCE.call_once(|| unsafe {
-        let mut action: libc::sigaction = std::mem::zeroed();
-        action.sa_sigaction = pause as extern "C" fn(libc::c_int) as libc::sighandler_t;
-        action.sa_flags = libc::SA_RESTART;
-        libc::sigaction(SIGNAL, &raw const action, std::ptr::null_mut());
-    });
+/// Lets the signal pause threads until it is dropped. Where that cannot be, nothing is paused, and the check says so.
+struct Handling;
+
+/// How many [`Handling`] there are, and what the signal did before the first.
+static HANDLING: Mutex<(usize, Option<libc::sigaction>)> = Mutex::new((0, None));
+
+impl Handling {
+    fn begin() -> Self {
+        let mut all = HANDLING.lock().unwrap_or_else(PoisonError::into_inner);
+        if all.0 == 0 {
+            // SAFETY: an action of zeros is one without flags and mask; the handler is a function that stays. It runs on a stack of its own where the
+            // thread has one: runtimes with small stacks ask for that.
+            unsafe {
+                let mut action: libc::sigaction = std::mem::zeroed();
+                let mut before: libc::sigaction = std::mem::zeroed();
+                action.sa_sigaction = pause as *const () as libc::sighandler_t;
+                action.sa_flags = libc::SA_RESTART | libc::SA_ONSTACK | libc::SA_SIGINFO;
+                if libc::sigaction(SIGNAL, std::ptr::null(), &raw mut before) == 0 {
+                    let takes_more = before.sa_flags & libc::SA_SIGINFO != 0;
+                    let handler = if takes_more { before.sa_sigaction } else { 0 };
+                    BEFORE.store(handler, Ordering::Relaxed);
+                    if libc::sigaction(SIGNAL, &raw const action, std::ptr::null_mut()) == 0 {
+                        all.1 = Some(before);
+                    }
+                }
+            }
+        }
+        all.0 += 1;
+        Self
+    }
+}
+
+impl Drop for Handling {
+    fn drop(&mut self) {
+        let mut all = HANDLING.lock().unwrap_or_else(PoisonError::into_inner);
+        all.0 -= 1;
+        if all.0 == 0
+            && let Some(before) = all.1.take()
+        {
+            // SAFETY: as it was.
+            unsafe { libc::sigaction(SIGNAL, &raw const before, std::ptr::null_mut()) };
+        }
+    }
 }
 
 /// Pauses the thread that made it, over and over, until it is dropped. The kernel's timer needs no thread and no core of its own.
@@ -187,7 +242,6 @@ struct Pausing<'a> {
 
 impl<'a> Pausing<'a> {
     fn begin(thread: usize, begun: &'a AtomicUsize) -> Self {
-        let_pause();
         // The first use of a thread's variables may allocate, which a handler must not.
         let _ = pauses();
         // SAFETY: all that is pointed to is whole and lives through the call; an event of zeros is one without fields.
@@ -242,6 +296,7 @@ pub(crate) fn meet(work: impl Fn(usize, &Counter<'_>) -> (usize, usize) + Sync) 
         met: &met,
     };
     let (start, clock) = (Barrier::new(THREADS), Instant::now());
+    let _handling = Handling::begin();
     let of_thread = |thread: usize| {
         start.wait();
         let pausing = Pausing::begin(thread, &begun);
@@ -257,11 +312,11 @@ pub(crate) fn meet(work: impl Fn(usize, &Counter<'_>) -> (usize, usize) + Sync) 
             }
             if over.load(Ordering::Relaxed) {
                 drop(pausing);
-                return (calls, differing);
+                return (calls, differing, pauses());
             }
         }
     };
-    let sums: Vec<(usize, usize)> = std::thread::scope(|scope| {
+    let sums: Vec<(usize, usize, usize)> = std::thread::scope(|scope| {
         let of_thread = &of_thread;
         let workers: Vec<_> = (0..THREADS)
             .map(|t| scope.spawn(move || of_thread(t)))
@@ -269,13 +324,14 @@ pub(crate) fn meet(work: impl Fn(usize, &Counter<'_>) -> (usize, usize) + Sync) 
         // A thread that panicked has no answer.
         workers
             .into_iter()
-            .map(|w| w.join().unwrap_or((1, 1)))
+            .map(|w| w.join().unwrap_or((1, 1, 0)))
             .collect()
     });
     Met {
         calls: sums.iter().map(|s| s.0).sum(),
         meetings: met.into_inner(),
         differing: sums.iter().map(|s| s.1).sum(),
+        pauses: sums.iter().map(|s| s.2).sum(),
     }
 }
 

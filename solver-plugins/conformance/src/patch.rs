@@ -170,19 +170,25 @@ fn threads(subject: &Subject) -> Seen {
         return Seen::Nothing("no patch fits".into());
     };
     // One thread alone, from a state at the bent position.
-    let alone: Vec<(PatchState, Vec<f64>, PatchAnswer)> = sets
+    let alone: Vec<_> = sets
         .iter()
         .map(|set| {
             let state = bend(subject, set, Ask::NOTHING).0;
             let x = set.bent(57);
-            let a = subject.patch_forces(&mut state.clone(), &x, 0.0, Ask::NOTHING);
-            (state, x, a)
+            let answers = Ask::HAMMERED.map(|ask| {
+                let mut after = state.clone();
+                let a = subject.patch_forces(&mut after, &x, 0.0, ask);
+                (ask, after, a)
+            });
+            (state, x, answers)
         })
         .collect();
     let met = meet(|t, counter| {
-        let (state, x, a) = &alone[t];
-        let differing = subject.hammer_patches(state, x, (&a.force, &a.energy), CALLS, counter);
-        (CALLS, differing)
+        let (state, x, answers) = &alone[t];
+        let differing = answers.iter().map(|(ask, after, a)| {
+            subject.hammer_patches((state, x), *ask, (after, a), CALLS, counter)
+        });
+        (answers.len() * CALLS, differing.sum())
     });
     met.seen()
 }

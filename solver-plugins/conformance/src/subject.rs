@@ -302,12 +302,12 @@ impl Subject {
 
 impl Subject {
     /// Calls forces `times` times on the same state with as little around the calls as can be, so that calls of
-    /// several threads meet, through the `counter` of all; how many differ from the first answer in `want` (force, energy).
+    /// several threads meet, through the `counter` of all; how many differ from the state and the answer that one thread got.
     pub(crate) fn hammer(
         &self,
-        state: &State,
-        position: &[f64],
-        want: (&[f64], &[f64]),
+        (state, position): (&State, &[f64]),
+        ask: Ask,
+        (after, want): (&State, &Answer),
         times: usize,
         counter: &Counter<'_>,
     ) -> usize {
@@ -319,6 +319,8 @@ impl Subject {
         let mut force = Guarded::zeros(vectors);
         let mut moment = Guarded::zeros(turning);
         let mut energy = Guarded::zeros(PF_ENERGIES * lanes);
+        let mut fields = Guarded::zeros(want.fields.len());
+        let mut step = Guarded::zeros(want.step.len());
         let mut batch = self.batch(lanes, x.pointer(), &mut now);
         batch.force = force.pointer();
         batch.energy = energy.pointer();
@@ -329,6 +331,12 @@ impl Subject {
             batch.spin = w.pointer();
             batch.moment = moment.pointer();
         }
+        if ask.fields {
+            batch.fields = fields.pointer();
+        }
+        if ask.bound {
+            batch.critical_step = step.pointer();
+        }
         (0..times)
             .filter(|_| {
                 let (to, from) = (&mut now.history, state.history.slice());
@@ -338,7 +346,16 @@ impl Subject {
                 let call =
                     || unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
                 let code = counter.during(call);
-                code != PF_OK || !same(force.slice(), want.0) || !same(energy.slice(), want.1)
+                let outputs = [
+                    (&force, &want.force[..]),
+                    (&moment, &want.moment),
+                    (&energy, &want.energy),
+                    (&fields, &want.fields),
+                    (&step, &want.step),
+                    (&now.history, after.history.slice()),
+                    (&now.material_history, after.material_history.slice()),
+                ];
+                code != PF_OK || outputs.iter().any(|(got, want)| !same(got.slice(), want))
             })
             .count()
     }

@@ -98,7 +98,12 @@ impl MaterialInstance {
             functions,
             instance,
         };
-        let reference = unsafe { MaterialRef::new(raw) }.map_err(fail)?;
+        let reference = unsafe { MaterialRef::new(raw) }.map_err(|text| {
+            if !instance.is_null() {
+                unsafe { ((*functions).destroy)(instance) };
+            }
+            fail(text)
+        })?;
         Ok(Arc::new(Self {
             reference,
             functions,

@@ -62,10 +62,11 @@ pub fn hermite_rate(s: f64, h: f64) -> [f64; 4] {
 
 /// Slopes at the knots of the cubic spline through `values` at `times` whose first slope is zero (the sheets
 /// start at rest) and whose last but one knot is none (its third derivative does not jump there): so any
-/// cubic that starts at rest is reproduced. Cubic Hermite pieces with these slopes are C2.
+/// cubic that starts at rest is reproduced. A motion that is known from a later time than 0 on is under way there: then the second
+/// knot is none either, and any cubic is reproduced. Cubic Hermite pieces with these slopes are C2.
 ///
 /// `times`: `[f]` ascending (s); `values`: `[f][columns]`, the result has the same shape, per second. With
-/// two frames the spline is the parabola that starts at rest; with one, slopes are zero.
+/// two frames the spline is the parabola that starts at rest, or a line; under way with three a parabola; with one, slopes are zero.
 pub fn spline_slopes(times: &[f64], values: &[f64], columns: usize) -> Vec<f64> {
     let n = times.len();
     let mut slopes = vec![0.0; n * columns];
@@ -75,16 +76,34 @@ pub fn spline_slopes(times: &[f64], values: &[f64], columns: usize) -> Vec<f64> 
     let h: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
     let chord =
         |i: usize, c: usize| (values[(i + 1) * columns + c] - values[i * columns + c]) / h[i];
+    let under_way = times[0] > 0.0;
     if n == 2 {
         for c in 0..columns {
-            slopes[columns + c] = 2.0 * chord(0, c);
+            let chord = chord(0, c);
+            slopes[c] = if under_way { chord } else { 0.0 };
+            slopes[columns + c] = if under_way { chord } else { 2.0 * chord };
         }
         return slopes;
     }
-    // Rows 1 .. n - 1 of the tridiagonal system; row 0 says that the first slope is zero.
+    if n == 3 && under_way {
+        for c in 0..columns {
+            let (a, b) = (chord(0, c), chord(1, c));
+            let bend = (b - a) / (h[0] + h[1]);
+            slopes[c] = a - bend * h[0];
+            slopes[columns + c] = a + bend * h[0];
+            slopes[2 * columns + c] = b + bend * h[1];
+        }
+        return slopes;
+    }
+    // Rows of the tridiagonal system; row 0 says that the first slope is zero, or else what the last row does from the other end.
     let span = h[n - 2] + h[n - 3];
+    let first_span = h[0] + h[1];
     let mut upper = vec![0.0; n];
     let mut pivot = vec![1.0; n];
+    if under_way {
+        pivot[0] = h[1];
+        upper[0] = first_span / pivot[0];
+    }
     for i in 1..n {
         let (lower, diagonal, above) = match i {
             _ if i == n - 1 => (span, h[n - 3], 0.0),
@@ -94,6 +113,12 @@ pub fn spline_slopes(times: &[f64], values: &[f64], columns: usize) -> Vec<f64> 
         upper[i] = above / pivot[i];
     }
     for c in 0..columns {
+        if under_way {
+            let (b, a) = (h[0], h[1]);
+            let right =
+                (b * b * chord(1, c) + (2.0 * first_span + b) * a * chord(0, c)) / first_span;
+            slopes[c] = right / pivot[0];
+        }
         for i in 1..n - 1 {
             let right = 3.0 * (h[i] * chord(i - 1, c) + h[i - 1] * chord(i, c));
             slopes[i * columns + c] = (right - h[i] * slopes[(i - 1) * columns + c]) / pivot[i];
@@ -104,6 +129,9 @@ pub fn spline_slopes(times: &[f64], values: &[f64], columns: usize) -> Vec<f64> 
             (right - span * slopes[(n - 2) * columns + c]) / pivot[n - 1];
         for i in (1..n - 1).rev() {
             slopes[i * columns + c] -= upper[i] * slopes[(i + 1) * columns + c];
+        }
+        if under_way {
+            slopes[c] -= upper[0] * slopes[columns + c];
         }
     }
     slopes

@@ -158,10 +158,14 @@ fn judge_element(
     Ok(checks)
 }
 
-/// Numbers of element and of patch fields in a manifest.
+/// Numbers of element and of patch fields in a manifest: none where it names none.
 fn declared_fields(manifest: &str) -> Option<[usize; 2]> {
     let manifest: Value = serde_json::from_str(manifest).ok()?;
-    let fields = manifest.get("fields")?.as_array()?;
+    let none = Vec::new();
+    let fields = match manifest.get("fields") {
+        Some(fields) => fields.as_array()?,
+        None => &none,
+    };
     let patch = fields.iter().filter(|f| f["patch"] == true).count();
     Some([fields.len() - patch, patch])
 }

@@ -218,8 +218,8 @@ pub struct PatchBatch<'a> {
     pub stiffness: Option<&'a mut [f64]>,
 }
 
-/// The caller's side of a material: what an element formulation or the solver holds.
-#[derive(Clone, Copy)]
+/// The caller's side of a material: what an element formulation or the solver holds. It cannot be copied: whoever is lent one must not keep it
+/// beyond the material's instance.
 pub struct MaterialRef {
     raw: pf_material,
     sizes: MaterialSizes,
@@ -248,10 +248,17 @@ impl MaterialRef {
                 s.thickness, s.areal_mass
             ));
         }
+        let bending = unsafe { (*raw.functions).bending };
+        if s.has_bending != 0 && bending.is_none() {
+            return Err(
+                "the material says that it has bending (`has_bending`), and its function `bending` is NULL"
+                    .into(),
+            );
+        }
         let sizes = MaterialSizes {
             membrane_history: s.membrane_history as usize,
             bending_history: s.bending_history as usize,
-            has_bending: s.has_bending != 0 && unsafe { (*raw.functions).bending.is_some() },
+            has_bending: s.has_bending != 0,
             thickness: s.thickness,
             areal_mass: s.areal_mass,
         };

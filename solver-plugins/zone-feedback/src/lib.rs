@@ -41,9 +41,18 @@ struct Zone {
     bounds: [f64; 4],
     /// Left, right, bottom, top.
     free_sides: [bool; 4],
+    /// Names of the zones in whose places it is.
+    #[serde(default)]
+    replaces: Vec<String>,
 }
 
 impl Zone {
+    /// Of its box (m2).
+    fn area(&self) -> f64 {
+        let [x0, y0, x1, y1] = self.bounds;
+        (x1 - x0) * (y1 - y0)
+    }
+
     /// Whether a place of the flat ply lies in the zone and at least `overlap` (m) from its cut sides.
     fn holds(&self, at: Vec3, overlap: f64) -> bool {
         (0..4).all(|side| {
@@ -185,7 +194,35 @@ fn fine_runs(host: &Host) -> Result<Vec<Fine>, StepError> {
             zone,
         });
     }
+    let (list, left_out) = current(list);
+    if !left_out.is_empty() {
+        let names = left_out
+            .iter()
+            .map(|f| format!("'{}' (zone {})", f.input.step, f.zone.name));
+        let text = format!(
+            "not fed back, since their zones were drawn again or run again: {}",
+            names.collect::<Vec<_>>().join(", ")
+        );
+        host.log(Log::Info, &text);
+    }
     Ok(list)
+}
+
+/// The runs that count, in the order in which they are given, and the others: none of a zone that another one replaces, and of one
+/// zone that of its largest box, of several with that the last. So `comparison` and `zone-extraction` take them too.
+fn current(list: Vec<Fine>) -> (Vec<Fine>, Vec<Fine>) {
+    let counts = |i: usize| {
+        let own = &list[i].zone;
+        let replaced = list.iter().any(|f| f.zone.replaces.contains(&own.name));
+        let better = |(j, other): (usize, &Fine)| {
+            let by_area = other.zone.area().total_cmp(&own.area());
+            other.zone.name == own.name && by_area.then(j.cmp(&i)).is_gt()
+        };
+        !replaced && !list.iter().enumerate().any(better)
+    };
+    let taken: Vec<bool> = (0..list.len()).map(counts).collect();
+    let mut taken = taken.into_iter();
+    list.into_iter().partition(|_| taken.next() == Some(true))
 }
 
 /// Motion of the nodes of a coarse ply that lie deep in a zone, at the coarse frames.

@@ -174,13 +174,54 @@ fn coarse_nodes_stand_off_the_fine_surface_so_that_their_elements_are_as_long() 
 
 #[test]
 fn zones_that_share_nodes_drive_each_once() {
-    let (coarse, one, two) = (coarse(), fine(0.003), fine(0.001));
+    let (coarse, one, mut two) = (coarse(), fine(0.003), fine(0.001));
+    two.attributes["zone"]["name"] = json!("B");
     let out = feed_back(json!({}), &coarse, &[&one, &two]).unwrap();
     assert_eq!(out.result("driven_nodes"), (13 * 9) as f64);
     assert!(
         (out.result("feedback_change") - 0.003).abs() < 1e-12,
         "the first has them"
     );
+}
+
+#[test]
+fn of_zones_that_were_drawn_again_the_runs_that_count_are_fed_back() {
+    let coarse = coarse();
+    let zone = |name: &str, x0: f64, replaces: &[&str], draw_in: f64| {
+        let zone = json!({"name": name, "box": [x0, -0.06, 0.20, 0.06],
+            "free_sides": [false, true, false, false], "replaces": replaces});
+        formed(
+            [x0, -0.06, 0.20, 0.06],
+            0.005,
+            &[0.0, 0.5, 1.0],
+            draw_in,
+            zone,
+        )
+    };
+    let fed = |fine: &[&MemoryArtifact]| {
+        let out = feed_back(json!({}), &coarse, fine).unwrap();
+        let names = out.attributes["fed_back"].clone();
+        (names, out.result("feedback_change"), out)
+    };
+    // Drawn larger, wherever it stands in the list; of the same box the last.
+    let (small, large) = (zone("A", 0.06, &[], 0.001), zone("A", 0.04, &[], 0.003));
+    for list in [[&small, &large], [&large, &small]] {
+        let (names, change, out) = fed(&list);
+        assert_eq!(names, json!(["A"]));
+        assert!((change - 0.003).abs() < 1e-12, "{change}");
+        assert!(
+            out.log.iter().any(|l| l.contains("(zone A)")),
+            "{:?}",
+            out.log
+        );
+    }
+    let again = zone("A", 0.06, &[], 0.002);
+    assert!((fed(&[&small, &again]).1 - 0.002).abs() < 1e-12);
+    // One in the place of another.
+    let both = zone("B", 0.05, &["A"], 0.004);
+    let (names, change, _) = fed(&[&small, &both]);
+    assert_eq!(names, json!(["B"]));
+    assert!((change - 0.004).abs() < 1e-12, "{change}");
 }
 
 #[test]

@@ -26,6 +26,7 @@ enum fault {
   NEIGHBOUR,      /* a lane feels the next one a little */
   MEAN,           /* energy of a lane holds the mean of the batch */
   RACE,           /* scratch memory in a global */
+  STEP_RACE,      /* the same, where the critical step is wanted */
   COUNTER,        /* the force depends on how often it was asked for */
   ASKING,         /* another force when fields are wanted */
   BAD_STATUS,     /* returns 42 */
@@ -179,6 +180,12 @@ static int32_t faulty_forces(const void *it, const pf_element_batch *b) {
       shared[i] = b->force[i];
     for (uint32_t i = 0; i < 12 * n; i++)
       b->force[i] = shared[i];
+    break;
+  case STEP_RACE:
+    for (uint32_t l = 0; b->critical_step && l < n; l++)
+      shared[l] = b->critical_step[l];
+    for (uint32_t l = 0; b->critical_step && l < n; l++)
+      b->critical_step[l] = shared[l];
     break;
   case COUNTER:
     b->force[0] += 1e-9 * (double)calls++;

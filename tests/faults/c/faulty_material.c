@@ -21,6 +21,7 @@ enum fault {
   BENT_AT_REST,    /* moment at zero curvature */
   FIXED_SIZES,     /* thickness and areal mass of the one sheet that its author had */
   RACE,            /* scratch memory in a global */
+  STIFFNESS_RACE,  /* the same, where the stiffness is wanted */
   DIVIDES_BY_DT,   /* as a law in rates does */
   SKIPS_ZERO_DT,   /* no stress when no time has passed */
   SHEARED_STRESS,  /* a wrong stress from 20 degrees of shear on */
@@ -137,6 +138,12 @@ static int32_t membrane(const void *it, const pf_membrane_batch *b) {
   }
   if (FAULT == PAST_END)
     b->stress[3 * n] = 0;
+  if (FAULT == STIFFNESS_RACE && b->stiffness) {
+    for (uint32_t l = 0; l < n; l++)
+      shared[l] = b->stiffness[l] * (1 + fabs(b->metric[l] - 1));
+    for (uint32_t l = 0; l < n; l++)
+      b->stiffness[l] = shared[l];
+  }
   if (FAULT == RACE) { /* as a Fortran common block or a static work array would do */
     for (uint32_t i = 0; i < 3 * n; i++)
       shared[i] = b->stress[i];

@@ -148,9 +148,9 @@ impl Subject {
     /// As [`Subject::hammer`], of patch_forces.
     pub(crate) fn hammer_patches(
         &self,
-        state: &PatchState,
-        position: &[f64],
-        want: (&[f64], &[f64]),
+        (state, position): (&PatchState, &[f64]),
+        ask: Ask,
+        (after, want): (&PatchState, &PatchAnswer),
         times: usize,
         counter: &Counter<'_>,
     ) -> usize {
@@ -162,15 +162,30 @@ impl Subject {
         let mut x = Guarded::of(position);
         let mut force = Guarded::zeros(position.len());
         let mut energy = Guarded::zeros(lanes);
+        let mut fields = Guarded::zeros(want.fields.len());
+        let mut stiffness = Guarded::zeros(want.stiffness.len());
         let mut batch = self.patch_batch(lanes, x.pointer(), &mut now);
         batch.force = force.pointer();
         batch.energy = energy.pointer();
+        if ask.fields {
+            batch.fields = fields.pointer();
+        }
+        if ask.bound {
+            batch.stiffness = stiffness.pointer();
+        }
         (0..times)
             .filter(|_| {
                 let (to, from) = (&mut now.history, state.history.slice());
                 to.slice_mut().copy_from_slice(from);
                 let code = counter.during(|| unsafe { call(self.instance, &raw const batch) });
-                code != PF_OK || !same(force.slice(), want.0) || !same(energy.slice(), want.1)
+                let outputs = [
+                    (&force, &want.force[..]),
+                    (&energy, &want.energy),
+                    (&fields, &want.fields),
+                    (&stiffness, &want.stiffness),
+                    (&now.history, after.history.slice()),
+                ];
+                code != PF_OK || outputs.iter().any(|(got, want)| !same(got.slice(), want))
             })
             .count()
     }
