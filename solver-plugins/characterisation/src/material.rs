@@ -90,6 +90,14 @@ impl Template {
 }
 
 impl Template {
+    /// A parameter of the material, by the names on the way to it; `None` where it is not told or empty.
+    #[must_use]
+    pub fn parameter(&self, path: &[&str]) -> Option<&Value> {
+        let with = self.value.get("with");
+        let found = path.iter().fold(with, |v, key| v.and_then(|v| v.get(key)));
+        found.filter(|v| !v.is_null())
+    }
+
     /// Refuses a bending law that the material would refuse beside what the template has.
     fn takes_bending(&self, blocks: &[Block<'_>]) -> Result<(), String> {
         let new = |sign: &str| {
@@ -101,7 +109,7 @@ impl Template {
             return Ok(());
         }
         let bending = self.value.get("with").and_then(|w| w.get("bending"));
-        let has = |key: &str| bending.is_some_and(|b| b.get(key).is_some());
+        let has = |key: &str| bending.is_some_and(|b| b.get(key).is_some_and(|v| !v.is_null()));
         let origin = &self.origin;
         if has("family_1") || has("family_2") {
             return Err(format!(
@@ -164,7 +172,10 @@ pub fn file(
     };
     template.takes_bending(blocks)?;
     let mut value = template.value.clone();
-    let with = value.entry("with").or_insert_with(|| json!({}));
+    let with = value.entry("with").or_insert(Value::Null);
+    if with.is_null() {
+        *with = json!({});
+    }
     if let Value::Object(with) = with {
         blocks.iter().for_each(|b| put(with, b));
     }
@@ -203,7 +214,12 @@ fn put(into: &mut Map<String, Value>, (path, value): &Block<'_>) {
             }
         },
         [first, rest @ ..] => {
-            if let Value::Object(below) = into.entry(*first).or_insert_with(|| json!({})) {
+            let below = into.entry(*first).or_insert(Value::Null);
+            // A block that is there and empty is none.
+            if below.is_null() {
+                *below = json!({});
+            }
+            if let Value::Object(below) = below {
                 put(below, &(rest, value.clone()));
             }
         }
@@ -397,6 +413,11 @@ mod tests {
             assert!(e.contains("`bending.positive`"), "{e}");
             assert!(put(bending, "positive").is_ok());
         }
+        // An empty block is none: it takes a law, and is no law beside which another could stand.
+        let (_, text) = put("  bending:\n", "positive").unwrap();
+        assert!(text.contains("positive: {linear: 1 N m}"), "{text}");
+        let e = put("  bending: {positive: }\n", "negative").unwrap_err();
+        assert!(e.contains("has no `bending.positive`"), "{e}");
         let both = "  bending: {positive: {stiffness: 1 N m}}\n";
         assert!(put(both, "negative").is_ok());
     }

@@ -304,7 +304,7 @@ fn a_degree_that_cannot_be_is_refused() {
         },
     )
     .unwrap_err();
-    assert!(e.contains("the least is 4"), "{e}");
+    assert!(e.contains("the least of `fit: tangent-angle` is 4"), "{e}");
     let [x, z] = BENDING[0].scan(10e-3, 0.0, 1);
     let few = Profile::new(&x, &z, 1e-3, &|i| i.to_string()).unwrap();
     assert!(

@@ -62,7 +62,7 @@ impl Step for CharacterisePictureFrame {
         }
         series.extend(more);
         write_fit(&mut out, &shear, !negative.is_empty(), series);
-        write_file(&mut out, &shear, template.as_ref(), &p)?;
+        write_file(host, &mut out, &shear, template.as_ref(), &p)?;
         write_results(&mut out, &shear, !negative.is_empty());
         out.write(host)
     }
@@ -151,6 +151,7 @@ fn write_fit(out: &mut Output, shear: &Shear, both: bool, mut series: Vec<Series
 }
 
 fn write_file(
+    host: &Host,
     out: &mut Output,
     shear: &Shear,
     template: Option<&Template>,
@@ -160,7 +161,8 @@ fn write_file(
         let texts = values.iter().map(|v| quantity(*v, 1.0, unit));
         texts.map(Value::from).collect()
     };
-    let law = match &shear.yarns {
+    let told = |path: &[&str]| template.and_then(|t| t.parameter(path)).cloned();
+    let mut law = match &shear.yarns {
         Yarns::Polynomial(p) => {
             let limit = shear.limit.clamp(LIMITS[0], LIMITS[1]);
             json!({"coefficients": all(&p.coefficients, "N/m"), "limit": quantity(limit, 1.0, "rad")})
@@ -169,10 +171,27 @@ fn write_file(
             json!({"table": {"angles": all(angles, "rad"), "forces": all(forces, "N/m")}})
         }
     };
+    // Of a fabric with a law of its own for negative shear.
+    if let Some(negative) = told(&["shear", "negative"]) {
+        if p.negative.is_empty() {
+            law["negative"] = negative;
+        } else {
+            host.log(
+                Log::Warn,
+                "the template has a law of its own for negative shear (`shear.negative`); the new one is fitted to tests of both directions \
+                 and takes its place. To keep two laws, evaluate each direction by itself as `positive` and join them by hand",
+            );
+        }
+    }
     let stitch = shear.stitch.map(|s| {
         let angles = s.stitch.angles.map(|g| quantity(g, 1.0, "rad"));
         let forces = [0.0, s.stitch.peak, 0.0].map(|f| quantity(f, 1.0, "N/m"));
-        json!({"angles": angles, "forces": forces})
+        let mut block = json!({"angles": angles, "forces": forces});
+        // The tests tell what it carries, the template which sign of shear stretches it.
+        if let Some(direction) = told(&["stitch", "direction"]) {
+            block["direction"] = direction;
+        }
+        block
     });
     let note = [format!(
         "Shear from {} positive and {} negative picture-frame tests, to {} deg: rms residual {} % of the force.",

@@ -120,6 +120,50 @@ fn yarns_and_stitch_of_the_ncf_come_back_and_stand_in_the_material() {
 }
 
 #[test]
+fn what_the_tests_do_not_tell_of_a_fabric_stays_as_in_the_template() {
+    let folder = tempfile::tempdir().unwrap();
+    let up = csv(folder.path(), "up.csv", ncf_shear, 1.0, 55.0);
+    let down = csv(folder.path(), "down.csv", ncf_shear, -1.0, 55.0);
+    let guide = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/guide/materials.md");
+    let guide = std::fs::read_to_string(guide).unwrap();
+    let start = guide
+        .find("name: A fabric that shears differently")
+        .unwrap();
+    let start = &guide[start..start + guide[start..].find("```").unwrap()];
+    let template = folder.path().join("both.yaml");
+    std::fs::write(&template, format!("plyflow_material: 1\n{start}")).unwrap();
+    let evaluated = |positive: &PathBuf, negative: &[PathBuf], stitch: bool| {
+        let mut parameters = with(
+            std::slice::from_ref(positive),
+            negative,
+            stitch,
+            "woven-38616",
+        );
+        parameters["template"] = json!(template);
+        run::<CharacterisePictureFrame>(parameters, &[], &[]).unwrap()
+    };
+    // The law of negative shear, where only the other was tested.
+    let woven = csv(folder.path(), "woven.csv", woven_shear, 1.0, 60.0);
+    let out = evaluated(&woven, &[], false);
+    let shear = &material(&out)["with"]["shear"];
+    assert_eq!(
+        shear["negative"]["table"]["forces"][3], "240 N/m",
+        "{shear}"
+    );
+    assert!(out.log.is_empty(), "{:?}", out.log);
+    // Which sign of shear stretches the stitch.
+    let out = evaluated(&up, &[down], true);
+    let value = material(&out);
+    assert_eq!(value["with"]["stitch"]["direction"], "negative");
+    assert!(value["with"]["shear"]["negative"].is_null());
+    assert!(
+        out.log.iter().any(|l| l.contains("`shear.negative`")),
+        "{:?}",
+        out.log
+    );
+}
+
+#[test]
 fn a_fabric_fitted_without_a_stitch_loses_that_of_the_template() {
     let folder = tempfile::tempdir().unwrap();
     let up = csv(folder.path(), "up.csv", woven_shear, 1.0, 60.0);

@@ -20,8 +20,8 @@ mod write;
 
 use crate::reference::Curve;
 use crate::run::{Test, run, with_threads};
-use crate::specimen::{Common, Specimen};
-use crate::strip::{CLAMPED, Grid, fibre_strain, rows};
+use crate::specimen::{Common, Specimen, element};
+use crate::strip::{CLAMPED, Grid, check_bends, fibre_strain, rows};
 use plyflow_mechanics::history::{constant_speed_way, linear};
 use plyflow_mechanics::model::{Drive, NodalLoad};
 use plyflow_mechanics::sheet::Pressed;
@@ -263,6 +263,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         x[2] = p.imperfection * shape.at(x[0], x[1]);
     }
     let axis = [FRAC_1_SQRT_2, -FRAC_1_SQRT_2, 0.0];
+    check_bends(&element(host, &p.common)?.0, &p.common)?;
     let mut specimen = Specimen::new(host, &p.common, mesh, axis, Pressed::No)?;
     if p.transverse_load > 0.0 {
         let loads = transverse_loads(p, &grid, &shape, &specimen);

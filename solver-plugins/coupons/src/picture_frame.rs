@@ -8,7 +8,7 @@
 
 use crate::output::{Output, Style};
 use crate::reference::Curve;
-use crate::run::{Outcome, Test, run, with_threads};
+use crate::run::{Outcome, SAMPLES, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
@@ -243,6 +243,13 @@ fn check(p: &Parameters) -> Result<(), StepError> {
     if p.path.is_empty() {
         return Err("path: is empty; expected at least one shear angle, e.g. [40 deg]".into());
     }
+    if p.path.len() > SAMPLES {
+        return Err(format!(
+            "path: given {} angles; expected no more than {SAMPLES}, as many as there are measurements in a run",
+            p.path.len()
+        )
+        .into());
+    }
     if let Some(g) = p.path.iter().find(|g| g.abs() > limit) {
         return Err(format!(
             "path: given {:.1} deg; expected -80 to 80 deg",
@@ -318,7 +325,7 @@ fn write(
             .iter()
             .copied()
             .zip(normalised.iter().copied())
-            .take(crate::run::SAMPLES / p.path.len())
+            .take(SAMPLES / p.path.len())
             .filter(|(g, _)| g * first > 0.0)
             .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -351,8 +358,10 @@ fn write_path(
     let length = out.curve("run/path_length", "rad", &test.length)?;
     let work = out.curve("run/work_density", "N/m", &density)?;
     let legs = p.path.len();
-    let samples = crate::run::SAMPLES / legs;
-    for (k, leg) in normalised.chunks(samples).take(legs).enumerate() {
+    for k in 0..legs {
+        // What was measured in the time of the leg.
+        let at = |k: usize| (k * SAMPLES / legs).min(normalised.len());
+        let leg = &normalised[at(k)..at(k + 1)];
         let peak = leg.iter().map(|f| f.abs()).fold(0.0, f64::max);
         host.result(&format!("leg_force.{}", k + 1), peak, "N/m")?;
     }

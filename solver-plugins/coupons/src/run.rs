@@ -90,7 +90,8 @@ pub fn run(
             .time_step
             .unwrap_or(f64::INFINITY)
             .min(p.step_safety * critical);
-        let steps = (interval / wanted).ceil().max(1.0);
+        // Of two and more: what is measured is the mean over the steps between samples, and the first of all says nothing yet.
+        let steps = (interval / wanted).ceil().max(2.0);
         if steps.is_nan() || steps > 1e9 {
             return Err(format!(
                 "the critical step has fallen to {critical:.3e} s at t = {:.5} s: an element has collapsed. \

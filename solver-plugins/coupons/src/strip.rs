@@ -9,6 +9,7 @@
 //! line must be one of those, or the strip is clamped a tenth of an element off.
 
 use crate::specimen::{Common, Specimen, element};
+use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::vec3::V;
 use plyflow_sdk::{Host, StepError};
@@ -19,9 +20,34 @@ pub const CLAMPED: usize = 4;
 /// Whether the nodes of the chosen element rotate.
 ///
 /// # Errors
-/// When a component is missing or refuses its parameters.
+/// When a component is missing or refuses its parameters; when element and material do not bend.
 pub fn rotates(host: &Host, p: &Common) -> Result<bool, StepError> {
-    Ok(element(host, p)?.0.rotates())
+    let element = element(host, p)?.0;
+    check_bends(&element, p)?;
+    if !element.rotates() && element.sizes.patch_nodes == 0 {
+        return Err(format!(
+            "element: given '{}', a membrane, which does not bend; expected an element that does, such as rf4 or s4",
+            p.element.plugin
+        )
+        .into());
+    }
+    Ok(element.rotates())
+}
+
+/// Refuses an element that bends with a material that does not: it would be a membrane without a word.
+///
+/// # Errors
+/// When it is so.
+pub fn check_bends(element: &ElementInstance, p: &Common) -> Result<(), StepError> {
+    if element.sizes.patch_nodes > 0 && !element.material.reference().sizes().has_bending {
+        return Err(format!(
+            "element: given '{}', which bends, and material '{}', which has no bending; expected a material with `bending` \
+             (`plyflow plugins {}`)",
+            p.element.plugin, p.material.name, p.material.plugin
+        )
+        .into());
+    }
+    Ok(())
 }
 
 /// A structured strip: columns along x, rows along y.

@@ -232,7 +232,13 @@ pub fn fit(profile: &Profile, choice: &Choice) -> Result<ProfileFit, String> {
     let points = profile.x.len();
     let (from, to) = match choice.degree {
         Some(d) if d < least => {
-            return Err(format!("a degree of {d} is too low; the least is {least}"));
+            let method = match choice.method {
+                Method::TangentAngle => "tangent-angle",
+                Method::Deflection => "deflection",
+            };
+            return Err(format!(
+                "a degree of {d} is too low; the least of `fit: {method}` is {least}"
+            ));
         }
         Some(d) => (d, d),
         None => (least, choice.maximum_degree.max(least)),

@@ -67,7 +67,7 @@ impl Done<'_> {
             .series("specimen, -min z", d, &bottom, Style::Dashed)
             .series("specimen, half peak to valley", d, &half, Style::Dashed);
         if let Some((x, y)) = &measured {
-            plot = plot.series("thesis", x, y, Style::Points);
+            plot = plot.series("measured", x, y, Style::Points);
         }
         plot.done();
         Ok(())
@@ -91,7 +91,7 @@ impl Done<'_> {
             .series("point B", d, &b, Style::Line)
             .series("pin-jointed net", d, &net, Style::Dashed);
         if let Some((x, y)) = &measured {
-            plot = plot.series("thesis", x, y, Style::Points);
+            plot = plot.series("measured", x, y, Style::Points);
         }
         plot.done();
         Ok(())

@@ -1,10 +1,10 @@
-//! Coupons give the same bytes for any number of threads. The pieces that threads share are larger than one
-//! (batches of elements, blocks of nodes): the meshes here have more than a thousand nodes.
+//! Coupons as steps. They give the same bytes for any number of threads: the pieces that threads share are larger than one
+//! (batches of elements, blocks of nodes), so the meshes of these tests have more than a thousand nodes.
 
 use plyflow_abi::{PF_KIND_ELEMENT, pf_component, pf_str};
 use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4};
 use plyflow_sdk::{Host, Step, StepError, element_table, material_table};
-use plyflow_surface::memory_host::{Machine, MemoryArtifact, run_on};
+use plyflow_surface::memory_host::{Machine, MemoryArtifact, MemoryInput, run_on};
 use serde_json::{Value, json};
 
 macro_rules! step {
@@ -27,6 +27,13 @@ step!(
 step!(Film, "coupon-film/manifest.json", film);
 step!(Inflation, "coupon-inflation/manifest.json", inflation);
 step!(BiasPlane, "coupon-bias-plane/manifest.json", bias_plane);
+step!(
+    BiasExtension,
+    "coupon-bias-extension/manifest.json",
+    bias_extension
+);
+step!(Cantilever, "coupon-cantilever/manifest.json", cantilever);
+step!(PureBending, "coupon-bending/manifest.json", pure_bending);
 
 fn component(kind: u32, name: &str) -> Option<pf_component> {
     let functions: *const std::ffi::c_void = match (kind, name) {
@@ -165,4 +172,90 @@ fn a_disc_beyond_its_limit_point_stops_with_a_statement() {
         "{:?}",
         run.log
     );
+}
+
+#[test]
+fn the_force_of_a_leg_is_that_of_its_own_part_of_the_path() {
+    // 15 legs, of which 400 samples are no multiple: to and fro, the last to a smaller angle than all others.
+    let mut path: Vec<f64> = (0..14).map(|k| [0.6, 0.2][k % 2]).collect();
+    path.push(0.4);
+    let machine = Machine {
+        threads: 1,
+        component,
+    };
+    // Without a stitch the yarns' force is that of the angle alone.
+    let mut material = ncf();
+    material["with"]["stitch"] = Value::Null;
+    let with = json!({
+        "material": material, "element": element("m4"), "element_size": 0.145 / 4.0,
+        "path": path, "leg_time": 0.02, "frames": 1
+    });
+    let run = run_on::<PictureFrame>(&machine, with.clone(), &[], &[]).unwrap();
+    let force = |g: f64| {
+        let c = [0.0, 112.19, 94.73, 137.06, -65.56, 29.56];
+        c.iter().rev().fold(0.0, |s, c| s * g + c)
+    };
+    for (k, largest) in [(1, 0.6), (2, 0.6), (8, 0.6), (14, 0.6), (15, 0.4)] {
+        let told = run.result(&format!("leg_force.{k}"));
+        assert!(
+            (told / force(largest) - 1.0).abs() < 0.05,
+            "leg {k}: {told} N/m"
+        );
+    }
+    let mut many = with;
+    many["path"] = json!(vec![0.1; 401]);
+    let error = run_on::<PictureFrame>(&machine, many, &[], &[]).unwrap_err();
+    assert!(error.contains("path: given 401 angles"), "{error}");
+}
+
+#[test]
+fn a_specimen_is_measured_where_it_takes_one_step_between_samples() {
+    let machine = Machine {
+        threads: 1,
+        component,
+    };
+    let with = json!({
+        "material": ncf(), "element": element("rf4"), "element_size": 0.145, "path": [0.6],
+        "leg_time": 0.004, "frames": 1
+    });
+    let run = run_on::<PictureFrame>(&machine, with, &[], &[]).unwrap();
+    // All but the first, which has no steps before it, and the end, which has one.
+    assert!(run.arrays["curves/run/shear_angle"].1.len() >= 399);
+    assert!(run.result("force_peak") > 1.0);
+}
+
+#[test]
+fn a_test_of_bending_refuses_what_does_not_bend() {
+    type Run = fn(&Machine, Value, &[MemoryInput<'_>], &[u64]) -> Result<MemoryArtifact, String>;
+    let mut flat = ncf();
+    flat["with"]["bending"] = Value::Null;
+    let machine = Machine {
+        threads: 1,
+        component,
+    };
+    let refused = |material: &Value, element_name: &str, name: &str| {
+        let (run, required) = match name {
+            "bending" => (run_on::<PureBending> as Run, json!({"path": [20.0]})),
+            "cantilever" => (run_on::<Cantilever> as Run, json!({"overhang": 0.1})),
+            _ => (
+                run_on::<BiasExtension> as Run,
+                json!({"length": 0.15, "width": 0.05, "displacement": 0.01}),
+            ),
+        };
+        let mut with = required;
+        with["material"] = material.clone();
+        with["element"] = element(element_name);
+        run(&machine, with, &[], &[]).unwrap_err()
+    };
+    for name in ["bending", "cantilever", "bias extension"] {
+        let error = refused(&flat, "rf4", name);
+        assert!(
+            error.contains("given 'rf4', which bends, and material 'NCF', which has no bending"),
+            "{name}: {error}"
+        );
+    }
+    for name in ["bending", "cantilever"] {
+        let error = refused(&ncf(), "m4", name);
+        assert!(error.contains("given 'm4', a membrane"), "{name}: {error}");
+    }
 }
