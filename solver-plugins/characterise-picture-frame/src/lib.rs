@@ -175,6 +175,13 @@ fn write_file(
     if let Some(negative) = told(&["shear", "negative"]) {
         if p.negative.is_empty() {
             law["negative"] = negative;
+            if told(&["stitch", "direction"]).is_some_and(|d| d == "negative") {
+                host.log(
+                    Log::Warn,
+                    "the template's stitch is stretched in negative shear (`stitch.direction`) and its `shear.negative` stays as it was: the law of these tests \
+                     is written as that of positive shear. If they stretched the stitch, put it into `shear.negative` by hand",
+                );
+            }
         } else {
             host.log(
                 Log::Warn,

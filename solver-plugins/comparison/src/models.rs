@@ -3,7 +3,7 @@
 use plyflow_defects::of_run::{self, Sheet};
 use plyflow_defects::{Ply, Settings, Tool};
 use plyflow_model::scene::first_axis;
-use plyflow_sdk::{Host, Input, StepError};
+use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::flat_bounds;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -163,6 +163,8 @@ pub struct PassedOver {
     pub earlier: Vec<Input>,
     /// How many of the latter are coarse.
     pub earlier_coarse: usize,
+    /// Whether one of them is a run of the whole from the beginning of the process.
+    pub earlier_from_start: bool,
     /// Cells times cycles of the superseded.
     pub superseded_cycles: f64,
     /// Cells times cycles of the earlier.
@@ -170,11 +172,11 @@ pub struct PassedOver {
 }
 
 impl PassedOver {
-    /// When the process that the global run tells began for what is in its cost, if that was late (s): what it began from is not, where no earlier
-    /// pass is given.
+    /// When the process that the global run tells began for what is in its cost, if that was late (s): what it began from is in it where a
+    /// run of the whole from the beginning is among the earlier ones.
     pub fn global_began_late(&self, models: &[Model]) -> Option<f64> {
         let global = models.iter().find(|m| m.role == Role::Global)?;
-        global.began_late.filter(|_| self.earlier.is_empty())
+        global.began_late.filter(|_| !self.earlier_from_start)
     }
 
     /// All of them.
@@ -203,7 +205,9 @@ pub fn read_models(
     let global = global.ok_or("global: no run arrives")?;
     passed_over.earlier_coarse = passed_over.earlier.len();
     for input in &passed_over.earlier {
-        passed_over.earlier_cycles += host.attributes::<Formed>(input)?.element_cycles;
+        let formed: Formed = host.attributes(input)?;
+        passed_over.earlier_cycles += formed.element_cycles;
+        passed_over.earlier_from_start |= is_from_start(host, input, &formed)?;
     }
     let passes = 1 + passed_over.earlier.len();
     let tool = of_run::tool(host, &global)?;
@@ -243,6 +247,7 @@ pub fn read_models(
         let formed: Formed = host.attributes(&input)?;
         passed_over.earlier_coarse += usize::from(formed.zone.is_null());
         passed_over.earlier_cycles += formed.element_cycles;
+        passed_over.earlier_from_start |= is_from_start(host, &input, &formed)?;
         passed_over.earlier.push(input);
     }
     Ok((models, passed_over))
@@ -262,6 +267,17 @@ fn same_pass(first: &Input, second: &Input, zone: &str, passes: usize) -> String
         )
     };
     format!("local: two local runs belong to zone {zone}, {a} and {b}; {why}")
+}
+
+/// When a run began, if that was late (s).
+fn began_late(meshes: &Meshes) -> Option<f64> {
+    let first = meshes.times.first().copied();
+    first.filter(|&t| meshes.times.len() > 1 && t > 0.0)
+}
+
+/// Whether a run is one of the whole from the beginning of the process.
+fn is_from_start(host: &Host, input: &Input, formed: &Formed) -> Result<bool, StepError> {
+    Ok(formed.zone.is_null() && began_late(&host.meshes(input)?).is_none())
 }
 
 /// Others and the reference, in that order, with their own tools or the global run's.
@@ -385,7 +401,7 @@ fn read(
             .map(|b| b.cells)
             .sum(),
         element_cycles: formed.element_cycles,
-        began_late: (meshes.times.first().copied()).filter(|&t| meshes.times.len() > 1 && t > 0.0),
+        began_late: began_late(&meshes),
         axes: (formed.sheets.iter())
             .filter_map(|s| Some((s.name.clone(), first_axis(s.fibre_1?, s.fibre_2?))))
             .collect(),

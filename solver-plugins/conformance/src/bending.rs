@@ -5,7 +5,7 @@ use crate::buffer::Guarded;
 use crate::cycle::Cycles;
 use crate::law::{Law, largest, metrics, size};
 use crate::material::{LANES, zero_dt};
-use crate::meeting::{Counter, THREADS, meet, same};
+use crate::meeting::{Counter, THREADS, meet_in_turn, same};
 use crate::shapes::pick;
 use crate::slope::Energies;
 use crate::{Run, Seen, Sequence, rules, worse};
@@ -273,12 +273,11 @@ fn threads(law: &Law) -> Seen {
             (history, m, k, answers)
         })
         .collect();
-    let met = meet(|t, counter| {
+    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
         let (history, m, k, answers) = &alone[t];
-        let differing = answers
-            .iter()
-            .map(|(ask, after, want)| hammer(law, (history, m, k), *ask, (after, want), counter));
-        (answers.len() * CALLS, differing.sum())
+        let (ask, after, want) = &answers[a];
+        let differing = hammer(law, (history, m, k), *ask, (after, want), counter);
+        (CALLS, differing)
     });
     met.seen()
 }

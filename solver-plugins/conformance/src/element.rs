@@ -1,7 +1,7 @@
 //! Checks of an element formulation: its calls, its buffers, its lanes.
 
 use crate::breaches::{Ask, Breaches, Refusal};
-use crate::meeting::{THREADS, meet};
+use crate::meeting::{THREADS, meet_in_turn};
 use crate::shapes::{Elements, pick};
 use crate::subject::{Answer, Masses, Motion, State, Subject};
 use crate::{Check, Run, Seen, Sink, element_motion, patch, rules};
@@ -279,12 +279,11 @@ fn threads(subject: &Subject) -> Seen {
             (state, x, answers)
         })
         .collect();
-    let met = meet(|t, counter| {
+    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
         let (state, x, answers) = &alone[t];
-        let differing = answers
-            .iter()
-            .map(|(ask, after, a)| subject.hammer((state, x), *ask, (after, a), CALLS, counter));
-        (answers.len() * CALLS, differing.sum())
+        let (ask, after, want) = &answers[a];
+        let differing = subject.hammer((state, x), *ask, (after, want), CALLS, counter);
+        (CALLS, differing)
     });
     met.seen()
 }

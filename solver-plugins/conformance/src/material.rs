@@ -3,7 +3,7 @@
 use crate::breaches::{Ask, Breaches, DT, Refusal};
 use crate::buffer::Guarded;
 use crate::law::{Answer, Law, largest, metrics, trellis, undeformed};
-use crate::meeting::{THREADS, meet};
+use crate::meeting::{THREADS, meet_in_turn};
 use crate::shapes::pick;
 use crate::{Check, Run, Seen, Sink, bending, material_law, rules};
 use plyflow_sdk::abi::*;
@@ -225,12 +225,11 @@ fn threads(law: &Law) -> Seen {
             (history, metric, answers)
         })
         .collect();
-    let met = meet(|t, counter| {
+    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
         let (history, metric, answers) = &alone[t];
-        let differing = answers.iter().map(|(ask, after, want)| {
-            law.hammer((history, metric), *ask, (after, want), CALLS, counter)
-        });
-        (answers.len() * CALLS, differing.sum())
+        let (ask, after, want) = &answers[a];
+        let differing = law.hammer((history, metric), *ask, (after, want), CALLS, counter);
+        (CALLS, differing)
     });
     met.seen()
 }

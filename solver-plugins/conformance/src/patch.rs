@@ -2,7 +2,7 @@
 
 use crate::breaches::{Ask, Breaches, DT};
 use crate::linear::{V, cross, norm, rotation};
-use crate::meeting::{THREADS, meet};
+use crate::meeting::{THREADS, meet_in_turn};
 use crate::shapes::{Patches, moved, pick};
 use crate::subject::{PatchAnswer, PatchState, Subject};
 use crate::{Run, Seen, rules, worse};
@@ -183,12 +183,11 @@ fn threads(subject: &Subject) -> Seen {
             (state, x, answers)
         })
         .collect();
-    let met = meet(|t, counter| {
+    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
         let (state, x, answers) = &alone[t];
-        let differing = answers.iter().map(|(ask, after, a)| {
-            subject.hammer_patches((state, x), *ask, (after, a), CALLS, counter)
-        });
-        (answers.len() * CALLS, differing.sum())
+        let (ask, after, want) = &answers[a];
+        let differing = subject.hammer_patches((state, x), *ask, (after, want), CALLS, counter);
+        (CALLS, differing)
     });
     met.seen()
 }

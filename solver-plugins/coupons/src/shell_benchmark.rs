@@ -271,8 +271,7 @@ fn benchmark(host: &Host, p: &Parameters) -> Result<(), StepError> {
         )
         .into());
     }
-    let (element, _) = crate::specimen::element(host, &p.common)?;
-    let guard = usize::from(!element.rotates());
+    let guard = usize::from(!crate::strip::rotates(host, &p.common)?);
     let setup = match p.case {
         Case::CantileverShear => cantilever(p, 10.0, guard),
         Case::CantileverMoment => cantilever(p, 12.0, guard),

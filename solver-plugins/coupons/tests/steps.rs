@@ -219,7 +219,7 @@ fn a_specimen_is_measured_where_it_takes_one_step_between_samples() {
         "leg_time": 0.004, "frames": 1
     });
     let run = run_on::<PictureFrame>(&machine, with, &[], &[]).unwrap();
-    // All but the first, which has no steps before it, and the end, which has one.
+    // All but the first, which has no steps before it.
     assert!(run.arrays["curves/run/shear_angle"].1.len() >= 399);
     assert!(run.result("force_peak") > 1.0);
 }
