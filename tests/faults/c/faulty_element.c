@@ -181,11 +181,11 @@ static int32_t faulty_forces(const void *it, const pf_element_batch *b) {
     for (uint32_t i = 0; i < 12 * n; i++)
       b->force[i] = shared[i];
     break;
-  case STEP_RACE:
-    for (uint32_t l = 0; b->critical_step && l < n; l++)
-      shared[l] = b->critical_step[l];
-    for (uint32_t l = 0; b->critical_step && l < n; l++)
-      b->critical_step[l] = shared[l];
+  case STEP_RACE: /* what it makes of the forces for its step is 0 for whoever is alone */
+    for (uint32_t i = 0; b->critical_step && i < 12 * n; i++)
+      shared[i] = b->force[i];
+    for (uint32_t i = 0; b->critical_step && i < 12 * n; i++)
+      b->critical_step[i % n] += shared[i] - b->force[i];
     break;
   case COUNTER:
     b->force[0] += 1e-9 * (double)calls++;
