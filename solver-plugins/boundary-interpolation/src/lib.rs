@@ -126,15 +126,7 @@ impl Step for BoundaryInterpolation {
             .into());
         }
         if !sheets.iter().any(|s| s.attributes["kind"] == "ply") {
-            let millimetres = |v: f64| (1e6 * v).round() / 1e3;
-            let [x0, y0, x1, y1] = bounds.map(millimetres);
-            return Err(format!(
-                "no ply of '{}' has a whole element of {} mm in zone {} (x {x0} to {x1} mm, y {y0} to {y1} mm); expected a zone that is at least one element wide and lies on a ply. Draw it larger (`boxes` of zone-extraction), or take a smaller `element_size`",
-                input.step,
-                millimetres(p.element_size),
-                zone["name"]
-            )
-            .into());
+            return Err(too_small(&input.step, &zone["name"], bounds, p.element_size).into());
         }
         write(host, &meshes.times, first, &sheets)?;
         let times = &meshes.times[first..];
@@ -156,6 +148,17 @@ impl Step for BoundaryInterpolation {
         host.result("elements", count(|s| s.fine.grid.cells.len() / 4), "1")?;
         host.result("driven_nodes", count(|s| s.fine.driven_nodes.len()), "1")
     }
+}
+
+/// Why a zone has no ply.
+fn too_small(step: &str, zone: &Value, bounds: Rectangle, element_size: f64) -> String {
+    let millimetres = |v: f64| (1e6 * v).round() / 1e3;
+    let [x0, y0, x1, y1] = bounds.map(millimetres);
+    let size = millimetres(element_size);
+    format!(
+        "no ply of '{step}' has a whole element of {size} mm in zone {zone} (x {x0} to {x1} mm, y {y0} to {y1} mm); expected a zone that is at least \
+         one element wide and lies on a ply. Draw it larger (`boxes` of zone-extraction), or take a smaller `element_size`"
+    )
 }
 
 /// The frame of the coarse run with which the fine run begins.

@@ -150,6 +150,20 @@ fn write_fit(out: &mut Output, shear: &Shear, both: bool, mut series: Vec<Series
     out.plot("shear", "Normalised shear force", axes[0], axes[1], &series);
 }
 
+/// Says what becomes of the template's law for negative shear, where that may not be what is meant. `turned`: its stitch is stretched there.
+fn warn_of_negative(host: &Host, p: &Parameters, turned: bool) {
+    let text = if !p.negative.is_empty() {
+        "the template has a law of its own for negative shear (`shear.negative`); the new one is fitted to tests of both directions \
+         and takes its place. To keep two laws, evaluate each direction by itself as `positive` and join them by hand"
+    } else if turned {
+        "the template's stitch is stretched in negative shear (`stitch.direction`) and its `shear.negative` stays as it was: the law of these tests \
+         is written as that of positive shear. If they stretched the stitch, put it into `shear.negative` by hand"
+    } else {
+        return;
+    };
+    host.log(Log::Warn, text);
+}
+
 fn write_file(
     host: &Host,
     out: &mut Output,
@@ -171,23 +185,12 @@ fn write_file(
             json!({"table": {"angles": all(angles, "rad"), "forces": all(forces, "N/m")}})
         }
     };
-    // Of a fabric with a law of its own for negative shear.
+    let direction = told(&["stitch", "direction"]);
     if let Some(negative) = told(&["shear", "negative"]) {
+        let turned = direction.as_ref().is_some_and(|d| d == "negative");
+        warn_of_negative(host, p, turned);
         if p.negative.is_empty() {
             law["negative"] = negative;
-            if told(&["stitch", "direction"]).is_some_and(|d| d == "negative") {
-                host.log(
-                    Log::Warn,
-                    "the template's stitch is stretched in negative shear (`stitch.direction`) and its `shear.negative` stays as it was: the law of these tests \
-                     is written as that of positive shear. If they stretched the stitch, put it into `shear.negative` by hand",
-                );
-            }
-        } else {
-            host.log(
-                Log::Warn,
-                "the template has a law of its own for negative shear (`shear.negative`); the new one is fitted to tests of both directions \
-                 and takes its place. To keep two laws, evaluate each direction by itself as `positive` and join them by hand",
-            );
         }
     }
     let stitch = shear.stitch.map(|s| {
@@ -195,8 +198,8 @@ fn write_file(
         let forces = [0.0, s.stitch.peak, 0.0].map(|f| quantity(f, 1.0, "N/m"));
         let mut block = json!({"angles": angles, "forces": forces});
         // The tests tell what it carries, the template which sign of shear stretches it.
-        if let Some(direction) = told(&["stitch", "direction"]) {
-            block["direction"] = direction;
+        if let Some(direction) = &direction {
+            block["direction"] = direction.clone();
         }
         block
     });

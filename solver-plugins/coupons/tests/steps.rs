@@ -64,6 +64,12 @@ fn component(kind: u32, name: &str) -> Option<pf_component> {
     })
 }
 
+/// One thread, with Plyflow's own components.
+const ALONE: Machine = Machine {
+    threads: 1,
+    component,
+};
+
 fn element(name: &str) -> Value {
     json!({"plugin": name, "with": {"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01}})
 }
@@ -156,15 +162,11 @@ fn same_bytes_on_one_and_two_threads_film_and_disc() {
 
 #[test]
 fn a_disc_beyond_its_limit_point_stops_with_a_statement() {
-    let machine = Machine {
-        threads: 1,
-        component,
-    };
     let with = json!({
         "material": film(), "element": element("m4"), "element_size": 0.02, "pressure": 12000.0,
         "ramp_time": 0.1, "hold_time": 0.1, "frames": 3
     });
-    let run = run_on::<Inflation>(&machine, with, &[], &[]).unwrap_or_else(|e| panic!("{e}"));
+    let run = run_on::<Inflation>(&ALONE, with, &[], &[]).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(run.result("ran_away"), 1.0);
     assert!(run.result("centre_height") < 0.2);
     assert!(
@@ -179,10 +181,6 @@ fn the_force_of_a_leg_is_that_of_its_own_part_of_the_path() {
     // 15 legs, of which 400 samples are no multiple: to and fro, the last to a smaller angle than all others.
     let mut path: Vec<f64> = (0..14).map(|k| [0.6, 0.2][k % 2]).collect();
     path.push(0.4);
-    let machine = Machine {
-        threads: 1,
-        component,
-    };
     // Without a stitch the yarns' force is that of the angle alone.
     let mut material = ncf();
     material["with"]["stitch"] = Value::Null;
@@ -190,7 +188,7 @@ fn the_force_of_a_leg_is_that_of_its_own_part_of_the_path() {
         "material": material, "element": element("m4"), "element_size": 0.145 / 4.0,
         "path": path, "leg_time": 0.02, "frames": 1
     });
-    let run = run_on::<PictureFrame>(&machine, with.clone(), &[], &[]).unwrap();
+    let run = run_on::<PictureFrame>(&ALONE, with.clone(), &[], &[]).unwrap();
     let force = |g: f64| {
         let c = [0.0, 112.19, 94.73, 137.06, -65.56, 29.56];
         c.iter().rev().fold(0.0, |s, c| s * g + c)
@@ -204,21 +202,17 @@ fn the_force_of_a_leg_is_that_of_its_own_part_of_the_path() {
     }
     let mut many = with;
     many["path"] = json!(vec![0.1; 401]);
-    let error = run_on::<PictureFrame>(&machine, many, &[], &[]).unwrap_err();
+    let error = run_on::<PictureFrame>(&ALONE, many, &[], &[]).unwrap_err();
     assert!(error.contains("path: given 401 angles"), "{error}");
 }
 
 #[test]
 fn a_specimen_is_measured_where_it_takes_one_step_between_samples() {
-    let machine = Machine {
-        threads: 1,
-        component,
-    };
     let with = json!({
         "material": ncf(), "element": element("rf4"), "element_size": 0.145, "path": [0.6],
         "leg_time": 0.004, "frames": 1
     });
-    let run = run_on::<PictureFrame>(&machine, with, &[], &[]).unwrap();
+    let run = run_on::<PictureFrame>(&ALONE, with, &[], &[]).unwrap();
     // All but the first, which has no steps before it.
     assert!(run.arrays["curves/run/shear_angle"].1.len() >= 399);
     assert!(run.result("force_peak") > 1.0);
@@ -229,10 +223,6 @@ fn a_test_of_bending_refuses_what_does_not_bend() {
     type Run = fn(&Machine, Value, &[MemoryInput<'_>], &[u64]) -> Result<MemoryArtifact, String>;
     let mut flat = ncf();
     flat["with"]["bending"] = Value::Null;
-    let machine = Machine {
-        threads: 1,
-        component,
-    };
     let refused = |material: &Value, element_name: &str, name: &str| {
         let (run, required) = match name {
             "bending" => (run_on::<PureBending> as Run, json!({"path": [20.0]})),
@@ -245,7 +235,7 @@ fn a_test_of_bending_refuses_what_does_not_bend() {
         let mut with = required;
         with["material"] = material.clone();
         with["element"] = element(element_name);
-        run(&machine, with, &[], &[]).unwrap_err()
+        run(&ALONE, with, &[], &[]).unwrap_err()
     };
     for name in ["bending", "cantilever", "bias extension"] {
         let error = refused(&flat, "rf4", name);

@@ -77,21 +77,19 @@ pub fn spline_slopes(times: &[f64], values: &[f64], columns: usize) -> Vec<f64> 
     let chord =
         |i: usize, c: usize| (values[(i + 1) * columns + c] - values[i * columns + c]) / h[i];
     let under_way = times[0] > 0.0;
-    if n == 2 {
+    if n == 2 || (n == 3 && under_way) {
         for c in 0..columns {
-            let chord = chord(0, c);
-            slopes[c] = if under_way { chord } else { 0.0 };
-            slopes[columns + c] = if under_way { chord } else { 2.0 * chord };
-        }
-        return slopes;
-    }
-    if n == 3 && under_way {
-        for c in 0..columns {
-            let (a, b) = (chord(0, c), chord(1, c));
-            let bend = (b - a) / (h[0] + h[1]);
-            slopes[c] = a - bend * h[0];
-            slopes[columns + c] = a + bend * h[0];
-            slopes[2 * columns + c] = b + bend * h[1];
+            let (a, b) = (chord(0, c), chord(n - 2, c));
+            let few = match n {
+                2 if under_way => [a, a, 0.0],
+                2 => [0.0, 2.0 * a, 0.0],
+                // The parabola through all three.
+                _ => {
+                    let bend = (b - a) / (h[0] + h[1]);
+                    [a - bend * h[0], a + bend * h[0], b + bend * h[1]]
+                }
+            };
+            (0..n).for_each(|i| slopes[i * columns + c] = few[i]);
         }
         return slopes;
     }
