@@ -337,7 +337,11 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         Process::Press(press) => return build_press(p, press, components),
     };
     let stack = assembly::stack(scene)?;
-    let (tool, grid) = tool::build(scene, p.tool_grid)?;
+    let tool::Built {
+        mesh: tool,
+        grid,
+        error,
+    } = tool::build(scene, p.tool_grid)?;
     let planes = symmetry::planes(scene);
     symmetry::check(scene, planes, &stack, &tool)?;
     let at = layout(&stack, process, p, &tool, planes)?;
@@ -387,6 +391,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         reference,
         tool,
         rigid: Vec::new(),
+        field_errors: vec![("tool", error)],
         zone: None,
         start: None,
         element_size: p.element_size,

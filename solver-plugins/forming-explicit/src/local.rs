@@ -182,7 +182,11 @@ pub fn build_local(
         drive,
     } = sheets_of(p, &input, &stack, components)?;
     let start = late::of_model(&stack, &input.sheets, input.time[0])?;
-    let (tool, grid) = tool::build(scene, p.tool_grid)?;
+    let tool::Built {
+        mesh: tool,
+        grid,
+        error,
+    } = tool::build(scene, p.tool_grid)?;
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]])?;
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
@@ -210,6 +214,7 @@ pub fn build_local(
         reference,
         tool,
         rigid: Vec::new(),
+        field_errors: vec![("tool", error)],
         zone: Some(input.zone),
         start,
         element_size: input.element_size,

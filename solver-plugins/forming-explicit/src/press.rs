@@ -344,7 +344,11 @@ pub fn build_press(
 ) -> Result<Forming, String> {
     let scene = &p.scene;
     let stack = assembly::stack(scene)?;
-    let (tool, grid) = tool::build(scene, p.tool_grid)?;
+    let tool::Built {
+        mesh: tool,
+        grid,
+        error,
+    } = tool::build(scene, p.tool_grid)?;
     let planes = symmetry::planes(scene);
     symmetry::check(scene, planes, &stack, &tool)?;
     let at = levels(press, &stack, tool.bounds()[1][2])?;
@@ -413,8 +417,14 @@ pub fn build_press(
     let reference = model.start().clone();
     let reach = bodies_reach(&reference);
     let (die, holder) = plates(press, &at);
-    let mut rigid = vec![RigidBody::plate("die", &die, reach)];
-    rigid.extend(holder.map(|h| RigidBody::plate("holder", &h, reach)));
+    let (mut rigid, mut field_errors) = (Vec::new(), vec![("tool", error)]);
+    for (name, plate) in [("die", Some(die)), ("holder", holder)] {
+        if let Some(plate) = plate {
+            let body = RigidBody::plate(name, &plate, reach);
+            field_errors.push((name, body.error_against(&plate)));
+            rigid.push(body);
+        }
+    }
     Ok(Forming {
         model,
         load: Load::Press(load),
@@ -423,6 +433,7 @@ pub fn build_press(
         reference,
         tool,
         rigid,
+        field_errors,
         zone: None,
         start: None,
         element_size: p.element_size,

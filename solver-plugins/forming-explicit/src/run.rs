@@ -11,12 +11,12 @@ use crate::symmetry::MirroredBody;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::component::ElementField;
-use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact};
+use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact, RigidSurface};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, SheetEnergy, judge};
 use plyflow_mechanics::model::{Clock, Model};
 use plyflow_mechanics::vec3::{V, dot, norm};
 use plyflow_model::scene::Scene;
-use plyflow_tooling::ToolMesh;
+use plyflow_tooling::{FieldError, ToolMesh};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -62,11 +62,39 @@ pub struct RigidBody {
     pub cells: Vec<[u32; 4]>,
 }
 
+impl Forming {
+    /// By how much (m) what contacts see of a rigid part differs at most from its triangles; none of a part that is a plane.
+    pub fn field_error(&self, part: &str) -> f64 {
+        let of = self.field_errors.iter().find(|(name, _)| *name == part);
+        of.map_or(0.0, |(_, e)| e.largest)
+    }
+}
+
 impl RigidBody {
+    /// The largest difference of its cells, cut along their diagonals, from a plate: at the cells' middles, and those of their sides.
+    pub fn error_against(&self, plate: &OpenPlate) -> FieldError {
+        let corner = |n: u32| self.points[n as usize];
+        let middle = |of: &[V]| -> V {
+            std::array::from_fn(|k| of.iter().map(|p| p[k]).sum::<f64>() / of.len() as f64)
+        };
+        let mut worst = FieldError::default();
+        for cell in &self.cells {
+            let c = cell.map(corner);
+            let sides = (0..4).map(|k| middle(&[c[k], c[(k + 1) % 4]]));
+            let diagonals = [middle(&[c[0], c[2]]), middle(&[c[1], c[3]])];
+            for at in sides.chain(diagonals) {
+                let largest = plate.distance(at).0.abs();
+                worst = worst.or(FieldError { largest, at });
+            }
+        }
+        worst
+    }
+
     /// The face of a plate out to a radius that covers `reach` (m), its rounding, and as much of the wall again.
     pub fn plate(name: &str, plate: &OpenPlate, reach: f64) -> Self {
-        const AROUND: usize = 96;
-        const ALONG: usize = 8;
+        // Chords of 0.01 mm for what presses have: openings of 70 mm, roundings of 10 mm.
+        const AROUND: usize = 192;
+        const ALONG: usize = 16;
         let a = plate.opening + plate.edge;
         let mut profile = vec![[1.05 * reach.max(a), 0.0]];
         for i in 0..=ALONG {
@@ -132,6 +160,9 @@ pub struct Forming {
     pub tool: ToolMesh,
     /// What else is rigid, to be looked at.
     pub rigid: Vec<RigidBody>,
+    /// By rigid part ("tool", "die", "holder"): by how much (m) and where what contacts see differs most from the triangles that are
+    /// written of it.
+    pub field_errors: Vec<(&'static str, FieldError)>,
     /// The zone of a local run.
     pub zone: Option<serde_json::Value>,
     /// Where a run that begins late begins.

@@ -5,14 +5,24 @@ use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::{V, cross, dot, norm, sub};
 use plyflow_model::material::MaterialEntry;
 use plyflow_model::scene::{Process, Scene, Sheet, StlTool, Tool};
-use plyflow_tooling::{SignedDistanceGrid, SurfaceTree, ToolMesh};
+use plyflow_tooling::{FieldError, SignedDistanceGrid, SurfaceTree, ToolMesh};
 use std::sync::Arc;
+
+/// A tool as it is given, and as contacts see it.
+pub struct Built {
+    /// Its triangles.
+    pub mesh: ToolMesh,
+    /// Its distance field.
+    pub grid: SignedDistanceGrid,
+    /// By how much they differ.
+    pub error: FieldError,
+}
 
 /// Tool mesh and its distance field.
 ///
 /// # Errors
 /// When the tool cannot be built.
-pub fn build(scene: &Scene, spacing: f64) -> Result<(ToolMesh, SignedDistanceGrid), String> {
+pub fn build(scene: &Scene, spacing: f64) -> Result<Built, String> {
     let mesh = plyflow_tooling::build(&scene.tool).map_err(|e| e.to_string())?;
     if let (Tool::Stl(stl), Process::DoubleDiaphragm(_)) = (&scene.tool, &scene.process) {
         check_foot(stl, mesh.bounds()[0][2])?;
@@ -31,7 +41,8 @@ pub fn build(scene: &Scene, spacing: f64) -> Result<(ToolMesh, SignedDistanceGri
     if let Tool::Stl(_) = &scene.tool {
         check_walls(&mesh, &grid)?;
     }
-    Ok((mesh, grid))
+    let error = grid.error_against(&mesh, stack, |_| true);
+    Ok(Built { mesh, grid, error })
 }
 
 /// How far (m) a file's lowest point may lie from the bed: what single precision leaves of a metre and more.

@@ -4,6 +4,7 @@
 //! Coordinates as in scenes: x along the tool, y across, z up, the machine bed is the plane z = 0.
 //! Lengths in metres.
 
+mod audit;
 mod double_dome;
 mod error;
 mod hemisphere;
@@ -17,6 +18,7 @@ mod tetrahedron;
 mod tree;
 mod vector;
 
+pub use audit::FieldError;
 pub use error::ToolError;
 pub use mesh::ToolMesh;
 pub use sdf::SignedDistanceGrid;

@@ -120,32 +120,41 @@ impl ToolMesh {
         found
     }
 
-    /// The bodies of which it consists, each with all points: facets that share edges. The order is that of their first facets.
-    pub(crate) fn shells(&self) -> Vec<ToolMesh> {
+    /// Which body each facet is of: facets that share edges are of one. Numbered in the order of their first facets.
+    pub(crate) fn bodies(&self) -> Vec<u32> {
         let adjacency = self.adjacency();
-        let mut of = vec![usize::MAX; self.triangles.len()];
-        let mut shells: Vec<ToolMesh> = Vec::new();
+        let mut of = vec![u32::MAX; self.triangles.len()];
+        let mut count = 0;
         for first in 0..self.triangles.len() {
-            if of[first] != usize::MAX {
+            if of[first] != u32::MAX {
                 continue;
             }
-            let (shell, mut open) = (shells.len(), vec![first]);
-            of[first] = shell;
+            let mut open = vec![first];
+            of[first] = count;
             while let Some(t) = open.pop() {
                 for next in adjacency.neighbour[t].into_iter().flatten() {
-                    if of[next as usize] == usize::MAX {
-                        of[next as usize] = shell;
+                    if of[next as usize] == u32::MAX {
+                        of[next as usize] = count;
                         open.push(next as usize);
                     }
                 }
             }
-            shells.push(ToolMesh {
-                points: self.points.clone(),
-                triangles: Vec::new(),
-            });
+            count += 1;
         }
+        of
+    }
+
+    /// The bodies of which it consists, each with all points: facets that share edges. The order is that of their first facets.
+    pub(crate) fn shells(&self) -> Vec<ToolMesh> {
+        let of = self.bodies();
+        let count = of.iter().max().map_or(0, |m| *m as usize + 1);
+        let empty = || ToolMesh {
+            points: self.points.clone(),
+            triangles: Vec::new(),
+        };
+        let mut shells: Vec<ToolMesh> = (0..count).map(|_| empty()).collect();
         for (t, shell) in of.iter().enumerate() {
-            shells[*shell].triangles.push(self.triangles[t]);
+            shells[*shell as usize].triangles.push(self.triangles[t]);
         }
         shells
     }

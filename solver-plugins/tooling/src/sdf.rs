@@ -5,6 +5,7 @@
 //! to Splines, XII), which reproduces cubics. The field is twice continuously differentiable and the
 //! returned gradient is that of the returned distance, to the rounding of single precision.
 
+use crate::audit::{FieldError, Survey};
 use crate::mesh::ToolMesh;
 use crate::tree::SurfaceTree;
 use crate::vector::V3;
@@ -58,6 +59,12 @@ impl SignedDistanceGrid {
             reach > 0.0 && reach.is_finite(),
             "reach must be positive, not {reach}"
         );
+        let survey = Survey::new(mesh, reach + 8.0 * spacing);
+        Self::over(mesh, &survey, spacing, reach)
+    }
+
+    /// The field over a survey of its tool.
+    fn over(mesh: &ToolMesh, survey: &Survey, spacing: f64, reach: f64) -> Self {
         let [tool_low, tool_high] = mesh.bounds();
         let box_low = tool_low.map(|v| v - reach);
         let box_high = tool_high.map(|v| v + reach);
@@ -67,10 +74,9 @@ impl SignedDistanceGrid {
             std::array::from_fn(|k| ((box_high[k] - box_low[k]) / spacing).ceil() as usize + 6);
         // Of bodies that stand on or in each other the nearest facet may be one inside of another: the least of their own distances is that of
         // what they are together, outside of it and in sign.
-        let below = mesh.without_bottom(reach + 8.0 * spacing);
         let mut samples: Option<Vec<f32>> = None;
-        for shell in below.shells() {
-            let own = sample(&SurfaceTree::new(&shell), origin, spacing, nodes);
+        for tree in survey.trees() {
+            let own = sample(tree, origin, spacing, nodes);
             samples = Some(match samples {
                 None => own,
                 Some(mut least) => {
@@ -190,6 +196,19 @@ impl SignedDistanceGrid {
             Some((cell, part)) => self.interpolate(cell, part),
             None => self.distance_to_box(p),
         }
+    }
+
+    /// The field's largest error, held against the triangles at every facet and every edge, on the surface and `offset` (m) out of it, at
+    /// places half a spacing apart, where `counts` is true.
+    pub fn error_against(
+        &self,
+        mesh: &ToolMesh,
+        offset: f64,
+        counts: impl Fn([f64; 3]) -> bool + Sync,
+    ) -> FieldError {
+        let survey = Survey::new(mesh, self.reach + 8.0 * self.spacing);
+        let field = |p| self.distance_and_gradient(p).0;
+        survey.error([0.5 * self.spacing, offset], field, counts)
     }
 
     /// As [`distance_and_gradient`](Self::distance_and_gradient) for points closer than `limit` (at most

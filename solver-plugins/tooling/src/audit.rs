@@ -1,0 +1,201 @@
+//! A tool's distance field held against its triangles.
+
+use crate::mesh::ToolMesh;
+use crate::tree::SurfaceTree;
+use crate::vector::{V3, add, dot, norm, scale, sub, unit};
+use rayon::prelude::*;
+
+/// Largest difference of a tool's distance field from the distance to its triangles, and where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FieldError {
+    /// m, never negative.
+    pub largest: f64,
+    /// The place (m).
+    pub at: [f64; 3],
+}
+
+impl FieldError {
+    /// The larger of both; of equals the first.
+    pub fn or(self, other: Self) -> Self {
+        if other.largest > self.largest {
+            other
+        } else {
+            self
+        }
+    }
+}
+
+/// A place near a tool's surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    /// m.
+    pub at: V3,
+    /// Distance to the closest point of the triangles (m), positive outside.
+    pub distance: f64,
+}
+
+/// A piece of a facet (three corners), or of an edge (the third is the second), with the direction out of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece {
+    corners: [V3; 3],
+    out: V3,
+    body: u32,
+}
+
+impl Piece {
+    /// Where it is looked at: of an edge there is no area to have a centre.
+    fn middle(&self) -> V3 {
+        let [a, b, c] = self.corners;
+        if b == c {
+            scale(add(a, b), 0.5)
+        } else {
+            scale(add(add(a, b), c), 1.0 / 3.0)
+        }
+    }
+
+    /// Its parts, none longer than `spacing`, each longest side halved in turn: long thin facets need few.
+    pub fn parts(&self, spacing: f64, visit: &mut impl FnMut(Piece)) {
+        let [a, b, c] = self.corners;
+        let sides = [[a, b, c], [b, c, a], [c, a, b]];
+        let length = |s: &[V3; 3]| norm(sub(s[1], s[0]));
+        let longest =
+            sides[1..].iter().fold(
+                sides[0],
+                |best, s| {
+                    if length(s) > length(&best) { *s } else { best }
+                },
+            );
+        if length(&longest) <= spacing {
+            return visit(*self);
+        }
+        let middle = scale(add(longest[0], longest[1]), 0.5);
+        let [from, to, apex] = longest;
+        let is_edge = b == c;
+        for corners in [[from, middle, apex], [middle, to, apex]] {
+            let corners = if is_edge {
+                let [p, q] = [corners[0], corners[1]];
+                [p, q, q]
+            } else {
+                corners
+            };
+            Piece { corners, ..*self }.parts(spacing, visit);
+        }
+    }
+}
+
+/// Cosine of the angle between neighbouring facets beyond which their edge is looked at by itself: less is a chord of something round.
+const CREASE: f64 = 0.985;
+
+/// A tool as its distance field has to see it: its bodies without their bottoms.
+pub(crate) struct Survey {
+    mesh: ToolMesh,
+    /// One for each body.
+    trees: Vec<SurfaceTree>,
+    /// Height of the bottom (m), below which nothing is looked at.
+    low: f64,
+}
+
+impl Survey {
+    /// Of a tool whose walls go on below its bottom by `depth` (m).
+    pub fn new(mesh: &ToolMesh, depth: f64) -> Self {
+        let low = mesh.bounds()[0][2];
+        let mesh = mesh.without_bottom(depth);
+        let trees = mesh.shells().iter().map(SurfaceTree::new).collect();
+        Self { mesh, trees, low }
+    }
+
+    /// One for each body.
+    pub fn trees(&self) -> &[SurfaceTree] {
+        &self.trees
+    }
+
+    /// Distance to the closest point of the triangles (m): of bodies that stand on or in each other the least of their own distances is that
+    /// of what they are together, outside of it and in sign.
+    pub fn distance(&self, at: V3) -> f64 {
+        let distances = self.trees.iter().map(|t| t.closest(at).signed_distance);
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// All facets, and all edges that are sharper than chords of something round.
+    pub fn pieces(&self) -> Vec<Piece> {
+        let bodies = self.mesh.bodies();
+        let neighbour = self.mesh.adjacency().neighbour;
+        let normal = |t: usize| unit(self.mesh.area_normal(t));
+        let mut pieces = Vec::new();
+        for t in 0..self.mesh.triangles.len() {
+            let (out, corners, body) = (normal(t), self.mesh.corners(t), bodies[t]);
+            if out == [0.0; 3] {
+                continue;
+            }
+            pieces.push(Piece { corners, out, body });
+            for k in 0..3 {
+                let Some(n) = neighbour[t][k].map(|n| n as usize).filter(|n| *n > t) else {
+                    continue;
+                };
+                let other = normal(n);
+                if dot(other, out) < CREASE && other != [0.0; 3] {
+                    let [a, b] = [corners[k], corners[(k + 1) % 3]];
+                    pieces.push(Piece {
+                        corners: [a, b, b],
+                        out: unit(add(out, other)),
+                        body,
+                    });
+                }
+            }
+        }
+        pieces
+    }
+
+    /// Places of a piece: its middle, its corners if it is of an edge, and what lies `offset` (m) out of these, where sheets have
+    /// their middles; none that another body covers.
+    pub fn places(&self, piece: &Piece, offset: f64, mut visit: impl FnMut(Place)) {
+        let [a, b, c] = piece.corners;
+        let ends = if b == c { &[a, b][..] } else { &[] };
+        for on in ends.iter().copied().chain([piece.middle()]) {
+            let others = self.trees.iter().enumerate();
+            let mut others = others.filter(|(k, _)| *k != piece.body as usize);
+            let covered = others.any(|(_, tree)| tree.closest(on).signed_distance < 1e-6);
+            if covered || on[2] < self.low {
+                continue;
+            }
+            visit(Place {
+                at: on,
+                distance: 0.0,
+            });
+            if offset > 0.0 {
+                let at = add(on, scale(piece.out, offset));
+                let distance = self.distance(at);
+                // Between walls closer than that no sheet has room.
+                if at[2] >= self.low && distance > 0.5 * offset {
+                    visit(Place { at, distance });
+                }
+            }
+        }
+    }
+
+    /// The largest error of a field over all pieces' parts of `spacing` (m), where `counts` is true.
+    pub fn error(
+        &self,
+        [spacing, offset]: [f64; 2],
+        field: impl Fn(V3) -> f64 + Sync,
+        counts: impl Fn(V3) -> bool + Sync,
+    ) -> FieldError {
+        let of = |piece: &Piece| {
+            let mut worst = FieldError::default();
+            piece.parts(spacing, &mut |part| {
+                self.places(&part, offset, |place| {
+                    if counts(place.at) {
+                        let largest = (field(place.at) - place.distance).abs();
+                        worst = worst.or(FieldError {
+                            largest,
+                            at: place.at,
+                        });
+                    }
+                });
+            });
+            worst
+        };
+        let all: Vec<FieldError> = self.pieces().par_iter().map(of).collect();
+        all.into_iter().fold(FieldError::default(), FieldError::or)
+    }
+}
