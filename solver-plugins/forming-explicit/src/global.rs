@@ -7,7 +7,7 @@ use crate::press::build_press;
 use crate::process::{Cycle, FrameDrive, Load};
 use crate::run::{Body, Forming};
 use crate::symmetry;
-use crate::tool::{self, ToolSurfaces};
+use crate::tool::ToolSurfaces;
 use plyflow_blank::Blank;
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::mirror::{Mirrors, Planes, on_outer_boundary};
@@ -15,7 +15,7 @@ use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::{DoubleDiaphragm, Process};
-use plyflow_tooling::ToolMesh;
+use plyflow_tooling::{RigidTool, ToolMesh};
 
 /// Extent in the plane: x0, y0, x1, y1 (m).
 type Box2 = [f64; 4];
@@ -337,11 +337,12 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         Process::Press(press) => return build_press(p, press, components),
     };
     let stack = assembly::stack(scene)?;
-    let tool::Built {
+    let RigidTool {
         mesh: tool,
-        grid,
+        field: grid,
         error,
-    } = tool::build(scene, p.tool_grid)?;
+        warnings: tool_warnings,
+    } = plyflow_tooling::given::rigid(scene, p.tool_grid)?;
     let planes = symmetry::planes(scene);
     symmetry::check(scene, planes, &stack, &tool)?;
     let at = layout(&stack, process, p, &tool, planes)?;
@@ -392,6 +393,7 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         tool,
         rigid: Vec::new(),
         field_errors: vec![("tool", error)],
+        tool_warnings,
         zone: None,
         start: None,
         element_size: p.element_size,

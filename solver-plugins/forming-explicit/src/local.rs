@@ -6,7 +6,7 @@ use crate::late::{self, Start};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
 use crate::run::{Body, Forming};
-use crate::tool::{self, ToolSurfaces};
+use crate::tool::ToolSurfaces;
 use plyflow_mechanics::history::{hermite, hermite_rate, locate};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::mirror::Planes;
@@ -14,6 +14,7 @@ use plyflow_mechanics::model::{Drive, Hold, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
 use plyflow_model::scene::{Process, Scene, SheetKind};
+use plyflow_tooling::RigidTool;
 
 /// A sheet of the zone as the boundary artifact holds it.
 #[derive(Debug, Clone, PartialEq)]
@@ -182,11 +183,12 @@ pub fn build_local(
         drive,
     } = sheets_of(p, &input, &stack, components)?;
     let start = late::of_model(&stack, &input.sheets, input.time[0])?;
-    let tool::Built {
+    let RigidTool {
         mesh: tool,
-        grid,
+        field: grid,
         error,
-    } = tool::build(scene, p.tool_grid)?;
+        warnings: tool_warnings,
+    } = plyflow_tooling::given::rigid(scene, p.tool_grid)?;
     let cycle = Cycle::new(process, [input.frame[0], input.frame[frames - 1]])?;
     let mut model =
         Model::new(points, specs, assembly::step_settings(p)).map_err(|e| e.to_string())?;
@@ -215,6 +217,7 @@ pub fn build_local(
         tool,
         rigid: Vec::new(),
         field_errors: vec![("tool", error)],
+        tool_warnings,
         zone: Some(input.zone),
         start,
         element_size: input.element_size,

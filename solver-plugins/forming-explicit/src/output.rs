@@ -16,6 +16,7 @@ use plyflow_mechanics::contact::ContactEnergy;
 use plyflow_mechanics::energy::SheetEnergy;
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::{Host, Log, Progress, StepError};
+use plyflow_tooling::FieldError;
 use serde_json::json;
 use std::time::Instant;
 
@@ -346,6 +347,7 @@ const LARGEST_FIBRE_STRAIN: f64 = 0.01;
 /// All that a user should know of a run that came to its end.
 fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<String> {
     let mut warnings = mesh_warnings(forming);
+    warnings.extend(forming.tool_warnings.iter().cloned());
     warnings.extend(outcome.warnings.iter().cloned());
     warnings.extend(now.iter().filter_map(Penetration::too_deep));
     warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
@@ -386,6 +388,15 @@ fn penetration_attributes(
         .collect()
 }
 
+/// By how much what contacts see of rigid parts differs from their triangles, and where.
+fn field_error_attributes(forming: &Forming) -> serde_json::Map<String, serde_json::Value> {
+    let of = |(part, e): &(&str, FieldError)| {
+        let value = json!({"max": e.largest, "place": e.at});
+        ((*part).to_owned(), value)
+    };
+    forming.field_errors.iter().map(of).collect()
+}
+
 fn write_summary(
     host: &Host,
     p: &Parameters,
@@ -418,12 +429,15 @@ fn write_summary(
         },
         "penetration": penetration_attributes(&penetrations, &outcome.peaks),
         "overlap_bound": OVERLAP_BOUND,
+        "tool_field_error": field_error_attributes(forming),
         "warnings": warnings,
     }))?;
     for w in &warnings {
         host.log(Log::Warn, w);
     }
     write_health(host, outcome, &penetrations)?;
+    let errors = forming.field_errors.iter().map(|(_, e)| e.largest);
+    host.result("tool_field_error", errors.fold(0.0, f64::max), "m")?;
     write_shape(host, forming)?;
     host.result("elements", elements as f64, "1")?;
     host.result("cycles", outcome.cycles as f64, "1")?;

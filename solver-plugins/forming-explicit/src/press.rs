@@ -11,7 +11,7 @@ use crate::penetration;
 use crate::process::Load;
 use crate::run::{Forming, RigidBody};
 use crate::symmetry;
-use crate::tool::{self, ToolSurface};
+use crate::tool::ToolSurface;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{OpenPlate, RigidContact, RigidItem, RigidMotion, RigidSurface};
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
@@ -19,7 +19,7 @@ use plyflow_mechanics::mirror::Mirrors;
 use plyflow_mechanics::model::Model;
 use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{Hold, Press, Scene, Towards};
-use plyflow_tooling::{SignedDistanceGrid, ToolMesh};
+use plyflow_tooling::{RigidTool, SignedDistanceGrid, ToolMesh};
 use std::sync::Arc;
 
 /// Mass of a holder that a force presses, over that of the plies: heavy enough to follow their contacts stably in
@@ -344,11 +344,12 @@ pub fn build_press(
 ) -> Result<Forming, String> {
     let scene = &p.scene;
     let stack = assembly::stack(scene)?;
-    let tool::Built {
+    let RigidTool {
         mesh: tool,
-        grid,
+        field: grid,
         error,
-    } = tool::build(scene, p.tool_grid)?;
+        warnings: tool_warnings,
+    } = plyflow_tooling::given::rigid(scene, p.tool_grid)?;
     let planes = symmetry::planes(scene);
     symmetry::check(scene, planes, &stack, &tool)?;
     let at = levels(press, &stack, tool.bounds()[1][2])?;
@@ -434,6 +435,7 @@ pub fn build_press(
         tool,
         rigid,
         field_errors,
+        tool_warnings,
         zone: None,
         start: None,
         element_size: p.element_size,

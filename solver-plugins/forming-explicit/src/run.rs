@@ -163,6 +163,8 @@ pub struct Forming {
     /// By rigid part ("tool", "die", "holder"): by how much (m) and where what contacts see differs most from the triangles that are
     /// written of it.
     pub field_errors: Vec<(&'static str, FieldError)>,
+    /// What the user should know of the tool.
+    pub tool_warnings: Vec<String>,
     /// The zone of a local run.
     pub zone: Option<serde_json::Value>,
     /// Where a run that begins late begins.

@@ -24,6 +24,12 @@ struct Parameters {
     generators: Generators,
     locking_angle: f64,
     crease_angle: f64,
+    #[serde(default = "default_grid")]
+    tool_grid: f64,
+}
+
+fn default_grid() -> f64 {
+    plyflow_tooling::given::DEFAULT_SPACING
 }
 
 /// A ply with its net.
@@ -46,7 +52,7 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
     let p: Parameters = host.parameters()?;
     report(host, 0.0, "reading the tool");
     let plies = plies(&p.scene)?;
-    let tool = plyflow_tooling::build(&p.scene.tool)?;
+    let tool = plyflow_tooling::given::checked(&p.scene, p.tool_grid)?;
     let surface = SmoothSurface::new(&tool, p.crease_angle)
         .ok_or("the tool has no facet with an area: give another one")?;
     let started = Instant::now();

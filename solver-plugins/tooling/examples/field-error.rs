@@ -23,6 +23,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         .filter(|g| !g.is_empty())
         .unwrap_or(&[4.0, 3.0, 2.0]);
     for spacing in given {
+        for tolerance in [3e-5, 4e-5] {
+            let started = Instant::now();
+            let space = [1e-3 * spacing, 1e-2];
+            let (grid, e) =
+                SignedDistanceGrid::build_within(&mesh, space, [tolerance, offset], &|_| true);
+            println!(
+                "spacing {spacing} mm, within {:.3} mm: built in {:.2} s, {:.1} MB; largest error {:.4} mm at {:?}",
+                1e3 * tolerance,
+                started.elapsed().as_secs_f64(),
+                grid.memory() as f64 / 1e6,
+                1e3 * e.largest,
+                e.at.map(|c| (c * 1e5).round() / 1e2),
+            );
+            let again = grid.error_against(&mesh, offset, |_| true);
+            println!("  looked at again: {:.4} mm", 1e3 * again.largest);
+        }
         let started = Instant::now();
         let grid = SignedDistanceGrid::build(&mesh, 1e-3 * spacing, 1e-2);
         let built = started.elapsed().as_secs_f64();

@@ -1,7 +1,7 @@
 //! A tool's distance field held against its triangles.
 
 use crate::mesh::ToolMesh;
-use crate::tree::SurfaceTree;
+use crate::tree::{ClosestPoint, SurfaceTree};
 use crate::vector::{V3, add, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 
@@ -53,6 +53,17 @@ impl Piece {
         }
     }
 
+    /// Of a piece of a facet its middle and the direction out of it.
+    pub fn face(&self) -> Option<(V3, V3)> {
+        let [_, b, c] = self.corners;
+        (b != c).then(|| (self.middle(), self.out))
+    }
+
+    /// Its middle, and what lies `offset` (m) out of it.
+    pub fn middles(&self, offset: f64) -> [V3; 2] {
+        [self.middle(), add(self.middle(), scale(self.out, offset))]
+    }
+
     /// Its parts, none longer than `spacing`, each longest side halved in turn: long thin facets need few.
     pub fn parts(&self, spacing: f64, visit: &mut impl FnMut(Piece)) {
         let [a, b, c] = self.corners;
@@ -89,7 +100,8 @@ const CREASE: f64 = 0.985;
 /// A tool as its distance field has to see it: its bodies without their bottoms.
 pub(crate) struct Survey {
     mesh: ToolMesh,
-    /// One for each body.
+    shells: Vec<ToolMesh>,
+    /// One for each of them.
     trees: Vec<SurfaceTree>,
     /// Height of the bottom (m), below which nothing is looked at.
     low: f64,
@@ -100,8 +112,13 @@ impl Survey {
     pub fn new(mesh: &ToolMesh, depth: f64) -> Self {
         let low = mesh.bounds()[0][2];
         let mesh = mesh.without_bottom(depth);
-        let trees = mesh.shells().iter().map(SurfaceTree::new).collect();
-        Self { mesh, trees, low }
+        let shells = mesh.shells();
+        Self {
+            trees: shells.iter().map(SurfaceTree::new).collect(),
+            shells,
+            mesh,
+            low,
+        }
     }
 
     /// One for each body.
@@ -114,6 +131,16 @@ impl Survey {
     pub fn distance(&self, at: V3) -> f64 {
         let distances = self.trees.iter().map(|t| t.closest(at).signed_distance);
         distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The closest point of the body that a piece is of, and the direction out of the facet there.
+    pub fn nearest_of(&self, at: V3, piece: &Piece) -> (ClosestPoint, V3) {
+        let body = piece.body as usize;
+        let found = self.trees[body].closest(at);
+        (
+            found,
+            unit(self.shells[body].area_normal(found.triangle as usize)),
+        )
     }
 
     /// All facets, and all edges that are sharper than chords of something round.

@@ -7,6 +7,7 @@
 mod audit;
 mod double_dome;
 mod error;
+pub mod given;
 mod hemisphere;
 mod mesh;
 mod ramp;
@@ -20,6 +21,7 @@ mod vector;
 
 pub use audit::FieldError;
 pub use error::ToolError;
+pub use given::RigidTool;
 pub use mesh::ToolMesh;
 pub use sdf::SignedDistanceGrid;
 pub use tree::{ClosestPoint, SurfaceTree};

@@ -9,7 +9,11 @@ use crate::audit::{FieldError, Survey};
 use crate::mesh::ToolMesh;
 use crate::tree::SurfaceTree;
 use crate::vector::V3;
+use finer::{Finer, Wanted};
 use rayon::prelude::*;
+use std::sync::Arc;
+
+mod finer;
 
 /// Cells along each side of a block of the early-out map.
 const BLOCK: usize = 4;
@@ -40,6 +44,8 @@ pub struct SignedDistanceGrid {
     /// For each block of cells a bound of the distance in it: lower where positive, upper where negative
     /// (inside), 0 where the sign changes. z fastest.
     bounds: Vec<f32>,
+    /// What is added where the tool is sharper than the spacing shows.
+    finer: Arc<Finer>,
 }
 
 impl SignedDistanceGrid {
@@ -50,17 +56,34 @@ impl SignedDistanceGrid {
     /// # Panics
     /// If the mesh has no facets, or `spacing` or `reach` is not a positive number.
     pub fn build(mesh: &ToolMesh, spacing: f64, reach: f64) -> Self {
-        assert!(!mesh.triangles.is_empty(), "the tool has no facets");
-        assert!(
-            spacing > 0.0 && spacing.is_finite(),
-            "spacing must be positive, not {spacing}"
-        );
-        assert!(
-            reach > 0.0 && reach.is_finite(),
-            "reach must be positive, not {reach}"
-        );
+        check_arguments(mesh, spacing, reach);
         let survey = Survey::new(mesh, reach + 8.0 * spacing);
         Self::over(mesh, &survey, spacing, reach)
+    }
+
+    /// As [`build`](Self::build), and finer, in steps of two down to a 64th of `spacing`, wherever the field would differ from the triangles by
+    /// more than four fifths of `tolerance` (m) on the surface or `offset` (m) out of it, unless it differs by `tolerance` nowhere where `counts` is
+    /// true. Also tells the largest error that is left.
+    ///
+    /// # Panics
+    /// As [`build`](Self::build).
+    pub fn build_within(
+        mesh: &ToolMesh,
+        [spacing, reach]: [f64; 2],
+        [tolerance, offset]: [f64; 2],
+        counts: &(dyn Fn([f64; 3]) -> bool + Sync),
+    ) -> (Self, FieldError) {
+        check_arguments(mesh, spacing, reach);
+        let survey = Survey::new(mesh, reach + 8.0 * spacing);
+        let mut grid = Self::over(mesh, &survey, spacing, reach);
+        let wanted = Wanted {
+            tolerance,
+            offset,
+            counts,
+        };
+        let error = grid.refine(&survey, &wanted);
+        grid.bounds = block_bounds(&grid.coefficients, grid.nodes, grid.blocks, &grid.finer);
+        (grid, error)
     }
 
     /// The field over a survey of its tool.
@@ -88,7 +111,8 @@ impl SignedDistanceGrid {
         let samples = samples.unwrap_or_default();
         let coefficients = spline_coefficients(samples, nodes);
         let blocks = nodes.map(|n| (n - 1).div_ceil(BLOCK));
-        let bounds = block_bounds(&coefficients, nodes, blocks);
+        let finer = Arc::default();
+        let bounds = block_bounds(&coefficients, nodes, blocks, &finer);
         Self {
             spacing,
             reach,
@@ -102,6 +126,7 @@ impl SignedDistanceGrid {
             nearer: 0.0,
             blocks,
             bounds,
+            finer,
         }
     }
 
@@ -159,8 +184,9 @@ impl SignedDistanceGrid {
         let shifted = from.iter().zip(&shifts);
         let coefficients: Vec<f32> = shifted.map(|(c, s)| (f64::from(*c) - s) as f32).collect();
         Self {
-            bounds: block_bounds(&coefficients, nodes, self.blocks),
+            bounds: block_bounds(&coefficients, nodes, self.blocks, &self.finer),
             coefficients,
+            finer: self.finer.clone(),
             nearer: self.nearer + shifts.iter().fold(0.0, |m: f64, s| m.max(*s)),
             ..*self
         }
@@ -183,7 +209,7 @@ impl SignedDistanceGrid {
 
     /// Bytes held.
     pub fn memory(&self) -> usize {
-        4 * (self.coefficients.len() + self.bounds.len())
+        4 * (self.coefficients.len() + self.bounds.len()) + self.finer.memory()
     }
 
     /// Signed distance (m) and its gradient (dimensionless, nearly unit length) at a point.
@@ -221,8 +247,7 @@ impl SignedDistanceGrid {
             self.reach
         );
         let (cell, part) = self.cell(p)?;
-        let b = cell.map(|c| c / BLOCK);
-        let bound = self.bounds[(b[0] * self.blocks[1] + b[1]) * self.blocks[2] + b[2]];
+        let bound = self.bounds[self.block(cell)];
         if f64::from(bound) >= limit {
             return None;
         }
@@ -269,40 +294,19 @@ impl SignedDistanceGrid {
 
     #[inline]
     fn interpolate(&self, cell: [usize; 3], part: [f32; 3]) -> (f64, V3) {
-        let [wx, wy, wz] = part.map(weights);
-        let [dx, dy, dz] = part.map(slopes);
         let stride = [self.nodes[1] * self.nodes[2], self.nodes[2]];
         let base = (cell[0] - 1) * stride[0] + (cell[1] - 1) * stride[1] + cell[2] - 1;
-        // Sums over x and y of rows along z: value, slope along x, slope along y.
-        let (mut v, mut vx, mut vy) = ([0f32; 4], [0f32; 4], [0f32; 4]);
-        for a in 0..4 {
-            let (mut r, mut ry) = ([0f32; 4], [0f32; 4]);
-            for b in 0..4 {
-                let from = base + a * stride[0] + b * stride[1];
-                let row: &[f32; 4] = self.coefficients[from..from + 4].try_into().unwrap();
-                for c in 0..4 {
-                    r[c] += wy[b] * row[c];
-                    ry[c] += dy[b] * row[c];
-                }
-            }
-            for c in 0..4 {
-                v[c] += wx[a] * r[c];
-                vx[c] += dx[a] * r[c];
-                vy[c] += wx[a] * ry[c];
-            }
-        }
-        let dot = |u: [f32; 4], w: [f32; 4]| {
-            f64::from((u[0] * w[0] + u[1] * w[1]) + (u[2] * w[2] + u[3] * w[3]))
-        };
-        let inverse = 1.0 / self.spacing;
-        (
-            dot(v, wz),
-            [
-                dot(vx, wz) * inverse,
-                dot(vy, wz) * inverse,
-                dot(v, dz) * inverse,
-            ],
-        )
+        let mut found = evaluate(&self.coefficients, base, stride, part, 1.0 / self.spacing);
+        self.finer
+            .add(self.block(cell), cell, part, self.spacing, &mut found);
+        found
+    }
+
+    /// The block that holds a cell.
+    #[inline]
+    fn block(&self, cell: [usize; 3]) -> usize {
+        let b = cell.map(|c| c / BLOCK);
+        (b[0] * self.blocks[1] + b[1]) * self.blocks[2] + b[2]
     }
 
     fn distance_to_box(&self, p: V3) -> (f64, V3) {
@@ -325,6 +329,61 @@ impl SignedDistanceGrid {
             },
         )
     }
+}
+
+fn check_arguments(mesh: &ToolMesh, spacing: f64, reach: f64) {
+    assert!(!mesh.triangles.is_empty(), "the tool has no facets");
+    assert!(
+        spacing > 0.0 && spacing.is_finite(),
+        "spacing must be positive, not {spacing}"
+    );
+    assert!(
+        reach > 0.0 && reach.is_finite(),
+        "reach must be positive, not {reach}"
+    );
+}
+
+/// Value and gradient of a tricubic B-spline at `part` of a cell, whose 4 x 4 x 4 coefficients begin at `base` and are apart by `stride` along x
+/// and y; `inverse`: one over their spacing (1/m).
+#[inline]
+fn evaluate(
+    coefficients: &[f32],
+    base: usize,
+    stride: [usize; 2],
+    part: [f32; 3],
+    inverse: f64,
+) -> (f64, V3) {
+    let [wx, wy, wz] = part.map(weights);
+    let [dx, dy, dz] = part.map(slopes);
+    // Sums over x and y of rows along z: value, slope along x, slope along y.
+    let (mut v, mut vx, mut vy) = ([0f32; 4], [0f32; 4], [0f32; 4]);
+    for a in 0..4 {
+        let (mut r, mut ry) = ([0f32; 4], [0f32; 4]);
+        for b in 0..4 {
+            let from = base + a * stride[0] + b * stride[1];
+            let row: &[f32; 4] = coefficients[from..from + 4].try_into().unwrap();
+            for c in 0..4 {
+                r[c] += wy[b] * row[c];
+                ry[c] += dy[b] * row[c];
+            }
+        }
+        for c in 0..4 {
+            v[c] += wx[a] * r[c];
+            vx[c] += dx[a] * r[c];
+            vy[c] += wx[a] * ry[c];
+        }
+    }
+    let dot = |u: [f32; 4], w: [f32; 4]| {
+        f64::from((u[0] * w[0] + u[1] * w[1]) + (u[2] * w[2] + u[3] * w[3]))
+    };
+    (
+        dot(v, wz),
+        [
+            dot(vx, wz) * inverse,
+            dot(vy, wz) * inverse,
+            dot(v, dz) * inverse,
+        ],
+    )
 }
 
 /// Weights of the uniform cubic B-spline at place `t` in a cell.
@@ -379,10 +438,16 @@ fn sample(tree: &SurfaceTree, origin: V3, spacing: f64, nodes: [usize; 3]) -> Ve
 }
 
 /// A cubic B-spline stays between the least and the largest of the coefficients that it is made of.
-fn block_bounds(coefficients: &[f32], nodes: [usize; 3], blocks: [usize; 3]) -> Vec<f32> {
+fn block_bounds(
+    coefficients: &[f32],
+    nodes: [usize; 3],
+    blocks: [usize; 3],
+    finer: &Finer,
+) -> Vec<f32> {
     let mut bounds = vec![0f32; blocks.iter().product()];
+    let slab_size = blocks[1] * blocks[2];
     bounds
-        .par_chunks_mut(blocks[1] * blocks[2])
+        .par_chunks_mut(slab_size)
         .enumerate()
         .for_each(|(bx, slab)| {
             for (at, bound) in slab.iter_mut().enumerate() {
@@ -399,6 +464,9 @@ fn block_bounds(coefficients: &[f32], nodes: [usize; 3], blocks: [usize; 3]) -> 
                         }
                     }
                 }
+                let mut range = [low, high];
+                finer.widen(bx * slab_size + at, &mut range);
+                let [low, high] = range;
                 *bound = if low > 0.0 { low } else { high.min(0.0) };
             }
         });

@@ -4,6 +4,8 @@ use crate::vector::{add, scale, sub, unit};
 use plyflow_model::scene::{FlatTool, Tool};
 use plyflow_model::units::Length;
 
+mod finer;
+
 /// A number in 0..1 from a counter (SplitMix64).
 fn random(n: u64) -> f64 {
     let mut z = n

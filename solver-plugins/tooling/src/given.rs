@@ -1,0 +1,446 @@
+//! Whether the tool that is computed is the tool that was given: the checks of all steps that form over a scene's tool.
+
+use crate::audit::{FieldError, Survey};
+use crate::mesh::ToolMesh;
+use crate::sdf::SignedDistanceGrid;
+use crate::tree::SurfaceTree;
+use crate::vector::{V3, dot, norm, scale, sub};
+use plyflow_model::material::MaterialEntry;
+use plyflow_model::scene::{Process, Scene, Sheet, SheetKind, Tool};
+
+/// How far (m) a tool's lowest point may lie from the bed: what single precision leaves of a metre and more.
+const FOOT: f64 = 1e-5;
+
+/// Share of the thinnest ply that a tool's field may be off by where a sheet can touch it.
+const SHARE: f64 = 0.1;
+
+/// Most values (of four bytes, and eight while they are made) of a tool's distance field.
+const MOST_VALUES: f64 = 4e8;
+
+/// Most values of a field that is tried out to see whether it would do.
+const MOST_TRIED: f64 = 3e7;
+
+/// Spacing (m) of a distance field where nothing else is asked for.
+pub const DEFAULT_SPACING: f64 = 3e-3;
+
+/// A tool that passed all checks, and its distance field.
+pub struct RigidTool {
+    /// Its triangles.
+    pub mesh: ToolMesh,
+    /// What contacts see.
+    pub field: SignedDistanceGrid,
+    /// By how much both differ at most, wherever it is.
+    pub error: FieldError,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// The thinnest ply of a scene, or the thinnest sheet of one without plies (m); infinite without any.
+pub fn thinnest_ply(scene: &Scene) -> f64 {
+    let least =
+        |of: &mut dyn Iterator<Item = &Sheet>| of.map(thickness).fold(f64::INFINITY, f64::min);
+    let plies = least(&mut scene.sheets.iter().filter(|s| s.kind == SheetKind::Ply));
+    if plies.is_finite() {
+        plies
+    } else {
+        least(&mut scene.sheets.iter())
+    }
+}
+
+fn thickness(sheet: &Sheet) -> f64 {
+    match &sheet.material {
+        MaterialEntry::Inline(material) => material.thickness.si(),
+        // None is left when a scene is built.
+        MaterialEntry::File(_) | MaterialEntry::Varied(_) => 0.0,
+    }
+}
+
+/// The triangles of a scene's tool, once they are known to be a tool in the right place: its file can be read and has one outside
+/// ([`crate::build`]), it is no speck beside `spacing` (m), stands on the bed with all of its bodies, fits into the frame and has no walls
+/// thinner than a ply.
+///
+/// # Errors
+/// A text for the user: what was given, what is expected, what to do.
+pub fn checked(scene: &Scene, spacing: f64) -> Result<ToolMesh, String> {
+    let mesh = crate::build(&scene.tool).map_err(|e| e.to_string())?;
+    if mesh.triangles.is_empty() {
+        return Err("scene.tool: it has no facet; expected a surface".into());
+    }
+    check_unit(scene, &mesh, spacing)?;
+    if let Process::DoubleDiaphragm(process) = &scene.process {
+        check_foot(scene, mesh.bounds()[0][2])?;
+        let frame = [process.frame_length.si(), process.frame_width.si()];
+        check_frame(scene, &mesh, frame)?;
+    }
+    let shells = mesh.shells();
+    check_bodies(scene, &mesh, &shells)?;
+    check_walls(scene, &mesh)?;
+    Ok(mesh)
+}
+
+/// A scene's tool, [`checked`], and its distance field with points `spacing` (m) apart and more where the tool is sharper.
+///
+/// # Errors
+/// As [`checked`]; and where sheets can touch the tool and the field is off by more than a tenth of the thinnest ply, with the spacing
+/// that would do.
+pub fn rigid(scene: &Scene, spacing: f64) -> Result<RigidTool, String> {
+    let mesh = checked(scene, spacing)?;
+    check_size(scene, &mesh, spacing)?;
+    let ply = thinnest_ply(scene);
+    let tolerance = SHARE * ply;
+    let touched = touched(scene, &mesh);
+    let build = |spacing: f64| {
+        let stack = stack(scene);
+        let space = [spacing, reach(spacing, stack)];
+        SignedDistanceGrid::build_within(&mesh, space, [tolerance, stack], &touched)
+    };
+    let (field, error) = build(spacing);
+    if error.largest > tolerance {
+        let would_do = spacing_that_does(
+            &mesh,
+            stack(scene),
+            [spacing, error.largest / tolerance],
+            |s| {
+                let (field, error) = build(s);
+                (error.largest <= tolerance).then(|| field.memory())
+            },
+        );
+        return Err(off(spacing, error, ply, would_do));
+    }
+    let elsewhere = field.error_against(&mesh, 0.0, |p| !touched(p));
+    let mut warnings = Vec::new();
+    if elsewhere.largest > tolerance {
+        warnings.push(format!(
+            "scene.tool: its distance field (`tool_grid`, {}) is {} off the tool's triangles at {}, more than a tenth of the thinnest ply \
+             ({}); no sheet is expected to touch it there",
+            mm(spacing),
+            mm(elsewhere.largest),
+            place(elsewhere.at),
+            mm(ply)
+        ));
+    }
+    warnings.extend(unlike_sizes(scene, &mesh));
+    Ok(RigidTool {
+        error: error.or(elsewhere),
+        mesh,
+        field,
+        warnings,
+    })
+}
+
+/// Thickness of all sheets (m).
+fn stack(scene: &Scene) -> f64 {
+    scene.sheets.iter().map(thickness).sum()
+}
+
+/// How far out of a tool its field reaches (m). Contact acts at distances of the stack's thickness; a few cells around it are plenty.
+fn reach(spacing: f64, stack: f64) -> f64 {
+    (4.0 * spacing).max(0.01).max(2.0 * stack)
+}
+
+/// Whether a sheet can touch a place of the tool: between diaphragms all of it; of a punch, which ends where it is described, what has gone
+/// through the blank.
+fn touched(scene: &Scene, mesh: &ToolMesh) -> impl Fn(V3) -> bool + Sync + use<> {
+    let from = match &scene.process {
+        Process::DoubleDiaphragm(_) => f64::NEG_INFINITY,
+        Process::Press(press) => mesh.bounds()[1][2] - press.stroke.si() - stack(scene),
+    };
+    move |p: V3| p[2] >= from
+}
+
+/// Length as text in mm, to three figures.
+fn mm(metres: f64) -> String {
+    let value = 1e3 * metres;
+    let digits = (2 - value.abs().max(1e-4).log10().floor() as i32).clamp(0, 6) as usize;
+    let text = format!("{value:.digits$}");
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
+    format!("{text} mm")
+}
+
+fn place(at: V3) -> String {
+    let [x, y, z] = at.map(|c| 1e3 * c);
+    format!("({x:.1}, {y:.1}, {z:.1}) mm")
+}
+
+/// A spacing of which it is known that it does, with its memory (bytes), below one of which it is known that it does not, by `over` times.
+fn spacing_that_does(
+    mesh: &ToolMesh,
+    stack: f64,
+    [from, over]: [f64; 2],
+    does: impl Fn(f64) -> Option<usize>,
+) -> Option<(f64, usize)> {
+    // What is lost grows with the spacing, at least linearly.
+    let mut spacing = from / over.clamp(2.0, 1e4);
+    loop {
+        // Two figures, so that it can be written down.
+        let unit = 10f64.powf(spacing.log10().floor() - 1.0);
+        let rounded = (spacing / unit).floor() * unit;
+        if values(mesh, rounded, reach(rounded, stack)) > MOST_TRIED {
+            return None;
+        }
+        if let Some(memory) = does(rounded) {
+            return Some((rounded, memory));
+        }
+        spacing *= 0.5;
+    }
+}
+
+/// What to say of a field that is off its tool where a sheet can touch it.
+fn off(spacing: f64, error: FieldError, ply: f64, would_do: Option<(f64, usize)>) -> String {
+    let remedy = match would_do {
+        Some((spacing, memory)) => format!(
+            "`tool_grid: {}` would do, in {:.0} MB of memory",
+            mm(spacing),
+            (memory as f64 / 1e6).max(1.0)
+        ),
+        None => format!(
+            "no `tool_grid` of up to {MOST_TRIED:.0e} values does: round the tool's edges there, or leave out what no sheet touches"
+        ),
+    };
+    format!(
+        "scene.tool: its distance field (`tool_grid`, {}) is {} off the tool's triangles at {}, where a sheet can touch it; expected at most {}, a \
+         tenth of the thinnest ply ({}): {remedy}",
+        mm(spacing),
+        mm(error.largest),
+        place(error.at),
+        mm(SHARE * ply),
+        mm(ply)
+    )
+}
+
+fn size(mesh: &ToolMesh) -> V3 {
+    let [low, high] = mesh.bounds();
+    sub(high, low)
+}
+
+/// What to ask about the unit of a file.
+fn unit_question(scene: &Scene) -> String {
+    match &scene.tool {
+        Tool::Stl(stl) => format!(
+            ": is `unit` ({} m) the length of one unit of the file?",
+            stl.unit.si()
+        ),
+        _ => String::new(),
+    }
+}
+
+/// Where the scene speaks of the tool.
+fn named(scene: &Scene) -> String {
+    match &scene.tool {
+        Tool::Stl(stl) => format!("scene.tool.stl: {}", stl.file),
+        _ => "scene.tool: the tool".into(),
+    }
+}
+
+/// Whether a tool is more than a speck: a wrong `unit` would leave a run without any.
+fn check_unit(scene: &Scene, mesh: &ToolMesh, spacing: f64) -> Result<(), String> {
+    let size = size(mesh);
+    // A spacing may be as large as it likes where it is made finer by itself.
+    let least = 4.0 * spacing.min(DEFAULT_SPACING);
+    if size.into_iter().fold(0.0, f64::max) >= least {
+        return Ok(());
+    }
+    Err(format!(
+        "{} spans {:.3} x {:.3} x {:.3} mm, less than four spacings of its distance field (`tool_grid`, {:.3} mm); expected a tool{}",
+        named(scene),
+        1e3 * size[0],
+        1e3 * size[1],
+        1e3 * size[2],
+        250.0 * least,
+        unit_question(scene)
+    ))
+}
+
+/// Whether a tool stands on the bed. What is below it would take room from the air that is drawn, and under one that floats the film
+/// would be drawn in.
+fn check_foot(scene: &Scene, low: f64) -> Result<(), String> {
+    if low.abs() <= FOOT {
+        return Ok(());
+    }
+    let translate = match &scene.tool {
+        Tool::Stl(stl) => stl.translate.map(|l| l.si()),
+        _ => [0.0; 3],
+    };
+    let [x, y, z] = translate;
+    Err(format!(
+        "scene.tool.stl: the lowest point of {} lies at z = {:.3} mm; expected a tool that stands on the bed, z = 0, with its axis at x = y = 0: \
+         `translate: [{} mm, {} mm, {} mm]`, and `unit` the length of one unit of the file",
+        named(scene).trim_start_matches("scene.tool.stl: "),
+        1e3 * low,
+        1e3 * x,
+        1e3 * y,
+        1e3 * (z - low)
+    ))
+}
+
+/// Whether a tool lies inside of the frame.
+fn check_frame(scene: &Scene, mesh: &ToolMesh, frame: [f64; 2]) -> Result<(), String> {
+    let [low, high] = mesh.bounds();
+    if (0..2).all(|k| low[k] > -0.5 * frame[k] && high[k] < 0.5 * frame[k]) {
+        return Ok(());
+    }
+    Err(format!(
+        "{} reaches from ({:.1}, {:.1}) to ({:.1}, {:.1}) mm, the frame (process.double_diaphragm) from ({:.1}, {:.1}) to ({:.1}, {:.1}) mm; \
+         the frame is too small for it: expected a tool inside of the frame, with its axis at x = y = 0{}",
+        named(scene),
+        1e3 * low[0],
+        1e3 * low[1],
+        1e3 * high[0],
+        1e3 * high[1],
+        -500.0 * frame[0],
+        -500.0 * frame[1],
+        500.0 * frame[0],
+        500.0 * frame[1],
+        unit_question(scene)
+    ))
+}
+
+/// Whether each of a tool's bodies stands on what the lowest of them stands on, or on or in another body.
+fn check_bodies(scene: &Scene, mesh: &ToolMesh, shells: &[ToolMesh]) -> Result<(), String> {
+    if shells.len() < 2 {
+        return Ok(());
+    }
+    let low = mesh.bounds()[0][2];
+    let trees: Vec<SurfaceTree> = shells.iter().map(SurfaceTree::new).collect();
+    let corners = |k: usize| {
+        shells[k]
+            .triangles
+            .iter()
+            .flatten()
+            .map(|p| mesh.points[*p as usize])
+    };
+    let touches = |a: usize, b: usize| {
+        let near = |p: V3| trees[b].closest(p).signed_distance <= FOOT;
+        corners(a).any(near)
+    };
+    let mut held: Vec<bool> = (0..shells.len())
+        .map(|k| corners(k).any(|p| p[2] <= low + FOOT))
+        .collect();
+    loop {
+        let found = (0..shells.len()).find(|&k| {
+            !held[k] && (0..shells.len()).any(|o| held[o] && (touches(k, o) || touches(o, k)))
+        });
+        match found {
+            Some(k) => held[k] = true,
+            None => break,
+        }
+    }
+    let Some(k) = held.iter().position(|h| !h) else {
+        return Ok(());
+    };
+    let lowest = corners(k).fold(
+        [0.0, 0.0, f64::INFINITY],
+        |l, p| if p[2] < l[2] { p } else { l },
+    );
+    Err(format!(
+        "{}: one of its {} bodies floats, its lowest point at {}, and touches no other; expected bodies that stand on the tool's foot or on or in \
+         each other: move it, or leave it out",
+        named(scene),
+        shells.len(),
+        place(lowest)
+    ))
+}
+
+/// Whether a tool has walls that would not hold a ply: in them nothing tells on which side a sheet is once it is as deep as they are thick.
+fn check_walls(scene: &Scene, mesh: &ToolMesh) -> Result<(), String> {
+    let ply = thinnest_ply(scene);
+    if !ply.is_finite() {
+        return Ok(());
+    }
+    let survey = Survey::new(mesh, 10.0 * ply);
+    let foot = mesh.bounds()[0][2] + 2.0 * ply;
+    let thin = survey.thin_walls(DEFAULT_SPACING, ply, |p| p[2] > foot);
+    let Some((thickness, at)) = thin else {
+        return Ok(());
+    };
+    Err(format!(
+        "{} has a wall {} thin at {}; expected walls not thinner than the thinnest ply ({}), which sheets do not go through: make it thicker, or \
+         leave it out{}",
+        named(scene),
+        mm(thickness),
+        place(at),
+        mm(ply),
+        unit_question(scene)
+    ))
+}
+
+impl Survey {
+    /// The thinnest wall that is thinner than `least` (m), with its place: two faces back to back, nearly parallel.
+    fn thin_walls(
+        &self,
+        spacing: f64,
+        least: f64,
+        counts: impl Fn(V3) -> bool,
+    ) -> Option<(f64, V3)> {
+        let mut worst = None::<(f64, V3)>;
+        for piece in self.pieces() {
+            piece.parts(spacing, &mut |part| {
+                let Some((on, out)) = part.face().filter(|(on, _)| counts(*on)) else {
+                    return;
+                };
+                let inside = sub(on, scale(out, least));
+                let (found, normal) = self.nearest_of(inside, &part);
+                // Beyond the other face, which looks the other way.
+                let thickness = least - found.signed_distance;
+                let through = found.signed_distance > 1e-9 && thickness > 0.0;
+                let back =
+                    dot(normal, out) < -0.9 && norm(sub(found.point, on)) < 1.1 * thickness + 1e-9;
+                if through && back && worst.is_none_or(|(w, _)| thickness < w) {
+                    worst = Some((thickness, on));
+                }
+            });
+        }
+        worst
+    }
+}
+
+/// Values of a distance field.
+fn values(mesh: &ToolMesh, spacing: f64, reach: f64) -> f64 {
+    let along = size(mesh).map(|s| (s + 2.0 * reach) / spacing + 6.0);
+    along.into_iter().product()
+}
+
+/// Whether a tool's distance field can be kept.
+fn check_size(scene: &Scene, mesh: &ToolMesh, spacing: f64) -> Result<(), String> {
+    let values = values(mesh, spacing, reach(spacing, stack(scene)));
+    if values <= MOST_VALUES {
+        return Ok(());
+    }
+    let size = size(mesh);
+    Err(format!(
+        "the tool spans {:.3} x {:.3} x {:.3} m, and its distance field would have {values:.1e} values {:.3} mm apart; expected at most \
+         {MOST_VALUES:.0e}: take a larger `tool_grid`{}",
+        size[0],
+        size[1],
+        size[2],
+        1e3 * spacing,
+        unit_question(scene).replacen(':', ";", 1)
+    ))
+}
+
+/// Times that a ply is as long as the tool beyond which a wrong unit is likely, and the other way round.
+const UNLIKE: f64 = 15.0;
+
+/// What to ask where a tool is far smaller than the plies, or far larger.
+pub fn unlike_sizes(scene: &Scene, mesh: &ToolMesh) -> Option<String> {
+    let size = size(mesh);
+    let tool = size[0].max(size[1]);
+    let plies = scene.sheets.iter().filter(|s| s.kind == SheetKind::Ply);
+    let length = |s: &Sheet| Some(s.length?.si().max(s.width?.si()));
+    let ply = plies.filter_map(length).fold(0.0, f64::max);
+    let unlike = ply > 0.0 && !(1.0 / UNLIKE..=UNLIKE).contains(&(tool / ply));
+    unlike.then(|| {
+        format!(
+            "{} spans {} x {} in the plane, the plies up to {}{}",
+            named(scene),
+            mm(size[0]),
+            mm(size[1]),
+            mm(ply),
+            unit_question(scene)
+        )
+    })
+}
