@@ -5,6 +5,7 @@ mod detect;
 pub use detect::{Detection, Ply, Summary, Thresholds, detect};
 
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
+use plyflow_surface::draped::{DRAPED, DrapedPart, Formed};
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Surface, Topology, of_run};
 use serde::Deserialize;
@@ -16,7 +17,7 @@ pub struct DefectDetection;
 export_step!(DefectDetection);
 
 #[derive(Deserialize)]
-struct Formed {
+struct Run {
     sheets: Vec<Sheet>,
 }
 
@@ -29,13 +30,19 @@ struct Sheet {
 
 struct Judged {
     name: String,
-    /// Undeformed area (m2).
+    /// Undeformed area of what is judged (m2).
     area: f64,
     points: Vec<Vec3>,
     cells: Vec<u32>,
     undeformed: Vec<Vec3>,
     shear_angle: Vec<f64>,
     found: Detection,
+    /// `[cells]` whether a net reaches the cell; `None`: all are formed.
+    draped: Option<Vec<bool>>,
+    /// Undeformed area that is not draped (m2).
+    undraped_area: f64,
+    /// What of that lies where the fabric locks, or behind (m2).
+    locked_area: f64,
 }
 
 impl Step for DefectDetection {
@@ -44,7 +51,7 @@ impl Step for DefectDetection {
     fn run(host: &Host) -> Result<(), StepError> {
         let thresholds: Thresholds = host.parameters()?;
         let input = host.input("formed")?;
-        let formed: Formed = host.attributes(&input)?;
+        let formed: Run = host.attributes(&input)?;
         let plies: Vec<&Sheet> = formed.sheets.iter().filter(|s| s.kind == "ply").collect();
         let meshes = host.meshes(&input)?;
         let Some(frame) = meshes.times.len().checked_sub(1) else {
@@ -100,20 +107,21 @@ fn judge(
     }
     let (undeformed, cells) = host.mesh(input, body)?;
     let points = host.frame_points(input, body, frame)?;
-    let shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
-    let topology = Topology::new(undeformed.len(), 4, &cells);
-    let missing = of_run::missing_below(host, input, &sheet.name)?;
+    let part = Formed::read(host, input, body, frame)?;
+    let shear_angle = part.of_cells(host.frame_field(input, body, frame, "shear_angle")?);
+    let topology = Topology::new(part.flat.len(), 4, &part.cells);
+    let missing = of_run::missing_below(host, input, &sheet.name)?.map(|m| part.at_nodes(m));
     let ply = Ply {
         missing: missing.as_deref(),
         topology: &topology,
-        undeformed: &undeformed,
-        formed: &points,
+        undeformed: &part.flat,
+        formed: &part.points,
         shear_angle: &shear_angle,
         offset: sheet.offset,
     };
     let found = detect(tool, &ply, thresholds);
-    let area = topology.cell_areas(&undeformed).iter().sum();
-    Ok(Judged {
+    let area = topology.cell_areas(&part.flat).iter().sum();
+    let mut judged = Judged {
         area,
         name: sheet.name.clone(),
         points,
@@ -121,7 +129,40 @@ fn judge(
         undeformed,
         shear_angle,
         found,
-    })
+        draped: None,
+        undraped_area: 0.0,
+        locked_area: 0.0,
+    };
+    if let Some(part) = part.part {
+        judged.spread(part);
+    }
+    Ok(judged)
+}
+
+impl Judged {
+    /// From the part that is draped to the whole ply, of which the rest has no values; where the fabric locks it is flagged, since it cannot lie
+    /// there as the tool asks.
+    fn spread(&mut self, part: DrapedPart) {
+        let nodes = self.undeformed.len();
+        let f = &mut self.found;
+        self.shear_angle = part.to_cells(&self.shear_angle, 0.0);
+        f.nodal_distance = part.to_nodes(nodes, &f.nodal_distance, 0.0);
+        f.curvature_max = part.to_nodes(nodes, &f.curvature_max, 0.0);
+        f.poor_conformity = part.to_nodes(nodes, &f.poor_conformity, false);
+        f.over_shear = part.to_cells(&f.over_shear, false);
+        f.flag = part.to_cells(&f.flag, false);
+        let areas = Topology::new(nodes, 4, &self.cells).cell_areas(&self.undeformed);
+        for (c, area) in areas.iter().enumerate() {
+            if !part.draped[c] {
+                self.undraped_area += area;
+                if part.locked[c] {
+                    self.locked_area += area;
+                    f.flag[c] = true;
+                }
+            }
+        }
+        self.draped = Some(part.draped);
+    }
 }
 
 /// Share of a ply's area from which on over-shear is no local matter: the limit is probably another fabric's.
@@ -187,6 +228,9 @@ fn write(
             "1",
             &number(&f.over_shear),
         )?;
+        if let Some(draped) = &p.draped {
+            host.write_field(&p.name, On::Cells, DRAPED, 1, "1", &number(draped))?;
+        }
         let poor = number(&f.poor_conformity);
         host.write_field(&p.name, On::Points, "poor_conformity", 1, "1", &poor)?;
         host.write_field(&p.name, On::Cells, "flag", 1, "1", &number(&f.flag))?;
@@ -204,11 +248,20 @@ fn write(
     for p in plies {
         let mut entry = serde_json::to_value(p.found.summary)?;
         entry["name"] = Value::from(p.name.as_str());
+        if p.draped.is_some() {
+            entry["undraped_area"] = Value::from(p.undraped_area);
+            entry["locked_area"] = Value::from(p.locked_area);
+        }
         list.push(entry);
     }
     host.write_attributes(&json!({"thresholds": thresholds, "plies": list}))?;
     let all = |get: fn(&Summary) -> f64| plies.iter().map(move |p| get(&p.found.summary));
     host.result("flagged_area", all(|s| s.flagged_area).sum(), "m2")?;
+    if plies.iter().any(|p| p.draped.is_some()) {
+        let sum = |of: fn(&Judged) -> f64| plies.iter().map(of).sum();
+        host.result("undraped_area", sum(|p| p.undraped_area), "m2")?;
+        host.result("locked_area", sum(|p| p.locked_area), "m2")?;
+    }
     host.result("over_shear_area", all(|s| s.over_shear_area).sum(), "m2")?;
     host.result(
         "poor_conformity_area",

@@ -6,6 +6,7 @@ use plyflow_defects::align::{Alignment, MOST_PASSES, Settings, align_where};
 use plyflow_defects::of_run::Sheet;
 use plyflow_defects::{Ply, Tool, of_run, scan};
 use plyflow_sdk::{Host, Input, Log, StepError};
+use plyflow_surface::draped;
 use plyflow_surface::of_run::Stack;
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Closest, Surface, Topology, triangles};
@@ -109,7 +110,7 @@ impl Beside {
             let run = format!("{}{items}", input.step);
             for sheet in formed.sheets.iter().filter(|s| s.is_ply()) {
                 let body = meshes.body(&sheet.name)?;
-                let (undeformed, cells) = host.mesh(&input, body)?;
+                let part = draped::Formed::read(host, &input, body, frame)?;
                 let ply = &sheet.name;
                 all.push(Self {
                     label: match formed.zone["name"].as_str() {
@@ -117,9 +118,9 @@ impl Beside {
                         None => format!("{ply} of {run}"),
                     },
                     name: format!("{run}/{ply}"),
-                    topology: Topology::new(undeformed.len(), body.nodes_per_cell, &cells),
-                    formed: host.frame_points(&input, body, frame)?,
-                    undeformed,
+                    topology: Topology::new(part.flat.len(), body.nodes_per_cell, &part.cells),
+                    formed: part.points,
+                    undeformed: part.flat,
                 });
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::{Neighbour, Ply, Tool};
 use plyflow_sdk::{Host, Input, Meshes, StepError};
+use plyflow_surface::draped::Formed;
 use plyflow_surface::{Topology, of_run};
 use serde::Deserialize;
 
@@ -63,7 +64,7 @@ pub fn last_frame(input: &Input, meshes: &Meshes) -> Result<usize, StepError> {
 }
 
 /// A ply in the frame `frame` of a run, its distances and curvatures taken; without fields. `offset`: of its mid-surface from the
-/// tool (m).
+/// tool (m). Of a net that does not reach everywhere it is the part that is draped ([`plyflow_surface::draped`]).
 ///
 /// # Errors
 /// When the run has no such body, or its mesh or frame cannot be read.
@@ -75,24 +76,34 @@ pub fn ply(
     tool: &Tool,
     foot_margin: f64,
 ) -> Result<Ply, StepError> {
+    Ok(part_of_ply(host, input, frame, (name, offset), tool, foot_margin)?.0)
+}
+
+fn part_of_ply(
+    host: &Host,
+    input: &Input,
+    frame: usize,
+    (name, offset): (&str, f64),
+    tool: &Tool,
+    foot_margin: f64,
+) -> Result<(Ply, Formed), StepError> {
     let meshes = host.meshes(input)?;
     let body = meshes.body(name)?;
-    let (undeformed, cells) = host.mesh(input, body)?;
-    let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
-    let formed = host.frame_points(input, body, frame)?;
+    let mut formed = Formed::read(host, input, body, frame)?;
+    let topology = Topology::new(formed.flat.len(), body.nodes_per_cell, &formed.cells);
     let mut ply = Ply::new(
         name.to_owned(),
         topology,
-        undeformed,
-        formed,
+        std::mem::take(&mut formed.flat),
+        std::mem::take(&mut formed.points),
         tool,
         offset,
         foot_margin,
     );
     if let Some(missing) = of_run::missing_below(host, input, name)? {
-        ply.lower(&missing);
+        ply.lower(&formed.at_nodes(missing));
     }
-    Ok(ply)
+    Ok((ply, formed))
 }
 
 /// As [`ply`], with its shear angle and, where the run has them, its fibre strains.
@@ -110,13 +121,16 @@ pub fn strained_ply(
     let meshes = host.meshes(input)?;
     let body = meshes.body(&sheet.name)?;
     let place = (sheet.name.as_str(), sheet.offset);
-    let mut ply = ply(host, input, frame, place, tool, foot_margin)?;
-    ply.shear_angle = host.frame_field(input, body, frame, "shear_angle")?;
+    let (mut ply, part) = part_of_ply(host, input, frame, place, tool, foot_margin)?;
+    let field = |name: &str| -> Result<Vec<f64>, StepError> {
+        Ok(part.of_cells(host.frame_field(input, body, frame, name)?))
+    };
+    ply.shear_angle = field("shear_angle")?;
     // Not every run has them: a pin-jointed net's fibres have no strain.
     let names = ["fibre_strain_1", "fibre_strain_2"];
     let has = |name: &&str| body.fields.iter().any(|f| f.name == **name);
     if names.iter().all(has) {
-        let [a, b] = names.map(|name| host.frame_field(input, body, frame, name));
+        let [a, b] = names.map(field);
         ply.fibre_strain = a?.iter().zip(&b?).map(|(a, b)| a.min(*b)).collect();
     }
     Ok(ply)

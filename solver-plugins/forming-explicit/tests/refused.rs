@@ -9,6 +9,9 @@ use plyflow_forming_explicit::parameters::Parameters;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
+/// Of the non-crimp fabric of the tests (m).
+const PLY_THICKNESS: f64 = 4e-4;
+
 fn refused(p: &Parameters) -> String {
     build_global(p, &BuiltIn).err().expect("refused")
 }
@@ -149,33 +152,103 @@ fn a_tool_that_does_not_stand_on_the_bed_or_is_of_another_unit_says_so() {
     assert_told(
         &metres,
         &[
-            "100.000 x 60.000 x 20.000 m",
-            "tool_grid",
+            "from (-50000.0, -30000.0) to (50000.0, 30000.0) mm",
+            "the frame is too small",
             "is `unit` (1 m) the length",
         ],
     );
 }
 
-#[test]
-fn a_wall_that_is_lost_between_the_points_of_the_distance_field_says_so() {
+/// An STL block of this size (mm) as a tool.
+fn of_block(size: [f64; 3], grid: f64, unit: &str) -> (tempfile::TempDir, Parameters) {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("wall.stl");
-    let with = |thickness: f64, grid: f64, unit: &str| {
-        let text = block([100.0, thickness, 30.0], [-50.0, -0.3 * thickness, 0.0]);
-        std::fs::write(&file, text).unwrap();
-        bag(1, |p| {
-            p["tool_grid"] = json!(grid);
-            p["scene"]["tool"] = json!({"stl": {"file": file.to_str().unwrap(), "unit": unit}});
-        })
-    };
-    let told = refused(&with(2.0, 0.003, "1 mm"));
-    assert_told(&told, &["walls 2.00 mm thin", "`tool_grid: 1.00 mm`"]);
-    for (thickness, grid) in [(2.0, 0.001), (12.0, 0.003)] {
-        let built = build_global(&with(thickness, grid, "1 mm"), &BuiltIn);
-        built.map(|_| ()).unwrap();
+    let file = folder.path().join("block.stl");
+    let low = [-0.5 * size[0], -0.3 * size[1], 0.0];
+    std::fs::write(&file, block(size, low)).unwrap();
+    let p = bag(1, |p| {
+        p["tool_grid"] = json!(grid);
+        p["scene"]["tool"] = json!({"stl": {"file": file.to_str().unwrap(), "unit": unit}});
+    });
+    (folder, p)
+}
+
+#[test]
+fn a_wall_thinner_than_a_ply_says_so_and_thicker_ones_are_in_the_field() {
+    for thickness in [0.02, 0.2] {
+        let (_folder, p) = of_block([100.0, thickness, 30.0], 0.003, "1 mm");
+        let told = refused(&p);
+        let wall = format!("has a wall {thickness} mm thin at (");
+        assert_told(&told, &[&wall, "thinnest ply", "leave it out"]);
     }
-    let speck = refused(&with(2.0, 0.003, "1 um"));
-    assert_told(&speck, &["0.100 x 0.002 x 0.030 mm", "is `unit`"]);
+    let (_folder, p) = of_block([100.0, 2.0, 30.0], 0.003, "1 mm");
+    let built = build_global(&p, &BuiltIn)
+        .map_err(|e| e.to_string())
+        .unwrap();
+    assert!(
+        built.field_error("tool") <= 0.1 * PLY_THICKNESS,
+        "{}",
+        built.field_error("tool")
+    );
+    let (_folder, p) = of_block([100.0, 2.0, 30.0], 0.003, "1 um");
+    assert_told(&refused(&p), &["0.100 x 0.002 x 0.030 mm", "is `unit`"]);
+}
+
+/// A field that shows nothing of the tool: no defects, and exit 0.
+#[test]
+fn a_spacing_that_shows_nothing_of_the_tool_is_refused_with_one_that_does() {
+    let (_folder, p) = of_block([100.0, 60.0, 20.0], 1.0, "1 mm");
+    let told = refused(&p);
+    assert_told(
+        &told,
+        &[
+            "`tool_grid`, 1000 mm",
+            "where a sheet can touch it",
+            "would do, in ",
+        ],
+    );
+    let from = told.find("`tool_grid: ").expect("a spacing that does") + 12;
+    let spacing = told[from..]
+        .split(' ')
+        .next()
+        .unwrap()
+        .parse::<f64>()
+        .unwrap();
+    let (_folder, p) = of_block([100.0, 60.0, 20.0], 1e-3 * spacing, "1 mm");
+    let built = build_global(&p, &BuiltIn)
+        .map_err(|e| e.to_string())
+        .unwrap();
+    assert!(built.field_error("tool") <= 0.1 * PLY_THICKNESS);
+    // Of the tools that Plyflow draws itself as well.
+    let p = bag(1, |p| p["tool_grid"] = json!(1.0));
+    assert_told(&refused(&p), &["`tool_grid`, 1000 mm", "would do"]);
+}
+
+#[test]
+fn a_body_that_floats_is_named() {
+    let (folder, p) = of_block([100.0, 60.0, 20.0], 0.003, "1 mm");
+    let file = folder.path().join("block.stl");
+    let with = |low: f64| {
+        let both = block([100.0, 60.0, 20.0], [-50.0, -30.0, 0.0])
+            + &block([20.0, 20.0, 10.0], [-10.0, -10.0, low]);
+        std::fs::write(&file, both).unwrap();
+    };
+    with(25.0);
+    assert_told(
+        &refused(&p),
+        &["one of its 2 bodies floats", "(-10.0, -10.0, 25.0) mm"],
+    );
+    for on_or_in in [20.0, 15.0] {
+        with(on_or_in);
+        build_global(&p, &BuiltIn).map(|_| ()).unwrap();
+    }
+}
+
+#[test]
+fn a_tool_that_leaves_the_frame_says_so() {
+    let p = bag(1, |p| {
+        p["scene"]["process"]["double_diaphragm"]["frame_width"] = json!("0.05 m")
+    });
+    assert_told(&refused(&p), &["scene.tool", "the frame is too small"]);
 }
 
 #[test]

@@ -70,7 +70,8 @@ impl Node {
         }
     }
 
-    fn stop(&self) -> Option<Stop> {
+    /// Why it is not placed, or what it hangs on is not.
+    pub(crate) fn stop(&self) -> Option<Stop> {
         match *self {
             Node::Stopped(why) | Node::Behind(why) => Some(why),
             _ => None,

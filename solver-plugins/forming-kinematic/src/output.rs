@@ -217,8 +217,22 @@ fn write_bodies(
         host.write_field(name, on, "fibre_strain_1", 1, "1", &none)?;
         host.write_field(name, on, "fibre_strain_2", 1, "1", &none)?;
         host.write_field(name, on, "draped", 1, "1", &reached)?;
+        if d.draped.reached.iter().any(|r| !r) {
+            let why = d.draped.stopped.iter().map(|s| s.map_or(0.0, number));
+            let why: Vec<f64> = why.collect();
+            host.write_field(name, on, "drape_stop", 1, "1", &why)?;
+        }
     }
     host.end_frame()
+}
+
+/// A reason in the field `drape_stop`; 0 is none.
+fn number(why: Stop) -> f64 {
+    match why {
+        Stop::Locked => 1.0,
+        Stop::Edge => 2.0,
+        Stop::Bed => 3.0,
+    }
 }
 
 fn sheet(d: &Done) -> Value {

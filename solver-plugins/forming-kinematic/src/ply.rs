@@ -106,10 +106,12 @@ impl Ply {
 pub struct Draped {
     /// Positions (m).
     pub points: Vec<Vec3>,
-    /// Per cell: shear angle (rad) of the net at its centre.
+    /// Per cell: shear angle (rad) of the net at its centre; 0 where the net does not reach all of it.
     pub shear: Vec<f64>,
     /// Per cell: whether the net reaches all of it.
     pub reached: Vec<bool>,
+    /// Per cell that is not reached: why the net stopped there, or before; `None` also where no node of the net near by tells.
+    pub stopped: Vec<Option<Stop>>,
 }
 
 /// What stopped a net, by reason: nodes and the first of them in the flat ply (m).
@@ -146,7 +148,7 @@ pub fn lay(net: &Net, mesh: &QuadMesh, surface: &dyn DrapeSurface, offset: f64) 
         let found = inside(net, at).map(|x| onto(surface, x, offset));
         on_net.push(found.is_some());
         draped.points.push(found.unwrap_or_else(|| {
-            let mut x = beyond(net, nearest(&whole, at).0, at);
+            let mut x = beyond(net, nearest(&whole, at), at);
             x[2] = x[2].max(bed + offset);
             x
         }));
@@ -161,12 +163,24 @@ pub fn lay(net: &Net, mesh: &QuadMesh, surface: &dyn DrapeSurface, offset: f64) 
         let at = net.coordinates(centre);
         let shear = shear_at(net, at);
         let reached = shear.is_some() && cell.iter().all(|n| on_net[*n as usize]);
-        draped
-            .shear
-            .push(shear.unwrap_or_else(|| nearest(&whole, at).1));
+        draped.shear.push(shear.filter(|_| reached).unwrap_or(0.0));
         draped.reached.push(reached);
+        let corners = cell.iter().map(|n| {
+            let p = mesh.points[*n as usize];
+            net.coordinates([p[0], p[1]])
+        });
+        let places = corners.chain([at]);
+        let stop = places.filter_map(|at| stop_at(net, at)).min();
+        draped.stopped.push(stop.filter(|_| !reached));
     }
     Some(draped)
+}
+
+/// The first reason (in the order of [`Stop`]) that the nodes around a place of the net have for not being placed.
+fn stop_at(net: &Net, at: [f64; 2]) -> Option<Stop> {
+    let [i, j] = at.map(|v| v.floor() as i32);
+    let around = crate::net::corners([i, j]).into_iter();
+    around.filter_map(|c| net.node(c).stop()).min()
 }
 
 /// Position at a place of the net (in steps of it), when it lies in a whole cell.
@@ -209,16 +223,15 @@ fn beyond(net: &Net, cell: [i32; 2], at: [f64; 2]) -> Vec3 {
     sum([0.25 - p - q, 0.25 + p - q, 0.25 + p + q, 0.25 - p + q])
 }
 
-/// Whole cells with a side where the net ends, with their shear angles (rad): the nearest cell to what is not reached is one
-/// of them.
-fn rim(net: &Net) -> Vec<([i32; 2], f64)> {
+/// Whole cells with a side where the net ends: the nearest cell to what is not reached is one of them.
+fn rim(net: &Net) -> Vec<[i32; 2]> {
     let inner = |[i, j]: [i32; 2]| {
         let sides = [[i - 1, j], [i + 1, j], [i, j - 1], [i, j + 1]];
         sides.iter().all(|c| net.shear(*c).is_some())
     };
     net.nodes()
-        .filter_map(|(at, _)| net.shear(at).map(|g| (at, g)))
-        .filter(|(at, _)| !inner(*at))
+        .map(|(at, _)| at)
+        .filter(|at| net.shear(*at).is_some() && !inner(*at))
         .collect()
 }
 
@@ -255,7 +268,7 @@ fn shear_at(net: &Net, at: [f64; 2]) -> Option<f64> {
     (weight > 0.0).then(|| sum / weight)
 }
 
-fn nearest(whole: &[([i32; 2], f64)], at: [f64; 2]) -> ([i32; 2], f64) {
+fn nearest(whole: &[[i32; 2]], at: [f64; 2]) -> [i32; 2] {
     let away = |cell: &[i32; 2]| {
         let d = [0, 1].map(|k| f64::from(cell[k]) + 0.5 - at[k]);
         d[0] * d[0] + d[1] * d[1]
@@ -263,7 +276,7 @@ fn nearest(whole: &[([i32; 2], f64)], at: [f64; 2]) -> ([i32; 2], f64) {
     // The first of equally near ones.
     let mut best = whole[0];
     for other in &whole[1..] {
-        if away(&other.0) < away(&best.0) {
+        if away(other) < away(&best) {
             best = *other;
         }
     }

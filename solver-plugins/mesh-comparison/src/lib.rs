@@ -6,6 +6,7 @@ mod zones;
 pub use advice::{Advice, advise};
 
 use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
+use plyflow_surface::draped;
 use plyflow_surface::{Topology, weighted_quantiles};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -104,10 +105,10 @@ fn read(host: &Host, input: Input) -> Result<Run, StepError> {
     let (mut angles, mut areas) = (Vec::new(), Vec::new());
     for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
         let body = meshes.body(&sheet.name)?;
-        let (undeformed, cells) = host.mesh(&input, body)?;
-        let topology = Topology::new(undeformed.len(), body.nodes_per_cell, &cells);
-        areas.extend(topology.cell_areas(&undeformed));
-        angles.extend(host.frame_field(&input, body, frame, "shear_angle")?);
+        let part = draped::Formed::read(host, &input, body, frame)?;
+        let topology = Topology::new(part.flat.len(), body.nodes_per_cell, &part.cells);
+        areas.extend(topology.cell_areas(&part.flat));
+        angles.extend(part.of_cells(host.frame_field(&input, body, frame, "shear_angle")?));
     }
     if angles.is_empty() {
         return Err(format!("'{}' has no ply", input.step).into());

@@ -27,6 +27,8 @@ pub use smooth::{SmoothSheet, StandOff};
 pub use topology::{Topology, triangles};
 pub use traction::traction;
 
+#[cfg(feature = "steps")]
+pub mod draped;
 #[cfg(feature = "memory-host")]
 pub mod memory_host;
 #[cfg(feature = "steps")]

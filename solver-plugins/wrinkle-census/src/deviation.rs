@@ -61,10 +61,14 @@ pub fn rests(
         } else {
             (ply.offset, of_run::missing_below(host, input, &ply.name)?)
         };
+        let of_part = |all: Vec<f64>| match &ply.part {
+            Some(part) => part.at_nodes(&all),
+            None => all,
+        };
         all.push(Rest {
             surface,
             offset,
-            missing,
+            missing: missing.map(of_part),
         });
     }
     Ok(all)

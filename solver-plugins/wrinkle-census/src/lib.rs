@@ -21,6 +21,7 @@ use parameters::Parameters;
 use plot::{Curve, Plots};
 use plyflow_sdk::{Host, Input, On, Step, StepError, export_step};
 use plyflow_surface::Topology;
+use plyflow_surface::draped::DrapedPart;
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{weighted_mean, weighted_quantiles};
 use serde::Deserialize;
@@ -61,6 +62,8 @@ struct Ply {
     stack: f64,
     /// What of it is bent how much; `None` when the artifact does not say.
     moments: Option<(On, Vec<f64>)>,
+    /// What of the run's ply this is; `None`: all.
+    part: Option<DrapedPart>,
 }
 
 impl Step for WrinkleCensus {
@@ -135,16 +138,22 @@ fn read(host: &Host, input: &Input, frame: usize, wanted: Option<&str>) -> Resul
         )
         .into());
     }
-    let (flat, cells) = host.mesh(input, body)?;
+    let part = plyflow_surface::draped::Formed::read(host, input, body, frame)?;
+    let shear = host.frame_field(input, body, frame, "shear_angle")?;
+    let moments = moments::read(host, input, body, frame)?;
     Ok(Ply {
         name: sheet.name.clone(),
-        points: host.frame_points(input, body, frame)?,
-        shear: host.frame_field(input, body, frame, "shear_angle")?,
-        moments: moments::read(host, input, body, frame)?,
+        shear: part.of_cells(shear),
+        moments: moments.map(|(on, values)| match on {
+            On::Points => (on, part.at_nodes(values)),
+            On::Cells => (on, part.of_cells(values)),
+        }),
         offset: sheet.offset,
         stack: formed.sheets.iter().map(|s| s.thickness).sum(),
-        flat,
-        cells,
+        points: part.points,
+        flat: part.flat,
+        cells: part.cells,
+        part: part.part,
     })
 }
 

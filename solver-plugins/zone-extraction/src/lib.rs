@@ -206,6 +206,34 @@ fn write(
     host.result("ply_fraction", fraction, "1")
 }
 
+/// Tells what of a ply has no shape: there are no defects to draw zones around, but where the fabric locks, which is flagged.
+fn tell_undraped(host: &Host, ply: &str, areas: &[f64], draped: &[f64], flags: &[f64]) {
+    let area = |of: &dyn Fn(usize) -> bool| -> f64 {
+        let chosen = (0..areas.len()).filter(|c| draped[*c] < 0.5 && of(*c));
+        chosen.map(|c| areas[c]).sum()
+    };
+    let (all, locked) = (area(&|_| true), area(&|c| flags[c] > 0.5));
+    if all == 0.0 {
+        return;
+    }
+    let share = |of: f64| (100.0 * of / areas.iter().sum::<f64>()).clamp(0.1, 100.0);
+    let flagged = if locked > 0.0 {
+        format!(
+            "; {:.1} % of its area is flagged there because the fabric locks",
+            share(locked)
+        )
+    } else {
+        String::new()
+    };
+    host.log(
+        Log::Warn,
+        &format!(
+            "ply '{ply}' is not draped on {:.1} % of its area: what forms there is not known, and no zone looks for it{flagged}",
+            share(all)
+        ),
+    );
+}
+
 /// Names of the plies, their flagged cells, and the box around all of them.
 fn read(host: &Host) -> Result<(Vec<String>, Vec<FlaggedCell>, Rectangle), StepError> {
     let input = host.input("defects")?;
@@ -250,6 +278,10 @@ fn read(host: &Host) -> Result<(Vec<String>, Vec<FlaggedCell>, Rectangle), StepE
             blank[3].max(all[3]),
         ];
         let areas = topology.cell_areas(&flat);
+        if body.fields.iter().any(|f| f.name == "draped") {
+            let draped = host.frame_field(&input, body, frame, "draped")?;
+            tell_undraped(host, &body.name, &areas, &draped, &flags);
+        }
         for c in (0..topology.cells()).filter(|&c| flags[c] > 0.5) {
             let bounds = around(&mut topology.cell(c).iter().map(|&i| i as usize));
             cells.push(FlaggedCell {
