@@ -286,3 +286,82 @@ fn a_ply_that_lies_beside_the_one_below_it_conforms_where_it_lies_on_the_film() 
     zone.attributes["sheets"][1]["holes"] = json!([square(0.4)]);
     assert!((detect(&zone).result("distance_max") - BELOW).abs() < 1e-9);
 }
+
+/// Cells of a net that hang on: over-sheared and off the tool, whatever they show. `locked`: those of them where the fabric locks.
+fn half_draped(draped: impl Fn(usize) -> bool, locked: impl Fn(usize) -> bool) -> MemoryArtifact {
+    let shear = |c: usize| if draped(c) { 0.05 } else { 1.2 };
+    let z = |x: f64, _: f64| OFFSET + if x > 0.051 { 0.02 } else { 0.0 };
+    let mut input = formed(z, shear);
+    let field = |name: &str, value: &dyn Fn(usize) -> f64| MemoryField {
+        name: name.into(),
+        on: On::Cells,
+        components: 1,
+        values: (0..200).map(value).collect(),
+    };
+    let on = field("draped", &|c| f64::from(u8::from(draped(c))));
+    let why = field("drape_stop", &|c| match (draped(c), locked(c)) {
+        (true, _) => 0.0,
+        (false, true) => 1.0,
+        (false, false) => 3.0,
+    });
+    input.bodies[1].fields[1].extend([on, why]);
+    input
+}
+
+#[test]
+fn cells_that_a_net_does_not_reach_are_no_defects_and_told() {
+    // Fifteen of twenty cells along x, of 10 mm: what hangs on begins at x = 50 mm.
+    let found = detect(&half_draped(|c| c % 20 < 15, |_| false));
+    for name in [
+        "flagged_area",
+        "over_shear_area",
+        "poor_conformity_area",
+        "locked_area",
+    ] {
+        assert_eq!(found.result(name), 0.0, "{name}");
+    }
+    assert!((found.result("undraped_area") - 5e-3).abs() < 1e-12);
+    assert_eq!(
+        [found.result("shear_max"), found.result("shear_min")],
+        [0.05; 2]
+    );
+    assert!(found.result("distance_max").abs() < 1e-12);
+    let ply = found.body("ply_1");
+    assert_eq!(
+        ply.last("undeformed").len(),
+        3 * 231,
+        "the whole ply is there"
+    );
+    assert_eq!(ply.last("draped").iter().sum::<f64>(), 150.0);
+    assert!(ply.last("flag").iter().all(|f| *f == 0.0));
+    let text = found.log.join("\n");
+    assert!(
+        text.contains("ply 'ply_1'") && text.contains("draped on 75.0 % of its area"),
+        "{text}"
+    );
+}
+
+#[test]
+fn where_the_fabric_locks_the_ply_is_flagged_and_nothing_of_it_is_measured() {
+    let locked = |c: usize| c / 20 < 4;
+    let found = detect(&half_draped(|c| c % 20 < 15, locked));
+    assert!((found.result("locked_area") - 2e-3).abs() < 1e-12);
+    assert_eq!(found.result("flagged_area"), 0.0);
+    assert_eq!(found.result("shear_max"), 0.05);
+    let flags = found.body("ply_1").last("flag");
+    for (c, flag) in flags.iter().enumerate() {
+        assert_eq!(*flag > 0.5, c % 20 >= 15 && locked(c), "cell {c}");
+    }
+    assert!(found.log.join("\n").contains("the fabric locks"));
+}
+
+#[test]
+fn a_run_that_draped_all_of_a_ply_or_is_no_net_is_judged_as_before() {
+    let all = detect(&half_draped(|_| true, |_| false));
+    let mut plain = half_draped(|_| true, |_| false);
+    plain.bodies[1].fields[1].truncate(1);
+    let plain = detect(&plain);
+    assert!(plain.log.is_empty() && all.log.is_empty());
+    assert_eq!(all.bodies, plain.bodies);
+    assert!(plain.result("poor_conformity_area") > 0.0);
+}

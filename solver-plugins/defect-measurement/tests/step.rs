@@ -214,3 +214,39 @@ fn what_cannot_be_measured_is_told() {
     without.attributes = json!({"sheets": []});
     assert!(refused(json!({}), &without).contains("no sheet of kind 'ply'"));
 }
+
+#[test]
+fn what_a_net_does_not_reach_is_no_bridging_and_told() {
+    let mut input = formed();
+    let ply = input.bodies.iter_mut().find(|b| b.name == "ply_2").unwrap();
+    // The blister lies about x = 40 mm, the wrinkle left of 0.
+    let cells = ply.cells.chunks_exact(4);
+    let draped = cells.map(|c| f64::from(u8::from(ply.points[c[0] as usize][0] < 0.005)));
+    let draped: Vec<f64> = draped.collect();
+    let on: f64 = draped.iter().sum();
+    for (shear, draped) in ply.fields[0][0].values.iter_mut().zip(&draped) {
+        *shear = if *draped > 0.5 { *shear } else { 1.4 };
+    }
+    ply.fields[0].push(plyflow_surface::memory_host::MemoryField {
+        name: "draped".into(),
+        on: plyflow_sdk::On::Cells,
+        components: 1,
+        values: draped,
+    });
+    let inputs = [MemoryInput::new("formed", &input)];
+    let out = run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap();
+    assert_eq!(out.result("wrinkle_count"), 1.0);
+    assert_eq!(out.result("bridging_count"), 0.0);
+    let shown = out.body("ply_2");
+    assert_eq!(
+        shown.cells.len(),
+        4 * on as usize,
+        "what is shown is what was measured"
+    );
+    assert!(shown.last("shear_angle").iter().all(|g| *g == 0.1));
+    let text = out.log.join("\n");
+    assert!(
+        text.contains("ply 'ply_2'") && text.contains("of its area (field `draped`)"),
+        "{text}"
+    );
+}

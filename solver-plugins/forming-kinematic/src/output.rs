@@ -9,7 +9,7 @@ use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
 use plyflow_surface::vector::distance;
-use plyflow_tooling::ToolMesh;
+use plyflow_tooling::{ToolMesh, given};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -29,7 +29,7 @@ struct Parameters {
 }
 
 fn default_grid() -> f64 {
-    plyflow_tooling::given::DEFAULT_SPACING
+    given::DEFAULT_SPACING
 }
 
 /// A ply with its net.
@@ -52,7 +52,7 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
     let p: Parameters = host.parameters()?;
     report(host, 0.0, "reading the tool");
     let plies = plies(&p.scene)?;
-    let tool = plyflow_tooling::given::checked(&p.scene, p.tool_grid)?;
+    let tool = given::checked(&p.scene, p.tool_grid)?;
     let surface = SmoothSurface::new(&tool, p.crease_angle)
         .ok_or("the tool has no facet with an area: give another one")?;
     let started = Instant::now();
@@ -69,7 +69,33 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
     let seconds = started.elapsed().as_secs_f64();
     report(host, 0.95, "writing");
     write_bodies(host, &p.scene, &tool, &done)?;
-    write_summary(host, &p, &done, seconds)
+    let (off, at) = surface.smoothed_by();
+    let mut of_tool = Vec::from_iter(given::unlike_sizes(&p.scene, &tool));
+    of_tool.extend(much_smoothed(&p, (off, at)));
+    host.result("tool_field_error", off, "m")?;
+    write_summary(
+        host,
+        &p,
+        &done,
+        (of_tool, json!({"tool": {"max": off, "place": at}})),
+        seconds,
+    )
+}
+
+/// What to say of a tool whose facets the net does not lie on.
+fn much_smoothed(p: &Parameters, (off, at): (f64, [f64; 3])) -> Option<String> {
+    let ply = given::thinnest_ply(&p.scene);
+    let [x, y, z] = at.map(|c| 1e3 * c);
+    (off > ply).then(|| {
+        format!(
+            "the net lies on a surface that is smoothed over the tool's facets, {:.2} mm off them at ({x:.1}, {y:.1}, {z:.1}) mm, more than the thinnest \
+             ply ({:.2} mm): if these facets stand for something round, give finer ones; if their edges are real, take a smaller `crease_angle` \
+             ({:.0} deg)",
+            1e3 * off,
+            1e3 * ply,
+            p.crease_angle.to_degrees()
+        )
+    })
 }
 
 fn report(host: &Host, fraction: f64, phase: &str) {
@@ -303,11 +329,11 @@ fn write_summary(
     host: &Host,
     p: &Parameters,
     done: &[Done],
+    (mut texts, field_error): (Vec<String>, Value),
     seconds: f64,
 ) -> Result<(), StepError> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let (mut area, mut covered, mut unreachable, mut elements) = (0.0, 0.0, 0, 0);
-    let mut texts = Vec::new();
     for d in done {
         let areas = d.mesh.areas();
         let mut missed = 0;
@@ -341,6 +367,7 @@ fn write_summary(
         "net_spacing": p.net_spacing.unwrap_or(0.25 * p.element_size),
         "zone": null,
         "elements": elements,
+        "tool_field_error": field_error,
         "warnings": texts,
     }))?;
     let strain = done.iter().map(|d| d.fibre_strain).fold(0.0, f64::max);

@@ -84,6 +84,28 @@ impl SmoothSurface {
         })
     }
 
+    /// How far (m) the smooth surface lies off the facets at most, of their middles and the middles of their edges, and where.
+    pub fn smoothed_by(&self) -> (f64, Vec3) {
+        const PLACES: [[f64; 3]; 4] = [
+            [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
+            [0.5, 0.5, 0.0],
+            [0.0, 0.5, 0.5],
+            [0.5, 0.0, 0.5],
+        ];
+        let mut most = (0.0, [0.0; 3]);
+        for patch in self.patches.iter().filter(|p| p.face != [0.0; 3]) {
+            for place in PLACES {
+                let off = patch.height(place).abs();
+                if off > most.0 {
+                    let [a, b, c] = patch.corners;
+                    let on = add(scale(a, place[0]), scale(b, place[1]));
+                    most = (off, add(on, scale(c, place[2])));
+                }
+            }
+        }
+        most
+    }
+
     /// Height (m) of the highest facet over (x, y) whose outside is up, with that facet's normal; `None` when there is none.
     pub fn top(&self, x: f64, y: f64) -> Option<(f64, Vec3)> {
         let mut best: Option<(f64, Vec3)> = None;

@@ -224,6 +224,89 @@ fn cells_beyond_the_locking_angle_are_left_open_and_the_rest_is_draped() {
         }
     }
     assert_eq!(a.cells, b.cells);
+    // What is not has no shear, and says why.
+    assert!(b.fields[0].iter().all(|f| f.name != "drape_stop"));
+    let (draped, why) = (a.last("draped"), a.last("drape_stop"));
+    for (c, on) in draped.iter().enumerate() {
+        assert_eq!(why[c], if *on > 0.5 { 0.0 } else { 1.0 }, "cell {c}");
+        assert!(*on > 0.5 || a.last("shear_angle")[c] == 0.0, "cell {c}");
+    }
+}
+
+/// An STL file of blocks between these corners (mm).
+fn blocks(all: &[[[f64; 3]; 2]]) -> tempfile::NamedTempFile {
+    let mut text = String::new();
+    for [low, high] in all {
+        let corner = |k: usize| [0, 1, 2].map(|d| if k >> d & 1 == 1 { high[d] } else { low[d] });
+        text += "solid block\n";
+        for [a, b, c, d] in [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ] {
+            for facet in [[a, b, c], [a, c, d]] {
+                text += "facet normal 0 0 0\nouter loop\n";
+                for [x, y, z] in facet.map(corner) {
+                    text += &format!("vertex {x} {y} {z}\n");
+                }
+                text += "endloop\nendfacet\n";
+            }
+        }
+        text += "endsolid block\n";
+    }
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), text).unwrap();
+    file
+}
+
+/// The same places, units and walls as in `forming-explicit`: a net hangs as happily over a speck, or over what floats.
+#[test]
+fn a_tool_is_held_to_the_checks_of_explicit_forming() {
+    let block = [[-60.0, -40.0, 0.0], [60.0, 40.0, 20.0]];
+    let over = |all: &[[[f64; 3]; 2]], unit: &str| {
+        let file = blocks(all);
+        let tool = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": unit,
+                                  "translate": ["0 m", "0 m", "0 m"]}});
+        let with = json!({"scene": scene(tool, [0.06, 0.05], [0.0, 90.0]), "element_size": 0.005});
+        drape(with).map(|formed| formed.result("coverage"))
+    };
+    assert_eq!(over(&[block], "1 mm"), Ok(1.0));
+    for (all, unit, parts) in [
+        (
+            vec![block.map(|p| [p[0], p[1], p[2] + 15.0])],
+            "1 mm",
+            ["z = 15.000 mm", "stands on the bed"],
+        ),
+        (
+            vec![block],
+            "1 um",
+            ["0.120 x 0.080 x 0.020 mm", "is `unit`"],
+        ),
+        (vec![block], "1 m", ["the frame is too small", "is `unit`"]),
+        (
+            vec![block.map(|p| [p[0] + 600.0, p[1], p[2]])],
+            "1 mm",
+            ["the frame is too small", "x = y = 0"],
+        ),
+        (
+            vec![block, [[-9.0, -9.0, 25.0], [9.0, 9.0, 30.0]]],
+            "1 mm",
+            ["one of its 2 bodies floats", "25.0) mm"],
+        ),
+        (
+            vec![block, [[-9.0, -0.01, 20.0], [9.0, 0.01, 60.0]]],
+            "1 mm",
+            ["has a wall 0.02 mm thin", "thinnest ply"],
+        ),
+    ] {
+        let told = over(&all, unit).expect_err(parts[0]);
+        for part in parts {
+            assert!(told.contains(part), "'{part}' in: {told}");
+        }
+    }
 }
 
 #[test]
@@ -266,4 +349,62 @@ fn drape_has_one_frame_so_that_no_step_takes_it_for_a_motion() {
     assert!(body.points.iter().all(|p| (p[2] - z).abs() < 1e-12));
     let zeros = |name: &str| body.last(name).iter().all(|v| *v == 0.0);
     assert!(zeros("fibre_strain_1") && zeros("fibre_strain_2"));
+}
+
+/// A roof of two planes that meet at 20 degrees: less than `crease_angle`, and no fillet.
+#[test]
+fn a_tool_that_is_smoothed_by_more_than_a_ply_says_so() {
+    let with = |crease: f64| {
+        let formed = on_hemisphere(0.06, json!({"crease_angle": crease})).unwrap();
+        (formed.result("tool_field_error"), formed.log.join("\n"))
+    };
+    // Fine facets of a ball: by what their chords leave out.
+    let (off, told) = with(0.5);
+    assert!(off > 0.0 && off < 2.0 * CHORD_TOLERANCE, "{off}");
+    assert!(!told.contains("smoothed"), "{told}");
+    assert_eq!(with(0.0).0, 0.0);
+    let mut ridge = scene(json!({}), [0.06, 0.05], [0.0, 90.0]);
+    let file = roof();
+    ridge["tool"] = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": "1 mm",
+                                   "translate": ["0 m", "0 m", "0 m"]}});
+    let formed = drape(json!({"scene": ridge, "element_size": 0.005})).unwrap();
+    assert!(formed.result("tool_field_error") > 1e-3);
+    let told = formed.log.join("\n");
+    assert!(
+        told.contains("smoothed") && told.contains("smaller `crease_angle` (30 deg)"),
+        "{told}"
+    );
+}
+
+/// 120 mm long, 80 mm wide, 20 mm high at its eaves; its two slopes at 10 degrees.
+fn roof() -> tempfile::NamedTempFile {
+    let high = 20.0 + 40.0 * 10f64.to_radians().tan();
+    let profile = [
+        [-40.0, 0.0],
+        [40.0, 0.0],
+        [40.0, 20.0],
+        [0.0, high],
+        [-40.0, 20.0],
+    ];
+    let at = |k: usize, x: f64| [x, profile[k % 5][0], profile[k % 5][1]];
+    let mut facets = Vec::new();
+    for k in 0..5 {
+        let [a, b, c, d] = [at(k, -60.0), at(k, 60.0), at(k + 1, 60.0), at(k + 1, -60.0)];
+        facets.extend([[a, c, b], [a, d, c]]);
+    }
+    for k in 1..4 {
+        facets.push([at(0, -60.0), at(k + 1, -60.0), at(k, -60.0)]);
+        facets.push([at(0, 60.0), at(k, 60.0), at(k + 1, 60.0)]);
+    }
+    let mut text = "solid roof\n".to_owned();
+    for facet in facets {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for [x, y, z] in facet {
+            text += &format!("vertex {x} {y} {z}\n");
+        }
+        text += "endloop\nendfacet\n";
+    }
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), text + "endsolid roof\n").unwrap();
+    file
 }

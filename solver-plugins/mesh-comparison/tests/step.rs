@@ -178,3 +178,23 @@ fn the_artifact_holds_the_advice() {
     assert!(size > 0.0 && out.attributes["advised_element_size"] == size);
     assert_eq!(out.attributes["target_error"], 0.1);
 }
+
+#[test]
+fn cells_that_a_net_does_not_reach_are_in_no_quantile() {
+    let runs = [50, 100].map(|n| {
+        let mut run = strip(n, |x| if x < 0.08 { x } else { 9.0 });
+        let values = (0..n).map(|c| f64::from(u8::from(c < 4 * n / 5))).collect();
+        run.bodies[0].fields[0].push(MemoryField {
+            name: "draped".into(),
+            on: On::Cells,
+            components: 1,
+            values,
+        });
+        run
+    });
+    let out = compare(&runs).unwrap();
+    let (_, largest) = &out.arrays["study/shear_max"];
+    assert!(largest.iter().all(|g| *g < 0.08), "{largest:?}");
+    let told = out.log.iter().filter(|l| l.contains("80.0 % of its area"));
+    assert_eq!(told.count(), 2, "{:?}", out.log);
+}

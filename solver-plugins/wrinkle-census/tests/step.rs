@@ -477,3 +477,31 @@ fn a_level_ply_has_none_and_a_circle_beside_it_is_told() {
     let told = census(&level, other).unwrap_err();
     assert!(told.contains("'ply_7'") && told.contains("ply_1"), "{told}");
 }
+
+/// A quarter of the ply hangs on from where a net ended, 4 mm lower.
+#[test]
+fn what_a_net_does_not_reach_deviates_from_nothing() {
+    let mut input = formed(|_, _| 9.8e-3);
+    let ply = &mut input.bodies[0];
+    for p in &mut ply.frames[0] {
+        if p[0] > 0.075 + 1e-9 {
+            p[2] = 5.8e-3;
+        }
+    }
+    ply.fields[0].push(MemoryField {
+        name: "draped".into(),
+        on: On::Cells,
+        components: 1,
+        values: (0..N * N)
+            .map(|k| f64::from(u8::from(k % N < 75)))
+            .collect(),
+    });
+    input.bodies.push(plate("die", 10e-3));
+    let mut with = parameters(json!([0.07]));
+    with["inner_circles"] = json!([]);
+    let found = census(&input, with).unwrap();
+    assert!(found.result("deviation_largest") < 1e-15);
+    assert_eq!(found.body("ply_1").last("deviation").len(), 76 * (N + 1));
+    let text = found.log.join("\n");
+    assert!(text.contains("draped on 75.0 % of its area"), "{text}");
+}
