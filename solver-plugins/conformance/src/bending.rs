@@ -3,10 +3,10 @@
 use crate::breaches::{Ask, Breaches, DT};
 use crate::buffer::Guarded;
 use crate::cycle::Cycles;
-use crate::law::{Law, largest, metrics, size};
+use crate::law::{Law, largest, metrics, size, undeformed};
 use crate::material::{LANES, zero_dt};
 use crate::meeting::{Counter, THREADS, meet_in_turn, same};
-use crate::shapes::pick;
+use crate::neighbours::{self, ALL, mixed, of_lanes};
 use crate::slope::Energies;
 use crate::{Run, Seen, Sequence, rules, worse};
 use plyflow_sdk::abi::*;
@@ -180,24 +180,21 @@ fn repeatable(law: &Law, twin: &Law) -> Seen {
 }
 
 fn lanes(law: &Law) -> Seen {
-    let (m, k) = (metrics(64, 0.02, 101), curvatures(64, GENTLE, 103));
-    let all = |order: &[usize]| -> Vec<Vec<u64>> {
-        let (m, k) = (pick(&m, 64, order), pick(&k, 64, order));
+    let m = mixed(&[
+        metrics(ALL, 0.02, 101),
+        metrics(ALL, 1e-3, 105),
+        undeformed(ALL),
+    ]);
+    let k = mixed(&[
+        curvatures(ALL, sharp(law), 103),
+        curvatures(ALL, 1.0, 107),
+        curvatures(ALL, 1e-6, 109),
+    ]);
+    neighbours::judge(|order| {
+        let (m, k) = (of_lanes(&m, order), of_lanes(&k, order));
         let (history, a) = bend(law, &m, &k, Ask::EVERYTHING);
         bits(&history, &a, order.len())
-    };
-    let whole = all(&(0..64).collect::<Vec<_>>());
-    for width in (8..=64).step_by(8) {
-        let order: Vec<usize> = (0..width).map(|i| (87 - i) % 64).collect();
-        let part = all(&order);
-        if let Some(to) = (0..width).find(|to| part[*to] != whole[order[*to]]) {
-            return Seen::Bad(format!(
-                "lane {} of 64 differs from the same state in lane {to} of {width}",
-                order[to]
-            ));
-        }
-    }
-    Seen::Well("same bits in batches of 8, 16, .. 64 lanes in other orders".into())
+    })
 }
 
 fn asking(law: &Law) -> Seen {

@@ -2,9 +2,10 @@
 
 use crate::breaches::{Ask, Breaches, Refusal};
 use crate::meeting::{THREADS, meet_in_turn};
-use crate::shapes::{Elements, pick};
+use crate::neighbours::{self, mixed, of_lanes};
+use crate::shapes::Elements;
 use crate::subject::{Answer, Masses, Motion, State, Subject};
-use crate::{Check, Run, Seen, Sink, element_motion, patch, rules};
+use crate::{Check, Run, Seen, Sequence, Sink, element_motion, patch, rules};
 use plyflow_sdk::abi::*;
 
 /// Lanes of the sets that the mechanics are judged on.
@@ -198,45 +199,36 @@ fn repeatable(subject: &Subject, twin: &Subject) -> Seen {
 }
 
 fn lanes(subject: &Subject) -> Seen {
-    let all = Elements::new(subject.nodes(), 64, 17);
-    // Whether lanes are deformed much or little must not matter to their neighbours.
-    let positions: Vec<f64> = {
-        let (little, much) = (all.deformed(0.002, 19), all.deformed(0.1, 23));
-        let lane = |i: usize| i % 64;
-        (0..little.len())
-            .map(|i| if lane(i) % 3 == 0 { much[i] } else { little[i] })
-            .collect()
+    let all = Elements::new(subject.nodes(), neighbours::ALL, 17);
+    let positions = mixed(&[
+        all.deformed(0.1, 23),
+        all.deformed(0.002, 19),
+        all.deformed(1e-9, 29),
+    ]);
+    // Rotations in the step (rad), with and without.
+    let turning = |angle: f64, seed: u64| -> Vec<f64> {
+        let mut s = Sequence(seed);
+        (0..positions.len()).map(|_| angle * s.next()).collect()
     };
-    let run = |order: &[usize]| {
+    let spins = mixed(&[turning(0.4, 41), turning(1e-3, 43), turning(1e-9, 47)]);
+    neighbours::judge(|order| {
         let elements = all.picked(order);
-        let x = pick(&positions, 64, order);
+        let (x, spin) = (of_lanes(&positions, order), of_lanes(&spins, order));
         let (mut state, masses) = subject.initialise(&elements);
-        let motion = Motion {
-            from: Some(&elements.reference),
-            spin: None,
+        let motion = |spin| Motion {
+            from: Some(&elements.reference[..]),
+            spin,
         };
-        let a = subject.forces(&mut state, &x, motion, Ask::EVERYTHING);
-        (state, masses, a)
-    };
-    let order: Vec<usize> = (0..64).collect();
-    let whole = run(&order);
-    for width in (8..=64).step_by(8) {
-        for start in [0usize, 29] {
-            // Backwards, from somewhere in the middle, and with the last lane repeated as in a tail.
-            let mut order: Vec<usize> = (0..width).map(|i| (start + 64 - i) % 64).collect();
-            order[width - 1] = order[width - 2];
-            let part = run(&order);
-            for (to, from) in order.iter().enumerate() {
-                let a = bits(&whole.0, &whole.1, &whole.2, *from);
-                if a != bits(&part.0, &part.1, &part.2, to) {
-                    return Seen::Bad(format!(
-                        "lane {from} of 64 differs from the same element in lane {to} of {width}"
-                    ));
-                }
-            }
-        }
-    }
-    Seen::Well("same bits in batches of 8, 16, .. 64 lanes in other orders".into())
+        let still = subject.forces(&mut state, &x, motion(None), Ask::EVERYTHING);
+        let turned = subject.forces(&mut state, &x, motion(Some(&spin)), Ask::EVERYTHING);
+        (0..order.len())
+            .map(|l| {
+                let mut all = bits(&state, &masses, &still, l);
+                all.extend(bits(&state, &masses, &turned, l));
+                all
+            })
+            .collect()
+    })
 }
 
 fn asking(subject: &Subject) -> Seen {

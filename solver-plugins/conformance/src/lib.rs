@@ -17,6 +17,7 @@ mod linear;
 mod material;
 mod material_law;
 mod meeting;
+mod neighbours;
 mod patch;
 mod rules;
 mod shapes;

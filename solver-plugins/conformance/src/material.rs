@@ -4,7 +4,7 @@ use crate::breaches::{Ask, Breaches, DT, Refusal};
 use crate::buffer::Guarded;
 use crate::law::{Answer, Law, largest, metrics, trellis, undeformed};
 use crate::meeting::{THREADS, meet_in_turn};
-use crate::shapes::pick;
+use crate::neighbours::{self, ALL, mixed, of_lanes};
 use crate::{Check, Run, Seen, Sink, bending, material_law, rules};
 use plyflow_sdk::abi::*;
 
@@ -173,19 +173,8 @@ fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
         }
     });
     run.check(rules::LANES, || {
-        let metric = metrics(64, 0.05, 71);
-        let whole = all(law, &metric);
-        for width in (8..=64).step_by(8) {
-            let order: Vec<usize> = (0..width).map(|i| (87 - i) % 64).collect();
-            let part = all(law, &pick(&metric, 64, &order));
-            if let Some(to) = (0..width).find(|to| part[*to] != whole[order[*to]]) {
-                return Seen::Bad(format!(
-                    "lane {} of 64 differs from the same state in lane {to} of {width}",
-                    order[to]
-                ));
-            }
-        }
-        Seen::Well("same bits in batches of 8, 16, .. 64 lanes in other orders".into())
+        let metric = mixed(&[trellis(ALL), metrics(ALL, 0.05, 71), metrics(ALL, 1e-9, 73)]);
+        neighbours::judge(|order| all(law, &of_lanes(&metric, order)))
     });
     run.check(rules::ASKING, || {
         let mut with = once(law, &metric, Ask::EVERYTHING);

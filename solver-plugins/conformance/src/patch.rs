@@ -3,7 +3,8 @@
 use crate::breaches::{Ask, Breaches, DT};
 use crate::linear::{V, cross, norm, rotation};
 use crate::meeting::{THREADS, meet_in_turn};
-use crate::shapes::{Patches, moved, pick};
+use crate::neighbours::{self, mixed, of_lanes};
+use crate::shapes::{Patches, moved};
 use crate::subject::{PatchAnswer, PatchState, Subject};
 use crate::{Run, Seen, rules, worse};
 
@@ -105,29 +106,22 @@ fn bits(state: &PatchState, a: &PatchAnswer, l: usize) -> Vec<u64> {
 }
 
 fn lanes(subject: &Subject) -> Seen {
-    let Some(all) = Patches::new(subject.nodes(), subject.slots(), 64, 59) else {
+    let Some(all) = Patches::new(subject.nodes(), subject.slots(), neighbours::ALL, 59) else {
         return Seen::Nothing("no patch fits".into());
     };
-    let bent = all.bent(57);
-    let run = |order: &[usize]| {
+    let part = |share: f64| -> Vec<f64> {
+        let bent = all.bent(57);
+        let flat = all.reference.iter();
+        flat.zip(&bent).map(|(a, b)| a + share * (b - a)).collect()
+    };
+    let bent = mixed(&[part(1.0), part(1e-2), part(1e-9)]);
+    neighbours::judge(|order| {
         let patches = all.picked(order);
         let (mut state, _) = subject.patch_initialise(&patches);
-        let a = subject.patch_forces(&mut state, &pick(&bent, 64, order), DT, Ask::EVERYTHING);
-        (state, a)
-    };
-    let whole = run(&(0..64).collect::<Vec<_>>());
-    for width in (8..=64).step_by(8) {
-        let order: Vec<usize> = (0..width).map(|i| (87 - i) % 64).collect();
-        let part = run(&order);
-        for (to, from) in order.iter().enumerate() {
-            if bits(&whole.0, &whole.1, *from) != bits(&part.0, &part.1, to) {
-                return Seen::Bad(format!(
-                    "lane {from} of 64 differs from the same patch in lane {to} of {width}"
-                ));
-            }
-        }
-    }
-    Seen::Well("same bits in batches of 8, 16, .. 64 patches in other orders".into())
+        let x = of_lanes(&bent, order);
+        let a = subject.patch_forces(&mut state, &x, DT, Ask::EVERYTHING);
+        (0..order.len()).map(|l| bits(&state, &a, l)).collect()
+    })
 }
 
 fn repeatable(subject: &Subject, twin: &Subject, patches: &Patches) -> Seen {

@@ -10,7 +10,7 @@ use plyflow_kernels::isotropic::Isotropic;
 use plyflow_kernels::m4::M4;
 use plyflow_kernels::rf4::Rf4;
 use plyflow_kernels::s4::S4;
-use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef};
+use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch};
 
 const MEMBRANE: [&str; 13] = [
     "create",
@@ -87,6 +87,11 @@ const DRILLING: u8 = 4;
 /// Says that it does not read the velocity, and reads it.
 const READS_VELOCITY: u8 = 5;
 
+/// Takes a short way, with other bits, when all lanes turn little.
+const HASTY: u8 = 6;
+/// The same when all but one in eight do.
+const HASTY_WITH_MOST: u8 = 7;
+
 /// Of a batch of the most lanes.
 static STILL: [f64; 12 * 64] = [0.0; 12 * 64];
 
@@ -118,7 +123,21 @@ impl<const FAULT: u8> Element for Faulty<FAULT> {
         if FAULT == DEAF {
             batch.spin = &STILL[..batch.spin.len()];
         }
+        let spin: Vec<f64> = batch.spin.to_vec();
         let code = self.0.forces(batch, material);
+        let lanes = batch.lanes;
+        let slow = |l: &usize| (0..12).all(|r| spin[r * lanes + l].abs() * batch.dt < 0.03);
+        let hasty = (0..lanes).step_by(8).map(|c| {
+            let slow = (c..c + 8).filter(slow).count();
+            FAULT == HASTY && slow == 8 || FAULT == HASTY_WITH_MOST && slow >= 7
+        });
+        for (chunk, _) in hasty.enumerate().filter(|(_, hasty)| *hasty) {
+            for row in batch.moment.chunks_exact_mut(lanes) {
+                for m in &mut row[8 * chunk..8 * chunk + 8] {
+                    *m *= 1.0 + 1e-15;
+                }
+            }
+        }
         for (i, m) in batch.moment.iter_mut().enumerate() {
             match FAULT {
                 SIGN => *m = -*m,
@@ -140,10 +159,58 @@ fn each_fault_of_rotations_is_found_by_the_check_that_is_meant_for_it() {
     assert!(found::<SIGN>().contains(&"energy"));
     assert!(found::<SOFT>().contains(&"energy"));
     assert!(found::<SOFT>().contains(&"balance"));
+    assert_eq!(found::<HASTY>(), ["batch-independence"]);
+    assert_eq!(found::<HASTY_WITH_MOST>(), ["batch-independence"]);
     assert!(found::<WEIGHTLESS>().contains(&"mass"));
     assert!(found::<DRILLING>().contains(&"rest"));
     // A slice without a velocity in it: a panic. In C it would be NULL.
     assert!(found::<READS_VELOCITY>().contains(&"status"));
+}
+
+/// Rf4 whose patches take a short way, with other bits, when all of a batch's chunk are nearly flat.
+struct HastyPatches(Rf4);
+
+impl Element for HastyPatches {
+    const MANIFEST: &'static str = Rf4::MANIFEST;
+
+    fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
+        Rf4::create(parameters, material).map(Self)
+    }
+
+    fn sizes(&self) -> ElementSizes {
+        self.0.sizes()
+    }
+
+    fn initialise(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) {
+        self.0.initialise(batch, material);
+    }
+
+    fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
+        self.0.forces(batch, material)
+    }
+
+    fn patch_initialise(&self, batch: &mut PatchBatch<'_>, material: &MaterialRef) {
+        self.0.patch_initialise(batch, material);
+    }
+
+    fn patch_forces(&self, batch: &mut PatchBatch<'_>, material: &MaterialRef) -> i32 {
+        let code = self.0.patch_forces(batch, material);
+        let n = batch.lanes;
+        for c in (0..n).step_by(8) {
+            if batch.energy[c..c + 8].iter().all(|w| *w < 1e-12) {
+                for row in batch.force.chunks_exact_mut(n) {
+                    row[c..c + 8].iter_mut().for_each(|f| *f *= 1.0 + 1e-15);
+                }
+            }
+        }
+        code
+    }
+}
+
+#[test]
+fn a_patch_that_depends_on_its_neighbours_is_found_out() {
+    let found = failed(&with_fabric::<HastyPatches>("{}", "fibre-energy"));
+    assert_eq!(found, ["patch-batch-independence"]);
 }
 
 /// M4's sizes with three nodes: enough for the check that looks at them.

@@ -67,6 +67,47 @@ fn verdicts_say_how_far_a_law_was_judged() {
     assert!(seen.contains("200 1/m"), "{seen}");
 }
 
+/// A law that takes a short way, with other bits, when all of a batch's chunk are deformed or bent little.
+struct Hasty(Isotropic);
+
+fn hasten(n: usize, values: &mut [f64], is_small: impl Fn(usize) -> bool) {
+    for c in (0..n).step_by(8) {
+        if (c..c + 8).all(&is_small) {
+            for row in values.chunks_exact_mut(n) {
+                row[c..c + 8].iter_mut().for_each(|s| *s *= 1.0 + 1e-15);
+            }
+        }
+    }
+}
+
+impl Material for Hasty {
+    const MANIFEST: &'static str = Isotropic::MANIFEST;
+
+    fn create(parameters: &str) -> Result<Self, String> {
+        Isotropic::create(parameters).map(Self)
+    }
+
+    fn sizes(&self) -> MaterialSizes {
+        self.0.sizes()
+    }
+
+    fn membrane(&self, b: &mut MembraneBatch<'_>) {
+        self.0.membrane(b);
+        hasten(b.lanes, b.stress, |l| (b.metric[l] - 1.0).abs() < 1e-3);
+    }
+
+    fn bending(&self, b: &mut BendingBatch<'_>) {
+        self.0.bending(b);
+        hasten(b.lanes, b.moment, |l| b.curvature[l].abs() < 2.0);
+    }
+}
+
+#[test]
+fn a_law_that_depends_on_its_neighbours_is_found_out() {
+    let found = failed(&of_material::<Hasty>(ISOTROPIC));
+    assert_eq!(found, ["batch-independence", "bending-batch-independence"]);
+}
+
 /// A law that is stiffer in steps that take less than a millisecond.
 struct Rate(Isotropic);
 

@@ -437,7 +437,8 @@ fn forces_kernel<V: Lanes>(
             let f = (w(2) * m11 + w(3) * m22 + w(4) * m12) - (w(0) * p1 + w(1) * p2);
             sum = sum + f;
             for k in 0..3 {
-                (f * normal[k]).store(force, (3 * i + k) * n + c);
+                // Plus zero: a lane that does not use the node has +0 there, and not -0, whatever its neighbours use.
+                (f * normal[k] + zero).store(force, (3 * i + k) * n + c);
             }
         }
         for k in 0..3 {

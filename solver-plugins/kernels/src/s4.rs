@@ -7,10 +7,12 @@
 //! nodes by the exact rotation `spin * dt`. So elements may meet at an angle in the reference, and
 //! rotations may have any size. With the one-point gradient of [`crate::quad`], `g_a = x,a` and `d,a`,
 //!
-//! `C_ab = g_a . g_b`, `k_ab = -(d,a . g_b + d,b . g_a) / 2`,
+//! `C_ab = g_a . g_b`, `k_ab = -c (d,a . g_b + d,b . g_a) / 2`, `c = 1 + |q_d|^2 / 32`,
 //!
-//! which is `n . x,ab` when d is normal to the surface (differentiate `d . x,b = 0`), and both vanish
-//! under rigid motion. Each side I-J has the transverse shear `e_IJ = (x_J - x_I) . (d_I + d_J) / 2`
+//! with the directors' hourglass mode q_d; without it, c = 1, this is `n . x,ab` when d is normal to the surface (differentiate `d . x,b = 0`), and both vanish
+//! under rigid motion. The factor c gives the slopes of the directors the length that the mode takes off them: four unit
+//! vectors turned to and fro by b have a mean shorter by cos b, so that an element that is bent by more than about 0.4 rad from side to side
+//! could unbend by this mode, against nothing but its hourglass control (`docs/decisions/0039`). Each side I-J has the transverse shear `e_IJ = (x_J - x_I) . (d_I + d_J) / 2`
 //! less its value in the reference; it is zero for a side bent to an arc with normal directors, and
 //! for every constant curvature (trapezoidal rule of a linear slope), whatever the element's shape.
 //! The means of opposite sides give the transverse shear `gamma_a` at the point; their differences

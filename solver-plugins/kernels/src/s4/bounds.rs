@@ -219,6 +219,8 @@ pub(super) fn critical_step(
         let bending = state.bending + shared;
         let twist = state.twist + if s4.layers.is_some() { 0.0 } else { shared };
         let [s11, s22] = state.slope.map(|v| dot(v, v));
+        let mode = state.mode(&lane);
+        let (bending, twist) = (bending * mode.length, twist * mode.length);
         let bent = lane.area * lane.widest * bending * s11.max(s22);
         let twisted = lane.area * lane.widest * 0.5 * twist * (s11 + s22);
         let rotation = lane.rotational(
@@ -236,15 +238,42 @@ pub(super) fn critical_step(
         let [y, z, r] = [1.0 / mass, 1.0 / mass, 1.0 / inertia];
         kinds.add([(material + twisted) * y, 0.0, rotation.twist * r]);
         kinds.add([shear * lean * lean * y, shear * z, rotation.sides * r]);
-        kinds.add([bent * y, 0.0, rotation.bending * r]);
+        let flexed = (rotation.bending.sqrt() + mode.flexed(&lane, bending, twist)).powi(2);
+        kinds.add([bent * y, 0.0, flexed * r]);
         kinds.add([lane.area * lane.widest * swelling * y, 0.0, 0.0]);
-        kinds.add([0.0, 0.0, rotation.hourglass * r]);
+        let held = lane.director + lane.area * mode.work / 16.0;
+        kinds.add([0.0, 0.0, held * lane.mode() * r]);
         // Second derivatives of the strains: curvature is bilinear in slopes of x and of d, a side's
         // shear in its ends; a turned director has d2 d = t x (t x d).
-        let (pull, reaction) = state.loads(&lane);
-        let coupling = lane.area * lane.widest * state.moment() + 2.0 * pull;
+        let (pull, reaction) = state.loads(&lane, &mode);
+        let moment = lane.area * state.moment();
+        let changing = moment * mode.size / 16.0 * (lane.mode() * lane.widest).sqrt();
+        let coupling =
+            lane.widest * moment * mode.length.sqrt() + 2.0 * pull + changing * s11.max(s22).sqrt();
+        let reaction = reaction + 2.0 * changing * c[0].max(c[1]).sqrt();
         let lambda = kinds.largest() + rest / mass + coupling / mixed + reaction / inertia;
         step[l] = 2.0 / lambda.sqrt();
+    }
+}
+
+/// The directors' hourglass mode q_d of one lane, and what it does to curvatures: `k = c k0`, `c = 1 + |q_d|^2 / 32`.
+struct Mode {
+    /// |q_d|.
+    size: f64,
+    /// c^2.
+    length: f64,
+    /// k0 (1/m).
+    curvature: V3,
+    /// Size of `M k0` (N).
+    work: f64,
+}
+
+impl Mode {
+    /// Root of what curvatures store as the mode changes c (root of N m).
+    fn flexed(&self, lane: &Lane, bending: f64, twist: f64) -> f64 {
+        let [k1, k2, k12] = self.curvature;
+        let stored = bending * (k1 * k1 + k2 * k2) + 2.0 * twist * k12 * k12;
+        (lane.area * stored.max(0.0) * lane.mode()).sqrt() * self.size / 16.0
     }
 }
 
@@ -378,8 +407,29 @@ impl State {
         (over * material, over * stress + lane.plane * mode + bent)
     }
 
+    /// The directors' hourglass mode.
+    fn mode(&self, lane: &Lane) -> Mode {
+        let (d, [g1, g2], [s1, s2]) = (&self.d, self.g, self.slope);
+        let mode: V3 = core::array::from_fn(|k| {
+            ((d[0][k] - d[1][k]) + (d[2][k] - d[3][k])) - lane.h[0] * s1[k] - lane.h[1] * s2[k]
+        });
+        let square = dot(mode, mode);
+        let k = [
+            -dot(s1, g1),
+            -dot(s2, g2),
+            -0.5 * (dot(s1, g2) + dot(s2, g1)),
+        ];
+        let [m1, m2, m12] = self.moments;
+        Mode {
+            size: square.sqrt(),
+            length: (1.0 + square / 32.0).powi(2),
+            curvature: k,
+            work: (m1 * k[0] + m2 * k[1] + 2.0 * m12 * k[2]).abs(),
+        }
+    }
+
     /// Bounds of the sides' transverse forces (N) and of |dW/dd| at a node (N m).
-    fn loads(&self, lane: &Lane) -> (f64, f64) {
+    fn loads(&self, lane: &Lane, mode: &Mode) -> (f64, f64) {
         let d = &self.d;
         let ends = [[0, 1], [3, 2], [0, 3], [1, 2]];
         let mut e = [0.0; 4];
@@ -404,13 +454,9 @@ impl State {
         let [g1, g2] = self.g;
         let columns = [mix(m1, g1, m12, g2), mix(m12, g1, m2, g2)].map(|v| lane.area * norm(v));
         let widest = lane.widest.sqrt();
-        let hourglass: V3 = core::array::from_fn(|k| {
-            ((d[0][k] - d[1][k]) + (d[2][k] - d[3][k]))
-                - lane.h[0] * self.slope[0][k]
-                - lane.h[1] * self.slope[1][k]
-        });
-        let reaction = widest * (columns[0] + columns[1])
-            + lane.director * lane.mode().sqrt() * norm(hourglass)
+        let held = lane.director + lane.area * mode.work / 16.0;
+        let reaction = widest * mode.length.sqrt() * (columns[0] + columns[1])
+            + held * lane.mode().sqrt() * mode.size
             + pull * longest;
         (pull, reaction)
     }

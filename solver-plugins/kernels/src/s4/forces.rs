@@ -144,6 +144,15 @@ fn hourglass<V: Lanes>(v: &[[V; 3]; 4], h: [V; 2], u: &[V; 3], w: &[V; 3]) -> [V
     ]
 }
 
+/// What the directors' hourglass mode takes off the slopes of their mean, as a factor `1 + |q_d|^2 / 32`: four unit vectors that are
+/// turned to and fro by b (`|q_d| = 4 b`) have a mean, and its slopes, shorter by cos b. Uncorrected, an element that is bent gives way
+/// to this mode, which no neighbour sees.
+#[inline(always)]
+fn lengthened<V: Lanes>(d: &[[V; 3]; 4], h: [V; 2], s1: &[V; 3], s2: &[V; 3]) -> V {
+    let q = hourglass(d, h, s1, s2);
+    V::splat(1.0) + V::splat(1.0 / 32.0) * dot(&q, &q)
+}
+
 /// Turns the directors (which start along the normal) and writes g, d,a, metrics and curvatures.
 #[inline(always)]
 fn kinematics_kernel<V: Lanes>(
@@ -183,8 +192,9 @@ fn kinematics_kernel<V: Lanes>(
         store(&s2, s.slope, 3, n, c);
         let metric = [dot(&g1, &g1), dot(&g2, &g2), dot(&g1, &g2)];
         store(&metric, s.metric, 0, n, c);
-        let twist = -(half * (dot(&s1, &g2) + dot(&s2, &g1)));
-        let mut k = [-dot(&s1, &g1), -dot(&s2, &g2), twist];
+        let length = lengthened(&d, [b(4), b(5)], &s1, &s2);
+        let twist = -(length * (half * (dot(&s1, &g2) + dot(&s2, &g1))));
+        let mut k = [-(length * dot(&s1, &g1)), -(length * dot(&s2, &g2)), twist];
         if let Some(z) = height {
             let change = V::splat(2.0 * z) * twist;
             let layer = |c12: V| [metric[0], metric[1], c12];
@@ -304,7 +314,14 @@ fn forces_kernel<V: Lanes>(
         let w2u = lift * (c11 * w2 - c12 * w1) * inverse;
 
         let stress = scaled(area, &three(s.stress, 0, n, c));
+        // Curvatures are the product of `length` and of what slopes and columns give.
+        let length = V::splat(1.0) + V::splat(1.0 / 32.0) * qd;
         let m = scaled(area, &three(s.moment, 0, n, c));
+        let (p1, p2) = (mix(m[0], &g1, m[2], &g2), mix(m[2], &g1, m[1], &g2));
+        let work = -(dot(&s1, &p1) + dot(&s2, &p2));
+        let held = bent + V::splat(1.0 / 16.0) * work;
+        let m = scaled(length, &m);
+        let (p1, p2) = (scaled(length, &p1), scaled(length, &p2));
         let (mut f, mut t) = ([[V::splat(0.0); 3]; 4], [[V::splat(0.0); 3]; 4]);
         for k in 0..3 {
             let stay = plane * hx[k] - lift * nn[k];
@@ -326,9 +343,9 @@ fn forces_kernel<V: Lanes>(
             f[2][k] = (stay - u) + (v[1] + v[3]);
             f[3][k] = (v[2] - v[1]) - (w + stay);
             // The same for the directors.
-            let stay = bent * hd[k];
-            let t1 = -(m[0] * g1[k] + m[2] * g2[k]) - h1 * stay;
-            let t2 = -(m[2] * g1[k] + m[1] * g2[k]) - h2 * stay;
+            let stay = held * hd[k];
+            let t1 = -p1[k] - h1 * stay;
+            let t2 = -p2[k] - h2 * stay;
             let (u, w) = (b11 * t1 + b12 * t2, b21 * t1 + b22 * t2);
             let v = [
                 half * pull[0] * side[0][k],

@@ -48,18 +48,35 @@ pub(super) fn scaled<V: Lanes>(p: V, a: &V3<V>) -> V3<V> {
 /// The unit vector d turned by the rotation vector t (Rodrigues), any angle, and renormalised:
 /// `d cos a + (t x d) sin a / a + t (t . d) (1 - cos a) / a^2`, a = |t|.
 ///
-/// When no lane turns by more than [`SMALL`], which in a step of a run is nearly always, `sin a / a` and
-/// `(1 - cos a) / a^2` are Taylor series in a^2 of four terms (truncation below 1e-17): no root, no quotient. Else sine
+/// A lane that turns by less than [`SMALL`], which in a step of a run nearly all do, has `sin a / a` and
+/// `(1 - cos a) / a^2` as Taylor series in a^2 of four terms (truncation below 1e-17): no root, no quotient. In the others sine
 /// and cosine are Taylor series at a quarter of the angle (at most pi/4 after whole turns are taken off; truncation below
 /// 1e-16), doubled twice, and `(1 - cos a) / a^2` is `(sin(a/2) / (a/2))^2 / 2`, which has no cancellation.
+///
+/// Each lane has its own way, whatever its neighbours do: that none goes the long way only saves the work.
 #[inline(always)]
 pub(super) fn turn<V: Lanes>(d: &V3<V>, t: &V3<V>) -> V3<V> {
     let squared = dot(t, t);
-    if V::all(squared.lt(V::splat(SMALL * SMALL))) {
-        let (sine, versine) = (cubic(&SINC, squared), cubic(&VERSINE, squared));
-        let cosine = V::splat(1.0) - squared * versine;
+    let small = squared.lt(V::splat(SMALL * SMALL));
+    let (sine, versine) = (cubic(&SINC, squared), cubic(&VERSINE, squared));
+    let cosine = V::splat(1.0) - squared * versine;
+    if V::all(small) {
         return rotated(d, t, sine, cosine, versine);
     }
+    let long = long_way(squared);
+    let pick = |short: V, long: V| V::select(small, short, long);
+    rotated(
+        d,
+        t,
+        pick(sine, long[0]),
+        pick(cosine, long[1]),
+        pick(versine, long[2]),
+    )
+}
+
+/// `sin a / a`, `cos a` and `(1 - cos a) / a^2` of any angle, from its square.
+#[inline(always)]
+fn long_way<V: Lanes>(squared: V) -> V3<V> {
     const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it rounds to a whole number
     let (one, two, half) = (V::splat(1.0), V::splat(2.0), V::splat(0.5));
     // The floor keeps the quotients below defined; at 1e-100 rad they are 1 and 1/2.
@@ -80,8 +97,7 @@ pub(super) fn turn<V: Lanes>(d: &V3<V>, t: &V3<V>) -> V3<V> {
     let (s4, c4) = (two * s2 * c2, one - two * s2 * s2);
     let over = one / a;
     let along = two * s2 * over;
-    let versine = half * along * along;
-    rotated(d, t, s4 * over, c4, versine)
+    [s4 * over, c4, half * along * along]
 }
 
 #[inline(always)]
@@ -154,6 +170,35 @@ mod tests {
             }
         }
         assert_eq!(turned([0.0, 0.6, 0.8], [0.0; 3]), [0.0, 0.6, 0.8]);
+    }
+
+    /// The lanes of the directors (0, 0.6, 0.8) turned about x by the angles.
+    fn lanes_turned(angles: [f64; 8]) -> [[u64; 8]; 3] {
+        let d = [0.0, 0.6, 0.8].map(Portable::splat);
+        let (t, zero) = (Portable::load(&angles, 0), Portable::splat(0.0));
+        turn(&d, &[t, zero, zero]).map(|x| {
+            let mut out = [0.0; 8];
+            x.store(&mut out, 0);
+            out.map(f64::to_bits)
+        })
+    }
+
+    #[test]
+    fn a_director_s_bits_do_not_depend_on_how_far_its_neighbours_turn() {
+        for i in 0..200 {
+            let a = 1e-4 * 1.06f64.powi(i);
+            let alone = lanes_turned([a; 8]);
+            for other in [0.0, 1e-5, 0.029, 0.5, 2.0] {
+                for place in 0..8 {
+                    let mut angles = [other; 8];
+                    angles[place] = a;
+                    let among = lanes_turned(angles);
+                    for k in 0..3 {
+                        assert_eq!(among[k][place], alone[k][0], "{a} rad among {other} rad");
+                    }
+                }
+            }
+        }
     }
 
     #[test]
