@@ -16,6 +16,8 @@ pub const EXPECTATION: u8 = 5;
 pub const LOCKED: u8 = 6;
 /// A plugin does not keep the contract (`check-plugin`).
 pub const NOT_CONFORMING: u8 = 7;
+/// Something in the store is not what was written, and is not shown; or a step made again has other bytes (`verify --again`).
+pub const DAMAGED: u8 = 8;
 /// Stopped by the user (Ctrl-C) or SIGTERM.
 pub const INTERRUPTED: u8 = 130;
 
@@ -30,4 +32,5 @@ Exit codes:
     5  an expectation was missed (with --check)
     6  another process is running this workflow
     7  a plugin does not keep the contract (check-plugin)
+    8  something in the store is damaged; the same run makes it again
   130  stopped by Ctrl-C; the same command resumes";

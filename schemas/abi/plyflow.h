@@ -179,7 +179,8 @@ typedef struct pf_services {
 
   /* Checkpoints, since ABI 1.1: so that long work that is killed goes on where it was.
    * `checkpoint`: a folder that is kept until the step has succeeded. What lies in it was written by an earlier attempt
-   * with the same plugin, components, parameters and inputs; a file may be torn, and none is required to be there.
+   * with the same plugin, components, parameters and inputs; a file may be torn or damaged, and none is required to be
+   * there: seal each (a hash of its bytes, its name, and the name of the folder, which is the step's key).
    * The host keeps a small file of its own there, plyflow-cost.json. Empty text: this host keeps nothing.
    * `checkpoint_due`: 1 when enough time has passed since the last one.
    * `checkpoint_saved`: everything is on disk; the cost of the step so far is noted, so that a later attempt adds to it.

@@ -10,6 +10,7 @@ mod error;
 mod h5;
 mod mesh;
 mod reader;
+pub mod seal;
 mod small;
 mod writer;
 

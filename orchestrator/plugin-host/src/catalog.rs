@@ -3,6 +3,7 @@
 use crate::describe::{Description, describe};
 use crate::load::{Plugin, read_manifest};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_artifact::seal::{read_document, seal, sealed};
 use plyflow_model::manifest::PluginKind;
 use plyflow_workflow::resolved::PluginId;
 use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
@@ -21,8 +22,8 @@ const SUFFIX: &str = ".so";
 /// How long a library may take to load and describe itself.
 const LOAD_LIMIT: Duration = Duration::from_secs(30);
 
-/// Version of the cache file.
-const CACHE_VERSION: u32 = 1;
+/// Version of the cache file. 2: sealed.
+const CACHE_VERSION: u32 = 2;
 
 /// How the manifest of an unknown library is read.
 #[derive(Debug, Clone)]
@@ -99,8 +100,8 @@ impl PluginCatalog {
     ) -> Self {
         let libraries = cache_file
             .as_ref()
-            .and_then(|path| std::fs::read(path).ok())
-            .and_then(|bytes| serde_json::from_slice::<CacheFile>(&bytes).ok())
+            .and_then(|path| read_document(path.as_std_path()).ok())
+            .and_then(|bytes| serde_json::from_str::<CacheFile>(sealed(&bytes).ok()?).ok())
             .filter(|cache| cache.version == CACHE_VERSION)
             .map(|cache| cache.libraries)
             .unwrap_or_default();
@@ -261,7 +262,7 @@ impl PluginCatalog {
         let written = path
             .parent()
             .map_or(Ok(()), std::fs::create_dir_all)
-            .and_then(|()| std::fs::write(&temporary, serde_json::to_vec(&file)?))
+            .and_then(|()| std::fs::write(&temporary, seal(&serde_json::to_string(&file)?)))
             .and_then(|()| std::fs::rename(&temporary, path));
         if written.is_err() {
             let _ = std::fs::remove_file(&temporary);

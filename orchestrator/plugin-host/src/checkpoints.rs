@@ -3,16 +3,47 @@
 use crate::emitter::Emitter;
 use crate::process;
 use camino::Utf8Path;
+use plyflow_artifact::seal::{read_document, seal, sealed};
 use plyflow_model::job::{self, Cost, LogLevel};
+use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// The cost up to the last checkpoint, beside the plugin's files.
 const COST: &str = "plyflow-cost.json";
 
-/// What a step that was stopped has cost up to its last checkpoint in this folder; `None` when there is none.
+/// What is noted of an instance: sealed, and with the name of its folder, so that another's note does not pass for it.
+#[derive(Serialize, Deserialize)]
+struct Noted {
+    of: String,
+    cost: Cost,
+}
+
+fn name(folder: &Utf8Path) -> &str {
+    folder.file_name().unwrap_or_default()
+}
+
+fn read_cost(folder: &Utf8Path) -> Result<Cost, String> {
+    let bytes = read_document(folder.join(COST).as_std_path()).map_err(|e| e.to_string())?;
+    let text = sealed(&bytes).map_err(|e| e.to_string())?;
+    let noted: Noted = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    match noted.of == name(folder) {
+        true => Ok(noted.cost),
+        false => Err("it is of another step or key".into()),
+    }
+}
+
+/// What a step that was stopped has cost up to its last checkpoint in this folder; `None` when there is none, or when it is damaged.
 pub fn cost_so_far(folder: &Utf8Path) -> Option<Cost> {
-    serde_json::from_slice(&std::fs::read(folder.join(COST)).ok()?).ok()
+    read_cost(folder).ok()
+}
+
+/// Whether the note of what a step has cost so far is there and damaged, in words.
+pub fn damaged_cost(folder: &Utf8Path) -> Option<String> {
+    let path = folder.join(COST);
+    let there = path.symlink_metadata().is_ok();
+    let why = read_cost(folder).err().filter(|_| there)?;
+    Some(format!("{path}: {why}"))
 }
 
 /// Checkpoints of the running step.
@@ -51,9 +82,21 @@ impl<'a> Checkpoints<'a> {
                 emitter.log(LogLevel::Warn, &text);
                 return String::new();
             }
-            let _ = self
-                .earlier
-                .set(cost_so_far(&job.folder).unwrap_or_default());
+            let earlier = read_cost(&job.folder);
+            let is_new = || {
+                let mut files = job.folder.read_dir_utf8().into_iter().flatten();
+                files.next().is_none()
+            };
+            if let Err(e) = &earlier
+                && !is_new()
+            {
+                let text = format!(
+                    "what earlier attempts cost up to their last checkpoint is not known ({COST}: {e}): the cost that is told is \
+                     that of this attempt alone"
+                );
+                emitter.log(LogLevel::Warn, &text);
+            }
+            let _ = self.earlier.set(earlier.unwrap_or_default());
             job.folder.to_string()
         })
     }
@@ -76,10 +119,14 @@ impl<'a> Checkpoints<'a> {
             peak_memory: process::peak_memory(),
             threads: 0,
         });
-        let written = serde_json::to_vec(&cost).map_err(std::io::Error::from);
+        let noted = Noted {
+            of: name(&job.folder).to_owned(),
+            cost,
+        };
+        let written = serde_json::to_string(&noted).map_err(std::io::Error::from);
         let new = job.folder.join(format!("{COST}.new"));
         let written = written
-            .and_then(|bytes| std::fs::write(&new, bytes))
+            .and_then(|text| std::fs::write(&new, seal(&text)))
             .and_then(|()| std::fs::rename(&new, job.folder.join(COST)));
         if let Err(e) = written {
             let text = format!("{}: the cost so far cannot be noted: {e}", job.folder);
@@ -106,9 +153,9 @@ mod tests {
     #[test]
     fn a_later_attempt_adds_the_cost_up_to_the_last_checkpoint() {
         let place = tempfile::tempdir().unwrap();
-        let folder = place.path().join("label/key");
+        let folder = camino::Utf8PathBuf::from_path_buf(place.path().join("label/key")).unwrap();
         let job = |interval| job::Checkpoints {
-            folder: folder.to_str().unwrap().into(),
+            folder: folder.clone(),
             interval,
         };
         let cost = |wall, cpu, peak_memory| Cost {
@@ -125,7 +172,7 @@ mod tests {
         let often = job(0.0);
         let first = Checkpoints::new(Some(&often));
         assert!(first.due(), "before anyone has asked where to write to");
-        assert_eq!(first.folder(&emitter), folder.to_str().unwrap());
+        assert_eq!(first.folder(&emitter), folder.as_str());
         assert!(first.due());
         assert_eq!(first.with_earlier(cost(1.0, 2.0, 5)), cost(1.0, 2.0, 5));
         assert_eq!(cost_so_far(&often.folder), None);
@@ -142,6 +189,20 @@ mod tests {
         assert_eq!(sum.wall_seconds, 1.0 + noted.wall_seconds);
         assert_eq!(sum.cpu_seconds, 2.0 + noted.cpu_seconds);
         assert_eq!((sum.peak_memory, sum.threads), (noted.peak_memory, 2));
+        // The note of another step or key is none of this one, nor is a damaged one.
+        let other = folder.with_file_name("other");
+        std::fs::create_dir(&other).unwrap();
+        std::fs::copy(folder.join(COST), other.join(COST)).unwrap();
+        assert_eq!(cost_so_far(&other), None);
+        assert!(damaged_cost(&other).unwrap().contains("another"));
+        assert_eq!(damaged_cost(&folder), None);
+        let whole = std::fs::read(folder.join(COST)).unwrap();
+        for bit in (0..8 * whole.len()).step_by(23) {
+            let mut bytes = whole.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(other.join(COST), bytes).unwrap();
+            assert_eq!(cost_so_far(&other), None, "bit {bit}");
+        }
         // A third attempt has the cost of both.
         second.saved(&emitter);
         let third = Checkpoints::new(Some(&rarely));

@@ -17,7 +17,7 @@ mod services;
 mod worker;
 
 pub use catalog::{Describer, PluginCatalog};
-pub use checkpoints::cost_so_far;
+pub use checkpoints::{cost_so_far, damaged_cost};
 pub use describe::{Description, describe, describe_main};
 pub use load::{LoadError, Plugin};
 pub use worker::{run_job, worker_main};

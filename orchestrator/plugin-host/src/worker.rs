@@ -7,6 +7,7 @@ use crate::{process, services};
 use camino::Utf8Path;
 use plyflow_abi::*;
 use plyflow_artifact::ErrorKind;
+use plyflow_artifact::seal::{hash_file, seal};
 use plyflow_model::job::{Cost, FailureKind, JOB_VERSION, Job, LogLevel, Message, Record};
 use plyflow_model::manifest::PluginKind;
 use std::io::{Read, Write};
@@ -120,6 +121,7 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
         ErrorKind::Io => (FailureKind::Error, e.message),
         _ => malformed(e.message),
     })?;
+    let hash = sealed_hash(job, bytes)?;
     let record = Record {
         version: JOB_VERSION,
         step: job.step.clone(),
@@ -127,6 +129,7 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
         key: job.key.clone(),
         kind: job.output_kind.clone(),
         bytes,
+        hash,
         cost,
         results: std::mem::take(&mut output.results),
         collection: labels,
@@ -155,6 +158,24 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
             })?;
     }
     Ok(record)
+}
+
+/// The hash of the artifact as the disk has it, `bytes` long.
+fn sealed_hash(job: &Job, bytes: u64) -> Result<String, Failure> {
+    let path = &job.artifact;
+    match hash_file(path.as_std_path()) {
+        Ok((hash, found)) if found == bytes => Ok(hash),
+        Ok((_, found)) => {
+            let text = format!(
+                "the artifact {path} has {found} bytes and {bytes} were written: something else has changed it"
+            );
+            Err((FailureKind::Malformed, text))
+        }
+        Err(e) => {
+            let text = format!("the artifact {path} cannot be read again: {e}");
+            Err((FailureKind::Error, text))
+        }
+    }
 }
 
 fn load(job: &Job) -> Result<Plugin, Failure> {
@@ -221,8 +242,7 @@ fn judge(job: &Job, code: i32, output: &mut crate::host::Output) -> Result<(), F
 }
 
 fn write_record(path: &Utf8Path, record: &Record, lasting: bool) -> std::io::Result<()> {
-    let mut text = serde_json::to_string_pretty(record)?;
-    text.push('\n');
+    let text = seal(&serde_json::to_string_pretty(record)?);
     let mut file = std::fs::File::create(path)?;
     file.write_all(text.as_bytes())?;
     if lasting { file.sync_all() } else { Ok(()) }

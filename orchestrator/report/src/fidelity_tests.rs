@@ -19,6 +19,7 @@ fn comparison(step: &str, results: &[(&str, f64)]) -> Instance {
             key: "k".into(),
             kind: "comparison".into(),
             bytes: 0,
+            hash: String::new(),
             cost: Cost::default(),
             results: results.iter().map(result).collect(),
             collection: None,

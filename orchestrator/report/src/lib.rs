@@ -35,7 +35,7 @@ pub use input::{Expectation, Instance, ReportInput, Verdict};
 pub use summary::summary;
 
 use camino::{Utf8Path, Utf8PathBuf};
-use std::io::Read;
+use plyflow_artifact::seal;
 use study::Material;
 use view::Sharpness;
 
@@ -70,7 +70,8 @@ pub enum ReportError {
 /// # Errors
 /// When the file cannot be written or a picture not be encoded.
 pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportError> {
-    let page = drawn(input, &mut Material::read(input, true)).map_err(ReportError::Picture)?;
+    let mut page = drawn(input, &mut Material::read(input, true)).map_err(ReportError::Picture)?;
+    page += &sealed_by(&page);
     let wrong = |source| ReportError::Write {
         path: out.to_owned(),
         source,
@@ -108,17 +109,27 @@ fn drawn(input: &ReportInput, material: &mut Material) -> Result<String, String>
     page::page(input, material, sharp, in_full)
 }
 
-/// Whether the report at `path` is the one of a fingerprint: then it need not be written again. Reads only the
-/// beginning of the file.
+/// The last line of a page: the hash of all that is before it.
+fn sealed_by(page: &str) -> String {
+    format!("\n<!-- blake3 {} -->\n", seal::hash(page.as_bytes()))
+}
+
+/// Whether the report at `path` is the one of a fingerprint, as it was written: then it need not be written again.
 #[must_use]
 pub fn is_current(path: &Utf8Path, fingerprint: &str) -> bool {
-    let mut head = [0u8; 512];
-    let Ok(mut file) = std::fs::File::open(path) else {
+    let Ok(bytes) = seal::read_document(path.as_std_path()) else {
         return false;
     };
-    let Ok(n) = file.read(&mut head) else {
+    let Ok(text) = String::from_utf8(bytes) else {
+        return false;
+    };
+    let length = sealed_by("").len();
+    let Some((page, last)) =
+        (text.len().checked_sub(length)).and_then(|at| text.split_at_checked(at))
+    else {
         return false;
     };
     let mark = page::fingerprint_mark(fingerprint);
-    String::from_utf8_lossy(&head[..n]).contains(&mark)
+    let head = page.get(..512).unwrap_or(page);
+    head.contains(&mark) && sealed_by(page) == last
 }

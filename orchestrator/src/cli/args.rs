@@ -52,7 +52,7 @@ pub enum Command {
     CheckPlugin(CheckPluginArgs),
     /// Show what an artifact holds
     #[command(
-        after_help = "Examples:\n  plyflow inspect result.h5\n  plyflow inspect 'local[A]' --workflow workflow.yaml"
+        after_help = "Examples:\n  plyflow inspect result.vtkhdf\n  plyflow inspect 'local[A]' --workflow workflow.yaml"
     )]
     Inspect(InspectArgs),
     /// Write the text files that the artifact of a step carries, such as a material file
@@ -65,6 +65,11 @@ pub enum Command {
         after_help = "Examples:\n  plyflow schema scene --format text               # all keys of a scene, with types, bounds and defaults\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
     )]
     Schema(SchemaArgs),
+    /// Read a whole store and say what of it is not as it was written, or make a step again and compare its bytes
+    #[command(
+        after_help = "Examples:\n  plyflow verify workflow.yaml\n  plyflow verify workflow.yaml --dry-run       # say it, move nothing\n  plyflow verify workflow.yaml --again zones   # make it again from the same inputs and compare\n\nWhat is damaged is moved to the folder `damaged` of the store, and the next run makes it again. Ends with code 8 when something was."
+    )]
+    Verify(VerifyArgs),
     /// Remove artifacts that no workflow's last run uses, or all of a store
     #[command(
         after_help = "Examples:\n  plyflow clean workflow.yaml --dry-run\n  plyflow clean workflow.yaml\n  plyflow clean workflow.yaml --all"
@@ -397,6 +402,31 @@ pub enum SchemaKind {
     Material,
     /// Files of expectations
     Expected,
+}
+
+/// `verify`
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// The workflow beside whose file the store lies
+    pub workflow: Option<Utf8PathBuf>,
+    #[command(flatten)]
+    /// Where things are.
+    pub places: Places,
+    /// Use another value for a parameter, written as in YAML; may be repeated (with --again)
+    #[arg(long = "set", value_name = "STEP.PARAMETER=VALUE", requires = "again")]
+    pub set: Vec<String>,
+    /// Instead: make this step again, from the inputs that the store has, and compare its artifact byte by byte; may be repeated
+    #[arg(long, value_name = "STEP", requires = "workflow")]
+    pub again: Vec<String>,
+    /// Cores to use with --again [default: all]
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), requires = "again")]
+    pub jobs: Option<u32>,
+    /// Say what is damaged, move nothing
+    #[arg(long, short = 'n', conflicts_with = "again")]
+    pub dry_run: bool,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
 }
 
 /// `clean`

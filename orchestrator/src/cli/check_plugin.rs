@@ -261,7 +261,7 @@ fn job(step: &ResolvedStep, search_path: Vec<Utf8PathBuf>, folder: &Utf8Path) ->
         collection: step.collection,
         threads: 4,
         memory_limit: 0,
-        artifact: folder.join("checks.h5"),
+        artifact: folder.join("checks.vtkhdf"),
         record: folder.join("checks.json"),
         scratch: folder.join("scratch"),
         checkpoints: None,

@@ -49,7 +49,7 @@ pub fn clean(args: &CleanArgs) -> Done {
     let mut noted = None;
     if !args.all {
         for run in store.runs().map_err(failed())? {
-            let journal = Journal::read(&run.journal()).map_err(failed())?;
+            let journal = whole(&run.journal())?;
             used.extend(journal.last_keys());
             noted = noted.max(modified(&run.journal()));
         }
@@ -57,7 +57,7 @@ pub fn clean(args: &CleanArgs) -> Done {
     // What has come since any journal was last written to is the work of a run that could not note it: the disk was full, or it was
     // killed between the two. The next run finds it by its file.
     let unnoted = |key: &Key| noted.is_some() && modified(&store.artifact(key)) > noted;
-    let (mut count, mut size) = (0u64, 0u64);
+    let (mut count, mut size, mut damaged) = (0u64, 0u64, 0u64);
     for key in store
         .keys()
         .map_err(failed())?
@@ -69,6 +69,24 @@ pub fn clean(args: &CleanArgs) -> Done {
         if !args.dry_run {
             store.remove(&key).map_err(failed())?;
         }
+    }
+    // Of an earlier version: without a hash, so nothing uses them any more.
+    for key in store.earlier_keys().map_err(failed())? {
+        count += 1;
+        size += size_of(&store.earlier_artifact(&key));
+        if !args.dry_run {
+            store.remove_earlier(&key).map_err(failed())?;
+        }
+    }
+    for path in store.set_aside_before().map_err(failed())? {
+        damaged += 1;
+        size += match path.is_dir() {
+            true => folder_size(&path),
+            false => size_of(&path),
+        };
+    }
+    if !args.dry_run {
+        store.remove_set_aside().map_err(failed())?;
     }
     let mut old = 0u64;
     for run in store.runs().map_err(failed())? {
@@ -95,11 +113,38 @@ pub fn clean(args: &CleanArgs) -> Done {
         1 => " and 1 old checkpoint".into(),
         n => format!(" and {n} old checkpoints"),
     };
+    let aside = match damaged {
+        0 => String::new(),
+        1 => " and 1 damaged file that was set aside".into(),
+        n => format!(" and {n} damaged files that were set aside"),
+    };
     print(&format!(
-        "{verb} {count} artifact{s}{checkpoints}, {}, in the store {}\n",
+        "{verb} {count} artifact{s}{checkpoints}{aside}, {}, in the store {}\n",
         bytes(size),
         store.root()
     ))
+}
+
+/// A journal from which it can be told what is in use.
+///
+/// # Errors
+/// [`exit::DAMAGED`] when it is damaged: what it does not know any more would be removed.
+fn whole(path: &Utf8Path) -> Result<Journal, Stop> {
+    let why = match Journal::read(path) {
+        Ok(journal) if !journal.is_damaged() => return Ok(journal),
+        Ok(_) => String::new(),
+        Err(e) => format!(": {e}"),
+    };
+    let text = format!(
+        "the journal {path} is damaged{why}: it cannot be told which artifacts are in use, so nothing is removed. Run its workflow once, \
+         which sets the journal aside and notes anew what is in use; or remove the whole store with --all"
+    );
+    Err(Stop::new(exit::DAMAGED, text))
+}
+
+/// Size of a file (bytes), 0 when it is not there.
+fn size_of(path: &Utf8Path) -> u64 {
+    std::fs::symlink_metadata(path).map_or(0, |m| m.len())
 }
 
 /// When a file was last written to, if it is there.

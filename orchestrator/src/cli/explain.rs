@@ -7,6 +7,7 @@ use super::{Done, Stop, print};
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
+use crate::store::Flaw;
 use serde_json::json;
 
 /// The instances that a word means: all of a step, or one by its label.
@@ -91,8 +92,10 @@ fn as_json(session: &Session<'_>, id: Id) -> serde_json::Value {
         State::Unkeyed => "unknown",
         _ => "run",
     };
+    let flaw = session.flaw(id).filter(|_| state == "run");
     let (last, changed) = match (instance.state, difference(session, id)) {
         (State::Done { .. } | State::Unkeyed, _) => ("", vec![]),
+        _ if flaw.is_some() => ("damaged", vec![]),
         (_, Difference::Never) => ("never", vec![]),
         (_, Difference::Gone) => ("gone", vec![]),
         (_, Difference::Changed(list)) => ("changed", list),
@@ -103,6 +106,7 @@ fn as_json(session: &Session<'_>, id: Id) -> serde_json::Value {
         "key": instance.key.map(|k| k.hex()),
         "because": last,
         "changes": changed,
+        "damage": flaw.map(Flaw::text),
         "failed": session.failed_before(id).map(|f| f.reason),
     })
 }
@@ -123,6 +127,10 @@ fn as_text(session: &Session<'_>, id: Id) -> String {
     if let Some(failed) = session.failed_before(id) {
         let reason = failed.reason.replace('\n', "\n  ");
         return format!("{label}: will run; it failed last time (key {key}):\n  {reason}\n");
+    }
+    if let Some(flaw) = session.flaw(id) {
+        let text = flaw.text();
+        return format!("{label}: will run; nothing changed, but {text}\n");
     }
     match difference(session, id) {
         Difference::Never => format!("{label}: will run; it has not run before (key {key})\n"),

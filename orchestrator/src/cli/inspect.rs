@@ -1,13 +1,16 @@
 //! `inspect`: what an artifact holds.
 
 use super::args::{InspectArgs, Places, TextOrJson, Workflow};
+use super::damage::{damaged, recheck};
 use super::explain::instances_named;
 use super::open::{Opened, open};
 use super::table::{bytes, number, table};
 use super::{Done, Stop, print};
+use crate::engine::Depth;
 use crate::engine::core::State;
 use crate::exit;
 use crate::progress::duration_text;
+use crate::store::{check_artifact, record_beside};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::Artifact;
 use plyflow_model::job::Record;
@@ -19,11 +22,8 @@ use serde_json::{Value, json};
 /// [`exit::USAGE`] when there is no such artifact.
 pub fn inspect(args: &InspectArgs) -> Done {
     let path = locate(args)?;
+    let record = record_of(&path)?;
     let artifact = Artifact::open(path.as_std_path()).map_err(|e| Stop::new(exit::USAGE, e))?;
-    let beside = path.with_extension("record.json");
-    let record: Option<Record> = std::fs::read(beside)
-        .ok()
-        .and_then(|text| serde_json::from_slice(&text).ok());
     let parsed = |text: &str| serde_json::from_str::<Value>(text).unwrap_or_default();
     if args.format == TextOrJson::Json {
         let all = json!({
@@ -36,6 +36,7 @@ pub fn inspect(args: &InspectArgs) -> Done {
             "times": artifact.times(),
             "provenance": parsed(artifact.provenance()),
             "record": record,
+            "verified": record.is_some(),
         });
         return print(&format!("{all:#}\n"));
     }
@@ -45,6 +46,26 @@ pub fn inspect(args: &InspectArgs) -> Done {
         record.as_ref(),
         &parsed(artifact.provenance()),
     ))
+}
+
+/// The record beside an artifact, when there is one: then the artifact is what it tells of.
+///
+/// # Errors
+/// [`exit::DAMAGED`] when the two are not what was written.
+fn record_of(path: &Utf8Path) -> Result<Option<Record>, Stop> {
+    let found = record_beside(path).and_then(|record| {
+        if let Some(record) = &record {
+            check_artifact(path, record)?;
+        }
+        Ok(record)
+    });
+    found.map_err(|flaw| {
+        let text = format!(
+            "{}; what is in it is not shown. A run of its workflow makes it again",
+            flaw.text()
+        );
+        Stop::new(exit::DAMAGED, text)
+    })
 }
 
 fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
@@ -75,8 +96,13 @@ fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
 /// # Errors
 /// [`exit::USAGE`] when there is no such step or item, several items, or no artifact yet.
 pub fn artifact_of(opened: &Opened, word: &str, file: &Utf8Path) -> Result<Utf8PathBuf, Stop> {
-    let session = opened.look()?;
+    let mut session = opened.look()?;
     let ids = instances_named(opened, &session, word)?;
+    recheck(&mut session, &|id| ids.contains(&id), Depth::Artifacts);
+    let damages: Vec<String> = ids.iter().filter_map(|id| session.damage(*id)).collect();
+    if !damages.is_empty() {
+        return Err(damaged(&damages, &format!("plyflow run {file}")));
+    }
     let labels: Vec<String> = ids.iter().map(|id| session.core.label(*id)).collect();
     let [id] = ids[..] else {
         let text = if labels.is_empty() {
@@ -120,9 +146,16 @@ fn text(path: &Utf8Path, artifact: &Artifact, record: Option<&Record>, made: &Va
             r.host
         );
         out += &format!("size      {}\n", bytes(r.bytes));
+        out += &format!(
+            "verified  its bytes are those that were written (BLAKE3 {})\n",
+            r.hash
+        );
         for warning in &r.warnings {
             out += &format!("warning   {warning}\n");
         }
+    }
+    if record.is_none() {
+        out += "verified  no: no record lies beside it, so it cannot be told whether it is as it was written\n";
     }
     if let Some(labels) = artifact.collection() {
         out += &format!("items     {}: {}\n", labels.len(), labels.join(", "));

@@ -3,6 +3,7 @@
 mod args;
 mod check_plugin;
 mod clean;
+mod damage;
 mod explain;
 mod extract;
 mod front;
@@ -15,6 +16,7 @@ mod report;
 mod results;
 mod run;
 mod table;
+mod verify;
 
 pub use args::Cli;
 
@@ -102,6 +104,7 @@ fn dispatch(command: Command) -> Done {
         Command::Inspect(a) => inspect::inspect(&a),
         Command::Extract(a) => extract::extract(&a),
         Command::Schema(a) => plugins::schema(&a),
+        Command::Verify(a) => verify::verify(&a),
         Command::Clean(a) => clean::clean(&a),
         Command::Completions { shell } => {
             let mut command = Cli::command();

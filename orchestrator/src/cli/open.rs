@@ -113,7 +113,15 @@ pub fn catalog(folders: Vec<Utf8PathBuf>, store: &Utf8Path) -> Result<PluginCata
         arguments: vec!["step-worker".into(), "--describe".into()],
     };
     // Only where there is a store: a look at the plugins leaves nothing in the folder where it was taken.
-    let cache = store.is_dir().then(|| store.join("plugins.json"));
+    let store = Store::new(store.to_owned());
+    let cache = store.root().is_dir().then(|| store.plugins());
+    if let Some(text) = cache
+        .is_some()
+        .then(|| store.set_damaged_plugins_aside())
+        .flatten()
+    {
+        super::warn(&format!("plyflow: {text}\n"));
+    }
     Ok(PluginCatalog::new(folders, cache, describer))
 }
 
@@ -210,6 +218,7 @@ impl Opened {
             limits,
             search_path: self.search_path.clone(),
             force: Vec::new(),
+            compare: Vec::new(),
             checkpoint_interval: f64::INFINITY,
         };
         let mut session =

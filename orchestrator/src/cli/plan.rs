@@ -37,6 +37,9 @@ pub fn plan(args: &PlanArgs) -> Done {
     let mut opened = open(&args.workflow)?;
     opened.restrict(&args.until)?;
     let session = opened.look()?;
+    for text in session.told() {
+        super::warn(&format!("plyflow: {text}\n"));
+    }
     let found = prospects(&session);
     if args.format == TextOrJson::Json {
         let list: Vec<_> = found
@@ -166,7 +169,7 @@ fn goes_on(session: &Session<'_>, id: Id) -> String {
 }
 
 fn cost_of(session: &Session<'_>, key: &Key) -> Option<Cost> {
-    session.store.read_record(key).map(|r| r.cost)
+    session.store.read_record(key).ok().map(|r| r.cost)
 }
 
 /// What the items of a step that fans out over the collections of `givers` cost when they ran last, added up.
@@ -220,6 +223,9 @@ fn waits_for(session: &Session<'_>, id: Id) -> String {
 
 /// Why an instance must run, in one line.
 fn why(session: &Session<'_>, id: Id) -> String {
+    if let Some(flaw) = session.flaw(id) {
+        return flaw.text().to_owned();
+    }
     match difference(session, id) {
         Difference::Never => "has not run before".into(),
         Difference::Gone => "its artifact is not in the store any more".into(),
@@ -258,6 +264,13 @@ pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], given: &Workf
         let (label, reason) = (f.label, f.reason.replace('\n', "\n  "));
         return format!(
             "nothing of it is in the store: {label} failed last time:\n  {reason}\nrun it again with: {again}"
+        );
+    }
+    if let Some((id, flaw)) = of_these().find_map(|id| Some((id, session.flaw(id)?))) {
+        return format!(
+            "nothing of it can be shown: {}: {}; make it again with: {again}",
+            core.label(id),
+            flaw.text()
         );
     }
     if of_these().all(|id| matches!(difference(session, id), Difference::Never)) {

@@ -1,12 +1,13 @@
 //! `report`, and the report and summary at the end of a run.
 
 use super::args::{ReportArgs, Workflow};
+use super::damage::{concluded, recheck, tell_gone};
 use super::open::{Opened, open};
 use super::plan::nothing_yet;
 use super::results::{OK, Row, records, rows};
 use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
-use crate::engine::{Failure, Session};
+use crate::engine::{Depth, Failure, Session};
 use crate::exit;
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
@@ -15,10 +16,16 @@ use plyflow_report::{Expectation, Instance, ReportInput, is_current, write_repor
 /// `plyflow report`.
 ///
 /// # Errors
-/// When there is nothing to report or the file cannot be written.
+/// When there is nothing to report or the file cannot be written; [`exit::DAMAGED`] when something is damaged: a page with gaps would pass for
+/// the whole.
 pub fn report(args: &ReportArgs) -> Done {
     let opened = open(&args.workflow)?;
-    let session = opened.look()?;
+    let mut session = opened.look()?;
+    let damages = recheck(&mut session, &|_| true, Depth::Artifacts);
+    if !damages.is_empty() {
+        return concluded(Ok(()), &damages, &args.workflow);
+    }
+    tell_gone(&session);
     let found = Found::read(&session);
     if found.records.is_empty() {
         let text = nothing_yet(&session, &[], &args.workflow);

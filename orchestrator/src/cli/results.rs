@@ -1,13 +1,14 @@
 //! `results`: the named numbers of what the store has, beside what the workflow expects.
 
 use super::args::{Format, ResultsArgs};
+use super::damage::{concluded, recheck, tell_gone};
 use super::open::{Opened, open};
 use super::plan::nothing_yet;
 use super::report::{Found, input};
 use super::table::{bytes, number, table};
 use super::{Done, Stop, print};
-use crate::engine::Session;
 use crate::engine::core::{Id, State};
+use crate::engine::{Depth, Session};
 use crate::exit;
 use crate::progress::duration_text;
 use plyflow_model::job::Record;
@@ -98,7 +99,10 @@ pub fn records(session: &Session<'_>) -> Vec<(Id, Record)> {
             core.instances()[*id].item.clone(),
         )
     });
-    let read = |id: Id| Some((id, session.store.read_record(&core.instances()[id].key?)?));
+    let read = |id: Id| {
+        let key = core.instances()[id].key?;
+        Some((id, session.store.read_record(&key).ok()?))
+    };
     ids.into_iter().filter_map(read).collect()
 }
 
@@ -368,11 +372,20 @@ fn as_csv(rows: &[Row]) -> String {
 /// `plyflow results`.
 ///
 /// # Errors
-/// [`exit::EXPECTATION`] with `--check` when one is missed or not judged.
+/// [`exit::EXPECTATION`] with `--check` when one is missed or not judged; [`exit::DAMAGED`] when a number is not shown because its record is
+/// damaged.
 pub fn results(args: &ResultsArgs) -> Done {
     let opened = open(&args.workflow)?;
     opened.step_indices(&args.step)?;
-    let session = opened.look()?;
+    let mut session = opened.look()?;
+    // Numbers are printed from records; the front reads artifacts.
+    let depth = if args.front {
+        Depth::Artifacts
+    } else {
+        Depth::Records
+    };
+    let damages = recheck(&mut session, &|_| true, depth);
+    tell_gone(&session);
     let mut records = records(&session);
     let mut rows = rows(&session, &records);
     if !args.step.is_empty() {
@@ -386,11 +399,13 @@ pub fn results(args: &ResultsArgs) -> Done {
         });
     }
     if args.front {
-        return front(args, &opened, &session, records);
+        let told = front(args, &opened, &session, records);
+        return concluded(told, &damages, &args.workflow);
     }
     let told = match args.format {
         Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records))),
         Format::Csv => print(&as_csv(&rows)),
+        Format::Table if records.is_empty() && !damages.is_empty() => Ok(()),
         Format::Table if records.is_empty() => {
             let text = nothing_yet(&session, &args.step, &args.workflow);
             print(&format!("{text}\n"))
@@ -401,7 +416,7 @@ pub fn results(args: &ResultsArgs) -> Done {
             cost_table(&session, &records)
         )),
     };
-    checked(told, args.check, &rows)
+    concluded(checked(told, args.check, &rows), &damages, &args.workflow)
 }
 
 /// `plyflow results --front`, of the comparisons among `records`.

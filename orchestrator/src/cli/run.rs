@@ -7,11 +7,11 @@ use super::report;
 use super::results::checked;
 use super::{Done, Stop, print, warn};
 use crate::engine::core::{Instance, Limits, State};
-use crate::engine::{Failure, Local, Observer, Options, Session, Summary};
+use crate::engine::{Depth, Failure, Local, Observer, Options, Session, Summary};
 use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
 use crate::store::Lock;
-use camino::Utf8Path;
+use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::units::parse_quantity_in;
 use plyflow_workflow::resolved::FailurePolicy;
 use std::io::{IsTerminal, Read};
@@ -20,6 +20,9 @@ use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
+
+/// How often what turns out to be damaged at the end of a run is made again.
+const ROUNDS: usize = 2;
 
 /// Lines of a failed step's log that are shown.
 const LOG_LINES: usize = 15;
@@ -99,10 +102,88 @@ pub fn run(args: &RunArgs) -> Done {
     let wake = interrupts.poll_end().map_err(machine())?;
     // Not the path: a build that replaces the program in the middle of a run must not mix versions.
     let mut executor = Local::new("/proc/self/exe".into(), Some(wake));
-    let (session, summary) = session
-        .execute(&mut executor, observer.as_mut(), &|| interrupts.count())
-        .map_err(machine())?;
-    conclude(args, &opened, &session, &summary, begun)
+    for text in session.told() {
+        tell_damage(args, text);
+    }
+    let mut all = Summary::default();
+    for round in 0.. {
+        let (ended, summary) = session
+            .execute(&mut executor, observer.as_mut(), &|| interrupts.count())
+            .map_err(machine())?;
+        session = ended;
+        all.add(summary);
+        // What is about to be printed is read first; what is not as it was written is made again, as long as that helps.
+        let depth = about_to_read(args, &opened, &session, &all);
+        let lost = match depth {
+            Some(depth) if !all.interrupted => session.recheck(&|_| true, depth, observer.as_mut()),
+            _ => 0,
+        };
+        if lost == 0 {
+            break;
+        }
+        if round == ROUNDS {
+            let text = format!(
+                "made again {ROUNDS} times in this run, and each time damaged when it was read: look after the disk and the memory of this machine"
+            );
+            return Err(Stop::new(exit::DAMAGED, text));
+        }
+    }
+    let end = conclude(args, &opened, &session, &all, begun);
+    // The process ends with this: to give ten thousand steps back to the allocator takes longer than to look at them.
+    std::mem::forget(session);
+    std::mem::forget(opened);
+    end
+}
+
+/// Says what was found damaged of the files of the run itself.
+fn tell_damage(args: &RunArgs, text: &str) {
+    match args.log_format {
+        LogFormat::Json => {
+            let line = serde_json::json!({"event": "damaged", "what": text});
+            warn(&format!("{line}\n"));
+        }
+        LogFormat::Text => warn(&format!("plyflow: {text}\n")),
+    }
+}
+
+/// What of the store will be printed at the end of a run: `None` when it has nothing new to tell.
+fn about_to_read(
+    args: &RunArgs,
+    opened: &Opened,
+    session: &Session<'_>,
+    summary: &Summary,
+) -> Option<Depth> {
+    match (stale_report(args, opened, session, summary), args.check) {
+        (Some(_), _) => Some(Depth::Artifacts),
+        _ if shows(args, summary) => Some(Depth::Artifacts),
+        (None, true) => Some(Depth::Records),
+        (None, false) => None,
+    }
+}
+
+/// Whether the results are told on the screen: when there is something new.
+fn shows(args: &RunArgs, summary: &Summary) -> bool {
+    let worked = summary.executed + summary.failures.len() + summary.skipped > 0;
+    let any = summary.executed + summary.cached > 0;
+    worked && any && !args.quiet && args.log_format == LogFormat::Text
+}
+
+/// The report that has to be written because it does not tell what is.
+fn stale_report(
+    args: &RunArgs,
+    opened: &Opened,
+    session: &Session<'_>,
+    summary: &Summary,
+) -> Option<Utf8PathBuf> {
+    let path = Some(report::beside(&opened.workflow.file, &args.until))
+        .filter(|_| !args.no_report && has_news(summary))?;
+    // A step that was run again to the same key (`--force`) has other costs and the same name.
+    let stale = summary.executed > 0
+        || !report::is_written(
+            &path,
+            &report::fingerprint(opened, session, &summary.failures),
+        );
+    stale.then_some(path)
 }
 
 fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
@@ -127,6 +208,7 @@ fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
         },
         search_path: opened.search_path.clone(),
         force: opened.step_indices(&args.force)?,
+        compare: Vec::new(),
         checkpoint_interval: checkpoint_interval(&args.checkpoint_every)?,
     })
 }
@@ -192,16 +274,8 @@ fn conclude(
 /// Writes the report and prints the summary, both only when there is something new to tell; judges the
 /// expectations when asked to.
 fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary: &Summary) -> Done {
-    let worked = summary.executed + summary.failures.len() + summary.skipped > 0;
-    let any = summary.executed + summary.cached > 0;
-    let path = Some(report::beside(&opened.workflow.file, &args.until))
-        .filter(|_| !args.no_report && has_news(summary));
-    // A step that was run again to the same key (`--force`) has other costs and the same name.
-    let stale = path.as_ref().filter(|p| {
-        summary.executed > 0
-            || !report::is_written(p, &report::fingerprint(opened, session, &summary.failures))
-    });
-    let show = worked && any && !args.quiet && args.log_format == LogFormat::Text;
+    let stale = stale_report(args, opened, session, summary);
+    let show = shows(args, summary);
     if stale.is_none() && !show && !args.check {
         return Ok(());
     }
@@ -213,8 +287,9 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         &summary.failures,
         (&args.workflow, &args.until),
     );
-    let mut written = path.clone();
-    if let Some(path) = stale
+    let mut written = Some(report::beside(&opened.workflow.file, &args.until))
+        .filter(|_| !args.no_report && has_news(summary));
+    if let Some(path) = &stale
         && let Err(e) = plyflow_report::write_report(&input, path)
     {
         // The artifacts are whole: a report that cannot be written is no failed run.
@@ -254,6 +329,7 @@ fn tell(
     for (n, word) in [
         (summary.failures.len(), "failed"),
         (summary.skipped, "not run"),
+        (summary.damaged, "damaged and set aside"),
     ] {
         if n > 0 {
             parts.push(format!("{n} {word}"));
@@ -267,7 +343,7 @@ fn tell(
     if args.log_format == LogFormat::Json {
         let line = serde_json::json!({
             "event": "end", "executed": summary.executed, "cached": summary.cached,
-            "failed": summary.failures.len(), "not_run": summary.skipped,
+            "failed": summary.failures.len(), "not_run": summary.skipped, "damaged": summary.damaged,
             "interrupted": summary.interrupted, "seconds": begun.elapsed().as_secs_f64(),
         });
         warn(&format!("{line}\n"));

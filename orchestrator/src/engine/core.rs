@@ -92,6 +92,13 @@ pub enum Event {
         /// Which.
         id: Id,
     },
+    /// Artifacts that were found turned out not to be what was written: they are not there any more.
+    Lost {
+        /// The instance that was started and wanted to read them.
+        reader: Option<Id>,
+        /// Whose they are.
+        ids: Vec<Id>,
+    },
     /// The user wants the run to stop.
     Interrupt,
 }
@@ -206,6 +213,7 @@ impl<'g> Core<'g> {
                 self.release(id);
                 self.finish(id, State::Stopped);
             }
+            Event::Lost { reader, ids } => self.lost(reader, &ids),
             Event::Interrupt => self.stop(),
         }
         self.settle()
@@ -414,6 +422,32 @@ impl<'g> Core<'g> {
     fn missing(&mut self, id: Id) {
         self.instances[id].state = State::Waiting;
         self.agenda.push_back(id);
+    }
+
+    /// Done instances of which the artifact is lost run again; who is about to read one of these waits for it.
+    fn lost(&mut self, reader: Option<Id>, ids: &[Id]) {
+        for id in ids {
+            if matches!(self.instances[*id].state, State::Done { .. }) {
+                self.open += 1;
+                self.missing(*id);
+            }
+        }
+        if let Some(id) = reader {
+            self.release(id);
+            self.instances[id].attempts -= 1;
+            self.missing(id);
+        }
+        let is_of = |id: &Id| {
+            let mut inputs = self.instances[*id].inputs.iter();
+            inputs.any(|(_, giver)| ids.contains(giver))
+        };
+        let readers: Vec<_> = (self.ready.iter().filter(|e| is_of(&e.2)))
+            .cloned()
+            .collect();
+        for entry in readers {
+            self.ready.remove(&entry);
+            self.missing(entry.2);
+        }
     }
 
     fn try_ready(&mut self, id: Id) {

@@ -20,6 +20,8 @@ struct Script {
     /// label -> attempts that fail
     fails: HashMap<String, u32>,
     cache: Vec<String>,
+    /// labels of what is in the cache and turns out to be damaged when it is read
+    rotten: Vec<String>,
     interrupt_after: Option<usize>,
 }
 
@@ -60,6 +62,12 @@ fn play(steps: Vec<ResolvedStep>, script: &Script) -> Play {
                 }
                 Event::Looked { id, found }
             }
+            Some(Effect::Start { id, .. }) if !rotten_inputs(&core, id, script).is_empty() => {
+                Event::Lost {
+                    reader: Some(id),
+                    ids: rotten_inputs(&core, id, script),
+                }
+            }
             Some(Effect::Start { id, attempt, .. }) => {
                 p.order.push(core.label(id));
                 running.push_back((id, attempt));
@@ -98,6 +106,16 @@ fn play(steps: Vec<ResolvedStep>, script: &Script) -> Play {
     }
     assert!(core.is_finished(), "the run stalls");
     p
+}
+
+/// Inputs that were found and are not what was written.
+fn rotten_inputs(core: &Core<'_>, id: Id, script: &Script) -> Vec<Id> {
+    let givers = core.instances()[id].inputs.iter().map(|(_, giver)| *giver);
+    let rotten = |g: &Id| {
+        core.instances()[*g].state == State::Done { cached: true }
+            && script.rotten.contains(&core.label(*g))
+    };
+    givers.filter(rotten).collect()
 }
 
 fn output(script: &Script, label: &str) -> Output {
@@ -192,6 +210,52 @@ fn two_fan_outs_meeting_in_one_step_give_every_pair() {
     let mut pairs: Vec<&String> = p.order.iter().filter(|o| o.starts_with("pair")).collect();
     pairs.sort();
     assert_eq!(pairs, ["pair[A,A]", "pair[A,B]", "pair[B,A]", "pair[B,B]"]);
+}
+
+#[test]
+fn a_damaged_input_is_made_again_before_who_reads_it_and_so_are_its_own() {
+    let names = |list: &[&str]| list.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
+    let mut script = Script {
+        cores: 4,
+        items: items(&[("zones", 2)]),
+        cache: names(&["coarse", "zones", "boundary[A]", "fine[A]"]),
+        rotten: names(&["coarse"]),
+        ..Default::default()
+    };
+    // boundary[B] reads `coarse`; nobody reads the damaged one of A.
+    let p = play(forming(), &script);
+    assert_eq!(p.order, ["coarse", "boundary[B]", "fine[B]", "compare"]);
+    // A damaged collection comes back with the same items; who is ready to read it waits.
+    script.rotten = names(&["coarse", "zones"]);
+    let p = play(forming(), &script);
+    let expected = ["coarse", "zones", "boundary[B]", "fine[B]", "compare"];
+    assert_eq!(p.order, expected);
+    // All the way up, when each is found damaged only when it is read.
+    script.cache = names(&["coarse", "zones", "boundary[A]", "boundary[B]", "fine[A]"]);
+    script.rotten = names(&["coarse", "zones", "boundary[B]"]);
+    let p = play(forming(), &script);
+    let expected = ["coarse", "zones", "boundary[B]", "fine[B]", "compare"];
+    assert_eq!(p.order, expected);
+    assert!(p.skipped.is_empty());
+}
+
+#[test]
+fn a_damaged_input_that_fails_when_it_is_made_again_skips_who_reads_it() {
+    let steps = vec![
+        step("a", &[], &[]),
+        step("b", &[], &[("in", "a")]),
+        step("c", &[], &[("in", "b")]),
+    ];
+    let script = Script {
+        cache: vec!["a".into()],
+        rotten: vec!["a".into()],
+        fails: [("a".to_owned(), 9)].into(),
+        ..Default::default()
+    };
+    let p = play(steps, &script);
+    assert_eq!(p.order, ["a"]);
+    let skipped = |x: &str| (x.to_owned(), "a".to_owned());
+    assert_eq!(p.skipped, [skipped("b"), skipped("c")]);
 }
 
 #[test]

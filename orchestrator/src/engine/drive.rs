@@ -1,13 +1,24 @@
 //! Acts on what the core decides: looks into the store, hands jobs to an executor, commits artifacts,
 //! keeps the journal.
 
+#[path = "compare.rs"]
+mod compare;
+#[path = "opening.rs"]
+mod opening;
+#[path = "sound.rs"]
+mod sound;
+
+pub use compare::Compared;
+pub use sound::Depth;
+
 use super::core::{Core, Effect, Event, Id, Limits, Output, State};
 use super::executor::{Executor, Outcome, Report, Task};
 use super::shown::{Failure, Observer, Summary, Update};
 use super::unchanged::Unchanged;
-use crate::plan::{Graph, InputKey, Key};
-use crate::store::{Journal, Known, RunFolder, Store};
+use crate::plan::{ByKey, Graph, InputKey, Key};
+use crate::store::{ENDING, Flaw, Journal, Known, RunFolder, Seen, Store};
 use camino::Utf8PathBuf;
+use opening::{look_at_journal, open_for_writing};
 use plyflow_model::job::{
     Checkpoints, Cost, DATA_MODEL_VERSION, JOB_VERSION, Job, JobInput, LibraryRef, Message, Record,
 };
@@ -27,6 +38,8 @@ pub struct Options {
     pub search_path: Vec<Utf8PathBuf>,
     /// Run again even what the store has (for steps named here).
     pub force: Vec<usize>,
+    /// Run these again too, but only to compare what they make with what the store has.
+    pub compare: Vec<usize>,
     /// Time between checkpoints of a running step (s).
     pub checkpoint_interval: f64,
 }
@@ -52,6 +65,12 @@ pub struct Session<'a> {
     /// Running instances that have been heard of since they started, with what of theirs turned out to have changed.
     heard: HashMap<Id, Option<String>>,
     summary: Summary,
+    sound: sound::Sound,
+    /// What was found when the files of the run were opened, for the user.
+    told: Vec<String>,
+    /// What was seen of files before anybody asked.
+    ahead: HashMap<Key, Seen, ByKey>,
+    compared: Vec<(String, Compared)>,
 }
 
 impl<'a> Session<'a> {
@@ -68,12 +87,9 @@ impl<'a> Session<'a> {
         writing: bool,
     ) -> io::Result<Self> {
         let folder = store.run(&workflow.name);
-        let journal = if writing {
-            folder.prepare()?;
-            store.take_unplaced(&folder);
-            Journal::open(&folder.journal())?
-        } else {
-            Journal::read(&folder.journal())?
+        let (journal, told) = match writing {
+            true => open_for_writing(store, &folder)?,
+            false => look_at_journal(&folder)?,
         };
         Ok(Self {
             workflow,
@@ -90,13 +106,31 @@ impl<'a> Session<'a> {
             unchanged: Unchanged::default(),
             heard: HashMap::new(),
             summary: Summary::default(),
+            sound: sound::Sound::default(),
+            told,
+            ahead: HashMap::default(),
+            compared: Vec::new(),
         })
+    }
+
+    /// Labels of what was made again to be compared, and how it compares.
+    pub fn compared(&self) -> &[(String, Compared)] {
+        &self.compared
+    }
+
+    /// What was found damaged when the files of the run were opened, in words.
+    pub fn told(&self) -> &[String] {
+        &self.told
     }
 
     /// Looks up all that can be keyed without running anything.
     pub fn look(&mut self, observer: &mut dyn Observer) {
-        let effects = self.core.start();
+        let keys = self.journal.last_keys();
+        let (core, store) = (&mut self.core, self.store);
+        let (ahead, effects) = store.look_ahead(&keys, || core.start());
+        self.ahead = ahead;
         self.take(effects, observer);
+        self.ahead = HashMap::default();
     }
 
     /// The folder of this run.
@@ -117,6 +151,7 @@ impl<'a> Session<'a> {
     ) -> io::Result<(Self, Summary)> {
         if !self.pending.is_empty() {
             self.journal.started();
+            std::fs::create_dir_all(self.folder.tmp())?;
         }
         let (mut reports, mut heard) = (Vec::new(), 0);
         loop {
@@ -127,6 +162,9 @@ impl<'a> Session<'a> {
                         threads,
                         attempt,
                     } => {
+                        if !self.inputs_are_whole(id, observer) {
+                            continue;
+                        }
                         observer.update(&self.core, id, &Update::Started { threads, attempt });
                         self.heard.remove(&id);
                         if let Some(reason) = self.changed(id) {
@@ -197,7 +235,7 @@ impl<'a> Session<'a> {
         while let Some(effect) = queue.pop_front() {
             match effect {
                 Effect::Look(id) => {
-                    let found = self.find(id);
+                    let found = self.find(id, observer);
                     let cached = found.is_some();
                     queue.extend(self.core.handle(Event::Looked { id, found }));
                     if cached {
@@ -213,22 +251,40 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether the store has the artifact of an instance, whole.
-    fn find(&mut self, id: Id) -> Option<Output> {
+    /// Whether the store has the artifact of an instance, whole: as long as nothing has written to its files since they were known to be
+    /// so, they are taken for it; else they are read.
+    fn find(&mut self, id: Id, observer: &mut dyn Observer) -> Option<Output> {
         let instance = &self.core.instances()[id];
         let (key, step) = (instance.key?, instance.step);
-        if self.options.force.contains(&step) {
+        if self.options.force.contains(&step) || self.options.compare.contains(&step) {
             return None;
         }
-        let bytes = self.store.size(&key)?;
-        let known = match self.journal.known(&key) {
-            Some(known) if known.bytes == bytes && self.store.has_record(&key) => known.clone(),
-            _ => {
-                let record = self.store.read_record(&key).filter(|r| r.bytes == bytes)?;
-                Known {
-                    bytes,
-                    labels: record.collection,
-                }
+        let seen = match self.ahead.remove(&key) {
+            Some(seen) => Ok(seen),
+            None => self.store.look(&key),
+        };
+        let known = self.journal.known(&key);
+        let known = match (&seen, known) {
+            (Ok(seen), Some(k)) if k.stamp == Some(seen.stamp) && k.bytes == seen.bytes => {
+                Ok(k.clone())
+            }
+            (Err(flaw), _) => Err(flaw.clone()),
+            (Ok(seen), _) => self.read_whole(id).map(|record| Known {
+                bytes: record.bytes,
+                labels: record.collection,
+                stamp: Some(seen.stamp),
+            }),
+        };
+        let known = match known {
+            Ok(known) => known,
+            Err(Flaw::Gone) if self.store.has_earlier(&key) => {
+                self.lose(id, Flaw::Unsealed, false, observer);
+                return None;
+            }
+            Err(Flaw::Gone) => return None,
+            Err(flaw) => {
+                self.lose(id, flaw, self.writing, observer);
+                return None;
             }
         };
         if self.core.graph().steps[step].collection && known.labels.is_none() {
@@ -260,7 +316,7 @@ impl<'a> Session<'a> {
         }
         let key = self.core.instances()[id].key;
         let cost = key
-            .and_then(|k| self.store.read_record(&k))
+            .and_then(|k| self.store.read_record(&k).ok())
             .map(|r| r.cost)
             .unwrap_or_default();
         self.costs.insert(id, cost);
@@ -293,10 +349,11 @@ impl<'a> Session<'a> {
             .tmp()
             .join(format!("{}-{}", std::process::id(), self.serial));
         let place = |end: &str| Utf8PathBuf::from(format!("{tmp}{end}"));
-        let (artifact, record) = (place(".h5"), place(".record.json"));
+        let (artifact, record) = (place(ENDING), place(".record.json"));
         self.jobs.insert(id, (artifact.clone(), record.clone()));
         let instance = &self.core.instances()[id];
         let label = self.core.label(id);
+        let compared = self.options.compare.contains(&instance.step);
         if let Some(key) = instance.key
             && self.options.force.contains(&instance.step)
         {
@@ -332,7 +389,8 @@ impl<'a> Session<'a> {
             artifact,
             record,
             scratch: place(".scratch"),
-            checkpoints: instance.key.map(|key| Checkpoints {
+            // What is compared is made from the start.
+            checkpoints: (instance.key).filter(|_| !compared).map(|key| Checkpoints {
                 folder: self.folder.checkpoints(&label, &key),
                 interval: self.options.checkpoint_interval,
             }),
@@ -373,7 +431,10 @@ impl<'a> Session<'a> {
     /// What of an instance is no longer as it was when the run began.
     fn changed(&mut self, id: Id) -> Option<String> {
         let step = self.core.instances()[id].step;
-        self.unchanged.first_changed(&self.workflow.steps[step])
+        let changed = self.unchanged.first_changed(&self.workflow.steps[step])?;
+        // A library may have rotted without a trace for who looks at dates alone: the next run reads it.
+        let _ = std::fs::remove_file(self.store.plugins());
+        Some(changed)
     }
 
     /// When an instance is first heard of it has loaded its libraries and read its files: if they have changed since it was started, nobody
@@ -457,6 +518,11 @@ impl<'a> Session<'a> {
                 record.bytes
             ));
         }
+        if self.options.compare.contains(&instance.step)
+            && let Some(known) = self.compare(id, &artifact, &beside)?
+        {
+            return Ok(known);
+        }
         let lasting = record.is_lasting();
         if let Err(e) = self.store.commit(&key, &artifact, &beside, lasting) {
             let root = self.store.root();
@@ -481,11 +547,13 @@ impl<'a> Session<'a> {
         Ok(Known {
             bytes: size,
             labels: record.collection.clone(),
+            stamp: self.store.look(&key).ok().map(|seen| seen.stamp),
         })
     }
 
     fn succeed(&mut self, id: Id, record: &Record, known: Known, observer: &mut dyn Observer) {
         self.summary.executed += 1;
+        self.sound.made(id);
         self.costs.insert(id, record.cost);
         let output = Output {
             labels: known.labels.clone(),

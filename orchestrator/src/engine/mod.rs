@@ -7,7 +7,7 @@ pub(crate) mod local;
 mod shown;
 mod unchanged;
 
-pub use drive::{Options, Session, input_keys};
+pub use drive::{Compared, Depth, Options, Session, input_keys};
 pub use executor::{Executor, Outcome, Report, Task};
 pub use local::Local;
 pub use shown::{Failure, Observer, Summary, Update};

@@ -9,6 +9,11 @@ use plyflow_model::job::{LogLevel, Progress, Record};
 pub enum Update<'a> {
     /// Found in the store.
     Cached,
+    /// What the store had of it is not what was written; it is made again.
+    Damaged {
+        /// What is wrong and where it is kept, in words.
+        what: &'a str,
+    },
     /// A worker is being started.
     Started {
         /// Threads it may use.
@@ -77,4 +82,18 @@ pub struct Summary {
     pub skipped: usize,
     /// Whether the user stopped it.
     pub interrupted: bool,
+    /// Instances whose artifacts turned out to be damaged.
+    pub damaged: usize,
+}
+
+impl Summary {
+    /// Takes up how a further round of the same run ended.
+    pub fn add(&mut self, round: Self) {
+        self.executed += round.executed;
+        self.cached += round.cached;
+        self.failures.extend(round.failures);
+        self.skipped = round.skipped;
+        self.interrupted |= round.interrupted;
+        self.damaged += round.damaged;
+    }
 }

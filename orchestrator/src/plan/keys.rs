@@ -5,6 +5,7 @@ use plyflow_workflow::resolved::ResolvedStep;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
+use std::hash::{BuildHasher, Hasher};
 
 /// A BLAKE3 content key.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -27,6 +28,37 @@ impl Key {
             .ok()
             .map(|h| Self(*h.as_bytes()))
     }
+}
+
+/// Hashes keys for maps: they are hashes already.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ByKey;
+
+/// See [`ByKey`].
+#[derive(Debug, Default)]
+pub struct FirstBytes(u64);
+
+impl BuildHasher for ByKey {
+    type Hasher = FirstBytes;
+
+    fn build_hasher(&self) -> FirstBytes {
+        FirstBytes::default()
+    }
+}
+
+impl Hasher for FirstBytes {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        // Of a key 32 bytes; of a slot 8, as a whole number.
+        if let Some(first) = bytes.first_chunk::<8>() {
+            self.0 ^= u64::from_le_bytes(*first);
+        }
+    }
+
+    fn write_usize(&mut self, _: usize) {}
 }
 
 impl fmt::Display for Key {

@@ -6,7 +6,7 @@ mod keys;
 mod reason;
 
 pub use fanout::{Extent, Walk, walk};
-pub use keys::{Ingredients, InputKey, Key, Recipe, canonical_json, instance_key};
+pub use keys::{ByKey, Ingredients, InputKey, Key, Recipe, canonical_json, instance_key};
 pub use reason::{Change, changes};
 
 use petgraph::Direction;

@@ -93,6 +93,9 @@ impl Observer for Bars {
     fn update(&mut self, core: &Core<'_>, id: Id, update: &Update<'_>) {
         match update {
             Update::Cached => {}
+            Update::Damaged { what } => {
+                self.line(&format!("{:>16} DAMAGED: {what}", core.label(id)));
+            }
             Update::Started { .. } => {
                 let label = core.label(id);
                 self.running.insert(

@@ -12,6 +12,7 @@ impl Observer for JsonLines {
     fn update(&mut self, core: &Core<'_>, id: Id, update: &Update<'_>) {
         let (event, more) = match update {
             Update::Cached => ("cached", json!({})),
+            Update::Damaged { what } => ("damaged", json!({"what": what})),
             Update::Started { threads, attempt } => {
                 ("started", json!({"threads": threads, "attempt": attempt}))
             }

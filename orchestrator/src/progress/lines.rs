@@ -26,6 +26,7 @@ impl Observer for Lines {
     fn update(&mut self, core: &Core<'_>, id: Id, update: &Update<'_>) {
         match update {
             Update::Cached => {}
+            Update::Damaged { what } => say(&format!("damaged  {}: {what}", core.label(id))),
             Update::Started { threads, attempt } => {
                 let now = Instant::now();
                 self.running.insert(id, (Pace::default(), now));

@@ -1,10 +1,11 @@
 //! The journal of a workflow's runs: one append-only file.
 //!
 //! After 8 bytes of magic, frames of `length: u32 LE`, `checksum: 8 bytes of BLAKE3`, `payload`
-//! (postcard). A frame that does not check ends the journal: a torn tail is cut off by the next writer.
+//! (postcard). Where a frame does not check and none that does follows it, the journal ends: a torn tail is cut off by the next writer.
+//! Where one follows, the file is damaged: the frames between are lost, the next writer keeps the damaged file beside a new one.
 //! Nothing depends on the journal being whole: an artifact that it does not know is found by its file.
 
-use crate::plan::{Ingredients, InputKey, Key, Recipe};
+use crate::plan::{ByKey, Ingredients, InputKey, Key, Recipe};
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -13,7 +14,11 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-const MAGIC: &[u8; 8] = b"PFJRNL01";
+const MAGIC: &[u8; 8] = b"PFJRNL02";
+/// Of the version without [`Entry::Seen`], otherwise the same.
+const EARLIER: &[u8; 8] = b"PFJRNL01";
+/// Longest frame (bytes) that is looked for behind a damaged one.
+const LOOKED_FOR: usize = 1 << 16;
 const HEAD: usize = 12;
 /// At most this long after a record it is on the disk, and at most this often the disk is asked.
 const FLUSH: Duration = Duration::from_millis(200);
@@ -40,6 +45,8 @@ enum Entry {
     Ended { executed: u64, failed: u64 },
     /// An instance failed for good.
     Failed { key: Key, slot: u64, reason: String },
+    /// What the file system told of the files of a key when they were known to be whole.
+    Seen { key: Key, stamp: u64 },
 }
 
 /// What went into the key of one instance.
@@ -60,6 +67,8 @@ pub struct Known {
     pub bytes: u64,
     /// Labels of a collection's items.
     pub labels: Option<Vec<String>>,
+    /// What the file system told of its files when they were last known to be whole.
+    pub stamp: Option<u64>,
 }
 
 /// A journal, open for reading or for writing.
@@ -68,16 +77,18 @@ pub struct Journal {
     path: Utf8PathBuf,
     file: Option<File>,
     bytes: Vec<u8>,
-    known: HashMap<Key, Known>,
-    last: HashMap<u64, Key>,
+    known: HashMap<Key, Known, ByKey>,
+    last: HashMap<u64, Key, ByKey>,
     failed: HashMap<u64, (Key, String)>,
     cold: Vec<Range<usize>>,
-    recipes: HashMap<Key, String>,
+    /// Where the frames of recipes lie.
+    recipes: HashMap<Key, Range<usize>, ByKey>,
     frames: usize,
     buffer: Vec<u8>,
     unsynced: Option<Instant>,
     /// Length (bytes) of the file up to which it is whole.
     whole: u64,
+    damaged: bool,
 }
 
 /// The slot of an instance: where successive runs put successive keys.
@@ -97,8 +108,29 @@ fn checksum(payload: &[u8]) -> [u8; 8] {
     std::array::from_fn(|i| hash.as_bytes()[i])
 }
 
+/// Where the payload of the frame at `at` lies, when it checks.
+fn frame(bytes: &[u8], at: usize) -> Option<Range<usize>> {
+    let head = bytes.get(at..at + HEAD)?;
+    let length = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
+    let start = at + HEAD;
+    let payload = bytes.get(start..start.checked_add(length)?)?;
+    (checksum(payload) == head[4..]).then_some(start..start + length)
+}
+
+/// Where the next frame begins that checks and can be decoded, from `at` on.
+fn next_frame(bytes: &[u8], at: usize) -> Option<usize> {
+    let is_one = |at: &usize| {
+        let length = bytes.get(*at..at + 4)?;
+        let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]);
+        let short = (1..=LOOKED_FOR as u32).contains(&length);
+        let payload = frame(bytes, *at).filter(|_| short)?;
+        postcard::from_bytes::<Entry>(&bytes[payload]).ok()
+    };
+    (at..bytes.len().saturating_sub(HEAD)).find(|at| is_one(at).is_some())
+}
+
 impl Journal {
-    /// Reads a journal as far as it is whole; an absent one is empty. It cannot be written to.
+    /// Reads what is whole of a journal; an absent one is empty. It cannot be written to.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -111,8 +143,13 @@ impl Journal {
         Ok(Self::scan(path, bytes).0)
     }
 
-    /// Opens a journal for writing, cuts off a torn tail and sheds old records when they prevail. Call
-    /// only under the run's lock.
+    /// A journal in which nothing is noted and that cannot be written to.
+    pub fn empty(path: &Utf8Path) -> Self {
+        Self::scan(path, Vec::new()).0
+    }
+
+    /// Opens a journal for writing, cuts off a torn tail and sheds old records when they prevail. A damaged one is left as
+    /// [`Journal::damaged_file`], and what can be read of it goes on in a new one. Call only under the run's lock.
     ///
     /// # Errors
     /// When the file cannot be read or written.
@@ -128,64 +165,89 @@ impl Journal {
         file.read_to_end(&mut bytes)?;
         let length = bytes.len();
         let (mut journal, whole) = Self::scan(path, bytes);
-        if whole < MAGIC.len() {
+        if whole < MAGIC.len() && !journal.damaged {
             file.set_len(0)?;
             file.rewind()?;
             file.write_all(MAGIC)?;
             journal.whole = MAGIC.len() as u64;
         } else {
             journal.whole = whole as u64;
-            if whole < length {
+            if journal.bytes.starts_with(EARLIER) {
+                file.rewind()?;
+                file.write_all(MAGIC)?;
+            }
+            if whole < length && !journal.damaged {
                 file.set_len(whole as u64)?;
             }
             file.seek(SeekFrom::Start(whole as u64))?;
         }
         journal.file = Some(file);
-        if journal.frames > 1000 + 8 * (journal.last.len() + journal.failed.len()) {
+        if journal.damaged {
+            std::fs::rename(path, Self::damaged_file(path))?;
+            journal.compact()?;
+            journal.damaged = true;
+        } else if journal.frames > 1000 + 8 * (journal.last.len() + journal.failed.len()) {
             journal.compact()?;
         }
         Ok(journal)
     }
 
+    /// Where [`Journal::open`] leaves a journal that it has found damaged.
+    pub fn damaged_file(path: &Utf8Path) -> Utf8PathBuf {
+        path.with_extension("damaged")
+    }
+
+    /// Whether the file was found damaged when it was opened: what is known is what could be read of it.
+    pub fn is_damaged(&self) -> bool {
+        self.damaged
+    }
+
     fn scan(path: &Utf8Path, bytes: Vec<u8>) -> (Self, usize) {
+        // A step takes some 400 bytes.
+        let likely = bytes.len() / 400;
         let mut journal = Self {
             path: path.to_owned(),
             file: None,
             bytes: Vec::new(),
-            known: HashMap::new(),
-            last: HashMap::new(),
+            known: HashMap::with_capacity_and_hasher(likely, ByKey),
+            last: HashMap::with_capacity_and_hasher(likely, ByKey),
             failed: HashMap::new(),
-            cold: Vec::new(),
-            recipes: HashMap::new(),
+            cold: Vec::with_capacity(likely),
+            recipes: HashMap::with_capacity_and_hasher(likely, ByKey),
             frames: 0,
             buffer: Vec::new(),
             unsynced: None,
             whole: 0,
+            damaged: false,
         };
-        if !bytes.starts_with(MAGIC) {
-            return (journal, 0);
-        }
+        let known = bytes.starts_with(MAGIC) || bytes.starts_with(EARLIER);
+        // One that is only begun is torn.
+        journal.damaged = !known && bytes.len() >= MAGIC.len();
         let mut at = MAGIC.len();
-        while let Some(head) = bytes.get(at..at + HEAD) {
-            let length = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
-            let start = at + HEAD;
-            let Some(payload) = bytes.get(start..start + length) else {
+        loop {
+            while let Some(payload) = frame(&bytes, at)
+                && journal.take(&bytes[payload.clone()], payload.clone())
+            {
+                at = payload.end;
+            }
+            let Some(next) = next_frame(&bytes, at + 1) else {
                 break;
             };
-            if checksum(payload) != head[4..] || !journal.take(payload, start..start + length) {
-                break;
-            }
-            at = start + length;
+            journal.damaged = true;
+            at = next;
         }
         journal.bytes = bytes;
-        (journal, at)
+        (journal, if known { at } else { 0 })
     }
 
     /// Notes one record; false when it cannot be decoded.
     fn take(&mut self, payload: &[u8], range: Range<usize>) -> bool {
-        // Postcard writes the variant first: 3 is `Detail`, left for later.
+        // Postcard writes the variant first: 3 is `Detail`, left for later; 2 is `Recipe`, of which the digest comes next.
+        let digest = || payload.get(1..)?.first_chunk::<32>().copied().map(Key);
         if payload.first() == Some(&3) {
             self.cold.push(range);
+        } else if let (Some(2), Some(digest)) = (payload.first(), digest()) {
+            self.recipes.insert(digest, range);
         } else {
             match postcard::from_bytes(payload) {
                 Ok(Entry::Made {
@@ -194,18 +256,25 @@ impl Journal {
                     bytes,
                     labels,
                 }) => {
-                    self.known.insert(key, Known { bytes, labels });
+                    let stamp = None;
+                    self.known.insert(
+                        key,
+                        Known {
+                            bytes,
+                            labels,
+                            stamp,
+                        },
+                    );
                     self.uses(slot, key);
                 }
                 Ok(Entry::Use { key, slot }) => self.uses(slot, key),
+                Ok(Entry::Seen { key, stamp }) => {
+                    if let Some(known) = self.known.get_mut(&key) {
+                        known.stamp = Some(stamp);
+                    }
+                }
                 Ok(Entry::Failed { key, slot, reason }) => {
                     self.failed.insert(slot, (key, reason));
-                }
-                Ok(Entry::Recipe {
-                    digest,
-                    ingredients,
-                }) => {
-                    self.recipes.insert(digest, ingredients);
                 }
                 Ok(_) => {}
                 Err(_) => return false,
@@ -255,6 +324,15 @@ impl Journal {
         keys
     }
 
+    /// The ingredients of a recipe, as JSON.
+    fn recipe(&self, digest: &Key) -> Option<String> {
+        let range = self.recipes.get(digest)?.clone();
+        match postcard::from_bytes(&self.bytes[range]) {
+            Ok(Entry::Recipe { ingredients, .. }) => Some(ingredients),
+            _ => None,
+        }
+    }
+
     /// How a key came about: its ingredients and inputs.
     pub fn detail(&self, key: &Key) -> Option<(Ingredients, Vec<InputKey>)> {
         let detail = self.cold.iter().rev().find_map(|range| {
@@ -263,7 +341,7 @@ impl Journal {
                 _ => None,
             }
         })?;
-        let ingredients = serde_json::from_str(self.recipes.get(&detail.recipe)?).ok()?;
+        let ingredients = serde_json::from_str(&self.recipe(&detail.recipe)?).ok()?;
         Some((ingredients, detail.inputs))
     }
 
@@ -277,10 +355,16 @@ impl Journal {
         inputs: impl FnOnce() -> Vec<InputKey>,
     ) {
         let slot = slot(step, item);
-        if self.known.get(&key) == Some(&artifact) {
+        let stamp = artifact.stamp;
+        let before = self.known.get(&key);
+        if before.is_some_and(|k| (k.bytes, &k.labels) == (artifact.bytes, &artifact.labels)) {
+            let seen = before.and_then(|k| k.stamp) == stamp;
             let failed = self.failed.get(&slot).is_some_and(|f| f.0 == key);
             if failed || self.last.get(&slot) != Some(&key) {
                 self.push(&Entry::Use { key, slot });
+            }
+            if !seen && let Some(stamp) = stamp {
+                self.saw(key, stamp);
             }
             return;
         }
@@ -302,6 +386,14 @@ impl Journal {
             bytes: artifact.bytes,
             labels: artifact.labels,
         });
+        if let Some(stamp) = stamp {
+            self.saw(key, stamp);
+        }
+    }
+
+    /// Notes what the file system tells of the files of a key that are known to be whole.
+    pub fn saw(&mut self, key: Key, stamp: u64) {
+        self.push(&Entry::Seen { key, stamp });
     }
 
     /// Notes why an instance with this key failed.
@@ -393,7 +485,7 @@ impl Journal {
             };
             if let (false, Some(ingredients)) = (
                 fresh.recipes.contains_key(&detail.recipe),
-                self.recipes.get(&detail.recipe).cloned(),
+                self.recipe(&detail.recipe),
             ) {
                 fresh.push(&Entry::Recipe {
                     digest: detail.recipe,
@@ -401,13 +493,16 @@ impl Journal {
                 });
             }
             fresh.push(&Entry::Detail(detail));
-            let Known { bytes, labels } = known.clone();
+            let known = known.clone();
             fresh.push(&Entry::Made {
                 key,
                 slot,
-                bytes,
-                labels,
+                bytes: known.bytes,
+                labels: known.labels,
             });
+            if let Some(stamp) = known.stamp {
+                fresh.saw(key, stamp);
+            }
         }
         let mut failed: Vec<_> = self.failed.iter().collect();
         failed.sort_unstable();

@@ -61,6 +61,10 @@ impl Lock {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
         }
+        if path.is_dir() {
+            // Nobody holds what nobody could open.
+            fs::rename(path, path.with_extension("damaged")).map_err(failed)?;
+        }
         let mut options = File::options();
         let mut file = options
             .read(true)

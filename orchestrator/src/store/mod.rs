@@ -3,8 +3,10 @@
 //! ```text
 //! .plyflow/
 //!   lock                           shared by runs, exclusive for `clean`
-//!   artifacts/ab/ab12...ef.h5      an artifact under its content key: whole or absent
-//!   artifacts/ab/ab12...ef.record.json   what it cost and found; there before the artifact is
+//!   artifacts/ab/ab12...ef.vtkhdf  an artifact under its content key: whole or absent
+//!   artifacts/ab/ab12...ef.record.json   what it cost and found, and the hash of the artifact; there before the artifact is
+//!   damaged/                       what was not as it was written, kept for those who want to look
+//!   plugins.json                   what is known of plugin libraries; only saves time
 //!   resolved/<file>                the workflow of a file as last resolved; only saves time
 //!   runs/<workflow>/lock           held while a run is on; the kernel frees it whatever happens
 //!   runs/<workflow>/journal        one append-only file
@@ -15,18 +17,30 @@
 //!   runs/<workflow>/unplaced/      finished artifacts that could not be put into `artifacts`, and their records
 //! ```
 
+mod aside;
+mod check;
 mod journal;
 mod lock;
 pub mod resolved;
 
+pub use aside::damage_of_plugins;
+pub use check::{Expected, Flaw, Seen, check_artifact, read_unplaced, record_beside};
 pub use journal::{Detail, Journal, Known};
 pub use lock::{Lock, LockError};
 
 use crate::plan::Key;
 use camino::{Utf8Path, Utf8PathBuf};
-use plyflow_model::job::Record;
 use std::cell::RefCell;
 use std::{fs, io};
+
+/// Ending of an artifact's name: programs that show meshes choose their reader by it.
+pub const ENDING: &str = ".vtkhdf";
+
+/// Ending of a record's name.
+const RECORD_ENDING: &str = ".record.json";
+
+/// Ending of artifacts of earlier versions, which kept no hash of them.
+const EARLIER_ENDING: &str = ".h5";
 
 /// A store.
 #[derive(Debug)]
@@ -99,12 +113,31 @@ impl RunFolder {
         Ok(old)
     }
 
+    /// Checkpoints of all instances and keys.
+    ///
+    /// # Errors
+    /// When a folder cannot be read.
+    pub fn all_checkpoints(&self) -> io::Result<Vec<Utf8PathBuf>> {
+        let mut all = Vec::new();
+        for instance in list(&self.root.join("checkpoints"))? {
+            if instance.is_dir() {
+                all.extend(list(&instance)?.into_iter().filter(|p| p.is_dir()));
+            }
+        }
+        Ok(all)
+    }
+
     /// Makes the folder and clears what a killed run left in `tmp`. Call only under the lock.
     ///
     /// # Errors
     /// When the folder cannot be written.
     pub fn prepare(&self) -> io::Result<()> {
-        match fs::remove_dir_all(self.tmp()) {
+        let tmp = self.tmp();
+        let removed = match fs::symlink_metadata(&tmp) {
+            Ok(found) if !found.is_dir() => fs::remove_file(&tmp),
+            _ => fs::remove_dir_all(&tmp),
+        };
+        match removed {
             Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
             _ => {}
         }
@@ -198,7 +231,8 @@ impl Store {
         for folder in [artifacts, self.root.join("runs"), resolved] {
             let _ = fs::remove_dir(folder);
         }
-        match fs::remove_file(self.root.join("plugins.json")) {
+        self.remove_set_aside()?;
+        match fs::remove_file(self.plugins()) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
             _ => Ok(()),
         }
@@ -211,12 +245,22 @@ impl Store {
 
     /// Where the artifact of a key lies, if it does.
     pub fn artifact(&self, key: &Key) -> Utf8PathBuf {
-        self.file(key, ".h5")
+        self.file(key, ENDING)
+    }
+
+    /// Where an earlier version has put the artifact of a key.
+    pub fn earlier_artifact(&self, key: &Key) -> Utf8PathBuf {
+        self.file(key, EARLIER_ENDING)
+    }
+
+    /// Whether there is an artifact of a key that an earlier version has written.
+    pub fn has_earlier(&self, key: &Key) -> bool {
+        self.earlier_artifact(key).is_file()
     }
 
     /// Where its record lies.
     pub fn record(&self, key: &Key) -> Utf8PathBuf {
-        self.file(key, ".record.json")
+        self.file(key, RECORD_ENDING)
     }
 
     fn file(&self, key: &Key, end: &str) -> Utf8PathBuf {
@@ -229,16 +273,6 @@ impl Store {
     pub fn size(&self, key: &Key) -> Option<u64> {
         let found = rustix::fs::stat(self.artifact(key).as_std_path()).ok()?;
         u64::try_from(found.st_size).ok()
-    }
-
-    /// Whether there is a record of a key. A power cut may leave one without a byte.
-    pub fn has_record(&self, key: &Key) -> bool {
-        rustix::fs::stat(self.record(key).as_std_path()).is_ok_and(|found| found.st_size > 0)
-    }
-
-    /// The record of a key, if it can be read.
-    pub fn read_record(&self, key: &Key) -> Option<Record> {
-        serde_json::from_slice(&fs::read(self.record(key)).ok()?).ok()
     }
 
     /// Makes a finished artifact visible: the record first, so that a visible artifact has one. `lasting`: when this returns, both
@@ -256,11 +290,17 @@ impl Store {
         let shard = usize::from(key.0[0]);
         if !self.shards.borrow()[shard] {
             let target = self.artifact(key);
-            fs::create_dir_all(target.parent().unwrap_or(&self.root))?;
+            let folder = target.parent().unwrap_or(&self.root);
+            if fs::symlink_metadata(folder).is_ok_and(|m| m.is_file()) {
+                self.set_aside(folder)?;
+            }
+            fs::create_dir_all(folder)?;
             self.shards.borrow_mut()[shard] = true;
         }
-        place(record, &self.record(key))?;
         let target = self.artifact(key);
+        self.free(&target)?;
+        self.free(&self.record(key))?;
+        place(record, &self.record(key))?;
         place(artifact, &target)?;
         if lasting {
             // Names lie in folders, which the disk keeps apart from the files.
@@ -289,18 +329,35 @@ impl Store {
             // The commit came so far.
             false => drop(fs::copy(self.record(key), place(".record.json"))?),
         }
-        fs::rename(artifact, place(".h5"))
+        fs::rename(artifact, place(ENDING))
     }
 
-    /// Commits what [`Store::keep_unplaced`] has put aside; what still cannot be stays.
-    pub fn take_unplaced(&self, run: &RunFolder) {
+    /// Files of resolved workflows.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn kept_resolutions(&self) -> io::Result<Vec<Utf8PathBuf>> {
+        let mut files = list(&self.root.join("resolved"))?;
+        let own = |name: &str| name.len() == 16 && name.bytes().all(|b| b.is_ascii_hexdigit());
+        files.retain(|f| f.file_name().is_some_and(own));
+        Ok(files)
+    }
+
+    /// Commits what [`Store::keep_unplaced`] has put aside; what still cannot be stays, and what is damaged is set aside. Gives what is
+    /// to be told.
+    pub fn take_unplaced(&self, run: &RunFolder) -> Vec<String> {
+        let mut told = Vec::new();
         for artifact in list(&run.unplaced()).unwrap_or_default() {
-            let key = artifact.file_stem().and_then(Key::from_hex);
-            if let (Some("h5"), Some(key)) = (artifact.extension(), key) {
+            if let Some(key) = key_of(&artifact, ENDING) {
                 let record = artifact.with_extension("record.json");
-                if self.size(&key).is_some() {
+                if let Err(flaw) = check::unplaced(&artifact, &key) {
+                    let moved = [&artifact, &record].map(|p| self.set_aside(p).is_ok());
+                    if moved.contains(&true) {
+                        told.push(format!("{}; it is set aside", flaw.text()));
+                    }
+                } else if self.size(&key).is_some() {
                     let _ = (fs::remove_file(&record), fs::remove_file(&artifact));
-                } else if record.is_file() {
+                } else {
                     let kept = run.unplaced().join("record");
                     // A commit that fails between the two may take the record with it.
                     if fs::copy(&record, &kept).is_ok()
@@ -313,6 +370,7 @@ impl Store {
             }
         }
         let _ = fs::remove_dir(run.unplaced());
+        told
     }
 
     /// Keys of all artifacts, sorted.
@@ -320,18 +378,47 @@ impl Store {
     /// # Errors
     /// When a folder cannot be read.
     pub fn keys(&self) -> io::Result<Vec<Key>> {
+        self.keys_with(ENDING)
+    }
+
+    /// Keys of all artifacts that earlier versions have written, sorted.
+    ///
+    /// # Errors
+    /// When a folder cannot be read.
+    pub fn earlier_keys(&self) -> io::Result<Vec<Key>> {
+        self.keys_with(EARLIER_ENDING)
+    }
+
+    /// Keys of all records, sorted.
+    ///
+    /// # Errors
+    /// When a folder cannot be read.
+    pub fn recorded_keys(&self) -> io::Result<Vec<Key>> {
+        self.keys_with(RECORD_ENDING)
+    }
+
+    fn keys_with(&self, ending: &str) -> io::Result<Vec<Key>> {
         let mut keys = Vec::new();
         for shard in list(&self.root.join("artifacts"))? {
-            for file in list(&shard)? {
-                if file.extension() == Some("h5")
-                    && let Some(key) = file.file_stem().and_then(Key::from_hex)
-                {
-                    keys.push(key);
-                }
+            // A file of somebody else's is no shard.
+            if shard.is_dir() {
+                keys.extend(list(&shard)?.iter().filter_map(|f| key_of(f, ending)));
             }
         }
         keys.sort_unstable();
         Ok(keys)
+    }
+
+    /// Removes an artifact of an earlier version, and its record if no other artifact has taken it over.
+    ///
+    /// # Errors
+    /// When a file cannot be removed.
+    pub fn remove_earlier(&self, key: &Key) -> io::Result<()> {
+        fs::remove_file(self.earlier_artifact(key))?;
+        if self.size(key).is_none() {
+            let _ = fs::remove_file(self.record(key));
+        }
+        Ok(())
     }
 
     /// Removes an artifact and its record; the artifact first, so that none is left without a record.
@@ -345,6 +432,11 @@ impl Store {
             other => other,
         }
     }
+}
+
+/// The key of which a file is, by its name and ending.
+fn key_of(file: &Utf8Path, ending: &str) -> Option<Key> {
+    Key::from_hex(file.file_name()?.strip_suffix(ending)?)
 }
 
 /// Renames a file, or copies it where the target lies on another disk: whole or not at all.
@@ -421,8 +513,7 @@ mod tests {
         let run = store.run("study");
         let key = Key([7; 32]);
         let (a, r) = (root.join("a"), root.join("r"));
-        fs::write(&a, "artifact").unwrap();
-        fs::write(&r, "{}").unwrap();
+        write_pair(&key, &a, &r);
         // A file where the folder should be: nothing can be put there.
         fs::write(root.join("artifacts"), "").unwrap();
         assert!(store.commit(&key, &a, &r, true).is_err());
@@ -432,7 +523,47 @@ mod tests {
         fs::remove_file(root.join("artifacts")).unwrap();
         store.take_unplaced(&run);
         assert_eq!(store.size(&key), Some(8));
-        assert!(store.has_record(&key) && !run.unplaced().exists());
+        assert!(store.check(&key, None).is_ok() && !run.unplaced().exists());
+    }
+
+    #[test]
+    fn what_is_damaged_while_it_could_not_be_committed_never_gets_into_the_store() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
+        let store = Store::new(root.clone());
+        let run = store.run("study");
+        let key = Key([7; 32]);
+        let (a, r) = (root.join("a"), root.join("r"));
+        write_pair(&key, &a, &r);
+        store.keep_unplaced(&run, &key, &a, &r).unwrap();
+        let kept = run.unplaced().join(format!("{}{ENDING}", key.hex()));
+        fs::write(&kept, "ARTIFACT").unwrap();
+        let told = store.take_unplaced(&run);
+        assert!(told[0].contains("damaged"), "{told:?}");
+        assert_eq!(store.size(&key), None);
+        assert_eq!(store.set_aside_before().unwrap().len(), 2);
+    }
+
+    /// An artifact and its record, as a worker leaves them.
+    pub(super) fn write_pair(key: &Key, artifact: &Utf8Path, record: &Utf8Path) {
+        fs::write(artifact, "artifact").unwrap();
+        let whole = plyflow_model::job::Record {
+            version: plyflow_model::job::JOB_VERSION,
+            step: "s".into(),
+            item: vec![],
+            key: key.hex(),
+            kind: "forming".into(),
+            bytes: 8,
+            hash: blake3::hash(b"artifact").to_hex().to_string(),
+            cost: plyflow_model::job::Cost::default(),
+            results: vec![],
+            collection: None,
+            warnings: vec![],
+            host: "h".into(),
+            started: 0.0,
+        };
+        let text = serde_json::to_string_pretty(&whole).unwrap();
+        fs::write(record, plyflow_artifact::seal::seal(&text)).unwrap();
     }
 
     #[test]
@@ -449,7 +580,8 @@ mod tests {
             store.artifact(&key),
             store.record(&key),
             store.run("study").journal(),
-            store.run("study").tmp().join("1.h5"),
+            store.run("study").tmp().join("1.vtkhdf"),
+            store.damaged().join("x"),
             root.join("resolved/0123456789abcdef"),
             root.join("plugins.json"),
         ];

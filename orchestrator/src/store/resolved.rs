@@ -75,6 +75,19 @@ pub fn read(
     postcard::from_bytes::<Packed>(packed).ok()?.unpack()
 }
 
+/// Whether a file of kept resolutions is damaged, in words.
+pub fn damage(path: &Utf8Path) -> Option<String> {
+    let bytes = match plyflow_artifact::seal::read_document(path.as_std_path()) {
+        Ok(bytes) => bytes,
+        Err(e) => return Some(e.to_string()),
+    };
+    let whole = bytes.get(32..64).is_some_and(|sum| {
+        let payload = &bytes[64..];
+        blake3::hash(payload).as_bytes() == sum
+    });
+    (!whole).then(|| "its bytes are not those that were written".to_owned())
+}
+
 /// Keeps a resolution in a store that is there. One that cannot be written only costs time.
 pub fn write(
     root: &Utf8Path,
@@ -84,6 +97,9 @@ pub fn write(
 ) {
     let place = place(root, file);
     let temporary = Utf8PathBuf::from(format!("{place}.{}", std::process::id()));
+    if place.is_dir() {
+        let _ = super::Store::new(root.to_owned()).set_aside(&place);
+    }
     let written = encode(circumstances, resolution).is_some_and(|bytes| {
         root.is_dir()
             && std::fs::create_dir_all(root.join("resolved"))

@@ -10,8 +10,8 @@
 use camino::Utf8PathBuf;
 use serde::{Deserialize, Serialize};
 
-/// Version of this contract; a worker refuses a job of another.
-pub const JOB_VERSION: u32 = 1;
+/// Version of this contract; a worker refuses a job of another. 2: records are sealed and hold the hash of the artifact.
+pub const JOB_VERSION: u32 = 2;
 
 /// Version of the data model (`schemas/data-model.md`); part of every content key.
 pub const DATA_MODEL_VERSION: u32 = 1;
@@ -122,7 +122,7 @@ pub struct NamedResult {
     pub measured: bool,
 }
 
-/// What is kept beside an artifact (`<key>.record.json`).
+/// What is kept beside an artifact (`<key>.record.json`). The file ends with a seal: the BLAKE3 of all that is before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// [`JOB_VERSION`].
@@ -137,6 +137,9 @@ pub struct Record {
     pub kind: String,
     /// Size of the artifact (bytes): a file of another size is not the one that was written.
     pub bytes: u64,
+    /// BLAKE3 of the artifact, hex: a file of other bytes is not the one that was written. Empty in records of version 1.
+    #[serde(default)]
+    pub hash: String,
     /// What it cost.
     pub cost: Cost,
     /// Results in the order reported, measured ones marked.

@@ -1,7 +1,7 @@
 //! Checkpoints: the state of a run between two frames, and the frames that it has written.
 //!
 //! The artifact of a run that is killed is lost, so its frames are kept here and written again. Every file ends with the
-//! hash of what is before it: a torn one is as good as none.
+//! hash of its name, that of its folder (the key of the step), and what is before it: a torn one, or one of another step, is as good as none.
 
 use crate::run::{Course, Forming};
 use plyflow_mechanics::archive::Archive;
@@ -23,11 +23,22 @@ struct Sealed {
     path: PathBuf,
 }
 
+/// A hash that has begun with what a file is: a whole file of another key, or another frame, must not pass for it.
+fn hasher(path: &Path) -> blake3::Hasher {
+    let mut hash = blake3::Hasher::new();
+    for name in [path.parent().and_then(Path::file_name), path.file_name()] {
+        let name = name.unwrap_or_default().as_encoded_bytes();
+        hash.update(&(name.len() as u64).to_le_bytes());
+        hash.update(name);
+    }
+    hash
+}
+
 impl Sealed {
     fn create(path: &Path) -> io::Result<Self> {
         Ok(Self {
             file: BufWriter::new(File::create(path.with_extension("new"))?),
-            hash: blake3::Hasher::new(),
+            hash: hasher(path),
             path: path.to_owned(),
         })
     }
@@ -63,7 +74,8 @@ impl Write for Sealed {
 fn read_sealed(path: &Path) -> Option<Vec<u8>> {
     let mut bytes = std::fs::read(path).ok()?;
     let end = bytes.len().checked_sub(SEAL)?;
-    let whole = *blake3::hash(&bytes[..end]).as_bytes() == bytes[end..];
+    let hash = hasher(path).update(&bytes[..end]).finalize();
+    let whole = *hash.as_bytes() == bytes[end..];
     bytes.truncate(end);
     whole.then_some(bytes)
 }
@@ -268,5 +280,22 @@ mod tests {
         turned[3] ^= 1;
         std::fs::write(&path, turned).unwrap();
         assert!(read_sealed(&path).is_none());
+    }
+
+    #[test]
+    fn a_whole_file_of_another_key_or_frame_is_as_good_as_none() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |key: &str, name: &str| place.path().join(key).join(name);
+        for key in ["a", "b"] {
+            std::fs::create_dir(place.path().join(key)).unwrap();
+            let mut file = Sealed::create(&at(key, "frame-1")).unwrap();
+            file.write_all(key.as_bytes()).unwrap();
+            file.close(false).unwrap();
+        }
+        std::fs::copy(at("a", "frame-1"), at("a", "frame-2")).unwrap();
+        assert!(read_sealed(&at("a", "frame-2")).is_none());
+        std::fs::copy(at("b", "frame-1"), at("a", "frame-1")).unwrap();
+        assert!(read_sealed(&at("a", "frame-1")).is_none());
+        assert_eq!(read_sealed(&at("b", "frame-1")).unwrap(), b"b");
     }
 }

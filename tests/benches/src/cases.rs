@@ -124,6 +124,21 @@ fn run(folder: &Path) {
     );
 }
 
+/// What `ninja` takes to find that nothing is to be done for `n` files; `None` where there is no ninja.
+fn ninja(n: usize) -> Option<Spent> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut text = String::from("rule t\n  command = echo $v > $out\n");
+    for i in 0..n {
+        text += &format!("build s{i}: t\n  v = {i}\n");
+    }
+    std::fs::write(folder.path().join("build.ninja"), text).expect("a build file");
+    let mut command = Command::new("ninja");
+    command.current_dir(folder.path()).stdout(Stdio::null());
+    let first = command.stderr(Stdio::null()).status().ok()?;
+    assert!(first.success(), "ninja does not build");
+    Some(least(9, || spent(|| quiet(&mut command))))
+}
+
 /// Spawns processes that load a library and end, two at a time.
 fn bare_loop(n: usize) {
     let bare = std::env::current_exe()
@@ -174,7 +189,16 @@ pub fn engine() -> Vec<Row> {
             first.cpu,
             "s",
         ));
-        let again = least(5, || spent(|| run(folder.path())));
+        let again = least(9, || spent(|| run(folder.path())));
+        if let Some(other) = ninja(10_000) {
+            let case = format!("no-op of 10,000 steps {name} over ninja's");
+            rows.push(Row::new(
+                format!("{case}, wall"),
+                again.wall / other.wall,
+                "1",
+            ));
+            rows.push(Row::new(format!("{case}, CPU"), again.cpu / other.cpu, "1"));
+        }
         rows.push(Row::new(
             format!("no-op of 10,000 steps {name}, CPU"),
             1e3 * again.cpu,

@@ -225,7 +225,7 @@ pub fn artifacts(store: &Path) -> BTreeMap<String, Vec<u8>> {
     {
         for file in std::fs::read_dir(shard.path()).expect("a shard").flatten() {
             let name = file.file_name().into_string().expect("a UTF-8 name");
-            if name.ends_with(".h5") {
+            if name.ends_with(".vtkhdf") {
                 found.insert(name, std::fs::read(file.path()).expect("an artifact"));
             }
         }

@@ -108,7 +108,7 @@ impl Study {
         for shard in std::fs::read_dir(root).into_iter().flatten().flatten() {
             for file in std::fs::read_dir(shard.path()).unwrap().flatten() {
                 let name = file.file_name().into_string().unwrap();
-                if name.ends_with(".h5") {
+                if name.ends_with(".vtkhdf") {
                     found.insert(name, std::fs::read(file.path()).unwrap());
                 }
             }

@@ -87,6 +87,7 @@ impl Study {
                 key: key(&label),
                 kind: kind.into(),
                 bytes: bytes.unwrap(),
+                hash: String::new(),
                 cost: Cost {
                     wall_seconds: 12.5 + n,
                     cpu_seconds: 24.0 + 9.0 * n,

@@ -1,0 +1,638 @@
+//! Damage of every kind to every file of a store: no command tells a wrong number, the same run repairs it, nothing blocks for ever.
+//!
+//! `PLYFLOW_FLIPS=1000 cargo test --release -p plyflow-faults --test damage -- --ignored --nocapture` does the long form of it, on real
+//! plugins too, which have to be built (`make build`).
+
+use plyflow::plan::Key;
+use plyflow::store::{Journal, Store};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+/// The program of this build profile; built on the first call.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let profile = plyflow_faults::folder().parent().expect("a profile folder");
+        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
+        let target = profile.parent().expect("a target folder");
+        cargo.env("CARGO_TARGET_DIR", target);
+        cargo.args(["build", "--quiet", "--package", "plyflow"]);
+        if profile.ends_with("release") {
+            cargo.arg("--release");
+        }
+        let built = cargo.status().expect("cargo starts").success();
+        assert!(built, "plyflow does not build");
+        profile.join("plyflow")
+    })
+}
+
+/// A folder with a workflow in it, and its store.
+struct Study {
+    folder: tempfile::TempDir,
+}
+
+impl Study {
+    fn new(workflow: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let text = format!("plyflow: 1\nname: study\n{workflow}");
+        std::fs::write(folder.path().join("workflow.yaml"), text).expect("a workflow file");
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command_on(&self, file: &str, words: &[&str]) -> Command {
+        let mut command = Command::new(program());
+        command.arg(words[0]).arg(file).args(&words[1..]);
+        command.current_dir(self.folder.path()).stdin(Stdio::null());
+        command.env("PLYFLOW_PLUGINS", plyflow_faults::folder());
+        command
+    }
+
+    /// Runs a command to its end. One that takes minutes is taken for one that never ends.
+    fn call(&self, words: &[&str]) -> Output {
+        let mut command = self.command_on("workflow.yaml", words);
+        let out = [self.path("stdout"), self.path("stderr")];
+        let [to, err] = [0, 1].map(|k| std::fs::File::create(&out[k]).expect("a file"));
+        let mut child = command
+            .stdout(to)
+            .stderr(err)
+            .spawn()
+            .expect("plyflow starts");
+        let begun = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().expect("a child") {
+                break status;
+            }
+            if begun.elapsed() > Duration::from_secs(300) {
+                child.kill().expect("a child");
+                panic!("{words:?} hangs");
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        };
+        let [stdout, stderr] = out.map(|p| std::fs::read(p).expect("a file"));
+        Output {
+            status,
+            stdout,
+            stderr,
+        }
+    }
+
+    /// Every visible artifact: name and bytes.
+    fn artifacts(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        let mut all = files(&self.path(".plyflow/artifacts"));
+        all.retain(|f| kind(f) == "vtkhdf");
+        let read = |f: PathBuf| {
+            let bytes = std::fs::read(&f).expect("an artifact");
+            (f.file_name().expect("a name").into(), bytes)
+        };
+        all.into_iter().map(read).collect()
+    }
+}
+
+/// Artifacts with attributes alone, collections, meshes with frames and arrays; a fan-out; and one that reads most of them.
+const MIXED: &str = "
+steps:
+  first: {plugin: trivial, with: {value: 2}}
+  zones: {plugin: split, with: {items: 3}, from: {in: first}}
+  mesh: {plugin: mesh, with: {points: 40, frames: 4}, for_each: {z: zones}, from: {in: zones}}
+  read: {plugin: mesh-reader, for_each: {z: zones}, from: {formed: mesh}}
+  all: {plugin: sum, from: {in: [read, mesh, first]}}
+";
+
+/// Numbers without a pattern, the same each time (xorshift64*).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let mixed = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33;
+        usize::try_from(mixed).expect("31 bits") % n
+    }
+
+    fn one_of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
+        &list[self.below(list.len())]
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Damage {
+    /// One bit turned.
+    Bit,
+    /// The same, with nothing to be seen in what the file system tells: rot.
+    Rot,
+    Zeroed,
+    Truncated,
+    Longer,
+    Emptied,
+    /// Exchanged with another file of its kind.
+    Swapped,
+    Deleted,
+    /// A folder in its place, with something in it.
+    Folder,
+    Unreadable,
+    /// A link that leads to itself.
+    Link,
+}
+
+const WHOLE_FILE: [Damage; 9] = [
+    Damage::Zeroed,
+    Damage::Truncated,
+    Damage::Longer,
+    Damage::Emptied,
+    Damage::Swapped,
+    Damage::Deleted,
+    Damage::Folder,
+    Damage::Unreadable,
+    Damage::Link,
+];
+
+/// All files of a store but those that were set aside, sorted.
+fn files(store: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![store.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() && !path.ends_with("damaged") {
+                folders.push(path);
+            } else if path.is_file() {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// What comes behind the name in a file's name: files of one kind have the same.
+fn kind(path: &Path) -> String {
+    let name = path
+        .file_name()
+        .and_then(|n| n.to_str())
+        .unwrap_or_default();
+    name.split_once('.').map_or(name, |(_, end)| end).to_owned()
+}
+
+/// Makes the journal take a file of an artifact for unchanged, as it would if a disk had let it rot.
+fn hide(store: &Path, file: &Path) {
+    let name = file.file_name().and_then(|n| n.to_str());
+    let key = name.and_then(|n| Key::from_hex(n.split('.').next()?));
+    let store = Store::new(store.to_owned().try_into().expect("a UTF-8 path"));
+    if let Some(key) = key
+        && let Ok(seen) = store.look(&key)
+    {
+        let mut journal = Journal::open(&store.run("study").journal()).expect("a journal");
+        journal.saw(key, seen.stamp);
+        journal.flush().expect("room for a note");
+    }
+}
+
+fn harm(store: &Path, file: &Path, damage: Damage, random: &mut Random) {
+    let bytes = std::fs::read(file).expect("a file that can be read");
+    let bit = random.below(8 * bytes.len().max(1));
+    let write = |bytes: &[u8]| std::fs::write(file, bytes).expect("a file that can be written");
+    match damage {
+        Damage::Bit | Damage::Rot => {
+            let mut bytes = bytes;
+            if let Some(byte) = bytes.get_mut(bit / 8) {
+                *byte ^= 1 << (bit % 8);
+            }
+            write(&bytes);
+            if damage == Damage::Rot {
+                hide(store, file);
+            }
+        }
+        Damage::Zeroed => write(&vec![0; bytes.len()]),
+        Damage::Truncated => write(&bytes[..bit / 8]),
+        Damage::Longer => write(&[&bytes[..], b"more"].concat()),
+        Damage::Emptied => write(b""),
+        Damage::Swapped => {
+            let mut others = files(store);
+            others.retain(|f| f != file && kind(f) == kind(file));
+            if !others.is_empty() {
+                let other = random.one_of(&others);
+                let held = store.join("held");
+                std::fs::rename(file, &held).expect("a rename");
+                std::fs::rename(other, file).expect("a rename");
+                std::fs::rename(held, other).expect("a rename");
+            }
+        }
+        Damage::Deleted => std::fs::remove_file(file).expect("a file"),
+        Damage::Folder => {
+            std::fs::remove_file(file).expect("a file");
+            std::fs::create_dir(file).expect("a folder");
+            std::fs::write(file.join("x"), "x").expect("a file in it");
+        }
+        Damage::Unreadable => {
+            std::fs::set_permissions(file, std::fs::Permissions::from_mode(0)).expect("a mode");
+        }
+        Damage::Link => {
+            std::fs::remove_file(file).expect("a file");
+            std::os::unix::fs::symlink(file, file).expect("a link");
+        }
+    }
+}
+
+/// A study whose numbers are known, and the step that is made again to read the others.
+struct Lab {
+    study: Study,
+    reader: &'static str,
+    numbers: BTreeMap<String, u64>,
+    artifacts: BTreeMap<PathBuf, Vec<u8>>,
+}
+
+impl Lab {
+    fn new(study: Study, reader: &'static str) -> Self {
+        let mut lab = Self {
+            study,
+            reader,
+            numbers: BTreeMap::new(),
+            artifacts: BTreeMap::new(),
+        };
+        let output = lab.study.call(&["run"]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+        let output = lab.study.call(&["results", "--format", "json"]);
+        lab.numbers = numbers(&output);
+        assert!(lab.numbers.len() > 2);
+        lab.artifacts = lab.study.artifacts();
+        lab
+    }
+
+    fn store(&self) -> PathBuf {
+        self.study.path(".plyflow")
+    }
+
+    /// Runs a command that may find what is damaged: it says so, or tells what is right.
+    fn ask(&self, words: &[&str], about: &str) -> Output {
+        let output = self.study.call(words);
+        let said = text(&output);
+        let about = format!("{about}; {words:?} said: {said}");
+        assert!(!said.contains("panicked"), "{about}");
+        match output.status.code() {
+            Some(0) => {}
+            Some(8) => assert!(said.contains("damaged"), "{about}"),
+            other => panic!("code {other:?}; {about}"),
+        }
+        output
+    }
+
+    /// Damages one file, asks, runs, and looks whether all is as it was.
+    fn trial(&self, number: usize, damage: Damage, random: &mut Random) {
+        let file = random.one_of(&files(&self.store())).clone();
+        let place = file
+            .strip_prefix(self.store())
+            .expect("a file of the store");
+        let about = format!("trial {number}: {damage:?} of {}", place.display());
+        harm(&self.store(), &file, damage, random);
+        match random.below(4) {
+            0 => {
+                let asked = self.ask(&["results", "--format", "json"], &about);
+                let told = numbers(&asked);
+                for (name, value) in &told {
+                    assert_eq!(self.numbers.get(name), Some(value), "{about}: {name}");
+                }
+                let all = told.len() == self.numbers.len();
+                let said = text(&asked);
+                let named = said.contains("damaged") || said.contains("not in the store");
+                assert!(
+                    all || named,
+                    "{about}: a number is left out without a word: {said}"
+                );
+            }
+            1 => drop(self.ask(&["report"], &about)),
+            2 => drop(self.ask(&["plan"], &about)),
+            _ => {}
+        }
+        // The same command repairs it, what it reads and what it does not.
+        let run = ["run", "--no-report", "--force", self.reader];
+        let output = self.ask(&run, &about);
+        assert_eq!(output.status.code(), Some(0), "{about}: {}", text(&output));
+        let output = self.ask(&["results", "--format", "json"], &about);
+        if !output.status.success() {
+            // Rot that nothing has read: now it is named and set aside, and the next run has it.
+            assert_eq!(self.ask(&run, &about).status.code(), Some(0), "{about}");
+        }
+        let output = self.ask(&["results", "--format", "json"], &about);
+        assert_eq!(output.status.code(), Some(0), "{about}: {}", text(&output));
+        assert_eq!(numbers(&output), self.numbers, "{about}");
+    }
+
+    /// Reads all: what is damaged still (rot that nobody has read) is found now, and made again.
+    fn settle(&self, about: &str) {
+        if self.ask(&["verify"], about).status.code() == Some(8) {
+            self.ask(&["run", "--no-report"], about);
+        }
+        let output = self.ask(&["verify"], about);
+        assert_eq!(output.status.code(), Some(0), "{about}: {}", text(&output));
+        assert!(self.study.artifacts() == self.artifacts, "{about}");
+    }
+
+    fn trials(&self, seed: u64, flips: usize, whole: usize) {
+        let mut random = Random(seed);
+        for number in 0..flips + whole {
+            let damage = match number {
+                n if n >= flips => WHOLE_FILE[n % WHOLE_FILE.len()],
+                n if n % 3 == 0 => Damage::Rot,
+                _ => Damage::Bit,
+            };
+            self.trial(number, damage, &mut random);
+            if number % 20 == 19 {
+                self.settle(&format!("after trial {number}"));
+            }
+        }
+        self.settle("at the end");
+        println!("{flips} bits and {whole} files: no wrong number, all repaired");
+    }
+}
+
+fn text(output: &Output) -> String {
+    let both = [&output.stdout[..], &output.stderr[..]].concat();
+    String::from_utf8_lossy(&both).into_owned()
+}
+
+/// The numbers that do not depend on the machine, bit for bit.
+fn numbers(output: &Output) -> BTreeMap<String, u64> {
+    let all: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    let rows = all["results"].as_array().cloned().unwrap_or_default();
+    let rows = rows.iter().filter(|r| r["measured"] == false);
+    rows.filter_map(|r| {
+        let name = format!("{}{}.{}", r["step"], r["item"], r["result"]);
+        Some((name, r["value"].as_f64()?.to_bits()))
+    })
+    .collect()
+}
+
+#[test]
+fn damage_to_any_file_of_a_store_gives_no_wrong_number_and_is_repaired() {
+    Lab::new(Study::new(MIXED), "all").trials(38, 60, 18);
+}
+
+#[test]
+fn every_kind_of_file_survives_every_kind_of_damage_to_the_whole_of_it() {
+    let lab = Lab::new(Study::new(MIXED), "all");
+    let mut random = Random(7);
+    let kinds = ["vtkhdf", "record.json", "journal", "json", "lock"];
+    for kind_ in kinds {
+        for damage in WHOLE_FILE {
+            let mut all = files(&lab.store());
+            all.retain(|f| kind(f) == kind_);
+            let file = random.one_of(&all).clone();
+            harm(&lab.store(), &file, damage, &mut random);
+            let about = format!("{damage:?} of {kind_}");
+            let output = lab.ask(&["run", "--no-report", "--force", "all"], &about);
+            assert_eq!(output.status.code(), Some(0), "{about}: {}", text(&output));
+            let output = lab.ask(&["results", "--format", "json"], &about);
+            assert_eq!(numbers(&output), lab.numbers, "{about}");
+        }
+    }
+    lab.settle("at the end");
+}
+
+#[test]
+fn a_record_edited_by_hand_never_turns_a_check_green() {
+    let steps = "steps:\n  a: {plugin: trivial, with: {value: 2}}\nexpect:\n  - {step: a, result: value, value: 3, tolerance: 0.1, source: made up}\n";
+    let study = Study::new(steps);
+    let run = |more: &[&str]| {
+        study
+            .call(&[&["run", "--no-report"], more].concat())
+            .status
+            .code()
+    };
+    assert_eq!(run(&["--check"]), Some(5));
+    let all = files(&study.path(".plyflow"));
+    let record = all.iter().find(|f| kind(f) == "record.json").unwrap();
+    let edited = std::fs::read_to_string(record).unwrap();
+    let edited = edited.replace("\"value\": 2.0", "\"value\": 3.0");
+    for words in [
+        &["results", "--check"][..],
+        &["run", "--check", "--no-report"],
+    ] {
+        std::fs::write(record, &edited).unwrap();
+        let output = study.call(words);
+        let said = text(&output);
+        assert!(said.contains("damaged"), "{said}");
+        // Not shown, or made again and missed as before.
+        let code = if words[0] == "run" { 5 } else { 8 };
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        run(&[]);
+    }
+    // With nothing to be seen from outside.
+    for words in [
+        &["results", "--check"][..],
+        &["run", "--check", "--no-report"],
+    ] {
+        std::fs::write(record, &edited).unwrap();
+        hide(&study.path(".plyflow"), record);
+        let output = study.call(words);
+        assert!(text(&output).contains("damaged"), "{}", text(&output));
+        assert!(matches!(output.status.code(), Some(5 | 8)));
+        run(&[]);
+    }
+    let last = numbers(&study.call(&["results", "--format", "json"]));
+    assert_eq!(last.values().copied().collect::<Vec<_>>(), [2f64.to_bits()]);
+}
+
+#[test]
+fn rot_in_what_a_report_or_inspect_shows_is_named_and_made_again() {
+    let lab = Lab::new(Study::new(MIXED), "all");
+    let all = files(&lab.store());
+    // Measured in the middle of the numbers of a mesh: HDF5 itself does not notice.
+    let of_mesh = |f: &&PathBuf| {
+        let text = std::fs::read_to_string(f).unwrap_or_default();
+        kind(f) == "record.json" && text.contains("\"step\": \"mesh\"")
+    };
+    let record = all.iter().find(of_mesh).unwrap();
+    let name = record.to_str().unwrap().replace(".record.json", ".vtkhdf");
+    let artifact = Path::new(&name);
+    for words in [
+        &["report"][..],
+        &["inspect"],
+        &["results", "--front"],
+        &["run", "--force", "read"],
+    ] {
+        let mut bytes = std::fs::read(artifact).unwrap();
+        let half = bytes.len() / 2;
+        bytes[half] ^= 4;
+        std::fs::write(artifact, &bytes).unwrap();
+        hide(&lab.store(), artifact);
+        let output = match words[0] {
+            "inspect" => lab.study.command_on(&name, words).output().unwrap(),
+            _ => lab.study.call(words),
+        };
+        let said = text(&output);
+        assert!(said.contains("damaged"), "{words:?}: {said}");
+        let code = if words[0] == "run" { 0 } else { 8 };
+        assert_eq!(output.status.code(), Some(code), "{words:?}: {said}");
+        if words[0] == "inspect" {
+            lab.ask(&["verify"], "after inspect");
+        }
+        lab.ask(&["run", "--no-report"], "again");
+        lab.settle(words[0]);
+    }
+}
+
+#[test]
+fn a_step_made_again_is_compared_byte_for_byte() {
+    let study = Study::new(
+        "steps:\n  same: {plugin: mesh}\n  other: {plugin: trivial, with: {value: 1}}\n  last: {plugin: sum, from: {in: [same, other]}}\n",
+    );
+    study.call(&["run", "--no-report"]);
+    let before = study.artifacts();
+    let words = ["verify", "--again", "same", "--again", "last"];
+    let output = study.call(&words);
+    let said = text(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    for step in ["same", "last"] {
+        assert!(
+            said.contains(&format!("{step}: made again, the same ")),
+            "{said}"
+        );
+    }
+    assert_eq!(study.artifacts(), before);
+    // One that was made of other inputs than its key says, sealed all the same, as a plugin that is not reproducible leaves it.
+    let store = Store::new(study.path(".plyflow").try_into().unwrap());
+    let named = |step: &str| {
+        let keys = store.keys().unwrap();
+        let of = |k: &Key| store.read_record(k).unwrap().step == step;
+        keys.into_iter().find(of).unwrap()
+    };
+    let (key, mut record) = (named("last"), store.read_record(&named("last")).unwrap());
+    let bytes = std::fs::read(store.artifact(&named("other"))).unwrap();
+    record.bytes = bytes.len() as u64;
+    record.hash = plyflow_artifact::seal::hash(&bytes);
+    let text_ = serde_json::to_string(&record).unwrap();
+    std::fs::write(store.artifact(&key), &bytes).unwrap();
+    std::fs::write(store.record(&key), plyflow_artifact::seal::seal(&text_)).unwrap();
+    let output = study.call(&words);
+    let said = text(&output);
+    assert_eq!(output.status.code(), Some(8), "{said}");
+    assert!(
+        said.contains("last: made again, and it is ANOTHER"),
+        "{said}"
+    );
+    assert_eq!(std::fs::read(store.artifact(&key)).unwrap(), bytes);
+}
+
+#[test]
+fn a_store_of_an_earlier_version_is_told_and_left_alone_until_it_is_cleaned() {
+    let study = Study::new("steps:\n  a: {plugin: trivial, with: {value: 2}}\n");
+    study.call(&["run", "--no-report"]);
+    let all = files(&study.path(".plyflow"));
+    let artifact = all.iter().find(|f| kind(f) == "vtkhdf").unwrap();
+    let record = artifact.with_extension("record.json");
+    let text_ = std::fs::read_to_string(&record).unwrap();
+    let mut old: Value = serde_json::from_str(&text_).unwrap();
+    for name in ["seal", "hash"] {
+        old.as_object_mut().unwrap().remove(name);
+    }
+    old["version"] = 1.into();
+    std::fs::write(&record, old.to_string()).unwrap();
+    let earlier = artifact.with_extension("h5");
+    std::fs::rename(artifact, &earlier).unwrap();
+    for words in [&["plan"][..], &["explain", "a"]] {
+        let said = text(&study.call(words));
+        assert!(said.contains("an earlier version"), "{said}");
+    }
+    let said = text(&study.call(&["verify"]));
+    assert!(said.contains("1 of an earlier version"), "{said}");
+    let said = text(&study.call(&["run", "--no-report"]));
+    assert!(said.contains("study: 1 run, 0 cached"), "{said}");
+    assert!(earlier.exists(), "nothing is thrown away unasked");
+    assert_eq!(study.call(&["clean"]).status.code(), Some(0));
+    assert!(!earlier.exists());
+    let said = text(&study.call(&["run", "--no-report"]));
+    assert!(said.contains("study: 0 run, 1 cached"), "{said}");
+}
+
+/// A small part of real plugins (that of `forming.rs` of the end-to-end tests), and what reads it.
+fn real() -> Study {
+    let study = Study::new(
+        "
+steps:
+  coarse:
+    plugin: forming-explicit
+    with: {scene: scene.yaml, element: m4, element_size: 20 mm, frames: 20, tool_grid: 5 mm}
+  defects: {plugin: defect-detection, from: {formed: coarse}, with: {distance_threshold: 20 mm}}
+  zones: {plugin: zone-extraction, from: {defects: defects}}
+",
+    );
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let materials = repository
+        .canonicalize()
+        .expect("a folder")
+        .join("workflows/materials");
+    let scene = include_str!("small-scene.yaml");
+    let scene = scene.replace("MATERIALS", materials.to_str().expect("a UTF-8 path"));
+    std::fs::write(study.path("scene.yaml"), scene).expect("a scene");
+    study
+}
+
+/// Copies a folder.
+fn copy(from: &Path, to: &Path) {
+    let _ = std::fs::remove_dir_all(to);
+    let status = std::process::Command::new("cp")
+        .arg("-a")
+        .args([from, to])
+        .status();
+    assert!(status.expect("cp starts").success());
+}
+
+/// Damages checkpoints of a run that was killed: the same command ends with the same bytes as one that was left alone.
+fn checkpoints(seed: u64, times: usize) {
+    let lab = Lab::new(real(), "defects");
+    let killed = real();
+    let often = ["--checkpoint-every", "0 s", "--jobs", "1"];
+    let mut command = killed.command_on("workflow.yaml", &["run", "--no-report"]);
+    command
+        .args(often)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    let mut engine = command.spawn().expect("plyflow starts");
+    let folder = killed.path(".plyflow/runs/study/checkpoints");
+    let begun = Instant::now();
+    while !files(&folder).iter().any(|f| f.ends_with("frame-9")) {
+        assert!(begun.elapsed() < Duration::from_secs(300), "no checkpoint");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    engine.kill().unwrap();
+    engine.wait().unwrap();
+    // Its worker dies with it.
+    std::thread::sleep(Duration::from_secs(1));
+    let pristine = killed.path("pristine");
+    copy(&killed.path(".plyflow"), &pristine);
+    let mut random = Random(seed);
+    for number in 0..times {
+        copy(&pristine, &killed.path(".plyflow"));
+        let file = random.one_of(&files(&folder)).clone();
+        let damage = match number % 3 {
+            0 => WHOLE_FILE[(number / 3) % WHOLE_FILE.len()],
+            _ => Damage::Bit,
+        };
+        harm(&folder, &file, damage, &mut random);
+        let about = format!("{damage:?} of {}", file.display());
+        let output = killed.call(&["run", "--no-report"]);
+        assert_eq!(output.status.code(), Some(0), "{about}: {}", text(&output));
+        assert!(killed.artifacts() == lab.artifacts, "{about}");
+    }
+    println!("{times} checkpoints damaged: the same bytes each time");
+}
+
+#[test]
+#[ignore = "takes minutes: PLYFLOW_FLIPS random bits (1000) and a fifth as many whole files, of test plugins, real plugins and checkpoints"]
+fn many_damages_to_a_store_give_no_wrong_number_and_are_repaired() {
+    let flips = std::env::var("PLYFLOW_FLIPS").map_or(1000, |n| n.parse().expect("a number"));
+    Lab::new(Study::new(MIXED), "all").trials(1, flips * 8 / 10, flips * 4 / 25);
+    Lab::new(real(), "defects").trials(2, flips * 3 / 20, flips / 25);
+    checkpoints(3, flips * 3 / 40);
+}
