@@ -6,7 +6,7 @@ pub const OK: u8 = 0;
 pub const INTERNAL: u8 = 1;
 /// The command line is wrong, or a file it names does not exist.
 pub const USAGE: u8 = 2;
-/// The workflow, scene or material file has errors; nothing was run.
+/// The workflow, scene or material file has errors, or a library needs consent; nothing was run.
 pub const INVALID: u8 = 3;
 /// At least one step failed; the rest ran as the failure policy says.
 pub const STEP_FAILED: u8 = 4;
@@ -16,7 +16,7 @@ pub const EXPECTATION: u8 = 5;
 pub const LOCKED: u8 = 6;
 /// A plugin does not keep the contract (`check-plugin`).
 pub const NOT_CONFORMING: u8 = 7;
-/// Stopped by the user (Ctrl-C) or SIGTERM.
+/// Stopped by the user (Ctrl-C), SIGTERM or SIGHUP.
 pub const INTERRUPTED: u8 = 130;
 
 /// All codes with their meaning, for `--help`.
