@@ -6,7 +6,7 @@ pub const OK: u8 = 0;
 pub const INTERNAL: u8 = 1;
 /// The command line is wrong, or a file it names does not exist.
 pub const USAGE: u8 = 2;
-/// The workflow, scene or material file has errors; nothing was run.
+/// The workflow, scene or material file has errors, or a library needs consent; nothing was run.
 pub const INVALID: u8 = 3;
 /// At least one step failed; the rest ran as the failure policy says.
 pub const STEP_FAILED: u8 = 4;
@@ -18,7 +18,7 @@ pub const LOCKED: u8 = 6;
 pub const NOT_CONFORMING: u8 = 7;
 /// Something in the store is not what was written, and is not shown; or a step made again has other bytes (`verify --again`).
 pub const DAMAGED: u8 = 8;
-/// Stopped by the user (Ctrl-C) or SIGTERM.
+/// Stopped by the user (Ctrl-C), SIGTERM or SIGHUP.
 pub const INTERRUPTED: u8 = 130;
 
 /// All codes with their meaning, for `--help`.

@@ -7,12 +7,17 @@
 use std::ffi::{c_char, c_int};
 
 /// Entry of the program.
+// The C runtime calls it, with what C promises of `argv`.
+#[allow(clippy::not_unsafe_ptr_arg_deref)]
 #[unsafe(no_mangle)]
-pub extern "C" fn main(_argc: c_int, _argv: *const *const c_char) -> c_int {
+pub extern "C" fn main(argc: c_int, argv: *const *const c_char) -> c_int {
     // On Linux with glibc the arguments reach the standard library even so.
     let mut arguments = std::env::args().skip(1);
     if arguments.next().as_deref() == Some("step-worker") {
-        plyflow::worker::main(&arguments.collect::<Vec<_>>());
+        let inside = || unsafe {
+            plyflow_plugin_host::rename_argument(argv, argc, c"--parent", c"--inside");
+        };
+        plyflow::worker::main(&arguments.collect::<Vec<_>>(), inside);
     }
     // As the standard library has it: a closed pipe is an error to handle, not a signal to die by.
     unsafe { libc::signal(libc::SIGPIPE, libc::SIG_IGN) };

@@ -1,17 +1,21 @@
 //! The plugins on a search path.
 
+mod gate;
+
+use self::gate::{looked, needs_consent, read_stranger};
 use crate::describe::{Description, describe};
 use crate::load::{Plugin, read_manifest};
+use crate::supervise::Orphans;
+use crate::trust::{Place, Stranger, Trust};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::seal::{read_document, seal, sealed};
 use plyflow_model::manifest::PluginKind;
-use plyflow_workflow::resolved::PluginId;
 use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::os::unix::fs::MetadataExt;
-use std::os::unix::process::ExitStatusExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
@@ -80,13 +84,28 @@ pub struct PluginCatalog {
     describer: Describer,
     cache: Mutex<Cache>,
     scanned: OnceLock<Vec<Found>>,
+    trust: Trust,
 }
 
 /// A library in a folder of the search path.
 #[derive(Debug, Clone)]
 enum Found {
+    Plugin(Box<CatalogEntry>, Place),
+    Broken {
+        path: Utf8PathBuf,
+        reason: String,
+    },
+    /// Nothing is known of it, because it may not be loaded.
+    Stranger(Stranger),
+}
+
+/// What a look at a library gave.
+enum Looked {
     Plugin(Box<CatalogEntry>),
-    Broken { path: Utf8PathBuf, reason: String },
+    /// A library that is no plugin.
+    Foreign,
+    Broken(String),
+    Stranger(Stranger),
 }
 
 impl PluginCatalog {
@@ -115,6 +134,7 @@ impl PluginCatalog {
             describer,
             cache,
             scanned: OnceLock::new(),
+            trust: Trust::everything(),
         }
     }
 
@@ -129,7 +149,7 @@ impl PluginCatalog {
     pub fn plugins(&self) -> Vec<CatalogEntry> {
         let mut entries: Vec<CatalogEntry> = Vec::new();
         for found in self.scan() {
-            if let Found::Plugin(entry) = found {
+            if let Found::Plugin(entry, _) = found {
                 let same = |e: &CatalogEntry| {
                     e.id.name == entry.id.name && e.manifest.kind == entry.manifest.kind
                 };
@@ -146,7 +166,14 @@ impl PluginCatalog {
     pub fn broken(&self) -> Vec<(Utf8PathBuf, String)> {
         let broken = |found: &Found| match found {
             Found::Broken { path, reason } => Some((path.clone(), reason.clone())),
-            Found::Plugin(_) => None,
+            Found::Stranger(library) => {
+                let reason = needs_consent("", [library]).to_string();
+                Some((library.path.clone(), reason))
+            }
+            Found::Plugin(entry, place) => {
+                let taken = self.taken(entry, *place)?;
+                Some((entry.id.path.clone(), taken.to_string()))
+            }
         };
         self.scan().iter().filter_map(broken).collect()
     }
@@ -154,11 +181,16 @@ impl PluginCatalog {
     fn scan(&self) -> &[Found] {
         self.scanned.get_or_init(|| {
             let mut found = Vec::new();
-            for path in self.folders.iter().flat_map(|folder| libraries(folder)) {
-                match self.look(&path) {
-                    Ok(Some(entry)) => found.push(Found::Plugin(Box::new(entry))),
-                    Ok(None) => {}
-                    Err(reason) => found.push(Found::Broken { path, reason }),
+            let libraries = self.folders.iter().flat_map(|folder| {
+                let place = self.trust.place(&folder.join("lib.so"));
+                libraries(folder).into_iter().map(move |path| (path, place))
+            });
+            for (path, place) in libraries {
+                match self.look(&path, place, false) {
+                    Looked::Plugin(entry) => found.push(Found::Plugin(entry, place)),
+                    Looked::Foreign => {}
+                    Looked::Broken(reason) => found.push(Found::Broken { path, reason }),
+                    Looked::Stranger(library) => found.push(Found::Stranger(library)),
                 }
             }
             self.save();
@@ -170,49 +202,53 @@ impl PluginCatalog {
         self.cache.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a library is: a plugin, none (`None`), or broken.
-    fn look(&self, path: &Utf8Path) -> Result<Option<CatalogEntry>, String> {
+    /// What a library is. One that may not be loaded is described by what lies beside it; `ask`: the user may be asked
+    /// when nothing does.
+    fn look(&self, path: &Utf8Path, place: Place, ask: bool) -> Looked {
+        match place {
+            Place::Elsewhere => self.look_at_stranger(path, ask),
+            Place::Installation | Place::Own => match self.known(path, None) {
+                Ok(known) => looked(path, known),
+                Err(reason) => Looked::Broken(reason),
+            },
+        }
+    }
+
+    /// Hash and description of a library that may be loaded, from the cache when the file is as it was. `hash`: that of
+    /// its bytes, where they have just been read.
+    fn known(
+        &self,
+        path: &Utf8Path,
+        hash: Option<String>,
+    ) -> Result<(String, Description), String> {
         let stamp = stamp(path).map_err(|e| e.to_string())?;
-        let known = self
+        let kept = self
             .cache()
             .libraries
             .get(path)
             .filter(|k| k.stamp == stamp && is_readable(&k.description))
+            .filter(|k| hash.as_ref().is_none_or(|h| *h == k.hash))
             .cloned();
-        let known = match known {
-            Some(known) => known,
-            None => {
-                let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
-                let hash = blake3::hash(&bytes).to_hex().to_string();
-                let description = self.describe(path);
-                let known = Known {
-                    stamp,
-                    hash,
-                    description,
-                };
-                // A broken library may only lack something that is installed later: ask again.
-                if !matches!(known.description, Description::Broken(_)) {
-                    let mut cache = self.cache();
-                    cache.libraries.insert(path.to_owned(), known.clone());
-                    cache.changed = true;
-                }
-                known
-            }
-        };
-        match known.description {
-            Description::Foreign(_) => Ok(None),
-            Description::Broken(reason) => Err(reason),
-            Description::Plugin(text) => {
-                let manifest = read_manifest(&text)?;
-                let id = PluginId {
-                    name: manifest.name.clone(),
-                    version: manifest.version.clone(),
-                    path: path.to_owned(),
-                    hash: known.hash,
-                };
-                Ok(Some(CatalogEntry { id, manifest }))
-            }
+        if let Some(known) = kept {
+            return Ok((known.hash, known.description));
         }
+        let hash = match hash {
+            Some(hash) => hash,
+            None => read_stranger(path)?.hash,
+        };
+        let description = self.describe(path);
+        // A broken library may only lack something that is installed later: ask again.
+        if !matches!(description, Description::Broken(_)) {
+            let known = Known {
+                stamp,
+                hash: hash.clone(),
+                description: description.clone(),
+            };
+            let mut cache = self.cache();
+            cache.libraries.insert(path.to_owned(), known);
+            cache.changed = true;
+        }
+        Ok((hash, description))
     }
 
     fn describe(&self, path: &Utf8Path) -> Description {
@@ -287,33 +323,24 @@ impl Catalog for PluginCatalog {
             let Ok(path) = path.canonicalize_utf8() else {
                 return Err(not_found(vec![path]));
             };
-            let found = self.look(&path);
+            let place = self.trust.place(&path);
+            let found = self.look(&path, place, true);
             self.save();
             return match found {
-                Ok(Some(entry)) => Ok(entry),
-                Ok(None) => Err(CatalogError::Broken {
+                Looked::Plugin(entry) => match self.taken(&entry, place) {
+                    Some(taken) => Err(taken),
+                    None => Ok(*entry),
+                },
+                Looked::Foreign => Err(CatalogError::Broken {
                     path,
                     reason: "it is not a Plyflow plugin: it does not export `plyflow_plugin`"
                         .into(),
                 }),
-                Err(reason) => Err(CatalogError::Broken { path, reason }),
+                Looked::Broken(reason) => Err(CatalogError::Broken { path, reason }),
+                Looked::Stranger(library) => Err(needs_consent(name_or_path, [&library])),
             };
         }
-        for found in self.scan() {
-            match found {
-                Found::Plugin(entry) if entry.id.name == name_or_path => {
-                    return Ok((**entry).clone());
-                }
-                Found::Broken { path, reason } if named_like(path, name_or_path) => {
-                    return Err(CatalogError::Broken {
-                        path: path.clone(),
-                        reason: reason.clone(),
-                    });
-                }
-                _ => {}
-            }
-        }
-        Err(not_found(self.folders.clone()))
+        self.find_by_name(name_or_path)
     }
 
     fn names(&self, kind: PluginKind) -> Vec<String> {
@@ -376,6 +403,7 @@ fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
+        .process_group(0)
         .spawn()?;
     let mut pipe = child.stdout.take().expect("piped above");
     let (send, receive) = std::sync::mpsc::channel();
@@ -388,8 +416,13 @@ fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)
     match receive.recv_timeout(LOAD_LIMIT) {
         Ok(said) => Ok((said, Some(child.wait()?))),
         Err(_) => {
+            // What the library started goes too, also where it has left the group.
+            if let Ok(group) = libc::pid_t::try_from(child.id()) {
+                unsafe { libc::kill(-group, libc::SIGKILL) };
+            }
             child.kill()?;
             child.wait()?;
+            Orphans::end(&[]);
             Ok((Vec::new(), None))
         }
     }
@@ -415,7 +448,17 @@ pub(crate) fn find_component_library(
     name: &str,
 ) -> Result<Plugin, String> {
     if is_path(name) {
-        let plugin = Plugin::load(Utf8Path::new(name)).map_err(|e| e.to_string())?;
+        let path = Utf8Path::new(name);
+        let folder = path.canonicalize_utf8().ok();
+        let folder = folder.as_deref().and_then(Utf8Path::parent);
+        // The engine has asked about the libraries that it knows of; this one it never saw.
+        if !folder.is_some_and(|f| folders.iter().any(|known| known == f)) {
+            return Err(format!(
+                "the {kind} {name} lies in no folder that is trusted, and no parameter of type `{kind}` names it: \
+                 it is not loaded"
+            ));
+        }
+        let plugin = Plugin::load(path).map_err(|e| e.to_string())?;
         if plugin.manifest.kind == kind {
             return Ok(plugin);
         }

@@ -160,7 +160,8 @@ impl<'a, 'w> HostState<'a, 'w> {
             if library.name != name && library.path.as_str() != name {
                 continue;
             }
-            let plugin = Plugin::load(&library.path).map_err(|e| e.to_string())?;
+            let hash = library.hash.as_deref();
+            let plugin = Plugin::load_bytes(&library.path, hash).map_err(|e| e.to_string())?;
             if plugin.manifest.kind == kind {
                 let _ = listed.set(plugin);
                 break;

@@ -14,10 +14,14 @@ mod host;
 mod load;
 mod process;
 mod services;
+mod supervise;
+mod trust;
 mod worker;
 
 pub use catalog::{Describer, PluginCatalog};
 pub use checkpoints::{cost_so_far, damaged_cost};
 pub use describe::{Description, describe, describe_main};
 pub use load::{LoadError, Plugin};
+pub use supervise::{Orphans, rename_argument, supervise};
+pub use trust::{Ask, Consent, Place, Stranger, Trust, manifest_file};
 pub use worker::{run_job, worker_main};

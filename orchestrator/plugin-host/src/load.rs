@@ -101,6 +101,29 @@ impl Plugin {
         Self::check(path, descriptor).map_err(|e| fail(false, e))
     }
 
+    /// As [`Plugin::load`], but only when the bytes of the file are those that the user consented to (BLAKE3, hex); `None`: it lies
+    /// where any bytes are trusted.
+    ///
+    /// # Errors
+    /// As [`Plugin::load`], and when the bytes are others.
+    pub fn load_bytes(path: &Utf8Path, hash: Option<&str>) -> Result<Self, LoadError> {
+        if let Some(wanted) = hash {
+            let fail = |reason: String| LoadError {
+                path: path.into(),
+                reason,
+                foreign: false,
+            };
+            let found = hash_of(path).map_err(|e| fail(e.to_string()))?;
+            if found != wanted {
+                return Err(fail(format!(
+                    "it is not the library that was consented to: its blake3 is {found}, expected {wanted}. It has \
+                     changed since this command began; run it again"
+                )));
+            }
+        }
+        Self::load(path)
+    }
+
     fn check(path: &Utf8Path, d: &'static pf_plugin) -> Result<Self, String> {
         let (kind, size) = match d.kind {
             PF_KIND_STEP => (PluginKind::Step, size_of::<pf_step_functions>()),
@@ -148,6 +171,13 @@ impl Plugin {
     pub fn functions(&self) -> *const c_void {
         self.functions
     }
+}
+
+/// BLAKE3 of a file, hex.
+pub(crate) fn hash_of(path: &Utf8Path) -> std::io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(std::fs::File::open(path)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
 }
 
 /// Reads a manifest by all of its rules; the error is a sentence.

@@ -15,8 +15,8 @@ extern "C" fn on_terminate(_: libc::c_int) {
     CANCELLED.store(true, Ordering::Relaxed);
 }
 
-/// Makes this process a worker: SIGTERM asks the step to stop, Ctrl-C is left to the engine (which sends
-/// SIGTERM), and the process dies when the thread that started it ends.
+/// Makes this process a worker: SIGTERM asks the step to stop, Ctrl-C and a closed terminal are left to the engine
+/// (which sends SIGTERM), and the process dies when the thread that started it ends.
 pub(crate) fn become_worker() {
     unsafe {
         let mut action: libc::sigaction = std::mem::zeroed();
@@ -24,14 +24,18 @@ pub(crate) fn become_worker() {
         action.sa_flags = libc::SA_RESTART;
         libc::sigaction(libc::SIGTERM, &raw const action, std::ptr::null_mut());
         libc::signal(libc::SIGINT, libc::SIG_IGN);
+        libc::signal(libc::SIGHUP, libc::SIG_IGN);
         #[cfg(target_os = "linux")]
         libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL as libc::c_ulong);
     }
 }
 
-/// Limits the memory that this process may use for data; 0: no limit.
+/// Limits the memory that this process may use for data, and tells its libraries; 0: no limit.
+///
+/// Call before any other thread exists.
 pub(crate) fn limit_memory(bytes: u64) {
     if bytes > 0 {
+        unsafe { std::env::set_var(plyflow_model::budget::MEMORY_VARIABLE, bytes.to_string()) };
         let limit = libc::rlimit {
             rlim_cur: bytes,
             rlim_max: bytes,

@@ -187,7 +187,8 @@ fn load(job: &Job) -> Result<Plugin, Failure> {
             job.version
         )));
     }
-    let plugin = Plugin::load(&job.plugin.path).map_err(|e| failed(e.to_string()))?;
+    let hash = job.plugin.hash.as_deref();
+    let plugin = Plugin::load_bytes(&job.plugin.path, hash).map_err(|e| failed(e.to_string()))?;
     if plugin.manifest.kind != PluginKind::Step {
         return Err(failed(format!(
             "{}: the plugin '{}' is of kind {}; a step needs kind step",

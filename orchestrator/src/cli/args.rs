@@ -44,9 +44,12 @@ pub enum Command {
     Report(ReportArgs),
     /// List the plugins that can be found, or the parameters of one
     #[command(
-        after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --plugins ./build ./build/libmine.so"
+        after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --trust ./build/libmine.so"
     )]
     Plugins(PluginsArgs),
+    /// Keep the list of libraries, besides Plyflow's own, that you let it load
+    #[command(after_help = TRUST_EXAMPLES)]
+    Trust(TrustArgs),
     /// Judge a plugin against the contract, in a process of its own
     #[command(after_help = CHECK_PLUGIN_EXAMPLES)]
     CheckPlugin(CheckPluginArgs),
@@ -108,6 +111,16 @@ Examples:
 Found are names, keys, types, units, bounds, wires, missing files, and scenes that make no sense. What only a run finds: what
 is in STL and CSV files, curves of materials that make no law, and what depends on the mesh.";
 
+const TRUST_EXAMPLES: &str = "\
+Examples:
+  plyflow trust ./libmine.so            # these bytes, wherever they lie
+  plyflow trust target/release          # a folder that you build into
+  plyflow trust                         # show the list
+  plyflow trust --forget ./libmine.so
+
+A library can do all that you can do. Plyflow loads its own plugins, those in folders that you name (--plugins, PLYFLOW_PLUGINS), and
+those on this list. Any other, such as one in the folder of a workflow, only with --trust or after a question on the terminal.";
+
 const CHECK_PLUGIN_EXAMPLES: &str = "\
 Examples:
   plyflow check-plugin ./libmy_element.so               # with a fabric and a film
@@ -115,7 +128,7 @@ Examples:
   plyflow check-plugin ./libmy_material.so --material my-sheet.yaml
   plyflow check-plugin material-fabric --material my-fabric.yaml --format json
 
-A crash, an exit or a hang of the plugin is a finding as any other. Ends with code 7 when a check failed.";
+To name a library here is to consent that it is loaded. A crash, an exit or a hang of the plugin is a finding as any other. Ends with code 7 when a check failed.";
 
 /// A workflow and where things are.
 #[derive(Debug, Args)]
@@ -136,9 +149,18 @@ pub struct Places {
     /// Folder for artifacts and journals [default: .plyflow beside the workflow]
     #[arg(long, value_name = "DIR")]
     pub store: Option<Utf8PathBuf>,
-    /// Look for plugins here first; may be repeated
+    /// Look for plugins here first, and trust what lies there; may be repeated
     #[arg(long, value_name = "DIR")]
     pub plugins: Vec<Utf8PathBuf>,
+    /// Load libraries that a workflow brings along: all, or the one with this path or BLAKE3; may be repeated
+    #[arg(
+        long,
+        value_name = "LIBRARY",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = ""
+    )]
+    pub trust: Vec<String>,
 }
 
 /// `run`
@@ -314,6 +336,20 @@ pub struct PluginsArgs {
     /// Form
     #[arg(long, value_enum, default_value = "text")]
     pub format: TextOrJson,
+    /// Write the manifest of the named plugin into a file beside its library, so that others can read it without loading it
+    #[arg(long, requires = "name")]
+    pub write_manifest: bool,
+}
+
+/// `trust`
+#[derive(Debug, Args)]
+pub struct TrustArgs {
+    /// Libraries (their bytes as they are now) or folders (whatever will lie there) [default: show the list]
+    #[arg(value_name = "LIBRARY|DIR|BLAKE3")]
+    pub paths: Vec<Utf8PathBuf>,
+    /// Take them out of the list
+    #[arg(long, requires = "paths")]
+    pub forget: bool,
 }
 
 /// `check-plugin`
@@ -332,6 +368,9 @@ pub struct CheckPluginArgs {
     /// Look for plugins here first; may be repeated
     #[arg(long, value_name = "DIR")]
     pub plugins: Vec<Utf8PathBuf>,
+    /// Also load libraries that a material file names
+    #[arg(long)]
+    pub trust: bool,
     /// Seconds after which a plugin counts as hanging
     #[arg(long, value_name = "SECONDS", default_value = "120")]
     pub time_limit: f64,

@@ -6,20 +6,20 @@
 //! every check as it begins and ends, so that a worker that dies or hangs leaves behind which check it was.
 
 use super::args::{CheckPluginArgs, Places, TextOrJson};
-use super::open::{catalog, program, search_path};
+use super::open::{catalog, folders, program};
 use super::{Done, Stop, print};
+use crate::engine::drive::library;
 use crate::engine::executor::{Executor, Outcome, Report, Task};
 use crate::engine::local::Local;
 use crate::exit;
 use camino::{Utf8Path, Utf8PathBuf};
-use plyflow_model::job::{JOB_VERSION, Job, LibraryRef, Message};
+use plyflow_model::job::{JOB_VERSION, Job, Message};
 use plyflow_model::manifest::PluginKind;
 use plyflow_plugin_host::PluginCatalog;
 use plyflow_workflow::resolved::{PluginId, ResolvedStep};
 use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::io::IsTerminal;
 
 /// How the step marks the lines that hold a check.
 const MARK: &str = "conformance: ";
@@ -87,10 +87,17 @@ pub fn check_plugin(args: &CheckPluginArgs) -> Done {
     let places = Places {
         store: None,
         plugins: args.plugins.clone(),
+        // To judge a library is to run it: whoever names its path consents.
+        trust: match args.trust {
+            true => vec![String::new()],
+            false => Some(args.plugin.clone())
+                .filter(|p| Utf8Path::new(p).is_file())
+                .into_iter()
+                .collect(),
+        },
     };
-    let folders = search_path(&places, None)?;
     // No store: a look at a plugin leaves nothing behind.
-    let catalog = catalog(folders.clone(), Utf8Path::new(""))?;
+    let catalog = catalog(folders(&places, None)?, &places, Utf8Path::new(""))?;
     let mut verdict = Verdict::new(&args.plugin);
     match catalog.find(&args.plugin, Utf8Path::new(".")) {
         Ok(entry) => {
@@ -110,7 +117,7 @@ pub fn check_plugin(args: &CheckPluginArgs) -> Done {
                         .into(),
                 );
             } else {
-                judge(args, &entry, &catalog, folders, &mut verdict)?;
+                judge(args, &entry, &catalog, &mut verdict)?;
             }
         }
         Err(e @ CatalogError::Broken { .. }) => verdict.broken(&e.to_string()),
@@ -124,7 +131,6 @@ fn judge(
     args: &CheckPluginArgs,
     entry: &CatalogEntry,
     catalog: &PluginCatalog,
-    search_path: Vec<Utf8PathBuf>,
     verdict: &mut Verdict,
 ) -> Done {
     let folder = Folder::new()?;
@@ -132,15 +138,18 @@ fn judge(
     std::fs::write(&file, workflow(args, entry, &folder.0)?)
         .map_err(Stop::machine(format!("writing {file}")))?;
     let resolved = plyflow_workflow::resolve(&file, catalog, &[]).map_err(|findings| {
-        super::warn(&findings.render(std::io::stderr().is_terminal()));
+        super::show_findings(&findings);
         Stop::silent(exit::INVALID)
     })?;
     let step = resolved.workflow.steps.into_iter().next();
     let step = step.ok_or_else(|| Stop::new(exit::INTERNAL, "the workflow has no step"))?;
     named_by_material(entry, &step)?;
+    for id in &step.components {
+        catalog.admit(id).map_err(|e| Stop::new(exit::INVALID, e))?;
+    }
     let task = Task {
         id: 0,
-        job: job(&step, search_path, &folder.0),
+        job: job(&step, catalog.trusted_folders(), &folder.0),
         time_limit: args.time_limit,
         log: folder.0.join("log"),
     };
@@ -243,10 +252,7 @@ fn workflow(
 }
 
 fn job(step: &ResolvedStep, search_path: Vec<Utf8PathBuf>, folder: &Utf8Path) -> Job {
-    let library = |p: &PluginId| LibraryRef {
-        name: p.name.clone(),
-        path: p.path.clone(),
-    };
+    let library = |p: &PluginId| library(p, &search_path);
     Job {
         version: JOB_VERSION,
         step: step.name.clone(),
@@ -254,7 +260,7 @@ fn job(step: &ResolvedStep, search_path: Vec<Utf8PathBuf>, folder: &Utf8Path) ->
         key: String::new(),
         plugin: library(&step.plugin),
         components: step.components.iter().map(library).collect(),
-        search_path,
+        search_path: search_path.clone(),
         parameters: step.parameters.clone(),
         inputs: Vec::new(),
         output_kind: step.output_kind.clone(),

@@ -82,6 +82,7 @@ fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
     let places = Places {
         store: args.places.store.clone(),
         plugins: args.places.plugins.clone(),
+        trust: args.places.trust.clone(),
     };
     let opened = open(&Workflow {
         workflow: file.clone(),

@@ -9,6 +9,7 @@ mod extract;
 mod front;
 mod inspect;
 mod keys;
+mod machine;
 mod open;
 mod plan;
 mod plugins;
@@ -16,6 +17,7 @@ mod report;
 mod results;
 mod run;
 mod table;
+mod trust;
 mod verify;
 
 pub use args::Cli;
@@ -23,8 +25,9 @@ pub use args::Cli;
 use crate::exit;
 use args::Command;
 use clap::{CommandFactory, Parser};
+use plyflow_model::text::safe;
 use std::fmt::Display;
-use std::io::Write as _;
+use std::io::{IsTerminal, Write as _};
 
 /// An end of a command that is not success: what to say and the exit code.
 #[derive(Debug)]
@@ -61,8 +64,14 @@ impl Stop {
 /// What a command ends with.
 pub type Done = Result<(), Stop>;
 
-/// Writes to standard error. Whoever reads may have gone, the disk may be full: what happened is told by the exit code all the same.
+/// Writes to standard error, with what could steer a terminal made visible. Whoever reads may have gone, the disk may be full: what happened is told by the exit code all the same.
 pub(crate) fn warn(text: &str) {
+    let _ = std::io::stderr().lock().write_all(safe(text).as_bytes());
+}
+
+/// Shows findings in colours on a terminal. Their own text has been made safe, the colours have not.
+pub(crate) fn show_findings(findings: &plyflow_workflow::Diagnostics) {
+    let text = findings.render(std::io::stderr().is_terminal());
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
@@ -79,6 +88,7 @@ pub fn main() -> u8 {
             };
         }
     };
+    plyflow_plugin_host::Orphans::adopt();
     match dispatch(cli.command) {
         Ok(()) => exit::OK,
         Err(stop) => {
@@ -100,6 +110,7 @@ fn dispatch(command: Command) -> Done {
         Command::Results(a) => results::results(&a),
         Command::Report(a) => report::report(&a),
         Command::Plugins(a) => plugins::plugins(&a),
+        Command::Trust(a) => trust::command(&a),
         Command::CheckPlugin(a) => check_plugin::check_plugin(&a),
         Command::Inspect(a) => inspect::inspect(&a),
         Command::Extract(a) => extract::extract(&a),
@@ -114,11 +125,14 @@ fn dispatch(command: Command) -> Done {
     }
 }
 
-/// Prints to standard output; a reader that has gone away (`| head`) ends the command quietly.
+/// Prints to standard output, with what could steer a terminal made visible; a reader that has gone away (`| head`) ends the command quietly.
 pub fn print(text: &str) -> Done {
     use std::io::Write;
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out
+        .write_all(safe(text).as_bytes())
+        .and_then(|()| out.flush())
+    {
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Err(Stop::silent(exit::OK)),
         Err(e) => Err(Stop::machine("standard output")(e)),
         Ok(()) => Ok(()),

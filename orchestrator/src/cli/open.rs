@@ -1,8 +1,8 @@
 //! Opens what most commands need: the plugins, the workflow, the store.
 
-use super::Stop;
 use super::args::{Places, Workflow};
-use crate::engine::core::Limits;
+use super::{Stop, trust};
+use crate::engine::core::{Limits, State};
 use crate::engine::{Options, Session};
 use crate::exit;
 use crate::plan::Graph;
@@ -12,7 +12,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_plugin_host::{Describer, PluginCatalog};
 use plyflow_workflow::Part;
 use plyflow_workflow::resolved::ResolvedWorkflow;
-use std::io::IsTerminal;
+use std::collections::HashSet;
 
 /// A workflow that is ready to plan, and where its things are.
 pub struct Opened {
@@ -23,7 +23,7 @@ pub struct Opened {
     /// Its store.
     pub store: Store,
     /// Where plugins are looked for.
-    pub search_path: Vec<Utf8PathBuf>,
+    pub catalog: PluginCatalog,
 }
 
 /// This program.
@@ -44,47 +44,64 @@ fn absolute(path: &Utf8Path) -> Utf8PathBuf {
     camino::absolute_utf8(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// The folders where plugins are looked for, in order: the command line, the workflow, the environment,
-/// beside this program.
+/// The folders where plugins are looked for, by whom they are trusted.
+#[derive(Debug, Default)]
+pub struct Folders {
+    /// All, in the order of the search: the command line, the workflow, the environment, beside this program.
+    pub search: Vec<Utf8PathBuf>,
+    /// Beside this program.
+    installation: Vec<Utf8PathBuf>,
+    /// Of the command line and the environment: the user's own.
+    own: Vec<Utf8PathBuf>,
+}
+
+/// The folders where plugins are looked for.
 ///
 /// # Errors
 /// When this program cannot be found.
-pub fn search_path(places: &Places, workflow: Option<&Utf8Path>) -> Result<Vec<Utf8PathBuf>, Stop> {
-    let mut folders: Vec<Utf8PathBuf> = places.plugins.iter().map(|p| absolute(p)).collect();
-    for given in &folders {
+pub fn folders(places: &Places, workflow: Option<&Utf8Path>) -> Result<Folders, Stop> {
+    let mut found = Folders::default();
+    for given in places.plugins.iter().map(|p| absolute(p)) {
         if !given.is_dir() {
             return Err(Stop::new(
                 exit::USAGE,
                 format!("--plugins {given}: there is no such folder"),
             ));
         }
+        found.own.push(given);
     }
+    let mut search = found.own.clone();
     // The file is parsed twice only when it may name folders: a study may have ten thousand steps.
     if let Some(file) = workflow.filter(|f| mentions_plugins(f)) {
-        folders.extend(plyflow_workflow::plugin_search_folders(file));
+        search.extend(plyflow_workflow::plugin_search_folders(file));
     }
     if let Some(list) = std::env::var_os("PLYFLOW_PLUGINS") {
         let given = std::env::split_paths(&list).filter(|p| !p.as_os_str().is_empty());
-        folders.extend(
-            given
-                .filter_map(|p| Utf8PathBuf::from_path_buf(p).ok())
-                .map(|p| absolute(&p)),
-        );
-    }
-    if let Some(beside) = program()?.parent() {
-        folders.push(beside.join("plugins"));
-        folders.push(beside.to_owned());
-        if let Some(prefix) = beside.parent() {
-            folders.push(prefix.join("lib/plyflow"));
+        for path in given.filter_map(|p| Utf8PathBuf::from_path_buf(p).ok()) {
+            // A path from where one happens to stand may lead into a stranger's folder.
+            if path.is_absolute() {
+                found.own.push(path.clone());
+            }
+            search.push(absolute(&path));
         }
     }
+    if let Some(beside) = program()?.parent() {
+        found
+            .installation
+            .extend([beside.join("plugins"), beside.to_owned()]);
+        if let Some(prefix) = beside.parent() {
+            found.installation.push(prefix.join("lib/plyflow"));
+        }
+    }
+    search.extend(found.installation.iter().cloned());
     let mut seen = Vec::new();
-    folders.retain(|f| {
+    search.retain(|f| {
         let new = f.is_dir() && !seen.contains(f);
         seen.push(f.clone());
         new
     });
-    Ok(folders)
+    found.search = search;
+    Ok(found)
 }
 
 fn mentions_plugins(file: &Utf8Path) -> bool {
@@ -103,11 +120,12 @@ pub fn store_root(places: &Places, workflow: Option<&Utf8Path>) -> Utf8PathBuf {
     }
 }
 
-/// The plugins on a search path. What is known of them is kept in the store, if there is one.
+/// The plugins on a search path, behind the gate of what the user trusts. What is known of them is kept in the store, if
+/// there is one.
 ///
 /// # Errors
-/// When this program cannot be found.
-pub fn catalog(folders: Vec<Utf8PathBuf>, store: &Utf8Path) -> Result<PluginCatalog, Stop> {
+/// When this program cannot be found, or `--trust` names no library.
+pub fn catalog(folders: Folders, places: &Places, store: &Utf8Path) -> Result<PluginCatalog, Stop> {
     let describer = Describer::Child {
         program: program()?,
         arguments: vec!["step-worker".into(), "--describe".into()],
@@ -122,7 +140,8 @@ pub fn catalog(folders: Vec<Utf8PathBuf>, store: &Utf8Path) -> Result<PluginCata
     {
         super::warn(&format!("plyflow: {text}\n"));
     }
-    Ok(PluginCatalog::new(folders, cache, describer))
+    let trust = trust::trust(places, &folders.installation, folders.own)?;
+    Ok(PluginCatalog::new(folders.search, cache, describer).gated(trust))
 }
 
 /// Reads and checks a workflow; says everything that is wrong with it.
@@ -133,7 +152,7 @@ pub fn open(args: &Workflow) -> Result<Opened, Stop> {
     match load(args)? {
         Ok(opened) => Ok(opened),
         Err(findings) => {
-            super::warn(&findings.render(std::io::stderr().is_terminal()));
+            super::show_findings(&findings);
             Err(Stop::silent(exit::INVALID))
         }
     }
@@ -149,12 +168,12 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
         let text = format!("there is no workflow file {file}");
         return Err(Stop::new(exit::USAGE, text));
     }
-    let search_path = search_path(&args.places, Some(file))?;
+    let folders = folders(&args.places, Some(file))?;
     let root = store_root(&args.places, Some(file));
-    let catalog = catalog(search_path.clone(), &root)?;
+    let catalog = catalog(folders, &args.places, &root)?;
     let overrides = overrides(&args.set)?;
     let full = absolute(file);
-    let circumstances = resolved::circumstances(&program()?, &full, &args.set, &search_path);
+    let circumstances = resolved::circumstances(&program()?, &full, &args.set, catalog.folders());
     let kept = circumstances
         .as_ref()
         .and_then(|c| resolved::read(&root, &full, c, &catalog));
@@ -175,7 +194,7 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
         workflow,
         graph,
         store: Store::new(root),
-        search_path,
+        catalog,
     }))
 }
 
@@ -190,8 +209,9 @@ pub fn check_part(
     if !file.is_file() {
         return Ok(None);
     }
-    let search_path = search_path(&args.places, Some(file))?;
-    let catalog = catalog(search_path, &store_root(&args.places, Some(file)))?;
+    let folders = folders(&args.places, Some(file))?;
+    let root = store_root(&args.places, Some(file));
+    let catalog = catalog(folders, &args.places, &root)?;
     Ok(plyflow_workflow::check_part(file, &catalog))
 }
 
@@ -216,7 +236,7 @@ impl Opened {
         };
         let options = Options {
             limits,
-            search_path: self.search_path.clone(),
+            search_path: self.catalog.trusted_folders(),
             force: Vec::new(),
             compare: Vec::new(),
             checkpoint_interval: f64::INFINITY,
@@ -227,6 +247,36 @@ impl Opened {
             )?;
         session.look(&mut Quiet);
         Ok(session)
+    }
+
+    /// Whether every library that a run would load may be loaded: those of steps that are not all in the store. Asked of the libraries
+    /// as they are now, whatever the store has kept of them.
+    ///
+    /// # Errors
+    /// [`exit::INVALID`] with the first library that may not.
+    pub fn admit(&self, session: &Session<'_>) -> Result<(), Stop> {
+        let core = &session.core;
+        let open = core.instances().iter();
+        let open: HashSet<usize> = open
+            .filter(|i| !matches!(i.state, State::Done { .. }))
+            .map(|i| i.step)
+            .collect();
+        let mut seen = HashSet::new();
+        for (at, step) in self.workflow.steps.iter().enumerate() {
+            let plan = &self.graph.steps[at];
+            let hidden = || !plan.dimensions.is_empty() && !core.hidden_by(at).is_empty();
+            if !plan.wanted || !(open.contains(&at) || hidden()) {
+                continue;
+            }
+            for id in std::iter::once(&step.plugin).chain(&step.components) {
+                if seen.insert(&id.path) {
+                    self.catalog
+                        .admit(id)
+                        .map_err(|e| Stop::new(exit::INVALID, format!("{}: {e}", step.name)))?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Wants only these steps and what they need.

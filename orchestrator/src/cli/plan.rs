@@ -15,7 +15,6 @@ use plyflow_model::job::Cost;
 use plyflow_plugin_host::cost_so_far;
 use plyflow_workflow::Part;
 use serde_json::json;
-use std::io::IsTerminal;
 
 /// What a run would do with an instance, or with the hidden ones of a step.
 pub struct Prospect {
@@ -343,7 +342,7 @@ pub fn validate(args: &ValidateArgs) -> Done {
                 // A reader that has gone away must not make findings a success.
                 let _ = print(&format!("{:#}\n", findings.to_json()));
             } else {
-                super::warn(&findings.render(std::io::stderr().is_terminal()));
+                super::show_findings(&findings);
             }
             Err(Stop::silent(exit::INVALID))
         }

@@ -1,11 +1,12 @@
 //! `plugins` and `schema`: what can be written into files.
 
 use super::args::{PluginsArgs, SchemaArgs, SchemaKind, TextOrJson};
-use super::open::{catalog, search_path, store_root};
+use super::open::{catalog, folders, store_root};
 use super::{Done, Stop, keys, print};
 use crate::exit;
 use camino::Utf8Path;
 use plyflow_model::schema;
+use plyflow_plugin_host::{PluginCatalog, manifest_file};
 use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
 use serde_json::{Value, json};
 
@@ -15,8 +16,8 @@ use serde_json::{Value, json};
 /// [`exit::USAGE`] when the named plugin is not found or broken.
 pub fn plugins(args: &PluginsArgs) -> Done {
     let file = args.workflow.as_deref();
-    let folders = search_path(&args.places, file)?;
-    let catalog = catalog(folders, &store_root(&args.places, file))?;
+    let folders = folders(&args.places, file)?;
+    let catalog = catalog(folders, &args.places, &store_root(&args.places, file))?;
     let Some(name) = &args.name else {
         return list(&catalog.plugins(), &catalog.broken(), args.format);
     };
@@ -27,11 +28,26 @@ pub fn plugins(args: &PluginsArgs) -> Done {
                 let folders: Vec<&str> = searched.iter().map(|f| f.as_str()).collect();
                 format!("; searched: {}", folders.join(", "))
             }
-            CatalogError::Broken { .. } => String::new(),
+            _ => String::new(),
         };
         Stop::new(exit::USAGE, format!("{e}{more}"))
     })?;
+    if args.write_manifest {
+        return write_manifest(&entry, &catalog);
+    }
     show(&entry, args.format)
+}
+
+/// Writes what a library says of itself beside it, for those who may not load it.
+fn write_manifest(e: &CatalogEntry, catalog: &PluginCatalog) -> Done {
+    // From the library itself: what lies beside it now may be what is to be replaced.
+    catalog
+        .admit(&e.id)
+        .map_err(|e| Stop::new(exit::USAGE, e))?;
+    let file = manifest_file(&e.id.path);
+    let text = serde_json::to_string_pretty(&e.manifest).unwrap_or_default() + "\n";
+    std::fs::write(&file, text).map_err(Stop::machine(format!("writing {file}")))?;
+    print(&format!("{file}: written\n"))
 }
 
 fn list(
@@ -166,8 +182,8 @@ pub fn schema(args: &SchemaArgs) -> Done {
         SchemaKind::Material => schema::material(),
         SchemaKind::Expected => schema::expected(),
         SchemaKind::Workflow => {
-            let folders = search_path(&args.places, None)?;
-            let catalog = catalog(folders, &store_root(&args.places, None))?;
+            let folders = folders(&args.places, None)?;
+            let catalog = catalog(folders, &args.places, &store_root(&args.places, None))?;
             let manifests: Vec<_> = catalog.plugins().into_iter().map(|e| e.manifest).collect();
             schema::workflow_with(&manifests)
         }

@@ -128,6 +128,12 @@ fn arguments(given: &Workflow) -> String {
     for (option, value) in set.chain(store).chain(folders) {
         words.extend([option.to_owned(), value.to_owned()]);
     }
+    // As it was typed: `--trust` alone, or with what it names.
+    let trust = places.trust.iter().map(|t| match t.as_str() {
+        "" => "--trust".to_owned(),
+        named => format!("--trust={named}"),
+    });
+    words.extend(trust);
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
     let quoted = |w: &String| {
         if !w.is_empty() && w.chars().all(plain) {

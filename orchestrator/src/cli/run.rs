@@ -18,7 +18,7 @@ use std::io::{IsTerminal, Read};
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Instant;
 
 /// How often what turns out to be damaged at the end of a run is made again.
@@ -27,7 +27,7 @@ const ROUNDS: usize = 2;
 /// Lines of a failed step's log that are shown.
 const LOG_LINES: usize = 15;
 
-/// Ctrl-C and SIGTERM, counted, with something that becomes readable for `poll`.
+/// Ctrl-C, SIGTERM and SIGHUP, counted, with something that becomes readable for `poll`.
 struct Interrupts {
     wake: UnixStream,
     heard: Arc<AtomicU32>,
@@ -41,10 +41,30 @@ impl Interrupts {
         for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
             signal_hook::low_level::pipe::register(signal, write.try_clone()?)?;
         }
+        Self::listen_to_hangups(write)?;
         Ok(Self {
             wake,
             heard: Arc::default(),
         })
+    }
+
+    /// A closed terminal counts once: the shell and the kernel may both tell of it, and the second would not let steps end in order.
+    /// Whoever ignores it (`nohup`) goes on.
+    fn listen_to_hangups(write: UnixStream) -> std::io::Result<()> {
+        let mut before: libc::sigaction = unsafe { std::mem::zeroed() };
+        let asked = unsafe { libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut before) };
+        if asked == 0 && before.sa_sigaction == libc::SIG_IGN {
+            return Ok(());
+        }
+        let told = AtomicBool::new(false);
+        let tell = move || {
+            if !told.swap(true, Ordering::Relaxed) {
+                let _ = rustix::io::write(&write, b"X");
+            }
+        };
+        // An atomic and a write to a socket that does not block: both are allowed in a handler.
+        unsafe { signal_hook::low_level::register(signal_hook::consts::SIGHUP, tell) }?;
+        Ok(())
     }
 
     fn poll_end(&self) -> std::io::Result<OwnedFd> {
@@ -98,6 +118,10 @@ pub fn run(args: &RunArgs) -> Done {
     .map_err(machine())?;
     let mut observer = observer(args);
     session.look(observer.as_mut());
+    if let Err(stop) = opened.admit(&session) {
+        observer.end();
+        return Err(stop);
+    }
     let interrupts = Interrupts::listen().map_err(machine())?;
     let wake = interrupts.poll_end().map_err(machine())?;
     // Not the path: a build that replaces the program in the middle of a run must not mix versions.
@@ -193,7 +217,7 @@ fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
         _ => opened.workflow.on_failure,
     };
     let memory = match &args.memory {
-        None => machine_memory() / 10 * 9,
+        None => super::machine::memory() / 10 * 9,
         Some(text) => {
             text.parse::<plyflow_model::workflow::Memory>()
                 .map_err(|e| Stop::new(exit::USAGE, format!("--memory {text}: {e}")))?
@@ -206,7 +230,7 @@ fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
             memory,
             policy,
         },
-        search_path: opened.search_path.clone(),
+        search_path: opened.catalog.trusted_folders(),
         force: opened.step_indices(&args.force)?,
         compare: Vec::new(),
         checkpoint_interval: checkpoint_interval(&args.checkpoint_every)?,
@@ -225,12 +249,6 @@ fn checkpoint_interval(text: &str) -> Result<f64, Stop> {
         Ok(_) => Err(wrong("it is negative".into())),
         Err(e) => Err(wrong(e.reason())),
     }
-}
-
-/// Memory of this machine (bytes); 0 when the system does not tell.
-fn machine_memory() -> u64 {
-    let info = rustix::system::sysinfo();
-    u64::from(info.mem_unit) * info.totalram as u64
 }
 
 fn observer(args: &RunArgs) -> Box<dyn Observer> {

@@ -146,6 +146,15 @@ pub struct Limits {
     pub policy: FailurePolicy,
 }
 
+impl Limits {
+    /// The bound of memory (bytes; 0: none) of a step that states none: the run's memory in the share that it has of the cores, but
+    /// no less than a quarter.
+    pub fn memory_of(&self, threads: u32) -> u64 {
+        let share = f64::from(threads) / f64::from(self.cores.max(1));
+        (self.memory as f64 * share.clamp(0.25, 1.0)) as u64
+    }
+}
+
 /// The state of a run.
 pub struct Core<'g> {
     graph: &'g Graph,

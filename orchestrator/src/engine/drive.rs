@@ -22,7 +22,7 @@ use opening::{look_at_journal, open_for_writing};
 use plyflow_model::job::{
     Checkpoints, Cost, DATA_MODEL_VERSION, JOB_VERSION, Job, JobInput, LibraryRef, Message, Record,
 };
-use plyflow_workflow::resolved::ResolvedWorkflow;
+use plyflow_workflow::resolved::{PluginId, ResolvedWorkflow};
 use std::collections::{HashMap, VecDeque};
 use std::io;
 use std::time::Duration;
@@ -34,7 +34,7 @@ const BEAT: Duration = Duration::from_millis(200);
 pub struct Options {
     /// Cores, memory, policy.
     pub limits: Limits,
-    /// Folders searched for components.
+    /// Folders searched for components, without links: those whose libraries are trusted whatever their bytes.
     pub search_path: Vec<Utf8PathBuf>,
     /// Run again even what the store has (for steps named here).
     pub force: Vec<usize>,
@@ -368,10 +368,7 @@ impl<'a> Session<'a> {
                 );
             }
         }
-        let library = |p: &plyflow_workflow::resolved::PluginId| LibraryRef {
-            name: p.name.clone(),
-            path: p.path.clone(),
-        };
+        let library = |p: &PluginId| library(p, &self.options.search_path);
         let job = Job {
             version: JOB_VERSION,
             step: step.name.clone(),
@@ -385,7 +382,10 @@ impl<'a> Session<'a> {
             output_kind: step.output_kind.clone(),
             collection: step.collection,
             threads,
-            memory_limit: step.resources.memory,
+            memory_limit: match step.resources.memory {
+                0 => self.options.limits.memory_of(threads),
+                stated => stated,
+            },
             artifact,
             record,
             scratch: place(".scratch"),
@@ -608,6 +608,17 @@ impl<'a> Session<'a> {
             .journal
             .failure(step, &instance.item, instance.key.as_ref()?)?;
         Some(self.failure(id, reason))
+    }
+}
+
+/// A library as a worker is told of it: one that lies outside of the trusted folders with the bytes that were consented to.
+pub(crate) fn library(id: &PluginId, trusted: &[Utf8PathBuf]) -> LibraryRef {
+    let folder = id.path.parent();
+    let is_trusted = trusted.iter().any(|f| Some(f.as_path()) == folder);
+    LibraryRef {
+        name: id.name.clone(),
+        path: id.path.clone(),
+        hash: (!is_trusted).then(|| id.hash.clone()),
     }
 }
 

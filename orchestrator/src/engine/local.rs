@@ -3,6 +3,7 @@
 use super::executor::{Executor, Outcome, Report, Task};
 use camino::Utf8PathBuf;
 use plyflow_model::job::{FailureKind, LogLevel, Message};
+use plyflow_plugin_host::Orphans;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{MemfdFlags, OFlags};
 use rustix::process::{Pid, PidfdFlags, Signal};
@@ -36,6 +37,9 @@ struct Worker {
     verdict: Option<Message>,
     log: Log,
     time_limit: f64,
+    memory_limit: u64,
+    /// It said that memory was refused to it.
+    wants_memory: bool,
     deadline: Option<Instant>,
     kill_at: Option<Instant>,
     stop: Option<Stop>,
@@ -226,6 +230,8 @@ impl Executor for Local {
                 file: None,
             },
             time_limit: task.time_limit,
+            memory_limit: task.job.memory_limit,
+            wants_memory: false,
             deadline,
             kill_at: None,
             stop: None,
@@ -255,6 +261,8 @@ impl Executor for Local {
             }
             if exited && let Some(mut worker) = self.workers.remove(&id) {
                 let outcome = worker.reap();
+                let alive: Vec<u32> = self.workers.values().map(|w| w.process.id()).collect();
+                Orphans::end(&alive);
                 out.push(Report::Ended { id, outcome });
             }
         }
@@ -277,6 +285,7 @@ impl Drop for Local {
             worker.signal(Signal::KILL);
             let _ = worker.process.wait();
         }
+        Orphans::end(&[]);
     }
 }
 
@@ -339,7 +348,10 @@ impl Worker {
         while let Some(pipe) = &mut self.stderr {
             match pipe.read(&mut buffer) {
                 Ok(0) => self.stderr = None,
-                Ok(n) => self.log.write(&buffer[..n]),
+                Ok(n) => {
+                    self.wants_memory |= tells_of_memory(&buffer[..n]);
+                    self.log.write(&buffer[..n]);
+                }
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
                 Err(_) => break,
             }
@@ -386,6 +398,13 @@ impl Worker {
                 }
             }
             (Some(Message::Failed { kind, message }), None) => Outcome::Failed { kind, message },
+            (_, None) if self.wants_memory && self.memory_limit > 0 => {
+                let message = out_of_memory(self.memory_limit);
+                Outcome::Failed {
+                    kind: FailureKind::Error,
+                    message,
+                }
+            }
             (_, None) => match status.signal() {
                 Some(n) => Outcome::Signal(
                     signal_hook::low_level::signal_name(n)
@@ -395,6 +414,21 @@ impl Worker {
             },
         }
     }
+}
+
+/// Whether what a worker wrote as it died says that memory was refused to it: Rust's and C++'s words.
+fn tells_of_memory(said: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(said);
+    text.contains("memory allocation of ") || text.contains("std::bad_alloc")
+}
+
+/// What to say of a step that came to its bound of memory (bytes).
+fn out_of_memory(bound: u64) -> String {
+    format!(
+        "it wanted more memory than its bound of {:.1} GiB; give it more with `resources: {{memory: ..}}` of the step, or let it \
+         compute less: larger elements, a coarser grid, fewer frames",
+        bound as f64 / (1u64 << 30) as f64
+    )
 }
 
 fn level_name(level: LogLevel) -> &'static str {

@@ -1,7 +1,7 @@
 //! The engine: [`core`] decides, [`drive`](mod@drive) acts, an [`Executor`] runs jobs somewhere.
 
 pub mod core;
-mod drive;
+pub(crate) mod drive;
 pub(crate) mod executor;
 pub(crate) mod local;
 mod shown;

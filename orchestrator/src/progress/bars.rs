@@ -5,6 +5,7 @@ use crate::engine::core::{Core, Id, State};
 use crate::engine::{Observer, Update};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use plyflow_model::job::LogLevel;
+use plyflow_model::text::{one_line, safe};
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
@@ -55,7 +56,7 @@ impl Default for Bars {
 
 impl Bars {
     fn line(&self, text: &str) {
-        let _ = self.all.println(text);
+        let _ = self.all.println(safe(text));
     }
 
     fn close(&mut self, id: Id) {
@@ -97,7 +98,7 @@ impl Observer for Bars {
                 self.line(&format!("{:>16} DAMAGED: {what}", core.label(id)));
             }
             Update::Started { .. } => {
-                let label = core.label(id);
+                let label = one_line(&core.label(id)).into_owned();
                 self.running.insert(
                     id,
                     Running {
@@ -113,7 +114,7 @@ impl Observer for Bars {
                     let left = running.pace.left(p.fraction, Instant::now());
                     if let Some(bar) = &running.bar {
                         bar.set_position((1000.0 * p.fraction.clamp(0.0, 1.0)) as u64);
-                        bar.set_message(progress_text(p, left));
+                        bar.set_message(one_line(&progress_text(p, left)).into_owned());
                     }
                 }
             }

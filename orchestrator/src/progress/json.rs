@@ -3,7 +3,6 @@
 use crate::engine::core::{Core, Id};
 use crate::engine::{Observer, Update};
 use serde_json::{Value, json};
-use std::io::Write;
 
 /// Writes `{"event", "step", "item", ..}` lines.
 pub struct JsonLines;
@@ -35,6 +34,6 @@ impl Observer for JsonLines {
         if let (Value::Object(line), Value::Object(more)) = (&mut line, more) {
             line.extend(more);
         }
-        let _ = writeln!(std::io::stderr().lock(), "{line}");
+        crate::cli::warn(&format!("{line}\n"));
     }
 }

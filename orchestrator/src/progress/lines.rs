@@ -5,7 +5,6 @@ use crate::engine::core::{Core, Id};
 use crate::engine::{Observer, Update};
 use plyflow_model::job::LogLevel;
 use std::collections::HashMap;
-use std::io::Write;
 use std::time::{Duration, Instant};
 
 /// Progress of a step is told at most this often.
@@ -19,7 +18,7 @@ pub struct Lines {
 
 fn say(text: &str) {
     // A closed standard error must not stop a run.
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    crate::cli::warn(&format!("{text}\n"));
 }
 
 impl Observer for Lines {

@@ -1,29 +1,33 @@
-//! `plyflow step-worker`: one process, one step. The plugin host does the work; this module sees to it that
-//! the process ends when it should.
+//! `plyflow step-worker`: one step, in a process under a supervisor. The plugin host does the work; this module sees to
+//! it that the processes end when they should.
 
 use camino::Utf8Path;
+use plyflow_plugin_host::supervise;
 use rustix::process::{Pid, Signal};
 
 /// Runs the worker and ends the process. `arguments` are those after `step-worker`: the file of a job or
-/// `-`, with `--parent PID` when the engine is its parent; or `--describe LIBRARY`.
-pub fn main(arguments: &[String]) -> ! {
+/// `-`, with `--parent PID` when the engine is its parent; or `--describe LIBRARY`. `inside` is called first in the
+/// process that loads libraries.
+///
+/// All end by `_exit`: a plugin's clean-up at exit must not turn a finished step into a crash.
+pub fn main(arguments: &[String], inside: impl FnOnce()) -> ! {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let code = match words[..] {
-        ["--describe", library] => plyflow_plugin_host::describe_main(Utf8Path::new(library)),
-        [source] => plyflow_plugin_host::worker_main(source),
+    match words[..] {
+        ["--describe", library] => supervise(inside, || {
+            plyflow_plugin_host::describe_main(Utf8Path::new(library))
+        }),
+        [source] => supervise(inside, || plyflow_plugin_host::worker_main(source)),
         [source, "--parent", parent] => match follow(parent) {
-            Ok(()) => plyflow_plugin_host::worker_main(source),
+            Ok(()) => supervise(inside, || plyflow_plugin_host::worker_main(source)),
             Err(text) => refuse(&text),
         },
         _ => refuse("wants the file of a job, or - for standard input"),
-    };
-    // Not `std::process::exit`: a plugin's clean-up at exit must not turn a finished step into a crash.
-    unsafe { libc::_exit(code) }
+    }
 }
 
-fn refuse(text: &str) -> i32 {
-    eprintln!("plyflow step-worker: {text}");
-    2
+fn refuse(text: &str) -> ! {
+    crate::cli::warn(&format!("plyflow step-worker: {text}\n"));
+    unsafe { libc::_exit(2) }
 }
 
 /// Dies when the engine dies, however it dies.

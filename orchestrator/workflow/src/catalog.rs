@@ -35,6 +35,41 @@ pub enum CatalogError {
         /// Why: ABI version, manifest, missing symbol.
         reason: String,
     },
+    /// It would have to be loaded to know more, or to run it, and that is not allowed.
+    #[error("{}", consent_text(libraries))]
+    NeedsConsent {
+        /// Name or path as given.
+        name: String,
+        /// Libraries that may not be loaded, with the BLAKE3 (hex) of their bytes.
+        libraries: Vec<(Utf8PathBuf, String)>,
+    },
+    /// Two different libraries have the same name, and one of them is trusted more than the other.
+    #[error(
+        "`{name}` is the name of the plugin {owner}, and {other} takes it: two libraries of one name, so that nobody can \
+         know which is meant; give the second another name, or take it out of the folder"
+    )]
+    Taken {
+        /// The name.
+        name: String,
+        /// The library that comes with this program, or that is on the user's own list.
+        owner: Utf8PathBuf,
+        /// The library that takes its name.
+        other: Utf8PathBuf,
+    },
+}
+
+fn consent_text(libraries: &[(Utf8PathBuf, String)]) -> String {
+    let [(path, hash), more @ ..] = libraries else {
+        return "a library was not loaded".into();
+    };
+    let others = match more.len() {
+        0 => String::new(),
+        n => format!(", nor {n} more beside it,"),
+    };
+    format!(
+        "the library {path} (blake3 {hash}) was not loaded{others}: it is neither part of this program nor on your own list, and a \
+         library can do all that you can do. If you trust it: `--trust` for this command, `plyflow trust {path}` for good"
+    )
 }
 
 /// Finds plugins.

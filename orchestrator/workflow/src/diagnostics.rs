@@ -2,6 +2,7 @@
 
 use crate::yaml::Span;
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::text::{one_line, safe, safe_in_place};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -85,6 +86,8 @@ impl Diagnostics {
     }
 
     /// Text for people: each finding with its source line, a caret and a remedy, then a count.
+    ///
+    /// The colours are escape sequences of a terminal; the findings' own text holds none.
     pub fn render(&self, colour: bool) -> String {
         let theme = if colour {
             miette::GraphicalTheme::unicode()
@@ -95,7 +98,8 @@ impl Diagnostics {
             .with_width(110)
             .with_context_lines(1);
         let mut out = String::new();
-        for d in &self.items {
+        let items: Vec<Diagnostic> = self.items.iter().map(Diagnostic::made_safe).collect();
+        for d in &items {
             if handler.render_report(&mut out, &Report::of(d)).is_err() {
                 out += &format!("{}:{}:{}: {}\n", d.file, d.line, d.column, d.message);
             }
@@ -352,6 +356,25 @@ impl Problems {
 }
 
 impl Diagnostic {
+    /// With nothing in it that could steer a terminal.
+    fn made_safe(&self) -> Self {
+        let made = |text: &Option<String>| text.as_ref().map(|t| safe(t).into_owned());
+        let text = self.text.as_ref().map(|t| match safe_in_place(t) {
+            std::borrow::Cow::Borrowed(_) => t.clone(),
+            std::borrow::Cow::Owned(changed) => Arc::new(changed),
+        });
+        Self {
+            file: one_line(self.file.as_str()).into_owned().into(),
+            message: safe(&self.message).into_owned(),
+            given: made(&self.given),
+            expected: made(&self.expected),
+            help: made(&self.help),
+            span: self.span.clone(),
+            text,
+            ..*self
+        }
+    }
+
     /// States what was given.
     pub fn given(&mut self, text: impl Into<String>) -> &mut Self {
         self.given = Some(text.into());

@@ -431,6 +431,8 @@ pub(crate) fn find(
                 CatalogError::Broken { .. } => {
                     d.help("rebuild the plugin against the ABI of this program");
                 }
+                // The message says what to do.
+                CatalogError::NeedsConsent { .. } | CatalogError::Taken { .. } => {}
             }
         }
     }

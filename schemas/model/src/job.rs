@@ -23,6 +23,10 @@ pub struct LibraryRef {
     pub name: String,
     /// The library, absolute.
     pub path: Utf8PathBuf,
+    /// BLAKE3 (hex) that its bytes must have before it is loaded: what the user consented to. Absent: it lies where any
+    /// bytes are trusted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hash: Option<String>,
 }
 
 /// What a step cost.
@@ -80,7 +84,7 @@ pub struct Job {
     pub plugin: LibraryRef,
     /// Components that the parameters name; looked up here before `search_path`.
     pub components: Vec<LibraryRef>,
-    /// Folders searched for further components, in order.
+    /// Folders searched for further components, in order: only such as are trusted whatever lies in them.
     pub search_path: Vec<Utf8PathBuf>,
     /// Resolved parameters: JSON object, SI numbers.
     pub parameters: serde_json::Value,

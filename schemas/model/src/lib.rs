@@ -1,6 +1,7 @@
 //! The words of the domain, typed and without I/O: units, material, scene, workflow and the manifest of
 //! a plugin. Everything else in the repository depends on this crate and it depends on nothing of it.
 
+pub mod budget;
 pub mod canonical;
 pub mod friction;
 pub mod job;
@@ -10,6 +11,7 @@ pub mod nearest;
 pub mod outline;
 pub mod scene;
 pub mod schema;
+pub mod text;
 pub mod units;
 pub mod workflow;
 

@@ -16,6 +16,7 @@ pub use quality::{POOR_JACOBIAN, Quality};
 
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::mirror::Planes;
+use plyflow_model::budget::{self, Wanted};
 use plyflow_model::outline::{Millimetres, OutlineError, Point, Region};
 use plyflow_model::scene::Sheet;
 
@@ -70,6 +71,9 @@ pub enum MeshError {
         /// What happened.
         why: &'static str,
     },
+    /// It would have too many elements; the sentence says how many, and what would do.
+    #[error("{0}")]
+    TooMany(String),
 }
 
 /// The blank of a ply, placed over the tool.
@@ -148,11 +152,34 @@ impl Blank {
         cut::part(self, planes)
     }
 
+    /// Material of it (m2).
+    fn area(&self) -> f64 {
+        match self {
+            Self::Rectangle([x0, y0, x1, y1]) => (x1 - x0) * (y1 - y0),
+            Self::Region(region) => region.area(),
+        }
+    }
+
+    /// Whether a mesh of elements of `size` (m) is not too large to be made.
+    fn allow(&self, size: f64) -> Result<(), MeshError> {
+        budget::allow(Wanted {
+            what: "its mesh",
+            of: "elements",
+            count: self.area() / (size * size),
+            most: budget::MOST_ELEMENTS,
+            bytes: budget::ELEMENT_BYTES,
+            parameter: "element_size",
+            size,
+        })
+        .map_err(MeshError::TooMany)
+    }
+
     /// Its mesh in the plane z = 0 with edges near `size` (m), and the quality of a mesh that follows an outline.
     ///
     /// # Errors
-    /// When the outline cannot be followed at this size.
+    /// When it would have too many elements, or the outline cannot be followed at this size.
     pub fn mesh(&self, size: f64) -> Result<(QuadMesh, Option<Quality>), MeshError> {
+        self.allow(size)?;
         match self {
             Self::Rectangle([x0, y0, x1, y1]) => {
                 let grid = QuadMesh::grid(&even_axis(*x0, *x1, size), &even_axis(*y0, *y1, size));
@@ -163,6 +190,27 @@ impl Blank {
                 let quality = Quality::new(&mesh, region, size);
                 Ok((mesh, Some(quality)))
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elements_a_thousand_times_too_small_are_refused_before_any_is_made() {
+        let square = vec![[0.0, 0.0], [0.4, 0.0], [0.5, 0.3], [0.0, 0.2]];
+        let region = Region::new(square, vec![]).unwrap();
+        for blank in [
+            Blank::Rectangle([0.0, 0.0, 0.4, 0.2]),
+            Blank::Region(region),
+        ] {
+            let error = blank.mesh(1e-6).unwrap_err();
+            assert!(matches!(error, MeshError::TooMany(_)), "{error}");
+            let text = error.to_string();
+            assert!(text.contains("elements at `element_size`"), "{text}");
+            assert!(blank.mesh(0.01).is_ok());
         }
     }
 }

@@ -248,6 +248,7 @@ fn grid(p: &Parameters) -> Grid {
 }
 
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
+    p.common.allow(p.length * p.width)?;
     check(p)?;
     let curve = |path: &Option<String>, y| {
         path.as_ref()

@@ -128,6 +128,7 @@ fn middle(mesh: &QuadMesh, length: f64, width: f64) -> Vec<usize> {
 }
 
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
+    p.common.allow(p.length * p.width)?;
     let eighth = 0.25 * std::f64::consts::PI;
     let turn = eighth - p.mesh_angle;
     let mesh = turned_rectangle(p.length, p.width, p.common.element_size, turn);

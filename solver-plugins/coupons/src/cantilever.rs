@@ -157,6 +157,7 @@ fn grid(p: &Parameters, rotates: bool) -> Grid {
 
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     check_family(p.family)?;
+    p.common.allow(p.overhang * p.width)?;
     if p.duration <= p.ramp_time {
         return Err(format!(
             "duration: given {:.3} s, the weight rises for {:.3} s; expected time to come to rest after it",

@@ -132,6 +132,7 @@ fn curve(path: Option<&String>) -> Result<Option<Curve>, StepError> {
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let closed_form = curve(p.closed_form.as_ref())?;
     let measured = curve(p.measured.as_ref())?;
+    p.common.allow(p.length * p.width)?;
     let xs = even_axis(-0.5 * p.length, 0.5 * p.length, p.common.element_size);
     let ys = even_axis(-0.5 * p.width, 0.5 * p.width, p.common.element_size);
     let mesh = QuadMesh::grid(&xs, &ys);

@@ -224,6 +224,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         )
         .into());
     }
+    p.common.allow(std::f64::consts::PI * p.radius * p.radius)?;
     let mesh = disc(p.radius, p.common.element_size);
     let rim: Vec<u32> = (mesh.on_boundary().iter().enumerate())
         .filter(|(_, on)| **on)

@@ -192,6 +192,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         )?),
         None => None,
     };
+    p.common.allow(p.side * p.side)?;
     let axis = even_axis(0.0, p.side, p.common.element_size);
     let mesh = QuadMesh::grid(&axis, &axis);
     let driven: Vec<u32> = (mesh.on_boundary().iter().enumerate())

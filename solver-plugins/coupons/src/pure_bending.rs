@@ -177,6 +177,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         )?),
         None => None,
     };
+    p.common.allow(p.length * p.width)?;
     // An even number of elements along the strip: a column of nodes lies in its middle.
     let half = (0.5 * p.length / p.common.element_size)
         .round()

@@ -8,6 +8,7 @@ use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
+use plyflow_model::budget::{self, Wanted};
 use plyflow_model::material::Material;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;
@@ -53,6 +54,24 @@ impl Common {
     /// Thickness of the sheet (m).
     pub fn thickness(&self) -> f64 {
         self.material.thickness.si()
+    }
+
+    /// Whether a specimen of this area (m2) does not have too many elements to be made.
+    ///
+    /// # Errors
+    /// Says how many there would be, and what size would do.
+    pub fn allow(&self, area: f64) -> Result<(), StepError> {
+        let size = self.element_size;
+        let wanted = Wanted {
+            what: "the mesh of the specimen",
+            of: "elements",
+            count: area / (size * size),
+            most: budget::MOST_ELEMENTS,
+            bytes: budget::ELEMENT_BYTES,
+            parameter: "element_size",
+            size,
+        };
+        Ok(budget::allow(wanted)?)
     }
 
     /// Mass per area (kg/m2).

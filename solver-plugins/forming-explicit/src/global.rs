@@ -14,6 +14,7 @@ use plyflow_mechanics::mirror::{Mirrors, Planes, on_outer_boundary};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
+use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::{DoubleDiaphragm, Process};
 use plyflow_tooling::{RigidTool, ToolMesh};
 
@@ -101,6 +102,8 @@ fn layout(
             1e3 * film_size
         ));
     }
+    let fine_part = [0, 1].map(|k| fine[k + 2] - if planes.0[k] { 0.0 } else { fine[k] });
+    allow_film(fine_part[0] * fine_part[1], p)?;
     // A grid line lies on every mirror plane.
     let axis = |k: usize, half: f64| {
         let (low, fine_low) = if planes.0[k] {
@@ -129,6 +132,23 @@ fn layout(
         film: QuadMesh::grid(&xs, &ys),
         film_size,
         planes,
+    })
+}
+
+/// Whether the films' elements are not too many to be made; `fine`: the area of the even ones (m2), which are most.
+fn allow_film(fine: f64, p: &Parameters) -> Result<(), String> {
+    let size = p.film_size();
+    budget::allow(Wanted {
+        what: "the mesh of a diaphragm",
+        of: "elements",
+        count: fine / (size * size),
+        most: budget::MOST_ELEMENTS,
+        bytes: budget::ELEMENT_BYTES,
+        parameter: match p.diaphragm_element_size {
+            Some(_) => "diaphragm_element_size",
+            None => "element_size",
+        },
+        size,
     })
 }
 

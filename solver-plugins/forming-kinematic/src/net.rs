@@ -92,7 +92,9 @@ pub struct Net {
 }
 
 /// Most nodes of a net: about 1 GB.
-const MOST_NODES: f64 = 1.2e7;
+pub(crate) const MOST_NODES: f64 = 1.2e7;
+/// What a node takes (bytes).
+pub(crate) const NODE_BYTES: f64 = size_of::<Node>() as f64;
 
 impl Net {
     /// The empty net whose cells cover the blank; `None` when that takes too many nodes.

@@ -1,11 +1,12 @@
 //! The step behind the host: scene, nets, artifact.
 
-use crate::net::{Fabric, Generators, Net, Stop};
+use crate::net::{self, Fabric, Generators, Net, Stop};
 use crate::ply::{Draped, Ply, Stops, lay, plies, stops};
 use crate::root::drop_on;
 use crate::surface::SmoothSurface;
 use plyflow_blank::Quality;
 use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
 use plyflow_surface::vector::distance;
@@ -135,6 +136,20 @@ fn start_of(p: &Parameters, ply: &Ply) -> Result<[f64; 2], String> {
     Ok(start)
 }
 
+/// Whether a net is not too large to be made; it has a node at least for each square of its spacing.
+fn allow_net(fabric: &Fabric) -> Result<(), String> {
+    let [x0, y0, x1, y1] = fabric.blank;
+    budget::allow(Wanted {
+        what: "its net",
+        of: "nodes",
+        count: (x1 - x0) * (y1 - y0) / (fabric.spacing * fabric.spacing),
+        most: net::MOST_NODES,
+        bytes: net::NODE_BYTES,
+        parameter: "net_spacing",
+        size: fabric.spacing,
+    })
+}
+
 fn drape(
     host: &Host,
     p: &Parameters,
@@ -170,6 +185,7 @@ fn drape(
         offset: ply.offset,
         bed,
     };
+    allow_net(&fabric).map_err(|e| format!("ply '{name}': {e}"))?;
     let mut net = Net::new(fabric).ok_or_else(|| {
         format!(
             "the net of ply '{name}' at a spacing of {spacing} m has too many nodes; enlarge `net_spacing`"

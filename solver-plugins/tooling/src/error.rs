@@ -19,6 +19,9 @@ pub enum ToolError {
         /// What to change.
         remedy: String,
     },
+    /// It would have too many facets; the sentence says how many, and what would do.
+    #[error("tool: {0}")]
+    TooMany(String),
     /// The file cannot be read.
     #[error("tool file {}: {source}; give a binary or ASCII STL file, with a path relative to the scene file", path.display())]
     Read {

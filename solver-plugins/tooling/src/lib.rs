@@ -7,6 +7,7 @@
 mod audit;
 mod double_dome;
 mod error;
+mod facets;
 pub mod given;
 mod hemisphere;
 mod mesh;
@@ -41,6 +42,7 @@ pub fn build(tool: &Tool) -> Result<ToolMesh, ToolError> {
 
 /// As [`build`], with STL paths relative to `folder`, the one that holds the scene file.
 pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
+    facets::allow(tool)?;
     match tool {
         Tool::JoggleSpar(spar) => spar::joggle_spar(spar),
         Tool::Flat(flat) => spar::flat(flat),

@@ -131,9 +131,10 @@ impl Study {
         let mut command = Command::new(program());
         command.arg(words[0]).arg(file).args(&words[1..]);
         command.current_dir(self.folder.path());
-        command
-            .env("PLYFLOW_PLUGINS", plyflow_faults::folder())
-            .stdin(Stdio::null());
+        // The study's own folder too: a library that a test builds there is its author's.
+        let folders = [plyflow_faults::folder(), self.folder.path()];
+        let folders = std::env::join_paths(folders).expect("folders without a colon");
+        command.env("PLYFLOW_PLUGINS", folders).stdin(Stdio::null());
         command
     }
 

@@ -26,6 +26,7 @@ fn job(dir: &TempDir, plugin: &str, kind: &str, parameters: Value) -> Job {
         plugin: LibraryRef {
             name: plugin.into(),
             path: utf8(library(plugin)),
+            hash: None,
         },
         components: vec![],
         search_path: vec![],
@@ -344,6 +345,7 @@ fn a_component_is_found_in_the_job_and_on_the_search_path() {
     listed.components = vec![LibraryRef {
         name: "paper".into(),
         path: path.clone(),
+        hash: None,
     }];
     let (code, messages) = run(&listed);
     assert_eq!(code, 0);
@@ -360,6 +362,22 @@ fn a_component_is_found_in_the_job_and_on_the_search_path() {
     );
     by_path.components = listed.components.clone();
     assert_eq!(done(&by_path).results[0].value, 1e-4);
+
+    // A path that nobody has asked the user about is not loaded, unless it lies where everything is trusted.
+    by_path.components = vec![];
+    let (_, text) = failed(&by_path);
+    assert!(text.contains("no folder that is trusted"), "{text}");
+    by_path.search_path = vec![path.parent().unwrap().canonicalize_utf8().unwrap()];
+    assert_eq!(done(&by_path).results[0].value, 1e-4);
+
+    // Bytes that are not those that were consented to.
+    let mut others = listed.clone();
+    others.components[0].hash = Some("00".repeat(32));
+    let (_, text) = failed(&others);
+    assert!(
+        text.contains("not the library that was consented to"),
+        "{text}"
+    );
 
     let mut searched = job(&dir, "component", "test", json!({"material": "paper"}));
     searched.search_path = vec![path.parent().unwrap().to_owned()];

@@ -38,6 +38,7 @@ fn a_step_in_c_runs_when_built_with_only_the_header() {
         plugin: LibraryRef {
             name: "double-time".into(),
             path: at("libdouble_time.so"),
+            hash: None,
         },
         components: vec![],
         search_path: vec![],
