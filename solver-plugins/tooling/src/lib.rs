@@ -6,12 +6,13 @@
 
 mod double_dome;
 mod error;
+pub mod facets;
 mod hemisphere;
 mod mesh;
 mod ramp;
 pub mod sdf;
 mod spar;
-pub mod stl;
+mod stl;
 mod sweep;
 mod tetrahedron;
 mod tree;
