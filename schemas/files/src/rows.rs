@@ -3,7 +3,7 @@
 //! The grammar within a line is that of the crate `csv`. Around it are the dialects of the field: any encoding and line ends, comments,
 //! `sep=;` of spreadsheets, separators and units as the header has them.
 
-use crate::text::{decode, lines, shown};
+use crate::text::{LONGEST_MESSAGE, decode, excerpt, lines, shown};
 use std::borrow::Cow;
 
 /// What parts the cells of a row.
@@ -22,7 +22,8 @@ pub enum Separator {
 }
 
 impl Separator {
-    const ALL: [Separator; 5] = [
+    /// All, the likeliest first.
+    pub const ALL: [Separator; 5] = [
         Separator::Tab,
         Separator::Semicolon,
         Separator::Comma,
@@ -84,9 +85,9 @@ pub struct RowError {
 }
 
 impl RowError {
-    /// At a line.
+    /// At a line. The sentence is shown as any text of a user's is: [`excerpt`].
     pub fn at(line: usize, problem: impl Into<String>) -> Self {
-        let problem = problem.into();
+        let problem = excerpt(&problem.into(), LONGEST_MESSAGE);
         Self { line, problem }
     }
 

@@ -234,6 +234,9 @@ fn unknown(
 ) -> UnitError {
     // In its place, so that `N/mn` is offered a length and `mn` alone a force.
     let fits = |name: &str| {
+        if whole.len() > 200 {
+            return false;
+        }
         let meant = whole.replacen(&unit, name, 1);
         read_unit(&meant).is_ok_and(|u| wanted.is_none_or(|w| u.exponents == w))
     };
