@@ -2,6 +2,7 @@
 
 use crate::yaml::Span;
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::text::{LONGEST_MESSAGE, excerpt};
 use plyflow_model::text::{one_line, safe, safe_in_place};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -126,15 +127,21 @@ impl Diagnostics {
 /// such a line, and miette panics when one stands further right than 65535.
 const LONGEST_LINE: usize = 2000;
 
-/// Whether the lines of a place are short enough to be shown with a caret.
+/// Whether the lines of a place, and those around them, which are shown too, are short enough to be shown with a caret.
 fn shows_well(text: &str, span: &Span) -> bool {
     let bytes = text.as_bytes();
     let (start, end) = (span.start.min(bytes.len()), span.end.min(bytes.len()));
-    let before = bytes[..start].iter().rposition(|b| *b == b'\n');
-    let after = bytes[end..].iter().position(|b| *b == b'\n');
-    let from = before.map_or(0, |i| i + 1);
-    let to = after.map_or(bytes.len(), |i| end + i);
+    let before = |at: usize| bytes[..at].iter().rposition(|b| *b == b'\n');
+    let after = |at: usize| bytes[at..].iter().position(|b| *b == b'\n').map(|i| at + i);
+    let first = before(start);
+    let above = first.and_then(before);
+    let last = after(end);
+    let below = last.and_then(|at| after(at + 1));
+    let from = first.map_or(0, |i| i + 1);
+    let (to, length) = (last.unwrap_or(bytes.len()), bytes.len());
     to - from <= LONGEST_LINE
+        && first.is_none_or(|i| i - above.map_or(0, |a| a + 1) <= LONGEST_LINE)
+        && last.is_none_or(|i| below.unwrap_or(length) - i <= LONGEST_LINE)
 }
 
 /// A finding as miette wants it.
@@ -265,11 +272,11 @@ impl Problems {
         message: impl Into<String>,
     ) -> &mut Diagnostic {
         let set = source.set.iter().rev().find(|s| s.start <= span.start);
-        let mut message = message.into();
+        let mut message = shown(message);
         let (file, text, span) = match set {
             None => (source.name.clone(), &source.text, span.clone()),
             Some(set) => {
-                message.push_str(&format!(" (given by `--set {}`)", set.text));
+                message.push_str(&format!(" (given by `--set {}`)", excerpt(&set.text, 200)));
                 let span = span.start - set.start..span.end.max(span.start) - set.start;
                 ("--set".into(), &set.text, span)
             }
@@ -296,7 +303,7 @@ impl Problems {
             line: 0,
             column: 0,
             severity: Severity::Error,
-            message,
+            message: shown(message),
             given: None,
             expected: None,
             help: None,
@@ -377,19 +384,19 @@ impl Diagnostic {
 
     /// States what was given.
     pub fn given(&mut self, text: impl Into<String>) -> &mut Self {
-        self.given = Some(text.into());
+        self.given = Some(shown(text));
         self
     }
 
     /// States what was expected.
     pub fn expected(&mut self, text: impl Into<String>) -> &mut Self {
-        self.expected = Some(text.into());
+        self.expected = Some(shown(text));
         self
     }
 
     /// States the remedy.
     pub fn help(&mut self, text: impl Into<String>) -> &mut Self {
-        self.help = Some(text.into());
+        self.help = Some(shown(text));
         self
     }
 
@@ -404,10 +411,15 @@ impl Diagnostic {
             self.expected = Some(plyflow_model::manifest::one_of(names.iter().copied()));
         }
         if let Some(nearest) = plyflow_model::nearest::nearest(given, names) {
-            self.help = Some(format!("did you mean `{nearest}`?"));
+            self.help = Some(shown(format!("did you mean `{nearest}`?")));
         }
         self
     }
+}
+
+/// A text as findings have it, whatever of a user's is in it: of bounded length, and without characters that a terminal obeys.
+fn shown(text: impl Into<String>) -> String {
+    excerpt(&text.into(), LONGEST_MESSAGE)
 }
 
 /// Line and column (characters), both from 1.

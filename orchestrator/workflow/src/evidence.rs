@@ -3,7 +3,8 @@
 use crate::catalog::{Catalog, Plugins};
 use crate::diagnostics::Problems;
 use crate::resolved::{PluginId, ResolvedWorkflow};
-use camino::Utf8PathBuf;
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::open::{self, FileError, MOST_DATA};
 use serde::{Deserialize, Serialize};
 
 /// A workflow and what it rests on.
@@ -46,7 +47,7 @@ impl Evidence {
     #[must_use]
     pub fn holds(&self, catalog: &dyn Catalog) -> bool {
         let same = |(path, known): &(Utf8PathBuf, String)| {
-            std::fs::read(path).is_ok_and(|bytes| hash(&bytes) == *known)
+            hash_file(path).is_ok_and(|hash| hash == *known)
         };
         self.files.iter().all(same)
             && self.folders.iter().all(|f| f.is_dir())
@@ -54,6 +55,13 @@ impl Evidence {
                 catalog.find(name, folder).is_ok_and(|e| e.id == *known)
             })
     }
+}
+
+/// BLAKE3 of a file of data, hex: what the readers of such files would read.
+pub(crate) fn hash_file(path: &Utf8Path) -> Result<String, FileError> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(open::open(path.as_std_path(), MOST_DATA)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
 }
 
 /// BLAKE3 of some bytes, hex.

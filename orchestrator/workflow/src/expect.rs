@@ -4,9 +4,10 @@
 use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
 use crate::load::Draft;
-use crate::parameters::{absolute, unreadable};
+use crate::parameters::{named, unreadable};
 use crate::resolved::Expectation;
 use crate::yaml::{Entry, Kind, Node};
+use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_model::manifest::one_of;
 use plyflow_model::schema;
 use plyflow_model::units::{Dimension, parse_quantity_in, parse_unit};
@@ -47,8 +48,8 @@ pub(crate) fn expectations(
 
 /// Reads the JSON file that `expect` names. It is noted as read, so that a change of it is seen.
 fn read(given: &str, at: &Node, from: &Source, problems: &mut Problems) -> Option<(Source, Node)> {
-    let path = absolute(&from.folder, given);
-    let bytes = match std::fs::read(&path) {
+    let path = named(&from.folder, given);
+    let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => bytes,
         Err(e) => {
             unreadable(problems, from, &at.span, given, &path, &e);
@@ -56,9 +57,12 @@ fn read(given: &str, at: &Node, from: &Source, problems: &mut Problems) -> Optio
         }
     };
     problems.note_file(&path, &crate::evidence::hash(&bytes));
-    let Ok(text) = String::from_utf8(bytes) else {
-        problems.add_unreadable(&path, "the file is not text in UTF-8".into());
-        return None;
+    let text = match crate::scene::written(bytes) {
+        Ok(text) => text,
+        Err(why) => {
+            problems.add_unreadable(&path, why);
+            return None;
+        }
     };
     let folder = from.folder.clone();
     let source = Source {

@@ -13,6 +13,7 @@ use crate::scene::is_word;
 use crate::wires::{self, Wiring};
 use crate::yaml::{Entry, Node};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_model::manifest::PluginKind;
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_model::{canonical, schema};
@@ -180,13 +181,12 @@ fn open(path: &Utf8Path, problems: &mut Problems) -> Option<(Source, Node)> {
             return None;
         }
     };
-    match std::fs::read(&full) {
+    let full = open::in_other_form(full.as_std_path())
+        .and_then(|found| Utf8PathBuf::from_path_buf(found).ok())
+        .unwrap_or(full);
+    match open::read(full.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => crate::scene::parse(problems, full, bytes),
-        Err(e) => {
-            let why = match e.kind() {
-                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
-                _ => e.to_string(),
-            };
+        Err(why) => {
             let d = problems.add_unreadable(path, format!("cannot read the workflow: {why}"));
             d.help(
                 "give the path of a workflow file, such as `workflows/joggle-spar/workflow.yaml`",

@@ -9,6 +9,8 @@ use crate::resolved::{InputFile, PluginId};
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Component, Utf8Path, Utf8PathBuf};
 use indexmap::IndexMap;
+use plyflow_files::open::{self, FileError};
+use plyflow_files::text::shown;
 use plyflow_model::manifest::{Bounds, Declaration, PluginKind, Shape};
 use serde_json::{Map, Value, json};
 use std::rc::Rc;
@@ -250,10 +252,9 @@ impl<'a> Resolver<'a> {
 
     /// Reads a file that a parameter names: hashes it and returns its absolute path.
     pub fn file(&mut self, text: &str, node: &Node, at: &Place<'_>) -> Option<Utf8PathBuf> {
-        let path = absolute(&at.source.folder, text);
-        match std::fs::read(&path) {
-            Ok(bytes) => {
-                let hash = crate::evidence::hash(&bytes);
+        let path = named(&at.source.folder, text);
+        match crate::evidence::hash_file(&path) {
+            Ok(hash) => {
                 self.problems.note_file(&path, &hash);
                 self.files.push(InputFile {
                     pointer: at.pointer.clone(),
@@ -353,15 +354,15 @@ pub fn unreadable(
     span: &Span,
     given: &str,
     path: &Utf8Path,
-    error: &std::io::Error,
+    error: &FileError,
 ) {
-    let why = match error.kind() {
-        std::io::ErrorKind::NotFound => "there is no such file".into(),
-        _ => error.to_string(),
-    };
-    let d = problems.add(source, span, format!("cannot read `{given}`: {why}"));
+    let message = format!("cannot read `{}`: {error}", shown(given));
+    let d = problems.add(source, span, message);
     d.given(given)
         .expected(format!("a file; the path is relative to {}", source.folder));
+    if !matches!(error, FileError::Missing) {
+        return;
+    }
     let beside: Vec<String> = path
         .parent()
         .and_then(|folder| folder.read_dir_utf8().ok())
@@ -372,8 +373,17 @@ pub fn unreadable(
     let name = path.file_name().unwrap_or_default();
     let mut beside: Vec<&str> = beside.iter().map(String::as_str).collect();
     beside.sort_unstable();
-    if let Some(nearest) = plyflow_model::nearest::nearest(name, beside) {
-        d.help(format!("did you mean `{nearest}`, in the same folder?"));
+    // Differences that nobody sees: blanks at the ends, and forms of Unicode (more than one such name is there).
+    let bare = |name: &str| open::composed(name.trim());
+    let alike: Vec<&str> = beside.iter().copied().filter(|b| bare(b) == bare(name)).collect();
+    if let Some(one) = alike.first() {
+        d.help(match (one.trim() == *one, name.trim() == name) {
+            (true, false) => format!("the file `{}` is there: take the blank at the end of the path away", shown(one)),
+            (false, true) => format!("the name of the file there has a blank at its end or begin: rename it to `{}`", shown(one.trim())),
+            _ => format!("{} names there look alike, in other forms of Unicode: rename one of them", alike.len()),
+        });
+    } else if let Some(nearest) = plyflow_model::nearest::nearest(name, beside) {
+        d.help(format!("did you mean `{}`, in the same folder?", shown(nearest)));
     }
 }
 
@@ -437,6 +447,14 @@ pub(crate) fn find(
         }
     }
     None
+}
+
+/// The absolute path of a file that is named in another one: where there is none of that name, that of the same name in another form of Unicode.
+pub fn named(folder: &Utf8Path, text: &str) -> Utf8PathBuf {
+    let path = absolute(folder, text);
+    open::in_other_form(path.as_std_path())
+        .and_then(|found| Utf8PathBuf::from_path_buf(found).ok())
+        .unwrap_or(path)
 }
 
 /// The path, absolute, with `.` and `..` taken out. Behind a link to a folder `..` is the folder above the one that it leads to, as

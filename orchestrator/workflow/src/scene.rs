@@ -3,9 +3,11 @@
 use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
 use crate::hints::other_format;
-use crate::parameters::{Place, Resolver, absolute, find, unreadable};
+use crate::parameters::{Place, Resolver, find, named, unreadable};
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::open::{self, MOST_WRITTEN};
+use plyflow_files::text::decode;
 use plyflow_model::manifest::{PluginKind, Shape};
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_model::{material::Material, scene::Scene, schema};
@@ -23,8 +25,8 @@ pub fn read(
     span: &Span,
     given: &str,
 ) -> Option<(Source, Node)> {
-    let path = absolute(&from.folder, given);
-    let bytes = match std::fs::read(&path) {
+    let path = named(&from.folder, given);
+    let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => bytes,
         Err(e) => {
             unreadable(problems, from, span, given, &path, &e);
@@ -37,9 +39,12 @@ pub fn read(
 /// Parses the bytes of a file.
 pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Option<(Source, Node)> {
     problems.note_file(&path, &crate::evidence::hash(&bytes));
-    let Ok(text) = String::from_utf8(bytes) else {
-        problems.add_unreadable(&shown(&path), "the file is not text in UTF-8".into());
-        return None;
+    let text = match written(bytes) {
+        Ok(text) => text,
+        Err(why) => {
+            problems.add_unreadable(&shown(&path), why);
+            return None;
+        }
     };
     let folder = path
         .parent()
@@ -65,6 +70,18 @@ pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Opti
             None
         }
     }
+}
+
+/// The text of a file that people write. Names in it are compared and shown, so that its encoding must be certain: UTF-8, or UTF-16 with its mark.
+pub fn written(bytes: Vec<u8>) -> Result<String, String> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return decode(&bytes).map(|text| text.into_owned());
+    }
+    String::from_utf8(bytes).map_err(|e| {
+        let good = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = good.iter().filter(|b| **b == b'\n').count() + 1;
+        format!("the file is not text in UTF-8, from line {line}: save it as UTF-8")
+    })
 }
 
 /// The path as messages show it: relative when it lies below the current folder.

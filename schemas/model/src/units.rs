@@ -7,7 +7,9 @@
 mod parse;
 mod quantity;
 
-pub use parse::{Unit, check_si, parse_quantity, parse_quantity_in, parse_unit, plain_number};
+pub use parse::{
+    Unit, check_si, parse_quantity, parse_quantity_in, parse_unit, parse_unit_of, plain_number,
+};
 pub use quantity::{
     Acceleration, Angle, Area, ArealMass, Curvature, Density, Energy, Force, ForcePerLength,
     Frequency, Length, Mass, Moment, Number, Pressure, QUANTITY_PATTERN, Temperature, Time,
@@ -252,6 +254,18 @@ pub enum UnitError {
         /// Expected.
         dimension: Option<Dimension>,
     },
+    /// A unit of another system, which is not taken.
+    #[error("unknown unit `{unit}` in `{text}` (write {write}); expected {}", expected(*.dimension))]
+    Foreign {
+        /// As given.
+        text: String,
+        /// The part that is not known.
+        unit: String,
+        /// What to write instead, and the factor.
+        write: &'static str,
+        /// Expected.
+        dimension: Option<Dimension>,
+    },
     /// A unit of another dimension.
     #[error("`{text}` is {got}; expected {}", expected(Some(*.dimension)))]
     WrongDimension {
@@ -277,10 +291,12 @@ impl UnitError {
             UnitError::BadNumber { text, .. } => format!("`{text}` does not begin with a number"),
             UnitError::Comma { text, .. } => format!("`{text}` has a comma in its number"),
             UnitError::MissingUnit { text, .. } => format!("`{text}` has no unit"),
-            UnitError::UnknownUnit { text, unit, .. } if text == unit => {
+            UnitError::UnknownUnit { text, unit, .. } | UnitError::Foreign { text, unit, .. }
+                if text == unit =>
+            {
                 format!("unknown unit `{unit}`")
             }
-            UnitError::UnknownUnit { text, unit, .. } => {
+            UnitError::UnknownUnit { text, unit, .. } | UnitError::Foreign { text, unit, .. } => {
                 format!("unknown unit `{unit}` in `{text}`")
             }
             UnitError::WrongDimension { text, got, .. } => format!("`{text}` is {got}"),
@@ -317,6 +333,15 @@ impl UnitError {
                 nearest: Some(n), ..
             } => format!("did you mean `{n}`?"),
             UnitError::UnknownUnit { dimension, .. } => write(*dimension),
+            UnitError::Foreign { write, .. } => format!("write {write}"),
+            // Test machines tell forces as masses.
+            UnitError::WrongDimension {
+                dimension: Dimension::Force,
+                got,
+                ..
+            } if got == Dimension::Mass.with_article() => {
+                "as a force write `N`, `kgf` (9.80665 N), `gf` (0.00980665 N) or `lbf` (4.4482216152605 N)".into()
+            }
             UnitError::WrongDimension { dimension, .. } => write(Some(*dimension)),
             UnitError::TooLarge { .. } => "check the exponent".into(),
         }

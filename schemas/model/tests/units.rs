@@ -123,6 +123,96 @@ fn an_unknown_unit_suggests_the_nearest_of_the_wanted_dimension() {
 }
 
 #[test]
+fn units_of_another_system_are_read_exactly() {
+    use Dimension::*;
+    for (text, d, same) in [
+        ("0.25 in", Length, "6.35 mm"),
+        ("1 inch", Length, "2.54 cm"),
+        ("3 ft", Length, "914.4 mm"),
+        ("5 mil", Length, "127 um"),
+        ("2 yd", Length, "1828.8 mm"),
+        ("1 in2", Area, "645.16 mm2"),
+        ("2 lb", Mass, "907.18474 g"),
+        ("16 oz", Mass, "453.59237 g"),
+        ("10 lbf", Force, "44.482216152605 N"),
+        ("1 ozf", Force, "0.27801385095378125 N"),
+        ("1 kgf", Force, "9.80665 N"),
+        ("20 gf", Force, "196.133 mN"),
+        ("1 atm", Pressure, "1.01325 bar"),
+        ("25 mmHg", Pressure, "3333.059685375 Pa"),
+    ] {
+        assert_eq!(read(text, d).to_bits(), read(same, d).to_bits(), "{text}");
+    }
+    for (text, d, si) in [
+        ("14.5 psi", Pressure, 99973.98),
+        ("2 ksi", Pressure, 13789514.59),
+        ("1 lbf/in2", Pressure, 6894.757293168362),
+        ("1 lbf/in", ForcePerLength, 175.126835246),
+        ("10 oz/yd2", ArealMass, 0.3390574747),
+        ("25 inHg", Pressure, 84659.716),
+        ("1 lbf in", Moment, 0.1129848290),
+        ("0.1 1/in", Curvature, 3.937007874),
+    ] {
+        assert!(
+            (read(text, d) / si - 1.0).abs() < 1e-7,
+            "{text}: {}",
+            read(text, d)
+        );
+    }
+}
+
+#[test]
+fn what_is_offered_has_the_wanted_dimension() {
+    use Dimension::*;
+    for (text, d, help) in [
+        ("5 inches", Length, "did you mean `in`?"),
+        ("5 \"", Length, "did you mean `in`?"),
+        ("5 lbff", Force, "did you mean `lbf`?"),
+        ("5 PSI", Pressure, "did you mean `psi`?"),
+        (
+            "60 degF",
+            Temperature,
+            "write degC: 32 degF = 0 degC, and 1.8 degF more are 1 degC more",
+        ),
+        ("5 dyn", Force, "write N: 1 dyn = 1e-5 N"),
+        ("5 kg", Force, "as a force write `N`, `kgf` (9.80665 N)"),
+    ] {
+        let e = parse_quantity(text, d).unwrap_err();
+        assert!(e.help().starts_with(help), "{text}: {}", e.help());
+    }
+    // Whatever the slip, and in whatever place, of whatever dimension.
+    let words = [
+        "inn", "mim", "mn", "gg", "kgg", "sec", "hz", "degf", "tt", "hh", "lbs", "ib", "pound",
+        "oxz", "pas", "bra", "jj", "celsius",
+    ];
+    for d in Dimension::ALL {
+        for word in words {
+            for whole in [
+                word.to_owned(),
+                format!("N/{word}"),
+                format!("{word}/m2"),
+                format!("1/{word}"),
+            ] {
+                let Err(e) = parse_quantity(&format!("1 {whole}"), d) else {
+                    continue;
+                };
+                let column = parse_unit_of(&whole, d).unwrap_err();
+                assert_eq!(column.help(), e.help(), "{whole}");
+                if let UnitError::UnknownUnit {
+                    nearest: Some(n),
+                    unit,
+                    ..
+                } = e
+                {
+                    let meant = whole.replacen(&unit, &n, 1);
+                    assert!(parse_unit_of(&meant, d).is_ok(), "{whole} as {d}: {n}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_comma_in_a_number_is_told_with_what_to_write() {
     for (text, help) in [
         ("5,5 mm", "write `5.5 mm`"),

@@ -1,9 +1,14 @@
-//! CSV files of raw test data: `#` comment lines, one header line `name [unit],name [unit]`, rows of numbers.
+//! CSV files of raw test data: `#` comment lines, one header line `name [unit],name [unit]`, rows of numbers, in the dialects of
+//! [`plyflow_files::rows`]: any separator, decimal commas, quotes, encodings, and units in parentheses or in a row of their own.
 //!
 //! Everything that is wrong is an error with file, line and column: a test that is read wrongly gives a
 //! law that looks right.
 
-use plyflow_model::units::{Dimension, parse_quantity, parse_unit};
+use plyflow_files::number::{Decimal, Signs, plain};
+use plyflow_files::open::{self, MOST_DATA};
+use plyflow_files::rows::{Head, Lines, RowError, Separator, names};
+use plyflow_files::text::{excerpt, shown};
+use plyflow_model::units::{Dimension, parse_quantity, parse_unit, parse_unit_of};
 
 /// Displacements may go back by so much (m): the jitter of an encoder.
 const JITTER: f64 = 1e-4;
@@ -156,79 +161,181 @@ impl Table {
 /// # Errors
 /// When it cannot be read, and as [`parse`].
 pub fn read(path: &str, wanted: &[Column]) -> Result<Table, String> {
-    let bytes = std::fs::read(path).map_err(|e| format!("{path}: cannot be read: {e}"))?;
-    let text = String::from_utf8(bytes)
-        .map_err(|_| format!("{path}: is not UTF-8 text; save the table as CSV (UTF-8)"))?;
-    let name = std::path::Path::new(path)
-        .file_name()
-        .and_then(|n| n.to_str());
-    parse(&text, name.unwrap_or(path), wanted)
+    let shown = excerpt(path, 300);
+    let path = std::path::Path::new(path);
+    let bytes = open::read(path, MOST_DATA).map_err(|e| format!("{shown}: cannot be read: {e}"))?;
+    let name = path.file_name().and_then(|n| n.to_str());
+    let name = name.map_or(shown, |n| excerpt(n, 100));
+    parse(&bytes, &name, wanted)
 }
 
-/// Reads a text; columns that nobody asked for are passed over.
+/// Reads the bytes of a file; columns that nobody asked for are passed over.
 ///
 /// # Errors
 /// A missing or repeated column, one that is nearly an optional one, a missing, unknown or unfit unit, a row of another length, a value that is
 /// no finite number: each with `source`, line and column.
-pub fn parse(text: &str, source: &str, wanted: &[Column]) -> Result<Table, String> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut lines = (text.lines().enumerate())
-        .map(|(i, line)| (i + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let expected = || {
-        let names: Vec<String> = wanted.iter().filter(|c| c.required).map(heading).collect();
-        format!("a header line such as `{}`", names.join(","))
+pub fn parse(bytes: impl AsRef<[u8]>, source: &str, wanted: &[Column]) -> Result<Table, String> {
+    of_rows(bytes.as_ref(), source, wanted).map_err(|e| e.of(source))
+}
+
+/// A column that is in a file: where, which, and its unit as the file writes it.
+type Picked = (usize, Column, String);
+
+fn of_rows(bytes: &[u8], source: &str, wanted: &[Column]) -> Result<Table, RowError> {
+    let lines = Lines::new(bytes)?;
+    let Some((_, first)) = lines.first() else {
+        return Err(RowError::at(
+            0,
+            format!("is empty; expected {}", example(wanted)),
+        ));
     };
-    let (header_line, header) = lines
-        .next()
-        .ok_or_else(|| format!("{source}: is empty; expected {}", expected()))?;
-    if !header.contains('[') {
-        let text = format!(
-            "{source}:{header_line}: `{header}` names no units; expected {}",
-            expected()
-        );
-        return Err(text);
+    let separator = separator(&lines, first, wanted)?;
+    let (mut heads, line, last) = header(&lines, separator, wanted)?;
+    while heads
+        .last()
+        .is_some_and(|h| h.name.is_empty() && h.unit.is_none())
+    {
+        heads.pop();
     }
-    // What spreadsheets write where the comma is the decimal sign.
-    for (sign, word) in [(';', "semicolons"), ('\t', "tabs")] {
-        if header.contains(sign) && !header.contains(',') {
-            return Err(format!(
-                "{source}:{header_line}: the columns of `{}` are separated by {word}; expected commas between columns and a \
-                 point in decimals, below {}",
-                header.replace('\t', " "),
-                expected()
-            ));
+    let picked = pick(&heads, wanted, line)?;
+    // The decimal sign is that of all numbers of the file.
+    let mut signs = Signs::default();
+    let mut rows = lines.rows(separator);
+    while let Some(row) = rows.read()? {
+        if row.line > last {
+            let cells = picked.iter().filter_map(|p| row.cells.get(p.0));
+            cells.for_each(|c| signs.note(row.line, c));
         }
     }
-    let heads: Vec<(&str, &str)> = header.split(',').map(split_head).collect();
-    let picked = pick(&heads, wanted, source, header_line)?;
+    let decimal = signs.decide().map_err(|(line, e)| RowError::at(line, e))?;
     let mut table = Table {
         source: source.to_owned(),
         lines: Vec::new(),
         columns: (picked.iter())
             .map(|(_, column, unit)| Values {
                 name: column.name,
-                unit: (*unit).to_owned(),
+                unit: unit.clone(),
                 values: Vec::new(),
             })
             .collect(),
     };
-    for (line, row) in lines {
-        let cells: Vec<&str> = row.split(',').map(str::trim).collect();
-        if cells.len() != heads.len() {
-            let (n, m) = (cells.len(), heads.len());
-            return Err(format!(
-                "{source}:{line}: {n} values where the header names {m} columns; values are separated by commas, decimals by a point"
+    let mut rows = lines.rows(separator);
+    while let Some(row) = rows.read()? {
+        if row.line <= last {
+            continue;
+        }
+        // Spreadsheets part cells that nobody filled, too.
+        let behind = row.cells.iter().skip(heads.len()).all(str::is_empty);
+        if row.cells.len() < heads.len() || !behind {
+            let (n, m) = (row.cells.len(), heads.len());
+            let words = separator.words();
+            return Err(RowError::at(
+                row.line,
+                format!(
+                    "{n} values where the header names {m} columns; values are separated by {words} here, decimals by a point, or by a comma where \
+                     the values are separated otherwise"
+                ),
             ));
         }
         for ((index, column, unit), into) in picked.iter().zip(&mut table.columns) {
-            let value = value(cells[*index], unit, column.dimension)
-                .map_err(|e| format!("{source}:{line}: column '{}': {e}", column.name))?;
+            let value = value(&row.cells[*index], decimal, unit, column.dimension)
+                .map_err(|e| RowError::at(row.line, format!("column '{}': {e}", column.name)))?;
             into.values.push(value);
         }
-        table.lines.push(line);
+        table.lines.push(row.line);
     }
     Ok(table)
+}
+
+fn example(wanted: &[Column]) -> String {
+    let names: Vec<String> = wanted.iter().filter(|c| c.required).map(heading).collect();
+    format!("a header line such as `{}`", names.join(","))
+}
+
+/// The separator of a file: that of its header's in which the columns that are asked for are found, else the likeliest.
+fn separator(lines: &Lines, first: &str, wanted: &[Column]) -> Result<Separator, RowError> {
+    if let Some(told) = lines.told {
+        return Ok(told);
+    }
+    let mut of_line = Separator::of_line(first);
+    if first.matches('"').count() % 2 == 1 {
+        // The header goes on in the next line.
+        of_line = Separator::ALL.to_vec();
+    }
+    of_line.retain(|s| *s != Separator::Blanks);
+    for &separator in &of_line {
+        let mut rows = lines.rows(separator);
+        let Ok(Some(row)) = rows.read() else { continue };
+        let has = |c: &Column| row.cells.iter().any(|cell| Head::of(cell).name == c.name);
+        if wanted.iter().filter(|c| c.required).all(has) {
+            return Ok(separator);
+        }
+    }
+    // A comma that parts nothing is a decimal sign.
+    let single = Separator::Semicolon;
+    Ok(of_line.first().copied().unwrap_or(single))
+}
+
+/// The header, its line, and the line behind which data begins: instruments write a row of units below the names.
+fn header(
+    lines: &Lines,
+    separator: Separator,
+    wanted: &[Column],
+) -> Result<(Vec<Head>, usize, usize), RowError> {
+    let mut rows = lines.rows(separator);
+    let Some(row) = rows.read()? else {
+        return Err(RowError::at(
+            0,
+            format!("is empty; expected {}", example(wanted)),
+        ));
+    };
+    let line = row.line;
+    // What stands in parentheses may be a remark.
+    let known = |h: &Head| h.certain || h.unit.as_ref().is_some_and(|u| parse_unit(u).is_ok());
+    let whole = |cell: &str| Head {
+        name: cell.to_owned(),
+        unit: None,
+        certain: false,
+    };
+    let named = row.cells.iter().map(|cell| {
+        Some(Head::of(cell))
+            .filter(known)
+            .unwrap_or_else(|| whole(cell))
+    });
+    let mut heads: Vec<Head> = named.collect();
+    if heads.iter().any(|h| h.unit.is_some()) {
+        return Ok((heads, line, line));
+    }
+    let names_of = heads.iter().map(|h| h.name.clone()).collect::<Vec<_>>();
+    if let Some(row) = rows.read()? {
+        let bare = |cell: &str| {
+            let inner = cell
+                .trim_start_matches(['[', '('])
+                .trim_end_matches([']', ')']);
+            inner.trim().to_owned()
+        };
+        let is_unit = |cell: &str| {
+            let unit = bare(cell);
+            let number = plain(&unit, Decimal::Point).or(plain(&unit, Decimal::Comma));
+            (cell.is_empty() || (unit != cell && unit == "1") || number.is_none())
+                && parse_unit(&unit).is_ok()
+        };
+        if row.cells.len() <= heads.len() && row.cells.iter().all(is_unit) {
+            for (head, cell) in heads.iter_mut().zip(row.cells.iter()) {
+                head.unit = Some(bare(cell)).filter(|u| !u.is_empty());
+                head.certain = true;
+            }
+            return Ok((heads, line, row.line));
+        }
+    }
+    Err(RowError::at(
+        line,
+        format!(
+            "`{}` names no units; expected {}",
+            names(names_of.iter().map(String::as_str)),
+            example(wanted)
+        ),
+    ))
 }
 
 fn heading(column: &Column) -> String {
@@ -237,73 +344,76 @@ fn heading(column: &Column) -> String {
     format!("{} [{unit}]", column.name)
 }
 
-/// `force [N]` -> (`force`, `N`); no brackets: unit `?`.
-fn split_head(head: &str) -> (&str, &str) {
-    let head = head.trim().trim_matches('"');
-    match head.split_once('[') {
-        Some((name, rest)) => (name.trim(), rest.trim_end_matches(']').trim()),
-        None => (head, "?"),
-    }
-}
-
-fn pick<'a>(
-    heads: &[(&'a str, &'a str)],
-    wanted: &[Column],
-    source: &str,
-    line: usize,
-) -> Result<Vec<(usize, Column, &'a str)>, String> {
+fn pick(heads: &[Head], wanted: &[Column], line: usize) -> Result<Vec<Picked>, RowError> {
     let mut picked = Vec::new();
     for column in wanted {
         let found: Vec<usize> = (0..heads.len())
-            .filter(|&i| heads[i].0 == column.name)
+            .filter(|&i| heads[i].name == column.name)
             .collect();
         let index = match found[..] {
             [] if !column.required => {
-                if let Some((name, _)) = heads.iter().find(|h| looks_like(h.0, column.name)) {
-                    return Err(format!(
-                        "{source}:{line}: the column '{name}' is not one that is read; did you mean `{}`? If not, give it \
-                         another name",
-                        heading(column)
+                if let Some(head) = heads.iter().find(|h| looks_like(&h.name, column.name)) {
+                    return Err(RowError::at(
+                        line,
+                        format!(
+                            "the column '{}' is not one that is read; did you mean `{}`? If not, give it another name",
+                            shown(&head.name),
+                            heading(column)
+                        ),
                     ));
                 }
                 continue;
             }
             [] => {
-                let names: Vec<&str> = heads.iter().map(|h| h.0).collect();
-                return Err(format!(
-                    "{source}:{line}: there is no column '{}'; the header names: {}; expected `{}`",
-                    column.name,
-                    names.join(", "),
-                    heading(column)
+                return Err(RowError::at(
+                    line,
+                    format!(
+                        "there is no column '{}'; the header names: {}; expected `{}`",
+                        column.name,
+                        names(heads.iter().map(|h| h.name.as_str())),
+                        heading(column)
+                    ),
                 ));
             }
             [index] => index,
             _ => {
-                return Err(format!(
-                    "{source}:{line}: column '{}' stands there more than once",
-                    column.name
-                ));
+                let problem = format!("column '{}' stands there more than once", column.name);
+                return Err(RowError::at(line, problem));
             }
         };
-        let unit = heads[index].1;
         let what = column.dimension.with_article();
         let say = |e: String| {
-            format!(
-                "{source}:{line}: column '{}': {e}; expected {what}, such as `{}`",
+            let problem = format!(
+                "column '{}': {e}; expected {what}, such as `{}`",
                 column.name,
                 heading(column)
-            )
+            );
+            RowError::at(line, problem)
         };
-        if unit == "?" {
+        let Some(unit) = heads[index].unit.as_deref() else {
             return Err(say("has no unit".into()));
-        }
-        let parsed = parse_unit(unit).map_err(|e| say(e.to_string()))?;
-        if parsed.exponents != column.dimension.exponents() {
-            return Err(say(format!("the unit '{unit}' does not fit")));
-        }
-        picked.push((index, *column, unit));
+        };
+        parse_unit_of(unit, column.dimension).map_err(|e| match e {
+            plyflow_model::units::UnitError::WrongDimension { got, .. } => say(format!(
+                "the unit '{}' does not fit: it is {got}{}",
+                shown(unit),
+                as_force(&got, column.dimension)
+            )),
+            e => say(format!("{}: {}", e.reason(), e.help())),
+        })?;
+        picked.push((index, *column, unit.to_owned()));
     }
     Ok(picked)
+}
+
+/// Test machines tell forces as masses.
+fn as_force(got: &str, wanted: Dimension) -> &'static str {
+    match wanted {
+        Dimension::Force if got == Dimension::Mass.with_article() => {
+            " (as a force write `kgf`, `gf` or `lbf`)"
+        }
+        _ => "",
+    }
 }
 
 /// Whether a header may stand for an optional column that it does not name: it would be passed over, and nobody told.
@@ -312,21 +422,25 @@ fn looks_like(head: &str, name: &str) -> bool {
         .is_some_and(|start| start.eq_ignore_ascii_case(name))
 }
 
-fn value(text: &str, unit: &str, dimension: Dimension) -> Result<f64, String> {
-    let number: f64 = text.parse().map_err(|_| match text {
-        "" => "there is no value".to_owned(),
-        _ => format!("'{text}' is not a number"),
-    })?;
-    if !number.is_finite() {
-        return Err(format!(
-            "'{text}' is not a finite number; leave the row out"
-        ));
-    }
+fn value(text: &str, decimal: Decimal, unit: &str, dimension: Dimension) -> Result<f64, String> {
+    let Some(number) = plain(text, decimal) else {
+        let text = shown(text);
+        let word = text.trim_start_matches(['-', '+']).to_lowercase();
+        return Err(match &word[..] {
+            "" => "there is no value".to_owned(),
+            "nan" | "inf" | "infinity" => {
+                format!("'{text}' is not a finite number; leave the row out")
+            }
+            _ => format!("'{text}' is not a number"),
+        });
+    };
     if dimension == Dimension::Dimensionless && matches!(unit, "" | "1") {
-        return Ok(number);
+        return number
+            .parse()
+            .map_err(|_| format!("'{text}' is not a number"));
     }
     // Through the one reader of units, so that 10 mm and 1 cm are the same bits here too.
-    parse_quantity(&format!("{text} {unit}"), dimension).map_err(|e| e.to_string())
+    parse_quantity(&format!("{number} {unit}"), dimension).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]
@@ -365,7 +479,7 @@ mod tests {
         for head in [
             "Angle [deg]",
             "ANGLE [deg]",
-            "angle (deg)",
+            "angle (of the frame)",
             "angle_1 [deg]",
             "Angles [deg]",
         ] {
@@ -419,18 +533,130 @@ mod tests {
     }
 
     #[test]
-    fn semicolons_and_tabs_between_columns_are_told_with_what_to_write() {
-        for (text, word) in [
-            ("displacement [mm];force [N]\n0,5;1,2\n", "semicolons"),
-            ("# c\ndisplacement [mm]\tforce [N]\n1\t2\n", "tabs"),
+    fn the_dialects_of_the_field_give_the_same_table() {
+        let same = parse(
+            "displacement [mm],force [N]\n0.5,-1.25\n10,1500\n",
+            "t.csv",
+            &WANTED,
+        )
+        .unwrap();
+        for text in [
+            "displacement [mm];force [N]\n0,5;-1,25\n10;1500\n",
+            "# c; d\ndisplacement [mm]\tforce [N]\n0.5\t-1.25\n10\t1.5E+03\n",
+            "displacement [mm]|force [N]\n0.5|-1.25\n10|1500\n",
+            "\"displacement [mm]\",\"force [N]\"\n\"0,5\",\"-1,25\"\n\"10\",\"1500\"\n",
+            "sep=;\nforce [kN];displacement [cm]\n-0.00125;0.05\n1.5;1\n",
+            "\"force\n[N]\",displacement (mm)\n-1.25,0.5\n\n1500,10\n",
+            "displacement,force\nmm,N\n0.5,-1.25\n10,1500\n",
+            "displacement;force;note\n[mm];[N];\n0,5;-1,25;a\n10;1500;b, c\n;;\n",
+            "displacement / mm,force / N\n0.5,\u{2212}1.25\n10,1500\n",
+            "displacement [mm],force [N],,\n0.5,-1.25,,\n10,1500,,\n,,,\n",
+            "displacement [mm],force [N],remark (first, of two)\n0.5,-1.25,\"a,b\"\n10,1500,c\n",
+            "\"# made by \"\"A\"\", 2020\"\ndisplacement [mm],force [N]\n0.5,-1.25\n\"#x,y\"\n10,1.5D3\n",
+        ] {
+            let mark = "\u{feff}".to_owned() + text;
+            let wide: Vec<u8> = mark.encode_utf16().flat_map(u16::to_le_bytes).collect();
+            let mac = text.replace('\n', "\r");
+            let windows = mark.replace('\n', "\r\n");
+            for bytes in [
+                text.as_bytes(),
+                mark.as_bytes(),
+                &wide,
+                mac.as_bytes(),
+                windows.as_bytes(),
+            ] {
+                let read = parse(bytes, "t.csv", &WANTED).unwrap_or_else(|e| panic!("{e}\n{text}"));
+                for name in ["displacement", "force"] {
+                    assert_eq!(read.column(name), same.column(name), "{text}");
+                }
+            }
+        }
+        // Latin-1: the signs of degrees and of micrometres.
+        let latin = b"angle [\xb0],width [\xb5m]\n1.5,2\n";
+        let wanted = [
+            Column::required("angle", Dimension::Angle),
+            Column::required("width", Dimension::Length),
+        ];
+        let read = parse(latin, "t.csv", &wanted).unwrap();
+        assert_eq!(read.values("angle").unwrap(), [1.5f64.to_radians()]);
+        assert_eq!(read.values("width").unwrap(), [2e-6]);
+        // One column: a comma is no separator.
+        let read = parse("displacement [mm]\n0,5\n", "t.csv", &WANTED[..1]).unwrap();
+        assert_eq!(read.values("displacement").unwrap(), [0.0005]);
+    }
+
+    #[test]
+    fn what_a_comma_means_is_never_guessed() {
+        for (text, says) in [
+            (
+                "displacement [mm],force [N]\n1,0,2,5\n",
+                "t.csv:2: 4 values where the header names 2",
+            ),
+            (
+                "displacement [mm];force [N]\n1;1,234\n2;2,345\n",
+                "t.csv:2: the comma of `1,234` may be",
+            ),
+            (
+                "displacement [mm];force [N]\n0.5;1,234\n",
+                "t.csv:2: `1,234` has a comma",
+            ),
+            (
+                "displacement [mm];force [N]\n0,5;1\n1.5;2\n",
+                "t.csv:2: `0,5` has a comma",
+            ),
+            (
+                "displacement [mm];force [N]\n0,5;1.234,5\n",
+                "t.csv:2: column 'force': '1.234,5' is not a number",
+            ),
+            (
+                "displacement [mm],force [N],note\n1,2,\"a\n3,4,b\n5,6,\"c\n",
+                "t.csv:2: a quotation mark is not closed",
+            ),
         ] {
             let e = error(text);
+            assert!(e.starts_with(says), "{e}");
+        }
+    }
+
+    #[test]
+    fn units_of_another_system_are_read_and_hints_have_the_right_dimension() {
+        let table = parse("displacement [in],force [lbf]\n0.5,10\n", "t.csv", &WANTED).unwrap();
+        assert_eq!(table.values("displacement").unwrap(), [0.0127]);
+        assert_eq!(table.values("force").unwrap(), [44.482216152605]);
+        for (unit, says) in [
+            ("gg", "unknown unit `gg`: did you mean `gf`?"),
+            ("lbs", "unknown unit `lbs`"),
+            (
+                "kg",
+                "the unit 'kg' does not fit: it is a mass (as a force write `kgf`",
+            ),
+            ("dyn", "unknown unit `dyn`: write N: 1 dyn = 1e-5 N"),
+        ] {
+            let e = error(&format!("displacement [mm],force [{unit}]\n1,2\n"));
             assert!(
-                e.contains(word)
-                    && e.contains("expected commas between columns and a point in decimals"),
+                e.starts_with(&format!("t.csv:1: column 'force': {says}")),
                 "{e}"
             );
-            assert!(e.contains("displacement [mm],force [N]"), "{e}");
+        }
+    }
+
+    #[test]
+    fn messages_are_short_and_harmless_whatever_is_in_the_file() {
+        let long = "\u{1b}[2Jx".repeat(2_000_000);
+        for text in [
+            long.clone(),
+            format!("displacement [mm],force [{long}]\n1,2\n"),
+            format!("displacement [mm],{long} [N]\n1,2\n"),
+            format!("displacement [mm],force [N]\n1,{long}\n"),
+            format!("displacement [mm],force [N],{long}\n1,2\n"),
+        ] {
+            let e = error(&text);
+            assert!(
+                e.len() < 900 && !e.contains('\u{1b}'),
+                "{} {}",
+                e.len(),
+                &e[..80]
+            );
         }
     }
 

@@ -1,5 +1,7 @@
 //! Material files: new numbers put into a complete file, or a fragment of one.
 
+use plyflow_files::open::{self, MOST_WRITTEN};
+use plyflow_files::text::decode;
 use plyflow_model::material::Material;
 use plyflow_sdk::{Host, StepError};
 use serde_json::{Map, Value, json};
@@ -62,8 +64,9 @@ impl Template {
                     .into(),
             ),
             (Some(path), None) => {
-                let text = std::fs::read_to_string(path)
+                let bytes = open::read(std::path::Path::new(path), MOST_WRITTEN)
                     .map_err(|e| format!("{path}: cannot be read: {e}"))?;
+                let text = decode(&bytes).map_err(|e| format!("{path}: {e}"))?;
                 let name = std::path::Path::new(path)
                     .file_name()
                     .and_then(|n| n.to_str());

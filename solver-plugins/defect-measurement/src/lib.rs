@@ -22,7 +22,7 @@ export_step!(DefectMeasurement);
 struct Parameters {
     sections: Vec<Section>,
     scan: Option<String>,
-    scan_unit: f64,
+    scan_unit: Option<f64>,
     scan_offset: Option<f64>,
     scan_align: Align,
     scan_kept: f64,

@@ -222,7 +222,7 @@ impl Scan {
         let missing = |p: Vec3| beneath.as_ref().map_or(0.0, |b| b.missing(p));
         let mut alignment = None;
         if p.scan_align == Align::ClosestPoints {
-            let found = aligned(host, &points, tool, (offset, &missing), p)?;
+            let found = aligned(host, &points, tool, (offset, &missing), (p, read.unit))?;
             points.iter_mut().for_each(|p| *p = found.place(*p));
             alignment = Some(found);
         }
@@ -258,7 +258,7 @@ fn aligned(
     points: &[Vec3],
     tool: &Surface,
     (offset, missing): (f64, &dyn Fn(Vec3) -> f64),
-    p: &Parameters,
+    (p, unit): (&Parameters, f64),
 ) -> Result<Alignment, StepError> {
     let settings = Settings {
         offset,
@@ -271,7 +271,7 @@ fn aligned(
              its numbers is taken for {} mm), or move the scan to within some centimetres and degrees of the tool",
             points.len(),
             p.scan.as_deref().unwrap_or_default(),
-            1e3 * p.scan_unit
+            1e3 * unit
         )
     })?;
     if !found.converged {

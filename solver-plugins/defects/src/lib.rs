@@ -9,6 +9,7 @@ mod measure;
 #[cfg(feature = "steps")]
 pub mod of_run;
 pub mod pairs;
+mod points;
 pub mod scan;
 
 pub use cause::{Cause, Limits, Neighbour, find_causes, relative_angle};

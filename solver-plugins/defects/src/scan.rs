@@ -1,14 +1,16 @@
 //! Scanned preforms: facets from STL files, or clouds of points, which are joined to facets here.
 
+use crate::points;
 use nalgebra::{Matrix3, Vector3};
+use plyflow_files::open::{FileError, MOST_DATA};
+use plyflow_files::text::excerpt;
+use plyflow_files::{open, stl};
 use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub};
-use plyflow_tooling::stl::solids;
+use plyflow_tooling::facets;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// What a file holds.
@@ -18,49 +20,32 @@ pub struct Scan {
     pub points: Vec<Vec3>,
     /// Empty for a cloud: see [`join`].
     pub triangles: Vec<[u32; 3]>,
+    /// What one unit of the file's numbers was taken for (m).
+    pub unit: f64,
 }
 
 /// Why a scan cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
-    /// The file cannot be opened or is no STL.
+    /// The file cannot be opened.
     #[error("cannot read the scan `{path}`: {source}")]
     Read {
         /// As given.
         path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
+        /// Why.
+        source: FileError,
     },
     /// Neither facets nor points by its name.
     #[error(
-        "`{path}` is called neither *.stl (facets) nor *.xyz, *.txt, *.asc or *.csv (x y z of a point on each line); give one of these"
+        "`{path}` is called neither *.stl (facets) nor *.xyz, *.txt, *.asc, *.csv, *.tsv or *.dat (x y z of a point on each line); give one of these"
     )]
     Kind {
         /// As given.
         path: PathBuf,
     },
-    /// A line that holds no point.
-    #[error(
-        "{path}:{line}: `{text}` does not begin with three numbers x, y, z; correct or remove the line"
-    )]
-    Line {
-        /// As given.
-        path: PathBuf,
-        /// From 1.
-        line: usize,
-        /// As given, at most 60 characters.
-        text: String,
-    },
-    /// A facet that lies nowhere.
-    #[error(
-        "the scan `{path}`: facet {facet} has a corner whose coordinates are not all finite numbers; export the scan again"
-    )]
-    Facet {
-        /// As given.
-        path: PathBuf,
-        /// From 1.
-        facet: usize,
-    },
+    /// What is in it is no scan: `file:line: problem; remedy`.
+    #[error("{0}")]
+    Content(String),
     /// Too little to measure.
     #[error("the scan `{path}` has {found} points; at least {LEAST} are needed")]
     Few {
@@ -74,24 +59,40 @@ pub enum ScanError {
 /// A surface has at least so many points.
 const LEAST: usize = 20;
 
-/// Corners closer than this part of the diagonal of the box around a scan are one.
-const WELD: f64 = 1e-6;
-
-/// Reads a scan whose numbers are in `unit` (m). STL: the facets of all solids; corners nearer to each other than a millionth of the scan's diagonal are
-/// one point, facets that lose a corner by that or repeat another one are left out; how they are wound is left to [`orient`]. `.xyz`, `.txt`, `.asc`, `.csv`: a point a line, its first three numbers, parted by blanks, commas or semicolons; empty lines, those that begin with
-/// `#` or `//`, and a first line of words are passed over.
+/// Reads a scan whose numbers are in `unit` (m; `None`: as a table's header says, else millimetres). STL: the facets of all solids
+/// ([`plyflow_files::stl`], joined by [`plyflow_tooling::facets::join`]); facets that repeat another one are left out; how they are wound is left to
+/// [`orient`]. `.xyz`, `.txt`, `.asc`, `.csv`, `.tsv`, `.dat`: a point a line, in the columns that a header calls x, y and z, else in the first three.
 ///
 /// # Errors
 /// See [`ScanError`].
-pub fn read(path: &Path, unit: f64) -> Result<Scan, ScanError> {
+pub fn read(path: &Path, unit: Option<f64>) -> Result<Scan, ScanError> {
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    let scan = match extension.as_deref().and_then(|e| e.to_str()) {
-        Some("stl") => read_stl(path, unit)?,
-        Some("xyz" | "txt" | "asc" | "csv") => read_points(path, unit)?,
-        _ => {
-            return Err(ScanError::Kind {
-                path: path.to_owned(),
-            });
+    let extension = extension.as_deref().and_then(|e| e.to_str());
+    let facets = extension == Some("stl");
+    if !facets
+        && !matches!(
+            extension,
+            Some("xyz" | "txt" | "asc" | "csv" | "tsv" | "dat")
+        )
+    {
+        return Err(ScanError::Kind {
+            path: path.to_owned(),
+        });
+    }
+    let bytes = open::read(path, MOST_DATA).map_err(|source| ScanError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let scan = if facets {
+        of_facets(&bytes, unit.unwrap_or(1e-3))
+            .map_err(|e| ScanError::Content(format!("the scan {}", e.of(path))))?
+    } else {
+        let name = excerpt(&path.display().to_string(), 300);
+        let read = points::read(&bytes, unit).map_err(|e| ScanError::Content(e.of(&name)))?;
+        Scan {
+            points: read.points,
+            triangles: Vec::new(),
+            unit: read.unit,
         }
     };
     if scan.points.len() < LEAST {
@@ -103,81 +104,25 @@ pub fn read(path: &Path, unit: f64) -> Result<Scan, ScanError> {
     Ok(scan)
 }
 
-fn read_stl(path: &Path, unit: f64) -> Result<Scan, ScanError> {
-    let failed = |source| ScanError::Read {
-        path: path.to_owned(),
-        source,
-    };
-    let bytes = std::fs::read(path).map_err(failed)?;
-    let mut corners: Vec<Vec3> = Vec::new();
-    for solid in solids(&bytes) {
-        let mut input = Cursor::new(&solid[..]);
-        for facet in stl_io::create_stl_reader(&mut input).map_err(failed)? {
-            let facet = facet.map_err(failed)?.vertices;
-            if facet.iter().flat_map(|v| v.0).any(|c| !c.is_finite()) {
-                return Err(ScanError::Facet {
-                    path: path.to_owned(),
-                    facet: corners.len() / 3 + 1,
-                });
-            }
-            corners.extend(facet.map(|v| v.0.map(|c| f64::from(c) * unit)));
-        }
+fn of_facets(bytes: &[u8], unit: f64) -> Result<Scan, stl::StlError> {
+    let mut read = stl::parse(bytes)?;
+    for p in read.corners.as_flattened_mut() {
+        *p = p.map(|c| c * unit);
     }
-    let (points, stands_for) = weld(&corners);
+    let surface = facets::join(&read.corners);
     let mut seen = BTreeSet::new();
-    let mut whole = |t: &[u32; 3]| {
+    let mut first = |t: &[u32; 3]| {
         let mut sorted = *t;
         sorted.sort_unstable();
-        let [a, b, c] = sorted;
-        a != b && b != c && seen.insert(sorted)
+        seen.insert(sorted)
     };
-    let facets = stands_for.as_chunks::<3>().0;
+    let mut triangles = surface.triangles;
+    triangles.retain(|t| first(t));
     Ok(Scan {
-        triangles: facets.iter().copied().filter(|t| whole(t)).collect(),
-        points,
+        triangles,
+        points: surface.points,
+        unit,
     })
-}
-
-/// The places of corners, those within reach of an earlier one left out, and the place that each corner takes: seams, where a file gives the same
-/// place with other last digits, are closed.
-fn weld(corners: &[Vec3]) -> (Vec<Vec3>, Vec<u32>) {
-    // The equal ones first, which are most by far. Adding zero turns -0 into 0.
-    let mut first: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut places: Vec<GeomWithData<Vec3, u32>> = Vec::new();
-    let of_corner: Vec<u32> = (corners.iter())
-        .map(|p| {
-            let p = p.map(|c| c + 0.0);
-            *first.entry(p.map(f64::to_bits)).or_insert_with(|| {
-                places.push(GeomWithData::new(p, places.len() as u32));
-                places.len() as u32 - 1
-            })
-        })
-        .collect();
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for place in &places {
-        for d in 0..3 {
-            low[d] = low[d].min(place.geom()[d]);
-            high[d] = high[d].max(place.geom()[d]);
-        }
-    }
-    let near = WELD * norm(sub(high, low));
-    let tree = RTree::bulk_load(places.clone());
-    let mut points = Vec::new();
-    let mut stands_for = vec![u32::MAX; places.len()];
-    for place in &places {
-        if stands_for[place.data as usize] != u32::MAX {
-            continue;
-        }
-        for other in tree.locate_within_distance(*place.geom(), near * near) {
-            let taken = &mut stands_for[other.data as usize];
-            *taken = (*taken).min(points.len() as u32);
-        }
-        // Whatever the search's rounding makes of a distance of 0.
-        stands_for[place.data as usize] = points.len() as u32;
-        points.push(*place.geom());
-    }
-    let stands_for = of_corner.iter().map(|&i| stands_for[i as usize]);
-    (points, stands_for.collect())
 }
 
 /// Winds all facets alike, where some are wound against others: as along every side that two of them share the one goes against the other, so on what
@@ -270,40 +215,6 @@ fn pieces(triangles: &[[u32; 3]]) -> Vec<Piece> {
         found.push(piece);
     }
     found
-}
-
-fn read_points(path: &Path, unit: f64) -> Result<Scan, ScanError> {
-    let failed = |source| ScanError::Read {
-        path: path.to_owned(),
-        source,
-    };
-    let input = BufReader::new(File::open(path).map_err(failed)?);
-    let (mut points, mut first) = (Vec::new(), true);
-    for (k, line) in input.lines().enumerate() {
-        let line = line.map_err(failed)?;
-        let text = line.trim();
-        if text.is_empty() || text.starts_with('#') || text.starts_with("//") {
-            continue;
-        }
-        let words = text.split(|c: char| c.is_whitespace() || c == ',' || c == ';');
-        let numbers: Vec<f64> = (words.filter(|w| !w.is_empty()).take(3))
-            .map_while(|w| w.parse().ok().filter(|v: &f64| v.is_finite()))
-            .collect();
-        if let [x, y, z] = numbers[..] {
-            points.push([x, y, z].map(|v| v * unit));
-        } else if !(first && text.starts_with(|c: char| c.is_alphabetic() || c == '"')) {
-            return Err(ScanError::Line {
-                path: path.to_owned(),
-                line: k + 1,
-                text: text.chars().take(60).collect(),
-            });
-        }
-        first = false;
-    }
-    Ok(Scan {
-        points,
-        triangles: Vec::new(),
-    })
 }
 
 /// Neighbours of a point that its triangles are looked for among.

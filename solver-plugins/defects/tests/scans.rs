@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use plyflow_defects::align::{MOST_PASSES, Settings, align};
 use plyflow_defects::scan::{orient, read};
+use plyflow_files::stl::write;
 use plyflow_model::scene::Tool;
 use plyflow_surface::Surface;
 use plyflow_surface::vector::{Vec3, add, cross, distance, scale, sub, unit};
@@ -96,31 +97,34 @@ fn what_the_surface_does_not_decide_stays() {
 fn points_are_read_in_their_unit_and_what_is_no_point_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.csv");
-    let rows: String = (0..30).map(|i| format!("{i}, {},5;7\n", 2 * i)).collect();
+    let rows: String = (0..30).map(|i| format!("{i}, {},5\n", 2 * i)).collect();
     fs::write(&path, format!("x,y,z\n# a remark\n\n{rows}")).unwrap();
-    let scan = read(&path, 0.001).unwrap();
+    let scan = read(&path, Some(0.001)).unwrap();
     assert_eq!((scan.points.len(), scan.triangles.len()), (30, 0));
     assert_eq!(scan.points[3], [0.003, 0.006, 0.005]);
     fs::write(&path, "x,y,z\n1 2 3\nnext\n").unwrap();
-    let error = read(&path, 0.001).unwrap_err().to_string();
-    assert!(error.ends_with("scan.csv:3: `next` does not begin with three numbers x, y, z; correct or remove the line"), "{error}");
+    let error = read(&path, Some(0.001)).unwrap_err().to_string();
+    assert!(
+        error.contains("scan.csv:3: `next` has 1 values where line 2 has 3"),
+        "{error}"
+    );
     fs::write(&path, "1 2 3\n1 2 nan\n").unwrap();
     assert!(
-        read(&path, 0.001)
+        read(&path, Some(0.001))
             .unwrap_err()
             .to_string()
             .contains(":2: `1 2 nan`")
     );
     fs::write(&path, "1 2 3\n").unwrap();
     assert!(
-        read(&path, 0.001)
+        read(&path, Some(0.001))
             .unwrap_err()
             .to_string()
             .contains("has 1 points")
     );
-    let error = read(&folder.path().join("scan.ply"), 1.0).unwrap_err();
+    let error = read(&folder.path().join("scan.ply"), None).unwrap_err();
     assert!(error.to_string().contains("*.stl"), "{error}");
-    let error = read(&folder.path().join("none.xyz"), 1.0).unwrap_err();
+    let error = read(&folder.path().join("none.xyz"), None).unwrap_err();
     assert!(error.to_string().contains("none.xyz"), "{error}");
 }
 
@@ -129,14 +133,10 @@ fn facets_of_an_stl_share_their_corners() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.STL");
     let mesh = spar();
-    let facet = |t: &[u32; 3]| stl_io::Triangle {
-        normal: stl_io::Normal::new([0.0; 3]),
-        vertices: t.map(|i| stl_io::Vertex::new(mesh.points[i as usize].map(|v| 1e3 * v as f32))),
-    };
-    let facets: Vec<stl_io::Triangle> = mesh.triangles.iter().map(facet).collect();
-    let mut file = fs::File::create(&path).unwrap();
-    stl_io::write_stl(&mut file, facets.iter()).unwrap();
-    let scan = read(&path, 0.001).unwrap();
+    let facet = |t: &[u32; 3]| t.map(|i| mesh.points[i as usize].map(|v| 1e3 * v));
+    let facets: Vec<[Vec3; 3]> = mesh.triangles.iter().map(facet).collect();
+    fs::write(&path, write(&facets)).unwrap();
+    let scan = read(&path, Some(0.001)).unwrap();
     assert_eq!(scan.triangles.len(), mesh.triangles.len());
     assert!(scan.points.len() <= mesh.points.len());
     let far = scan.points.iter().map(|p| p[0]).fold(0.0, f64::max);
@@ -166,7 +166,7 @@ fn all_solids_of_a_text_file_are_read_and_none_needs_a_name() {
     for header in ["solid", "solid patch"] {
         let both = solid(header, &mesh.points, first) + "\n" + &solid(header, &mesh.points, second);
         fs::write(&path, both).unwrap();
-        let scan = read(&path, 0.001).unwrap();
+        let scan = read(&path, Some(0.001)).unwrap();
         assert_eq!(scan.triangles.len(), mesh.triangles.len(), "{header}");
         // The patches hang together.
         assert!(scan.points.len() <= mesh.points.len());
@@ -178,23 +178,14 @@ fn a_facet_that_lies_nowhere_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.stl");
     let mesh = spar();
-    for wrong in [f32::NAN, f32::INFINITY] {
-        let facet = |(k, t): (usize, &[u32; 3])| {
-            let mut vertices = t.map(|i| mesh.points[i as usize].map(|v| 1e3 * v as f32));
-            if k == 6 {
-                vertices[1][2] = wrong;
-            }
-            stl_io::Triangle {
-                normal: stl_io::Normal::new([0.0; 3]),
-                vertices: vertices.map(stl_io::Vertex::new),
-            }
-        };
-        let facets: Vec<stl_io::Triangle> = mesh.triangles.iter().enumerate().map(facet).collect();
-        let mut file = fs::File::create(&path).unwrap();
-        stl_io::write_stl(&mut file, facets.iter()).unwrap();
-        let error = read(&path, 0.001).unwrap_err().to_string();
+    for wrong in [f64::NAN, f64::INFINITY] {
+        let facet = |t: &[u32; 3]| t.map(|i| mesh.points[i as usize].map(|v| 1e3 * v));
+        let mut facets: Vec<[Vec3; 3]> = mesh.triangles.iter().map(facet).collect();
+        facets[6][1][2] = wrong;
+        fs::write(&path, write(&facets)).unwrap();
+        let error = read(&path, Some(0.001)).unwrap_err().to_string();
         assert!(
-            error.contains("scan.stl`: facet 7 has") && error.contains("export the scan again"),
+            error.contains("scan.stl: facet 7 has") && error.contains("export the file again"),
             "{error}"
         );
     }
@@ -254,7 +245,7 @@ fn seams_are_closed_and_facets_that_collapse_or_repeat_are_left_out() {
         solid("solid", &points, &left) + &solid("solid", &moved, &with),
     )
     .unwrap();
-    let scan = read(&path, 0.001).unwrap();
+    let scan = read(&path, Some(0.001)).unwrap();
     assert_eq!(
         (scan.points.len(), scan.triangles.len()),
         (points.len(), facets.len())

@@ -3,8 +3,6 @@
 
 use plyflow_model::scene::Scene;
 use std::error::Error;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -15,15 +13,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene: Scene = serde_saphyr::from_str(&std::fs::read_to_string(&scene_path)?)?;
     let folder = Path::new(&scene_path).parent().unwrap_or(Path::new(""));
     let mesh = plyflow_tooling::build_from(&scene.tool, folder)?;
-    let facets: Vec<stl_io::Triangle> = (0..mesh.triangles.len())
-        .map(|t| stl_io::Triangle {
-            normal: stl_io::Normal::new([0.0; 3]),
-            vertices: mesh
-                .corners(t)
-                .map(|p| stl_io::Vertex::new(p.map(|c| (c * 1e3) as f32))),
-        })
+    let facets: Vec<[[f64; 3]; 3]> = (0..mesh.triangles.len())
+        .map(|t| mesh.corners(t).map(|p| p.map(|c| c * 1e3)))
         .collect();
-    stl_io::write_stl(&mut BufWriter::new(File::create(&stl_path)?), facets.iter())?;
+    std::fs::write(&stl_path, plyflow_files::stl::write(&facets))?;
     let [low, high] = mesh.bounds().map(|p| p.map(|c| c * 1e3));
     println!(
         "{stl_path}: {} points, {} facets",

@@ -28,8 +28,11 @@ pub enum ToolError {
         /// The file.
         path: PathBuf,
         /// The cause.
-        source: std::io::Error,
+        source: plyflow_files::open::FileError,
     },
+    /// The file is no STL, or not all of it: `file:line: problem; remedy`.
+    #[error("tool file {0}")]
+    Stl(String),
     /// The file's facets do not make a usable surface.
     #[error("tool file {}: {problem}; {remedy}", path.display())]
     Surface {

@@ -7,14 +7,15 @@
 mod audit;
 mod double_dome;
 mod error;
-mod facets;
+mod facet_budget;
+pub mod facets;
 pub mod given;
 mod hemisphere;
 mod mesh;
 mod ramp;
 pub mod sdf;
 mod spar;
-pub mod stl;
+mod stl;
 mod sweep;
 mod tetrahedron;
 mod tree;
@@ -42,7 +43,7 @@ pub fn build(tool: &Tool) -> Result<ToolMesh, ToolError> {
 
 /// As [`build`], with STL paths relative to `folder`, the one that holds the scene file.
 pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
-    facets::allow(tool)?;
+    facet_budget::allow(tool)?;
     match tool {
         Tool::JoggleSpar(spar) => spar::joggle_spar(spar),
         Tool::Flat(flat) => spar::flat(flat),

@@ -1,26 +1,19 @@
 //! Tools from STL files.
 
 use crate::error::ToolError;
-use crate::mesh::ToolMesh;
-use crate::vector::{V3, cross, dot, norm, sub};
-use std::borrow::Cow;
-use std::fs::File;
-use std::io::{Cursor, Read};
+use crate::facets;
+use crate::mesh::{Adjacency, ToolMesh};
+use crate::vector::{V3, dot, sub};
+use plyflow_files::open::{self, MOST_DATA};
+use plyflow_files::stl::{self, Facets};
 use std::path::Path;
 
 /// How far above its lowest point, over its height, a tool may be open.
 const FOOT: f64 = 1e-3;
 
-/// Points closer than this part of the tool's diagonal are one.
-const WELD: f64 = 1e-6;
-
-/// Reads a binary or ASCII file, welds its points, drops facets without area and checks that the rest is a
-/// surface with a consistent outside, open at its foot at most.
+/// Reads a file ([`plyflow_files::stl`]), joins its facets ([`facets::join`]) and checks that they are a surface with a consistent
+/// outside, open at its foot at most.
 pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, ToolError> {
-    let read_error = |source| ToolError::Read {
-        path: path.to_owned(),
-        source,
-    };
     let surface_error = |problem: String, remedy: &str| ToolError::Surface {
         path: path.to_owned(),
         problem,
@@ -35,217 +28,162 @@ pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, To
             "give the length of one unit of the file, such as `1 mm`",
         ));
     }
-    let bytes = std::fs::read(path).map_err(read_error)?;
-    let unreadable = |source| match no_stl(path) {
-        Some((problem, remedy)) => surface_error(problem, remedy),
-        None => read_error(source),
-    };
-    let mut soup: Vec<[V3; 3]> = Vec::new();
-    for solid in solids(&bytes) {
-        let mut input = Cursor::new(&solid[..]);
-        for triangle in stl_io::create_stl_reader(&mut input).map_err(unreadable)? {
-            let corners = triangle
-                .map_err(unreadable)?
-                .vertices
-                .map(|v| std::array::from_fn(|k| f64::from(v.0[k]) * unit + translate[k]));
-            if corners.iter().flatten().any(|c: &f64| !c.is_finite()) {
-                return Err(surface_error(
-                    format!(
-                        "facet {} has a coordinate that is not a finite number",
-                        soup.len() + 1
-                    ),
-                    "export the file again",
-                ));
-            }
-            soup.push(corners);
+    let bytes = open::read(path, MOST_DATA).map_err(|source| ToolError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let mut read = stl::parse(&bytes).map_err(|e| ToolError::Stl(e.of(path)))?;
+    drop(bytes);
+    for corners in &mut read.corners {
+        for p in corners.iter_mut() {
+            *p = std::array::from_fn(|k| p[k] * unit + translate[k]);
         }
-    }
-    let mesh = weld(&soup);
-    if mesh.triangles.is_empty() {
-        return Err(surface_error(
-            format!("none of its {} facets has an area", soup.len()),
-            "export the tool's surface as facets",
-        ));
-    }
-    check(&mesh, unit, translate).map_err(|(problem, remedy)| surface_error(problem, remedy))?;
-    Ok(mesh)
-}
-
-/// The solids of a text file, each as a file of its own (the reader takes the first alone, and asks for a name); anything else as it is.
-pub fn solids(bytes: &[u8]) -> Vec<Cow<'_, [u8]>> {
-    let whole = || vec![Cow::Borrowed(bytes)];
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return whole();
-    };
-    // A binary file may begin with the word too.
-    if !text.trim_start().starts_with("solid") || !text.contains("facet") {
-        return whole();
-    }
-    let mut solids: Vec<Cow<'_, [u8]>> = Vec::new();
-    let mut lines: Vec<&str> = Vec::new();
-    for line in text.lines().filter(|l| !l.trim().is_empty()) {
-        let first = lines.is_empty();
-        lines.push(if first { "solid of_a_tool" } else { line });
-        if line.trim_start().starts_with("endsolid") {
-            solids.push(Cow::Owned((lines.join("\n") + "\n").into_bytes()));
-            lines.clear();
-        }
-    }
-    if !lines.is_empty() {
-        solids.push(Cow::Owned((lines.join("\n") + "\n").into_bytes()));
-    }
-    solids
-}
-
-/// What a file that cannot be read is instead, and what to do.
-fn no_stl(path: &Path) -> Option<(String, &'static str)> {
-    const HEAD: usize = 84;
-    let length = std::fs::metadata(path).ok()?.len();
-    let mut head = Vec::new();
-    let file = File::open(path).ok()?;
-    file.take(HEAD as u64).read_to_end(&mut head).ok()?;
-    if head.is_empty() {
-        return Some(("it is empty".into(), "export the tool's surface again"));
-    }
-    let text = String::from_utf8_lossy(&head);
-    let text = text.trim_start();
-    for (start, what) in [
-        ("ISO-10303", "a STEP file"),
-        ("<", "HTML or XML"),
-        ("PK", "a zip archive"),
-    ] {
-        if text.starts_with(start) {
-            let problem = format!("it is {what}, no STL file");
-            return Some((problem, "export the tool's surface as STL"));
-        }
-    }
-    if text.starts_with("solid") {
-        return None;
-    }
-    // Binary: 80 bytes of text, the number of facets, 50 bytes for each.
-    let count: [u8; 4] = head.get(80..HEAD)?.try_into().ok()?;
-    let count = u64::from(u32::from_le_bytes(count));
-    let there = (length - HEAD as u64) / 50;
-    (there < count).then(|| {
-        (
-            format!("it ends after {there} of the {count} facets that it announces"),
-            "it was cut off, or is no STL file: copy or export it again",
-        )
-    })
-}
-
-/// Joins equal points; facets that lose a corner or have no area are dropped.
-fn weld(soup: &[[V3; 3]]) -> ToolMesh {
-    let corners = ToolMesh {
-        points: soup.iter().flatten().copied().collect(),
-        triangles: Vec::new(),
-    };
-    let [low, high] = corners.bounds();
-    let near = WELD * norm(sub(high, low));
-    let mut order: Vec<u32> = (0..corners.points.len() as u32).collect();
-    order.sort_by(|&a, &b| {
-        let (p, q) = (corners.points[a as usize], corners.points[b as usize]);
-        p[0].total_cmp(&q[0]).then(a.cmp(&b))
-    });
-    // Each corner takes the first of the sorted corners within reach that stands for itself.
-    let mut stands_for = vec![u32::MAX; order.len()];
-    let mut mesh = ToolMesh::default();
-    let mut kept: Vec<(f64, u32)> = Vec::new();
-    let mut window = 0;
-    for &c in &order {
-        let p = corners.points[c as usize];
-        while window < kept.len() && kept[window].0 < p[0] - near {
-            window += 1;
-        }
-        let found = kept[window..]
-            .iter()
-            .map(|&(_, q)| q)
-            .find(|&q| norm(sub(mesh.points[q as usize], p)) <= near);
-        stands_for[c as usize] = found.unwrap_or_else(|| {
-            let q = mesh.push(p);
-            kept.push((p[0], q));
-            q
-        });
-    }
-    for t in 0..soup.len() {
-        let [a, b, c] = [3 * t, 3 * t + 1, 3 * t + 2].map(|k| stands_for[k]);
-        let [p, q, r] = [a, b, c].map(|k| mesh.points[k as usize]);
-        let longest = norm(sub(q, p)).max(norm(sub(r, q))).max(norm(sub(p, r)));
-        let height = norm(cross(sub(q, p), sub(r, p))) / longest;
-        if a != b && b != c && c != a && height > 0.0 {
-            mesh.triangles.push([a, b, c]);
-        }
-    }
-    mesh
-}
-
-fn check(mesh: &ToolMesh, unit: f64, translate: V3) -> Result<(), (String, &'static str)> {
-    let adjacency = mesh.adjacency();
-    let place = |[a, b]: [u32; 2]| {
-        let text = [a, b].map(|p| {
-            let q: V3 = std::array::from_fn(|k| (mesh.points[p as usize][k] - translate[k]) / unit);
-            format!("({:.4}, {:.4}, {:.4})", q[0], q[1], q[2])
-        });
-        format!(
-            "the edge from {} to {} (in the file's units)",
-            text[0], text[1]
-        )
-    };
-    if let Some(edge) = adjacency.crowded {
-        return Err((
-            format!("{} has more than two facets", place(edge)),
-            "export one surface without double or inner walls",
-        ));
-    }
-    if let Some(edge) = adjacency.flipped {
-        return Err((
-            format!(
-                "the two facets at {} are oriented against each other",
-                place(edge)
-            ),
-            "make the normals consistent (in MeshLab: Re-Orient all faces coherently)",
-        ));
-    }
-    // About a point at the foot: where a tool is open there, what is missing has no part in it.
-    let [low, high] = mesh.bounds();
-    let foot = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]];
-    let shells = mesh.shells();
-    for shell in &shells {
-        let volume: f64 = (0..shell.triangles.len())
-            .map(|t| dot(sub(shell.corners(t)[0], foot), shell.area_normal(t)) / 6.0)
-            .sum();
-        if volume <= 0.0 {
-            let which = match shells.len() {
-                1 => "its facets point inwards".to_owned(),
-                n => {
-                    let at = shell.corners(0)[0];
-                    let q: V3 = std::array::from_fn(|k| (at[k] - translate[k]) / unit);
-                    format!(
-                        "the facets of one of its {n} bodies, that at ({:.4}, {:.4}, {:.4}) (in the file's units), point inwards",
-                        q[0], q[1], q[2]
-                    )
-                }
-            };
-            return Err((
-                format!("{which} (volume {volume:.3e} m3)"),
-                "flip the facets so that they point away from the tool; a cavity inside of a tool is to be left out",
+        if corners.as_flattened().iter().any(|c| !c.is_finite()) {
+            return Err(surface_error(
+                "it has a coordinate that is too large".to_owned(),
+                "export the file again",
             ));
         }
     }
-    // A rim higher up has no outside beside it.
-    let near = low[2] + FOOT * (high[2] - low[2]);
-    let is_high = |edge: &&[u32; 2]| edge.iter().any(|p| mesh.points[*p as usize][2] > near);
-    if let Some(edge) = adjacency.open.iter().find(is_high) {
-        return Err((
-            format!(
-                "it has a hole or a free rim above its foot: {} has one facet only ({} such edges in all)",
-                place(*edge),
-                adjacency.open.iter().filter(is_high).count()
-            ),
-            "close it (in MeshLab: Close Holes), or draw its walls down to its foot",
+    let surface = facets::join(&read.corners);
+    let mesh = ToolMesh {
+        points: surface.points,
+        triangles: surface.triangles,
+    };
+    if mesh.triangles.is_empty() {
+        return Err(surface_error(
+            format!("none of its {} facets has an area", read.corners.len()),
+            "export the tool's surface as facets",
         ));
     }
-    Ok(())
+    let checked = Checked {
+        mesh: &mesh,
+        facet: &surface.facet,
+        read: &read,
+        unit,
+        translate,
+    };
+    checked
+        .check()
+        .map_err(|(problem, remedy)| surface_error(problem, remedy))?;
+    Ok(mesh)
+}
+
+/// A surface beside the file that it is of.
+struct Checked<'a> {
+    mesh: &'a ToolMesh,
+    /// Facet of the file for each of the mesh.
+    facet: &'a [u32],
+    read: &'a Facets,
+    unit: f64,
+    translate: V3,
+}
+
+impl Checked<'_> {
+    /// A point in the file's units.
+    fn point(&self, p: V3) -> String {
+        let q: V3 = std::array::from_fn(|k| (p[k] - self.translate[k]) / self.unit);
+        format!("({:.4}, {:.4}, {:.4})", q[0], q[1], q[2])
+    }
+
+    /// An edge, and the first facet of the file that has it.
+    fn edge(&self, [a, b]: [u32; 2]) -> String {
+        let has = |t: &[u32; 3]| t.contains(&a) && t.contains(&b);
+        let of = self.mesh.triangles.iter().position(has);
+        let place = of.map_or(String::new(), |t| {
+            format!(", {}", self.read.place(self.facet[t] as usize))
+        });
+        let [p, q] = [a, b].map(|p| self.point(self.mesh.points[p as usize]));
+        format!("the edge from {p} to {q} (in the file's units{place})")
+    }
+
+    fn check(&self) -> Result<(), (String, &'static str)> {
+        let (mesh, adjacency) = (self.mesh, self.mesh.adjacency());
+        if let Some(edge) = adjacency.crowded {
+            return Err((
+                format!("{} has more than two facets", self.edge(edge)),
+                "export one surface without double or inner walls",
+            ));
+        }
+        if let Some(edge) = adjacency.flipped {
+            return Err((
+                format!(
+                    "the two facets at {} are oriented against each other",
+                    self.edge(edge)
+                ),
+                "make the normals consistent (in MeshLab: Re-Orient all faces coherently)",
+            ));
+        }
+        self.outside(&adjacency)?;
+        // A rim higher up has no outside beside it.
+        let [low, high] = mesh.bounds();
+        let near = low[2] + FOOT * (high[2] - low[2]);
+        let is_high = |edge: &&[u32; 2]| edge.iter().any(|p| mesh.points[*p as usize][2] > near);
+        if let Some(edge) = adjacency.open.iter().find(is_high) {
+            return Err((
+                format!(
+                    "it has a hole or a free rim above its foot: {} has one facet only ({} such edges in all)",
+                    self.edge(*edge),
+                    adjacency.open.iter().filter(is_high).count()
+                ),
+                "close it (in MeshLab: Close Holes), or draw its walls down to its foot",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Whether each body has its outside outside.
+    fn outside(&self, adjacency: &Adjacency) -> Result<(), (String, &'static str)> {
+        let mesh = self.mesh;
+        // About a point at the foot: where a tool is open there, what is missing has no part in it.
+        let [low, high] = mesh.bounds();
+        let foot = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]];
+        let bodies = bodies(adjacency);
+        let count = bodies.iter().max().map_or(0, |b| b + 1);
+        let (mut volumes, mut first) = (vec![0.0; count], vec![usize::MAX; count]);
+        for (t, &body) in bodies.iter().enumerate() {
+            volumes[body] += dot(sub(mesh.corners(t)[0], foot), mesh.area_normal(t)) / 6.0;
+            first[body] = first[body].min(t);
+        }
+        let Some(body) = volumes.iter().position(|v| *v <= 0.0) else {
+            return Ok(());
+        };
+        let which = match count {
+            1 => "its facets point inwards".to_owned(),
+            n => format!(
+                "the facets of one of its {n} bodies, that at {} (in the file's units, {}), point inwards",
+                self.point(mesh.corners(first[body])[0]),
+                self.read.place(self.facet[first[body]] as usize)
+            ),
+        };
+        Err((
+            format!("{which} (volume {:.3e} m3)", volumes[body]),
+            "flip the facets so that they point away from the tool; a cavity inside of a tool is to be left out",
+        ))
+    }
+}
+
+/// For each facet the body of which it is: facets that share edges. The order is that of their first facets.
+fn bodies(adjacency: &Adjacency) -> Vec<usize> {
+    let mut of = vec![usize::MAX; adjacency.neighbour.len()];
+    let mut count = 0;
+    for first in 0..of.len() {
+        if of[first] != usize::MAX {
+            continue;
+        }
+        let mut open = vec![first];
+        of[first] = count;
+        while let Some(t) = open.pop() {
+            for next in adjacency.neighbour[t].into_iter().flatten() {
+                if of[next as usize] == usize::MAX {
+                    of[next as usize] = count;
+                    open.push(next as usize);
+                }
+            }
+        }
+        count += 1;
+    }
+    of
 }
 
 #[cfg(test)]
@@ -254,20 +192,15 @@ mod tests {
     use crate::hemisphere::hemisphere;
     use std::io::Write;
 
-    fn facets(mesh: &ToolMesh) -> Vec<stl_io::Triangle> {
-        (0..mesh.triangles.len())
-            .map(|t| stl_io::Triangle {
-                normal: stl_io::Normal::new([0.0; 3]),
-                vertices: mesh
-                    .corners(t)
-                    .map(|p| stl_io::Vertex::new(p.map(|c| (c * 1e3) as f32))),
-            })
+    fn facets(mesh: &ToolMesh) -> Vec<[V3; 3]> {
+        let all = 0..mesh.triangles.len();
+        all.map(|t| mesh.corners(t).map(|p| p.map(|c| 1e3 * c)))
             .collect()
     }
 
     fn binary(mesh: &ToolMesh) -> tempfile::NamedTempFile {
         let mut file = tempfile::NamedTempFile::new().unwrap();
-        stl_io::write_stl(&mut file, facets(mesh).iter()).unwrap();
+        file.write_all(&stl::write(&facets(mesh))).unwrap();
         file
     }
 
@@ -276,8 +209,8 @@ mod tests {
         writeln!(file, "solid tool").unwrap();
         for t in facets(mesh) {
             writeln!(file, "facet normal 0 0 0\nouter loop").unwrap();
-            for v in t.vertices {
-                writeln!(file, "vertex {} {} {}", v.0[0], v.0[1], v.0[2]).unwrap();
+            for v in t {
+                writeln!(file, "vertex {} {} {}", v[0], v[1], v[2]).unwrap();
             }
             writeln!(file, "endloop\nendfacet").unwrap();
         }
@@ -365,7 +298,11 @@ mod tests {
             text(&mixed)
         );
         let mut double = mesh.clone();
+        // There twice, it is the same; as a wall it is one too many.
         double.triangles.push(mesh.triangles[2]);
+        read(binary(&double).path(), 1e-3, [0.0; 3]).unwrap();
+        let [a, b, c] = mesh.triangles[2];
+        double.triangles.push([b, a, c]);
         assert!(
             text(&double).contains("more than two facets"),
             "{}",

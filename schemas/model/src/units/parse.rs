@@ -26,7 +26,7 @@ const PREFIXES: [(&str, i32); 12] = [
 /// A named unit: symbol, whether it takes SI prefixes, power of ten, integer factor, degrees, exponents.
 struct Symbol(&'static str, bool, i32, u64, i32, Exponents);
 
-const SYMBOLS: [Symbol; 19] = [
+const SYMBOLS: [Symbol; 36] = [
     Symbol("m", true, 0, 1, 0, [1, 0, 0, 0, 0]),
     Symbol("g", true, -3, 1, 0, [0, 1, 0, 0, 0]),
     Symbol("s", true, 0, 1, 0, [0, 0, 1, 0, 0]),
@@ -46,10 +46,60 @@ const SYMBOLS: [Symbol; 19] = [
     Symbol("°", false, 0, 1, 1, [0, 0, 0, 0, 1]),
     Symbol("%", false, -2, 1, 0, [0, 0, 0, 0, 0]),
     Symbol("1", false, 0, 1, 0, [0, 0, 0, 0, 0]),
+    // Of another system, exact by definition: the yard and the pound of 1959, standard gravity.
+    Symbol("in", false, -4, 254, 0, [1, 0, 0, 0, 0]),
+    Symbol("inch", false, -4, 254, 0, [1, 0, 0, 0, 0]),
+    Symbol("mil", false, -7, 254, 0, [1, 0, 0, 0, 0]),
+    Symbol("thou", false, -7, 254, 0, [1, 0, 0, 0, 0]),
+    Symbol("ft", false, -4, 3048, 0, [1, 0, 0, 0, 0]),
+    Symbol("yd", false, -4, 9144, 0, [1, 0, 0, 0, 0]),
+    Symbol("lb", false, -8, 45_359_237, 0, [0, 1, 0, 0, 0]),
+    Symbol("oz", false, -12, 28_349_523_125, 0, [0, 1, 0, 0, 0]),
+    Symbol("lbf", false, -13, 44_482_216_152_605, 0, [1, 1, -2, 0, 0]),
+    Symbol(
+        "ozf",
+        false,
+        -17,
+        27_801_385_095_378_125,
+        0,
+        [1, 1, -2, 0, 0],
+    ),
+    Symbol("kgf", false, -5, 980_665, 0, [1, 1, -2, 0, 0]),
+    Symbol("gf", false, -8, 980_665, 0, [1, 1, -2, 0, 0]),
+    Symbol("atm", false, 0, 101_325, 0, [-1, 1, -2, 0, 0]),
+    Symbol("mmHg", false, -9, 133_322_387_415, 0, [-1, 1, -2, 0, 0]),
+    Symbol("inHg", false, -9, 3_386_388_640_341, 0, [-1, 1, -2, 0, 0]),
+    // These two by their parts: see `COMPOUND`.
+    Symbol("psi", false, -5, 44_482_216_152_605, 0, [-1, 1, -2, 0, 0]),
+    Symbol("ksi", false, -2, 44_482_216_152_605, 0, [-1, 1, -2, 0, 0]),
+];
+
+/// Units whose factor is no decimal number: symbol, and by what it is divided.
+const COMPOUND: [(&str, u64); 2] = [("psi", 254 * 254), ("ksi", 254 * 254)];
+
+/// Units that are not taken, and what to write instead.
+const FOREIGN: [(&str, &str, Exponents); 9] = [
+    (
+        "degF",
+        "degC: 32 degF = 0 degC, and 1.8 degF more are 1 degC more",
+        [0, 0, 0, 1, 0],
+    ),
+    (
+        "\u{b0}F",
+        "degC: 32 degF = 0 degC, and 1.8 degF more are 1 degC more",
+        [0, 0, 0, 1, 0],
+    ),
+    ("mi", "km: 1 mi = 1.609344 km", [1, 0, 0, 0, 0]),
+    ("dyn", "N: 1 dyn = 1e-5 N", [1, 1, -2, 0, 0]),
+    ("kp", "N: 1 kp = 9.80665 N", [1, 1, -2, 0, 0]),
+    ("kip", "N: 1 kip = 4448.2216152605 N", [1, 1, -2, 0, 0]),
+    ("torr", "Pa: 1 torr = 133.322 Pa", [-1, 1, -2, 0, 0]),
+    ("\u{c5}", "nm: 1 \u{c5} = 0.1 nm", [1, 0, 0, 0, 0]),
+    ("rpm", "1/s or rad/s", [0, 0, -1, 0, 0]),
 ];
 
 /// Words people write for units.
-const ALIASES: [(&str, &str); 26] = [
+const ALIASES: [(&str, &str); 44] = [
     ("sec", "s"),
     ("secs", "s"),
     ("second", "s"),
@@ -76,6 +126,24 @@ const ALIASES: [(&str, &str); 26] = [
     ("celsius", "degC"),
     ("percent", "%"),
     ("gsm", "g/m2"),
+    ("inches", "in"),
+    ("\"", "in"),
+    ("\u{2033}", "in"),
+    ("''", "in"),
+    ("foot", "ft"),
+    ("feet", "ft"),
+    ("'", "ft"),
+    ("\u{2032}", "ft"),
+    ("mils", "mil"),
+    ("yard", "yd"),
+    ("yards", "yd"),
+    ("lbs", "lb"),
+    ("pound", "lb"),
+    ("pounds", "lb"),
+    ("ounce", "oz"),
+    ("ounces", "oz"),
+    ("gram-force", "gf"),
+    ("pond", "gf"),
 ];
 
 /// A unit, reduced to SI: value = number x 10^`decimal` x `numerator` / `denominator` x (pi/180)^`degrees` + `offset`.
@@ -117,6 +185,15 @@ impl Unit {
             &mut self.denominator
         };
         *side = side.checked_mul(factor)?;
+        if let Some((_, by)) = COMPOUND.iter().find(|c| c.0 == symbol.0) {
+            let by = by.checked_pow(power.unsigned_abs())?;
+            let side = if power > 0 {
+                &mut self.denominator
+            } else {
+                &mut self.numerator
+            };
+            *side = side.checked_mul(by)?;
+        }
         Some(())
     }
 }
@@ -126,30 +203,73 @@ impl Unit {
 /// # Errors
 /// [`UnitError::UnknownUnit`] with the symbol that is not known.
 pub fn parse_unit(text: &str) -> Result<Unit, UnitError> {
-    read_unit(text).map_err(|unit| unknown(text, unit, None))
+    read_unit(text).map_err(|unit| unknown(text, text, unit, None, None))
 }
 
-fn unknown(text: &str, unit: String, dimension: Option<Dimension>) -> UnitError {
-    let lower = unit.to_lowercase();
-    let alias = ALIASES
+/// Reads a unit of a dimension, such as that of a column.
+///
+/// # Errors
+/// [`UnitError::UnknownUnit`] with what was probably meant, of this dimension; [`UnitError::WrongDimension`].
+pub fn parse_unit_of(text: &str, dimension: Dimension) -> Result<Unit, UnitError> {
+    let wanted = dimension.exponents();
+    let unit =
+        read_unit(text).map_err(|unit| unknown(text, text, unit, Some(wanted), Some(dimension)))?;
+    if unit.exponents != wanted {
+        return Err(UnitError::WrongDimension {
+            text: text.trim().into(),
+            got: in_words(unit.exponents),
+            dimension,
+        });
+    }
+    Ok(unit)
+}
+
+/// What is said of a text whose unit `whole` has a part that is not known. What is offered has the wanted dimension, where one is wanted.
+fn unknown(
+    text: &str,
+    whole: &str,
+    unit: String,
+    wanted: Option<Exponents>,
+    dimension: Option<Dimension>,
+) -> UnitError {
+    // In its place, so that `N/mn` is offered a length and `mn` alone a force.
+    let fits = |name: &str| {
+        if whole.len() > 200 {
+            return false;
+        }
+        let meant = whole.replacen(&unit, name, 1);
+        read_unit(&meant).is_ok_and(|u| wanted.is_none_or(|w| u.exponents == w))
+    };
+    let alone = whole.trim() == unit;
+    let foreign = FOREIGN
         .iter()
-        .find(|(a, _)| *a == lower)
-        .map(|(_, u)| (*u).to_owned());
-    let nearest = alias.or_else(|| {
-        let mut names: Vec<String> = Vec::new();
+        .find(|f| f.0.to_lowercase() == unit.to_lowercase());
+    let text = text.chars().take(80).collect();
+    if let Some((_, write, exponents)) = foreign
+        && (!alone || wanted.is_none_or(|w| w == *exponents))
+    {
+        return UnitError::Foreign {
+            text,
+            unit,
+            write,
+            dimension,
+        };
+    }
+    let lower = unit.to_lowercase();
+    let alias = ALIASES.iter().find(|(a, u)| *a == lower && fits(u));
+    let nearest = alias.map(|(_, u)| (*u).to_owned()).or_else(|| {
+        let mut names: Vec<String> = vec!["degC".into()];
         for s in SYMBOLS.iter().filter(|s| s.0 != "1" && s.0 != "%") {
             names.push(s.0.into());
             if s.1 {
                 names.extend(PREFIXES.iter().map(|(p, _)| format!("{p}{}", s.0)));
             }
         }
-        // A unit of the wanted dimension is the likelier meaning.
-        let wanted = dimension.map(Dimension::exponents);
-        names.sort_by_key(|n| read_unit(n).ok().map(|u| u.exponents) != wanted);
+        names.retain(|n| fits(n));
         nearest(&unit, names.iter().map(String::as_str)).map(str::to_owned)
     });
     UnitError::UnknownUnit {
-        text: text.into(),
+        text,
         unit,
         nearest,
         dimension,
@@ -356,7 +476,8 @@ impl Decimal<'_> {
 /// # Errors
 /// A [`UnitError`] that says what was given, what was expected and an example.
 pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, UnitError> {
-    let (value, exponents, has_unit) = read_quantity(text, Some(dimension))?;
+    let wanted = Some(dimension.exponents());
+    let (value, exponents, has_unit) = read_quantity(text, wanted, Some(dimension))?;
     if !has_unit && dimension != Dimension::Dimensionless {
         return Err(UnitError::MissingUnit {
             text: text.trim().into(),
@@ -384,7 +505,7 @@ pub fn parse_quantity_in(text: &str, unit: &str) -> Result<f64, UnitError> {
     if let Some(dimension) = Dimension::of(wanted) {
         return parse_quantity(text, dimension);
     }
-    let (value, exponents, has_unit) = read_quantity(text, None)?;
+    let (value, exponents, has_unit) = read_quantity(text, Some(wanted), None)?;
     let text: String = text.trim().into();
     if !has_unit {
         return Err(UnitError::MissingUnit {
@@ -405,6 +526,7 @@ pub fn parse_quantity_in(text: &str, unit: &str) -> Result<f64, UnitError> {
 
 fn read_quantity(
     text: &str,
+    wanted: Option<Exponents>,
     dimension: Option<Dimension>,
 ) -> Result<(f64, Exponents, bool), UnitError> {
     let text = text.trim();
@@ -422,11 +544,11 @@ fn read_quantity(
     }
     let rest = rest.trim();
     // `4/mm` reads as `4 1/mm`.
-    let unit = match rest.strip_prefix('/') {
-        Some(below) if !below.is_empty() => read_unit(&format!("1/{below}")),
-        _ => read_unit(rest),
-    }
-    .map_err(|unit| unknown(text, unit, dimension))?;
+    let whole = match rest.strip_prefix('/') {
+        Some(below) if !below.is_empty() => format!("1/{below}"),
+        _ => rest.to_owned(),
+    };
+    let unit = read_unit(&whole).map_err(|unit| unknown(text, &whole, unit, wanted, dimension))?;
     let value = number.times(&unit);
     if !value.is_finite() {
         return Err(UnitError::TooLarge {

@@ -1,0 +1,11 @@
+//! Files that users name: tools, scans and tests as the field's programs write them.
+//!
+//! One reader for each kind of file, and one place for its dialects: [`stl`] for facets, [`rows`] for everything in columns. Under
+//! them [`open`] (what is opened at all, and how much of it is read), [`text`] (encodings, and what a message may show of a file) and
+//! [`number`] (decimal signs). What is no dialect that is known here is refused, with its line; nothing is passed over in silence.
+
+pub mod number;
+pub mod open;
+pub mod rows;
+pub mod stl;
+pub mod text;
