@@ -2,6 +2,7 @@
 
 use crate::penetration::PenetrationPeak;
 use crate::run::HistoryRow;
+use crate::watch::Watched;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 
 /// How far a run has come, between two frames.
@@ -17,6 +18,8 @@ pub struct Course {
     pub start_shift: Option<f64>,
     /// Largest penetrations of the frames so far, in the order of [`crate::run::Forming::penetrations`].
     pub peaks: Vec<PenetrationPeak>,
+    /// What the watch has seen.
+    pub watched: Watched,
     /// Critical step at the last frame (s); taken again when a run is taken up.
     pub(crate) critical_step: f64,
     /// The step (s) of which the user knows; of this attempt, and not kept for another.
@@ -31,6 +34,7 @@ impl Default for Course {
             smallest_step: f64::INFINITY,
             start_shift: None,
             peaks: Vec::new(),
+            watched: Watched::default(),
             critical_step: f64::INFINITY,
             told_step: None,
         }
@@ -53,7 +57,8 @@ impl Course {
         a.value(&mut self.history)?;
         a.value(&mut self.smallest_step)?;
         a.value(&mut self.start_shift)?;
-        a.value(&mut self.peaks)
+        a.value(&mut self.peaks)?;
+        a.value(&mut self.watched)
     }
 }
 

@@ -270,6 +270,7 @@ mod tests {
             holder_travel: 0.0,
             sheets: Vec::new(),
             interfaces: Vec::new(),
+            depths: Vec::new(),
         };
         (0..rows).map(row).collect()
     }

@@ -3,6 +3,7 @@
 //! global run meshes the scene itself; with a `boundary` input it is a local run of one zone; with `zones` plies bend in these
 //! alone.
 
+pub mod absurd;
 pub mod assembly;
 mod checkpoint;
 mod course;
@@ -24,6 +25,7 @@ pub mod run;
 mod strain;
 pub mod symmetry;
 mod tool;
+pub mod watch;
 mod writer;
 
 pub use global::build_global;

@@ -9,6 +9,7 @@ use crate::penetration::{OVERLAP_BOUND, Penetration, PenetrationPeak, too_deep_o
 use crate::press::PressLoad;
 use crate::run::{Body, Forming, Outcome};
 use crate::strain::ply_extremes;
+use crate::watch::{DEPTH_BOUND, Kind, PairDepth, depth_attributes, depth_warnings};
 use crate::writer::Writer;
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::component::element_fields;
@@ -122,6 +123,7 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
         crate::local::feed_back(&mut forming, Feedback { time, sheets })?;
     }
     tell_bending(host, &forming, p)?;
+    crate::absurd::check(p, &forming)?;
     let mut fields = Vec::new();
     for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
         let film = sheet.scene.kind == SheetKind::Diaphragm;
@@ -245,6 +247,16 @@ fn write_energies(host: &Host, forming: &Forming, outcome: &Outcome) -> Result<(
             write(format!("history/interfaces/{name}/{what}"), data.collect())?;
         }
     }
+    for (k, d) in outcome.depths.iter().enumerate() {
+        let data: Vec<f64> = (rows.iter())
+            .map(|r| r.depths.get(k).copied().unwrap_or(0.0))
+            .collect();
+        if data.iter().all(|depth| *depth == 0.0) {
+            continue;
+        }
+        let path = format!("history/depth/{}", d.pair.name);
+        host.write_f64(&path, &[data.len()], "m", &data)?;
+    }
     Ok(())
 }
 
@@ -349,6 +361,7 @@ fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<St
     let mut warnings = mesh_warnings(forming);
     warnings.extend(forming.tool_warnings.iter().cloned());
     warnings.extend(outcome.warnings.iter().cloned());
+    warnings.extend(depth_warnings(&outcome.depths));
     warnings.extend(now.iter().filter_map(Penetration::too_deep));
     warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
     let (_, _, strain) = ply_extremes(forming);
@@ -430,6 +443,8 @@ fn write_summary(
         "penetration": penetration_attributes(&penetrations, &outcome.peaks),
         "overlap_bound": OVERLAP_BOUND,
         "tool_field_error": field_error_attributes(forming),
+        "depth": depth_attributes(&outcome.depths),
+        "depth_bound": DEPTH_BOUND,
         "warnings": warnings,
     }))?;
     for w in &warnings {
@@ -479,7 +494,33 @@ fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<(
     host.result("overlap_ratio", worst(Penetration::overlap), "1")?;
     host.result("penetration_peak_max", peak(|_, k| k.largest), "m")?;
     host.result("penetration_peak_q999", peak(|_, k| k.q999), "m")?;
-    host.result("overlap_peak_ratio", peak(|p, k| p.overlap_of(k.q999)), "1")
+    host.result("overlap_peak_ratio", peak(|p, k| p.overlap_of(k.q999)), "1")?;
+    let deepest = |f: fn(&PairDepth) -> f64, counts: fn(&PairDepth) -> bool| {
+        let of = outcome.depths.iter().filter(|d| counts(d));
+        of.map(f).fold(0.0, f64::max)
+    };
+    let nodes = |d: &PairDepth| d.pair.kind == Kind::Nodes;
+    let plies = |d: &PairDepth| d.pair.kind == Kind::Nodes && d.pair.of_ply;
+    host.result("depth", deepest(|d| d.end.depth, nodes), "m")?;
+    host.result("depth_ratio", deepest(PairDepth::share, nodes), "1")?;
+    host.result("depth_peak", deepest(|d| d.peak.deep.depth, nodes), "m")?;
+    host.result(
+        "depth_peak_ratio",
+        deepest(PairDepth::peak_share, nodes),
+        "1",
+    )?;
+    host.result("ply_depth_ratio", deepest(PairDepth::share, plies), "1")?;
+    host.result(
+        "ply_depth_peak_ratio",
+        deepest(PairDepth::peak_share, plies),
+        "1",
+    )?;
+    let of = |kind: Kind| move |d: &&PairDepth| d.pair.kind == kind;
+    for (name, kind) in [("edge_depth", Kind::Edges), ("film_hang", Kind::Hangs)] {
+        let ends = outcome.depths.iter().filter(of(kind)).map(|d| d.end.depth);
+        host.result(name, ends.fold(0.0, f64::max), "m")?;
+    }
+    Ok(())
 }
 
 /// What the plies came to, and the quality of what they are meshed with.

@@ -1,5 +1,6 @@
 //! The time loop: frames, ledger, step control, health.
 
+use crate::absurd;
 use crate::assembly::StackSheet;
 pub use crate::course::Course;
 use crate::diagnosis;
@@ -8,6 +9,7 @@ use crate::penetration::{PenetrationPeak, keep_largest};
 use crate::press::PressLoad;
 use crate::process::Load;
 use crate::symmetry::MirroredBody;
+use crate::watch::{PairDepth, Watch};
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::component::ElementField;
@@ -60,6 +62,8 @@ pub struct RigidBody {
     pub points: Vec<V>,
     /// Quads.
     pub cells: Vec<[u32; 4]>,
+    /// What they show.
+    pub plate: OpenPlate,
 }
 
 impl Forming {
@@ -125,6 +129,7 @@ impl RigidBody {
             name: name.into(),
             points,
             cells,
+            plate: *plate,
         }
     }
 }
@@ -198,6 +203,8 @@ pub struct HistoryRow {
     pub sheets: Vec<SheetEnergy>,
     /// By interface, in the order of [`Model::interface_energies`].
     pub interfaces: Vec<ContactEnergy>,
+    /// How deep (m) bodies are in each other, by pair, in the order of [`Watch::pairs`].
+    pub depths: Vec<f64>,
 }
 
 /// What came of a run.
@@ -215,6 +222,8 @@ pub struct Outcome {
     pub start_shift: Option<f64>,
     /// Largest penetrations over all frames, in the order of [`Forming::penetrations`].
     pub peaks: Vec<PenetrationPeak>,
+    /// What the watch found.
+    pub depths: Vec<PairDepth>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -313,14 +322,14 @@ impl Forming {
         self.load.archive(a)
     }
 
-    fn row(&self, ledger: Ledger, critical_step: f64) -> HistoryRow {
+    fn row(&self, ledger: Ledger, course: &Course) -> HistoryRow {
         let m = &self.model;
         // Of the whole.
         let n = self.copies();
         HistoryRow {
             time: m.time,
             time_step: m.dt,
-            critical_step,
+            critical_step: course.critical_step,
             ledger: ledger.times(n),
             cavity: m.pressures.below,
             bag: m.pressures.above,
@@ -329,6 +338,7 @@ impl Forming {
             holder_travel: self.load.press().map_or(0.0, PressLoad::holder_travel),
             sheets: m.sheet_energies().iter().map(|e| e.times(n)).collect(),
             interfaces: m.interface_energies().map(|(_, e)| e.times(n)).collect(),
+            depths: course.watched.now.iter().map(|d| d.depth).collect(),
         }
     }
 
@@ -351,6 +361,7 @@ impl Forming {
             course.start_shift = late::begin(self, control.target_step, control.safety, observer)?;
             is_late = course.start_shift.is_some();
         }
+        let mut watch = Watch::new(self);
         for frame in course.frame..control.frames {
             if frame > course.frame {
                 course.frame = frame;
@@ -362,16 +373,44 @@ impl Forming {
             }
             let start = begin + interval * frame as f64;
             let is_late = std::mem::take(&mut is_late);
-            self.run_frame(control, [start, end], steps, is_late, &mut course, observer)?;
+            let course = &mut course;
+            self.run_frame(
+                control,
+                [start, end],
+                steps,
+                is_late,
+                course,
+                &mut watch,
+                observer,
+            )?;
         }
         self.model.time = end;
         self.load.apply(&mut self.model);
         self.model.step(true).map_err(|e| e.to_string())?;
         observer.frame(self, end)?;
         keep_largest(&mut course.peaks, &self.penetrations(), end);
-        let last = self.row(self.model.energies(), course.critical_step);
+        self.look(&mut watch, &mut course, true)?;
+        if let Some(what) = absurd::off_the_tool(self, &watch) {
+            return Err(what.into());
+        }
+        let last = self.row(self.model.energies(), &course);
         course.history.push(last);
-        Ok(self.outcome(course, control.kinetic_bound))
+        let depths = watch.depths(&course.watched);
+        Ok(self.outcome(course, depths, control.kinetic_bound))
+    }
+
+    /// Looks at what is in what.
+    fn look(
+        &self,
+        watch: &mut Watch,
+        course: &mut Course,
+        last: bool,
+    ) -> Result<(), plyflow_sdk::StepError> {
+        watch.look(self, &mut course.watched, last);
+        match watch.gone_through(&course.watched, self) {
+            Some(what) => Err(what.into()),
+            None => Ok(()),
+        }
     }
 
     /// Sets the step for the next frame, a whole fraction of `interval` (s), and gives their number.
@@ -404,6 +443,7 @@ impl Forming {
         steps: u64,
         is_late: bool,
         course: &mut Course,
+        watch: &mut Watch,
         observer: &mut dyn Observer,
     ) -> Result<(), plyflow_sdk::StepError> {
         for k in 0..steps {
@@ -433,11 +473,12 @@ impl Forming {
             }
             if k % (steps / LEDGER_PER_FRAME).max(1) == 0 {
                 let energies = self.model.energies();
-                course
-                    .history
-                    .push(self.row(energies, course.critical_step));
+                self.look(watch, course, false)?;
+                let row = self.row(energies, course);
+                course.history.push(row);
                 if let Some(what) =
                     diagnosis::open_ledger(&course.history, end, control.drift_bound)
+                        .or_else(|| absurd::flies(&course.history, [self.load.start(), end]))
                 {
                     return Err(diagnosis::of(self, &course.history, &what).into());
                 }
@@ -447,7 +488,7 @@ impl Forming {
         Ok(())
     }
 
-    fn outcome(&self, course: Course, kinetic_bound: f64) -> Outcome {
+    fn outcome(&self, course: Course, depths: Vec<PairDepth>, kinetic_bound: f64) -> Outcome {
         let Course {
             history,
             smallest_step,
@@ -466,6 +507,7 @@ impl Forming {
             smallest_step,
             start_shift,
             peaks,
+            depths,
             warnings,
         }
     }

@@ -245,7 +245,13 @@ impl Surface {
 
     /// The point of the surface closest to `p` (m). Of triangles equally near, the one of lowest index.
     pub fn closest(&self, p: Vec3) -> Closest {
-        let mut best = (f64::INFINITY, u32::MAX, [0.0; 3], Feature::Face);
+        let found = self.closest_within(p, f64::INFINITY);
+        found.expect("a surface has a triangle")
+    }
+
+    /// The same, if it is nearer than `reach` (m).
+    pub fn closest_within(&self, p: Vec3, reach: f64) -> Option<Closest> {
+        let mut best = (reach * reach, u32::MAX, [0.0; 3], Feature::Face);
         let mut stack = vec![(0usize, box_distance(&self.nodes[0], p))];
         while let Some((n, bound)) = stack.pop() {
             if bound > best.0 {
@@ -276,7 +282,7 @@ impl Surface {
                 }
             }
         }
-        self.describe(p, best.1 as usize, best.2, best.3)
+        (best.1 != u32::MAX).then(|| self.describe(p, best.1 as usize, best.2, best.3))
     }
 
     fn describe(&self, p: Vec3, triangle: usize, point: Vec3, feature: Feature) -> Closest {

@@ -18,6 +18,11 @@ impl Model {
         };
         self.set_driven(all, drive);
     }
+
+    /// Whether a node follows a drive.
+    pub fn is_driven(&self, node: u32) -> bool {
+        self.held[node as usize] == Held::Driven
+    }
 }
 
 /// Two drives, of nodes that lie one after the other.

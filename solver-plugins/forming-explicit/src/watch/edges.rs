@@ -1,0 +1,166 @@
+//! Edges of the tool against the cells of sheets: between its nodes a sheet may lie on what goes through it.
+
+use super::Deep;
+use super::rigid::Triangles;
+use super::sheet::{SheetMesh, SheetTree};
+use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
+use plyflow_tooling::ToolMesh;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap};
+
+/// Sine of the angle between neighbouring facets from which on an edge is looked at.
+const TURNS: f64 = 0.05;
+/// Places on edges, by the finest sheet's elements.
+const PER_ELEMENT: f64 = 4.0;
+
+/// A place on a convex edge of the tool.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    at: V,
+    /// Out of the tool (unit).
+    out: V,
+    /// Along the surface, across the edge (unit).
+    across: V,
+    /// Sine of the angle between the facets.
+    turn: f64,
+}
+
+/// Convex edges of a tool.
+pub(super) struct Edges {
+    places: Vec<Place>,
+}
+
+/// A sheet at which they are held.
+pub(super) struct Look<'a> {
+    pub x: &'a [V],
+    pub mesh: &'a SheetMesh,
+    pub tree: &'a SheetTree,
+    pub bounds: [V; 2],
+    /// Where the tool has moved (m).
+    pub shift: V,
+    /// Size of the elements (m).
+    pub size: f64,
+    /// Half of the sheet's thickness (m).
+    pub half: f64,
+    /// Error of the tool's field (m).
+    pub error: f64,
+    /// Depth (m) from which on it is told.
+    pub floor: f64,
+}
+
+impl Edges {
+    /// Of a tool, for sheets with elements of these sizes (m).
+    pub fn new(tool: &ToolMesh, sizes: &[f64]) -> Self {
+        let finest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+        let spacing = finest / PER_ELEMENT;
+        // In every box of that size the sharpest one.
+        let mut boxes: BTreeMap<[i64; 3], Place> = BTreeMap::new();
+        if !(spacing > 0.0 && spacing.is_finite()) {
+            return Self { places: Vec::new() };
+        }
+        for place in edges(tool, spacing) {
+            let key = place.at.map(|c| (c / spacing).floor() as i64);
+            let kept = boxes.entry(key).or_insert(place);
+            if place.turn > kept.turn {
+                *kept = place;
+            }
+        }
+        Self {
+            places: boxes.into_values().collect(),
+        }
+    }
+
+    /// How deep (m) they are in a sheet, and where, less what its elements cannot follow.
+    pub fn deepest(&self, triangles: &Triangles, look: &Look<'_>) -> Deep {
+        let depths: Vec<f64> = (self.places.par_iter())
+            .map(|place| depth(place, triangles, look))
+            .collect();
+        let mut deepest = Deep::default();
+        for (place, depth) in self.places.iter().zip(depths) {
+            if depth > deepest.depth {
+                let at = add(place.at, look.shift);
+                deepest = Deep {
+                    depth,
+                    node: u32::MAX,
+                    place: at,
+                };
+            }
+        }
+        deepest
+    }
+}
+
+fn depth(place: &Place, triangles: &Triangles, look: &Look<'_>) -> f64 {
+    let p = add(place.at, look.shift);
+    let [low, high] = look.bounds;
+    if (0..3).any(|k| p[k] < low[k] - look.size || p[k] > high[k] + look.size) {
+        return 0.0;
+    }
+    // Most places are far from the sheet, or under it.
+    let Some(cell) = look.tree.cell_within(p, look.size) else {
+        return 0.0;
+    };
+    let near = look.mesh.closest(look.x, p, (cell, [0.0; 2]));
+    let depth = look.half + near.height;
+    let beside = near.to_rim <= super::BESIDE * look.size;
+    if beside || depth <= look.floor || near.height > look.size {
+        return 0.0;
+    }
+    // A sheet over this edge looks the same way.
+    if dot(look.mesh.normal_in(look.x, near.cell), place.out) <= 0.0 {
+        return 0.0;
+    }
+    // What an element that bends over the edge cuts off with its diagonal, at most as for one whose diagonal turns by one radian.
+    let s = std::f64::consts::FRAC_1_SQRT_2 * look.size;
+    let off = |u: f64| triangles.distance(add(place.at, scale(place.across, u * s)));
+    let cut = (0.5 * (off(1.0) + off(-1.0))).clamp(0.0, look.size / 4.0);
+    let depth = depth - cut - look.error;
+    if depth > look.floor { depth } else { 0.0 }
+}
+
+/// Places on convex edges, `spacing` (m) apart.
+fn edges(tool: &ToolMesh, spacing: f64) -> Vec<Place> {
+    let mut sides: HashMap<[u32; 2], (usize, usize)> = HashMap::new();
+    let mut found = Vec::new();
+    for (t, triangle) in tool.triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            let key = [a.min(b), a.max(b)];
+            if let Some((other, _)) = sides.insert(key, (t, k)) {
+                found.extend(edge(tool, [other, t], [a, b], spacing));
+            }
+        }
+    }
+    found
+}
+
+fn edge(tool: &ToolMesh, [s, t]: [usize; 2], [a, b]: [u32; 2], spacing: f64) -> Vec<Place> {
+    let normal = |t: usize| {
+        let [p, q, r] = tool.corners(t);
+        direction(cross(sub(q, p), sub(r, p)))
+    };
+    let (m, n) = (normal(s), normal(t));
+    let [from, to] = [a, b].map(|k| tool.points[k as usize]);
+    let along = sub(to, from);
+    // `t` passes the edge from `a` to `b`: of a convex one the normals turn about it from `s` to `t` against that.
+    let turn = dot(cross(n, m), direction(along));
+    let sharp = dot(m, n) < 0.0;
+    if !(turn > TURNS || sharp && turn > 0.0) {
+        return Vec::new();
+    }
+    let out = direction(add(m, n));
+    let across = direction(cross(along, out));
+    let parts = (norm(along) / spacing).ceil().max(1.0) as usize;
+    let place = |k: usize| Place {
+        at: add(from, scale(along, k as f64 / parts as f64)),
+        out,
+        across,
+        turn: if sharp { 2.0 - turn } else { turn },
+    };
+    (0..=parts).map(place).collect()
+}
+
+fn direction(v: V) -> V {
+    let n = norm(v);
+    if n > 0.0 { scale(v, 1.0 / n) } else { v }
+}

@@ -1,0 +1,490 @@
+//! A sheet as the watch sees it: bilinear cells, their neighbours, the closest point of them.
+
+use plyflow_mechanics::mirror::Planes;
+use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
+use plyflow_surface::Surface;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// No cell: what lies across an edge where the sheet ends.
+const RIM: u32 = u32::MAX;
+/// Across this edge lies the cell's own mirror image.
+const MIRROR: u32 = u32::MAX - 1;
+
+/// Where on a sheet the closest point of a node was.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Seat {
+    /// Cell, in the sheet's numbers; [`Seat::NOWHERE`]'s when none is known.
+    pub cell: u32,
+    /// Place in it, -1 to 1.
+    pub xi: [f32; 2],
+    /// Distance (m) from the sheet's middle surface, positive on the side where the node belongs; infinite when it was beside the sheet, or
+    /// behind it without having gone through.
+    pub side: f32,
+}
+
+impl Seat {
+    /// Nothing known.
+    pub const NOWHERE: Self = Self {
+        cell: u32::MAX,
+        xi: [0.0; 2],
+        side: f32::INFINITY,
+    };
+}
+
+/// The closest point of a sheet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Near {
+    /// Cell.
+    pub cell: u32,
+    /// Place in it.
+    pub xi: [f64; 2],
+    /// Distance (m), positive on the upper side.
+    pub height: f64,
+    /// How far (m) the closest point is from the edge of the sheet, 0 on it; infinite where the cell does not reach the edge.
+    pub to_rim: f64,
+}
+
+/// The closest point of one cell.
+struct Foot {
+    xi: [f64; 2],
+    square: f64,
+    /// From it to the point (m).
+    away: V,
+    /// By coordinate: whether the closest point of the whole surface may lie across the side where it ends, and on which.
+    out: [i8; 2],
+}
+
+/// Topology of a sheet.
+pub(super) struct SheetMesh {
+    /// Nodes of its cells, in the model's numbers, ascending.
+    pub nodes: Vec<u32>,
+    cells: Vec<[u32; 4]>,
+    /// The same in the sheet's numbers.
+    local: Vec<[u32; 4]>,
+    /// By cell, across the edge from node k to the next: a cell, [`RIM`] or [`MIRROR`].
+    across: Vec<[u32; 4]>,
+    /// By node of the model: where its cells begin in `around`; one more at the end.
+    first: Vec<u32>,
+    around: Vec<u32>,
+    /// By node of the model: whether it lies on the edge of the sheet.
+    on_rim: Vec<bool>,
+}
+
+/// Where a cell is looked for among all.
+pub(super) struct SheetTree {
+    surface: Surface,
+    /// By triangle.
+    cells: Vec<u32>,
+}
+
+impl SheetTree {
+    /// The cell that is closest to a place (m), each as two triangles.
+    pub fn cell(&self, p: V) -> u32 {
+        self.cells[self.surface.closest(p).triangle]
+    }
+
+    /// The same, if it is nearer than `reach` (m).
+    pub fn cell_within(&self, p: V, reach: f64) -> Option<u32> {
+        let found = self.surface.closest_within(p, reach)?;
+        Some(self.cells[found.triangle])
+    }
+}
+
+/// Steps to the closest point of a cell at most.
+const STEPS: usize = 12;
+/// Cells that are crossed at most on the way to the closest one.
+const CROSSED: usize = 200;
+/// A cell is nearer only when it is by this share of the squared distance: on a common edge both are equally near but for rounding.
+const NEARER: f64 = 1.0 - 1e-9;
+
+const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+
+/// Weights of a cell's corners at a place in it.
+pub(super) fn weights(xi: [f64; 2]) -> [f64; 4] {
+    CORNERS.map(|c| 0.25 * (1.0 + c[0] * xi[0]) * (1.0 + c[1] * xi[1]))
+}
+
+fn mix(w: [f64; 4], q: &[V; 4]) -> V {
+    [0, 1, 2].map(|k| w[0] * q[0][k] + w[1] * q[1][k] + w[2] * q[2][k] + w[3] * q[3][k])
+}
+
+/// Derivatives of the place by the two coordinates.
+fn tangents(q: &[V; 4], xi: [f64; 2]) -> [V; 2] {
+    let along = CORNERS.map(|c| 0.25 * c[0] * (1.0 + c[1] * xi[1]));
+    let across = CORNERS.map(|c| 0.25 * c[1] * (1.0 + c[0] * xi[0]));
+    [mix(along, q), mix(across, q)]
+}
+
+/// Closest point of a bilinear cell: Gauss and Newton's steps within its bounds.
+fn foot(q: &[V; 4], p: V, start: [f64; 2]) -> Foot {
+    let mut xi = start.map(|c| c.clamp(-1.0, 1.0));
+    for step in 0..=STEPS {
+        let away = sub(p, mix(weights(xi), q));
+        let [a, b] = tangents(q, xi);
+        let g = [dot(a, away), dot(b, away)];
+        let side = |k: usize| match xi[k] {
+            c if c >= 1.0 && g[k] > 0.0 => 1,
+            c if c <= -1.0 && g[k] < 0.0 => -1,
+            _ => 0,
+        };
+        let out = [side(0), side(1)];
+        let (aa, ab, bb) = (dot(a, a), dot(a, b), dot(b, b));
+        let det = aa * bb - ab * ab;
+        let mut move_by = [0.0; 2];
+        match out {
+            [0, 0] if det > 1e-12 * aa * bb => {
+                move_by = [(bb * g[0] - ab * g[1]) / det, (aa * g[1] - ab * g[0]) / det];
+            }
+            [0, _] if aa > 0.0 => move_by[0] = g[0] / aa,
+            [_, 0] if bb > 0.0 => move_by[1] = g[1] / bb,
+            _ => {}
+        }
+        let next = [0, 1].map(|k| (xi[k] + move_by[k]).clamp(-1.0, 1.0));
+        let moved = (next[0] - xi[0]).abs().max((next[1] - xi[1]).abs());
+        if moved < 1e-7 || step == STEPS {
+            return Foot {
+                xi,
+                square: dot(away, away),
+                away,
+                out,
+            };
+        }
+        xi = next;
+    }
+    unreachable!("the last step returns")
+}
+
+/// The edge on which a coordinate ends.
+fn edge(coordinate: usize, side: i8) -> usize {
+    match (coordinate, side > 0) {
+        (0, true) => 1,
+        (0, false) => 3,
+        (_, true) => 2,
+        (_, false) => 0,
+    }
+}
+
+/// The corner at which both coordinates end.
+fn corner(out: [i8; 2]) -> usize {
+    match (out[0] > 0, out[1] > 0) {
+        (false, false) => 0,
+        (true, false) => 1,
+        (true, true) => 2,
+        (false, true) => 3,
+    }
+}
+
+impl SheetMesh {
+    /// Of cells in the numbers of a model with points that started at `start` (m).
+    pub fn new(cells: &[[u32; 4]], start: &[V], planes: Planes) -> Self {
+        let mut nodes: Vec<u32> = cells.iter().flatten().copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let mut sides: HashMap<[u32; 2], [u32; 2]> = HashMap::new();
+        let key = |c: &[u32; 4], e: usize| {
+            let (a, b) = (c[e], c[(e + 1) % 4]);
+            [a.min(b), a.max(b)]
+        };
+        for (i, cell) in cells.iter().enumerate() {
+            for e in 0..4 {
+                let both = sides.entry(key(cell, e)).or_insert([RIM; 2]);
+                both[usize::from(both[0] != RIM)] = i as u32;
+            }
+        }
+        let holding = |n: u32| planes.holding(start[n as usize]);
+        let mut on_rim = vec![false; start.len()];
+        let across = |(i, cell): (usize, &[u32; 4])| {
+            [0, 1, 2, 3].map(|e| {
+                let ends = key(cell, e);
+                let both = sides[&ends];
+                match both[usize::from(both[0] == i as u32)] {
+                    RIM => {
+                        let [a, b] = ends.map(holding);
+                        if (0..2).any(|k| a[k] && b[k]) {
+                            MIRROR
+                        } else {
+                            on_rim[ends[0] as usize] = true;
+                            on_rim[ends[1] as usize] = true;
+                            RIM
+                        }
+                    }
+                    other => other,
+                }
+            })
+        };
+        let across = cells.iter().enumerate().map(across).collect();
+        let mut first = vec![0u32; start.len() + 1];
+        for n in cells.iter().flatten() {
+            first[*n as usize + 1] += 1;
+        }
+        for n in 0..start.len() {
+            first[n + 1] += first[n];
+        }
+        let mut place = first.clone();
+        let mut around = vec![0; 4 * cells.len()];
+        for (i, cell) in cells.iter().enumerate() {
+            for n in cell {
+                around[place[*n as usize] as usize] = i as u32;
+                place[*n as usize] += 1;
+            }
+        }
+        let index = |n: u32| nodes.binary_search(&n).map_or(0, |k| k as u32);
+        Self {
+            local: cells.iter().map(|c| c.map(index)).collect(),
+            nodes,
+            cells: cells.to_vec(),
+            across,
+            first,
+            around,
+            on_rim,
+        }
+    }
+
+    /// Number of a node of the model among [`SheetMesh::nodes`].
+    ///
+    /// # Panics
+    /// When it is none of them.
+    pub fn index(&self, node: u32) -> usize {
+        self.nodes
+            .binary_search(&node)
+            .expect("a node of the sheet")
+    }
+
+    /// The box around it (m).
+    pub fn bounds(&self, x: &[V]) -> [V; 2] {
+        let all = self.nodes.iter().map(|n| x[*n as usize]);
+        all.fold(
+            [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
+            |[low, high], p| {
+                [
+                    [0, 1, 2].map(|k| low[k].min(p[k])),
+                    [0, 1, 2].map(|k| high[k].max(p[k])),
+                ]
+            },
+        )
+    }
+
+    /// The cell with the nearest middle.
+    pub fn nearest_middle(&self, x: &[V], p: V) -> u32 {
+        let mut best = (f64::INFINITY, 0);
+        for cell in 0..self.cells.len() as u32 {
+            let away = sub(mix([0.25; 4], &self.corners(x, cell)), p);
+            let square = dot(away, away);
+            if square < best.0 {
+                best = (square, cell);
+            }
+        }
+        best.1
+    }
+
+    /// A tree over its cells as they are now; `None` when they have no area.
+    pub fn tree(&self, x: &[V]) -> Option<SheetTree> {
+        let points: Vec<V> = self.nodes.iter().map(|n| x[*n as usize]).collect();
+        let (mut triangles, mut cells) = (Vec::new(), Vec::new());
+        for (c, [a, b, d, e]) in self.local.iter().enumerate() {
+            for t in [[*a, *b, *d], [*a, *d, *e]] {
+                let [p, q, r] = t.map(|n| points[n as usize]);
+                if norm(cross(sub(q, p), sub(r, p))) > 0.0 {
+                    triangles.push(t);
+                    cells.push(c as u32);
+                }
+            }
+        }
+        let surface = Surface::new(&points, &triangles)?;
+        Some(SheetTree { surface, cells })
+    }
+
+    /// Cells, in the model's nodes.
+    pub fn cells(&self) -> &[[u32; 4]] {
+        &self.cells
+    }
+
+    /// Nodes of the model in a cell.
+    pub fn cell(&self, cell: u32) -> [u32; 4] {
+        self.cells[cell as usize]
+    }
+
+    /// Whether a node of the model is one of the sheet's.
+    pub fn has(&self, node: u32) -> bool {
+        self.first[node as usize] < self.first[node as usize + 1]
+    }
+
+    fn around(&self, node: u32) -> &[u32] {
+        let n = node as usize;
+        &self.around[self.first[n] as usize..self.first[n + 1] as usize]
+    }
+
+    fn corners(&self, x: &[V], cell: u32) -> [V; 4] {
+        self.cells[cell as usize].map(|n| x[n as usize])
+    }
+
+    /// The closest point to `p` (m), from a place near it: down to the closest of all cells that can be reached so.
+    pub fn closest(&self, x: &[V], p: V, from: (u32, [f64; 2])) -> Near {
+        let (mut cell, start) = from;
+        let mut best = foot(&self.corners(x, cell), p, start);
+        for _ in 0..CROSSED {
+            let mut better = None;
+            let mut look = |c: u32| {
+                let least = better
+                    .as_ref()
+                    .map_or(best.square, |b: &(u32, Foot)| b.1.square);
+                let f = foot(&self.corners(x, c), p, [0.0; 2]);
+                if f.square < NEARER * least {
+                    better = Some((c, f));
+                }
+            };
+            match best.out {
+                [0, 0] => break,
+                [a, 0] | [0, a] => {
+                    let coordinate = usize::from(best.out[0] == 0);
+                    let other = self.across[cell as usize][edge(coordinate, a)];
+                    if other < MIRROR {
+                        look(other);
+                    }
+                }
+                out => {
+                    let node = self.cells[cell as usize][corner(out)];
+                    for other in self.around(node).iter().filter(|c| **c != cell) {
+                        look(*other);
+                    }
+                }
+            }
+            match better {
+                Some((c, f)) => (cell, best) = (c, f),
+                None => break,
+            }
+        }
+        self.describe(x, cell, &best)
+    }
+
+    fn describe(&self, x: &[V], cell: u32, f: &Foot) -> Near {
+        let q = self.corners(x, cell);
+        let nodes = self.cells[cell as usize];
+        let across = self.across[cell as usize];
+        let distance = f.square.sqrt();
+        let own = || {
+            let [a, b] = tangents(&q, f.xi);
+            cross(a, b)
+        };
+        let (normal, on_rim) = match f.out {
+            [0, 0] => (own(), false),
+            [a, 0] | [0, a] => {
+                let coordinate = usize::from(f.out[0] == 0);
+                let e = edge(coordinate, a);
+                match across[e] {
+                    RIM => (own(), true),
+                    MIRROR => (own(), false),
+                    other => {
+                        let there = self.normal_at_edge(x, other, [nodes[e], nodes[(e + 1) % 4]]);
+                        (add(direction(own()), there), false)
+                    }
+                }
+            }
+            out => {
+                let node = nodes[corner(out)];
+                (self.normal_at_node(x, node), self.on_rim[node as usize])
+            }
+        };
+        let above = dot(f.away, normal) >= 0.0;
+        let to_rim = if on_rim {
+            0.0
+        } else {
+            let of = |e: usize| {
+                if across[e] != RIM {
+                    return f64::INFINITY;
+                }
+                let length = norm(sub(
+                    scale(add(q[(e + 2) % 4], q[(e + 3) % 4]), 0.5),
+                    scale(add(q[e], q[(e + 1) % 4]), 0.5),
+                ));
+                let share = match e {
+                    0 => 1.0 + f.xi[1],
+                    1 => 1.0 - f.xi[0],
+                    2 => 1.0 - f.xi[1],
+                    _ => 1.0 + f.xi[0],
+                };
+                0.5 * share * length
+            };
+            (0..4).map(of).fold(f64::INFINITY, f64::min)
+        };
+        Near {
+            cell,
+            xi: f.xi,
+            height: if above { distance } else { -distance },
+            to_rim,
+        }
+    }
+
+    /// Normal of a cell at the middle of the edge between two of its nodes.
+    fn normal_at_edge(&self, x: &[V], cell: u32, ends: [u32; 2]) -> V {
+        let nodes = self.cells[cell as usize];
+        let at = |e: usize| ends.contains(&nodes[e]) && ends.contains(&nodes[(e + 1) % 4]);
+        let xi = match (0..4).find(|e| at(*e)) {
+            Some(0) => [0.0, -1.0],
+            Some(1) => [1.0, 0.0],
+            Some(2) => [0.0, 1.0],
+            Some(_) => [-1.0, 0.0],
+            None => [0.0; 2],
+        };
+        let [a, b] = tangents(&self.corners(x, cell), xi);
+        direction(cross(a, b))
+    }
+
+    /// Unit normal of the smooth sheet at a node: of the cells around it, each the less the longer its sides there
+    /// (N. Max, J. Graphics Tools 4, 1999).
+    pub fn normal_at_node(&self, x: &[V], node: u32) -> V {
+        let mut sum = [0.0; 3];
+        for cell in self.around(node) {
+            let nodes = self.cells[*cell as usize];
+            let k = nodes.iter().position(|n| *n == node).unwrap_or(0);
+            let at = |i: usize| x[nodes[(k + i) % 4] as usize];
+            let (a, b) = (sub(at(1), at(0)), sub(at(3), at(0)));
+            let lengths = dot(a, a) * dot(b, b);
+            if lengths > 0.0 {
+                sum = add(sum, scale(cross(a, b), 1.0 / lengths));
+            }
+        }
+        direction(sum)
+    }
+
+    /// Normal (of any length) of a cell in its middle.
+    pub fn normal_in(&self, x: &[V], cell: u32) -> V {
+        let [a, b, c, d] = self.corners(x, cell);
+        cross(sub(c, a), sub(d, b))
+    }
+
+    /// How far (m) the smooth sheet through the nodes lies off the cell at a place in it: half of how far the tangent planes of the corners lie
+    /// off it there, which is exact for a parabola; at most what it is for an element whose diagonal turns by one radian.
+    pub fn bulge(&self, x: &[V], cell: u32, xi: [f64; 2]) -> f64 {
+        let nodes = self.cells[cell as usize];
+        let q = self.corners(x, cell);
+        let [a, b] = tangents(&q, xi);
+        let normal = direction(cross(a, b));
+        let w = weights(xi);
+        let c = mix(w, &q);
+        let off: f64 = (0..4)
+            .map(|k| {
+                let n = self.normal_at_node(x, nodes[k]);
+                w[k] * dot(n, sub(q[k], c)) / dot(n, normal).max(0.3)
+            })
+            .sum();
+        let longest = (0..4)
+            .map(|k| norm(sub(q[(k + 1) % 4], q[k])))
+            .fold(0.0, f64::max);
+        (0.5 * off.abs()).min(longest / 4.0)
+    }
+
+    /// The same in the middle of the cells around a node, the largest.
+    pub fn bulge_around(&self, x: &[V], node: u32) -> f64 {
+        let around = self.around(node).iter();
+        around
+            .map(|c| self.bulge(x, *c, [0.0; 2]))
+            .fold(0.0, f64::max)
+    }
+}
+
+fn direction(v: V) -> V {
+    let n = norm(v);
+    if n > 0.0 { scale(v, 1.0 / n) } else { v }
+}
