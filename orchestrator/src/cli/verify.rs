@@ -202,6 +202,7 @@ fn again(args: &VerifyArgs) -> Done {
     let places = super::args::Places {
         store: args.places.store.clone(),
         plugins: args.places.plugins.clone(),
+        trust: args.places.trust.clone(),
     };
     let mut opened = open(&Workflow {
         workflow: file,
@@ -221,7 +222,7 @@ fn again(args: &VerifyArgs) -> Done {
             memory: 0,
             policy: FailurePolicy::KeepGoing,
         },
-        search_path: opened.search_path.clone(),
+        search_path: opened.catalog.trusted_folders(),
         force: Vec::new(),
         compare: steps,
         checkpoint_interval: f64::INFINITY,
