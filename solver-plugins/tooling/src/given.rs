@@ -96,18 +96,17 @@ pub fn rigid(scene: &Scene, spacing: f64) -> Result<RigidTool, String> {
     };
     let (field, error) = build(spacing);
     if error.largest > tolerance {
-        let would_do = spacing_that_does(
-            &mesh,
-            stack(scene),
-            [spacing, error.largest / tolerance],
-            |s| {
-                let (field, error) = build(s);
-                (error.largest <= tolerance).then(|| field.memory())
-            },
-        );
+        let would_do = spacing_that_does(&mesh, stack(scene), spacing, |s| {
+            let (field, error) = build(s);
+            (error.largest <= tolerance).then(|| field.memory())
+        });
         return Err(off(spacing, error, ply, would_do));
     }
-    let elsewhere = field.error_against(&mesh, 0.0, |p| !touched(p));
+    // Between diaphragms there is no elsewhere.
+    let elsewhere = match scene.process {
+        Process::DoubleDiaphragm(_) => FieldError::default(),
+        Process::Press(_) => field.error_against(&mesh, 0.0, |p| !touched(p)),
+    };
     let mut warnings = Vec::new();
     if elsewhere.largest > tolerance {
         warnings.push(format!(
@@ -166,19 +165,19 @@ fn place(at: V3) -> String {
     format!("({x:.1}, {y:.1}, {z:.1}) mm")
 }
 
-/// A spacing of which it is known that it does, with its memory (bytes), below one of which it is known that it does not, by `over` times.
+/// A spacing of which it is known that it does, with its memory (bytes), below one of which it is known that it does not.
 fn spacing_that_does(
     mesh: &ToolMesh,
     stack: f64,
-    [from, over]: [f64; 2],
+    from: f64,
     does: impl Fn(f64) -> Option<usize>,
 ) -> Option<(f64, usize)> {
-    // What is lost grows with the spacing, at least linearly.
-    let mut spacing = from / over.clamp(2.0, 1e4);
+    // Not larger than where nothing is asked for: what elements stand off in fillets is taken from the grid's own level.
+    let mut spacing = (0.5 * from).min(DEFAULT_SPACING);
     loop {
         // Two figures, so that it can be written down.
         let unit = 10f64.powf(spacing.log10().floor() - 1.0);
-        let rounded = (spacing / unit).floor() * unit;
+        let rounded = (spacing / unit * (1.0 + 1e-9)).floor() * unit;
         if values(mesh, rounded, reach(rounded, stack)) > MOST_TRIED {
             return None;
         }
@@ -377,13 +376,14 @@ impl Survey {
         counts: impl Fn(V3) -> bool,
     ) -> Option<(f64, V3)> {
         let mut worst = None::<(f64, V3)>;
+        let mut hints = vec![0; self.trees().len()];
         for piece in self.pieces() {
             piece.parts(spacing, &mut |part| {
                 let Some((on, out)) = part.face().filter(|(on, _)| counts(*on)) else {
                     return;
                 };
                 let inside = sub(on, scale(out, least));
-                let (found, normal) = self.nearest_of(inside, &part);
+                let (found, normal) = self.nearest_of(inside, &part, &mut hints);
                 // Beyond the other face, which looks the other way.
                 let thickness = least - found.signed_distance;
                 let through = found.signed_distance > 1e-9 && thickness > 0.0;
