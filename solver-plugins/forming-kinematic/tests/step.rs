@@ -351,6 +351,22 @@ fn drape_has_one_frame_so_that_no_step_takes_it_for_a_motion() {
     assert!(zeros("fibre_strain_1") && zeros("fibre_strain_2"));
 }
 
+/// 18 x 12 mm under plies of 300 mm: inches, or tenths of a millimetre.
+#[test]
+fn a_tool_of_quite_another_size_than_the_plies_is_asked_about_its_unit() {
+    let file = blocks(&[[[-60.0, -40.0, 0.0], [60.0, 40.0, 20.0]]]);
+    let of = |unit: &str| {
+        let tool = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": unit,
+                                  "translate": ["0 m", "0 m", "0 m"]}});
+        let with = json!({"scene": scene(tool, [0.3, 0.3], [0.0, 90.0]), "element_size": 0.003});
+        drape(with).unwrap().log.join("\n")
+    };
+    let told = of("0.15 mm");
+    let parts = ["spans 18 mm x 12 mm", "the plies up to 300 mm", "is `unit`"];
+    assert!(parts.iter().all(|p| told.contains(p)), "{told}");
+    assert!(!of("1 mm").contains("unit"));
+}
+
 /// Flat sides that meet at 15 degrees, less than `crease_angle`: the net lies on the tube that they may stand for, by the chord's height off them.
 #[test]
 fn a_tool_that_is_smoothed_by_more_than_a_ply_says_so() {
