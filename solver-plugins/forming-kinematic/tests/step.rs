@@ -274,6 +274,14 @@ fn a_tool_is_held_to_the_checks_of_explicit_forming() {
         drape(with).map(|formed| formed.result("coverage"))
     };
     assert_eq!(over(&[block], "1 mm"), Ok(1.0));
+    // A bar through two towers that stand beside the ply, no corner of which is in another: it does not float.
+    let tower = |y: f64| [[-8.0, y, 0.0], [8.0, y + 10.0, 60.0]];
+    let bar = [[-3.0, -70.0, 30.0], [3.0, 70.0, 36.0]];
+    let file = blocks(&[block, tower(45.0), tower(-55.0), bar]);
+    let tool = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": "1 mm",
+                              "translate": ["0 m", "0 m", "0 m"]}});
+    let crossed = serde_json::from_value(scene(tool, [0.06, 0.05], [0.0, 90.0])).unwrap();
+    plyflow_tooling::given::checked(&crossed, 3e-3).unwrap();
     for (all, unit, parts) in [
         (
             vec![block.map(|p| [p[0], p[1], p[2] + 15.0])],

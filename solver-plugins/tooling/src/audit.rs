@@ -43,6 +43,15 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
+    /// A whole facet of a body.
+    pub fn of(body: &ToolMesh, facet: usize) -> Self {
+        Self {
+            corners: body.corners(facet),
+            out: unit(body.area_normal(facet)),
+            body: 0,
+        }
+    }
+
     /// Where it is looked at: of an edge there is no area to have a centre.
     fn middle(&self) -> V3 {
         let [a, b, c] = self.corners;
