@@ -346,6 +346,18 @@ fn top_film(
     Ok(())
 }
 
+/// What to say of a distance field with points further apart than the nodes that it holds off.
+fn coarse_grid(p: &Parameters) -> Option<String> {
+    (p.tool_grid > p.element_size).then(|| {
+        format!(
+            "tool_grid: given {:.2} mm, the plies' elements have {:.2} mm; by how much nodes stand off fillets, so that elements are as long as the \
+             tool, is taken over the larger of both, and too small in fillets that are sharper: take a `tool_grid` of half the elements' size",
+            1e3 * p.tool_grid,
+            1e3 * p.element_size
+        )
+    })
+}
+
 /// Builds the model of a whole scene.
 ///
 /// # Errors
@@ -361,8 +373,9 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
         mesh: tool,
         field: grid,
         error,
-        warnings: tool_warnings,
+        warnings: mut tool_warnings,
     } = plyflow_tooling::given::rigid(scene, p.tool_grid)?;
+    tool_warnings.extend(coarse_grid(p));
     let planes = symmetry::planes(scene);
     symmetry::check(scene, planes, &stack, &tool)?;
     let at = layout(&stack, process, p, &tool, planes)?;

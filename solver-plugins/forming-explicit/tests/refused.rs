@@ -239,8 +239,19 @@ fn a_body_that_floats_is_named() {
     );
     for on_or_in in [20.0, 15.0] {
         with(on_or_in);
-        build_global(&p, &BuiltIn).map(|_| ()).unwrap();
+        plyflow_tooling::given::checked(&p.scene, p.tool_grid).unwrap();
     }
+}
+
+#[test]
+fn what_contacts_see_of_every_rigid_part_is_held_against_what_is_drawn_of_it() {
+    let p = press(1, &json!({"gap": "0.003 m"}), |_| {});
+    let built = build_global(&p, &BuiltIn).unwrap_or_else(|e| panic!("{e}"));
+    for part in ["tool", "die", "holder"] {
+        let error = built.field_error(part);
+        assert!(error > 0.0 && error < 2e-5, "{part}: {error}");
+    }
+    assert_eq!(built.field_error("bed"), 0.0);
 }
 
 #[test]

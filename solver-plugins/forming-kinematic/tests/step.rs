@@ -274,6 +274,14 @@ fn a_tool_is_held_to_the_checks_of_explicit_forming() {
         drape(with).map(|formed| formed.result("coverage"))
     };
     assert_eq!(over(&[block], "1 mm"), Ok(1.0));
+    // A bar through two towers that stand beside the ply, no corner of which is in another: it does not float.
+    let tower = |y: f64| [[-8.0, y, 0.0], [8.0, y + 10.0, 60.0]];
+    let bar = [[-3.0, -70.0, 30.0], [3.0, 70.0, 36.0]];
+    let file = blocks(&[block, tower(45.0), tower(-55.0), bar]);
+    let tool = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": "1 mm",
+                              "translate": ["0 m", "0 m", "0 m"]}});
+    let crossed = serde_json::from_value(scene(tool, [0.06, 0.05], [0.0, 90.0])).unwrap();
+    plyflow_tooling::given::checked(&crossed, 3e-3).unwrap();
     for (all, unit, parts) in [
         (
             vec![block.map(|p| [p[0], p[1], p[2] + 15.0])],
@@ -351,7 +359,23 @@ fn drape_has_one_frame_so_that_no_step_takes_it_for_a_motion() {
     assert!(zeros("fibre_strain_1") && zeros("fibre_strain_2"));
 }
 
-/// A roof of two planes that meet at 20 degrees: less than `crease_angle`, and no fillet.
+/// 18 x 12 mm under plies of 300 mm: inches, or tenths of a millimetre.
+#[test]
+fn a_tool_of_quite_another_size_than_the_plies_is_asked_about_its_unit() {
+    let file = blocks(&[[[-60.0, -40.0, 0.0], [60.0, 40.0, 20.0]]]);
+    let of = |unit: &str| {
+        let tool = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": unit,
+                                  "translate": ["0 m", "0 m", "0 m"]}});
+        let with = json!({"scene": scene(tool, [0.3, 0.3], [0.0, 90.0]), "element_size": 0.003});
+        drape(with).unwrap().log.join("\n")
+    };
+    let told = of("0.15 mm");
+    let parts = ["spans 18 mm x 12 mm", "the plies up to 300 mm", "is `unit`"];
+    assert!(parts.iter().all(|p| told.contains(p)), "{told}");
+    assert!(!of("1 mm").contains("unit"));
+}
+
+/// Flat sides that meet at 15 degrees, less than `crease_angle`: the net lies on the tube that they may stand for, by the chord's height off them.
 #[test]
 fn a_tool_that_is_smoothed_by_more_than_a_ply_says_so() {
     let with = |crease: f64| {
@@ -363,12 +387,14 @@ fn a_tool_that_is_smoothed_by_more_than_a_ply_says_so() {
     assert!(off > 0.0 && off < 2.0 * CHORD_TOLERANCE, "{off}");
     assert!(!told.contains("smoothed"), "{told}");
     assert_eq!(with(0.0).0, 0.0);
-    let mut ridge = scene(json!({}), [0.06, 0.05], [0.0, 90.0]);
-    let file = roof();
-    ridge["tool"] = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": "1 mm",
+    let mut sides = scene(json!({}), [0.06, 0.05], [0.0, 90.0]);
+    let file = arch();
+    sides["tool"] = json!({"stl": {"file": file.path().to_str().unwrap(), "unit": "1 mm",
                                    "translate": ["0 m", "0 m", "0 m"]}});
-    let formed = drape(json!({"scene": ridge, "element_size": 0.005})).unwrap();
-    assert!(formed.result("tool_field_error") > 1e-3);
+    let formed = drape(json!({"scene": sides, "element_size": 0.005})).unwrap();
+    let height = 0.01 * (7.5f64.to_radians() / 2.0).tan();
+    let off = formed.result("tool_field_error");
+    assert!((off / height - 1.0).abs() < 0.02, "{off} of {height}");
     let told = formed.log.join("\n");
     assert!(
         told.contains("smoothed") && told.contains("smaller `crease_angle` (30 deg)"),
@@ -376,27 +402,24 @@ fn a_tool_that_is_smoothed_by_more_than_a_ply_says_so() {
     );
 }
 
-/// 120 mm long, 80 mm wide, 20 mm high at its eaves; its two slopes at 10 degrees.
-fn roof() -> tempfile::NamedTempFile {
-    let high = 20.0 + 40.0 * 10f64.to_radians().tan();
-    let profile = [
-        [-40.0, 0.0],
-        [40.0, 0.0],
-        [40.0, 20.0],
-        [0.0, high],
-        [-40.0, 20.0],
-    ];
-    let at = |k: usize, x: f64| [x, profile[k % 5][0], profile[k % 5][1]];
+/// Half of a tube of 24 flat sides, each 20 mm wide, 120 mm long.
+fn arch() -> tempfile::NamedTempFile {
+    let radius = 10.0 / 7.5f64.to_radians().sin();
+    let at = |k: usize, x: f64| {
+        let (s, c) = (15.0 * (k % 13) as f64).to_radians().sin_cos();
+        let z = if k % 13 == 12 { 0.0 } else { radius * s };
+        [x, radius * c, z]
+    };
     let mut facets = Vec::new();
-    for k in 0..5 {
+    for k in 0..13 {
         let [a, b, c, d] = [at(k, -60.0), at(k, 60.0), at(k + 1, 60.0), at(k + 1, -60.0)];
         facets.extend([[a, c, b], [a, d, c]]);
     }
-    for k in 1..4 {
+    for k in 1..12 {
         facets.push([at(0, -60.0), at(k + 1, -60.0), at(k, -60.0)]);
         facets.push([at(0, 60.0), at(k, 60.0), at(k + 1, 60.0)]);
     }
-    let mut text = "solid roof\n".to_owned();
+    let mut text = "solid arch\n".to_owned();
     for facet in facets {
         text += "facet normal 0 0 0\nouter loop\n";
         for [x, y, z] in facet {
@@ -405,6 +428,6 @@ fn roof() -> tempfile::NamedTempFile {
         text += "endloop\nendfacet\n";
     }
     let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), text + "endsolid roof\n").unwrap();
+    std::fs::write(file.path(), text + "endsolid arch\n").unwrap();
     file
 }

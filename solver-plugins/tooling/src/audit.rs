@@ -43,6 +43,15 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
+    /// A whole facet of a body.
+    pub fn of(body: &ToolMesh, facet: usize) -> Self {
+        Self {
+            corners: body.corners(facet),
+            out: unit(body.area_normal(facet)),
+            body: 0,
+        }
+    }
+
     /// Where it is looked at: of an edge there is no area to have a centre.
     fn middle(&self) -> V3 {
         let [a, b, c] = self.corners;
@@ -133,14 +142,14 @@ impl Survey {
         distances.fold(f64::INFINITY, f64::min)
     }
 
-    /// The closest point of the body that a piece is of, and the direction out of the facet there.
-    pub fn nearest_of(&self, at: V3, piece: &Piece) -> (ClosestPoint, V3) {
+    /// The closest point of the body that a piece is of, and the direction out of the facet there. `hints`: one for each body, where the last
+    /// search ended; pieces come neighbour after neighbour.
+    pub fn nearest_of(&self, at: V3, piece: &Piece, hints: &mut [usize]) -> (ClosestPoint, V3) {
         let body = piece.body as usize;
-        let found = self.trees[body].closest(at);
-        (
-            found,
-            unit(self.shells[body].area_normal(found.triangle as usize)),
-        )
+        let (found, place) = self.trees[body].closest_from(at, hints[body]);
+        hints[body] = place;
+        let normal = self.shells[body].area_normal(found.triangle as usize);
+        (found, unit(normal))
     }
 
     /// All facets, and all edges that are sharper than chords of something round.

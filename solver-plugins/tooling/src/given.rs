@@ -1,6 +1,6 @@
 //! Whether the tool that is computed is the tool that was given: the checks of all steps that form over a scene's tool.
 
-use crate::audit::{FieldError, Survey};
+use crate::audit::{FieldError, Piece, Survey};
 use crate::mesh::ToolMesh;
 use crate::sdf::SignedDistanceGrid;
 use crate::tree::SurfaceTree;
@@ -96,18 +96,17 @@ pub fn rigid(scene: &Scene, spacing: f64) -> Result<RigidTool, String> {
     };
     let (field, error) = build(spacing);
     if error.largest > tolerance {
-        let would_do = spacing_that_does(
-            &mesh,
-            stack(scene),
-            [spacing, error.largest / tolerance],
-            |s| {
-                let (field, error) = build(s);
-                (error.largest <= tolerance).then(|| field.memory())
-            },
-        );
+        let would_do = spacing_that_does(&mesh, stack(scene), spacing, |s| {
+            let (field, error) = build(s);
+            (error.largest <= tolerance).then(|| field.memory())
+        });
         return Err(off(spacing, error, ply, would_do));
     }
-    let elsewhere = field.error_against(&mesh, 0.0, |p| !touched(p));
+    // Between diaphragms there is no elsewhere.
+    let elsewhere = match scene.process {
+        Process::DoubleDiaphragm(_) => FieldError::default(),
+        Process::Press(_) => field.error_against(&mesh, 0.0, |p| !touched(p)),
+    };
     let mut warnings = Vec::new();
     if elsewhere.largest > tolerance {
         warnings.push(format!(
@@ -166,19 +165,19 @@ fn place(at: V3) -> String {
     format!("({x:.1}, {y:.1}, {z:.1}) mm")
 }
 
-/// A spacing of which it is known that it does, with its memory (bytes), below one of which it is known that it does not, by `over` times.
+/// A spacing of which it is known that it does, with its memory (bytes), below one of which it is known that it does not.
 fn spacing_that_does(
     mesh: &ToolMesh,
     stack: f64,
-    [from, over]: [f64; 2],
+    from: f64,
     does: impl Fn(f64) -> Option<usize>,
 ) -> Option<(f64, usize)> {
-    // What is lost grows with the spacing, at least linearly.
-    let mut spacing = from / over.clamp(2.0, 1e4);
+    // Not larger than where nothing is asked for: what elements stand off in fillets is taken from the grid's own level.
+    let mut spacing = (0.5 * from).min(DEFAULT_SPACING);
     loop {
         // Two figures, so that it can be written down.
         let unit = 10f64.powf(spacing.log10().floor() - 1.0);
-        let rounded = (spacing / unit).floor() * unit;
+        let rounded = (spacing / unit * (1.0 + 1e-9)).floor() * unit;
         if values(mesh, rounded, reach(rounded, stack)) > MOST_TRIED {
             return None;
         }
@@ -299,30 +298,84 @@ fn check_frame(scene: &Scene, mesh: &ToolMesh, frame: [f64; 2]) -> Result<(), St
     ))
 }
 
+/// One of a tool's bodies.
+struct Body<'a> {
+    shell: &'a ToolMesh,
+    tree: SurfaceTree,
+    bounds: [V3; 2],
+}
+
+impl<'a> Body<'a> {
+    fn new(shell: &'a ToolMesh) -> Self {
+        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for p in shell.triangles.iter().flatten() {
+            for (d, c) in shell.points[*p as usize].into_iter().enumerate() {
+                bounds[0][d] = bounds[0][d].min(c);
+                bounds[1][d] = bounds[1][d].max(c);
+            }
+        }
+        Self {
+            shell,
+            tree: SurfaceTree::new(shell),
+            bounds,
+        }
+    }
+
+    fn corners(&self) -> impl Iterator<Item = V3> {
+        let points = self.shell.triangles.iter().flatten();
+        points.map(|p| self.shell.points[*p as usize])
+    }
+
+    /// The smallest of its extents (m).
+    fn thickness(&self) -> f64 {
+        let along = (0..3).map(|d| self.bounds[1][d] - self.bounds[0][d]);
+        along.fold(f64::INFINITY, f64::min)
+    }
+
+    fn touches(&self, other: &Self) -> bool {
+        let apart = |d: usize| {
+            self.bounds[0][d] > other.bounds[1][d] + FOOT
+                || other.bounds[0][d] > self.bounds[1][d] + FOOT
+        };
+        if (0..3).any(apart) {
+            return false;
+        }
+        // Bars that cross have no corner in each other, but places of their sides. No finer than a 200th of the larger one.
+        let extent = |b: &Self| norm(sub(b.bounds[1], b.bounds[0]));
+        let least = 0.25 * self.thickness().min(other.thickness());
+        let spacing = least.max(extent(self).max(extent(other)) / 200.0);
+        self.reaches(other, spacing) || other.reaches(self, spacing)
+    }
+
+    /// Whether a corner, or a place of the surface of those that are `spacing` (m) apart, lies on or in another body.
+    fn reaches(&self, other: &Self, spacing: f64) -> bool {
+        let near = |p: V3| other.tree.closest(p).signed_distance <= FOOT;
+        let mut found = self.corners().any(near);
+        for facet in 0..self.shell.triangles.len() {
+            if found {
+                break;
+            }
+            Piece::of(self.shell, facet).parts(spacing, &mut |part| {
+                found |= part.face().is_some_and(|(on, _)| near(on));
+            });
+        }
+        found
+    }
+}
+
 /// Whether each of a tool's bodies stands on what the lowest of them stands on, or on or in another body.
 fn check_bodies(scene: &Scene, mesh: &ToolMesh, shells: &[ToolMesh]) -> Result<(), String> {
     if shells.len() < 2 {
         return Ok(());
     }
     let low = mesh.bounds()[0][2];
-    let trees: Vec<SurfaceTree> = shells.iter().map(SurfaceTree::new).collect();
-    let corners = |k: usize| {
-        shells[k]
-            .triangles
-            .iter()
-            .flatten()
-            .map(|p| mesh.points[*p as usize])
-    };
-    let touches = |a: usize, b: usize| {
-        let near = |p: V3| trees[b].closest(p).signed_distance <= FOOT;
-        corners(a).any(near)
-    };
-    let mut held: Vec<bool> = (0..shells.len())
-        .map(|k| corners(k).any(|p| p[2] <= low + FOOT))
+    let bodies: Vec<Body<'_>> = shells.iter().map(Body::new).collect();
+    let mut held: Vec<bool> = (bodies.iter())
+        .map(|b| b.bounds[0][2] <= low + FOOT)
         .collect();
     loop {
         let found = (0..shells.len()).find(|&k| {
-            !held[k] && (0..shells.len()).any(|o| held[o] && (touches(k, o) || touches(o, k)))
+            !held[k] && (0..shells.len()).any(|o| held[o] && bodies[k].touches(&bodies[o]))
         });
         match found {
             Some(k) => held[k] = true,
@@ -332,10 +385,13 @@ fn check_bodies(scene: &Scene, mesh: &ToolMesh, shells: &[ToolMesh]) -> Result<(
     let Some(k) = held.iter().position(|h| !h) else {
         return Ok(());
     };
-    let lowest = corners(k).fold(
-        [0.0, 0.0, f64::INFINITY],
-        |l, p| if p[2] < l[2] { p } else { l },
-    );
+    let lowest =
+        bodies[k].corners().fold(
+            [0.0, 0.0, f64::INFINITY],
+            |l, p| {
+                if p[2] < l[2] { p } else { l }
+            },
+        );
     Err(format!(
         "{}: one of its {} bodies floats, its lowest point at {}, and touches no other; expected bodies that stand on the tool's foot or on or in \
          each other: move it, or leave it out",
@@ -377,13 +433,14 @@ impl Survey {
         counts: impl Fn(V3) -> bool,
     ) -> Option<(f64, V3)> {
         let mut worst = None::<(f64, V3)>;
+        let mut hints = vec![0; self.trees().len()];
         for piece in self.pieces() {
             piece.parts(spacing, &mut |part| {
                 let Some((on, out)) = part.face().filter(|(on, _)| counts(*on)) else {
                     return;
                 };
                 let inside = sub(on, scale(out, least));
-                let (found, normal) = self.nearest_of(inside, &part);
+                let (found, normal) = self.nearest_of(inside, &part, &mut hints);
                 // Beyond the other face, which looks the other way.
                 let thickness = least - found.signed_distance;
                 let through = found.signed_distance > 1e-9 && thickness > 0.0;
