@@ -61,7 +61,12 @@ impl Lock {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
         }
-        if path.is_dir() {
+        let is_none = match fs::metadata(path) {
+            Ok(found) => found.is_dir(),
+            // A link to itself, for one.
+            Err(e) => fs::symlink_metadata(path).is_ok() && e.kind() != io::ErrorKind::NotFound,
+        };
+        if is_none {
             // Nobody holds what nobody could open.
             fs::rename(path, path.with_extension("damaged")).map_err(failed)?;
         }
@@ -152,6 +157,20 @@ fn told_by_kernel(file: &Metadata) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_file_in_the_place_of_a_lock_blocks_nobody() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = Utf8PathBuf::from_path_buf(folder.path().join("lock")).unwrap();
+        fs::create_dir(&path).unwrap();
+        drop(Lock::exclusive(&path, "the run").unwrap());
+        assert!(path.is_file());
+        fs::remove_file(&path).unwrap();
+        fs::remove_dir(path.with_extension("damaged")).unwrap();
+        std::os::unix::fs::symlink(&path, &path).unwrap();
+        drop(Lock::exclusive(&path, "the run").unwrap());
+        assert!(path.is_file());
+    }
 
     #[test]
     fn a_second_holder_is_told_who_holds_it_and_gets_it_after_the_drop() {
