@@ -5,7 +5,7 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read, Seek, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
 /// A lock, held until it is dropped.
 #[derive(Debug)]
@@ -71,13 +71,16 @@ impl Lock {
             fs::rename(path, path.with_extension("damaged")).map_err(failed)?;
         }
         let mut options = File::options();
-        let mut file = options
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(failed)?;
+        options.read(true).write(true).create(true).truncate(false);
+        let mut file = match options.open(path) {
+            // One's own, which somebody has closed to oneself: it stays the same file, so whoever holds it goes on to hold it.
+            Err(e) if e.kind() == io::ErrorKind::PermissionDenied && is_own(path) => {
+                fs::set_permissions(path, fs::Permissions::from_mode(0o600)).map_err(failed)?;
+                options.open(path)
+            }
+            other => other,
+        }
+        .map_err(failed)?;
         let how = if alone {
             FlockOperation::NonBlockingLockExclusive
         } else {
@@ -106,6 +109,12 @@ impl Lock {
         write(&mut file).map_err(failed)?;
         Ok(Self { _file: file })
     }
+}
+
+/// Whether a plain file belongs to the user of this process.
+fn is_own(path: &Utf8Path) -> bool {
+    let own = rustix::process::geteuid().as_raw();
+    fs::symlink_metadata(path).is_ok_and(|m| m.is_file() && m.uid() == own)
 }
 
 /// The processes that hold a lock, in words: as the kernel tells; else the one that wrote its number when it took the lock alone.
@@ -170,6 +179,8 @@ mod tests {
         std::os::unix::fs::symlink(&path, &path).unwrap();
         drop(Lock::exclusive(&path, "the run").unwrap());
         assert!(path.is_file());
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o0)).unwrap();
+        drop(Lock::exclusive(&path, "the run").unwrap());
     }
 
     #[test]
