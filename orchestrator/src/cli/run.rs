@@ -10,7 +10,7 @@ use crate::engine::core::{Instance, Limits, State};
 use crate::engine::{Depth, Failure, Local, Observer, Options, Session, Summary};
 use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
-use crate::store::Lock;
+use crate::store::{Early, Lock, Store};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::units::parse_quantity_in;
 use plyflow_workflow::resolved::FailurePolicy;
@@ -96,6 +96,7 @@ pub fn run(args: &RunArgs) -> Done {
         std::fs::create_dir_all(&root)
             .map_err(Stop::machine(format!("making the store {root}")))?;
     }
+    let early = Early::begin(&Store::new(store_root(&args.workflow.places, Some(file))));
     let mut opened = open(&args.workflow)?;
     opened.restrict(&args.until)?;
     let options = options(args, &opened)?;
@@ -108,12 +109,13 @@ pub fn run(args: &RunArgs) -> Done {
     let what = format!("the workflow '{}'", opened.workflow.name);
     let _run = Lock::exclusive(&folder.lock(), &what).map_err(locked)?;
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
-    let mut session = Session::new(
+    let mut session = Session::new_after(
         &opened.workflow,
         &opened.graph,
         &opened.store,
         options,
         true,
+        early,
     )
     .map_err(machine())?;
     let mut observer = observer(args);

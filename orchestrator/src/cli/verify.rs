@@ -242,6 +242,9 @@ fn again(args: &VerifyArgs) -> Done {
     let (session, summary) = session
         .execute(&mut executor, &mut observer, &|| 0)
         .map_err(failed())?;
+    for text in session.told() {
+        warn(&format!("plyflow: {text}\n"));
+    }
     let mut out = String::new();
     for (label, how) in session.compared() {
         out += &format!("{label}: {}\n", how.text());

@@ -16,7 +16,7 @@ use super::executor::{Executor, Outcome, Report, Task};
 use super::shown::{Failure, Observer, Summary, Update};
 use super::unchanged::Unchanged;
 use crate::plan::{ByKey, Graph, InputKey, Key};
-use crate::store::{ENDING, Flaw, Journal, Known, RunFolder, Seen, Store};
+use crate::store::{ENDING, Early, Flaw, Journal, Known, RunFolder, Seen, Store};
 use camino::Utf8PathBuf;
 use opening::{look_at_journal, open_for_writing};
 use plyflow_model::job::{
@@ -86,9 +86,29 @@ impl<'a> Session<'a> {
         options: Options,
         writing: bool,
     ) -> io::Result<Self> {
+        Self::new_after(workflow, graph, store, options, writing, None)
+    }
+
+    /// As [`Session::new`], with what was read ahead for a session that writes.
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn new_after(
+        workflow: &'a ResolvedWorkflow,
+        graph: &'a Graph,
+        store: &'a Store,
+        options: Options,
+        writing: bool,
+        early: Option<Early>,
+    ) -> io::Result<Self> {
         let folder = store.run(&workflow.name);
+        let early = early.and_then(|early| early.finish(&folder.journal()));
+        let (scanned, ahead) = match early {
+            Some((scanned, ahead)) => (Some(scanned), ahead),
+            None => (None, HashMap::default()),
+        };
         let (journal, told) = match writing {
-            true => open_for_writing(store, &folder)?,
+            true => open_for_writing(store, &folder, scanned)?,
             false => look_at_journal(&folder)?,
         };
         Ok(Self {
@@ -108,7 +128,7 @@ impl<'a> Session<'a> {
             summary: Summary::default(),
             sound: sound::Sound::default(),
             told,
-            ahead: HashMap::default(),
+            ahead,
             compared: Vec::new(),
         })
     }
@@ -125,10 +145,15 @@ impl<'a> Session<'a> {
 
     /// Looks up all that can be keyed without running anything.
     pub fn look(&mut self, observer: &mut dyn Observer) {
-        let keys = self.journal.last_keys();
-        let (core, store) = (&mut self.core, self.store);
-        let (ahead, effects) = store.look_ahead(&keys, || core.start());
-        self.ahead = ahead;
+        let effects = if self.ahead.is_empty() {
+            let keys = self.journal.last_keys();
+            let (core, store) = (&mut self.core, self.store);
+            let (ahead, effects) = store.look_ahead(&keys, || core.start());
+            self.ahead = ahead;
+            effects
+        } else {
+            self.core.start()
+        };
         self.take(effects, observer);
         self.ahead = HashMap::default();
     }

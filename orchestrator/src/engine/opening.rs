@@ -1,6 +1,7 @@
 //! Opens the journal of a run, and says what of its files was found damaged.
 
 use super::{Journal, RunFolder, Store};
+use crate::store::Scanned;
 use camino::Utf8PathBuf;
 use std::io;
 
@@ -8,6 +9,7 @@ use std::io;
 pub(super) fn open_for_writing(
     store: &Store,
     folder: &RunFolder,
+    ahead: Option<Scanned>,
 ) -> io::Result<(Journal, Vec<String>)> {
     folder.prepare()?;
     let mut told = store.take_unplaced(folder);
@@ -15,7 +17,7 @@ pub(super) fn open_for_writing(
     let kept = |place: Option<Utf8PathBuf>| {
         place.map_or(String::new(), |p| format!("; it is kept as {p}"))
     };
-    let journal = match Journal::open(&path) {
+    let journal = match Journal::open_with(&path, ahead) {
         Ok(journal) => journal,
         Err(e) if path.symlink_metadata().is_ok() => {
             // A folder, or a file that may not be read: without it all is found by its files.

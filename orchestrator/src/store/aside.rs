@@ -20,7 +20,8 @@ impl Store {
         // Not followed: a link is moved, not what it points to.
         match fs::symlink_metadata(path) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-            other => drop(other?),
+            Err(e) => return Err(e),
+            Ok(_) => {}
         }
         let folder = self.damaged();
         if fs::symlink_metadata(&folder).is_ok_and(|m| !m.is_dir()) {

@@ -164,7 +164,7 @@ impl Store {
                 scope.spawn(move || look_at_many(artifacts, part))
             });
             let done = meanwhile();
-            let mut found = HashMap::with_capacity_and_hasher(keys.len(), ByKey::default());
+            let mut found = HashMap::with_capacity_and_hasher(keys.len(), ByKey);
             for part in all {
                 found.extend(part.join().unwrap_or_default());
             }

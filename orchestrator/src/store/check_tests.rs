@@ -84,7 +84,7 @@ fn what_lies_there_instead_of_a_file_is_named() {
         assert!(is_damaged(&store, &key), "a folder as {path}");
         restore();
     }
-    fs::set_permissions(&artifact, fs::Permissions::from_mode(0)).unwrap();
+    fs::set_permissions(&artifact, fs::Permissions::from_mode(0o0)).unwrap();
     // The superuser may read it all the same.
     let unreadable = fs::File::open(&artifact).is_err();
     assert_eq!(is_damaged(&store, &key), unreadable);

@@ -12,6 +12,7 @@ use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
+use std::os::unix::fs::MetadataExt;
 use std::time::{Duration, Instant};
 
 const MAGIC: &[u8; 8] = b"PFJRNL02";
@@ -108,6 +109,46 @@ fn checksum(payload: &[u8]) -> [u8; 8] {
     std::array::from_fn(|i| hash.as_bytes()[i])
 }
 
+/// A journal that was read before its run held the lock.
+#[derive(Debug)]
+pub struct Scanned {
+    journal: Journal,
+    whole: usize,
+    mark: Mark,
+}
+
+/// Size, inode and times of a file.
+type Mark = [i64; 6];
+
+fn mark(file: &File) -> io::Result<Mark> {
+    let m = file.metadata()?;
+    let whole = |n: u64| n.cast_signed();
+    let sizes = [whole(m.size()), whole(m.ino())];
+    let times = [m.mtime(), m.mtime_nsec(), m.ctime(), m.ctime_nsec()];
+    Ok([sizes[0], sizes[1], times[0], times[1], times[2], times[3]])
+}
+
+impl Scanned {
+    /// Reads a journal; `None` when there is none that can be read.
+    pub fn read(path: &Utf8Path) -> Option<Self> {
+        let mut file = File::open(path).ok()?;
+        let mark = mark(&file).ok()?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).ok()?;
+        let (journal, whole) = Journal::scan(path, bytes);
+        Some(Self {
+            journal,
+            whole,
+            mark,
+        })
+    }
+
+    /// What was read.
+    pub fn journal(&self) -> &Journal {
+        &self.journal
+    }
+}
+
 /// Where the payload of the frame at `at` lies, when it checks.
 fn frame(bytes: &[u8], at: usize) -> Option<Range<usize>> {
     let head = bytes.get(at..at + HEAD)?;
@@ -154,6 +195,14 @@ impl Journal {
     /// # Errors
     /// When the file cannot be read or written.
     pub fn open(path: &Utf8Path) -> io::Result<Self> {
+        Self::open_with(path, None)
+    }
+
+    /// As [`Journal::open`]; what was read `ahead` is taken if the file has not changed since.
+    ///
+    /// # Errors
+    /// As [`Journal::open`].
+    pub fn open_with(path: &Utf8Path, ahead: Option<Scanned>) -> io::Result<Self> {
         let mut options = File::options();
         let mut file = options
             .read(true)
@@ -161,10 +210,16 @@ impl Journal {
             .create(true)
             .truncate(false)
             .open(path)?;
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes)?;
-        let length = bytes.len();
-        let (mut journal, whole) = Self::scan(path, bytes);
+        let ahead = ahead.filter(|a| a.journal.path == path && mark(&file).ok() == Some(a.mark));
+        let (mut journal, whole) = match ahead {
+            Some(ahead) => (ahead.journal, ahead.whole),
+            None => {
+                let mut bytes = Vec::new();
+                file.read_to_end(&mut bytes)?;
+                Self::scan(path, bytes)
+            }
+        };
+        let length = journal.bytes.len();
         if whole < MAGIC.len() && !journal.damaged {
             file.set_len(0)?;
             file.rewind()?;

@@ -174,6 +174,29 @@ fn what_was_seen_of_files_is_noted_again_only_when_it_is_new() {
 }
 
 #[test]
+fn what_was_read_ahead_is_taken_only_if_nobody_has_written_since() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = at(&folder);
+    assert!(Scanned::read(&path).is_none());
+    let mut j = Journal::open(&path).unwrap();
+    note(&mut j, 0, 1);
+    j.flush().unwrap();
+    let ahead = Scanned::read(&path).unwrap();
+    assert_eq!(ahead.journal().last("s", &[0]), Some(key(1)));
+    let mut open = Journal::open_with(&path, Some(ahead)).unwrap();
+    note(&mut open, 1, 2);
+    open.flush().unwrap();
+    // Another has written after it was read.
+    let ahead = Scanned::read(&path).unwrap();
+    note(&mut open, 2, 3);
+    open.flush().unwrap();
+    let late = Journal::open_with(&path, Some(ahead)).unwrap();
+    for n in 0..3u8 {
+        assert_eq!(late.last("s", &[n.into()]), Some(key(n + 1)));
+    }
+}
+
+#[test]
 fn a_journal_of_the_earlier_version_is_read_and_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let mut j = Journal::open(&at(&folder)).unwrap();

@@ -5,7 +5,7 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read, Seek, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
 /// A lock, held until it is dropped.
 #[derive(Debug)]
@@ -61,18 +61,26 @@ impl Lock {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
         }
-        if path.is_dir() {
+        let is_none = match fs::metadata(path) {
+            Ok(found) => found.is_dir(),
+            // A link to itself, for one.
+            Err(e) => fs::symlink_metadata(path).is_ok() && e.kind() != io::ErrorKind::NotFound,
+        };
+        if is_none {
             // Nobody holds what nobody could open.
             fs::rename(path, path.with_extension("damaged")).map_err(failed)?;
         }
         let mut options = File::options();
-        let mut file = options
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(failed)?;
+        options.read(true).write(true).create(true).truncate(false);
+        let mut file = match options.open(path) {
+            // One's own, which somebody has closed to oneself: it stays the same file, so whoever holds it goes on to hold it.
+            Err(e) if e.kind() == io::ErrorKind::PermissionDenied && is_own(path) => {
+                fs::set_permissions(path, fs::Permissions::from_mode(0o600)).map_err(failed)?;
+                options.open(path)
+            }
+            other => other,
+        }
+        .map_err(failed)?;
         let how = if alone {
             FlockOperation::NonBlockingLockExclusive
         } else {
@@ -101,6 +109,12 @@ impl Lock {
         write(&mut file).map_err(failed)?;
         Ok(Self { _file: file })
     }
+}
+
+/// Whether a plain file belongs to the user of this process.
+fn is_own(path: &Utf8Path) -> bool {
+    let own = rustix::process::geteuid().as_raw();
+    fs::symlink_metadata(path).is_ok_and(|m| m.is_file() && m.uid() == own)
 }
 
 /// The processes that hold a lock, in words: as the kernel tells; else the one that wrote its number when it took the lock alone.
@@ -152,6 +166,22 @@ fn told_by_kernel(file: &Metadata) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_file_in_the_place_of_a_lock_blocks_nobody() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = Utf8PathBuf::from_path_buf(folder.path().join("lock")).unwrap();
+        fs::create_dir(&path).unwrap();
+        drop(Lock::exclusive(&path, "the run").unwrap());
+        assert!(path.is_file());
+        fs::remove_file(&path).unwrap();
+        fs::remove_dir(path.with_extension("damaged")).unwrap();
+        std::os::unix::fs::symlink(&path, &path).unwrap();
+        drop(Lock::exclusive(&path, "the run").unwrap());
+        assert!(path.is_file());
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o0)).unwrap();
+        drop(Lock::exclusive(&path, "the run").unwrap());
+    }
 
     #[test]
     fn a_second_holder_is_told_who_holds_it_and_gets_it_after_the_drop() {

@@ -19,13 +19,15 @@
 
 mod aside;
 mod check;
+mod early;
 mod journal;
 mod lock;
 pub mod resolved;
 
 pub use aside::damage_of_plugins;
 pub use check::{Expected, Flaw, Seen, check_artifact, read_unplaced, record_beside};
-pub use journal::{Detail, Journal, Known};
+pub use early::{Ahead, Early};
+pub use journal::{Detail, Journal, Known, Scanned};
 pub use lock::{Lock, LockError};
 
 use crate::plan::Key;

@@ -235,7 +235,7 @@ fn harm(store: &Path, file: &Path, damage: Damage, random: &mut Random) {
             std::fs::write(file.join("x"), "x").expect("a file in it");
         }
         Damage::Unreadable => {
-            std::fs::set_permissions(file, std::fs::Permissions::from_mode(0)).expect("a mode");
+            std::fs::set_permissions(file, std::fs::Permissions::from_mode(0o0)).expect("a mode");
         }
         Damage::Link => {
             std::fs::remove_file(file).expect("a file");
