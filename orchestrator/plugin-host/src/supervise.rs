@@ -42,7 +42,10 @@ pub fn supervise(inside: impl FnOnce(), work: impl FnOnce() -> i32) -> ! {
             libc::_exit(work());
         }
         let status = attend(&heard, worker, engine);
-        end_all(&[]);
+        // Mostly there is nothing left, and to hear that costs less than to look.
+        if libc::waitpid(-1, std::ptr::null_mut(), libc::WNOHANG) >= 0 {
+            end_all(&[]);
+        }
         end_as(status)
     }
 }
@@ -177,7 +180,7 @@ impl Orphans {
         }
     }
 
-    /// Kills what ended workers have left; `workers`: those that still run.
+    /// Kills what workers have left whose supervisor was killed (others have left nothing); `workers`: those that still run.
     pub fn end(workers: &[u32]) {
         if ADOPTING.load(Ordering::Relaxed) {
             end_all(workers);

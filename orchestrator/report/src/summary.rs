@@ -6,6 +6,7 @@ use crate::study::{Comparison, Material, Study};
 use crate::units::{bytes, duration, fixed, number, quantity};
 use crate::verdict;
 use camino::Utf8Path;
+use plyflow_model::text::one_line;
 
 /// Tables are shown up to this many rows.
 const LONGEST: usize = 40;
@@ -28,7 +29,7 @@ pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
             &study.title
         };
         if !text.is_empty() {
-            blocks.push(format!("{title}: {text}\n"));
+            blocks.push(format!("{}: {text}\n", one_line(title)));
         }
         blocks.push(zone_table(study));
         blocks.extend(study.comparison.as_ref().map(defect_table));

@@ -12,6 +12,7 @@ use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
 use crate::store::{Early, Lock, Store};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::text::one_line;
 use plyflow_model::units::parse_quantity_in;
 use plyflow_workflow::resolved::FailurePolicy;
 use std::io::{IsTerminal, Read};
@@ -106,7 +107,7 @@ pub fn run(args: &RunArgs) -> Done {
         &format!("the store {}", opened.store.root()),
     )
     .map_err(locked)?;
-    let what = format!("the workflow '{}'", opened.workflow.name);
+    let what = format!("the workflow '{}'", one_line(&opened.workflow.name));
     let _run = Lock::exclusive(&folder.lock(), &what).map_err(locked)?;
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
     let mut session = Session::new_after(
@@ -357,7 +358,7 @@ fn tell(
     }
     let line = format!(
         "{}: {} in {wall}\n",
-        session.workflow.name,
+        one_line(&session.workflow.name),
         parts.join(", ")
     );
     if args.log_format == LogFormat::Json {

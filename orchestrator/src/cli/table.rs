@@ -1,7 +1,12 @@
 //! Plain tables.
 
-/// Columns padded to their widest cell; columns listed in `right` are aligned to the right.
+use plyflow_model::text::one_line;
+
+/// Columns padded to their widest cell; columns listed in `right` are aligned to the right. A
+/// cell is one line, whatever others have put into it.
 pub fn table(head: &[&str], rows: &[Vec<String>], right: &[usize]) -> String {
+    let safe = |row: &Vec<String>| row.iter().map(|c| one_line(c).into_owned()).collect();
+    let rows: Vec<Vec<String>> = rows.iter().map(safe).collect();
     let width = |at: usize| {
         let cells = rows
             .iter()
@@ -12,7 +17,7 @@ pub fn table(head: &[&str], rows: &[Vec<String>], right: &[usize]) -> String {
     let widths: Vec<usize> = (0..head.len()).map(width).collect();
     let mut out = String::new();
     let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
-    for row in std::iter::once(&head).chain(rows) {
+    for row in std::iter::once(&head).chain(&rows) {
         let mut line = String::new();
         for (at, width) in widths.iter().enumerate() {
             let cell = row.get(at).map_or("", String::as_str);

@@ -238,6 +238,7 @@ fn again(args: &VerifyArgs) -> Done {
     .map_err(failed())?;
     let mut observer = Lines::default();
     session.look(&mut observer);
+    opened.admit(&session)?;
     let mut executor = Local::new("/proc/self/exe".into(), None);
     let (session, summary) = session
         .execute(&mut executor, &mut observer, &|| 0)

@@ -1,6 +1,7 @@
 //! Decides what happens next: (state, event) -> (state, effects). No I/O, no clock, no processes.
 
 use crate::plan::{Extent, Graph, Key, Walk, instance_key, walk};
+use plyflow_model::text::one_line;
 use plyflow_workflow::resolved::FailurePolicy;
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
@@ -261,7 +262,9 @@ impl<'g> Core<'g> {
         if step.dimensions.is_empty() {
             return step.name.clone();
         }
-        format!("{}[{}]", step.name, self.item_labels(id).join(","))
+        let label = format!("{}[{}]", step.name, self.item_labels(id).join(","));
+        // A plugin writes the labels: no line of its own is to come from them.
+        one_line(&label).into_owned()
     }
 
     /// The labels of the item of an instance, outermost first.

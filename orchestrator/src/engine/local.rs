@@ -40,6 +40,8 @@ struct Worker {
     memory_limit: u64,
     /// It said that memory was refused to it.
     wants_memory: bool,
+    /// A signal has ended it, so that it may have left something behind.
+    was_killed: bool,
     deadline: Option<Instant>,
     kill_at: Option<Instant>,
     stop: Option<Stop>,
@@ -232,6 +234,7 @@ impl Executor for Local {
             time_limit: task.time_limit,
             memory_limit: task.job.memory_limit,
             wants_memory: false,
+            was_killed: false,
             deadline,
             kill_at: None,
             stop: None,
@@ -261,8 +264,10 @@ impl Executor for Local {
             }
             if exited && let Some(mut worker) = self.workers.remove(&id) {
                 let outcome = worker.reap();
-                let alive: Vec<u32> = self.workers.values().map(|w| w.process.id()).collect();
-                Orphans::end(&alive);
+                if worker.was_killed {
+                    let alive: Vec<u32> = self.workers.values().map(|w| w.process.id()).collect();
+                    Orphans::end(&alive);
+                }
                 out.push(Report::Ended { id, outcome });
             }
         }
@@ -366,6 +371,7 @@ impl Worker {
             Ok(status) => status,
             Err(e) => return Outcome::NotStarted(format!("waiting for the worker: {e}")),
         };
+        self.was_killed = status.signal().is_some();
         let outcome = self.judge(status);
         let text = match &outcome {
             Outcome::Failed { kind, message } => format!("failed ({kind:?}): {message}\n"),

@@ -55,14 +55,17 @@ fn label(step: &ResolvedStep) -> String {
 
 /// Graphviz text.
 pub fn to_dot(workflow: &ResolvedWorkflow) -> String {
-    let quote = |s: &str| format!("\"{}\"", s.replace('\\', "\\\\").replace('"', "\\\""));
+    let quote = |s: &str| {
+        let text = s.replace('\\', "\\\\").replace('"', "\\\"");
+        format!("\"{}\"", text.replace('\n', "\\n"))
+    };
     let mut out = format!(
         "digraph {} {{\n  rankdir=LR;\n  node [shape=box];\n",
         quote(&workflow.name)
     );
     let graph = graph(workflow);
     for step in graph.node_weights() {
-        let text = quote(&format!("{}\n{}", label(step), step.plugin.name)).replace('\n', "\\n");
+        let text = quote(&format!("{}\n{}", label(step), step.plugin.name));
         let _ = writeln!(out, "  {} [label={text}];", quote(&step.name));
     }
     for edge in graph.edge_indices() {

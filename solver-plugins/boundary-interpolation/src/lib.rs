@@ -14,6 +14,7 @@ use place::Place;
 use pull::{FORCES, Pull};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
+use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::first_axis;
 use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
 use plyflow_surface::flat_bounds;
@@ -413,6 +414,19 @@ fn film_bounds(
     Ok(common)
 }
 
+/// Whether the elements of a sheet in a zone are not too many to be made.
+fn allow(zone: Rectangle, sheet: &str, parameter: &str, size: f64) -> Result<(), String> {
+    budget::allow(Wanted {
+        what: &format!("the mesh of '{sheet}' in the zone"),
+        of: "elements",
+        count: (zone[2] - zone[0]) * (zone[3] - zone[1]) / (size * size),
+        most: budget::MOST_ELEMENTS,
+        bytes: budget::ELEMENT_BYTES,
+        parameter,
+        size,
+    })
+}
+
 /// The part of the mesh of a sheet, of these `bounds` (m) when nothing else is told, in a zone; `None` where it does not reach.
 fn part(
     sheet: &Sheet,
@@ -420,8 +434,12 @@ fn part(
     zone: Rectangle,
     p: &Parameters,
 ) -> Result<Option<Grid>, StepError> {
+    let (parameter, size) = match p.film_element_size {
+        Some(size) if sheet.kind != "ply" => ("film_element_size", size),
+        _ => ("element_size", p.element_size),
+    };
+    allow(zone, &sheet.name, parameter, size)?;
     if sheet.kind != "ply" {
-        let size = p.film_element_size.unwrap_or(p.element_size);
         return Ok(film_grid(zone, bounds, p.film_margin, size));
     }
     let outline = sheet.outline.clone().unwrap_or_else(|| corners(bounds));

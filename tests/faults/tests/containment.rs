@@ -132,7 +132,7 @@ fn a_step_without_a_bound_of_memory_has_one_and_its_failure_says_it_and_what_to_
 #[test]
 fn no_name_log_or_message_of_others_steers_a_terminal_or_a_page() {
     let place = Place::new(STEP);
-    let evil = "\\e]0;title\\a\\u009b2J \\u202e <script>alert(1)</script>";
+    let evil = "\\e]0;title\\a\\u009b2J \\u202e <script>alert(1)</script>\\nstudy: forged line";
     place.write(
         "workflow.yaml",
         &format!("plyflow: 1\nname: \"{evil}\"\ndescription: \"{evil}\"\n{STEP}"),
@@ -167,4 +167,8 @@ fn harmless(text: &str, words: &[&str]) {
     let steers = |c: &char| c.is_control() && *c != '\n' || ('\u{202a}'..='\u{202e}').contains(c);
     let found = text.chars().find(steers);
     assert_eq!(found, None, "{words:?}: {text:?}");
+    assert!(
+        !text.lines().any(|l| l.starts_with("study: forged")),
+        "{words:?}: {text:?}"
+    );
 }
