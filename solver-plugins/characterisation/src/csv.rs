@@ -174,7 +174,11 @@ pub fn read(path: &str, wanted: &[Column]) -> Result<Table, String> {
 /// # Errors
 /// A missing or repeated column, one that is nearly an optional one, a missing, unknown or unfit unit, a row of another length, a value that is
 /// no finite number: each with `source`, line and column.
-pub fn parse(bytes: impl AsRef<[u8]>, source: &str, wanted: &[Column]) -> Result<Table, String> {
+pub fn parse(
+    bytes: &(impl AsRef<[u8]> + ?Sized),
+    source: &str,
+    wanted: &[Column],
+) -> Result<Table, String> {
     of_rows(bytes.as_ref(), source, wanted).map_err(|e| e.of(source))
 }
 
