@@ -108,7 +108,9 @@ fn mentions_plugins(file: &Utf8Path) -> bool {
     let read = plyflow_files::open::read(file.as_std_path(), plyflow_files::open::MOST_WRITTEN);
     // What cannot be read is told when it is loaded; in UTF-16 the word has zeros in it.
     read.is_ok_and(|bytes| {
-        bytes.windows(7).any(|w| w == b"plugins") || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff])
+        bytes.windows(7).any(|w| w == b"plugins")
+            || bytes.starts_with(&[0xff, 0xfe])
+            || bytes.starts_with(&[0xfe, 0xff])
     })
 }
 

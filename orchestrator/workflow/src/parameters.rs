@@ -375,15 +375,31 @@ pub fn unreadable(
     beside.sort_unstable();
     // Differences that nobody sees: blanks at the ends, and forms of Unicode (more than one such name is there).
     let bare = |name: &str| open::composed(name.trim());
-    let alike: Vec<&str> = beside.iter().copied().filter(|b| bare(b) == bare(name)).collect();
+    let alike: Vec<&str> = beside
+        .iter()
+        .copied()
+        .filter(|b| bare(b) == bare(name))
+        .collect();
     if let Some(one) = alike.first() {
         d.help(match (one.trim() == *one, name.trim() == name) {
-            (true, false) => format!("the file `{}` is there: take the blank at the end of the path away", shown(one)),
-            (false, true) => format!("the name of the file there has a blank at its end or begin: rename it to `{}`", shown(one.trim())),
-            _ => format!("{} names there look alike, in other forms of Unicode: rename one of them", alike.len()),
+            (true, false) => format!(
+                "the file `{}` is there: take the blank at the end of the path away",
+                shown(one)
+            ),
+            (false, true) => format!(
+                "the name of the file there has a blank at its end or begin: rename it to `{}`",
+                shown(one.trim())
+            ),
+            _ => format!(
+                "{} names there look alike, in other forms of Unicode: rename one of them",
+                alike.len()
+            ),
         });
     } else if let Some(nearest) = plyflow_model::nearest::nearest(name, beside) {
-        d.help(format!("did you mean `{}`, in the same folder?", shown(nearest)));
+        d.help(format!(
+            "did you mean `{}`, in the same folder?",
+            shown(nearest)
+        ));
     }
 }
 

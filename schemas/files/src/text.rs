@@ -101,30 +101,30 @@ pub fn shown(text: &str) -> String {
 }
 
 /// A text of at most about `most` characters: of a longer one the beginning and the end, with what is left out between them. What a
-/// terminal obeys (escapes, line ends, marks that turn the direction of writing) becomes `\u{fffd}`, a tab a space.
+/// terminal obeys (escapes, line ends, marks that turn the direction of writing) is written out, as `\u001b`; a tab is a blank.
 pub fn excerpt(text: &str, most: usize) -> String {
-    let plain = |c: char| match c {
-        '\t' => ' ',
-        c if obeyed(c) => char::REPLACEMENT_CHARACTER,
-        c => c,
+    let plain = |text: &mut String, c: char| match c {
+        '\t' => text.push(' '),
+        '\n' => text.push_str("\\n"),
+        c if obeyed(c) => text.push_str(&format!("\\u{:04x}", u32::from(c))),
+        c => text.push(c),
     };
     // Bytes are at least as many as characters: short texts need no count.
     let count = match text.len() <= most {
         true => text.len(),
         false => text.chars().count(),
     };
+    let mut short = String::new();
     if count <= most {
-        return text.chars().map(plain).collect();
+        text.chars().for_each(|c| plain(&mut short, c));
+        return short;
     }
     let (head, tail) = (most * 2 / 3, most / 3);
-    let from = text
-        .char_indices()
-        .rev()
-        .nth(tail.max(1) - 1)
-        .map_or(0, |c| c.0);
-    let mut short: String = text.chars().take(head).map(plain).collect();
+    let mut from = text.char_indices().rev();
+    let from = from.nth(tail.max(1) - 1).map_or(0, |c| c.0);
+    text.chars().take(head).for_each(|c| plain(&mut short, c));
     short += &format!(" .. ({} characters left out) .. ", count - head - tail);
-    short.extend(text[from..].chars().map(plain));
+    text[from..].chars().for_each(|c| plain(&mut short, c));
     short
 }
 
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn what_is_shown_is_short_and_harmless() {
-        assert_eq!(shown("a\tb\u{1b}[31m\u{202e}"), "a b\u{fffd}[31m\u{fffd}");
+        assert_eq!(shown("a\tb\u{1b}[31m\u{202e}"), "a b\\u001b[31m\\u202e");
         let long = "x".repeat(10_000_000) + "end";
         let short = shown(&long);
         assert!(

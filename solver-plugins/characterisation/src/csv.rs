@@ -174,7 +174,11 @@ pub fn read(path: &str, wanted: &[Column]) -> Result<Table, String> {
 /// # Errors
 /// A missing or repeated column, one that is nearly an optional one, a missing, unknown or unfit unit, a row of another length, a value that is
 /// no finite number: each with `source`, line and column.
-pub fn parse(bytes: impl AsRef<[u8]>, source: &str, wanted: &[Column]) -> Result<Table, String> {
+pub fn parse(
+    bytes: &(impl AsRef<[u8]> + ?Sized),
+    source: &str,
+    wanted: &[Column],
+) -> Result<Table, String> {
     of_rows(bytes.as_ref(), source, wanted).map_err(|e| e.of(source))
 }
 
@@ -551,7 +555,7 @@ mod tests {
             "displacement;force;note\n[mm];[N];\n0,5;-1,25;a\n10;1500;b, c\n;;\n",
             "displacement / mm,force / N\n0.5,\u{2212}1.25\n10,1500\n",
             "displacement [mm],force [N],,\n0.5,-1.25,,\n10,1500,,\n,,,\n",
-            "displacement [mm],force [N],remark (first, of two)\n0.5,-1.25,\"a,b\"\n10,1500,c\n",
+            "displacement [mm],force [N],\"remark (first, of two)\"\n0.5,-1.25,\"a,b\"\n10,1500,c\n",
             "\"# made by \"\"A\"\", 2020\"\ndisplacement [mm],force [N]\n0.5,-1.25\n\"#x,y\"\n10,1.5D3\n",
         ] {
             let mark = "\u{feff}".to_owned() + text;

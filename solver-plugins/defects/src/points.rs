@@ -82,8 +82,11 @@ fn is_number(cell: &str) -> bool {
     value(cell, Decimal::Point).is_some() || value(cell, Decimal::Comma).is_some()
 }
 
+/// A row of cells, and by what it was parted into them.
+type Way = (Separator, Vec<String>);
+
 /// The first row with something in it behind a line, parted by each of the separators in its line.
-fn first_behind(lines: &Lines, last: usize) -> Option<(usize, Vec<(Separator, Vec<String>)>)> {
+fn first_behind(lines: &Lines, last: usize) -> Option<(usize, Vec<Way>)> {
     let (line, text) = lines.all().find(|l| l.0 > last && !l.1.trim().is_empty())?;
     let mut found = Vec::new();
     let mut of_line = Separator::of_line(text);

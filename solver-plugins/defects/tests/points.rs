@@ -6,7 +6,7 @@ use std::fs;
 /// 25 places in mm, no two coordinates of one alike.
 fn places() -> Vec<[f64; 3]> {
     let each = 0..25;
-    each.map(|i| f64::from(i))
+    each.map(f64::from)
         .map(|i| [i + 0.25, 100.0 - 2.0 * i, 0.5 * i - 3.125])
         .collect()
 }
