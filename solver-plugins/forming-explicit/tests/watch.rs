@@ -169,10 +169,7 @@ fn a_ply_without_contact_to_the_film_and_the_bed_stops_the_run_with_pair_place_a
         .retain(|c| !c.name.ends_with("/ply_2") && !c.name.contains("/ply_2/"));
     let told = format!(
         "{:?}",
-        forming
-            .run(&p.control(), &mut Silent)
-            .err()
-            .expect("stopped")
+        forming.run(&p.control(), &mut Silent).expect_err("stopped")
     );
     for part in [
         "'ply_2' has gone through",

@@ -158,7 +158,7 @@ impl Study {
                     "end": 6e-5, "share": 0.15, "bound": 4e-5, "place": [0.0123, 0.0, 0.02],
                     "peak": {"depth": 9e-5, "time": 0.1875, "place": [0.0124, 0.0, 0.02], "share": 0.225},
                 },
-                "film/ply_1/between_nodes": {"end": 5e-4, "share": 6.25, "peak": {"depth": 6e-4, "time": 0.5, "share": 7.5}},
+                "between_nodes/ply_1/film": {"end": 5e-4, "share": 6.25, "peak": {"depth": 6e-4, "time": 0.5, "share": 7.5}},
             },
             "warnings": if zone.is_none() { json!(["the film <upper> is stretched by 61 %"]) } else { json!([]) },
         });

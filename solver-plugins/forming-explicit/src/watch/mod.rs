@@ -638,7 +638,7 @@ fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Vec<Op
             hangs[film * stack.len() + ply] = Some(all.len());
             let both = pair(film.min(ply), film.max(ply));
             all.push(Pair {
-                name: format!("{}/between_nodes", both.name),
+                name: format!("between_nodes/{}", both.name),
                 kind: Kind::Hangs,
                 bound: f64::INFINITY,
                 most: f64::INFINITY,
