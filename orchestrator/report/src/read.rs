@@ -91,6 +91,8 @@ pub(crate) struct FormingFacts {
     pub(crate) penetration: BTreeMap<String, Penetration>,
     /// Share of the thinner body up to which bodies may reach into each other.
     pub(crate) overlap_bound: Option<f64>,
+    /// By pair, what the watch found.
+    pub(crate) depth: BTreeMap<String, Depth>,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -135,6 +137,34 @@ pub(crate) struct Penetration {
     pub(crate) overlap: Option<f64>,
     /// Over the whole run.
     pub(crate) peak: Option<PenetrationPeak>,
+}
+
+/// How deep bodies are in each other at the end of a run.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Depth {
+    /// m.
+    pub(crate) end: f64,
+    /// Of the thinner sheet.
+    pub(crate) share: f64,
+    /// Depth (m) that may be.
+    pub(crate) bound: Option<f64>,
+    pub(crate) place: Option<[f64; 3]>,
+    /// The deepest of all rows.
+    pub(crate) peak: DepthPeak,
+}
+
+/// The deepest of a pair over a run.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct DepthPeak {
+    /// m.
+    pub(crate) depth: f64,
+    /// Of the thinner sheet.
+    pub(crate) share: f64,
+    /// s.
+    pub(crate) time: f64,
+    pub(crate) place: Option<[f64; 3]>,
 }
 
 /// Largest penetrations of a contact pair over a run.

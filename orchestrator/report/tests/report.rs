@@ -190,6 +190,31 @@ fn what_overlapped_beyond_its_bound_on_the_way_is_marked_in_the_table_of_penetra
 }
 
 #[test]
+fn what_the_watch_found_beyond_its_bound_is_marked_in_the_table_of_depths() {
+    let (_keep, folder) = folder();
+    let page = page(&whole(&folder), &folder);
+    let (_, table) = page.split_once("<h3>Depth</h3>").expect("a table");
+    let (table, _) = table.split_once("</table>").expect("its end");
+    let row = |pair: &str| {
+        let row = table.split("<tr>").find(|r| r.contains(pair));
+        row.expect("a row of the pair").to_owned()
+    };
+    let deep = row("tool/ply_1");
+    assert!(deep.contains(r#"<td class="n missed">0.06</td>"#), "{deep}");
+    assert!(
+        deep.contains("15.00 %") && deep.contains("12.3, 0.0, 20.0"),
+        "{deep}"
+    );
+    assert!(
+        deep.contains("22.50 %") && deep.contains(">0.188<"),
+        "{deep}"
+    );
+    // What may be of any depth is marked by no bound.
+    let hangs = row("between_nodes");
+    assert!(!hangs.contains("missed") && hangs.contains("–"), "{hangs}");
+}
+
+#[test]
 fn texts_from_files_are_escaped_everywhere() {
     let (_keep, folder) = folder();
     let mut input = whole(&folder);

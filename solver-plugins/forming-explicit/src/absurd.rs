@@ -249,7 +249,7 @@ pub(crate) fn flies(history: &[HistoryRow], [begin, end]: [f64; 2]) -> Option<St
 }
 
 /// What to say of plies that are off the tool at the end.
-pub(crate) fn off_the_tool(forming: &Forming, watch: &Watch) -> Option<String> {
+pub fn off_the_tool(forming: &Forming, watch: &Watch) -> Option<String> {
     if forming.zone.is_some() {
         return None;
     }
@@ -265,4 +265,53 @@ pub(crate) fn off_the_tool(forming: &Forming, watch: &Watch) -> Option<String> {
             )
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plyflow_mechanics::energy::Ledger;
+
+    #[test]
+    fn sheets_fly_when_they_move_with_more_than_they_store_for_most_of_half_a_run() {
+        let row = |time: f64, kinetic: f64| HistoryRow {
+            time,
+            time_step: 1.0,
+            critical_step: 1.0,
+            ledger: Ledger {
+                kinetic,
+                membrane: 1.0,
+                ..Ledger::default()
+            },
+            cavity: 0.0,
+            bag: 0.0,
+            frame: 0.0,
+            punch_force: 0.0,
+            holder_travel: 0.0,
+            sheets: Vec::new(),
+            interfaces: Vec::new(),
+            depths: Vec::new(),
+        };
+        let history = |kinetic: &dyn Fn(usize) -> f64, rows: usize| -> Vec<HistoryRow> {
+            (0..rows).map(|k| row(k as f64, kinetic(k))).collect()
+        };
+        let told = flies(&history(&|_| 3.0, 60), [0.0, 100.0]).expect("told");
+        assert!(told.contains("100 % of the run"), "{told}");
+        // Not before half of it is over, not for a knock, and not where the start alone is fast.
+        assert_eq!(flies(&history(&|_| 3.0, 45), [0.0, 100.0]), None);
+        assert_eq!(
+            flies(
+                &history(&|k| if k % 3 == 0 { 9.0 } else { 0.1 }, 60),
+                [0.0, 100.0]
+            ),
+            None
+        );
+        assert_eq!(
+            flies(
+                &history(&|k| if k < 20 { 9.0 } else { 0.1 }, 60),
+                [0.0, 100.0]
+            ),
+            None
+        );
+    }
 }

@@ -74,6 +74,7 @@ pub(super) fn section(material: &Material) -> Markup {
                     }
                 }
                 (penetrations(&runs))
+                (watched(&runs))
             }
         }
     }
@@ -232,6 +233,37 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
                 }
                 tbody { @for (_, r) in runs { @for (i, (pair, p)) in r.facts.penetration.iter().enumerate() {
                     tr { th { @if i == 0 { (r.label) } } td { (pair) } (depths(p.max, p.q999, p.overlap, r.facts.overlap_bound)) (peak(p.peak.as_ref(), r.facts.overlap_bound)) }
+                } } }
+            } }
+        }
+    }
+}
+
+/// What the watch found, by pair.
+fn watched(runs: &[(bool, &Run)]) -> Markup {
+    let any = runs.iter().any(|(_, r)| !r.facts.depth.is_empty());
+    let place = |at: Option<[f64; 3]>| {
+        at.map_or("–".into(), |at| at.map(|c| fixed(1e3 * c, 1)).join(", "))
+    };
+    html! {
+        @if any {
+            h3 { "Depth" }
+            p { "How much nearer to each other bodies are than their thicknesses allow, found from the tool's triangles and the sheets' cells without asking the contacts; of every row of the history, not of frames alone. Pairs that never came into each other are left out. Between nodes of plies films hang through: that carries no load. "
+                "Shares are of the thinner sheet." }
+            div class="scroll" { table {
+                thead {
+                    tr { th rowspan="2" { "run" } th rowspan="2" { "pair" } th class="group" colspan="3" { "at the end" } th class="group" colspan="4" { "over the whole run" } }
+                    tr {
+                        @for _ in 0..2 { th class="n" { "deepest (mm)" } th class="n" { "share" } th class="n" { "at (mm)" } }
+                        th class="n" { "at (s)" }
+                    }
+                }
+                tbody { @for (_, r) in runs { @for (i, (pair, d)) in r.facts.depth.iter().enumerate() {
+                    @let class = if d.bound.is_some_and(|b| d.end > b) { "n missed" } else { "n" };
+                    tr { th { @if i == 0 { (r.label) } } td { (pair) }
+                        td class=(class) { (number(d.end * 1e3, 3)) } td class="n" { (percent(Some(d.share))) } td class="n" { (place(d.place)) }
+                        td class="n" { (number(d.peak.depth * 1e3, 3)) } td class="n" { (percent(Some(d.peak.share))) } td class="n" { (place(d.peak.place)) }
+                        td class="n" { (fixed(d.peak.time, 3)) } }
                 } } }
             } }
         }

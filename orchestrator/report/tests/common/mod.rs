@@ -154,6 +154,13 @@ impl Study {
                 "ply_1/ply_2": {"max": 1e-4, "q999": 6e-5},
             },
             "overlap_bound": 0.1,
+            "depth": {
+                "tool/ply_1": {
+                    "end": 6e-5, "share": 0.15, "bound": 4e-5, "place": [0.0123, 0.0, 0.02],
+                    "peak": {"depth": 9e-5, "time": 0.1875, "place": [0.0124, 0.0, 0.02], "share": 0.225},
+                },
+                "between_nodes/ply_1/film": {"end": 5e-4, "share": 6.25, "peak": {"depth": 6e-4, "time": 0.5, "share": 7.5}},
+            },
             "warnings": if zone.is_none() { json!(["the film <upper> is stretched by 61 %"]) } else { json!([]) },
         });
         w.attributes(&attributes.to_string()).unwrap();

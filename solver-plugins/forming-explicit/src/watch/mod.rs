@@ -22,7 +22,7 @@ use sheet::{Near, Seat, SheetMesh, SheetTree};
 /// Share of the thinner sheet below which a depth counts as none, except at the end.
 const FLOOR: f64 = 0.02;
 /// Steps after which closest points are looked for among all cells again, and not only near the last ones.
-const ANEW: u64 = 2000;
+const ANEW: u64 = 4000;
 /// Distance (m) from a sheet's middle surface over which a node may have come through it since the row before.
 const LEAP: f64 = 0.01;
 /// A node nearer than this share of an element to the edge of a sheet is beside it.
@@ -591,11 +591,8 @@ fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Vec<Op
                 kind: Kind::Nodes,
                 thinner,
                 bound: DEPTH_BOUND * thinner,
-                most: if is_ply(k) {
-                    thinner
-                } else {
-                    thinner.max(thinnest)
-                },
+                // A film may land on the bed harder than it is thick.
+                most: thinner.max(if is_ply(k) { 0.0 } else { thinnest }),
                 of_ply: is_ply(k),
             });
         }
@@ -619,11 +616,21 @@ fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Vec<Op
             bound: DEPTH_BOUND * a.min(b),
             // Until their middles have crossed.
             most: 0.5 * (a + b),
-            of_ply: is_ply(low) || is_ply(high),
+            of_ply: true,
         }
     };
+    // No ply feels what films do to each other beside the plies; they fold there, and only the nodes of the upper one are held off.
+    let films = |low: usize, high: usize| Pair {
+        bound: DEPTH_BOUND * thinnest,
+        most: thinnest.max(0.25 * sizes[low].min(sizes[high])),
+        of_ply: false,
+        ..pair(low, high)
+    };
     for high in 1..stack.len() {
-        all.extend((0..high).map(|low| pair(low, high)));
+        all.extend((0..high).map(|low| match is_ply(low) || is_ply(high) {
+            true => pair(low, high),
+            false => films(low, high),
+        }));
     }
     let mut hangs = vec![None; stack.len() * stack.len()];
     for film in (0..stack.len()).filter(|k| !is_ply(*k)) {
@@ -631,7 +638,7 @@ fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Vec<Op
             hangs[film * stack.len() + ply] = Some(all.len());
             let both = pair(film.min(ply), film.max(ply));
             all.push(Pair {
-                name: format!("{}/between_nodes", both.name),
+                name: format!("between_nodes/{}", both.name),
                 kind: Kind::Hangs,
                 bound: f64::INFINITY,
                 most: f64::INFINITY,

@@ -136,3 +136,130 @@ pub(super) fn from_plate(plate: &OpenPlate, p: V) -> f64 {
     let distance = face.min(wall).min(arc);
     if inside { -distance } else { distance }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plyflow_mechanics::contact::RigidSurface;
+
+    /// A box with these corners (m).
+    fn block(low: V, high: V) -> ToolMesh {
+        let corner = |k: usize| -> V {
+            std::array::from_fn(|d| if k >> d & 1 == 1 { high[d] } else { low[d] })
+        };
+        let sides = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        ToolMesh {
+            points: (0..8).map(corner).collect(),
+            triangles: sides
+                .iter()
+                .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn a_place_in_a_box_is_as_deep_as_its_nearest_face_at_faces_edges_and_corners() {
+        let tool = Triangles::new(&block([0.0; 3], [0.1, 0.06, 0.02])).unwrap();
+        let e = 1e-4;
+        for (p, expected) in [
+            ([0.05, 0.03, 0.02 - e], -e),
+            ([0.1 - e, 0.06 - 2.0 * e, 0.01], -e),
+            ([0.1 - e, 0.06 - e, 0.02 - e], -e),
+            ([0.1 - 3.0 * e, 0.03, 0.02 - 2.0 * e], -2.0 * e),
+            ([0.1 + 3.0 * e, 0.06 + 4.0 * e, 0.01], 5.0 * e),
+            ([0.1 + e, 0.06 + e, 0.02 + e], 3f64.sqrt() * e),
+        ] {
+            let found = tool.closest(p).distance;
+            assert!(
+                (found - expected).abs() < 1e-12,
+                "{p:?}: {found}, not {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_face_of_one_body_that_lies_in_another_one_is_no_surface() {
+        let mut both = block([0.0; 3], [0.1, 0.06, 0.02]);
+        let second = block([0.05, 0.01, 0.0], [0.15, 0.05, 0.02]);
+        both.points.extend(second.points);
+        both.triangles
+            .extend(second.triangles.iter().map(|t| t.map(|n| n + 8)));
+        let tool = Triangles::new(&both).unwrap();
+        // Just outside of the second body's end, which lies 50 mm inside of the first one.
+        let found = tool.closest([0.05 - 1e-4, 0.03, 0.01]).distance;
+        assert!((found + 0.01).abs() < 1e-12, "{found}");
+        assert!(tool.closest([0.16, 0.03, 0.01]).distance > 0.0099);
+    }
+
+    #[test]
+    fn a_hollow_lets_nodes_in_by_what_makes_chords_as_long_as_arcs_and_nothing_else_does() {
+        // Half of a groove of 20 mm radius along y, in facets of 1 degree, closed by a box below.
+        let (radius, size, width) = (0.02, 0.004, 0.05);
+        let outline: Vec<[f64; 2]> = (0..=180)
+            .map(|k| {
+                let (s, c) = f64::from(k).to_radians().sin_cos();
+                [-radius * c, 0.03 - radius * s]
+            })
+            .collect();
+        let mut mesh = ToolMesh::default();
+        for y in [-width, width] {
+            mesh.points.extend(outline.iter().map(|p| [p[0], y, p[1]]));
+        }
+        let n = outline.len() as u32;
+        for k in 0..n - 1 {
+            mesh.triangles.push([k, k + 1, n + k + 1]);
+            mesh.triangles.push([k, n + k + 1, n + k]);
+        }
+        let tool = Triangles::new(&mesh).unwrap();
+        let on = tool.closest([0.001, 0.003, 0.0101]);
+        let expected = size * size / (24.0 * radius);
+        let found = tool.let_be(&on, size);
+        assert!(
+            (found / expected - 1.0).abs() < 0.1,
+            "{found}, not {expected}"
+        );
+        // The same from below is convex, and a plane is nothing.
+        mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        let tool = Triangles::new(&mesh).unwrap();
+        assert_eq!(
+            tool.let_be(&tool.closest([0.001, 0.003, 0.0099]), size),
+            0.0
+        );
+        let tool = Triangles::new(&block([0.0; 3], [0.1, 0.06, 0.02])).unwrap();
+        assert!(tool.let_be(&tool.closest([0.05, 0.03, 0.021]), size) < 1e-12);
+    }
+
+    #[test]
+    fn a_plate_is_where_the_contact_has_it_though_the_watch_looks_for_its_nearest_point() {
+        for side in [1.0, -1.0] {
+            let plate = OpenPlate {
+                height: 0.01,
+                side,
+                opening: 0.03,
+                edge: 0.004,
+            };
+            for i in 0..2000 {
+                let f = |k: f64| (f64::from(i) * k).fract();
+                let p = [
+                    0.1 * (f(0.618) - 0.5),
+                    0.1 * (f(0.414) - 0.5),
+                    0.03 * f(0.732),
+                ];
+                let (found, theirs) = (from_plate(&plate, p), plate.distance(p).0);
+                // Deep inside theirs is the distance to the part that faces, which is no nearer.
+                let same = (found - theirs).abs() < 1e-12;
+                assert!(
+                    same || found < 0.0 && theirs <= found,
+                    "{p:?}: {found}, {theirs}"
+                );
+            }
+        }
+    }
+}

@@ -93,6 +93,8 @@ impl SheetTree {
 
 /// Steps to the closest point of a cell at most.
 const STEPS: usize = 12;
+/// Last step (of half an element) to it: of 4 um in an element of 8 mm, which is 0.03 um of a distance of 0.24 mm.
+const SETTLED: f64 = 1e-3;
 /// Cells that are crossed at most on the way to the closest one.
 const CROSSED: usize = 200;
 /// A cell is nearer only when it is by this share of the squared distance: on a common edge both are equally near but for rounding.
@@ -142,7 +144,7 @@ fn foot(q: &[V; 4], p: V, start: [f64; 2]) -> Foot {
         }
         let next = [0, 1].map(|k| (xi[k] + move_by[k]).clamp(-1.0, 1.0));
         let moved = (next[0] - xi[0]).abs().max((next[1] - xi[1]).abs());
-        if moved < 1e-7 || step == STEPS {
+        if moved < SETTLED || step == STEPS {
             return Foot {
                 xi,
                 square: dot(away, away),
@@ -487,4 +489,91 @@ impl SheetMesh {
 fn direction(v: V) -> V {
     let n = norm(v);
     if n > 0.0 { scale(v, 1.0 / n) } else { v }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+
+    fn grid(shape: impl Fn(f64, f64) -> f64) -> (SheetMesh, Vec<V>) {
+        let mesh = QuadMesh::grid(&even_axis(0.0, 0.1, 0.01), &even_axis(0.0, 0.06, 0.01));
+        let sheet = SheetMesh::new(&mesh.cells, &mesh.points, Planes::default());
+        let lifted = |p: &V| [p[0], p[1], shape(p[0], p[1])];
+        let x = mesh.points.iter().map(lifted).collect();
+        (sheet, x)
+    }
+
+    /// Nearest of many points of all cells.
+    fn nearest(sheet: &SheetMesh, x: &[V], p: V) -> f64 {
+        let steps = || (0..=40).map(|k| -1.0 + 0.05 * f64::from(k));
+        let mut best = f64::INFINITY;
+        for cell in 0..sheet.cells().len() as u32 {
+            let q = sheet.corners(x, cell);
+            for (u, v) in steps().flat_map(|u| steps().map(move |v| (u, v))) {
+                best = best.min(norm(sub(p, mix(weights([u, v]), &q))));
+            }
+        }
+        best
+    }
+
+    #[test]
+    fn the_closest_point_of_a_wavy_sheet_is_found_from_anywhere_near_with_its_side() {
+        let (sheet, x) = grid(|a, b| 0.004 * (90.0 * a).sin() * (60.0 * b).cos());
+        let tree = sheet.tree(&x).unwrap();
+        for i in 0..120 {
+            let f = |k: f64| (f64::from(i) * k).fract();
+            let (a, b) = (0.005 + 0.09 * f(0.618), 0.005 + 0.05 * f(0.414));
+            let up = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let p = [
+                a,
+                b,
+                0.004 * (90.0 * a).sin() * (60.0 * b).cos() + up * 0.0025,
+            ];
+            let near = sheet.closest(&x, p, (tree.cell(p), [0.0; 2]));
+            let by_points = nearest(&sheet, &x, p);
+            let found = near.height.abs();
+            assert!(
+                found <= by_points + 1e-12 && found > by_points - 5e-5,
+                "{p:?}: {found}, {by_points}"
+            );
+            assert!(near.height * up > 0.0, "{p:?}: {}", near.height);
+            // From two cells away too.
+            let from = sheet.nearest_middle(&x, [a + 0.012, b - 0.009, p[2]]);
+            let walked = sheet.closest(&x, p, (from, [0.0; 2]));
+            // Beside a hollow edge the closest point of one cell is not that of both: by what the edge's angle makes of the distance.
+            let more = walked.height.abs() - near.height.abs();
+            assert!(more < 2e-4 && walked.height * up > 0.0, "{p:?}: {more}");
+        }
+    }
+
+    #[test]
+    fn past_its_edge_a_sheet_has_no_side_and_at_a_mirror_plane_it_has_no_edge() {
+        let (sheet, x) = grid(|_, _| 0.0);
+        let at =
+            |sheet: &SheetMesh, p: V| sheet.closest(&x, p, (sheet.nearest_middle(&x, p), [0.0; 2]));
+        assert_eq!(at(&sheet, [-0.003, 0.03, -0.002]).to_rim, 0.0);
+        assert_eq!(at(&sheet, [0.102, 0.062, 0.002]).to_rim, 0.0);
+        assert!((at(&sheet, [0.004, 0.03, -0.002]).to_rim - 0.004).abs() < 1e-9);
+        assert_eq!(at(&sheet, [0.05, 0.03, -0.002]).to_rim, f64::INFINITY);
+        let mesh = QuadMesh::grid(&even_axis(0.0, 0.1, 0.01), &even_axis(0.0, 0.06, 0.01));
+        let half = SheetMesh::new(&mesh.cells, &mesh.points, Planes([true, false]));
+        let near = at(&half, [0.0, 0.03, -0.002]);
+        assert_eq!((near.to_rim, near.height), (f64::INFINITY, -0.002));
+    }
+
+    #[test]
+    fn what_a_cell_cuts_off_a_parabola_is_found_from_the_normals_at_its_corners() {
+        let k = 20.0;
+        let (sheet, x) = grid(|a, _| -0.5 * k * a * a);
+        let cell = sheet.nearest_middle(&x, [0.035, 0.035, 0.0]);
+        let (found, expected) = (sheet.bulge(&x, cell, [0.0; 2]), k * 0.01 * 0.01 / 8.0);
+        // The normals of the middle of the sheet are turned by its slope.
+        assert!(
+            (found / expected - 1.0).abs() < 0.25,
+            "{found}, not {expected}"
+        );
+        let (flat, y) = grid(|a, b| 0.3 * a - 0.1 * b);
+        assert!(flat.bulge(&y, cell, [0.3, -0.4]) < 1e-15);
+    }
 }

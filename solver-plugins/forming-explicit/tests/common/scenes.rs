@@ -116,3 +116,30 @@ pub fn gentle_press(element: &str, fibre_1: f64, symmetry: &[&str]) -> Parameter
         p["tool_grid"] = json!(0.00175);
     })
 }
+
+/// The text of an STL file of blocks with these corners.
+pub fn blocks(all: &[([f64; 3], [f64; 3])]) -> String {
+    // Counter-clockwise from outside.
+    let sides = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let mut text = String::from("solid blocks\n");
+    for (low, high) in all {
+        let corner = |k: usize| [0, 1, 2].map(|d| if k >> d & 1 == 1 { high[d] } else { low[d] });
+        for [a, b, c, d] in sides {
+            for facet in [[a, b, c], [a, c, d]] {
+                text += "facet normal 0 0 0\nouter loop\n";
+                for [x, y, z] in facet.map(corner) {
+                    text += &format!("vertex {x} {y} {z}\n");
+                }
+                text += "endloop\nendfacet\n";
+            }
+        }
+    }
+    text + "endsolid blocks\n"
+}
