@@ -319,7 +319,7 @@ typedef struct pf_element_batch {
   double *fields;          /* NULL or [fields][lanes] */
   double *mass;            /* initialise only: [nodes][lanes] kg */
   double *inertia;         /* initialise only: [nodes][lanes] kg m2 or NULL */
-  double *critical_step;   /* NULL or [lanes] s: bound of 2/omega_max of this element with the masses it wrote */
+  double *critical_step;   /* NULL or [lanes] s: bound of 2/omega_max of this element with the masses it wrote; 0: the element is none any more (inside out), the run stops */
   const pf_material *material;
 } pf_element_batch;
 

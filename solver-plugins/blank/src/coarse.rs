@@ -3,6 +3,7 @@
 
 use crate::MeshError;
 use crate::edge::{Curve, Stop};
+use plyflow_fixed::FixedBits;
 use plyflow_model::outline::{Millimetres, Point, Region, cross, segment_distance, winds};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use std::collections::{BTreeMap, BTreeSet};
@@ -282,7 +283,7 @@ fn improve_ears(mesh: &Coarse, curves: &[Curve], triangles: &mut [[u32; 3]]) {
 fn least_sine(p: [Point; 4]) -> f64 {
     let sine = |k: usize| {
         let (a, b, c) = (p[k], p[(k + 1) % 4], p[(k + 3) % 4]);
-        let long = |q: Point| (q[0] - a[0]).hypot(q[1] - a[1]);
+        let long = |q: Point| (q[0] - a[0]).fixed_hypot(q[1] - a[1]);
         cross(a, b, c) / (long(b) * long(c))
     };
     (0..4).map(sine).fold(f64::INFINITY, f64::min)

@@ -1,6 +1,7 @@
 //! Contours as the mesher sees them: places along them, their corners, the narrowest parts of a region.
 
 use crate::MeshError;
+use plyflow_fixed::FixedBits;
 use plyflow_model::outline::{Millimetres, Point, Region, cross, segment_distance, signed_area};
 
 /// A contour turns by more than this (rad) at its sharp corners; a node stands on every one of them. Of softer
@@ -38,7 +39,7 @@ impl Curve {
         let mut way = vec![0.0];
         for i in 0..n {
             let (a, b) = (corners[i], corners[(i + 1) % n]);
-            way.push(way[i] + (b[0] - a[0]).hypot(b[1] - a[1]));
+            way.push(way[i] + (b[0] - a[0]).fixed_hypot(b[1] - a[1]));
         }
         let mut curve = Self {
             corners: corners.to_vec(),
@@ -58,7 +59,7 @@ impl Curve {
             self.corners[(i + 1) % n],
         );
         let along = (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]);
-        cross(a, b, c).atan2(along)
+        cross(a, b, c).fixed_atan2(along)
     }
 
     /// Its length (m).

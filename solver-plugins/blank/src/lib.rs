@@ -3,6 +3,9 @@
 //! A rectangle is a regular grid. Any other outline is meshed with quads alone that follow it ([`mesh_region`]): nodes on
 //! its edge, one on each sharp corner, grid lines along x and y inside.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod coarse;
 mod cut;
 mod edge;
@@ -12,6 +15,7 @@ mod smooth;
 
 pub use edge::{LEAST_FEATURE, SHARP};
 pub use mesher::mesh_region;
+use plyflow_fixed::FixedBits;
 pub use quality::{POOR_JACOBIAN, Quality};
 
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
@@ -137,7 +141,7 @@ impl Blank {
             Self::Rectangle([x0, y0, x1, y1]) => {
                 let dx = (x0 - p[0]).max(p[0] - x1).max(0.0);
                 let dy = (y0 - p[1]).max(p[1] - y1).max(0.0);
-                dx.hypot(dy)
+                dx.fixed_hypot(dy)
             }
             Self::Region(region) if region.contains(p) => 0.0,
             Self::Region(region) => region.distance_to_edge(p),

@@ -1,5 +1,6 @@
 //! What a mesh is worth.
 
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::outline::{Millimetres, Point, Region, cross};
 use std::f64::consts::TAU;
@@ -54,14 +55,14 @@ impl Quality {
             for k in 0..4 {
                 let (a, b, c) = (p[k], p[(k + 1) % 4], p[(k + 3) % 4]);
                 let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
-                let (lu, lv) = (u[0].hypot(u[1]), v[0].hypot(v[1]));
+                let (lu, lv) = (u[0].fixed_hypot(u[1]), v[0].fixed_hypot(v[1]));
                 let twice = u[0] * v[1] - u[1] * v[0];
                 let jacobian = twice / (lu * lv);
                 if jacobian < q.least_scaled_jacobian {
                     q.least_scaled_jacobian = jacobian;
                     q.worst_at = [0, 1].map(|d| 0.25 * p.iter().map(|x| x[d]).sum::<f64>());
                 }
-                let angle = twice.atan2(u[0] * v[0] + u[1] * v[1]).rem_euclid(TAU);
+                let angle = twice.fixed_atan2(u[0] * v[0] + u[1] * v[1]).rem_euclid(TAU);
                 q.least_angle = q.least_angle.min(angle);
                 q.largest_angle = q.largest_angle.max(angle);
                 (shortest, longest) = (shortest.min(lu), longest.max(lu));

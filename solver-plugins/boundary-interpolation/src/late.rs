@@ -2,6 +2,7 @@
 
 use crate::cut::Placed;
 use crate::grid::Rectangle;
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mesh::{NONE, QuadMesh};
 use plyflow_sdk::{BodyInfo, Host, Input, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, add, cross, distance, dot, norm, scale, sub};
@@ -111,7 +112,7 @@ fn sharpest(points: &[Vec3], pairs: &[[[u32; 4]; 2]]) -> f64 {
     };
     let bend = |[a, b]: &[[u32; 4]; 2]| {
         let (n, m) = (normal(a), normal(b));
-        let angle = norm(cross(n, m)).atan2(dot(n, m));
+        let angle = norm(cross(n, m)).fixed_atan2(dot(n, m));
         angle / distance(middle(points, a), middle(points, b))
     };
     let bends: Vec<f64> = pairs.iter().map(bend).collect();

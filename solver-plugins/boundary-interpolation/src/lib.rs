@@ -1,6 +1,9 @@
 //! Step plugin `boundary-interpolation`: the fine meshes of a zone, and the motion of their cut edges from a
 //! coarse forming run.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod cut;
 mod grid;
 mod late;

@@ -9,6 +9,7 @@ use crate::meeting::{Counter, THREADS, meet_in_turn, same};
 use crate::neighbours::{self, ALL, mixed, of_lanes};
 use crate::slope::Energies;
 use crate::{Run, Seen, Sequence, rules, worse};
+use plyflow_fixed::FixedBits;
 use plyflow_sdk::abi::*;
 
 /// Curvatures of gentle folds (1/m): a radius of 20 mm.
@@ -290,7 +291,7 @@ fn cycle(law: &Law) -> Seen {
         );
         let mut history = start(law, LANES);
         let at = |t: f64| {
-            let (s, c) = t.sin_cos();
+            let (s, c) = t.fixed_sin_cos();
             let bent = a.iter().zip(&b);
             bent.map(|(a, b)| s * a + (1.0 - c) * 0.5 * b).collect()
         };

@@ -205,12 +205,13 @@ fn lanes(subject: &Subject) -> Seen {
         all.deformed(0.002, 19),
         all.deformed(1e-9, 29),
     ]);
-    // Rotations in the step (rad), with and without.
+    // Rotations in a step (rad), after one without: what a run does, what it may do, and nearly none. A series that ends early still rounds
+    // as the sine does when the angle is small enough: a hundredth is not.
     let turning = |angle: f64, seed: u64| -> Vec<f64> {
         let mut s = Sequence(seed);
         (0..positions.len()).map(|_| angle * s.next()).collect()
     };
-    let spins = mixed(&[turning(0.4, 41), turning(1e-3, 43), turning(1e-9, 47)]);
+    let spins = mixed(&[turning(0.4, 41), turning(1e-2, 43), turning(1e-9, 47)]);
     neighbours::judge(|order| {
         let elements = all.picked(order);
         let (x, spin) = (of_lanes(&positions, order), of_lanes(&spins, order));

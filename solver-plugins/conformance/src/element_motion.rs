@@ -6,6 +6,7 @@ use crate::linear::{V, cross, largest_eigenvalue, rotation};
 use crate::shapes::{Elements, moved};
 use crate::subject::{Answer, Masses, Motion, State, Subject};
 use crate::{Run, Seen, Sequence, rules, worse};
+use plyflow_fixed::FixedBits;
 
 pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, lanes: usize) {
     let elements = Elements::new(subject.nodes(), lanes, 31);
@@ -330,7 +331,7 @@ impl<'a> Case<'a> {
             self.elements.deformed(STRAIN, 43),
         );
         let at = |t: f64| -> Vec<f64> {
-            let (s, c) = ((6.0 * t).sin(), 1.0 - (4.0 * t).cos());
+            let (s, c) = ((6.0 * t).fixed_sin(), 1.0 - (4.0 * t).fixed_cos());
             (0..x0.len())
                 .map(|i| x0[i] + s * (a[i] - x0[i]) + c * (b[i] - x0[i]))
                 .collect()
@@ -496,7 +497,7 @@ fn path(
 /// The rotation vector of a rotation by less than 180 degrees.
 fn axis_of(q: &[V; 3]) -> V {
     let cosine = 0.5 * (q[0][0] + q[1][1] + q[2][2] - 1.0);
-    let angle = cosine.clamp(-1.0, 1.0).acos();
+    let angle = cosine.clamp(-1.0, 1.0).fixed_acos();
     let twice = [q[2][1] - q[1][2], q[0][2] - q[2][0], q[1][0] - q[0][1]];
     let length = twice.iter().map(|x| x * x).sum::<f64>().sqrt();
     twice.map(|x| x * angle / length.max(f64::MIN_POSITIVE))

@@ -4,6 +4,7 @@ use crate::Sequence;
 use crate::breaches::{Ask, Breaches, DT, Refusal};
 use crate::buffer::Guarded;
 use crate::meeting::{Counter, same};
+use plyflow_fixed::FixedBits;
 use plyflow_sdk::abi::*;
 use std::ffi::c_void;
 
@@ -211,7 +212,7 @@ pub(crate) fn trellis(lanes: usize) -> Vec<f64> {
     for l in 0..lanes {
         let sign = if l % 2 == 0 { 1.0 } else { -1.0 };
         let degrees: f64 = 10.3 + 49.4 * (l / 2) as f64 / pairs as f64;
-        metric[2 * lanes + l] = sign * degrees.to_radians().sin();
+        metric[2 * lanes + l] = sign * degrees.to_radians().fixed_sin();
     }
     metric
 }

@@ -6,6 +6,9 @@
 //! Every check has a [`Rule`] and ends in a [`Check`] with a measured number where there is one. A [`Sink`] hears
 //! of a check before it begins, so that a crash can be told apart from its neighbours.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod bending;
 mod breaches;
 mod buffer;

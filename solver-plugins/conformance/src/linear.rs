@@ -1,5 +1,7 @@
 //! Small dense matrices and vectors.
 
+use plyflow_fixed::FixedBits;
+
 pub(crate) type V = [f64; 3];
 
 pub(crate) fn dot(a: V, b: V) -> f64 {
@@ -18,7 +20,7 @@ pub(crate) fn cross(a: V, b: V) -> V {
 pub(crate) fn rotation(w: V) -> [V; 3] {
     let angle = dot(w, w).sqrt();
     let n = w.map(|c| c / angle.max(f64::MIN_POSITIVE));
-    let (s, c) = angle.sin_cos();
+    let (s, c) = angle.fixed_sin_cos();
     let k = [[0.0, -n[2], n[1]], [n[2], 0.0, -n[0]], [-n[1], n[0], 0.0]];
     std::array::from_fn(|i| {
         std::array::from_fn(|j| {

@@ -8,6 +8,7 @@ use crate::linear::largest_eigenpair;
 use crate::material::{LANES, STRAIN};
 use crate::slope::Energies;
 use crate::{Run, Seen, rules, worse};
+use plyflow_fixed::FixedBits;
 
 /// Random strains: their size and seed.
 const STRAINS: [(f64, u64); 3] = [(0.005, 73), (STRAIN, 79), (0.1, 83)];
@@ -159,7 +160,7 @@ fn cycle(law: &Law) -> Seen {
     for (size, seed) in STRAINS {
         let (a, b) = (metrics(LANES, size, seed), metrics(LANES, size, seed + 100));
         lead(&|t| {
-            let (s, c) = t.sin_cos();
+            let (s, c) = t.fixed_sin_cos();
             (0..one.len())
                 .map(|i| one[i] + s * (a[i] - one[i]) + (1.0 - c) * 0.5 * (b[i] - one[i]))
                 .collect()
@@ -167,7 +168,7 @@ fn cycle(law: &Law) -> Seen {
     }
     // To the one side, to the other, and back.
     let sheared = trellis(LANES);
-    lead(&|t| between(&one, &sheared, t.sin()));
+    lead(&|t| between(&one, &sheared, t.fixed_sin()));
     cycles.seen(RANGE)
 }
 

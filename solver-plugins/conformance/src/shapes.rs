@@ -3,6 +3,7 @@
 
 use crate::Sequence;
 use crate::linear::{V, cross, dot, rotation, turn};
+use plyflow_fixed::FixedBits;
 
 /// Elements side by side, one in each lane.
 #[derive(Clone)]
@@ -34,7 +35,7 @@ impl Elements {
         for l in 0..lanes {
             // Lane 0 is the plain square of 5 mm that is easiest to follow by hand.
             let plain = l == 0;
-            let size = 5e-3 * 10f64.powf(if plain { 0.0 } else { s.between(-0.4, 0.4) });
+            let size = 5e-3 * 10f64.fixed_powf(if plain { 0.0 } else { s.between(-0.4, 0.4) });
             let stretch = if plain { 1.0 } else { s.between(1.0, 6.0) }.sqrt();
             let skew = if plain { 0.0 } else { 0.6 * s.next() };
             let noise = if plain { 0.0 } else { 0.12 };
@@ -47,7 +48,7 @@ impl Elements {
                 *corner = turn(&q, flat.map(|x| x * size));
             }
             let angle = s.between(-3.1, 3.1);
-            let e1 = turn(&q, [angle.cos(), angle.sin(), 0.0]);
+            let e1 = turn(&q, [angle.fixed_cos(), angle.fixed_sin(), 0.0]);
             for k in 0..nodes {
                 for c in 0..3 {
                     new.reference[(3 * k + c) * lanes + l] = corners[k][c];
@@ -170,7 +171,7 @@ impl Patches {
         };
         for l in 0..lanes {
             let around = kinds[l % kinds.len()];
-            let size = 5e-3 * 10f64.powf(s.between(-0.4, 0.4));
+            let size = 5e-3 * 10f64.fixed_powf(s.between(-0.4, 0.4));
             let q = rotation([0.3 * s.next(), 0.3 * s.next(), 0.0]);
             let stretch = s.between(1.0, 2.0).sqrt();
             let centre = [size * s.next(), size * s.next(), 0.0];
@@ -182,8 +183,8 @@ impl Patches {
                         ((k - 1) as f64 + 0.2 * s.next()) * std::f64::consts::TAU / spokes as f64;
                     let corner = nodes == 4 && k % 2 == 0;
                     let r = size * if corner { 1.4 } else { 1.0 } * (1.0 + 0.15 * s.next());
-                    p[0] += stretch * r * angle.cos();
-                    p[1] += r * angle.sin() / stretch;
+                    p[0] += stretch * r * angle.fixed_cos();
+                    p[1] += r * angle.fixed_sin() / stretch;
                 }
                 let p = turn(&q, p);
                 for c in 0..3 {
@@ -191,7 +192,7 @@ impl Patches {
                 }
             }
             let angle = s.between(-3.1, 3.1);
-            let e1 = turn(&q, [angle.cos(), angle.sin(), 0.0]);
+            let e1 = turn(&q, [angle.fixed_cos(), angle.fixed_sin(), 0.0]);
             for c in 0..3 {
                 new.axis[c * lanes + l] = e1[c];
             }

@@ -22,6 +22,7 @@ use crate::reference::Curve;
 use crate::run::{Test, run, with_threads};
 use crate::specimen::{Common, Specimen, element};
 use crate::strip::{CLAMPED, Grid, check_bends, fibre_strain, rows};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::history::{constant_speed_way, linear};
 use plyflow_mechanics::model::{Drive, NodalLoad};
 use plyflow_mechanics::sheet::Pressed;
@@ -221,7 +222,11 @@ impl Test for BiasExtension {
 /// Shear angle (rad) of the pin-jointed net in the central zone; 90 degrees when it is stretched out.
 fn net_angle(length: f64, width: f64, displacement: f64) -> f64 {
     let free = length - width;
-    FRAC_PI_2 - 2.0 * ((free + displacement) / (SQRT_2 * free)).min(1.0).acos()
+    FRAC_PI_2
+        - 2.0
+            * ((free + displacement) / (SQRT_2 * free))
+                .min(1.0)
+                .fixed_acos()
 }
 
 /// Runs the step.
@@ -353,7 +358,7 @@ fn gauge(specimen: &Specimen, point: [f64; 2], radius: f64) -> Vec<u32> {
                 .map(|n| specimen.mesh.points[*n as usize][k])
                 .sum::<f64>()
         };
-        (mean(0) - point[0]).hypot(mean(1) - point[1])
+        (mean(0) - point[0]).fixed_hypot(mean(1) - point[1])
     };
     let cells = 0..specimen.mesh.cells.len() as u32;
     let near: Vec<u32> = cells.clone().filter(|c| distance(c) <= radius).collect();

@@ -9,6 +9,7 @@ use crate::output::{Output, Style};
 use crate::rotated_mesh::{least_jacobian, turned_rectangle};
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::history::{linear, smooth_step};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Drive, Fixed};
@@ -152,7 +153,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         .map(|x| if x[0] > 0.5 * p.length { 1.0 } else { -1.0 })
         .collect();
     let middle = middle(&mesh, p.length, p.width);
-    let axis = [eighth.cos(), -eighth.sin(), 0.0];
+    let axis = [eighth.fixed_cos(), -eighth.fixed_sin(), 0.0];
     let mut specimen = Specimen::new(host, &p.common, mesh, axis, Pressed::No)?;
     for node in 0..specimen.mesh.points.len() as u32 {
         specimen.model.fix(

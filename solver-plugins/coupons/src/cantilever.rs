@@ -14,6 +14,7 @@ use crate::specimen::{Common, Specimen};
 use crate::strip::{
     self, CLAMPED, Grid, axis_of_family, check_family, fibre_strain, largest, rows,
 };
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
@@ -283,7 +284,7 @@ impl Done<'_> {
         let [x, z] = self.shape[self.shape.len() - 1];
         host.result("tip_x", x, "m")?;
         host.result("tip_height", z, "m")?;
-        host.result("secant_angle", (-z).atan2(x), "rad")?;
+        host.result("secant_angle", (-z).fixed_atan2(x), "rad")?;
         if let Some(c) = &self.reference {
             let last = c.x.len() - 1;
             host.result("tip_error", (z - c.y[last]).abs(), "m")?;

@@ -7,6 +7,7 @@ use crate::output::{Output, Style};
 use crate::reference::Curve;
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::Drive;
@@ -191,10 +192,10 @@ fn round(u: f64, v: f64) -> [f64; 2] {
         [0.0, 0.0]
     } else if u.abs() >= v.abs() {
         let angle = quarter * v / u;
-        [u * angle.cos(), u * angle.sin()]
+        [u * angle.fixed_cos(), u * angle.fixed_sin()]
     } else {
         let angle = quarter * u / v;
-        [v * angle.sin(), v * angle.cos()]
+        [v * angle.fixed_sin(), v * angle.fixed_cos()]
     }
 }
 

@@ -10,6 +10,9 @@
 //!
 //! All quantities are SI. Results are the same for any number of threads.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod bias_extension;
 pub mod bias_plane;
 pub mod cantilever;

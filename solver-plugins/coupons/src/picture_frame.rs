@@ -10,6 +10,7 @@ use crate::output::{Output, Style};
 use crate::reference::Curve;
 use crate::run::{Outcome, SAMPLES, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::Drive;
@@ -80,7 +81,7 @@ struct Frame {
 impl Drive for Frame {
     fn position(&self, k: usize, t: f64) -> V {
         let half = 0.5 * self.path.angle(t);
-        let (c, s) = (half.cos(), half.sin());
+        let (c, s) = (half.fixed_cos(), half.fixed_sin());
         let [x, y] = self.corners[k];
         [x * c + y * s, x * s + y * c, 0.0]
     }
@@ -116,7 +117,7 @@ struct PictureFrame {
 impl PictureFrame {
     /// Force of the cross-head (N) from the generalised force dW/dg.
     fn crosshead(&self, generalised: f64, angle: f64) -> f64 {
-        generalised / (self.side * (0.25 * std::f64::consts::PI - 0.5 * angle).sin())
+        generalised / (self.side * (0.25 * std::f64::consts::PI - 0.5 * angle).fixed_sin())
     }
 }
 
@@ -129,7 +130,7 @@ impl Test for PictureFrame {
         // Reactions belong to the positions before the step.
         let (t, dt) = (specimen.model.time - specimen.model.dt, specimen.model.dt);
         let angle = self.path.angle(t);
-        let (c, s) = ((0.5 * angle).cos(), (0.5 * angle).sin());
+        let (c, s) = ((0.5 * angle).fixed_cos(), (0.5 * angle).fixed_sin());
         let mut moment = 0.0;
         for (r, [x, y]) in specimen.model.reactions().iter().zip(&self.corners) {
             moment += 0.5 * (r[0] * (y * c - x * s) + r[1] * (x * c - y * s));
@@ -271,7 +272,7 @@ fn write(
 ) -> Result<(), StepError> {
     let reference = references.first_leg.as_ref();
     let mut out = Output::new(host);
-    let lever = |g: f64| 2.0 * p.side * (0.25 * std::f64::consts::PI - 0.5 * g).cos();
+    let lever = |g: f64| 2.0 * p.side * (0.25 * std::f64::consts::PI - 0.5 * g).fixed_cos();
     let normalised: Vec<f64> = test
         .angle
         .iter()

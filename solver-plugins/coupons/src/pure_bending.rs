@@ -22,6 +22,7 @@ use crate::reference::Curve;
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use crate::strip::{self, CLAMPED, Grid, axis_of_family, check_family, fibre_strain, rows};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, StepError};
@@ -253,7 +254,7 @@ fn check(p: &Parameters) -> Result<(), StepError> {
         return Err(format!("shear_angle: given {given:.1} deg; expected -60 to 60 deg").into());
     }
     // The strip may close to a ring, not more.
-    let most = 6.0 * p.shear_angle.cos() / p.length;
+    let most = 6.0 * p.shear_angle.fixed_cos() / p.length;
     if let Some(k) = p.path.iter().find(|k| k.abs() > most) {
         return Err(format!(
             "path: given {:.4} 1/mm; a strip of {:.1} mm at this shear is closed to a ring at {:.4} 1/mm. \

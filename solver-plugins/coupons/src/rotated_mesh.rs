@@ -5,6 +5,7 @@
 //! triangle three. Grid points are kept where they are at least 0.6 grid spacings away from the edges, so
 //! the edges of the kept cells are Delaunay edges: no other point lies in the circle over such an edge.
 
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mesh::{QuadMesh, area_vector, even_axis};
 use std::collections::BTreeMap;
 
@@ -23,7 +24,7 @@ pub fn turned_rectangle(length: f64, width: f64, size: f64, angle: f64) -> QuadM
     }
     let h = 2.0 * size;
     let mut points = rectangle_edge(length, width, h);
-    let (c, s) = (turn.cos(), turn.sin());
+    let (c, s) = (turn.fixed_cos(), turn.fixed_sin());
     let reach = (length + width) / h;
     let reach = reach.ceil() as i32;
     let mut grid: BTreeMap<(i32, i32), u32> = BTreeMap::new();
@@ -189,7 +190,7 @@ pub fn least_jacobian(mesh: &QuadMesh) -> f64 {
         let p = cell.map(|n| [mesh.points[n as usize][0], mesh.points[n as usize][1]]);
         for k in 0..4 {
             let (a, b, c) = (p[k], p[(k + 1) % 4], p[(k + 3) % 4]);
-            let long = |q: P| (q[0] - a[0]).hypot(q[1] - a[1]);
+            let long = |q: P| (q[0] - a[0]).fixed_hypot(q[1] - a[1]);
             least = least.min(cross(a, b, c) / (long(b) * long(c)));
         }
     }

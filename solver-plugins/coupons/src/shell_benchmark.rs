@@ -7,6 +7,7 @@
 use crate::output::{Output, Style};
 use crate::specimen::{Common, Specimen};
 use plyflow_characterisation::csv::{self, Column};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, NodalLoad};
 use plyflow_mechanics::relax::{Tolerance, relax};
@@ -167,7 +168,7 @@ fn annulus(p: &Parameters, guard: usize) -> Setup {
     let mesh = mapped([n, m], |u, v| {
         let turns = (u * n as f64 - guard as f64) / whole;
         let (r, a) = (10.0 - 4.0 * v, 2.0 * PI * turns);
-        [r * a.cos(), r * a.sin(), 0.0]
+        [r * a.fixed_cos(), r * a.fixed_sin(), 0.0]
     });
     let node = |i: usize, j: usize| (j * (n + 1) + i) as u32;
     Setup {
@@ -190,9 +191,9 @@ fn hemisphere(p: &Parameters) -> Setup {
     let mesh = mapped([n, m], |u, v| {
         let (a, b) = (FRAC_PI_2 * u, top * v);
         [
-            10.0 * b.cos() * a.cos(),
-            10.0 * b.cos() * a.sin(),
-            10.0 * b.sin(),
+            10.0 * b.fixed_cos() * a.fixed_cos(),
+            10.0 * b.fixed_cos() * a.fixed_sin(),
+            10.0 * b.fixed_sin(),
         ]
     });
     let node = |i: usize, j: usize| (j * (n + 1) + i) as u32;
@@ -225,7 +226,7 @@ fn semi_cylinder(p: &Parameters) -> Setup {
     // Half of it: from the edge (angle 0, x = radius) up to the crown (x = 0); y from the free to the fixed end.
     let mesh = mapped([n, m], |u, v| {
         let a = FRAC_PI_2 * v;
-        [radius * a.cos(), length * u, radius * a.sin()]
+        [radius * a.fixed_cos(), length * u, radius * a.fixed_sin()]
     });
     let node = |i: usize, j: usize| (j * (n + 1) + i) as u32;
     let mut fixed = Vec::new();

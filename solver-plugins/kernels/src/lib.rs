@@ -6,6 +6,9 @@
 //! together with others, the exported symbol of a plugin may not. A stranger's plugin needs none
 //! of this; the contract is `plyflow.h` alone.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod fabric;
 mod functions;
 pub mod isotropic;

@@ -12,6 +12,7 @@
 //! bending, and no resistance to compression besides incompressibility's.
 
 use crate::{Lanes, WIDTH, dispatch, exp};
+use plyflow_fixed::FixedBits;
 use plyflow_sdk::{Material, MaterialSizes, MembraneBatch};
 use serde::Deserialize;
 
@@ -76,7 +77,7 @@ pub struct Marlow {
 impl Exponential {
     fn new(amplitude: f64, growth: f64, decay: f64, limit: f64) -> Result<Self, String> {
         let fine = amplitude > 0.0 && growth >= 0.0 && decay > 0.0 && limit > 0.0;
-        let (up, down) = ((growth * limit).exp(), (-decay * limit).exp());
+        let (up, down) = ((growth * limit).fixed_exp(), (-decay * limit).fixed_exp());
         if !(fine && up.is_finite()) {
             return Err(format!(
                 "uniaxial: given amplitude {amplitude} Pa, growth {growth}, decay {decay}, limit \

@@ -11,6 +11,7 @@
 //! turns with the element), and the normal `n = g1 x g2 / |g1 x g2|`.
 
 use crate::{Lanes, WIDTH, dispatch};
+use plyflow_fixed::FixedBits;
 use plyflow_sdk::abi::PF_OK;
 use plyflow_sdk::{Aligned, ElementBatch, MaterialRef, MembraneBatch};
 
@@ -452,7 +453,7 @@ pub(crate) fn fields_of(n: usize, metric: &[f64], stress: &[f64], fields: &mut [
     for l in 0..n {
         let (c11, c22, c12) = (metric[l], metric[n + l], metric[2 * n + l]);
         let product = (c11 * c22).sqrt().max(f64::MIN_POSITIVE);
-        fields[l] = (c12 / product).clamp(-1.0, 1.0).asin();
+        fields[l] = (c12 / product).clamp(-1.0, 1.0).fixed_asin();
         fields[n + l] = c11.sqrt() - 1.0;
         fields[2 * n + l] = c22.sqrt() - 1.0;
         fields[3 * n + l] = largest(c11, c22, c12).max(0.0).sqrt();

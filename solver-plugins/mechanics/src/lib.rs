@@ -17,6 +17,9 @@
 //! All quantities are SI. Results are identical for any number of threads: parallel passes write to their
 //! own slots, and every sum runs in a fixed order.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod archive;
 pub mod component;
 pub mod contact;
@@ -62,6 +65,28 @@ pub enum MechanicsError {
         cause: String,
         /// What to change.
         remedy: String,
+    },
+    /// An element is in a state for which it was not made, in which it may rest without force.
+    #[error(
+        "element {cell} of sheet '{sheet}', at ({:.1}, {:.1}, {:.1}) mm, is no element any more at t = {time:.6} s (cycle {cycle}): {what}. \
+         What it carries there means nothing, so the run stops. Likely cause: the sheet bends or is compressed more sharply than its \
+         elements can show, or it is pushed through something. What to try: a smaller element_size there, a larger hourglass_floor, \
+         a slower process",
+        1e3 * place[0], 1e3 * place[1], 1e3 * place[2]
+    )]
+    Distorted {
+        /// Simulated time (s).
+        time: f64,
+        /// Cycle.
+        cycle: u64,
+        /// Name of the sheet.
+        sheet: String,
+        /// Its cell.
+        cell: usize,
+        /// Middle of the cell (m).
+        place: vec3::V,
+        /// What has become of it.
+        what: String,
     },
 }
 

@@ -3,6 +3,7 @@
 
 mod common;
 
+use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
@@ -140,4 +141,35 @@ fn elastica_is_followed_by_the_shell_with_rotations_of_20_and_40_elements() {
 fn elastica_is_followed_by_the_rotation_free_shell_of_10_and_20_elements() {
     follows_the_elastica(common::rotation_free, 10, 10.0);
     follows_the_elastica(common::rotation_free, 20, 10.0);
+}
+
+#[test]
+fn strip_too_coarse_for_its_arc_stops_and_says_where() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let ended = pool.unwrap().install(|| {
+        // Four elements over a hairpin: each would have to bend by a right angle.
+        let (mut model, _) = strip(common::stiff_shell(), 4);
+        loop {
+            let t = model.time;
+            model.body_acceleration = [0.0, 0.0, 0.5 * (1.0 - smooth_step(t, 0.05, 0.1))];
+            if let Err(e) = model.step(false) {
+                return Some(e);
+            }
+            if model.time > 3.0 * (RAMP + HOLD) {
+                return None;
+            }
+        }
+    });
+    match ended.expect("it stops") {
+        MechanicsError::Distorted {
+            sheet, place, time, ..
+        } => {
+            assert_eq!(sheet, "strip");
+            assert!(
+                (0.0..LENGTH).contains(&place[0]) && time > RAMP,
+                "{place:?} at {time}"
+            );
+        }
+        e => panic!("{e}"),
+    }
 }

@@ -1,7 +1,7 @@
 //! Measures the built program from outside and appends one JSON row per case to a file under
 //! `docs/benchmarks`, named after the machine's processor.
 //!
-//! `plyflow-benches [engine] [kernels] [solver] [profile] [limits] [study]`: these groups, or all.
+//! `plyflow-benches [engine] [kernels] [solver] [profile] [limits] [study] [busy]`: these groups, or all.
 
 mod cases;
 mod limits;
@@ -15,13 +15,14 @@ type Group = (&'static str, fn() -> Vec<cases::Row>);
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let groups: [Group; 6] = [
+    let groups: [Group; 7] = [
         ("engine", cases::engine),
         ("kernels", cases::kernels),
         ("solver", solver::solver),
         ("profile", solver::profile),
         ("limits", limits::limits),
         ("study", cases::study),
+        ("busy", solver::busy),
     ];
     if let Some(odd) = wanted
         .iter()

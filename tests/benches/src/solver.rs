@@ -5,6 +5,9 @@ use plyflow_e2e::{program, repository};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 
 /// Where the time of a step goes: what the result is called and what it is.
 const PARTS: [(&str, &str); 4] = [
@@ -214,6 +217,65 @@ pub fn profile() -> Vec<Row> {
     rows.extend(one.profile("m4, joggle spar 8 mm, 1 thread"));
     rows.extend(at_rest(&place("flat-tool")));
     rows
+}
+
+/// Two threads on two cores where others want them too, on a machine that is quiet but for these: the rate over that without others,
+/// and that over the fair share of two threads among them.
+pub fn busy() -> Vec<Row> {
+    let folder = copy(0.2);
+    let place = folder.path().join("workflows/flat-tool");
+    let rate = |others: usize| {
+        let _others = Others::start(others);
+        let one = run(&place, &membranes("scene.yaml"), 2);
+        one.steps / one.wall
+    };
+    let alone = rate(0).max(rate(0));
+    let cores = std::thread::available_parallelism().map_or(0, |n| n.get());
+    let case = |k: usize| format!("m4, flat tool 8 mm, 2 threads, {k} others on {cores} cores");
+    let mut rows = vec![Row::new(case(0), alone, "steps/s")];
+    for k in [1, 2, 4, 7] {
+        let kept = rate(k) / alone;
+        let fair = 2.0 / (k + 2) as f64;
+        rows.push(Row::new(
+            format!("{}, rate over that alone", case(k)),
+            kept,
+            "1",
+        ));
+        rows.push(Row::new(
+            format!("{}, over the fair share (bound 0.77)", case(k)),
+            kept / fair,
+            "1",
+        ));
+    }
+    rows
+}
+
+/// Threads that compute without end until this is dropped.
+struct Others(Arc<AtomicBool>, Vec<JoinHandle<()>>);
+
+impl Others {
+    fn start(count: usize) -> Self {
+        let ended = Arc::new(AtomicBool::new(false));
+        let busy = |_| {
+            let ended = ended.clone();
+            std::thread::spawn(move || {
+                while !ended.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            })
+        };
+        let threads = (0..count).map(busy).collect();
+        Self(ended, threads)
+    }
+}
+
+impl Drop for Others {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+        for thread in self.1.drain(..) {
+            thread.join().expect("it only spins");
+        }
+    }
 }
 
 /// The demo's membranes over a scene.

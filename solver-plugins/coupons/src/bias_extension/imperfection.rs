@@ -1,5 +1,6 @@
 //! The random out-of-plane shape of a specimen.
 
+use plyflow_fixed::FixedBits;
 use std::f64::consts::{PI, TAU};
 
 /// Half waves along the length, at most: about the width of a wrinkle on a specimen twice as long as wide.
@@ -60,9 +61,9 @@ impl Shape {
         }
         let mut sum = 0.0;
         for m in 0..ALONG {
-            let along = (PI * (m + 1) as f64 * x / self.length).sin();
+            let along = (PI * (m + 1) as f64 * x / self.length).fixed_sin();
             for n in 0..=ACROSS {
-                let across = (0.5 * TAU * n as f64 * (y / self.width + 0.5)).cos();
+                let across = (0.5 * TAU * n as f64 * (y / self.width + 0.5)).fixed_cos();
                 sum += self.amplitudes[m * (ACROSS + 1) + n] * along * across;
             }
         }

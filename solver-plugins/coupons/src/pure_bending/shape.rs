@@ -1,5 +1,6 @@
 //! The folded strip.
 
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::vec3::V;
@@ -17,15 +18,15 @@ impl Shape {
     /// `[x, z, turn]` of column i: place (m) and turn about -y (rad) at the shear (rad) and curvature (1/m).
     pub fn column(&self, i: usize, shear: f64, curvature: f64) -> [f64; 3] {
         let j = i as f64 - self.half as f64;
-        let delta = curvature * self.h / shear.cos();
-        let chord = self.h * shear.cos();
+        let delta = curvature * self.h / shear.fixed_cos();
+        let chord = self.h * shear.fixed_cos();
         let (x, z) = if delta.abs() < 1e-9 {
             (j, 0.5 * j * j * delta)
         } else {
-            let twice = 2.0 * (0.5 * delta).sin();
+            let twice = 2.0 * (0.5 * delta).fixed_sin();
             // 1 - cos a as 2 sin^2(a / 2): no cancellation.
-            let s = (0.5 * j * delta).sin();
-            ((j * delta).sin() / twice, 2.0 * s * s / twice)
+            let s = (0.5 * j * delta).fixed_sin();
+            ((j * delta).fixed_sin() / twice, 2.0 * s * s / twice)
         };
         [chord * x, chord * z, j * delta]
     }
@@ -74,7 +75,7 @@ impl Drive for Roll {
         let (shear, curvature) = self.history.at(t);
         let [x, z, _] = self.shape.column(i, shear, curvature);
         let along = self.shape.h * (i as f64 - self.shape.half as f64);
-        [x, y + along * shear.sin(), z]
+        [x, y + along * shear.fixed_sin(), z]
     }
 
     fn spin(&self, k: usize, t: f64) -> Option<V> {

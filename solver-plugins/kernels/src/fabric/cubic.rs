@@ -9,6 +9,7 @@
 //! point where the last interval is the longer one (points closer together where the curve bends).
 
 use crate::{Lanes, WIDTH};
+use plyflow_fixed::FixedBits;
 
 /// Most points of a table.
 pub(super) const MAX_POINTS: usize = 64;
@@ -70,7 +71,7 @@ fn slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
     let (d0, d1) = (chord[n - 2], chord[n - 3]);
     m[n - 1] = if d0 * d1 > 0.0 && d0.abs() < d1.abs() {
         // From the middle of the last interval to its end, of the way between the middles of the last two.
-        d0 * (d0 / d1).powf(h[n - 2] / (h[n - 2] + h[n - 3]))
+        d0 * (d0 / d1).fixed_powf(h[n - 2] / (h[n - 2] + h[n - 3]))
     } else {
         end(h[n - 2], h[n - 3], d0, d1)
     };

@@ -8,6 +8,7 @@
 
 use super::yarn::Angle;
 use crate::Lanes;
+use plyflow_fixed::FixedBits;
 
 /// Most points of the curve.
 pub(super) const MAX_POINTS: usize = 8;
@@ -50,7 +51,7 @@ impl Stitch {
             let (angle, slope) = (angles[i], after - before);
             hinges[i] = Hinge {
                 angle,
-                cosine: angle.cos(),
+                cosine: angle.fixed_cos(),
                 slope,
             };
             before = after;
@@ -58,9 +59,9 @@ impl Stitch {
         Self {
             sign,
             onset: angles[0],
-            onset_cosine: angles[0].cos(),
+            onset_cosine: angles[0].fixed_cos(),
             peak: angles[1],
-            peak_sine: angles[1].sin(),
+            peak_sine: angles[1].fixed_sin(),
             rise: forces[1] / (angles[1] - angles[0]),
             hinges,
             count: n,

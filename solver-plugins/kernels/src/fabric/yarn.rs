@@ -3,6 +3,7 @@
 
 use super::cubic::Cubic;
 use crate::{Lanes, polynomial};
+use plyflow_fixed::FixedBits;
 
 /// Most polynomial coefficients.
 pub(super) const MAX_COEFFICIENTS: usize = 10;
@@ -95,11 +96,11 @@ impl Polynomial {
             potential_sine: p,
             potential_cosine: q,
             limit,
-            limit_sine: limit.sin(),
+            limit_sine: limit.fixed_sin(),
             limit_slope: 0.0,
         };
         let (f, s) = law.scalar(limit);
-        law.limit_slope = s.max(f / limit) / limit.cos();
+        law.limit_slope = s.max(f / limit) / limit.fixed_cos();
         law
     }
 
@@ -149,11 +150,13 @@ pub(super) struct Table {
 impl Table {
     /// From angles (rad, increasing from 0, below pi/2) and forces (N/m, the first 0).
     pub(super) fn new(angles: &[f64], forces: &[f64]) -> Self {
-        let sines: Vec<f64> = angles.iter().map(|g| g.sin()).collect();
+        let sines: Vec<f64> = angles.iter().map(|g| g.fixed_sin()).collect();
         let curve = Cubic::new(&sines, forces);
         let limit = angles[angles.len() - 1];
         // As beyond the limit of a polynomial.
-        let limit_slope = curve.end_slope.max(curve.end_value / (limit * limit.cos()));
+        let limit_slope = curve
+            .end_slope
+            .max(curve.end_value / (limit * limit.fixed_cos()));
         Self {
             curve,
             limit,

@@ -198,7 +198,7 @@ pub(super) fn plate(constants: &[f64], n: usize, l: usize) -> f64 {
     Lane::new(constants, n, l).plate(0.0)
 }
 
-/// A bound of 2 / omega_max with the masses and inertias that `initialise` wrote.
+/// A bound of 2 / omega_max with the masses and inertias that `initialise` wrote; 0 of an element that is inside out.
 pub(super) fn critical_step(
     s4: &S4,
     position: &[f64],
@@ -252,7 +252,12 @@ pub(super) fn critical_step(
             lane.widest * moment * mode.length.sqrt() + 2.0 * pull + changing * s11.max(s22).sqrt();
         let reaction = reaction + 2.0 * changing * c[0].max(c[1]).sqrt();
         let lambda = kinds.largest() + rest / mass + coupling / mixed + reaction / inertia;
-        step[l] = 2.0 / lambda.sqrt();
+        let is_inside_out = state.is_inside_out();
+        step[l] = if is_inside_out {
+            0.0
+        } else {
+            2.0 / lambda.sqrt()
+        };
     }
 }
 
@@ -365,6 +370,14 @@ impl State {
     fn moment(&self) -> f64 {
         let [a, b, c] = self.moments;
         largest(a, b, c).max(largest(-a, -b, c))
+    }
+
+    /// Whether a director lies a right angle or more from the normal. The sides' transverse shear, a sine, has fallen since 90 degrees, and
+    /// rests at 180: the sheet looks at itself from behind, and no step brings it back.
+    fn is_inside_out(&self) -> bool {
+        let [g1, g2] = self.g;
+        let normal = cross(g1, g2);
+        self.d.iter().any(|d| dot(*d, normal) <= 0.0)
     }
 
     /// Sine of the largest angle between a director and the normal.

@@ -203,7 +203,11 @@ impl SelfContact {
             }
             (sum, touched)
         };
-        let chunks = self.items.par_chunks_mut(256).map(follow_all);
+        let chunks = self
+            .items
+            .par_chunks_mut(256)
+            .map(follow_all)
+            .with_min_len(crate::team::least());
         chunks.collect_into_vec(&mut self.sums);
         if let Some(f) = onto {
             self.scatter(s.cells, f);

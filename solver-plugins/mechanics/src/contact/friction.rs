@@ -1,6 +1,7 @@
 //! Coefficients of friction: constant, or by pressure and by the angle between sliding and fibres.
 
 use crate::vec3::{V, add, cross, dot, norm, scale, sub, unit};
+use plyflow_fixed::FixedBits;
 use std::sync::Arc;
 
 /// No law gives more, whatever the pressure: the largest coefficient that a scene may state.
@@ -49,7 +50,7 @@ impl PressureDependence {
                 reference,
                 exponent,
             } => {
-                let of = coefficient * (pressure / reference).powf(*exponent);
+                let of = coefficient * (pressure / reference).fixed_powf(*exponent);
                 of.min(LARGEST_COEFFICIENT)
             }
             Self::Table(rows) => interpolate(rows, pressure),
@@ -281,7 +282,7 @@ impl Coulomb for VaryingFriction {
             let flat = sub(fibre, scale(s.normal, dot(fibre, s.normal)));
             let way = sub(s.held, scale(s.vt, s.spring));
             // A fibre has no sense: 0 to pi / 2.
-            let between = norm(cross(flat, way)).atan2(dot(flat, way).abs());
+            let between = norm(cross(flat, way)).fixed_atan2(dot(flat, way).abs());
             coefficient *= interpolate(&angle.factors, between);
         }
         coefficient.min(LARGEST_COEFFICIENT) * s.force

@@ -9,6 +9,7 @@ use super::folds::is_far;
 use super::search::{Surface, closest};
 use crate::mesh::area_vector;
 use crate::vec3::{V, add, dot, norm, scale, sub, unit};
+use plyflow_fixed::FixedBits;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
@@ -186,7 +187,7 @@ impl Blocks {
     /// Whether two blocks are one piece of surface too open to meet itself.
     fn is_open(&self, i: u32, j: u32, a: &Extent, b: &Extent) -> bool {
         let joined = self.blocks[i as usize].joined.binary_search(&j).is_ok();
-        let between = dot(a.axis, b.axis).clamp(-1.0, 1.0).acos();
+        let between = dot(a.axis, b.axis).clamp(-1.0, 1.0).fixed_acos();
         joined && between + a.spread + b.spread < FRAC_PI_2
     }
 }
@@ -209,7 +210,7 @@ impl Block {
             low,
             high,
             axis,
-            spread: least.clamp(-1.0, 1.0).acos(),
+            spread: least.clamp(-1.0, 1.0).fixed_acos(),
         }
     }
 }

@@ -283,7 +283,8 @@ impl RigidContact {
         let spans = items
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
             .zip_eq(self.spans.par_iter_mut())
-            .with_max_len(TOGETHER);
+            .with_max_len(TOGETHER)
+            .with_min_len(crate::team::least());
         if costly {
             let spans = spans.zip_eq(self.planes.par_chunks_mut(SPAN));
             let look = |(((items, wakes), span), planes): (_, &mut [_])| {

@@ -1,6 +1,7 @@
 //! Forces on the nodes, and where they take them.
 
 use super::*;
+use crate::team;
 
 /// What moves or turns the nodes of a model in a step.
 #[derive(Clone, Copy)]
@@ -78,6 +79,7 @@ impl Model {
             .zip_eq(self.contact_force.par_chunks_mut(NODE_CHUNK))
             .enumerate()
             .with_max_len(TOGETHER)
+            .with_min_len(team::least())
             .map(|(chunk, ((((x, v), force), external), contact))| {
                 let nodes = chunk * NODE_CHUNK..chunk * NODE_CHUNK + x.len();
                 force.fill([0.0; 3]);

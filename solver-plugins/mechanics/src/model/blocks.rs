@@ -227,6 +227,7 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .zip_eq(others)
         .with_max_len(TOGETHER)
+        .with_min_len(crate::team::least())
         .for_each(|((block, force), ((moment, pressure), area))| {
             let part = Part {
                 force,
@@ -294,6 +295,7 @@ pub(super) fn run_patch_blocks(
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .with_max_len(TOGETHER)
+        .with_min_len(crate::team::least())
         .for_each(|(block, force)| {
             PATCH_WORK.with_borrow_mut(|work| run_patch_block(block, force, present, work));
         });

@@ -79,6 +79,7 @@ impl Model {
             step_energies: Vec::new(),
             work: NodeWork::default(),
             scratch: Scratch::default(),
+            sharing: Sharing::default(),
             x: points,
         };
         for spec in specs {

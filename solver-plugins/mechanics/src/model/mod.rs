@@ -10,6 +10,7 @@ mod hold;
 mod mirror;
 mod query;
 mod rotation;
+mod shape;
 mod spent;
 mod stiffness;
 mod support;
@@ -22,6 +23,7 @@ use hold::Anchors;
 pub use hold::Hold;
 use mirror::Mirroring;
 use rotation::Rotations;
+pub use shape::ASK_INTERVAL;
 pub use spent::{Clock, Spent};
 pub use support::{Fixed, NodalLoad};
 use support::{Loads, Supports};
@@ -31,6 +33,7 @@ use crate::contact::*;
 use crate::energy::Ledger;
 use crate::mesh::{QuadMesh, area_vector};
 use crate::sheet::*;
+use crate::team::{self, Sharing};
 use crate::vec3::{V, add, dot, norm, scale, sub};
 use crate::{LANES, MechanicsError};
 use plyflow_abi::*;
@@ -167,6 +170,7 @@ pub struct Model {
     step_energies: Vec<ContactEnergy>,
     work: NodeWork,
     scratch: Scratch,
+    sharing: Sharing,
 }
 
 /// Kept from step to step only for their room: a step allocates nothing.
@@ -278,7 +282,7 @@ impl Model {
             run_patch_blocks(&mut self.patches, &mut self.patch_sums, present);
         };
         // The first to come takes the first half of the blocks, whose nodes it also moves: they are in its cache.
-        rayon::join(elements, scatter);
+        team::join(elements, scatter);
         self.mirroring.hand_over(&mut self.patch_sums.force);
         let failed = self.blocks.iter().map(|b| b.failed);
         let failed = failed.chain(self.patches.iter().map(|b| b.failed));
@@ -295,6 +299,7 @@ impl Model {
         self.normals
             .par_chunks_mut(NODE_CHUNK)
             .enumerate()
+            .with_min_len(team::least())
             .for_each(|(chunk, normals)| {
                 normals.fill([0.0; 3]);
                 sums.collect(&sums.area, chunk, normals);
@@ -335,7 +340,7 @@ impl Model {
         self.step_energies.resize_with(n, ContactEnergy::default);
         let (of_rigid, others) = self.step_energies.split_at_mut(n_rigid);
         let (of_sheets, of_folds) = others.split_at_mut(n_sheets);
-        let alone = rayon::current_num_threads() == 1;
+        let alone = team::is_alone();
         if alone {
             let f = &mut self.contact_force[..];
             for (c, energy) in self.rigid_contacts.iter_mut().zip(of_rigid) {
@@ -398,8 +403,17 @@ impl Model {
     /// [`Model::cell_field`] and [`Model::patch_field`].
     ///
     /// # Errors
-    /// When a component fails or a velocity is not finite.
+    /// When a component fails, a velocity is not finite, or an element is none any more ([`MechanicsError::Distorted`]), which is looked at
+    /// with `fields` and every some steps.
     pub fn step(&mut self, fields: bool) -> Result<(), MechanicsError> {
+        let mut sharing = std::mem::take(&mut self.sharing);
+        let done = sharing.during(|| self.step_of_team(fields));
+        self.sharing = sharing;
+        done
+    }
+
+    /// The step, by as many threads as [`team::is_alone`] says.
+    fn step_of_team(&mut self, fields: bool) -> Result<(), MechanicsError> {
         let clock = Clock::of_step(self.cycle);
         if self.cycle.is_multiple_of(NORMAL_INTERVAL) {
             // Contacts want the normals, and these what the elements sum.
@@ -430,6 +444,12 @@ impl Model {
         let limit = self.speed_limit();
         if self.work.bad.is_some() || self.max_speed > limit {
             return Err(self.unstable(limit));
+        }
+        if fields || self.cycle.is_multiple_of(shape::LOOK) {
+            self.check_shapes()?;
+        }
+        if self.cycle.is_multiple_of(ASK_INTERVAL) {
+            self.check_steps()?;
         }
         Ok(())
     }

@@ -119,7 +119,7 @@ impl Model {
     /// The step that the elements allow at the present positions (s), with mass scaling and bending.
     ///
     /// # Errors
-    /// When a component fails.
+    /// When a component fails, or an element of a model that has made steps gives none.
     pub fn critical_step(&self) -> Result<f64, MechanicsError> {
         let (sheets, x) = (&self.sheets, &self.x);
         let steps: Vec<f64> = self
@@ -129,6 +129,9 @@ impl Model {
             .map(|batch| batch_critical_step(&sheets[batch.sheet as usize], batch, x))
             .collect();
         let membrane = steps.into_iter().fold(f64::INFINITY, f64::min);
+        if membrane <= 0.0 && self.cycle > 0 {
+            self.check_steps()?;
+        }
         let rows: Vec<Vec<(u32, f64)>> = self
             .patches
             .par_iter()

@@ -8,6 +8,7 @@ use super::advance::{Turns, free_of, free_or_all};
 use super::*;
 use crate::mirror::Planes;
 use crate::vec3::cross;
+use plyflow_fixed::FixedBits;
 
 /// Rotational state; per-node arrays in the model's numbering.
 pub(super) struct Rotations {
@@ -137,6 +138,7 @@ impl Model {
         r.spin
             .par_chunks_mut(NODE_CHUNK)
             .enumerate()
+            .with_min_len(crate::team::least())
             .map(|(chunk, spin)| {
                 let nodes = chunk * NODE_CHUNK..chunk * NODE_CHUNK + spin.len();
                 let mut moment = [[0.0; 3]; NODE_CHUNK];
@@ -201,7 +203,7 @@ fn turn_between(from: V, to: V) -> V {
     if sine == 0.0 {
         return [0.0; 3];
     }
-    scale(axis, sine.atan2(dot(from, to)) / sine)
+    scale(axis, sine.fixed_atan2(dot(from, to)) / sine)
 }
 
 /// What turns a driven node whose drive leaves its rotation free.
