@@ -74,17 +74,20 @@ fn items(manifest: &str, path: &[&str]) -> plyflow_model::manifest::Items {
 
 #[test]
 fn a_table_that_the_manifest_takes_is_not_too_long_for_the_material() {
+    // Whatever else is wrong with so short a curve.
+    let not_by_number =
+        |refused: Option<String>| refused.is_none_or(|e| !e.contains("points; expected"));
     let column = |n: usize, step: f64| -> Vec<f64> { (0..n).map(|i| step * i as f64).collect() };
     let marlow = |n| {
-        let table = serde_json::json!({"uniaxial": {"strains": column(n, 0.01), "stresses": column(n, 1e5)}});
-        Marlow::create(&table.to_string()).is_ok()
+        let table = serde_json::json!({"thickness": 5e-5, "areal_mass": 0.05, "uniaxial": {"strains": column(n, 0.01), "stresses": column(n, 1e5)}});
+        not_by_number(Marlow::create(&table.to_string()).err())
     };
     let shear = |n| {
         let table = serde_json::json!({
             "fibre_modulus": 1e9, "thickness": 1e-3, "areal_mass": 0.1,
             "shear": {"table": {"angles": column(n, 0.01), "forces": column(n, 1.0)}},
         });
-        Fabric::create(&table.to_string()).is_ok()
+        not_by_number(Fabric::create(&table.to_string()).err())
     };
     let bending = |n| {
         let table = serde_json::json!({
@@ -92,7 +95,7 @@ fn a_table_that_the_manifest_takes_is_not_too_long_for_the_material() {
             "shear": {"coefficients": [0.0, 100.0]},
             "bending": {"positive": {"table": {"curvatures": column(n, 1.0), "moments": column(n, 1e-4)}}},
         });
-        Fabric::create(&table.to_string()).is_ok()
+        not_by_number(Fabric::create(&table.to_string()).err())
     };
     let all: [(&str, &[&[&str]], &dyn Fn(usize) -> bool); 3] = [
         (
@@ -117,7 +120,7 @@ fn a_table_that_the_manifest_takes_is_not_too_long_for_the_material() {
     for (manifest, paths, takes) in all {
         for path in paths {
             let items = items(manifest, path);
-            for n in [1, 2, 31, 32, 33, 41, 63, 64, 65] {
+            for n in [2, 31, 32, 33, 41, 63, 64, 65] {
                 assert_eq!(
                     items.broken_by_count(n).is_none(),
                     takes(n),
