@@ -97,7 +97,8 @@ fn a_table_that_the_manifest_takes_is_not_too_long_for_the_material() {
         });
         not_by_number(Fabric::create(&table.to_string()).err())
     };
-    let all: [(&str, &[&[&str]], &dyn Fn(usize) -> bool); 3] = [
+    type Limit<'a> = (&'a str, &'a [&'a [&'a str]], &'a dyn Fn(usize) -> bool);
+    let all: [Limit<'_>; 3] = [
         (
             Marlow::MANIFEST,
             &[&["uniaxial", "strains"], &["uniaxial", "stresses"]],
