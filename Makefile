@@ -32,6 +32,7 @@ test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 test-long: ## run the tests that take many minutes
 	@scripts/setup
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -p plyflow-forming-explicit -- --ignored --nocapture
+	$(CARGO) test $(CARGO_FLAGS) -p plyflow-characterisation --all-features --test calibration -- --ignored --nocapture
 
 templates: build ## build, check and run the element templates outside of the repository
 	scripts/check-templates

@@ -149,6 +149,9 @@ fn parameter(name: &str, d: &Value, depth: usize, out: &mut String) {
         ("minimum", "at least "),
         ("exclusive_minimum", "more than "),
         ("maximum", "at most "),
+        ("minimum_items", "items at least "),
+        ("maximum_items", "items at most "),
+        ("order", "order "),
     ] {
         if let Some(text) = word(key) {
             facts.push(format!("{label}{text}"));

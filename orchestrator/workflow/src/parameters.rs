@@ -11,7 +11,7 @@ use camino::{Utf8Component, Utf8Path, Utf8PathBuf};
 use indexmap::IndexMap;
 use plyflow_files::open::{self, FileError};
 use plyflow_files::text::shown;
-use plyflow_model::manifest::{Bounds, Declaration, PluginKind, Shape};
+use plyflow_model::manifest::{Bounds, Declaration, Items, PluginKind, Shape, Unfit};
 use serde_json::{Map, Value, json};
 use std::rc::Rc;
 
@@ -162,7 +162,7 @@ impl<'a> Resolver<'a> {
                 let v = quantity(node, *dimension, what, key, at.source, self.problems)?;
                 self.bounded(v, bounds, node, at)
             }
-            Shape::List(of) => self.list(node, of, at),
+            Shape::List(of, items) => self.list(node, of, items, at),
             Shape::Map(of) => self.map(node, of, at),
             Shape::Object(fields) => match node.kind {
                 Kind::Map(_) => {
@@ -212,7 +212,13 @@ impl<'a> Resolver<'a> {
         Some(json!(v))
     }
 
-    fn list(&mut self, node: &Node, of: &Declaration, at: &Place<'_>) -> Option<Value> {
+    fn list(
+        &mut self,
+        node: &Node,
+        of: &Declaration,
+        must: &Items,
+        at: &Place<'_>,
+    ) -> Option<Value> {
         let Kind::List(items) = &node.kind else {
             let expected = format!("a list, each item {}", of.shape.expected());
             return self.wrong(node, at, &expected);
@@ -226,10 +232,32 @@ impl<'a> Resolver<'a> {
                 self.value(item, of, &place)
             })
             .collect();
-        resolved
-            .into_iter()
-            .collect::<Option<Vec<Value>>>()
-            .map(Value::Array)
+        let resolved = resolved.into_iter().collect::<Option<Vec<Value>>>()?;
+        if let Some(expected) = must.broken_by_count(resolved.len()) {
+            let given = match resolved.len() {
+                1 => "1 item".to_owned(),
+                n => format!("{n} items"),
+            };
+            let message = format!("`{}` has {given}", at.what);
+            let d = self.problems.add(at.source, &node.span, message);
+            d.given(given).expected(expected);
+            return None;
+        }
+        let numbers: Option<Vec<f64>> = resolved.iter().map(Value::as_f64).collect();
+        let unfit = numbers.and_then(|n| must.broken_by_order(&n));
+        if let Some(Unfit {
+            item: Some(i),
+            expected,
+        }) = unfit
+        {
+            let [before, item] = [&items[i - 1], &items[i]];
+            let message = format!("`{}[{i}]` does not follow the item before it", at.what);
+            let d = self.problems.add(at.source, &item.span, message);
+            d.given(format!("{} after {}", item.describe(), before.describe()))
+                .expected(expected);
+            return None;
+        }
+        Some(Value::Array(resolved))
     }
 
     fn map(&mut self, node: &Node, of: &Declaration, at: &Place<'_>) -> Option<Value> {

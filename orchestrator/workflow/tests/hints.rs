@@ -58,6 +58,36 @@ fn a_scene_or_a_material_in_the_place_of_a_workflow_is_one_error() {
 }
 
 #[test]
+fn a_list_that_the_plugin_would_refuse_when_it_runs_is_refused_before() {
+    let told = |list: &str| {
+        let study = Study::sound();
+        study.mutate(
+            W,
+            "damping: 0.1",
+            &format!("damping: 0.1\n      curve: {list}"),
+        );
+        study.load().err().map(|found| found.to_string())
+    };
+    assert_eq!(told("[0 deg, 5 deg, 0.2 rad]"), None);
+    for (list, says) in [
+        ("[0 deg]", &["`curve` has 1 item", "2 to 4 items"][..]),
+        (
+            "[0 deg, 1 deg, 2 deg, 3 deg, 4 deg]",
+            &["`curve` has 5 items", "2 to 4 items"],
+        ),
+        // By the angles, not by their numbers.
+        (
+            "[0 deg, 0.2 rad, 5 deg]",
+            &["`curve[2]`", "more than the item before it"],
+        ),
+        ("[0 deg, 1 deg, 1 deg]", &["`curve[2]`"]),
+    ] {
+        let told = told(list).unwrap_or_default();
+        assert!(says.iter().all(|s| told.contains(s)), "{list}: {told}");
+    }
+}
+
+#[test]
 fn what_is_wrong_with_set_is_shown_in_its_own_text() {
     let study = Study::sound();
     for (set, place, says) in [

@@ -195,6 +195,82 @@ impl Bounds {
     }
 }
 
+/// What a list must be besides what its items are.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Items {
+    /// Fewest items.
+    pub minimum: Option<u64>,
+    /// Most items.
+    pub maximum: Option<u64>,
+    /// How numbers follow one another.
+    pub order: Option<Order>,
+}
+
+/// How the numbers of a list follow one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// Each is more than the one before.
+    Increasing,
+    /// None is less than the one before.
+    NotFalling,
+}
+
+/// What of a list is not as its declaration asks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unfit {
+    /// The item, from 0; `None`: their number.
+    pub item: Option<usize>,
+    /// What is expected.
+    pub expected: String,
+}
+
+impl Items {
+    /// What is expected of so many items, when there are too few or too many.
+    pub fn broken_by_count(&self, count: usize) -> Option<String> {
+        let count = count as u64;
+        let within =
+            self.minimum.is_none_or(|m| count >= m) && self.maximum.is_none_or(|m| count <= m);
+        if within {
+            return None;
+        }
+        Some(match (self.minimum, self.maximum) {
+            (Some(a), Some(b)) if a == b => format!("{a} items"),
+            (Some(a), Some(b)) => format!("{a} to {b} items"),
+            (Some(a), None) => format!("at least {a} items"),
+            (None, Some(b)) => format!("at most {b} items"),
+            (None, None) => return None,
+        })
+    }
+
+    /// The first of the numbers (SI) that does not follow the one before it as it must, and what is expected.
+    pub fn broken_by_order(&self, numbers: &[f64]) -> Option<Unfit> {
+        let order = self.order?;
+        let breaks = |w: &[f64]| match order {
+            Order::Increasing => w[1] <= w[0],
+            Order::NotFalling => w[1] < w[0],
+        };
+        let item = numbers.windows(2).position(breaks)? + 1;
+        let words = match order {
+            Order::Increasing => "more than the item before it",
+            Order::NotFalling => "no less than the item before it",
+        };
+        Some(Unfit {
+            item: Some(item),
+            expected: words.into(),
+        })
+    }
+
+    fn check(&self) -> Result<(), String> {
+        match (self.minimum, self.maximum) {
+            (Some(a), Some(b)) if a > b => {
+                Err(format!("no list has at least {a} and at most {b} items"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// A parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "RawDeclaration", into = "RawDeclaration")]
@@ -225,7 +301,7 @@ pub enum Shape {
     /// Text with a unit.
     Quantity(Dimension, Bounds),
     /// A sequence.
-    List(Box<Declaration>),
+    List(Box<Declaration>, Items),
     /// A mapping of free names.
     Map(Box<Declaration>),
     /// A mapping of these names.
@@ -241,6 +317,14 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// Whether its values are single numbers.
+    pub fn is_number(&self) -> bool {
+        matches!(
+            self,
+            Shape::Integer(_) | Shape::Number(_) | Shape::Quantity(..)
+        )
+    }
+
     /// What to write, for messages: "a length such as `5 mm`".
     pub fn expected(&self) -> String {
         match self {
@@ -250,7 +334,7 @@ impl Shape {
             Shape::String => "text".into(),
             Shape::Choice(values) => one_of(values.iter().map(String::as_str)),
             Shape::Quantity(d, _) => format!("{} such as `{}`", d.with_article(), d.example()),
-            Shape::List(of) => format!("a list, each item {}", of.shape.expected()),
+            Shape::List(of, _) => format!("a list, each item {}", of.shape.expected()),
             Shape::Map(of) => format!("a mapping of names, each {}", of.shape.expected()),
             Shape::Object(fields) => {
                 let names: Vec<&str> = fields.keys().map(String::as_str).collect();
@@ -308,6 +392,12 @@ struct RawDeclaration {
     maximum: Option<Value>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     exclusive_minimum: Option<Value>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    minimum_items: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    maximum_items: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    order: Option<Order>,
 }
 
 impl RawDeclaration {
@@ -321,6 +411,9 @@ impl RawDeclaration {
             ("minimum", self.minimum.is_some()),
             ("maximum", self.maximum.is_some()),
             ("exclusive_minimum", self.exclusive_minimum.is_some()),
+            ("minimum_items", self.minimum_items.is_some()),
+            ("maximum_items", self.maximum_items.is_some()),
+            ("order", self.order.is_some()),
         ];
         match present
             .iter()
@@ -389,10 +482,22 @@ impl TryFrom<RawDeclaration> for Declaration {
                 let allowed = &["dimension", "minimum", "maximum", "exclusive_minimum"];
                 (Shape::Quantity(d, raw.bounds(Some(d))?), allowed)
             }
-            "list" => (
-                Shape::List(raw.of.clone().ok_or_else(|| missing("of"))?),
-                &["of"],
-            ),
+            "list" => {
+                let items = Items {
+                    minimum: raw.minimum_items,
+                    maximum: raw.maximum_items,
+                    order: raw.order,
+                };
+                items.check()?;
+                let of = raw.of.clone().ok_or_else(|| missing("of"))?;
+                if items.order.is_some() && !of.shape.is_number() {
+                    return Err("`order` has no meaning for items that are no numbers".into());
+                }
+                (
+                    Shape::List(of, items),
+                    &["of", "minimum_items", "maximum_items", "order"],
+                )
+            }
             "map" => (
                 Shape::Map(raw.of.clone().ok_or_else(|| missing("of"))?),
                 &["of"],
@@ -470,7 +575,10 @@ impl From<Declaration> for RawDeclaration {
                 raw.dimension = Some(dimension);
                 "quantity"
             }
-            Shape::List(of) => {
+            Shape::List(of, items) => {
+                raw.minimum_items = items.minimum;
+                raw.maximum_items = items.maximum;
+                raw.order = items.order;
                 raw.of = Some(of);
                 "list"
             }

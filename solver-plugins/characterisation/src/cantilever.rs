@@ -1,5 +1,6 @@
 //! The standard cantilever test: Peirce's formula (thesis eq. 3.1, BS EN ISO 9073-7).
 
+use crate::material::significant;
 use serde::Deserialize;
 
 /// The angle of the standard (rad): 41.5 degrees.
@@ -7,6 +8,20 @@ pub const STANDARD_ANGLE: f64 = 41.5 * std::f64::consts::PI / 180.0;
 
 /// Overhangs of a strip of fabric (m): what lies outside is a wrong unit.
 pub const PLAUSIBLE_OVERHANG: [f64; 2] = [1e-3, 2.0];
+
+/// Bending stiffnesses per width (N m) of sheets that hang like fabrics.
+pub const PLAUSIBLE_STIFFNESS: [f64; 2] = [1e-6, 1.0];
+
+/// What one should know of a stiffness (N m) that no fabric has.
+pub fn implausible_stiffness(stiffness: f64) -> Option<String> {
+    let [low, high] = PLAUSIBLE_STIFFNESS.map(|b| significant(1e3 * b));
+    (!(PLAUSIBLE_STIFFNESS[0]..=PLAUSIBLE_STIFFNESS[1]).contains(&stiffness)).then(|| {
+        format!(
+            "the bending stiffness at rest is {} N mm; fabrics have {low} to {high} N mm: look at the units of the lengths and at `areal_mass`",
+            significant(1e3 * stiffness)
+        )
+    })
+}
 
 /// How an overhang becomes a stiffness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -33,7 +48,8 @@ pub fn stiffness(formula: Formula, overhang: f64, angle: f64, weight: f64) -> Re
     let degrees = angle.to_degrees();
     if !(1.0..=80.0).contains(&degrees) {
         return Err(format!(
-            "an angle of {degrees:.2} deg is outside of what Peirce's formula is for, 1 to 80 deg"
+            "an angle of {degrees:.2} deg is outside of what Peirce's formula is for, 1 to 80 deg: is its unit that of the number \
+             (41.5 deg are 0.724 rad)?"
         ));
     }
     match formula {

@@ -8,6 +8,7 @@ pub use plyflow_model::units::Dimension;
 
 pub mod bending;
 pub mod cantilever;
+pub mod confidence;
 pub mod csv;
 pub mod linear;
 pub mod material;
@@ -20,6 +21,7 @@ pub mod stitch;
 pub mod synthetic;
 pub mod voce;
 pub mod yarns;
+pub mod zero;
 
 /// Acceleration of free fall (m/s2) that weights are computed with.
 pub const GRAVITY: f64 = plyflow_model::STANDARD_GRAVITY;

@@ -4,18 +4,13 @@
 use crate::csv::Table;
 use crate::stitch::{StitchFit, fit_stitch};
 use crate::voce::rms;
-use crate::yarns::{Refused, Yarns, YarnsFit, fit_yarns};
+use crate::yarns::{Points, Yarns, YarnsFit, fit_yarns, joined};
+use crate::zero::{self, Start, Zero};
+use serde::Deserialize;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 /// Highest degree of a shear polynomial that `material-fabric` takes.
 pub const MAXIMUM_DEGREE: usize = 9;
-/// A force at zero shear of more than this part of the largest is taken for an offset of the load cell: the yarns' polynomial
-/// is 0 there, whatever was measured.
-pub const LARGEST_OFFSET: f64 = 0.1;
-/// Shear angle (rad) up to which a test tells the force at zero shear ..
-const START: f64 = 2.0 * std::f64::consts::PI / 180.0;
-/// .. by at least so many rows.
-const FEWEST_START_ROWS: usize = 5;
 /// What `material-fabric` takes as the end of the fitted range (rad).
 pub const LIMITS: [f64; 2] = [
     5.0 * std::f64::consts::PI / 180.0,
@@ -52,45 +47,80 @@ impl Frame {
     }
 }
 
+/// What is done about a test that does not begin with no force at no displacement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ZeroChoice {
+    /// The zero that the first rows tell is taken off.
+    Find,
+    /// The numbers are taken as they are.
+    Given,
+}
+
 /// One test: shear angle as a magnitude (rad) and normalised force (N/m).
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Test {
-    /// Shear angle, not signed (rad).
-    pub angle: Vec<f64>,
-    /// Normalised force, not signed (N/m).
-    pub force: Vec<f64>,
+    /// Points from the square frame on, none of them with a sign.
+    pub points: Points,
+    /// Where it began, whether that was taken off or not.
+    pub zero: Zero,
+    /// Ends (rad) of the largest piece without a row, from the square frame on.
+    pub gap: [f64; 2],
 }
 
 impl Test {
-    /// Normalises the columns `displacement` and `force` of a table.
+    /// Normalises the columns `displacement` and `force` of a table. `stitched`: the test stretches a stitch, whose onset is no end of slack.
     ///
     /// # Errors
     /// Too few rows, a displacement that goes back or that the frame cannot have, a test that hardly shears.
-    pub fn new(table: &Table, frame: &Frame) -> Result<Self, String> {
+    pub fn new(
+        table: &Table,
+        frame: &Frame,
+        choice: ZeroChoice,
+        stitched: bool,
+    ) -> Result<Self, String> {
         table.at_least(FEWEST_ROWS, "a shear curve")?;
         table.goes_forward(
             "displacement",
             "one file holds one stroke, without the way back",
         )?;
         let (displacement, force) = (table.values("displacement")?, table.values("force")?);
-        let mut test = Self::default();
-        for i in 0..table.rows() {
-            let d = displacement[i];
+        let (mut zero, mut first) = (zero::find(displacement, force, frame.side, stitched), 0);
+        let (mut from, mut none, mut errors) = (0.0, 0.0, [0.0; 2]);
+        if choice == ZeroChoice::Find {
+            (from, none) = (zero.displacement, zero.force);
+            first = displacement.partition_point(|d| *d < from);
+            if from != 0.0 || none != 0.0 {
+                let angle = |d: f64| frame.shear_angle(d).unwrap_or(0.0);
+                errors = [
+                    frame.normalised(zero.force_error, 0.0),
+                    angle(zero.displacement_error),
+                ];
+            }
+        } else if zero.start == Start::Together {
+            (zero.displacement, zero.force) = (0.0, 0.0);
+        }
+        let mut points = Points {
+            zero_error: errors,
+            ..Points::default()
+        };
+        for i in first..table.rows() {
+            let d = displacement[i] - from;
             let angle = frame.shear_angle(d).filter(|_| d >= -0.005 * frame.side);
             let Some(angle) = angle else {
                 return Err(format!(
                     "{}: a displacement of {:.3} mm does not fit a frame with a side of {:.3} mm; it is 0 where the \
                      frame is square, grows as it is pulled and stays below {:.3} mm",
                     table.place(i),
-                    1e3 * d,
+                    1e3 * displacement[i],
                     1e3 * frame.side,
                     1e3 * frame.side * (2.0 - 2f64.sqrt())
                 ));
             };
-            test.angle.push(angle);
-            test.force.push(frame.normalised(force[i], angle));
+            points.angle.push(angle);
+            points.force.push(frame.normalised(force[i] - none, angle));
         }
-        let reached = test.largest_angle();
+        let reached = points.angle.iter().fold(0.0f64, |m, g| m.max(*g));
         if reached < 5f64.to_radians() {
             return Err(format!(
                 "{}: the test reaches a shear angle of {:.2} deg only; is the displacement in the unit of the header, \
@@ -99,87 +129,109 @@ impl Test {
                 reached.to_degrees()
             ));
         }
-        Ok(test)
+        if points.angle.len() < FEWEST_ROWS {
+            return Err(format!(
+                "{}: {} rows lie after the force begins to rise; a shear curve needs at least {FEWEST_ROWS}",
+                table.source,
+                points.angle.len()
+            ));
+        }
+        let ends = std::iter::once(0.0).chain(points.angle.iter().copied());
+        let pieces = ends.zip(points.angle.iter().copied());
+        let gap = pieces.fold([0.0; 2], |widest: [f64; 2], (a, b)| {
+            if b - a > widest[1] - widest[0] {
+                [a, b]
+            } else {
+                widest
+            }
+        });
+        Ok(Self { points, zero, gap })
     }
 
-    /// Force at the square frame over the largest force, both by size: an offset of the load cell, when it is not small.
-    /// It is where a straight line through the first rows meets zero shear, so that a steep start counts for nothing.
-    /// 0 where the test begins beyond all of those rows.
-    pub fn offset(&self) -> f64 {
-        let mut rows: Vec<(f64, f64)> = (self.angle.iter().copied())
-            .zip(self.force.iter().copied())
-            .collect();
-        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let near = rows.partition_point(|r| r.0 <= START);
-        rows.truncate(near.max(FEWEST_START_ROWS));
-        if rows.first().is_none_or(|r| r.0 > START) {
-            return 0.0;
-        }
-        let n = rows.len() as f64;
-        let [mean_angle, mean_force] = [|r: &(f64, f64)| r.0, |r: &(f64, f64)| r.1]
-            .map(|f| rows.iter().map(f).sum::<f64>() / n);
-        let square = rows.iter().map(|r| (r.0 - mean_angle).powi(2)).sum::<f64>();
-        let product = (rows.iter())
-            .map(|r| (r.0 - mean_angle) * (r.1 - mean_force))
-            .sum::<f64>();
-        let slope = if square > 0.0 { product / square } else { 0.0 };
-        let largest = self.force.iter().fold(0.0f64, |m, f| m.max(f.abs()));
-        if largest > 0.0 {
-            (mean_force - slope * mean_angle).abs() / largest
-        } else {
-            0.0
+    fn up_to(&self, angle: f64) -> Points {
+        let p = &self.points;
+        let rows = p.angle.iter().zip(&p.force).filter(|(g, _)| **g <= angle);
+        let (angle, force) = rows.map(|(g, f)| (*g, *f)).unzip();
+        Points {
+            angle,
+            force,
+            zero_error: p.zero_error,
         }
     }
 
-    fn largest_angle(&self) -> f64 {
-        self.angle.iter().fold(0.0f64, |m, g| m.max(*g))
+    /// Force at an angle, straight between the rows (N/m); `None` beyond them.
+    fn force_at(&self, g: f64) -> Option<f64> {
+        let p = &self.points;
+        let i = p.angle.partition_point(|a| *a < g);
+        let (a, b) = (i.checked_sub(1)?, (i < p.angle.len()).then_some(i)?);
+        let part = (g - p.angle[a]) / (p.angle[b] - p.angle[a]).max(f64::MIN_POSITIVE);
+        Some(p.force[a] + part * (p.force[b] - p.force[a]))
     }
+}
 
-    fn up_to(&self, angle: f64) -> (Vec<f64>, Vec<f64>) {
-        let rows = self
-            .angle
-            .iter()
-            .zip(&self.force)
-            .filter(|(g, _)| **g <= angle);
-        rows.map(|(g, f)| (*g, *f)).unzip()
+/// A law of the yarns, with what it was fitted to.
+#[derive(Debug, Clone)]
+pub struct Law {
+    /// The fit.
+    pub fit: YarnsFit,
+    /// Its residual over the root mean square of the forces.
+    pub relative_rms: f64,
+    /// Largest angle of its data (rad): beyond it the law says nothing.
+    pub limit: f64,
+}
+
+impl Law {
+    fn new(tests: &[Points], degree: Option<usize>) -> Result<Self, String> {
+        let fit = fit_yarns(tests, degree)?;
+        let (angle, force) = joined(tests);
+        Ok(Self {
+            relative_rms: fit.rms / rms(&force),
+            limit: angle.iter().fold(0.0f64, |m, g| m.max(*g)),
+            fit,
+        })
     }
 }
 
 /// What picture-frame tests tell.
 #[derive(Debug, Clone)]
 pub struct Shear {
-    /// Force of the yarns over the shear angle's magnitude, zero at zero.
-    pub yarns: Yarns,
-    /// The polynomial that would follow the data best, where the material does not take it.
-    pub refused: Option<Refused>,
-    /// Root mean square residual of the yarns' fit (N/m).
-    pub yarns_rms: f64,
-    /// The same over the root mean square of the forces.
-    pub yarns_relative_rms: f64,
-    /// Condition of the yarns' fit.
-    pub condition: f64,
+    /// Force of the yarns over the shear angle's size: for both signs, or for positive shear where they differ.
+    pub law: Law,
+    /// That for negative shear, where the signs differ.
+    pub negative: Option<Law>,
     /// The stitch's part, for positive shear.
     pub stitch: Option<StitchFit>,
-    /// Largest angle of the yarns' data (rad): beyond it the polynomial says nothing.
-    pub limit: f64,
     /// Root mean square of measured less fitted force over that of the measured, positive shear.
     pub positive_relative_rms: f64,
     /// The same for negative shear; 0 without a test.
     pub negative_relative_rms: f64,
+    /// Largest difference of a test's mean force from that of all tests of its sign, over it; 0 with one test.
+    pub scatter: f64,
 }
 
 impl Shear {
-    /// Normalised force (N/m), odd but for the stitch, at a signed shear angle (rad).
+    /// The yarns' law of a sign.
+    pub fn yarns(&self, g: f64) -> &Yarns {
+        let law = self.negative.as_ref().filter(|_| g < 0.0);
+        &law.unwrap_or(&self.law).fit.yarns
+    }
+
+    /// Normalised force (N/m), odd but for the stitch and for a law of its own for negative shear, at a signed shear angle (rad).
     pub fn force(&self, g: f64) -> f64 {
-        self.yarns.odd(g) + self.stitch.map_or(0.0, |s| s.stitch.force(g))
+        self.yarns(g).odd(g) + self.stitch.map_or(0.0, |s| s.stitch.force(g))
     }
 }
+
+/// One law for both signs is taken for none of them where it leaves so many times more of a sign's force than that sign's own law ..
+const MUCH_WORSE: f64 = 1.5;
+/// .. and more than this part of the force.
+const SIGNS_ALIKE: f64 = 0.02;
 
 /// Fits the laws.
 ///
 /// With a stitch the yarns are fitted to the negative tests, where it is slack, and the stitch to what the
-/// positive tests have above the yarns; without, the yarns to all tests. `degree`: of the yarns' polynomial;
-/// `None`: of 2 to 9, as in [`fit_yarns`].
+/// positive tests have above the yarns. Without, the yarns are fitted to all tests; where one odd law follows a sign's tests much worse than a law of their
+/// own does, each sign has its own. `degree`: of the yarns' polynomial; `None`: of 2 to 9, as in [`fit_yarns`].
 ///
 /// # Errors
 /// A stitch without negative tests, data that do not determine the fit or end before the stitch has failed, no data below
@@ -194,70 +246,88 @@ pub fn characterise(
     if with_stitch && negative.is_empty() {
         return Err("the stitch is what positive shear has above negative shear: give tests in `negative` too".into());
     }
-    let join = |tests: &[&[Test]]| -> (Vec<f64>, Vec<f64>) {
-        let (mut angle, mut force) = (Vec::new(), Vec::new());
-        for test in tests.iter().copied().flatten() {
-            let (g, f) = test.up_to(maximum_angle);
-            angle.extend(g);
-            force.extend(f);
+    let kept =
+        |tests: &[Test]| -> Vec<Points> { tests.iter().map(|t| t.up_to(maximum_angle)).collect() };
+    let (up, down) = (kept(positive), kept(negative));
+    let both: Vec<Points> = up.iter().chain(&down).cloned().collect();
+    let mut law = Law::new(if with_stitch { &down } else { &both }, degree)?;
+    let mut own_negative = None;
+    if !with_stitch && !down.is_empty() {
+        let alone = [Law::new(&up, degree)?, Law::new(&down, degree)?];
+        let differs = [&up, &down].iter().zip(&alone).any(|(tests, own)| {
+            let left = misfit(tests, law.limit, |g| law.fit.yarns.value(g));
+            left > SIGNS_ALIKE && left > MUCH_WORSE * own.relative_rms
+        });
+        if differs {
+            let [one, other] = alone;
+            (law, own_negative) = (one, Some(other));
         }
-        (angle, force)
-    };
-    let (up, down) = (join(&[positive]), join(&[negative]));
-    let own = if with_stitch {
-        down.clone()
-    } else {
-        join(&[positive, negative])
-    };
-    let YarnsFit {
-        yarns,
-        rms: yarns_rms,
-        condition,
-        refused,
-    } = fit_yarns(&own.0, &own.1, degree)?;
-    let farthest = |angle: &[f64]| angle.iter().fold(0.0f64, |m, g| m.max(*g));
-    let limit = farthest(&own.0);
+    }
+    let limit = law.limit;
     let stitch = if with_stitch {
-        let rows = up.0.iter().zip(&up.1).filter(|(g, _)| **g <= limit);
-        let (angle, rest): (Vec<f64>, Vec<f64>) =
-            rows.map(|(g, f)| (*g, f - yarns.odd(*g))).unzip();
-        let fit = fit_stitch(&angle, &rest)?;
-        let end = fit.stitch.angles[2];
-        // A flank drawn on past the data is a guess, and past the yarns' law the material refuses it.
-        if end > farthest(&angle) {
-            return Err(ends_early(end, farthest(&up.0), limit));
-        }
-        Some(fit)
+        stitch_above(&up, &law)?
     } else {
         None
     };
     let mut shear = Shear {
-        yarns_relative_rms: yarns_rms / rms(&own.1),
-        yarns_rms,
-        yarns,
-        refused,
-        condition,
+        law,
+        negative: own_negative,
         stitch,
-        limit,
         positive_relative_rms: 0.0,
         negative_relative_rms: 0.0,
+        scatter: scatter(positive).max(scatter(negative)),
     };
-    let misfit = |(angle, force): &(Vec<f64>, Vec<f64>), sign: f64| {
-        let kept: Vec<usize> = (0..angle.len()).filter(|&i| angle[i] <= limit).collect();
-        let rest: Vec<f64> = kept
-            .iter()
-            .map(|&i| force[i] - sign * shear.force(sign * angle[i]))
-            .collect();
-        let size: Vec<f64> = kept.iter().map(|&i| force[i]).collect();
-        if size.is_empty() {
-            0.0
-        } else {
-            rms(&rest) / rms(&size)
-        }
-    };
-    let told = [misfit(&up, 1.0), misfit(&down, -1.0)];
+    let other = shear.negative.as_ref().map_or(limit, |l| l.limit);
+    let told = [
+        misfit(&up, limit, |g| shear.force(g)),
+        misfit(&down, other, |g| -shear.force(-g)),
+    ];
     [shear.positive_relative_rms, shear.negative_relative_rms] = told;
     Ok(shear)
+}
+
+/// The stitch in what positive tests have above the yarns' law.
+fn stitch_above(positive: &[Points], law: &Law) -> Result<Option<StitchFit>, String> {
+    let (angle, force) = joined(positive);
+    let farthest = |angle: &[f64]| angle.iter().fold(0.0f64, |m, g| m.max(*g));
+    let rows = angle.iter().zip(&force).filter(|(g, _)| **g <= law.limit);
+    let (inside, rest): (Vec<f64>, Vec<f64>) =
+        rows.map(|(g, f)| (*g, f - law.fit.yarns.odd(*g))).unzip();
+    let fit = fit_stitch(&inside, &rest)?;
+    let end = fit.stitch.angles[2];
+    // A flank drawn on past the data is a guess, and past the yarns' law the material refuses it.
+    if end > farthest(&inside) {
+        return Err(ends_early(end, farthest(&angle), law.limit));
+    }
+    Ok(Some(fit))
+}
+
+/// Root mean square of forces less those of a law, up to an angle (rad), over that of the forces; 0 without any.
+fn misfit(tests: &[Points], limit: f64, law: impl Fn(f64) -> f64) -> f64 {
+    let (angle, force) = joined(tests);
+    let kept = angle.iter().zip(&force).filter(|(g, _)| **g <= limit);
+    let (rest, size): (Vec<f64>, Vec<f64>) = kept.map(|(g, f)| (f - law(*g), *f)).unzip();
+    if size.is_empty() {
+        0.0
+    } else {
+        rms(&rest) / rms(&size)
+    }
+}
+
+/// Largest difference of a test's mean force from that of all, over the angles that all have.
+fn scatter(tests: &[Test]) -> f64 {
+    let end = |t: &Test| t.points.angle.iter().fold(0.0f64, |m, g| m.max(*g));
+    let limit = tests.iter().map(end).fold(f64::INFINITY, f64::min);
+    let places = || (1..=50).map(|i| limit * f64::from(i) / 51.0);
+    let sum = |t: &Test| places().filter_map(|g| t.force_at(g)).sum::<f64>();
+    let sums: Vec<f64> = tests.iter().map(sum).collect();
+    let mean = sums.iter().sum::<f64>() / sums.len().max(1) as f64;
+    let apart = sums.iter().map(|s| (s / mean - 1.0).abs());
+    if tests.len() < 2 {
+        0.0
+    } else {
+        apart.fold(0.0, f64::max)
+    }
 }
 
 /// Which tests ended (rad) before the stitch would have failed, and what to do.

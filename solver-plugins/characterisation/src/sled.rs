@@ -1,6 +1,8 @@
 //! The friction sled: static peak and dynamic mean of the pulling force over the normal force.
 
+use crate::confidence::{autocorrelation, student};
 use crate::csv::Table;
+use crate::voce::rms;
 
 /// A test with fewer rows in the window is refused.
 const FEWEST_ROWS: usize = 10;
@@ -15,7 +17,19 @@ pub struct Pull {
     /// Standard deviation of the force over the window's displacement, over the normal force: stick-slip and
     /// noise.
     pub scatter: f64,
+    /// Error of the dynamic coefficient from this pull alone, at a confidence of 95 %: from its scatter over the window, as far as places are independent of
+    /// their neighbours.
+    pub error: f64,
+    /// How much the coefficient changes from the first to the last quarter of the window.
+    pub drift: f64,
+    /// Force over the normal force where the record begins, before the sled moves; `None` when it begins later.
+    pub at_rest: Option<f64>,
 }
+
+/// Places of the window at which the force is compared with its mean.
+const PLACES: usize = 400;
+/// A record that begins within this (m) begins before the sled moves.
+const AT_REST: f64 = 1e-3;
 
 /// Evaluates the columns `displacement` and `force` of a table; `window`: from, to (m); `normal` force (N).
 ///
@@ -84,13 +98,34 @@ pub fn evaluate(table: &Table, window: [f64; 2], normal: f64) -> Result<Pull, St
             1e3 * to
         ));
     }
+    let places: Vec<f64> = (0..PLACES)
+        .map(|i| {
+            let at = from + (to - from) * (i as f64 + 0.5) / PLACES as f64;
+            let k = s.partition_point(|v| *v < at).clamp(1, s.len() - 1);
+            let part = (at - s[k - 1]) / (s[k] - s[k - 1]).max(f64::MIN_POSITIVE);
+            f[k - 1] + part * (f[k] - f[k - 1]) - mean
+        })
+        .collect();
+    let independent = (PLACES.min(inside) as f64 / independent_step(&places, inside)).max(2.0);
+    let quarter = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    let drift = quarter(&places[3 * PLACES / 4..]) - quarter(&places[..PLACES / 4]);
     let before = s.iter().zip(f).filter(|(v, _)| **v < from);
     let peak = before.map(|(_, f)| *f).reduce(f64::max);
     Ok(Pull {
         static_coefficient: peak.map(|p| p / normal),
         dynamic_coefficient: mean / normal,
         scatter: variance.max(0.0).sqrt() / normal,
+        error: student(independent as usize - 1) * rms(&places) / independent.sqrt() / normal,
+        drift: drift / normal,
+        at_rest: (first <= AT_REST).then(|| f[0] / normal),
     })
+}
+
+/// How many places, or rows where these are fewer, tell as much as one that is independent of all others.
+fn independent_step(places: &[f64], rows: usize) -> f64 {
+    let along_places = autocorrelation(places);
+    // Between rows the force is straight: places within one say the same.
+    (along_places * rows.min(PLACES) as f64 / PLACES as f64).max(1.0)
 }
 
 #[cfg(test)]
@@ -131,6 +166,19 @@ mod tests {
             (pull.scatter - 0.5 / 2f64.sqrt() / 5.0).abs() < 1e-4,
             "{pull:?}"
         );
+    }
+
+    #[test]
+    fn a_drift_and_a_force_before_the_sled_moves_are_told() {
+        let rising = |tare: f64| {
+            let line = (0..=250).map(|i| (f64::from(i), f64::from(i)));
+            table(line.map(move |(s, f)| (s, 1.0 + tare + 0.01 * f)))
+        };
+        let pull = evaluate(&rising(0.5), [0.1, 0.2], 1.0).unwrap();
+        assert!((pull.drift - 0.75).abs() < 1e-3, "{pull:?}");
+        assert!((pull.at_rest.unwrap() - 1.5).abs() < 1e-12, "{pull:?}");
+        // A trend is one number, not a hundred: the mean is not told by them.
+        assert!(pull.error > 0.2, "{pull:?}");
     }
 
     #[test]

@@ -20,6 +20,13 @@ impl Voce {
         self.linear * k - self.asymptote * (-k / self.scale).exp_m1()
     }
 
+    /// How its moment (N) at a curvature (1/m) follows changes of `linear`, `asymptote` and `scale`, linearly.
+    pub fn moment_change(&self, k: f64, change: [f64; 3]) -> f64 {
+        let part = -(-k / self.scale).exp_m1();
+        let by_scale = -self.asymptote * k / self.scale.powi(2) * (-k / self.scale).exp();
+        change[0] * k + change[1] * part + change[2] * by_scale
+    }
+
     /// Its slope at no curvature: the initial bending stiffness (N m).
     pub fn initial_stiffness(&self) -> f64 {
         self.linear + self.asymptote / self.scale
@@ -198,6 +205,13 @@ fn parameter_condition(law: &Voce, curvature: &[f64]) -> f64 {
     }))
 }
 
+/// Root mean square (N) of moments over curvatures less those of a law, and the same over the root mean square of the moments.
+pub fn relative_misfit<'a>(law: &Voce, points: impl Iterator<Item = &'a [f64; 2]>) -> [f64; 2] {
+    let (rest, size): (Vec<f64>, Vec<f64>) = points.map(|[k, m]| (m - law.moment(*k), *m)).unzip();
+    let rest = rms(&rest);
+    [rest, rest / rms(&size)]
+}
+
 /// Root mean square.
 pub fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
@@ -236,6 +250,21 @@ mod tests {
         // Over a small range the same law is much worse determined.
         let (k, m) = points(&NCF, 2.0);
         assert!(fit_voce(&k, &m).unwrap().condition > 10.0 * fit.condition);
+    }
+
+    #[test]
+    fn the_change_of_a_moment_is_that_of_finite_differences() {
+        let change = [2e-6, -3e-4, 0.05];
+        let moved = |h: f64| Voce {
+            linear: NCF.linear + h * change[0],
+            asymptote: NCF.asymptote + h * change[1],
+            scale: NCF.scale + h * change[2],
+        };
+        for k in [0.3, 4.0, 40.0] {
+            let expected = (moved(1e-3).moment(k) - moved(-1e-3).moment(k)) / 2e-3;
+            let got = NCF.moment_change(k, change);
+            assert!((got / expected - 1.0).abs() < 1e-6, "{got} {expected}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The yarns' part of the shear law: a polynomial that `material-fabric` takes, or a table where none is.
 
-use crate::linear::{Polynomial, bayes_criterion, fit_polynomial};
+use crate::confidence::{autocorrelation, of_curve, of_mean, student};
+use crate::linear::{Polynomial, Solution, bayes_criterion, fit_polynomial};
 use crate::material::significant;
 use crate::picture_frame::{FEWEST_ROWS, LIMITS, MAXIMUM_DEGREE};
 use crate::voce::rms;
@@ -44,6 +45,14 @@ impl Yarns {
         forces[i - 1] + part * (forces[i] - forces[i - 1])
     }
 
+    /// Slope at no shear (N/m), which is the shear stiffness at rest.
+    pub fn stiffness(&self) -> f64 {
+        match self {
+            Self::Polynomial(p) => p.coefficients.get(1).copied().unwrap_or(0.0),
+            Self::Table { angles, forces } => forces[1] / angles[1],
+        }
+    }
+
     /// Value of the odd extension.
     pub fn odd(&self, g: f64) -> f64 {
         self.value(g.abs()).copysign(g) * f64::from(u8::from(g != 0.0))
@@ -63,9 +72,39 @@ pub struct Refused {
     pub table_differs: Option<[f64; 2]>,
 }
 
+/// Shear angles over which the law's error is told: from this part of the largest ..
+const LEAST_ANGLE: f64 = 0.05;
+/// .. to the largest, at so many places.
+const PLACES: usize = 60;
+/// What a coefficient costs in Akaike's criterion, and in the weights of degrees that may be right: between Akaike's and the Bayesian one, which takes
+/// a law of no polynomial for one of a low degree.
+const AKAIKE: f64 = 2.0;
+const MODEL: f64 = 3.0;
+/// Residuals of which so many say as much as one that is independent of all others are those of a law that does not follow the data.
+const SYSTEMATIC: f64 = 1.6;
+/// Parts of the range that these are taken over.
+const PARTS: usize = 20;
+/// Rows that a coefficient needs.
+const ROWS_PER_COEFFICIENT: usize = 4;
+
+/// How far a law is uncertain, at a confidence of 95 %.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct YarnsError {
+    /// Shear angles (rad), from 5 to 100 % of the largest.
+    pub angle: Vec<f64>,
+    /// Error of the force there (N/m).
+    pub force: Vec<f64>,
+    /// Of the root mean square of the force's error over that of the force.
+    pub relative: f64,
+    /// Of the stiffness at rest (N/m).
+    pub stiffness: f64,
+}
+
 /// A fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct YarnsFit {
+    /// Error of the law.
+    pub error: YarnsError,
     /// The law.
     pub yarns: Yarns,
     /// Root mean square residual (N/m).
@@ -76,15 +115,37 @@ pub struct YarnsFit {
     pub refused: Option<Refused>,
 }
 
-/// Fits the yarns' law to points of shear angle (rad) and force (N/m).
+/// One test that a law is fitted to.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Points {
+    /// Shear angle (rad).
+    pub angle: Vec<f64>,
+    /// Force (N/m).
+    pub force: Vec<f64>,
+    /// By what standard error the force (N/m), and the angle (rad), of all of its points may be off, since the zero was found by them.
+    pub zero_error: [f64; 2],
+}
+
+/// A polynomial that was tried.
+struct Tried {
+    criterion: f64,
+    /// That, without what it counts for the degree.
+    misfit: f64,
+    degree: usize,
+    polynomial: Polynomial,
+    solution: Solution,
+}
+
+/// Fits the yarns' law to points of shear angle and force of tests that share it.
 ///
 /// Of the degrees that the material takes up to the largest angle, the one with the least Bayesian information
-/// criterion. When it takes none of them: a table from the one with the least criterion, its falling parts
+/// criterion; a degree needs four rows for each coefficient. When it takes none of them: a table from the one with the least criterion, its falling parts
 /// levelled out.
 ///
 /// # Errors
 /// With too few points, or points that do not determine a polynomial.
-pub fn fit_yarns(angle: &[f64], force: &[f64], degree: Option<usize>) -> Result<YarnsFit, String> {
+pub fn fit_yarns(tests: &[Points], degree: Option<usize>) -> Result<YarnsFit, String> {
+    let (angle, force) = joined(tests);
     if angle.len() < FEWEST_ROWS {
         return Err(format!(
             "{} points of shear lie in the range of the fit; at least {FEWEST_ROWS} are needed",
@@ -92,51 +153,241 @@ pub fn fit_yarns(angle: &[f64], force: &[f64], degree: Option<usize>) -> Result<
         ));
     }
     let limit = angle.iter().fold(0.0f64, |m, g| m.max(*g));
-    let floor = 1e-6 * rms(force);
+    let floor = 1e-6 * rms(&force);
+    let most = MAXIMUM_DEGREE.min(angle.len() / ROWS_PER_COEFFICIENT);
     let mut tried = Vec::new();
-    for d in degree.map_or(2..=MAXIMUM_DEGREE, |d| d..=d) {
-        let (polynomial, solution) = fit_polynomial(angle, force, d)?;
-        let criterion = bayes_criterion(solution.rms, floor, angle.len(), d);
-        tried.push((criterion, d, polynomial, solution));
+    for d in (2..=most).chain(degree.filter(|d| !(2..=most).contains(d))) {
+        let (polynomial, solution) = match fit_polynomial(&angle, &force, d) {
+            Ok(found) => found,
+            Err(_) if degree.is_some_and(|g| g != d) => continue,
+            Err(e) => return Err(e),
+        };
+        let left = rms_within(tests, d).unwrap_or(solution.rms);
+        tried.push(Tried {
+            criterion: bayes_criterion(left, floor, angle.len(), d),
+            misfit: bayes_criterion(left, floor, angle.len(), 0),
+            degree: d,
+            polynomial,
+            solution,
+        });
     }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    tried.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let mut refused: Option<Refused> = None;
-    for (_, degree, polynomial, solution) in &tried {
-        match accepted(&polynomial.coefficients, limit) {
+    let asked = |t: &&Tried| degree.is_none_or(|d| d == t.degree);
+    for t in tried.iter().filter(asked) {
+        match accepted(&t.polynomial.coefficients, limit) {
             Ok(()) => {
+                let yarns = Yarns::Polynomial(t.polynomial.clone());
                 return Ok(YarnsFit {
-                    yarns: Yarns::Polynomial(polynomial.clone()),
-                    rms: solution.rms,
-                    condition: solution.condition,
+                    error: uncertain(&yarns, t, &tried, tests),
+                    yarns,
+                    rms: t.solution.rms,
+                    condition: t.solution.condition,
                     refused,
                 });
             }
             Err(why) => {
                 refused.get_or_insert(Refused {
-                    degree: *degree,
-                    rms: solution.rms,
+                    degree: t.degree,
+                    rms: t.solution.rms,
                     why,
                     table_differs: None,
                 });
             }
         }
     }
-    let (Some((_, _, polynomial, solution)), Some(refused)) = (tried.first(), refused) else {
+    let (Some(best), Some(refused)) = (tried.iter().find(asked), refused) else {
         return Err("no degree was tried".into());
     };
-    let (yarns, differs) = rising_table(polynomial, limit)?;
-    let rest: Vec<f64> = (angle.iter().zip(force))
+    let (yarns, differs) = rising_table(&best.polynomial, limit)?;
+    let rest: Vec<f64> = (angle.iter().zip(&force))
         .map(|(g, f)| f - yarns.value(*g))
         .collect();
     Ok(YarnsFit {
+        error: uncertain(&yarns, best, &tried, tests),
         yarns,
         rms: rms(&rest),
-        condition: solution.condition,
+        condition: best.solution.condition,
         refused: Some(Refused {
             table_differs: Some(differs),
             ..refused
         }),
     })
+}
+
+/// Root mean square of what polynomials of each of several tests leave: how well a degree follows does not hang on how much specimens differ. `None` of one test, or where
+/// one of them does not determine its polynomial.
+fn rms_within(tests: &[Points], degree: usize) -> Option<f64> {
+    let (mut squares, mut rows) = (0.0, 0);
+    for t in tests {
+        let (_, own) = fit_polynomial(&t.angle, &t.force, degree).ok()?;
+        squares += own.rms * own.rms * t.angle.len() as f64;
+        rows += t.angle.len();
+    }
+    (tests.len() > 1).then(|| (squares / rows as f64).sqrt())
+}
+
+/// Angles and forces of all tests.
+pub fn joined(tests: &[Points]) -> (Vec<f64>, Vec<f64>) {
+    let all = tests.iter().flat_map(|t| t.angle.iter().zip(&t.force));
+    all.map(|(g, f)| (*g, *f)).unzip()
+}
+
+/// The error of a law that comes of the fit `best`.
+///
+/// What moves it: the scatter of the forces, as far as they are independent of their neighbours; where the zero was found, its error; which degree is
+/// right, each of the others by the root of its weight (model averaging, Hoeting et al., Stat. Sci. 14 (1999) 382); what the law
+/// leaves of the data where they do not scatter about it; what a table levels; and, with several tests, their spread where that is more.
+fn uncertain(yarns: &Yarns, best: &Tried, tried: &[Tried], tests: &[Points]) -> YarnsError {
+    let largest = |t: &Points| t.angle.iter().fold(0.0f64, |m, g| m.max(*g));
+    let limit = tests.iter().map(largest).fold(f64::INFINITY, f64::min);
+    let part = |i: usize| LEAST_ANGLE + (1.0 - LEAST_ANGLE) * i as f64 / (PLACES - 1) as f64;
+    let places: Vec<f64> = (0..PLACES).map(|i| limit * part(i)).collect();
+    // The forces there, then the stiffness at rest.
+    let told = |p: &Polynomial| -> Vec<f64> {
+        let forces = places.iter().map(|g| p.value(*g));
+        forces.chain([p.coefficients[1]]).collect()
+    };
+    let law: Vec<f64> = (places.iter().map(|g| yarns.value(*g)))
+        .chain([yarns.stiffness()])
+        .collect();
+    let less = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+    let central = told(&best.polynomial);
+    let (angle, force) = joined(tests);
+    let unit = angle.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let rest = |t: &Tried| -> Vec<f64> {
+        // In the order of the rows, test by test.
+        let all = angle.iter().zip(&force);
+        all.map(|(g, f)| f - t.polynomial.value(*g)).collect()
+    };
+    // What a degree that is too low leaves is no scatter: that and its directions are those of the degree that Akaike's criterion would take.
+    let by_akaike = |t: &&Tried| t.misfit + AKAIKE * t.degree as f64;
+    let wide = (tried.iter().filter(|t| t.degree >= best.degree))
+        .min_by(|a, b| by_akaike(a).total_cmp(&by_akaike(b)))
+        .unwrap_or(best);
+    let left = rest(best);
+    // Specimens that differ are no scatter within one: that is what is left over by laws of their own.
+    let mut own = Vec::new();
+    let mut within = Vec::new();
+    for t in tests {
+        if let Ok((p, _)) = fit_polynomial(&t.angle, &t.force, wide.degree) {
+            within.extend(t.angle.iter().zip(&t.force).map(|(g, f)| f - p.value(*g)));
+        }
+        if let Ok((p, _)) = fit_polynomial(&t.angle, &t.force, best.degree) {
+            own.push(told(&p));
+        }
+    }
+    let within = if tests.len() > 1 && own.len() == tests.len() {
+        within
+    } else {
+        own.clear();
+        rest(wide)
+    };
+    let time = autocorrelation(if own.is_empty() { &left } else { &within });
+    let freedom = (left.len() - wide.degree).max(1) as f64;
+    let deviation = rms(&within) * (left.len() as f64 / freedom * time).sqrt();
+    let of_powers = |v: &Vec<f64>| -> Vec<f64> {
+        let scaled = v.iter().enumerate();
+        let c = scaled.map(|(j, c)| deviation * c / unit.powi(j as i32 + 1));
+        told(&Polynomial {
+            coefficients: std::iter::once(0.0).chain(c).collect(),
+        })
+    };
+    let mut changes: Vec<Vec<f64>> = wide.solution.spread.iter().map(of_powers).collect();
+    for t in tests {
+        for moved in shifted(t, tests) {
+            let (angle, force) = joined(&moved);
+            if let Ok((p, _)) = fit_polynomial(&angle, &force, best.degree) {
+                changes.push(less(&told(&p), &central));
+            }
+        }
+    }
+    let (mut changes, freedom) = of_mean(
+        &own,
+        changes,
+        (freedom / time).max(1.0) as usize,
+        &[1.0; PLACES],
+    );
+    let weight = |t: &Tried| {
+        let apart = best.misfit - t.misfit + MODEL * (best.degree as f64 - t.degree as f64);
+        (0.5 * apart).exp()
+    };
+    let sum: f64 = tried.iter().map(weight).sum();
+    let others = tried
+        .iter()
+        .filter(|t| t.degree != best.degree && t.degree != wide.degree);
+    changes.extend(others.filter(|t| weight(t) > 1e-3 * sum).map(|t| {
+        let root = (weight(t) / sum).sqrt();
+        let apart = less(&told(&t.polynomial), &central);
+        apart.into_iter().map(|c| c * root).collect()
+    }));
+    if time > SYSTEMATIC {
+        changes.push(systematic(&angle, &left, &places));
+    }
+    if matches!(yarns, Yarns::Table { .. }) {
+        changes.push(less(&law, &central));
+    }
+    let size =
+        |i: usize| student(freedom) * changes.iter().map(|c| c[i] * c[i]).sum::<f64>().sqrt();
+    let forces: Vec<Vec<f64>> = changes.iter().map(|c| c[..PLACES].to_vec()).collect();
+    let root = (PLACES as f64).sqrt() * rms(&law[..PLACES]);
+    YarnsError {
+        force: (0..PLACES).map(size).collect(),
+        relative: of_curve(&forces, freedom) / root,
+        stiffness: size(PLACES),
+        angle: places,
+    }
+}
+
+/// What a law leaves along the angle, where neighbours leave alike: means over equal parts of the range, at places; and the slope of that at rest.
+fn systematic(angle: &[f64], left: &[f64], places: &[f64]) -> Vec<f64> {
+    let limit = angle.iter().fold(0.0f64, |m, g| m.max(*g));
+    let mut parts = [[0.0; 3]; PARTS];
+    for (g, r) in angle.iter().zip(left) {
+        let part = ((g / limit * PARTS as f64).max(0.0) as usize).min(PARTS - 1);
+        parts[part][0] += g;
+        parts[part][1] += r;
+        parts[part][2] += 1.0;
+    }
+    let means: Vec<[f64; 2]> = (parts.iter())
+        .filter(|p| p[2] >= 3.0)
+        .map(|p| [p[0] / p[2], p[1] / p[2]])
+        .collect();
+    let Some(first) = means.first() else {
+        return vec![0.0; places.len() + 1];
+    };
+    let at = |g: &f64| {
+        let i = means.partition_point(|m| m[0] < *g);
+        let Some((a, b)) = i.checked_sub(1).map(|a| means[a]).zip(means.get(i)) else {
+            return means[i.min(means.len() - 1)][1];
+        };
+        a[1] + (g - a[0]) / (b[0] - a[0]) * (b[1] - a[1])
+    };
+    let slope = first[1] / first[0].max(f64::MIN_POSITIVE);
+    places.iter().map(at).chain([slope]).collect()
+}
+
+/// All tests, with one of them moved by the errors of its zero, one after the other.
+fn shifted(which: &Points, tests: &[Points]) -> Vec<Vec<Points>> {
+    let moved = |k: usize| {
+        let of = |t: &Points| {
+            let mut t = t.clone();
+            let column = if k == 0 { &mut t.force } else { &mut t.angle };
+            column.iter_mut().for_each(|v| *v += which.zero_error[k]);
+            t
+        };
+        let all = tests.iter();
+        all.map(|t| {
+            if std::ptr::eq(t, which) {
+                of(t)
+            } else {
+                t.clone()
+            }
+        })
+        .collect()
+    };
+    let told = (0..2).filter(|&k| which.zero_error[k] > 0.0);
+    told.map(moved).collect()
 }
 
 /// Whether `material-fabric` takes coefficients (N/m), as they are written, up to an angle (rad): by its own check. What
@@ -200,6 +451,15 @@ fn rising_table(polynomial: &Polynomial, limit: f64) -> Result<(Yarns, [f64; 2])
 mod tests {
     use super::*;
 
+    fn fit(g: &[f64], f: &[f64], degree: Option<usize>) -> Result<YarnsFit, String> {
+        let points = Points {
+            angle: g.to_vec(),
+            force: f.to_vec(),
+            ..Points::default()
+        };
+        fit_yarns(&[points], degree)
+    }
+
     fn points(law: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {
         let g: Vec<f64> = (1..=300).map(|i| i as f64 / 300.0).collect();
         let f = g.iter().map(|g| law(*g)).collect();
@@ -210,7 +470,7 @@ mod tests {
     fn a_degree_that_rises_is_preferred_to_one_that_follows_better_and_falls() {
         // A shallow dip between 0.48 and 0.52 rad: degree 3 follows exactly, the material does not take it.
         let (g, f) = points(|g| 100.0 * (g * (0.48 * 0.52) - 0.5 * g * g + g.powi(3) / 3.0));
-        let free = fit_yarns(&g, &f, None).unwrap();
+        let free = fit(&g, &f, None).unwrap();
         let Yarns::Polynomial(p) = &free.yarns else {
             panic!("{free:?}")
         };
@@ -234,7 +494,7 @@ mod tests {
             }
         };
         let (g, f) = points(law);
-        let fit = fit_yarns(&g, &f, Some(9)).unwrap();
+        let fit = fit(&g, &f, Some(9)).unwrap();
         let Yarns::Table { angles, forces } = &fit.yarns else {
             panic!("{fit:?}")
         };
@@ -257,6 +517,6 @@ mod tests {
     #[test]
     fn a_force_that_is_positive_nowhere_is_refused() {
         let (g, f) = points(|g| -g);
-        assert!(fit_yarns(&g, &f, None).unwrap_err().contains("load cell"));
+        assert!(fit(&g, &f, None).unwrap_err().contains("load cell"));
     }
 }

@@ -1,7 +1,9 @@
 //! Step plugin `characterise-bending`: the law M(k) from the profile of a revised cantilever test.
 
 use plyflow_characterisation::bending::{Bending, Specimen, characterise};
-use plyflow_characterisation::cantilever::{PLAUSIBLE_OVERHANG, mean_and_deviation};
+use plyflow_characterisation::cantilever::{
+    PLAUSIBLE_OVERHANG, implausible_stiffness, mean_and_deviation,
+};
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
@@ -32,6 +34,12 @@ struct Parameters {
     template: Option<String>,
 }
 
+/// No strip of fabric is tested with less outside the clamp (m).
+const LEAST_REACH: f64 = 0.01;
+/// A strip that lies so many times farther from its points than the polynomial, and farther than this part of its length, is not one of Voce's law.
+const MUCH_FARTHER: f64 = 1.5;
+const FAR: f64 = 5e-4;
+
 const COLUMNS: [Column; 2] = [
     Column::required("x", Dimension::Length),
     Column::required("z", Dimension::Length),
@@ -54,6 +62,7 @@ impl Step for CharacteriseBending {
         };
         let found = characterise(&profiles, weight, &choice)?;
         warn(host, &found, &names);
+        warn_of_reach(host, &found, &p.report_at);
         let mut out = Output::default();
         write_profiles(&mut out, &found, &profiles, &names);
         write_law(&mut out, &found, &names);
@@ -70,8 +79,8 @@ impl Step for CharacteriseBending {
                 names.join(", ")
             ),
             format!(
-                "The law leaves {} % rms of the measured moment and holds to {} 1/mm; beyond, it is an extrapolation.",
-                significant(100.0 * found.voce.relative_rms),
+                "M(k) is told within {} % (rms, at 95 %) and holds to {} 1/mm; beyond, it is an extrapolation.",
+                significant(100.0 * found.relative_error),
                 significant(1e-3 * found.curvature.last().copied().unwrap_or(0.0))
             ),
         ];
@@ -123,12 +132,28 @@ fn profiles(host: &Host, p: &Parameters) -> Result<(Vec<Profile>, Vec<String>), 
                     table.plausible_length(name, range, "a strip of fabric")?;
                 }
                 let (x, z) = (table.values("x")?, table.values("z")?);
+                reaches_out(&table.source, x, z)?;
                 profiles.push(Profile::new(x, z, p.clamp_tolerance, &|i| table.place(i))?);
                 names.push(table.source.clone());
             }
             Ok((profiles, names))
         }
     }
+}
+
+/// Refuses a profile that hangs out by less than a strip of fabric can be tested with: its unit is not that of the header.
+fn reaches_out(source: &str, x: &[f64], z: &[f64]) -> Result<(), String> {
+    let far = x.iter().zip(z).fold(0.0f64, |m, (x, z)| m.max(x.hypot(*z)));
+    if far >= LEAST_REACH {
+        return Ok(());
+    }
+    Err(format!(
+        "{source}: the farthest point lies {:.3} mm from the clamp; a strip of fabric hangs out {:.0} mm to {:.0} m: are the units of \
+         the header, [..], those of the numbers?",
+        1e3 * far,
+        1e3 * LEAST_REACH,
+        PLAUSIBLE_OVERHANG[1]
+    ))
 }
 
 fn simulated(host: &Host, input: &Input, clamp_tolerance: f64) -> Result<Profile, StepError> {
@@ -149,8 +174,38 @@ fn simulated(host: &Host, input: &Input, clamp_tolerance: f64) -> Result<Profile
     Ok(Profile::new(&x, &z, clamp_tolerance, &place)?)
 }
 
+/// Says where the law is used or told beyond what was measured, or is none that a fabric has.
+fn warn_of_reach(host: &Host, found: &Bending, report_at: &[f64]) {
+    let largest = found.curvature.last().copied().unwrap_or(0.0);
+    let beyond: Vec<String> = (report_at.iter())
+        .filter(|k| **k > 1.05 * largest)
+        .map(|k| format!("{} 1/mm", significant(1e-3 * k)))
+        .collect();
+    if !beyond.is_empty() {
+        let text = format!(
+            "`report_at` asks for the moment at {}, and the strips are bent to {} 1/mm: there the moment is an extrapolation",
+            beyond.join(", "),
+            significant(1e-3 * largest)
+        );
+        host.log(Log::Warn, &text);
+    }
+    if let Some(text) = implausible_stiffness(found.voce.law.initial_stiffness()) {
+        host.log(Log::Warn, &text);
+    }
+}
+
 fn warn(host: &Host, found: &Bending, names: &[String]) {
     for (specimen, name) in found.specimens.iter().zip(names) {
+        let (strip, fit) = (&specimen.hanging, &specimen.profile);
+        if strip.rms > MUCH_FARTHER * fit.rms && strip.rms > FAR * strip.length {
+            let text = format!(
+                "{name}: no strip of a Voce law hangs through the points: it lies {:.3} mm from them, a free curve {:.3} mm. The clamp may \
+                 be tilted, the edge of the clamp not at x = z = 0, the tip held, or the strip of changing stiffness; look at the plot",
+                1e3 * strip.rms,
+                1e3 * fit.rms
+            );
+            host.log(Log::Warn, &text);
+        }
         if !specimen.profile.monotone {
             let text = format!(
                 "{name}: the curvature of the fitted profile does not fall from clamp to tip, as gravity makes it: the \
@@ -278,16 +333,18 @@ fn write_results(out: &mut Output, found: &Bending, profiles: &[Profile]) {
         |f: &dyn Fn(&Specimen) -> f64| found.specimens.iter().map(f).collect::<Vec<f64>>();
     let largest =
         |f: &dyn Fn(&Specimen) -> f64| over_specimens(f).into_iter().fold(0.0f64, f64::max);
-    let [lengths, rms] = [
-        over_specimens(&|s| s.profile.length),
+    let [lengths, rms, strip_rms] = [
+        over_specimens(&|s| s.hanging.length),
         over_specimens(&|s| s.profile.rms),
+        over_specimens(&|s| s.hanging.rms),
     ];
     // Over the points of all specimens.
     let count = |p: &Profile| p.x.len() as f64;
-    let squares: f64 = (rms.iter().zip(profiles))
-        .map(|(r, p)| r * r * count(p))
-        .sum();
     let points: f64 = profiles.iter().map(count).sum();
+    let pooled = |rms: &[f64]| {
+        let squares = rms.iter().zip(profiles).map(|(r, p)| r * r * count(p));
+        (squares.sum::<f64>() / points).sqrt()
+    };
     let monotone = found.specimens.iter().all(|s| s.profile.monotone);
     let results = [
         ("linear", voce.law.linear, "N m"),
@@ -310,7 +367,8 @@ fn write_results(out: &mut Output, found: &Bending, profiles: &[Profile]) {
         ("largest_moment", largest(&|s| s.largest()[1]), "N"),
         ("specimens", found.specimens.len() as f64, "1"),
         ("overhang", mean_and_deviation(&lengths)[0], "m"),
-        ("profile_rms", (squares / points).sqrt(), "m"),
+        ("profile_rms", pooled(&rms), "m"),
+        ("strip_rms", pooled(&strip_rms), "m"),
         ("profile_degree", largest(&|s| s.profile.degree as f64), "1"),
         ("profile_condition", largest(&|s| s.profile.condition), "1"),
         ("profile_monotone", flag(monotone), "1"),

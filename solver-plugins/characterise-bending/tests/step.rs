@@ -139,8 +139,8 @@ fn each_specimen_has_its_curves_and_their_spread_is_in_the_errors() {
     let parameters = |files: &[PathBuf]| json!({"profiles": files, "areal_mass": law.areal_mass});
     let out = run::<CharacteriseBending>(parameters(&files), &[], &[]).unwrap();
     let one = run::<CharacteriseBending>(parameters(&files[..1]), &[], &[]).unwrap();
-    // Half the difference of two is the standard error of their mean: 10 %.
-    assert!((out.result("law_error") - 0.1).abs() < 0.015);
+    // Half the difference of two is the standard error of their mean, 10 %; at 95 % that counts 12.7 times.
+    assert!((out.result("law_error") / 12.706 - 0.1).abs() < 0.015);
     assert!(one.result("law_error") < 0.005);
     assert_eq!(
         (out.result("specimens"), one.result("specimens")),

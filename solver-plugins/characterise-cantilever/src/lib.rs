@@ -2,12 +2,14 @@
 
 use plyflow_characterisation::GRAVITY;
 use plyflow_characterisation::cantilever::{
-    Formula, PLAUSIBLE_OVERHANG, STANDARD_ANGLE, mean_and_deviation, stiffness,
+    Formula, PLAUSIBLE_OVERHANG, STANDARD_ANGLE, implausible_stiffness, mean_and_deviation,
+    stiffness,
 };
+use plyflow_characterisation::confidence::student;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
-use plyflow_sdk::{Host, Step, StepError, export_step};
+use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -30,6 +32,24 @@ const COLUMNS: [Column; 2] = [
     Column::required("overhang", plyflow_characterisation::Dimension::Length),
     Column::optional("angle", plyflow_characterisation::Dimension::Angle),
 ];
+
+/// Specimens whose stiffnesses differ by more than this part (standard deviation) are not of one kind.
+const SCATTER: f64 = 0.3;
+
+/// Says what makes the mean doubtful.
+fn warn(host: &Host, mean: f64, deviation: f64) {
+    if let Some(text) = implausible_stiffness(mean) {
+        host.log(Log::Warn, &text);
+    }
+    if deviation > SCATTER * mean {
+        let text = format!(
+            "the stiffnesses of the specimens differ by {:.0} % (standard deviation): are all of one fabric, direction and face, and is each overhang that \
+             of its angle? Their mean is none of them",
+            100.0 * deviation / mean
+        );
+        host.log(Log::Warn, &text);
+    }
+}
 
 impl Step for CharacteriseCantilever {
     const MANIFEST: &'static str = include_str!("../manifest.json");
@@ -63,6 +83,7 @@ impl Step for CharacteriseCantilever {
         table.plausible_length("overhang", PLAUSIBLE_OVERHANG, "a strip of fabric")?;
         let [mean, deviation] = mean_and_deviation(&stiffnesses);
         let n = stiffnesses.len();
+        warn(host, mean, deviation);
         let mut out = Output::default();
         let numbers: Vec<f64> = (1..=n).map(|i| i as f64).collect();
         out.curve("curves/specimens/number", "1", &numbers);
@@ -104,6 +125,10 @@ impl Step for CharacteriseCantilever {
         out.attribute("bending", json!(p.bending));
         out.result("bending_stiffness", mean, "N m");
         out.result("bending_stiffness_deviation", deviation, "N m");
+        if n > 1 {
+            let error = student(n - 1) * deviation / (n as f64).sqrt();
+            out.result("bending_stiffness_error", error, "N m");
+        }
         out.result("bending_length", (mean / weight).cbrt(), "m");
         out.result("specimens", n as f64, "1");
         out.write(host)

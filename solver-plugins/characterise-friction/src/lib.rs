@@ -1,12 +1,13 @@
 //! Step plugin `characterise-friction`: Coulomb coefficients from sled tests.
 
 use plyflow_characterisation::cantilever::mean_and_deviation;
+use plyflow_characterisation::confidence::student;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::significant;
 use plyflow_characterisation::output::{Output, Series};
 use plyflow_characterisation::sled::{Pull, evaluate};
 use plyflow_characterisation::{Dimension, GRAVITY};
-use plyflow_sdk::{Host, Step, StepError, export_step};
+use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -29,6 +30,50 @@ const COLUMNS: [Column; 2] = [
     Column::required("displacement", Dimension::Length),
     Column::required("force", Dimension::Force),
 ];
+
+/// Coefficients of fabrics, films and tools: what lies outside is a wrong unit.
+const PLAUSIBLE: [f64; 2] = [0.02, 3.0];
+/// Parts of the dynamic coefficient that are warned of: of a force before the sled moves, of a drift over the window, of stick-slip.
+const AT_REST: f64 = 0.05;
+const DRIFT: f64 = 0.1;
+const STICK_SLIP: f64 = 0.2;
+
+/// Says what of a pull makes its mean doubtful.
+fn warn(host: &Host, source: &str, pull: &Pull, window: [f64; 2]) {
+    let mean = pull.dynamic_coefficient;
+    let percent = |part: f64| format!("{:.0} %", 100.0 * part.abs() / mean);
+    let say = |text: String| host.log(Log::Warn, &format!("{source}: {text}"));
+    let [low, high] = PLAUSIBLE;
+    if !(low..=high).contains(&mean) {
+        say(format!(
+            "a coefficient of {} is none that fabrics, films and tools have, {low} to {high}: are [N] of the header and `normal_force` \
+             or `sled_mass` in the units of the numbers?",
+            significant(mean)
+        ));
+    }
+    if let Some(rest) = pull.at_rest.filter(|r| r.abs() > AT_REST * mean) {
+        say(format!(
+            "before the sled moves the force is {} of that in the window: an offset of the load cell makes the coefficient wrong by as much; \
+             take it off, if it is one",
+            percent(rest)
+        ));
+    }
+    if pull.drift.abs() > DRIFT * mean {
+        say(format!(
+            "the force changes by {} from the first to the last quarter of the window from {:.0} to {:.0} mm: its mean hangs on the window",
+            percent(pull.drift),
+            1e3 * window[0],
+            1e3 * window[1]
+        ));
+    }
+    if pull.scatter > STICK_SLIP * mean {
+        say(format!(
+            "the force wavers by {} of its mean (standard deviation): the sled sticks and slips, and a coefficient for steady sliding is not what \
+             it does",
+            percent(pull.scatter)
+        ));
+    }
+}
 
 impl Step for CharacteriseFriction {
     const MANIFEST: &'static str = include_str!("../manifest.json");
@@ -56,7 +101,9 @@ impl Step for CharacteriseFriction {
         let (mut pulls, mut series) = (Vec::<Pull>::new(), Vec::new());
         for (i, path) in p.pulls.iter().enumerate() {
             let table = read(path, &COLUMNS)?;
-            pulls.push(evaluate(&table, [p.from, p.to], normal)?);
+            let pull = evaluate(&table, [p.from, p.to], normal)?;
+            warn(host, &table.source, &pull, [p.from, p.to]);
+            pulls.push(pull);
             let [x, y] =
                 ["displacement", "coefficient"].map(|n| format!("curves/pull_{}/{n}", i + 1));
             let coefficient: Vec<f64> = table.values("force")?.iter().map(|f| f / normal).collect();
@@ -103,6 +150,12 @@ impl Step for CharacteriseFriction {
         out.attribute("pair", json!(p.pair));
         out.result("dynamic_coefficient", dynamic, "1");
         out.result("dynamic_deviation", dynamic_deviation, "1");
+        // Of several pulls their spread; it has what one pull tells of itself in it.
+        let error = match pulls[..] {
+            [only] => only.error,
+            _ => student(pulls.len() - 1) * dynamic_deviation / (pulls.len() as f64).sqrt(),
+        };
+        out.result("dynamic_error", error, "1");
         if let Some([mean, deviation]) = peak {
             out.result("static_coefficient", mean, "1");
             out.result("static_deviation", deviation, "1");

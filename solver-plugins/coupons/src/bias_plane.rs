@@ -312,7 +312,7 @@ fn write(
         host.result("force_spread_largest", s.largest, "1")?;
     }
     let last = |v: &[f64]| v.last().copied().unwrap_or(0.0);
-    let peak = test.force.iter().copied().fold(0.0, f64::max);
+    let peak = crate::reference::largest_between(&test.force);
     host.result("force_peak", peak, "N")?;
     host.result("force_end", last(&test.force), "N")?;
     host.result("centre_shear_end", last(&test.shear), "rad")?;

@@ -338,7 +338,8 @@ fn write(
         host.result("force_error", error, "1")?;
     }
     write_path(host, &mut out, p, test, (&normalised, &norm), references)?;
-    let peak = test.force.iter().map(|f| f.abs()).fold(0.0, f64::max);
+    let sizes: Vec<f64> = test.force.iter().map(|f| f.abs()).collect();
+    let peak = crate::reference::largest_between(&sizes);
     host.result("force_peak", peak, "N")?;
     host.result("shear_min", test.extremes[0], "rad")?;
     host.result("shear_max", test.extremes[1], "rad")?;

@@ -88,3 +88,40 @@ impl Curve {
         Some((error, size, length))
     }
 }
+
+/// Largest of values sampled evenly, also between samples: the top of the parabola through the largest sample and its neighbours; at an end the sample.
+pub fn largest_between(samples: &[f64]) -> f64 {
+    let highest = samples.iter().copied().fold(0.0, f64::max);
+    let Some(i) = samples.iter().position(|v| *v == highest) else {
+        return highest;
+    };
+    let (Some(before), Some(after)) = (i.checked_sub(1).map(|k| samples[k]), samples.get(i + 1))
+    else {
+        return highest;
+    };
+    let (slope, bend) = (0.5 * (after - before), before - 2.0 * highest + after);
+    if bend < 0.0 {
+        highest - 0.5 * slope * slope / bend
+    } else {
+        highest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_top_between_samples_is_that_of_the_curve() {
+        // Samples of a sine that straddle its top.
+        let wave: Vec<f64> = (0..20).map(|i| (0.2 * f64::from(i) + 0.07).sin()).collect();
+        assert!((largest_between(&wave) - 1.0).abs() < 3e-4);
+        let apart: Vec<f64> = (0..8).map(|i| (0.4 * f64::from(i) - 0.63).sin()).collect();
+        let highest = apart.iter().copied().fold(0.0, f64::max);
+        assert!(highest < 0.985, "{highest}");
+        assert!((largest_between(&apart) - 1.0).abs() < 2e-3);
+        assert_eq!(largest_between(&[0.0, 1.0, 2.0]), 2.0);
+        assert_eq!(largest_between(&[1.0, 1.0, 1.0]), 1.0);
+        assert_eq!(largest_between(&[]), 0.0);
+    }
+}

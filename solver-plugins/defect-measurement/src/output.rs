@@ -6,12 +6,12 @@ use crate::sections::{Section, Sheet};
 use crate::{Measured, Seen};
 use plyflow_defects::align::Alignment;
 use plyflow_defects::{Defect, Kind, RidgeShear};
-use plyflow_sdk::{Host, On, StepError};
-use plyflow_surface::{bin_width, density, weighted_mean, weighted_quantiles};
+use plyflow_sdk::{Host, Log, On, StepError};
+use plyflow_surface::{SHARP, bin_width, density, weighted_mean, weighted_quantiles};
 use serde_json::{Value, json};
 
 /// Columns of the table of defects: label, SI unit.
-const COLUMNS: [(&str, &str); 14] = [
+const COLUMNS: [(&str, &str); 15] = [
     ("defect", ""),
     ("on", ""),
     ("type", ""),
@@ -19,6 +19,7 @@ const COLUMNS: [(&str, &str); 14] = [
     ("length", "m"),
     ("amplitude", "m"),
     ("least radius", "m"),
+    ("turn over a cell", "rad"),
     ("area", "m2"),
     ("direction", "rad"),
     ("x", "m"),
@@ -259,6 +260,9 @@ impl<'a> Output<'a> {
             host.result(&format!("wrinkle_length.{name}"), length, "m")?;
             host.result(&format!("wrinkle_amplitude.{name}"), amplitude, "m")?;
             host.result(&format!("bridging_area.{name}"), area, "m2")?;
+            let sharpest = of(m, Kind::Wrinkle).fold(0.0, |s: f64, d| s.max(d.sharpness));
+            host.result(&format!("crest_sharpness.{name}"), sharpest, "rad")?;
+            tell_sharpest(host, m);
             for (k, d) in m.defects.iter().enumerate() {
                 rows.push(row(name, k + 1, d));
                 list.push(entry(m, k + 1, d));
@@ -330,6 +334,34 @@ fn length(d: &Defect) -> Option<f64> {
     (d.kind == Kind::Wrinkle).then_some(d.length)
 }
 
+/// Absent for what has no crest.
+fn sharpness(d: &Defect) -> Option<f64> {
+    (d.kind == Kind::Wrinkle).then_some(d.sharpness)
+}
+
+/// Crests turn by no more than this (rad) over a cell whose radius is told within some per cent (`docs/decisions/0021`).
+const TOLD: f64 = 0.25;
+
+/// Says whose radius the mesh does not tell, and which would. On a scan, whose numbers are all that is known of it, that is a warning.
+fn tell_sharpest(host: &Host, m: &Measured) {
+    let sharp = |d: &&Defect| d.sharpness > SHARP;
+    let of_all = of(m, Kind::Wrinkle).filter(sharp);
+    let Some(sharpest) = of_all.max_by(|a, b| a.sharpness.total_cmp(&b.sharpness)) else {
+        return;
+    };
+    let count = of(m, Kind::Wrinkle).filter(sharp).count();
+    let numbered = m.defects.iter().position(|d| std::ptr::eq(d, sharpest));
+    let text = format!(
+        "{}: {count} of the wrinkles have crests as sharp as the mesh: that of wrinkle {} turns by {:.0} deg over one cell, so its radius and curvature \
+         are not told by more than a third. Cells of {:.2} of their size there would do",
+        m.ply.name,
+        numbered.map_or(0, |k| k + 1),
+        sharpest.sharpness.to_degrees(),
+        TOLD / sharpest.sharpness
+    );
+    host.log(if m.simulated { Log::Info } else { Log::Warn }, &text);
+}
+
 fn row(name: &str, number: usize, d: &Defect) -> Value {
     let shear = |get: fn(&RidgeShear) -> f64| d.ridge_shear.as_ref().map(get);
     json!([
@@ -340,6 +372,7 @@ fn row(name: &str, number: usize, d: &Defect) -> Value {
         length(d),
         d.amplitude,
         d.radius(),
+        sharpness(d),
         d.area,
         d.ridge_direction(),
         d.centre[0],
@@ -354,7 +387,7 @@ fn entry(m: &Measured, number: usize, d: &Defect) -> Value {
     let shear = d.ridge_shear.as_ref();
     json!({
         "on": m.ply.name, "number": number, "type": d.kind.name(), "cause": d.cause, "length": length(d),
-        "amplitude": d.amplitude, "radius": d.radius(), "area": d.area, "direction": d.ridge_direction(),
+        "amplitude": d.amplitude, "radius": d.radius(), "crest_sharpness": sharpness(d), "area": d.area, "direction": d.ridge_direction(),
         "centre": d.centre, "shear": d.shear, "ridge_shear": shear.map(|s| s.mean), "ridge_shear_min": shear.map(|s| s.min),
         "ridge_shear_max": shear.map(|s| s.max), "ridge_shear_profile": shear.map(|s| &s.profile), "ridge": d.ridge,
     })

@@ -36,7 +36,7 @@ const FLAT: f64 = 0.05;
 
 /// Height over the threshold at a place of the undeformed ply.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
+pub(crate) struct Sample {
     place: Vec3,
     /// (m).
     height: f64,
@@ -45,8 +45,12 @@ struct Sample {
 }
 
 impl Sample {
+    pub(crate) fn height(&self) -> f64 {
+        self.height
+    }
+
     /// Half way to another, on the cubic that has both heights and slopes.
-    fn half_way(&self, to: &Self) -> Self {
+    pub(crate) fn half_way(&self, to: &Self) -> Self {
         let way = sub(to.place, self.place);
         let slope = scale(add(self.slope, to.slope), 0.5);
         let rise = to.height - self.height;
@@ -120,7 +124,7 @@ pub(crate) fn extents(
 }
 
 /// At a node, with the slope that fits its neighbours best.
-fn sample(ply: &Ply, node: usize, threshold: f64) -> Sample {
+pub(crate) fn sample(ply: &Ply, node: usize, threshold: f64) -> Sample {
     let place = ply.undeformed[node];
     let value = ply.distance[node].value;
     let (mut spread, mut rise) = (Matrix3::zeros(), Vector3::zeros());

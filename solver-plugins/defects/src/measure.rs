@@ -1,11 +1,11 @@
 //! Wrinkles and bridging of one formed ply.
 
-use crate::area::{Extent, NONE, extents};
+use crate::area::{Extent, NONE, extents, sample};
 use crate::cause::Cause;
 use plyflow_surface::vector::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{
     Crests, Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances,
-    ridge_line,
+    ridge_line, sharpness,
 };
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -201,6 +201,9 @@ pub struct Defect {
     pub centre: [f64; 2],
     /// Largest magnitude of the principal curvatures (1/m).
     pub curvature_max: f64,
+    /// Wrinkles: largest turn (rad) of the ply over the crest from one cell to the next; above [`plyflow_surface::SHARP`] the mesh does not tell how
+    /// sharp it is.
+    pub sharpness: f64,
     /// Wrinkles: direction of the ridge in the undeformed plane, from x, in (-pi/2, pi/2] (rad).
     pub direction: f64,
     /// Smallest and largest shear angle of the cells it touches (rad).
@@ -234,7 +237,7 @@ impl Defect {
 /// beyond the tool's own there by more than `crest_hold` of the curvature threshold, at one of them at least by more than all of it (thresholds with
 /// hysteresis, Canny 1986: a crest whose curvature wavers about one threshold would fall to pieces), with single nodes between
 /// two such pieces where the ply is convex as well; its length is that of its ridge. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
-/// curvature reaches: pi sqrt(amplitude / (2 curvature)) along the surface. What else stands off the tool
+/// curvature reaches along the surface, however steep it is. What else stands off the tool
 /// is bridging.
 pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     let n = ply.topology.nodes();
@@ -273,7 +276,7 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     let mut set = vec![NONE; n];
     let mut nearest = vec![f64::INFINITY; n];
     for (w, (nodes, _)) in wrinkles.iter().enumerate() {
-        let reach = PI * (amplitude(ply, nodes) / (2.0 * curvature(&crested, nodes))).sqrt();
+        let reach = flank(highest_node(ply, nodes), curvature(&crested, nodes));
         let lengths = ply.topology.path_lengths(&ply.formed, nodes, &off, reach);
         for i in 0..n {
             if lengths[i] < nearest[i] {
@@ -296,6 +299,7 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
         let nodes = (0..n as u32).filter(|&i| set[i as usize] == w).collect();
         let mut defect = describe(ply, Kind::Wrinkle, nodes, &extents[w]);
         defect.length = ridge.length;
+        defect.sharpness = sharpness(&ply.topology, &ply.formed, &ridge.nodes);
         defect.direction = direction(ply, &ridge.nodes);
         defect.ridge_shear = ridge_shear(ply, &ridge);
         (defect.ridge, defect.ridge_nodes) = (ridge.points, ridge.nodes);
@@ -363,11 +367,46 @@ pub(crate) fn mean_along(ply: &Ply, field: &[f64], nodes: &[u32]) -> Option<f64>
     (!nodes.is_empty()).then(|| sum / nodes.len() as f64)
 }
 
-fn amplitude(ply: &Ply, nodes: &[u32]) -> f64 {
+fn highest_node(ply: &Ply, nodes: &[u32]) -> f64 {
     nodes
         .iter()
         .map(|&i| ply.distance[i as usize].value)
         .fold(0.0, f64::max)
+}
+
+/// Largest distance from the tool (m), also between nodes: half way between two it is that of the cubic with both their distances and slopes.
+fn amplitude(ply: &Ply, nodes: &[u32]) -> f64 {
+    let highest = highest_node(ply, nodes);
+    // The top lies beside a node not far below it.
+    let near = nodes.iter().map(|&i| i as usize);
+    let near = near.filter(|&i| ply.distance[i].value > NEARLY * highest);
+    let between = near.flat_map(|i| {
+        let own = sample(ply, i, 0.0);
+        let next = ply.topology.ring(i).iter().map(|&n| n as usize);
+        let next = next.filter(|&n| ply.distance[n].judged);
+        next.map(move |n| own.half_way(&sample(ply, n, 0.0)).height())
+    });
+    between.fold(highest, f64::max)
+}
+
+/// A node higher than this part of the highest may have the top of a defect beside it.
+const NEARLY: f64 = 0.8;
+
+/// Points at which the length of a flank is summed.
+const FLANK: usize = 64;
+
+/// Length (m) along the surface from the crest to the trough of a sinusoid with this height from trough to crest (m) and this curvature on its crest (1/m).
+fn flank(height: f64, curvature: f64) -> f64 {
+    if curvature <= 0.0 || height <= 0.0 {
+        return 0.0;
+    }
+    let number = (2.0 * curvature / height).sqrt();
+    let steepest = 0.5 * height * number;
+    let at = |i: usize| {
+        let slope = steepest * (PI * (i as f64 + 0.5) / FLANK as f64).sin();
+        (1.0 + slope * slope).sqrt()
+    };
+    (0..FLANK).map(at).sum::<f64>() * PI / (FLANK as f64 * number)
 }
 
 fn curvature(of: &[Curvature], nodes: &[u32]) -> f64 {
@@ -404,6 +443,7 @@ fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, extent: &Extent) -> Defect {
         area: extent.area,
         centre: extent.centre(),
         curvature_max: curvature(&ply.curvature, &nodes),
+        sharpness: 0.0,
         direction: 0.0,
         shear,
         nodes,

@@ -40,7 +40,7 @@ fn resolve(value: &Value, d: &Declaration, at: &str) -> Result<Value, String> {
         }
         (Shape::Boolean, Value::Bool(_)) => Ok(value.clone()),
         (Shape::Choice(values), Value::String(s)) if values.contains(s) => Ok(value.clone()),
-        (Shape::List(of), Value::Array(items)) => {
+        (Shape::List(of, _), Value::Array(items)) => {
             let all = items
                 .iter()
                 .enumerate()

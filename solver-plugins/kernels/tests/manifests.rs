@@ -56,3 +56,78 @@ fn defaults_of_the_manifest_are_those_of_the_code() {
         assert_eq!(p["hourglass_normal"]["default"], 0.01);
     }
 }
+
+/// The declaration of a list, by the names on the way to it.
+fn items(manifest: &str, path: &[&str]) -> plyflow_model::manifest::Items {
+    use plyflow_model::manifest::Shape;
+    let manifest = Manifest::parse(manifest).unwrap();
+    let mut fields = manifest.parameters;
+    for (k, name) in path.iter().enumerate() {
+        match fields.swap_remove(*name).unwrap().shape {
+            Shape::Object(inner) => fields = inner,
+            Shape::List(_, items) if k == path.len() - 1 => return items,
+            other => panic!("{path:?}: {other:?}"),
+        }
+    }
+    panic!("{path:?}")
+}
+
+#[test]
+fn a_table_that_the_manifest_takes_is_not_too_long_for_the_material() {
+    // Whatever else is wrong with so short a curve.
+    let not_by_number =
+        |refused: Option<String>| refused.is_none_or(|e| !e.contains("points; expected"));
+    let column = |n: usize, step: f64| -> Vec<f64> { (0..n).map(|i| step * i as f64).collect() };
+    let marlow = |n| {
+        let table = serde_json::json!({"thickness": 5e-5, "areal_mass": 0.05, "uniaxial": {"strains": column(n, 0.01), "stresses": column(n, 1e5)}});
+        not_by_number(Marlow::create(&table.to_string()).err())
+    };
+    let shear = |n| {
+        let table = serde_json::json!({
+            "fibre_modulus": 1e9, "thickness": 1e-3, "areal_mass": 0.1,
+            "shear": {"table": {"angles": column(n, 0.01), "forces": column(n, 1.0)}},
+        });
+        not_by_number(Fabric::create(&table.to_string()).err())
+    };
+    let bending = |n| {
+        let table = serde_json::json!({
+            "fibre_modulus": 1e9, "thickness": 1e-3, "areal_mass": 0.1,
+            "shear": {"coefficients": [0.0, 100.0]},
+            "bending": {"positive": {"table": {"curvatures": column(n, 1.0), "moments": column(n, 1e-4)}}},
+        });
+        not_by_number(Fabric::create(&table.to_string()).err())
+    };
+    type Limit<'a> = (&'a str, &'a [&'a [&'a str]], &'a dyn Fn(usize) -> bool);
+    let all: [Limit<'_>; 3] = [
+        (
+            Marlow::MANIFEST,
+            &[&["uniaxial", "strains"], &["uniaxial", "stresses"]],
+            &marlow,
+        ),
+        (
+            Fabric::MANIFEST,
+            &[&["shear", "table", "angles"], &["shear", "table", "forces"]],
+            &shear,
+        ),
+        (
+            Fabric::MANIFEST,
+            &[
+                &["bending", "positive", "table", "curvatures"],
+                &["bending", "positive", "table", "moments"],
+            ],
+            &bending,
+        ),
+    ];
+    for (manifest, paths, takes) in all {
+        for path in paths {
+            let items = items(manifest, path);
+            for n in [2, 31, 32, 33, 41, 63, 64, 65] {
+                assert_eq!(
+                    items.broken_by_count(n).is_none(),
+                    takes(n),
+                    "{path:?} of {n}"
+                );
+            }
+        }
+    }
+}

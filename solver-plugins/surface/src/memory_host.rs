@@ -248,7 +248,9 @@ fn si(value: &Value, shape: &Shape) -> Value {
         (Shape::Quantity(dimension, _), Value::String(text)) => {
             json!(parse_quantity(text, *dimension).unwrap_or_else(|e| panic!("{e}")))
         }
-        (Shape::List(of), Value::Array(items)) => items.iter().map(|v| si(v, &of.shape)).collect(),
+        (Shape::List(of, _), Value::Array(items)) => {
+            items.iter().map(|v| si(v, &of.shape)).collect()
+        }
         _ => value.clone(),
     }
 }

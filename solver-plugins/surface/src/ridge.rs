@@ -2,7 +2,7 @@
 
 use crate::curvature::Curvature;
 use crate::topology::Topology;
-use crate::vector::{Vec3, add, distance, dot, norm, scale, sub, unit};
+use crate::vector::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 use petgraph::algo::astar;
 use petgraph::graphmap::UnGraphMap;
 
@@ -54,6 +54,9 @@ pub fn ridge_line(
         let sides = add(crests[i - 1], crests[i + 1]);
         line[i] = add(scale(crests[i], 0.5), scale(sides, 0.25));
     }
+    if sharpness(topology, points, &nodes) > SHARP {
+        line = without_steps(line);
+    }
     let (first, last) = (nodes[0], nodes[nodes.len() - 1]);
     let axis = curvature[first as usize].min_direction;
     // Out of the region, along the line and the ridge's own direction alike.
@@ -76,6 +79,51 @@ pub fn ridge_line(
         nodes,
         length,
     })
+}
+
+/// A crest that turns by more than this (rad) from one node to the next is sharper than the mesh shows: its nodes lie beside it by parts of a
+/// cell, and where it is curved most cannot be told between them.
+pub const SHARP: f64 = 0.5;
+
+/// Largest turn (rad) of a surface from one cell to another at the same node, over the nodes along a crest: its curvature times the size of a cell, of crests sharper than the
+/// mesh as well, whose curvature is not told.
+pub fn sharpness(topology: &Topology, points: &[Vec3], nodes: &[u32]) -> f64 {
+    let normal = |&c: &u32| {
+        let p: Vec<Vec3> = (topology.cell(c as usize).iter())
+            .map(|&i| points[i as usize])
+            .collect();
+        match p.len() {
+            3 => unit(cross(sub(p[1], p[0]), sub(p[2], p[0]))),
+            _ => unit(cross(sub(p[2], p[0]), sub(p[3], p[1]))),
+        }
+    };
+    let turn = |&i: &u32| {
+        let all: Vec<Vec3> = topology.cells_of(i as usize).iter().map(normal).collect();
+        let pairs =
+            (all.iter().enumerate()).flat_map(|(k, a)| all[k + 1..].iter().map(move |b| (a, b)));
+        let least = pairs.map(|(a, b)| dot(*a, *b)).fold(1.0, f64::min);
+        least.max(-1.0).acos()
+    };
+    nodes.iter().map(turn).fold(0.0, f64::max)
+}
+
+/// Rounds of [`without_steps`], and how far a round goes to the middle of the neighbours and then back.
+const ROUNDS: usize = 4;
+const FORTH: f64 = 0.5;
+const BACK: f64 = -0.53;
+
+/// A line without steps from node to node, its bends as they are: smoothing that does not shrink (Taubin, SIGGRAPH 1995).
+fn without_steps(mut line: Vec<Vec3>) -> Vec<Vec3> {
+    for _ in 0..ROUNDS {
+        for part in [FORTH, BACK] {
+            let before = line.clone();
+            for i in 1..line.len().saturating_sub(1) {
+                let middle = scale(add(before[i - 1], before[i + 1]), 0.5);
+                line[i] = add(before[i], scale(sub(middle, before[i]), part));
+            }
+        }
+    }
+    line
 }
 
 /// Connected nodes around a crest.
@@ -147,6 +195,43 @@ impl Region<'_> {
         let start = self.strongest(self.nodes.iter().copied())?;
         let first = self.furthest(start);
         let last = self.furthest(first);
+        if first == last {
+            return Some(vec![start]);
+        }
+        let nodes = self.between(first, last)?;
+        if sharpness(self.topology, self.points, &nodes) <= SHARP {
+            return Some(nodes);
+        }
+        match [first, last].map(|end| self.top_of_rim(end)) {
+            ends if ends == [first, last] => Some(nodes),
+            [first, last] => self.between(first, last),
+        }
+    }
+
+    /// At the rim of the mesh, where only one side of it is known, a crest sharper than the mesh is not told by its curvature: from a node of the rim, up along it to
+    /// where the sheet stands off most.
+    fn top_of_rim(&self, end: u32) -> u32 {
+        let margin = |i: u32| self.margin.get(i as usize).copied().unwrap_or(0.0);
+        let mut at = end;
+        if !self.topology.is_free(end as usize) {
+            return end;
+        }
+        loop {
+            let beside = self.topology.edge_neighbours(at as usize).iter().copied();
+            let beside =
+                beside.filter(|&i| self.inside[i as usize] && self.topology.is_free(i as usize));
+            match beside.reduce(|a, b| if margin(b) > margin(a) { b } else { a }) {
+                Some(next) if margin(next) > margin(at) => at = next,
+                _ => return at,
+            }
+        }
+    }
+
+    /// The path between two nodes that is shortest where lengths count the more the less the ply is curved.
+    fn between(&self, first: u32, last: u32) -> Option<Vec<u32>> {
+        if first == last {
+            return Some(vec![first]);
+        }
         let mut graph = UnGraphMap::<u32, f64>::new();
         for &i in self.nodes {
             for &j in self.topology.ring(i as usize) {
@@ -155,9 +240,6 @@ impl Region<'_> {
                     graph.add_edge(i, j, norm(self.way(i, j)) / strength);
                 }
             }
-        }
-        if first == last {
-            return Some(vec![start]);
         }
         let path = astar(&graph, first, |i| i == last, |(_, _, cost)| *cost, |_| 0.0);
         path.map(|(_, nodes)| nodes)

@@ -62,6 +62,7 @@ pub fn catalog() -> Fake {
                  "x": {"type": "quantity", "dimension": "length", "required": true}, "y": {"type": "quantity", "dimension": "length", "default": "0 mm"}}}, "doc": "Points."},
               "elements": {"type": "map", "of": {"type": "element"}, "doc": "By sheet."},
               "table": {"type": "file", "doc": "A table."},
+              "curve": {"type": "list", "minimum_items": 2, "maximum_items": 4, "order": "increasing", "of": {"type": "quantity", "dimension": "angle"}, "doc": "A column."},
               "tables": {"type": "list", "of": {"type": "file"}, "doc": "Tables."}
             },
             "inputs": {"boundary": {"kind": "boundary", "required": false, "doc": "Driven edges."}},

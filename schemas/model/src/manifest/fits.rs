@@ -48,9 +48,10 @@ impl Shape {
             Shape::Choice(values) => met(value
                 .as_str()
                 .is_some_and(|v| values.iter().any(|w| w == v))),
-            Shape::List(of) => {
+            Shape::List(of, must) => {
                 let items = value.as_array().ok_or_else(|| self.expected())?;
-                items.iter().try_for_each(|item| of.shape.takes(item))
+                items.iter().try_for_each(|item| of.shape.takes(item))?;
+                must.broken_by_count(items.len()).map_or(Ok(()), Err)
             }
             Shape::Map(of) => {
                 let items = value.as_object().ok_or_else(|| self.expected())?;

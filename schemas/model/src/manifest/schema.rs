@@ -38,7 +38,15 @@ pub fn declaration(d: &Declaration) -> Value {
         Shape::String => json!({"type": "string"}),
         Shape::Choice(values) => json!({"enum": values}),
         Shape::Quantity(dimension, _) => quantity_schema(*dimension).to_value(),
-        Shape::List(of) => json!({"type": "array", "items": declaration(of)}),
+        Shape::List(of, items) => {
+            let mut list = json!({"type": "array", "items": declaration(of)});
+            for (key, count) in [("minItems", items.minimum), ("maxItems", items.maximum)] {
+                if let Some(count) = count {
+                    list[key] = json!(count);
+                }
+            }
+            list
+        }
         Shape::Map(of) => json!({"type": "object", "additionalProperties": declaration(of)}),
         Shape::Object(fields) => object(fields),
         Shape::Scene => json!({"type": ["string", "object"]}),

@@ -182,3 +182,39 @@ fn parameters_become_json_schema() {
         serde_json::json!(["a", "b"])
     );
 }
+
+#[test]
+fn lists_say_how_many_items_they_take_and_in_which_order() {
+    let parse = |list: &str| {
+        let text = format!(
+            r#"{{"name": "m", "version": "1", "kind": "material", "role": "material", "summary": "s", "parameters": {{"l": {list}}}}}"#
+        );
+        Manifest::parse(&text).map_err(|e| e.to_string())
+    };
+    let numbers = r#"{"type": "list", "minimum_items": 2, "maximum_items": 3, "order": "not-falling", "of": {"type": "number"}}"#;
+    let read = parse(numbers).unwrap();
+    let again = Manifest::parse(&serde_json::to_string(&read).unwrap()).unwrap();
+    assert_eq!(read, again);
+    let Shape::List(_, items) = &read.parameters["l"].shape else {
+        panic!("no list")
+    };
+    assert_eq!(items.broken_by_count(4).as_deref(), Some("2 to 3 items"));
+    assert_eq!(items.broken_by_count(3), None);
+    assert_eq!(items.broken_by_order(&[1.0, 1.0]), None);
+    assert_eq!(
+        items.broken_by_order(&[1.0, 2.0, 1.5]).unwrap().item,
+        Some(2)
+    );
+    for (from, to, says) in [
+        (
+            "\"maximum_items\": 3",
+            "\"maximum_items\": 1",
+            "no list has at least 2",
+        ),
+        ("\"number\"", "\"string\"", "`order` has no meaning"),
+        ("not-falling", "falling", "falling"),
+    ] {
+        let e = parse(&numbers.replace(from, to)).unwrap_err();
+        assert!(e.contains(says), "{e}");
+    }
+}

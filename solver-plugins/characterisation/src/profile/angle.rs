@@ -17,14 +17,14 @@ const CHORDS: usize = 16;
 /// Stations searched to each side for the foot of a point.
 const WINDOW: usize = 12;
 
-/// The curve for some unknowns, with its derivatives.
-struct Curve {
-    length: f64,
-    angle: Vec<f64>,
-    curvature: Vec<f64>,
-    place: Vec<[f64; 2]>,
+/// The curve for some unknowns, with its derivatives, at stations evenly over the arc.
+pub struct Curve {
+    pub length: f64,
+    pub angle: Vec<f64>,
+    pub curvature: Vec<f64>,
+    pub place: Vec<[f64; 2]>,
     /// `[term][station]`: derivative of the place with respect to an unknown.
-    change: Vec<Vec<[f64; 2]>>,
+    pub change: Vec<Vec<[f64; 2]>>,
 }
 
 /// `[term][station]`: derivative of angle and of curvature times length with respect to an unknown.
@@ -87,14 +87,23 @@ fn curve(grid: &Grid, basis: &Basis, unknowns: &[f64], length: f64) -> Curve {
 }
 
 /// Where a point's normal meets the curve.
-struct Foot {
+pub struct Foot {
     /// Arc length; before 0 and beyond the length on the straight continuations.
     arc: f64,
     /// Distance normal to the curve, signed (m).
-    distance: f64,
+    pub distance: f64,
     normal: [f64; 2],
     station: usize,
     weight: f64,
+}
+
+impl Foot {
+    /// What the distance to the curve falls by where its stations move so (m).
+    pub fn normal_part(&self, change: &[[f64; 2]]) -> f64 {
+        let [a, b] = [change[self.station], change[self.station + 1]];
+        let blend = |d: usize| (1.0 - self.weight) * a[d] + self.weight * b[d];
+        blend(0) * self.normal[0] + blend(1) * self.normal[1]
+    }
 }
 
 impl Curve {
@@ -213,10 +222,7 @@ pub fn fit(
     for _ in 0..ITERATIONS {
         let shape = curve(grid, &basis, &unknowns, length);
         let matrix = DMatrix::from_fn(now.len(), terms, |i, j| {
-            let f = &now[i];
-            let [a, b] = [shape.change[j][f.station], shape.change[j][f.station + 1]];
-            let blend = |d: usize| (1.0 - f.weight) * a[d] + f.weight * b[d];
-            blend(0) * f.normal[0] + blend(1) * f.normal[1]
+            now[i].normal_part(&shape.change[j])
         });
         let right: Vec<f64> = now.iter().map(|f| f.distance).collect();
         let solution = least_squares(&matrix, &right)?;
@@ -292,12 +298,12 @@ fn finish(
     }
 }
 
-fn squares(feet: &[Foot]) -> f64 {
+pub fn squares(feet: &[Foot]) -> f64 {
     feet.iter().map(|f| f.distance * f.distance).sum()
 }
 
 /// Feet of all points, and the arc at the last.
-fn misfit(curve: &Curve, profile: &Profile) -> (Vec<Foot>, f64) {
+pub fn misfit(curve: &Curve, profile: &Profile) -> (Vec<Foot>, f64) {
     let mut feet: Vec<Foot> = Vec::with_capacity(profile.x.len());
     for (x, y) in profile.x.iter().zip(&profile.deflection) {
         let near = feet.last().map_or(0, |f| f.station);

@@ -4,9 +4,11 @@
 mod angle;
 mod deflection;
 mod grid;
+mod hanging;
 
 use crate::linear::{Solution, bayes_criterion};
 use grid::Grid;
+pub use hanging::{Hanging, identify};
 use serde::Deserialize;
 
 /// Points of one measured profile, from the clamp outwards.

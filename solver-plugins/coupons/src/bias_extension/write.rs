@@ -153,7 +153,7 @@ impl Done<'_> {
             .filter(|(_, d)| **d <= 0.02)
             .map(|(g, _)| g);
         host.result("shear_gap_before_20mm", before.fold(0.0, f64::max), "rad")?;
-        let force = h.force.iter().copied().fold(0.0, f64::max);
+        let force = crate::reference::largest_between(&h.force);
         host.result("force_peak", force, "N")?;
         host.result(
             "shear_largest",
