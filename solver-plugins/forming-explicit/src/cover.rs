@@ -3,8 +3,8 @@
 //! A ply reaches out over the one below it, lies over a hole of it or beside it, or slides past its edge (plies of one outline whose
 //! fibres lie at different angles do): there it touches what comes next, at the distance of what is really between. How far plies slide
 //! nobody knows before. So any two sheets of a stack have a contact, with all of their nodes; where something lies between they are too
-//! far apart to touch, and nodes that are far from touching sleep. Along its rim a lower ply's nodes also hold the upper one: the cell of
-//! that with which it hangs over the rim may have no node near it. And the upper film's nodes lie on the plies, as these lie on its cells: a film
+//! far apart to touch, and nodes that are far from touching sleep. A lower ply's nodes also hold the upper one: the cell of that
+//! with which it hangs over the rim may have no node near it. And the upper film's nodes lie on the plies, as these lie on its cells: a film
 //! node that is pressed into a hollow between those of a ply would else go through it.
 
 use crate::assembly::{self, StackSheet};
