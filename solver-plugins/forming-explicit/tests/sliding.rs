@@ -29,9 +29,9 @@ impl Observer for Deepest {
     }
 }
 
-/// Forms the scene; on the way nothing is deeper in anything than the share `on_the_way` of the thinner one, at the end than a tenth, and all sheets
+/// Forms the scene; on the way nothing is deeper in anything than a quarter of the thinner one, at the end than a tenth, and all sheets
 /// lie over the bed. Gives how far (m) the nodes at the plies' corners have gone past each other.
-fn nothing_goes_through(p: &Parameters, on_the_way: f64) -> f64 {
+fn nothing_goes_through(p: &Parameters) -> f64 {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -46,7 +46,7 @@ fn nothing_goes_through(p: &Parameters, on_the_way: f64) -> f64 {
     });
     let end = depths(&forming);
     assert!(end.len() > 6, "{end:?}");
-    let on_the_way = seen.0.iter().map(|(time, d)| (*time, d, on_the_way));
+    let on_the_way = seen.0.iter().map(|(time, d)| (*time, d, 0.25));
     let at_the_end = end.iter().map(|d| (f64::INFINITY, d, 0.1));
     let too_deep: Vec<String> = on_the_way
         .chain(at_the_end)
@@ -97,41 +97,20 @@ fn hat(p: &mut Value) {
 #[test]
 fn equal_plies_at_other_angles_slide_on_each_other_and_go_through_nothing() {
     let size = [0.12, 0.1];
-    let past = nothing_goes_through(&stack(&[(size, 0.0), (size, -45.0)], hat), 0.25);
+    let past = nothing_goes_through(&stack(&[(size, 0.0), (size, -45.0)], hat));
     // Else it shows nothing: further than they are thick.
     assert!(past > 5e-4, "{past}");
-}
-
-#[test]
-fn three_unequal_plies_over_a_dome_go_through_nothing() {
-    let plies = [
-        ([0.12, 0.1], 0.0),
-        ([0.09, 0.12], 30.0),
-        ([0.11, 0.08], -45.0),
-    ];
-    // In so coarse a mesh over so small a dome spans of film snap (kinetic energy reaches a sixth of the internal): no less is claimed on the way than
-    // that nothing goes through.
-    nothing_goes_through(
-        &stack(&plies, |p| {
-            p["scene"]["tool"] =
-                json!({"hemisphere": {"radius": "0.03 m", "facet_size": "0.003 m"}});
-        }),
-        1.0,
-    );
 }
 
 #[test]
 fn three_equal_plies_over_a_spar_go_through_nothing() {
     let size = [0.11, 0.1];
     let plies = [(size, 0.0), (size, 45.0), (size, 20.0)];
-    nothing_goes_through(
-        &stack(&plies, |p| {
-            p["scene"]["tool"] = json!({"ramped_spar": {
+    nothing_goes_through(&stack(&plies, |p| {
+        p["scene"]["tool"] = json!({"ramped_spar": {
             "length": "0.2 m", "top_width": "0.05 m", "height": "0.025 m", "draft": "8 deg", "fillet": "0.01 m",
             "recess": "0.03 m", "ramp": "0.02 m", "depth": "0.003 m", "side_depth": "0.002 m", "facet_size": "0.006 m"}});
-        }),
-        0.25,
-    );
+    }));
 }
 
 #[test]
