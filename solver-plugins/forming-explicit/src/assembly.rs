@@ -1,10 +1,9 @@
 //! What global and local runs share: checking the stack, making components, stacking the contacts.
 
-use crate::cover::{Cover, beside, offset_over};
+use crate::cover::{self, Layer};
 use crate::elements;
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
-use crate::penetration;
 use crate::run::Body;
 use crate::symmetry::{self, Families, MirroredBody};
 use crate::tool::ToolSurfaces;
@@ -174,7 +173,8 @@ pub fn add_sheet_contact(
     let items = locate(model, index, nodes);
     let name = format!("{}/{}", stack[master].scene.name, stack[slave].scene.name);
     let settings = contact_settings(p);
-    let contact = SheetContact::new(name, side, offset, friction, &settings, items);
+    let mut contact = SheetContact::new(name, side, offset, friction, &settings, items);
+    contact.rim = cover::crooked_rim(model, index);
     model.sheet_contacts.push(contact);
 }
 
@@ -283,19 +283,43 @@ pub fn add_ply(
             1e3 * 0.5 * (x1 - x0).min(y1 - y0)
         ));
     }
+    let on = |n: &u32, k: usize| mesh.points[*n as usize][k].abs() < 1e-9;
+    let least_areal_mass = match p.scene.process {
+        Process::DoubleDiaphragm(_) => least_areal_masses(&mesh.cells, p.least_areal_mass, |e| {
+            !(0..2).any(|k| mirrors.planes.0[k] && e.iter().all(|n| on(n, k)))
+        }),
+        Process::Press(_) => vec![p.least_areal_mass; mesh.cells.len()],
+    };
     let spec = SheetSpec {
         name: name.clone(),
         nodes,
         layers: vec![1.0; mesh.cells.len()],
         pressed: vec![Pressed::No; mesh.cells.len()],
         patches,
-        least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
+        least_areal_mass,
         cells: mesh.cells,
         axis: axis(&sheet.scene),
         element,
         elsewhere,
     };
     Ok((spec, body))
+}
+
+/// Least areal masses (kg/m2) of a ply's cells between films: `least`, and so much more along its rim that the nodes there have about the mass of
+/// those inside. A contact is as stiff as its lighter node allows; at a rim, where the film leans over the edge, half or a quarter of a node's mass
+/// would have to bear more than others do. `ends`: whether the sheet ends at an edge that has one cell.
+pub fn least_areal_masses(
+    cells: &[[u32; 4]],
+    least: f64,
+    ends: impl Fn(&[u32; 2]) -> bool,
+) -> Vec<f64> {
+    let rim = cover::free_edges(cells.iter());
+    let rim: std::collections::HashSet<[u32; 2]> = rim.into_iter().filter(ends).collect();
+    let of_cell = |c: &[u32; 4]| {
+        let free = cover::edges(c).into_iter().filter(|e| rim.contains(e));
+        least * f64::from(1u32 << free.count().min(2))
+    };
+    cells.iter().map(of_cell).collect()
 }
 
 /// Direction of material axis e1 in the undeformed plane.
@@ -356,8 +380,6 @@ pub fn add_contacts(
 ) -> Result<(), String> {
     let friction = FrictionTable::new(scene)?;
     let top = placed.len() - 1;
-    let plies = (1..top).map(|k| (k, placed[k].index, &placed[k].slaves[..]));
-    let cover = Cover::new(model, &plies.collect::<Vec<_>>());
     let rigid = |name: String, surface, mu: FrictionLaw, offset: f64, nodes: &[u32]| {
         let items = nodes.iter().map(|n| RigidItem::new(*n)).collect();
         RigidContact::new(name, surface, offset, mu, &contact_settings(p), items)
@@ -378,28 +400,6 @@ pub fn add_contacts(
         model
             .rigid_contacts
             .push(rigid(name(part, 0), surface, mu, offset, nodes));
-    }
-    for k in 1..top {
-        // The chords of the film's elements cut through convex fillets; the plies' own nodes must stay outside the tool all
-        // the same. There they rub as the weakest of the surfaces below them does.
-        for (plies, nodes) in cover.groups((k, &placed[k].slaves), 1..k) {
-            let below: Vec<usize> = std::iter::once(0).chain(plies).collect();
-            let mut parts = vec!["tool"];
-            parts.extend(
-                below
-                    .iter()
-                    .chain([&k])
-                    .map(|i| stack[*i].scene.name.as_str()),
-            );
-            let mu = friction.through(model, &parts, &stack[k].scene.name)?;
-            let surface = tool.of(model, placed[k].index);
-            let between: Vec<&StackSheet> = below.iter().map(|i| &stack[*i]).collect();
-            let name = name("tool", k) + &beside(stack, 1..k, &below);
-            let contact = rigid(name, surface, mu, offset_over(&between, &stack[k]), &nodes);
-            model
-                .rigid_contacts
-                .push(contact.with_slack(penetration::slack_through(&between)));
-        }
     }
     let mut pair = |slave: usize, nodes: &[u32], master: usize, side: f64| -> Result<(), String> {
         let on = (master, placed[master].index);
@@ -423,19 +423,20 @@ pub fn add_contacts(
         pair(top - 1, slaves(top - 1), top, -1.0)?;
     }
     pair(top, slaves(top), 0, 1.0)?;
-    // Where plies that would lie between do not.
+    let sheets: Vec<Layer<'_>> = (placed.iter().enumerate())
+        .map(|(k, sheet)| (k, sheet.index, &sheet.slaves[..]))
+        .collect();
+    cover::add_contacts_past(model, stack, &sheets, &friction, p)?;
     for k in 1..top {
-        for below in (0..k - 1).rev() {
-            let ply = (below > 0).then_some(below);
-            let nodes = cover.past((k, slaves(k)), below + 1..k, ply);
-            if !nodes.is_empty() {
-                pair(k, &nodes, below, 1.0)?;
-            }
-        }
-        let nodes = cover.past((k, slaves(k)), k + 1..top, None);
-        if k + 1 < top && !nodes.is_empty() {
-            pair(k, &nodes, top, -1.0)?;
-        }
+        let surface = tool.of(model, placed[k].index);
+        let part = cover::RigidPart {
+            name: "tool",
+            surface,
+            above: false,
+            film: Some(0),
+            moves: false,
+        };
+        cover::add_rigid_contacts(model, stack, &part, sheets[k], 1..k, &friction, p)?;
     }
     for (k, ply) in placed.iter().enumerate().take(top).skip(1) {
         add_self_contact(model, stack, (k, ply.index), &ply.slaves, p)?;

@@ -1,202 +1,266 @@
-//! Where plies of different outlines lie on each other: which of them are between two others, node by node.
+//! What sheets of a stack touch besides their neighbours: past the edges of what lies between.
 //!
-//! In a stack of equal plies every sheet touches its neighbours alone. A ply that reaches out over the one below it, that lies over a hole
-//! of it or beside it touches what comes next, at the distance of what is really between.
+//! A ply reaches out over the one below it, lies over a hole of it or beside it, or slides past its edge (plies of one outline whose
+//! fibres lie at different angles do): there it touches what comes next, at the distance of what is really between. How far plies slide
+//! nobody knows before. So any two sheets of a stack have a contact, with all of their nodes; where something lies between they are too
+//! far apart to touch, and nodes that are far from touching sleep. A lower ply's nodes also hold the upper one: the cell of that
+//! with which it hangs over the rim may have no node near it. And the upper film's nodes lie on the plies, as these lie on its cells: a film
+//! node that is pressed into a hollow between those of a ply would else go through it.
 
-use crate::assembly::{Bins, StackSheet, inverse_bilinear};
+use crate::assembly::{self, StackSheet};
+use crate::friction::FrictionTable;
+use crate::parameters::Parameters;
+use crate::penetration;
+use plyflow_mechanics::contact::{
+    FrictionLaw, RigidContact, RigidItem, RigidSurface, SheetContact,
+};
+use plyflow_mechanics::mesh::area_vector;
 use plyflow_mechanics::model::Model;
-use plyflow_mechanics::vec3::V;
-use std::collections::{BTreeMap, HashMap};
+use plyflow_model::scene::SheetKind;
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
 
-/// How far (m) from another ply's edge a node may come to lie on its other side: more than plies slide on each other under vacuum.
-const SLIDES: f64 = 0.02;
-
-/// Where a node lies to a ply, in the undeformed plane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Lies {
-    /// On it, and it will not slide off.
-    On,
-    /// Near its edge, on either side.
-    Near,
-    /// Beside it.
-    Off,
-}
-
-/// Nodes of plies and where they lie to the other plies of their stack.
-#[derive(Debug, Default)]
-pub struct Cover {
-    /// By place in the stack of the nodes' ply and of the other one; none: the other one has all of these nodes on it, or beside it by less
-    /// than an element.
-    lies: BTreeMap<(usize, usize), Vec<Lies>>,
-}
-
-impl Cover {
-    /// Of plies: their places in the stack, their sheets in the model, and their nodes that may touch.
-    pub fn new(model: &Model, plies: &[(usize, usize, &[u32])]) -> Self {
-        let mut lies = BTreeMap::new();
-        for (other, sheet, _) in plies {
-            let plan = Plan::new(model, *sheet);
-            for (ply, _, nodes) in plies.iter().filter(|p| p.0 != *other) {
-                if let Some(found) = plan.of(model, nodes) {
-                    lies.insert((*ply, *other), found);
-                }
-            }
-        }
-        Self { lies }
-    }
-
-    fn at(&self, ply: usize, k: usize, other: usize) -> Lies {
-        self.lies.get(&(ply, other)).map_or(Lies::On, |l| l[k])
-    }
-
-    /// The nodes (of `nodes`, those of `ply`) that may touch the `other` ply though plies lie `between` the two in the stack: none of these
-    /// is surely there. Empty in a stack of equal plies.
-    pub fn past(
-        &self,
-        (ply, nodes): (usize, &[u32]),
-        between: impl Iterator<Item = usize> + Clone,
-        other: Option<usize>,
-    ) -> Vec<u32> {
-        let open = |k: &usize| {
-            let mut between = between.clone();
-            let free = between.all(|i| self.at(ply, *k, i) != Lies::On);
-            free && other.is_none_or(|o| self.at(ply, *k, o) != Lies::Off)
-        };
-        (0..nodes.len()).filter(open).map(|k| nodes[k]).collect()
-    }
-
-    /// The nodes of `ply` grouped by which of the plies `among` are surely there; those with all of them first.
-    pub fn groups(
-        &self,
-        (ply, nodes): (usize, &[u32]),
-        among: impl Iterator<Item = usize> + Clone,
-    ) -> Vec<(Vec<usize>, Vec<u32>)> {
-        let mut groups: BTreeMap<Vec<usize>, Vec<u32>> = BTreeMap::new();
-        for (k, node) in nodes.iter().enumerate() {
-            let there = among.clone().filter(|i| self.at(ply, k, *i) == Lies::On);
-            groups.entry(there.collect()).or_default().push(*node);
-        }
-        let mut groups: Vec<_> = groups.into_iter().collect();
-        groups.sort_by_key(|g| std::cmp::Reverse(g.0.len()));
-        groups
-    }
-}
+/// A sheet of a stack: its place in that, its sheet's number in the model, its nodes that may be slaves.
+pub type Layer<'a> = (usize, usize, &'a [u32]);
 
 /// Distance (m) of a sheet's mid-plane from what is under (or over) all the sheets `between`.
-pub fn offset_over(between: &[&StackSheet], sheet: &StackSheet) -> f64 {
+fn offset_over(between: &[&StackSheet], sheet: &StackSheet) -> f64 {
     // Summed from the tool upwards, as the stack's own offsets are.
     let under = between.iter().fold(0.0, |sum, s| sum + s.thickness);
     under + 0.5 * sheet.thickness
 }
 
-/// What the name of a contact of a part of a ply's nodes ends with: which of the plies `among` are not surely between.
-pub fn beside(
+/// What the name of a contact ends with that holds a ply where plies (their places in the stack) do not lie between.
+fn beside(stack: &[StackSheet], plies: impl Iterator<Item = usize>) -> String {
+    let missing: Vec<&str> = plies.map(|i| stack[i].scene.name.as_str()).collect();
+    // Also a part of the path of its energies in the artifact.
+    format!("/beside_{}", missing.join("_"))
+}
+
+/// The edges of a cell, around it.
+pub fn edges(c: &[u32; 4]) -> [[u32; 2]; 4] {
+    [0, 1, 2, 3].map(|k| [c[k], c[(k + 1) % 4]])
+}
+
+/// Edges that belong to one cell alone.
+pub fn free_edges<'a>(cells: impl Iterator<Item = &'a [u32; 4]> + Clone) -> Vec<[u32; 2]> {
+    let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
+    let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
+    for edge in cells.clone().flat_map(edges) {
+        *sides.entry(sorted(edge)).or_default() += 1;
+    }
+    (cells.flat_map(edges))
+        .filter(|e| sides[&sorted(*e)] == 1)
+        .collect()
+}
+
+/// Edges (model nodes) that bound a sheet of a model that is still flat. At a mirror plane a sheet does not end.
+fn rim(model: &Model, sheet: usize) -> Vec<[u32; 2]> {
+    let (from, to) = model.sheets[sheet].cell_range;
+    let planes = model.planes().0;
+    let on = |n: &u32, k: usize| model.x[*n as usize][k].abs() < 1e-9;
+    let ends = |e: &[u32; 2]| !(0..2).any(|k| planes[k] && e.iter().all(|n| on(n, k)));
+    let mut edges = free_edges(model.cells[from..to].iter());
+    edges.retain(ends);
+    edges
+}
+
+/// The cells along the rim of a sheet of a model that is still flat; none where its rim is convex.
+pub fn crooked_rim(model: &Model, sheet: usize) -> Vec<u32> {
+    let edges = rim(model, sheet);
+    let (from, to) = model.sheets[sheet].cell_range;
+    let x = |n: u32| model.x[n as usize];
+    let area = |c: &[u32; 4]| area_vector(c.map(x))[2].abs();
+    let areas = model.cells[from..to].iter().map(area);
+    let (whole, largest) = areas.fold((0.0, 0.0f64), |(w, l), a| (w + a, l.max(a)));
+    let nodes = edges.iter().flatten().map(|n| [x(*n)[0], x(*n)[1]]);
+    // Meshed curves are convex but for some hundredths of a cell.
+    if hull_area(nodes.collect()) - whole < 0.5 * largest {
+        return Vec::new();
+    }
+    let mut ends: Vec<u32> = edges.into_flattened();
+    ends.sort_unstable();
+    let at_rim = |c: &u32| {
+        let corners = model.cells[*c as usize];
+        corners.iter().any(|n| ends.binary_search(n).is_ok())
+    };
+    (from as u32..to as u32).filter(at_rim).collect()
+}
+
+/// Area (m2) of the convex hull of points in a plane (Andrew's monotone chain, 1979).
+fn hull_area(mut points: Vec<[f64; 2]>) -> f64 {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let turn = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
+    let chain = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+        let mut hull: Vec<[f64; 2]> = Vec::new();
+        for p in points {
+            while hull.len() > 1 && turn(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0.0 {
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        hull.pop();
+        hull
+    };
+    let mut hull = chain(&mut points.iter().copied());
+    hull.extend(chain(&mut points.iter().rev().copied()));
+    let of_edge = |k: usize| {
+        let (a, b) = (hull[k], hull[(k + 1) % hull.len()]);
+        0.5 * (a[0] * b[1] - a[1] * b[0])
+    };
+    (0..hull.len()).map(of_edge).sum()
+}
+
+/// Adds the contacts of plies with all sheets that are not their neighbours in the stack, and of the nodes of lower plies with the plies
+/// above them and of the upper film's with all plies. `sheets`: of the whole stack, from the tool upwards, of a model that is still
+/// flat.
+///
+/// # Errors
+/// When a friction coefficient is missing or makes no sense.
+pub fn add_contacts_past(
+    model: &mut Model,
     stack: &[StackSheet],
-    among: impl Iterator<Item = usize>,
-    between: &[usize],
-) -> String {
-    let missing: Vec<&str> = among
-        .filter(|i| !between.contains(i))
-        .map(|i| stack[i].scene.name.as_str())
-        .collect();
-    match missing.is_empty() {
-        true => String::new(),
-        // Also a part of the path of its energies in the artifact.
-        false => format!("/beside_{}", missing.join("_")),
-    }
-}
-
-/// A sheet in the undeformed plane.
-struct Plan {
-    corners: Vec<[V; 4]>,
-    bins: Bins,
-    /// Ends of the edges that bound it.
-    rim: Vec<[V; 2]>,
-    /// Side (m) of a cell.
-    size: f64,
-    planes: [bool; 2],
-}
-
-impl Plan {
-    fn new(model: &Model, sheet: usize) -> Self {
-        let (from, to) = model.sheets[sheet].cell_range;
-        let cells = &model.cells[from..to];
-        let planes = model.planes().0;
-        let x = |n: u32| model.x[n as usize];
-        let corners: Vec<[V; 4]> = cells.iter().map(|c| c.map(x)).collect();
-        let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
-        let edges = |c: &[u32; 4]| [0, 1, 2, 3].map(|k| [c[k], c[(k + 1) % 4]]);
-        let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-        for edge in cells.iter().flat_map(edges) {
-            *sides.entry(sorted(edge)).or_default() += 1;
+    sheets: &[Layer<'_>],
+    friction: &FrictionTable<'_>,
+    p: &Parameters,
+) -> Result<(), String> {
+    let is_ply = |k: usize| stack[k].scene.kind == SheetKind::Ply;
+    let law =
+        |model: &Model, from: usize, to: usize, slave: usize| -> Result<FrictionLaw, String> {
+            let chain: Vec<&str> = (from..=to).map(|k| stack[k].scene.name.as_str()).collect();
+            friction.past(model, &chain, &stack[slave].scene.name)
+        };
+    let add = |model: &mut Model,
+               slave: Layer<'_>,
+               master: Layer<'_>,
+               side: f64,
+               kind: Kind|
+     -> Result<(), String> {
+        let (from, to) = (slave.0.min(master.0), slave.0.max(master.0));
+        let mu = law(model, from, to, slave.0)?;
+        let on = (master.0, master.1);
+        assembly::add_sheet_contact(model, stack, (slave.0, slave.2), on, side, mu, p);
+        let contact = model.sheet_contacts.last_mut().expect("just added");
+        // What lies between holds them apart but at its edges, where all may touch for a moment.
+        if to - from > 1 {
+            (contact.share, contact.counted) = (0.5, 0.0);
         }
-        // At a mirror plane a sheet does not end.
-        let ends = |e: &[V; 2]| !(0..2).any(|k| planes[k] && e.iter().all(|p| p[k].abs() < 1e-9));
-        let rim = (cells.iter().flat_map(edges))
-            .filter(|e| sides[&sorted(*e)] == 1)
-            .map(|e| e.map(x))
-            .filter(ends)
+        if let Kind::Also = kind {
+            contact.share = 0.5;
+            contact.offset -= SLACK * stack[slave.0].thickness.min(stack[master.0].thickness);
+        }
+        Ok(())
+    };
+    for (upper, sheet) in sheets.iter().enumerate() {
+        for (lower, below) in sheets.iter().enumerate().take(upper) {
+            let apart = upper - lower > 1;
+            match (is_ply(lower), is_ply(upper)) {
+                (_, true) if apart => add(model, *sheet, *below, 1.0, Kind::Alone)?,
+                (true, false) if apart => add(model, *below, *sheet, -1.0, Kind::Alone)?,
+                _ => {}
+            }
+            if is_ply(lower) && !is_ply(upper) {
+                add(model, *sheet, *below, 1.0, Kind::Also)?;
+            }
+            if is_ply(lower) && is_ply(upper) {
+                add(model, *below, *sheet, -1.0, Kind::Also)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A contact of two sheets.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// The only one of the two.
+    Alone,
+    /// The other sheet's nodes hold this one as well.
+    Also,
+}
+
+/// How much nearer than others nodes come before they hold a sheet whose own nodes hold them as well, over the thickness of the thinner
+/// sheet: where the others do, these alone do.
+const SLACK: f64 = 0.02;
+
+/// A rigid part as the sheets of a stack meet it.
+pub struct RigidPart {
+    /// Its name.
+    pub name: &'static str,
+    /// Its surface.
+    pub surface: Arc<dyn RigidSurface>,
+    /// Whether it lies above the stack.
+    pub above: bool,
+    /// Place in the stack of the film that lies between it and all plies everywhere.
+    pub film: Option<usize>,
+    /// Whether it moves.
+    pub moves: bool,
+}
+
+/// Adds the contacts of a ply with a rigid part: of what faces the part it rubs on it; elsewhere its nodes stay outside of the part where the chords
+/// of other sheets' elements cut through its fillets. `among`: the plies between the two. Nodes that lie on all of these are held at the
+/// distance of their thicknesses; all nodes, at that of what lies there in any case. To be called when the contacts of the plies with each other
+/// are there.
+///
+/// # Errors
+/// When a friction coefficient is missing or makes no sense.
+pub fn add_rigid_contacts(
+    model: &mut Model,
+    stack: &[StackSheet],
+    part: &RigidPart,
+    (ply, _, nodes): Layer<'_>,
+    among: Range<usize>,
+    friction: &FrictionTable<'_>,
+    p: &Parameters,
+) -> Result<(), String> {
+    let own = stack[ply].scene.name.as_str();
+    let of = |k: &usize| stack[*k].scene.name.as_str();
+    let make = |model: &Model, between: &[usize], name: String| -> Result<RigidContact, String> {
+        let mut chain: Vec<&str> = std::iter::once(part.name)
+            .chain(between.iter().map(of))
+            .chain([own])
             .collect();
-        let area = |c: &[V; 4]| {
-            let d = |a: usize, b: usize| [0, 1].map(|k| c[b][k] - c[a][k]);
-            let ([ax, ay], [bx, by]) = (d(0, 2), d(1, 3));
-            0.5 * (ax * by - ay * bx).abs()
-        };
-        let whole: f64 = corners.iter().map(area).sum();
-        Self {
-            bins: Bins::of_cells(&corners),
-            rim,
-            size: (whole / corners.len().max(1) as f64).sqrt(),
-            corners,
-            planes,
+        let between: Vec<&StackSheet> = between.iter().map(|k| &stack[*k]).collect();
+        if part.above {
+            chain.reverse();
         }
+        let mut contact = RigidContact::new(
+            name,
+            part.surface.clone(),
+            offset_over(&between, &stack[ply]),
+            friction.through(model, &chain, own)?,
+            &assembly::contact_settings(p),
+            nodes.iter().map(|n| RigidItem::new(*n)).collect(),
+        )
+        .with_slack(penetration::slack_through(&between));
+        contact.moves = part.moves;
+        Ok(contact)
+    };
+    let film: Vec<usize> = part.film.into_iter().collect();
+    let mut all: Vec<usize> = film.iter().copied().chain(among.clone()).collect();
+    if part.above {
+        all.reverse();
     }
-
-    /// Where nodes lie; none where all of them are on it, or off by less than an element.
-    fn of(&self, model: &Model, nodes: &[u32]) -> Option<Vec<Lies>> {
-        // Of a mirrored model a ghost lies beyond the plane, where the sheet goes on as its image.
-        let place = |n: &u32| -> V {
-            let p = model.x[*n as usize];
-            [0, 1, 2].map(|k| {
-                if k < 2 && self.planes[k] {
-                    p[k].abs()
-                } else {
-                    p[k]
-                }
-            })
-        };
-        let places: Vec<V> = nodes.iter().map(place).collect();
-        let inside: Vec<bool> = places.iter().map(|p| self.has(*p)).collect();
-        let all = || places.iter().zip(&inside);
-        if all().all(|(p, inside)| *inside || self.to_rim(*p) < self.size) {
-            return None;
-        }
-        let lies = |(p, inside): (&V, &bool)| match (
-            self.to_rim(*p) < SLIDES.max(2.0 * self.size),
-            inside,
-        ) {
-            (true, _) => Lies::Near,
-            (false, true) => Lies::On,
-            (false, false) => Lies::Off,
-        };
-        Some(all().map(lies).collect())
+    let name = format!("{}/{own}", part.name);
+    let mut contact = make(model, &all, name.clone())?;
+    let side = if part.above { -1.0 } else { 1.0 };
+    for other in among.clone() {
+        let other = format!("{}/{own}", stack[other].scene.name);
+        let of_both =
+            |c: &SheetContact| c.name == other && c.side == side && c.items.len() == nodes.len();
+        let found = model.sheet_contacts.iter().position(of_both);
+        contact.through.extend(found);
     }
-
-    fn has(&self, p: V) -> bool {
-        self.bins.near(p).iter().any(|c| {
-            let xi = inverse_bilinear(self.corners[*c as usize], p);
-            xi.is_some_and(|xi| xi.iter().all(|x| x.abs() <= 1.0 + 1e-9))
-        })
+    debug_assert!(contact.through.len() == among.len());
+    model.rigid_contacts.push(contact);
+    if !among.is_empty() {
+        let name = name + &beside(stack, among);
+        let mut contact = make(model, &film, name)?;
+        (contact.share, contact.counted) = (0.5, 0.0);
+        model.rigid_contacts.push(contact);
     }
-
-    /// Distance (m) in the plane from its edge.
-    fn to_rim(&self, p: V) -> f64 {
-        let distance = |[a, b]: &[V; 2]| {
-            let (e, r) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
-            let along = (r[0] * e[0] + r[1] * e[1]) / (e[0] * e[0] + e[1] * e[1]).max(1e-300);
-            let t = along.clamp(0.0, 1.0);
-            (r[0] - t * e[0]).hypot(r[1] - t * e[1])
-        };
-        self.rim.iter().map(distance).fold(f64::INFINITY, f64::min)
-    }
+    Ok(())
 }

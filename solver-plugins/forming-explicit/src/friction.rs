@@ -17,6 +17,12 @@ struct Pair {
     class: &'static str,
 }
 
+impl Pair {
+    fn names(&self) -> [&str; 2] {
+        self.parts.each_ref().map(String::as_str)
+    }
+}
+
 /// The friction of a scene, checked against the surfaces that it has.
 pub struct FrictionTable<'a> {
     scene: &'a Scene,
@@ -58,30 +64,22 @@ fn pairs(scene: &Scene) -> Vec<Pair> {
     for two in sheets.windows(2) {
         found.push(pair(&two[0].name, &two[1].name, class(&two[0], &two[1])));
     }
-    // Where plies of other outlines do not lie between, sheets further apart in the stack touch.
-    let plies = || sheets.iter().filter(|s| s.kind == SheetKind::Ply);
-    let outline = |s: &Sheet| {
-        (
-            s.length,
-            s.width,
-            s.outline.clone(),
-            s.holes.clone(),
-            s.centre,
-        )
-    };
-    if plies().any(|s| plies().next().is_some_and(|f| outline(f) != outline(s))) {
-        for (i, lower) in sheets.iter().enumerate() {
-            for upper in sheets.iter().skip(i + 2) {
-                if class(lower, upper) != "diaphragm_diaphragm" {
-                    found.push(pair(&lower.name, &upper.name, class(lower, upper)));
-                }
+    // Past the edges of what lies between them any two sheets may touch: plies slide on each other.
+    for (i, lower) in sheets.iter().enumerate() {
+        for upper in sheets.iter().skip(i + 2) {
+            if class(lower, upper) != "diaphragm_diaphragm" {
+                found.push(pair(&lower.name, &upper.name, class(lower, upper)));
             }
         }
-        if let Process::Press(press) = &scene.process {
-            let holder = press.holder.as_ref().map(|_| "holder");
-            for part in ["tool", "die"].into_iter().chain(holder) {
-                found.extend(plies().map(|ply| pair(part, &ply.name, "tool_fabric")));
-            }
+    }
+    if let Process::Press(press) = &scene.process {
+        let holder = press.holder.as_ref().map(|_| "holder");
+        for part in ["tool", "die"].into_iter().chain(holder) {
+            let plies = sheets.iter().filter(|s| s.kind == SheetKind::Ply);
+            let new: Vec<Pair> = (plies.map(|ply| pair(part, &ply.name, "tool_fabric")))
+                .filter(|p| !found.iter().any(|f| same(&f.parts, p.names())))
+                .collect();
+            found.extend(new);
         }
     }
     // Beyond the plies the two films meet.
@@ -219,6 +217,27 @@ impl<'a> FrictionTable<'a> {
                 "friction.{class}: not given, but in this scene {} and {} touch; expected a coefficient",
                 touching.parts[0], touching.parts[1]
             )),
+        }
+    }
+
+    /// The law of two sheets that touch past the edges of those between them. Where the scene gives none for the two, that of the pair
+    /// of neighbours with the least coefficient, as in [`FrictionTable::through`]. `chain`: the names from the lower to the upper one.
+    ///
+    /// # Errors
+    /// When the scene does not give one of them.
+    pub fn past(&self, model: &Model, chain: &[&str], slave: &str) -> Result<FrictionLaw, String> {
+        let parts = [chain[0], chain[chain.len() - 1]];
+        let f = &self.scene.friction;
+        let named = f.pairs.iter().any(|p| same(&p.between, parts));
+        let class = match self.class(parts) {
+            "fabric_fabric" => f.fabric_fabric.is_some(),
+            "fabric_diaphragm" => f.fabric_diaphragm.is_some(),
+            _ => f.diaphragm_diaphragm.is_some(),
+        };
+        if named || class {
+            self.law(model, &Touching { parts, slave })
+        } else {
+            self.through(model, chain, slave)
         }
     }
 

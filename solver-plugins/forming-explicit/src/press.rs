@@ -4,16 +4,15 @@
 //! lowest ply, and pushes the plies through the opening of the die.
 
 use crate::assembly::{self, Components, StackSheet};
-use crate::cover::{self, Cover};
+use crate::cover::{self, Layer, RigidPart};
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
-use crate::penetration;
 use crate::process::Load;
 use crate::run::{Forming, RigidBody};
 use crate::symmetry;
 use crate::tool::ToolSurface;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
-use plyflow_mechanics::contact::{OpenPlate, RigidContact, RigidItem, RigidMotion, RigidSurface};
+use plyflow_mechanics::contact::{OpenPlate, RigidMotion, RigidSurface};
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
 use plyflow_mechanics::mirror::Mirrors;
 use plyflow_mechanics::model::Model;
@@ -264,7 +263,7 @@ fn rigid_parts(
 fn add_contacts(
     model: &mut Model,
     stack: &[StackSheet],
-    parts: &[(&str, Arc<dyn RigidSurface>, bool)],
+    parts: &[(&'static str, Arc<dyn RigidSurface>, bool)],
     scene: &Scene,
     p: &Parameters,
 ) -> Result<(), String> {
@@ -272,37 +271,6 @@ fn add_contacts(
     let friction = FrictionTable::new(scene)?;
     let all = stack.len();
     let nodes: Vec<Vec<u32>> = (0..all).map(|k| model.sheets[k].nodes.clone()).collect();
-    let plies = (0..all).map(|k| (k, k, &nodes[k][..]));
-    let covers = Cover::new(model, &plies.collect::<Vec<_>>());
-    for (part, surface, above) in parts {
-        for (k, sheet) in stack.iter().enumerate() {
-            // The ply that faces the part rubs on it; the others stay outside where its elements' chords cut through.
-            let own = sheet.scene.name.as_str();
-            let among = if *above { k + 1..all } else { 0..k };
-            for (between, nodes) in covers.groups((k, &nodes[k]), among.clone()) {
-                let names = between.iter().map(|i| stack[*i].scene.name.as_str());
-                let chain: Vec<&str> = if *above {
-                    std::iter::once(own).chain(names).chain([*part]).collect()
-                } else {
-                    std::iter::once(*part).chain(names).chain([own]).collect()
-                };
-                let mu = friction.through(model, &chain, own)?;
-                let beside = cover::beside(stack, among.clone(), &between);
-                let between: Vec<&StackSheet> = between.iter().map(|i| &stack[*i]).collect();
-                let mut contact = RigidContact::new(
-                    format!("{part}/{own}{beside}"),
-                    surface.clone(),
-                    cover::offset_over(&between, sheet),
-                    mu,
-                    &settings,
-                    nodes.iter().map(|n| RigidItem::new(*n)).collect(),
-                )
-                .with_slack(penetration::slack_through(&between));
-                contact.moves = *part != "die";
-                model.rigid_contacts.push(contact);
-            }
-        }
-    }
     let mut pair = |k: usize, nodes: &[u32], below: usize| -> Result<(), String> {
         let [lower, upper] = [below, k].map(|k| stack[k].scene.name.as_str());
         let touching = Touching {
@@ -316,13 +284,19 @@ fn add_contacts(
     for k in 1..all {
         pair(k, &nodes[k], k - 1)?;
     }
-    // Where plies that would lie between do not.
-    for k in 1..all {
-        for below in (0..k - 1).rev() {
-            let past = covers.past((k, &nodes[k]), below + 1..k, Some(below));
-            if !past.is_empty() {
-                pair(k, &past, below)?;
-            }
+    let plies: Vec<Layer<'_>> = (0..all).map(|k| (k, k, &nodes[k][..])).collect();
+    cover::add_contacts_past(model, stack, &plies, &friction, p)?;
+    for (name, surface, above) in parts {
+        let part = RigidPart {
+            name,
+            surface: surface.clone(),
+            above: *above,
+            film: None,
+            moves: *name != "die",
+        };
+        for (k, ply) in plies.iter().enumerate() {
+            let among = if *above { k + 1..all } else { 0..k };
+            cover::add_rigid_contacts(model, stack, &part, *ply, among, &friction, p)?;
         }
     }
     for k in 0..stack.len() {

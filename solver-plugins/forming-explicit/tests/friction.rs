@@ -127,7 +127,7 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
             vec!["'bed'", "tool, inner, outer, die, holder"],
         ),
         (
-            with(vec![pair(["tool", "outer"])]),
+            with(vec![pair(["tool", "holder"])]),
             vec!["do not rub", "tool and inner; outer and die"],
         ),
         (

@@ -5,6 +5,7 @@ mod common;
 use common::form;
 use common::scenes::{bag, press};
 use plyflow_forming_explicit::run::Forming;
+use plyflow_mechanics::contact::SheetContact;
 use serde_json::json;
 
 /// Mean height (m) of a body's nodes within a strip across x (m), near the middle of the width.
@@ -67,7 +68,7 @@ fn plies_that_overlap_in_part_lie_on_the_film_and_under_it_where_the_other_one_i
 }
 
 #[test]
-fn equal_plies_touch_their_neighbours_alone() {
+fn any_two_sheets_of_a_stack_have_a_contact_whatever_their_outlines() {
     let names = |p| -> Vec<String> {
         let model = plyflow_forming_explicit::build_global(&p, &common::BuiltIn)
             .unwrap()
@@ -77,62 +78,93 @@ fn equal_plies_touch_their_neighbours_alone() {
             .chain(model.sheet_contacts.iter().map(|c| c.name.clone()))
             .collect()
     };
-    let bag = names(bag(3, |_| {}));
-    assert!(
-        bag.contains(&"ply_2/ply_3".into()) && bag.contains(&"tool/ply_3".into()),
-        "{bag:?}"
-    );
-    let far = [
+    let gap = json!({"gap": "0.003 m"});
+    let small = |p: &mut serde_json::Value, k: usize| {
+        p["scene"]["sheets"][k]["width"] = json!("0.03 m");
+    };
+    let between = [
+        "ply_1/ply_2",
+        "ply_1/ply_3",
+        "ply_2/ply_3",
+        // From the other side.
+        "ply_2/ply_1",
+        "ply_3/ply_1",
+        "ply_3/ply_2",
+    ];
+    let in_bag = [
+        "lower/ply_1",
         "lower/ply_2",
         "lower/ply_3",
-        "ply_1/ply_3",
         "upper/ply_1",
         "upper/ply_2",
+        "upper/ply_3",
+        "ply_1/upper",
+        "ply_3/upper",
+        "lower/upper",
+        "tool/ply_3",
+        "tool/ply_3/beside_ply_1_ply_2",
     ];
-    for pair in far {
-        assert!(!bag.contains(&pair.into()), "{pair} in {bag:?}");
+    let in_press = [
+        "die/ply_1",
+        "die/ply_1/beside_ply_2_ply_3",
+        "tool/ply_3",
+        "tool/ply_3/beside_ply_1_ply_2",
+        "holder/ply_2/beside_ply_1",
+    ];
+    for unequal in [false, true] {
+        let bag = names(bag(3, |p| {
+            if unequal {
+                small(p, 2)
+            }
+        }));
+        let press = names(press(3, &gap, |p| {
+            if unequal {
+                small(p, 1)
+            }
+        }));
+        for (found, more) in [(&bag, &in_bag[..]), (&press, &in_press[..])] {
+            for pair in between.iter().chain(more) {
+                let count = found.iter().filter(|n| n == pair).count();
+                assert_eq!(count, 1, "{pair} in {found:?}");
+            }
+            // The artifact has arrays of these names.
+            let plain = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
+            assert!(found.iter().all(|n| n.chars().all(plain)), "{found:?}");
+        }
     }
-    assert!(bag.iter().all(|n| !n.contains("beside")), "{bag:?}");
-    let gap = json!({"gap": "0.003 m"});
-    let equal = names(press(3, &gap, |_| {}));
-    assert!(
-        equal
-            .iter()
-            .all(|n| n != "ply_1/ply_3" && !n.contains("beside")),
-        "{equal:?}"
-    );
-    // The middle one is a strip: the die reaches those beside it past it, and they each other.
-    let strip = names(press(3, &gap, |p| {
-        p["scene"]["sheets"][1]["width"] = json!("0.03 m")
-    }));
-    for pair in [
-        "ply_1/ply_3",
-        "die/ply_1/beside_ply_2",
-        "tool/ply_3/beside_ply_2",
-    ] {
-        assert!(strip.contains(&pair.into()), "{pair} in {strip:?}");
-    }
-    // The artifact has arrays of these names.
-    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
-    assert!(strip.iter().all(|n| n.chars().all(plain)), "{strip:?}");
 }
 
 #[test]
-fn friction_of_what_meets_past_a_ply_can_be_named() {
-    let pair = json!([{"between": ["lower", "ply_2"], "coefficient": 0.1}]);
-    let build = |p| plyflow_forming_explicit::build_global(&p, &common::BuiltIn);
-    let equal = build(bag(2, |p| p["scene"]["friction"]["pairs"] = pair.clone()));
-    assert!(equal.err().unwrap().contains("do not rub on each other"));
-    let model = build(bag(2, |p| {
-        staggered(p);
-        p["scene"]["friction"]["pairs"] = pair.clone();
-    }))
-    .map_err(|e| panic!("{e}"));
-    let contacts = model.unwrap().model.sheet_contacts;
-    let law = |name: &str| {
+fn friction_of_what_meets_past_a_ply_can_be_named_and_else_is_that_of_its_neighbours() {
+    let build = |p| {
+        plyflow_forming_explicit::build_global(&p, &common::BuiltIn)
+            .map_err(|e| panic!("{e}"))
+            .unwrap()
+            .model
+            .sheet_contacts
+    };
+    let law = |contacts: &[SheetContact], name: &str| {
         let found = contacts.iter().find(|c| c.name == name).unwrap();
         format!("{:?}", found.friction)
     };
-    assert_eq!(law("lower/ply_2"), "Constant(0.1)");
-    assert_eq!(law("lower/ply_1"), "Constant(0.4)");
+    let pair = json!([{"between": ["lower", "ply_2"], "coefficient": 0.1}]);
+    for unequal in [false, true] {
+        let contacts = build(bag(2, |p| {
+            if unequal {
+                staggered(p);
+            }
+            p["scene"]["friction"]["pairs"] = pair.clone();
+        }));
+        assert_eq!(law(&contacts, "lower/ply_2"), "Constant(0.1)");
+        assert_eq!(law(&contacts, "lower/ply_1"), "Constant(0.4)");
+    }
+    // A scene that gives its plies' friction pair by pair need not know of the first and the third.
+    let contacts = build(bag(3, |p| {
+        let pair = |a, b, mu| json!({"between": [a, b], "coefficient": mu});
+        let friction = &mut p["scene"]["friction"];
+        friction["pairs"] = json!([pair("ply_1", "ply_2", 0.2), pair("ply_3", "ply_2", 0.3)]);
+        friction.as_object_mut().unwrap().remove("fabric_fabric");
+    }));
+    assert_eq!(law(&contacts, "ply_1/ply_3"), "Constant(0.2)");
+    assert_eq!(law(&contacts, "ply_3/ply_2"), "Constant(0.3)");
 }

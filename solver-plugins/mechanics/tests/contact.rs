@@ -18,6 +18,7 @@ fn pace(dt: f64) -> Pace {
         dt,
         speed: 100.0,
         acceleration: 1e6,
+        growth: 1.0,
     }
 }
 
@@ -374,4 +375,59 @@ fn multipliers_grow_more_slowly_where_one_sheet_has_far_more_mass_in_a_node() {
     let expected = 2.0 * default.damping_ratio * default.stiffness_factor.sqrt() / 36.0 / 16.0;
     let got = augmentation(6e-3);
     assert!((got / expected - 1.0).abs() < 1e-9, "{got}, not {expected}");
+}
+
+/// A plate with a slot from its middle to its far rim, 4 mm wide, and a slave over its left arm.
+fn slotted() -> (QuadMesh, Vec<u32>) {
+    let axis = |n: u32| (0..=n).map(|k| 0.004 * f64::from(k)).collect::<Vec<_>>();
+    let mut mesh = QuadMesh::grid(&axis(5), &axis(6));
+    let centre = |c: &[u32; 4]| {
+        let sum = |k: usize| c.iter().map(|n| mesh.points[*n as usize][k]).sum::<f64>();
+        [0.25 * sum(0), 0.25 * sum(1)]
+    };
+    let in_slot = |c: &[u32; 4]| {
+        let [x, y] = centre(c);
+        (0.008..0.012).contains(&x) && y > 0.008
+    };
+    let cells: Vec<[u32; 4]> = mesh.cells.iter().copied().filter(|c| !in_slot(c)).collect();
+    mesh.cells = cells;
+    let rim = (0..mesh.cells.len() as u32).collect();
+    (mesh, rim)
+}
+
+#[test]
+fn a_slave_that_crosses_a_slot_is_held_by_what_is_beyond() {
+    let (mesh, rim) = slotted();
+    let neighbours = mesh.neighbours();
+    let mut x = mesh.points.clone();
+    let node = x.len() as u32;
+    x.push([0.006, 0.018, 2e-3]);
+    let normals = vec![[0.0, 0.0, 1.0]; x.len()];
+    let v = vec![[0.0; 3]; x.len()];
+    let held = |rim: &[u32]| {
+        let mut x = x.clone();
+        let mut c = contact(node, 0);
+        c.rim = rim.to_vec();
+        // Over the slot and down onto the right arm.
+        for k in 0..=400 {
+            let way = f64::from(k) / 400.0;
+            let height = if way < 0.7 {
+                2e-3
+            } else {
+                2e-3 - 1.8e-3 * (way - 0.7) / 0.3
+            };
+            x[node as usize] = [0.006 + 0.009 * way, 0.018, height];
+            let surface = Surface {
+                cells: &mesh.cells,
+                neighbours: &neighbours,
+                x: &x,
+                normals: &normals,
+            };
+            c.compute(&surface, &v, pace(1e-6));
+        }
+        c.items[0].penetration
+    };
+    assert!((held(&rim) - 2e-4).abs() < 1e-9, "{}", held(&rim));
+    // What it is for: the walk along the rim alone stays at the left arm.
+    assert_eq!(held(&[]), 0.0);
 }

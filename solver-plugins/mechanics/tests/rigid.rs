@@ -87,6 +87,7 @@ fn a_rising_floor_lifts_a_weight_and_does_its_work() {
         dt,
         speed: 100.0,
         acceleration: 1e6,
+        growth: 1.0,
     };
     let (mut external, mut lost, mut stored) = (0.0, 0.0, None);
     for i in 0..10_000 {
@@ -157,6 +158,7 @@ fn slide(costly: bool) -> (V, usize, usize) {
         dt,
         speed: 10.0,
         acceleration: 4.0 * gravity,
+        growth: 1.0,
     };
     let mut last = (x[0], 0, 0);
     for step in 0.. {
@@ -209,6 +211,7 @@ fn a_falling_weight_is_never_found_late() {
                 dt,
                 speed: 10.0,
                 acceleration: gravity,
+                growth: 1.0,
             };
             let mut steps = 0;
             while contact.items[0].normal_force == 0.0 {
@@ -240,6 +243,7 @@ fn slack_comes_before_the_force() {
         dt: 1e-6,
         speed: 100.0,
         acceleration: 1e6,
+        growth: 1.0,
     };
     let force = |height: f64| {
         let mut item = RigidItem::new(0);

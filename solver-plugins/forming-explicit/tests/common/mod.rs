@@ -1,6 +1,7 @@
 //! What the tests of whole runs share: components without a host, scenes, the run itself. No test uses all of it.
 #![allow(dead_code)]
 
+pub mod depth;
 pub mod scenes;
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};

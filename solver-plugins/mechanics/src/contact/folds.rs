@@ -188,6 +188,7 @@ impl SelfContact {
             friction,
             slip_factor: self.settings.slip_factor,
             augmentation: self.settings.augmentation,
+            growth: 1.0,
             clearing: false,
         };
         let (undeformed, near) = (&self.undeformed, self.near);
@@ -505,6 +506,7 @@ mod tests {
             dt: 1e-6,
             speed: 10.0,
             acceleration: f64::INFINITY,
+            growth: 1.0,
         };
         let law = Law {
             dt: 1e-6,
@@ -512,6 +514,7 @@ mod tests {
             friction: &Constant(0.0),
             slip_factor: 0.5,
             augmentation: 0.0,
+            growth: 1.0,
             clearing: false,
         };
         follow(&mut pair, &surface, &[[0.0; 3]; 7], &pace, &law, |_| true);

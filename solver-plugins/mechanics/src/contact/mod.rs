@@ -48,6 +48,8 @@ pub struct Pace {
     pub speed: f64,
     /// Bound of a relative acceleration (m/s2); infinite where there is none.
     pub acceleration: f64,
+    /// What presses sheets on each other now over what did in the last step: multipliers grow with it, and need not wait for penetrations.
+    pub growth: f64,
 }
 
 impl Pace {
@@ -193,6 +195,18 @@ pub(crate) fn normal_force(
         work,
         loss: -damper * vn * dt,
     }
+}
+
+/// The multiplier (N) and the work (J) put in by it of a contact whose load has grown by the factor `growth` since the last step: what presses
+/// steadily presses in proportion to its load. The spring's force grows by as much, so what is stored grows by what is put in.
+#[inline(always)]
+pub(crate) fn grown(held: f64, work: f64, growth: f64, stiffness: f64, gap: f64) -> (f64, f64) {
+    let more = held * (growth - 1.0);
+    let before = held - stiffness * gap;
+    if more == 0.0 || before <= 0.0 || before + more <= 0.0 {
+        return (held, work);
+    }
+    (held + more, work + (before + 0.5 * more) * more / stiffness)
 }
 
 /// Friction of a contact in a step.

@@ -1,6 +1,7 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
+use super::sheets::SheetContact;
 use super::{
     ContactEnergy, ContactSettings, Pace, TOGETHER, content, friction_force, normal_force, waking,
 };
@@ -154,8 +155,17 @@ pub struct RigidContact {
     pub slip_factor: f64,
     /// Share of the penalty force that a step adds to the multiplier.
     pub augmentation: f64,
+    /// Its stiffness over what the masses would allow.
+    pub share: f64,
+    /// As [`SheetContact::counted`].
+    pub counted: f64,
+    /// Of nodes that are held through other sheets: numbers of the contacts in [`crate::model::Model::sheet_contacts`] of these nodes, in
+    /// this order, with all sheets between. Where a node has slid past the edge of one, it is not held at this distance.
+    pub through: Vec<usize>,
     /// The nodes.
     pub items: Vec<RigidItem>,
+    /// By item.
+    between: Vec<Between>,
     /// By item: call of [`RigidContact::compute`] before which the node cannot reach the surface. Apart from the items,
     /// so that to pass over one that sleeps touches four bytes and not a cache line or two.
     wakes: Vec<u32>,
@@ -163,6 +173,17 @@ pub struct RigidContact {
     planes: Vec<TangentPlane>,
     spans: Vec<Span>,
     cycle: u64,
+}
+
+/// Whether the sheets between a node and a rigid surface lie there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+enum Between {
+    /// All of them do.
+    There,
+    /// They do again, but the node is still nearer than they are thick: a push would come all at once.
+    Coming,
+    /// Not all.
+    Gone,
 }
 
 /// The surface as a node saw it that touches or may at the next step: `gap = gradient . x - level`, x less the surface's
@@ -203,7 +224,11 @@ impl RigidContact {
             friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
+            share: 1.0,
+            counted: 1.0,
+            through: Vec::new(),
             items,
+            between: Vec::new(),
             wakes: Vec::new(),
             planes: Vec::new(),
             spans: Vec::new(),
@@ -216,6 +241,22 @@ impl RigidContact {
         self.offset -= slack;
         self.slack = slack;
         self
+    }
+
+    /// Takes note of which nodes lie on all sheets of [`RigidContact::through`].
+    pub(crate) fn look_between(&mut self, sheets: &[SheetContact]) {
+        if self.through.is_empty() {
+            return;
+        }
+        self.between.resize(self.items.len(), Between::There);
+        for (k, between) in self.between.iter_mut().enumerate() {
+            let lies_on = |c: &usize| sheets[*c].items[k].lies_on_its_cell();
+            *between = match (self.through.iter().all(lies_on), *between) {
+                (false, _) => Between::Gone,
+                (true, Between::Gone) => Between::Coming,
+                (true, as_it_was) => as_it_was,
+            };
+        }
     }
 
     /// Computes the force of every item from positions (m) and velocities (m/s). `pace`: of the nodes; the surface's own
@@ -275,6 +316,7 @@ impl RigidContact {
         self.wakes.resize(self.items.len(), 0);
         self.spans
             .resize_with(self.items.len().div_ceil(SPAN), Span::default);
+        self.between.resize(self.items.len(), Between::There);
         let costly = self.surface.is_costly();
         if costly {
             self.planes.resize(self.items.len(), TangentPlane::NONE);
@@ -282,17 +324,20 @@ impl RigidContact {
         let items = self.items.par_chunks_mut(SPAN);
         let spans = items
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
+            .zip_eq(self.between.par_chunks_mut(SPAN))
             .zip_eq(self.spans.par_iter_mut())
             .with_max_len(TOGETHER)
             .with_min_len(crate::team::least());
         if costly {
             let spans = spans.zip_eq(self.planes.par_chunks_mut(SPAN));
-            let look = |(((items, wakes), span), planes): (_, &mut [_])| {
-                looking.span(items, wakes, span, planes);
+            let look = |((((items, wakes), between), span), planes): (_, &mut [_])| {
+                looking.span(items, (wakes, between), span, planes);
             };
             spans.for_each(look);
         } else {
-            spans.for_each(|((items, wakes), span)| looking.span(items, wakes, span, &mut []));
+            spans.for_each(|(((items, wakes), between), span)| {
+                looking.span(items, (wakes, between), span, &mut []);
+            });
         }
         let mut total = ContactEnergy::default();
         for span in self.spans.iter().filter(|s| s.touches) {
@@ -318,6 +363,7 @@ impl RigidContact {
         a.value(&mut self.motion)?;
         a.value(&mut self.cycle)?;
         a.value(&mut self.wakes)?;
+        a.value(&mut self.between)?;
         a.value(&mut self.planes)?;
         a.value(&mut self.spans)?;
         a.values(&mut self.items)
@@ -361,7 +407,7 @@ impl<F: Coulomb> Looking<'_, F> {
     fn span(
         &self,
         items: &mut [RigidItem],
-        wakes: &mut [u32],
+        by_item: (&mut [u32], &mut [Between]),
         span: &mut Span,
         planes: &mut [TangentPlane],
     ) {
@@ -374,25 +420,25 @@ impl<F: Coulomb> Looking<'_, F> {
             fn wide<F: Coulomb>(
                 looking: &Looking<'_, F>,
                 items: &mut [RigidItem],
-                wakes: &mut [u32],
+                by_item: (&mut [u32], &mut [Between]),
                 span: &mut Span,
                 planes: &mut [TangentPlane],
             ) {
-                looking.each(items, wakes, span, planes);
+                looking.each(items, by_item, span, planes);
             }
             if std::arch::is_x86_feature_detected!("avx2") {
                 // Checked the line above.
-                return unsafe { wide(self, items, wakes, span, planes) };
+                return unsafe { wide(self, items, by_item, span, planes) };
             }
         }
-        self.each(items, wakes, span, planes);
+        self.each(items, by_item, span, planes);
     }
 
     #[inline(always)]
     fn each(
         &self,
         items: &mut [RigidItem],
-        wakes: &mut [u32],
+        by_item: (&mut [u32], &mut [Between]),
         span: &mut Span,
         planes: &mut [TangentPlane],
     ) {
@@ -400,11 +446,27 @@ impl<F: Coulomb> Looking<'_, F> {
             wake: u32::MAX,
             ..Span::default()
         };
-        for (k, (item, wake)) in items.iter_mut().zip(wakes).enumerate() {
+        let (wakes, between) = by_item;
+        let by_item = wakes.iter_mut().zip(between);
+        for (k, (item, (wake, between))) in items.iter_mut().zip(by_item).enumerate() {
             if self.cycle >= u64::from(*wake) {
+                if *between == Between::Gone {
+                    item.part();
+                    *wake = waking(self.cycle, 1);
+                    span.wake = span.wake.min(*wake);
+                    continue;
+                }
                 let mut plane = planes.get_mut(k);
                 let (gap, gradient) = self.gap(item, plane.as_deref_mut());
                 let relative = sub(self.v[item.node as usize], self.motion.velocity);
+                if *between == Between::Coming {
+                    if gap <= 0.0 {
+                        *wake = waking(self.cycle, 1);
+                        span.wake = span.wake.min(*wake);
+                        continue;
+                    }
+                    *between = Between::There;
+                }
                 if gap <= 0.0 || item.multiplier > 0.0 {
                     let energy = touch(item, gap, gradient, relative, &self.law);
                     span.energy.add(&energy);

@@ -15,7 +15,7 @@ use super::slave::{
 use super::{ContactEnergy, ContactSettings, Pace, TOGETHER, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
-use crate::vec3::{V, dot, scale};
+use crate::vec3::{V, dot, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,14 @@ pub struct SheetContact {
     /// Whether slaves are pushed out from wherever they are: also from so deep inside of the master that motion cannot have brought
     /// them there. That makes energy, and is for models that are put together by hand and damped.
     pub clearing: bool,
+    /// Its stiffness over what the masses would allow.
+    pub share: f64,
+    /// What of its stiffness counts when nodes' shares of the stability limit are given out ([`crate::model::Model::set_contact_stiffness`]): 1, or less
+    /// if it touches where others do not.
+    pub counted: f64,
+    /// Cells (model numbering) along the rim of a master whose rim is not convex: a slave beside such a rim may come nearer to another stretch
+    /// of it than the one that it follows. Empty of any other master.
+    pub rim: Vec<u32>,
     /// The slaves.
     pub items: Vec<SlaveItem>,
     /// By slave: call of [`SheetContact::compute`] before which it cannot touch. Apart from the items, so that to pass over one
@@ -63,6 +71,9 @@ impl SheetContact {
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
             clearing: false,
+            share: 1.0,
+            counted: 1.0,
+            rim: Vec::new(),
             items,
             wakes: Vec::new(),
             spans: Vec::new(),
@@ -115,12 +126,14 @@ impl SheetContact {
             offset: self.offset,
             slip_factor: self.slip_factor,
             augmentation: self.augmentation,
+            growth: pace.growth,
             clearing: self.clearing,
         };
         let following = Following {
             surface: *s,
             v,
             side,
+            rim: &self.rim,
             pace,
             cycle: self.cycle,
             law,
@@ -190,6 +203,7 @@ struct Following<'a, F> {
     surface: Surface<'a>,
     v: &'a [V],
     side: f64,
+    rim: &'a [u32],
     pace: Pace,
     cycle: u64,
     law: Law<'a, F>,
@@ -229,14 +243,7 @@ impl<F: Coulomb> Following<'_, F> {
         };
         for (item, wake) in items.iter_mut().zip(wakes) {
             if self.cycle >= u64::from(*wake) {
-                match follow(
-                    item,
-                    &self.surface,
-                    self.v,
-                    self.side,
-                    &self.pace,
-                    &self.law,
-                ) {
+                match follow(item, self) {
                     Met::Touch(energy) => {
                         span.energy.add(&energy);
                         span.touches = true;
@@ -261,14 +268,8 @@ enum Met {
 
 /// Follows a slave to the closest point of the surface and computes its force.
 #[inline(always)]
-fn follow<F: Coulomb>(
-    item: &mut SlaveItem,
-    s: &Surface<'_>,
-    v: &[V],
-    side: f64,
-    pace: &Pace,
-    law: &Law<'_, F>,
-) -> Met {
+fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
+    let (s, v, pace, law) = (&given.surface, given.v, &given.pace, &given.law);
     if item.cell == NONE {
         return Met::Never;
     }
@@ -284,16 +285,14 @@ fn follow<F: Coulomb>(
     }
     // In touch, the place moves by far less than a cell in a step: one iteration follows it.
     let iterations = if item.active { 1 } else { 3 };
-    let found = track(
-        s,
-        item,
-        s.x[item.node as usize],
-        law.offset,
-        iterations,
-        |_| true,
-    );
+    let p = s.x[item.node as usize];
+    let mut found = track(s, item, p, law.offset, iterations, |_| true);
+    let looks_around = !item.active || item.turn.is_multiple_of(4 * SEARCH_INTERVAL);
+    if !given.rim.is_empty() && looks_around && at_rim(&found.first) {
+        found = elsewhere(item, s, given.rim, law.offset, found);
+    }
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
-    let Some((pull, plain)) = pull_of(item, s, &found, side, law.offset, law.clearing) else {
+    let Some((pull, plain)) = pull_of(item, s, &found, given.side, law.offset, law.clearing) else {
         item.part();
         return Met::Apart(0);
     };
@@ -310,6 +309,29 @@ fn follow<F: Coulomb>(
     item.guarded |= deep;
     item.plain = plain;
     Met::Touch(touch(item, s, v, &pull, &found, law))
+}
+
+/// The closest point of the surface for a slave beside its rim, whose closest point so far is `found`: the walk along a rim that is not convex
+/// may end at a stretch that is nearest only of those around.
+#[inline(never)]
+fn elsewhere(item: &SlaveItem, s: &Surface<'_>, rim: &[u32], offset: f64, found: Found) -> Found {
+    let p = s.x[item.node as usize];
+    let apart = |cell: &u32| {
+        let corners = s.cells[*cell as usize].map(|n| s.x[n as usize]);
+        let way = sub(p, combine([0.25; 4], &corners));
+        dot(way, way)
+    };
+    let nearer = |a: &u32, b: &u32| apart(a).total_cmp(&apart(b)).then(a.cmp(b));
+    let Some(cell) = rim.iter().copied().min_by(nearer) else {
+        return found;
+    };
+    let start = SlaveItem::new(item.node, cell, [0.0; 2]);
+    let other = track(s, &start, p, offset, 3, |_| true);
+    if other.first.distance2 < found.first.distance2 {
+        other
+    } else {
+        found
+    }
 }
 
 /// A slave that does not touch. One that is so near that it looks again at once keeps its place, as one in touch does.

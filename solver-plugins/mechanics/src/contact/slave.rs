@@ -1,8 +1,8 @@
 //! One node of a sheet on another sheet: its state, its force in touch, and where that goes.
 
 use super::friction::{Coulomb, Sliding};
-use super::search::{Closest, FACES, Found, Surface, combine, shape};
-use super::{ContactEnergy, content, friction_force, normal_force};
+use super::search::{Closest, FACES, Found, RIM, Surface, combine, shape};
+use super::{ContactEnergy, content, friction_force, grown, normal_force};
 use crate::mesh::NONE;
 use crate::mirror::{Image, reflect};
 use crate::vec3::{V, add, dot, norm, scale, sub, unit};
@@ -103,6 +103,11 @@ impl SlaveItem {
     #[inline]
     pub(super) fn is_between(&self) -> bool {
         self.between
+    }
+
+    /// Whether the place of the master that it is nearest to is not past a rim.
+    pub(super) fn lies_on_its_cell(&self) -> bool {
+        self.cell != NONE && self.xi.iter().all(|x| x.abs() < 1.0 + RIM)
     }
 
     /// Weights of the cell's nodes.
@@ -302,6 +307,8 @@ pub(super) struct Law<'a, F> {
     pub(super) friction: &'a F,
     pub(super) slip_factor: f64,
     pub(super) augmentation: f64,
+    /// As [`super::Pace::growth`].
+    pub(super) growth: f64,
     /// Slaves are pushed out from wherever they are.
     pub(super) clearing: bool,
 }
@@ -397,9 +404,10 @@ fn react<F: Coulomb>(
     way: V,
     law: &Law<'_, F>,
 ) -> Reaction {
-    let (k, c, held, work) = (item.stiffness, item.damping, item.multiplier, item.work);
+    let (k, c) = (item.stiffness, item.damping);
     let depth = -gap;
     let gap = -item.admit(depth, rel, law.dt, law.offset);
+    let (held, work) = grown(item.multiplier, item.work, law.growth, k, gap);
     let rest = content(law.offset);
     let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
     let n = unit(way);

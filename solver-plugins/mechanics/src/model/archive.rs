@@ -17,6 +17,7 @@ impl Model {
             a.numbers(r.spin.as_flattened_mut())?;
         }
         a.value(&mut self.pressures)?;
+        a.value(&mut self.last_above)?;
         a.value(&mut self.time)?;
         a.value(&mut self.cycle)?;
         a.value(&mut self.dt)?;

@@ -41,6 +41,7 @@ impl Model {
             self_contacts: Vec::new(),
             rigid_contacts: Vec::new(),
             pressures: Pressures::default(),
+            last_above: 0.0,
             time: 0.0,
             cycle: 0,
             dt: settings.target_step,

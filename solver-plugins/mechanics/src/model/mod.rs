@@ -112,6 +112,8 @@ pub struct Model {
     pub rigid_contacts: Vec<RigidContact>,
     /// Pressures, set before each step.
     pub pressures: Pressures,
+    /// The pressure above (Pa) in the last step.
+    last_above: f64,
     /// Time (s) of the positions.
     pub time: f64,
     /// Steps done.
@@ -251,6 +253,10 @@ impl NodeWork {
 /// Nodes that are moved together.
 const NODE_CHUNK: usize = 256;
 
+/// What presses on sheets in a bag besides pressure (Pa), as films that are stretched over edges do: so much of their contacts' forces does not
+/// grow with the pressure.
+const ELSE_PRESSED: f64 = 1e4;
+
 /// How often (steps) the nodes' normals and areas are computed.
 const NORMAL_INTERVAL: u64 = 16;
 
@@ -321,7 +327,9 @@ impl Model {
             dt: self.dt,
             speed: 2.0 * (2.0 * self.max_speed).max(5.0),
             acceleration: 2.0 * (2.0 * self.max_acceleration).max(1e4),
+            growth: self.growth(),
         };
+        self.last_above = self.pressures.above;
         let surface = Surface {
             cells: &self.cells,
             neighbours: &self.neighbours,
@@ -376,6 +384,12 @@ impl Model {
         alone
     }
 
+    /// The pressure on the stack over that of the last step, for [`Pace::growth`]: sheets in a bag press on each other in proportion to it. Both are
+    /// taken by [`ELSE_PRESSED`] larger.
+    fn growth(&self) -> f64 {
+        (self.pressures.above + ELSE_PRESSED) / (self.last_above + ELSE_PRESSED)
+    }
+
     /// Energies of the contacts, by contact and of all.
     fn count_contacts(&mut self) {
         for contact in &self.rigid_contacts {
@@ -422,6 +436,9 @@ impl Model {
             part.add_to(&mut self.spent.elements);
             let part = clock.part();
             self.normals();
+            for contact in &mut self.rigid_contacts {
+                contact.look_between(&self.sheet_contacts);
+            }
             if !self.compute_contacts() {
                 let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
                 let folds = &self.self_contacts;

@@ -1,12 +1,11 @@
 //! How stiff contacts are, from the masses that they couple and the step.
 
 use super::*;
-use crate::contact::SlaveItem;
 
 impl Model {
     /// Sets stiffness and damping of all contacts from the masses that they couple, and bounds the
     /// assembled stiffness of every node: 2 sum(k) dt^2 / m stays below `2 * 0.7`, which leaves the rest of
-    /// the stability bound 4 to the elements.
+    /// the stability bound 4 to the elements. Contacts that touch where others do not count less ([`SheetContact::counted`]).
     pub fn set_contact_stiffness(&mut self, c: &ContactSettings) {
         let dt2 = self.settings.target_step.powi(2);
         let mass = &self.mass;
@@ -23,23 +22,25 @@ impl Model {
         let mut row = vec![0.0; mass.len()];
         for contact in &mut self.rigid_contacts {
             contact.augmentation = augmentation;
+            let (share, counted) = (contact.share, contact.counted);
             for item in &mut contact.items {
-                item.stiffness = c.stiffness_factor * mass[item.node as usize] / dt2;
-                row[item.node as usize] += item.stiffness;
+                item.stiffness = share * c.stiffness_factor * mass[item.node as usize] / dt2;
+                row[item.node as usize] += counted * item.stiffness;
             }
         }
         for contact in &mut self.sheet_contacts {
             contact.augmentation = augmentation;
+            let (share, counted) = (contact.share, contact.counted);
             for item in contact
                 .items
                 .iter_mut()
                 .filter(|i| i.cell != crate::mesh::NONE)
             {
                 let nodes = self.cells[item.cell as usize];
-                item.stiffness = c.stiffness_factor * reduced(item.node, nodes) / dt2;
-                row[item.node as usize] += item.stiffness;
+                item.stiffness = share * c.stiffness_factor * reduced(item.node, nodes) / dt2;
+                row[item.node as usize] += counted * item.stiffness;
                 for (k, n) in nodes.iter().enumerate() {
-                    row[*n as usize] += item.weights()[k] * item.stiffness;
+                    row[*n as usize] += counted * item.weights()[k] * item.stiffness;
                 }
             }
         }
@@ -93,15 +94,19 @@ impl Model {
         const BOUND: f64 = 0.5 * (4.0 - 1.4);
         let dt = self.settings.target_step;
         let mut row = vec![0.0; self.mass.len()];
-        for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
-            row[item.node as usize] += f64::from(item.damping);
+        for contact in &self.rigid_contacts {
+            for item in &contact.items {
+                row[item.node as usize] += contact.counted * f64::from(item.damping);
+            }
         }
-        let on_sheets = |i: &&mut SlaveItem| i.cell != crate::mesh::NONE;
-        let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
-        for item in sheets.filter(on_sheets) {
-            row[item.node as usize] += 2.0 * item.damping;
-            for (k, n) in self.cells[item.cell as usize].iter().enumerate() {
-                row[*n as usize] += 2.0 * item.weights()[k] * item.damping;
+        for contact in &self.sheet_contacts {
+            let items = contact.items.iter();
+            for item in items.filter(|i| i.cell != crate::mesh::NONE) {
+                let damping = 2.0 * contact.counted * item.damping;
+                row[item.node as usize] += damping;
+                for (k, n) in self.cells[item.cell as usize].iter().enumerate() {
+                    row[*n as usize] += item.weights()[k] * damping;
+                }
             }
         }
         let of = row.iter().zip(&self.mass);
@@ -113,7 +118,7 @@ impl Model {
             item.damping = limited as f32;
         }
         let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
-        for item in sheets.filter(on_sheets) {
+        for item in sheets.filter(|i| i.cell != crate::mesh::NONE) {
             let nodes = self.cells[item.cell as usize];
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.damping *= least.min(limit[item.node as usize]);
@@ -138,14 +143,18 @@ impl Model {
         }
         let dt2 = self.settings.target_step.powi(2);
         let mut used = vec![0.0; self.mass.len()];
-        for item in self.rigid_contacts.iter().flat_map(|c| &c.items) {
-            used[item.node as usize] += 0.5 * item.stiffness;
+        for contact in &self.rigid_contacts {
+            for item in &contact.items {
+                used[item.node as usize] += 0.5 * contact.counted * item.stiffness;
+            }
         }
-        for item in self.sheet_contacts.iter().flat_map(|c| &c.items) {
-            if item.cell != crate::mesh::NONE {
-                used[item.node as usize] += item.stiffness;
+        for contact in &self.sheet_contacts {
+            let items = contact.items.iter();
+            for item in items.filter(|i| i.cell != crate::mesh::NONE) {
+                let stiffness = contact.counted * item.stiffness;
+                used[item.node as usize] += stiffness;
                 for (w, n) in item.weights().iter().zip(self.cells[item.cell as usize]) {
-                    used[n as usize] += w.max(0.0) * item.stiffness;
+                    used[n as usize] += w.max(0.0) * stiffness;
                 }
             }
         }
