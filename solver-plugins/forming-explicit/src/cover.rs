@@ -4,8 +4,7 @@
 //! fibres lie at different angles do): there it touches what comes next, at the distance of what is really between. How far plies slide
 //! nobody knows before. So any two sheets of a stack have a contact, with all of their nodes; where something lies between they are too
 //! far apart to touch, and nodes that are far from touching sleep. A lower ply's nodes also hold the upper one: the cell of that
-//! with which it hangs over the rim may have no node near it. And the upper film's nodes lie on the plies, as these lie on its cells: a film
-//! node that is pressed into a hollow between those of a ply would else go through it.
+//! with which it hangs over the rim may have no node near it.
 
 use crate::assembly::{self, StackSheet};
 use crate::friction::FrictionTable;
@@ -161,9 +160,6 @@ pub fn add_contacts_past(
                 (_, true) if apart => add(model, *sheet, *below, 1.0, Kind::Alone)?,
                 (true, false) if apart => add(model, *below, *sheet, -1.0, Kind::Alone)?,
                 _ => {}
-            }
-            if is_ply(lower) && !is_ply(upper) {
-                add(model, *sheet, *below, 1.0, Kind::Also)?;
             }
             if is_ply(lower) && is_ply(upper) {
                 add(model, *below, *sheet, -1.0, Kind::Also)?;

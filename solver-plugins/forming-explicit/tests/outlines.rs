@@ -98,8 +98,6 @@ fn any_two_sheets_of_a_stack_have_a_contact_whatever_their_outlines() {
         "upper/ply_1",
         "upper/ply_2",
         "upper/ply_3",
-        "ply_1/upper",
-        "ply_3/upper",
         "lower/upper",
         "tool/ply_3",
         "tool/ply_3/beside_ply_1_ply_2",

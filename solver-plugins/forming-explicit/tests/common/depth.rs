@@ -55,7 +55,7 @@ pub fn depths(forming: &Forming) -> Vec<Depth> {
     let mut found = Vec::new();
     for slave in 0..=last {
         for master in (0..=last).filter(|m| *m != slave) {
-            if (is_ply(slave) || slave == last) && (is_ply(slave) || is_ply(master)) {
+            if is_ply(slave) {
                 found.extend(deepest(forming, slave, master));
             }
         }
