@@ -68,7 +68,7 @@ pub enum Command {
         after_help = "Examples:\n  plyflow schema scene --format text               # all keys of a scene, with types, bounds and defaults\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
     )]
     Schema(SchemaArgs),
-    /// Read a whole store and say what of it is not as it was written, or make a step again and compare its bytes
+    /// Check a whole store against its seals, or make a step again and compare its bytes
     #[command(
         after_help = "Examples:\n  plyflow verify workflow.yaml\n  plyflow verify workflow.yaml --dry-run       # say it, move nothing\n  plyflow verify workflow.yaml --again zones   # make it again from the same inputs and compare\n\nWhat is damaged is moved to the folder `damaged` of the store, and the next run makes it again. Ends with code 8 when something was."
     )]

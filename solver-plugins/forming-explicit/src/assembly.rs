@@ -9,6 +9,7 @@ use crate::symmetry::{self, Families, MirroredBody};
 use crate::tool::ToolSurfaces;
 use plyflow_abi::pf_component;
 use plyflow_blank::Blank;
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::{
     ContactSettings, FoldSpec, FrictionLaw, Plane, RigidContact, RigidItem, RigidSurface,
     SheetContact, SlaveItem,
@@ -127,7 +128,7 @@ fn check_sheet(sheet: &Sheet) -> Result<(), String> {
     if let (SheetKind::Ply, Some(second)) = (sheet.kind, sheet.fibre_2) {
         let degrees = |angle: f64| (1e6 * angle.to_degrees()).round() / 1e6;
         let between = second.si() - sheet.fibre_1.si();
-        if between.cos().abs() > SQUARE {
+        if between.fixed_cos().abs() > SQUARE {
             return Err(format!(
                 "ply '{}': given fibres at {} and {} deg; expected families that cross at a right angle before forming, such as -45 and 45 deg: \
                  elements and material laws of forming-explicit measure shear from there. (forming-kinematic drapes other angles too)",
@@ -283,20 +284,13 @@ pub fn add_ply(
             1e3 * 0.5 * (x1 - x0).min(y1 - y0)
         ));
     }
-    let on = |n: &u32, k: usize| mesh.points[*n as usize][k].abs() < 1e-9;
-    let least_areal_mass = match p.scene.process {
-        Process::DoubleDiaphragm(_) => least_areal_masses(&mesh.cells, p.least_areal_mass, |e| {
-            !(0..2).any(|k| mirrors.planes.0[k] && e.iter().all(|n| on(n, k)))
-        }),
-        Process::Press(_) => vec![p.least_areal_mass; mesh.cells.len()],
-    };
     let spec = SheetSpec {
         name: name.clone(),
         nodes,
         layers: vec![1.0; mesh.cells.len()],
         pressed: vec![Pressed::No; mesh.cells.len()],
         patches,
-        least_areal_mass,
+        least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
         cells: mesh.cells,
         axis: axis(&sheet.scene),
         element,
@@ -305,29 +299,12 @@ pub fn add_ply(
     Ok((spec, body))
 }
 
-/// Least areal masses (kg/m2) of a ply's cells between films: `least`, and so much more along its rim that the nodes there have about the mass of
-/// those inside. A contact is as stiff as its lighter node allows; at a rim, where the film leans over the edge, half or a quarter of a node's mass
-/// would have to bear more than others do. `ends`: whether the sheet ends at an edge that has one cell.
-pub fn least_areal_masses(
-    cells: &[[u32; 4]],
-    least: f64,
-    ends: impl Fn(&[u32; 2]) -> bool,
-) -> Vec<f64> {
-    let rim = cover::free_edges(cells.iter());
-    let rim: std::collections::HashSet<[u32; 2]> = rim.into_iter().filter(ends).collect();
-    let of_cell = |c: &[u32; 4]| {
-        let free = cover::edges(c).into_iter().filter(|e| rim.contains(e));
-        least * f64::from(1u32 << free.count().min(2))
-    };
-    cells.iter().map(of_cell).collect()
-}
-
 /// Direction of material axis e1 in the undeformed plane.
 pub fn axis(sheet: &Sheet) -> V {
     let first = sheet.fibre_1.si();
     let square = || first + std::f64::consts::FRAC_PI_2;
     let e1 = first_axis(first, sheet.fibre_2.map_or_else(square, |a| a.si()));
-    [e1.cos(), e1.sin(), 0.0]
+    [e1.fixed_cos(), e1.fixed_sin(), 0.0]
 }
 
 /// Settings of the time integration.

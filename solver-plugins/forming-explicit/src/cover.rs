@@ -3,8 +3,7 @@
 //! A ply reaches out over the one below it, lies over a hole of it or beside it, or slides past its edge (plies of one outline whose
 //! fibres lie at different angles do): there it touches what comes next, at the distance of what is really between. How far plies slide
 //! nobody knows before. So any two sheets of a stack have a contact, with all of their nodes; where something lies between they are too
-//! far apart to touch, and nodes that are far from touching sleep. A lower ply's nodes also hold the upper one: the cell of that
-//! with which it hangs over the rim may have no node near it.
+//! far apart to touch, and nodes that are far from touching sleep.
 
 use crate::assembly::{self, StackSheet};
 use crate::friction::FrictionTable;
@@ -38,12 +37,12 @@ fn beside(stack: &[StackSheet], plies: impl Iterator<Item = usize>) -> String {
 }
 
 /// The edges of a cell, around it.
-pub fn edges(c: &[u32; 4]) -> [[u32; 2]; 4] {
+fn edges(c: &[u32; 4]) -> [[u32; 2]; 4] {
     [0, 1, 2, 3].map(|k| [c[k], c[(k + 1) % 4]])
 }
 
 /// Edges that belong to one cell alone.
-pub fn free_edges<'a>(cells: impl Iterator<Item = &'a [u32; 4]> + Clone) -> Vec<[u32; 2]> {
+fn free_edges<'a>(cells: impl Iterator<Item = &'a [u32; 4]> + Clone) -> Vec<[u32; 2]> {
     let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
     let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
     for edge in cells.clone().flat_map(edges) {
@@ -65,6 +64,14 @@ fn rim(model: &Model, sheet: usize) -> Vec<[u32; 2]> {
     edges
 }
 
+/// The nodes (model numbering, increasing) on the rim of a sheet of a model that is still flat.
+fn rim_nodes(model: &Model, sheet: usize) -> Vec<u32> {
+    let mut ends = rim(model, sheet).into_flattened();
+    ends.sort_unstable();
+    ends.dedup();
+    ends
+}
+
 /// The cells along the rim of a sheet of a model that is still flat; none where its rim is convex.
 pub fn crooked_rim(model: &Model, sheet: usize) -> Vec<u32> {
     let edges = rim(model, sheet);
@@ -78,8 +85,7 @@ pub fn crooked_rim(model: &Model, sheet: usize) -> Vec<u32> {
     if hull_area(nodes.collect()) - whole < 0.5 * largest {
         return Vec::new();
     }
-    let mut ends: Vec<u32> = edges.into_flattened();
-    ends.sort_unstable();
+    let ends = rim_nodes(model, sheet);
     let at_rim = |c: &u32| {
         let corners = model.cells[*c as usize];
         corners.iter().any(|n| ends.binary_search(n).is_ok())
@@ -113,9 +119,8 @@ fn hull_area(mut points: Vec<[f64; 2]>) -> f64 {
     (0..hull.len()).map(of_edge).sum()
 }
 
-/// Adds the contacts of plies with all sheets that are not their neighbours in the stack, and of the nodes of lower plies with the plies
-/// above them and of the upper film's with all plies. `sheets`: of the whole stack, from the tool upwards, of a model that is still
-/// flat.
+/// Adds the contacts of plies with all sheets that are not their neighbours in the stack. `sheets`: of the whole stack, from the tool upwards, of a
+/// model that is still flat.
 ///
 /// # Errors
 /// When a friction coefficient is missing or makes no sense.
@@ -132,55 +137,32 @@ pub fn add_contacts_past(
             let chain: Vec<&str> = (from..=to).map(|k| stack[k].scene.name.as_str()).collect();
             friction.past(model, &chain, &stack[slave].scene.name)
         };
-    let add = |model: &mut Model,
-               slave: Layer<'_>,
-               master: Layer<'_>,
-               side: f64,
-               kind: Kind|
-     -> Result<(), String> {
-        let (from, to) = (slave.0.min(master.0), slave.0.max(master.0));
-        let mu = law(model, from, to, slave.0)?;
-        let on = (master.0, master.1);
-        assembly::add_sheet_contact(model, stack, (slave.0, slave.2), on, side, mu, p);
-        let contact = model.sheet_contacts.last_mut().expect("just added");
-        // What lies between holds them apart but at its edges, where all may touch for a moment.
-        if to - from > 1 {
+    let add =
+        |model: &mut Model, slave: Layer<'_>, master: Layer<'_>, side: f64| -> Result<(), String> {
+            let (from, to) = (slave.0.min(master.0), slave.0.max(master.0));
+            let mu = law(model, from, to, slave.0)?;
+            let on = (master.0, master.1);
+            assembly::add_sheet_contact(model, stack, (slave.0, slave.2), on, side, mu, p);
+            let contact = model.sheet_contacts.last_mut().expect("just added");
+            // What lies between holds them apart but at its edges, where all may touch for a moment.
             (contact.share, contact.counted) = (0.5, 0.0);
-        }
-        if let Kind::Also = kind {
-            contact.share = 0.5;
-            contact.offset -= SLACK * stack[slave.0].thickness.min(stack[master.0].thickness);
-        }
-        Ok(())
-    };
+            Ok(())
+        };
     for (upper, sheet) in sheets.iter().enumerate() {
         for (lower, below) in sheets.iter().enumerate().take(upper) {
-            let apart = upper - lower > 1;
-            match (is_ply(lower), is_ply(upper)) {
-                (_, true) if apart => add(model, *sheet, *below, 1.0, Kind::Alone)?,
-                (true, false) if apart => add(model, *below, *sheet, -1.0, Kind::Alone)?,
-                _ => {}
+            // Neighbours have theirs.
+            if upper - lower == 1 {
+                continue;
             }
-            if is_ply(lower) && is_ply(upper) {
-                add(model, *below, *sheet, -1.0, Kind::Also)?;
+            match (is_ply(lower), is_ply(upper)) {
+                (_, true) => add(model, *sheet, *below, 1.0)?,
+                (true, false) => add(model, *below, *sheet, -1.0)?,
+                (false, false) => {}
             }
         }
     }
     Ok(())
 }
-
-/// A contact of two sheets.
-#[derive(Clone, Copy)]
-enum Kind {
-    /// The only one of the two.
-    Alone,
-    /// The other sheet's nodes hold this one as well.
-    Also,
-}
-
-/// How much nearer than others nodes come before they hold a sheet whose own nodes hold them as well, over the thickness of the thinner
-/// sheet: where the others do, these alone do.
-const SLACK: f64 = 0.02;
 
 /// A rigid part as the sheets of a stack meet it.
 pub struct RigidPart {

@@ -1,6 +1,7 @@
 //! How far the rims of plies are drawn in.
 
 use crate::run::Forming;
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mesh::NONE;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::SheetKind;
@@ -25,7 +26,7 @@ impl DrawIn {
                     continue;
                 }
                 let (then, now) = (then[*node as usize], now[*node as usize]);
-                let way = (now[0] - then[0]).hypot(now[1] - then[1]);
+                let way = (now[0] - then[0]).fixed_hypot(now[1] - then[1]);
                 self.rim = self.rim.max(way);
                 if before && after {
                     self.corner = self.corner.max(way);

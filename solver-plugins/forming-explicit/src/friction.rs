@@ -1,5 +1,6 @@
 //! Which surfaces of a scene rub on each other, and by which law.
 
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::{
     AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, PressureDependence, SheetCells,
     VaryingFriction, Whose,
@@ -347,7 +348,7 @@ impl<'a> FrictionTable<'a> {
                 .map_or(first + std::f64::consts::FRAC_PI_2, |a| a.si()),
         };
         let (own, first_cell) = cells(model, &found.name);
-        let along = [direction.cos(), direction.sin(), 0.0];
+        let along = [direction.fixed_cos(), direction.fixed_sin(), 0.0];
         let whose = if found.name == touching.slave {
             Whose::Slave
         } else {

@@ -3,6 +3,9 @@
 //! global run meshes the scene itself; with a `boundary` input it is a local run of one zone; with `zones` plies bend in these
 //! alone.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod absurd;
 pub mod assembly;
 mod checkpoint;

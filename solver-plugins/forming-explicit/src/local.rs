@@ -297,13 +297,6 @@ fn sheets_of(
         all.drive.add(local);
         // Driven nodes push no one: they stand where the coarse run says, with its penetration.
         let is_free = |n: &u32| free[(n - first) as usize];
-        let least_areal_mass = if film {
-            vec![p.least_areal_mass; local.cells.len()]
-        } else {
-            // At the cut it does not end.
-            let ends = |e: &[u32; 2]| e.iter().any(|n| free[*n as usize]);
-            assembly::least_areal_masses(&local.cells, p.least_areal_mass, ends)
-        };
         let slaves = nodes.iter().copied().filter(is_free).collect();
         all.placed.push(Placed { index, slaves });
         all.bodies
@@ -314,7 +307,7 @@ fn sheets_of(
             layers: vec![1.0; local.cells.len()],
             pressed: vec![pressed; local.cells.len()],
             patches: mesh.patches(),
-            least_areal_mass,
+            least_areal_mass: vec![p.least_areal_mass; mesh.cells.len()],
             cells: mesh.cells,
             axis: assembly::axis(&sheet.scene),
             element,

@@ -11,6 +11,7 @@ use crate::process::Load;
 use crate::run::{Forming, RigidBody};
 use crate::symmetry;
 use crate::tool::ToolSurface;
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::contact::{OpenPlate, RigidMotion, RigidSurface};
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
@@ -177,12 +178,12 @@ fn radius_above(tool: &ToolMesh, z: f64) -> f64 {
         for k in 0..3 {
             let [a, b] = [k, (k + 1) % 3].map(|k| tool.points[triangle[k] as usize]);
             if a[2] > z {
-                radius = radius.max(a[0].hypot(a[1]));
+                radius = radius.max(a[0].fixed_hypot(a[1]));
             }
             if (a[2] > z) != (b[2] > z) {
                 let t = (z - a[2]) / (b[2] - a[2]);
                 let at = [0, 1].map(|c| a[c] + t * (b[c] - a[c]));
-                radius = radius.max(at[0].hypot(at[1]));
+                radius = radius.max(at[0].fixed_hypot(at[1]));
             }
         }
     }
@@ -418,7 +419,10 @@ pub fn build_press(
 
 /// Largest distance of a point from the axis (m).
 fn bodies_reach(points: &[[f64; 3]]) -> f64 {
-    points.iter().map(|q| q[0].hypot(q[1])).fold(0.0, f64::max)
+    points
+        .iter()
+        .map(|q| q[0].fixed_hypot(q[1]))
+        .fold(0.0, f64::max)
 }
 
 fn plates(press: &Press, at: &Levels) -> (OpenPlate, Option<OpenPlate>) {

@@ -10,6 +10,7 @@ use crate::press::PressLoad;
 use crate::process::Load;
 use crate::symmetry::MirroredBody;
 use crate::watch::{PairDepth, Watch};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::component::ElementField;
@@ -102,14 +103,14 @@ impl RigidBody {
         let a = plate.opening + plate.edge;
         let mut profile = vec![[1.05 * reach.max(a), 0.0]];
         for i in 0..=ALONG {
-            let (s, c) = (std::f64::consts::FRAC_PI_2 * i as f64 / ALONG as f64).sin_cos();
+            let (s, c) = (std::f64::consts::FRAC_PI_2 * i as f64 / ALONG as f64).fixed_sin_cos();
             profile.push([a - plate.edge * s, plate.edge * (1.0 - c)]);
         }
         profile.push([plate.opening, 2.0 * plate.edge]);
         let mut points = Vec::with_capacity(profile.len() * AROUND);
         for [r, y] in &profile {
             for k in 0..AROUND {
-                let (s, c) = (std::f64::consts::TAU * k as f64 / AROUND as f64).sin_cos();
+                let (s, c) = (std::f64::consts::TAU * k as f64 / AROUND as f64).fixed_sin_cos();
                 points.push([r * c, r * s, plate.height + plate.side * y]);
             }
         }

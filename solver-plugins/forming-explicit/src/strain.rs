@@ -1,6 +1,7 @@
 //! Shear angles and fibre strains of the plies, from their cells alone.
 
 use crate::run::Forming;
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::SheetKind;
 
@@ -58,6 +59,6 @@ pub fn cell_strain(then: [V; 4], now: [V; 4], axis: V) -> (f64, f64) {
     };
     let (f1, f2) = (map(axis), map([-axis[1], axis[0], 0.0]));
     let (l1, l2) = (norm(f1), norm(f2));
-    let g = (dot(f1, f2) / (l1 * l2)).clamp(-1.0, 1.0).asin();
+    let g = (dot(f1, f2) / (l1 * l2)).clamp(-1.0, 1.0).fixed_asin();
     (g, (l1 - 1.0).abs().max((l2 - 1.0).abs()))
 }

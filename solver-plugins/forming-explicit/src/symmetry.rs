@@ -4,6 +4,7 @@
 //! 45 degrees to them the plane exchanges the families and shear keeps its sign.
 
 use crate::assembly::{self, StackSheet};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::LANES;
 use plyflow_mechanics::component::{ElementField, ElementInstance, MaterialInstance};
 use plyflow_mechanics::mirror::{Image, Planes, Whole, reflect};
@@ -306,7 +307,7 @@ fn membrane_apart(material: &MaterialInstance, families: Families) -> Result<f64
             let [f1, f2] = [0, 1].map(|r| 1.0 + strain * spread(k, r));
             // As far as plies are sheared: up to 80 deg.
             let shear = 1.4 * share * spread(k, 2);
-            [f1 * f1, f2 * f2, f1 * f2 * shear.sin()]
+            [f1 * f1, f2 * f2, f1 * f2 * shear.fixed_sin()]
         });
         failed(material.reference().membrane(&mut MembraneBatch {
             lanes: LANES,

@@ -82,15 +82,7 @@ fn any_two_sheets_of_a_stack_have_a_contact_whatever_their_outlines() {
     let small = |p: &mut serde_json::Value, k: usize| {
         p["scene"]["sheets"][k]["width"] = json!("0.03 m");
     };
-    let between = [
-        "ply_1/ply_2",
-        "ply_1/ply_3",
-        "ply_2/ply_3",
-        // From the other side.
-        "ply_2/ply_1",
-        "ply_3/ply_1",
-        "ply_3/ply_2",
-    ];
+    let between = ["ply_1/ply_2", "ply_1/ply_3", "ply_2/ply_3"];
     let in_bag = [
         "lower/ply_1",
         "lower/ply_2",

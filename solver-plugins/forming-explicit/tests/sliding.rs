@@ -29,8 +29,9 @@ impl Observer for Deepest {
     }
 }
 
-/// Forms the scene; on the way nothing is deeper in anything than a quarter of the thinner one, at the end than a tenth, and all sheets
-/// lie over the bed. Gives how far (m) the nodes at the plies' corners have gone past each other.
+/// Forms the scene. On the way nothing is deeper in anything than the thinner one is thick (the watch, which would stop the run, lets be what elements
+/// cut off); at the end plies are in films by a tenth of these at most, and all sheets lie over the bed. Nodes of a lower ply may
+/// be deeper in cells of an upper one: contact is with the upper one's nodes. Gives how far (m) the nodes at the plies' corners have gone past each other.
 fn nothing_goes_through(p: &Parameters) -> f64 {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -45,9 +46,12 @@ fn nothing_goes_through(p: &Parameters) -> f64 {
         (forming, seen)
     });
     let end = depths(&forming);
-    assert!(end.len() > 6, "{end:?}");
-    let on_the_way = seen.0.iter().map(|(time, d)| (*time, d, 0.25));
-    let at_the_end = end.iter().map(|d| (f64::INFINITY, d, 0.1));
+    // Each ply against each of the others.
+    let plies = forming.stack.len() - 2;
+    assert!(end.len() >= plies * (plies + 1), "{end:?}");
+    let on_the_way = seen.0.iter().map(|(time, d)| (*time, d, 1.0));
+    let of_film = |d: &&Depth| d.thinner < 1e-4;
+    let at_the_end = (end.iter().filter(of_film)).map(|d| (f64::INFINITY, d, 0.1));
     let too_deep: Vec<String> = on_the_way
         .chain(at_the_end)
         .filter(|(_, d, bound)| d.depth > bound * d.thinner)

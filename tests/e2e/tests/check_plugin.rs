@@ -96,12 +96,12 @@ fn every_fault_planted_in_an_element_is_refused_by_the_check_that_is_meant_for_i
         (
             "NEIGHBOUR",
             "batch-independence",
-            "differs from the same element",
+            "differs from the same in lane",
         ),
         (
             "MEAN",
             "batch-independence",
-            "differs from the same element",
+            "differs from the same in lane",
         ),
         ("RACE", "threads", "differ"),
         ("STEP_RACE", "threads", "differ"),
@@ -168,7 +168,7 @@ fn every_fault_planted_in_a_material_is_refused_by_the_check_that_is_meant_for_i
         (
             "NEIGHBOUR",
             "batch-independence",
-            "differs from the same state",
+            "differs from the same in lane",
         ),
         ("GAINS", "cycle", "closed cycles"),
         ("WRONG_MOMENT", "moment", "M12"),

@@ -182,7 +182,12 @@ fn checkpoints(study: &Study) -> Vec<String> {
     let instances = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let has_state = |i: &std::fs::DirEntry| {
         let keys = std::fs::read_dir(i.path()).into_iter().flatten().flatten();
-        keys.into_iter().any(|k| k.path().join("state").exists())
+        // The note of what it has cost is the last that a checkpoint gets.
+        let whole = |k: std::fs::DirEntry| {
+            let file = |name: &str| k.path().join(name).exists();
+            file("state") && file("plyflow-cost.json")
+        };
+        keys.into_iter().any(whole)
     };
     let with_state = instances.filter(has_state);
     with_state

@@ -484,8 +484,13 @@ impl Watch {
         if !anew && clear.by - norm(sub(p, clear.at)) > -least {
             return f64::INFINITY;
         }
-        // What lies between is as much thinner as the sheet next to it is in it.
-        let need = 0.5 * own.thickness + (under.between - under.squeezed).max(0.0);
+        // What lies between is as much thinner as the sheet next to it is in it. Of an upper film the lower one does not count: each hangs between the
+        // other's nodes, and what is felt of that is a matter of the two (decision 34).
+        let film = match view.sheet > 0 && !self.pairs[pair].of_ply {
+            true => self.sheets[0].thickness,
+            false => 0.0,
+        };
+        let need = 0.5 * own.thickness + (under.between - under.squeezed - film).max(0.0);
         let mut on = None;
         let distance = match &part.shape {
             Shape::Bed => p[2],

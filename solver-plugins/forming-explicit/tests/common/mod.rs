@@ -104,6 +104,22 @@ pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
     })
 }
 
+/// What is told of a scene whose run does not get to its end.
+pub fn stopped(p: &Parameters, threads: usize) -> String {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap();
+    pool.install(|| {
+        let mut forming = build_global(p, &BuiltIn).unwrap();
+        match forming.run(&p.control(), &mut Silent) {
+            Err(StepError::Failed(text)) => text,
+            Err(other) => panic!("{other:?}"),
+            Ok(_) => panic!("it got to its end"),
+        }
+    })
+}
+
 /// For each point of `a` the one of `b` that began at the same place.
 pub fn twins(a: &[V], b: &[V]) -> Vec<usize> {
     let near = |p: &V| {
