@@ -42,6 +42,7 @@ lint: ## check form, lints and JSON Schemas
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
 	scripts/check-docs
+	scripts/check-bits
 
 bench: build ## measure; rows go to docs/benchmarks
 	$(CARGO) build $(CARGO_FLAGS) -p plyflow-benches

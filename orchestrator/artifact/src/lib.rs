@@ -5,6 +5,9 @@
 //! `UnstructuredGrid` per body, which VTK 9.4 to 9.7 (and ParaView of the same age) read as they are.
 //! Points are doubles, fields are singles.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod contents;
 mod error;
 mod h5;

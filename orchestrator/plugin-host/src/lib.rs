@@ -6,6 +6,9 @@
 //!   talks in messages on standard output.
 //! - [`describe_main`] is the body of `plyflow step-worker --describe LIBRARY`.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod catalog;
 mod checkpoints;
 mod describe;

@@ -4,6 +4,8 @@
 //! written there. A test compiles the header with the machine's C compiler and compares every
 //! size and offset with this file.
 #![allow(non_camel_case_types, missing_docs)]
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 use core::ffi::{c_char, c_void};
 

@@ -4,6 +4,9 @@
 //! them [`open`] (what is opened at all, and how much of it is read), [`text`] (encodings, and what a message may show of a file) and
 //! [`number`] (decimal signs). What is no dialect that is known here is refused, with its line; nothing is passed over in silence.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod number;
 pub mod open;
 pub mod rows;

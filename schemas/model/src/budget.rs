@@ -1,6 +1,8 @@
 //! What a size that a user writes may ask for. An element size a thousand times too small is a slip of a unit, not a wish
 //! for a million times the elements: how many there would be is told before any of them is made.
 
+use plyflow_fixed::FixedBits;
+
 /// Most elements of one mesh: one square metre in elements of 0.25 mm, with room to spare.
 pub const MOST_ELEMENTS: f64 = 2e7;
 /// What an element of a sheet takes at least (bytes): its corners, constants, state and forces.
@@ -60,7 +62,7 @@ fn allow_within(w: Wanted<'_>, memory: Option<f64>) -> Result<(), String> {
     };
     // Rounded up to two figures, so that the size given would really do.
     let enough = w.size * (w.count / most).sqrt() * 1.01;
-    let unit = 10f64.powf(enough.log10().floor() - 1.0);
+    let unit = 10f64.fixed_powf(enough.fixed_log10().floor() - 1.0);
     Err(format!(
         "{} would have {:.1e} {} at `{}` {:.3e} m and take at least {}; {bound}. Take `{}` of at least {:.2e} m, and look whether the unit is \
          the one that was meant",

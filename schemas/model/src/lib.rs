@@ -1,6 +1,9 @@
 //! The words of the domain, typed and without I/O: units, material, scene, workflow and the manifest of
 //! a plugin. Everything else in the repository depends on this crate and it depends on nothing of it.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod budget;
 pub mod canonical;
 pub mod friction;

@@ -1,6 +1,7 @@
 //! Outlines of blanks: polygons with holes, checked and brought to one form.
 
 use crate::scene::{Contour, Sheet};
+use plyflow_fixed::FixedBits;
 use std::fmt;
 
 /// A point in the plane (m).
@@ -142,7 +143,7 @@ impl Contour {
                 let turn = std::f64::consts::TAU / CIRCLE_CORNERS as f64;
                 (0..CIRCLE_CORNERS)
                     .map(|k| {
-                        let (s, c) = (turn * k as f64).sin_cos();
+                        let (s, c) = (turn * k as f64).fixed_sin_cos();
                         [x + r * c, y + r * s]
                     })
                     .collect()
@@ -284,7 +285,7 @@ pub fn segment_distance(p: Point, a: Point, b: Point) -> f64 {
     } else {
         0.0
     };
-    (p[0] - a[0] - t * d[0]).hypot(p[1] - a[1] - t * d[1])
+    (p[0] - a[0] - t * d[0]).fixed_hypot(p[1] - a[1] - t * d[1])
 }
 
 /// Twice the area of a triangle, positive counter-clockwise (m2).
@@ -320,7 +321,7 @@ fn size(corners: &[Point]) -> f64 {
     let o = corners[0];
     corners
         .iter()
-        .map(|p| (p[0] - o[0]).hypot(p[1] - o[1]))
+        .map(|p| (p[0] - o[0]).fixed_hypot(p[1] - o[1]))
         .fold(0.0, f64::max)
 }
 
@@ -332,7 +333,7 @@ fn check_contour(contour: ContourName, corners: &[Point]) -> Result<(), OutlineE
     let near = ROUNDING * size(corners);
     let all: Vec<_> = sides(corners).collect();
     for (i, (a, b)) in all.iter().enumerate() {
-        if (a[0] - b[0]).hypot(a[1] - b[1]) <= near {
+        if (a[0] - b[0]).fixed_hypot(a[1] - b[1]) <= near {
             return Err(OutlineError::Repeated {
                 contour,
                 first: i,

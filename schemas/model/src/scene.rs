@@ -7,6 +7,7 @@
 use crate::friction::Friction;
 use crate::material::MaterialEntry;
 use crate::units::{Angle, Force, Length, Number, Pressure, Time};
+use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -321,7 +322,7 @@ pub struct Sheet {
 /// assert_eq!(first_axis(deg(45.0), deg(-45.0)), deg(-45.0));
 /// ```
 pub fn first_axis(fibre_1: f64, fibre_2: f64) -> f64 {
-    if (fibre_2 - fibre_1).sin() >= 0.0 {
+    if (fibre_2 - fibre_1).fixed_sin() >= 0.0 {
         fibre_1
     } else {
         fibre_2

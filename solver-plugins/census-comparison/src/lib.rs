@@ -3,6 +3,9 @@
 //! A step of its own and no part of `comparison`: that one sets local runs against a global one, zone by zone and defect by
 //! defect; here whole runs of one part stand beside each other, and what is asked is how a census changes with the material.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod against;
 mod output;
 mod run;

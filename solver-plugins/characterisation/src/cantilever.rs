@@ -1,6 +1,7 @@
 //! The standard cantilever test: Peirce's formula (thesis eq. 3.1, BS EN ISO 9073-7).
 
 use crate::material::significant;
+use plyflow_fixed::FixedBits;
 use serde::Deserialize;
 
 /// The angle of the standard (rad): 41.5 degrees.
@@ -54,7 +55,7 @@ pub fn stiffness(formula: Formula, overhang: f64, angle: f64, weight: f64) -> Re
     }
     match formula {
         Formula::Peirce => {
-            Ok(weight * overhang.powi(3) * (0.5 * angle).cos() / (8.0 * angle.tan()))
+            Ok(weight * overhang.powi(3) * (0.5 * angle).fixed_cos() / (8.0 * angle.fixed_tan()))
         }
         Formula::Standard if (degrees - 41.5).abs() <= 0.05 => {
             Ok(weight * (0.5 * overhang).powi(3))

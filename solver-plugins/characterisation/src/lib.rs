@@ -4,6 +4,9 @@
 //! ([`cantilever`], [`bending`], [`picture_frame`], [`sled`]); [`csv`] reads raw data with located errors,
 //! [`material`] writes material files, [`output`] an artifact of kind `characterisation`.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub use plyflow_model::units::Dimension;
 
 pub mod bending;

@@ -1,6 +1,7 @@
 //! Linear least squares by QR, with the condition of what was solved.
 
 use nalgebra::{DMatrix, DVector};
+use plyflow_fixed::FixedBits;
 
 /// Below this ratio of singular values the unknowns are not determined.
 const RANK: f64 = 1e-12;
@@ -134,7 +135,7 @@ pub fn fit_polynomial(
 /// `rms`: the smaller the better. Residuals below `floor` count as `floor`.
 pub fn bayes_criterion(rms: f64, floor: f64, rows: usize, unknowns: usize) -> f64 {
     let n = rows as f64;
-    n * (rms * rms + floor * floor).ln() + unknowns as f64 * n.ln()
+    n * (rms * rms + floor * floor).fixed_ln() + unknowns as f64 * n.fixed_ln()
 }
 
 #[cfg(test)]

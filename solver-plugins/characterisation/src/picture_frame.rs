@@ -6,6 +6,7 @@ use crate::stitch::{StitchFit, fit_stitch};
 use crate::voce::rms;
 use crate::yarns::{Points, Yarns, YarnsFit, fit_yarns, joined};
 use crate::zero::{self, Start, Zero};
+use plyflow_fixed::FixedBits;
 use serde::Deserialize;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
@@ -35,7 +36,7 @@ impl Frame {
         let cosine = FRAC_1_SQRT_2 + displacement / (2.0 * self.side);
         (0.0..1.0)
             .contains(&cosine)
-            .then(|| FRAC_PI_2 - 2.0 * cosine.acos())
+            .then(|| FRAC_PI_2 - 2.0 * cosine.fixed_acos())
     }
 
     /// Normalised shear force (N/m) from the cross-head's force (N) at a shear angle (rad):
@@ -43,7 +44,7 @@ impl Frame {
     /// (`l = L`) the usual `F / (2 L cos((pi/2 - g)/2))`.
     pub fn normalised(&self, force: f64, angle: f64) -> f64 {
         let half = 0.5 * (FRAC_PI_2 - angle);
-        force * self.side / (2.0 * self.specimen_side * self.specimen_side * half.cos())
+        force * self.side / (2.0 * self.specimen_side * self.specimen_side * half.fixed_cos())
     }
 }
 

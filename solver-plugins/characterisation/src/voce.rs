@@ -2,6 +2,7 @@
 
 use crate::linear::condition;
 use nalgebra::DMatrix;
+use plyflow_fixed::FixedBits;
 
 /// `M(k) = linear k + asymptote (1 - exp(-k / scale))` for `k >= 0`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,13 +18,13 @@ pub struct Voce {
 impl Voce {
     /// Moment per width (N) at a curvature (1/m).
     pub fn moment(&self, k: f64) -> f64 {
-        self.linear * k - self.asymptote * (-k / self.scale).exp_m1()
+        self.linear * k - self.asymptote * (-k / self.scale).fixed_exp_m1()
     }
 
     /// How its moment (N) at a curvature (1/m) follows changes of `linear`, `asymptote` and `scale`, linearly.
     pub fn moment_change(&self, k: f64, change: [f64; 3]) -> f64 {
-        let part = -(-k / self.scale).exp_m1();
-        let by_scale = -self.asymptote * k / self.scale.powi(2) * (-k / self.scale).exp();
+        let part = -(-k / self.scale).fixed_exp_m1();
+        let by_scale = -self.asymptote * k / self.scale.powi(2) * (-k / self.scale).fixed_exp();
         change[0] * k + change[1] * part + change[2] * by_scale
     }
 
@@ -83,11 +84,11 @@ pub fn fit_voce(curvature: &[f64], moment: &[f64]) -> Result<VoceFit, String> {
         );
     }
     let (low, high) = (
-        (largest / SMALLEST_SCALE).ln(),
-        (largest * LARGEST_SCALE).ln(),
+        (largest / SMALLEST_SCALE).fixed_ln(),
+        (largest * LARGEST_SCALE).fixed_ln(),
     );
     let at = |i: f64| low + (high - low) * i / SEARCH as f64;
-    let misfit = |log_scale: f64| best_linear(curvature, moment, log_scale.exp()).1;
+    let misfit = |log_scale: f64| best_linear(curvature, moment, log_scale.fixed_exp()).1;
     let (mut best, mut least) = (0, f64::INFINITY);
     for i in 0..=SEARCH {
         let now = misfit(at(i as f64));
@@ -100,7 +101,7 @@ pub fn fit_voce(curvature: &[f64], moment: &[f64]) -> Result<VoceFit, String> {
         at((best as f64 + 1.0).min(SEARCH as f64)),
         &misfit,
     );
-    let (law, squares) = best_linear(curvature, moment, log_scale.exp());
+    let (law, squares) = best_linear(curvature, moment, log_scale.fixed_exp());
     // Without an asymptote every scale fits alike, and the search ends at its first.
     let saturation = if law.asymptote <= 0.0 || best == SEARCH {
         Saturation::NotReached
@@ -122,7 +123,10 @@ pub fn fit_voce(curvature: &[f64], moment: &[f64]) -> Result<VoceFit, String> {
 /// Law and sum of squared residuals for a given scale, with both factors non-negative.
 fn best_linear(curvature: &[f64], moment: &[f64], scale: f64) -> (Voce, f64) {
     let (mut aa, mut ab, mut bb, mut am, mut bm) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    let part: Vec<f64> = curvature.iter().map(|k| -(-k / scale).exp_m1()).collect();
+    let part: Vec<f64> = curvature
+        .iter()
+        .map(|k| -(-k / scale).fixed_exp_m1())
+        .collect();
     for ((&k, &m), &e) in curvature.iter().zip(moment).zip(&part) {
         aa += k * k;
         ab += k * e;
@@ -192,9 +196,9 @@ fn parameter_condition(law: &Voce, curvature: &[f64]) -> f64 {
         columns.push(curvature.iter().map(|k| law.linear * k).collect());
     }
     if law.asymptote > 0.0 {
-        let part = |k: &f64| -law.asymptote * (-k / law.scale).exp_m1();
+        let part = |k: &f64| -law.asymptote * (-k / law.scale).fixed_exp_m1();
         columns.push(curvature.iter().map(part).collect());
-        let part = |k: &f64| -law.asymptote * k / law.scale * (-k / law.scale).exp();
+        let part = |k: &f64| -law.asymptote * k / law.scale * (-k / law.scale).fixed_exp();
         columns.push(curvature.iter().map(part).collect());
     }
     if columns.is_empty() {

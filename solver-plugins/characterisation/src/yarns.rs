@@ -5,6 +5,7 @@ use crate::linear::{Polynomial, Solution, bayes_criterion, fit_polynomial};
 use crate::material::significant;
 use crate::picture_frame::{FEWEST_ROWS, LIMITS, MAXIMUM_DEGREE};
 use crate::voce::rms;
+use plyflow_fixed::FixedBits;
 use plyflow_kernels::fabric::Fabric;
 use plyflow_sdk::Material;
 use serde_json::json;
@@ -310,7 +311,7 @@ fn uncertain(yarns: &Yarns, best: &Tried, tried: &[Tried], tests: &[Points]) -> 
     );
     let weight = |t: &Tried| {
         let apart = best.misfit - t.misfit + MODEL * (best.degree as f64 - t.degree as f64);
-        (0.5 * apart).exp()
+        (0.5 * apart).fixed_exp()
     };
     let sum: f64 = tried.iter().map(weight).sum();
     let others = tried

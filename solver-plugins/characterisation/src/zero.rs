@@ -5,6 +5,7 @@
 
 use crate::linear::least_squares;
 use nalgebra::DMatrix;
+use plyflow_fixed::FixedBits;
 
 /// What the first rows of a test say.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -176,7 +177,7 @@ fn onset(d: &[f64], f: &[f64], level: usize, deviation: f64) -> Option<[f64; 4]>
     let (d, f) = (&d[..rows], &f[..rows]);
     let information = |squares: f64, unknowns: f64| {
         let n = rows as f64;
-        n * (squares / n + 1e-2 * deviation * deviation).ln() + unknowns * n.ln()
+        n * (squares / n + 1e-2 * deviation * deviation).fixed_ln() + unknowns * n.fixed_ln()
     };
     let smooth = (2..=4)
         .filter_map(|degree| {
@@ -289,7 +290,9 @@ pub fn find(d: &[f64], f: &[f64], side: f64, kinked: bool) -> Zero {
     }
     let drawn_on = drawn.at(0.0);
     let far = |j: usize| drawn.errors[j] * d[0].abs().powi(j as i32);
-    let unsure = (0..drawn.errors.len()).map(far).fold(0.0, f64::hypot);
+    let unsure = (0..drawn.errors.len())
+        .map(far)
+        .fold(0.0, FixedBits::fixed_hypot);
     if drawn_on.abs() <= (SURE * unsure).max(0.2 * first.abs()) {
         return right(error);
     }

@@ -1,5 +1,8 @@
 //! Step plugin `characterise-bending`: the law M(k) from the profile of a revised cantilever test.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use plyflow_characterisation::bending::{Bending, Specimen, characterise};
 use plyflow_characterisation::cantilever::{
     PLAUSIBLE_OVERHANG, implausible_stiffness, mean_and_deviation,
@@ -10,6 +13,7 @@ use plyflow_characterisation::output::{Output, Series};
 use plyflow_characterisation::profile::{Choice, Method, Profile};
 use plyflow_characterisation::voce::Saturation;
 use plyflow_characterisation::{Dimension, GRAVITY};
+use plyflow_fixed::FixedBits;
 use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::json;
@@ -143,7 +147,10 @@ fn profiles(host: &Host, p: &Parameters) -> Result<(Vec<Profile>, Vec<String>), 
 
 /// Refuses a profile that hangs out by less than a strip of fabric can be tested with: its unit is not that of the header.
 fn reaches_out(source: &str, x: &[f64], z: &[f64]) -> Result<(), String> {
-    let far = x.iter().zip(z).fold(0.0f64, |m, (x, z)| m.max(x.hypot(*z)));
+    let far = x
+        .iter()
+        .zip(z)
+        .fold(0.0f64, |m, (x, z)| m.max(x.fixed_hypot(*z)));
     if far >= LEAST_REACH {
         return Ok(());
     }

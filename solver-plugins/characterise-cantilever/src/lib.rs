@@ -1,5 +1,8 @@
 //! Step plugin `characterise-cantilever`: constant bending stiffness from a standard cantilever test.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use plyflow_characterisation::GRAVITY;
 use plyflow_characterisation::cantilever::{
     Formula, PLAUSIBLE_OVERHANG, STANDARD_ANGLE, implausible_stiffness, mean_and_deviation,
@@ -9,6 +12,7 @@ use plyflow_characterisation::confidence::student;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::{Output, Series};
+use plyflow_fixed::FixedBits;
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::json;
@@ -129,7 +133,7 @@ impl Step for CharacteriseCantilever {
             let error = student(n - 1) * deviation / (n as f64).sqrt();
             out.result("bending_stiffness_error", error, "N m");
         }
-        out.result("bending_length", (mean / weight).cbrt(), "m");
+        out.result("bending_length", (mean / weight).fixed_cbrt(), "m");
         out.result("specimens", n as f64, "1");
         out.write(host)
     }

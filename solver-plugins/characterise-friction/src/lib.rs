@@ -1,5 +1,8 @@
 //! Step plugin `characterise-friction`: Coulomb coefficients from sled tests.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use plyflow_characterisation::cantilever::mean_and_deviation;
 use plyflow_characterisation::confidence::student;
 use plyflow_characterisation::csv::{Column, read};

@@ -1,5 +1,8 @@
 //! Step plugin `characterise-picture-frame`: shear law of yarns and stitch from picture-frame tests.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use plyflow_characterisation::Dimension;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Block, Template, quantity, significant};

@@ -1,6 +1,9 @@
 //! Step plugin `comparison`: measures wrinkles, bridging and shear in the local runs, and in the global run
 //! and a reference at the same places, with what each cost.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod cut;
 mod fidelity;
 mod models;

@@ -1,5 +1,8 @@
 //! Step plugin `coupon-picture-frame`: see [`plyflow_coupons::picture_frame`].
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use plyflow_sdk::{Host, Step, StepError};
 
 /// The step.

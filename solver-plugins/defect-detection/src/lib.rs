@@ -1,5 +1,8 @@
 //! Step plugin `defect-detection`: flags over-sheared and badly conforming places of formed plies.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod detect;
 
 pub use detect::{Detection, Ply, Summary, Thresholds, detect};

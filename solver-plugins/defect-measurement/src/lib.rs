@@ -1,5 +1,8 @@
 //! Step plugin `defect-measurement`: what a metrologist measures on a preform, on a simulated one and on a scan alike.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod agreement;
 mod output;
 mod read;

@@ -1,6 +1,7 @@
 //! What a wrinkle most likely comes from, by what the fields say about its place.
 
 use crate::measure::{Defect, Kind, Ply, mean_along};
+use plyflow_fixed::FixedBits;
 use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::distance;
 use serde::{Deserialize, Serialize};
@@ -114,7 +115,8 @@ fn holds(corners: &[[f64; 2]], p: [f64; 2]) -> bool {
     let distance = |(k, a): (usize, &[f64; 2])| {
         let b = corners[(k + 1) % corners.len()];
         let (along, to) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
-        (along[0] * to[1] - along[1] * to[0]) / along[0].hypot(along[1]).max(f64::MIN_POSITIVE)
+        (along[0] * to[1] - along[1] * to[0])
+            / along[0].fixed_hypot(along[1]).max(f64::MIN_POSITIVE)
     };
     let distances = || corners.iter().enumerate().map(distance);
     distances().all(|d| d > -ROUNDING) || distances().all(|d| d < ROUNDING)

@@ -1,6 +1,9 @@
 //! Wrinkles and bridging of formed plies: measured, with their likely causes. The same for a
 //! simulated ply and for a scanned preform ([`scan`]), which may have to be aligned to the tool first ([`align`]). All lengths in m.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod align;
 mod area;
 mod cause;

@@ -2,6 +2,7 @@
 
 use crate::area::{Extent, NONE, extents, sample};
 use crate::cause::Cause;
+use plyflow_fixed::FixedBits;
 use plyflow_surface::vector::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{
     Crests, Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances,
@@ -403,7 +404,7 @@ fn flank(height: f64, curvature: f64) -> f64 {
     let number = (2.0 * curvature / height).sqrt();
     let steepest = 0.5 * height * number;
     let at = |i: usize| {
-        let slope = steepest * (PI * (i as f64 + 0.5) / FLANK as f64).sin();
+        let slope = steepest * (PI * (i as f64 + 0.5) / FLANK as f64).fixed_sin();
         (1.0 + slope * slope).sqrt()
     };
     (0..FLANK).map(at).sum::<f64>() * PI / (FLANK as f64 * number)
@@ -422,7 +423,7 @@ fn direction(ply: &Ply, nodes: &[u32]) -> f64 {
     let mean = [0, 1].map(|k| places().map(|p| p[k]).sum::<f64>() / nodes.len() as f64);
     let moment =
         |a: usize, b: usize| -> f64 { places().map(|p| (p[a] - mean[a]) * (p[b] - mean[b])).sum() };
-    0.5 * (2.0 * moment(0, 1)).atan2(moment(0, 0) - moment(1, 1))
+    0.5 * (2.0 * moment(0, 1)).fixed_atan2(moment(0, 0) - moment(1, 1))
 }
 
 fn describe(ply: &Ply, kind: Kind, nodes: Vec<u32>, extent: &Extent) -> Defect {

@@ -1,6 +1,7 @@
 //! Which defect of one model, or of a scan, is which of another, and how far apart the two are.
 
 use crate::{Defect, Kind, Ply, Settings, measure};
+use plyflow_fixed::FixedBits;
 
 /// Two defects are the same when their centres lie within this (m) or within half of the longer ridge.
 const SAME_DEFECT: f64 = 0.015;
@@ -11,7 +12,7 @@ const PAIRED_DOWN_TO: f64 = 0.5;
 
 /// Distance of the centres of two defects in the flat ply (m).
 pub fn apart(a: &Defect, b: &Defect) -> f64 {
-    (a.centre[0] - b.centre[0]).hypot(a.centre[1] - b.centre[1])
+    (a.centre[0] - b.centre[0]).fixed_hypot(a.centre[1] - b.centre[1])
 }
 
 /// How unlike two defects of one kind are (m), whose centres are `apart` (m): by place, length and width. Of several that may be

@@ -1,6 +1,9 @@
 //! Step plugin `forming-kinematic`: a pin-jointed net of inextensible fibres draped over a rigid tool. Geometry
 //! only: no forces, no time, no friction. The cheapest answer to how a ply shears.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod net;
 mod output;
 pub mod ply;

@@ -3,6 +3,7 @@
 
 use crate::root::{Circle, Miss};
 use crate::surface::DrapeSurface;
+use plyflow_fixed::FixedBits;
 use plyflow_surface::vector::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 
 /// How the first fibre of each family runs from the start.
@@ -139,10 +140,10 @@ impl Net {
     pub fn coordinates(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [a, b] = self.fabric.directions;
         let (px, py) = (x - self.fabric.start[0], y - self.fabric.start[1]);
-        let sine = (b - a).sin() * self.fabric.spacing;
+        let sine = (b - a).fixed_sin() * self.fabric.spacing;
         [
-            (px * b.sin() - py * b.cos()) / sine,
-            (py * a.cos() - px * a.sin()) / sine,
+            (px * b.fixed_sin() - py * b.fixed_cos()) / sine,
+            (py * a.fixed_cos() - px * a.fixed_sin()) / sine,
         ]
     }
 
@@ -152,8 +153,8 @@ impl Net {
         let (u, v) = (f64::from(i) * f.spacing, f64::from(j) * f.spacing);
         let [a, b] = f.directions;
         [
-            f.start[0] + u * a.cos() + v * b.cos(),
-            f.start[1] + u * a.sin() + v * b.sin(),
+            f.start[0] + u * a.fixed_cos() + v * b.fixed_cos(),
+            f.start[1] + u * a.fixed_sin() + v * b.fixed_sin(),
         ]
     }
 
@@ -193,8 +194,8 @@ impl Net {
         let axes = [
             [1.0, 0.0],
             [0.0, 1.0],
-            [-a.sin(), a.cos()],
-            [-b.sin(), b.cos()],
+            [-a.fixed_sin(), a.fixed_cos()],
+            [-b.fixed_sin(), b.fixed_cos()],
         ];
         axes.iter().all(|n| {
             let span = |p: &[[f64; 2]; 4]| {
@@ -224,7 +225,7 @@ impl Net {
         let g1 = sub(add(b, c), add(a, d));
         let g2 = sub(add(c, d), add(a, b));
         let [first, second] = self.fabric.directions;
-        (second - first) - norm(cross(g1, g2)).atan2(dot(g1, g2))
+        (second - first) - norm(cross(g1, g2)).fixed_atan2(dot(g1, g2))
     }
 
     /// Drapes the net from `place` (m) on the surface, whose unit normal there is `normal`. `tick` hears
@@ -246,7 +247,7 @@ impl Net {
         for (family, angle) in self.fabric.directions.into_iter().enumerate() {
             for sign in [1, -1] {
                 let s = f64::from(sign);
-                let flat = [s * angle.cos(), s * angle.sin(), 0.0];
+                let flat = [s * angle.fixed_cos(), s * angle.fixed_sin(), 0.0];
                 self.generate(surface, family, sign, flat);
             }
         }

@@ -3,6 +3,7 @@
 use crate::net::{Net, Node, Stop};
 use crate::surface::DrapeSurface;
 use plyflow_blank::{Blank, Quality};
+use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::scene::{Scene, Sheet, SheetKind};
@@ -49,7 +50,7 @@ pub fn plies(scene: &Scene) -> Result<Vec<Ply>, String> {
             blank: Blank::new(sheet).map_err(|e| e.to_string())?,
         };
         let [a, b] = ply.directions();
-        if (b - a).sin() < 0.1 {
+        if (b - a).fixed_sin() < 0.1 {
             return Err(format!(
                 "the fibres of ply '{}' run at {:.1} deg to each other; a net needs at least 6 deg: change \
                  fibre_1 or fibre_2",
@@ -83,7 +84,7 @@ impl Ply {
     pub fn directions(&self) -> [f64; 2] {
         use std::f64::consts::TAU;
         let [first, second] = self.stated();
-        let (a, b) = if (second - first).sin() >= 0.0 {
+        let (a, b) = if (second - first).fixed_sin() >= 0.0 {
             (first, second)
         } else {
             (second, first)

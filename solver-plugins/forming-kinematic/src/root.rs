@@ -1,6 +1,7 @@
 //! The point of a circle, or of a line, that lies on the surface.
 
 use crate::surface::DrapeSurface;
+use plyflow_fixed::FixedBits;
 use plyflow_surface::vector::{Vec3, add, dot, scale};
 
 /// Why there is no such point.
@@ -27,13 +28,13 @@ pub struct Circle {
 
 impl Circle {
     fn at(&self, angle: f64) -> Vec3 {
-        let (s, c) = angle.sin_cos();
+        let (s, c) = angle.fixed_sin_cos();
         let turn = add(scale(self.ahead, c), scale(self.aside, s));
         add(self.centre, scale(turn, self.radius))
     }
 
     fn slope(&self, angle: f64) -> Vec3 {
-        let (s, c) = angle.sin_cos();
+        let (s, c) = angle.fixed_sin_cos();
         scale(
             add(scale(self.ahead, -s), scale(self.aside, c)),
             self.radius,

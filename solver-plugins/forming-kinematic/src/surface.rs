@@ -4,6 +4,7 @@
 //! that meets the corners' normals, as a point-normal triangle (Vlachos, Peters, Boyd, Mitchell, Curved PN
 //! Triangles, I3D 2001), written as a height over the facet. Sharp edges stay sharp.
 
+use plyflow_fixed::FixedBits;
 use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use plyflow_tooling::{SurfaceTree, ToolMesh};
 
@@ -250,7 +251,7 @@ fn edges(mesh: &ToolMesh, faces: &[Vec3], crease: f64) -> Vec<[Across; 3]> {
                     tri[k] < tri[(k + 1) % 3]
                 };
                 let flat = n == [0.0; 3] || m == [0.0; 3];
-                let angle = norm(cross(n, m)).atan2(dot(n, m));
+                let angle = norm(cross(n, m)).fixed_atan2(dot(n, m));
                 if forward(t, k) != forward(o, l) && !flat && angle < crease {
                     across[t as usize][k] = Across::Smooth(o);
                     across[o as usize][l] = Across::Smooth(t);

@@ -1,5 +1,7 @@
 //! An element size for a target error, from the errors of runs of several sizes.
 
+use plyflow_fixed::FixedBits;
+
 /// An element size for a target error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Advice {
@@ -40,7 +42,7 @@ pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
     }
     let p = order(finest, &rising);
     let (next, difference) = rising[0];
-    let own = difference / ((next / finest).powf(p) - 1.0);
+    let own = difference / ((next / finest).fixed_powf(p) - 1.0);
     let advice = |size: f64, doubt: Option<String>| Advice {
         size,
         finest_error: own,
@@ -65,11 +67,11 @@ pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
             continue;
         }
         let share = if e0 > 0.0 {
-            (target / e0).ln() / (e1 / e0).ln()
+            (target / e0).fixed_ln() / (e1 / e0).fixed_ln()
         } else {
             0.0
         };
-        return advice(h0 * (h1 / h0).powf(share), None);
+        return advice(h0 * (h1 / h0).fixed_powf(share), None);
     }
     let size = errors[errors.len() - 1].0;
     let doubt = format!(
@@ -81,7 +83,7 @@ pub fn advise(measured: &[(f64, f64)], target: f64) -> Advice {
 
 /// Two significant digits.
 fn rounded(x: f64) -> f64 {
-    let unit = 10f64.powf(x.abs().max(1e-12).log10().floor() - 1.0);
+    let unit = 10f64.fixed_powf(x.abs().max(1e-12).fixed_log10().floor() - 1.0);
     (x / unit).round() * unit
 }
 
@@ -95,7 +97,7 @@ fn order(finest: f64, rising: &[(f64, f64)]) -> f64 {
         return least;
     }
     // Grows with p.
-    let ratio = |p: f64| ((h2 / finest).powf(p) - 1.0) / ((h1 / finest).powf(p) - 1.0);
+    let ratio = |p: f64| ((h2 / finest).fixed_powf(p) - 1.0) / ((h1 / finest).fixed_powf(p) - 1.0);
     let (mut low, mut high) = (least, most);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);

@@ -1,9 +1,13 @@
 //! Step plugin `mesh-comparison`: shear angles over the element size (thesis 5.5.1, mesh sensitivity); of zones, the distance from the tool.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod advice;
 mod zones;
 
 pub use advice::{Advice, advise};
+use plyflow_fixed::FixedBits;
 
 use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
 use plyflow_surface::draped;
@@ -136,7 +140,10 @@ fn error(run: &Run, finest: &Run, of: &[usize]) -> f64 {
 
 /// Slope of log y over log x by least squares; `None` for fewer than two places.
 fn slope(places: &[(f64, f64)]) -> Option<f64> {
-    let logs: Vec<(f64, f64)> = places.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let logs: Vec<(f64, f64)> = places
+        .iter()
+        .map(|(x, y)| (x.fixed_ln(), y.fixed_ln()))
+        .collect();
     let n = logs.len() as f64;
     let mean = |get: fn(&(f64, f64)) -> f64| logs.iter().map(get).sum::<f64>() / n;
     let (mx, my) = (mean(|p| p.0), mean(|p| p.1));

@@ -5,6 +5,9 @@
 //! known even when the component ends the process: `{"subject": "..", "begins": {rule}}` and
 //! `{"subject": "..", "ends": {check}}`. A check that fails does not fail the step: the result `failed` counts.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use plyflow_conformance::{Check, Outcome, Rule, Sink, check_element, check_material};
 use plyflow_model::material::Material;
 use plyflow_sdk::abi::*;

@@ -8,6 +8,9 @@
 //! All quantities are SI. Array layouts are those of `plyflow.h`: batched arrays are structure of
 //! arrays with the lane running fastest.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod aligned;
 mod component;
 mod step;

@@ -1,6 +1,7 @@
 //! Exact closest point and signed distance to a triangulated surface.
 
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use plyflow_fixed::FixedBits;
 
 /// Where on its triangle a closest point lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,7 +129,7 @@ impl Surface {
                 at[tri[i] as usize].push((t as u32, self.corner_angle(tri, i)));
             }
         }
-        let limit = crease.cos();
+        let limit = crease.fixed_cos();
         let smooth = |own: Vec3, corner: u32| {
             let around = at[corner as usize].iter();
             let sum = around.fold([0.0; 3], |sum, &(t, angle)| {
@@ -161,7 +162,7 @@ impl Surface {
         let p = self.points[tri[i] as usize];
         let u = unit(sub(self.points[tri[(i + 1) % 3] as usize], p));
         let v = unit(sub(self.points[tri[(i + 2) % 3] as usize], p));
-        norm(cross(u, v)).atan2(dot(u, v))
+        norm(cross(u, v)).fixed_atan2(dot(u, v))
     }
 
     fn set_edge_normals(&mut self) {

@@ -4,6 +4,7 @@ use crate::closest::{Surface, closest_on_triangle};
 use crate::curvature::{Curvature, curvatures};
 use crate::topology::Topology;
 use crate::vector::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
+use plyflow_fixed::FixedBits;
 use std::collections::BTreeMap;
 
 /// Facets of parametric tools have no longer sides (m): what is known at their corners goes for all of them.
@@ -148,7 +149,7 @@ fn bends(tool: &Surface) -> BTreeMap<[u32; 2], Bend> {
             }
             let [own, next] = [t, other].map(twice_area);
             let [a, b] = [unit(own), unit(next)];
-            let size = norm(cross(a, b)).atan2(dot(a, b));
+            let size = norm(cross(a, b)).fixed_atan2(dot(a, b));
             // Over a crest the rest of the other one lies below.
             let beyond = corners(other)
                 .map(|p| dot(sub(p, corners(t)[0]), a))

@@ -4,6 +4,7 @@
 use crate::topology::Topology;
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use nalgebra::{SMatrix, SVector};
+use plyflow_fixed::FixedBits;
 use rayon::prelude::*;
 
 /// Curvature of a surface at a node. Signs: positive where the surface bends towards its normal (a valley
@@ -104,7 +105,7 @@ fn iterate(offsets: &[Vec3], first: Vec3) -> Option<Curvature> {
         if moved < CONVERGED {
             break;
         }
-        if dot(new, first) < LARGEST_TURN.cos() {
+        if dot(new, first) < LARGEST_TURN.fixed_cos() {
             fits.truncate(1);
             break;
         }
@@ -118,7 +119,7 @@ fn iterate(offsets: &[Vec3], first: Vec3) -> Option<Curvature> {
 fn principal([a, b, c, d, e]: [f64; QUADRIC], size: f64, normal: Vec3) -> Curvature {
     let w = 1.0 + d * d + e * e;
     let gauss = (4.0 * a * c - b * b) / (w * w);
-    let mean = (a + c + a * e * e + c * d * d - b * d * e) / w.powf(1.5);
+    let mean = (a + c + a * e * e + c * d * d - b * d * e) / w.fixed_powf(1.5);
     let root = (mean * mean - gauss).max(0.0).sqrt();
     let (large, small) = if mean >= 0.0 {
         (mean + root, mean - root)
@@ -126,14 +127,14 @@ fn principal([a, b, c, d, e]: [f64; QUADRIC], size: f64, normal: Vec3) -> Curvat
         (mean - root, mean + root)
     };
     // Eigenvector of [[2a, b], [b, 2c]]: twice its angle is that of (a - c, b), for the larger eigenvalue.
-    let angle = 0.5 * b.atan2(a - c)
+    let angle = 0.5 * b.fixed_atan2(a - c)
         + if mean >= 0.0 {
             0.0
         } else {
             std::f64::consts::FRAC_PI_2
         };
     let [e1, e2] = tangents(normal);
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = angle.fixed_sin_cos();
     Curvature {
         max: large / size,
         min: small / size,

@@ -1,5 +1,7 @@
 //! Distributions of a quantity over a surface: every value counts by its weight (the area that it stands for).
 
+use plyflow_fixed::FixedBits;
+
 /// The quantiles `shares` (0 to 1) of `values` by weight: for each share q the least value that values of at least the
 /// share q of the whole weight do not exceed. All 0 without weight.
 ///
@@ -39,7 +41,7 @@ pub fn weighted_mean(values: &[f64], weights: &[f64]) -> f64 {
 /// A width of bins of 1, 2 or 5 times a power of ten, with 40 to 100 of them up to `range`.
 pub fn bin_width(range: f64) -> f64 {
     let least = range.max(1e-12) / 100.0;
-    let power = 10f64.powf(least.log10().floor());
+    let power = 10f64.fixed_powf(least.fixed_log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0];
     let step = step.into_iter().find(|s| s * power >= least * (1.0 - 1e-9));
     step.unwrap_or(10.0) * power

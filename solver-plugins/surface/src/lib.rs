@@ -2,6 +2,9 @@
 //! curvature, distributions, ridge lines, location in an undeformed quad mesh, smooth surfaces through nodes. All lengths in m. Everything is
 //! deterministic: ties go to the lowest index.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod closest;
 mod conformity;
 mod crests;

@@ -1,6 +1,7 @@
 //! Location of points in an undeformed quad mesh, seen from above.
 
 use crate::vector::Vec3;
+use plyflow_fixed::FixedBits;
 
 /// A place in a quad mesh: a cell and the bilinear weights of its nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,7 +152,7 @@ impl QuadLocator {
         }
         let w = weights(s.clamp(0.0, 1.0), t.clamp(0.0, 1.0));
         let inside = [0, 1].map(|d| (0..4).map(|i| w[i] * q[i][d]).sum::<f64>());
-        let miss = (p[0] - inside[0]).hypot(p[1] - inside[1]);
+        let miss = (p[0] - inside[0]).fixed_hypot(p[1] - inside[1]);
         (
             miss,
             Location {

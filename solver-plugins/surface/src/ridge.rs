@@ -5,6 +5,7 @@ use crate::topology::Topology;
 use crate::vector::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 use petgraph::algo::astar;
 use petgraph::graphmap::UnGraphMap;
+use plyflow_fixed::FixedBits;
 
 /// The crest line of a region.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +103,7 @@ pub fn sharpness(topology: &Topology, points: &[Vec3], nodes: &[u32]) -> f64 {
         let pairs =
             (all.iter().enumerate()).flat_map(|(k, a)| all[k + 1..].iter().map(move |b| (a, b)));
         let least = pairs.map(|(a, b)| dot(*a, *b)).fold(1.0, f64::min);
-        least.max(-1.0).acos()
+        least.max(-1.0).fixed_acos()
     };
     nodes.iter().map(turn).fold(0.0, f64::max)
 }

@@ -1,6 +1,7 @@
 //! Where vertical planes and curtains cut a triangulated surface.
 
 use crate::vector::{Vec3, add, distance, scale, sub};
+use plyflow_fixed::FixedBits;
 use std::collections::BTreeMap;
 
 /// Ends of lines that lie within this of each other (m) are one place.
@@ -34,7 +35,7 @@ pub fn plane_section(
 pub fn stations(path: &[[f64; 2]]) -> Vec<f64> {
     let mut gone = 0.0;
     let sides = path.windows(2).map(|w| {
-        gone += (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
+        gone += (w[1][0] - w[0][0]).fixed_hypot(w[1][1] - w[0][1]);
         gone
     });
     path.iter()
@@ -122,7 +123,7 @@ impl Side {
     /// `None` when it has no length.
     fn new(number: usize, [from, to]: [[f64; 2]; 2], stations: [f64; 2]) -> Option<Self> {
         let along = [to[0] - from[0], to[1] - from[1]];
-        let length = along[0].hypot(along[1]);
+        let length = along[0].fixed_hypot(along[1]);
         (length > 0.0).then(|| Self {
             number,
             from,

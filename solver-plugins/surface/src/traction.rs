@@ -1,6 +1,7 @@
 //! What pulls across a line of a sheet.
 
 use crate::vector::{Vec3, sub};
+use plyflow_fixed::FixedBits;
 
 /// First Piola-Kirchhoff traction (N/m of undeformed length) across a line with the normal `normal` of the flat ply, in a cell
 /// whose corners were at `then` and are at `now` (m), with resultants `s` (S11, S22, S12, N/m) in axes of which the first
@@ -16,7 +17,7 @@ pub fn traction(then: [Vec3; 4], now: [Vec3; 4], s: [f64; 3], axis: f64, normal:
         );
         [0, 1, 2].map(|k| p * d[k] + q * e[k])
     };
-    let (sin, cos) = axis.sin_cos();
+    let (sin, cos) = axis.fixed_sin_cos();
     let (e1, e2) = ([cos, sin], [-sin, cos]);
     let n = [e1, e2].map(|e| e[0] * normal[0] + e[1] * normal[1]);
     let (g1, g2) = (mapped(e1), mapped(e2));

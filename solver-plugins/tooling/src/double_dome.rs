@@ -4,6 +4,7 @@ use crate::CHORD_TOLERANCE;
 use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
+use plyflow_fixed::FixedBits;
 use plyflow_model::scene::DoubleDomeTool;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -78,7 +79,7 @@ impl Shape {
             centre,
             waist,
             height: (both * both - centre * centre).sqrt(),
-            turn: (centre / both).asin(),
+            turn: (centre / both).fixed_asin(),
             wall,
         })
     }
@@ -94,11 +95,11 @@ impl Shape {
         let (n, m) = (count(sweep, self.radius), count(self.turn, self.waist));
         let mut half = vec![[self.centre + self.radius, 0.0]];
         half.extend((1..=n).map(|k| {
-            let (s, c) = (sweep * k as f64 / n as f64).sin_cos();
+            let (s, c) = (sweep * k as f64 / n as f64).fixed_sin_cos();
             [self.centre + self.radius * c, self.radius * s]
         }));
         half.extend((1..=m).map(|k| {
-            let (s, c) = (self.turn * (1.0 - k as f64 / m as f64)).sin_cos();
+            let (s, c) = (self.turn * (1.0 - k as f64 / m as f64)).fixed_sin_cos();
             [self.waist * s, self.height - self.waist * c]
         }));
         let last = half.len() - 1;
@@ -147,7 +148,7 @@ impl Shape {
         let mut ring = Vec::with_capacity(2 * (over + down));
         let top = if pole { 0 } else { over };
         for k in 0..=top {
-            let (s, c) = (PI * k as f64 / over as f64).sin_cos();
+            let (s, c) = (PI * k as f64 / over as f64).fixed_sin_cos();
             // The ends exactly on the wall.
             let s = if k == 0 || k == over { 0.0 } else { s };
             ring.push(mesh.push([x, r * c, self.wall + r * s]));

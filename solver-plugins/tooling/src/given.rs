@@ -5,6 +5,7 @@ use crate::mesh::ToolMesh;
 use crate::sdf::SignedDistanceGrid;
 use crate::tree::SurfaceTree;
 use crate::vector::{V3, dot, norm, scale, sub};
+use plyflow_fixed::FixedBits;
 use plyflow_model::material::MaterialEntry;
 use plyflow_model::scene::{Process, Scene, Sheet, SheetKind, Tool};
 
@@ -150,7 +151,7 @@ fn touched(scene: &Scene, mesh: &ToolMesh) -> impl Fn(V3) -> bool + Sync + use<>
 /// Length as text in mm, to three figures.
 fn mm(metres: f64) -> String {
     let value = 1e3 * metres;
-    let digits = (2 - value.abs().max(1e-4).log10().floor() as i32).clamp(0, 6) as usize;
+    let digits = (2 - value.abs().max(1e-4).fixed_log10().floor() as i32).clamp(0, 6) as usize;
     let text = format!("{value:.digits$}");
     let text = if text.contains('.') {
         text.trim_end_matches('0').trim_end_matches('.')
@@ -176,7 +177,7 @@ fn spacing_that_does(
     let mut spacing = (0.5 * from).min(DEFAULT_SPACING);
     loop {
         // Two figures, so that it can be written down.
-        let unit = 10f64.powf(spacing.log10().floor() - 1.0);
+        let unit = 10f64.fixed_powf(spacing.fixed_log10().floor() - 1.0);
         let rounded = (spacing / unit * (1.0 + 1e-9)).floor() * unit;
         if values(mesh, rounded, reach(rounded, stack)) > MOST_TRIED {
             return None;

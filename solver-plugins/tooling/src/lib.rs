@@ -4,6 +4,9 @@
 //! Coordinates as in scenes: x along the tool, y across, z up, the machine bed is the plane z = 0.
 //! Lengths in metres.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod audit;
 mod double_dome;
 mod error;

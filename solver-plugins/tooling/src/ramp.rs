@@ -1,5 +1,7 @@
 //! The profile of a joggle: level, arc, straight slope, arc, level.
 
+use plyflow_fixed::FixedBits;
+
 /// A rise over a length with circular fillets of one radius at its foot and head; C1, with curvature 0 or
 /// 1/radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,18 +31,18 @@ impl Ramp {
         }
         // Two arcs of angle t and a tangent line between them span (length, height):
         //   length sin t + (2 radius - height) cos t = 2 radius.
-        let amplitude = length.hypot(2.0 * radius - height);
+        let amplitude = length.fixed_hypot(2.0 * radius - height);
         if length < Self::shortest(rise, radius) {
             return None;
         }
-        let angle = length.atan2(2.0 * radius - height)
-            - (2.0 * radius / amplitude).clamp(-1.0, 1.0).acos();
+        let angle = length.fixed_atan2(2.0 * radius - height)
+            - (2.0 * radius / amplitude).clamp(-1.0, 1.0).fixed_acos();
         Some(Self {
             length,
             rise,
             radius,
-            arc: radius * angle.sin(),
-            slope: angle.tan(),
+            arc: radius * angle.fixed_sin(),
+            slope: angle.fixed_tan(),
         })
     }
 
@@ -49,9 +51,9 @@ impl Ramp {
     pub(crate) fn shortest(rise: f64, radius: f64) -> f64 {
         let height = rise.abs();
         let half = std::f64::consts::FRAC_PI_4;
-        let arcs_at_45 = 2.0 * radius * (1.0 - half.cos());
+        let arcs_at_45 = 2.0 * radius * (1.0 - half.fixed_cos());
         if height > arcs_at_45 {
-            2.0 * radius * half.sin() + (height - arcs_at_45)
+            2.0 * radius * half.fixed_sin() + (height - arcs_at_45)
         } else {
             (4.0 * height * radius - height * height).max(0.0).sqrt()
         }

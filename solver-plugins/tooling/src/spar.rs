@@ -5,6 +5,7 @@ use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::ramp::Ramp;
 use crate::sweep::{JoggleShape, Sweep};
+use plyflow_fixed::FixedBits;
 use plyflow_model::scene::{FlatTool, Joggle, JoggleSpar, RampedSpar};
 use plyflow_model::units::{Angle, Length};
 
@@ -193,8 +194,8 @@ pub(crate) fn spar_sweep(spar: &JoggleSpar) -> Result<Sweep, ToolError> {
     let half = 0.5 * spar.length.si();
     let end_height = sweep.height + sweep.lift(half, 0.0);
     sweep.ends = [
-        -half + sweep.height * draft.tan(),
-        half - end_height * draft.tan(),
+        -half + sweep.height * draft.fixed_tan(),
+        half - end_height * draft.fixed_tan(),
     ];
     check_fit(spar, &sweep)?;
     Ok(sweep)
@@ -216,7 +217,7 @@ fn joggle(i: usize, j: &Joggle) -> Result<JoggleShape, ToolError> {
     }
     let (rise, sides) = (j.rise.si(), j.side_step.map(|s| s.si()));
     let amplitude = JoggleShape::amplitude(rise, sides);
-    let profile = Ramp::new(length * skew.cos(), amplitude, radius).ok_or_else(|| {
+    let profile = Ramp::new(length * skew.fixed_cos(), amplitude, radius).ok_or_else(|| {
         ToolError::length(
             SPAR,
             name("length"),
@@ -225,7 +226,7 @@ fn joggle(i: usize, j: &Joggle) -> Result<JoggleShape, ToolError> {
                 "its fillets of {} with the rise of {} and the side step need at least {}",
                 mm(radius),
                 mm(rise),
-                mm(Ramp::shortest(amplitude, radius) / skew.cos())
+                mm(Ramp::shortest(amplitude, radius) / skew.fixed_cos())
             ),
             "make the ramp longer or its fillets smaller",
         )
@@ -281,7 +282,7 @@ fn check_fit(spar: &JoggleSpar, sweep: &Sweep) -> Result<(), ToolError> {
         ));
     }
     let lowest = lowest_top(sweep);
-    let drop = sweep.fillet * (1.0 - sweep.arc_angle().cos());
+    let drop = sweep.fillet * (1.0 - sweep.arc_angle().fixed_cos());
     if lowest <= drop {
         return Err(ToolError::length(
             SPAR,
@@ -301,18 +302,20 @@ fn check_fit(spar: &JoggleSpar, sweep: &Sweep) -> Result<(), ToolError> {
 /// Joggles must lie between the rounded ends, one after the other.
 fn check_places(sweep: &Sweep, lowest: f64) -> Result<(), ToolError> {
     let tallest = sweep.height + (lowest - sweep.height).abs() + total_rise(sweep);
-    let foot = sweep.half_width + tallest * sweep.draft.tan();
+    let foot = sweep.half_width + tallest * sweep.draft.fixed_tan();
     let [low, high] = [sweep.ends[0] + sweep.corner, sweep.ends[1] - sweep.corner];
     let mut reached = (low, "the rounded end at".to_owned());
     for (i, j) in sweep.joggles.iter().enumerate() {
         // Joggles may slant across each other's x range, but must not meet at any y.
         let slant = if i == 0 {
-            foot * j.skew.tan().abs()
+            foot * j.skew.fixed_tan().abs()
         } else {
             0.0
         };
         let previous = i.checked_sub(1).map(|k| &sweep.joggles[k]);
-        let lean = previous.map_or(0.0, |p| foot * (p.skew.tan() - j.skew.tan()).abs());
+        let lean = previous.map_or(0.0, |p| {
+            foot * (p.skew.fixed_tan() - j.skew.fixed_tan()).abs()
+        });
         let begin = j.start - slant - lean;
         if begin < reached.0 {
             return Err(ToolError::length(
@@ -331,7 +334,7 @@ fn check_places(sweep: &Sweep, lowest: f64) -> Result<(), ToolError> {
         reached = (j.start + j.length, format!("the end of joggles[{i}] at"));
     }
     for (i, j) in sweep.joggles.iter().enumerate() {
-        let end = j.start + j.length + foot * j.skew.tan().abs();
+        let end = j.start + j.length + foot * j.skew.fixed_tan().abs();
         if end > high {
             return Err(ToolError::length(
                 SPAR,

@@ -4,6 +4,7 @@
 use crate::mesh::ToolMesh;
 use crate::ramp::Ramp;
 use crate::vector::V3;
+use plyflow_fixed::FixedBits;
 use std::f64::consts::FRAC_PI_2;
 
 /// The shape. Theoretical corners are where the top plane meets the planes of the walls.
@@ -44,7 +45,7 @@ pub(crate) struct JoggleShape {
 impl JoggleShape {
     /// Length of the vector of rise and larger side step.
     pub fn amplitude(rise: f64, sides: [f64; 2]) -> f64 {
-        rise.hypot(sides[0].abs().max(sides[1].abs()))
+        rise.fixed_hypot(sides[0].abs().max(sides[1].abs()))
     }
 
     /// Part of the joggle that has happened at (x, y): 0 to 1.
@@ -53,7 +54,7 @@ impl JoggleShape {
         if amplitude == 0.0 {
             return 0.0;
         }
-        let s = (x - self.start - y * self.skew.tan()) * self.skew.cos();
+        let s = (x - self.start - y * self.skew.fixed_tan()) * self.skew.fixed_cos();
         self.profile.height(s) / amplitude
     }
 
@@ -70,7 +71,7 @@ impl Sweep {
 
     /// Distance from the theoretical corner to where the fillet begins on the top.
     pub fn setback(&self) -> f64 {
-        self.fillet * (0.5 * self.arc_angle()).tan()
+        self.fillet * (0.5 * self.arc_angle()).fixed_tan()
     }
 
     /// Limits of the level top: x low, x high, half width, and its radius in plan.
@@ -116,15 +117,18 @@ impl Sweep {
     /// Offset from the top's outline and height of the undeformed profile at angle `a` of the fillet.
     pub fn fillet_point(&self, a: f64) -> (f64, f64) {
         (
-            self.fillet * a.sin(),
-            self.height - self.fillet * (1.0 - a.cos()),
+            self.fillet * a.fixed_sin(),
+            self.height - self.fillet * (1.0 - a.fixed_cos()),
         )
     }
 
     /// The same at length `s` down the wall.
     pub fn wall_point(&self, s: f64) -> (f64, f64) {
         let (d, z) = self.fillet_point(self.arc_angle());
-        (d + s * self.draft.sin(), z - s * self.draft.cos())
+        (
+            d + s * self.draft.fixed_sin(),
+            z - s * self.draft.fixed_cos(),
+        )
     }
 
     /// The deformed point at an offset and height of the profile, over a point of the top's outline.
@@ -253,7 +257,7 @@ pub(crate) fn arc_step(radius: f64, tolerance: f64, facet: f64) -> f64 {
     if radius <= 0.0 {
         return FRAC_PI_2;
     }
-    let chord = 2.0 * (1.0 - (tolerance / radius).min(0.5)).acos();
+    let chord = 2.0 * (1.0 - (tolerance / radius).min(0.5)).fixed_acos();
     chord.min(SLACK * facet / radius)
 }
 
@@ -290,15 +294,15 @@ impl TopGrid {
     fn new(sweep: &Sweep, facet: f64, tolerance: f64) -> Self {
         let step = SLACK * facet;
         let ([low, high], half, radius) = sweep.top();
-        let foot = radius + sweep.wall_point(sweep.height / sweep.draft.cos()).0;
+        let foot = radius + sweep.wall_point(sweep.height / sweep.draft.fixed_cos()).0;
         let turns = (FRAC_PI_2 / arc_step(foot, tolerance, facet))
             .ceil()
             .max(2.0) as usize;
         let corner = |k: usize| {
             let angle = FRAC_PI_2 * k as f64 / turns as f64;
             (
-                radius * (1.0 - angle.cos()),
-                half - radius + radius * angle.sin(),
+                radius * (1.0 - angle.fixed_cos()),
+                half - radius + radius * angle.fixed_sin(),
                 angle,
             )
         };
@@ -357,7 +361,7 @@ impl TopGrid {
                 } else if line == last {
                     [1.0, 0.0]
                 } else {
-                    [l.normal.cos(), side * l.normal.sin()]
+                    [l.normal.fixed_cos(), side * l.normal.fixed_sin()]
                 };
                 OutlinePoint {
                     base: l.point(place, self.across),
@@ -373,9 +377,9 @@ impl TopGrid {
 /// x between the corners, closer where a joggle bends the surface.
 fn stations(sweep: &Sweep, low: f64, high: f64, step: f64, tolerance: f64) -> Vec<f64> {
     let mut breaks = vec![(low, step)];
-    let foot = sweep.half_width + (sweep.height + 0.05) * sweep.draft.tan();
+    let foot = sweep.half_width + (sweep.height + 0.05) * sweep.draft.fixed_tan();
     for j in &sweep.joggles {
-        let slant = foot * j.skew.tan().abs();
+        let slant = foot * j.skew.fixed_tan().abs();
         let fine = (arc_step(j.fillet, tolerance, f64::MAX) * j.fillet).min(step);
         breaks.push(((j.start - slant).max(low), fine));
         breaks.push(((j.start + j.length + slant).min(high), step));

@@ -5,6 +5,7 @@ use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
 use crate::vector::{V3, add, cross, dot, norm, scale, slerp, sub, unit};
+use plyflow_fixed::FixedBits;
 use plyflow_model::scene::TetrahedronTool;
 use std::f64::consts::FRAC_PI_6;
 
@@ -67,7 +68,7 @@ impl Shape {
     fn new(edge: f64, height: f64, radius: f64) -> Self {
         let top = [0.0, 0.0, height];
         let corner = |i: usize| {
-            let (s, c) = (-5.0 * FRAC_PI_6 + 4.0 * FRAC_PI_6 * i as f64).sin_cos();
+            let (s, c) = (-5.0 * FRAC_PI_6 + 4.0 * FRAC_PI_6 * i as f64).fixed_sin_cos();
             scale([c, s, 0.0], edge / 3f64.sqrt())
         };
         let edges = [0, 1, 2].map(|i| unit(sub(corner(i), top)));
@@ -89,7 +90,7 @@ impl Shape {
     fn mesh(&self, facet: f64, tolerance: f64) -> ToolMesh {
         let mut mesh = ToolMesh::default();
         let [a, b] = [self.normals[0], self.normals[1]];
-        let angle = dot(a, b).clamp(-1.0, 1.0).acos();
+        let angle = dot(a, b).clamp(-1.0, 1.0).fixed_acos();
         let around = (angle / arc_step(self.radius, tolerance, facet))
             .ceil()
             .max(2.0) as usize;

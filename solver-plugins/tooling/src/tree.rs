@@ -2,6 +2,7 @@
 
 use crate::mesh::ToolMesh;
 use crate::vector::{V3, add, cross, dot, norm, scale, sub, unit};
+use plyflow_fixed::FixedBits;
 
 /// Closest point of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,7 +185,7 @@ fn feature_normals(mesh: &ToolMesh) -> Vec<[V3; 7]> {
         let c = mesh.corners(t);
         for k in 0..3 {
             let (u, v) = (sub(c[(k + 1) % 3], c[k]), sub(c[(k + 2) % 3], c[k]));
-            let angle = norm(cross(u, v)).atan2(dot(u, v));
+            let angle = norm(cross(u, v)).fixed_atan2(dot(u, v));
             let sum = &mut points[tri[k] as usize];
             *sum = add(*sum, scale(faces[t], angle));
         }

@@ -1,5 +1,7 @@
 //! Vectors of three numbers.
 
+use plyflow_fixed::FixedBits;
+
 pub(crate) type V3 = [f64; 3];
 
 #[inline]
@@ -45,13 +47,13 @@ pub(crate) fn unit(a: V3) -> V3 {
 
 /// Between two unit vectors along the great circle.
 pub(crate) fn slerp(a: V3, b: V3, w: f64) -> V3 {
-    let angle = dot(a, b).clamp(-1.0, 1.0).acos();
+    let angle = dot(a, b).clamp(-1.0, 1.0).fixed_acos();
     if angle < 1e-12 {
         return a;
     }
-    let s = angle.sin();
+    let s = angle.fixed_sin();
     unit(add(
-        scale(a, ((1.0 - w) * angle).sin() / s),
-        scale(b, (w * angle).sin() / s),
+        scale(a, ((1.0 - w) * angle).fixed_sin() / s),
+        scale(b, (w * angle).fixed_sin() / s),
     ))
 }

@@ -4,6 +4,9 @@
 //! Made for parts pressed by an axisymmetric punch (thesis chapter 4): there wrinkles run outwards, and a circle crosses
 //! each of them once.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod deviation;
 mod moments;
 mod parameters;
@@ -13,6 +16,7 @@ mod surface;
 mod trace;
 mod waves;
 
+use plyflow_fixed::FixedBits;
 pub use surface::{Cut, Hit};
 pub use trace::Trace;
 pub use waves::{Criteria, Side, Wave, median, waves};
@@ -80,7 +84,7 @@ impl Step for WrinkleCensus {
         let [x, y] = [p.centre[0], p.centre[1]];
         let around = |radius: f64| -> Vec<Option<Hit>> {
             let place = |i: usize| {
-                let (s, c) = (TAU * i as f64 / p.samples as f64).sin_cos();
+                let (s, c) = (TAU * i as f64 / p.samples as f64).fixed_sin_cos();
                 cut.seen([x + radius * c, y + radius * s], p.looks_up())
             };
             (0..p.samples).map(place).collect()
@@ -257,7 +261,7 @@ fn sections(
 ) -> Result<(), StepError> {
     let mut series = Vec::new();
     for (k, angle) in p.sections.iter().enumerate() {
-        let (s, c) = angle.sin_cos();
+        let (s, c) = angle.fixed_sin_cos();
         let (along, height) = profile(&line(p, cut, [p.centre[0], p.centre[1]], [c, s]));
         let curve = Curve {
             name: format!("section_{k}"),
@@ -282,7 +286,7 @@ fn cross_sections(
     let (mut series, mut counted) = (Vec::new(), Vec::new());
     let names = result_names(p)?;
     for (k, (across, name)) in p.cross_sections.iter().zip(names).enumerate() {
-        let (s, c) = across.angle.sin_cos();
+        let (s, c) = across.angle.fixed_sin_cos();
         let from = [
             p.centre[0] + across.offset * c,
             p.centre[1] + across.offset * s,
@@ -419,7 +423,7 @@ fn dome(
     values: &[f64],
     weights: &[f64],
 ) -> Result<(), StepError> {
-    let within = |q: &Vec3| (q[0] - p.centre[0]).hypot(q[1] - p.centre[1]) <= radius;
+    let within = |q: &Vec3| (q[0] - p.centre[0]).fixed_hypot(q[1] - p.centre[1]) <= radius;
     let weights: Vec<f64> = (ply.points.iter().zip(weights))
         .map(|(q, w)| if within(q) { *w } else { 0.0 })
         .collect();

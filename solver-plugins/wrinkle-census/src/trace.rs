@@ -2,6 +2,7 @@
 
 use crate::surface::Hit;
 use crate::waves::{Criteria, Side, Wave, waves};
+use plyflow_fixed::FixedBits;
 use std::f64::consts::{PI, TAU};
 
 /// The circles on which wrinkles are followed.
@@ -68,7 +69,7 @@ fn turn(a: &Wave, b: &Wave) -> f64 {
 
 /// Distance of two tops in space (m).
 fn distance((r, a): (f64, &Wave), (s, b): (f64, &Wave)) -> f64 {
-    let plan = r * r + s * s - 2.0 * r * s * turn(a, b).cos();
+    let plan = r * r + s * s - 2.0 * r * s * turn(a, b).fixed_cos();
     (plan.max(0.0) + (a.z - b.z).powi(2)).sqrt()
 }
 

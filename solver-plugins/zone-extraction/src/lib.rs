@@ -1,5 +1,8 @@
 //! Step plugin `zone-extraction`: boxes around connected defects, where finer runs look closer.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod extract;
 mod grow;
 

@@ -4,6 +4,9 @@
 //! drives the cuts of the next fine runs: overlapping Schwarz iterations (Schwarz 1870; Toselli and Widlund, Domain
 //! Decomposition Methods, 2005, ch. 1), the overlap being the strip between the cuts and the driven nodes.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 use plyflow_mechanics::history::{hermite, locate, spline_slopes};
 use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
 use plyflow_surface::vector::{Vec3, add, distance, scale, sub};

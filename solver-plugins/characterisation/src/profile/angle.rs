@@ -9,6 +9,7 @@ use super::grid::{Grid, legendre};
 use super::{Choice, Method, Profile, ProfileFit, Stations, overhang_reaches, spread};
 use crate::linear::{Solution, least_squares};
 use nalgebra::DMatrix;
+use plyflow_fixed::FixedBits;
 
 pub const LEAST_DEGREE: usize = 4;
 const ITERATIONS: usize = 60;
@@ -68,12 +69,15 @@ fn curve(grid: &Grid, basis: &Basis, unknowns: &[f64], length: f64) -> Curve {
     let pair = |a: Vec<f64>, b: Vec<f64>| -> Vec<[f64; 2]> {
         a.into_iter().zip(b).map(|(a, b)| [a, b]).collect()
     };
-    let place = pair(along(&|i| angle[i].cos()), along(&|i| angle[i].sin()));
+    let place = pair(
+        along(&|i| angle[i].fixed_cos()),
+        along(&|i| angle[i].fixed_sin()),
+    );
     let change = (basis.angle.iter())
         .map(|phi| {
             pair(
-                along(&|i| -angle[i].sin() * phi[i]),
-                along(&|i| angle[i].cos() * phi[i]),
+                along(&|i| -angle[i].fixed_sin() * phi[i]),
+                along(&|i| angle[i].fixed_cos() * phi[i]),
             )
         })
         .collect();
@@ -140,13 +144,16 @@ impl Curve {
         let mut s = nearest as f64 * h;
         for _ in 0..4 {
             let (c, angle, k) = self.at(s);
-            let (t, normal) = ([angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]);
+            let (t, normal) = (
+                [angle.fixed_cos(), angle.fixed_sin()],
+                [-angle.fixed_sin(), angle.fixed_cos()],
+            );
             let away = [c[0] - p[0], c[1] - p[1]];
             let slope = 1.0 + k * (away[0] * normal[0] + away[1] * normal[1]);
             s -= (away[0] * t[0] + away[1] * t[1]) / slope.max(0.2);
         }
         let (c, angle, _) = self.at(s);
-        let normal = [-angle.sin(), angle.cos()];
+        let normal = [-angle.fixed_sin(), angle.fixed_cos()];
         let along = (s / h).clamp(0.0, (n - 1) as f64);
         let station = (along as usize).min(n - 2);
         Foot {
@@ -167,7 +174,11 @@ impl Curve {
         if s >= self.length {
             let (c, a) = (self.place[n - 1], self.angle[n - 1]);
             let beyond = s - self.length;
-            return ([c[0] + beyond * a.cos(), c[1] + beyond * a.sin()], a, 0.0);
+            return (
+                [c[0] + beyond * a.fixed_cos(), c[1] + beyond * a.fixed_sin()],
+                a,
+                0.0,
+            );
         }
         let h = self.length / (n - 1) as f64;
         let i = ((s / h) as usize).min(n - 2);
@@ -181,7 +192,7 @@ impl Curve {
         ];
         let hermite =
             |a: f64, da: f64, b: f64, db: f64| w[0] * a + w[2] * b + h * (w[1] * da + w[3] * db);
-        let ends = [i, i + 1].map(|i| [self.angle[i].cos(), self.angle[i].sin()]);
+        let ends = [i, i + 1].map(|i| [self.angle[i].fixed_cos(), self.angle[i].fixed_sin()]);
         let c = [0, 1].map(|d| {
             hermite(
                 self.place[i][d],
@@ -323,9 +334,9 @@ fn guess(grid: &Grid, profile: &Profile, terms: usize) -> Result<(Vec<f64>, f64)
             profile.x[pair[1]] - profile.x[pair[0]],
             profile.deflection[pair[1]] - profile.deflection[pair[0]],
         ];
-        let length = d[0].hypot(d[1]);
+        let length = d[0].fixed_hypot(d[1]);
         if length > 0.0 {
-            rows.push((arc + 0.5 * length, d[1].atan2(d[0])));
+            rows.push((arc + 0.5 * length, d[1].fixed_atan2(d[0])));
         }
         arc += length;
     }

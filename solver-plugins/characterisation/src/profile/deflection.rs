@@ -4,6 +4,7 @@ use super::grid::{Grid, legendre};
 use super::{Choice, Method, Profile, ProfileFit, Stations, overhang_reaches, spread};
 use crate::linear::least_squares;
 use nalgebra::DMatrix;
+use plyflow_fixed::FixedBits;
 
 pub const LEAST_DEGREE: usize = 3;
 
@@ -82,7 +83,7 @@ pub fn stations(grid: &Grid, unknowns: &[f64], reach: f64, length: Option<f64>) 
         slope.push(d);
         out.x.push(t * reach);
         out.deflection.push(y);
-        out.curvature.push(second / (1.0 + d * d).powf(1.5));
+        out.curvature.push(second / (1.0 + d * d).fixed_powf(1.5));
     }
     let stretch: Vec<f64> = slope.iter().map(|d| reach * (1.0 + d * d).sqrt()).collect();
     out.arc = grid.integral(&stretch);

@@ -11,6 +11,7 @@ use crate::confidence::autocorrelation;
 use crate::linear::least_squares;
 use crate::voce::{Saturation, Voce, VoceFit};
 use nalgebra::{DMatrix, DVector};
+use plyflow_fixed::FixedBits;
 
 /// Steps along the strip.
 const STEPS: usize = 240;
@@ -93,8 +94,8 @@ fn hang(law: &Voce, weight: f64, length: f64, near: f64) -> Option<(Curve, f64)>
 fn integrate(law: &Voce, weight: f64, length: f64, tip: f64) -> Vec<[f64; 4]> {
     let h = length / STEPS as f64;
     let rate = |s: f64, v: [f64; 4]| {
-        let stiffness = law.linear + law.asymptote / law.scale * (-v[3] / law.scale).exp();
-        let (sin, cos) = v[0].sin_cos();
+        let stiffness = law.linear + law.asymptote / law.scale * (-v[3] / law.scale).fixed_exp();
+        let (sin, cos) = v[0].fixed_sin_cos();
         [-v[3], -cos, -sin, weight * s * cos / stiffness]
     };
     let shifted = |v: [f64; 4], r: [f64; 4], by: f64| std::array::from_fn(|i| v[i] + by * r[i]);
@@ -137,7 +138,8 @@ impl Search {
         Voce {
             linear: (law.linear + unit[0] * linear).max(0.0),
             asymptote: (law.asymptote + unit[1] * asymptote).max(0.0),
-            scale: (law.scale * scale.clamp(-1.0, 1.0).exp()).clamp(self.bounds[0], self.bounds[1]),
+            scale: (law.scale * scale.clamp(-1.0, 1.0).fixed_exp())
+                .clamp(self.bounds[0], self.bounds[1]),
         }
     }
 
@@ -233,7 +235,7 @@ pub fn identify(
     let length = overhang.unwrap_or(length);
     let secant = |p: &Profile| {
         let last = p.last();
-        p.deflection[last].atan2(p.x[last])
+        p.deflection[last].fixed_atan2(p.x[last])
     };
     // A start without `linear` cannot carry more than its asymptote.
     let mut law = start.law;

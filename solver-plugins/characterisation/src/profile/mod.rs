@@ -9,6 +9,7 @@ mod hanging;
 use crate::linear::{Solution, bayes_criterion};
 use grid::Grid;
 pub use hanging::{Hanging, identify};
+use plyflow_fixed::FixedBits;
 use serde::Deserialize;
 
 /// Points of one measured profile, from the clamp outwards.
@@ -68,7 +69,7 @@ impl Profile {
             // Which way the strip went up to the last point; out of the clamp it goes along x.
             let (a, b) = (i.saturating_sub(half), i - 1);
             let way = [x[b] - x[a], deflection[b] - deflection[a]];
-            let length = way[0].hypot(way[1]);
+            let length = way[0].fixed_hypot(way[1]);
             let along = if length > clamp_tolerance {
                 way.map(|w| w / length)
             } else {

@@ -1,6 +1,7 @@
 //! The laws of the thesis (tables 3.1 and 3.2), and what testing machines would record of them.
 
 use super::{Elastica, Noise, elastica};
+use plyflow_fixed::FixedBits;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 /// Acceleration of free fall (m/s2).
@@ -51,13 +52,13 @@ impl PublishedBending {
     pub fn moment(&self, k: f64) -> f64 {
         let [r0, r_inf, limit] = self.numbers;
         let per_millimetre = k / 1000.0;
-        r0 * per_millimetre + r_inf * (1.0 - (-per_millimetre / limit).exp())
+        r0 * per_millimetre + r_inf * (1.0 - (-per_millimetre / limit).fixed_exp())
     }
 
     /// Moment per width (N) and its slope (N m) at a curvature (1/m).
     pub fn law(&self, k: f64) -> [f64; 2] {
         let [r0, r_inf, limit] = self.numbers;
-        let slope = r0 + r_inf / limit * (-k / 1000.0 / limit).exp();
+        let slope = r0 + r_inf / limit * (-k / 1000.0 / limit).fixed_exp();
         [self.moment(k), slope / 1000.0]
     }
 
@@ -123,13 +124,13 @@ pub fn frame_force(
     let angle = |d: f64| {
         let along = side / SQRT_2 + 0.5 * d;
         let across = (side * side - along * along).sqrt();
-        FRAC_PI_2 - 2.0 * across.atan2(along)
+        FRAC_PI_2 - 2.0 * across.fixed_atan2(along)
     };
     let pull = 1e-6;
     let (a, b) = (angle(displacement - pull), angle(displacement + pull));
     let place = |t: f64| {
         let g = 0.5 * (a + b) + 0.5 * (b - a) * t;
-        sign * law(sign * g) * g.cos()
+        sign * law(sign * g) * g.fixed_cos()
     };
     let t = 0.6f64.sqrt();
     let mean = (5.0 * place(-t) + 8.0 * place(0.0) + 5.0 * place(t)) / 18.0;
@@ -143,8 +144,8 @@ pub fn sled_coefficient(peak: f64, dynamic: f64, ripple: f64, displacement: f64)
     if s < 5.0 {
         return peak * s / 5.0;
     }
-    let fall = (-(s - 5.0) / 3.0).exp();
+    let fall = (-(s - 5.0) / 3.0).fixed_exp();
     dynamic
         + (peak - dynamic) * fall
-        + ripple * (1.0 - fall) * (std::f64::consts::TAU * s / 8.0).sin()
+        + ripple * (1.0 - fall) * (std::f64::consts::TAU * s / 8.0).fixed_sin()
 }

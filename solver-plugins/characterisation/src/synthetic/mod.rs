@@ -4,6 +4,7 @@
 mod laws;
 
 pub use laws::*;
+use plyflow_fixed::FixedBits;
 
 /// A strip that is clamped horizontally at x = 0 and hangs under its own weight.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +27,7 @@ impl Elastica {
     /// Angle of the secant from the clamp to the tip, below the horizontal (rad).
     pub fn secant_angle(&self) -> f64 {
         let last = self.arc.len() - 1;
-        self.deflection[last].atan2(self.x[last])
+        self.deflection[last].fixed_atan2(self.x[last])
     }
 
     /// Place `[x, deflection]` at an arc length, between the stations by cubic Hermite pieces.
@@ -42,8 +43,8 @@ impl Elastica {
         };
         let ends = [self.angle[i], self.angle[i + 1]];
         [
-            hermite(&self.x, ends.map(f64::cos)),
-            hermite(&self.deflection, ends.map(f64::sin)),
+            hermite(&self.x, ends.map(FixedBits::fixed_cos)),
+            hermite(&self.deflection, ends.map(FixedBits::fixed_sin)),
         ]
     }
 }
@@ -97,9 +98,9 @@ fn integrate(
     let rate = |t: f64, s: [f64; 4]| {
         [
             -s[3],
-            -s[0].cos(),
-            -s[0].sin(),
-            weight * t * s[0].cos() / law(s[3])[1],
+            -s[0].fixed_cos(),
+            -s[0].fixed_sin(),
+            weight * t * s[0].fixed_cos() / law(s[3])[1],
         ]
     };
     let shifted = |s: [f64; 4], r: [f64; 4], by: f64| std::array::from_fn(|i| s[i] + by * r[i]);
@@ -160,7 +161,7 @@ impl Noise {
     /// A deviate of mean 0 and standard deviation 1.
     pub fn normal(&mut self) -> f64 {
         let (a, b) = (self.uniform().max(1e-300), self.uniform());
-        (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+        (-2.0 * a.fixed_ln()).sqrt() * (std::f64::consts::TAU * b).fixed_cos()
     }
 }
 
