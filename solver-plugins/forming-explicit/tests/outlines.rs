@@ -156,5 +156,5 @@ fn friction_of_what_meets_past_a_ply_can_be_named_and_else_is_that_of_its_neighb
         friction.as_object_mut().unwrap().remove("fabric_fabric");
     }));
     assert_eq!(law(&contacts, "ply_1/ply_3"), "Constant(0.2)");
-    assert_eq!(law(&contacts, "ply_3/ply_2"), "Constant(0.3)");
+    assert_eq!(law(&contacts, "ply_2/ply_3"), "Constant(0.3)");
 }
