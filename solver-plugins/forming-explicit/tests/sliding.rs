@@ -29,9 +29,10 @@ impl Observer for Deepest {
     }
 }
 
-/// Forms the scene. On the way nothing is deeper in anything than the thinner one is thick (the watch, which would stop the run, lets be what elements
-/// cut off); at the end plies are in films by a tenth of these at most, and all sheets lie over the bed. Nodes of a lower ply may
-/// be deeper in cells of an upper one: contact is with the upper one's nodes. Gives how far (m) the nodes at the plies' corners have gone past each other.
+/// Forms the scene to its end: the watch stops a run in which something goes through something else. Besides, plies are in films by less than
+/// these are thick on the way, and by a tenth of that at the end, and all sheets lie over the bed. Nodes of a lower ply may be deeper in
+/// straight cells of an upper one that cut off the tool's fillets: contact is with the upper one's nodes. Gives how far (m) the
+/// nodes at the plies' corners have gone past each other.
 fn nothing_goes_through(p: &Parameters) -> f64 {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -49,8 +50,8 @@ fn nothing_goes_through(p: &Parameters) -> f64 {
     // Each ply against each of the others.
     let plies = forming.stack.len() - 2;
     assert!(end.len() >= plies * (plies + 1), "{end:?}");
-    let on_the_way = seen.0.iter().map(|(time, d)| (*time, d, 1.0));
     let of_film = |d: &&Depth| d.thinner < 1e-4;
+    let on_the_way = (seen.0.iter().filter(|(_, d)| of_film(&d))).map(|(time, d)| (*time, d, 1.0));
     let at_the_end = (end.iter().filter(of_film)).map(|d| (f64::INFINITY, d, 0.1));
     let too_deep: Vec<String> = on_the_way
         .chain(at_the_end)
