@@ -297,7 +297,9 @@ mod stl {
         let mut text = String::from("solid dome\n");
         for corners in facets {
             text.push_str("facet normal 0 0 0\nouter loop\n");
-            for [x, y, z] in corners {
+            for corner in corners {
+                // All digits: text is read in double precision.
+                let [x, y, z] = corner.map(f64::from);
                 writeln!(text, "vertex {x} {y} {z}").unwrap();
             }
             text.push_str("endloop\nendfacet\n");

@@ -50,7 +50,7 @@ pub(super) struct Look<'a> {
 
 impl Edges {
     /// Of a tool, for sheets with elements of these sizes (m).
-    pub fn new(tool: &ToolMesh, sizes: &[f64]) -> Self {
+    pub fn new(tool: &ToolMesh, sizes: &[f64], mirrored: [bool; 2]) -> Self {
         let finest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
         let spacing = finest / PER_ELEMENT;
         // In every box of that size the sharpest one.
@@ -58,7 +58,12 @@ impl Edges {
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Self { places: Vec::new() };
         }
+        // Beyond a mirror plane there is nothing of the sheets that are computed.
+        let beyond = |at: &V| (0..2).any(|k| mirrored[k] && at[k] < 0.0);
         for place in edges(tool, spacing) {
+            if beyond(&place.at) {
+                continue;
+            }
             let key = place.at.map(|c| (c / spacing).floor() as i64);
             let kept = boxes.entry(key).or_insert(place);
             if place.turn > kept.turn {

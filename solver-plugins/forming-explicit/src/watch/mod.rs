@@ -263,7 +263,7 @@ impl Watch {
             .map(|s| vec![never; s.mesh.nodes.len() * parts.len()])
             .collect();
         Self {
-            edges: edges::Edges::new(&forming.tool, &sizes),
+            edges: edges::Edges::new(&forming.tool, &sizes, forming.model.planes().0),
             parts,
             sheets,
             clear,
