@@ -328,7 +328,7 @@ fn wrong_input_is_refused_with_what_to_do() {
     let odd = text(json!({"start": [0.0]}));
     assert!(odd.contains("two lengths"), "{odd}");
     let fine = text(json!({"net_spacing": 1e-6}));
-    assert!(fine.contains("enlarge `net_spacing`"), "{fine}");
+    assert!(fine.contains("Take `net_spacing` of at least"), "{fine}");
     let away =
         drape(json!({"scene": scene(hemisphere(), [0.4, 0.1], [0.0, 90.0]), "start": [0.15, 0.0]}))
             .unwrap_err();
