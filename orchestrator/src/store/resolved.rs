@@ -4,6 +4,7 @@
 //! Findings are never kept: a workflow with one is read again each time.
 
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::open::{self, MOST_NOTED};
 use plyflow_workflow::resolved::{
     Dimension, Expectation, FailurePolicy, InputFile, PluginId, ResolvedInput, ResolvedStep,
     ResolvedWorkflow, Resources,
@@ -62,7 +63,7 @@ pub fn read(
     circumstances: &Circumstances,
     catalog: &dyn Catalog,
 ) -> Option<ResolvedWorkflow> {
-    let bytes = std::fs::read(place(root, file)).ok()?;
+    let bytes = open::read(place(root, file).as_std_path(), MOST_NOTED).ok()?;
     let (known, rest) = bytes.split_first_chunk::<32>()?;
     let (sum, payload) = rest.split_first_chunk::<32>()?;
     if known != circumstances || blake3::hash(payload).as_bytes() != sum {
@@ -77,7 +78,7 @@ pub fn read(
 
 /// Whether a file of kept resolutions is damaged, in words.
 pub fn damage(path: &Utf8Path) -> Option<String> {
-    let bytes = match plyflow_artifact::seal::read_document(path.as_std_path()) {
+    let bytes = match open::read(path.as_std_path(), MOST_NOTED) {
         Ok(bytes) => bytes,
         Err(e) => return Some(e.to_string()),
     };
