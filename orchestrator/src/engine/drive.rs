@@ -19,7 +19,7 @@ use super::core::{Core, Effect, Event, Id, Limits, Output, State};
 use super::executor::{Executor, Outcome, Report};
 use super::shown::{Failure, Observer, Summary, Update};
 use super::unchanged::Unchanged;
-use crate::plan::{ByKey, Graph, Key};
+use crate::plan::{ByKey, Graph, Ingredients, Key};
 use crate::store::{ENDING, Early, Flaw, Journal, Known, RunFolder, Seen, Store};
 use camino::Utf8PathBuf;
 use opening::{look_at_journal, open_for_writing};
@@ -330,9 +330,10 @@ impl<'a> Session<'a> {
         let step = &self.core.graph().steps[instance.step];
         if let Some(key) = instance.key {
             let who = (step.name.as_str(), instance.item.as_slice());
-            self.journal.used(who, key, &step.recipe, artifact, || {
-                input_keys(&self.core, id)
-            });
+            let made_by = || Ingredients::of(&self.workflow.steps[instance.step]);
+            let inputs = || input_keys(&self.core, id);
+            self.journal
+                .used(who, key, (step.recipe, made_by), artifact, inputs);
         }
     }
 
@@ -428,7 +429,7 @@ impl<'a> Session<'a> {
         if step.collection && record.collection.is_none() {
             return Err(format!(
                 "malformed artifact: plugin '{}' did not declare its collection, though its manifest promises one",
-                step.recipe.ingredients.plugin.name
+                self.workflow.steps[instance.step].plugin.name
             ));
         }
         let size = std::fs::metadata(&artifact)

@@ -2,7 +2,7 @@
 
 use super::super::executor::Task;
 use super::{Core, ENDING, Id, Session};
-use crate::plan::InputKey;
+use crate::plan::{Ingredients, InputKey};
 use camino::Utf8PathBuf;
 use plyflow_model::job::{Checkpoints, DATA_MODEL_VERSION, JOB_VERSION, Job, JobInput, LibraryRef};
 use plyflow_workflow::resolved::PluginId;
@@ -63,7 +63,7 @@ impl Session<'_> {
             plugin: library(&step.plugin),
             components: step.components.iter().map(library).collect(),
             search_path: self.options.search_path.clone(),
-            parameters: step.parameters.clone(),
+            parameters: step.parameters.clone_value(),
             inputs,
             output_kind: step.output_kind.clone(),
             collection: step.collection,
@@ -96,7 +96,7 @@ impl Session<'_> {
     /// What the artifact says about its own making; only what its key also holds.
     fn provenance(&self, id: Id) -> serde_json::Value {
         let instance = &self.core.instances()[id];
-        let made_by = &self.core.graph().steps[instance.step].recipe.ingredients;
+        let made_by = Ingredients::of(&self.workflow.steps[instance.step]);
         let inputs: Vec<_> = input_keys(&self.core, id)
             .into_iter()
             .map(|i| serde_json::json!({"port": i.port, "step": i.step, "item": i.item, "key": i.key.hex()}))

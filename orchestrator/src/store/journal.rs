@@ -5,7 +5,7 @@
 //! Where one follows, the file is damaged: the frames between are lost, the next writer keeps the damaged file beside a new one.
 //! Nothing depends on the journal being whole: an artifact that it does not know is found by its file.
 
-use crate::plan::{ByKey, Ingredients, InputKey, Key, Recipe};
+use crate::plan::{ByKey, Ingredients, InputKey, Key};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, FileError, MOST_NOTED};
 use serde::{Deserialize, Serialize};
@@ -406,12 +406,13 @@ impl Journal {
         Some((ingredients, detail.inputs))
     }
 
-    /// Notes that an instance uses this artifact; writes nothing when that is already the last word.
+    /// Notes that an instance uses this artifact; writes nothing when that is already the last word. With the digest of its recipe comes
+    /// how it is made, which is asked for when it is new.
     pub fn used(
         &mut self,
         (step, item): (&str, &[u64]),
         key: Key,
-        recipe: &Recipe,
+        (recipe, made_by): (Key, impl FnOnce() -> Ingredients),
         artifact: Known,
         inputs: impl FnOnce() -> Vec<InputKey>,
     ) {
@@ -429,16 +430,16 @@ impl Journal {
             }
             return;
         }
-        if !self.recipes.contains_key(&recipe.digest) {
-            let ingredients = serde_json::to_string(&recipe.ingredients).unwrap_or_default();
+        if !self.recipes.contains_key(&recipe) {
+            let ingredients = serde_json::to_string(&made_by()).unwrap_or_default();
             self.push(&Entry::Recipe {
-                digest: recipe.digest,
+                digest: recipe,
                 ingredients,
             });
         }
         self.push(&Entry::Detail(Detail {
             key,
-            recipe: recipe.digest,
+            recipe,
             inputs: inputs(),
         }));
         self.push(&Entry::Made {
