@@ -405,7 +405,7 @@ fn libraries(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
 }
 
 /// Runs a command to its end: its standard output and its status, or no status when it had to be killed after
-/// [`LOAD_LIMIT`].
+/// [`LOAD_LIMIT`] or [`LONGEST_ANSWER`].
 fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)> {
     let mut child = command
         .stdin(Stdio::null())
@@ -419,14 +419,13 @@ fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)
     std::thread::spawn(move || {
         let mut said = Vec::new();
         let read = (&mut pipe).take(LONGEST_ANSWER).read_to_end(&mut said);
-        // One that goes on to talk is stopped as one that hangs.
-        if read.is_ok() && said.len() < LONGEST_ANSWER as usize {
-            let _ = send.send(said);
-        }
+        let whole = read.is_ok() && said.len() < LONGEST_ANSWER as usize;
+        let _ = send.send(whole.then_some(said));
     });
     match receive.recv_timeout(LOAD_LIMIT) {
-        Ok(said) => Ok((said, Some(child.wait()?))),
-        Err(_) => {
+        Ok(Some(said)) => Ok((said, Some(child.wait()?))),
+        // One that goes on to talk is stopped as one that hangs.
+        Ok(None) | Err(_) => {
             // What the library started goes too, also where it has left the group.
             if let Ok(group) = libc::pid_t::try_from(child.id()) {
                 unsafe { libc::kill(-group, libc::SIGKILL) };
@@ -503,4 +502,27 @@ pub(crate) fn find_component_library(
             folders.join(", ")
         }
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_without_end_is_cut_off_and_its_command_killed() {
+        let shell = |text: &str| {
+            let mut command = Command::new("sh");
+            command.args(["-c", text]);
+            answer(command).unwrap()
+        };
+        let (said, status) = shell("echo short");
+        assert_eq!(
+            (said.as_slice(), status.and_then(|s| s.code())),
+            (&b"short\n"[..], Some(0))
+        );
+        let begun = std::time::Instant::now();
+        let (said, status) = shell("yes");
+        assert!(said.is_empty() && status.is_none());
+        assert!(begun.elapsed() < LOAD_LIMIT / 2);
+    }
 }

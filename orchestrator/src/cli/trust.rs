@@ -117,10 +117,11 @@ fn consent(word: &str) -> Result<Consent, Stop> {
         return Ok(Consent::Bytes(word.to_ascii_lowercase()));
     }
     let path = Utf8Path::new(word).canonicalize_utf8();
-    path.map(Consent::Path).map_err(|_| {
+    // Consent to a folder would be consent to nothing.
+    path.ok().filter(|p| p.is_file()).map(Consent::Path).ok_or_else(|| {
         let text = format!(
             "--trust={word}: there is no such library; expected the path of a library or the BLAKE3 of its bytes (64 \
-             hexadecimal digits), or --trust alone for all libraries of the workflow"
+             hexadecimal digits), --trust alone for all libraries of the workflow, or --plugins for a folder of your own"
         );
         Stop::new(exit::USAGE, text)
     })

@@ -152,7 +152,7 @@ fn no_name_log_or_message_of_others_steers_a_terminal_or_a_page() {
         "workflow.yaml",
         &format!("plyflow: 1\nname: \"{evil}\"\ndescription: \"{evil}\"\n{STEP}"),
     );
-    let commands: [&[&str]; 8] = [
+    let commands: [&[&str]; 10] = [
         &["run", "--trust", "workflow.yaml"],
         &["run", "--trust", "workflow.yaml", "--log-format", "json"],
         &["plan", "workflow.yaml"],
@@ -161,6 +161,8 @@ fn no_name_log_or_message_of_others_steers_a_terminal_or_a_page() {
         &["graph", "workflow.yaml"],
         &["validate", "other.yaml"],
         &["validate", "other.yaml", "--format", "json"],
+        &["plan", "workflow.yaml", "\u{1b}]0;title\u{7}.yaml"],
+        &["plan", "\u{1b}[2J\u{202e}.yaml"],
     ];
     place.write(
         "other.yaml",

@@ -95,6 +95,9 @@ fn consent_is_for_the_bytes_and_is_given_by_option_by_list_or_by_folder() {
         assert!(!place.was_loaded());
     };
     refused();
+    // A folder is no library: to say nothing would be to let its user believe that it is trusted.
+    let output = place.call(&["run", "workflow.yaml", "--trust=."]);
+    assert_eq!(output.status.code(), Some(2), "{}", told(&output));
     for entry in ["./libstranger.so", hash.as_str(), there.to_str().unwrap()] {
         place.good(&["trust", entry]);
         assert!(told(&place.call(&["trust"])).contains(match entry {

@@ -2,32 +2,13 @@
 
 use plyflow::plan::Key;
 use plyflow::store::{Journal, Store};
+use plyflow_faults::program;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::OnceLock;
 use std::time::{Duration, Instant};
-
-/// The program of this build profile; built on the first call.
-fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let profile = plyflow_faults::folder().parent().expect("a profile folder");
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
-        let target = profile.parent().expect("a target folder");
-        cargo.env("CARGO_TARGET_DIR", target);
-        cargo.args(["build", "--quiet", "--package", "plyflow"]);
-        if profile.ends_with("release") {
-            cargo.arg("--release");
-        }
-        let built = cargo.status().expect("cargo starts").success();
-        assert!(built, "plyflow does not build");
-        profile.join("plyflow")
-    })
-}
 
 /// A folder with a workflow in it, and its store.
 pub struct Study {
