@@ -12,8 +12,11 @@ use std::ffi::{c_char, c_int};
 #[unsafe(no_mangle)]
 pub extern "C" fn main(argc: c_int, argv: *const *const c_char) -> c_int {
     // On Linux with glibc the arguments reach the standard library even so.
-    let mut arguments = std::env::args().skip(1);
-    if arguments.next().as_deref() == Some("step-worker") {
+    if std::env::args_os()
+        .nth(1)
+        .is_some_and(|a| a == "step-worker")
+    {
+        let arguments = std::env::args().skip(2);
         let inside = || unsafe {
             plyflow_plugin_host::rename_argument(argv, argc, c"--parent", c"--inside");
         };

@@ -4,8 +4,8 @@
 //! carry their seal themselves, as the last value of the object: the BLAKE3 of every byte before it. A seal tells what a disk, a
 //! copy or an editor has done to a file. It holds no secret, so it does not tell who has written it.
 
-use std::fs::File;
-use std::io::{self, Read};
+use plyflow_files::open;
+use std::io;
 use std::path::Path;
 
 /// What stands before the hash at the end of a sealed document.
@@ -66,7 +66,7 @@ pub fn hash(bytes: &[u8]) -> String {
 /// When it is no plain file (links are followed) or cannot be read.
 pub fn hash_file(path: &Path) -> io::Result<(String, u64)> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(plain(path)?)?;
+    hasher.update_reader(open::open(path, u64::MAX)?)?;
     Ok((hasher.finalize().to_hex().to_string(), hasher.count()))
 }
 
@@ -75,21 +75,7 @@ pub fn hash_file(path: &Path) -> io::Result<(String, u64)> {
 /// # Errors
 /// When it is no plain file (links are followed), is larger than any document, or cannot be read.
 pub fn read_document(path: &Path) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    plain(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST {
-        let text = format!("it is larger than {} MiB", LARGEST >> 20);
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, text));
-    }
-    Ok(bytes)
-}
-
-/// Opens a plain file: a pipe would be waited for without end.
-fn plain(path: &Path) -> io::Result<File> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is no plain file"));
-    }
-    File::open(path)
+    Ok(open::read(path, LARGEST)?)
 }
 
 #[cfg(test)]

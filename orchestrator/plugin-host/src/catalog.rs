@@ -26,6 +26,9 @@ const SUFFIX: &str = ".so";
 /// How long a library may take to load and describe itself.
 const LOAD_LIMIT: Duration = Duration::from_secs(30);
 
+/// Most bytes that a library may say of itself: what a plugin's manifest takes, many times over.
+const LONGEST_ANSWER: u64 = 16 << 20;
+
 /// Version of the cache file. 2: sealed.
 const CACHE_VERSION: u32 = 2;
 
@@ -232,11 +235,13 @@ impl PluginCatalog {
         if let Some(known) = kept {
             return Ok((known.hash, known.description));
         }
+        // Between the consent to its bytes and its loading somebody may exchange it.
+        let consented = hash.clone();
         let hash = match hash {
             Some(hash) => hash,
             None => read_stranger(path)?.hash,
         };
-        let description = self.describe(path);
+        let description = self.describe(path, consented.as_deref());
         // A broken library may only lack something that is installed later: ask again.
         if !matches!(description, Description::Broken(_)) {
             let known = Known {
@@ -251,18 +256,21 @@ impl PluginCatalog {
         Ok((hash, description))
     }
 
-    fn describe(&self, path: &Utf8Path) -> Description {
+    /// `bytes`: the BLAKE3 that its bytes must have to be loaded.
+    fn describe(&self, path: &Utf8Path, bytes: Option<&str>) -> Description {
         let Describer::Child { program, arguments } = &self.describer else {
-            return describe(path);
+            return describe(path, bytes);
         };
         let mut command = Command::new(program);
-        command.args(arguments).arg(path);
+        command.args(arguments).arg(path).args(bytes);
         let (said, status) = match answer(command) {
             Ok((said, Some(status))) => (said, status),
             Ok((_, None)) => {
                 return Description::Broken(format!(
-                    "loading it had not ended after {} s: its initialisers or `plyflow_plugin` hang",
-                    LOAD_LIMIT.as_secs()
+                    "loading it had not ended after {} s, or it said more than {} MiB: its initialisers or `plyflow_plugin` hang, \
+                     or write to file descriptors that are not theirs",
+                    LOAD_LIMIT.as_secs(),
+                    LONGEST_ANSWER >> 20
                 ));
             }
             Err(e) => return Description::Broken(format!("{program} cannot be started: {e}")),
@@ -397,7 +405,7 @@ fn libraries(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
 }
 
 /// Runs a command to its end: its standard output and its status, or no status when it had to be killed after
-/// [`LOAD_LIMIT`].
+/// [`LOAD_LIMIT`] or [`LONGEST_ANSWER`].
 fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)> {
     let mut child = command
         .stdin(Stdio::null())
@@ -410,12 +418,14 @@ fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)
     // A reader of its own, because the pipe alone tells when the child has ended.
     std::thread::spawn(move || {
         let mut said = Vec::new();
-        let _ = pipe.read_to_end(&mut said);
-        let _ = send.send(said);
+        let read = (&mut pipe).take(LONGEST_ANSWER).read_to_end(&mut said);
+        let whole = read.is_ok() && said.len() < LONGEST_ANSWER as usize;
+        let _ = send.send(whole.then_some(said));
     });
     match receive.recv_timeout(LOAD_LIMIT) {
-        Ok(said) => Ok((said, Some(child.wait()?))),
-        Err(_) => {
+        Ok(Some(said)) => Ok((said, Some(child.wait()?))),
+        // One that goes on to talk is stopped as one that hangs.
+        Ok(None) | Err(_) => {
             // What the library started goes too, also where it has left the group.
             if let Ok(group) = libc::pid_t::try_from(child.id()) {
                 unsafe { libc::kill(-group, libc::SIGKILL) };
@@ -492,4 +502,27 @@ pub(crate) fn find_component_library(
             folders.join(", ")
         }
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_without_end_is_cut_off_and_its_command_killed() {
+        let shell = |text: &str| {
+            let mut command = Command::new("sh");
+            command.args(["-c", text]);
+            answer(command).unwrap()
+        };
+        let (said, status) = shell("echo short");
+        assert_eq!(
+            (said.as_slice(), status.and_then(|s| s.code())),
+            (&b"short\n"[..], Some(0))
+        );
+        let begun = std::time::Instant::now();
+        let (said, status) = shell("yes");
+        assert!(said.is_empty() && status.is_none());
+        assert!(begun.elapsed() < LOAD_LIMIT / 2);
+    }
 }

@@ -17,22 +17,22 @@ pub enum Description {
     Broken(String),
 }
 
-/// Loads a library into this process and describes it.
+/// Loads a library into this process and describes it; `bytes`: only when its bytes have this BLAKE3 (hex).
 #[must_use]
-pub fn describe(path: &Utf8Path) -> Description {
-    match Plugin::load(path) {
+pub fn describe(path: &Utf8Path, bytes: Option<&str>) -> Description {
+    match Plugin::load_bytes(path, bytes) {
         Ok(plugin) => Description::Plugin(plugin.manifest_text.to_owned()),
         Err(e) if e.foreign => Description::Foreign(e.reason),
         Err(e) => Description::Broken(e.reason),
     }
 }
 
-/// The body of `plyflow step-worker --describe LIBRARY`: prints a [`Description`] and returns the exit
+/// The body of `plyflow step-worker --describe LIBRARY [BLAKE3]`: prints a [`Description`] and returns the exit
 /// code (0 when it could be printed).
 #[must_use]
-pub fn describe_main(path: &Utf8Path) -> i32 {
+pub fn describe_main(path: &Utf8Path, bytes: Option<&str>) -> i32 {
     let mut out = crate::process::private_stdout();
-    let line = serde_json::to_string(&describe(path)).expect("texts are JSON");
+    let line = serde_json::to_string(&describe(path, bytes)).expect("texts are JSON");
     match writeln!(out, "{line}").and_then(|()| out.flush()) {
         Ok(()) => 0,
         Err(_) => 1,

@@ -3,12 +3,14 @@
 //! What the plugin hands over is trusted as far as the contract goes (lengths are right, pointers are
 //! valid for the call); everything that can be checked is. No panic crosses into the plugin.
 
+use crate::emitter::LONGEST_TEXT;
 use crate::host::HostState;
 use crate::process;
 use plyflow_abi::*;
 use plyflow_artifact::{ArtifactError, DType, ErrorKind, On, check_result};
 use plyflow_model::job::{LogLevel, NamedResult, Progress};
 use plyflow_model::manifest::PluginKind;
+use plyflow_model::text::shortened;
 use plyflow_model::units::{check_si, parse_unit};
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -178,7 +180,7 @@ unsafe extern "C" fn progress(host: *mut c_void, p: *const pf_progress) {
             simulated_time: known(p.simulated_time),
             rate: known(p.rate),
             energy_ratio: known(p.energy_ratio),
-            phase: unsafe { p.phase.as_str() }.unwrap_or("").to_owned(),
+            phase: shortened(unsafe { p.phase.as_str() }.unwrap_or(""), 200).into_owned(),
         });
     });
 }
@@ -190,7 +192,7 @@ unsafe extern "C" fn cancelled(_: *mut c_void) -> i32 {
 unsafe extern "C" fn fail(host: *mut c_void, message: pf_str) {
     guard(host, (), |s| {
         let message = unsafe { message.as_str() }.unwrap_or("(a text that is not UTF-8)");
-        s.output().failure = Some(message.to_owned());
+        s.output().failure = Some(shortened(message, LONGEST_TEXT).into_owned());
     });
 }
 

@@ -261,7 +261,7 @@ fn job(step: &ResolvedStep, search_path: Vec<Utf8PathBuf>, folder: &Utf8Path) ->
         plugin: library(&step.plugin),
         components: step.components.iter().map(library).collect(),
         search_path: search_path.clone(),
-        parameters: step.parameters.clone(),
+        parameters: step.parameters.clone_value(),
         inputs: Vec::new(),
         output_kind: step.output_kind.clone(),
         collection: step.collection,

@@ -2,13 +2,18 @@
 
 /// Memory (bytes) that this process may use: that of the machine, or less where its control group (a container, a
 /// service) has a bound; 0 when the system does not tell.
-pub fn memory() -> u64 {
+fn memory() -> u64 {
     let info = rustix::system::sysinfo();
     let machine = u64::from(info.mem_unit) * info.totalram as u64;
     match group_bound() {
         Some(bound) if machine == 0 || bound < machine => bound,
         _ => machine,
     }
+}
+
+/// Memory (bytes) of all steps together where the user names no other; 0 when the system does not tell.
+pub fn default_memory() -> u64 {
+    memory() / 10 * 9
 }
 
 /// The least bound of this process's control groups, of either version.

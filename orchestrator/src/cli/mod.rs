@@ -25,7 +25,7 @@ pub use args::Cli;
 use crate::exit;
 use args::Command;
 use clap::{CommandFactory, Parser};
-use plyflow_model::text::safe;
+use plyflow_model::text::{safe, steers};
 use std::fmt::Display;
 use std::io::{IsTerminal, Write as _};
 
@@ -75,12 +75,23 @@ pub(crate) fn show_findings(findings: &plyflow_workflow::Diagnostics) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
+/// Tells help, or what is wrong with the command line: in colours, unless a word of it (the name of a stranger's file, say) could steer the
+/// terminal.
+fn tell_usage(e: &clap::Error) {
+    let steered = |word: std::ffi::OsString| word.to_string_lossy().chars().any(steers);
+    if std::env::args_os().any(steered) {
+        warn(&e.to_string());
+    } else {
+        let _ = e.print();
+    }
+}
+
 /// Runs the command line of this process and returns the exit code.
 pub fn main() -> u8 {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
-            let _ = e.print();
+            tell_usage(&e);
             return if e.use_stderr() {
                 exit::USAGE
             } else {

@@ -5,7 +5,7 @@ use super::{Stop, trust};
 use crate::engine::core::{Limits, State};
 use crate::engine::{Options, Session};
 use crate::exit;
-use crate::plan::Graph;
+use crate::plan::{Graph, recipes};
 use crate::progress::Quiet;
 use crate::store::{Store, resolved};
 use camino::{Utf8Path, Utf8PathBuf};
@@ -183,19 +183,20 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
     let kept = circumstances
         .as_ref()
         .and_then(|c| resolved::read(&root, &full, c, &catalog));
-    let workflow = match kept {
-        Some(workflow) => workflow,
+    let (workflow, recipes) = match kept {
+        Some(kept) => kept,
         None => match plyflow_workflow::resolve(file, &catalog, &overrides) {
             Ok(resolution) => {
+                let recipes = recipes(&resolution.workflow);
                 if let Some(c) = &circumstances {
-                    resolved::write(&root, &full, c, &resolution);
+                    resolved::write(&root, &full, c, (&resolution, &recipes));
                 }
-                resolution.workflow
+                (resolution.workflow, recipes)
             }
             Err(findings) => return Ok(Err(findings)),
         },
     };
-    let graph = Graph::new(&workflow).map_err(|e| Stop::new(exit::INVALID, e))?;
+    let graph = Graph::of_recipes(&workflow, recipes).map_err(|e| Stop::new(exit::INVALID, e))?;
     Ok(Ok(Opened {
         workflow,
         graph,

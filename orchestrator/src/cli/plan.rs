@@ -9,7 +9,7 @@ use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
 use crate::engine::{Session, input_keys};
 use crate::exit;
-use crate::plan::{Change, Key, changes};
+use crate::plan::{Change, Ingredients, Key, changes};
 use crate::progress::duration_text;
 use plyflow_model::job::Cost;
 use plyflow_plugin_host::cost_so_far;
@@ -314,7 +314,10 @@ pub fn difference(session: &Session<'_>, id: Id) -> Difference {
     let now = input_keys(core, id);
     Difference::Changed(changes(
         (&ingredients, &inputs),
-        (&step.recipe.ingredients, &now),
+        (
+            &Ingredients::of(&session.workflow.steps[instance.step]),
+            &now,
+        ),
     ))
 }
 

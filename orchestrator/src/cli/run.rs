@@ -12,10 +12,10 @@ use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
 use crate::store::{Early, Lock, Store};
 use camino::{Utf8Path, Utf8PathBuf};
-use plyflow_model::text::one_line;
+use plyflow_model::text::{one_line, shortened};
 use plyflow_model::units::parse_quantity_in;
 use plyflow_workflow::resolved::FailurePolicy;
-use std::io::{IsTerminal, Read};
+use std::io::{IsTerminal, Read, Seek, SeekFrom};
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
@@ -27,6 +27,12 @@ const ROUNDS: usize = 2;
 
 /// Lines of a failed step's log that are shown.
 const LOG_LINES: usize = 15;
+
+/// Bytes at the end of it among which these are.
+const LOG_BYTES: u64 = 64 << 10;
+
+/// Characters of each that are shown.
+const LONGEST_LOG_LINE: usize = 2000;
 
 /// Ctrl-C, SIGTERM and SIGHUP, counted, with something that becomes readable for `poll`.
 struct Interrupts {
@@ -220,7 +226,7 @@ fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
         _ => opened.workflow.on_failure,
     };
     let memory = match &args.memory {
-        None => super::machine::memory() / 10 * 9,
+        None => super::machine::default_memory(),
         Some(text) => {
             text.parse::<plyflow_model::workflow::Memory>()
                 .map_err(|e| Stop::new(exit::USAGE, format!("--memory {text}: {e}")))?
@@ -408,16 +414,26 @@ fn failure_text(first: &Failure, summary: &Summary) -> String {
         first.reason.replace('\n', "\n  ")
     );
     if let Some(log) = &first.log {
-        let bytes = std::fs::read(log).unwrap_or_default();
+        let bytes = end_of(log).unwrap_or_default();
         let text = String::from_utf8_lossy(&bytes);
         let lines: Vec<&str> = text.lines().collect();
         let tail = &lines[lines.len().saturating_sub(LOG_LINES)..];
         out += &format!("  log: {log}\n");
         for line in tail {
-            out += &format!("  | {line}\n");
+            out += &format!("  | {}\n", shortened(line, LONGEST_LOG_LINE));
         }
     }
     out
+}
+
+/// The last bytes of a log, of which there may be any number.
+fn end_of(log: &Utf8Path) -> std::io::Result<Vec<u8>> {
+    let mut file = std::fs::File::open(log)?;
+    let length = file.metadata()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(LOG_BYTES)))?;
+    let mut bytes = Vec::new();
+    file.take(LOG_BYTES).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 pub(super) fn first_line(text: &str) -> &str {

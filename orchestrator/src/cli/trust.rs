@@ -9,6 +9,7 @@ use super::args::{Places, TrustArgs};
 use super::{Done, Stop, print, warn};
 use crate::exit;
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::open;
 use plyflow_model::text::one_line;
 use plyflow_plugin_host::{Consent, Stranger, Trust};
 use std::io::{BufRead, IsTerminal, Write};
@@ -50,7 +51,13 @@ pub fn read() -> List {
         ));
         return List::default();
     }
-    parse(&std::fs::read_to_string(&path).unwrap_or_default())
+    parse(&text_of(&path))
+}
+
+/// The text of the list; empty when there is none that can be read.
+fn text_of(path: &Utf8Path) -> String {
+    let bytes = open::read(path.as_std_path(), open::MOST_WRITTEN).unwrap_or_default();
+    String::from_utf8(bytes).unwrap_or_default()
 }
 
 fn parse(text: &str) -> List {
@@ -110,10 +117,11 @@ fn consent(word: &str) -> Result<Consent, Stop> {
         return Ok(Consent::Bytes(word.to_ascii_lowercase()));
     }
     let path = Utf8Path::new(word).canonicalize_utf8();
-    path.map(Consent::Path).map_err(|_| {
+    // Consent to a folder would be consent to nothing.
+    path.ok().filter(|p| p.is_file()).map(Consent::Path).ok_or_else(|| {
         let text = format!(
             "--trust={word}: there is no such library; expected the path of a library or the BLAKE3 of its bytes (64 \
-             hexadecimal digits), or --trust alone for all libraries of the workflow"
+             hexadecimal digits), --trust alone for all libraries of the workflow, or --plugins for a folder of your own"
         );
         Stop::new(exit::USAGE, text)
     })
@@ -170,7 +178,13 @@ fn add(line: &str) -> Result<Utf8PathBuf, Stop> {
         .mode(0o600)
         .open(&path)
         .map_err(wrong())?;
-    file.write_all(format!("{line}\n").as_bytes())
+    // An editor may have left the last line without an end: the new one would be lost in it.
+    let text = text_of(&path);
+    let end = match text.is_empty() || text.ends_with('\n') {
+        true => "",
+        false => "\n",
+    };
+    file.write_all(format!("{end}{line}\n").as_bytes())
         .map_err(wrong())?;
     Ok(path)
 }
@@ -182,7 +196,7 @@ fn add(line: &str) -> Result<Utf8PathBuf, Stop> {
 pub fn command(args: &TrustArgs) -> Done {
     if args.paths.is_empty() {
         let path = place()?;
-        let text = std::fs::read_to_string(&path).unwrap_or_default();
+        let text = text_of(&path);
         let list = if entry_count(&text) == 0 {
             "nothing besides this program's own plugins is trusted\n".to_owned()
         } else {
@@ -257,7 +271,7 @@ fn line_for(given: &Utf8Path, forget: bool) -> Result<(String, String), Stop> {
 /// Takes an entry out of the list.
 fn forget(given: &Utf8Path, word: &str) -> Done {
     let path = place()?;
-    let text = std::fs::read_to_string(&path).unwrap_or_default();
+    let text = text_of(&path);
     let kept: Vec<&str> = text
         .lines()
         .filter(|l| !entry(l).eq_ignore_ascii_case(word))
@@ -273,9 +287,19 @@ fn forget(given: &Utf8Path, word: &str) -> Done {
     if !lines.is_empty() {
         lines.push('\n');
     }
-    std::fs::write(&beside, lines)
-        .and_then(|()| std::fs::rename(&beside, &path))
-        .map_err(Stop::machine(format!("writing {path}")))?;
+    // Readable by its owner alone, whatever the mask of this process: a list that others can write is not used.
+    let write = || {
+        let _ = std::fs::remove_file(&beside);
+        let mut options = std::fs::OpenOptions::new();
+        let mut file = options
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&beside)?;
+        file.write_all(lines.as_bytes())?;
+        std::fs::rename(&beside, &path)
+    };
+    write().map_err(Stop::machine(format!("writing {path}")))?;
     print(&format!("{given}: no longer trusted\n"))
 }
 

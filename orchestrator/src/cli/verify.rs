@@ -2,6 +2,7 @@
 
 use super::args::{TextOrJson, VerifyArgs, Workflow};
 use super::clean::locked;
+use super::machine::default_memory;
 use super::open::{cores, open, store_root};
 use super::table::bytes;
 use super::{Done, Stop, print, warn};
@@ -149,10 +150,14 @@ impl Findings<'_> {
     }
 
     fn note(&mut self, path: &Utf8Path, why: &str) {
-        let place = match (self.dry_run, self.store.set_aside(path)) {
-            (true, _) | (_, Ok(None)) => String::new(),
-            (_, Ok(Some(place))) => format!("; it is kept as {place}"),
-            (_, Err(e)) => format!("; it cannot be moved: {e}"),
+        let moved = match self.dry_run {
+            true => Ok(None),
+            false => self.store.set_aside(path),
+        };
+        let place = match moved {
+            Ok(None) => String::new(),
+            Ok(Some(place)) => format!("; it is kept as {place}"),
+            Err(e) => format!("; it cannot be moved: {e}"),
         };
         self.damaged
             .push(format!("{path} is damaged: {why}{place}"));
@@ -219,7 +224,7 @@ fn again(args: &VerifyArgs) -> Done {
     let options = Options {
         limits: Limits {
             cores: args.jobs.unwrap_or_else(cores),
-            memory: 0,
+            memory: default_memory(),
             policy: FailurePolicy::KeepGoing,
         },
         search_path: opened.catalog.trusted_folders(),
@@ -250,6 +255,9 @@ fn again(args: &VerifyArgs) -> Done {
     for (label, how) in session.compared() {
         out += &format!("{label}: {}\n", how.text());
     }
+    for step in not_compared(&session, &args.again) {
+        out += &format!("{step}: it has no items, so nothing was made again\n");
+    }
     print(&out)?;
     if let Some(first) = summary.failures.first() {
         warn(&format!("plyflow: {}: {}\n", first.label, first.reason));
@@ -260,4 +268,14 @@ fn again(args: &VerifyArgs) -> Done {
         true => Err(Stop::silent(exit::DAMAGED)),
         false => Ok(()),
     }
+}
+
+/// Those of the steps of which there is no instance: their collections are empty, or could not be made.
+fn not_compared<'a>(session: &Session<'_>, steps: &'a [String]) -> Vec<&'a String> {
+    let core = &session.core;
+    let is_of = |step: &String| {
+        let mut all = core.instances().iter();
+        all.any(|i| core.graph().steps[i.step].name == *step)
+    };
+    steps.iter().filter(|step| !is_of(step)).collect()
 }

@@ -156,12 +156,40 @@ impl Limits {
     }
 }
 
+/// The instances of a step by their items. Most steps have no fan-out and so one instance: it needs no map.
+#[derive(Debug, Default, Clone)]
+struct ByItem {
+    only: Option<Id>,
+    items: HashMap<Vec<u64>, Id>,
+}
+
+impl ByItem {
+    fn get(&self, item: &[u64]) -> Option<Id> {
+        match item {
+            [] => self.only,
+            item => self.items.get(item).copied(),
+        }
+    }
+
+    /// That of an item that has been discovered.
+    fn find(&self, item: &[u64]) -> Id {
+        self.get(item).expect("discovered before it is asked for")
+    }
+
+    fn insert(&mut self, item: &[u64], id: Id) {
+        match item {
+            [] => self.only = Some(id),
+            item => drop(self.items.insert(item.to_vec(), id)),
+        }
+    }
+}
+
 /// The state of a run.
 pub struct Core<'g> {
     graph: &'g Graph,
     limits: Limits,
     instances: Vec<Instance>,
-    by_item: Vec<HashMap<Vec<u64>, Id>>,
+    by_item: Vec<ByItem>,
     ready: BTreeSet<(usize, Vec<u64>, Id)>,
     running: usize,
     looking: usize,
@@ -180,7 +208,7 @@ impl<'g> Core<'g> {
             graph,
             limits,
             instances: Vec::new(),
-            by_item: vec![HashMap::new(); graph.steps.len()],
+            by_item: vec![ByItem::default(); graph.steps.len()],
             ready: BTreeSet::new(),
             running: 0,
             looking: 0,
@@ -275,7 +303,7 @@ impl<'g> Core<'g> {
             let owner: Vec<u64> = d.prefix.iter().map(|p| instance.item[*p]).collect();
             let index = instance.item[at];
             let labels = self.by_item[d.over].get(&owner).and_then(|o| {
-                self.instances[*o]
+                self.instances[o]
                     .labels
                     .as_ref()?
                     .get(index as usize)
@@ -289,7 +317,7 @@ impl<'g> Core<'g> {
     fn walk(&self, step: usize, fixed: &[Option<u64>]) -> Walk {
         walk(self.graph, step, fixed, |over, owner| {
             // Outer collections are walked first, so the owner has been discovered.
-            let id = self.by_item[over][owner];
+            let id = self.by_item[over].find(owner);
             let instance = &self.instances[id];
             match (instance.state, &instance.labels) {
                 (State::Done { .. }, Some(labels)) => Extent::Items(labels.len() as u64),
@@ -315,10 +343,10 @@ impl<'g> Core<'g> {
         }
         for item in self.walk(step, &fixed).known {
             let id = self.instances.len();
-            if self.by_item[step].contains_key(&item) {
+            if self.by_item[step].get(&item).is_some() {
                 continue;
             }
-            self.by_item[step].insert(item.clone(), id);
+            self.by_item[step].insert(&item, id);
             self.instances.push(Instance {
                 step,
                 item,
@@ -361,7 +389,7 @@ impl<'g> Core<'g> {
             let found = self.walk(wire.from, &fixed);
             want_done.extend(found.unknown);
             for path in found.known {
-                let giver = self.by_item[wire.from][&path];
+                let giver = self.by_item[wire.from].find(&path);
                 if self.instances[giver].key.is_none() {
                     want_key.push(giver);
                 }
@@ -370,7 +398,7 @@ impl<'g> Core<'g> {
         }
         if want_done.is_empty() && want_key.is_empty() {
             let key = instance_key(
-                &plan.recipe.digest,
+                &plan.recipe,
                 &self.instances[id].item,
                 inputs.iter().filter_map(|(wire, giver)| {
                     let wire = &plan.wires[*wire];

@@ -17,6 +17,12 @@ use std::time::{Duration, Instant};
 
 /// How long a worker has between SIGTERM and SIGKILL.
 const GRACE: Duration = Duration::from_secs(5);
+/// Reads (of 16 KiB) of one pipe before the others, the time limits and the user get their turn: a plugin may talk without end.
+const READS: usize = 64;
+/// Reads of the pipe of a worker that has ended: more than a pipe can hold.
+const READS_AT_END: usize = 4096;
+/// Most bytes of a log: what comes after them is dropped.
+const LONGEST_LOG: u64 = 64 << 20;
 /// A worker that says this much without a line end is not talking the protocol.
 const LONGEST_LINE: usize = 64 << 20;
 
@@ -57,10 +63,21 @@ enum Stop {
 struct Log {
     path: Utf8PathBuf,
     file: Option<File>,
+    written: u64,
 }
 
 impl Log {
     fn write(&mut self, bytes: &[u8]) {
+        let before = self.written;
+        self.written += bytes.len() as u64;
+        if self.written <= LONGEST_LOG {
+            self.append(bytes);
+        } else if before <= LONGEST_LOG {
+            self.append(b"\n(the log is longer than 64 MiB; the rest was dropped)\n");
+        }
+    }
+
+    fn append(&mut self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
         }
@@ -230,6 +247,7 @@ impl Executor for Local {
             log: Log {
                 path: task.log,
                 file: None,
+                written: 0,
             },
             time_limit: task.time_limit,
             memory_limit: task.job.memory_limit,
@@ -256,11 +274,12 @@ impl Executor for Local {
             let Some(worker) = self.workers.get_mut(&id) else {
                 continue;
             };
+            let most = if exited { READS_AT_END } else { READS };
             if said || exited {
-                worker.read_stdout(id, out);
+                worker.read_stdout(id, most, out);
             }
             if complained || exited {
-                worker.read_stderr();
+                worker.read_stderr(most);
             }
             if exited && let Some(mut worker) = self.workers.remove(&id) {
                 let outcome = worker.reap();
@@ -300,9 +319,10 @@ impl Worker {
         let _ = rustix::process::kill_process_group(Pid::from_child(&self.process), signal);
     }
 
-    fn read_stdout(&mut self, id: usize, out: &mut Vec<Report>) {
+    fn read_stdout(&mut self, id: usize, most: usize, out: &mut Vec<Report>) {
         let mut buffer = [0u8; 16384];
-        while let Some(pipe) = &mut self.stdout {
+        for _ in 0..most {
+            let Some(pipe) = &mut self.stdout else { break };
             match pipe.read(&mut buffer) {
                 Ok(0) => self.stdout = None,
                 Ok(n) => {
@@ -348,9 +368,10 @@ impl Worker {
         }
     }
 
-    fn read_stderr(&mut self) {
+    fn read_stderr(&mut self, most: usize) {
         let mut buffer = [0u8; 16384];
-        while let Some(pipe) = &mut self.stderr {
+        for _ in 0..most {
+            let Some(pipe) = &mut self.stderr else { break };
             match pipe.read(&mut buffer) {
                 Ok(0) => self.stderr = None,
                 Ok(n) => {
@@ -380,7 +401,8 @@ impl Worker {
             Outcome::TimedOut(limit) => format!("stopped at its time limit of {limit} s\n"),
             _ => String::new(),
         };
-        self.log.write(text.as_bytes());
+        // However long the log is.
+        self.log.append(text.as_bytes());
         outcome
     }
 

@@ -101,19 +101,10 @@ pub struct Ingredients {
     pub data_model: u32,
 }
 
-/// Ingredients and their digest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Recipe {
-    /// BLAKE3 of the canonical JSON of the ingredients.
-    pub digest: Key,
-    /// The ingredients.
-    pub ingredients: Ingredients,
-}
-
-impl Recipe {
-    /// The recipe of a step.
+impl Ingredients {
+    /// Those of a step.
     pub fn of(step: &ResolvedStep) -> Self {
-        let mut parameters = step.parameters.clone();
+        let mut parameters = step.parameters.clone_value();
         let mut files = Vec::with_capacity(step.files.len());
         for file in &step.files {
             // Where a file lies must not matter, only what is in it.
@@ -130,37 +121,33 @@ impl Recipe {
             version: p.version.clone(),
             hash: p.hash.clone(),
         };
-        let ingredients = Ingredients {
+        Self {
             step: step.name.clone(),
             plugin: binary(&step.plugin),
             components: step.components.iter().map(binary).collect(),
             parameters,
             files,
             data_model: DATA_MODEL_VERSION,
-        };
-        let digest = digest_of(&ingredients);
-        Self {
-            digest,
-            ingredients,
         }
     }
-}
 
-fn digest_of(i: &Ingredients) -> Key {
-    let mut text = String::with_capacity(512);
-    // Field by field, so that no serialiser's choice of key order can move the key.
-    let mut line = |value: &Value| {
-        write_canonical(value, &mut text);
-        text.push('\n');
-    };
-    let binary = |b: &Binary| serde_json::json!([b.name, b.hash]);
-    line(&Value::from(i.step.as_str()));
-    line(&binary(&i.plugin));
-    line(&Value::Array(i.components.iter().map(binary).collect()));
-    line(&i.parameters);
-    line(&serde_json::json!(i.files));
-    line(&Value::from(i.data_model));
-    Key(*blake3::hash(text.as_bytes()).as_bytes())
+    /// The step's recipe: BLAKE3 of their canonical JSON.
+    pub fn digest(&self) -> Key {
+        let mut text = String::with_capacity(512);
+        // Field by field, so that no serialiser's choice of key order can move the key.
+        let mut line = |value: &Value| {
+            write_canonical(value, &mut text);
+            text.push('\n');
+        };
+        let binary = |b: &Binary| serde_json::json!([b.name, b.hash]);
+        line(&Value::from(self.step.as_str()));
+        line(&binary(&self.plugin));
+        line(&Value::Array(self.components.iter().map(binary).collect()));
+        line(&self.parameters);
+        line(&serde_json::json!(self.files));
+        line(&Value::from(self.data_model));
+        Key(*blake3::hash(text.as_bytes()).as_bytes())
+    }
 }
 
 /// JSON with sorted keys and no white space: equal values have equal text.
@@ -251,14 +238,14 @@ mod tests {
 
     fn key_of(change: impl FnOnce(&mut ResolvedStep)) -> Key {
         let mut s = step("a", &[], &[]);
-        s.parameters = json!({"scene": {"tool": "/here/tool.stl"}, "angle": 0.5});
+        s.parameters = json!({"scene": {"tool": "/here/tool.stl"}, "angle": 0.5}).into();
         s.files = vec![InputFile {
             pointer: "/scene/tool".into(),
             path: "/here/tool.stl".into(),
             hash: "11".into(),
         }];
         change(&mut s);
-        Recipe::of(&s).digest
+        Ingredients::of(&s).digest()
     }
 
     #[test]
@@ -276,7 +263,7 @@ mod tests {
         let moved = key_of(|s| {
             s.plugin.path = "/there/p.so".into();
             s.files[0].path = "/there/tool.stl".into();
-            s.parameters = json!({"angle": 0.5, "scene": {"tool": "/there/tool.stl"}});
+            s.parameters = json!({"angle": 0.5, "scene": {"tool": "/there/tool.stl"}}).into();
             s.resources.cores = 7;
         });
         assert_eq!(base, moved);

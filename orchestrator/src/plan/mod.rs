@@ -6,7 +6,7 @@ mod keys;
 mod reason;
 
 pub use fanout::{Extent, Walk, walk};
-pub use keys::{ByKey, Ingredients, InputKey, Key, Recipe, canonical_json, instance_key};
+pub use keys::{ByKey, Ingredients, InputKey, Key, canonical_json, instance_key};
 pub use reason::{Change, changes};
 
 use petgraph::Direction;
@@ -40,8 +40,8 @@ pub struct WirePlan {
 pub struct StepPlan {
     /// Name.
     pub name: String,
-    /// Everything in the key that is the same for all instances.
-    pub recipe: Recipe,
+    /// Digest of its [`Ingredients`]: of everything in the key that is the same for all instances.
+    pub recipe: Key,
     /// Fan-out, outermost first.
     pub dimensions: Vec<DimensionPlan>,
     /// Wires in order.
@@ -92,16 +92,30 @@ pub enum PlanError {
     NoStep(String),
 }
 
+/// Digests of the ingredients of all steps, in order.
+pub fn recipes(workflow: &ResolvedWorkflow) -> Vec<Key> {
+    let steps = workflow.steps.iter();
+    steps.map(|s| Ingredients::of(s).digest()).collect()
+}
+
 impl Graph {
     /// Plans a workflow.
     ///
     /// # Errors
     /// When steps are out of order or a nested fan-out is incomplete.
     pub fn new(workflow: &ResolvedWorkflow) -> Result<Self, PlanError> {
+        Self::of_recipes(workflow, recipes(workflow))
+    }
+
+    /// As [`Graph::new`], with the [`recipes`] of its steps.
+    ///
+    /// # Errors
+    /// As [`Graph::new`].
+    pub fn of_recipes(workflow: &ResolvedWorkflow, recipes: Vec<Key>) -> Result<Self, PlanError> {
         let mut index: HashMap<&str, usize> = HashMap::with_capacity(workflow.steps.len());
         let mut edges = DiGraph::new();
         let mut steps: Vec<StepPlan> = Vec::with_capacity(workflow.steps.len());
-        for (at, step) in workflow.steps.iter().enumerate() {
+        for (at, (step, recipe)) in workflow.steps.iter().zip(recipes).enumerate() {
             edges.add_node(());
             let find = |name: &str| {
                 index.get(name).copied().ok_or_else(|| PlanError::Order {
@@ -152,7 +166,7 @@ impl Graph {
             index.insert(&step.name, at);
             steps.push(StepPlan {
                 name: step.name.clone(),
-                recipe: Recipe::of(step),
+                recipe,
                 dimensions,
                 wires,
                 fanned_by: Vec::new(),
@@ -219,7 +233,7 @@ pub(crate) mod tests {
                 hash: "00".into(),
             },
             components: vec![],
-            parameters: serde_json::json!({}),
+            parameters: serde_json::json!({}).into(),
             files: vec![],
             inputs: wires
                 .iter()

@@ -134,7 +134,7 @@ fn place(step: &str, item: &[u64]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::keys::{Key, Recipe};
+    use super::super::keys::Key;
     use super::super::tests::step;
     use super::*;
     use serde_json::json;
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn the_changed_parameter_and_input_are_named_with_old_and_new_value() {
         let mut a = step("s", &[], &[]);
-        a.parameters = json!({"limits": {"shear": 0.139, "gap": 1.0}, "list": [1, 2]});
+        a.parameters = json!({"limits": {"shear": 0.139, "gap": 1.0}, "list": [1, 2]}).into();
         let mut b = a.clone();
         b.parameters["limits"]["shear"] = json!(0.157);
         b.parameters["list"] = json!([1, 2, 3]);
@@ -152,7 +152,7 @@ mod tests {
             item: vec![1],
             key: k,
         };
-        let (old, new) = (Recipe::of(&a).ingredients, Recipe::of(&b).ingredients);
+        let (old, new) = (Ingredients::of(&a), Ingredients::of(&b));
         let found = changes(
             (&old, &[input(Key([1; 32]))]),
             (&new, &[input(Key([2; 32]))]),

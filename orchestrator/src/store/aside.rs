@@ -25,7 +25,7 @@ impl Store {
         }
         let folder = self.damaged();
         if fs::symlink_metadata(&folder).is_ok_and(|m| !m.is_dir()) {
-            fs::rename(&folder, folder.with_extension("old"))?;
+            fs::rename(&folder, free_name(&folder.with_extension("old")))?;
         }
         fs::create_dir_all(&folder)?;
         // The name tells where it was: `runs/study/journal` is kept as `runs-study-journal`.
@@ -35,12 +35,7 @@ impl Store {
             Some(name) if is_artifact => name.to_owned(),
             _ => inside.as_str().trim_start_matches('/').replace('/', "-"),
         };
-        let free = (1..).map(|n| match n {
-            1 => folder.join(&name),
-            n => folder.join(format!("{name}.{n}")),
-        });
-        let mut free = free.skip_while(|p| fs::symlink_metadata(p).is_ok());
-        let to = free.next().unwrap_or_else(|| folder.join(&name));
+        let to = free_name(&folder.join(&name));
         match fs::rename(path, &to) {
             // Another command was faster.
             Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -112,6 +107,14 @@ impl Store {
             _ => Ok(()),
         }
     }
+}
+
+/// This path, or the first of `PATH.2`, `PATH.3` .. at which nothing lies: whatever lies there stays.
+pub(super) fn free_name(path: &Utf8Path) -> Utf8PathBuf {
+    let numbered = (2..).map(|n| Utf8PathBuf::from(format!("{path}.{n}")));
+    let mut all = std::iter::once(path.to_owned()).chain(numbered);
+    all.find(|p| fs::symlink_metadata(p).is_err())
+        .unwrap_or_else(|| path.to_owned())
 }
 
 /// Why the note of plugin libraries is not what was written, when it is there and is not.

@@ -5,8 +5,9 @@
 //! Where one follows, the file is damaged: the frames between are lost, the next writer keeps the damaged file beside a new one.
 //! Nothing depends on the journal being whole: an artifact that it does not know is found by its file.
 
-use crate::plan::{ByKey, Ingredients, InputKey, Key, Recipe};
+use crate::plan::{ByKey, Ingredients, InputKey, Key};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::open::{self, FileError, MOST_NOTED};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs::File;
@@ -131,7 +132,7 @@ fn mark(file: &File) -> io::Result<Mark> {
 impl Scanned {
     /// Reads a journal; `None` when there is none that can be read.
     pub fn read(path: &Utf8Path) -> Option<Self> {
-        let mut file = File::open(path).ok()?;
+        let mut file = open::open(path.as_std_path(), MOST_NOTED).ok()?;
         let mark = mark(&file).ok()?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).ok()?;
@@ -176,10 +177,10 @@ impl Journal {
     /// # Errors
     /// When the file cannot be read.
     pub fn read(path: &Utf8Path) -> io::Result<Self> {
-        let bytes = match std::fs::read(path) {
+        let bytes = match open::read(path.as_std_path(), MOST_NOTED) {
             Ok(bytes) => bytes,
-            Err(e) if e.kind() == io::ErrorKind::NotFound => Vec::new(),
-            Err(e) => return Err(e),
+            Err(FileError::Missing) => Vec::new(),
+            Err(e) => return Err(e.into()),
         };
         Ok(Self::scan(path, bytes).0)
     }
@@ -203,6 +204,11 @@ impl Journal {
     /// # Errors
     /// As [`Journal::open`].
     pub fn open_with(path: &Utf8Path, ahead: Option<Scanned>) -> io::Result<Self> {
+        // A pipe in its place would be waited for, a device read without end.
+        let found = open::open(path.as_std_path(), MOST_NOTED);
+        if let Err(e @ (FileError::Special(_) | FileError::Large { .. })) = found {
+            return Err(e.into());
+        }
         let mut options = File::options();
         let mut file = options
             .read(true)
@@ -400,12 +406,13 @@ impl Journal {
         Some((ingredients, detail.inputs))
     }
 
-    /// Notes that an instance uses this artifact; writes nothing when that is already the last word.
+    /// Notes that an instance uses this artifact; writes nothing when that is already the last word. With the digest of its recipe comes
+    /// how it is made, which is asked for when it is new.
     pub fn used(
         &mut self,
         (step, item): (&str, &[u64]),
         key: Key,
-        recipe: &Recipe,
+        (recipe, made_by): (Key, impl FnOnce() -> Ingredients),
         artifact: Known,
         inputs: impl FnOnce() -> Vec<InputKey>,
     ) {
@@ -423,16 +430,16 @@ impl Journal {
             }
             return;
         }
-        if !self.recipes.contains_key(&recipe.digest) {
-            let ingredients = serde_json::to_string(&recipe.ingredients).unwrap_or_default();
+        if !self.recipes.contains_key(&recipe) {
+            let ingredients = serde_json::to_string(&made_by()).unwrap_or_default();
             self.push(&Entry::Recipe {
-                digest: recipe.digest,
+                digest: recipe,
                 ingredients,
             });
         }
         self.push(&Entry::Detail(Detail {
             key,
-            recipe: recipe.digest,
+            recipe,
             inputs: inputs(),
         }));
         self.push(&Entry::Made {

@@ -5,10 +5,11 @@ fn at(folder: &tempfile::TempDir) -> Utf8PathBuf {
     Utf8PathBuf::from_path_buf(folder.path().join("journal")).unwrap()
 }
 
-fn recipe(speed: f64) -> Recipe {
+fn recipe(speed: f64) -> (Key, impl FnOnce() -> Ingredients) {
     let mut s = step("s", &[], &[]);
-    s.parameters = serde_json::json!({ "speed": speed });
-    Recipe::of(&s)
+    s.parameters = serde_json::json!({ "speed": speed }).into();
+    let made_by = Ingredients::of(&s);
+    (made_by.digest(), || made_by)
 }
 
 fn key(n: u8) -> Key {
@@ -27,7 +28,7 @@ fn note(j: &mut Journal, item: u64, n: u8) {
         item: vec![],
         key: key(200),
     };
-    j.used(("s", &[item]), key(n), &recipe(f64::from(n)), made, || {
+    j.used(("s", &[item]), key(n), recipe(f64::from(n)), made, || {
         vec![input]
     });
 }
@@ -161,7 +162,7 @@ fn what_was_seen_of_files_is_noted_again_only_when_it_is_new() {
             stamp: Some(stamp),
             ..j.known(&key(1)).unwrap().clone()
         };
-        j.used(("s", &[0]), key(1), &recipe(1.0), artifact, Vec::new);
+        j.used(("s", &[0]), key(1), recipe(1.0), artifact, Vec::new);
         j.flush().unwrap();
         std::fs::metadata(at(&folder)).unwrap().len()
     };

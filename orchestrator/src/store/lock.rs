@@ -1,5 +1,6 @@
 //! Kernel locks: they end with the process that holds them, so nothing is ever left to unlock.
 
+use super::aside::free_name;
 use camino::{Utf8Path, Utf8PathBuf};
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
@@ -62,13 +63,13 @@ impl Lock {
             fs::create_dir_all(folder).map_err(failed)?;
         }
         let is_none = match fs::metadata(path) {
-            Ok(found) => found.is_dir(),
+            Ok(found) => !found.is_file(),
             // A link to itself, for one.
             Err(e) => fs::symlink_metadata(path).is_ok() && e.kind() != io::ErrorKind::NotFound,
         };
         if is_none {
             // Nobody holds what nobody could open.
-            fs::rename(path, path.with_extension("damaged")).map_err(failed)?;
+            fs::rename(path, free_name(&path.with_extension("damaged"))).map_err(failed)?;
         }
         let mut options = File::options();
         options.read(true).write(true).create(true).truncate(false);
@@ -122,7 +123,7 @@ fn holders(file: &mut File) -> String {
     let mut pids = file.metadata().map_or(Vec::new(), |m| told_by_kernel(&m));
     if pids.is_empty() {
         let mut written = String::new();
-        let _ = file.read_to_string(&mut written);
+        let _ = file.take(32).read_to_string(&mut written);
         pids.extend(written.trim().parse::<u32>().ok());
     }
     match &pids[..] {
@@ -175,7 +176,11 @@ mod tests {
         drop(Lock::exclusive(&path, "the run").unwrap());
         assert!(path.is_file());
         fs::remove_file(&path).unwrap();
-        fs::remove_dir(path.with_extension("damaged")).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.unwrap().success());
+        drop(Lock::exclusive(&path, "the run").unwrap());
+        assert!(path.is_file());
+        fs::remove_file(&path).unwrap();
         std::os::unix::fs::symlink(&path, &path).unwrap();
         drop(Lock::exclusive(&path, "the run").unwrap());
         assert!(path.is_file());

@@ -23,12 +23,14 @@ mod early;
 mod journal;
 mod lock;
 pub mod resolved;
+mod run;
 
 pub use aside::damage_of_plugins;
 pub use check::{Expected, Flaw, Seen, check_artifact, read_unplaced, record_beside};
 pub use early::{Ahead, Early};
 pub use journal::{Detail, Journal, Known, Scanned};
 pub use lock::{Lock, LockError};
+pub use run::RunFolder;
 
 use crate::plan::Key;
 use camino::{Utf8Path, Utf8PathBuf};
@@ -49,102 +51,6 @@ const EARLIER_ENDING: &str = ".h5";
 pub struct Store {
     root: Utf8PathBuf,
     shards: RefCell<[bool; 256]>,
-}
-
-/// Files of one run.
-#[derive(Debug, Clone)]
-pub struct RunFolder {
-    /// `runs/<workflow>`.
-    pub root: Utf8PathBuf,
-}
-
-impl RunFolder {
-    /// Its lock.
-    pub fn lock(&self) -> Utf8PathBuf {
-        self.root.join("lock")
-    }
-
-    /// Its journal.
-    pub fn journal(&self) -> Utf8PathBuf {
-        self.root.join("journal")
-    }
-
-    /// Temporary files.
-    pub fn tmp(&self) -> Utf8PathBuf {
-        self.root.join("tmp")
-    }
-
-    /// Log of an instance by its label.
-    pub fn log(&self, label: &str) -> Utf8PathBuf {
-        self.root
-            .join("logs")
-            .join(format!("{}.log", safe_name(label)))
-    }
-
-    /// Checkpoints of an instance, by its label and key.
-    pub fn checkpoints(&self, label: &str, key: &Key) -> Utf8PathBuf {
-        let of = self.root.join("checkpoints").join(safe_name(label));
-        of.join(key.hex())
-    }
-
-    /// Where it stands that checkpoints are of a run that was to begin anew (`--force`).
-    pub fn forced(&self, label: &str, key: &Key) -> Utf8PathBuf {
-        let of = self.root.join("checkpoints").join(safe_name(label));
-        of.join(format!("{}.forced", key.hex()))
-    }
-
-    /// Finished artifacts that could not be put into the store.
-    pub fn unplaced(&self) -> Utf8PathBuf {
-        self.root.join("unplaced")
-    }
-
-    /// Checkpoints that no command will go on from: of every instance all but those last written to.
-    ///
-    /// # Errors
-    /// When a folder cannot be read.
-    pub fn old_checkpoints(&self) -> io::Result<Vec<Utf8PathBuf>> {
-        let mut old = Vec::new();
-        for instance in list(&self.root.join("checkpoints"))? {
-            let mut of = list(&instance)?;
-            of.retain(|p| p.is_dir());
-            let written = |p: &Utf8PathBuf| fs::metadata(p).and_then(|m| m.modified()).ok();
-            of.sort_by_cached_key(|p| (written(p), p.clone()));
-            of.pop();
-            old.extend(of);
-        }
-        Ok(old)
-    }
-
-    /// Checkpoints of all instances and keys.
-    ///
-    /// # Errors
-    /// When a folder cannot be read.
-    pub fn all_checkpoints(&self) -> io::Result<Vec<Utf8PathBuf>> {
-        let mut all = Vec::new();
-        for instance in list(&self.root.join("checkpoints"))? {
-            if instance.is_dir() {
-                all.extend(list(&instance)?.into_iter().filter(|p| p.is_dir()));
-            }
-        }
-        Ok(all)
-    }
-
-    /// Makes the folder and clears what a killed run left in `tmp`. Call only under the lock.
-    ///
-    /// # Errors
-    /// When the folder cannot be written.
-    pub fn prepare(&self) -> io::Result<()> {
-        let tmp = self.tmp();
-        let removed = match fs::symlink_metadata(&tmp) {
-            Ok(found) if !found.is_dir() => fs::remove_file(&tmp),
-            _ => fs::remove_dir_all(&tmp),
-        };
-        match removed {
-            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
-            _ => {}
-        }
-        fs::create_dir_all(self.tmp())
-    }
 }
 
 /// A name that is safe as a file name and still tells names apart.
@@ -475,127 +381,5 @@ fn list(folder: &Utf8Path) -> io::Result<Vec<Utf8PathBuf>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_that_are_not_file_names_stay_apart() {
-        assert_eq!(safe_name("local[A,0]"), "local[A,0]");
-        assert_ne!(safe_name("a/b"), safe_name("a:b"));
-        assert!(!safe_name("../../etc").contains('/'));
-        assert!(!safe_name("..").starts_with('.'));
-    }
-
-    #[test]
-    fn an_artifact_becomes_visible_with_its_record() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
-        let store = Store::new(root.clone());
-        let key = Key([7; 32]);
-        let (a, r) = (root.join("a"), root.join("r"));
-        fs::write(&a, "artifact").unwrap();
-        assert!(
-            store.commit(&key, &a, &r, true).is_err(),
-            "a missing record must stop the commit"
-        );
-        assert_eq!(store.size(&key), None);
-        fs::write(&r, "{}").unwrap();
-        store.commit(&key, &a, &r, true).unwrap();
-        assert_eq!(store.size(&key), Some(8));
-        assert_eq!(store.keys().unwrap(), [key]);
-        store.remove(&key).unwrap();
-        assert!(store.keys().unwrap().is_empty());
-    }
-
-    #[test]
-    fn what_cannot_be_committed_is_kept_and_taken_by_the_next_run() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
-        let store = Store::new(root.clone());
-        let run = store.run("study");
-        let key = Key([7; 32]);
-        let (a, r) = (root.join("a"), root.join("r"));
-        write_pair(&key, &a, &r);
-        // A file where the folder should be: nothing can be put there.
-        fs::write(root.join("artifacts"), "").unwrap();
-        assert!(store.commit(&key, &a, &r, true).is_err());
-        store.keep_unplaced(&run, &key, &a, &r).unwrap();
-        store.take_unplaced(&run);
-        assert_eq!((store.size(&key), a.exists()), (None, false));
-        fs::remove_file(root.join("artifacts")).unwrap();
-        store.take_unplaced(&run);
-        assert_eq!(store.size(&key), Some(8));
-        assert!(store.check(&key, None).is_ok() && !run.unplaced().exists());
-    }
-
-    #[test]
-    fn what_is_damaged_while_it_could_not_be_committed_never_gets_into_the_store() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
-        let store = Store::new(root.clone());
-        let run = store.run("study");
-        let key = Key([7; 32]);
-        let (a, r) = (root.join("a"), root.join("r"));
-        write_pair(&key, &a, &r);
-        store.keep_unplaced(&run, &key, &a, &r).unwrap();
-        let kept = run.unplaced().join(format!("{}{ENDING}", key.hex()));
-        fs::write(&kept, "ARTIFACT").unwrap();
-        let told = store.take_unplaced(&run);
-        assert!(told[0].contains("damaged"), "{told:?}");
-        assert_eq!(store.size(&key), None);
-        assert_eq!(store.set_aside_before().unwrap().len(), 2);
-    }
-
-    /// An artifact and its record, as a worker leaves them.
-    pub(super) fn write_pair(key: &Key, artifact: &Utf8Path, record: &Utf8Path) {
-        fs::write(artifact, "artifact").unwrap();
-        let whole = plyflow_model::job::Record {
-            version: plyflow_model::job::JOB_VERSION,
-            step: "s".into(),
-            item: vec![],
-            key: key.hex(),
-            kind: "forming".into(),
-            bytes: 8,
-            hash: blake3::hash(b"artifact").to_hex().to_string(),
-            cost: plyflow_model::job::Cost::default(),
-            results: vec![],
-            collection: None,
-            warnings: vec![],
-            host: "h".into(),
-            started: 0.0,
-        };
-        let text = serde_json::to_string_pretty(&whole).unwrap();
-        fs::write(record, plyflow_artifact::seal::seal(&text)).unwrap();
-    }
-
-    #[test]
-    fn clearing_removes_what_runs_have_put_there_and_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
-        let store = Store::new(root.clone());
-        let key = Key([7; 32]);
-        let write = |path: Utf8PathBuf| {
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(path, "x").unwrap();
-        };
-        let own = [
-            store.artifact(&key),
-            store.record(&key),
-            store.run("study").journal(),
-            store.run("study").tmp().join("1.vtkhdf"),
-            store.damaged().join("x"),
-            root.join("resolved/0123456789abcdef"),
-            root.join("plugins.json"),
-        ];
-        let others = [
-            root.join("runs/exp1/result.csv"),
-            root.join("artifacts/sub/model.bin"),
-            root.join("resolved/issues.txt"),
-            root.join("notes.txt"),
-        ];
-        own.iter().chain(&others).cloned().for_each(write);
-        store.clear().unwrap();
-        assert!(own.iter().all(|p| !p.exists()));
-        assert!(others.iter().all(|p| p.exists()));
-    }
-}
+#[path = "store_tests.rs"]
+mod tests;

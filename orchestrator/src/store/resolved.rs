@@ -3,18 +3,21 @@
 //! all that the resolution read and asked are the same; in any doubt the workflow is resolved anew.
 //! Findings are never kept: a workflow with one is read again each time.
 
+use crate::plan::Key;
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::open::{self, MOST_NOTED};
 use plyflow_workflow::resolved::{
-    Dimension, Expectation, FailurePolicy, InputFile, PluginId, ResolvedInput, ResolvedStep,
-    ResolvedWorkflow, Resources,
+    Dimension, Expectation, FailurePolicy, InputFile, Parameters, PluginId, ResolvedInput,
+    ResolvedStep, ResolvedWorkflow, Resources,
 };
 use plyflow_workflow::{Catalog, Evidence, Resolution};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Number, Value};
+use std::borrow::Cow;
 use std::os::unix::fs::MetadataExt;
 
 /// Changes whenever the form of the file does.
-const FORM: &[u8] = b"plyflow resolved workflow 1";
+const FORM: &[u8] = b"plyflow resolved workflow 2";
 
 /// What a resolution depends on besides its [`Evidence`], as one hash.
 pub type Circumstances = [u8; 32];
@@ -55,14 +58,14 @@ fn place(root: &Utf8Path, file: &Utf8Path) -> Utf8PathBuf {
     root.join("resolved").join(&hash[..16])
 }
 
-/// The kept resolution, if there is one and everything it rests on is as it was.
+/// The kept resolution with the recipes of its steps, if there is one and everything it rests on is as it was.
 pub fn read(
     root: &Utf8Path,
     file: &Utf8Path,
     circumstances: &Circumstances,
     catalog: &dyn Catalog,
-) -> Option<ResolvedWorkflow> {
-    let bytes = std::fs::read(place(root, file)).ok()?;
+) -> Option<(ResolvedWorkflow, Vec<Key>)> {
+    let bytes = open::read(place(root, file).as_std_path(), MOST_NOTED).ok()?;
     let (known, rest) = bytes.split_first_chunk::<32>()?;
     let (sum, payload) = rest.split_first_chunk::<32>()?;
     if known != circumstances || blake3::hash(payload).as_bytes() != sum {
@@ -72,12 +75,12 @@ pub fn read(
     if !evidence.holds(catalog) {
         return None;
     }
-    postcard::from_bytes::<Packed>(packed).ok()?.unpack()
+    postcard::from_bytes::<Packed<'_>>(packed).ok()?.unpack()
 }
 
 /// Whether a file of kept resolutions is damaged, in words.
 pub fn damage(path: &Utf8Path) -> Option<String> {
-    let bytes = match plyflow_artifact::seal::read_document(path.as_std_path()) {
+    let bytes = match open::read(path.as_std_path(), MOST_NOTED) {
         Ok(bytes) => bytes,
         Err(e) => return Some(e.to_string()),
     };
@@ -93,14 +96,14 @@ pub fn write(
     root: &Utf8Path,
     file: &Utf8Path,
     circumstances: &Circumstances,
-    resolution: &Resolution,
+    (resolution, recipes): (&Resolution, &[Key]),
 ) {
     let place = place(root, file);
     let temporary = Utf8PathBuf::from(format!("{place}.{}", std::process::id()));
     if place.is_dir() {
         let _ = super::Store::new(root.to_owned()).set_aside(&place);
     }
-    let written = encode(circumstances, resolution).is_some_and(|bytes| {
+    let written = encode(circumstances, resolution, recipes).is_some_and(|bytes| {
         root.is_dir()
             && std::fs::create_dir_all(root.join("resolved"))
                 .and_then(|()| std::fs::write(&temporary, bytes))
@@ -112,9 +115,13 @@ pub fn write(
     }
 }
 
-fn encode(circumstances: &Circumstances, resolution: &Resolution) -> Option<Vec<u8>> {
+fn encode(
+    circumstances: &Circumstances,
+    resolution: &Resolution,
+    recipes: &[Key],
+) -> Option<Vec<u8>> {
     let mut payload = postcard::to_stdvec(&resolution.evidence).ok()?;
-    payload.extend(postcard::to_stdvec(&Packed::of(&resolution.workflow)).ok()?);
+    payload.extend(postcard::to_stdvec(&Packed::of(&resolution.workflow, recipes)).ok()?);
     let mut bytes = circumstances.to_vec();
     bytes.extend_from_slice(blake3::hash(&payload).as_bytes());
     bytes.extend(payload);
@@ -123,23 +130,27 @@ fn encode(circumstances: &Circumstances, resolution: &Resolution) -> Option<Vec<
 
 /// A [`ResolvedWorkflow`] in a form that needs no names of fields, with every library once.
 #[derive(Serialize, Deserialize)]
-struct Packed {
+struct Packed<'a> {
     name: String,
     file: Utf8PathBuf,
     description: Option<String>,
     libraries: Vec<PluginId>,
-    steps: Vec<PackedStep>,
+    #[serde(borrow)]
+    steps: Vec<PackedStep<'a>>,
     expectations: Vec<Expectation>,
     fail_fast: bool,
 }
 
 #[derive(Serialize, Deserialize)]
-struct PackedStep {
+struct PackedStep<'a> {
     name: String,
+    recipe: Key,
     role: String,
     plugin: usize,
     components: Vec<usize>,
-    parameters: PackedValue,
+    /// A [`PackedValue`], left as it is until somebody asks for it.
+    #[serde(borrow)]
+    parameters: Cow<'a, [u8]>,
     files: Vec<InputFile>,
     inputs: Vec<ResolvedInput>,
     dimensions: Vec<Dimension>,
@@ -163,6 +174,15 @@ enum PackedValue {
 }
 
 impl PackedValue {
+    fn bytes(value: &Value) -> Vec<u8> {
+        // Serialising into memory cannot fail: every type here has a known length.
+        postcard::to_stdvec(&Self::of(value)).unwrap_or_default()
+    }
+
+    fn read(bytes: &[u8]) -> Option<Value> {
+        postcard::from_bytes::<Self>(bytes).ok()?.unpack()
+    }
+
     fn of(value: &Value) -> Self {
         match value {
             Value::Null => Self::Null,
@@ -201,8 +221,8 @@ impl PackedValue {
     }
 }
 
-impl Packed {
-    fn of(workflow: &ResolvedWorkflow) -> Self {
+impl Packed<'_> {
+    fn of(workflow: &ResolvedWorkflow, recipes: &[Key]) -> Self {
         let mut libraries: Vec<PluginId> = Vec::new();
         let mut number = |id: &PluginId| {
             libraries.iter().position(|l| l == id).unwrap_or_else(|| {
@@ -213,12 +233,14 @@ impl Packed {
         let steps = workflow
             .steps
             .iter()
-            .map(|s| PackedStep {
+            .zip(recipes)
+            .map(|(s, recipe)| PackedStep {
                 name: s.name.clone(),
+                recipe: *recipe,
                 role: s.role.clone(),
                 plugin: number(&s.plugin),
                 components: s.components.iter().map(&mut number).collect(),
-                parameters: PackedValue::of(&s.parameters),
+                parameters: Cow::Owned(PackedValue::bytes(&s.parameters)),
                 files: s.files.clone(),
                 inputs: s.inputs.clone(),
                 dimensions: s.dimensions.clone(),
@@ -239,9 +261,9 @@ impl Packed {
         }
     }
 
-    fn unpack(self) -> Option<ResolvedWorkflow> {
+    fn unpack(self) -> Option<(ResolvedWorkflow, Vec<Key>)> {
         let library = |i: usize| self.libraries.get(i).cloned();
-        let step = |s: PackedStep| {
+        let step = |s: PackedStep<'_>| {
             Some(ResolvedStep {
                 name: s.name,
                 role: s.role,
@@ -251,7 +273,10 @@ impl Packed {
                     .into_iter()
                     .map(library)
                     .collect::<Option<_>>()?,
-                parameters: s.parameters.unpack()?,
+                parameters: Parameters::packed(s.parameters.into_owned(), |bytes| {
+                    PackedValue::read(bytes)
+                        .expect("what this program has packed, as its hash tells")
+                }),
                 files: s.files,
                 inputs: s.inputs,
                 dimensions: s.dimensions,
@@ -261,7 +286,8 @@ impl Packed {
                 retries: s.retries,
             })
         };
-        Some(ResolvedWorkflow {
+        let recipes = self.steps.iter().map(|s| s.recipe).collect();
+        let workflow = ResolvedWorkflow {
             name: self.name,
             file: self.file,
             description: self.description,
@@ -272,7 +298,8 @@ impl Packed {
             } else {
                 FailurePolicy::KeepGoing
             },
-        })
+        };
+        Some((workflow, recipes))
     }
 }
 

@@ -63,12 +63,13 @@ impl Kept {
             file,
         };
         let found = plyflow_workflow::resolve(&kept.file, &One("11"), &[]).unwrap();
-        write(&kept.root, &kept.file, &[1; 32], &found);
+        let recipes = crate::plan::recipes(&found.workflow);
+        write(&kept.root, &kept.file, &[1; 32], (&found, &recipes));
         kept
     }
 
     fn read(&self) -> Option<ResolvedWorkflow> {
-        read(&self.root, &self.file, &[1; 32], &One("11"))
+        Some(read(&self.root, &self.file, &[1; 32], &One("11"))?.0)
     }
 
     fn place(&self) -> Utf8PathBuf {
@@ -80,13 +81,15 @@ impl Kept {
 fn what_is_kept_is_what_was_resolved_bit_for_bit() {
     let kept = Kept::new(TEXT);
     let anew = plyflow_workflow::load(&kept.file, &One("11")).unwrap();
-    assert_eq!(kept.read(), Some(anew));
+    let recipes = crate::plan::recipes(&anew);
+    let read = read(&kept.root, &kept.file, &[1; 32], &One("11"));
+    assert_eq!(read, Some((anew, recipes)));
 }
 
 #[test]
 fn values_keep_their_type_and_their_bits() {
     let value = json!({"z": [null, true, -3, u64::MAX, -0.0, 5e-324, 1.0], "a": {"t": "µ"}});
-    let back = PackedValue::of(&value).unpack().unwrap();
+    let back = PackedValue::read(&PackedValue::bytes(&value)).unwrap();
     assert_eq!(back.to_string(), value.to_string());
 }
 
@@ -146,7 +149,8 @@ fn nothing_is_made_where_there_is_no_store() {
     let kept = Kept::new(TEXT);
     let none = kept.root.join("none");
     let found = plyflow_workflow::resolve(&kept.file, &One("11"), &[]).unwrap();
-    write(&none, &kept.file, &[1; 32], &found);
+    let recipes = crate::plan::recipes(&found.workflow);
+    write(&none, &kept.file, &[1; 32], (&found, &recipes));
     assert!(!none.exists());
 }
 

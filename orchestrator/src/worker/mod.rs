@@ -6,16 +6,15 @@ use plyflow_plugin_host::supervise;
 use rustix::process::{Pid, Signal};
 
 /// Runs the worker and ends the process. `arguments` are those after `step-worker`: the file of a job or
-/// `-`, with `--parent PID` when the engine is its parent; or `--describe LIBRARY`. `inside` is called first in the
+/// `-`, with `--parent PID` when the engine is its parent; or `--describe LIBRARY`, with the BLAKE3 that its bytes must have. `inside` is called first in the
 /// process that loads libraries.
 ///
 /// All end by `_exit`: a plugin's clean-up at exit must not turn a finished step into a crash.
 pub fn main(arguments: &[String], inside: impl FnOnce()) -> ! {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words[..] {
-        ["--describe", library] => supervise(inside, || {
-            plyflow_plugin_host::describe_main(Utf8Path::new(library))
-        }),
+        ["--describe", library] => describe(inside, library, None),
+        ["--describe", library, hash] => describe(inside, library, Some(hash)),
         [source] => supervise(inside, || plyflow_plugin_host::worker_main(source)),
         [source, "--parent", parent] => match follow(parent) {
             Ok(()) => supervise(inside, || plyflow_plugin_host::worker_main(source)),
@@ -23,6 +22,12 @@ pub fn main(arguments: &[String], inside: impl FnOnce()) -> ! {
         },
         _ => refuse("wants the file of a job, or - for standard input"),
     }
+}
+
+fn describe(inside: impl FnOnce(), library: &str, hash: Option<&str>) -> ! {
+    supervise(inside, || {
+        plyflow_plugin_host::describe_main(Utf8Path::new(library), hash)
+    })
 }
 
 fn refuse(text: &str) -> ! {

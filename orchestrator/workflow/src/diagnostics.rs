@@ -261,6 +261,7 @@ impl Source {
 pub struct Problems {
     items: Vec<Diagnostic>,
     read: BTreeMap<Utf8PathBuf, String>,
+    forms: Vec<(Utf8PathBuf, Utf8PathBuf)>,
 }
 
 impl Problems {
@@ -328,6 +329,16 @@ impl Problems {
         if known != hash {
             known.clear();
         }
+    }
+
+    /// Takes down that there was no file of a name, and which has the same name in another form of Unicode.
+    pub fn note_form(&mut self, name: &Utf8Path, found: &Utf8Path) {
+        self.forms.push((name.to_owned(), found.to_owned()));
+    }
+
+    /// Names of which there was no file, with the file that was taken for it.
+    pub fn forms(&self) -> &[(Utf8PathBuf, Utf8PathBuf)] {
+        &self.forms
     }
 
     /// The files that were read, with their hashes.

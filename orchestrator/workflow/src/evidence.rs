@@ -22,6 +22,8 @@ pub struct Evidence {
     /// Absolute paths of the files that were read (the workflow, scenes, materials, meshes) with the
     /// BLAKE3 of their bytes, hex.
     files: Vec<(Utf8PathBuf, String)>,
+    /// Names in files of which there was none, and the file that has the same name in another form of Unicode.
+    forms: Vec<(Utf8PathBuf, Utf8PathBuf)>,
     /// Folders that had to exist.
     folders: Vec<Utf8PathBuf>,
     /// Plugin names or paths, the folder that paths start from, and what the catalog found.
@@ -37,6 +39,7 @@ impl Evidence {
         let files = problems.files().iter();
         Self {
             files: files.map(|(p, h)| (p.clone(), h.clone())).collect(),
+            forms: problems.forms().to_vec(),
             folders,
             plugins: plugins.answers(),
         }
@@ -49,7 +52,11 @@ impl Evidence {
         let same = |(path, known): &(Utf8PathBuf, String)| {
             hash_file(path).is_ok_and(|hash| hash == *known)
         };
+        let means = |(name, known): &(Utf8PathBuf, Utf8PathBuf)| {
+            open::in_other_form(name.as_std_path()).is_some_and(|found| found == *known)
+        };
         self.files.iter().all(same)
+            && self.forms.iter().all(means)
             && self.folders.iter().all(|f| f.is_dir())
             && self.plugins.iter().all(|(name, folder, known)| {
                 catalog.find(name, folder).is_ok_and(|e| e.id == *known)

@@ -48,7 +48,7 @@ pub(crate) fn expectations(
 
 /// Reads the JSON file that `expect` names. It is noted as read, so that a change of it is seen.
 fn read(given: &str, at: &Node, from: &Source, problems: &mut Problems) -> Option<(Source, Node)> {
-    let path = named(&from.folder, given);
+    let path = named(problems, &from.folder, given);
     let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => bytes,
         Err(e) => {

@@ -301,7 +301,7 @@ fn step(
         role: manifest.role.clone(),
         plugin: plugin.id.clone(),
         components,
-        parameters,
+        parameters: parameters.into(),
         files: resolver.files,
         inputs: wiring.inputs[index].clone(),
         dimensions: wiring.dimensions[index].clone(),

@@ -280,7 +280,7 @@ impl<'a> Resolver<'a> {
 
     /// Reads a file that a parameter names: hashes it and returns its absolute path.
     pub fn file(&mut self, text: &str, node: &Node, at: &Place<'_>) -> Option<Utf8PathBuf> {
-        let path = named(&at.source.folder, text);
+        let path = named(self.problems, &at.source.folder, text);
         match crate::evidence::hash_file(&path) {
             Ok(hash) => {
                 self.problems.note_file(&path, &hash);
@@ -493,12 +493,19 @@ pub(crate) fn find(
     None
 }
 
-/// The absolute path of a file that is named in another one: where there is none of that name, that of the same name in another form of Unicode.
-pub fn named(folder: &Utf8Path, text: &str) -> Utf8PathBuf {
+/// The absolute path of a file that is named in another one: where there is none of that name, that of the same name in another form of
+/// Unicode. That is noted: a file of the very name may come later.
+pub fn named(problems: &mut Problems, folder: &Utf8Path, text: &str) -> Utf8PathBuf {
     let path = absolute(folder, text);
-    open::in_other_form(path.as_std_path())
-        .and_then(|found| Utf8PathBuf::from_path_buf(found).ok())
-        .unwrap_or(path)
+    let found = open::in_other_form(path.as_std_path())
+        .and_then(|found| Utf8PathBuf::from_path_buf(found).ok());
+    match found {
+        Some(found) if found != path => {
+            problems.note_form(&path, &found);
+            found
+        }
+        _ => path,
+    }
 }
 
 /// The path, absolute, with `.` and `..` taken out. Behind a link to a folder `..` is the folder above the one that it leads to, as

@@ -3,6 +3,10 @@
 
 use camino::Utf8PathBuf;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fmt;
+use std::ops::{Deref, DerefMut};
+use std::sync::OnceLock;
 
 /// A plugin library as found on the search path or by path.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,6 +63,78 @@ pub struct Resources {
     pub time_limit: f64,
 }
 
+/// Parameters of a step: a JSON value, which may stay packed until somebody asks for it. Of ten thousand steps that are all in the
+/// store nobody does.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(from = "Value", into = "Value")]
+pub struct Parameters {
+    value: OnceLock<Value>,
+    packed: Vec<u8>,
+    unpack: fn(&[u8]) -> Value,
+}
+
+impl Parameters {
+    /// Those that `unpack` makes of some bytes.
+    pub fn packed(bytes: Vec<u8>, unpack: fn(&[u8]) -> Value) -> Self {
+        Self {
+            value: OnceLock::new(),
+            packed: bytes,
+            unpack,
+        }
+    }
+}
+
+impl From<Value> for Parameters {
+    fn from(value: Value) -> Self {
+        Self {
+            value: value.into(),
+            packed: Vec::new(),
+            unpack: |_| Value::Null,
+        }
+    }
+}
+
+impl From<Parameters> for Value {
+    fn from(parameters: Parameters) -> Self {
+        parameters.clone_value()
+    }
+}
+
+impl Parameters {
+    /// A copy of the value.
+    pub fn clone_value(&self) -> Value {
+        Value::clone(self)
+    }
+}
+
+impl Deref for Parameters {
+    type Target = Value;
+
+    fn deref(&self) -> &Value {
+        self.value.get_or_init(|| (self.unpack)(&self.packed))
+    }
+}
+
+impl DerefMut for Parameters {
+    fn deref_mut(&mut self) -> &mut Value {
+        let value = Value::clone(self);
+        *self = Self::from(value);
+        self.value.get_mut().expect("it has just been set")
+    }
+}
+
+impl PartialEq for Parameters {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl fmt::Debug for Parameters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(&**self, f)
+    }
+}
+
 /// One step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResolvedStep {
@@ -71,7 +147,7 @@ pub struct ResolvedStep {
     /// Components that its parameters name (elements, materials), in order of their JSON pointer.
     pub components: Vec<PluginId>,
     /// Resolved `with` block: SI numbers, defaults filled in, keys sorted.
-    pub parameters: serde_json::Value,
+    pub parameters: Parameters,
     /// Files that parameters name.
     pub files: Vec<InputFile>,
     /// Wires, in the order of the plugin's ports.

@@ -25,7 +25,7 @@ pub fn read(
     span: &Span,
     given: &str,
 ) -> Option<(Source, Node)> {
-    let path = named(&from.folder, given);
+    let path = named(problems, &from.folder, given);
     let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => bytes,
         Err(e) => {

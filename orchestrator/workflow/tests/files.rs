@@ -86,6 +86,11 @@ fn a_name_in_another_form_of_unicode_is_found_and_differences_that_nobody_sees_a
     let loaded = study.load().unwrap();
     let step = common::step(&loaded, "coarse");
     assert_eq!(step.files.last().unwrap().path, study.path(marked));
+    // What was kept of it does not outlive a file of the very name.
+    let kept = plyflow_workflow::resolve(&study.path(W), &common::catalog(), &[]).unwrap();
+    assert!(kept.evidence.holds(&common::catalog()));
+    study.write(one, "another");
+    assert!(!kept.evidence.holds(&common::catalog()));
     for (named, there, says) in [
         (
             "a.csv ",

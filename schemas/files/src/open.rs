@@ -8,6 +8,9 @@ use unicode_normalization::{UnicodeNormalization, is_nfc};
 /// Most bytes of a file of data: facets, points, tests.
 pub const MOST_DATA: u64 = 2 << 30;
 
+/// Most bytes of a journal or a cache that a program has written itself.
+pub const MOST_NOTED: u64 = 8 << 30;
+
 /// Most bytes of a file that people write: workflows, scenes, materials, expectations.
 pub const MOST_WRITTEN: u64 = 16 << 20;
 
@@ -31,6 +34,17 @@ pub enum FileError {
     /// What the system says.
     #[error("{0}")]
     System(#[from] std::io::Error),
+}
+
+impl From<FileError> for std::io::Error {
+    fn from(e: FileError) -> Self {
+        match e {
+            FileError::System(e) => e,
+            FileError::Missing => Self::new(std::io::ErrorKind::NotFound, e),
+            FileError::Special(_) => Self::new(std::io::ErrorKind::InvalidInput, e),
+            FileError::Large { .. } => Self::new(std::io::ErrorKind::FileTooLarge, e),
+        }
+    }
 }
 
 /// Bytes in words.

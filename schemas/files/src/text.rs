@@ -1,5 +1,6 @@
 //! Encodings, lines, and what a message may show.
 
+use plyflow_model::text::{one_line, shortened};
 use std::borrow::Cow;
 
 /// The text of a file: UTF-8, UTF-16 (with a byte order mark, or plainly so) or, where it is neither, Latin-1, in which every byte is a
@@ -100,42 +101,10 @@ pub fn shown(text: &str) -> String {
     excerpt(text, LONGEST_WORD)
 }
 
-/// A text of at most about `most` characters: of a longer one the beginning and the end, with what is left out between them. What a
-/// terminal obeys (escapes, line ends, marks that turn the direction of writing) is written out, as `\u001b`; a tab is a blank.
+/// A text of at most about `most` characters ([`shortened`]) in one line. What steers a terminal is written out, as `\u001b`
+/// ([`one_line`]); a tab is a blank.
 pub fn excerpt(text: &str, most: usize) -> String {
-    let plain = |text: &mut String, c: char| match c {
-        '\t' => text.push(' '),
-        '\n' => text.push_str("\\n"),
-        c if obeyed(c) => text.push_str(&format!("\\u{:04x}", u32::from(c))),
-        c => text.push(c),
-    };
-    // Bytes are at least as many as characters: short texts need no count.
-    let count = match text.len() <= most {
-        true => text.len(),
-        false => text.chars().count(),
-    };
-    let mut short = String::new();
-    if count <= most {
-        text.chars().for_each(|c| plain(&mut short, c));
-        return short;
-    }
-    let (head, tail) = (most * 2 / 3, most / 3);
-    let mut from = text.char_indices().rev();
-    let from = from.nth(tail.max(1) - 1).map_or(0, |c| c.0);
-    text.chars().take(head).for_each(|c| plain(&mut short, c));
-    short += &format!(" .. ({} characters left out) .. ", count - head - tail);
-    text[from..].chars().for_each(|c| plain(&mut short, c));
-    short
-}
-
-/// Whether a character does something to a terminal, or to how a line reads.
-pub fn obeyed(c: char) -> bool {
-    c.is_control()
-        || matches!(
-            c,
-            '\u{2028}' | '\u{2029}' | '\u{200e}' | '\u{200f}' | '\u{61c}'
-        )
-        || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    one_line(&shortened(text, most).replace('\t', " ")).into_owned()
 }
 
 #[cfg(test)]

@@ -35,6 +35,28 @@ pub fn one_line(text: &str) -> Cow<'_, str> {
     replaced(text, |c| steers(c) || c == '\n' || c == '\t')
 }
 
+/// A text of at most about `most` characters: of a longer one the beginning and the end, with what is left out between them.
+#[must_use]
+pub fn shortened(text: &str, most: usize) -> Cow<'_, str> {
+    // Bytes are at least as many as characters: short texts need no count.
+    if text.len() <= most {
+        return Cow::Borrowed(text);
+    }
+    let count = text.chars().count();
+    if count <= most {
+        return Cow::Borrowed(text);
+    }
+    let (head, tail) = (most * 2 / 3, (most / 3).max(1));
+    let to = text.char_indices().nth(head).map_or(0, |c| c.0);
+    let from = text.char_indices().rev().nth(tail - 1).map_or(0, |c| c.0);
+    let left = count - head - tail;
+    Cow::Owned(format!(
+        "{} .. ({left} characters left out) .. {}",
+        &text[..to],
+        &text[from..]
+    ))
+}
+
 fn replaced(text: &str, wrong: impl Fn(char) -> bool) -> Cow<'_, str> {
     // Programs write mostly plain text: one look, no copy.
     if !text.chars().any(&wrong) {
@@ -86,6 +108,16 @@ mod tests {
             "\\u001b[31m\\u009b2J\\u000d\\u202e"
         );
         assert_eq!(one_line("a\nb"), "a\\nb");
+    }
+
+    #[test]
+    fn a_long_text_is_told_by_its_beginning_and_its_end() {
+        assert_eq!(shortened("\u{f6}\u{f6}\u{f6}", 3), "\u{f6}\u{f6}\u{f6}");
+        let long = format!("begin{}end", "\u{f6}".repeat(1_000_000));
+        let short = shortened(&long, 90);
+        assert!(short.starts_with("begin\u{f6}") && short.ends_with("\u{f6}end"));
+        assert!(short.contains("(999918 characters left out)"), "{short}");
+        assert!(short.chars().count() < 130);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 mod parse;
 mod quantity;
+mod symbols;
 
 pub use parse::{
     Unit, check_si, parse_quantity, parse_quantity_in, parse_unit, parse_unit_of, plain_number,

@@ -573,3 +573,30 @@ fn films_of_a_zone_end_where_the_smaller_one_is_joined_to_the_other() {
         }
     }
 }
+
+#[test]
+fn sizes_a_thousandfold_too_small_are_refused_before_a_zone_is_meshed() {
+    let formed = coarse(0.0);
+    for (with, sheet, parameter) in [
+        (json!({"element_size": 2e-6}), "film_low", "element_size"),
+        (
+            json!({"element_size": 2e-6, "film_element_size": 0.01}),
+            "ply_1",
+            "element_size",
+        ),
+        (
+            json!({"element_size": 0.01, "film_element_size": 2e-6}),
+            "film_low",
+            "film_element_size",
+        ),
+    ] {
+        let error = interpolate(&formed, with, &[0]).unwrap_err();
+        for part in [
+            format!("the mesh of '{sheet}' in the zone would have"),
+            format!("elements at `{parameter}`"),
+            format!("Take `{parameter}` of at least"),
+        ] {
+            assert!(error.contains(&part), "{error}");
+        }
+    }
+}

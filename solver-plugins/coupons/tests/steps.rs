@@ -249,3 +249,54 @@ fn a_test_of_bending_refuses_what_does_not_bend() {
         assert!(error.contains("given 'm4', a membrane"), "{name}: {error}");
     }
 }
+
+#[test]
+fn a_size_a_thousandfold_too_small_is_refused_before_any_element_is_made() {
+    type Run = fn(&Machine, Value, &[MemoryInput<'_>], &[u64]) -> Result<MemoryArtifact, String>;
+    let of = |run: Run, material: Value, element_name: &str, mut with: Value| {
+        with["material"] = material;
+        with["element"] = element(element_name);
+        with["element_size"] = json!(4e-6);
+        let error = run(&ALONE, with, &[], &[]).unwrap_err();
+        for part in [
+            "the mesh of the specimen would have",
+            "elements at `element_size`",
+            "Take `element_size` of at least",
+        ] {
+            assert!(error.contains(part), "{error}");
+        }
+    };
+    let pull = json!({"length": 0.15, "width": 0.05, "displacement": 0.01});
+    of(
+        run_on::<PictureFrame>,
+        ncf(),
+        "m4",
+        json!({"path": [0.6], "leg_time": 0.004}),
+    );
+    of(run_on::<BiasExtension>, ncf(), "rf4", pull);
+    of(
+        run_on::<BiasPlane>,
+        ncf(),
+        "m4",
+        json!({"extension": 0.02, "time": 0.002}),
+    );
+    of(
+        run_on::<Cantilever>,
+        ncf(),
+        "rf4",
+        json!({"overhang": 0.1, "width": 0.05}),
+    );
+    of(run_on::<PureBending>, ncf(), "rf4", json!({"path": [20.0]}));
+    of(
+        run_on::<Film>,
+        film(),
+        "m4",
+        json!({"mode": "planar", "length": 0.075, "width": 0.075, "strain": 1.0, "time": 0.005}),
+    );
+    of(
+        run_on::<Inflation>,
+        film(),
+        "m4",
+        json!({"pressure": 2000.0, "ramp_time": 0.006, "hold_time": 0.001}),
+    );
+}

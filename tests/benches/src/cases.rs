@@ -3,7 +3,7 @@
 use crate::machine::Class;
 use plyflow_e2e::{program, repository};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
@@ -107,6 +107,21 @@ fn folder(workflow: &str) -> tempfile::TempDir {
     folder
 }
 
+/// A folder with the two plugins that are needed, alone: those that are broken on purpose would be looked at in each run.
+fn plugins() -> PathBuf {
+    let folder = plyflow_faults::folder().with_file_name("bench-plugins");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    for name in ["trivial", "split"] {
+        let library = plyflow_faults::library(name);
+        let link = folder.join(library.file_name().expect("a name"));
+        if !link.exists() {
+            let _ = std::fs::remove_file(&link);
+            std::os::unix::fs::symlink(&library, link).expect("a link");
+        }
+    }
+    folder
+}
+
 fn run(folder: &Path) {
     let mut command = Command::new(program());
     command.args([
@@ -120,7 +135,7 @@ fn run(folder: &Path) {
     quiet(
         command
             .current_dir(folder)
-            .env("PLYFLOW_PLUGINS", plyflow_faults::folder()),
+            .env("PLYFLOW_PLUGINS", plugins()),
     );
 }
 

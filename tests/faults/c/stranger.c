@@ -1,6 +1,6 @@
 /* A library as a stranger may send it along: it does something as soon as it is loaded. Where MARK is set it appends its name to
  * that file from its constructor. As a step it does what the words in STRANGER say: fork (children in its group, and one that
- * leaves group, session and parent), hang, steer (control characters in its log, on its standard error and in its failure),
+ * leaves group, session and parent), hang, talk (without end, on its standard error), steer (control characters in its log, on its standard error and in its failure),
  * allocate (more and more memory). */
 
 #include "plyflow.h"
@@ -61,6 +61,8 @@ static int32_t run(const pf_services *s) {
     s->fail(s->host, TEXT("<script>alert(1)</script> \033[31m red"));
     return PF_ERROR;
   }
+  while (strstr(wish, "talk"))
+    fputs("more and more of what nobody wants to know, line after line without an end\n", stderr);
   /* 64 MiB at a time, and used, as a computation would. */
   for (size_t n = 0; strstr(wish, "allocate"); n++) {
     char *more = malloc(64 << 20);

@@ -39,6 +39,30 @@ pub fn folder() -> &'static Path {
     })
 }
 
+/// The program `plyflow` of this build profile; built on the first call.
+///
+/// # Panics
+/// When it does not build.
+pub fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let exe = std::env::current_exe().expect("a test has a path");
+        // TARGET/PROFILE/deps/TEST
+        let profile = exe.ancestors().nth(2).expect("a profile folder").to_owned();
+        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
+        let target = profile.parent().expect("a target folder");
+        cargo.env("CARGO_TARGET_DIR", target);
+        cargo.args(["build", "--quiet", "--package", "plyflow"]);
+        if profile.ends_with("release") {
+            cargo.arg("--release");
+        }
+        let built = cargo.status().expect("cargo starts").success();
+        assert!(built, "plyflow does not build");
+        profile.join("plyflow")
+    })
+}
+
 /// Names of the plugins' examples: those of their sources.
 fn names() -> Vec<String> {
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("plugins");

@@ -5,7 +5,7 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let code = match (arguments.next().as_deref(), arguments.next()) {
         (Some("--describe"), Some(library)) => {
-            plyflow_plugin_host::describe_main(library.as_str().into())
+            plyflow_plugin_host::describe_main(library.as_str().into(), None)
         }
         (Some(job), None) => plyflow_plugin_host::worker_main(job),
         _ => {

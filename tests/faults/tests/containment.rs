@@ -130,6 +130,21 @@ fn a_step_without_a_bound_of_memory_has_one_and_its_failure_says_it_and_what_to_
 }
 
 #[test]
+fn a_step_that_talks_without_end_has_its_time_limit_and_a_log_of_bounded_length() {
+    let limited = "steps:\n  one: {plugin: ./libstranger.so, resources: {time_limit: 2 s}}\n";
+    let place = Place::new(limited);
+    let begun = std::time::Instant::now();
+    let mut run = start(&place, "talk", "talk", &[]);
+    assert_eq!(run.wait().unwrap().code(), Some(4));
+    assert!(begun.elapsed().as_secs() < 60);
+    let log = place.path("there/.plyflow/runs/study/logs/one.log");
+    assert!(std::fs::metadata(log).unwrap().len() < 66 << 20);
+    let told = std::fs::read_to_string(place.path("log")).unwrap();
+    assert!(told.contains("stopped at its time limit"), "{told}");
+    assert!(told.len() < 100_000);
+}
+
+#[test]
 fn no_name_log_or_message_of_others_steers_a_terminal_or_a_page() {
     let place = Place::new(STEP);
     let evil = "\\e]0;title\\a\\u009b2J \\u202e <script>alert(1)</script>\\nstudy: forged line";
@@ -137,7 +152,7 @@ fn no_name_log_or_message_of_others_steers_a_terminal_or_a_page() {
         "workflow.yaml",
         &format!("plyflow: 1\nname: \"{evil}\"\ndescription: \"{evil}\"\n{STEP}"),
     );
-    let commands: [&[&str]; 8] = [
+    let commands: [&[&str]; 10] = [
         &["run", "--trust", "workflow.yaml"],
         &["run", "--trust", "workflow.yaml", "--log-format", "json"],
         &["plan", "workflow.yaml"],
@@ -146,6 +161,8 @@ fn no_name_log_or_message_of_others_steers_a_terminal_or_a_page() {
         &["graph", "workflow.yaml"],
         &["validate", "other.yaml"],
         &["validate", "other.yaml", "--format", "json"],
+        &["plan", "workflow.yaml", "\u{1b}]0;title\u{7}.yaml"],
+        &["plan", "\u{1b}[2J\u{202e}.yaml"],
     ];
     place.write(
         "other.yaml",

@@ -95,6 +95,9 @@ fn consent_is_for_the_bytes_and_is_given_by_option_by_list_or_by_folder() {
         assert!(!place.was_loaded());
     };
     refused();
+    // A folder is no library: to say nothing would be to let its user believe that it is trusted.
+    let output = place.call(&["run", "workflow.yaml", "--trust=."]);
+    assert_eq!(output.status.code(), Some(2), "{}", told(&output));
     for entry in ["./libstranger.so", hash.as_str(), there.to_str().unwrap()] {
         place.good(&["trust", entry]);
         assert!(told(&place.call(&["trust"])).contains(match entry {
@@ -126,6 +129,51 @@ fn consent_is_for_the_bytes_and_is_given_by_option_by_list_or_by_folder() {
         told(&output)
     );
     assert!(!place.was_loaded());
+}
+
+#[test]
+fn a_library_that_is_exchanged_after_the_consent_is_not_loaded_to_be_described() {
+    let place = Place::new(BY_PATH);
+    let of = |hash: &str| {
+        let words = ["step-worker", "--describe", "./libstranger.so", hash];
+        told(&place.call(&words))
+    };
+    assert!(of(&place.hash()).contains("Does what a stranger wants"));
+    assert!(place.was_loaded());
+    let text = of(&"ab".repeat(32));
+    assert!(
+        text.contains("not the library that was consented to"),
+        "{text}"
+    );
+    assert!(!place.was_loaded());
+}
+
+#[test]
+fn the_list_stays_in_use_whatever_the_mask_of_the_process_and_the_last_line() {
+    let place = Place::new(BY_PATH);
+    let list = place.path("home/.config/plyflow/trusted");
+    build("known", &place.path("known.so"));
+    place.good(&["trust", place.path("known.so").to_str().unwrap()]);
+    // As an editor leaves it: the last line without an end.
+    let text = std::fs::read_to_string(&list).unwrap();
+    std::fs::write(&list, text.trim_end()).unwrap();
+    place.good(&["trust", "./libstranger.so"]);
+    assert_eq!(std::fs::read_to_string(&list).unwrap().lines().count(), 2);
+    let forget = [
+        "trust",
+        "--forget",
+        place.path("known.so").to_str().unwrap(),
+    ]
+    .join(" ");
+    let program = place.path("bin/plyflow");
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", &format!("umask 0; {} {forget}", program.display())]);
+    shell
+        .env("HOME", place.path("home"))
+        .env_remove("XDG_CONFIG_HOME");
+    assert!(shell.status().unwrap().success());
+    let text = place.good(&["run", "workflow.yaml"]);
+    assert!(!text.contains("others than you"), "{text}");
 }
 
 #[test]

@@ -43,10 +43,19 @@ impl PluginCatalog {
             path: id.path.clone(),
             reason,
         })?;
-        if self.trust.allows_when_asked(&library) {
-            return Ok(());
+        if !self.trust.allows_when_asked(&library) {
+            return Err(needs_consent(&id.name, [&library]));
         }
-        Err(needs_consent(&id.name, [&library]))
+        // The workflow may have been checked by what lies beside the library, before this consent: now it can say itself what it is.
+        let now = self.look_at_stranger(&id.path, false);
+        self.save();
+        match now {
+            Looked::Broken(reason) => Err(CatalogError::Broken {
+                path: id.path.clone(),
+                reason,
+            }),
+            _ => Ok(()),
+        }
     }
 
     /// A plugin that has the name of one that is trusted more, with other bytes: which of them is meant nobody can know.

@@ -2,29 +2,10 @@
 
 #![allow(dead_code)] // Each of the two test programs uses a part of it.
 
+use plyflow_faults::program;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::OnceLock;
 use std::time::{Duration, Instant};
-
-/// The program of this build profile; built on the first call.
-pub fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let exe = std::env::current_exe().unwrap();
-        // TARGET/PROFILE/deps/TEST
-        let profile = exe.ancestors().nth(2).unwrap().to_owned();
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
-        cargo.env("CARGO_TARGET_DIR", profile.parent().unwrap());
-        cargo.args(["build", "--quiet", "--package", "plyflow"]);
-        if profile.ends_with("release") {
-            cargo.arg("--release");
-        }
-        assert!(cargo.status().unwrap().success(), "plyflow does not build");
-        profile.join("plyflow")
-    })
-}
 
 /// An installation with one plugin, a home, and a stranger's folder, all in one temporary folder.
 pub struct Place {

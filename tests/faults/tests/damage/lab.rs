@@ -1,55 +1,33 @@
-//! Damage of every kind to every file of a store: no command tells a wrong number, the same run repairs it, nothing blocks for ever.
-//!
-//! `PLYFLOW_FLIPS=1000 cargo test --release -p plyflow-faults --test damage -- --ignored --nocapture` does the long form of it, on real
-//! plugins too, which have to be built (`make build`).
+//! A study whose numbers are known, every kind of damage to its files, and what the commands say then.
 
 use plyflow::plan::Key;
 use plyflow::store::{Journal, Store};
+use plyflow_faults::program;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// The program of this build profile; built on the first call.
-fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let profile = plyflow_faults::folder().parent().expect("a profile folder");
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
-        let target = profile.parent().expect("a target folder");
-        cargo.env("CARGO_TARGET_DIR", target);
-        cargo.args(["build", "--quiet", "--package", "plyflow"]);
-        if profile.ends_with("release") {
-            cargo.arg("--release");
-        }
-        let built = cargo.status().expect("cargo starts").success();
-        assert!(built, "plyflow does not build");
-        profile.join("plyflow")
-    })
-}
-
 /// A folder with a workflow in it, and its store.
-struct Study {
+pub struct Study {
     folder: tempfile::TempDir,
 }
 
 impl Study {
-    fn new(workflow: &str) -> Self {
+    pub fn new(workflow: &str) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let text = format!("plyflow: 1\nname: study\n{workflow}");
         std::fs::write(folder.path().join("workflow.yaml"), text).expect("a workflow file");
         Self { folder }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn command_on(&self, file: &str, words: &[&str]) -> Command {
+    pub fn command_on(&self, file: &str, words: &[&str]) -> Command {
         let mut command = Command::new(program());
         command.arg(words[0]).arg(file).args(&words[1..]);
         command.current_dir(self.folder.path()).stdin(Stdio::null());
@@ -58,7 +36,7 @@ impl Study {
     }
 
     /// Runs a command to its end. One that takes minutes is taken for one that never ends.
-    fn call(&self, words: &[&str]) -> Output {
+    pub fn call(&self, words: &[&str]) -> Output {
         let mut command = self.command_on("workflow.yaml", words);
         let out = [self.path("stdout"), self.path("stderr")];
         let [to, err] = [0, 1].map(|k| std::fs::File::create(&out[k]).expect("a file"));
@@ -87,7 +65,7 @@ impl Study {
     }
 
     /// Every visible artifact: name and bytes.
-    fn artifacts(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+    pub fn artifacts(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         let mut all = files(&self.path(".plyflow/artifacts"));
         all.retain(|f| kind(f) == "vtkhdf");
         let read = |f: PathBuf| {
@@ -99,7 +77,7 @@ impl Study {
 }
 
 /// Artifacts with attributes alone, collections, meshes with frames and arrays; a fan-out; and one that reads most of them.
-const MIXED: &str = "
+pub const MIXED: &str = "
 steps:
   first: {plugin: trivial, with: {value: 2}}
   zones: {plugin: split, with: {items: 3}, from: {in: first}}
@@ -109,10 +87,10 @@ steps:
 ";
 
 /// Numbers without a pattern, the same each time (xorshift64*).
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
-    fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
@@ -120,13 +98,13 @@ impl Random {
         usize::try_from(mixed).expect("31 bits") % n
     }
 
-    fn one_of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
+    pub fn one_of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
         &list[self.below(list.len())]
     }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Damage {
+pub enum Damage {
     /// One bit turned.
     Bit,
     /// The same, with nothing to be seen in what the file system tells: rot.
@@ -143,9 +121,13 @@ enum Damage {
     Unreadable,
     /// A link that leads to itself.
     Link,
+    /// A pipe in its place: whoever reads it waits without end.
+    Pipe,
+    /// A link to a device: whoever reads it reads without end.
+    Device,
 }
 
-const WHOLE_FILE: [Damage; 9] = [
+pub const WHOLE_FILE: [Damage; 11] = [
     Damage::Zeroed,
     Damage::Truncated,
     Damage::Longer,
@@ -155,10 +137,12 @@ const WHOLE_FILE: [Damage; 9] = [
     Damage::Folder,
     Damage::Unreadable,
     Damage::Link,
+    Damage::Pipe,
+    Damage::Device,
 ];
 
 /// All files of a store but those that were set aside, sorted.
-fn files(store: &Path) -> Vec<PathBuf> {
+pub fn files(store: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![store.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -176,7 +160,7 @@ fn files(store: &Path) -> Vec<PathBuf> {
 }
 
 /// What comes behind the name in a file's name: files of one kind have the same.
-fn kind(path: &Path) -> String {
+pub fn kind(path: &Path) -> String {
     let name = path
         .file_name()
         .and_then(|n| n.to_str())
@@ -185,7 +169,7 @@ fn kind(path: &Path) -> String {
 }
 
 /// Makes the journal take a file of an artifact for unchanged, as it would if a disk had let it rot.
-fn hide(store: &Path, file: &Path) {
+pub fn hide(store: &Path, file: &Path) {
     let name = file.file_name().and_then(|n| n.to_str());
     let key = name.and_then(|n| Key::from_hex(n.split('.').next()?));
     let store = Store::new(store.to_owned().try_into().expect("a UTF-8 path"));
@@ -198,7 +182,7 @@ fn hide(store: &Path, file: &Path) {
     }
 }
 
-fn harm(store: &Path, file: &Path, damage: Damage, random: &mut Random) {
+pub fn harm(store: &Path, file: &Path, damage: Damage, random: &mut Random) {
     let bytes = std::fs::read(file).expect("a file that can be read");
     let bit = random.below(8 * bytes.len().max(1));
     let write = |bytes: &[u8]| std::fs::write(file, bytes).expect("a file that can be written");
@@ -241,19 +225,28 @@ fn harm(store: &Path, file: &Path, damage: Damage, random: &mut Random) {
             std::fs::remove_file(file).expect("a file");
             std::os::unix::fs::symlink(file, file).expect("a link");
         }
+        Damage::Pipe => {
+            std::fs::remove_file(file).expect("a file");
+            let made = Command::new("mkfifo").arg(file).status();
+            assert!(made.expect("mkfifo starts").success());
+        }
+        Damage::Device => {
+            std::fs::remove_file(file).expect("a file");
+            std::os::unix::fs::symlink("/dev/zero", file).expect("a link");
+        }
     }
 }
 
 /// A study whose numbers are known, and the step that is made again to read the others.
-struct Lab {
-    study: Study,
+pub struct Lab {
+    pub study: Study,
     reader: &'static str,
-    numbers: BTreeMap<String, u64>,
-    artifacts: BTreeMap<PathBuf, Vec<u8>>,
+    pub numbers: BTreeMap<String, u64>,
+    pub artifacts: BTreeMap<PathBuf, Vec<u8>>,
 }
 
 impl Lab {
-    fn new(study: Study, reader: &'static str) -> Self {
+    pub fn new(study: Study, reader: &'static str) -> Self {
         let mut lab = Self {
             study,
             reader,
@@ -269,12 +262,12 @@ impl Lab {
         lab
     }
 
-    fn store(&self) -> PathBuf {
+    pub fn store(&self) -> PathBuf {
         self.study.path(".plyflow")
     }
 
     /// Runs a command that may find what is damaged: it says so, or tells what is right.
-    fn ask(&self, words: &[&str], about: &str) -> Output {
+    pub fn ask(&self, words: &[&str], about: &str) -> Output {
         let output = self.study.call(words);
         let said = text(&output);
         let about = format!("{about}; {words:?} said: {said}");
@@ -288,7 +281,7 @@ impl Lab {
     }
 
     /// Damages one file, asks, runs, and looks whether all is as it was.
-    fn trial(&self, number: usize, damage: Damage, random: &mut Random) {
+    pub fn trial(&self, number: usize, damage: Damage, random: &mut Random) {
         let file = random.one_of(&files(&self.store())).clone();
         let place = file
             .strip_prefix(self.store())
@@ -329,7 +322,7 @@ impl Lab {
     }
 
     /// Reads all: what is damaged still (rot that nobody has read) is found now, and made again.
-    fn settle(&self, about: &str) {
+    pub fn settle(&self, about: &str) {
         if self.ask(&["verify"], about).status.code() == Some(8) {
             self.ask(&["run", "--no-report"], about);
         }
@@ -338,7 +331,7 @@ impl Lab {
         assert!(self.study.artifacts() == self.artifacts, "{about}");
     }
 
-    fn trials(&self, seed: u64, flips: usize, whole: usize) {
+    pub fn trials(&self, seed: u64, flips: usize, whole: usize) {
         let mut random = Random(seed);
         for number in 0..flips + whole {
             let damage = match number {
@@ -356,13 +349,13 @@ impl Lab {
     }
 }
 
-fn text(output: &Output) -> String {
+pub fn text(output: &Output) -> String {
     let both = [&output.stdout[..], &output.stderr[..]].concat();
     String::from_utf8_lossy(&both).into_owned()
 }
 
 /// The numbers that do not depend on the machine, bit for bit.
-fn numbers(output: &Output) -> BTreeMap<String, u64> {
+pub fn numbers(output: &Output) -> BTreeMap<String, u64> {
     let all: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
     let rows = all["results"].as_array().cloned().unwrap_or_default();
     let rows = rows.iter().filter(|r| r["measured"] == false);
@@ -373,190 +366,8 @@ fn numbers(output: &Output) -> BTreeMap<String, u64> {
     .collect()
 }
 
-#[test]
-fn damage_to_any_file_of_a_store_gives_no_wrong_number_and_is_repaired() {
-    Lab::new(Study::new(MIXED), "all").trials(38, 60, 18);
-}
-
-#[test]
-fn every_kind_of_file_survives_every_kind_of_damage_to_the_whole_of_it() {
-    let lab = Lab::new(Study::new(MIXED), "all");
-    let mut random = Random(7);
-    let kinds = ["vtkhdf", "record.json", "journal", "json", "lock"];
-    for kind_ in kinds {
-        for damage in WHOLE_FILE {
-            let mut all = files(&lab.store());
-            all.retain(|f| kind(f) == kind_);
-            let file = random.one_of(&all).clone();
-            harm(&lab.store(), &file, damage, &mut random);
-            let about = format!("{damage:?} of {kind_}");
-            let output = lab.ask(&["run", "--no-report", "--force", "all"], &about);
-            assert_eq!(output.status.code(), Some(0), "{about}: {}", text(&output));
-            let output = lab.ask(&["results", "--format", "json"], &about);
-            assert_eq!(numbers(&output), lab.numbers, "{about}");
-        }
-    }
-    lab.settle("at the end");
-}
-
-#[test]
-fn a_record_edited_by_hand_never_turns_a_check_green() {
-    let steps = "steps:\n  a: {plugin: trivial, with: {value: 2}}\nexpect:\n  - {step: a, result: value, value: 3, tolerance: 0.1, source: made up}\n";
-    let study = Study::new(steps);
-    let run = |more: &[&str]| {
-        study
-            .call(&[&["run", "--no-report"], more].concat())
-            .status
-            .code()
-    };
-    assert_eq!(run(&["--check"]), Some(5));
-    let all = files(&study.path(".plyflow"));
-    let record = all.iter().find(|f| kind(f) == "record.json").unwrap();
-    let edited = std::fs::read_to_string(record).unwrap();
-    let edited = edited.replace("\"value\": 2.0", "\"value\": 3.0");
-    for words in [
-        &["results", "--check"][..],
-        &["run", "--check", "--no-report"],
-    ] {
-        std::fs::write(record, &edited).unwrap();
-        let output = study.call(words);
-        let said = text(&output);
-        assert!(said.contains("damaged"), "{said}");
-        // Not shown, or made again and missed as before.
-        let code = if words[0] == "run" { 5 } else { 8 };
-        assert_eq!(output.status.code(), Some(code), "{said}");
-        run(&[]);
-    }
-    // With nothing to be seen from outside.
-    for words in [
-        &["results", "--check"][..],
-        &["run", "--check", "--no-report"],
-    ] {
-        std::fs::write(record, &edited).unwrap();
-        hide(&study.path(".plyflow"), record);
-        let output = study.call(words);
-        assert!(text(&output).contains("damaged"), "{}", text(&output));
-        assert!(matches!(output.status.code(), Some(5 | 8)));
-        run(&[]);
-    }
-    let last = numbers(&study.call(&["results", "--format", "json"]));
-    assert_eq!(last.values().copied().collect::<Vec<_>>(), [2f64.to_bits()]);
-}
-
-#[test]
-fn rot_in_what_a_report_or_inspect_shows_is_named_and_made_again() {
-    let lab = Lab::new(Study::new(MIXED), "all");
-    let all = files(&lab.store());
-    // Measured in the middle of the numbers of a mesh: HDF5 itself does not notice.
-    let of_mesh = |f: &&PathBuf| {
-        let text = std::fs::read_to_string(f).unwrap_or_default();
-        kind(f) == "record.json" && text.contains("\"step\": \"mesh\"")
-    };
-    let record = all.iter().find(of_mesh).unwrap();
-    let name = record.to_str().unwrap().replace(".record.json", ".vtkhdf");
-    let artifact = Path::new(&name);
-    for words in [
-        &["report"][..],
-        &["inspect"],
-        &["results", "--front"],
-        &["run", "--force", "read"],
-    ] {
-        let mut bytes = std::fs::read(artifact).unwrap();
-        let half = bytes.len() / 2;
-        bytes[half] ^= 4;
-        std::fs::write(artifact, &bytes).unwrap();
-        hide(&lab.store(), artifact);
-        let output = match words[0] {
-            "inspect" => lab.study.command_on(&name, words).output().unwrap(),
-            _ => lab.study.call(words),
-        };
-        let said = text(&output);
-        assert!(said.contains("damaged"), "{words:?}: {said}");
-        let code = if words[0] == "run" { 0 } else { 8 };
-        assert_eq!(output.status.code(), Some(code), "{words:?}: {said}");
-        if words[0] == "inspect" {
-            lab.ask(&["verify"], "after inspect");
-        }
-        lab.ask(&["run", "--no-report"], "again");
-        lab.settle(words[0]);
-    }
-}
-
-#[test]
-fn a_step_made_again_is_compared_byte_for_byte() {
-    let study = Study::new(
-        "steps:\n  same: {plugin: mesh}\n  other: {plugin: trivial, with: {value: 1}}\n  last: {plugin: sum, from: {in: [same, other]}}\n",
-    );
-    study.call(&["run", "--no-report"]);
-    let before = study.artifacts();
-    let words = ["verify", "--again", "same", "--again", "last"];
-    let output = study.call(&words);
-    let said = text(&output);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    for step in ["same", "last"] {
-        assert!(
-            said.contains(&format!("{step}: made again, the same ")),
-            "{said}"
-        );
-    }
-    assert_eq!(study.artifacts(), before);
-    // One that was made of other inputs than its key says, sealed all the same, as a plugin that is not reproducible leaves it.
-    let store = Store::new(study.path(".plyflow").try_into().unwrap());
-    let named = |step: &str| {
-        let keys = store.keys().unwrap();
-        let of = |k: &Key| store.read_record(k).unwrap().step == step;
-        keys.into_iter().find(of).unwrap()
-    };
-    let (key, mut record) = (named("last"), store.read_record(&named("last")).unwrap());
-    let bytes = std::fs::read(store.artifact(&named("other"))).unwrap();
-    record.bytes = bytes.len() as u64;
-    record.hash = plyflow_artifact::seal::hash(&bytes);
-    let text_ = serde_json::to_string(&record).unwrap();
-    std::fs::write(store.artifact(&key), &bytes).unwrap();
-    std::fs::write(store.record(&key), plyflow_artifact::seal::seal(&text_)).unwrap();
-    let output = study.call(&words);
-    let said = text(&output);
-    assert_eq!(output.status.code(), Some(8), "{said}");
-    assert!(
-        said.contains("last: made again, and it is ANOTHER"),
-        "{said}"
-    );
-    assert_eq!(std::fs::read(store.artifact(&key)).unwrap(), bytes);
-}
-
-#[test]
-fn a_store_of_an_earlier_version_is_told_and_left_alone_until_it_is_cleaned() {
-    let study = Study::new("steps:\n  a: {plugin: trivial, with: {value: 2}}\n");
-    study.call(&["run", "--no-report"]);
-    let all = files(&study.path(".plyflow"));
-    let artifact = all.iter().find(|f| kind(f) == "vtkhdf").unwrap();
-    let record = artifact.with_extension("record.json");
-    let text_ = std::fs::read_to_string(&record).unwrap();
-    let mut old: Value = serde_json::from_str(&text_).unwrap();
-    for name in ["seal", "hash"] {
-        old.as_object_mut().unwrap().remove(name);
-    }
-    old["version"] = 1.into();
-    std::fs::write(&record, old.to_string()).unwrap();
-    let earlier = artifact.with_extension("h5");
-    std::fs::rename(artifact, &earlier).unwrap();
-    for words in [&["plan"][..], &["explain", "a"]] {
-        let said = text(&study.call(words));
-        assert!(said.contains("an earlier version"), "{said}");
-    }
-    let said = text(&study.call(&["verify"]));
-    assert!(said.contains("1 of an earlier version"), "{said}");
-    let said = text(&study.call(&["run", "--no-report"]));
-    assert!(said.contains("study: 1 run, 0 cached"), "{said}");
-    assert!(earlier.exists(), "nothing is thrown away unasked");
-    assert_eq!(study.call(&["clean"]).status.code(), Some(0));
-    assert!(!earlier.exists());
-    let said = text(&study.call(&["run", "--no-report"]));
-    assert!(said.contains("study: 0 run, 1 cached"), "{said}");
-}
-
 /// A small part of real plugins (that of `forming.rs` of the end-to-end tests), and what reads it.
-fn real() -> Study {
+pub fn real() -> Study {
     let study = Study::new(
         "
 steps:
@@ -572,67 +383,18 @@ steps:
         .canonicalize()
         .expect("a folder")
         .join("workflows/materials");
-    let scene = include_str!("small-scene.yaml");
+    let scene = include_str!("../small-scene.yaml");
     let scene = scene.replace("MATERIALS", materials.to_str().expect("a UTF-8 path"));
     std::fs::write(study.path("scene.yaml"), scene).expect("a scene");
     study
 }
 
 /// Copies a folder.
-fn copy(from: &Path, to: &Path) {
+pub fn copy(from: &Path, to: &Path) {
     let _ = std::fs::remove_dir_all(to);
     let status = std::process::Command::new("cp")
         .arg("-a")
         .args([from, to])
         .status();
     assert!(status.expect("cp starts").success());
-}
-
-/// Damages checkpoints of a run that was killed: the same command ends with the same bytes as one that was left alone.
-fn checkpoints(seed: u64, times: usize) {
-    let lab = Lab::new(real(), "defects");
-    let killed = real();
-    let often = ["--checkpoint-every", "0 s", "--jobs", "1"];
-    let mut command = killed.command_on("workflow.yaml", &["run", "--no-report"]);
-    command
-        .args(often)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null());
-    let mut engine = command.spawn().expect("plyflow starts");
-    let folder = killed.path(".plyflow/runs/study/checkpoints");
-    let begun = Instant::now();
-    while !files(&folder).iter().any(|f| f.ends_with("frame-9")) {
-        assert!(begun.elapsed() < Duration::from_secs(300), "no checkpoint");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    engine.kill().unwrap();
-    engine.wait().unwrap();
-    // Its worker dies with it.
-    std::thread::sleep(Duration::from_secs(1));
-    let pristine = killed.path("pristine");
-    copy(&killed.path(".plyflow"), &pristine);
-    let mut random = Random(seed);
-    for number in 0..times {
-        copy(&pristine, &killed.path(".plyflow"));
-        let file = random.one_of(&files(&folder)).clone();
-        let damage = match number % 3 {
-            0 => WHOLE_FILE[(number / 3) % WHOLE_FILE.len()],
-            _ => Damage::Bit,
-        };
-        harm(&folder, &file, damage, &mut random);
-        let about = format!("{damage:?} of {}", file.display());
-        let output = killed.call(&["run", "--no-report"]);
-        assert_eq!(output.status.code(), Some(0), "{about}: {}", text(&output));
-        assert!(killed.artifacts() == lab.artifacts, "{about}");
-    }
-    println!("{times} checkpoints damaged: the same bytes each time");
-}
-
-#[test]
-#[ignore = "takes minutes: PLYFLOW_FLIPS random bits (1000) and a fifth as many whole files, of test plugins, real plugins and checkpoints"]
-fn many_damages_to_a_store_give_no_wrong_number_and_are_repaired() {
-    let flips = std::env::var("PLYFLOW_FLIPS").map_or(1000, |n| n.parse().expect("a number"));
-    Lab::new(Study::new(MIXED), "all").trials(1, flips * 8 / 10, flips * 4 / 25);
-    Lab::new(real(), "defects").trials(2, flips * 3 / 20, flips / 25);
-    checkpoints(3, flips * 3 / 40);
 }

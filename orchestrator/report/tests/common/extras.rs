@@ -1,0 +1,62 @@
+//! What a made-up forming run has besides its sheets: further fields, and its history.
+
+use super::shapes::Sheet;
+use plyflow_artifact::{ArtifactWriter, DType, On};
+
+/// Fields that no map shows: a scalar on cells, one on points, a vector, and one that is the same everywhere.
+pub fn further_fields(w: &mut ArtifactWriter, name: &str, s: &Sheet, last: bool) {
+    let n = s.flat.len() / 3;
+    let strain: Vec<f64> = s.shear.iter().map(|g| 1e-3 * g.abs()).collect();
+    let pressure: Vec<f64> = (0..n).map(|i| 2e5 * (i as f64 / n as f64)).collect();
+    let moved = s.flat.iter().zip(&s.formed).map(|(a, b)| b - a);
+    let moved: Vec<f64> = moved.map(|d| if last { d } else { 0.0 }).collect();
+    for (what, on, components, unit, values) in [
+        ("fibre_strain_1", On::Cells, 1, "1", &strain),
+        ("contact_pressure", On::Points, 1, "Pa", &pressure),
+        ("displacement", On::Points, 3, "m", &moved),
+        ("thickness", On::Points, 1, "m", &vec![0.0005; n]),
+    ] {
+        w.frame_field(name, on, what, components, unit, values)
+            .unwrap();
+    }
+}
+
+pub fn history(w: &mut ArtifactWriter, press: bool) {
+    let n = 600;
+    let time: Vec<f64> = (0..n).map(|i| f64::from(i) / f64::from(n - 1)).collect();
+    type Column = (&'static str, &'static str, fn(f64) -> f64);
+    let columns: [Column; 12] = [
+        ("time", "s", |t| t),
+        ("kinetic", "J", |t| {
+            0.3 * t * (1.0 - t) + 0.02 * (80.0 * t).sin().abs()
+        }),
+        ("membrane", "J", |t| 9.0 * t * t),
+        ("bending", "J", |t| 0.8 * t),
+        ("hourglass", "J", |t| 0.02 * t),
+        ("contact", "J", |t| 0.2 * t),
+        ("friction", "J", |t| 3.0 * t * t * t),
+        ("damping", "J", |t| 0.4 * t),
+        ("external", "J", |t| {
+            9.0 * t * t + 1.42 * t + 3.0 * t * t * t
+        }),
+        ("drift", "J", |t| 0.02 * t),
+        ("bag_pressure", "Pa", |t| 1e5 * t.min(0.8) / 0.8),
+        ("frame_height", "m", |t| 0.12 * (1.0 - t)),
+    ];
+    let of_press: [Column; 2] = [
+        ("punch_force", "N", |t| 180.0 * t * t),
+        ("holder_travel", "m", |t| -1e-3 * t),
+    ];
+    let more = if press { &of_press[..] } else { &[] };
+    for (name, unit, f) in columns.into_iter().chain(more.iter().copied()) {
+        let data: Vec<u8> = time.iter().flat_map(|t| f(*t).to_ne_bytes()).collect();
+        w.array(
+            &format!("history/{name}"),
+            DType::F64,
+            &[u64::try_from(n).unwrap()],
+            unit,
+            &data,
+        )
+        .unwrap();
+    }
+}
