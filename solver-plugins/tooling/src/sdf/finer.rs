@@ -344,10 +344,8 @@ impl SignedDistanceGrid {
             let error = worst.and_then(|part| self.at_part(survey, &part, wanted, |_| ()));
             (again, error.unwrap_or_default())
         };
-        let all: Vec<(Vec<Piece>, FieldError)> = (pieces.par_chunks(TOGETHER))
-            .zip(looked)
-            .map(of)
-            .collect();
+        let all: Vec<(Vec<Piece>, FieldError)> =
+            (pieces.par_chunks(TOGETHER)).zip(looked).map(of).collect();
         let mut again = Vec::with_capacity(all.iter().map(|a| a.0.len()).sum());
         let mut worst = FieldError::default();
         for (parts, error) in all {
