@@ -25,6 +25,9 @@ pub(crate) const LEVELS: u32 = 6;
 /// Most bricks, of 1.4 kB each.
 const MOST_BRICKS: usize = 500_000;
 
+/// Bricks whose coefficients are made together.
+const MADE_TOGETHER: usize = 1024;
+
 /// Share of what is wanted from which on a place is made finer: between the places that are looked at there is a little more.
 const ENOUGH: f64 = 0.8;
 
@@ -362,16 +365,21 @@ impl SignedDistanceGrid {
         let of = |b: &[u32; 3]| self.left(survey, level, *b, wanted);
         let left: Vec<[f32; 64]> = all.places.par_iter().map(of).collect();
         let values = |b: &[u32; 3]| coefficients(*b, wanted, (&all, &left), most);
-        let made: Vec<Vec<f32>> = all.places.par_iter().map(values).collect();
         let finer = Arc::make_mut(&mut self.finer);
         let blocks = self.blocks;
-        for (b, made) in all.places.iter().zip(&made) {
-            if made.iter().any(|c| *c != 0.0) {
-                let (eight, which) = finer.place(level, *b, blocks);
-                finer.eights[eight][which].values = (finer.values.len() / VALUES) as u32;
-                finer.values.extend_from_slice(made);
+        finer.values.reserve_exact(VALUES * all.places.len());
+        // Some at a time, so that they are not held twice.
+        for places in all.places.chunks(MADE_TOGETHER) {
+            let made: Vec<Vec<f32>> = places.par_iter().map(values).collect();
+            for (b, made) in places.iter().zip(&made) {
+                if made.iter().any(|c| *c != 0.0) {
+                    let (eight, which) = finer.place(level, *b, blocks);
+                    finer.eights[eight][which].values = (finer.values.len() / VALUES) as u32;
+                    finer.values.extend_from_slice(made);
+                }
             }
         }
+        finer.values.shrink_to_fit();
     }
 
     /// What the field leaves of the exact distance at the first node of each cell of a brick; 0 where no wanted brick asks for it.
