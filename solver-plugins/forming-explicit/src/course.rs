@@ -52,7 +52,11 @@ impl Course {
         })
     }
 
-    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    /// All of it but what each attempt finds out anew.
+    ///
+    /// # Errors
+    /// When the bytes cannot be written, or are not those of a course.
+    pub fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
         a.value(&mut self.frame)?;
         a.value(&mut self.history)?;
         a.value(&mut self.smallest_step)?;

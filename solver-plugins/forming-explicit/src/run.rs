@@ -318,7 +318,10 @@ impl Forming {
     }
 
     /// What changes: the model, and what its loads remember.
-    pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    ///
+    /// # Errors
+    /// When the bytes cannot be written, or are not those of this model.
+    pub fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.model.archive(a)?;
         self.load.archive(a)
     }

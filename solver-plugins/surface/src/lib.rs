@@ -18,7 +18,7 @@ mod topology;
 mod traction;
 pub mod vector;
 
-pub use closest::{Closest, Feature, Surface};
+pub use closest::{Closest, Feature, Surface, TriangleTree};
 pub use conformity::{NodalDistance, foot_height, nodal_distances};
 pub use crests::{Crests, tool_crests};
 pub use curvature::{Curvature, curvatures};

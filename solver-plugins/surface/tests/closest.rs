@@ -3,7 +3,9 @@
 mod common;
 
 use plyflow_surface::vector::{Vec3, distance, norm, scale};
-use plyflow_surface::{Feature, QuadLocator, Surface, Topology, nodal_distances, triangles};
+use plyflow_surface::{
+    Feature, QuadLocator, Surface, Topology, TriangleTree, nodal_distances, triangles,
+};
 
 fn brute_force(points: &[Vec3], tris: &[[u32; 3]], p: Vec3) -> f64 {
     // Projected gradient over barycentric coordinates is slow; sample the sides finely and the plane exactly.
@@ -47,6 +49,28 @@ fn distance_equals_brute_force_on_a_wavy_jittered_surface() {
             "{p:?}"
         );
         assert!((distance(p, found.point) - expected).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_search_finds_the_same_from_any_hint() {
+    let (points, tris) = common::sphere(3, 1.0);
+    let surface = Surface::new(&points, &tris).unwrap();
+    let tree = TriangleTree::new(points, surface.triangles().to_vec());
+    let (tree, count) = (tree.unwrap(), surface.triangles().len());
+    for i in 0..400usize {
+        let f = |k: f64| (i as f64 * k).fract() - 0.5;
+        let p = [3.0 * f(0.618), 3.0 * f(0.414), 3.0 * f(0.732)];
+        let found = surface.closest(p);
+        let hint = i * 7919 % count;
+        assert_eq!(surface.closest_from(p, hint), found);
+        assert_eq!(tree.closest_from(p, hint), found.triangle);
+        let reach = found.signed_distance.abs();
+        for hint in [None, Some(hint)] {
+            assert_eq!(surface.closest_within(p, 1.01 * reach, hint), Some(found));
+            assert_eq!(surface.closest_within(p, 0.99 * reach, hint), None);
+            assert_eq!(tree.closest_within(p, 0.99 * reach, hint), None);
+        }
     }
 }
 

@@ -86,7 +86,7 @@ impl SurfaceTree {
         let mut place = hint;
         let (mut point, mut feature) = closest_on_triangle(p, &self.triangles[hint]);
         let mut best = norm_squared(sub(p, point));
-        let mut stack = [(0u32, 0.0f64); 64];
+        let mut stack = [(0u32, 0.0f64); 40];
         stack[0] = (0, self.nodes[0].distance_squared(p));
         let mut depth = 1;
         while depth > 0 {
@@ -106,8 +106,8 @@ impl SurfaceTree {
                 }
                 continue;
             }
-            let children =
-                [index + 1, node.first].map(|c| (c, self.nodes[c as usize].distance_squared(p)));
+            let child = |c: u32| (c, self.nodes[c as usize].distance_squared(p));
+            let children = [child(index + 1), child(node.first)];
             let swap = children[0].1 <= children[1].1;
             let [far, near] = if swap {
                 [children[1], children[0]]

@@ -28,7 +28,12 @@ struct Place {
 /// Convex edges of a tool.
 pub(super) struct Edges {
     places: Vec<Place>,
+    /// By sheet and place: the sheet's triangle that was found last, near which the next search begins; [`UNKNOWN`] before.
+    last: Vec<Vec<u32>>,
 }
+
+/// No triangle.
+const UNKNOWN: u32 = u32::MAX;
 
 /// A sheet at which they are held.
 pub(super) struct Look<'a> {
@@ -56,7 +61,10 @@ impl Edges {
         // In every box of that size the sharpest one.
         let mut boxes: BTreeMap<[i64; 3], Place> = BTreeMap::new();
         if !(spacing > 0.0 && spacing.is_finite()) {
-            return Self { places: Vec::new() };
+            return Self {
+                places: Vec::new(),
+                last: vec![Vec::new(); sizes.len()],
+            };
         }
         // Beyond a mirror plane there is nothing of the sheets that are computed.
         let beyond = |at: &V| (0..2).any(|k| mirrored[k] && at[k] < 0.0);
@@ -70,15 +78,19 @@ impl Edges {
                 *kept = place;
             }
         }
+        let places: Vec<Place> = boxes.into_values().collect();
         Self {
-            places: boxes.into_values().collect(),
+            last: vec![vec![UNKNOWN; places.len()]; sizes.len()],
+            places,
         }
     }
 
-    /// How deep (m) they are in a sheet, and where, less what its elements cannot follow.
-    pub fn deepest(&self, triangles: &Triangles, look: &Look<'_>) -> Deep {
+    /// How deep (m) they are in sheet number `sheet`, and where, less what its elements cannot follow.
+    pub fn deepest(&mut self, sheet: usize, triangles: &Triangles, look: &Look<'_>) -> Deep {
         let depths: Vec<f64> = (self.places.par_iter())
-            .map(|place| depth(place, triangles, look))
+            .zip(&mut self.last[sheet])
+            .with_min_len(super::CHUNK)
+            .map(|(place, last)| depth(place, triangles, look, last))
             .collect();
         let mut deepest = Deep::default();
         for (place, depth) in self.places.iter().zip(depths) {
@@ -95,14 +107,14 @@ impl Edges {
     }
 }
 
-fn depth(place: &Place, triangles: &Triangles, look: &Look<'_>) -> f64 {
+fn depth(place: &Place, triangles: &Triangles, look: &Look<'_>, last: &mut u32) -> f64 {
     let p = add(place.at, look.shift);
     let [low, high] = look.bounds;
     if (0..3).any(|k| p[k] < low[k] - look.size || p[k] > high[k] + look.size) {
         return 0.0;
     }
     // Most places are far from the sheet, or under it.
-    let Some(cell) = look.tree.cell_within(p, look.size) else {
+    let Some(cell) = look.tree.cell_within(p, look.size, last) else {
         return 0.0;
     };
     let near = look.mesh.closest(look.x, p, (cell, [0.0; 2]));
@@ -117,7 +129,7 @@ fn depth(place: &Place, triangles: &Triangles, look: &Look<'_>) -> f64 {
     }
     // What an element that bends over the edge cuts off with its diagonal, at most as for one whose diagonal turns by one radian.
     let s = std::f64::consts::FRAC_1_SQRT_2 * look.size;
-    let off = |u: f64| triangles.distance(add(place.at, scale(place.across, u * s)));
+    let off = |u: f64| triangles.distance(add(place.at, scale(place.across, u * s)), (0, 0));
     let cut = (0.5 * (off(1.0) + off(-1.0))).clamp(0.0, look.size / 4.0);
     let depth = depth - cut - look.error;
     if depth > look.floor { depth } else { 0.0 }

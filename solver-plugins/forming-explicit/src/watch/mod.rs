@@ -15,9 +15,9 @@ use crate::run::Forming;
 use plyflow_mechanics::vec3::{V, cross, norm, sub};
 use plyflow_model::scene::SheetKind;
 use rayon::prelude::*;
-use rigid::{Triangles, from_plate};
+use rigid::{Hint, Triangles, from_plate};
 use serde::{Deserialize, Serialize};
-use sheet::{Near, Seat, SheetMesh, SheetTree};
+use sheet::{Bent, Near, Seat, SheetMesh, SheetTree};
 
 /// Share of the thinner sheet below which a depth counts as none, except at the end.
 const FLOOR: f64 = 0.02;
@@ -129,12 +129,17 @@ struct Watcher {
     size: f64,
 }
 
-/// A node's place and how far (m) it was from what it must not reach then; the watch need not look again before it has gone that far.
+/// A node's place when it was looked at, and its distance (m) from a part then, which can have shrunk by no more than the node has moved.
 #[derive(Clone, Copy)]
 struct Clear {
     at: V,
-    by: f64,
+    distance: f64,
+    /// Triangle of the tool that was closest.
+    hint: Hint,
 }
+
+/// Distances (m) are bounds but for rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// The watch over a run.
 pub struct Watch {
@@ -180,6 +185,8 @@ struct Scene<'a> {
     trees: Option<&'a [Option<SheetTree>]>,
     /// By sheet (m).
     boxes: &'a [[V; 2]],
+    /// By sheet.
+    bent: &'a [Bent],
     first: bool,
     last: bool,
 }
@@ -202,7 +209,7 @@ impl Watcher {
             return None;
         }
         let from = match scene.trees {
-            Some(trees) => (trees[own].as_ref()?.cell(p), [0.0; 2]),
+            Some(trees) => (trees[own].as_ref()?.cell(p, seat.cell), [0.0; 2]),
             None if seat.cell == u32::MAX => (self.mesh.nearest_middle(scene.x, p), [0.0; 2]),
             None => (seat.cell, seat.xi.map(f64::from)),
         };
@@ -257,7 +264,8 @@ impl Watch {
         let (pairs, hangs) = pairs(forming, &parts, &sizes);
         let never = Clear {
             at: [0.0; 3],
-            by: f64::NEG_INFINITY,
+            distance: f64::NEG_INFINITY,
+            hint: (0, 0),
         };
         let clear = (sheets.iter())
             .map(|s| vec![never; s.mesh.nodes.len() * parts.len()])
@@ -310,6 +318,7 @@ impl Watch {
             .collect();
         let shifts: Vec<V> = self.parts.iter().map(|p| forming.shift(&p.name)).collect();
         let mut deepest = vec![Deep::default(); self.pairs.len()];
+        let bent: Vec<Bent> = self.sheets.iter().map(|s| Bent::new(&s.mesh)).collect();
         let mut clear = std::mem::take(&mut self.clear);
         self.nearest.fill(f64::INFINITY);
         let scene = Scene {
@@ -317,6 +326,7 @@ impl Watch {
             shifts: &shifts,
             trees: trees.as_deref(),
             boxes: &boxes,
+            bent: &bent,
             first,
             last,
         };
@@ -444,8 +454,9 @@ impl Watch {
             let squeezed = depth.max(0.0);
             let least = self.floor(pair, scene.last).max(deepest[pair].depth);
             if depth > least {
-                depth -= sheet.mesh.bulge(scene.x, near.cell, near.xi)
-                    + own.mesh.bulge_around(scene.x, node);
+                let [own_bent, bent] = [view.sheet, other].map(|k| &scene.bent[k]);
+                depth -= sheet.mesh.bulge(scene.x, bent, near.cell, near.xi)
+                    + own.mesh.bulge_around(scene.x, own_bent, node);
                 if depth > least {
                     deepest[pair] = Deep { depth, node, place };
                 }
@@ -480,10 +491,6 @@ impl Watch {
         let node = own.mesh.nodes[i];
         let place = view.scene.x[node as usize];
         let p = sub(place, view.scene.shifts[k]);
-        let anew = view.scene.trees.is_some();
-        if !anew && clear.by - norm(sub(p, clear.at)) > -least {
-            return f64::INFINITY;
-        }
         // What lies between is as much thinner as the sheet next to it is in it. Of an upper film the lower one does not count: each hangs between the
         // other's nodes, and what is felt of that is a matter of the two (decision 34).
         let film = match view.sheet > 0 && !self.pairs[pair].of_ply {
@@ -491,17 +498,21 @@ impl Watch {
             false => 0.0,
         };
         let need = 0.5 * own.thickness + (under.between - under.squeezed - film).max(0.0);
+        let nearest = clear.distance - norm(sub(p, clear.at));
+        if !view.scene.last && need - nearest - part.error < least - ROUNDING {
+            return f64::INFINITY;
+        }
         let mut on = None;
         let distance = match &part.shape {
             Shape::Bed => p[2],
             Shape::Plate(plate) => from_plate(plate, p),
-            Shape::Tool(triangles) => on.insert(triangles.closest(p)).distance,
+            Shape::Tool(triangles) => on.insert(triangles.closest(p, clear.hint)).distance,
         };
         let mut depth = need - distance;
-        // The sheets between may be squeezed less when it is looked at next.
         *clear = Clear {
             at: p,
-            by: -depth - under.squeezed,
+            distance,
+            hint: on.map_or(clear.hint, |on| on.triangle),
         };
         let near = -depth;
         depth -= part.error;
@@ -517,15 +528,16 @@ impl Watch {
     }
 
     /// Holds edges of the tool against the sheets' cells.
-    fn look_at_edges(&self, scene: &Scene<'_>, deepest: &mut [Deep]) {
-        let (Some(trees), Some(Shape::Tool(triangles))) =
-            (scene.trees, self.parts.first().map(|p| &p.shape))
-        else {
-            return;
-        };
-        for (k, (sheet, tree)) in self.sheets.iter().zip(trees).enumerate() {
+    fn look_at_edges(&mut self, scene: &Scene<'_>, deepest: &mut [Deep]) {
+        let Some(trees) = scene.trees else { return };
+        for (k, tree) in trees.iter().enumerate() {
             let Some(tree) = tree else { continue };
             let pair = self.pair_with_edges(k);
+            let floor = self.floor(pair, scene.last);
+            let Some(Shape::Tool(triangles)) = self.parts.first().map(|p| &p.shape) else {
+                return;
+            };
+            let sheet = &self.sheets[k];
             let look = edges::Look {
                 x: scene.x,
                 mesh: &sheet.mesh,
@@ -535,9 +547,9 @@ impl Watch {
                 size: sheet.size,
                 half: 0.5 * sheet.thickness,
                 error: self.parts[0].error,
-                floor: self.floor(pair, scene.last),
+                floor,
             };
-            deepest[pair] = self.edges.deepest(triangles, &look);
+            deepest[pair] = self.edges.deepest(k, triangles, &look);
         }
     }
 

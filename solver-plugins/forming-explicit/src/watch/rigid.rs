@@ -10,6 +10,9 @@ pub(super) struct Triangles {
     bodies: Vec<Surface>,
 }
 
+/// A triangle of a tool near which a search begins: its body and its number there.
+pub(super) type Hint = (u32, u32);
+
 /// The closest point of a tool.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OnTool {
@@ -19,6 +22,8 @@ pub(super) struct OnTool {
     pub at: V,
     /// Out of the tool there (unit).
     pub normal: V,
+    /// The triangle that it lies on.
+    pub triangle: Hint,
 }
 
 impl Triangles {
@@ -30,30 +35,39 @@ impl Triangles {
         (!bodies.is_empty()).then_some(Self { bodies })
     }
 
-    /// Of bodies that stand on or in each other the least of their distances is that of what they are together.
-    pub fn closest(&self, p: V) -> OnTool {
-        let of = |s: &Surface| {
-            let c = s.closest(p);
-            OnTool {
-                distance: c.signed_distance,
-                at: c.point,
-                normal: c.normal,
-            }
+    /// The closest point of a body. The hint makes a search shorter and changes nothing of what is found.
+    fn of_body(&self, body: usize, p: V, hint: Hint) -> OnTool {
+        let surface = &self.bodies[body];
+        let c = match hint.0 as usize == body {
+            true => surface.closest_from(p, hint.1 as usize),
+            false => surface.closest(p),
         };
-        let mut all = self.bodies.iter().map(of);
+        OnTool {
+            distance: c.signed_distance,
+            at: c.point,
+            normal: c.normal,
+            triangle: (body as u32, c.triangle as u32),
+        }
+    }
+
+    /// Of bodies that stand on or in each other the least of their distances is that of what they are together. `hint`: a triangle that is
+    /// probably near, such as the last one or (0, 0).
+    pub fn closest(&self, p: V, hint: Hint) -> OnTool {
+        let mut all = (0..self.bodies.len()).map(|b| self.of_body(b, p, hint));
         let first = all.next().expect("a tool has a body");
         all.fold(first, |a, b| if b.distance < a.distance { b } else { a })
     }
 
     /// Distance (m), positive outside.
-    pub fn distance(&self, p: V) -> f64 {
-        let all = self.bodies.iter().map(|s| s.closest(p).signed_distance);
+    pub fn distance(&self, p: V, hint: Hint) -> f64 {
+        let all = (0..self.bodies.len()).map(|b| self.of_body(b, p, hint).distance);
         all.fold(f64::INFINITY, f64::min)
     }
 
     /// Curvatures (1/m) of the surface at a place on it, from how far places half an element of `size` (m) away in its tangent plane lie off
     /// it: the sum of the principal ones and that of their squares. Positive where it is convex.
-    fn curvatures(&self, at: V, normal: V, size: f64) -> [f64; 2] {
+    fn curvatures(&self, on: &OnTool, size: f64) -> [f64; 2] {
+        let (at, normal) = (on.at, on.normal);
         let side = if normal[2].abs() < 0.7 {
             [0.0, 0.0, 1.0]
         } else {
@@ -63,7 +77,8 @@ impl Triangles {
         let a = scale(a, 1.0 / norm(a));
         let b = cross(normal, a);
         let s = 0.5 * size;
-        let off = |u: f64, v: f64| self.distance(add(at, add(scale(a, u * s), scale(b, v * s))));
+        let place = |u: f64, v: f64| add(at, add(scale(a, u * s), scale(b, v * s)));
+        let off = |u: f64, v: f64| self.distance(place(u, v), on.triangle);
         let square = s * s;
         let (k1, k2) = (
             (off(1.0, 0.0) + off(-1.0, 0.0)) / square,
@@ -77,7 +92,7 @@ impl Triangles {
     /// How far (m) into a hollow the nodes of elements of `size` (m) stand so that the elements are as long as the surface (decision 28),
     /// recomputed from the triangles.
     pub fn let_be(&self, on: &OnTool, size: f64) -> f64 {
-        let [sum, squares] = self.curvatures(on.at, on.normal, size);
+        let [sum, squares] = self.curvatures(on, size);
         if squares <= 0.0 {
             return 0.0;
         }
@@ -176,7 +191,7 @@ mod tests {
             ([0.1 + 3.0 * e, 0.06 + 4.0 * e, 0.01], 5.0 * e),
             ([0.1 + e, 0.06 + e, 0.02 + e], 3f64.sqrt() * e),
         ] {
-            let found = tool.closest(p).distance;
+            let found = tool.closest(p, (0, 0)).distance;
             assert!(
                 (found - expected).abs() < 1e-12,
                 "{p:?}: {found}, not {expected}"
@@ -193,9 +208,9 @@ mod tests {
             .extend(second.triangles.iter().map(|t| t.map(|n| n + 8)));
         let tool = Triangles::new(&both).unwrap();
         // Just outside of the second body's end, which lies 50 mm inside of the first one.
-        let found = tool.closest([0.05 - 1e-4, 0.03, 0.01]).distance;
+        let found = tool.closest([0.05 - 1e-4, 0.03, 0.01], (0, 0)).distance;
         assert!((found + 0.01).abs() < 1e-12, "{found}");
-        assert!(tool.closest([0.16, 0.03, 0.01]).distance > 0.0099);
+        assert!(tool.closest([0.16, 0.03, 0.01], (0, 0)).distance > 0.0099);
     }
 
     #[test]
@@ -218,7 +233,7 @@ mod tests {
             mesh.triangles.push([k, n + k + 1, n + k]);
         }
         let tool = Triangles::new(&mesh).unwrap();
-        let on = tool.closest([0.001, 0.003, 0.0101]);
+        let on = tool.closest([0.001, 0.003, 0.0101], (0, 0));
         let expected = size * size / (24.0 * radius);
         let found = tool.let_be(&on, size);
         assert!(
@@ -229,11 +244,11 @@ mod tests {
         mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         let tool = Triangles::new(&mesh).unwrap();
         assert_eq!(
-            tool.let_be(&tool.closest([0.001, 0.003, 0.0099]), size),
+            tool.let_be(&tool.closest([0.001, 0.003, 0.0099], (0, 0)), size),
             0.0
         );
         let tool = Triangles::new(&block([0.0; 3], [0.1, 0.06, 0.02])).unwrap();
-        assert!(tool.let_be(&tool.closest([0.05, 0.03, 0.021]), size) < 1e-12);
+        assert!(tool.let_be(&tool.closest([0.05, 0.03, 0.021], (0, 0)), size) < 1e-12);
     }
 
     #[test]

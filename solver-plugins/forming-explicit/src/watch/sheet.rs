@@ -2,9 +2,10 @@
 
 use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
-use plyflow_surface::Surface;
+use plyflow_surface::TriangleTree;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// No cell: what lies across an edge where the sheet ends.
 const RIM: u32 = u32::MAX;
@@ -73,21 +74,43 @@ pub(super) struct SheetMesh {
 
 /// Where a cell is looked for among all.
 pub(super) struct SheetTree {
-    surface: Surface,
+    tree: TriangleTree,
     /// By triangle.
     cells: Vec<u32>,
 }
 
 impl SheetTree {
-    /// The cell that is closest to a place (m), each as two triangles.
-    pub fn cell(&self, p: V) -> u32 {
-        self.cells[self.surface.closest(p).triangle]
+    /// The cell that is closest to a place (m), each as two triangles. `hint`: a cell that is probably near.
+    pub fn cell(&self, p: V, hint: u32) -> u32 {
+        // Its first triangle, where all cells have two.
+        let triangle = (2 * hint as usize).min(self.cells.len() - 1);
+        self.cells[self.tree.closest_from(p, triangle)]
     }
 
-    /// The same, if it is nearer than `reach` (m).
-    pub fn cell_within(&self, p: V, reach: f64) -> Option<u32> {
-        let found = self.surface.closest_within(p, reach)?;
-        Some(self.cells[found.triangle])
+    /// The same, if it is nearer than `reach` (m). `last`: the triangle that was found last, if any (of a tree over the same cells), and is now.
+    pub fn cell_within(&self, p: V, reach: f64, last: &mut u32) -> Option<u32> {
+        let hint = Some(*last as usize).filter(|t| *t < self.cells.len());
+        let found = self.tree.closest_within(p, reach, hint)?;
+        *last = found as u32;
+        Some(self.cells[found])
+    }
+}
+
+/// How a sheet is bent at one time, found out where it is asked for: a normal counts for up to four cells, and a cell for four nodes.
+pub(super) struct Bent {
+    /// By node, in the sheet's numbers: [`SheetMesh::normal_at_node`].
+    normals: Vec<OnceLock<V>>,
+    /// By cell: [`SheetMesh::bulge`] in its middle (m).
+    middles: Vec<OnceLock<f64>>,
+}
+
+impl Bent {
+    /// Nothing is known yet.
+    pub fn new(mesh: &SheetMesh) -> Self {
+        Self {
+            normals: vec![OnceLock::new(); mesh.nodes.len()],
+            middles: vec![OnceLock::new(); mesh.cells.len()],
+        }
     }
 }
 
@@ -293,8 +316,8 @@ impl SheetMesh {
                 }
             }
         }
-        let surface = Surface::new(&points, &triangles)?;
-        Some(SheetTree { surface, cells })
+        let tree = TriangleTree::new(points, triangles)?;
+        Some(SheetTree { tree, cells })
     }
 
     /// Cells, in the model's nodes.
@@ -458,8 +481,8 @@ impl SheetMesh {
 
     /// How far (m) the smooth sheet through the nodes lies off the cell at a place in it: half of how far the tangent planes of the corners lie
     /// off it there, which is exact for a parabola; at most what it is for an element whose diagonal turns by one radian.
-    pub fn bulge(&self, x: &[V], cell: u32, xi: [f64; 2]) -> f64 {
-        let nodes = self.cells[cell as usize];
+    pub fn bulge(&self, x: &[V], bent: &Bent, cell: u32, xi: [f64; 2]) -> f64 {
+        let (nodes, local) = (self.cells[cell as usize], self.local[cell as usize]);
         let q = self.corners(x, cell);
         let [a, b] = tangents(&q, xi);
         let normal = direction(cross(a, b));
@@ -467,7 +490,8 @@ impl SheetMesh {
         let c = mix(w, &q);
         let off: f64 = (0..4)
             .map(|k| {
-                let n = self.normal_at_node(x, nodes[k]);
+                let known = &bent.normals[local[k] as usize];
+                let n = *known.get_or_init(|| self.normal_at_node(x, nodes[k]));
                 w[k] * dot(n, sub(q[k], c)) / dot(n, normal).max(0.3)
             })
             .sum();
@@ -478,11 +502,13 @@ impl SheetMesh {
     }
 
     /// The same in the middle of the cells around a node, the largest.
-    pub fn bulge_around(&self, x: &[V], node: u32) -> f64 {
+    pub fn bulge_around(&self, x: &[V], bent: &Bent, node: u32) -> f64 {
+        let of = |c: u32| {
+            let known = &bent.middles[c as usize];
+            *known.get_or_init(|| self.bulge(x, bent, c, [0.0; 2]))
+        };
         let around = self.around(node).iter();
-        around
-            .map(|c| self.bulge(x, *c, [0.0; 2]))
-            .fold(0.0, f64::max)
+        around.map(|c| of(*c)).fold(0.0, f64::max)
     }
 }
 
@@ -530,7 +556,7 @@ mod tests {
                 b,
                 0.004 * (90.0 * a).sin() * (60.0 * b).cos() + up * 0.0025,
             ];
-            let near = sheet.closest(&x, p, (tree.cell(p), [0.0; 2]));
+            let near = sheet.closest(&x, p, (tree.cell(p, 0), [0.0; 2]));
             let by_points = nearest(&sheet, &x, p);
             let found = near.height.abs();
             assert!(
@@ -567,13 +593,16 @@ mod tests {
         let k = 20.0;
         let (sheet, x) = grid(|a, _| -0.5 * k * a * a);
         let cell = sheet.nearest_middle(&x, [0.035, 0.035, 0.0]);
-        let (found, expected) = (sheet.bulge(&x, cell, [0.0; 2]), k * 0.01 * 0.01 / 8.0);
+        let (found, expected) = (
+            sheet.bulge(&x, &Bent::new(&sheet), cell, [0.0; 2]),
+            k * 0.01 * 0.01 / 8.0,
+        );
         // The normals of the middle of the sheet are turned by its slope.
         assert!(
             (found / expected - 1.0).abs() < 0.25,
             "{found}, not {expected}"
         );
         let (flat, y) = grid(|a, b| 0.3 * a - 0.1 * b);
-        assert!(flat.bulge(&y, cell, [0.3, -0.4]) < 1e-15);
+        assert!(flat.bulge(&y, &Bent::new(&flat), cell, [0.3, -0.4]) < 1e-15);
     }
 }

@@ -25,6 +25,9 @@ pub(crate) const LEVELS: u32 = 6;
 /// Most bricks, of 1.4 kB each.
 const MOST_BRICKS: usize = 500_000;
 
+/// Bricks whose coefficients are made together.
+const MADE_TOGETHER: usize = 1024;
+
 /// Share of what is wanted from which on a place is made finer: between the places that are looked at there is a little more.
 const ENOUGH: f64 = 0.8;
 
@@ -203,11 +206,6 @@ impl SignedDistanceGrid {
     /// left, and tells the largest error over all pieces.
     pub(super) fn refine(&mut self, survey: &Survey, wanted: &Wanted<'_>) -> FieldError {
         let mut spacing = 0.5 * self.spacing;
-        let field = |p| self.distance_and_gradient(p).0;
-        let first = survey.error([spacing, wanted.offset], field, wanted.counts);
-        if first.largest <= wanted.tolerance {
-            return first;
-        }
         let mut pieces = survey.pieces();
         // What pieces that were looked at for the last time have at most.
         let mut settled = FieldError::default();
@@ -217,7 +215,7 @@ impl SignedDistanceGrid {
             let worst = looked
                 .iter()
                 .fold(FieldError::default(), |w, l| w.or(l.error));
-            if level == LEVELS {
+            if level == 0 && worst.largest <= wanted.tolerance || level == LEVELS {
                 return settled.or(worst);
             }
             let failing = looked.iter().flat_map(|l| &l.failing);
@@ -226,21 +224,11 @@ impl SignedDistanceGrid {
             if next.places.is_empty() || bricks > MOST_BRICKS {
                 return settled.or(worst);
             }
-            self.add_level(survey, level + 1, &next);
             // What lies near a new brick is looked at again, more closely.
-            let near = |l: &Looked| {
-                let middles = l.piece.middles(wanted.offset);
-                (middles.iter()).any(|p| next.contains(&self.brick_at(level + 1, *p)))
-            };
-            let again: Vec<bool> = looked.par_iter().map(near).collect();
-            pieces.clear();
-            for (l, again) in looked.into_iter().zip(again) {
-                if again {
-                    pieces.push(l.piece);
-                } else {
-                    settled = settled.or(l.error);
-                }
-            }
+            let near = |p: V3| next.contains(&self.brick_at(level + 1, p));
+            let (again, error) = self.sort(survey, (&pieces, looked), spacing, wanted, near);
+            (pieces, settled) = (again, settled.or(error));
+            self.add_level(survey, level + 1, &next);
             // Fewer places than at first: what is left is looked at with the finest cells.
             spacing = self.spacing / f64::from(1 << (level + 1));
         }
@@ -282,7 +270,27 @@ impl SignedDistanceGrid {
         Bricks::new(found)
     }
 
-    /// Looks at the parts of pieces, which are what is looked at next.
+    /// What is found at one part of a piece: its largest error, none where nothing counts.
+    fn at_part(
+        &self,
+        survey: &Survey,
+        part: &Piece,
+        wanted: &Wanted<'_>,
+        mut visit: impl FnMut(FieldError),
+    ) -> Option<FieldError> {
+        let mut worst = None;
+        survey.places(part, wanted.offset, |Place { at, distance }| {
+            if (wanted.counts)(at) {
+                let largest = (self.distance_and_gradient(at).0 - distance).abs();
+                let error = FieldError { largest, at };
+                worst = Some(worst.unwrap_or(FieldError::default()).or(error));
+                visit(error);
+            }
+        });
+        worst
+    }
+
+    /// Looks at the parts of pieces, [`TOGETHER`] pieces at a time.
     fn look(
         &self,
         survey: &Survey,
@@ -290,34 +298,64 @@ impl SignedDistanceGrid {
         spacing: f64,
         wanted: &Wanted<'_>,
     ) -> Vec<Looked> {
-        let of = |piece: &Piece| {
-            let mut all = Vec::new();
-            piece.parts(spacing, &mut |part| {
-                let mut counted = false;
-                let mut looked = Looked {
-                    piece: part,
-                    error: FieldError::default(),
-                    failing: Vec::new(),
-                };
-                survey.places(&part, wanted.offset, |Place { at, distance }| {
-                    if !(wanted.counts)(at) {
+        let of = |pieces: &[Piece]| {
+            let mut looked = Looked::default();
+            for piece in pieces {
+                piece.parts(spacing, &mut |part| {
+                    let failing = &mut looked.failing;
+                    let error = self.at_part(survey, &part, wanted, |e| {
+                        if e.largest > ENOUGH * wanted.tolerance {
+                            failing.push(e.at);
+                        }
+                    });
+                    looked.error = looked.error.or(error.unwrap_or_default());
+                    looked.parts.push(error.map_or(f64::NAN, |e| e.largest));
+                });
+            }
+            looked.parts.shrink_to_fit();
+            looked
+        };
+        pieces.par_chunks(TOGETHER).map(of).collect()
+    }
+
+    /// Of what was looked at, the parts that lie `near` something new, and the largest error of the others. Parts are made again here: kept for
+    /// all pieces they would be the largest thing that a run ever holds.
+    fn sort(
+        &self,
+        survey: &Survey,
+        (pieces, looked): (&[Piece], Vec<Looked>),
+        spacing: f64,
+        wanted: &Wanted<'_>,
+        near: impl Fn(V3) -> bool + Sync,
+    ) -> (Vec<Piece>, FieldError) {
+        let of = |(pieces, looked): (&[Piece], Looked)| {
+            let mut errors = looked.parts.into_iter();
+            let (mut again, mut largest, mut worst) = (Vec::new(), 0.0, None);
+            for piece in pieces {
+                piece.parts(spacing, &mut |part| {
+                    let error = errors.next().unwrap_or(f64::NAN);
+                    if error.is_nan() {
                         return;
                     }
-                    counted = true;
-                    let largest = (self.distance_and_gradient(at).0 - distance).abs();
-                    looked.error = looked.error.or(FieldError { largest, at });
-                    if largest > ENOUGH * wanted.tolerance {
-                        looked.failing.push(at);
+                    if part.middles(wanted.offset).into_iter().any(&near) {
+                        again.push(part);
+                    } else if error > largest {
+                        (largest, worst) = (error, Some(part));
                     }
                 });
-                if counted {
-                    all.push(looked);
-                }
-            });
-            all
+            }
+            let error = worst.and_then(|part| self.at_part(survey, &part, wanted, |_| ()));
+            (again, error.unwrap_or_default())
         };
-        let all: Vec<Vec<Looked>> = pieces.par_iter().map(of).collect();
-        all.into_iter().flatten().collect()
+        let all: Vec<(Vec<Piece>, FieldError)> =
+            (pieces.par_chunks(TOGETHER)).zip(looked).map(of).collect();
+        let mut again = Vec::with_capacity(all.iter().map(|a| a.0.len()).sum());
+        let mut worst = FieldError::default();
+        for (parts, error) in all {
+            again.extend(parts);
+            worst = worst.or(error);
+        }
+        (again, worst)
     }
 
     fn add_level(&mut self, survey: &Survey, level: u32, wanted: &Bricks) {
@@ -327,16 +365,21 @@ impl SignedDistanceGrid {
         let of = |b: &[u32; 3]| self.left(survey, level, *b, wanted);
         let left: Vec<[f32; 64]> = all.places.par_iter().map(of).collect();
         let values = |b: &[u32; 3]| coefficients(*b, wanted, (&all, &left), most);
-        let made: Vec<Vec<f32>> = all.places.par_iter().map(values).collect();
         let finer = Arc::make_mut(&mut self.finer);
         let blocks = self.blocks;
-        for (b, made) in all.places.iter().zip(&made) {
-            if made.iter().any(|c| *c != 0.0) {
-                let (eight, which) = finer.place(level, *b, blocks);
-                finer.eights[eight][which].values = (finer.values.len() / VALUES) as u32;
-                finer.values.extend_from_slice(made);
+        finer.values.reserve_exact(VALUES * all.places.len());
+        // Some at a time, so that they are not held twice.
+        for places in all.places.chunks(MADE_TOGETHER) {
+            let made: Vec<Vec<f32>> = places.par_iter().map(values).collect();
+            for (b, made) in places.iter().zip(&made) {
+                if made.iter().any(|c| *c != 0.0) {
+                    let (eight, which) = finer.place(level, *b, blocks);
+                    finer.eights[eight][which].values = (finer.values.len() / VALUES) as u32;
+                    finer.values.extend_from_slice(made);
+                }
             }
         }
+        finer.values.shrink_to_fit();
     }
 
     /// What the field leaves of the exact distance at the first node of each cell of a brick; 0 where no wanted brick asks for it.
@@ -368,10 +411,17 @@ impl SignedDistanceGrid {
     }
 }
 
-/// A part of a piece with what was found there.
+/// Pieces that are looked at together.
+const TOGETHER: usize = 64;
+
+/// What was found at the parts of some pieces.
+#[derive(Default)]
 struct Looked {
-    piece: Piece,
+    /// The largest error.
     error: FieldError,
+    /// By part: its largest error (m); not a number where nothing counts.
+    parts: Vec<f64>,
+    /// Places that are off by too much.
     failing: Vec<V3>,
 }
 
