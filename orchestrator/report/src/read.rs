@@ -91,6 +91,8 @@ pub(crate) struct FormingFacts {
     pub(crate) penetration: BTreeMap<String, Penetration>,
     /// Share of the thinner body up to which bodies may reach into each other.
     pub(crate) overlap_bound: Option<f64>,
+    /// The same on the way; of runs that do not tell it that of the end.
+    pub(crate) overlap_peak_bound: Option<f64>,
     /// By pair, what the watch found.
     pub(crate) depth: BTreeMap<String, Depth>,
     pub(crate) warnings: Vec<String>,

@@ -415,6 +415,17 @@ pub fn add_contacts(
         };
         cover::add_rigid_contacts(model, stack, &part, sheets[k], 1..k, &friction, p)?;
     }
+    // The upper film lies on the cells of the lower one, whose chords cut the tool's edges.
+    let part = cover::RigidPart {
+        name: "tool",
+        surface: tool.of(model, placed[top].index),
+        above: false,
+        film: Some(0),
+        moves: false,
+    };
+    cover::add_rigid_contacts(model, stack, &part, sheets[top], 0..0, &friction, p)?;
+    let contact = model.rigid_contacts.last_mut().expect("just added");
+    (contact.share, contact.counted) = (0.5, 0.0);
     for (k, ply) in placed.iter().enumerate().take(top).skip(1) {
         add_self_contact(model, stack, (k, ply.index), &ply.slaves, p)?;
     }

@@ -5,7 +5,9 @@ use crate::checkpoint::Recorder;
 use crate::inputs::{advised_size, bending_zones, read_boundary, read_motion};
 use crate::local::Feedback;
 use crate::parameters::Parameters;
-use crate::penetration::{OVERLAP_BOUND, Penetration, PenetrationPeak, too_deep_on_the_way};
+use crate::penetration::{
+    OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, too_deep_on_the_way,
+};
 use crate::press::PressLoad;
 use crate::run::{Body, Forming, Outcome};
 use crate::strain::ply_extremes;
@@ -442,6 +444,7 @@ fn write_summary(
         },
         "penetration": penetration_attributes(&penetrations, &outcome.peaks),
         "overlap_bound": OVERLAP_BOUND,
+        "overlap_peak_bound": OVERLAP_PEAK_BOUND,
         "tool_field_error": field_error_attributes(forming),
         "depth": depth_attributes(&outcome.depths),
         "depth_bound": DEPTH_BOUND,

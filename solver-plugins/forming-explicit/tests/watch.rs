@@ -7,7 +7,7 @@ use common::{BuiltIn, Silent, fabric, form};
 use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::Forming;
-use plyflow_forming_explicit::watch::{PairDepth, Watch, Watched};
+use plyflow_forming_explicit::watch::{PairDepth, Watch, Watched, depth_warnings};
 use serde_json::json;
 
 fn build(p: &Parameters) -> Forming {
@@ -95,39 +95,59 @@ fn a_node_that_is_put_through_the_sheet_below_it_is_told_and_one_beside_it_is_no
     assert!(found.depth > 0.6 * (2.4e-4 + 1e-4), "{found:?}");
 }
 
-#[test]
-fn an_edge_of_the_tool_that_goes_through_a_film_between_its_nodes_is_told() {
+/// What is seen of a film that lies on a block of 100 mm as if there were no fin of 2 mm on it, 5 mm high, at x = `from` (mm), with a ply of
+/// `length` over the middle.
+fn through_a_fin(from: f64, length: &str) -> Vec<PairDepth> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("fin.stl");
-    // A fin of 2 mm on a block, between two rows of nodes.
     let text = common::scenes::blocks(&[
         ([-50.0, -30.0, 0.0], [50.0, 30.0, 15.0]),
-        ([2.5, -20.0, 0.0], [4.5, 20.0, 20.0]),
+        ([from, -20.0, 0.0], [from + 2.0, 20.0, 20.0]),
     ]);
     std::fs::write(&file, text).unwrap();
     let mut forming = build(&bag(1, |p| {
         p["scene"]["tool"] = json!({"stl": {"file": file.to_str().unwrap(), "unit": "1 mm"}});
+        p["scene"]["sheets"][1]["length"] = json!(length);
         p["tool_grid"] = json!(0.001);
     }));
-    let depths = seen(&mut forming, |f| {
-        // The film lies on the block, as if there were no fin.
+    seen(&mut forming, |f| {
         let nodes = f.model.sheets[0].nodes.clone();
         nodes
             .iter()
             .for_each(|n| f.model.x[*n as usize][2] = 0.015 + 4e-5);
         f.model.cycle += 5000;
-    });
-    let found = depths
-        .iter()
-        .find(|d| d.pair.name == "tool_edges/lower")
-        .unwrap();
-    // 5 mm of fin, of which a quarter of an element is let be.
+    })
+}
+
+#[test]
+fn an_edge_of_the_tool_that_goes_through_a_film_between_its_nodes_is_told_where_a_ply_is_near() {
+    // The fins stand between two rows of nodes.
+    let named = |depths: &[PairDepth], name: &str| {
+        depths.iter().find(|d| d.pair.name == name).unwrap().clone()
+    };
+    let deep = |found: &PairDepth, from: f64| {
+        let (depth, x) = (found.end.depth, found.end.place[0]);
+        // 5 mm of fin, of which a quarter of an element is let be.
+        assert!(depth > 2.5e-3 && depth < 5.1e-3, "{:?}", found.end);
+        assert!(
+            x > from - 1e-4 && x < from + 2.1e-3,
+            "{x} beside a fin at {from}"
+        );
+    };
+    let depths = through_a_fin(2.5, "0.1 m");
+    deep(&named(&depths, "tool_edges/lower"), 2.5e-3);
+    let told = depth_warnings(&depths);
     assert!(
-        found.end.depth > 2.5e-3 && found.end.depth < 5.1e-3,
-        "{:?}",
-        found.end
+        told.iter().any(|w| w.contains("through 'lower'")),
+        "{told:?}"
     );
-    assert!(found.end.place[0] > 2.4e-3 && found.end.place[0] < 4.6e-3);
+    assert_eq!(named(&depths, "tool_edges_off_plies/lower").end.depth, 0.0);
+    // Far from the ply it is in the table, and no warning.
+    let depths = through_a_fin(42.5, "0.04 m");
+    deep(&named(&depths, "tool_edges_off_plies/lower"), 42.5e-3);
+    assert_eq!(named(&depths, "tool_edges/lower").end.depth, 0.0);
+    let told = depth_warnings(&depths);
+    assert!(told.iter().all(|w| !w.contains("edge")), "{told:?}");
 }
 
 #[test]

@@ -219,10 +219,12 @@ fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64], blank: Plot<'
 fn penetrations(runs: &[(bool, &Run)]) -> Markup {
     let any = runs.iter().any(|(_, r)| !r.facts.penetration.is_empty());
     let bound = runs.iter().find_map(|(_, r)| r.facts.overlap_bound);
+    let on_the_way = |r: &Run| r.facts.overlap_peak_bound.or(r.facts.overlap_bound);
+    let later = runs.iter().find_map(|(_, r)| r.facts.overlap_peak_bound);
     html! {
         @if any {
             h3 { "Penetration" }
-            p { "The quantile is that of the nodes in touch; the overlap is what the bodies themselves share of the thinner one, by the quantile" @if let Some(b) = bound { " (bound " (fixed(100.0 * b, 0)) " %)" } ". Over the whole run the quantile is that of the times with 100 nodes in touch and more, where there are any." }
+            p { "The quantile is that of the nodes in touch; the overlap is what the bodies themselves share of the thinner one, by the quantile" @if let Some(b) = bound { " (bound " (fixed(100.0 * b, 0)) " %" @if let Some(b) = later { " at the end, " (fixed(100.0 * b, 0)) " % on the way" } ")" } ". Over the whole run the quantile is that of the times with 100 nodes in touch and more, where there are any." }
             div class="scroll" { table {
                 thead {
                     tr { th rowspan="2" { "run" } th rowspan="2" { "pair" } th class="group" colspan="3" { "at the end" } th class="group" colspan="4" { "over the whole run" } }
@@ -232,7 +234,7 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
                     }
                 }
                 tbody { @for (_, r) in runs { @for (i, (pair, p)) in r.facts.penetration.iter().enumerate() {
-                    tr { th { @if i == 0 { (r.label) } } td { (pair) } (depths(p.max, p.q999, p.overlap, r.facts.overlap_bound)) (peak(p.peak.as_ref(), r.facts.overlap_bound)) }
+                    tr { th { @if i == 0 { (r.label) } } td { (pair) } (depths(p.max, p.q999, p.overlap, r.facts.overlap_bound)) (peak(p.peak.as_ref(), on_the_way(r))) }
                 } } }
             } }
         }

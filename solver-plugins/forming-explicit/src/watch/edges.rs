@@ -33,7 +33,7 @@ pub(super) struct Edges {
 }
 
 /// No triangle.
-const UNKNOWN: u32 = u32::MAX;
+pub(super) const UNKNOWN: u32 = u32::MAX;
 
 /// A sheet at which they are held.
 pub(super) struct Look<'a> {
@@ -85,18 +85,30 @@ impl Edges {
         }
     }
 
-    /// How deep (m) they are in sheet number `sheet`, and where, less what its elements cannot follow.
-    pub fn deepest(&mut self, sheet: usize, triangles: &Triangles, look: &Look<'_>) -> Deep {
+    /// How deep (m) they are in sheet number `sheet`, and where, less what its elements cannot follow: of all places that `counts` says true
+    /// of (m), and of the others.
+    pub fn deepest(
+        &mut self,
+        sheet: usize,
+        triangles: &Triangles,
+        look: &Look<'_>,
+        counts: impl Fn(V) -> bool,
+    ) -> [Deep; 2] {
         let depths: Vec<f64> = (self.places.par_iter())
             .zip(&mut self.last[sheet])
             .with_min_len(super::CHUNK)
             .map(|(place, last)| depth(place, triangles, look, last))
             .collect();
-        let mut deepest = Deep::default();
+        let mut deepest = [Deep::default(); 2];
         for (place, depth) in self.places.iter().zip(depths) {
-            if depth > deepest.depth {
-                let at = add(place.at, look.shift);
-                deepest = Deep {
+            // Neither can be less deep, whichever of them it is of.
+            if depth <= deepest[0].depth.min(deepest[1].depth) {
+                continue;
+            }
+            let at = add(place.at, look.shift);
+            let of = &mut deepest[usize::from(!counts(at))];
+            if depth > of.depth {
+                *of = Deep {
                     depth,
                     node: u32::MAX,
                     place: at,

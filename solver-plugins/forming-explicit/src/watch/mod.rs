@@ -148,6 +148,8 @@ pub struct Watch {
     pairs: Vec<Pair>,
     /// By film and ply: number of the pair of what hangs through.
     hangs: Vec<Option<usize>>,
+    /// By film: number of the pair of edges of the tool that are an element away from all plies.
+    beyond: Vec<Option<usize>>,
     /// By sheet, node and part.
     clear: Vec<Vec<Clear>>,
     /// By pair of a part and a sheet: how far (m) the nearest node was from touching at the last look.
@@ -261,7 +263,7 @@ impl Watch {
             })
             .collect();
         let sizes: Vec<f64> = sheets.iter().map(|s| s.size).collect();
-        let (pairs, hangs) = pairs(forming, &parts, &sizes);
+        let (pairs, hangs, beyond) = pairs(forming, &parts, &sizes);
         let never = Clear {
             at: [0.0; 3],
             distance: f64::NEG_INFINITY,
@@ -278,6 +280,7 @@ impl Watch {
             nearest: vec![f64::INFINITY; pairs.len()],
             pairs,
             hangs,
+            beyond,
             stands_off: !press,
         }
     }
@@ -549,7 +552,20 @@ impl Watch {
                 error: self.parts[0].error,
                 floor,
             };
-            deepest[pair] = self.edges.deepest(k, triangles, &look);
+            let Some(beyond) = self.beyond[k] else {
+                [deepest[pair], _] = self.edges.deepest(k, triangles, &look, |_| true);
+                continue;
+            };
+            // What a film does an element away from all plies no ply feels.
+            let plies = || (self.beyond.iter().zip(trees)).filter(|(film, _)| film.is_none());
+            let on_plies = |at: V| {
+                let mut trees = plies().filter_map(|(_, tree)| tree.as_ref());
+                trees.any(|tree| {
+                    tree.cell_within(at, sheet.size, &mut { edges::UNKNOWN })
+                        .is_some()
+                })
+            };
+            [deepest[pair], deepest[beyond]] = self.edges.deepest(k, triangles, &look, on_plies);
         }
     }
 
@@ -590,8 +606,13 @@ fn is_off([low, high]: [V; 2], p: V) -> bool {
     (0..3).any(|k| p[k] < low[k] - LEAP || p[k] > high[k] + LEAP)
 }
 
-/// The pairs: parts with sheets, edges of the tool with sheets, sheets with each other, and by film and ply the number of what hangs through.
-fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Vec<Option<usize>>) {
+/// The pairs: parts with sheets, edges of the tool with sheets, sheets with each other; by film and ply the number of what hangs through, and by film
+/// that of edges off the plies.
+fn pairs(
+    forming: &Forming,
+    parts: &[Part],
+    sizes: &[f64],
+) -> (Vec<Pair>, Vec<Option<usize>>, Vec<Option<usize>>) {
     let stack = &forming.stack;
     let is_ply = |k: usize| stack[k].scene.kind == SheetKind::Ply;
     let plies = (0..stack.len()).filter(|k| is_ply(*k));
@@ -614,16 +635,15 @@ fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Vec<Op
             });
         }
     }
-    for (k, s) in stack.iter().enumerate() {
-        all.push(Pair {
-            name: format!("tool_edges/{}", name(k)),
-            kind: Kind::Edges,
-            thinner: s.thickness,
-            bound: s.thickness.max(thinnest),
-            most: 0.5 * sizes[k],
-            of_ply: is_ply(k),
-        });
-    }
+    let edges = |k: usize| Pair {
+        name: format!("tool_edges/{}", name(k)),
+        kind: Kind::Edges,
+        thinner: stack[k].thickness,
+        bound: stack[k].thickness.max(thinnest),
+        most: 0.5 * sizes[k],
+        of_ply: is_ply(k),
+    };
+    all.extend((0..stack.len()).map(edges));
     let pair = |low: usize, high: usize| {
         let [a, b] = [low, high].map(|k| stack[k].thickness);
         Pair {
@@ -663,7 +683,16 @@ fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Vec<Op
             });
         }
     }
-    (all, hangs)
+    let mut beyond = vec![None; stack.len()];
+    for film in (0..stack.len()).filter(|k| !is_ply(*k)) {
+        beyond[film] = Some(all.len());
+        all.push(Pair {
+            name: format!("tool_edges_off_plies/{}", name(film)),
+            bound: f64::INFINITY,
+            ..edges(film)
+        });
+    }
+    (all, hangs, beyond)
 }
 
 /// Side (m) of a square as large as the median cell over the tool of a sheet that lies flat; of one that lies nowhere over it, of all its cells.

@@ -13,7 +13,7 @@ use super::friction::{Constant, Coulomb, FrictionLaw};
 use super::proximity::{Blocks, Candidate, Reach};
 use super::search::{Closest, Surface, cell_normal, combine, shape, track};
 use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, relative_speed, scatter, touch};
-use super::{ContactEnergy, ContactSettings, Pace};
+use super::{ContactEnergy, ContactSettings, Follow, Pace, content};
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, dot, norm, scale, sub};
 use rayon::prelude::*;
@@ -187,7 +187,12 @@ impl SelfContact {
             offset: self.offset,
             friction,
             slip_factor: self.settings.slip_factor,
-            augmentation: self.settings.augmentation,
+            follow: Follow {
+                share: self.settings.augmentation,
+                rest: content(self.offset),
+                deep: f64::INFINITY,
+                swift: f64::INFINITY,
+            },
             growth: 1.0,
             clearing: false,
         };
@@ -513,7 +518,12 @@ mod tests {
             offset: 1e-3,
             friction: &Constant(0.0),
             slip_factor: 0.5,
-            augmentation: 0.0,
+            follow: Follow {
+                share: 0.0,
+                rest: 0.0,
+                deep: f64::INFINITY,
+                swift: f64::INFINITY,
+            },
             growth: 1.0,
             clearing: false,
         };

@@ -3,7 +3,8 @@
 use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
 use super::sheets::SheetContact;
 use super::{
-    ContactEnergy, ContactSettings, Pace, TOGETHER, content, friction_force, normal_force, waking,
+    ContactEnergy, ContactSettings, Follow, Pace, TOGETHER, content, friction_force, normal_force,
+    waking,
 };
 use crate::archive::{Archive, ArchiveError};
 use crate::vec3::{V, add, dot, norm, scale, sub};
@@ -155,6 +156,8 @@ pub struct RigidContact {
     pub slip_factor: f64,
     /// Share of the penalty force that a step adds to the multiplier.
     pub augmentation: f64,
+    /// As [`SheetContact::deep`].
+    pub deep: f64,
     /// Its stiffness over what the masses would allow.
     pub share: f64,
     /// As [`SheetContact::counted`].
@@ -224,6 +227,7 @@ impl RigidContact {
             friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
+            deep: f64::INFINITY,
             share: 1.0,
             counted: 1.0,
             through: Vec::new(),
@@ -309,7 +313,12 @@ impl RigidContact {
                 x,
                 offset: self.offset,
                 slip_factor: self.slip_factor,
-                augmentation: self.augmentation,
+                follow: Follow {
+                    share: self.augmentation,
+                    rest: content(self.offset),
+                    deep: self.deep,
+                    swift: f64::INFINITY,
+                },
             },
         };
         self.cycle += 1;
@@ -520,7 +529,7 @@ struct Law<'a, F> {
     x: &'a [V],
     offset: f64,
     slip_factor: f64,
-    augmentation: f64,
+    follow: Follow,
 }
 
 /// Force of an item in touch, or so lately that it still has a multiplier; its energy. `v`: relative to the surface.
@@ -535,8 +544,7 @@ fn touch<F: Coulomb>(
     let (k, c) = (item.stiffness, f64::from(item.damping));
     let vn = dot(v, g);
     let (held, work) = (item.multiplier, item.work);
-    let rest = content(law.offset);
-    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.follow, held, work);
     // The gradient of a distance field is a unit vector up to the error of its interpolation.
     let n = scale(g, 1.0 / dot(g, g).max(1e-12).sqrt());
     let mut energy = ContactEnergy {

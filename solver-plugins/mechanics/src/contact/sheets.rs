@@ -12,7 +12,7 @@ use super::search::{Closest, Found, RIM, Surface, combine, track};
 use super::slave::{
     Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
 };
-use super::{ContactEnergy, ContactSettings, Pace, TOGETHER, waking};
+use super::{ContactEnergy, ContactSettings, Follow, Pace, SWIFT, TOGETHER, content, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
 use crate::vec3::{V, dot, scale, sub};
@@ -33,6 +33,10 @@ pub struct SheetContact {
     pub slip_factor: f64,
     /// Share of the penalty force that a step adds to the multiplier.
     pub augmentation: f64,
+    /// Penetration (m) from which on multipliers grow faster; infinite: never.
+    pub deep: f64,
+    /// Whether multipliers take over what steadily presses. Without them a contact is a spring: for one that catches what others let through.
+    pub follows: bool,
     /// Whether slaves are pushed out from wherever they are: also from so deep inside of the master that motion cannot have brought
     /// them there. That makes energy, and is for models that are put together by hand and damped.
     pub clearing: bool,
@@ -70,6 +74,8 @@ impl SheetContact {
             friction: friction.into(),
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
+            deep: f64::INFINITY,
+            follows: true,
             clearing: false,
             share: 1.0,
             counted: 1.0,
@@ -125,7 +131,12 @@ impl SheetContact {
             friction,
             offset: self.offset,
             slip_factor: self.slip_factor,
-            augmentation: self.augmentation,
+            follow: Follow {
+                share: if self.follows { self.augmentation } else { 0.0 },
+                rest: content(self.offset),
+                deep: self.deep,
+                swift: SWIFT * self.deep,
+            },
             growth: pace.growth,
             clearing: self.clearing,
         };
@@ -269,10 +280,14 @@ enum Met {
 /// Follows a slave to the closest point of the surface and computes its force.
 #[inline(always)]
 fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
-    let (s, v, pace, law) = (&given.surface, given.v, &given.pace, &given.law);
+    let (s, v, pace) = (&given.surface, given.v, &given.pace);
     if item.cell == NONE {
         return Met::Never;
     }
+    let law = &Law {
+        offset: given.law.offset * (1.0 - 0.01 * f64::from(item.let_in)),
+        ..given.law
+    };
     item.turn = item.turn.wrapping_add(1);
     if item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
         if item.active {

@@ -2,7 +2,7 @@
 
 use super::friction::{Coulomb, Sliding};
 use super::search::{Closest, FACES, Found, RIM, Surface, combine, shape};
-use super::{ContactEnergy, content, friction_force, grown, normal_force};
+use super::{ContactEnergy, Follow, friction_force, grown, normal_force};
 use crate::mesh::NONE;
 use crate::mirror::{Image, reflect};
 use crate::vec3::{V, add, dot, norm, scale, sub, unit};
@@ -46,6 +46,8 @@ pub struct SlaveItem {
     pub(super) guarded: bool,
     /// Whether it touches several cells, of a concave fold or corner.
     between: bool,
+    /// By how much nearer than the contact's distance it may come before it touches: hundredths of that.
+    pub let_in: u8,
     /// Direction from master to slave at the last search.
     pub(super) direction: V,
     /// Place in the cell, -1..1.
@@ -84,6 +86,7 @@ impl SlaveItem {
             active: false,
             guarded: false,
             between: false,
+            let_in: 0,
             direction: [0.0; 3],
             xi,
             stiffness: 0.0,
@@ -306,7 +309,7 @@ pub(super) struct Law<'a, F> {
     pub(super) offset: f64,
     pub(super) friction: &'a F,
     pub(super) slip_factor: f64,
-    pub(super) augmentation: f64,
+    pub(super) follow: Follow,
     /// As [`super::Pace::growth`].
     pub(super) growth: f64,
     /// Slaves are pushed out from wherever they are.
@@ -408,8 +411,7 @@ fn react<F: Coulomb>(
     let depth = -gap;
     let gap = -item.admit(depth, rel, law.dt, law.offset);
     let (held, work) = grown(item.multiplier, item.work, law.growth, k, gap);
-    let rest = content(law.offset);
-    let normal = normal_force(gap, vn, law.dt, k, c, law.augmentation, rest, held, work);
+    let normal = normal_force(gap, vn, law.dt, k, c, law.follow, held, work);
     let n = unit(way);
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));

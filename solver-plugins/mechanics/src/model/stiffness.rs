@@ -2,6 +2,9 @@
 
 use super::*;
 
+/// Share of the thinner sheet from which on a contact is deep ([`SheetContact::deep`]).
+const DEEP: f64 = 0.1;
+
 impl Model {
     /// Sets stiffness and damping of all contacts from the masses that they couple, and bounds the
     /// assembled stiffness of every node: 2 sum(k) dt^2 / m stays below `2 * 0.7`, which leaves the rest of
@@ -19,9 +22,17 @@ impl Model {
         let augmentation = c
             .augmentation
             .min(c.largest_augmentation(self.mass_ratio()));
+        let mut thickness = vec![f64::INFINITY; mass.len()];
+        for sheet in &self.sheets {
+            for node in &sheet.nodes {
+                thickness[*node as usize] = sheet.thickness;
+            }
+        }
         let mut row = vec![0.0; mass.len()];
         for contact in &mut self.rigid_contacts {
             contact.augmentation = augmentation;
+            let nodes = contact.items.iter().map(|i| thickness[i.node as usize]);
+            contact.deep = DEEP * nodes.fold(f64::INFINITY, f64::min);
             let (share, counted) = (contact.share, contact.counted);
             for item in &mut contact.items {
                 item.stiffness = share * c.stiffness_factor * mass[item.node as usize] / dt2;
@@ -30,6 +41,14 @@ impl Model {
         }
         for contact in &mut self.sheet_contacts {
             contact.augmentation = augmentation;
+            let items = contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
+            // Where they are kept further apart than they are thick, what is between them is to spare.
+            let both = items.map(|i| {
+                let master = self.cells[i.cell as usize][0];
+                let [a, b] = [i.node, master].map(|n| thickness[n as usize]);
+                (contact.offset - 0.5 * (a + b)).max(0.0) + DEEP * a.min(b)
+            });
+            contact.deep = both.fold(f64::INFINITY, f64::min);
             let (share, counted) = (contact.share, contact.counted);
             for item in contact
                 .items
