@@ -98,12 +98,9 @@ fn films_too_light_for_the_pressure_are_told_with_the_contact_that_they_break() 
     assert_says(
         &text,
         &[
-            "the run became unstable in cycle ",
+            "'ply_1' has gone through 'lower' at (",
             "(bagging)",
-            // Bare films are kept apart by more than they are thick; film and ply share what they are said to.
-            "Deepest contact: lower/",
-            "Likely cause: a sheet is on its way through its neighbour.",
-            "larger least_areal_mass (stiffer contact)",
+            "larger `least_areal_mass`",
         ],
     );
 }
