@@ -6,7 +6,7 @@
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_workflow::resolved::{
     Dimension, Expectation, FailurePolicy, InputFile, PluginId, ResolvedInput, ResolvedStep,
-    ResolvedWorkflow, Resources,
+    ResolvedWorkflow, Resources, Study,
 };
 use plyflow_workflow::{Catalog, Evidence, Resolution};
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use serde_json::{Map, Number, Value};
 use std::os::unix::fs::MetadataExt;
 
 /// Changes whenever the form of the file does.
-const FORM: &[u8] = b"plyflow resolved workflow 1";
+const FORM: &[u8] = b"plyflow resolved workflow 2";
 
 /// What a resolution depends on besides its [`Evidence`], as one hash.
 pub type Circumstances = [u8; 32];
@@ -131,11 +131,13 @@ struct Packed {
     steps: Vec<PackedStep>,
     expectations: Vec<Expectation>,
     fail_fast: bool,
+    study: Option<Study>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct PackedStep {
     name: String,
+    base: Option<String>,
     role: String,
     plugin: usize,
     components: Vec<usize>,
@@ -215,6 +217,7 @@ impl Packed {
             .iter()
             .map(|s| PackedStep {
                 name: s.name.clone(),
+                base: s.base.clone(),
                 role: s.role.clone(),
                 plugin: number(&s.plugin),
                 components: s.components.iter().map(&mut number).collect(),
@@ -236,6 +239,7 @@ impl Packed {
             steps,
             expectations: workflow.expectations.clone(),
             fail_fast: workflow.on_failure == FailurePolicy::FailFast,
+            study: workflow.study.clone(),
         }
     }
 
@@ -244,6 +248,7 @@ impl Packed {
         let step = |s: PackedStep| {
             Some(ResolvedStep {
                 name: s.name,
+                base: s.base,
                 role: s.role,
                 plugin: library(s.plugin)?,
                 components: s
@@ -272,6 +277,7 @@ impl Packed {
             } else {
                 FailurePolicy::KeepGoing
             },
+            study: self.study,
         })
     }
 }

@@ -427,6 +427,14 @@ fn combined(a: Exponents, b: Exponents, sign: i8) -> Result<Exponents, Problem> 
     Ok(all)
 }
 
+/// The SI unit of a dimension.
+pub(crate) fn si_unit(exponents: Exponents) -> String {
+    match Dimension::of(exponents) {
+        Some(d) => d.base_unit().to_owned(),
+        None => base_unit(exponents),
+    }
+}
+
 /// A dimension in words.
 pub(crate) fn words(exponents: Exponents) -> String {
     match Dimension::of(exponents) {

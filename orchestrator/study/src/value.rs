@@ -1,7 +1,7 @@
 //! Values of variables.
 
 use crate::Problem;
-use crate::number::{Quantity, double, text, words};
+use crate::number::{Quantity, double, si_unit, text, words};
 use plyflow_model::units::Exponents;
 
 /// A value of a variable or of an expression.
@@ -27,6 +27,15 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// The SI unit of a number; empty for a plain one and for what is no number.
+    #[must_use]
+    pub fn si_unit(self) -> String {
+        match self {
+            Self::Quantity(exponents) => si_unit(exponents),
+            _ => String::new(),
+        }
+    }
+
     /// In words.
     #[must_use]
     pub fn in_words(self) -> String {
