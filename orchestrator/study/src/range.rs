@@ -2,7 +2,7 @@
 
 use crate::number::{double, of_double, power_of_ten, rounded};
 use crate::{Exact, Problem, Quantity, Value};
-use num_traits::{CheckedDiv, CheckedMul, Signed, Zero};
+use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, Signed, Zero};
 use plyflow_fixed::FixedBits;
 
 /// Most values of one range.
@@ -67,7 +67,7 @@ impl Range {
 
     /// A number with the digits that matter, never beyond the ends.
     fn short(&self, number: &Exact) -> Option<Exact> {
-        let width = (self.to.number - self.from.number).abs();
+        let width = self.to.number.checked_sub(&self.from.number)?.abs();
         let mut grain = i32::MAX;
         if !width.is_zero() {
             grain = power_of_ten(&width)? - 6;
@@ -108,7 +108,8 @@ fn stepped(range: &Range, by: &Quantity) -> Result<Vec<Value>, Problem> {
     let by = by
         .in_unit_of(&range.from)
         .map_err(|p| Problem::new(format!("`by` does not fit: {}", p.message)))?;
-    let way = range.to.number - range.from.number;
+    let (from, to) = (&range.from.number, &range.to.number);
+    let way = to.checked_sub(from).ok_or_else(too_fine)?;
     let text = |n: &Exact| {
         Quantity {
             number: *n,
@@ -129,7 +130,10 @@ fn stepped(range: &Range, by: &Quantity) -> Result<Vec<Value>, Problem> {
         .help(format!("write `by: {}`", text(&-by.number))));
     }
     if !steps.is_integer() {
-        let last = range.from.number + by.number * steps.floor();
+        let last = by.number.checked_mul(&steps.floor());
+        let last = last
+            .and_then(|w| from.checked_add(&w))
+            .ok_or_else(too_fine)?;
         return Err(Problem::new(format!(
             "steps of {} from {} lead to {} and then beyond {}",
             by.text(),
@@ -146,7 +150,7 @@ fn stepped(range: &Range, by: &Quantity) -> Result<Vec<Value>, Problem> {
         .ok_or_else(too_many)?;
     let one = |i: u32| {
         let way = by.number.checked_mul(&Exact::from_integer(i.into()))?;
-        Some(range.value(range.from.number + way))
+        Some(range.value(from.checked_add(&way)?))
     };
     (0..=n).map(one).collect::<Option<_>>().ok_or_else(too_fine)
 }
@@ -174,10 +178,11 @@ fn counted(range: &Range, count: u32) -> Result<Vec<Value>, Problem> {
         i if range.log => range.at(f64::from(i) / f64::from(count - 1)),
         i => {
             let part = Exact::new(i.into(), (count - 1).into());
-            let way = (range.to.number - range.from.number)
-                .checked_mul(&part)
+            let (from, to) = (&range.from.number, &range.to.number);
+            let way = to.checked_sub(from).and_then(|w| w.checked_mul(&part));
+            let number = way
+                .and_then(|w| from.checked_add(&w))
                 .ok_or_else(too_fine)?;
-            let number = range.from.number + way;
             // What ends after few digits is kept as it is.
             let ends = rounded(&number, -9) == Some(number);
             let number = if ends {
@@ -256,5 +261,13 @@ mod tests {
         assert!(of("0", "1", "#3", true).is_err());
         assert!(of("0 mm", "1 s", "1 mm", false).is_err());
         assert!(of("0", "1", "1e-9", false).is_err());
+        // Never a number that has gone round.
+        for step in ["#3", "1e30"] {
+            let e = of("0.123456789012345678901234567891", "1e30", step, false).unwrap_err();
+            assert!(
+                e.message.contains("more digits") || e.message.contains("beyond"),
+                "{e}"
+            );
+        }
     }
 }

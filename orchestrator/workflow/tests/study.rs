@@ -267,6 +267,10 @@ fn a_study_that_is_wrong_is_told_where_it_is_wrong() {
             "5:3",
             &["a grid of 2 variables has no 3 points"],
         ),
+        ("  points: [{}]", "5:12", &["no variable"]),
+        ("  vary: {}", "5:9", &["no variable"]),
+        ("  union: []", "5:3", &["has no parts"]),
+        ("  zip: {limit: []}", "5:16", &["no value"]),
         ("  points: none.csv", "5:11", &["cannot read `none.csv`"]),
         (
             "  at_most_failures: -1\n  vary: {limit: [4 deg]}",

@@ -428,6 +428,13 @@ impl Reader<'_> {
         };
         let names: Vec<Option<String>> = first.entries().iter().map(|e| self.name(e)).collect();
         let names: Vec<String> = names.into_iter().collect::<Option<_>>()?;
+        if names.is_empty() {
+            self.tell(
+                Problem::new("the point has no variable").expected("`{name: value, ..}`"),
+                &first.span,
+            );
+            return None;
+        }
         let mut rows = Vec::new();
         for item in items {
             let unknown = item.entries().iter().find(|e| !names.contains(&e.key));
