@@ -303,6 +303,9 @@ pub struct ResultsArgs {
     /// Only this step; may be repeated
     #[arg(long, value_name = "STEP")]
     pub step: Vec<String>,
+    /// Instead: the table of the study, a row for each of its points
+    #[arg(long, conflicts_with_all = ["front", "step"])]
+    pub study: bool,
     /// Instead: what every way that a comparison measured costs, how wrong it is, and whether it is on the Pareto front
     #[arg(long, conflicts_with = "check")]
     pub front: bool,

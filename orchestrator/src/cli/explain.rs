@@ -21,9 +21,9 @@ pub fn instances_named(
 ) -> Result<Vec<Id>, Stop> {
     let core = &session.core;
     let step = word.split('[').next().unwrap_or(word);
-    let index = opened.step_indices(&[step.to_owned()])?[0];
+    let of = opened.step_indices(&[step.to_owned()])?;
     let all: Vec<Id> = (0..core.instances().len())
-        .filter(|id| core.instances()[*id].step == index)
+        .filter(|id| of.contains(&core.instances()[*id].step))
         .collect();
     if step == word {
         return Ok(all);

@@ -12,6 +12,7 @@ pub fn outline(schema: &Value) -> String {
     let mut writer = Writer {
         definitions: &schema["$defs"],
         written: HashMap::new(),
+        open: Vec::new(),
         out: String::new(),
     };
     if let Some(text) = schema["description"].as_str() {
@@ -26,6 +27,8 @@ struct Writer<'s> {
     definitions: &'s Value,
     /// Definitions whose keys have been written, and under which key.
     written: HashMap<String, String>,
+    /// Definitions that are being written: one of them within itself (a product of sets of points) would never end.
+    open: Vec<String>,
     out: String,
 }
 
@@ -224,11 +227,19 @@ impl Writer<'_> {
                 self.prose(&text, depth + 1);
                 return;
             }
+            if self.open.contains(name) {
+                self.prose("(the same keys again)", depth + 1);
+                return;
+            }
             if let Some(key) = key {
                 self.written.insert(name.clone(), key.to_owned());
             }
         }
+        self.open.extend(value.name.clone());
         self.keys_of(&value, depth);
+        if value.name.is_some() {
+            self.open.pop();
+        }
     }
 
     fn prose(&mut self, text: &str, depth: usize) {
@@ -304,6 +315,9 @@ mod tests {
                 "'{line}' in:\n{material}"
             );
         }
-        assert!(outline(&schema::workflow()).contains("for_each: "));
+        let workflow = outline(&schema::workflow());
+        assert!(workflow.contains("for_each: "));
+        // A set of points may have sets of points in it.
+        assert!(workflow.contains("(the same keys again)"), "{workflow}");
     }
 }

@@ -302,17 +302,24 @@ impl Opened {
     /// # Errors
     /// When a name is none of the steps; says which there are.
     pub fn step_indices(&self, names: &[String]) -> Result<Vec<usize>, Stop> {
-        let find = |name: &String| {
-            self.graph.find(name).ok_or_else(|| {
-                let all: Vec<&str> = self.graph.steps.iter().map(|s| s.name.as_str()).collect();
-                let text = format!(
+        let mut found = Vec::new();
+        for name in names {
+            let named = self.graph.named(name);
+            if named.is_empty() {
+                let mut all: Vec<&str> = self.graph.steps.iter().map(|s| s.base.as_str()).collect();
+                all.dedup();
+                let mut text = format!(
                     "there is no step '{name}'; the steps are: {}",
                     all.join(", ")
                 );
-                Stop::new(exit::USAGE, text)
-            })
-        };
-        names.iter().map(find).collect()
+                if let Some(first) = self.graph.steps.iter().find(|s| s.name != s.base) {
+                    text += &format!("; at a point of the study such as '{}'", first.name);
+                }
+                return Err(Stop::new(exit::USAGE, text));
+            }
+            found.extend(named);
+        }
+        Ok(found)
     }
 }
 

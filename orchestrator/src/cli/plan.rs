@@ -4,6 +4,7 @@ use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs, Wo
 use super::open::{self, open};
 use super::report::command;
 use super::run::first_line;
+use super::study_plan::Prospects;
 use super::table::table;
 use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
@@ -39,6 +40,10 @@ pub fn plan(args: &PlanArgs) -> Done {
     for text in session.told() {
         super::warn(&format!("plyflow: {text}\n"));
     }
+    let study = Prospects::of(&session);
+    if let (Some(study), TextOrJson::Text) = (&study, args.format) {
+        return print(&study.text());
+    }
     let found = prospects(&session);
     if args.format == TextOrJson::Json {
         let list: Vec<_> = found
@@ -49,7 +54,11 @@ pub fn plan(args: &PlanArgs) -> Done {
                     "last_cpu_seconds": p.last.map(|c| c.cpu_seconds)})
             })
             .collect();
-        return print(&format!("{:#}\n", json!(list)));
+        let all = match study {
+            Some(study) => json!({"study": study.as_json(), "steps": list}),
+            None => json!(list),
+        };
+        return print(&format!("{all:#}\n"));
     }
     let rows: Vec<Vec<String>> = found
         .iter()
@@ -167,7 +176,7 @@ fn goes_on(session: &Session<'_>, id: Id) -> String {
     }
 }
 
-fn cost_of(session: &Session<'_>, key: &Key) -> Option<Cost> {
+pub(super) fn cost_of(session: &Session<'_>, key: &Key) -> Option<Cost> {
     session.store.read_record(key).ok().map(|r| r.cost)
 }
 
@@ -256,8 +265,8 @@ pub(super) fn or_none(text: &str) -> &str {
 pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], given: &Workflow) -> String {
     let core = &session.core;
     let again = command(given);
-    let name = |id: &Id| &core.graph().steps[core.instances()[*id].step].name;
-    let wanted = |id: &Id| steps.is_empty() || steps.contains(name(id));
+    let named: Vec<usize> = steps.iter().flat_map(|s| core.graph().named(s)).collect();
+    let wanted = |id: &Id| steps.is_empty() || named.contains(&core.instances()[*id].step);
     let of_these = || (0..core.instances().len()).filter(wanted);
     if let Some(f) = of_these().find_map(|id| session.failed_before(id)) {
         let (label, reason) = (f.label, f.reason.replace('\n', "\n  "));
@@ -333,7 +342,11 @@ pub fn validate(args: &ValidateArgs) -> Done {
         }),
         None => open::load(&args.workflow)?.map(|o| {
             let n = o.workflow.steps.len();
-            format!("{n} step{}", if n == 1 { "" } else { "s" })
+            let steps = format!("{n} step{}", if n == 1 { "" } else { "s" });
+            match &o.workflow.study {
+                Some(study) => format!("{} points, {steps} in all", study.points.len()),
+                None => steps,
+            }
         }),
     };
     let json = args.format == TextOrJson::Json;

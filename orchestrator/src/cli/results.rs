@@ -17,7 +17,7 @@ use serde_json::json;
 
 /// Verdicts on what is expected.
 pub const OK: &str = "ok";
-const MISSED: &str = "missed";
+pub const MISSED: &str = "missed";
 const NOT_JUDGED: &str = "not judged";
 
 /// One number, or one expectation without a number.
@@ -43,6 +43,9 @@ impl Row {
     /// What it is about, in a list.
     fn title(&self) -> String {
         let e = self.expected.as_ref();
+        if self.step == super::study::STEP {
+            return self.name.clone();
+        }
         if e.is_some_and(|e| !e.mean_over.is_empty()) {
             format!("{} ({})", self.name, self.step)
         } else {
@@ -164,6 +167,7 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
             rows.push(absent(e));
         }
     }
+    rows.extend(super::study::rows(session, records));
     rows
 }
 
@@ -334,6 +338,19 @@ fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> ser
     json!({"workflow": session.workflow.name, "results": results, "steps": costs})
 }
 
+/// Whether the name of a step in the file, or of one at a point of a study, is among `wanted`.
+pub fn is_named(session: &Session<'_>, step: &str, wanted: &[String]) -> bool {
+    let is = |name: &str| wanted.iter().any(|w| w == name);
+    let of = |name: &str| {
+        let steps = &session.core.graph().steps;
+        steps
+            .iter()
+            .find(|s| s.name == name)
+            .map(|s| s.base.clone())
+    };
+    is(step) || of(step).is_some_and(|base| is(&base))
+}
+
 /// A text as a cell of CSV.
 pub fn csv_text(t: &str) -> String {
     if t.contains([',', '"', '\n']) {
@@ -388,14 +405,17 @@ pub fn results(args: &ResultsArgs) -> Done {
     tell_gone(&session);
     let mut records = records(&session);
     let mut rows = rows(&session, &records);
+    if args.study {
+        let told = super::study::tell(args, &session, &records);
+        return concluded(checked(told, args.check, &rows), &damages, &args.workflow);
+    }
     if !args.step.is_empty() {
         let over = |r: &Row| r.expected.as_ref().map_or(vec![], |e| e.mean_over.clone());
-        rows.retain(|r| {
-            args.step.contains(&r.step) || over(r).iter().any(|s| args.step.contains(s))
-        });
+        let wanted = |step: &str| is_named(&session, step, &args.step);
+        rows.retain(|r| wanted(&r.step) || over(r).iter().any(|s| wanted(s)));
         records.retain(|(id, _)| {
             let step = session.core.instances()[*id].step;
-            args.step.contains(&session.core.graph().steps[step].name)
+            wanted(&session.core.graph().steps[step].name)
         });
     }
     if args.front {

@@ -293,7 +293,10 @@ fn conclude(
     }
     if let Some(first) = summary.failures.first() {
         warn(&failure_text(first, summary));
-        return Err(Stop::silent(exit::STEP_FAILED));
+        match super::study::borne(session) {
+            Some(text) => warn(&text),
+            None => return Err(Stop::silent(exit::STEP_FAILED)),
+        }
     }
     verdict.and(told)
 }
@@ -303,10 +306,23 @@ fn conclude(
 fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary: &Summary) -> Done {
     let stale = stale_report(args, opened, session, summary);
     let show = shows(args, summary);
-    if stale.is_none() && !show && !args.check {
+    let table = study_files(args, opened);
+    if stale.is_none() && !show && !args.check && table.is_none() {
         return Ok(());
     }
     let found = report::Found::read(session);
+    let mut of_study = String::new();
+    if let Some((csv, artifact)) = table {
+        let table = super::study::Table::read(session, &found.records);
+        of_study = super::study::in_short(session, &table);
+        match super::study_file::write(&table, session, &csv, &artifact) {
+            Ok(()) => of_study += &format!("table: {csv}, {artifact}\n"),
+            // As with the report: the artifacts are whole.
+            Err(e) => warn(&format!(
+                "plyflow: the table of the study was not written: {e}\n"
+            )),
+        }
+    }
     let input = report::input(
         opened,
         session,
@@ -324,10 +340,16 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         written = None;
     }
     let told = match show {
-        true => print(&(plyflow_report::summary(&input, written.as_deref()) + "\n")),
+        true => print(&(of_study + &plyflow_report::summary(&input, written.as_deref()) + "\n")),
         false => Ok(()),
     };
     checked(told, args.check, &found.rows)
+}
+
+/// The files of the study's table: at the end of every run of the whole they tell what is, also when the study has only got smaller.
+fn study_files(args: &RunArgs, opened: &Opened) -> Option<(Utf8PathBuf, Utf8PathBuf)> {
+    opened.workflow.study.as_ref()?;
+    (args.until.is_empty()).then(|| super::study_file::beside(&opened.workflow.file))
 }
 
 /// Whether a report of a run would tell what is: one that was stopped goes on, and one without any artifact has nothing to show.
@@ -393,7 +415,8 @@ fn tell(
 /// Whether all that is known of a step has been run or found.
 fn is_done(session: &Session<'_>, step: &str) -> bool {
     let core = &session.core;
-    let of = |i: &&Instance| core.graph().steps[i.step].name == step;
+    let named = core.graph().named(step);
+    let of = |i: &&Instance| named.contains(&i.step);
     let mut all = core.instances().iter().filter(of).peekable();
     all.peek().is_some() && all.all(|i| matches!(i.state, State::Done { .. }))
 }

@@ -197,6 +197,7 @@ pub struct Core<'g> {
     free_cores: u32,
     used_memory: u64,
     stopping: bool,
+    failed_points: BTreeSet<u32>,
     agenda: VecDeque<Id>,
     effects: Vec<Effect>,
 }
@@ -216,6 +217,7 @@ impl<'g> Core<'g> {
             free_cores: limits.cores.max(1),
             used_memory: 0,
             stopping: false,
+            failed_points: BTreeSet::new(),
             agenda: VecDeque::new(),
             effects: Vec::new(),
         }
@@ -403,7 +405,7 @@ impl<'g> Core<'g> {
                 inputs.iter().filter_map(|(wire, giver)| {
                     let wire = &plan.wires[*wire];
                     let giver = &self.instances[*giver];
-                    let step = graph.steps[wire.from].name.as_str();
+                    let step = graph.steps[wire.from].base.as_str();
                     Some((
                         wire.port.as_str(),
                         step,
@@ -521,9 +523,19 @@ impl<'g> Core<'g> {
         }
         self.finish(id, State::Failed);
         self.skip_waiters(id, id);
-        if self.limits.policy == FailurePolicy::FailFast {
+        if self.limits.policy == FailurePolicy::FailFast || !self.bears(id) {
             self.stop();
         }
+    }
+
+    /// Whether the study bears that this instance has failed too.
+    fn bears(&mut self, id: Id) -> bool {
+        let Some(bears) = &self.graph.bears else {
+            return true;
+        };
+        let of = &bears.points[self.instances[id].step];
+        self.failed_points.extend(of.iter().copied());
+        self.failed_points.len() <= bears.failures as usize
     }
 
     fn skip(&mut self, id: Id, cause: Id) {

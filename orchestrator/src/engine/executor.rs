@@ -80,6 +80,21 @@ impl Outcome {
     }
 }
 
+/// The class of a failure, from the reason that the user reads ([`Outcome::reason`]), which is what a journal keeps of it.
+pub fn class_of(reason: &str) -> &'static str {
+    let classes = [
+        ("the plugin panicked", "panic"),
+        ("malformed artifact", "malformed"),
+        ("the worker crashed", "crash"),
+        ("the worker ended", "crash"),
+        ("the worker could not be started", "machine"),
+        ("the artifact cannot be put into the store", "machine"),
+        ("stopped at its time limit", "time-limit"),
+    ];
+    let found = classes.iter().find(|(begin, _)| reason.starts_with(begin));
+    found.map_or("error", |(_, class)| class)
+}
+
 /// What an executor reports.
 #[derive(Debug)]
 pub enum Report {
@@ -112,4 +127,28 @@ pub trait Executor {
 
     /// Asks a job to stop; `now`: without grace. Its end is still reported.
     fn cancel(&mut self, id: usize, now: bool);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_has_the_class_of_how_it_ended() {
+        let failed = |kind| Outcome::Failed {
+            kind,
+            message: "m".into(),
+        };
+        for (outcome, class) in [
+            (failed(FailureKind::Error), "error"),
+            (failed(FailureKind::Panic), "panic"),
+            (failed(FailureKind::Malformed), "malformed"),
+            (Outcome::Signal("SIGSEGV".into()), "crash"),
+            (Outcome::Silent(3), "crash"),
+            (Outcome::TimedOut(2.0), "time-limit"),
+            (Outcome::NotStarted("m".into()), "machine"),
+        ] {
+            assert_eq!(class_of(&outcome.reason()), class, "{outcome:?}");
+        }
+    }
 }

@@ -69,7 +69,7 @@ impl Session<'_> {
         let record = self.store.check(
             &key,
             Some(Expected {
-                step: &self.workflow.steps[instance.step].name,
+                step: self.workflow.steps[instance.step].in_file(),
                 item: &instance.item,
                 kind: &self.workflow.steps[instance.step].output_kind,
             }),

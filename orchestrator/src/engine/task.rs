@@ -19,7 +19,7 @@ impl Session<'_> {
             let from = &self.workflow.steps[given.step];
             inputs.push(JobInput {
                 port: step.inputs[wire].port.clone(),
-                step: from.name.clone(),
+                step: from.in_file().to_owned(),
                 kind: from.output_kind.clone(),
                 item: given.item.clone(),
                 artifact: given
@@ -57,7 +57,7 @@ impl Session<'_> {
         let library = |p: &PluginId| library(p, &self.options.search_path);
         let job = Job {
             version: JOB_VERSION,
-            step: step.name.clone(),
+            step: step.in_file().to_owned(),
             item: instance.item.clone(),
             key: instance.key.map(|k| k.hex()).unwrap_or_default(),
             plugin: library(&step.plugin),
@@ -134,7 +134,7 @@ pub fn input_keys(core: &Core<'_>, id: Id) -> Vec<InputKey> {
         let given = &core.instances()[*giver];
         Some(InputKey {
             port: wires[*wire].port.clone(),
-            step: core.graph().steps[given.step].name.clone(),
+            step: core.graph().steps[given.step].base.clone(),
             item: given.item.clone(),
             key: given.key?,
         })

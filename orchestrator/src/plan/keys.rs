@@ -87,7 +87,7 @@ pub struct Binary {
 /// What all instances of a step have in common in their keys.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ingredients {
-    /// Name of the step: it is in the artifact, and later steps see it.
+    /// Name of the step in the file: it is in the artifact, and later steps see it.
     pub step: String,
     /// The plugin.
     pub plugin: Binary,
@@ -122,7 +122,7 @@ impl Ingredients {
             hash: p.hash.clone(),
         };
         Self {
-            step: step.name.clone(),
+            step: step.in_file().to_owned(),
             plugin: binary(&step.plugin),
             components: step.components.iter().map(binary).collect(),
             parameters,
@@ -255,6 +255,15 @@ mod tests {
         assert_ne!(base, key_of(|s| s.components.push(s.plugin.clone())));
         assert_ne!(base, key_of(|s| s.parameters["angle"] = json!(0.25)));
         assert_ne!(base, key_of(|s| s.files[0].hash = "12".into()));
+    }
+
+    #[test]
+    fn the_key_does_not_follow_the_name_of_a_point() {
+        let base = key_of(|_| {});
+        let at_point = key_of(|s| {
+            s.base = Some(std::mem::replace(&mut s.name, "a@angle=45deg".into()));
+        });
+        assert_eq!(base, at_point);
     }
 
     #[test]

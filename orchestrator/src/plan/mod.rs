@@ -40,6 +40,8 @@ pub struct WirePlan {
 pub struct StepPlan {
     /// Name.
     pub name: String,
+    /// Its name in the file, which keys, plugins and artifacts know: that of all points of a study.
+    pub base: String,
     /// Digest of its [`Ingredients`]: of everything in the key that is the same for all instances.
     pub recipe: Key,
     /// Fan-out, outermost first.
@@ -65,7 +67,36 @@ pub struct StepPlan {
 pub struct Graph {
     /// In topological order, as in the workflow.
     pub steps: Vec<StepPlan>,
+    /// What a study bears.
+    pub bears: Option<Bears>,
     edges: DiGraph<(), ()>,
+}
+
+/// How many points of a study may fail before it is stopped, and what is of which point.
+#[derive(Debug)]
+pub struct Bears {
+    /// So many may.
+    pub failures: u32,
+    /// Positions of the points that a step is of.
+    pub points: Vec<Vec<u32>>,
+}
+
+impl Bears {
+    fn of(workflow: &ResolvedWorkflow) -> Option<Self> {
+        let study = workflow.study.as_ref()?;
+        let mut points = vec![Vec::new(); workflow.steps.len()];
+        for (p, point) in study.points.iter().enumerate() {
+            for step in &point.steps {
+                if points[*step].last() != Some(&(p as u32)) {
+                    points[*step].push(p as u32);
+                }
+            }
+        }
+        Some(Self {
+            failures: study.at_most_failures?,
+            points,
+        })
+    }
 }
 
 /// A workflow that cannot be planned; found by `plyflow validate` before, so only a defect gets here.
@@ -166,6 +197,7 @@ impl Graph {
             index.insert(&step.name, at);
             steps.push(StepPlan {
                 name: step.name.clone(),
+                base: step.in_file().to_owned(),
                 recipe,
                 dimensions,
                 wires,
@@ -177,7 +209,22 @@ impl Graph {
                 wanted: true,
             });
         }
-        Ok(Self { steps, edges })
+        let bears = Bears::of(workflow);
+        Ok(Self {
+            steps,
+            bears,
+            edges,
+        })
+    }
+
+    /// Indices of the steps that a name means: the one of that name, or those of all points of a study.
+    pub fn named(&self, name: &str) -> Vec<usize> {
+        match self.find(name) {
+            Some(at) => vec![at],
+            None => (0..self.steps.len())
+                .filter(|at| self.steps[*at].base == name)
+                .collect(),
+        }
     }
 
     /// Index of a step by name.
@@ -196,10 +243,11 @@ impl Graph {
         let mut wanted = BTreeSet::new();
         let mut stack = Vec::new();
         for name in names {
-            stack.push(
-                self.find(name)
-                    .ok_or_else(|| PlanError::NoStep(name.clone()))?,
-            );
+            let named = self.named(name);
+            if named.is_empty() {
+                return Err(PlanError::NoStep(name.clone()));
+            }
+            stack.extend(named);
         }
         while let Some(at) = stack.pop() {
             if wanted.insert(at) {
@@ -225,6 +273,7 @@ pub(crate) mod tests {
     pub(crate) fn step(name: &str, dims: &[&str], wires: &[(&str, &str)]) -> ResolvedStep {
         ResolvedStep {
             name: name.into(),
+            base: None,
             role: "test".into(),
             plugin: PluginId {
                 name: "p".into(),
@@ -268,6 +317,7 @@ pub(crate) mod tests {
             steps,
             expectations: vec![],
             on_failure: FailurePolicy::KeepGoing,
+            study: None,
         }
     }
 

@@ -8,7 +8,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_NOTED};
 use plyflow_workflow::resolved::{
     Dimension, Expectation, FailurePolicy, InputFile, Parameters, PluginId, ResolvedInput,
-    ResolvedStep, ResolvedWorkflow, Resources,
+    ResolvedStep, ResolvedWorkflow, Resources, Study,
 };
 use plyflow_workflow::{Catalog, Evidence, Resolution};
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use std::os::unix::fs::MetadataExt;
 
 /// Changes whenever the form of the file does.
-const FORM: &[u8] = b"plyflow resolved workflow 2";
+const FORM: &[u8] = b"plyflow resolved workflow 3";
 
 /// What a resolution depends on besides its [`Evidence`], as one hash.
 pub type Circumstances = [u8; 32];
@@ -139,12 +139,14 @@ struct Packed<'a> {
     steps: Vec<PackedStep<'a>>,
     expectations: Vec<Expectation>,
     fail_fast: bool,
+    study: Option<Study>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct PackedStep<'a> {
     name: String,
     recipe: Key,
+    base: Option<String>,
     role: String,
     plugin: usize,
     components: Vec<usize>,
@@ -237,6 +239,7 @@ impl Packed<'_> {
             .map(|(s, recipe)| PackedStep {
                 name: s.name.clone(),
                 recipe: *recipe,
+                base: s.base.clone(),
                 role: s.role.clone(),
                 plugin: number(&s.plugin),
                 components: s.components.iter().map(&mut number).collect(),
@@ -258,6 +261,7 @@ impl Packed<'_> {
             steps,
             expectations: workflow.expectations.clone(),
             fail_fast: workflow.on_failure == FailurePolicy::FailFast,
+            study: workflow.study.clone(),
         }
     }
 
@@ -266,6 +270,7 @@ impl Packed<'_> {
         let step = |s: PackedStep<'_>| {
             Some(ResolvedStep {
                 name: s.name,
+                base: s.base,
                 role: s.role,
                 plugin: library(s.plugin)?,
                 components: s
@@ -298,6 +303,7 @@ impl Packed<'_> {
             } else {
                 FailurePolicy::KeepGoing
             },
+            study: self.study,
         };
         Some((workflow, recipes))
     }

@@ -63,6 +63,12 @@ impl<'a> Checker<'a> {
         self.value(node, &View(self.follow(self.root)), what, &node.span);
     }
 
+    /// Checks a value against a definition of the document, such as `Step`.
+    pub fn check_as(&mut self, definition: &str, node: &Node, what: &str) {
+        let schema = &self.root["$defs"][definition];
+        self.value(node, &View(self.follow(schema)), what, &node.span);
+    }
+
     fn follow(&self, schema: &'a Value) -> Vec<&'a Map<String, Value>> {
         let mut maps = Vec::new();
         let mut next = Some(schema);

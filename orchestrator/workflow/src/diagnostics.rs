@@ -1,6 +1,6 @@
 //! Errors with their place: collected in one pass, shown as text with source lines, or as JSON.
 
-use crate::yaml::Span;
+use crate::yaml::{Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::text::{LONGEST_MESSAGE, excerpt};
 use plyflow_model::text::{one_line, safe, safe_in_place};
@@ -41,6 +41,9 @@ pub struct Diagnostic {
     /// What to do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub help: Option<String>,
+    /// Points of the study at which it was found; empty: it does not depend on them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<String>,
     #[serde(skip)]
     span: Span,
     #[serde(skip)]
@@ -223,18 +226,20 @@ pub struct Source {
     pub folder: Utf8PathBuf,
     /// Its text.
     pub text: Arc<String>,
-    /// What the command line puts into its tree. Places in these texts are counted on beyond the file's own, each text
+    /// What the command line and other files put into its tree. Places in these texts are counted on beyond the file's own, each text
     /// from its `start`, so that a node of the tree knows by its span alone where it comes from.
     pub set: Vec<SetText>,
 }
 
-/// A text of the command line, `STEP.PARAMETER=VALUE`.
+/// A text of which parts are put into the tree of a file: one of the command line (`STEP.PARAMETER=VALUE`), or that of another file.
 #[derive(Debug, Clone)]
 pub struct SetText {
     /// Place of its first byte, beyond the end of the file.
     pub start: usize,
     /// As given.
     pub text: Arc<String>,
+    /// The file that it is the text of; none: it is of the command line.
+    pub name: Option<Utf8PathBuf>,
 }
 
 impl Source {
@@ -251,7 +256,28 @@ impl Source {
         self.set.push(SetText {
             start,
             text: Arc::new(text.to_owned()),
+            name: None,
         });
+        start
+    }
+
+    /// Where a place of the tree comes from: the text, its file (none: the command line), and the place of its first byte.
+    pub fn origin(&self, span: &Span) -> (Arc<String>, Option<Utf8PathBuf>, usize) {
+        match self.set.iter().rev().find(|s| s.start <= span.start) {
+            Some(set) => (set.text.clone(), set.name.clone(), set.start),
+            None => (self.text.clone(), Some(self.name.clone()), 0),
+        }
+    }
+
+    /// Adds a text of another file, or finds it, and returns the place of its first byte.
+    pub fn add_text(&mut self, text: Arc<String>, name: Option<Utf8PathBuf>) -> usize {
+        let same = |s: &&SetText| Arc::ptr_eq(&s.text, &text) && s.name == name;
+        if let Some(known) = self.set.iter().find(same) {
+            return known.start;
+        }
+        let end = |s: &SetText| s.start + s.text.len();
+        let start = self.set.last().map_or(self.text.len(), end) + 1;
+        self.set.push(SetText { start, text, name });
         start
     }
 }
@@ -262,6 +288,7 @@ pub struct Problems {
     items: Vec<Diagnostic>,
     read: BTreeMap<Utf8PathBuf, String>,
     forms: Vec<(Utf8PathBuf, Utf8PathBuf)>,
+    parsed: BTreeMap<Utf8PathBuf, (Source, Node)>,
 }
 
 impl Problems {
@@ -276,6 +303,14 @@ impl Problems {
         let mut message = shown(message);
         let (file, text, span) = match set {
             None => (source.name.clone(), &source.text, span.clone()),
+            Some(SetText {
+                start,
+                text,
+                name: Some(name),
+            }) => {
+                let span = span.start - start..span.end.max(span.start) - start;
+                (name.clone(), text, span)
+            }
             Some(set) => {
                 message.push_str(&format!(" (given by `--set {}`)", excerpt(&set.text, 200)));
                 let span = span.start - set.start..span.end.max(span.start) - set.start;
@@ -292,6 +327,7 @@ impl Problems {
             given: None,
             expected: None,
             help: None,
+            points: Vec::new(),
             span,
             text: Some(text.clone()),
         })
@@ -308,6 +344,7 @@ impl Problems {
             given: None,
             expected: None,
             help: None,
+            points: Vec::new(),
             span: 0..0,
             text: None,
         })
@@ -346,6 +383,25 @@ impl Problems {
         &self.read
     }
 
+    /// A file that was read and parsed in this pass. It is read once, whoever names it, and at however many points.
+    pub fn parsed(&self, path: &Utf8Path) -> Option<(Source, Node)> {
+        self.parsed.get(path).cloned()
+    }
+
+    /// Keeps a file that was read and parsed.
+    pub fn keep_parsed(&mut self, path: &Utf8Path, file: &(Source, Node)) {
+        self.parsed.insert(path.to_owned(), file.clone());
+    }
+
+    /// Says of all findings behind the first `from` that they are of this point of the study.
+    pub fn at_point(&mut self, from: usize, point: &str) {
+        for d in &mut self.items[from..] {
+            if d.points.is_empty() && !point.is_empty() {
+                d.points.push(point.to_owned());
+            }
+        }
+    }
+
     /// How many so far; to learn whether a part added any.
     pub fn count(&self) -> usize {
         self.items.len()
@@ -365,8 +421,36 @@ impl Problems {
         items.sort_by_key(|d| (rank(d), d.line, d.column));
         let mut kept: Vec<Diagnostic> = Vec::new();
         for d in items {
-            if !kept.contains(&d) {
-                kept.push(d);
+            if d.points.is_empty() {
+                if !kept.contains(&d) {
+                    kept.push(d);
+                }
+                continue;
+            }
+            // What is wrong at one place for many points is one finding.
+            let same = |k: &&mut Diagnostic| {
+                !k.points.is_empty() && (&k.file, &k.span, k.line) == (&d.file, &d.span, d.line)
+            };
+            match kept.iter_mut().rev().find(same) {
+                Some(known) => {
+                    if !known.points.contains(&d.points[0]) {
+                        known.points.extend(d.points);
+                    }
+                }
+                None => kept.push(d),
+            }
+        }
+        for d in &mut kept {
+            match d.points.as_slice() {
+                [] => {}
+                [one] => d.message += &format!(" (at the point {})", excerpt(one, 200)),
+                [one, further @ ..] => {
+                    d.message += &format!(
+                        " (at the point {}, and something here also at {} more)",
+                        excerpt(one, 200),
+                        further.len()
+                    );
+                }
             }
         }
         Diagnostics { items: kept }
@@ -387,6 +471,7 @@ impl Diagnostic {
             given: made(&self.given),
             expected: made(&self.expected),
             help: made(&self.help),
+            points: self.points.iter().map(|p| safe(p).into_owned()).collect(),
             span: self.span.clone(),
             text,
             ..*self

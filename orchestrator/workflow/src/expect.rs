@@ -5,7 +5,8 @@ use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
 use crate::load::Draft;
 use crate::parameters::{named, unreadable};
-use crate::resolved::Expectation;
+use crate::resolved::{Expectation, FamilyExpectation};
+use crate::study::Asked;
 use crate::yaml::{Entry, Kind, Node};
 use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_model::manifest::one_of;
@@ -16,32 +17,57 @@ use std::sync::{Arc, LazyLock};
 
 static EXPECTED: LazyLock<Value> = LazyLock::new(schema::expected);
 
+/// What a workflow expects.
+#[derive(Default)]
+pub(crate) struct Expected {
+    /// On results of steps.
+    pub of_results: Vec<Expectation>,
+    /// On responses, over the points of a study.
+    pub of_responses: Vec<FamilyExpectation>,
+}
+
 /// Reads the list, here or in its file; everything wrong is reported where it stands.
 pub(crate) fn expectations(
     root: &Node,
     drafts: &[Draft<'_>],
+    asked: Option<&Asked<'_>>,
     source: &Source,
     problems: &mut Problems,
-) -> Vec<Expectation> {
+) -> Expected {
     let Some(expect) = root.get("expect") else {
-        return Vec::new();
+        return Expected::default();
     };
     let list = |items: &[Node], source: &Source, problems: &mut Problems| {
-        let read = |item| entry(item, drafts, source, problems);
-        items.iter().flat_map(read).collect::<Vec<_>>()
+        let mut all = Expected::default();
+        for item in items {
+            match (item.get("response"), asked) {
+                (None, _) => all.of_results.extend(entry(item, drafts, source, problems)),
+                (Some(_), Some(asked)) => {
+                    all.of_responses
+                        .extend(asked.expectation(item, source, problems));
+                }
+                (Some(node), None) => {
+                    let message = "`response` in a workflow without a study";
+                    let d = problems.add(source, &node.span, message);
+                    d.expected("`step` and `result`");
+                }
+            }
+        }
+        all
     };
     let Some(given) = expect.text() else {
         return list(expect.items(), source, problems);
     };
     let Some((file, tree)) = read(given, expect, source, problems) else {
-        return Vec::new();
+        return Expected::default();
     };
     Checker::new(&EXPECTED, &file, problems).check(&tree, "the expectations");
     let items = tree.get("expectations").map_or(&[][..], Node::items);
     let origin = tree.get("source").and_then(Node::text);
     let mut all = list(items, &file, problems);
-    for e in &mut all {
-        e.source = e.source.take().or_else(|| origin.map(str::to_owned));
+    let sources = all.of_results.iter_mut().map(|e| &mut e.source);
+    for source in sources.chain(all.of_responses.iter_mut().map(|e| &mut e.source)) {
+        *source = source.take().or_else(|| origin.map(str::to_owned));
     }
     all
 }
@@ -157,20 +183,21 @@ fn is_run_of(name: &str, step: &str) -> bool {
     }
 }
 
-fn expectation(
-    item: &Node,
+/// What the plugin of a step declares of one of its results: its name, its unit, and whether it depends on the machine. `None` when there is
+/// no such step or result (and that is reported).
+pub(crate) fn declared(
     step: &Node,
+    result: &Node,
     drafts: &[Draft<'_>],
     source: &Source,
     problems: &mut Problems,
-) -> Option<Expectation> {
+) -> Option<(String, String, bool)> {
     let name = step.text()?;
     let Some(draft) = drafts.iter().find(|d| d.name() == name) else {
         let d = problems.add(source, &step.span, format!("there is no step `{name}`"));
         d.given(name).suggest(name, drafts.iter().map(Draft::name));
         return None;
     };
-    let result = item.get("result")?;
     let result_name = result.text()?;
     let manifest = &draft.plugin.as_ref()?.manifest;
     let Some(declared) = manifest.result(result_name) else {
@@ -196,9 +223,36 @@ fn expectation(
             return None;
         }
     }
+    Some((
+        result_name.to_owned(),
+        declared.unit.clone(),
+        declared.measured,
+    ))
+}
+
+fn expectation(
+    item: &Node,
+    step: &Node,
+    drafts: &[Draft<'_>],
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<Expectation> {
+    let name = step.text()?;
+    let result = match item.get("result") {
+        Some(result) => result,
+        None => {
+            // So that an unknown step is told all the same.
+            if !drafts.iter().any(|d| d.name() == name) {
+                let d = problems.add(source, &step.span, format!("there is no step `{name}`"));
+                d.given(name).suggest(name, drafts.iter().map(Draft::name));
+            }
+            return None;
+        }
+    };
+    let (result_name, unit, _) = declared(step, result, drafts, source, problems)?;
     let mut number = |key: &str| {
         let entry = item.entry(key).filter(|e| e.value.kind != Kind::Null)?;
-        value(entry, &declared.unit, result_name, source, problems)
+        value(entry, &unit, &result_name, source, problems)
     };
     let (value, tolerance) = (number("value"), number("tolerance"));
     let (minimum, maximum) = (number("minimum"), number("maximum"));
@@ -229,8 +283,8 @@ fn expectation(
     Some(Expectation {
         step: name.to_owned(),
         mean_over: Vec::new(),
-        result: result_name.to_owned(),
-        unit: declared.unit.clone(),
+        result: result_name,
+        unit,
         value,
         tolerance,
         minimum,
@@ -240,7 +294,7 @@ fn expectation(
 }
 
 /// A value with the unit of the result, in SI.
-fn value(
+pub(crate) fn value(
     entry: &Entry,
     unit: &str,
     result: &str,

@@ -13,9 +13,11 @@ mod hints;
 mod load;
 mod overrides;
 mod parameters;
+mod paths;
 mod process;
 pub mod resolved;
 mod scene;
+mod study;
 mod wires;
 mod yaml;
 

@@ -10,8 +10,9 @@ use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
 use crate::resolved::{FailurePolicy, ResolvedStep, ResolvedWorkflow, Resources};
 use crate::scene::is_word;
+use crate::study::{Asked, Family};
 use crate::wires::{self, Wiring};
-use crate::yaml::{Entry, Node};
+use crate::yaml::{Entry, Kind, Node};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_model::manifest::PluginKind;
@@ -22,9 +23,10 @@ use std::collections::HashSet;
 use std::rc::Rc;
 use std::sync::LazyLock;
 
-static WORKFLOW: LazyLock<Value> = LazyLock::new(schema::workflow);
+pub(crate) static WORKFLOW: LazyLock<Value> = LazyLock::new(schema::workflow);
 
 /// One step while it is being resolved.
+#[derive(Clone)]
 pub(crate) struct Draft<'n> {
     /// Its entry in `steps`.
     pub entry: &'n Entry,
@@ -135,26 +137,51 @@ fn load_into(
     if other_format(&root, "plyflow", wanted, &source, problems) {
         return None;
     }
-    overrides::apply(&mut root, overrides, &mut source, problems);
-    Checker::new(&WORKFLOW, &source, problems).check(&root, "the workflow");
+    overrides::apply(&mut root, overrides, &mut source, problems, catalog);
+    let family = match root.get("study") {
+        Some(study) => Some(Family::read(study, &root, &source, problems)?),
+        None => None,
+    };
+    let shown = family.as_ref().map(|f| f.first(&root));
+    Checker::new(&WORKFLOW, &source, problems)
+        .check(shown.as_ref().unwrap_or(&root), "the workflow");
     plugin_folders(&root, &source, problems);
     let drafts = drafts(&root, &source, catalog, problems);
     let wiring = wires::connect(&drafts, &source, problems);
-    let expectations = expect::expectations(&root, &drafts, &source, problems);
-    let mut steps: Vec<Option<ResolvedStep>> = drafts
-        .iter()
-        .enumerate()
-        .map(|(i, draft)| step(draft, &wiring, i, &source, catalog, problems))
-        .collect();
-    if problems.count() > 0 {
-        return None;
+    let asked = family
+        .as_ref()
+        .map(|f| Asked::read(f, &root, &drafts, &wiring, &source, problems));
+    if let (None, Some(e)) = (
+        &asked,
+        root.entry("responses")
+            .filter(|e| e.value.kind != Kind::Null),
+    ) {
+        let d = problems.add(
+            &source,
+            &e.key_span,
+            "`responses` in a workflow without a study",
+        );
+        d.expected("a block `study`, or no `responses`");
     }
-    let steps = wiring
-        .order
-        .iter()
-        .map(|&i| steps[i].take())
-        .collect::<Option<Vec<_>>>()?;
-    let on_failure = match root.get("on_failure").and_then(Node::text) {
+    let expectations = expect::expectations(&root, &drafts, asked.as_ref(), &source, problems);
+    let mut resolve = |draft: &Draft<'_>, i: usize, problems: &mut Problems| {
+        step(draft, &wiring, i, &source, catalog, problems)
+    };
+    let (steps, mut study) = match &family {
+        Some(family) => family.steps(&drafts, &wiring, &source, problems, &mut resolve)?,
+        None => (one_each(&drafts, &wiring, problems, &mut resolve)?, None),
+    };
+    let expectations = match (&mut study, asked) {
+        (Some(study), Some(asked)) => {
+            study.responses = asked.responses;
+            study.expectations = expectations.of_responses;
+            crate::study::at_all_points(expectations.of_results, study, &steps)
+        }
+        _ => expectations.of_results,
+    };
+    let of_study = root.get("study").and_then(|s| s.get("on_failure"));
+    let on_failure = of_study.or(root.get("on_failure"));
+    let on_failure = match on_failure.and_then(Node::text) {
         Some("fail-fast") => FailurePolicy::FailFast,
         _ => FailurePolicy::KeepGoing,
     };
@@ -168,8 +195,29 @@ fn load_into(
         steps,
         expectations,
         on_failure,
+        study,
     };
     Some((workflow, named_folders(&root, &source)))
+}
+
+/// The steps of a workflow that is no study, in topological order.
+fn one_each(
+    drafts: &[Draft<'_>],
+    wiring: &Wiring,
+    problems: &mut Problems,
+    resolve: &mut dyn FnMut(&Draft<'_>, usize, &mut Problems) -> Option<ResolvedStep>,
+) -> Option<Vec<ResolvedStep>> {
+    let mut steps: Vec<Option<ResolvedStep>> = drafts
+        .iter()
+        .enumerate()
+        .map(|(i, draft)| resolve(draft, i, problems))
+        .collect();
+    if problems.count() > 0 {
+        return None;
+    }
+    (wiring.order.iter())
+        .map(|&i| steps[i].take())
+        .collect::<Option<Vec<_>>>()
 }
 
 /// Reads and parses the workflow file.
@@ -298,6 +346,7 @@ fn step(
     let output = manifest.output.as_ref()?;
     Some(ResolvedStep {
         name: draft.name().to_owned(),
+        base: None,
         role: manifest.role.clone(),
         plugin: plugin.id.clone(),
         components,

@@ -1,7 +1,11 @@
 //! Parameters given on the command line in place of the file's.
 
+use crate::catalog::Plugins;
 use crate::diagnostics::{Problems, Source};
-use crate::yaml::{Entry, Kind, Node, Span, parse};
+use crate::paths::{Blocked, Word, put, put_in_file};
+use crate::yaml::{Kind, Node, Span, parse};
+use indexmap::IndexMap;
+use plyflow_model::manifest::{Declaration, Shape};
 
 /// `STEP.PARAMETER=VALUE`, the value written as in YAML. Places are those in this text.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,13 +14,6 @@ pub struct Override {
     step: Word,
     path: Vec<Word>,
     value: Node,
-}
-
-/// A name and where it stands.
-#[derive(Debug, Clone, PartialEq)]
-struct Word {
-    name: String,
-    span: Span,
 }
 
 impl Word {
@@ -86,6 +83,7 @@ pub(crate) fn apply(
     overrides: &[Override],
     source: &mut Source,
     problems: &mut Problems,
+    catalog: &Plugins<'_>,
 ) {
     for given in overrides {
         let start = source.add_set(&given.text);
@@ -116,26 +114,77 @@ pub(crate) fn apply(
         let path: Vec<Word> = std::iter::once(with)
             .chain(given.path.iter().map(on))
             .collect();
-        if let Err(blocked) = set(step, &path, value) {
-            let (name, below) = (&path[blocked.at - 1].name, &path[blocked.at]);
-            let message = format!(
-                "`{name}` is {}: there is no `{}` in it to be set",
-                blocked.what, below.name
-            );
-            let d = problems.add(source, &below.span, message);
-            d.given(given.text.clone()).help(format!(
-                "give the whole of `{name}`, as in --set '{}.{name}={{..}}', or write it out in the file",
-                wanted.name
-            ));
+        let file = step
+            .get("plugin")
+            .and_then(Node::text)
+            .and_then(|name| catalog.find(name, &source.folder).ok())
+            .and_then(|entry| words_to_file(&entry.manifest.parameters, &given.path));
+        if let Err(blocked) = set(step, &path, file, value) {
+            let name = &path[blocked.at - 1].name;
+            let d = blocked.report(&path, source, problems);
+            d.given(given.text.clone());
+            if blocked.names.is_empty() {
+                d.help(format!(
+                    "give the whole of `{name}`, as in --set '{}.{name}={{..}}', or write it out in the file",
+                    wanted.name
+                ));
+            }
         }
     }
 }
 
-/// What stands where a mapping is expected on the way to what is set.
-struct Blocked {
-    /// How many words of the path lead there.
-    at: usize,
-    what: String,
+/// How many words of a path lead to a parameter that is a scene or a material, if it goes on from there.
+fn words_to_file(declared: &IndexMap<String, Declaration>, path: &[Word]) -> Option<usize> {
+    let mut declaration = declared.get(&path.first()?.name)?;
+    for at in 1..path.len() {
+        declaration = match &declaration.shape {
+            Shape::Scene | Shape::SheetMaterial => return Some(at),
+            Shape::Object(fields) => fields.get(&path[at].name)?,
+            Shape::List(of, _) | Shape::Map(of) => of,
+            _ => return None,
+        };
+    }
+    None
+}
+
+/// Sets a value of a step; `file`: how many words behind `with` lead to a scene or a material, perhaps in a file of its own.
+fn set(step: &mut Node, path: &[Word], file: Option<usize>, value: Node) -> Result<(), Blocked> {
+    let Some(file) = file else {
+        return put(step, path, value, false);
+    };
+    let (to, rest) = path.split_at(file + 1);
+    // What stands there is taken out, changed, and put back.
+    let mut place = Node {
+        kind: Kind::Null,
+        span: to[file].span.clone(),
+    };
+    swap(step, to, &mut place)?;
+    let done = put_in_file(&mut place, rest, value);
+    swap(step, to, &mut place)?;
+    done.map_err(|b| Blocked {
+        at: b.at + to.len(),
+        ..b
+    })
+}
+
+/// Exchanges a value with the one where a path leads.
+fn swap(node: &mut Node, path: &[Word], with: &mut Node) -> Result<(), Blocked> {
+    let mut value = Node {
+        kind: Kind::Null,
+        span: with.span.clone(),
+    };
+    std::mem::swap(&mut value, with);
+    if let Some(there) = find(node, path) {
+        std::mem::swap(there, &mut value);
+        *with = value;
+        return Ok(());
+    }
+    put(node, path, value, false)
+}
+
+fn find<'n>(node: &'n mut Node, path: &[Word]) -> Option<&'n mut Node> {
+    path.iter()
+        .try_fold(node, |node, word| child(node, &word.name))
 }
 
 fn child<'n>(node: &'n mut Node, key: &str) -> Option<&'n mut Node> {
@@ -149,44 +198,29 @@ fn child<'n>(node: &'n mut Node, key: &str) -> Option<&'n mut Node> {
         .map(|e| &mut e.value)
 }
 
-fn set(node: &mut Node, path: &[Word], value: Node) -> Result<(), Blocked> {
-    let Some((word, path)) = path.split_first() else {
-        *node = value;
-        return Ok(());
-    };
-    if node.kind == Kind::Null {
-        *node = Node {
-            kind: Kind::Map(Vec::new()),
-            span: word.span.clone(),
-        };
-    }
-    let Kind::Map(entries) = &mut node.kind else {
-        return Err(Blocked {
-            at: 0,
-            what: node.describe(),
-        });
-    };
-    let at = entries
-        .iter()
-        .rposition(|e| e.key == word.name)
-        .unwrap_or_else(|| {
-            entries.push(Entry {
-                key: word.name.clone(),
-                key_span: word.span.clone(),
-                value: Node {
-                    kind: Kind::Null,
-                    span: word.span.clone(),
-                },
-            });
-            entries.len() - 1
-        });
-    set(&mut entries[at].value, path, value).map_err(|e| Blocked { at: e.at + 1, ..e })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::catalog::{Catalog, CatalogEntry, CatalogError};
+    use camino::Utf8Path;
+    use plyflow_model::manifest::PluginKind;
     use serde_json::json;
+
+    /// No plugin at all.
+    struct Nothing;
+
+    impl Catalog for Nothing {
+        fn find(&self, name: &str, _: &Utf8Path) -> Result<CatalogEntry, CatalogError> {
+            Err(CatalogError::NotFound {
+                name: name.into(),
+                searched: Vec::new(),
+            })
+        }
+
+        fn names(&self, _: PluginKind) -> Vec<String> {
+            Vec::new()
+        }
+    }
 
     #[test]
     fn an_override_replaces_or_adds_a_parameter_at_any_depth() {
@@ -203,7 +237,8 @@ mod tests {
             .iter()
             .map(|t| t.parse().unwrap())
             .collect();
-        apply(&mut root, &list, &mut source, &mut problems);
+        let catalog = Plugins::new(&Nothing);
+        apply(&mut root, &list, &mut source, &mut problems, &catalog);
         assert_eq!(problems.count(), 0);
         let json = root.to_json();
         assert_eq!(json["steps"]["a"]["with"], json!({"x": "2 mm"}));
@@ -213,6 +248,7 @@ mod tests {
             &["c.x=1".parse().unwrap()],
             &mut source,
             &mut problems,
+            &catalog,
         );
         assert_eq!(problems.count(), 1);
     }

@@ -281,7 +281,9 @@ impl<'a> Resolver<'a> {
     /// Reads a file that a parameter names: hashes it and returns its absolute path.
     pub fn file(&mut self, text: &str, node: &Node, at: &Place<'_>) -> Option<Utf8PathBuf> {
         let path = named(self.problems, &at.source.folder, text);
-        match crate::evidence::hash_file(&path) {
+        // Read in this pass already, perhaps for another point of a study.
+        let known = self.problems.files().get(&path).filter(|h| !h.is_empty());
+        match known.map_or_else(|| crate::evidence::hash_file(&path), |h| Ok(h.clone())) {
             Ok(hash) => {
                 self.problems.note_file(&path, &hash);
                 self.files.push(InputFile {

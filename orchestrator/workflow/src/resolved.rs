@@ -2,6 +2,7 @@
 //! the planner and the engine need, and nothing of YAML.
 
 use camino::Utf8PathBuf;
+use plyflow_model::workflow::{FamilyOf, ResponseOf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
@@ -138,8 +139,11 @@ impl fmt::Debug for Parameters {
 /// One step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResolvedStep {
-    /// Name in the workflow.
+    /// Name in the workflow; of a step of a study with the values that it depends on, such as `formed@angle=45deg`.
     pub name: String,
+    /// Of a step of a study: its name in the file. Its plugin, its artifact and its key know it by that, so that a key is of values
+    /// alone: points share what is the same for them, and no other name makes anything run again.
+    pub base: Option<String>,
     /// Role of its plugin.
     pub role: String,
     /// Its plugin.
@@ -162,6 +166,118 @@ pub struct ResolvedStep {
     pub resources: Resources,
     /// How often a failed step is tried again.
     pub retries: u32,
+}
+
+impl ResolvedStep {
+    /// Its name in the file.
+    pub fn in_file(&self) -> &str {
+        self.base.as_deref().unwrap_or(&self.name)
+    }
+}
+
+/// The points of a study, and what is read from them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Study {
+    /// The variables.
+    pub variables: Vec<StudyVariable>,
+    /// The points.
+    pub points: Vec<StudyPoint>,
+    /// Names of the steps in the file, in the order in which they run.
+    pub steps: Vec<String>,
+    /// What is read from every point.
+    pub responses: Vec<StudyResponse>,
+    /// What is expected of it.
+    pub expectations: Vec<FamilyExpectation>,
+    /// The samples: method, number of points, seed.
+    pub samples: Vec<(String, u32, u32)>,
+    /// Failed points that are borne; none: any number may fail, and the run does not end well.
+    pub at_most_failures: Option<u32>,
+}
+
+/// A variable of a study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StudyVariable {
+    /// Name.
+    pub name: String,
+    /// Unit in which its values are shown; empty for plain numbers, texts, and yes or no.
+    pub unit: String,
+    /// The SI unit of the same.
+    pub si_unit: String,
+}
+
+/// A value of a variable.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum StudyValue {
+    /// A number: in the unit of its variable, and in SI.
+    Number {
+        /// As it is shown.
+        shown: f64,
+        /// In SI.
+        si: f64,
+    },
+    /// A text.
+    Text(String),
+    /// Yes or no.
+    Bool(bool),
+}
+
+/// A point of a study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StudyPoint {
+    /// Its name: its values, such as `angle=45deg,mu=0.1`.
+    pub name: String,
+    /// A value for each variable.
+    pub values: Vec<StudyValue>,
+    /// For each step of the file: the position of this point's in the workflow.
+    pub steps: Vec<usize>,
+}
+
+/// What is read from every point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StudyResponse {
+    /// Name.
+    pub name: String,
+    /// Position of its step among the steps of the file.
+    pub step: usize,
+    /// Name of the step's result.
+    pub result: String,
+    /// Its unit.
+    pub unit: String,
+    /// What is taken of several items.
+    pub of: Option<ResponseOf>,
+}
+
+/// A stated expectation over the points of a study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FamilyExpectation {
+    /// Position of the response.
+    pub response: usize,
+    /// What is claimed.
+    pub of: FamilyOf,
+    /// Position of the variable along which is looked.
+    pub over: Option<usize>,
+    /// Where points mirror each other (SI), and as written.
+    pub about: Option<(f64, String)>,
+    /// Whether it grows.
+    pub increasing: bool,
+    /// Positions of the points that are meant.
+    pub points: Vec<u32>,
+    /// The condition that chooses them, as written.
+    pub condition: Option<String>,
+    /// Unit of the numbers below.
+    pub unit: String,
+    /// Expected value (SI), if stated.
+    pub value: Option<f64>,
+    /// Allowed absolute deviation (SI).
+    pub tolerance: Option<f64>,
+    /// Allowed deviation as a part of the largest size of the response.
+    pub relative_tolerance: Option<f64>,
+    /// Lower bound (SI).
+    pub minimum: Option<f64>,
+    /// Upper bound (SI).
+    pub maximum: Option<f64>,
+    /// Where the expectation comes from.
+    pub source: Option<String>,
 }
 
 /// A stated expectation on a result.
@@ -212,4 +328,6 @@ pub struct ResolvedWorkflow {
     pub expectations: Vec<Expectation>,
     /// Failure policy.
     pub on_failure: FailurePolicy,
+    /// Its study, if it is one.
+    pub study: Option<Study>,
 }

@@ -4,6 +4,7 @@ use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Problems, Source};
 use crate::hints::other_format;
 use crate::parameters::{Place, Resolver, find, named, unreadable};
+use crate::paths;
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
@@ -26,6 +27,9 @@ pub fn read(
     given: &str,
 ) -> Option<(Source, Node)> {
     let path = named(problems, &from.folder, given);
+    if let Some(known) = problems.parsed(&path) {
+        return Some(known);
+    }
     let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => bytes,
         Err(e) => {
@@ -33,7 +37,9 @@ pub fn read(
             return None;
         }
     };
-    parse(problems, path, bytes)
+    let file = parse(problems, path.clone(), bytes)?;
+    problems.keep_parsed(&path, &file);
+    Some(file)
 }
 
 /// Parses the bytes of a file.
@@ -105,6 +111,7 @@ pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Opti
             };
             scene_value(resolver, &scene, &place)
         }
+        Kind::Map(_) if node.get("file").is_some() => changed_scene(resolver, node, at),
         Kind::Map(_) => scene_value(resolver, node, at),
         _ => {
             let message = format!("`{}` is {}", at.what, node.describe());
@@ -114,6 +121,51 @@ pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Opti
             None
         }
     }
+}
+
+/// The scene of `{file: .., set: {..}}`, where `set` has values by their path in the file.
+fn changed_scene(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+    only_keys(resolver, node, at, &["file", "set"]);
+    let file = file_of(resolver, node, at, "the path of a scene file")?;
+    let (mut source, mut scene) = read(resolver.problems, at.source, &file.span, file.text()?)?;
+    let before = resolver.problems.count();
+    if let Some(set) = node.entry("set") {
+        paths::apply(&mut scene, &mut source, set, at.source, resolver.problems);
+    }
+    let place = Place {
+        source: &source,
+        key: scene.span.clone(),
+        ..at.clone()
+    };
+    let value = scene_value(resolver, &scene, &place);
+    value.filter(|_| resolver.problems.count() == before)
+}
+
+fn only_keys(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>, known: &[&str]) {
+    for e in node
+        .entries()
+        .iter()
+        .filter(|e| !known.contains(&e.key.as_str()))
+    {
+        let names = known.iter().copied();
+        crate::check::unknown_key(e, &at.what, names, at.source, resolver.problems);
+    }
+}
+
+/// What `file` of a mapping says, if it is a text.
+fn file_of<'n>(
+    resolver: &mut Resolver<'_>,
+    node: &'n Node,
+    at: &Place<'_>,
+    expected: &str,
+) -> Option<&'n Node> {
+    let file = node.get("file")?;
+    if file.text().is_none() {
+        let message = format!("`file` is {}", file.describe());
+        let d = resolver.problems.add(at.source, &file.span, message);
+        d.given(file.describe()).expected(expected);
+    }
+    Some(file)
 }
 
 /// The canonical form of a scene.
@@ -226,24 +278,15 @@ pub fn checked_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>
     material_value(resolver, node, at, sound)
 }
 
-/// Resolves a parameter of type `sheet_material`: a file, a material, or `{file: .., with: {..}}`, where every
-/// parameter under `with` takes the place of the file's own (`null` removes it).
+/// Resolves a parameter of type `sheet_material`: a file, a material, or `{file: .., with: {..}, set: {..}}`, where every
+/// parameter under `with` takes the place of the file's own (`null` removes it), and every value under `set` that at its path.
 pub fn sheet_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
     let expected = Shape::SheetMaterial.expected();
     match &node.kind {
         Kind::Text(file) => material_file(resolver, &node.span, file, at),
-        Kind::Map(entries) if node.get("file").is_some() => {
-            let known = ["file", "with"];
-            for e in entries.iter().filter(|e| !known.contains(&e.key.as_str())) {
-                crate::check::unknown_key(e, &at.what, known, at.source, resolver.problems);
-            }
-            let file = node.get("file")?;
-            if file.text().is_none() {
-                let message = format!("`file` is {}", file.describe());
-                let d = resolver.problems.add(at.source, &file.span, message);
-                d.given(file.describe())
-                    .expected("the path of a material file");
-            }
+        Kind::Map(_) if node.get("file").is_some() => {
+            only_keys(resolver, node, at, &["file", "with", "set"]);
+            file_of(resolver, node, at, "the path of a material file")?;
             varied_material(resolver, node, at)
         }
         Kind::Map(_) => checked_material(resolver, node, at),
@@ -256,10 +299,23 @@ pub fn sheet_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) 
     }
 }
 
-/// The material of `{file: .., with: {..}}`, whose keys have been checked.
+/// The material of `{file: .., with: {..}, set: {..}}`, whose keys have been checked.
 fn varied_material(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
     let file = node.get("file")?;
-    let mut material = material_file(resolver, &file.span, file.text()?, at)?;
+    let before = resolver.problems.count();
+    let (mut source, mut tree) = read(resolver.problems, at.source, &file.span, file.text()?)?;
+    if let Some(set) = node.entry("set") {
+        paths::apply(&mut tree, &mut source, set, at.source, resolver.problems);
+    }
+    let place = Place {
+        source: &source,
+        key: tree.span.clone(),
+        ..at.clone()
+    };
+    let mut material = checked_material(resolver, &tree, &place)?;
+    if resolver.problems.count() > before {
+        return None;
+    }
     let with = node.entry("with").filter(|e| e.value.kind != Kind::Null);
     if let Some(with) = with {
         override_parameters(resolver, &with.value, &mut material, at)?;

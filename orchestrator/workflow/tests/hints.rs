@@ -105,15 +105,36 @@ fn what_is_wrong_with_set_is_shown_in_its_own_text() {
             ],
         ),
         ("coarse.element_size=4", 21, &["`4` has no unit"]),
-        // A file, or the short form of a component, has nothing in it that could be set.
+        // The short form of a component has nothing in it that could be set.
         (
-            "coarse.scene.process.x=1",
-            14,
+            "coarse.element.with.hourglass=1",
+            16,
             &[
-                "`scene` is",
-                "no `process` in it",
-                "--set 'coarse.scene={..}'",
+                "`element` is",
+                "no `with` in it",
+                "--set 'coarse.element={..}'",
             ],
+        ),
+        // A path goes on into the scene's file, and by names into its lists.
+        (
+            "coarse.scene.friction.fabric_fabrik=0.1",
+            23,
+            &["unknown key `fabric_fabrik`", "`fabric_fabric`"],
+        ),
+        (
+            "coarse.scene.sheets.ply_9.fibre_1=1 deg",
+            21,
+            &["no `ply_9` in the list `sheets`", "did you mean"],
+        ),
+        (
+            "coarse.scene.sheets.ply-1.material.with.sheer=1 N/m",
+            41,
+            &["`sheer` is no parameter", "`shear`"],
+        ),
+        (
+            "coarse.scene.sheets.ply-1.fibre_1=1 mm",
+            35,
+            &["`1 mm` is a length"],
         ),
         ("local.element_size=5,5 mm", 20, &["write `5.5 mm`"]),
         (

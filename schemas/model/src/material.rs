@@ -53,4 +53,7 @@ pub struct VariedMaterial {
     /// Parameters that take the place of the file's own; `null` removes one.
     #[serde(default)]
     pub with: serde_json::Map<String, serde_json::Value>,
+    /// Any value of the file by its path, such as `thickness: 0.4 mm` or `with.shear.stiffness: 112 N/m`.
+    #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
+    pub set: serde_json::Map<String, serde_json::Value>,
 }

@@ -6,6 +6,13 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
+mod study;
+
+pub use study::{
+    Direction, ExpectResponse, FamilyOf, PointSet, PointsOf, Response, ResponseOf, Sample,
+    SampleMethod, Scalar, Scale, Span, Study, Values,
+};
+
 /// Version of the workflow format that this crate reads.
 pub const VERSION: u32 = 1;
 
@@ -27,8 +34,14 @@ pub struct Workflow {
     /// Further folders to search for plugins, relative to this file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub plugins: Vec<String>,
+    /// Runs the steps at many points: each value of these variables where `${name}` stands in a step.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub study: Option<Study>,
     /// The steps by name, in any order.
     pub steps: IndexMap<String, Step>,
+    /// What is read from every point of the study, by name: the columns of its table.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub responses: IndexMap<String, Response>,
     /// What is expected of results: a list, or the path of a JSON file with one, relative to this file.
     #[serde(default, skip_serializing_if = "Expectations::is_empty")]
     #[schemars(extend("x-expected" = "a list of expectations, or the path of a JSON file with them"))]
@@ -109,6 +122,16 @@ pub struct Resources {
     pub time_limit: Option<Time>,
 }
 
+/// An entry of `expect`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Expectable {
+    /// On a result of steps.
+    Result(Expect),
+    /// On a response of a study.
+    Response(ExpectResponse),
+}
+
 /// A stated expectation on a result: a value (with a tolerance), a bound, or both.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -161,7 +184,7 @@ impl Of {
 #[serde(untagged)]
 pub enum Expectations {
     /// In the workflow.
-    List(Vec<Expect>),
+    List(Vec<Expectable>),
     /// In a JSON file of their own (see [`Expected`]), relative to the workflow.
     File(String),
 }
@@ -193,7 +216,7 @@ pub struct Expected {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
     /// The expectations.
-    pub expectations: Vec<Expect>,
+    pub expectations: Vec<Expectable>,
 }
 
 /// A value of a result: a plain number when the result has no unit, else text with a unit.
@@ -315,10 +338,10 @@ mod tests {
             "expectations": [{"step": "a", "result": "r", "maximum": 1}]
         }))
         .unwrap();
-        assert_eq!(
-            expected.expectations[0].maximum,
-            Some(ResultValue::Number(1.0))
-        );
+        let Expectable::Result(first) = &expected.expectations[0] else {
+            panic!("an expectation on a result");
+        };
+        assert_eq!(first.maximum, Some(ResultValue::Number(1.0)));
     }
 
     #[test]

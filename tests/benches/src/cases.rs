@@ -237,6 +237,64 @@ pub fn engine() -> Vec<Row> {
     rows
 }
 
+/// A study of a thousand trivial points beside the same steps written out: to plan it, to run it, and to add one point.
+pub fn points() -> Vec<Row> {
+    let n = 1000;
+    let study = |to: usize| {
+        format!(
+            "plyflow: 1\nname: trivial\nstudy:\n  vary:\n    v: {{from: 1, to: {to}, by: 1}}\nsteps:\n  \
+             s: {{plugin: trivial, with: {{value: \"${{v}}\"}}}}\nresponses:\n  value: {{step: s, result: value}}\n"
+        )
+    };
+    assert!(program().is_file());
+    let plan = |folder: &Path| {
+        let mut command = Command::new(program());
+        command.args(["plan", "workflow.yaml"]).current_dir(folder);
+        quiet(command.env("PLYFLOW_PLUGINS", plyflow_faults::folder()));
+    };
+    let planned = least(5, || {
+        let folder = folder(&study(n));
+        spent(|| plan(folder.path()))
+    });
+    let full = least(3, || {
+        let folder = folder(&study(n));
+        spent(|| run(folder.path()))
+    });
+    let by_hand = least(3, || {
+        let folder = written_out(n);
+        spent(|| run(folder.path()))
+    });
+    let grown = folder(&study(n));
+    run(grown.path());
+    std::fs::write(grown.path().join("workflow.yaml"), study(n + 1)).expect("a workflow");
+    let added = spent(|| run(grown.path()));
+    let more = |a: f64, b: f64| 1e3 * (a - b) / n as f64;
+    vec![
+        Row::new(
+            "study of 1,000 trivial points, plan, wall",
+            planned.wall,
+            "s",
+        ),
+        Row::new("study of 1,000 trivial points, plan, CPU", planned.cpu, "s"),
+        Row::new("study of 1,000 trivial points, 2 jobs, CPU", full.cpu, "s"),
+        Row::new(
+            "study of 1,000 trivial points, a point more than by hand, wall",
+            more(full.wall, by_hand.wall),
+            "ms",
+        ),
+        Row::new(
+            "study of 1,000 trivial points, a point more than by hand, CPU",
+            more(full.cpu, by_hand.cpu),
+            "ms",
+        ),
+        Row::new(
+            "study of 1,000 trivial points, one more point, wall",
+            1e3 * added.wall,
+            "ms",
+        ),
+    ]
+}
+
 /// Element-steps per second of one core, as the kernels' own example measures them.
 pub fn kernels() -> Vec<Row> {
     let target = program()

@@ -1,7 +1,7 @@
 //! Measures the built program from outside and appends one JSON row per case to a file under
 //! `docs/benchmarks`, named after the machine's processor.
 //!
-//! `plyflow-benches [engine] [kernels] [solver] [profile] [limits] [study] [busy]`: these groups, or all.
+//! `plyflow-benches [engine] [points] [kernels] [solver] [profile] [limits] [study] [busy]`: these groups, or all.
 
 mod cases;
 mod limits;
@@ -15,8 +15,9 @@ type Group = (&'static str, fn() -> Vec<cases::Row>);
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let groups: [Group; 7] = [
+    let groups: [Group; 8] = [
         ("engine", cases::engine),
+        ("points", cases::points),
         ("kernels", cases::kernels),
         ("solver", solver::solver),
         ("profile", solver::profile),

@@ -30,6 +30,27 @@ impl Unit {
         offset: 0.0,
     };
 
+    /// Whether values of it do not begin at the zero of its dimension (`degC`): such values cannot be added or scaled.
+    pub fn has_offset(&self) -> bool {
+        self.offset != 0.0
+    }
+
+    /// What a number in this unit is multiplied by to be in another one: 10^a x b / c. `None` where that is no ratio of whole
+    /// numbers (degrees and radians), or the two have no zero in common.
+    pub fn factor_to(&self, other: &Unit) -> Option<(i32, u128, u128)> {
+        let same = self.exponents == other.exponents
+            && self.degrees == other.degrees
+            && self.offset == other.offset;
+        let [a, b] = [self.numerator, self.denominator].map(u128::from);
+        let [c, d] = [other.numerator, other.denominator].map(u128::from);
+        let ratio = (
+            self.decimal.checked_sub(other.decimal)?,
+            a.checked_mul(d)?,
+            b.checked_mul(c)?,
+        );
+        same.then_some(ratio)
+    }
+
     /// Multiplies by a symbol to a power; `None` when a factor or exponent overflows.
     fn times(&mut self, symbol: &Symbol, prefix: i32, power: i32) -> Option<()> {
         for (e, s) in self.exponents.iter_mut().zip(symbol.5) {

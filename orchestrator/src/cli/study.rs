@@ -1,0 +1,569 @@
+//! The table of a study: a row for each of its points, whatever became of it; and what is expected of the points together.
+
+use super::args::{Format, ResultsArgs};
+use super::results::{Row, csv_text};
+use super::table::{number, table};
+use super::{Done, Stop, print};
+use crate::engine::Session;
+use crate::engine::class_of;
+use crate::engine::core::{Id, State};
+use crate::exit;
+use plyflow_model::job::Record;
+use plyflow_model::units::si_number;
+use plyflow_model::workflow::{FamilyOf, ResponseOf};
+use plyflow_study::{Claim, Found, Mark, judge};
+use plyflow_workflow::resolved::{
+    Expectation, FamilyExpectation, Study, StudyPoint, StudyResponse, StudyValue,
+};
+use serde_json::{Value, json};
+use std::collections::{BTreeSet, HashMap};
+
+/// Where the expectations over a study stand in lists of results.
+pub const STEP: &str = "study";
+
+/// Points that a summary shows.
+const SHOWN: usize = 20;
+
+/// Characters of a cause that a table shows.
+const CAUSE: usize = 80;
+
+/// What became of a point.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Status {
+    /// All its steps are there.
+    Done,
+    /// A step of it has failed.
+    Failed {
+        /// The step.
+        step: String,
+        /// The class of the failure.
+        class: &'static str,
+        /// Why, in one line.
+        cause: String,
+    },
+    /// Something of it has not been run yet.
+    NotRun,
+}
+
+impl Status {
+    /// In a word.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Failed { .. } => "failed",
+            Self::NotRun => "not run",
+        }
+    }
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// What became of the point.
+    pub status: Status,
+    /// For each response: its value (SI); `None`: there is none.
+    pub responses: Vec<Option<f64>>,
+    /// For each step that a response is of: the keys of its artifacts, hex, of several items one behind the other.
+    pub keys: Vec<String>,
+}
+
+/// The table.
+pub struct Table<'s> {
+    /// The study.
+    pub study: &'s Study,
+    /// Steps that responses are of, each once, as positions among the steps of the file.
+    pub steps: Vec<usize>,
+    /// A row for each point.
+    pub lines: Vec<Line>,
+}
+
+impl<'s> Table<'s> {
+    /// Reads what the store has of every point. `records`: of all instances that are done.
+    ///
+    /// # Panics
+    /// When the workflow is no study; the caller has asked.
+    pub fn read(session: &Session<'s>, records: &[(Id, Record)]) -> Self {
+        let study = session.workflow.study.as_ref().expect("a study");
+        let mut steps: Vec<usize> = Vec::new();
+        for response in &study.responses {
+            if !steps.contains(&response.step) {
+                steps.push(response.step);
+            }
+        }
+        let records: HashMap<Id, &Record> = records.iter().map(|(id, r)| (*id, r)).collect();
+        let mut by_step: Vec<Vec<Id>> = vec![Vec::new(); session.core.graph().steps.len()];
+        for (id, instance) in session.core.instances().iter().enumerate() {
+            by_step[instance.step].push(id);
+        }
+        for ids in &mut by_step {
+            ids.sort_by(|a, b| {
+                session.core.instances()[*a]
+                    .item
+                    .cmp(&session.core.instances()[*b].item)
+            });
+        }
+        let mut known: HashMap<usize, Fate> = HashMap::new();
+        let lines = study.points.iter().map(|point| {
+            let fates: Vec<usize> = point.steps.clone();
+            for step in &fates {
+                known
+                    .entry(*step)
+                    .or_insert_with(|| Fate::of(session, *step, &by_step[*step]));
+            }
+            let status = status(fates.iter().map(|s| &known[s]));
+            let value = |r: &StudyResponse| {
+                let ids = &by_step[point.steps[r.step]];
+                let whole = known[&point.steps[r.step]] == Fate::Done;
+                whole.then(|| response(r, ids, &records)).flatten()
+            };
+            let keys = |step: &usize| {
+                let ids = by_step[point.steps[*step]].iter();
+                let keys = ids.filter_map(|id| session.core.instances()[*id].key);
+                keys.map(|k| k.hex()).collect::<Vec<_>>().join(" ")
+            };
+            Line {
+                status,
+                responses: study.responses.iter().map(value).collect(),
+                keys: steps.iter().map(keys).collect(),
+            }
+        });
+        let lines = lines.collect();
+        Self {
+            study,
+            steps,
+            lines,
+        }
+    }
+
+    /// How many points have this status.
+    pub fn count(&self, word: &str) -> usize {
+        self.lines
+            .iter()
+            .filter(|l| l.status.word() == word)
+            .count()
+    }
+
+    /// Seeds of the samples, in words.
+    pub fn seeds(&self) -> String {
+        let seeds = self.study.samples.iter().map(|s| s.2.to_string());
+        seeds.collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// What became of a step at a point.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Fate {
+    Done,
+    Failed(String, String),
+    NotRun,
+}
+
+impl Fate {
+    fn of(session: &Session<'_>, step: usize, ids: &[Id]) -> Self {
+        let core = &session.core;
+        // `--until` may have left it out.
+        if !core.graph().steps[step].wanted {
+            return Self::NotRun;
+        }
+        if let Some(failure) = ids.iter().find_map(|id| session.failed_before(*id)) {
+            return Self::Failed(failure.label, failure.reason);
+        }
+        let done = |id: &Id| matches!(core.instances()[*id].state, State::Done { .. });
+        match ids.iter().all(done) && core.hidden_by(step).is_empty() {
+            true => Self::Done,
+            false => Self::NotRun,
+        }
+    }
+}
+
+fn status<'f>(fates: impl Iterator<Item = &'f Fate>) -> Status {
+    let mut all = Status::Done;
+    for fate in fates {
+        match fate {
+            Fate::Failed(step, reason) => {
+                return Status::Failed {
+                    step: step.clone(),
+                    class: class_of(reason),
+                    cause: super::run::first_line(reason).to_owned(),
+                };
+            }
+            Fate::NotRun => all = Status::NotRun,
+            Fate::Done => {}
+        }
+    }
+    all
+}
+
+fn response(r: &StudyResponse, ids: &[Id], records: &HashMap<Id, &Record>) -> Option<f64> {
+    let mut values = Vec::with_capacity(ids.len());
+    for id in ids {
+        let results = &records.get(id)?.results;
+        // What depends on the machine has no place in a table that is the same on every one.
+        let found = results.iter().find(|n| n.name == r.result && !n.measured)?;
+        values.push(found.value);
+    }
+    let sum = || values.iter().sum::<f64>();
+    match r.of {
+        None => values.first().copied().filter(|_| values.len() == 1),
+        Some(ResponseOf::Sum) => Some(sum()),
+        _ if values.is_empty() => None,
+        Some(ResponseOf::Mean) => Some(sum() / values.len() as f64),
+        Some(ResponseOf::Max) => values.iter().copied().reduce(f64::max),
+        Some(ResponseOf::Min) => values.iter().copied().reduce(f64::min),
+    }
+}
+
+/// What a study bears of the failures of a run, in words; `None`: it does not.
+pub fn borne(session: &Session<'_>) -> Option<String> {
+    let study = session.workflow.study.as_ref()?;
+    let most = study.at_most_failures? as usize;
+    let core = &session.core;
+    let failed: BTreeSet<usize> = (0..core.instances().len())
+        .filter(|id| core.instances()[*id].state == State::Failed)
+        .map(|id| core.instances()[id].step)
+        .collect();
+    let is_failed = |p: &&StudyPoint| p.steps.iter().any(|s| failed.contains(s));
+    let n = study.points.iter().filter(is_failed).count();
+    let points = study.points.len();
+    (n <= most).then(|| {
+        format!(
+            "{n} of {points} points failed; the study bears {most} (`at_most_failures`), so that this run ends well\n"
+        )
+    })
+}
+
+// Expectations over the points.
+
+/// A row of results for each expectation over the points; none without a study.
+pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
+    let Some(study) = &session.workflow.study else {
+        return Vec::new();
+    };
+    if study.expectations.is_empty() || session.core.graph().steps.iter().any(|s| !s.wanted) {
+        return Vec::new();
+    }
+    let table = Table::read(session, records);
+    study.expectations.iter().map(|e| row(&table, e)).collect()
+}
+
+/// A name for the number that is held against an expectation.
+fn title(study: &Study, e: &FamilyExpectation) -> String {
+    let response = &study.responses[e.response].name;
+    let over = e
+        .over
+        .map(|i| study.variables[i].name.as_str())
+        .unwrap_or_default();
+    let name = match e.of {
+        FamilyOf::Each => response.clone(),
+        FamilyOf::Mean | FamilyOf::Max | FamilyOf::Min => format!("{} of {response}", e.of.word()),
+        FamilyOf::Argmax | FamilyOf::Argmin => {
+            format!("{over} at the {} of {response}", &e.of.word()[3..])
+        }
+        FamilyOf::Monotone if e.increasing => format!("fall of {response} along {over}"),
+        FamilyOf::Monotone => format!("rise of {response} along {over}"),
+        FamilyOf::ZeroWhere => format!("largest size of {response}"),
+        FamilyOf::SymmetricAbout => {
+            let about = e.about.as_ref().map_or("", |a| a.1.as_str());
+            format!("asymmetry of {response} about {over} = {about}")
+        }
+    };
+    match &e.condition {
+        Some(condition) => format!("{name} where {condition}"),
+        None => name,
+    }
+}
+
+fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
+    let found = found(table, e);
+    let relative = e.relative_tolerance.map(|t| {
+        let all = table.lines.iter().filter_map(|l| l.responses[e.response]);
+        t * all.fold(0.0, |a: f64, v| a.max(v.abs()))
+    });
+    let along = matches!(
+        e.of,
+        FamilyOf::Monotone | FamilyOf::ZeroWhere | FamilyOf::SymmetricAbout
+    );
+    let expected = Expectation {
+        step: STEP.into(),
+        mean_over: Vec::new(),
+        result: table.study.responses[e.response].name.clone(),
+        unit: e.unit.clone(),
+        value: e.value,
+        tolerance: e.tolerance.filter(|_| !along),
+        minimum: e.minimum,
+        // What is found along a variable is the size of what should not be.
+        maximum: if along {
+            Some(relative.or(e.tolerance).unwrap_or(0.0))
+        } else {
+            e.maximum
+        },
+        source: e.source.clone(),
+    };
+    let mut row = Row {
+        step: STEP.into(),
+        item: Vec::new(),
+        name: title(table.study, e),
+        value: found.value,
+        unit: e.unit.clone(),
+        measured: false,
+        expected: Some(expected),
+    };
+    // Points without a result could change what is found, unless it is out of its bounds already and they could only add to it.
+    if found.missing > 0 && !(found.stands && row.verdict() == Some(super::results::MISSED)) {
+        row.value = None;
+    }
+    // One part of the study stands for the whole where its largest is not known.
+    if e.relative_tolerance.is_some()
+        && table
+            .lines
+            .iter()
+            .any(|l| l.responses[e.response].is_none())
+    {
+        row.value = None;
+    }
+    if found.missing > 0 {
+        row.name += &format!(
+            " ({} of {} points have no value)",
+            found.missing,
+            e.points.len()
+        );
+    } else if !(found.at.is_empty() || along && found.value == Some(0.0)) {
+        let name = |i: &usize| table.study.points[e.points[*i] as usize].name.as_str();
+        let names: Vec<&str> = found.at.iter().map(name).collect();
+        row.name += &format!(" (at {})", names.join(" and "));
+    }
+    row
+}
+
+fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
+    let claim = match e.of {
+        FamilyOf::Each => Claim::Each,
+        FamilyOf::Mean => Claim::Mean,
+        FamilyOf::Max => Claim::Max,
+        FamilyOf::Min => Claim::Min,
+        FamilyOf::Argmax => Claim::Argmax,
+        FamilyOf::Argmin => Claim::Argmin,
+        FamilyOf::ZeroWhere => Claim::Zero,
+        FamilyOf::Monotone => Claim::Monotone {
+            increasing: e.increasing,
+        },
+        FamilyOf::SymmetricAbout => Claim::Symmetric {
+            about: e.about.as_ref().map_or(f64::NAN, |a| a.0),
+        },
+    };
+    let mut groups: HashMap<String, usize> = HashMap::new();
+    let mut marks = Vec::with_capacity(e.points.len());
+    for i in &e.points {
+        let point = &table.study.points[*i as usize];
+        let values = point.values.iter().enumerate();
+        let others: Vec<&StudyValue> = values
+            .filter(|(v, _)| Some(*v) != e.over)
+            .map(|(_, x)| x)
+            .collect();
+        let next = groups.len();
+        marks.push(Mark {
+            along: match e.over.map(|v| &point.values[v]) {
+                Some(StudyValue::Number { si, .. }) => *si,
+                _ => 0.0,
+            },
+            group: *groups.entry(format!("{others:?}")).or_insert(next),
+            result: table.lines[*i as usize].responses[e.response],
+        });
+    }
+    let low = [e.minimum, e.value.map(|v| v - e.tolerance.unwrap_or(0.0))];
+    let high = [e.maximum, e.value.map(|v| v + e.tolerance.unwrap_or(0.0))];
+    let low = low.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
+    let high = high.into_iter().flatten().fold(f64::INFINITY, f64::min);
+    judge(claim, &marks, (low, high))
+}
+
+// How the table is shown.
+
+/// A name with its unit, as in the head of a table: `angle [deg]`.
+pub fn head(name: &str, unit: &str) -> String {
+    match unit {
+        "" | "1" => name.to_owned(),
+        unit => format!("{name} [{unit}]"),
+    }
+}
+
+/// A value of a variable, in the unit of its column.
+pub fn shown(value: &StudyValue) -> String {
+    match value {
+        StudyValue::Number { shown, .. } => si_number(*shown),
+        StudyValue::Text(t) => t.clone(),
+        StudyValue::Bool(b) => b.to_string(),
+    }
+}
+
+/// `plyflow results --study`.
+///
+/// # Errors
+/// [`exit::USAGE`] when the workflow is no study.
+pub fn tell(args: &ResultsArgs, session: &Session<'_>, records: &[(Id, Record)]) -> Done {
+    if session.workflow.study.is_none() {
+        let text = "this workflow is no study: it has no block `study`";
+        return Err(Stop::new(exit::USAGE, text));
+    }
+    let table = Table::read(session, records);
+    match args.format {
+        Format::Json => print(&format!("{:#}\n", as_json(session, &table))),
+        Format::Csv => print(&as_csv(&table)),
+        Format::Table => print(&(as_table(&table, usize::MAX) + "\n" + &sum(&table))),
+    }
+}
+
+/// The first rows and how many there are of each kind, for the end of a run.
+pub fn in_short(session: &Session<'_>, found: &Table<'_>) -> String {
+    let name = plyflow_model::text::one_line(&session.workflow.name);
+    let mut out = format!("study {name}: {}", sum(found));
+    out += &as_table(found, SHOWN);
+    let more = found.lines.len().saturating_sub(SHOWN);
+    if more > 0 {
+        out += &format!("and {more} more: plyflow results --study\n");
+    }
+    out
+}
+
+/// How many points there are of each kind.
+fn sum(table: &Table<'_>) -> String {
+    let mut parts = vec![format!("{} points", table.lines.len())];
+    for word in ["done", "failed", "not run"] {
+        match table.count(word) {
+            0 => {}
+            n => parts.push(format!("{n} {word}")),
+        }
+    }
+    parts.join(", ") + "\n"
+}
+
+/// The begin of a text.
+pub fn shortened(text: &str) -> String {
+    match text.char_indices().nth(CAUSE) {
+        Some((end, _)) => format!("{}…", text[..end].trim_end()),
+        None => text.to_owned(),
+    }
+}
+
+fn as_table(found: &Table<'_>, most: usize) -> String {
+    let study = found.study;
+    let mut heads: Vec<String> = study
+        .variables
+        .iter()
+        .map(|v| head(&v.name, &v.unit))
+        .collect();
+    heads.extend(study.responses.iter().map(|r| head(&r.name, &r.unit)));
+    let numbers: Vec<usize> = (0..heads.len()).collect();
+    let failed = found.count("failed") > 0;
+    heads.push("status".into());
+    if failed {
+        heads.push("cause".into());
+    }
+    let line = |(point, line): (&StudyPoint, &Line)| {
+        let mut cells: Vec<String> = point.values.iter().map(shown).collect();
+        let value = |v: &Option<f64>| v.map_or("-".to_owned(), number);
+        cells.extend(line.responses.iter().map(value));
+        cells.push(line.status.word().into());
+        if let Status::Failed { step, class, cause } = &line.status {
+            let text = format!("{step}: {class}: {cause}");
+            cells.push(shortened(&text));
+        } else if failed {
+            cells.push(String::new());
+        }
+        cells
+    };
+    let lines = study.points.iter().zip(&found.lines).take(most).map(line);
+    let lines: Vec<Vec<String>> = lines.collect();
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    table(&heads, &lines, &numbers)
+}
+
+/// The table as CSV: the same bytes as the file beside the workflow.
+pub fn as_csv(found: &Table<'_>) -> String {
+    let study = found.study;
+    let mut heads = vec!["point".to_owned()];
+    heads.extend(study.variables.iter().map(|v| head(&v.name, &v.unit)));
+    heads.extend(study.responses.iter().map(|r| head(&r.name, &r.unit)));
+    heads.extend(["status", "failed_step", "failure_class", "cause"].map(str::to_owned));
+    if !study.samples.is_empty() {
+        heads.push("seed".into());
+    }
+    heads.extend(
+        found
+            .steps
+            .iter()
+            .map(|s| format!("key_{}", study.steps[*s])),
+    );
+    let row = |cells: Vec<String>| {
+        let cells: Vec<String> = cells.iter().map(|c| csv_text(c)).collect();
+        cells.join(",") + "\n"
+    };
+    let mut out = row(heads);
+    for (point, line) in study.points.iter().zip(&found.lines) {
+        let mut cells = vec![point.name.clone()];
+        cells.extend(point.values.iter().map(shown));
+        cells.extend(
+            line.responses
+                .iter()
+                .map(|v| v.map(si_number).unwrap_or_default()),
+        );
+        cells.push(line.status.word().into());
+        match &line.status {
+            Status::Failed { step, class, cause } => {
+                cells.extend([step.clone(), (*class).to_owned(), cause.clone()]);
+            }
+            _ => cells.extend([const { String::new() }; 3]),
+        }
+        if !study.samples.is_empty() {
+            cells.push(found.seeds());
+        }
+        cells.extend(line.keys.iter().cloned());
+        out += &row(cells);
+    }
+    out
+}
+
+/// The table for programs.
+fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
+    let study = found.study;
+    let points = study.points.iter().zip(&found.lines).map(|(point, line)| {
+        let names = study.variables.iter().map(|v| v.name.clone());
+        let value = |v: &StudyValue| match v {
+            StudyValue::Number { shown, .. } => json!(shown),
+            StudyValue::Text(t) => json!(t),
+            StudyValue::Bool(b) => json!(b),
+        };
+        let values: serde_json::Map<String, Value> =
+            names.zip(point.values.iter().map(value)).collect();
+        let names = study.responses.iter().map(|r| r.name.clone());
+        let responses: serde_json::Map<String, Value> =
+            names.zip(line.responses.iter().map(|v| json!(v))).collect();
+        let names = found.steps.iter().map(|s| study.steps[*s].clone());
+        let keys: serde_json::Map<String, Value> =
+            names.zip(line.keys.iter().map(|k| json!(k))).collect();
+        let failure = match &line.status {
+            Status::Failed { step, class, cause } => {
+                json!({"step": step, "class": class, "cause": cause})
+            }
+            _ => Value::Null,
+        };
+        json!({"point": point.name, "values": values, "responses": responses,
+            "status": line.status.word(), "failure": failure, "keys": keys})
+    });
+    let points: Vec<Value> = points.collect();
+    let variables = study
+        .variables
+        .iter()
+        .map(|v| json!({"name": v.name, "unit": v.unit}));
+    let responses = (study.responses.iter())
+        .map(|r| json!({"name": r.name, "step": study.steps[r.step], "result": r.result, "unit": r.unit}));
+    let samples = study
+        .samples
+        .iter()
+        .map(|s| json!({"method": s.0, "count": s.1, "seed": s.2}));
+    json!({
+        "workflow": session.workflow.name,
+        "variables": variables.collect::<Vec<_>>(), "responses": responses.collect::<Vec<_>>(),
+        "samples": samples.collect::<Vec<_>>(), "points": points,
+    })
+}

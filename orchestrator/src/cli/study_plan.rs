@@ -1,0 +1,292 @@
+//! `plan` of a study: its points, what they share, and what is left to do costs.
+
+use super::plan::cost_of;
+use super::run::first_line;
+use super::study::{head, shortened};
+use super::table::table;
+use crate::engine::Session;
+use crate::engine::core::{Id, State};
+use crate::progress::duration_text;
+use plyflow_workflow::resolved::Study;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+
+/// Points that are listed.
+const SHOWN: usize = 20;
+
+/// Steps of which the cost is looked up to estimate that of others like them.
+const LOOKED_AT: usize = 50;
+
+/// What of a study is there and what is not.
+pub struct Prospects<'s> {
+    study: &'s Study,
+    /// By step of the file.
+    steps: Vec<Step>,
+    /// Positions of the points of which something is missing, and what of them failed last time.
+    open: Vec<(usize, Option<String>)>,
+}
+
+/// A step of the file, at all points.
+struct Step {
+    name: String,
+    /// How many different ones there are.
+    count: usize,
+    cached: usize,
+    run: usize,
+    /// Those whose items are not known yet.
+    unknown: usize,
+    /// What one took (CPU, s), on average, if any is there.
+    took: Option<f64>,
+    /// What those that are missing take (CPU, s).
+    estimate: f64,
+    /// Missing ones of which nothing is known.
+    without: usize,
+}
+
+impl<'s> Prospects<'s> {
+    /// Looks at a session; `None` when the workflow is no study.
+    pub fn of(session: &Session<'s>) -> Option<Self> {
+        let study = session.workflow.study.as_ref()?;
+        let core = &session.core;
+        let mut by_step: Vec<Vec<Id>> = vec![Vec::new(); core.graph().steps.len()];
+        for (id, instance) in core.instances().iter().enumerate() {
+            by_step[instance.step].push(id);
+        }
+        let fates: Vec<Fate> = (0..by_step.len())
+            .map(|step| Fate::of(session, step, &by_step[step]))
+            .collect();
+        let steps = (0..study.steps.len()).map(|at| {
+            let mut all: Vec<usize> = study.points.iter().map(|p| p.steps[at]).collect();
+            all.sort_unstable();
+            all.dedup();
+            Step::of(session, &study.steps[at], &all, &by_step, &fates)
+        });
+        let steps = steps.collect();
+        let is_open = |p: &usize| {
+            let of = study.points[*p].steps.iter();
+            of.clone()
+                .any(|s| !matches!(fates[*s], Fate::Cached | Fate::LeftOut))
+        };
+        let failed: Vec<Option<String>> = (by_step.iter())
+            .map(|ids| {
+                let failure = ids.iter().find_map(|id| session.failed_before(*id))?;
+                Some(format!(
+                    "{}: {}",
+                    failure.label,
+                    first_line(&failure.reason)
+                ))
+            })
+            .collect();
+        let failure = |p: usize| {
+            study.points[p]
+                .steps
+                .iter()
+                .find_map(|s| failed[*s].clone())
+        };
+        let open = (0..study.points.len()).filter(is_open);
+        let open = open.map(|p| (p, failure(p))).collect();
+        Some(Self { study, steps, open })
+    }
+
+    fn estimate(&self) -> f64 {
+        self.steps.iter().map(|s| s.estimate).sum()
+    }
+
+    fn without(&self) -> usize {
+        self.steps.iter().map(|s| s.without).sum()
+    }
+
+    /// In words.
+    pub fn text(&self) -> String {
+        let names: Vec<String> = self
+            .study
+            .variables
+            .iter()
+            .map(|v| head(&v.name, &v.unit))
+            .collect();
+        let (all, open) = (self.study.points.len(), self.open.len());
+        let s = if all == 1 { "" } else { "s" };
+        let mut out = format!(
+            "study over {}: {all} point{s}, {} done, {open} to run\n",
+            names.join(", "),
+            all - open
+        );
+        out += "\n";
+        let row = |s: &Step| {
+            let seconds = |t: f64| duration_text(t);
+            vec![
+                s.name.clone(),
+                match (s.count, all) {
+                    (1, 2..) => "one for all points".into(),
+                    (n, all) if n == all => "one for each point".into(),
+                    (n, _) => format!("{n} for {all} points"),
+                },
+                s.cached.to_string(),
+                s.run.to_string(),
+                s.unknown.to_string(),
+                s.took.map(seconds).unwrap_or_default(),
+                if s.without > 0 {
+                    "not known".into()
+                } else {
+                    seconds(s.estimate)
+                },
+            ]
+        };
+        let rows: Vec<Vec<String>> = self.steps.iter().map(row).collect();
+        let heads = [
+            "step",
+            "shared",
+            "cached",
+            "to run",
+            "items unknown",
+            "one took (CPU)",
+            "estimate (CPU)",
+        ];
+        out += &table(&heads, &rows, &[2, 3, 4, 5, 6]);
+        if !self.open.is_empty() {
+            out += "\npoints to run:\n";
+            for (p, failure) in self.open.iter().take(SHOWN) {
+                out += &format!("  {}", self.study.points[*p].name);
+                if let Some(text) = failure {
+                    out += &format!("   failed last time: {}", shortened(text));
+                }
+                out.push('\n');
+            }
+            if open > SHOWN {
+                out += &format!("  and {} more\n", open - SHOWN);
+            }
+        }
+        out + "\n" + &self.cost()
+    }
+
+    fn cost(&self) -> String {
+        let missing: usize = self.steps.iter().map(|s| s.run + s.unknown).sum();
+        match (missing, self.without()) {
+            (0, _) => "nothing to run\n".into(),
+            (n, w) if n == w => format!(
+                "{n} steps to run; none like them has run yet, so that their cost is not known\n"
+            ),
+            (n, w) => {
+                let known = duration_text(self.estimate());
+                let mut text =
+                    format!("{n} steps to run; about {known} of CPU time, as such steps took");
+                if w > 0 {
+                    text += &format!(", without {w} of which none like them has run yet");
+                }
+                text + "\n"
+            }
+        }
+    }
+
+    /// For programs.
+    pub fn as_json(&self) -> Value {
+        let steps = self.steps.iter().map(|s| {
+            json!({"step": s.name, "different": s.count, "cached": s.cached, "run": s.run, "unknown": s.unknown,
+                "mean_cpu_seconds": s.took, "estimated_cpu_seconds": s.estimate, "without_estimate": s.without})
+        });
+        let name = |(p, _): &(usize, Option<String>)| self.study.points[*p].name.as_str();
+        json!({
+            "variables": self.study.variables.iter().map(|v| v.name.as_str()).collect::<Vec<_>>(),
+            "points": self.study.points.len(),
+            "points_to_run": self.open.iter().map(name).collect::<Vec<_>>(),
+            "steps": steps.collect::<Vec<_>>(),
+            "estimated_cpu_seconds": self.estimate(),
+            "steps_without_estimate": self.without(),
+        })
+    }
+}
+
+/// Where a step of the graph stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fate {
+    Cached,
+    /// This part of it is missing.
+    Run(f64),
+    /// How many items it has is not known.
+    Unknown,
+    /// Not wanted (`--until`).
+    LeftOut,
+}
+
+impl Fate {
+    fn of(session: &Session<'_>, step: usize, ids: &[Id]) -> Self {
+        let core = &session.core;
+        if !core.graph().steps[step].wanted {
+            return Self::LeftOut;
+        }
+        if !core.hidden_by(step).is_empty() {
+            return Self::Unknown;
+        }
+        let done = |id: &&Id| matches!(core.instances()[**id].state, State::Done { .. });
+        let missing = ids.len() - ids.iter().filter(done).count();
+        match missing {
+            0 => Self::Cached,
+            n => Self::Run(n as f64 / ids.len() as f64),
+        }
+    }
+}
+
+impl Step {
+    fn of(
+        session: &Session<'_>,
+        name: &str,
+        all: &[usize],
+        by_step: &[Vec<Id>],
+        fates: &[Fate],
+    ) -> Self {
+        let cpu = |step: usize| -> Option<f64> {
+            let ids = by_step[step].iter();
+            let costs = ids.map(|id| cost_of(session, &session.core.instances()[*id].key?));
+            costs.map(|c| Some(c?.cpu_seconds)).sum()
+        };
+        let cached: BTreeSet<usize> = (all.iter().copied())
+            .filter(|s| fates[*s] == Fate::Cached)
+            .collect();
+        // Spread over all that are there, so that a dear corner of the study counts.
+        let apart = cached.len().div_ceil(LOOKED_AT).max(1);
+        let known: Vec<f64> = cached
+            .iter()
+            .step_by(apart)
+            .filter_map(|s| cpu(*s))
+            .collect();
+        let took = (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
+        let mut step = Self {
+            name: name.to_owned(),
+            count: all.len(),
+            cached: cached.len(),
+            run: 0,
+            unknown: 0,
+            took,
+            estimate: 0.0,
+            without: 0,
+        };
+        for at in all {
+            let part = match fates[*at] {
+                Fate::Cached | Fate::LeftOut => continue,
+                Fate::Run(part) => {
+                    step.run += 1;
+                    part
+                }
+                Fate::Unknown => {
+                    step.unknown += 1;
+                    1.0
+                }
+            };
+            // What it took itself when it ran last, with other parameters perhaps, is nearer than what others took.
+            let plan = &session.core.graph().steps[*at];
+            let own = (by_step[*at].iter())
+                .map(|id| {
+                    let item = &session.core.instances()[*id].item;
+                    let last = session.journal.last(&plan.name, item)?;
+                    Some(cost_of(session, &last)?.cpu_seconds)
+                })
+                .sum::<Option<f64>>()
+                .filter(|_| !by_step[*at].is_empty());
+            match own.or(took) {
+                Some(cpu) => step.estimate += part * cpu,
+                None => step.without += 1,
+            }
+        }
+        step
+    }
+}

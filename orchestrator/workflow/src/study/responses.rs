@@ -1,0 +1,105 @@
+//! `responses`: what is read from every point; and expectations on results of steps, at every point.
+
+use crate::diagnostics::{Problems, Source};
+use crate::expect::declared;
+use crate::load::Draft;
+use crate::resolved::{Expectation, ResolvedStep, Study, StudyResponse};
+use crate::wires::Wiring;
+use crate::yaml::{Entry, Node};
+use plyflow_model::workflow::ResponseOf;
+
+/// Reads the responses; everything wrong is reported.
+pub(super) fn responses(
+    root: &Node,
+    drafts: &[Draft<'_>],
+    wiring: &Wiring,
+    source: &Source,
+    problems: &mut Problems,
+) -> Vec<StudyResponse> {
+    let entries = root.get("responses").map_or(&[][..], Node::entries);
+    let mut all: Vec<StudyResponse> = Vec::new();
+    for entry in entries.iter() {
+        if !crate::scene::is_word(&entry.key) {
+            let message = format!("`{}` cannot name a response", entry.key);
+            let d = problems.add(source, &entry.key_span, message);
+            d.given(entry.key.clone())
+                .expected("letters, digits, `_` and `-`, at most 64");
+        }
+        all.extend(response(entry, drafts, wiring, source, problems));
+    }
+    all
+}
+
+fn response(
+    entry: &Entry,
+    drafts: &[Draft<'_>],
+    wiring: &Wiring,
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<StudyResponse> {
+    let (step, result) = (entry.value.get("step")?, entry.value.get("result")?);
+    let (name, unit, measured) = declared(step, result, drafts, source, problems)?;
+    if measured {
+        let message = format!("`{name}` depends on the machine");
+        let d = problems.add(source, &result.span, message);
+        d.expected("a result that is the same on every machine: a table of a study has no other");
+        return None;
+    }
+    let at = drafts.iter().position(|d| step.text() == Some(d.name()))?;
+    let of = match entry.value.get("of").and_then(Node::text) {
+        Some("max") => Some(ResponseOf::Max),
+        Some("min") => Some(ResponseOf::Min),
+        Some("mean") => Some(ResponseOf::Mean),
+        Some("sum") => Some(ResponseOf::Sum),
+        _ => None,
+    };
+    if of.is_none() && wiring.dimensions.get(at).is_some_and(|d| !d.is_empty()) {
+        let message = format!(
+            "step `{}` has an item for each of a collection",
+            drafts[at].name()
+        );
+        let d = problems.add(source, &entry.key_span, message);
+        d.expected("`of: max`, `min`, `mean` or `sum`: what is taken of the items");
+        return None;
+    }
+    Some(StudyResponse {
+        name: entry.key.clone(),
+        step: wiring.order.iter().position(|i| *i == at)?,
+        result: name,
+        unit,
+        of,
+    })
+}
+
+/// Expectations on steps of the file, on what they are at every point.
+pub(crate) fn at_all_points(
+    expectations: Vec<Expectation>,
+    study: &Study,
+    steps: &[ResolvedStep],
+) -> Vec<Expectation> {
+    let all = |base: &str| -> Vec<String> {
+        let Some(at) = study.steps.iter().position(|s| s == base) else {
+            return Vec::new();
+        };
+        let mut there: Vec<usize> = study.points.iter().map(|p| p.steps[at]).collect();
+        there.sort_unstable();
+        there.dedup();
+        there.into_iter().map(|i| steps[i].name.clone()).collect()
+    };
+    let mut found = Vec::new();
+    for e in expectations {
+        if e.mean_over.is_empty() {
+            let at = |step: String| Expectation { step, ..e.clone() };
+            found.extend(all(&e.step).into_iter().map(at));
+        } else {
+            let mean_over: Vec<String> = e.mean_over.iter().flat_map(|s| all(s)).collect();
+            let step = mean_over.first().cloned().unwrap_or_default();
+            found.push(Expectation {
+                step,
+                mean_over,
+                ..e
+            });
+        }
+    }
+    found
+}

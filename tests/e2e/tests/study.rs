@@ -1,0 +1,237 @@
+//! Studies: points share steps, grow and go on, and have one table whatever happened on the way.
+
+use plyflow_e2e::{Study, wait_for, well};
+use serde_json::Value;
+
+/// A study of these values, with a step that is the same for all.
+fn points(values: &str) -> String {
+    format!(
+        "
+study:
+  vary: {{v: {values}}}
+steps:
+  base: {{plugin: trivial, with: {{value: 10}}}}
+  one: {{plugin: trivial, with: {{value: \"${{v}}\"}}}}
+  all: {{plugin: sum, from: {{in: [base, one]}}}}
+responses:
+  total: {{step: all, result: sum}}
+"
+    )
+}
+
+/// The bytes of the table: CSV and HDF5.
+fn table(study: &Study) -> (String, Vec<u8>) {
+    let csv = std::fs::read_to_string(study.path("study.csv")).expect("a table");
+    (
+        csv,
+        std::fs::read(study.path("study.h5")).expect("an artifact"),
+    )
+}
+
+/// The table as `plyflow results --study --format json` tells it.
+fn told(study: &Study) -> Value {
+    let output = study.call(&["results", "--study", "--format", "json"]);
+    serde_json::from_slice(&output.stdout).expect("a table in JSON")
+}
+
+#[test]
+fn added_points_run_alone_and_the_table_has_the_bytes_of_one_run() {
+    let grown = Study::new(&points("[1, 2, 3]"));
+    assert_eq!(grown.run(&["--jobs", "1"]), well(1 + 2 * 3, 0));
+    // In the middle, at the front, and as another way to write the same.
+    grown.write(&points("{from: 0, to: 5, by: 1}"));
+    assert_eq!(grown.run(&["--jobs", "4"]), well(2 * 3, 7));
+    assert_eq!(grown.run(&[]), well(0, 13));
+    let whole = Study::new(&points("{from: 0, to: 5, count: 6}"));
+    assert_eq!(whole.run(&["--jobs", "3"]), well(13, 0));
+    assert_eq!(table(&grown), table(&whole));
+    assert_eq!(grown.artifacts(), whole.artifacts());
+    // What was printed is what lies there.
+    let printed = grown.call(&["results", "--study", "--format", "csv"]);
+    assert_eq!(String::from_utf8(printed.stdout).unwrap(), table(&grown).0);
+    // Fewer points run nothing, and more that were there before neither.
+    grown.write(&points("[4]"));
+    assert_eq!(grown.run(&[]), well(0, 3));
+    assert_eq!(table(&grown).0.lines().count(), 2);
+}
+
+#[test]
+fn other_names_run_nothing_and_a_step_by_hand_is_the_same() {
+    let study = Study::new(&points("[1, 2]"));
+    assert_eq!(study.run(&[]), well(5, 0));
+    study.write(
+        &points("[1, 2]")
+            .replace("vary: {v:", "vary: {w:")
+            .replace("${v}", "${w}"),
+    );
+    assert_eq!(study.run(&[]), well(0, 5));
+    // Without a study, with the value of a point.
+    let by_hand = "
+steps:
+  base: {plugin: trivial, with: {value: 10}}
+  one: {plugin: trivial, with: {value: 2}}
+  all: {plugin: sum, from: {in: [base, one]}}
+";
+    study.write(by_hand);
+    assert_eq!(study.run(&[]), well(0, 3));
+}
+
+#[test]
+fn a_study_killed_at_many_moments_goes_on_to_the_table_of_an_undisturbed_one() {
+    let slow = points("{from: 1, to: 12, by: 1}").replace(
+        "one: {plugin: trivial, with: {value: \"${v}\"}}",
+        "one: {plugin: trivial, with: {value: \"${v}\"}}\n  wait: {plugin: sleep, with: {seconds: \"${v} / 100\"}}",
+    );
+    let whole = Study::new(&slow);
+    assert_eq!(whole.run(&["--jobs", "2"]), well(1 + 3 * 12, 0));
+    let study = Study::new(&slow);
+    for moment in [3, 9, 20] {
+        let mut engine = study.start(&["--jobs", "2"]);
+        wait_for("some steps", || {
+            study.artifacts().len() >= moment || engine.try_wait().is_ok_and(|s| s.is_some())
+        });
+        let _ = engine.kill();
+        let _ = engine.wait();
+    }
+    let end = study.run(&["--jobs", "2"]);
+    assert_eq!((end.code, end.executed + end.cached), (Some(0), 37));
+    assert!(end.cached >= 9, "{end:?}");
+    assert_eq!(table(&study), table(&whole));
+}
+
+const SOME_TOO_LONG: &str = "
+study:
+  vary: {seconds: [0, 60], v: [1, 2]}
+BEARS
+steps:
+  wait: {plugin: sleep, with: {seconds: \"${seconds}\"}, resources: {time_limit: 1 s}}
+  one: {plugin: trivial, with: {value: \"${v}\"}, from: {in: wait}}
+responses:
+  value: {step: one, result: value}
+expect:
+  - {response: value, of: max, value: 2}
+  - {response: value, of: monotone, over: v, direction: increasing, where: 'seconds == 0'}
+  - {response: value, maximum: 1.5}
+";
+
+#[test]
+fn a_failed_point_is_a_row_with_its_class_and_cause() {
+    let study = Study::new(&SOME_TOO_LONG.replace("BEARS", ""));
+    let end = study.run(&[]);
+    assert_eq!((end.code, end.failed, end.not_run), (Some(4), 1, 2));
+    let rows = told(&study)["points"].clone();
+    let of = |i: usize| &rows[i];
+    assert_eq!(of(0)["point"], "seconds=0,v=1");
+    assert_eq!(
+        (&of(0)["status"], &of(0)["responses"]["value"]),
+        (&"done".into(), &1.0.into())
+    );
+    for i in [2, 3] {
+        assert_eq!(
+            (&of(i)["status"], &of(i)["responses"]["value"]),
+            (&"failed".into(), &Value::Null)
+        );
+        assert_eq!(of(i)["failure"]["class"], "time-limit");
+        assert_eq!(of(i)["failure"]["step"], "wait@seconds=60");
+        assert!(
+            of(i)["failure"]["cause"]
+                .as_str()
+                .unwrap()
+                .contains("time limit of 1 s")
+        );
+    }
+    let csv = table(&study).0;
+    assert_eq!(csv.lines().count(), 5);
+    assert!(csv.contains("\"seconds=60,v=1\",60,1,,failed,"), "{csv}");
+    // A largest value is not known while points are missing; a bound that is broken already is.
+    let verdicts: Vec<Value> = study.results()["results"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|r| r["step"] == "study")
+        .map(|r| r["verdict"].clone())
+        .collect();
+    assert_eq!(verdicts, ["not judged", "ok", "missed"]);
+}
+
+#[test]
+fn as_many_failed_points_are_borne_as_the_study_says() {
+    let bears = |n: u32| {
+        let study =
+            Study::new(&SOME_TOO_LONG.replace("BEARS", &format!("  at_most_failures: {n}")));
+        study.run(&["--jobs", "1"])
+    };
+    let end = bears(2);
+    assert_eq!((end.code, end.failed), (Some(0), 1), "one step, two points");
+    assert_eq!(bears(1).code, Some(4));
+}
+
+#[test]
+fn a_plan_tells_points_what_they_share_and_what_the_rest_costs() {
+    let study = Study::new(&points("[1, 2]"));
+    let plan = |words: &[&str]| {
+        let output = study.call(words);
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let first = plan(&["plan"]);
+    assert!(
+        first.contains("study over v: 2 points, 0 done, 2 to run"),
+        "{first}"
+    );
+    assert!(first.contains("cost is not known"), "{first}");
+    assert_eq!(study.run(&[]), well(5, 0));
+    study.write(&points("[1, 2, 3]"));
+    let more = plan(&["plan"]);
+    assert!(
+        more.contains("3 points, 2 done, 1 to run") && more.contains("  v=3\n"),
+        "{more}"
+    );
+    assert!(
+        more.contains("base  one for all points") && more.contains("2 steps to run; about"),
+        "{more}"
+    );
+    let json: Value = serde_json::from_str(&plan(&["plan", "--format", "json"])).unwrap();
+    assert_eq!(json["study"]["points_to_run"], serde_json::json!(["v=3"]));
+    assert_eq!(json["study"]["steps_without_estimate"], 0);
+    assert_eq!(json["steps"].as_array().unwrap().len(), 7);
+}
+
+#[test]
+fn steps_of_a_study_are_named_together_or_at_one_point() {
+    let study = Study::new(&points("[1, 2]"));
+    assert_eq!(study.run(&["--until", "one@v=2"]), well(1, 0));
+    assert_eq!(study.run(&["--until", "one"]), well(1, 1));
+    assert_eq!(study.run(&[]), well(3, 2));
+    let end = study.run(&["--force", "one"]);
+    assert_eq!((end.code, end.executed), (Some(0), 2));
+    let wrong = study.call(&["run", "--until", "two"]);
+    let text = String::from_utf8(wrong.stderr).unwrap();
+    assert!(
+        wrong.status.code() == Some(2) && text.contains("one@v=1"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_thousand_points_are_one_table() {
+    let study = Study::new(
+        &points("{from: 1, to: 1000, by: 1}")
+            .replace("  all: {plugin: sum, from: {in: [base, one]}}\n", "")
+            .replace("step: all, result: sum", "step: one, result: value"),
+    );
+    assert_eq!(study.run(&[]), well(1001, 0));
+    let (csv, _) = table(&study);
+    assert_eq!(csv.lines().count(), 1001);
+    assert!(
+        csv.lines()
+            .nth(500)
+            .unwrap()
+            .starts_with("v=500,500,500,done,")
+    );
+    study.write(
+        &points("{from: 1, to: 1003, by: 1}")
+            .replace("  all: {plugin: sum, from: {in: [base, one]}}\n", "")
+            .replace("step: all, result: sum", "step: one, result: value"),
+    );
+    assert_eq!(study.run(&[]), well(3, 1001));
+}
