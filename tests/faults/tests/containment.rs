@@ -17,6 +17,13 @@ fn start(place: &Place, wish: &str, token: &str, more: &[&str]) -> Child {
     let mut command = place.command(&words);
     command.env("STRANGER", wish).env("TOKEN", token);
     command.stdout(log.try_clone().unwrap()).stderr(log);
+    // As in a terminal, also where the tests themselves run under `nohup`.
+    unsafe {
+        command.pre_exec(|| {
+            libc::signal(libc::SIGHUP, libc::SIG_DFL);
+            Ok(())
+        });
+    }
     command.spawn().unwrap()
 }
 
