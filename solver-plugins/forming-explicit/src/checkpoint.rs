@@ -10,7 +10,7 @@ use plyflow_sdk::{Host, Log, On, StepError};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Bytes of the hash at the end of a file.
@@ -36,8 +36,13 @@ fn hasher(path: &Path) -> blake3::Hasher {
 
 impl Sealed {
     fn create(path: &Path) -> io::Result<Self> {
+        let begun = path.with_extension("new");
+        // A pipe that lies there would wait for a reader for ever.
+        if std::fs::symlink_metadata(&begun).is_ok() {
+            std::fs::remove_file(&begun)?;
+        }
         Ok(Self {
-            file: BufWriter::new(File::create(path.with_extension("new"))?),
+            file: BufWriter::new(File::create_new(begun)?),
             hash: hasher(path),
             path: path.to_owned(),
         })
@@ -70,9 +75,19 @@ impl Write for Sealed {
     }
 }
 
+/// Opens a file, and nothing else: to open a pipe waits for a writer for ever.
+fn open(path: &Path) -> io::Result<File> {
+    if !std::fs::symlink_metadata(path)?.is_file() {
+        let text = format!("{} is no file", path.display());
+        return Err(io::Error::new(io::ErrorKind::InvalidData, text));
+    }
+    File::open(path)
+}
+
 /// What a file holds, if it is whole.
 fn read_sealed(path: &Path) -> Option<Vec<u8>> {
-    let mut bytes = std::fs::read(path).ok()?;
+    let mut bytes = Vec::new();
+    open(path).ok()?.read_to_end(&mut bytes).ok()?;
     let end = bytes.len().checked_sub(SEAL)?;
     let hash = hasher(path).update(&bytes[..end]).finalize();
     let whole = *hash.as_bytes() == bytes[end..];
@@ -247,7 +262,7 @@ impl<'a> Recorder<'a> {
         course: &mut Course,
     ) -> io::Result<()> {
         for frame in self.synced..self.frames {
-            File::open(frame_file(folder, frame))?.sync_all()?;
+            open(&frame_file(folder, frame))?.sync_all()?;
         }
         self.synced = self.frames;
         let mut file = Sealed::create(&folder.join("state"))?;
@@ -297,5 +312,21 @@ mod tests {
         std::fs::copy(at("b", "frame-1"), at("a", "frame-1")).unwrap();
         assert!(read_sealed(&at("a", "frame-1")).is_none());
         assert_eq!(read_sealed(&at("b", "frame-1")).unwrap(), b"b");
+    }
+
+    #[test]
+    fn a_pipe_in_the_place_of_a_file_is_no_file_and_is_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frame-0");
+        for pipe in [path.clone(), path.with_extension("new")] {
+            let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+            assert!(made.unwrap().success());
+        }
+        assert!(read_sealed(&path).is_none());
+        assert!(open(&path).is_err());
+        let mut file = Sealed::create(&path).unwrap();
+        file.write_all(b"a frame").unwrap();
+        file.close(false).unwrap();
+        assert_eq!(read_sealed(&path).unwrap(), b"a frame");
     }
 }

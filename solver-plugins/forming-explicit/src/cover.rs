@@ -167,27 +167,19 @@ pub fn add_contacts_past(
                 continue;
             }
             add(model, *below, *sheet, -1.0)?;
-            let ends = rim_nodes(model, below.1);
             let contact = model.sheet_contacts.last_mut().expect("just added");
-            contact.follows = false;
-            for item in &mut contact.items {
-                let at_rim = ends.binary_search(&item.node).is_ok();
-                item.let_in = if at_rim { RIM_LET_IN } else { INSIDE_LET_IN };
-            }
+            contact.let_in = Some(LET_IN);
         }
     }
     Ok(())
 }
 
-/// Hundredths of the distance of two plies by which nodes on the rim of the lower one may reach into cells of the upper one that hang over it.
+/// Share of the distance of two plies by which nodes of the lower one may reach into cells of the upper one before these are held off, besides what
+/// the straight cells of both cut off where they are curved.
 ///
 /// The nodes of the upper one, which lie on the lower one, carry what presses the two together. Held at the same distance the nodes of the lower
 /// one would share in it, in shares that no physics gives, and where nodes lie on nodes a bag at rest trembles.
-const RIM_LET_IN: u8 = 5;
-
-/// The same of all others: as much as keeps the middles of the plies from crossing. With less they touch on the crest of every wrinkle, where the
-/// straight cells of two plies that lie on each other do not.
-const INSIDE_LET_IN: u8 = 50;
+const LET_IN: f64 = 0.05;
 
 /// A rigid part as the sheets of a stack meet it.
 pub struct RigidPart {

@@ -200,9 +200,7 @@ impl Forming {
                 judge(&c.name, 0.0, touching)
             }
         });
-        // What only catches is let in on purpose; the watch tells how deep.
-        let followed = m.sheet_contacts.iter().filter(|c| c.follows);
-        let sheets = followed.map(|c| {
+        let sheets = m.sheet_contacts.iter().map(|c| {
             let touching = c.items.iter().filter(|i| i.active);
             between(&c.name, c.offset, touching.map(deep).collect())
         });

@@ -431,3 +431,105 @@ fn a_slave_that_crosses_a_slot_is_held_by_what_is_beyond() {
     // What it is for: the walk along the rim alone stays at the left arm.
     assert_eq!(held(&[]), 0.0);
 }
+
+#[test]
+fn a_slave_on_a_flank_is_held_where_the_sheet_is_bent_so_sharply_that_nodes_normals_are_far_from_the_flanks()
+ {
+    // The normals of all nodes are those of the ridge, 69 and 74 degrees off the flanks'.
+    for fold in [-2.4f64, -2.6] {
+        let (sin, cos) = (0.5 * fold).sin_cos();
+        for (cell, place) in [(3, [0.0045, 0.002]), (0, [-0.003, -0.003])] {
+            let (mesh, x) = scene(fold, place, 0.8 * OFFSET / cos);
+            let (energy, f) = evaluate(&mesh, &x, cell);
+            let force = *f.last().unwrap();
+            let out = [-sin * f64::signum(place[0]), 0.0, cos];
+            let expected = 0.2 * OFFSET * 1e5;
+            let error = norm(sub(force, scale(out, expected))) / expected;
+            // The cells are warped by up to 0.04 mm.
+            assert!(
+                energy > 0.0 && error < 0.3,
+                "fold {fold} at {place:?}: {force:?}"
+            );
+        }
+        // From under the flank nothing is held.
+        let (mesh, x) = scene(fold, [0.0045, 0.002], -0.8 * OFFSET / cos);
+        assert_eq!(evaluate(&mesh, &x, 3).0, 0.0);
+    }
+}
+
+/// A contact that catches: of a slave over the middle of a cell of 8 mm of a sheet of the curvature `bend` (1/m, hollow), at `height` (m)
+/// over the cell.
+struct Catch {
+    mesh: QuadMesh,
+    x: Vec<V>,
+    normals: Vec<V>,
+    contact: SheetContact,
+}
+
+impl Catch {
+    fn new(bend: f64, height: f64) -> Self {
+        let axis = even_axis(-0.02, 0.02, 0.008);
+        let mut mesh = QuadMesh::grid(&axis, &axis);
+        for p in &mut mesh.points {
+            p[2] = 0.5 * bend * p[0] * p[0];
+        }
+        let normal = |p: &V| {
+            let n = [-bend * p[0], 0.0, 1.0];
+            scale(n, 1.0 / norm(n))
+        };
+        let mut normals: Vec<V> = mesh.points.iter().map(normal).collect();
+        normals.push([0.0, 0.0, 1.0]);
+        let mut x = mesh.points.clone();
+        // The cell in the middle reaches from -4 to 4 mm.
+        x.push([0.0, 0.0, 0.5 * bend * 0.004 * 0.004 + height]);
+        let mut contact = contact(x.len() as u32 - 1, mesh.cells.len() as u32 / 2);
+        contact.let_in = Some(0.03);
+        Self {
+            mesh,
+            x,
+            normals,
+            contact,
+        }
+    }
+
+    /// Penetration (m) now; `None` when it does not touch.
+    fn penetration(&mut self) -> Option<f64> {
+        let neighbours = self.mesh.neighbours();
+        let surface = Surface {
+            cells: &self.mesh.cells,
+            neighbours: &neighbours,
+            x: &self.x,
+            normals: &self.normals,
+        };
+        let v = vec![[0.0; 3]; self.x.len()];
+        for _ in 0..8 {
+            self.contact.compute(&surface, &v, pace(1e-6));
+        }
+        let item = &self.contact.items[0];
+        item.active.then_some(item.penetration)
+    }
+}
+
+#[test]
+fn what_catches_lets_in_what_straight_cells_cut_off_and_no_more_than_half_of_the_distance() {
+    // Of a parabola of the curvature k a cell of the length h cuts off k h2 / 8.
+    let cut_off = |bend: f64| bend * 0.008 * 0.008 / 8.0;
+    for bend in [0.0, 2.0, 5.0, 40.0] {
+        let let_in = (0.03 * OFFSET + 2.0 * cut_off(bend)).min(0.5 * OFFSET);
+        let touching = OFFSET - let_in;
+        let apart = Catch::new(bend, touching + 0.01 * OFFSET).penetration();
+        assert_eq!(apart, None, "bend {bend}");
+        let deep = Catch::new(bend, touching - 0.01 * OFFSET).penetration();
+        let deep = deep.unwrap_or_else(|| panic!("bend {bend}: not in touch"));
+        assert!((deep / OFFSET - 0.01).abs() < 2e-3, "bend {bend}: {deep}");
+    }
+}
+
+#[test]
+fn what_is_let_in_does_not_change_while_a_slave_touches() {
+    let mut catch = Catch::new(5.0, 0.7 * OFFSET);
+    let deep = catch.penetration().expect("in touch");
+    // As if the sheet had become flat between its nodes.
+    catch.normals.fill([0.0, 0.0, 1.0]);
+    assert_eq!(catch.penetration(), Some(deep));
+}

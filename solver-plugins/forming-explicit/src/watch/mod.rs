@@ -8,6 +8,7 @@ mod edges;
 mod rigid;
 mod sheet;
 mod told;
+mod watcher;
 
 pub use told::{DEPTH_BOUND, PairDepth, depth_attributes, depth_warnings};
 
@@ -18,13 +19,13 @@ use rayon::prelude::*;
 use rigid::{Hint, Triangles, from_plate};
 use serde::{Deserialize, Serialize};
 use sheet::{Bent, Near, Seat, SheetMesh, SheetTree};
+use std::sync::OnceLock;
+use watcher::{Scene, Watcher, has_come_through};
 
 /// Share of the thinner sheet below which a depth counts as none, except at the end.
 const FLOOR: f64 = 0.02;
 /// Steps after which closest points are looked for among all cells again, and not only near the last ones.
 const ANEW: u64 = 4000;
-/// Distance (m) from a sheet's middle surface over which a node may have come through it since the row before.
-const LEAP: f64 = 0.01;
 /// A node nearer than this share of an element to the edge of a sheet is beside it.
 const BESIDE: f64 = 0.1;
 /// Nodes that are looked at together.
@@ -120,15 +121,6 @@ struct Part {
     error: f64,
 }
 
-struct Watcher {
-    mesh: SheetMesh,
-    thickness: f64,
-    /// By node of the mesh: whether it is moved by the run itself.
-    free: Vec<bool>,
-    /// Size (m) of its elements over the tool.
-    size: f64,
-}
-
 /// A node's place when it was looked at, and its distance (m) from a part then, which can have shrunk by no more than the node has moved.
 #[derive(Clone, Copy)]
 struct Clear {
@@ -178,45 +170,12 @@ struct Under {
     squeezed: f64,
 }
 
-/// Everything at one time.
-struct Scene<'a> {
-    x: &'a [V],
-    /// By part (m).
-    shifts: &'a [V],
-    /// By sheet, where everything is looked at anew.
-    trees: Option<&'a [Option<SheetTree>]>,
-    /// By sheet (m).
-    boxes: &'a [[V; 2]],
-    /// By sheet.
-    bent: &'a [Bent],
-    first: bool,
-    last: bool,
-}
-
 /// The nodes of one sheet, in one direction.
 struct View<'a> {
     scene: &'a Scene<'a>,
     sheet: usize,
     up: bool,
     between: &'a [Vec<[f64; 2]>],
-}
-
-impl Watcher {
-    /// The closest point of this sheet, number `own` of the stack, to a node; `None`, and nothing known of it any more, where there is none or
-    /// where it is one of its own nodes.
-    fn near(&self, scene: &Scene<'_>, own: usize, node: u32, seat: &mut Seat) -> Option<Near> {
-        let p = scene.x[node as usize];
-        if self.mesh.has(node) || is_off(scene.boxes[own], p) {
-            *seat = Seat::NOWHERE;
-            return None;
-        }
-        let from = match scene.trees {
-            Some(trees) => (trees[own].as_ref()?.cell(p, seat.cell), [0.0; 2]),
-            None if seat.cell == u32::MAX => (self.mesh.nearest_middle(scene.x, p), [0.0; 2]),
-            None => (seat.cell, seat.xi.map(f64::from)),
-        };
-        Some(self.mesh.closest(scene.x, p, from))
-    }
 }
 
 impl Watch {
@@ -312,6 +271,7 @@ impl Watch {
             let of = |s: &Watcher| s.mesh.tree(&model.x);
             self.sheets.par_iter().map(of).collect()
         });
+        let asked: Vec<OnceLock<Option<SheetTree>>> = (0..count).map(|_| OnceLock::new()).collect();
         let first = watched.anew_at.is_none();
         if anew {
             watched.anew_at = Some(model.cycle);
@@ -328,6 +288,7 @@ impl Watch {
             x: &model.x,
             shifts: &shifts,
             trees: trees.as_deref(),
+            asked: &asked,
             boxes: &boxes,
             bent: &bent,
             first,
@@ -433,15 +394,20 @@ impl Watch {
         let mut upper = view.sheet + 1..self.sheets.len();
         while let Some(other) = if view.up { upper.next() } else { lower.next() } {
             let sheet = &self.sheets[other];
-            let Some(near) = sheet.near(scene, other, node, &mut seats[other]) else {
+            let Some(mut near) = sheet.near(scene, other, node, &mut seats[other]) else {
                 continue;
             };
-            let over = if view.up { -near.height } else { near.height };
+            let above = |near: &Near| if view.up { -near.height } else { near.height };
+            let mut over = above(&near);
             let before = if scene.first {
                 0.0
             } else {
                 f64::from(seats[other].side)
             };
+            if scene.trees.is_none() && over < 0.0 && has_come_through(before, over) {
+                near = sheet.nearest(scene, other, node, near);
+                over = above(&near);
+            }
             let beside = near.to_rim <= BESIDE * sheet.size;
             let there = !beside && (over >= 0.0 || has_come_through(before, over));
             seats[other] = Seat {
@@ -593,17 +559,6 @@ impl Watch {
         let (low, high) = (a.min(b), a.max(b));
         (self.parts.len() + 1) * self.sheets.len() + high * (high - 1) / 2 + low
     }
-}
-
-/// Whether a node that is behind a sheet now, by `over` (m, negative), has come through it: it was on the right side shortly before, or has been
-/// behind it. Infinite `before`: it was beside, from where it may well have come around the edge.
-fn has_come_through(before: f64, over: f64) -> bool {
-    before.is_finite() && before.max(0.0) - over < LEAP || before < 0.0
-}
-
-/// Whether a place is outside of a box by more than what matters.
-fn is_off([low, high]: [V; 2], p: V) -> bool {
-    (0..3).any(|k| p[k] < low[k] - LEAP || p[k] > high[k] + LEAP)
 }
 
 /// The pairs: parts with sheets, edges of the tool with sheets, sheets with each other; by film and ply the number of what hangs through, and by film

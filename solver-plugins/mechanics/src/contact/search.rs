@@ -155,7 +155,7 @@ fn entry(neighbours: &[[u32; 4]], from: u32, to: u32) -> usize {
 }
 
 /// The middle of an edge.
-fn middle(edge: usize) -> [f64; 2] {
+pub(super) fn middle(edge: usize) -> [f64; 2] {
     match edge {
         0 => [0.0, -1.0],
         1 => [1.0, 0.0],

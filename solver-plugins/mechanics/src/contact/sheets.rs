@@ -8,14 +8,14 @@
 
 use super::blend::pulled;
 use super::friction::{Constant, Coulomb, FrictionLaw};
-use super::search::{Closest, Found, RIM, Surface, combine, track};
+use super::search::{Closest, Found, RIM, Surface, cell_normal, combine, middle, track};
 use super::slave::{
     Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
 };
 use super::{ContactEnergy, ContactSettings, Follow, Pace, SWIFT, TOGETHER, content, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
-use crate::vec3::{V, dot, scale, sub};
+use crate::vec3::{V, add, dot, scale, sub, unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -35,8 +35,10 @@ pub struct SheetContact {
     pub augmentation: f64,
     /// Penetration (m) from which on multipliers grow faster; infinite: never.
     pub deep: f64,
-    /// Whether multipliers take over what steadily presses. Without them a contact is a spring: for one that catches what others let through.
-    pub follows: bool,
+    /// Of a contact that catches what the other sheet's nodes let through: the share of the distance at which sheets touch by which its slaves may
+    /// come nearer before they do, besides what straight cells cut off curved sheets. What is let in does not change while a slave touches: that
+    /// would make energy. `None`: slaves touch at that distance.
+    pub let_in: Option<f64>,
     /// Whether slaves are pushed out from wherever they are: also from so deep inside of the master that motion cannot have brought
     /// them there. That makes energy, and is for models that are put together by hand and damped.
     pub clearing: bool,
@@ -75,7 +77,7 @@ impl SheetContact {
             slip_factor: settings.slip_factor,
             augmentation: settings.augmentation,
             deep: f64::INFINITY,
-            follows: true,
+            let_in: None,
             clearing: false,
             share: 1.0,
             counted: 1.0,
@@ -131,12 +133,7 @@ impl SheetContact {
             friction,
             offset: self.offset,
             slip_factor: self.slip_factor,
-            follow: Follow {
-                share: if self.follows { self.augmentation } else { 0.0 },
-                rest: content(self.offset),
-                deep: self.deep,
-                swift: SWIFT * self.deep,
-            },
+            follow: self.follow(),
             growth: pace.growth,
             clearing: self.clearing,
         };
@@ -144,6 +141,7 @@ impl SheetContact {
             surface: *s,
             v,
             side,
+            let_in: self.let_in,
             rim: &self.rim,
             pace,
             cycle: self.cycle,
@@ -177,6 +175,21 @@ impl SheetContact {
         total
     }
 
+    /// How its multipliers follow penetrations. What catches hurries nowhere: it bears what changes slowly, and nodes that slide over the edges of
+    /// cells come and go.
+    fn follow(&self) -> Follow {
+        let (share, deep) = match self.let_in {
+            Some(_) => (GENTLY * self.augmentation, f64::INFINITY),
+            None => (self.augmentation, self.deep),
+        };
+        Follow {
+            share,
+            rest: content(self.offset),
+            deep,
+            swift: SWIFT * deep,
+        }
+    }
+
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
     pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
         for (items, span) in self.items.chunks(SPAN).zip(&self.spans) {
@@ -199,6 +212,12 @@ impl SheetContact {
 /// forces are on the nodes.
 const SPAN: usize = 64;
 
+/// How fast multipliers of a contact that catches grow, over others.
+const GENTLY: f64 = 0.3;
+
+/// Steps for which a slave that is to be caught sleeps at least: almost all of them never touch, and in so few steps none gets far.
+const LATE: u64 = 12;
+
 /// A run of [`SPAN`] slaves.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 struct Span {
@@ -214,6 +233,7 @@ struct Following<'a, F> {
     surface: Surface<'a>,
     v: &'a [V],
     side: f64,
+    let_in: Option<f64>,
     rim: &'a [u32],
     pace: Pace,
     cycle: u64,
@@ -284,10 +304,8 @@ fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
     if item.cell == NONE {
         return Met::Never;
     }
-    let law = &Law {
-        offset: given.law.offset * (1.0 - 0.01 * f64::from(item.let_in)),
-        ..given.law
-    };
+    let mut own = given.let_in.map(|_| law_of(item, given));
+    let law = own.as_ref().unwrap_or(&given.law);
     item.turn = item.turn.wrapping_add(1);
     if item.plain && !item.turn.is_multiple_of(SEARCH_INTERVAL) {
         if item.active {
@@ -307,6 +325,11 @@ fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
         found = elsewhere(item, s, given.rim, law.offset, found);
     }
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
+    if let Some(base) = given.let_in.filter(|_| !item.active) {
+        item.let_in(s, base, given.law.offset);
+        own = Some(law_of(item, given));
+    }
+    let law = own.as_ref().unwrap_or(&given.law);
     let Some((pull, plain)) = pull_of(item, s, &found, given.side, law.offset, law.clearing) else {
         item.part();
         return Met::Apart(0);
@@ -317,13 +340,29 @@ fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
     // One that comes from beside has got behind the rim.
     let behind = deep && at_rim(&found.first);
     if behind || (pull.gap > 0.0 && item.multiplier == 0.0) {
-        return apart(item, pull.gap.max(0.0), s, v, pace, plain);
+        let met = apart(item, pull.gap.max(0.0), s, v, pace, plain);
+        return match met {
+            Met::Apart(steps) if given.let_in.is_some() => {
+                item.plain = false;
+                Met::Apart(steps.max(LATE))
+            }
+            met => met,
+        };
     }
     // Any other was lost in a fold, and is found where it has no way to be pushed from: that would make energy from nothing, now or
     // when it is less deep.
     item.guarded |= deep;
     item.plain = plain;
     Met::Touch(touch(item, s, v, &pull, &found, law))
+}
+
+/// The law of a contact at the distance at which one of its slaves touches.
+#[inline(always)]
+fn law_of<'a, F: Coulomb>(item: &SlaveItem, given: &Following<'a, F>) -> Law<'a, F> {
+    Law {
+        offset: item.touching(given.law.offset),
+        ..given.law
+    }
 }
 
 /// The closest point of the surface for a slave beside its rim, whose closest point so far is `found`: the walk along a rim that is not convex
@@ -394,7 +433,36 @@ fn pull_of(
         let (pull, alone) = pulled(found, offset);
         return Some((pull, alone && !at_rim));
     }
+    // Where a sheet is bent sharply, what lies between its nodes' normals is far from those of its cells.
+    let on_own_side = |n: V| side * dot(first.arm, n) > 0.1 * distance;
+    if own_normal(s, first).is_some_and(on_own_side) {
+        return Some(pulled(found, offset));
+    }
     let through = (item.active || clearing) && height < -0.5 * distance && height > -offset;
     let pull = || Pull::plain(height - offset, scale(up, side));
     through.then(|| (pull(), false))
+}
+
+/// Unit normal of the cell at the closest point on it, or of it and the next one where that point lies on the edge between them; `None` at a
+/// corner, where the node's normal is as good.
+#[inline(never)]
+fn own_normal(s: &Surface<'_>, c: &Closest) -> Option<V> {
+    let own = cell_normal(s, c.cell, c.xi);
+    let edge = match c.free {
+        [true, true] => return Some(own),
+        [false, true] if c.xi[0] > 0.0 => 1,
+        [false, true] => 3,
+        [true, false] if c.xi[1] > 0.0 => 2,
+        [true, false] => 0,
+        [false, false] => return None,
+    };
+    let next = s.neighbours[c.cell as usize][edge];
+    // A rim or a mirror plane.
+    if next as usize >= s.cells.len() {
+        return Some(own);
+    }
+    let back = s.neighbours[next as usize]
+        .iter()
+        .position(|n| *n == c.cell)?;
+    Some(unit(add(own, cell_normal(s, next, middle(back)))))
 }

@@ -46,8 +46,9 @@ pub struct SlaveItem {
     pub(super) guarded: bool,
     /// Whether it touches several cells, of a concave fold or corner.
     between: bool,
-    /// By how much nearer than the contact's distance it may come before it touches: hundredths of that.
-    pub let_in: u8,
+    /// By how much nearer than the contact's distance it may come before it touches, in [`LET_IN`] of that
+    /// ([`super::SheetContact::let_in`]).
+    let_in: u16,
     /// Direction from master to slave at the last search.
     pub(super) direction: V,
     /// Place in the cell, -1..1.
@@ -100,6 +101,20 @@ impl SlaveItem {
             penetration: 0.0,
             ignored: 0.0,
         }
+    }
+
+    /// Distance (m) at which it touches, where sheets touch at `offset`.
+    #[inline(always)]
+    pub(super) fn touching(&self, offset: f64) -> f64 {
+        offset * (1.0 - LET_IN * f64::from(self.let_in))
+    }
+
+    /// Lets it come nearer by the share `base` of the distance `offset` (m) at which sheets touch, and by what the straight cells of both sheets
+    /// cut off them where they are curved: by its own as much as by that which it is nearest to. At most by [`MOST_LET_IN`].
+    #[inline(never)]
+    pub(super) fn let_in(&mut self, s: &Surface<'_>, base: f64, offset: f64) {
+        let share = base + 2.0 * bulge(s, self.cell, self.weights()) / offset;
+        self.let_in = (share.min(MOST_LET_IN) / LET_IN) as u16;
     }
 
     /// Whether it lies in a concave fold or corner, between several cells.
@@ -180,6 +195,29 @@ impl SlaveItem {
         self.ignored = self.ignored.min(depth.max(0.0));
         depth - self.ignored
     }
+}
+
+/// Steps of [`SlaveItem::let_in`], over the distance at which sheets touch.
+const LET_IN: f64 = 1e-4;
+
+/// What a slave is let in by at most, over the distance at which sheets touch: as much as keeps the middles of two sheets from crossing.
+const MOST_LET_IN: f64 = 0.5;
+
+/// How far (m) the smooth sheet through the nodes lies off a cell, at a place in it given by the weights of its nodes: half of how far the tangent
+/// planes at its corners lie off it there, which is exact for a parabola.
+fn bulge(s: &Surface<'_>, cell: u32, weights: [f64; 4]) -> f64 {
+    let nodes = s.cells[cell as usize];
+    let x = nodes.map(|n| s.x[n as usize]);
+    let normals = nodes.map(|n| s.normals[n as usize]);
+    let place = combine(weights, &x);
+    let normal = unit(combine(weights, &normals));
+    let off: f64 = (0..4)
+        .map(|k| {
+            let n = normals[k];
+            weights[k] * dot(n, sub(x[k], place)) / dot(n, normal).max(0.3)
+        })
+        .sum();
+    0.5 * off.abs()
 }
 
 /// What a search may move the closest point by while nothing folds, over the offset.
