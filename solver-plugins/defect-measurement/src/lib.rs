@@ -4,11 +4,13 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod agreement;
+mod compression;
 mod output;
 mod read;
 mod sections;
 
 use agreement::Agreement;
+use compression::Compression;
 use output::Output;
 use plyflow_defects::of_run::{Sheet, neighbours};
 use plyflow_defects::{Defect, Limits, Ply, Settings, find_causes, measure};
@@ -23,6 +25,7 @@ export_step!(DefectMeasurement);
 /// What the manifest has beside [`Settings`] and [`Limits`].
 #[derive(Deserialize)]
 struct Parameters {
+    compressed_below: f64,
     sections: Vec<Section>,
     scan: Option<String>,
     scan_unit: Option<f64>,
@@ -159,6 +162,7 @@ impl Step for DefectMeasurement {
         let beside = read::Beside::read(host)?;
         let mut output = Output::new(host, &run, &measured, agreement.as_ref());
         output.bodies()?;
+        output.compression(Compression::of(&measured, p.compressed_below))?;
         output.distances()?;
         for (section, path) in p.sections.iter().zip(&sections) {
             output.section(&section.label, path, section.on, &beside)?;
