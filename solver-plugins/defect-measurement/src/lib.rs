@@ -8,6 +8,8 @@ mod compression;
 mod output;
 mod read;
 mod sections;
+mod slip;
+mod slipping;
 
 use agreement::Agreement;
 use compression::Compression;
@@ -16,6 +18,7 @@ use plyflow_defects::of_run::{Sheet, neighbours};
 use plyflow_defects::{Defect, Limits, Ply, Settings, find_causes, measure};
 use plyflow_sdk::{Host, Log, Progress, Step, StepError, export_step};
 use serde::Deserialize;
+use slipping::{Asked, Slipping};
 
 /// The step.
 pub struct DefectMeasurement;
@@ -103,6 +106,7 @@ impl Step for DefectMeasurement {
         let settings: Settings = host.parameters()?;
         let limits: Limits = host.parameters()?;
         let p: Parameters = host.parameters()?;
+        let asked: Asked = host.parameters()?;
         let corners = p.sections.iter().map(Section::corners);
         let sections = corners.collect::<Result<Vec<_>, _>>()?;
         let phase = |phase, fraction| {
@@ -160,7 +164,9 @@ impl Step for DefectMeasurement {
         }
         phase("writing", 0.9)?;
         let beside = read::Beside::read(host)?;
+        let slipping = Slipping::of(host, &measured, &asked)?;
         let mut output = Output::new(host, &run, &measured, agreement.as_ref());
+        output.slipping = slipping;
         output.bodies()?;
         output.compression(Compression::of(&measured, p.compressed_below))?;
         output.distances()?;

@@ -4,6 +4,7 @@ use crate::agreement::{self, Agreement};
 use crate::compression::{self, Compression};
 use crate::read::{Beside, Run};
 use crate::sections::{Section, Sheet};
+use crate::slipping::Slipping;
 use crate::{Measured, Seen};
 use plyflow_defects::align::Alignment;
 use plyflow_defects::{Defect, Kind, RidgeShear};
@@ -63,6 +64,8 @@ pub struct Output<'a> {
     plots: Vec<Value>,
     sections: Vec<Value>,
     compression: Option<Compression>,
+    /// Between plies, where there are several.
+    pub slipping: Option<Slipping>,
 }
 
 impl<'a> Output<'a> {
@@ -81,6 +84,7 @@ impl<'a> Output<'a> {
             plots: Vec::new(),
             sections: Vec::new(),
             compression: None,
+            slipping: None,
         }
     }
 
@@ -115,6 +119,9 @@ impl<'a> Output<'a> {
             }
             if !p.shear_angle.is_empty() {
                 host.write_field(&p.name, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
+            }
+            if let Some(slipping) = self.slipping.as_ref().filter(|_| m.simulated) {
+                slipping.write(host, &p.name)?;
             }
             for (name, strains) in STRAINS.iter().zip(&p.fibre_strains) {
                 if !strains.is_empty() {
@@ -317,10 +324,18 @@ impl<'a> Output<'a> {
             json!({"ply": a.ply, "defects": list})
         });
         tables.extend(self.compression.as_ref().map(Compression::table));
+        let slipping = self.slipping.as_ref();
+        tables.extend(slipping.iter().flat_map(|s| s.tables()));
+        let plots: Vec<Value> = self
+            .plots
+            .iter()
+            .cloned()
+            .chain(slipping.iter().flat_map(|s| s.plots()))
+            .collect();
         host.write_attributes(&json!({
-            "defects": list, "sections": self.sections, "plots": self.plots, "maps": self.maps(),
+            "defects": list, "sections": self.sections, "plots": plots, "maps": self.maps(),
             "alignment": alignment.map(alignment_json), "agreement": agreement, "tables": tables,
-            "fibre_compression": self.compression,
+            "fibre_compression": self.compression, "slip": slipping.map(Slipping::told),
         }))
     }
 
@@ -355,6 +370,15 @@ impl<'a> Output<'a> {
             if !of.is_empty() {
                 let title = format!("Strain of the fibres of family {}", k + 1);
                 maps.push(map((name, &title, "1"), of));
+            }
+        }
+        if let Some(slipping) = &self.slipping {
+            for (field, title) in slipping.maps() {
+                let of: Vec<&Measured> =
+                    simulated().filter(|m| slipping.has(&m.ply.name)).collect();
+                if !of.is_empty() {
+                    maps.push(map((&field, &title, "mm"), of));
+                }
             }
         }
         maps
