@@ -114,6 +114,24 @@ pub(crate) fn of_body(
 /// # Errors
 /// When the artifact cannot be read.
 pub(crate) fn add(path: &Utf8Path, plies: &mut [Ply]) -> Result<(), String> {
+    // What a run computed comes before what was found in it.
+    add_where(path, plies, |_| true, true)
+}
+
+/// Adds what a measurement has found on the plies that no other artifact has: how they slip on each other.
+///
+/// # Errors
+/// When the artifact cannot be read.
+pub(crate) fn add_slip(path: &Utf8Path, plies: &mut [Ply]) -> Result<(), String> {
+    add_where(path, plies, |o| o.title.starts_with("Slip"), false)
+}
+
+fn add_where(
+    path: &Utf8Path,
+    plies: &mut [Ply],
+    wanted: impl Fn(&Other) -> bool,
+    first: bool,
+) -> Result<(), String> {
     let artifact = open(path)?;
     let frame = last_frame(&artifact)?;
     for ply in plies {
@@ -130,12 +148,15 @@ pub(crate) fn add(path: &Utf8Path, plies: &mut [Ply]) -> Result<(), String> {
         if !places.iter().zip(&ply.formed).all(near) {
             continue;
         }
-        // What a run computed comes before what was found in it.
         let mut all = of_body(&artifact, body, frame, &ply.cells);
         let same = |a: &Other, b: &Other| a.title == b.title && a.unit == b.unit;
-        all.retain(|o| !ply.others.iter().any(|known| same(known, o)));
-        all.append(&mut ply.others);
-        ply.others = all;
+        all.retain(|o| wanted(o) && !ply.others.iter().any(|known| same(known, o)));
+        if first {
+            all.append(&mut ply.others);
+            ply.others = all;
+        } else {
+            ply.others.append(&mut all);
+        }
     }
     Ok(())
 }

@@ -400,6 +400,8 @@ impl Reader<'_> {
             let found = measured::read(&self.instance(at).artifact, facts, at);
             let label = self.instance(at).label();
             study.measured.extend(self.noted(&label, found));
+            let added = others::add_slip(&self.instance(at).artifact, &mut study.plies);
+            self.noted(&label, added);
         }
     }
 

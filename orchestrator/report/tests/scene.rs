@@ -295,3 +295,21 @@ fn every_field_of_the_plies_is_in_the_menu_with_its_unit_and_what_is_the_same_ev
     }
     panic!("ply_1 has no displacement");
 }
+
+#[test]
+fn slip_that_a_measurement_has_found_is_in_the_menu_of_the_view_and_its_numbers_of_defects_are_not()
+{
+    let (_keep, folder) = folder();
+    let mut study = whole_study(&folder);
+    study.measurement();
+    let page = page(&study.input(), &folder);
+    let scene = Scene::of(&page);
+    let fields = list(&scene.told["fields"]);
+    let place = |name: &str| fields.iter().position(|f| f["name"] == name);
+    let slip = place("Slip along").expect("slip is shown");
+    assert!(page.contains(">Slip along (mm)<") && place("Defect").is_none());
+    // On the ply that has it alone.
+    let bodies = list(&scene.told["bodies"]).into_iter();
+    let with = bodies.filter(|b| list(&b["fields"]).iter().any(|f| *f == slip));
+    assert_eq!(with.count(), 1);
+}

@@ -7,8 +7,8 @@ use plyflow_model::scene::Contour;
 use plyflow_model::units::{Dimension, parse_quantity, si_number};
 
 /// What only plies have.
-const OF_PLIES: [&str; 7] = [
-    "length", "width", "outline", "holes", "centre", "fibre_1", "fibre_2",
+const OF_PLIES: [&str; 8] = [
+    "length", "width", "outline", "holes", "centre", "fibre_1", "fibre_2", "regions",
 ];
 
 /// Checks what a sheet says of its size and fibres.

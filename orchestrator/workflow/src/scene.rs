@@ -11,7 +11,7 @@ use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_files::text::decode;
 use plyflow_model::manifest::{PluginKind, Shape};
 use plyflow_model::units::{Dimension, parse_quantity};
-use plyflow_model::{material::Material, scene::Scene, schema};
+use plyflow_model::{material::Material, regions, scene::Scene, schema};
 use serde_json::{Value, json};
 use std::sync::{Arc, LazyLock};
 
@@ -192,9 +192,18 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
     match serde_json::from_value::<Scene>(scene).and_then(|mut scene| {
         // Prose does not matter to any result.
         scene.description = None;
-        serde_json::to_value(scene)
+        let faults = regions::faults(&scene);
+        serde_json::to_value(scene).map(|value| (value, faults))
     }) {
-        Ok(value) => Some(value),
+        Ok((value, faults)) => {
+            for fault in &faults {
+                let region = region_of(node, fault);
+                let at_region = region.map_or(&at.key, |n| &n.span);
+                let d = (resolver.problems).add(at.source, at_region, fault.text.clone());
+                d.help("places of a region are relative to its ply's `centre`");
+            }
+            faults.is_empty().then_some(value)
+        }
         Err(e) => {
             // The schema is made from the types, so that only what it cannot say comes here.
             resolver
@@ -203,6 +212,12 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
             None
         }
     }
+}
+
+/// The region of a scene that a fault is about.
+fn region_of<'n>(scene: &'n Node, fault: &regions::Fault) -> Option<&'n Node> {
+    let sheet = scene.get("sheets")?.items().get(fault.sheet)?;
+    sheet.get("regions")?.items().get(fault.region)
 }
 
 fn stl_file(resolver: &mut Resolver<'_>, scene: &Node, at: &Place<'_>) -> Option<Utf8PathBuf> {

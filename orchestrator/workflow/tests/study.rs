@@ -92,6 +92,20 @@ fn steps_are_there_once_for_every_value_that_they_depend_on() {
 }
 
 #[test]
+fn a_regions_sizes_and_coefficients_are_changed_by_path() {
+    let at = "scene: {file: scene.yaml, set: {sheets.ply-1.regions.slick.rectangle.length: \"${length}\", sheets.ply-1.regions.slick.friction.upper-film: \"${mu}\"}}\n      element: m4";
+    let block = "  vary:\n    length: [30 mm]\n    mu: [0.2]";
+    let study = with(block, &[("scene: scene.yaml\n      element: m4", at)]);
+    let region = "    width: 300 mm\n    regions:\n      - {name: slick, rectangle: {length: 20 mm, width: 20 mm}, friction: {upper-film: 0.1}}\n";
+    study.mutate("scene.yaml", "    width: 300 mm\n", region);
+    let w = load(&study);
+    let coarse = step(&w, "coarse@length=30mm,mu=0.2");
+    let region = &coarse.parameters["scene"]["sheets"][1]["regions"][0];
+    assert_eq!(region["rectangle"]["length"], json!("0.03 m"));
+    assert_eq!(region["friction"]["upper-film"], json!(0.2));
+}
+
+#[test]
 fn a_scene_and_its_materials_are_changed_by_path() {
     let block = "  vary:\n    angle: [0 deg, 45 deg]\n    mu: [0.1]\n    shear: [100 N/m]";
     let set = "scene: {file: scene.yaml, set: {sheets.ply-1.fibre_1: \"-45 deg + ${angle}\", sheets.ply-1.fibre_2: \"45 deg + ${angle}\", friction.fabric_diaphragm: \"${mu}\", \

@@ -12,6 +12,7 @@ pub mod manifest;
 pub mod material;
 pub mod nearest;
 pub mod outline;
+pub mod regions;
 pub mod scene;
 pub mod schema;
 pub mod text;

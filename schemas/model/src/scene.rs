@@ -6,6 +6,7 @@
 
 use crate::friction::Friction;
 use crate::material::MaterialEntry;
+use crate::regions::PlyRegion;
 use crate::units::{Angle, Force, Length, Number, Pressure, Time};
 use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
@@ -309,6 +310,9 @@ pub struct Sheet {
     /// shear stretches it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fibre_2: Option<Angle>,
+    /// Plies: places with another friction, or without stitches.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<PlyRegion>,
 }
 
 /// Direction (rad, from x) of the first axis of a ply whose fibre families lie at `fibre_1` and `fibre_2` (rad): that of the family

@@ -59,6 +59,7 @@ fn held<E: Element>(mesh: &QuadMesh, to: impl Fn(V) -> V) -> Model {
         least_areal_mass: vec![0.0; m],
         element,
         elsewhere: None,
+        other_material: None,
     };
     let settings = StepSettings {
         target_step: 0.0,

@@ -144,6 +144,7 @@ impl Specimen {
             least_areal_mass: vec![0.0; m],
             element,
             elsewhere: None,
+            other_material: None,
         };
         let settings = StepSettings {
             target_step: p.time_step.unwrap_or(0.0),

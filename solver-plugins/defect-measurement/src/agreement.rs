@@ -234,6 +234,7 @@ fn as_scanned(ply: &Ply) -> Ply {
         undeformed: ply.formed.clone(),
         shear_angle: Vec::new(),
         fibre_strain: Vec::new(),
+        fibre_strains: [Vec::new(), Vec::new()],
         ..ply.clone()
     }
 }

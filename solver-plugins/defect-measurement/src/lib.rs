@@ -4,16 +4,21 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod agreement;
+mod compression;
 mod output;
 mod read;
 mod sections;
+mod slip;
+mod slipping;
 
 use agreement::Agreement;
+use compression::Compression;
 use output::Output;
 use plyflow_defects::of_run::{Sheet, neighbours};
 use plyflow_defects::{Defect, Limits, Ply, Settings, find_causes, measure};
 use plyflow_sdk::{Host, Log, Progress, Step, StepError, export_step};
 use serde::Deserialize;
+use slipping::{Asked, Slipping};
 
 /// The step.
 pub struct DefectMeasurement;
@@ -23,6 +28,7 @@ export_step!(DefectMeasurement);
 /// What the manifest has beside [`Settings`] and [`Limits`].
 #[derive(Deserialize)]
 struct Parameters {
+    compressed_below: f64,
     sections: Vec<Section>,
     scan: Option<String>,
     scan_unit: Option<f64>,
@@ -100,6 +106,7 @@ impl Step for DefectMeasurement {
         let settings: Settings = host.parameters()?;
         let limits: Limits = host.parameters()?;
         let p: Parameters = host.parameters()?;
+        let asked: Asked = host.parameters()?;
         let corners = p.sections.iter().map(Section::corners);
         let sections = corners.collect::<Result<Vec<_>, _>>()?;
         let phase = |phase, fraction| {
@@ -157,8 +164,11 @@ impl Step for DefectMeasurement {
         }
         phase("writing", 0.9)?;
         let beside = read::Beside::read(host)?;
+        let slipping = Slipping::of(host, &measured, &asked)?;
         let mut output = Output::new(host, &run, &measured, agreement.as_ref());
+        output.slipping = slipping;
         output.bodies()?;
+        output.compression(Compression::of(&measured, p.compressed_below))?;
         output.distances()?;
         for (section, path) in p.sections.iter().zip(&sections) {
             output.section(&section.label, path, section.on, &beside)?;

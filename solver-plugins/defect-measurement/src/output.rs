@@ -1,8 +1,10 @@
 //! The artifact: bodies with their fields, tables of defects, sections, distributions.
 
 use crate::agreement::{self, Agreement};
+use crate::compression::{self, Compression};
 use crate::read::{Beside, Run};
 use crate::sections::{Section, Sheet};
+use crate::slipping::Slipping;
 use crate::{Measured, Seen};
 use plyflow_defects::align::Alignment;
 use plyflow_defects::{Defect, Kind, RidgeShear};
@@ -50,6 +52,9 @@ pub const SCAN: &str = "scan";
 /// Quantiles of the distance that are told.
 const QUANTILES: [(&str, f64); 4] = [("q50", 0.5), ("q90", 0.9), ("q99", 0.99), ("largest", 1.0)];
 
+/// Fields of the strains along both families of fibres.
+const STRAINS: [&str; 2] = ["fibre_strain_1", "fibre_strain_2"];
+
 /// Writes what was measured.
 pub struct Output<'a> {
     host: &'a Host,
@@ -58,6 +63,9 @@ pub struct Output<'a> {
     agreement: Option<&'a Agreement>,
     plots: Vec<Value>,
     sections: Vec<Value>,
+    compression: Option<Compression>,
+    /// Between plies, where there are several.
+    pub slipping: Option<Slipping>,
 }
 
 impl<'a> Output<'a> {
@@ -75,6 +83,8 @@ impl<'a> Output<'a> {
             agreement,
             plots: Vec::new(),
             sections: Vec::new(),
+            compression: None,
+            slipping: None,
         }
     }
 
@@ -109,6 +119,14 @@ impl<'a> Output<'a> {
             }
             if !p.shear_angle.is_empty() {
                 host.write_field(&p.name, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
+            }
+            if let Some(slipping) = self.slipping.as_ref().filter(|_| m.simulated) {
+                slipping.write(host, &p.name)?;
+            }
+            for (name, strains) in STRAINS.iter().zip(&p.fibre_strains) {
+                if !strains.is_empty() {
+                    host.write_field(&p.name, On::Cells, name, 1, "1", strains)?;
+                }
             }
         }
         host.end_frame()
@@ -151,6 +169,22 @@ impl<'a> Output<'a> {
             "x": {"label": "distance", "unit": "mm"}, "y": {"label": "probability density", "unit": "1/mm"},
             "series": series,
         }));
+        Ok(())
+    }
+
+    /// Results of fibre compression, and by how much it has fallen from the measurement `against`. `None`: the run does not tell it.
+    pub fn compression(&mut self, found: Option<Compression>) -> Result<(), StepError> {
+        let host = self.host;
+        for input in host.inputs_of("against")? {
+            match &found {
+                Some(found) => found.against(host, &input)?,
+                None => return Err(compression::unknown(self.run.step())),
+            }
+        }
+        if let Some(found) = &found {
+            found.report(host)?;
+        }
+        self.compression = found;
         Ok(())
     }
 
@@ -251,14 +285,18 @@ impl<'a> Output<'a> {
         let count = |kind| simulated().flat_map(|m| of(m, kind)).count() as f64;
         host.result("wrinkle_count", count(Kind::Wrinkle), "1")?;
         host.result("bridging_count", count(Kind::Bridging), "1")?;
+        if let Some(uppermost) = simulated().next_back() {
+            for (what, unit, value) in wrinkles(uppermost) {
+                host.result(&format!("uppermost_{what}"), value, unit)?;
+            }
+        }
         let (mut rows, mut list) = (Vec::new(), Vec::new());
         for m in self.measured {
             let name = &m.ply.name;
-            let length = of(m, Kind::Wrinkle).fold(0.0, |s, d| s + d.length);
-            let amplitude = of(m, Kind::Wrinkle).fold(0.0, |s: f64, d| s.max(d.amplitude));
             let area = of(m, Kind::Bridging).fold(0.0, |s, d| s + d.area);
-            host.result(&format!("wrinkle_length.{name}"), length, "m")?;
-            host.result(&format!("wrinkle_amplitude.{name}"), amplitude, "m")?;
+            for (what, unit, value) in wrinkles(m) {
+                host.result(&format!("{what}.{name}"), value, unit)?;
+            }
             host.result(&format!("bridging_area.{name}"), area, "m2")?;
             let sharpest = of(m, Kind::Wrinkle).fold(0.0, |s: f64, d| s.max(d.sharpness));
             host.result(&format!("crest_sharpness.{name}"), sharpest, "rad")?;
@@ -285,9 +323,19 @@ impl<'a> Output<'a> {
             tables.push(json!({"name": "agreement", "title": title, "columns": columns(&BOTH), "rows": rows}));
             json!({"ply": a.ply, "defects": list})
         });
+        tables.extend(self.compression.as_ref().map(Compression::table));
+        let slipping = self.slipping.as_ref();
+        tables.extend(slipping.iter().flat_map(|s| s.tables()));
+        let plots: Vec<Value> = self
+            .plots
+            .iter()
+            .cloned()
+            .chain(slipping.iter().flat_map(|s| s.plots()))
+            .collect();
         host.write_attributes(&json!({
-            "defects": list, "sections": self.sections, "plots": self.plots, "maps": self.maps(),
+            "defects": list, "sections": self.sections, "plots": plots, "maps": self.maps(),
             "alignment": alignment.map(alignment_json), "agreement": agreement, "tables": tables,
+            "fibre_compression": self.compression, "slip": slipping.map(Slipping::told),
         }))
     }
 
@@ -315,6 +363,24 @@ impl<'a> Output<'a> {
             let title = format!("Height of the scan over {}", a.ply);
             maps.push(map(("deviation", &title, "mm"), scan().collect()));
         }
+        for (k, name) in STRAINS.iter().enumerate() {
+            let of: Vec<&Measured> = simulated()
+                .filter(|m| !m.ply.fibre_strains[k].is_empty())
+                .collect();
+            if !of.is_empty() {
+                let title = format!("Strain of the fibres of family {}", k + 1);
+                maps.push(map((name, &title, "1"), of));
+            }
+        }
+        if let Some(slipping) = &self.slipping {
+            for (field, title) in slipping.maps() {
+                let of: Vec<&Measured> =
+                    simulated().filter(|m| slipping.has(&m.ply.name)).collect();
+                if !of.is_empty() {
+                    maps.push(map((&field, &title, "mm"), of));
+                }
+            }
+        }
         maps
     }
 }
@@ -327,6 +393,20 @@ fn number(m: &Measured, d: &Defect) -> Option<usize> {
 
 fn of(m: &Measured, kind: Kind) -> impl Iterator<Item = &Defect> {
     m.defects.iter().filter(move |d| d.kind == kind)
+}
+
+/// What is told of the wrinkles of a ply: name, unit, value. A wrinkle stands off the tool by more than the distance threshold.
+fn wrinkles(m: &Measured) -> [(&'static str, &'static str, f64); 4] {
+    let all = || of(m, Kind::Wrinkle);
+    let length = all().fold(0.0, |s, d| s + d.length);
+    let longest = all().fold(0.0, |s: f64, d| s.max(d.length));
+    let amplitude = all().fold(0.0, |s: f64, d| s.max(d.amplitude));
+    [
+        ("wrinkle_count", "1", all().count() as f64),
+        ("wrinkle_length", "m", length),
+        ("wrinkle_length_max", "m", longest),
+        ("wrinkle_amplitude", "m", amplitude),
+    ]
 }
 
 /// Absent for what has no ridge.

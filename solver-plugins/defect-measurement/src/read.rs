@@ -63,6 +63,11 @@ impl Run {
         })
     }
 
+    /// The run itself.
+    pub fn step(&self) -> &Input {
+        &self.input
+    }
+
     /// Index of the ply that a scan shows: the one of that name, or the uppermost.
     pub fn shown(&self, name: Option<&str>) -> Result<usize, StepError> {
         let Some(name) = name else {

@@ -250,3 +250,149 @@ fn what_a_net_does_not_reach_is_no_bridging_and_told() {
         "{text}"
     );
 }
+
+#[test]
+fn the_uppermost_ply_is_counted_and_its_longest_wrinkle_told_apart_from_all_of_them() {
+    let mut run_off = formed();
+    // A second wrinkle, 15 mm from the lower edge, 2 mm high and 40 mm long.
+    for (p, flat) in run_off.bodies[2].frames[0].iter_mut().zip(flat()) {
+        let along = (flat[0] + 0.035) / 0.020;
+        let fade = if along.abs() < 1.0 {
+            (0.5 * PI * along).cos()
+        } else {
+            0.0
+        };
+        p[2] += 0.002 * bump(flat[1] + 0.035, 0.007) * fade;
+    }
+    let inputs = [MemoryInput::new("formed", &run_off)];
+    let out = run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap();
+    let of = |name: &str| out.result(name);
+    assert_eq!(
+        (
+            of("wrinkle_count"),
+            of("wrinkle_count.ply_1"),
+            of("wrinkle_count.ply_2")
+        ),
+        (2.0, 0.0, 2.0)
+    );
+    for name in [
+        "wrinkle_count",
+        "wrinkle_length",
+        "wrinkle_length_max",
+        "wrinkle_amplitude",
+    ] {
+        assert_eq!(
+            of(&format!("uppermost_{name}")),
+            of(&format!("{name}.ply_2")),
+            "{name}"
+        );
+    }
+    let both: Vec<f64> = (0..2)
+        .map(|k| out.attributes["defects"][k]["length"].as_f64().unwrap())
+        .collect();
+    assert!((of("uppermost_wrinkle_length") - both[0] - both[1]).abs() < 1e-12);
+    assert!(both[0] > 1.2 * both[1] && of("uppermost_wrinkle_length_max") == both[0]);
+    // The height is over 1 mm where the fade is over a third (0.5), along the crest.
+    let reach = 2.0 * 0.030 * 2.0 / PI * (1.0f64 / 3.0).acos();
+    assert!(
+        (both[0] / reach - 1.0).abs() < 0.03,
+        "{} for {reach}",
+        both[0]
+    );
+    // Under another threshold the flatter one is no wrinkle.
+    let inputs = [MemoryInput::new("formed", &run_off)];
+    let out =
+        run::<DefectMeasurement>(json!({"distance_threshold": 0.0025}), &inputs, &[]).unwrap();
+    assert_eq!(out.result("uppermost_wrinkle_count"), 1.0);
+}
+
+/// Fills the strain of a family of `ply_2`: `inner` in the cells whose lower left corner lies left of x = -40 mm, `outer` elsewhere.
+fn strain(of: &mut MemoryArtifact, family: usize, inner: f64, outer: f64) {
+    let ply = &mut of.bodies[2];
+    for (c, value) in ply
+        .cells
+        .chunks_exact(4)
+        .zip(&mut ply.fields[0][family].values)
+    {
+        *value = if ply.points[c[0] as usize][0] < -0.0401 {
+            inner
+        } else {
+            outer
+        };
+    }
+}
+
+#[test]
+fn fibre_compression_is_the_flat_area_below_the_threshold_with_its_mean_and_least_strain() {
+    let mut dry = formed();
+    // A quarter of 160 x 100 mm at -0.4 %, the rest just not below the threshold.
+    strain(&mut dry, 1, -4e-3, -1e-4);
+    let measure = |run_: &MemoryArtifact, parameters: Value, against: Option<&MemoryArtifact>| {
+        let mut inputs = vec![MemoryInput::new("formed", run_)];
+        inputs.extend(against.map(|a| MemoryInput::new("against", a)));
+        run::<DefectMeasurement>(parameters, &inputs, &[])
+    };
+    let out = measure(&dry, json!({}), None).unwrap();
+    let near = |name: &str, value: f64| {
+        let found = out.result(name);
+        assert!(
+            (found - value).abs() < 1e-9 * value.abs().max(1e-3),
+            "{name}: {found} for {value}"
+        );
+    };
+    near("compressed_area.ply_2.family_1", 0.04 * 0.1);
+    near("compressed_strain_mean.ply_2.family_1", -4e-3);
+    near("fibre_strain_least.ply_2.family_1", -4e-3);
+    near("fibre_compression.ply_2.family_1", 1e-3);
+    // Family 2 and the other ply are stretched; all together have four times the area.
+    near("compressed_area.ply_2.family_2", 0.0);
+    near("compressed_strain_mean.ply_2.family_2", 0.0);
+    near("fibre_strain_least.ply_2.family_2", 2e-4);
+    near("compressed_area", 0.004);
+    near("fibre_compression", 0.25e-3);
+    near("fibre_strain_least", -4e-3);
+    assert!(!out.results.contains_key("compressed_area_fall"));
+    assert_eq!(out.body("ply_2").last("fibre_strain_1")[0], -4e-3);
+    let table = &out.attributes["tables"][1];
+    assert_eq!(
+        (&table["name"], table["rows"].as_array().unwrap().len()),
+        (&json!("fibre_compression"), 4)
+    );
+
+    // The same area at 0.3 of the strain: it falls by 70 %, the area does not.
+    let mut lubricated = formed();
+    strain(&mut lubricated, 1, -1.2e-3, 1e-4);
+    let fallen = measure(&lubricated, json!({}), Some(&out)).unwrap();
+    for (name, value) in [
+        ("fibre_compression_fall", 0.7),
+        ("compressed_strain_mean_fall.ply_2.family_1", 0.7),
+        ("fibre_strain_least_fall", 0.7),
+        ("compressed_area_fall", 0.0),
+    ] {
+        assert!((fallen.result(name) - value).abs() < 1e-9, "{name}");
+    }
+    // What was not compressed cannot fall, and is not told as if it had not.
+    assert!(
+        !fallen
+            .results
+            .contains_key("compressed_area_fall.ply_2.family_2")
+    );
+    let other = measure(&lubricated, json!({"compressed_below": -5e-4}), Some(&out)).unwrap_err();
+    assert!(other.contains("expected the same in both"), "{other}");
+    let mut net = formed();
+    for body in &mut net.bodies[1..] {
+        body.fields[0].truncate(1);
+    }
+    let bare = measure(&net, json!({}), None).unwrap();
+    assert!(!bare.results.contains_key("compressed_area"));
+    assert!(
+        measure(&net, json!({}), Some(&out))
+            .unwrap_err()
+            .contains("no fibre strains")
+    );
+    assert!(
+        measure(&dry, json!({}), Some(&bare))
+            .unwrap_err()
+            .contains("no fibre compression")
+    );
+}

@@ -202,6 +202,7 @@ mod tests {
             formed: points,
             shear_angle: Vec::new(),
             fibre_strain: Vec::new(),
+            fibre_strains: [Vec::new(), Vec::new()],
             distance: (0..10).map(at).collect(),
             curvature: Vec::new(),
             tool_crest: Vec::new(),

@@ -43,6 +43,8 @@ pub struct Ply {
     pub shear_angle: Vec<f64>,
     /// `[cells]` the smaller of the two strains along fibres; empty when they are not known.
     pub fibre_strain: Vec<f64>,
+    /// By family, `[cells]`: the strain along its fibres; empty when they are not known.
+    pub fibre_strains: [Vec<f64>; 2],
     /// `[nodes]`.
     pub distance: Vec<NodalDistance>,
     /// `[nodes]`.
@@ -95,6 +97,7 @@ impl Ply {
             formed,
             shear_angle: Vec::new(),
             fibre_strain: Vec::new(),
+            fibre_strains: [Vec::new(), Vec::new()],
             distance,
             curvature,
             tool_crest,

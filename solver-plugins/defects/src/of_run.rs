@@ -131,7 +131,9 @@ pub fn strained_ply(
     let has = |name: &&str| body.fields.iter().any(|f| f.name == **name);
     if names.iter().all(has) {
         let [a, b] = names.map(field);
-        ply.fibre_strain = a?.iter().zip(&b?).map(|(a, b)| a.min(*b)).collect();
+        let (a, b) = (a?, b?);
+        ply.fibre_strain = a.iter().zip(&b).map(|(a, b)| a.min(*b)).collect();
+        ply.fibre_strains = [a, b];
     }
     Ok(ply)
 }

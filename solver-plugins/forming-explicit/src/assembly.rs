@@ -4,6 +4,7 @@ use crate::cover::{self, Layer};
 use crate::elements;
 use crate::friction::{FrictionTable, Touching};
 use crate::parameters::Parameters;
+use crate::regions;
 use crate::run::Body;
 use crate::symmetry::{self, Families, MirroredBody};
 use crate::tool::ToolSurfaces;
@@ -81,6 +82,9 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
             scene.name,
             scene.process.word()
         ));
+    }
+    if let Some(fault) = plyflow_model::regions::faults(scene).into_iter().next() {
+        return Err(fault.text);
     }
     let mut stack = scene
         .sheets
@@ -262,7 +266,10 @@ pub fn add_ply(
     }
     let first = points.len() as u32;
     points.extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
+    regions::check(&sheet.scene, &mesh.points, &mesh.cells, mirrors.planes)?;
     let element = elements::of_ply(components, sheet, &p.element)?;
+    let flat = (&mesh.points[..], &mesh.cells[..]);
+    let other_material = regions::unstitched(components, sheet, flat, &element, p)?;
     symmetry::check_material(&element, sheet, mirrors.planes)?;
     let elsewhere = elements::elsewhere(components, sheet, &element, &mesh, mirrors.planes, p)?;
     let body = Body {
@@ -295,6 +302,7 @@ pub fn add_ply(
         axis: axis(&sheet.scene),
         element,
         elsewhere,
+        other_material,
     };
     Ok((spec, body))
 }

@@ -1,9 +1,10 @@
 //! Which surfaces of a scene rub on each other, and by which law.
 
+use crate::regions::{self, Placed};
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::{
-    AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, PressureDependence, SheetCells,
-    VaryingFriction, Whose,
+    AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, Partner, PressureDependence,
+    RegionalFriction, SheetCells, VaryingFriction, Whose,
 };
 use plyflow_mechanics::model::Model;
 use plyflow_model::friction::{self as scene, AngleLaw, Coefficient, Place, PressureLaw};
@@ -132,6 +133,17 @@ impl<'a> FrictionTable<'a> {
                 None => {}
             }
         }
+        for sheet in &scene.sheets {
+            for region in &sheet.regions {
+                for (partner, given) in &region.friction {
+                    let place = place(sheet, &region.name, partner);
+                    match given {
+                        Coefficient::Law(law) => check_law(law, &place)?,
+                        Coefficient::Constant(n) => check_coefficient(n.0, &place)?,
+                    }
+                }
+            }
+        }
         Ok(table)
     }
 
@@ -191,6 +203,69 @@ impl<'a> FrictionTable<'a> {
     /// # Errors
     /// When the scene does not give it, or when whose fibres count is not clear.
     pub fn law(&self, model: &Model, touching: &Touching<'_>) -> Result<FrictionLaw, String> {
+        self.by_region(model, touching, true)
+    }
+
+    /// The law of a contact with what its surfaces' regions say. `cells`: whether its nodes touch cells of the other surface.
+    fn by_region(
+        &self,
+        model: &Model,
+        touching: &Touching<'_>,
+        cells: bool,
+    ) -> Result<FrictionLaw, String> {
+        let mut laws = vec![self.everywhere(model, touching)?];
+        let [lower, upper] = touching.parts;
+        // The surface whose nodes touch comes first; of two between which they do not, the lower one.
+        let (own, other) = match touching.slave == upper {
+            true => (upper, lower),
+            false => (lower, upper),
+        };
+        let mut of = |name: &str, partner: &str| -> Result<Vec<(Placed<'a>, u16)>, String> {
+            let Some(sheet) = self.scene.sheets.iter().find(|s| s.name == name) else {
+                return Ok(Vec::new());
+            };
+            let class = self.class(touching.parts);
+            let mut found = Vec::new();
+            for placed in regions::of_sheet(sheet)? {
+                let law = match placed.region.coefficient(partner, class) {
+                    None => continue,
+                    Some(Coefficient::Constant(n)) => n.0.into(),
+                    Some(Coefficient::Law(law)) => {
+                        let at = place(sheet, &placed.region.name, partner);
+                        self.make(law, &at, model, touching)?
+                    }
+                };
+                found.push((placed, laws.len() as u16));
+                laws.push(law);
+            }
+            Ok(found)
+        };
+        let (near, far) = (of(own, other)?, of(other, own)?);
+        if laws.len() == 1 {
+            return Ok(laws.swap_remove(0));
+        }
+        let slave = regions::by_node(model, touching.slave, &near);
+        let partner = if far.is_empty() {
+            Partner::Bare
+        } else if cells {
+            let (cells, first) = self::cells(model, other);
+            Partner::Sheet {
+                laws: regions::by_node(model, other, &far),
+                cells: cells.to_vec(),
+                first_cell: first as u32,
+            }
+        } else {
+            Partner::Between(regions::by_node(model, touching.slave, &far))
+        };
+        Ok(FrictionLaw::Regional(Arc::new(RegionalFriction {
+            laws,
+            slave,
+            partner,
+        })))
+    }
+
+    /// The law of a contact outside of all regions.
+    fn everywhere(&self, model: &Model, touching: &Touching<'_>) -> Result<FrictionLaw, String> {
         let f = &self.scene.friction;
         let mut own = f.pairs.iter().enumerate();
         if let Some((k, given)) = own.find(|(_, p)| same(&p.between, touching.parts)) {
@@ -254,21 +329,29 @@ impl<'a> FrictionTable<'a> {
         parts: &[&str],
         sheet: &str,
     ) -> Result<FrictionLaw, String> {
-        let mut least: Option<FrictionLaw> = None;
+        let mut laws: Vec<FrictionLaw> = Vec::new();
         for two in parts.windows(2) {
             let touching = Touching {
                 parts: [two[0], two[1]],
                 slave: sheet,
             };
-            let law = without_fibres_of_others(self.law(model, &touching)?);
-            if least
-                .as_ref()
-                .is_none_or(|l| at_one_bar(&law) < at_one_bar(l))
-            {
-                least = Some(law);
-            }
+            let law = self.by_region(model, &touching, false)?;
+            laws.push(without_fibres_of_others(law));
         }
-        Ok(least.unwrap_or_else(|| 0.0.into()))
+        if laws.iter().any(|l| matches!(l, FrictionLaw::Regional(_))) {
+            return Ok(regions::least(model, sheet, &laws));
+        }
+        let lesser = |a: FrictionLaw, b| {
+            if at_one_bar(&b) < at_one_bar(&a) {
+                b
+            } else {
+                a
+            }
+        };
+        Ok(laws
+            .into_iter()
+            .reduce(lesser)
+            .unwrap_or_else(|| 0.0.into()))
     }
 
     /// Class of two surfaces. In a zone that not every ply reaches, others touch than in the whole scene.
@@ -364,8 +447,10 @@ impl<'a> FrictionTable<'a> {
 }
 
 /// Coefficient under 1 bar, along the fibres or wherever its factor is 1.
-fn at_one_bar(law: &FrictionLaw) -> f64 {
+pub(crate) fn at_one_bar(law: &FrictionLaw) -> f64 {
     match law {
+        // Outside of the regions.
+        FrictionLaw::Regional(r) => r.laws.first().map_or(0.0, at_one_bar),
         FrictionLaw::Constant(c) => *c,
         FrictionLaw::Varying(v) => v.pressure.coefficient(1e5),
     }
@@ -374,6 +459,13 @@ fn at_one_bar(law: &FrictionLaw) -> f64 {
 /// A node on a rigid part has no cell of a master, whose fibres it could ask for.
 fn without_fibres_of_others(law: FrictionLaw) -> FrictionLaw {
     match law {
+        FrictionLaw::Regional(r) => {
+            let laws = r.laws.iter().cloned().map(without_fibres_of_others);
+            FrictionLaw::Regional(Arc::new(RegionalFriction {
+                laws: laws.collect(),
+                ..(*r).clone()
+            }))
+        }
         FrictionLaw::Varying(v) if v.angle.as_ref().is_some_and(|a| a.whose == Whose::Master) => {
             FrictionLaw::Varying(Arc::new(VaryingFriction {
                 angle: None,
@@ -382,6 +474,11 @@ fn without_fibres_of_others(law: FrictionLaw) -> FrictionLaw {
         }
         law => law,
     }
+}
+
+/// Where a scene tells a coefficient of a region.
+fn place(sheet: &Sheet, region: &str, partner: &str) -> String {
+    format!("sheets.{}.regions.{region}.friction.{partner}", sheet.name)
 }
 
 /// The cells of a sheet (model nodes) and the number of the first.

@@ -212,6 +212,7 @@ fn bottom_film(
             .collect(),
         element,
         elsewhere: None,
+        other_material: None,
     };
     parts.placed.push(Placed { index: 0, slaves });
     let body = assembly::body(&stack[0], 0, &mesh.points, &mesh.cells, at.planes)?;
@@ -336,6 +337,7 @@ fn top_film(
         axis: assembly::axis(&top.scene),
         element,
         elsewhere: None,
+        other_material: None,
     };
     parts.bodies.push(body);
     parts.placed.push(Placed {

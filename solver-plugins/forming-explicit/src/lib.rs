@@ -24,6 +24,7 @@ pub mod parameters;
 pub mod penetration;
 pub mod press;
 pub mod process;
+pub mod regions;
 pub mod run;
 mod strain;
 pub mod symmetry;

@@ -5,6 +5,7 @@ use crate::elements;
 use crate::late::{self, Start};
 use crate::parameters::Parameters;
 use crate::process::{Cycle, Load};
+use crate::regions;
 use crate::run::{Body, Forming};
 use crate::tool::ToolSurfaces;
 use plyflow_mechanics::history::{hermite, hermite_rate, locate};
@@ -288,6 +289,8 @@ fn sheets_of(
             points: local.points.clone(),
             cells: local.cells.clone(),
         };
+        let flat = (&mesh.points[..], &mesh.cells[..]);
+        let other_material = regions::unstitched(components, sheet, flat, &element, p)?;
         let nodes: Vec<u32> = (first..all.points.len() as u32).collect();
         let mut free = vec![true; local.points.len()];
         for n in &local.driven {
@@ -312,6 +315,7 @@ fn sheets_of(
             axis: assembly::axis(&sheet.scene),
             element,
             elsewhere: None,
+            other_material,
         });
     }
     Ok(all)

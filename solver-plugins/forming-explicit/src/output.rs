@@ -300,6 +300,10 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value>
                     value["holes"] = json!(blank.holes());
                 }
             }
+            let regions = crate::regions::attributes(&s.scene);
+            if !regions.is_empty() {
+                value["regions"] = regions.into();
+            }
             if let Some(q) = &body.quality {
                 value["mesh_quality"] = json!({
                     "least_scaled_jacobian": q.least_scaled_jacobian,

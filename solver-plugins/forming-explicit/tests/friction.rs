@@ -40,7 +40,7 @@ fn law<'a>(model: &'a Model, name: &str) -> &'a FrictionLaw {
 fn constant(model: &Model, name: &str) -> f64 {
     match law(model, name) {
         FrictionLaw::Constant(mu) => *mu,
-        FrictionLaw::Varying(law) => panic!("{name}: {law:?}"),
+        law => panic!("{name}: {law:?}"),
     }
 }
 
@@ -74,7 +74,7 @@ fn laws_of_pressure_and_angle_reach_the_contacts() {
     }));
     let varying = |name: &str| match law(&m, name) {
         FrictionLaw::Varying(law) => law.clone(),
-        FrictionLaw::Constant(mu) => panic!("{name}: {mu}"),
+        law => panic!("{name}: {law:?}"),
     };
     let power = varying("tool/inner");
     assert!(power.angle.is_none());

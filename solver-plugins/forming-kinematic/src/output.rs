@@ -312,6 +312,11 @@ fn warnings(p: &Parameters, d: &Done, unreached: usize) -> Vec<String> {
             millimetres(d.start)
         ));
     }
+    if !d.ply.scene.regions.is_empty() {
+        texts.push(format!(
+            "ply '{name}': its `regions` count for nothing here: a pin-jointed net knows neither friction nor stitches; forming-explicit computes them"
+        ));
+    }
     let poor = d.quality.and_then(|q| q.warning());
     texts.extend(poor.map(|text| format!("ply '{name}': {text}")));
     if unreached == 0 {

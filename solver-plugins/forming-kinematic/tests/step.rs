@@ -431,3 +431,13 @@ fn arch() -> tempfile::NamedTempFile {
     std::fs::write(file.path(), text + "endsolid arch\n").unwrap();
     file
 }
+
+#[test]
+fn regions_of_a_ply_are_said_to_count_for_nothing_in_a_net() {
+    let mut scene = scene(hemisphere(), [0.08, 0.08], [0.0, 90.0]);
+    scene["sheets"][1]["regions"] = json!([{"name": "a", "rectangle": {"length": "0.02 m", "width": "0.02 m"}, "friction": {"all": 0.1}}]);
+    let formed = on_hemisphere(0.08, json!({"scene": scene})).unwrap();
+    let text = formed.attributes["warnings"][0].as_str().unwrap();
+    assert!(text.contains("`regions` count for nothing"), "{text}");
+    assert_eq!(formed.attributes["warnings"].as_array().unwrap().len(), 1);
+}

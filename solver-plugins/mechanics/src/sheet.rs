@@ -68,6 +68,28 @@ pub struct SheetSpec {
     pub element: ElementInstance,
     /// What takes its place in some cells, if anything does.
     pub elsewhere: Option<Elsewhere>,
+    /// Another material that some cells have, if any do.
+    pub other_material: Option<OtherMaterial>,
+}
+
+/// The same formulation with another material in some cells of a sheet, such as a fabric without its stitch. What bends about nodes is that of the
+/// sheet's own material everywhere.
+pub struct OtherMaterial {
+    /// The sheet's element with that material.
+    pub element: ElementInstance,
+    /// What takes its place in the cells of [`Elsewhere`], where the sheet has such.
+    pub elsewhere: Option<ElementInstance>,
+    /// `[m]` whether a cell has it.
+    pub cells: Vec<bool>,
+}
+
+/// Which of a sheet's formulations a batch has.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Kind {
+    /// That of [`Elsewhere`].
+    pub elsewhere: bool,
+    /// With the material of [`OtherMaterial`].
+    pub other: bool,
 }
 
 /// A membrane that some cells of a sheet have instead of the sheet's element. Neither patches nor rotations belong to it: the
@@ -95,6 +117,8 @@ pub struct Sheet {
     pub element: ElementInstance,
     /// That of the batches that are marked so ([`Elsewhere`]).
     pub elsewhere: Option<ElementInstance>,
+    /// Both with another material, of the batches that are marked so ([`OtherMaterial`]).
+    pub other_material: Option<[Option<ElementInstance>; 2]>,
     /// Thickness (m).
     pub thickness: f64,
     /// Mass by mass scaling (kg).
@@ -105,6 +129,14 @@ impl Sheet {
     /// The formulation of a batch.
     #[inline]
     pub fn element_of(&self, batch: &Batch) -> &ElementInstance {
+        if batch.other
+            && let Some([own, elsewhere]) = &self.other_material
+        {
+            let element = if batch.elsewhere { elsewhere } else { own };
+            if let Some(element) = element {
+                return element;
+            }
+        }
         match &self.elsewhere {
             Some(element) if batch.elsewhere => element,
             _ => &self.element,
@@ -118,6 +150,8 @@ pub struct Batch {
     pub sheet: u32,
     /// Whether they have the sheet's other formulation ([`Elsewhere`]).
     pub elsewhere: bool,
+    /// Whether they have the sheet's other material ([`OtherMaterial`]).
+    pub other: bool,
     /// Elements that count; the rest repeat the last.
     pub count: u32,
     /// Model nodes by corner and lane.

@@ -54,6 +54,7 @@ impl Strip {
             least_areal_mass: vec![0.0; mesh.cells.len()],
             element: self.element,
             elsewhere: None,
+            other_material: None,
         };
         let settings = StepSettings {
             target_step: 5e-6,

@@ -347,6 +347,11 @@ impl Study {
             w.frame_points(name, &s.formed).unwrap();
             w.frame_field(name, On::Points, "defect", 1, "1", &defect)
                 .unwrap();
+            if *name == "ply_2" {
+                let along: Vec<f64> = s.flat.chunks_exact(3).map(|p| 0.01 * p[1]).collect();
+                w.frame_field(name, On::Points, "slip_along", 1, "m", &along)
+                    .unwrap();
+            }
         }
         w.end_frame().unwrap();
         let r = RADIUS + 0.008;

@@ -1,5 +1,6 @@
 //! Coefficients of friction: constant, or by pressure and by the angle between sliding and fibres.
 
+use super::regions::RegionalFriction;
 use crate::vec3::{V, add, cross, dot, norm, scale, sub, unit};
 use plyflow_fixed::FixedBits;
 use std::sync::Arc;
@@ -14,6 +15,8 @@ pub enum FrictionLaw {
     Constant(f64),
     /// By pressure and direction.
     Varying(Arc<VaryingFriction>),
+    /// By the places of the sheets that touch.
+    Regional(Arc<RegionalFriction>),
 }
 
 impl From<f64> for FrictionLaw {

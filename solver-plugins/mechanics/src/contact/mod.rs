@@ -13,6 +13,7 @@ mod blend;
 mod folds;
 mod friction;
 mod proximity;
+mod regions;
 mod rigid;
 mod search;
 mod sheets;
@@ -24,6 +25,7 @@ pub use friction::{
     AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, PressureDependence, SheetCells,
     VaryingFriction, Whose,
 };
+pub use regions::{NodeLaws, Partner, RegionalFriction};
 pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
 pub use search::{Surface, shape};
 pub use sheets::SheetContact;

@@ -269,6 +269,7 @@ impl RigidContact {
         match self.friction.clone() {
             FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), x, v, pace),
             FrictionLaw::Varying(law) => self.compute_with(&*law, x, v, pace),
+            FrictionLaw::Regional(law) => self.compute_with(&*law, x, v, pace),
         }
     }
 

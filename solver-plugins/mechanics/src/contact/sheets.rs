@@ -116,6 +116,7 @@ impl SheetContact {
         match self.friction.clone() {
             FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace, onto),
             FrictionLaw::Varying(law) => self.compute_with(&*law, s, v, pace, onto),
+            FrictionLaw::Regional(law) => self.compute_with(&*law, s, v, pace, onto),
         }
     }
 

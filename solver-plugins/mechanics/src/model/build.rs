@@ -1,6 +1,7 @@
 //! Building a model: sheets, batches, masses.
 
 use super::*;
+use crate::component::ElementInstance;
 use crate::mesh::Patch;
 use crate::mirror::{Mirrors, mirrored_in};
 use std::sync::Arc;
@@ -132,7 +133,7 @@ impl Model {
         let pressed = |c: usize| matches!(spec.pressed[c], Pressed::Below | Pressed::Both);
         self.pressed_below.extend((0..cells.len()).map(pressed));
         let groups = (orders.iter()).flat_map(|(e, o)| o.chunks(BLOCK * LANES).map(|g| (*e, g)));
-        for (elsewhere, group) in groups {
+        for (kind, group) in groups {
             let used = group.iter().flat_map(|c| cells[*c as usize]);
             let mut block = Block::new(used);
             for (b, chunk) in group.chunks(LANES).enumerate() {
@@ -143,7 +144,7 @@ impl Model {
                         lane: l as u16,
                     };
                 }
-                let of = (sheet_index, elsewhere);
+                let of = (sheet_index, kind);
                 let batch = element_batch(of, &spec, &cells, chunk, &block);
                 block.batches.push(batch);
             }
@@ -166,6 +167,7 @@ impl Model {
             added_mass: 0.0,
             element: spec.element,
             elsewhere: spec.elsewhere.map(|e| e.element),
+            other_material: spec.other_material.map(|o| [Some(o.element), o.elsewhere]),
         };
         self.initialise(
             &mut sheet,
@@ -289,7 +291,7 @@ impl Model {
         &mut self,
         sheet: &mut Sheet,
         axis: V,
-        orders: &[(bool, Vec<u32>)],
+        orders: &[(Kind, Vec<u32>)],
         least: &[f64],
         areal_mass: f64,
     ) -> Result<(), MechanicsError> {
@@ -423,27 +425,36 @@ impl Model {
     }
 }
 
-/// The cells of a sheet by formulation (whether the one of [`Elsewhere`]), each group of them in an order of its own: a block
-/// has elements of one kind, and membranes cost what membranes cost.
-fn orders(spec: &SheetSpec, centres: &[V]) -> Vec<(bool, Vec<u32>)> {
-    let kinds: &[bool] = match &spec.elsewhere {
-        None => &[false],
-        Some(_) => &[false, true],
+/// The cells of a sheet by formulation, each group of them in an order of its own: a block has elements of one kind, and membranes cost what
+/// membranes cost.
+fn orders(spec: &SheetSpec, centres: &[V]) -> Vec<(Kind, Vec<u32>)> {
+    let both = |there: bool| if there { &[false, true][..] } else { &[false] };
+    let kind = |c: usize| Kind {
+        elsewhere: spec.elsewhere.as_ref().is_some_and(|e| e.cells[c]),
+        other: spec.other_material.as_ref().is_some_and(|o| o.cells[c]),
     };
-    let is = |c: usize| spec.elsewhere.as_ref().is_some_and(|e| e.cells[c]);
-    let order = |kind: &bool| {
+    let others = both(spec.other_material.is_some()).iter();
+    let kinds = others.flat_map(|o| {
+        let of = |e: &bool| Kind {
+            elsewhere: *e,
+            other: *o,
+        };
+        both(spec.elsewhere.is_some()).iter().map(of)
+    });
+    let order = |wanted: Kind| {
         let own: Vec<u32> = (0..centres.len() as u32)
-            .filter(|c| is(*c as usize) == *kind)
+            .filter(|c| kind(*c as usize) == wanted)
             .collect();
         let places: Vec<V> = own.iter().map(|c| centres[*c as usize]).collect();
         let order = compact_order(&places, BLOCK * LANES);
-        (*kind, order.iter().map(|k| own[*k as usize]).collect())
+        (wanted, order.iter().map(|k| own[*k as usize]).collect())
     };
-    kinds.iter().map(order).collect()
+    kinds.map(order).collect()
 }
 
 /// Whether the element of [`Elsewhere`] is a membrane, and told for every cell.
 fn check_elsewhere(spec: &SheetSpec) -> Result<(), MechanicsError> {
+    check_other_material(spec)?;
     let Some(e) = &spec.elsewhere else {
         return Ok(());
     };
@@ -464,16 +475,44 @@ fn check_elsewhere(spec: &SheetSpec) -> Result<(), MechanicsError> {
     Ok(())
 }
 
-/// A batch of the cells `chunk` of a sheet, with its element or the one of [`Elsewhere`]; `cells` in model nodes.
+/// Whether another material is told for every cell, and its elements are like the sheet's own.
+fn check_other_material(spec: &SheetSpec) -> Result<(), MechanicsError> {
+    let Some(other) = &spec.other_material else {
+        return Ok(());
+    };
+    let pairs = [
+        (Some(&spec.element), Some(&other.element)),
+        (
+            spec.elsewhere.as_ref().map(|e| &e.element),
+            other.elsewhere.as_ref(),
+        ),
+    ];
+    let shape = |e: &ElementInstance| (e.sizes.dofs_per_node, e.sizes.fields, e.sizes.patch_nodes);
+    let alike = pairs.iter().all(|(a, b)| a.map(shape) == b.map(shape));
+    if other.cells.len() == spec.cells.len() && alike {
+        return Ok(());
+    }
+    Err(MechanicsError::Input(format!(
+        "sheet '{}': its other material is told for {} of {} cells, with elements that must be like its own",
+        spec.name,
+        other.cells.len(),
+        spec.cells.len()
+    )))
+}
+
+/// A batch of the cells `chunk` of a sheet, all of one kind; `cells` in model nodes.
 fn element_batch(
-    (sheet, elsewhere): (u32, bool),
+    (sheet, kind): (u32, Kind),
     spec: &SheetSpec,
     cells: &[[u32; 4]],
     chunk: &[u32],
     block: &Block<Batch>,
 ) -> Batch {
-    let element = match &spec.elsewhere {
-        Some(e) if elsewhere => &e.element,
+    let other = spec.other_material.as_ref().filter(|_| kind.other);
+    let element = match (&spec.elsewhere, other) {
+        (Some(e), None) if kind.elsewhere => &e.element,
+        (Some(e), Some(o)) if kind.elsewhere => o.elsewhere.as_ref().unwrap_or(&e.element),
+        (_, Some(o)) => &o.element,
         _ => &spec.element,
     };
     let s = element.sizes;
@@ -493,7 +532,8 @@ fn element_batch(
     let is_pressed = (0..LANES).any(|l| shares(l) != [0.0; 2]);
     Batch {
         sheet,
-        elsewhere,
+        elsewhere: kind.elsewhere,
+        other: kind.other,
         count: chunk.len() as u32,
         places: nodes.map(|n| n.map(|n| block.place(n))),
         nodes,

@@ -81,5 +81,6 @@ pub fn sheet(name: &str, mesh: &QuadMesh, first: u32, element: ElementInstance) 
         least_areal_mass: vec![0.0; m],
         element,
         elsewhere: None,
+        other_material: None,
     }
 }

@@ -1,0 +1,444 @@
+//! Slip in the artifact: fields, sections, results.
+
+use crate::Measured;
+use crate::slip::{Course, Faces, Line, Slip, course, mirrored, size};
+use plyflow_defects::Ply;
+use plyflow_fixed::FixedBits;
+use plyflow_sdk::{Host, Log, On, StepError};
+use plyflow_surface::weighted_mean;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// More stations on either side of a section's middle are not looked at.
+const STATIONS: f64 = 100_000.0;
+/// Where less than this share of a section has its mirror image, one is told so.
+const ONE_SIDED: f64 = 0.5;
+/// The parts of slip, as results, arrays and fields name them.
+const PARTS: [&str; 2] = ["along", "across"];
+
+/// What the manifest has of slip.
+#[derive(Deserialize)]
+pub struct Asked {
+    slip_direction: f64,
+    slip_step: f64,
+    slip_sections: Vec<AskedSection>,
+}
+
+/// A line on the flat plies.
+#[derive(Deserialize)]
+struct AskedSection {
+    name: String,
+    /// Its middle (m).
+    at: Vec<f64>,
+    /// From x (rad).
+    direction: f64,
+    /// (m).
+    length: Option<f64>,
+}
+
+/// By node of a ply: the number of the ply on which it lies, and its slip over it.
+type Field = Vec<Option<(usize, Slip)>>;
+
+/// A section and two plies that lie on each other there.
+struct Cut {
+    section: usize,
+    pair: [String; 2],
+    /// (m).
+    stations: Vec<f64>,
+    values: [Vec<f64>; 2],
+    courses: [Course; 2],
+}
+
+/// The slip of the plies of a run.
+pub struct Slipping {
+    direction: f64,
+    /// By ply, from the tool upwards; empty of one that lies on none.
+    fields: Vec<(String, Field)>,
+    names: Vec<String>,
+    pairs: Vec<Value>,
+    cuts: Vec<Cut>,
+    sections: Vec<String>,
+}
+
+impl Asked {
+    fn line(&self, section: &AskedSection, faces: &Faces<'_>) -> Result<Line, StepError> {
+        let middle = <[f64; 2]>::try_from(&section.at[..])
+            .map_err(|_| "slip_sections: `at` is a place [x, y]")?;
+        let reach = section
+            .length
+            .map_or_else(|| faces.reach(middle), |l| 0.5 * l);
+        let count = (reach / self.slip_step + 1e-9).floor();
+        if count > STATIONS {
+            return Err(format!(
+                "slip_step: section '{}' would have {count:.0} stations on either side of its middle, a place every {} mm; expected at most {STATIONS}",
+                section.name,
+                1e3 * self.slip_step
+            )
+            .into());
+        }
+        Ok(Line {
+            middle,
+            axis: [section.direction.fixed_cos(), section.direction.fixed_sin()],
+            step: self.slip_step,
+            reach: count as i64,
+        })
+    }
+
+    /// Names are parts of results' names, and told apart by them.
+    fn check(&self) -> Result<(), StepError> {
+        for (k, section) in self.slip_sections.iter().enumerate() {
+            let name = &section.name;
+            let begins = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+            if !begins
+                || !name
+                    .chars()
+                    .all(|c| c.is_ascii_alphanumeric() || "_-".contains(c))
+            {
+                return Err(format!(
+                    "slip_sections[{k}].name: '{name}' cannot be a part of a result's name; expected letters, digits, _ and -, the first a letter, such as A-A"
+                )
+                .into());
+            }
+            if self.slip_sections[..k].iter().any(|s| s.name == *name) {
+                return Err(format!("slip_sections[{k}].name: there is another section '{name}'; give each a name of its own").into());
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Slipping {
+    /// Of the plies of a run, from the tool upwards. `None` of a single ply.
+    ///
+    /// # Errors
+    /// When a section cannot be taken, or meets no two plies that lie on each other.
+    pub fn of(
+        host: &Host,
+        measured: &[Measured],
+        asked: &Asked,
+    ) -> Result<Option<Self>, StepError> {
+        asked.check()?;
+        let plies: Vec<&Ply> = (measured.iter())
+            .filter(|m| m.simulated)
+            .map(|m| &m.ply)
+            .collect();
+        if plies.len() < 2 {
+            return match asked.slip_sections.first() {
+                None => Ok(None),
+                Some(s) => Err(format!(
+                    "slip_sections: '{}': the run has one ply, and nothing to slip on",
+                    s.name
+                )
+                .into()),
+            };
+        }
+        let Some(faces) = Faces::new(&plies, asked.slip_direction) else {
+            let why = "the plies of the run are not all meshes of quads, so their places cannot be found in each other";
+            if asked.slip_sections.is_empty() {
+                host.log(Log::Info, &format!("no slip between plies is told: {why}"));
+                return Ok(None);
+            }
+            return Err(format!("slip_sections: {why}").into());
+        };
+        let mut slipping = Self {
+            direction: asked.slip_direction,
+            fields: Vec::new(),
+            names: plies.iter().map(|p| p.name.clone()).collect(),
+            pairs: Vec::new(),
+            cuts: Vec::new(),
+            sections: asked.slip_sections.iter().map(|s| s.name.clone()).collect(),
+        };
+        let fields: Vec<Field> = (0..faces.count()).map(|k| faces.field(k)).collect();
+        let mut pairs = Vec::new();
+        for (upper, field) in fields.iter().enumerate() {
+            for lower in (0..upper).rev() {
+                if field.iter().flatten().any(|(on, _)| *on == lower) {
+                    pairs.push([lower, upper]);
+                    slipping.whole(host, &faces, [lower, upper], field)?;
+                }
+            }
+        }
+        for (k, section) in asked.slip_sections.iter().enumerate() {
+            let line = asked.line(section, &faces)?;
+            let before = slipping.cuts.len();
+            for [lower, upper] in &pairs {
+                slipping.cut(host, (k, &line), [*lower, *upper], &faces)?;
+            }
+            if slipping.cuts.len() == before {
+                return Err(format!(
+                    "slip_sections: '{}' through {:?} m meets no two plies that lie on each other; its place is one on the flat plies",
+                    section.name, section.at
+                )
+                .into());
+            }
+        }
+        let names = slipping.names.clone();
+        slipping.fields = names
+            .into_iter()
+            .zip(fields)
+            .filter(|(_, f)| f.iter().any(Option::is_some))
+            .collect();
+        Ok(Some(slipping))
+    }
+
+    fn pair(&self, [lower, upper]: [usize; 2]) -> [String; 2] {
+        [lower, upper].map(|k| self.names[k].clone())
+    }
+
+    /// Results of two plies, wherever the one lies on the other.
+    fn whole(
+        &mut self,
+        host: &Host,
+        faces: &Faces<'_>,
+        pair: [usize; 2],
+        field: &Field,
+    ) -> Result<(), StepError> {
+        let [lower, upper] = self.pair(pair);
+        let ply = faces.ply(pair[1]);
+        let areas = ply.topology.node_areas(&ply.undeformed);
+        let here =
+            |found: &Option<(usize, Slip)>| found.filter(|(on, _)| *on == pair[0]).map(|(_, s)| s);
+        let (mut sizes, mut weights) = (Vec::new(), Vec::new());
+        let mut largest = [0.0f64; 2];
+        for (slip, area) in field.iter().map(here).zip(&areas) {
+            let Some(slip) = slip else { continue };
+            sizes.push(size(&slip));
+            weights.push(*area);
+            largest = [0, 1].map(|p| largest[p].max(slip.parts[p].abs()));
+        }
+        let max = sizes.iter().copied().fold(0.0, f64::max);
+        let mean = weighted_mean(&sizes, &weights);
+        for (name, value) in [
+            ("slip_max", max),
+            ("slip_mean", mean),
+            ("slip_along_max", largest[0]),
+            ("slip_across_max", largest[1]),
+        ] {
+            host.result(&format!("{name}.{lower}.{upper}"), value, "m")?;
+        }
+        self.pairs.push(json!({
+            "lower": lower, "upper": upper, "area": weights.iter().sum::<f64>(), "max": max, "mean": mean,
+            "along_max": largest[0], "across_max": largest[1],
+        }));
+        Ok(())
+    }
+
+    /// Results and arrays of two plies along a section, where the one lies on the other there.
+    fn cut(
+        &mut self,
+        host: &Host,
+        (number, line): (usize, &Line),
+        pair: [usize; 2],
+        faces: &Faces<'_>,
+    ) -> Result<(), StepError> {
+        let found = faces.along(pair[0], pair[1], line);
+        let part =
+            |p: usize| -> Vec<(i64, f64)> { found.iter().map(|(k, s)| (*k, s.parts[p])).collect() };
+        let values = [part(0), part(1)];
+        let (Some(along), Some(across)) = (course(&values[0]), course(&values[1])) else {
+            return Ok(());
+        };
+        let [lower, upper] = self.pair(pair);
+        let name = &self.sections[number];
+        let stations: Vec<i64> = found.iter().map(|(k, _)| *k).collect();
+        if mirrored(&stations) < ONE_SIDED {
+            let text = format!(
+                "slip section '{name}' of {upper} over {lower}: {:.0} % of it have their mirror image about its middle on both plies; only these count for its \
+                 symmetric and antisymmetric parts. Give a middle (`at`) in the middle of the plies",
+                100.0 * mirrored(&stations)
+            );
+            host.log(Log::Warn, &text);
+        }
+        for (part, course) in PARTS.iter().zip([&along, &across]) {
+            let told = |what: &str, value: f64, unit: &str| {
+                host.result(
+                    &format!("section_slip_{what}.{name}.{part}.{lower}.{upper}"),
+                    value,
+                    unit,
+                )
+            };
+            told("max", course.max, "m")?;
+            told("mean", course.mean, "m")?;
+            let Some(parity) = course.parity else {
+                continue;
+            };
+            told("symmetric", parity.symmetric, "m")?;
+            told("antisymmetric", parity.antisymmetric, "m")?;
+            if let Some(share) = parity.asymmetry() {
+                told("asymmetry", share, "1")?;
+            }
+        }
+        let cut = Cut {
+            section: number,
+            pair: [lower, upper],
+            stations: stations.iter().map(|k| line.station(*k)).collect(),
+            values: values.map(|v| v.into_iter().map(|(_, value)| value).collect()),
+            courses: [along, across],
+        };
+        host.write_f64(
+            &self.path(&cut, "station"),
+            &[cut.stations.len()],
+            "m",
+            &cut.stations,
+        )?;
+        for (part, values) in PARTS.iter().zip(&cut.values) {
+            host.write_f64(&self.path(&cut, part), &[values.len()], "m", values)?;
+        }
+        self.cuts.push(cut);
+        Ok(())
+    }
+
+    fn path(&self, cut: &Cut, what: &str) -> String {
+        let [lower, upper] = &cut.pair;
+        format!("slip/{}/{lower}/{upper}/{what}", self.sections[cut.section])
+    }
+
+    /// Whether a body has fields of slip.
+    pub fn has(&self, body: &str) -> bool {
+        self.fields.iter().any(|(name, _)| name == body)
+    }
+
+    /// Writes the fields of a body, if it has any; no slip where it lies on no ply.
+    pub fn write(&self, host: &Host, body: &str) -> Result<(), StepError> {
+        let Some((_, field)) = self.fields.iter().find(|(name, _)| name == body) else {
+            return Ok(());
+        };
+        let slip = |s: &Option<(usize, Slip)>| s.map_or([0.0; 3], |(_, s)| s.vector);
+        let vectors: Vec<f64> = field.iter().flat_map(slip).collect();
+        host.write_field(body, On::Points, "slip", 3, "m", &vectors)?;
+        for (p, part) in PARTS.iter().enumerate() {
+            let values: Vec<f64> = field
+                .iter()
+                .map(|s| s.map_or(0.0, |(_, s)| s.parts[p]))
+                .collect();
+            host.write_field(body, On::Points, &format!("slip_{part}"), 1, "m", &values)?;
+        }
+        let on: Vec<f64> = field
+            .iter()
+            .map(|s| s.map_or(0.0, |(on, _)| (on + 1) as f64))
+            .collect();
+        host.write_field(body, On::Points, "slip_on", 1, "1", &on)
+    }
+
+    fn in_words(&self, part: &str) -> String {
+        // To a hundredth of a degree, without an end of zeros.
+        let degrees = (100.0 * self.direction.to_degrees()).round() / 100.0;
+        format!("{part} {degrees} deg")
+    }
+
+    /// A plot for each pair and part, with a line for each section.
+    pub fn plots(&self) -> Vec<Value> {
+        let mut plots = Vec::new();
+        for pair in &self.pairs {
+            let [lower, upper] = ["lower", "upper"].map(|n| pair[n].as_str().unwrap_or_default());
+            for part in PARTS {
+                let of_pair = self.cuts.iter().filter(|c| c.pair == [lower, upper]);
+                let series: Vec<Value> = of_pair
+                    .map(|c| json!({"label": self.sections[c.section], "x": self.path(c, "station"), "y": self.path(c, part)}))
+                    .collect();
+                if !series.is_empty() {
+                    plots.push(json!({
+                        "name": format!("slip_{part}_{lower}_{upper}"),
+                        "title": format!("Slip of {upper} over {lower}, {}", self.in_words(part)),
+                        "x": {"label": "along the section in the flat ply, from its middle", "unit": "mm"}, "y": {"label": "slip", "unit": "mm"},
+                        "series": series,
+                    }));
+                }
+            }
+        }
+        plots
+    }
+
+    /// Fields that are drawn as maps, with their titles.
+    pub fn maps(&self) -> [(String, String); 2] {
+        PARTS.map(|part| {
+            let title = format!("Slip over the ply below, {}", self.in_words(part));
+            (format!("slip_{part}"), title)
+        })
+    }
+
+    /// For programs.
+    pub fn told(&self) -> Value {
+        let course = |c: &Course| {
+            let parity = c.parity.as_ref();
+            json!({
+                "max": c.max, "mean": c.mean, "symmetric": parity.map(|p| p.symmetric),
+                "antisymmetric": parity.map(|p| p.antisymmetric), "asymmetry": parity.and_then(|p| p.asymmetry()),
+            })
+        };
+        let cut = |c: &Cut| {
+            json!({
+                "name": self.sections[c.section], "lower": c.pair[0], "upper": c.pair[1],
+                "along": course(&c.courses[0]), "across": course(&c.courses[1]),
+            })
+        };
+        let cuts: Vec<Value> = self.cuts.iter().map(cut).collect();
+        json!({"direction": self.direction, "plies": self.names, "pairs": self.pairs, "sections": cuts})
+    }
+
+    /// Tables of the report.
+    pub fn tables(&self) -> Vec<Value> {
+        let columns = |of: &[(&str, &str)]| -> Vec<Value> {
+            of.iter()
+                .map(|(label, unit)| json!({"label": label, "unit": unit}))
+                .collect()
+        };
+        let row = |p: &Value| {
+            json!([
+                p["upper"],
+                p["lower"],
+                p["max"],
+                p["mean"],
+                p["along_max"],
+                p["across_max"]
+            ])
+        };
+        let pairs = columns(&[
+            ("ply", ""),
+            ("over", ""),
+            ("largest slip", "m"),
+            ("mean", "m"),
+            ("largest along", "m"),
+            ("largest across", "m"),
+        ]);
+        let rows: Vec<Value> = self.pairs.iter().map(row).collect();
+        let title = format!("Slip between plies, {}", self.in_words("along and across"));
+        let mut tables =
+            vec![json!({"name": "slip", "title": title, "columns": pairs, "rows": rows})];
+        if !self.cuts.is_empty() {
+            let row = |c: &Cut, p: usize| {
+                let course = &c.courses[p];
+                let parity = course.parity.as_ref();
+                json!([
+                    self.sections[c.section],
+                    c.pair[1],
+                    c.pair[0],
+                    PARTS[p],
+                    course.max,
+                    course.mean,
+                    parity.map(|p| p.symmetric),
+                    parity.map(|p| p.antisymmetric),
+                    parity.and_then(|p| p.asymmetry()),
+                ])
+            };
+            let rows: Vec<Value> = self
+                .cuts
+                .iter()
+                .flat_map(|c| [row(c, 0), row(c, 1)])
+                .collect();
+            let head = columns(&[
+                ("section", ""),
+                ("ply", ""),
+                ("over", ""),
+                ("part", ""),
+                ("largest", "m"),
+                ("mean", "m"),
+                ("symmetric part (rms)", "m"),
+                ("antisymmetric part (rms)", "m"),
+                ("share of the antisymmetric", "1"),
+            ]);
+            tables.push(json!({"name": "slip_sections", "title": "Slip along sections", "columns": head, "rows": rows}));
+        }
+        tables
+    }
+}
