@@ -3,7 +3,7 @@
 mod common;
 
 use camino::{Utf8Path, Utf8PathBuf};
-use common::family::{alone, friction_map, sample, sweep, texts};
+use common::family::{About, Out, alone, family, friction_map, grid, number, sample, sweep, texts};
 use plyflow_model::units::si_number;
 use plyflow_report::{Fate, ReportInput, write_report};
 use std::collections::BTreeSet;
@@ -291,7 +291,8 @@ fn one_point_alone_and_responses_without_values_are_told_in_words() {
     let (_dir, folder) = folder();
     let told = plain(&page(&alone(&folder), &folder));
     assert!(
-        told.contains("1 point, 1 done") && told.contains("It is 100 mm at 1 point."),
+        told.contains("1 point, 1 done")
+            && told.contains("It is 100 mm at 1 point, so that there is nothing to plot."),
         "{told}"
     );
     assert!(told.contains("No point has a value of it."));
@@ -333,4 +334,30 @@ fn the_page_of_a_point_is_linked_where_it_was_written() {
     );
     assert_eq!(text.matches("Its own page").count(), 1);
     assert!(plain(&text).contains("--point 'angle=0deg'"));
+}
+
+#[test]
+fn a_study_of_more_points_than_are_listed_says_so_and_no_link_is_lost() {
+    let (_dir, folder) = folder();
+    let steps = |n: usize| -> Vec<f64> { (0..n).map(|i| i as f64).collect() };
+    let about = About {
+        variables: &[("a", ""), ("b", "")],
+        responses: &[("sum", "1")],
+        plies: false,
+    };
+    let rows = grid(&[&steps(50), &steps(24)]);
+    let input = family(&folder, &about, rows, |v| match number(&v[0]) {
+        49.0 => Out::Failed("error", "late"),
+        a => Out::Values(vec![Some(a + number(&v[1]))], 0.0),
+    });
+    let text = page(&input, &folder);
+    assert!(text.len() < 2_000_000, "{}", text.len());
+    assert_eq!(self::rows(&text).len(), 1000);
+    assert!(plain(&text).contains("The first 1000 of 1200 points are listed here."));
+    // The failed ones are the last: they are told without a link.
+    assert!(plain(section(&text, "failed")).contains("a=49,b=23"));
+    let places: BTreeSet<&str> = all_between(&text, " id=\"", "\"").into_iter().collect();
+    let links = all_between(&text, "href=\"#", "\"");
+    assert!(links.iter().all(|l| places.contains(l)));
+    assert!(text.contains("class=\"computed-small\""));
 }

@@ -84,6 +84,8 @@ struct Sheet {
     name: String,
     points: Vec<Vec3>,
     mesh: Triangles,
+    /// Corners of all cells that are drawn.
+    used: Vec<u32>,
     values: Vec<f64>,
     shade: Shade,
 }
@@ -236,9 +238,11 @@ struct Look {
 
 impl Look {
     fn of(sheet: &Sheet, camera: &Camera) -> Self {
-        let mut corners = [sheet.points[0]; 4];
+        let used = || sheet.used.iter().map(|i| *i as usize);
+        let first = used().next().unwrap_or(0);
+        let mut corners = [sheet.points[first]; 4];
         let place = |p: Vec3| camera.project(p);
-        for p in &sheet.points {
+        for p in used().map(|i| &sheet.points[i]) {
             let at = place(*p);
             for (k, (d, sign)) in [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)]
                 .into_iter()
@@ -249,12 +253,12 @@ impl Look {
                 }
             }
         }
-        let apart = sheet.values.len().div_ceil(LOOKED_AT).max(1);
+        let apart = sheet.used.len().div_ceil(LOOKED_AT).max(1);
         Self {
             name: sheet.name.clone(),
             shade: sheet.shade,
             corners,
-            values: sheet.values.iter().copied().step_by(apart).collect(),
+            values: used().step_by(apart).map(|i| sheet.values[i]).collect(),
         }
     }
 }
@@ -274,23 +278,26 @@ fn read(path: &Utf8Path, kind: &str) -> Result<Sheet, String> {
         return Err(format!("body '{name}' has no place"));
     }
     let field = |on, what: &str| artifact.frame_field(name, frame, on, what).ok();
+    // What is not draped has no shear and no distance, though zeros stand there.
+    let draped = field(On::Cells, "draped").filter(|d| d.len() == cells.len());
+    let is_draped = |i: usize| draped.as_ref().is_none_or(|d| d[i] > 0.5);
+    let kept: Vec<usize> = (0..cells.len()).filter(|i| is_draped(*i)).collect();
+    let shear = field(On::Cells, "shear_angle").filter(|s| s.len() == cells.len());
+    let shear = shear.map(|s| kept.iter().map(|i| s[*i]).collect::<Vec<f64>>());
+    let cells: Vec<[u32; 4]> = kept.iter().map(|i| cells[*i]).collect();
     let deflection = || flat.iter().zip(&points).map(|(a, b)| b[2] - a[2]).collect();
     let (shade, values) = match kind {
         "coupon" => (Shade::Deflection, deflection()),
-        _ => match (
-            field(On::Points, "nodal_distance"),
-            field(On::Cells, "shear_angle"),
-        ) {
+        _ => match (field(On::Points, "nodal_distance"), shear) {
             (Some(d), _) if d.len() == points.len() => (Shade::Distance, d),
-            (_, Some(s)) if s.len() == cells.len() => {
-                (Shade::Shear, at_points(&s, &cells, points.len()))
-            }
+            (_, Some(s)) => (Shade::Shear, at_points(&s, &cells, points.len())),
             _ => (Shade::Nothing, vec![0.0; points.len()]),
         },
     };
     Ok(Sheet {
         name: body.attributes["ply"].as_str().unwrap_or(name).to_owned(),
         mesh: Triangles::new(points.len(), cells.as_flattened(), 4),
+        used: cells.as_flattened().to_vec(),
         points,
         values,
         shade,

@@ -19,6 +19,10 @@ use maud::{Markup, html};
 
 /// Rows of the table, and places of points.
 const LISTED: usize = 1000;
+/// Of more points the marks in a plot are not links, each of which has its length.
+const LINKED: usize = 600;
+/// Values that differ by no more than this part of them are the same.
+const ROUNDING: f64 = 1e-9;
 /// Responses that are drawn.
 const RESPONSES: usize = 12;
 
@@ -83,10 +87,16 @@ impl<'a> Shown<'a> {
         }
     }
 
+    /// The address of a point's place on the page; none where there is no room for it.
+    fn address(&self, point: usize) -> Option<String> {
+        let place = || format!("#{}", self.family.points[point].place());
+        (point < LISTED).then(place)
+    }
+
     /// A link to the place of a point.
     fn link(&self, point: usize) -> Markup {
-        let point = &self.family.points[point];
-        html! { a href={ "#" (point.place()) } { (parted(&point.name)) } }
+        let name = parted(&self.family.points[point].name);
+        html! { a href=[self.address(point)] { (name) } }
     }
 }
 
@@ -154,6 +164,7 @@ fn response(shown: &Shown<'_>, r: usize) -> Result<Markup, String> {
     let response = &shown.family.responses[r];
     let values = shown.values(r);
     let maps = map::maps(shown, r, &values)?;
+    let [low, high] = range_of(&values);
     Ok(html! {
         section class="response" data-response=(response.name) {
             h3 { (response.titled()) " " span class="note" { (response.result) " of the step " code { (response.step) } } }
@@ -161,33 +172,48 @@ fn response(shown: &Shown<'_>, r: usize) -> Result<Markup, String> {
                 p { "No point has a value of it." }
             } @else {
                 (extremes(shown, response, &values))
-                (slices::slices(shown, r, &values))
-                (maps)
-                (sensitivity::section(shown, r, &values))
+                @if low < high {
+                    (slices::slices(shown, r, &values))
+                    (maps)
+                    (sensitivity::section(shown, r, &values))
+                }
             }
         }
     })
 }
 
+/// Smallest and largest of a response; the same where they differ by no more than rounding.
+fn range_of(values: &[Option<f64>]) -> [f64; 2] {
+    let known = || values.iter().flatten().copied();
+    let low = known().fold(f64::INFINITY, f64::min);
+    let high = known().fold(f64::NEG_INFINITY, f64::max);
+    match is_same(low, high) {
+        true => [low, low],
+        false => [low, high],
+    }
+}
+
+fn is_same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
 /// Where a response is smallest and largest.
 fn extremes(shown: &Shown<'_>, response: &Response, values: &[Option<f64>]) -> Markup {
-    let known: Vec<(usize, f64)> = values
-        .iter()
-        .enumerate()
-        .filter_map(|(i, v)| Some((i, (*v)?)))
-        .collect();
-    let low = known.iter().map(|k| k.1).fold(f64::INFINITY, f64::min);
-    let high = known.iter().map(|k| k.1).fold(f64::NEG_INFINITY, f64::max);
+    let [low, high] = range_of(values);
     let at = |value: f64| {
-        let all: Vec<usize> = known.iter().filter(|k| k.1 == value).map(|k| k.0).collect();
-        let more = all.len() - 1;
-        html! { " at " (shown.link(all[0])) @if more > 0 { " and " (plural(more, "other point", "other points")) } }
+        let all = (0..values.len()).filter(|i| values[*i].is_some_and(|v| is_same(v, value)));
+        let all: Vec<usize> = all.collect();
+        html! {
+            " at " (shown.link(all[0]))
+            @if all.len() > 1 { " and " (plural(all.len() - 1, "other point", "other points")) }
+        }
     };
-    let missing = values.len() - known.len();
+    let known = values.iter().flatten().count();
+    let missing = values.len() - known;
     html! {
         p {
             @if low == high {
-                "It is " (quantity(low, &response.unit, 5)) " at " (plural(known.len(), "point", "points")) "."
+                "It is " (quantity(low, &response.unit, 5)) " at " (plural(known, "point", "points")) ", so that there is nothing to plot."
             } @else {
                 "Smallest: " b { (quantity(low, &response.unit, 5)) } (at(low)) ". Largest: " b { (quantity(high, &response.unit, 5)) } (at(high)) "."
             }

@@ -13,8 +13,8 @@
   const key = (row, column) => {
     const cell = row.cells[column];
     const text = cell.textContent.trim();
-    if (cell.classList.contains('none') || text === '') return null;
     if (cell.dataset.value !== undefined) return Number(cell.dataset.value);
+    if (cell.classList.contains('none') || text === '') return null;
     // The first column is the name of a point: by it the order of the study comes back.
     return column === 0 ? Number(row.dataset.order) : text;
   };

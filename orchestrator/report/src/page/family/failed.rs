@@ -6,6 +6,10 @@ use crate::units::plural;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
+/// Whole texts of failures that are shown.
+const FULL: usize = 50;
+
+/// A row for each failed point.
 pub(super) fn section(shown: &Shown<'_>) -> Markup {
     let failed: Vec<(usize, [&str; 3])> = (shown.family.points.iter().enumerate())
         .filter_map(|(i, p)| match &p.fate {
@@ -35,6 +39,22 @@ pub(super) fn section(shown: &Shown<'_>) -> Markup {
                     tr { th scope="row" { (shown.link(*i)) } td { code { (step) } } td { (class) } td class="cause" { (cause) } }
                 } }
             } }
+            (in_full(shown))
+        }
+    }
+}
+
+/// What failed steps said beyond their first line.
+fn in_full(shown: &Shown<'_>) -> Markup {
+    let long = |f: &&(String, String)| f.1.trim().contains('\n');
+    let all: Vec<&(String, String)> = shown.input.failures.iter().filter(long).collect();
+    html! {
+        @if !all.is_empty() {
+            details {
+                summary { "What failed steps say in full" }
+                @if all.len() > FULL { p class="note" { "The first " (FULL) " of " (all.len()) "." } }
+                dl { @for (label, reason) in all.iter().take(FULL) { dt { (label) } dd { (reason) } } }
+            }
         }
     }
 }

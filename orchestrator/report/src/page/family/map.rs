@@ -1,6 +1,6 @@
 //! A response over two variables: colours and lines of equal value between the computed points, which are drawn on top.
 
-use super::Shown;
+use super::{LINKED, Shown, range_of};
 use crate::colour::{Palette, Scale as Colours};
 use crate::family::Fate;
 use crate::family::plane::{Corner, Plane, contour};
@@ -43,9 +43,7 @@ pub(super) fn maps(
     let pairs = (0..numeric.len()).flat_map(|i| (i + 1..numeric.len()).map(move |j| [i, j]));
     let pairs: Vec<[usize; 2]> = pairs.map(|p| p.map(|i| numeric[i])).collect();
     let Some(colours) = colours(values) else {
-        return Ok(
-            html! { @if !pairs.is_empty() { p class="note" { "No map: the response is the same wherever it has a value." } } },
-        );
+        return Ok(html! {});
     };
     let (mut drawn, mut not) = (Vec::new(), Vec::new());
     for pair in &pairs {
@@ -85,14 +83,9 @@ pub(super) fn maps(
 
 /// The colours of all maps of a response; `None` when it is the same everywhere.
 fn colours(values: &[Option<f64>]) -> Option<Colours> {
-    let known = || values.iter().flatten().copied();
-    let (low, high) = (
-        known().fold(f64::INFINITY, f64::min),
-        known().fold(f64::NEG_INFINITY, f64::max),
-    );
+    let [low, high] = range_of(values);
     let size = low.abs().max(high.abs());
-    // Rounding is no difference.
-    if high <= low || high - low <= 1e-9 * size {
+    if low >= high || low.is_infinite() {
         return None;
     }
     Some(if low < 0.0 && high > 0.0 {
@@ -318,10 +311,13 @@ impl Map<'_> {
     /// The points: computed ones in the colour of their own value, failed ones as crosses.
     fn marks(&self, place: &[Vec<f64>; 2]) -> Markup {
         let family = self.shown.family;
+        if self.plane.points.len() > LINKED {
+            return self.small_marks(place);
+        }
         html! {
             @for p in &self.plane.points {
                 @let [x, y] = self.at(place, *p);
-                a href={ "#" (family.points[*p].place()) } tabindex="-1" {
+                a href=[self.shown.address(*p)] tabindex="-1" {
                     @match (self.values[*p], &family.points[*p].fate) {
                         (Some(v), _) => circle class="computed" cx=(px(x)) cy=(px(y)) r="4" fill=(self.colour(v)) {},
                         (None, Fate::Failed { .. }) => {
@@ -332,6 +328,24 @@ impl Map<'_> {
                     }
                 }
             }
+        }
+    }
+
+    /// The same of so many that each has little room.
+    fn small_marks(&self, place: &[Vec<f64>; 2]) -> Markup {
+        let (mut known, mut failed, mut open) = (String::new(), String::new(), String::new());
+        for p in &self.plane.points {
+            let [x, y] = self.at(place, *p).map(px);
+            let _ = match (self.values[*p], &self.shown.family.points[*p].fate) {
+                (Some(_), _) => write!(known, "M{x} {y}h0"),
+                (None, Fate::Failed { .. }) => write!(failed, "M{x} {y}m-2.5-2.5l5 5m0-5l-5 5"),
+                (None, _) => write!(open, "M{x} {y}m-2 0h4"),
+            };
+        }
+        html! {
+            path class="computed-small" d=(known) {}
+            @if !failed.is_empty() { path class="cross" d=(failed) {} }
+            @if !open.is_empty() { path class="open-point" d=(open) {} }
         }
     }
 

@@ -1,6 +1,6 @@
 //! A response over one variable: every point, lines through points that differ in it alone, bars where several stand at one value.
 
-use super::Shown;
+use super::{LINKED, Shown};
 use crate::family::Fate;
 use crate::family::scale::Scale;
 use crate::plot::{Axis, CHARACTER, COLOURS, MARKERS, Zero, extent};
@@ -14,8 +14,6 @@ use std::fmt::Write;
 const VARIABLES: usize = 10;
 /// Lines of one plot.
 const LINES: usize = COLOURS;
-/// Of more points the marks are not links, each of which has its length.
-const LINKED: usize = 600;
 
 const SIZE: [f64; 2] = [480.0, 290.0];
 const LEFT: f64 = 54.0;
@@ -295,7 +293,7 @@ impl<'a> Slice<'a> {
         html! {
             @for (p, place) in &places {
                 @let (colour, class, shape) = shape(*p);
-                a href={ "#" (self.shown.family.points[*p].place()) } tabindex="-1" { path class={ (class) " c" (colour) } d={ (place) (shape) } {} }
+                a href=[self.shown.address(*p)] tabindex="-1" { path class={ (class) " c" (colour) } d={ (place) (shape) } {} }
             }
         }
     }
