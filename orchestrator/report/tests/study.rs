@@ -361,3 +361,22 @@ fn a_study_of_more_points_than_are_listed_says_so_and_no_link_is_lost() {
     assert!(links.iter().all(|l| places.contains(l)));
     assert!(text.contains("class=\"computed-small\""));
 }
+
+#[test]
+fn why_there_is_no_map_is_the_reason_of_these_points() {
+    let (_dir, folder) = folder();
+    let about = About {
+        variables: &[("a", ""), ("b", ""), ("c", "")],
+        responses: &[("sum", "1")],
+        plies: false,
+    };
+    let five = [0.0, 1.0, 2.0, 3.0, 4.0];
+    let rows = grid(&[&five, &[1.0, 2.0], &five]);
+    let input = family(&folder, &about, rows, |v| {
+        Out::Values(vec![Some(number(&v[0]) + number(&v[1]))], 0.0)
+    });
+    let told = plain(&page(&input, &folder));
+    let why = "No map over a and b; b and c: points with a value have 2 values of a variable; a map needs 3.";
+    assert!(told.contains(why), "{told}");
+    assert!(told.contains("sum over a and c"), "{told}");
+}

@@ -3,7 +3,7 @@
 use super::{LINKED, Shown, range_of};
 use crate::colour::{Palette, Scale as Colours};
 use crate::family::Fate;
-use crate::family::plane::{Corner, Plane, contour};
+use crate::family::plane::{Corner, LEAST, Plane, contour};
 use crate::field::bar;
 use crate::plot::{CHARACTER, ticks};
 use crate::raster::{Camera, Canvas, Paint, Triangles};
@@ -113,19 +113,18 @@ fn of_pair(
 ) -> Result<Result<Markup, String>, String> {
     let others = shown.others(&pair);
     let planes = Plane::all(&shown.levels, pair);
-    let mut why = None;
-    let mut kept = Vec::new();
-    for plane in planes.iter() {
-        match plane.is_mapped(values) {
-            Ok(()) => kept.push(plane),
-            Err(text) => why = Some(text),
-        }
-    }
+    let kept: Vec<&Plane> = (planes.iter())
+        .filter(|p| p.is_mapped(values).is_ok())
+        .collect();
     if kept.is_empty() {
-        let why = match others.as_slice() {
-            [] => why.unwrap_or_default(),
-            _ => "points that differ in these two alone are too few, as other variables differ too"
-                .into(),
+        let known = |p: &&Plane| p.points.iter().filter(|i| values[**i].is_some()).count();
+        let best = planes.iter().max_by_key(known);
+        let why = match best.filter(|p| others.is_empty() || known(p) >= LEAST) {
+            Some(plane) => plane.is_mapped(values).err().unwrap_or_default(),
+            None => {
+                "points that differ in these two alone are too few, as other variables differ too"
+                    .into()
+            }
         };
         return Ok(Err(why));
     }
