@@ -5,7 +5,8 @@ usage: check_report.py [--screenshots FOLDER] REPORT.html...
 
 Fails on any error in the console, any request but the page itself, a file of 5 MB or more; with formed plies also
 unless the 3D view draws in several colours and changes when it is dragged, turned by keys, asked for another field or without
-its bodies, and a defect is highlighted in the table, on the maps and in the view. Needs chromium, chromium-driver
+its bodies, and a defect is highlighted in the table, on the maps and in the view; of a study unless its table sorts, its marks lead to
+their points and it fits a phone. Needs chromium, chromium-driver
 and the package selenium. Exit code 0: all as it should be.
 """
 
@@ -40,6 +41,12 @@ for (let i = 0; i < bytes.length; i += 4) {
   mark = (Math.imul(mark, 31) + i + bytes[i] * 65536 + bytes[i + 1] * 256 + bytes[i + 2]) | 0;
 }
 return {colours: colours.size, covered: covered / (bytes.length / 4), mark};
+"""
+COLUMN = """
+return [...document.querySelectorAll('table.points tbody tr')].map((row) => {
+  const cell = row.cells[arguments[0]];
+  return {text: cell.textContent.trim(), value: cell.dataset.value ?? null, place: row.dataset.place};
+});
 """
 FRAME = "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done));"
 
@@ -179,6 +186,69 @@ def check_defects(page):
     return f"{len(rows)} defects"
 
 
+def check_study(page, path):
+    """The table of a study sorts with the mouse and with keys, pictures follow, and every mark leads to its point."""
+    heads = page.all("table.points thead th")
+    # Of a column: text and value of each cell, and the place that its row leads to.
+    column = lambda at: page.driver.execute_script(COLUMN, at)
+    places = lambda: page.driver.execute_script("return [...document.querySelectorAll('article.point')].map((a) => a.id)")
+    before = column(0)
+    assert len(places()) == len(before), "not every point has its place"
+    for at in range(1, len(heads)):
+        button = heads[at].find_element(By.CSS_SELECTOR, "button")
+        page.press(button)
+        assert heads[at].get_attribute("aria-sort") == "ascending", "a click does not sort"
+        up = [float(c["value"]) for c in column(at) if c["value"] is not None]
+        assert up == sorted(up), f"column {at} is not sorted: {up}"
+        button.send_keys(Keys.ENTER)
+        assert heads[at].get_attribute("aria-sort") == "descending", "Enter does not sort"
+        cells = column(at)
+        assert [float(c["value"]) for c in cells if c["value"] is not None] == up[::-1], f"column {at} is not sorted downwards"
+        # What has no value is last, whichever way.
+        dashes = [c["text"] == "–" for c in cells]
+        assert dashes == sorted(dashes), f"column {at} has its missing values in the middle"
+        assert places() == [c["place"] for c in cells], "the pictures do not follow the table"
+        assert page.all("#sorted")[0].get_attribute("textContent"), "the order is not told"
+    page.press(heads[0].find_element(By.CSS_SELECTOR, "button"))
+    assert column(0) == before, "the order of the study does not come back"
+    marks = page.all("#responses svg a")
+    # The last: of several that lie on each other the uppermost takes the click.
+    for mark in marks[-1:]:
+        ActionChains(page.driver).move_to_element(mark).perform()
+        target = mark.get_dom_attribute("href").removeprefix("#")
+        page.to(mark)
+        ActionChains(page.driver).move_to_element(mark).click().perform()
+        assert page.driver.current_url.endswith(target), "a mark does not lead to its point"
+        name = page.driver.execute_script("return arguments[0].querySelector('title')?.textContent", mark)
+        place = page.driver.execute_script("return document.getElementById(arguments[0]).querySelector('h3').textContent", target)
+        assert name and name.split("\n")[0] == place, f"a mark is called {name} and leads to {place}"
+    for select in page.all("#response"):
+        options = select.find_elements(By.CSS_SELECTOR, "option")
+        options[-1].click()
+        shown = [r.get_attribute("data-response") for r in page.all("section.response") if r.is_displayed()]
+        assert shown == [options[-1].get_attribute("value")], f"chosen is one response, shown are {shown}"
+        options[0].click()
+        assert all(r.is_displayed() for r in page.all("section.response")), "not all responses came back"
+    narrow(path)
+    return f"{len(before)} points, {len(marks)} marks"
+
+
+def narrow(path):
+    """On a phone nothing but tables goes beyond the screen, also without scripts."""
+    for how in [{}, {"scripts": False}, {"dark": True}]:
+        driver = browser(**how)
+        try:
+            size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
+            driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            page = Page(driver, path)
+            width = page.all("html")[0].get_property("scrollWidth")
+            assert width <= 390, f"{how}: the page is {width} wide on a screen of 390"
+            hidden = [r for r in page.all("section.response") if not r.is_displayed()]
+            assert not hidden, f"{how}: a response is hidden"
+        finally:
+            driver.quit()
+
+
 def check(path, folder):
     """One report; gives what was seen in words."""
     size = path.stat().st_size
@@ -191,6 +261,8 @@ def check(path, folder):
             said.append(check_view(page, section))
         if page.all(".view3d"):
             said.append(check_defects(page))
+        if page.all("table.points"):
+            said.append(check_study(page, path))
         page.quiet()
     finally:
         driver.quit()

@@ -15,6 +15,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (input, name) in [
         (study.input(), "report.html"),
         (coupons.input(), "coupon.html"),
+        (common::family::friction_map(&folder), "study-map.html"),
+        (common::family::sweep(&folder, 5), "study-sweep.html"),
+        (common::family::sweep(&folder, 45), "study-small.html"),
+        (common::family::sample(&folder, 200), "study-sample.html"),
+        (common::family::alone(&folder), "study-alone.html"),
+        (common::family::texts(&folder), "study-texts.html"),
     ] {
         let out = folder.join(name);
         let size = plyflow_report::write_report(&input, &out)?;

@@ -42,6 +42,7 @@ fn input(instances: Vec<Instance>) -> ReportInput {
         expectations: Vec::new(),
         failures: Vec::new(),
         not_run: 0,
+        family: None,
         until: Vec::new(),
     }
 }

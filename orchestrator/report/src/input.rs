@@ -1,5 +1,6 @@
 //! What a report is made of.
 
+use crate::family::Family;
 use camino::Utf8PathBuf;
 use plyflow_model::job::Record;
 
@@ -29,6 +30,8 @@ pub struct ReportInput {
     pub failures: Vec<(String, String)>,
     /// Number of instances that are known and did not run.
     pub not_run: usize,
+    /// The points of a study; absent when the workflow is none, and on the page of one point.
+    pub family: Option<Family>,
 }
 
 impl ReportInput {

@@ -8,6 +8,7 @@
 
 mod colour;
 mod comparison;
+mod family;
 mod fidelity;
 mod field;
 mod input;
@@ -30,6 +31,7 @@ mod units;
 mod verdict;
 mod view;
 
+pub use family::{Family, Fate, Point, Response, Sampled, Value, Variable};
 pub use fidelity::{COUNTS, Measure, Way, Ways, ways};
 pub use input::{Expectation, Instance, ReportInput, Verdict};
 pub use summary::summary;
@@ -70,7 +72,15 @@ pub enum ReportError {
 /// # Errors
 /// When the file cannot be written or a picture not be encoded.
 pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportError> {
-    let mut page = drawn(input, &mut Material::read(input, true)).map_err(ReportError::Picture)?;
+    let study = input.family.as_ref();
+    let study = study.map(|f| family::Read::of(input, f)).transpose();
+    let study = study.map_err(ReportError::Picture)?;
+    let rest = study.as_ref().map_or(input, |s| s.rest(input));
+    let mut material = Material::read(rest, true);
+    if let Some(study) = &study {
+        material.problems.extend(study.problems.iter().cloned());
+    }
+    let mut page = drawn(input, &mut material, study.as_ref()).map_err(ReportError::Picture)?;
     page += &sealed_by(&page);
     let wrong = |source| ReportError::Write {
         path: out.to_owned(),
@@ -90,12 +100,16 @@ pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportEr
 }
 
 /// The page with the finest pictures for which there is room.
-fn drawn(input: &ReportInput, material: &mut Material) -> Result<String, String> {
+fn drawn(
+    input: &ReportInput,
+    material: &mut Material,
+    study: Option<&family::Read>,
+) -> Result<String, String> {
     let (mut sharp, mut size) = (Sharpness(SHARPNESS[0]), 0);
     let mut in_full = 0;
     for tried in SHARPNESS {
         sharp = Sharpness(tried);
-        let page = page::page(input, material, sharp, in_full)?;
+        let page = page::page(input, material, study, (sharp, in_full))?;
         size = page.len();
         if size <= LARGEST {
             return Ok(page);
@@ -106,7 +120,7 @@ fn drawn(input: &ReportInput, material: &mut Material) -> Result<String, String>
     material.problems.push(format!(
         "this page of {size} is larger than {bound} even with its coarsest pictures"
     ));
-    page::page(input, material, sharp, in_full)
+    page::page(input, material, study, (sharp, in_full))
 }
 
 /// The last line of a page: the hash of all that is before it.

@@ -2,6 +2,7 @@
 
 mod costs;
 mod energy;
+mod family;
 mod fidelity;
 mod maps;
 mod provenance;
@@ -9,8 +10,9 @@ mod scene;
 mod steps;
 mod tables;
 
-pub(crate) use tables::{expected_text, got_text};
+pub(crate) use tables::{expected_text, got_text, is_notable};
 
+use crate::family::Read;
 use crate::input::ReportInput;
 use crate::place;
 use crate::study::{Material, Study};
@@ -26,13 +28,19 @@ pub(crate) fn fingerprint_mark(fingerprint: &str) -> String {
     html! { meta name="plyflow-report" content=(fingerprint); }.into_string()
 }
 
-/// The whole page. `in_full`: its size with the finest pictures (bytes), when these found no room.
+/// The whole page. `study`: what was read of a study; `material` is then of what is shown besides it. `in_full`: the page's size with the
+/// finest pictures (bytes), when these found no room.
 pub(crate) fn page(
     input: &ReportInput,
     material: &Material,
-    sharp: Sharpness,
-    in_full: usize,
+    study: Option<&Read>,
+    (sharp, in_full): (Sharpness, usize),
 ) -> Result<String, String> {
+    let rest = study.map_or(input, |s| s.rest(input));
+    let shown = input.family.as_ref().zip(study);
+    let shown = shown.map(|(f, s)| family::Shown::new(input, f, &s.warnings, s.pictures.as_ref()));
+    let large = study.is_some_and(Read::is_large);
+    let points = shown.as_ref().map(family::sections).transpose()?;
     let mut studies = Vec::new();
     let drawn = material
         .studies
@@ -42,7 +50,7 @@ pub(crate) fn page(
     for (n, study) in material.studies.iter().enumerate() {
         studies.push(study_sections(study, n, drawn, sharp)?);
     }
-    let steps = steps::section(input, material, sharp)?;
+    let steps = steps::section(rest, material, sharp)?;
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -51,38 +59,52 @@ pub(crate) fn page(
                 (PreEscaped(fingerprint_mark(&input.fingerprint)))
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { (input.workflow) " – forming report" }
+                title { (input.workflow) @if shown.is_some() { " – study" } @else { " – forming report" } }
                 style { (PreEscaped(STYLE)) }
             }
             body {
-                (head(input, material))
+                (head(input, material, shown.as_ref(), large))
                 @if sharp.0 < crate::COARSE { (coarser(in_full)) }
                 main {
+                    @if let Some(points) = &points { (points) }
                     @for study in &studies { (study) }
                     (steps)
-                    (fidelity::section(input))
+                    (fidelity::section(rest))
                     (tables::expectations(input))
-                    (costs::section(input, material))
+                    @match shown.as_ref().filter(|_| large) {
+                        Some(s) => (family::costs(input, s.family)),
+                        None => (costs::section(input, material)),
+                    }
                     (energy::section(material))
-                    (tables::results(input, material.studies.is_empty()))
-                    (provenance::section(input, material))
+                    @if !large || !rest.instances.is_empty() { (tables::results(rest, material.studies.is_empty())) }
+                    (provenance::section(input, rest, material))
                 }
                 footer { "Made by " (input.program) ". This page is complete in itself: it loads nothing." }
-                (scene::scripts(drawn > 0))
+                (scene::scripts(drawn > 0, shown.is_some()))
             }
         }
     };
     Ok(page.into_string())
 }
 
-fn head(input: &ReportInput, material: &Material) -> Markup {
-    let warnings = verdict::warnings(input, material);
+/// `study`: of a study; `large`: what is of one of its points is not told here.
+fn head(
+    input: &ReportInput,
+    material: &Material,
+    study: Option<&family::Shown<'_>>,
+    large: bool,
+) -> Markup {
+    let warnings = verdict::warnings(input, material, large);
     html! {
         header {
-            p class="kind" { "Forming report" }
+            p class="kind" { @if study.is_some() { "Study" } @else { "Forming report" } }
             h1 { (input.workflow) }
             @if let Some(text) = &input.description { p class="description" { (text) } }
-            @for study in &material.studies {
+            @if let Some(s) = study {
+                @let whole = s.family.count("done") == s.family.points.len();
+                p class={ "verdict " (class(if whole { Tone::Good } else { Tone::Bad })) } { (s.family.counts()) }
+            }
+            @for study in material.studies.iter().filter(|_| !large) {
                 @let (tone, text) = verdict::of_study(study);
                 @if !text.is_empty() {
                     p class={ "verdict " (class(tone)) } {
@@ -93,10 +115,10 @@ fn head(input: &ReportInput, material: &Material) -> Markup {
             }
             @let (tone, text) = verdict::of_run(input);
             @if !text.is_empty() { p class={ "verdict " (class(tone)) } { (text) } }
-            @if material.studies.is_empty() && text.is_empty() {
+            @if material.studies.is_empty() && text.is_empty() && study.is_none() {
                 p class="verdict good" { (input.instances.len()) " steps finished" }
             }
-            @if !input.failures.is_empty() {
+            @if !input.failures.is_empty() && study.is_none() {
                 section class="warnings bad" id="failures" {
                     h2 { "Failed" }
                     dl { @for (label, reason) in &input.failures { dt { (label) } dd { (reason) } } }
@@ -108,7 +130,8 @@ fn head(input: &ReportInput, material: &Material) -> Markup {
                     dl { @for (label, texts) in verdict::by_step(&warnings) { dt { (label) } dd { (texts.join("\n")) } } }
                 }
             }
-            (contents(material, input))
+            @if let Some(s) = study.filter(|_| large) { (family::warned(s)) }
+            (contents(material, input, large))
         }
     }
 }
@@ -128,11 +151,18 @@ fn class(tone: Tone) -> &'static str {
     }
 }
 
-fn contents(material: &Material, input: &ReportInput) -> Markup {
+fn contents(material: &Material, input: &ReportInput, large: bool) -> Markup {
     let study = material.studies.first();
     let maps = study.is_some_and(|s| !s.plies.is_empty());
     let local = material.studies.iter().any(|s| !s.locals.is_empty());
+    let family = input.family.as_ref();
+    let failed = family.is_some_and(|f| f.count("failed") > 0);
+    let responses = family.is_some_and(|f| !f.responses.is_empty());
     let items = [
+        (family.is_some(), "#points", "Table of points"),
+        (failed, "#failed", "Failed points"),
+        (responses, "#responses", "Responses"),
+        (family.is_some(), "#places", "Point by point"),
         (maps, "#view-0", "3D view"),
         (maps, "#maps-0", "Maps"),
         (local, "#local-0", "Local runs"),
@@ -146,7 +176,11 @@ fn contents(material: &Material, input: &ReportInput) -> Markup {
             "#plots",
             steps::heading(material),
         ),
-        (fidelity::has(input), "#fidelity", "Speed against error"),
+        (
+            !large && fidelity::has(input),
+            "#fidelity",
+            "Speed against error",
+        ),
         (
             !input.expectations.is_empty(),
             "#expectations",
@@ -154,7 +188,7 @@ fn contents(material: &Material, input: &ReportInput) -> Markup {
         ),
         (true, "#costs", "Costs"),
         (energy::has(material), "#energy", "Energy and contact"),
-        (true, "#results", "Results"),
+        (!large, "#results", "Results"),
         (true, "#provenance", "Provenance"),
     ];
     html! {

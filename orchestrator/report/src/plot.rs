@@ -4,11 +4,11 @@ mod axis;
 mod boxes;
 mod thin;
 
-pub(crate) use axis::ticks;
+pub(crate) use axis::{Axis, Zero, extent, ticks};
 pub(crate) use boxes::Boxes;
 
 use crate::view::px;
-use axis::{Axis, LARGEST, Zero, extent};
+use axis::LARGEST;
 use maud::{Markup, html};
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -66,12 +66,12 @@ const TOP: f64 = 16.0;
 const BOTTOM: f64 = 38.0;
 /// Left margin: at least this, and else what the texts of the ticks need at this width per character (px).
 const LEFT: f64 = 50.0;
-const CHARACTER: f64 = 6.6;
+pub(crate) const CHARACTER: f64 = 6.6;
 /// Marks on the lines of further series are this far apart (px).
 const MARK_EVERY: f64 = 60.0;
 
 /// Markers about a place, told apart without colour.
-const MARKERS: [&str; 6] = [
+pub(crate) const MARKERS: [&str; 6] = [
     "m-2.8 0a2.8 2.8 0 1 0 5.6 0a2.8 2.8 0 1 0-5.6 0",
     "m-2.5-2.5h5v5h-5z",
     "m0-3.5l3.5 3.5l-3.5 3.5l-3.5-3.5z",

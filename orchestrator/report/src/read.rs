@@ -298,7 +298,7 @@ pub(crate) fn last_frame(artifact: &Artifact) -> Result<u64, String> {
         .ok_or_else(|| "it has no frame".to_owned())
 }
 
-fn quads(name: &str, cells: &[u32], k: u32) -> Result<Vec<[u32; 4]>, String> {
+pub(crate) fn quads(name: &str, cells: &[u32], k: u32) -> Result<Vec<[u32; 4]>, String> {
     if k != 4 {
         return Err(format!(
             "body '{name}' has cells of {k} nodes; sheets have 4"

@@ -1,7 +1,8 @@
 //! The table at the end of a run in the terminal.
 
-use crate::input::{Instance, ReportInput, Verdict, label};
-use crate::page::{expected_text, got_text};
+use crate::family::{SMALL, base};
+use crate::input::{Expectation, Instance, ReportInput, Verdict, label};
+use crate::page::{expected_text, got_text, is_notable};
 use crate::study::{Comparison, Material, Study};
 use crate::units::{bytes, duration, fixed, number, quantity};
 use crate::verdict;
@@ -21,7 +22,10 @@ const ITEMS: usize = 3;
 pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
     let material = Material::read(input, false);
     let mut blocks: Vec<String> = Vec::new();
-    for study in &material.studies {
+    let family = input.family.as_ref();
+    let large = family.is_some_and(|f| f.points.len() > SMALL);
+    // The table of a study tells of its points; one line for each run of each would bury it.
+    for study in material.studies.iter().filter(|_| !large) {
         let (_, text) = verdict::of_study(study);
         let title = if study.title.is_empty() {
             &input.workflow
@@ -34,9 +38,9 @@ pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
         blocks.push(zone_table(study));
         blocks.extend(study.comparison.as_ref().map(defect_table));
     }
-    blocks.push(warning_lines(&verdict::warnings(input, &material)));
+    blocks.push(warning_lines(&verdict::warnings(input, &material, false)));
     blocks.push(result_table(input));
-    blocks.push(cost_table(&input.instances));
+    blocks.push(cost_table(&input.instances, large));
     blocks.extend(report.map(|path| format!("report: {path}\n")));
     blocks.retain(|b| !b.is_empty());
     blocks.join("\n")
@@ -109,7 +113,10 @@ fn defect_table(c: &Comparison) -> String {
 
 fn result_table(input: &ReportInput) -> String {
     if !input.expectations.is_empty() {
-        let rows: Vec<Vec<String>> = (input.expectations.iter())
+        let many = input.family.is_some() && input.expectations.len() > LONGEST;
+        let told = |e: &&Expectation| !many || is_notable(e);
+        let met = input.expectations.iter().filter(|e| !told(e)).count();
+        let rows: Vec<Vec<String>> = (input.expectations.iter().filter(told))
             .map(|e| {
                 let place = format!("{}.{}", label(&e.step, &e.item), e.result);
                 let verdict = match e.verdict() {
@@ -120,7 +127,11 @@ fn result_table(input: &ReportInput) -> String {
                 vec![place, got_text(e), expected_text(e), verdict.into()]
             })
             .collect();
-        return table(&["result", "value", "expected", "verdict"], &rows, &[1]);
+        let mut text = table(&["result", "value", "expected", "verdict"], &rows, &[1]);
+        if met > 0 {
+            text += &format!("{met} more expectations are met, at single points\n");
+        }
+        return text;
     }
     let rows: Vec<Vec<String>> = (input.instances.iter())
         .flat_map(|i| i.record.results.iter().map(move |r| (i, r)))
@@ -138,12 +149,14 @@ fn result_table(input: &ReportInput) -> String {
     }
 }
 
-fn cost_table(instances: &[Instance]) -> String {
+/// `together`: all points of a study in one row of a step.
+fn cost_table(instances: &[Instance], together: bool) -> String {
     let mut steps: Vec<(&str, Vec<&Instance>)> = Vec::new();
     for i in instances {
-        match steps.iter_mut().find(|(name, _)| *name == i.step) {
+        let step = if together { base(i) } else { &i.step };
+        match steps.iter_mut().find(|(name, _)| *name == step) {
             Some((_, items)) => items.push(i),
-            None => steps.push((&i.step, vec![i])),
+            None => steps.push((step, vec![i])),
         }
     }
     let mut rows = Vec::new();

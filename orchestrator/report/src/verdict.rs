@@ -180,8 +180,12 @@ pub(crate) fn by_step(warnings: &[(String, String)]) -> Vec<(&str, Vec<&str>)> {
     all
 }
 
-/// Warnings of all steps and what could not be read, each once, with the step.
-pub(crate) fn warnings(input: &ReportInput, material: &Material) -> Vec<(String, String)> {
+/// Warnings of all steps and what could not be read, each once, with the step. `apart`: those of steps are told elsewhere.
+pub(crate) fn warnings(
+    input: &ReportInput,
+    material: &Material,
+    apart: bool,
+) -> Vec<(String, String)> {
     let mut all: Vec<(String, String)> = Vec::new();
     let mut add = |label: String, text: &str| {
         let entry = (label, text.to_owned());
@@ -189,7 +193,8 @@ pub(crate) fn warnings(input: &ReportInput, material: &Material) -> Vec<(String,
             all.push(entry);
         }
     };
-    for (instance, facts) in input.instances.iter().zip(&material.facts) {
+    let steps = input.instances.iter().zip(&material.facts);
+    for (instance, facts) in steps.filter(|_| !apart) {
         for text in &instance.record.warnings {
             add(instance.label(), text);
         }

@@ -323,6 +323,9 @@ pub struct ReportArgs {
     /// Where to write it [default: report.html beside the workflow]
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<Utf8PathBuf>,
+    /// Of a study: write the page of this point, by its name, into a folder beside the study's page; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub point: Vec<String>,
 }
 
 /// `plugins`

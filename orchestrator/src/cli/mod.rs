@@ -19,6 +19,7 @@ mod run;
 mod study;
 mod study_file;
 mod study_plan;
+mod study_report;
 mod table;
 mod trust;
 mod verify;

@@ -38,7 +38,16 @@ pub fn report(args: &ReportArgs) -> Done {
     let failures: Vec<Failure> = (0..session.core.instances().len())
         .filter_map(|id| session.failed_before(id))
         .collect();
-    let input = input(&opened, &session, &found, &failures, (&args.workflow, &[]));
+    let page = if args.point.is_empty() {
+        path.clone()
+    } else {
+        beside(&opened.workflow.file, &[])
+    };
+    let asked = (&args.workflow, &[][..], page.as_path());
+    let input = input(&opened, &session, &found, &failures, asked);
+    if !args.point.is_empty() {
+        return super::study_report::points(args, &session, &input, &page);
+    }
     let bytes = write_report(&input, &path).map_err(|e| Stop::new(exit::INTERNAL, e))?;
     print(&format!("{path}: {}\n", super::table::bytes(bytes)))
 }
@@ -78,10 +87,15 @@ pub fn beside(workflow: &Utf8Path, until: &[String]) -> Utf8PathBuf {
 }
 
 /// Changes with what a page shows of the same artifacts: an older page is then written again.
-const LAYOUT: &[u8] = b"page 8";
+const LAYOUT: &[u8] = b"page 9";
 
-/// Names all that a report depends on.
-pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure]) -> String {
+/// Names all that a report depends on. `page`: where it lies.
+pub fn fingerprint(
+    opened: &Opened,
+    session: &Session<'_>,
+    failures: &[Failure],
+    page: &Utf8Path,
+) -> String {
     let mut hasher = blake3::Hasher::new();
     let mut add = |bytes: &[u8]| {
         hasher.update(&(bytes.len() as u64).to_le_bytes());
@@ -104,6 +118,11 @@ pub fn fingerprint(opened: &Opened, session: &Session<'_>, failures: &[Failure])
     for failure in failures {
         add(failure.label.as_bytes());
         add(failure.reason.as_bytes());
+    }
+    if let Some(study) = &opened.workflow.study {
+        add(&serde_json::to_vec(study).unwrap_or_default());
+        let pages = super::study_report::written(session, page);
+        pages.iter().for_each(|p| add(p.as_bytes()));
     }
     hasher.finalize().to_hex().to_string()
 }
@@ -134,24 +153,30 @@ fn arguments(given: &Workflow) -> String {
         named => format!("--trust={named}"),
     });
     words.extend(trust);
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
-    let quoted = |w: &String| {
-        if !w.is_empty() && w.chars().all(plain) {
-            w.clone()
-        } else {
-            format!("'{}'", w.replace('\'', "'\\''"))
-        }
-    };
-    words.iter().map(quoted).collect::<Vec<_>>().join(" ")
+    words
+        .iter()
+        .map(|w| quoted(w))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
-/// All that a report or a summary is made of. `given`, `until`: the workflow as the user asked for it.
+/// A word as one types it for a shell.
+pub(super) fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}
+
+/// All that a report or a summary is made of. `given`, `until`: the workflow as the user asked for it; `page`: where the report lies.
 pub fn input(
     opened: &Opened,
     session: &Session<'_>,
     found: &Found,
     failures: &[Failure],
-    (given, until): (&Workflow, &[String]),
+    (given, until, page): (&Workflow, &[String], &Utf8Path),
 ) -> ReportInput {
     let core = &session.core;
     let instance = |(id, record): &(Id, Record)| {
@@ -187,6 +212,8 @@ pub fn input(
         let state = core.instances()[*id].state;
         !matches!(state, State::Done { .. } | State::Failed) && !failed(&core.label(*id))
     };
+    let file = &opened.workflow.file;
+    let family = super::study_report::family(session, &found.records, file, page);
     ReportInput {
         workflow: opened.workflow.name.clone(),
         description: opened.workflow.description.clone(),
@@ -194,7 +221,7 @@ pub fn input(
         given: arguments(given),
         until: until.to_vec(),
         program: format!("plyflow {}", env!("CARGO_PKG_VERSION")),
-        fingerprint: fingerprint(opened, session, failures),
+        fingerprint: fingerprint(opened, session, failures, page),
         instances: found.records.iter().map(instance).collect(),
         expectations: found.rows.iter().filter_map(expectation).collect(),
         failures: failures
@@ -202,6 +229,7 @@ pub fn input(
             .map(|f| (f.label.clone(), f.reason.clone()))
             .collect(),
         not_run: (0..core.instances().len()).filter(did_not_run).count(),
+        family: family.filter(|_| until.is_empty()),
     }
 }
 

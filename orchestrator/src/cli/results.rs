@@ -353,7 +353,7 @@ pub fn is_named(session: &Session<'_>, step: &str, wanted: &[String]) -> bool {
 
 /// A text as a cell of CSV.
 pub fn csv_text(t: &str) -> String {
-    if t.contains([',', '"', '\n']) {
+    if t.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", t.replace('"', "\"\""))
     } else {
         t.to_owned()
@@ -450,7 +450,9 @@ fn front(
         records,
         rows: Vec::new(),
     };
-    let ways = plyflow_report::ways(&input(opened, session, &found, &[], (&args.workflow, &[])));
+    let page = super::report::beside(&opened.workflow.file, &[]);
+    let asked = (&args.workflow, &[][..], page.as_path());
+    let ways = plyflow_report::ways(&input(opened, session, &found, &[], asked));
     match args.format {
         Format::Json => print(&format!("{:#}\n", super::front::as_json(&ways))),
         Format::Csv => print(&super::front::as_csv(&ways)),

@@ -214,7 +214,7 @@ fn stale_report(
     let stale = summary.executed > 0
         || !report::is_written(
             &path,
-            &report::fingerprint(opened, session, &summary.failures),
+            &report::fingerprint(opened, session, &summary.failures, &path),
         );
     stale.then_some(path)
 }
@@ -328,7 +328,11 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         session,
         &found,
         &summary.failures,
-        (&args.workflow, &args.until),
+        (
+            &args.workflow,
+            &args.until,
+            &report::beside(&opened.workflow.file, &args.until),
+        ),
     );
     let mut written = Some(report::beside(&opened.workflow.file, &args.until))
         .filter(|_| !args.no_report && has_news(summary));

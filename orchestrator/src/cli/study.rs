@@ -554,9 +554,9 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
     let variables = study
         .variables
         .iter()
-        .map(|v| json!({"name": v.name, "unit": v.unit}));
+        .map(|v| json!({"name": v.name, "unit": v.unit, "si_unit": v.si_unit}));
     let responses = (study.responses.iter())
-        .map(|r| json!({"name": r.name, "step": study.steps[r.step], "result": r.result, "unit": r.unit}));
+        .map(|r| json!({"name": r.name, "step": study.steps[r.step], "result": r.result, "of": r.of, "unit": r.unit}));
     let samples = study
         .samples
         .iter()

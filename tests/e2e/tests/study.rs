@@ -154,6 +154,69 @@ fn a_failed_point_is_a_row_with_its_class_and_cause() {
     assert_eq!(verdicts, ["not judged", "ok", "missed"]);
 }
 
+/// What stands between two texts, wherever the first stands.
+fn all_between<'a>(text: &'a str, from: &str, to: &str) -> Vec<&'a str> {
+    let pieces = text.split(from).skip(1);
+    pieces
+        .map(|p| p.split(to).next().unwrap_or_default())
+        .collect()
+}
+
+#[test]
+fn the_page_of_a_study_has_the_numbers_of_its_csv_and_leads_to_pages_of_points() {
+    let study = Study::new(&SOME_TOO_LONG.replace("BEARS", ""));
+    assert_eq!(study.run(&[]).failed, 1);
+    let read = |name: &str| std::fs::read_to_string(study.path(name)).expect(name);
+    assert!(study.call(&["report"]).status.success());
+    let page = read("report.html");
+    let csv = read("study.csv");
+    let body = all_between(&page, "<table class=\"points\">", "</table>")[0];
+    let rows = all_between(body, "<tr data-place", "</tr>");
+    let lines: Vec<&str> = csv.lines().skip(1).collect();
+    assert_eq!((rows.len(), lines.len()), (4, 4));
+    for (row, line) in rows.iter().zip(&lines) {
+        let (name, rest) = line[1..].split_once('"').expect("a name with a comma");
+        assert!(row.replace("<wbr>", "").contains(name), "{row}");
+        // Both variables, the response, and the status.
+        let cells: Vec<&str> = rest[1..].split(',').take(4).collect();
+        let numbers = all_between(row, "data-value=\"", "\"");
+        let told: Vec<&str> = cells[..3]
+            .iter()
+            .copied()
+            .filter(|c| !c.is_empty())
+            .collect();
+        assert_eq!(numbers, told, "{line}");
+        assert!(row.contains(cells[3]), "{line}");
+    }
+    let failed = all_between(&page, "id=\"failed\"", "</section>")[0];
+    assert!(
+        failed.contains("time-limit") && failed.contains("time limit of 1 s"),
+        "{failed}"
+    );
+    // A page of one point, which the study's leads to when it is written again, with the same bytes each time.
+    let output = study.call(&["report", "--point", "seconds=0,v=2"]);
+    assert!(output.status.success(), "{output:?}");
+    let own = read("report-points/seconds=0,v=2.html");
+    assert!(
+        own.contains("one@v=2") || own.contains("v=2"),
+        "the steps of the point"
+    );
+    assert!(!own.contains("v=1"), "nothing of another point");
+    let link = "href=\"report-points/seconds=0,v=2.html\"";
+    assert!(!page.contains(link));
+    assert!(study.call(&["report"]).status.success());
+    let again = read("report.html");
+    assert_eq!(again.matches(link).count(), 1);
+    assert!(study.call(&["report"]).status.success());
+    assert!(again == read("report.html"), "the page has other bytes");
+    let unknown = study.call(&["report", "--point", "v=2"]);
+    let told = String::from_utf8_lossy(&unknown.stderr).into_owned();
+    assert!(
+        !unknown.status.success() && told.contains("there is no point 'v=2'"),
+        "{told}"
+    );
+}
+
 #[test]
 fn as_many_failed_points_are_borne_as_the_study_says() {
     let bears = |n: u32| {

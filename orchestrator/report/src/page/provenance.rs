@@ -10,8 +10,8 @@ use serde_json::Value;
 /// Instances whose parameters are listed in full.
 const LONGEST: usize = 200;
 
-/// Per instance: key, plugin, components, inputs, parameters.
-pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
+/// Per instance: key, plugin, components, inputs, parameters. `rest`: what is listed; of a large study only what is the same at every point.
+pub(super) fn section(input: &ReportInput, rest: &ReportInput, material: &Material) -> Markup {
     html! {
         section id="provenance" {
             h2 { "Provenance" }
@@ -22,10 +22,13 @@ pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
             }
             p class="note" { "Workflow file: " code { (input.file) } ". The same key means the same bytes."
                 @if let Some(text) = began(&input.instances) { " " (text) } }
-            @if input.instances.len() > LONGEST {
-                p class="note" { "The first " (LONGEST) " of " (input.instances.len()) " steps." }
+            @if rest.instances.len() < input.instances.len() {
+                p class="note" { "Listed are the steps that are the same at every point. Those of a point are on its own page; their keys are in its place above and in the table of the study." }
             }
-            @for (i, facts) in input.instances.iter().zip(&material.facts).take(LONGEST) {
+            @if rest.instances.len() > LONGEST {
+                p class="note" { "The first " (LONGEST) " of " (rest.instances.len()) " steps." }
+            }
+            @for (i, facts) in rest.instances.iter().zip(&material.facts).take(LONGEST) {
                 (instance(i, facts.as_ref()))
             }
         }

@@ -12,6 +12,7 @@ const REGL_LICENCE: &str = include_str!("../../vendor/regl/LICENSE");
 const SCENE: &str = include_str!("../script/scene3d.js");
 const VIEW: &str = include_str!("../script/view3d.js");
 const PAGE: &str = include_str!("../script/page.js");
+const STUDY: &str = include_str!("../script/study.js");
 
 /// Directions of the buttons: name, and where the viewer stands as azimuth and elevation (deg).
 const STANDARD: [(&str, [i32; 2]); 4] = [
@@ -21,10 +22,11 @@ const STANDARD: [(&str, [i32; 2]); 4] = [
     ("End", [0, 0]),
 ];
 
-/// The scripts of the page; those of the view only when there is one.
-pub(super) fn scripts(view: bool) -> Markup {
+/// The scripts of the page; those of the view and of a study's table only when there is one.
+pub(super) fn scripts(view: bool, study: bool) -> Markup {
     html! {
         script { (PreEscaped(PAGE)) }
+        @if study { script { (PreEscaped(STUDY)) } }
         @if view {
             script { (PreEscaped(format!("/*!{REGL_LICENCE}*/\n"))) (PreEscaped(REGL)) }
             script { (PreEscaped(SCENE)) }

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 
 /// Tables of steps are shown up to this many rows.
 const LONGEST: usize = 400;
+/// More expectations of a study than this are told apart by whether they are met.
+const MANY: usize = 40;
 
 /// Zones and what was flagged on each ply.
 pub(super) fn zones(study: &Study) -> Markup {
@@ -222,22 +224,42 @@ pub(super) fn verdict_and_source(e: &Expectation) -> Markup {
     html! { td class=(class) { (text) } td { (e.source.as_deref().unwrap_or_default()) } }
 }
 
-/// Expectations with what was found.
+/// Expectations with what was found. Of a study with many, those that are met at single points stand apart.
 pub(super) fn expectations(input: &ReportInput) -> Markup {
+    let all = &input.expectations;
+    let many = input.family.is_some() && all.len() > MANY;
+    let is_first = |e: &&Expectation| !many || is_notable(e);
+    let first: Vec<&Expectation> = all.iter().filter(is_first).collect();
+    let met: Vec<&Expectation> = all.iter().filter(|e| !is_first(e)).collect();
     html! {
-        @if !input.expectations.is_empty() {
+        @if !all.is_empty() {
             section id="expectations" {
                 h2 { "Expectations" }
-                div class="scroll" { table {
-                    thead { tr { th { "step" } th { "result" } th class="n" { "expected" } th class="n" { "got" } th { "verdict" } th { "source" } } }
-                    tbody { @for e in &input.expectations { tr {
-                        td { (label(&e.step, &e.item)) } td { (e.result) }
-                        td class="n" { (expected_text(e)) } td class="n" { (got_text(e)) }
-                        (verdict_and_source(e))
-                    } } }
-                } }
+                @if !first.is_empty() { (expectation_table(&first)) }
+                @if !met.is_empty() {
+                    details { summary { (met.len()) " more are met, at single points" } (expectation_table(&met)) }
+                }
             }
         }
+    }
+}
+
+/// Whether an expectation of a study is told before all others: it is about the points together, or is not met.
+pub(crate) fn is_notable(e: &Expectation) -> bool {
+    e.step == "study" || e.verdict() != Verdict::Met
+}
+
+fn expectation_table(all: &[&Expectation]) -> Markup {
+    html! {
+        @if all.len() > LONGEST { p class="note" { "The first " (LONGEST) " of " (all.len()) "." } }
+        div class="scroll" { table {
+            thead { tr { th { "step" } th { "result" } th class="n" { "expected" } th class="n" { "got" } th { "verdict" } th { "source" } } }
+            tbody { @for e in all.iter().take(LONGEST) { tr {
+                td { (label(&e.step, &e.item)) } td { (e.result) }
+                td class="n" { (expected_text(e)) } td class="n" { (got_text(e)) }
+                (verdict_and_source(e))
+            } } }
+        } }
     }
 }
 

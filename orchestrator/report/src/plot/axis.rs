@@ -29,7 +29,7 @@ fn step(low: f64, high: f64, count: usize) -> Option<f64> {
 
 /// When an axis begins at zero though no value does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Zero {
+pub(crate) enum Zero {
     /// Always.
     Always,
     /// When zero is nearer than this part of the largest value.
@@ -38,7 +38,7 @@ pub(super) enum Zero {
 
 /// Smallest and largest of the values, never the same; 0 and 1 when there is none. Infinite values and those that are
 /// no number do not count.
-pub(super) fn extent(values: impl Iterator<Item = f64>, zero: Zero) -> [f64; 2] {
+pub(crate) fn extent(values: impl Iterator<Item = f64>, zero: Zero) -> [f64; 2] {
     let usual = |v: &f64| v.abs() < LARGEST;
     let [low, high] = values
         .filter(usual)
@@ -70,16 +70,16 @@ pub(super) fn extent(values: impl Iterator<Item = f64>, zero: Zero) -> [f64; 2] 
 }
 
 /// Larger values are taken for infinite: differences of them would be.
-pub(super) const LARGEST: f64 = 1e150;
+pub(crate) const LARGEST: f64 = 1e150;
 
 /// A range of values along a stretch of the page.
 #[derive(Debug, Clone)]
-pub(super) struct Axis {
-    pub(super) low: f64,
-    pub(super) high: f64,
+pub(crate) struct Axis {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
     /// Where `low` and `high` lie on the page (px).
     page: [f64; 2],
-    pub(super) ticks: Vec<f64>,
+    pub(crate) ticks: Vec<f64>,
     /// The texts of the ticks are in 10^exponent.
     exponent: i32,
     /// Decimal places of the texts.
@@ -88,7 +88,7 @@ pub(super) struct Axis {
 
 impl Axis {
     /// From `low` to `high` (more than `low`) with about `count` ticks.
-    pub(super) fn new([low, high]: [f64; 2], count: usize, page: [f64; 2]) -> Self {
+    pub(crate) fn new([low, high]: [f64; 2], count: usize, page: [f64; 2]) -> Self {
         let ticks = ticks(low, high, count);
         let largest = ticks.iter().fold(0.0f64, |a, t| a.max(t.abs()));
         let size = if largest > 0.0 {
@@ -120,25 +120,25 @@ impl Axis {
     }
 
     /// Where a value lies on the page (px).
-    pub(super) fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         let [a, b] = self.page;
         a + (value - self.low) / (self.high - self.low) * (b - a)
     }
 
     /// Text of a tick, in the power of ten of the axis.
-    pub(super) fn text(&self, tick: f64) -> String {
+    pub(crate) fn text(&self, tick: f64) -> String {
         let value = tick / 10f64.powi(self.exponent);
         trim(crate::units::fixed(value, self.places))
     }
 
     /// Length of the longest text (characters).
-    pub(super) fn widest(&self) -> usize {
+    pub(crate) fn widest(&self) -> usize {
         let all = self.ticks.iter().map(|t| self.text(*t).chars().count());
         all.max().unwrap_or(1)
     }
 
     /// The power of ten that the texts leave out: `×10³`.
-    pub(super) fn power(&self) -> Option<String> {
+    pub(crate) fn power(&self) -> Option<String> {
         let digit = |c: char| match c {
             '-' => '⁻',
             c => {

@@ -2,6 +2,7 @@
 #![allow(dead_code, missing_docs)]
 
 mod extras;
+pub mod family;
 mod shapes;
 
 use camino::{Utf8Path, Utf8PathBuf};
@@ -484,6 +485,7 @@ impl Study {
             instances: self.instances,
             failures: vec![],
             not_run: 0,
+            family: None,
             until: Vec::new(),
         }
     }

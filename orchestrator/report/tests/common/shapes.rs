@@ -25,6 +25,12 @@ pub fn wave(x: f64, y: f64) -> f64 {
 }
 
 pub fn sheet(bounds: [f64; 4], size: f64, offset: f64) -> Sheet {
+    wavy(bounds, size, offset, 1.0)
+}
+
+/// A sheet whose waves are higher by a factor.
+pub fn wavy(bounds: [f64; 4], size: f64, offset: f64, factor: f64) -> Sheet {
+    let wave = |x, y| factor * wave(x, y);
     let n = [0, 1].map(|d| ((bounds[d + 2] - bounds[d]) / size).round() as usize);
     let mut s = Sheet {
         flat: vec![],
