@@ -11,7 +11,7 @@ use crate::exit;
 use plyflow_model::job::Record;
 use plyflow_model::units::si_number;
 use plyflow_model::workflow::{FamilyOf, ResponseOf};
-use plyflow_study::{Claim, Found, Mark, judge};
+use plyflow_study::{Found, judge, marks};
 use plyflow_workflow::resolved::{
     Expectation, FamilyExpectation, Study, StudyPoint, StudyResponse, StudyValue,
 };
@@ -239,11 +239,19 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
     let Some(study) = &session.workflow.study else {
         return Vec::new();
     };
-    if study.expectations.is_empty() || session.core.graph().steps.iter().any(|s| !s.wanted) {
+    // What `--until` leaves out is not expected either.
+    let graph = session.core.graph();
+    let wanted = |e: &&FamilyExpectation| {
+        let step = study.responses[e.response].step;
+        let mut points = e.points.iter().map(|p| &study.points[*p as usize]);
+        points.all(|p| graph.steps[p.steps[step]].wanted)
+    };
+    let all: Vec<&FamilyExpectation> = study.expectations.iter().filter(wanted).collect();
+    if all.is_empty() {
         return Vec::new();
     }
     let table = Table::read(session, records);
-    study.expectations.iter().map(|e| row(&table, e)).collect()
+    all.into_iter().map(|e| row(&table, e)).collect()
 }
 
 /// A name for the number that is held against an expectation.
@@ -332,49 +340,35 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
         let names: Vec<&str> = found.at.iter().map(name).collect();
         row.name += &format!(" (at {})", names.join(" and "));
     }
+    if found.alone > 0 {
+        let what = match e.of {
+            FamilyOf::SymmetricAbout => "without a mirror point",
+            _ => "without another one beside it",
+        };
+        row.name += &format!(" ({} of {} points {what})", found.alone, e.points.len());
+    }
     row
 }
 
 fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
-    let claim = match e.of {
-        FamilyOf::Each => Claim::Each,
-        FamilyOf::Mean => Claim::Mean,
-        FamilyOf::Max => Claim::Max,
-        FamilyOf::Min => Claim::Min,
-        FamilyOf::Argmax => Claim::Argmax,
-        FamilyOf::Argmin => Claim::Argmin,
-        FamilyOf::ZeroWhere => Claim::Zero,
-        FamilyOf::Monotone => Claim::Monotone {
-            increasing: e.increasing,
-        },
-        FamilyOf::SymmetricAbout => Claim::Symmetric {
-            about: e.about.as_ref().map_or(f64::NAN, |a| a.0),
-        },
-    };
-    let mut groups: HashMap<String, usize> = HashMap::new();
-    let mut marks = Vec::with_capacity(e.points.len());
-    for i in &e.points {
+    let mark = |i: &u32| {
         let point = &table.study.points[*i as usize];
+        let along = match e.over.map(|v| &point.values[v]) {
+            Some(StudyValue::Number { si, .. }) => *si,
+            _ => 0.0,
+        };
         let values = point.values.iter().enumerate();
-        let others: Vec<&StudyValue> = values
-            .filter(|(v, _)| Some(*v) != e.over)
-            .map(|(_, x)| x)
-            .collect();
-        let next = groups.len();
-        marks.push(Mark {
-            along: match e.over.map(|v| &point.values[v]) {
-                Some(StudyValue::Number { si, .. }) => *si,
-                _ => 0.0,
-            },
-            group: *groups.entry(format!("{others:?}")).or_insert(next),
-            result: table.lines[*i as usize].responses[e.response],
-        });
-    }
+        let others = values.filter(|(v, _)| Some(*v) != e.over).map(|(_, x)| x);
+        let others = format!("{:?}", others.collect::<Vec<_>>());
+        let result = table.lines[*i as usize].responses[e.response];
+        (along, others, result)
+    };
+    let marks = marks(e.points.iter().map(mark));
     let low = [e.minimum, e.value.map(|v| v - e.tolerance.unwrap_or(0.0))];
     let high = [e.maximum, e.value.map(|v| v + e.tolerance.unwrap_or(0.0))];
     let low = low.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
     let high = high.into_iter().flatten().fold(f64::INFINITY, f64::min);
-    judge(claim, &marks, (low, high))
+    judge(e.claim(), &marks, (low, high))
 }
 
 // How the table is shown.

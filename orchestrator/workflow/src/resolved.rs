@@ -280,6 +280,18 @@ pub struct FamilyExpectation {
     pub source: Option<String>,
 }
 
+impl FamilyExpectation {
+    /// What is claimed.
+    #[must_use]
+    pub fn claim(&self) -> plyflow_study::Claim {
+        plyflow_study::Claim {
+            of: self.of,
+            increasing: self.increasing,
+            about: self.about.as_ref().map_or(f64::NAN, |a| a.0),
+        }
+    }
+}
+
 /// A stated expectation on a result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expectation {

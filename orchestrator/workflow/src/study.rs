@@ -92,7 +92,10 @@ impl Family {
         if points.all.is_empty() {
             let at = study.entry("where").map_or(place, |e| &e.value.span);
             let d = problems.add(source, at, "the study has no point");
-            d.expected("at least one point for which `where` holds");
+            d.expected(match study.entry("where") {
+                Some(_) => "at least one point for which `where` holds",
+                None => "at least one point",
+            });
             return None;
         }
         let names: Vec<String> = points.variables.iter().map(|v| v.name.clone()).collect();

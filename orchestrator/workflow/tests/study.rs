@@ -268,6 +268,16 @@ fn a_study_that_is_wrong_is_told_where_it_is_wrong() {
             &["a grid of 2 variables has no 3 points"],
         ),
         ("  points: [{}]", "5:12", &["no variable"]),
+        (
+            "  vary: {limit: [1e99 deg, 1e-40 deg]}",
+            "5:18",
+            &["`1e99 deg`", "more digits"],
+        ),
+        (
+            "  vary: {point: [4 deg]}",
+            "5:10",
+            &["every table of a study has"],
+        ),
         ("  vary: {}", "5:9", &["no variable"]),
         ("  union: []", "5:3", &["has no parts"]),
         ("  zip: {limit: []}", "5:16", &["no value"]),
@@ -285,6 +295,29 @@ fn a_study_that_is_wrong_is_told_where_it_is_wrong() {
 }
 
 #[test]
+fn a_table_of_points_may_look_as_any_table() {
+    let all = |csv: &str| -> Vec<String> {
+        let study = with(
+            "  points: cases.csv",
+            &[LIMIT, ("damping: 0.1", "damping: ${d}")],
+        );
+        study.write("cases.csv", csv);
+        let study = load(&study).study.unwrap();
+        study.points.into_iter().map(|p| p.name).collect()
+    };
+    let wanted = ["limit=4.5deg,d=0.1", "limit=6deg,d=0.25"];
+    for csv in [
+        "\u{feff}limit [deg];d\r\n4,5;0,1\r\n6,0;0,25\r\n",
+        "sep=;\n\"limit (deg)\";\"d\"\n\"4,5\";\"0,1\"\n6;2,5D-1\n",
+        "limit,d\ndeg,-\n4.5,1e-1\n6,.25\n",
+        "limit / deg\td\n4.5\t0.1\n// more\n6\t0.25\n",
+        "limit;d\n4.5 deg;0.1\n6 deg;0.25\n",
+    ] {
+        assert_eq!(all(csv), wanted, "{csv}");
+    }
+}
+
+#[test]
 fn a_table_that_is_wrong_is_told_with_its_line() {
     for (csv, line, says) in [
         ("limit [furlong]\n4\n", 1, "furlong"),
@@ -292,6 +325,13 @@ fn a_table_that_is_wrong_is_told_with_its_line() {
         ("limit [deg],x\n4\n", 2, "1 cells, and the head 2"),
         ("limit [deg],\"\"\n4,1\n", 1, "cannot name a variable"),
         ("limit [deg],x\n4,\n", 2, "no value for `x`"),
+        ("limit [deg]\n1e99\n", 2, "more digits"),
+        (
+            "limit [deg];x\n4,5;1.5\n",
+            2,
+            "one of them is no decimal sign",
+        ),
+        ("limit [deg],status\n4,1\n", 1, "every table of a study has"),
     ] {
         let study = with("  points: cases.csv", &[LIMIT]);
         study.write("cases.csv", csv);
@@ -357,6 +397,47 @@ fn a_value_that_does_not_fit_is_told_where_it_stands_and_at_which_point() {
             "{found}"
         );
     }
+}
+
+#[test]
+fn what_is_set_is_never_taken_away_by_what_is_set_behind_it() {
+    let block = "  vary:\n    limit: [4 deg, 5 deg]";
+    let set = |set: &str| {
+        let text = format!("scene: {{file: scene.yaml, set: {{{set}}}}}\n      element: m4");
+        with(
+            block,
+            &[LIMIT, ("scene: scene.yaml\n      element: m4", &text)],
+        )
+    };
+    for (wrong, says) in [
+        (
+            "sheets.ply-1.fibre_1: 0 deg, sheets.ply-1: {name: x}",
+            "`sheets.ply-1` takes `sheets.ply-1.fibre_1` away again",
+        ),
+        (
+            "friction.fabric_fabric: 0.1, ' friction . fabric_fabric ': 0.2",
+            "takes `friction.fabric_fabric` away again",
+        ),
+    ] {
+        let told = told(&set(wrong));
+        assert!(told.contains(says) && told.contains(W), "{wrong}\n{told}");
+    }
+    // A longer path behind a shorter one changes a part of it; and the command line has the last word.
+    let study =
+        set("friction: {fabric_fabric: 0.1, fabric_diaphragm: 0.1}, friction.fabric_fabric: 0.3");
+    let friction = |set: &str| {
+        let set = [set.parse().unwrap()];
+        let w = plyflow_workflow::load_with(&study.path(W), &common::catalog(), &set);
+        let w = w.unwrap_or_else(|e| panic!("{}", e.render(false)));
+        step(&w, "coarse").parameters["scene"]["friction"]["fabric_fabric"].clone()
+    };
+    assert_eq!(friction("coarse.damping=0.1"), json!(0.3));
+    assert_eq!(
+        friction("coarse.scene.friction.fabric_fabric=0.4"),
+        json!(0.4)
+    );
+    let whole = "coarse.scene.friction={fabric_fabric: 0.5, fabric_diaphragm: 0.1}";
+    assert_eq!(friction(whole), json!(0.5));
 }
 
 #[test]
@@ -442,6 +523,10 @@ fn expectations_that_no_point_can_answer_are_refused() {
             "without the variable",
         ),
         (
+            "response: length, of: max, maximum: 5 mm, value: 1 mm, tolerance: -1 mm",
+            "`tolerance` is negative",
+        ),
+        (
             "response: length, of: argmax, over: limit, value: 4 mm",
             "`4 mm` is a length",
         ),
@@ -480,6 +565,15 @@ fn expectations_that_no_point_can_answer_are_refused() {
         let told = told(&with(block, &[LIMIT, ("expect:\n", &list)]));
         assert!(told.contains(says), "{expect}\n{told}");
         assert_eq!(told.lines().count(), 1, "{expect}\n{told}");
+    }
+    for (from, says) in [
+        ("ratio:", "has the name of a column"),
+        ("length:", "has the name of a variable"),
+    ] {
+        let to = if from == "ratio:" { "cause:" } else { "limit:" };
+        let list = RESPONSES.replace(from, to);
+        let told = told(&with(block, &[LIMIT, ("expect:\n", &list)]));
+        assert!(told.contains(says), "{told}");
     }
     let fanned = RESPONSES.replace("coarse, result", "local, result");
     let told = told(&with(block, &[LIMIT, ("expect:\n", &fanned)]));

@@ -144,10 +144,18 @@ pub struct Expect {
     /// What is held against the value and the bounds.
     #[serde(default, skip_serializing_if = "Of::is_each")]
     pub of: Of,
-    /// Expected value, with the unit of the result.
+    /// What is expected of it.
+    #[serde(flatten)]
+    pub stated: Stated,
+}
+
+/// What a number is expected to be, with its unit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Stated {
+    /// Expected value, with the unit of the result (`argmax`, `argmin` of a response: of the variable).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<ResultValue>,
-    /// Allowed absolute deviation from `value`.
+    /// Allowed absolute deviation from `value`; of a response also from zero, from symmetry, or against the direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<ResultValue>,
     /// Lower bound.
@@ -341,7 +349,29 @@ mod tests {
         let Expectable::Result(first) = &expected.expectations[0] else {
             panic!("an expectation on a result");
         };
-        assert_eq!(first.maximum, Some(ResultValue::Number(1.0)));
+        assert_eq!(first.stated.maximum, Some(ResultValue::Number(1.0)));
+    }
+
+    #[test]
+    fn parts_that_formats_share_are_read_and_a_slip_in_them_is_refused() {
+        let study = |more: serde_json::Value| {
+            let mut study =
+                serde_json::json!({"vary": {"a": [1, 2]}, "where": "a > 1", "at_most_failures": 3});
+            study
+                .as_object_mut()
+                .unwrap()
+                .extend(more.as_object().unwrap().clone());
+            serde_json::from_value::<Study>(study)
+        };
+        let read = study(serde_json::json!({})).unwrap();
+        assert_eq!(
+            (read.at_most_failures, read.set.condition.as_deref()),
+            (Some(3), Some("a > 1"))
+        );
+        assert!(read.set.vary.is_some());
+        assert!(study(serde_json::json!({"varry": {}})).is_err());
+        let expect = serde_json::json!({"response": "r", "of": "max", "maximum": 1, "unit": "m"});
+        assert!(serde_json::from_value::<Expectable>(expect).is_err());
     }
 
     #[test]

@@ -8,8 +8,7 @@ use crate::resolved::{FamilyExpectation, StudyResponse};
 use crate::wires::Wiring;
 use crate::yaml::{Kind, Node};
 use plyflow_model::workflow::FamilyOf;
-use plyflow_study::{Claim, Expression, Kind as ValueKind, Mark, Names, Value, judge};
-use std::collections::HashMap;
+use plyflow_study::{Expression, Kind as ValueKind, Names, Value, judge, marks};
 
 /// A study and what is read from its points.
 pub(crate) struct Asked<'a> {
@@ -29,7 +28,8 @@ impl<'a> Asked<'a> {
         source: &Source,
         problems: &mut Problems,
     ) -> Self {
-        let responses = super::responses::responses(root, drafts, wiring, source, problems);
+        let responses =
+            super::responses::responses(root, &family.names, (drafts, wiring), source, problems);
         let declared = root.get("responses").map_or(&[][..], Node::entries);
         Self {
             family,
@@ -70,6 +70,9 @@ impl<'a> Asked<'a> {
         };
         let (expected, tolerance) = (number("value"), number("tolerance"));
         let (minimum, maximum) = (number("minimum"), number("maximum"));
+        if let (Some(_), Some(e)) = (tolerance.filter(|t| *t < 0.0), item.entry("tolerance")) {
+            problems.add(source, &e.value.span, "`tolerance` is negative");
+        }
         let relative = item
             .get("relative_tolerance")
             .and_then(|n| n.to_json().as_f64());
@@ -211,7 +214,7 @@ impl<'a> Asked<'a> {
         let variable = &self.family.points.variables[over];
         let value = match &node.kind {
             Kind::Number(n) => Value::of_number(&n.to_string()).ok(),
-            Kind::Text(t) => Some(Value::of_text(t)),
+            Kind::Text(t) => Value::of_text(t).ok(),
             _ => None,
         };
         match value.filter(|v| v.kind() == variable.kind) {
@@ -237,34 +240,30 @@ impl<'a> Asked<'a> {
         source: &Source,
         problems: &mut Problems,
     ) {
-        let claim = match (e.of, &e.about) {
-            (FamilyOf::Monotone, _) => Claim::Monotone { increasing: true },
-            (FamilyOf::SymmetricAbout, Some((about, _))) => Claim::Symmetric { about: *about },
-            _ => return,
-        };
+        if !matches!(e.of, FamilyOf::Monotone | FamilyOf::SymmetricAbout) {
+            return;
+        }
         let Some(over) = e.over else { return };
-        let mut groups: HashMap<String, usize> = HashMap::new();
         let others: Vec<usize> = (0..self.family.names.len())
             .filter(|i| *i != over)
             .collect();
-        let mut marks = Vec::new();
-        for i in &e.points {
+        let mark = |i: &u32| {
             let point = &self.family.points.all[*i as usize];
-            let next = groups.len();
-            let group = point.part(&self.family.points.variables, &others);
-            marks.push(Mark {
-                along: point.values[over].si().unwrap_or(f64::NAN),
-                group: *groups.entry(group).or_insert(next),
-                result: Some(0.0),
-            });
-        }
-        if judge(claim, &marks, (f64::NEG_INFINITY, f64::INFINITY))
+            let along = point.values[over].si().unwrap_or(f64::NAN);
+            (
+                along,
+                point.part(&self.family.points.variables, &others),
+                Some(0.0),
+            )
+        };
+        let marks = marks(e.points.iter().map(mark));
+        if judge(e.claim(), &marks, (f64::NEG_INFINITY, f64::INFINITY))
             .value
             .is_none()
         {
             let name = &self.family.names[over];
-            let (message, expected) = match claim {
-                Claim::Symmetric { .. } => (
+            let (message, expected) = match e.of {
+                FamilyOf::SymmetricAbout => (
                     format!("no two points mirror each other in `{name}`, all else being the same"),
                     "pairs of points at the same distance on both sides of `about`",
                 ),
@@ -359,12 +358,5 @@ fn stated(item: &Node, of: FamilyOf, source: &Source, problems: &mut Problems) {
     if !along && given("tolerance") && !given("value") {
         let d = problems.add(source, &item.span, "`tolerance` without `value`");
         d.help("for a bound use `minimum` or `maximum`");
-    }
-    let negative = |key: &str| {
-        let text = item.get(key).map(|n| n.to_json().to_string());
-        text.is_some_and(|t| t.trim_start_matches('"').trim_start().starts_with('-'))
-    };
-    if negative("tolerance") {
-        problems.add(source, &item.span, "`tolerance` is negative");
     }
 }
