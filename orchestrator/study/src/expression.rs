@@ -118,6 +118,17 @@ impl Expression {
         yes(&self.root, of)
     }
 
+    /// How far each of its comparisons is from holding, in SI, where the variables have these values: 0 where it holds. Parts joined by `and`
+    /// are one comparison each; of what has no such number (`or`, `not`, texts) it is 1 where it does not hold.
+    ///
+    /// # Errors
+    /// As [`Expression::holds`].
+    pub fn excess(&self, of: &[Value]) -> Result<Vec<f64>, ExpressionError> {
+        let mut found = Vec::new();
+        evaluate::excess(&self.root, of, &mut found)?;
+        Ok(found)
+    }
+
     /// Positions of the variables that it names, each once, in order.
     #[must_use]
     pub fn variables(&self) -> Vec<usize> {

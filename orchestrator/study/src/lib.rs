@@ -11,6 +11,7 @@
 mod expression;
 mod judge;
 mod number;
+pub mod optimise;
 mod points;
 mod range;
 mod sample;

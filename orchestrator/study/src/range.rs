@@ -62,6 +62,27 @@ impl Range {
         Ok(self.value(self.short(&exact).ok_or_else(too_fine)?))
     }
 
+    /// The fraction of the way at which a value lies; `None` outside of the ends, or for another dimension.
+    #[must_use]
+    pub fn fraction(&self, value: &Value) -> Option<f64> {
+        let Value::Quantity(q) = value else {
+            return None;
+        };
+        let number = q.in_unit_of(&self.from).ok()?.number;
+        let (from, to) = (self.from.number, self.to.number);
+        if number < from.min(to) || number > from.max(to) {
+            return None;
+        }
+        if from == to {
+            return Some(0.5);
+        }
+        let (a, b, x) = (double(&from), double(&to), double(&number));
+        Some(match self.log {
+            false => (x - a) / (b - a),
+            true => (x.fixed_ln() - a.fixed_ln()) / (b.fixed_ln() - a.fixed_ln()),
+        })
+    }
+
     fn value(&self, number: Exact) -> Value {
         Value::Quantity(Quantity {
             number,

@@ -146,3 +146,33 @@ fn call(function: Function, given: &[Quantity]) -> Result<Quantity, Problem> {
         }
     }
 }
+
+/// See [`super::Expression::excess`].
+pub(super) fn excess(
+    node: &Node,
+    of: &[Value],
+    found: &mut Vec<f64>,
+) -> Result<(), ExpressionError> {
+    let Kind::Compared(all, last) = &node.kind else {
+        if let Kind::And(all) = &node.kind {
+            return all.iter().try_for_each(|n| excess(n, of, found));
+        }
+        found.push(f64::from(u8::from(!yes(node, of)?)));
+        return Ok(());
+    };
+    let nodes: Vec<&Node> = all.iter().map(|(_, n)| n).chain([&**last]).collect();
+    for (i, (sign, _)) in all.iter().enumerate() {
+        let (a, b) = (value(nodes[i], of)?, value(nodes[i + 1], of)?);
+        let holds = compared(*sign, &a, &b).map_err(|p| failed(node, p))?;
+        let size = match (&a, &b) {
+            _ if holds => 0.0,
+            // Of what is too small to be told, or must not be equal, something is left.
+            (Value::Quantity(a), Value::Quantity(b)) if *sign != Compare::Other => {
+                (a.si() - b.si()).abs().max(f64::MIN_POSITIVE)
+            }
+            _ => 1.0,
+        };
+        found.push(size);
+    }
+    Ok(())
+}

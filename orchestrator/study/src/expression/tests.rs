@@ -111,3 +111,20 @@ fn a_temperature_in_degrees_is_compared_and_never_turned_round() {
         assert!(holds(wrong).is_err(), "{wrong}");
     }
 }
+
+#[test]
+fn what_does_not_hold_tells_how_far_it_is_from_it() {
+    let all = ["x", "layup"].map(str::to_owned);
+    let names = Names {
+        all: &all,
+        bare: true,
+    };
+    let of = [Value::of_text("3 mm").unwrap(), Value::Text("L3".into())];
+    let excess = |t: &str| Expression::read(t, names).unwrap().excess(&of).unwrap();
+    assert_eq!(excess("x <= 5 mm"), [0.0]);
+    assert_eq!(excess("x <= 1 mm and x > 1 mm"), [0.002, 0.0]);
+    assert_eq!(excess("1 mm <= x <= 2 mm"), [0.0, 0.001]);
+    assert_eq!(excess("x < 3 mm"), [f64::MIN_POSITIVE]);
+    assert_eq!(excess("x == 2 mm or layup == 'L4'"), [1.0]);
+    assert_eq!(excess("layup == 'L4' and not (x > 1 m)"), [1.0, 0.0]);
+}
