@@ -75,6 +75,8 @@ pub struct Table<'s> {
     pub steps: Vec<usize>,
     /// A row for each point.
     pub lines: Vec<Line>,
+    /// Of an optimisation: how far it has come with each point.
+    pub trace: Option<super::optimise::Trace>,
 }
 
 impl<'s> Table<'s> {
@@ -127,10 +129,11 @@ impl<'s> Table<'s> {
                 keys: steps.iter().map(keys).collect(),
             }
         });
-        let lines = lines.collect();
+        let lines: Vec<Line> = lines.collect();
         Self {
             study,
             steps,
+            trace: super::optimise::Trace::of(session, study, &lines),
             lines,
         }
     }
@@ -216,6 +219,11 @@ fn response(r: &StudyResponse, ids: &[Id], records: &HashMap<Id, &Record>) -> Op
 /// What a study bears of the failures of a run, in words; `None`: it does not.
 pub fn borne(session: &Session<'_>) -> Option<String> {
     let study = session.workflow.study.as_ref()?;
+    if study.optimisation.is_some() {
+        return Some(
+            "a point that fails is an answer to an optimisation: this run ends well\n".into(),
+        );
+    }
     let most = study.at_most_failures? as usize;
     let core = &session.core;
     let failed: BTreeSet<usize> = (0..core.instances().len())
@@ -267,6 +275,8 @@ fn title(study: &Study, e: &FamilyExpectation) -> String {
         FamilyOf::Argmax | FamilyOf::Argmin => {
             format!("{over} at the {} of {response}", &e.of.word()[3..])
         }
+        FamilyOf::Best if over.is_empty() => format!("{response} at the best point"),
+        FamilyOf::Best => format!("{over} at the best point"),
         FamilyOf::Monotone if e.increasing => format!("fall of {response} along {over}"),
         FamilyOf::Monotone => format!("rise of {response} along {over}"),
         FamilyOf::ZeroWhere => format!("largest size of {response}"),
@@ -340,6 +350,9 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
         let names: Vec<&str> = found.at.iter().map(name).collect();
         row.name += &format!(" (at {})", names.join(" and "));
     }
+    if e.of == FamilyOf::Best {
+        row.name += super::optimise::why_not(table);
+    }
     if found.alone > 0 {
         let what = match e.of {
             FamilyOf::SymmetricAbout => "without a mirror point",
@@ -351,6 +364,9 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
 }
 
 fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
+    if e.of == FamilyOf::Best {
+        return super::optimise::found(table, e);
+    }
     let mark = |i: &u32| {
         let point = &table.study.points[*i as usize];
         let along = match e.over.map(|v| &point.values[v]) {
@@ -396,14 +412,16 @@ pub fn shown(value: &StudyValue) -> String {
 /// [`exit::USAGE`] when the workflow is no study.
 pub fn tell(args: &ResultsArgs, session: &Session<'_>, records: &[(Id, Record)]) -> Done {
     if session.workflow.study.is_none() {
-        let text = "this workflow is no study: it has no block `study`";
+        let text = "this workflow is no study: it has no block `study` or `optimise`";
         return Err(Stop::new(exit::USAGE, text));
     }
     let table = Table::read(session, records);
     match args.format {
         Format::Json => print(&format!("{:#}\n", as_json(session, &table))),
         Format::Csv => print(&as_csv(&table)),
-        Format::Table => print(&(as_table(&table, usize::MAX) + "\n" + &sum(&table))),
+        Format::Table => {
+            print(&(as_table(&table, usize::MAX) + "\n" + &sum(&table) + &best(&table)))
+        }
     }
 }
 
@@ -416,7 +434,7 @@ pub fn in_short(session: &Session<'_>, found: &Table<'_>) -> String {
     if more > 0 {
         out += &format!("and {more} more: plyflow results --study\n");
     }
-    out
+    out + &best(found)
 }
 
 /// How many points there are of each kind.
@@ -429,6 +447,12 @@ fn sum(table: &Table<'_>) -> String {
         }
     }
     parts.join(", ") + "\n"
+}
+
+/// What an optimisation has led to; empty for a study.
+fn best(table: &Table<'_>) -> String {
+    let trace = table.trace.as_ref();
+    trace.map_or_else(String::new, |t| t.in_words(table))
 }
 
 /// The begin of a text.
@@ -449,14 +473,16 @@ fn as_table(found: &Table<'_>, most: usize) -> String {
     heads.extend(study.responses.iter().map(|r| head(&r.name, &r.unit)));
     let numbers: Vec<usize> = (0..heads.len()).collect();
     let failed = found.count("failed") > 0;
+    heads.extend(found.trace.iter().flat_map(|t| t.heads(study)));
     heads.push("status".into());
     if failed {
         heads.push("cause".into());
     }
-    let line = |(point, line): (&StudyPoint, &Line)| {
+    let line = |(at, (point, line)): (usize, (&StudyPoint, &Line))| {
         let mut cells: Vec<String> = point.values.iter().map(shown).collect();
         let value = |v: &Option<f64>| v.map_or("-".to_owned(), number);
         cells.extend(line.responses.iter().map(value));
+        cells.extend(found.trace.iter().flat_map(|t| t.cells(at, number)));
         cells.push(line.status.word().into());
         if let Status::Failed { step, class, cause } = &line.status {
             let text = format!("{step}: {class}: {cause}");
@@ -466,7 +492,8 @@ fn as_table(found: &Table<'_>, most: usize) -> String {
         }
         cells
     };
-    let lines = study.points.iter().zip(&found.lines).take(most).map(line);
+    let lines = study.points.iter().zip(&found.lines).take(most);
+    let lines = lines.enumerate().map(line);
     let lines: Vec<Vec<String>> = lines.collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     table(&heads, &lines, &numbers)
@@ -478,6 +505,7 @@ pub fn as_csv(found: &Table<'_>) -> String {
     let mut heads = vec!["point".to_owned()];
     heads.extend(study.variables.iter().map(|v| head(&v.name, &v.unit)));
     heads.extend(study.responses.iter().map(|r| head(&r.name, &r.unit)));
+    heads.extend(found.trace.iter().flat_map(|t| t.heads(study)));
     heads.extend(["status", "failed_step", "failure_class", "cause"].map(str::to_owned));
     if !study.samples.is_empty() {
         heads.push("seed".into());
@@ -493,7 +521,7 @@ pub fn as_csv(found: &Table<'_>) -> String {
         cells.join(",") + "\n"
     };
     let mut out = row(heads);
-    for (point, line) in study.points.iter().zip(&found.lines) {
+    for (at, (point, line)) in study.points.iter().zip(&found.lines).enumerate() {
         let mut cells = vec![point.name.clone()];
         cells.extend(point.values.iter().map(shown));
         cells.extend(
@@ -501,6 +529,7 @@ pub fn as_csv(found: &Table<'_>) -> String {
                 .iter()
                 .map(|v| v.map(si_number).unwrap_or_default()),
         );
+        cells.extend(found.trace.iter().flat_map(|t| t.cells(at, si_number)));
         cells.push(line.status.word().into());
         match &line.status {
             Status::Failed { step, class, cause } => {
@@ -559,5 +588,6 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
         "workflow": session.workflow.name,
         "variables": variables.collect::<Vec<_>>(), "responses": responses.collect::<Vec<_>>(),
         "samples": samples.collect::<Vec<_>>(), "points": points,
+        "optimisation": found.trace.as_ref().map(|t| t.as_json(found)),
     })
 }

@@ -326,6 +326,7 @@ fn a_table_that_is_wrong_is_told_with_its_line() {
         ("limit [deg],\"\"\n4,1\n", 1, "cannot name a variable"),
         ("limit [deg],x\n4,\n", 2, "no value for `x`"),
         ("limit [deg]\n1e99\n", 2, "more digits"),
+        (",,\n\"\"\n", 1, "nothing in it"),
         (
             "limit [deg];x\n4,5;1.5\n",
             2,
@@ -399,6 +400,8 @@ fn a_value_that_does_not_fit_is_told_where_it_stands_and_at_which_point() {
     }
 }
 
+const FRICTION: &str = "{tool_diaphragm: 0.5, tool_fabric: 0.2, fabric_fabric: 0.5, fabric_diaphragm: 0.1, diaphragm_diaphragm: 0.5}";
+
 #[test]
 fn what_is_set_is_never_taken_away_by_what_is_set_behind_it() {
     let block = "  vary:\n    limit: [4 deg, 5 deg]";
@@ -423,8 +426,9 @@ fn what_is_set_is_never_taken_away_by_what_is_set_behind_it() {
         assert!(told.contains(says) && told.contains(W), "{wrong}\n{told}");
     }
     // A longer path behind a shorter one changes a part of it; and the command line has the last word.
-    let study =
-        set("friction: {fabric_fabric: 0.1, fabric_diaphragm: 0.1}, friction.fabric_fabric: 0.3");
+    let study = set(&format!(
+        "friction: {FRICTION}, friction.fabric_fabric: 0.3"
+    ));
     let friction = |set: &str| {
         let set = [set.parse().unwrap()];
         let w = plyflow_workflow::load_with(&study.path(W), &common::catalog(), &set);
@@ -436,8 +440,8 @@ fn what_is_set_is_never_taken_away_by_what_is_set_behind_it() {
         friction("coarse.scene.friction.fabric_fabric=0.4"),
         json!(0.4)
     );
-    let whole = "coarse.scene.friction={fabric_fabric: 0.5, fabric_diaphragm: 0.1}";
-    assert_eq!(friction(whole), json!(0.5));
+    let whole = format!("coarse.scene.friction={FRICTION}");
+    assert_eq!(friction(&whole), json!(0.5));
 }
 
 #[test]
@@ -581,4 +585,165 @@ fn expectations_that_no_point_can_answer_are_refused() {
         told.contains("has an item for each of a collection"),
         "{told}"
     );
+}
+
+/// The sound study of the other tests as an optimisation with this block.
+fn optimised(block: &str, expect: &str) -> Study {
+    let study = Study::sound();
+    study.mutate(
+        W,
+        "on_failure: keep-going\n",
+        &format!("optimise: {{{block}}}\n"),
+    );
+    study.mutate(W, LIMIT.0, LIMIT.1);
+    study.mutate(W, "expect:\n", &format!("{RESPONSES}{expect}"));
+    study
+}
+
+const OVER: &str = "over: {limit: {from: 4 deg, to: 8 deg}}";
+
+#[test]
+fn an_optimisation_has_the_points_that_it_is_looked_at_with() {
+    let block = format!(
+        "minimise: length, {OVER}, subject_to: [ratio < 0.1 and length > 0 mm], budget: 40, method: simplex, start: {{limit: 7 deg}}"
+    );
+    let study = optimised(&block, "");
+    let of = |w: &ResolvedWorkflow| -> Vec<String> {
+        w.study
+            .as_ref()
+            .unwrap()
+            .points
+            .iter()
+            .map(|p| p.name.clone())
+            .collect()
+    };
+    let first = load(&study);
+    assert_eq!(of(&first), ["limit=7deg", "limit=6deg"]);
+    assert_eq!(
+        step(&first, "defects@limit=6deg").base.as_deref(),
+        Some("defects")
+    );
+    let o = first.study.unwrap().optimisation.unwrap();
+    assert_eq!((o.objective, o.maximise, o.subject_to.len()), (1, false, 1));
+    let at = |digest: &str| {
+        let digest = digest.to_owned();
+        let points = move |name: &str, d: &str, search: &plyflow_study::optimise::Search| {
+            assert_eq!((name, d), (first.name.as_str(), digest.as_str()));
+            let one = |t: &str| search.read(&[t.to_owned()]);
+            Some(
+                ["5 deg", "4.5 deg", "8 deg"]
+                    .into_iter()
+                    .map(|t| one(t).unwrap())
+                    .collect(),
+            )
+        };
+        let catalog = common::catalog();
+        plyflow_workflow::resolve_with_points(&study.path(W), &catalog, &[], &points).unwrap()
+    };
+    let w = at(&o.digest).workflow;
+    assert_eq!(of(&w), ["limit=5deg", "limit=4.5deg", "limit=8deg"]);
+    // What has come of a point: two constraints, of which the second is not met.
+    let o = w.study.as_ref().unwrap().optimisation.as_ref().unwrap();
+    let (_, points) = o.search.as_ref().unwrap();
+    let outcome =
+        |ratio, length| o.outcome(w.study.as_ref().unwrap(), &points[0], &[ratio, length]);
+    let done = plyflow_study::optimise::Outcome::Done {
+        objective: -0.25,
+        excess: vec![0.0, 0.25],
+    };
+    assert_eq!(outcome(Some(0.05), Some(-0.25)), Ok(done));
+    assert_eq!(
+        outcome(None, Some(0.1)),
+        Ok(plyflow_study::optimise::Outcome::Failed)
+    );
+}
+
+#[test]
+fn an_optimisation_that_is_wrong_is_told_where_it_is_wrong() {
+    let rest = "budget: 40, method: simplex";
+    for (block, says) in [
+        (
+            format!("{OVER}, {rest}"),
+            "without `minimise` or `maximise`",
+        ),
+        (
+            format!("minimise: length, maximise: ratio, {OVER}, {rest}"),
+            "`minimise` and `maximise`",
+        ),
+        (
+            format!("minimise: lenght, {OVER}, {rest}"),
+            "did you mean `length`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, subject_to: [ratio < 3 mm]"),
+            "do not go together",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, subject_to: [ratios < 3]"),
+            "did you mean `ratio`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, subject_to: [limit < 3 deg]"),
+            "names no response",
+        ),
+        (
+            format!("minimise: length, {OVER}, budget: soon, method: simplex"),
+            "CPU time, such as `2 h`",
+        ),
+        (
+            format!("minimise: length, {OVER}, budget: 40, method: simplx"),
+            "did you mean `simplex`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, start: {{limit: 9 deg}}"),
+            "cannot begin at `9 deg`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, start: {{limits: 5 deg}}"),
+            "`start` has no `limit`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, population: 8"),
+            "it is for `method: evolution`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, seeds: 8"),
+            "did you mean `seed`",
+        ),
+        (
+            format!("minimise: length, over: {{limit: [4 deg, 9 deg, 5 deg]}}, {rest}"),
+            "is a choice",
+        ),
+        (
+            format!("minimise: length, over: {{limit: [4 deg, 9 mm]}}, {rest}"),
+            "are of two kinds",
+        ),
+        (
+            format!(
+                "minimise: length, over: {{limit: {{from: 4 deg, to: 8 deg}}, x: {{from: 1, to: 2}}}}, {rest}"
+            ),
+            "no step depends on `x`",
+        ),
+    ] {
+        let told = told(&optimised(&block, ""));
+        assert!(told.contains(says) && told.contains(W), "{block}\n{told}");
+    }
+    let block = format!("minimise: length, {OVER}, {rest}");
+    for (expect, says) in [
+        (
+            "{response: length, of: monotone, over: limit, direction: increasing}",
+            "`of: monotone` in an optimisation",
+        ),
+        (
+            "{response: length, of: best, over: limit, value: 5 mm}",
+            "`5 mm` is a length",
+        ),
+        ("{response: length, of: best}", "states nothing"),
+    ] {
+        let told = told(&optimised(&block, &format!("  - {expect}\n")));
+        assert!(told.contains(says), "{expect}\n{told}");
+    }
+    let best = format!("{RESPONSES}  - {{response: length, of: best, maximum: 1 mm}}\n");
+    let of_study = told(&with(ANGLES, &[LIMIT, ("expect:\n", &best)]));
+    assert!(of_study.contains("`of: best` in a study"), "{of_study}");
 }

@@ -6,8 +6,10 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
+mod optimise;
 mod study;
 
+pub use optimise::{Optimise, OptimiseMethod};
 pub use study::{
     Direction, ExpectResponse, FamilyOf, PointSet, PointsOf, Response, ResponseOf, Sample,
     SampleMethod, Scalar, Scale, Span, Study, Values,
@@ -37,9 +39,12 @@ pub struct Workflow {
     /// Runs the steps at many points: each value of these variables where `${name}` stands in a step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study: Option<Study>,
+    /// Looks for the values of variables with which a response is smallest or largest; in place of `study`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optimise: Option<Optimise>,
     /// The steps by name, in any order.
     pub steps: IndexMap<String, Step>,
-    /// What is read from every point of the study, by name: the columns of its table.
+    /// What is read from every point of the study or optimisation, by name: the columns of its table.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub responses: IndexMap<String, Response>,
     /// What is expected of results: a list, or the path of a JSON file with one, relative to this file.

@@ -12,7 +12,7 @@ use plyflow_study::{Expression, Kind as ValueKind, Names, Value, judge, marks};
 
 /// A study and what is read from its points.
 pub(crate) struct Asked<'a> {
-    family: &'a Family,
+    pub(super) family: &'a Family,
     pub responses: Vec<StudyResponse>,
     /// Names of all, also of those that are wrong (and reported).
     declared: Vec<String>,
@@ -38,6 +38,16 @@ impl<'a> Asked<'a> {
         }
     }
 
+    /// What an optimisation looks for; `None` for a study, or when something is wrong (and reported).
+    pub fn optimisation(
+        &self,
+        root: &Node,
+        source: &Source,
+        problems: &mut Problems,
+    ) -> Option<crate::resolved::Optimisation> {
+        super::optimise::looked_for(self.family, &self.responses, root, source, problems)
+    }
+
     /// Reads an expectation over the points; everything wrong is reported.
     pub fn expectation(
         &self,
@@ -57,11 +67,36 @@ impl<'a> Asked<'a> {
             return None;
         };
         let of = of(item);
+        let searched = self.family.search.is_some();
+        if searched != (of == FamilyOf::Best)
+            && matches!(
+                of,
+                FamilyOf::Best | FamilyOf::Monotone | FamilyOf::SymmetricAbout
+            )
+        {
+            let at = item.get("of").map_or(&item.span, |n| &n.span);
+            let message = format!(
+                "`of: {}` in {}",
+                of.word(),
+                if searched {
+                    "an optimisation"
+                } else {
+                    "a study"
+                }
+            );
+            problems.add(source, at, message).help(match searched {
+                true => "a method chooses the points: expect something `of: best`",
+                false => "it is for `optimise`; use `max`, `min`, `argmax` or `argmin`",
+            });
+            return None;
+        }
         let over = self.over(item, of, source, problems)?;
         let points = self.points(item, of, source, problems)?;
         let variable = over.map(|i| &self.family.points.variables[i]);
         let (unit, what) = match (of, variable) {
-            (FamilyOf::Argmax | FamilyOf::Argmin, Some(v)) => (v.unit.clone(), v.name.as_str()),
+            (FamilyOf::Argmax | FamilyOf::Argmin | FamilyOf::Best, Some(v)) => {
+                (v.unit.clone(), v.name.as_str())
+            }
             _ => (self.responses[response].unit.clone(), name),
         };
         let mut number = |key: &str| {
@@ -84,7 +119,7 @@ impl<'a> Asked<'a> {
         };
         stated(item, of, source, problems);
         let si_unit = match (of, variable) {
-            (FamilyOf::Argmax | FamilyOf::Argmin, Some(v)) => v.kind.si_unit(),
+            (FamilyOf::Argmax | FamilyOf::Argmin | FamilyOf::Best, Some(v)) => v.kind.si_unit(),
             _ => unit,
         };
         let found = FamilyExpectation {
@@ -132,7 +167,7 @@ impl<'a> Asked<'a> {
             return Some(None);
         };
         let name = node.text()?;
-        if !needs {
+        if !needs && of != FamilyOf::Best {
             let d = problems.add(
                 source,
                 &node.span,
@@ -190,7 +225,8 @@ impl<'a> Asked<'a> {
             Ok(chosen)
         });
         match chosen {
-            Ok(chosen) if chosen.is_empty() => {
+            // The points of an optimisation are not known before it has run.
+            Ok(chosen) if chosen.is_empty() && self.family.search.is_none() => {
                 let d = problems.add(source, &node.span, "this holds at no point of the study");
                 d.expected("a condition that chooses at least one point");
                 None
@@ -279,7 +315,9 @@ impl<'a> Asked<'a> {
 }
 
 fn of(item: &Node) -> FamilyOf {
-    use FamilyOf::{Argmax, Argmin, Each, Max, Mean, Min, Monotone, SymmetricAbout, ZeroWhere};
+    use FamilyOf::{
+        Argmax, Argmin, Best, Each, Max, Mean, Min, Monotone, SymmetricAbout, ZeroWhere,
+    };
     let all = [
         Each,
         Mean,
@@ -290,6 +328,7 @@ fn of(item: &Node) -> FamilyOf {
         Monotone,
         ZeroWhere,
         SymmetricAbout,
+        Best,
     ];
     let word = item.get("of").and_then(Node::text);
     let found = all.into_iter().find(|o| Some(o.word()) == word);

@@ -8,6 +8,7 @@ use plyflow_files::number::{Decimal, Signs};
 use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_files::rows::{Head, Lines, RowError, Separator};
 use plyflow_files::text::decode;
+use plyflow_study::optimise::Along;
 use plyflow_study::{
     Axis, Method, Problem, Quantity, Range, Sample, Step, Table, Value, range, sample,
 };
@@ -57,7 +58,68 @@ pub(super) fn read(study: &Node, source: &Source, problems: &mut Problems) -> Op
     })
 }
 
+/// Reads the variables of an optimisation, and where they stand; `None` when something is wrong (and reported).
+pub(super) fn over(
+    node: &Node,
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<Vec<(String, Along)>> {
+    let mut reader = Reader {
+        source,
+        problems,
+        samples: Vec::new(),
+        groups: Vec::new(),
+    };
+    let one = |entry: &Entry| {
+        let name = reader.name(entry);
+        let along = reader.along(&entry.value, &entry.key_span);
+        Some((name?, along?))
+    };
+    let all: Vec<Option<(String, Along)>> = node.entries().iter().map(one).collect();
+    all.into_iter().collect()
+}
+
+/// Reads one value; `None` when something is wrong (and reported).
+pub(super) fn value(node: &Node, source: &Source, problems: &mut Problems) -> Option<Value> {
+    let mut reader = Reader {
+        source,
+        problems,
+        samples: Vec::new(),
+        groups: Vec::new(),
+    };
+    reader.value(node, &node.span)
+}
+
 impl Reader<'_> {
+    /// What a variable of an optimisation may be: a range, its steps, or one of a list.
+    fn along(&mut self, node: &Node, key: &Span) -> Option<Along> {
+        let is_range = matches!(&node.kind, Kind::Map(_));
+        if is_range && node.get("by").is_none() && node.get("count").is_none() {
+            return self.range(node).map(Along::Range);
+        }
+        let values = self.values(node, key)?;
+        let si: Vec<Option<f64>> = values.iter().map(Value::si).collect();
+        let grows = |w: &[Option<f64>]| matches!(w, [Some(a), Some(b)] if a < b);
+        let falls = |w: &[Option<f64>]| matches!(w, [Some(a), Some(b)] if a > b);
+        let ordered = si.windows(2).all(grows) || si.windows(2).all(falls);
+        if let Some(odd) = values.iter().find(|v| v.kind() != values[0].kind()) {
+            let message = format!(
+                "`{}` and `{}` are of two kinds",
+                values[0].text(),
+                odd.text()
+            );
+            self.tell(
+                Problem::new(message).expected("values of one kind"),
+                &node.span,
+            );
+            return None;
+        }
+        Some(match is_range || (ordered && values.len() > 1) {
+            true => Along::Steps(values),
+            false => Along::Choice(values),
+        })
+    }
+
     fn tell(&mut self, problem: Problem, span: &Span) {
         report(problem, span, self.source, self.problems);
     }
@@ -490,6 +552,9 @@ impl Cells {
         let decimal = signs
             .decide()
             .map_err(|(line, text)| RowError::at(line, text))?;
+        if all.is_empty() {
+            return Err(RowError::at(0, "the table has nothing in it"));
+        }
         let (line, heads) = all.remove(0);
         let mut heads: Vec<Head> = heads.iter().map(|c| Head::of(c)).collect();
         let number = |cell: &str| plyflow_files::number::plain(cell, decimal).is_some();

@@ -8,8 +8,12 @@ use crate::wires::Wiring;
 use crate::yaml::{Entry, Node};
 use plyflow_model::workflow::ResponseOf;
 
-/// Columns of the table that are always there, so that no variable and no response is named so. Beside them are `key_STEP`.
-pub(super) const COLUMNS: [&str; 6] = [
+/// Columns of the table that are always there, so that no variable and no response is named so. Beside them are `key_STEP`
+/// and, of an optimisation, `excess_1` and so on.
+pub(super) const COLUMNS: [&str; 9] = [
+    "asked",
+    "feasible",
+    "best_so_far",
     "point",
     "status",
     "failed_step",
@@ -20,7 +24,7 @@ pub(super) const COLUMNS: [&str; 6] = [
 
 /// Whether a name is that of a column that the table of a study has anyway.
 pub(super) fn is_column(name: &str) -> bool {
-    COLUMNS.contains(&name) || name.starts_with("key_")
+    COLUMNS.contains(&name) || name.starts_with("key_") || name.starts_with("excess_")
 }
 
 /// Reads the responses; everything wrong is reported.

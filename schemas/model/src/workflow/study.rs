@@ -181,7 +181,7 @@ pub struct ExpectResponse {
     /// What of the points is held against the value and the bounds.
     #[serde(default, skip_serializing_if = "FamilyOf::is_each")]
     pub of: FamilyOf,
-    /// The variable along which is looked: for `argmax`, `argmin`, `monotone`, `symmetric_about`.
+    /// The variable along which is looked: for `argmax`, `argmin`, `monotone`, `symmetric_about`, and `best` where it is meant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub over: Option<String>,
     /// For `symmetric_about`: the value of the variable at which the points mirror each other.
@@ -226,6 +226,8 @@ pub enum FamilyOf {
     ZeroWhere,
     /// Is the same at points that mirror each other in a value of the variable `over`.
     SymmetricAbout,
+    /// Of an optimisation: at the best point that meets its constraints; with `over`, the value of that variable there.
+    Best,
 }
 
 impl FamilyOf {
@@ -246,6 +248,7 @@ impl FamilyOf {
             Self::Monotone => "monotone",
             Self::ZeroWhere => "zero_where",
             Self::SymmetricAbout => "symmetric_about",
+            Self::Best => "best",
         }
     }
 }
