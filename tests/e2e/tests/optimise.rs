@@ -97,7 +97,7 @@ fn a_failed_point_is_a_row_and_the_best_point_meets_what_must_hold() {
     );
     // Neither a number nor a verdict on what has no result.
     let empty = |l: &&str| l.split(',').nth(6 + 1) == Some("");
-    assert!(failed.iter().all(|l| empty(l)), "{failed:?}");
+    assert!(failed.iter().all(empty), "{failed:?}");
 }
 
 #[test]
