@@ -220,9 +220,7 @@ fn response(r: &StudyResponse, ids: &[Id], records: &HashMap<Id, &Record>) -> Op
 pub fn borne(session: &Session<'_>) -> Option<String> {
     let study = session.workflow.study.as_ref()?;
     if study.optimisation.is_some() {
-        return Some(
-            "a point that fails is an answer to an optimisation: this run ends well\n".into(),
-        );
+        return Some("what fails at a point is an answer to an optimisation\n".into());
     }
     let most = study.at_most_failures? as usize;
     let core = &session.core;
