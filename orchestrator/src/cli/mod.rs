@@ -11,6 +11,7 @@ mod inspect;
 mod keys;
 mod machine;
 mod open;
+mod optimise;
 mod plan;
 mod plugins;
 mod report;

@@ -164,11 +164,33 @@ pub fn open(args: &Workflow) -> Result<Opened, Stop> {
     }
 }
 
+/// As [`open`], an optimisation with these points.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_at(args: &Workflow, points: &[Vec<plyflow_study::Value>]) -> Result<Opened, Stop> {
+    match load_at(args, Some(points))? {
+        Ok(opened) => Ok(opened),
+        Err(findings) => {
+            super::show_findings(&findings);
+            Err(Stop::silent(exit::INVALID))
+        }
+    }
+}
+
 /// As [`open`], with the findings given back.
 ///
 /// # Errors
 /// When the file does not exist or an override is not understood.
 pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnostics>, Stop> {
+    load_at(args, None)
+}
+
+/// `points`: those of an optimisation; where none are given, those that it has asked for when it ran last.
+fn load_at(
+    args: &Workflow,
+    points: Option<&[Vec<plyflow_study::Value>]>,
+) -> Result<Result<Opened, plyflow_workflow::Diagnostics>, Stop> {
     let file = &args.workflow;
     if !file.is_file() {
         let text = format!("there is no workflow file {file}");
@@ -182,13 +204,25 @@ pub fn load(args: &Workflow) -> Result<Result<Opened, plyflow_workflow::Diagnost
     let circumstances = resolved::circumstances(&program()?, &full, &args.set, catalog.folders());
     let kept = circumstances
         .as_ref()
+        .filter(|_| points.is_none())
         .and_then(|c| resolved::read(&root, &full, c, &catalog));
     let (workflow, recipes) = match kept {
         Some(kept) => kept,
-        None => match plyflow_workflow::resolve(file, &catalog, &overrides) {
+        None => match plyflow_workflow::resolve_with_points(
+            file,
+            &catalog,
+            &overrides,
+            &|name, digest, search| match points {
+                Some(points) => Some(points.to_vec()),
+                None => super::optimise::asked_before(&root, name, digest, search),
+            },
+        ) {
             Ok(resolution) => {
                 let recipes = recipes(&resolution.workflow);
-                if let Some(c) = &circumstances {
+                // What an optimisation has asked for changes from run to run.
+                let study = resolution.workflow.study.as_ref();
+                let moves = study.is_some_and(|s| s.optimisation.is_some());
+                if let Some(c) = circumstances.as_ref().filter(|_| !moves) {
                     resolved::write(&root, &full, c, (&resolution, &recipes));
                 }
                 (resolution.workflow, recipes)

@@ -180,7 +180,11 @@ fn parameter(name: &str, d: &Value, depth: usize, out: &mut String) {
 /// See [`Stop`].
 pub fn schema(args: &SchemaArgs) -> Done {
     let text = match args.which {
-        SchemaKind::PlainWorkflow => schema::workflow(),
+        // People read the types alone; editors must not call an expression wrong.
+        SchemaKind::PlainWorkflow => match args.format {
+            TextOrJson::Json => schema::workflow_for_editors(),
+            TextOrJson::Text => schema::workflow(),
+        },
         SchemaKind::Scene => schema::scene(),
         SchemaKind::Material => schema::material(),
         SchemaKind::Expected => schema::expected(),

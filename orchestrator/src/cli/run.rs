@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Instant;
 
 /// How often what turns out to be damaged at the end of a run is made again.
-const ROUNDS: usize = 2;
+pub(super) const ROUNDS: usize = 2;
 
 /// Lines of a failed step's log that are shown.
 const LOG_LINES: usize = 15;
@@ -35,13 +35,13 @@ const LOG_BYTES: u64 = 64 << 10;
 const LONGEST_LOG_LINE: usize = 2000;
 
 /// Ctrl-C, SIGTERM and SIGHUP, counted, with something that becomes readable for `poll`.
-struct Interrupts {
+pub(super) struct Interrupts {
     wake: UnixStream,
     heard: Arc<AtomicU32>,
 }
 
 impl Interrupts {
-    fn listen() -> std::io::Result<Self> {
+    pub(super) fn listen() -> std::io::Result<Self> {
         let (wake, write) = UnixStream::pair()?;
         wake.set_nonblocking(true)?;
         write.set_nonblocking(true)?;
@@ -74,12 +74,12 @@ impl Interrupts {
         Ok(())
     }
 
-    fn poll_end(&self) -> std::io::Result<OwnedFd> {
+    pub(super) fn poll_end(&self) -> std::io::Result<OwnedFd> {
         Ok(self.wake.try_clone()?.into())
     }
 
     /// How many there have been.
-    fn count(&self) -> u32 {
+    pub(super) fn count(&self) -> u32 {
         let mut buffer = [0u8; 16];
         while let Ok(n) = (&self.wake).read(&mut buffer) {
             if n == 0 {
@@ -105,6 +105,10 @@ pub fn run(args: &RunArgs) -> Done {
     }
     let early = Early::begin(&Store::new(store_root(&args.workflow.places, Some(file))));
     let mut opened = open(&args.workflow)?;
+    if let Some(o) = super::optimise::of(&opened) {
+        drop(early);
+        return super::optimise::run(args, &opened, o, begun);
+    }
     opened.restrict(&args.until)?;
     let options = options(args, &opened)?;
     let folder = opened.store.run(&opened.workflow.name);
@@ -219,7 +223,7 @@ fn stale_report(
     stale.then_some(path)
 }
 
-fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
+pub(super) fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
     let policy = match (args.keep_going, args.fail_fast) {
         (true, _) => FailurePolicy::KeepGoing,
         (_, true) => FailurePolicy::FailFast,
@@ -260,7 +264,7 @@ fn checkpoint_interval(text: &str) -> Result<f64, Stop> {
     }
 }
 
-fn observer(args: &RunArgs) -> Box<dyn Observer> {
+pub(super) fn observer(args: &RunArgs) -> Box<dyn Observer> {
     match args.log_format {
         LogFormat::Json => Box::new(JsonLines),
         LogFormat::Text if args.quiet => Box::new(Quiet),
@@ -270,7 +274,7 @@ fn observer(args: &RunArgs) -> Box<dyn Observer> {
 }
 
 /// Tells how the run went; what matters most comes last.
-fn conclude(
+pub(super) fn conclude(
     args: &RunArgs,
     opened: &Opened,
     session: &Session<'_>,

@@ -11,7 +11,7 @@ use crate::exit;
 use plyflow_model::job::Record;
 use plyflow_model::units::si_number;
 use plyflow_model::workflow::{FamilyOf, ResponseOf};
-use plyflow_study::{Claim, Found, Mark, judge};
+use plyflow_study::{Found, judge, marks};
 use plyflow_workflow::resolved::{
     Expectation, FamilyExpectation, Study, StudyPoint, StudyResponse, StudyValue,
 };
@@ -75,6 +75,8 @@ pub struct Table<'s> {
     pub steps: Vec<usize>,
     /// A row for each point.
     pub lines: Vec<Line>,
+    /// Of an optimisation: how far it has come with each point.
+    pub trace: Option<super::optimise::Trace>,
 }
 
 impl<'s> Table<'s> {
@@ -127,10 +129,11 @@ impl<'s> Table<'s> {
                 keys: steps.iter().map(keys).collect(),
             }
         });
-        let lines = lines.collect();
+        let lines: Vec<Line> = lines.collect();
         Self {
             study,
             steps,
+            trace: super::optimise::Trace::of(session, study, &lines),
             lines,
         }
     }
@@ -216,6 +219,9 @@ fn response(r: &StudyResponse, ids: &[Id], records: &HashMap<Id, &Record>) -> Op
 /// What a study bears of the failures of a run, in words; `None`: it does not.
 pub fn borne(session: &Session<'_>) -> Option<String> {
     let study = session.workflow.study.as_ref()?;
+    if study.optimisation.is_some() {
+        return Some("what fails at a point is an answer to an optimisation\n".into());
+    }
     let most = study.at_most_failures? as usize;
     let core = &session.core;
     let failed: BTreeSet<usize> = (0..core.instances().len())
@@ -239,11 +245,19 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
     let Some(study) = &session.workflow.study else {
         return Vec::new();
     };
-    if study.expectations.is_empty() || session.core.graph().steps.iter().any(|s| !s.wanted) {
+    // What `--until` leaves out is not expected either.
+    let graph = session.core.graph();
+    let wanted = |e: &&FamilyExpectation| {
+        let step = study.responses[e.response].step;
+        let mut points = e.points.iter().map(|p| &study.points[*p as usize]);
+        points.all(|p| graph.steps[p.steps[step]].wanted)
+    };
+    let all: Vec<&FamilyExpectation> = study.expectations.iter().filter(wanted).collect();
+    if all.is_empty() {
         return Vec::new();
     }
     let table = Table::read(session, records);
-    study.expectations.iter().map(|e| row(&table, e)).collect()
+    all.into_iter().map(|e| row(&table, e)).collect()
 }
 
 /// A name for the number that is held against an expectation.
@@ -259,6 +273,8 @@ fn title(study: &Study, e: &FamilyExpectation) -> String {
         FamilyOf::Argmax | FamilyOf::Argmin => {
             format!("{over} at the {} of {response}", &e.of.word()[3..])
         }
+        FamilyOf::Best if over.is_empty() => format!("{response} at the best point"),
+        FamilyOf::Best => format!("{over} at the best point"),
         FamilyOf::Monotone if e.increasing => format!("fall of {response} along {over}"),
         FamilyOf::Monotone => format!("rise of {response} along {over}"),
         FamilyOf::ZeroWhere => format!("largest size of {response}"),
@@ -332,49 +348,41 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
         let names: Vec<&str> = found.at.iter().map(name).collect();
         row.name += &format!(" (at {})", names.join(" and "));
     }
+    if e.of == FamilyOf::Best {
+        row.name += super::optimise::why_not(table);
+    }
+    if found.alone > 0 {
+        let what = match e.of {
+            FamilyOf::SymmetricAbout => "without a mirror point",
+            _ => "without another one beside it",
+        };
+        row.name += &format!(" ({} of {} points {what})", found.alone, e.points.len());
+    }
     row
 }
 
 fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
-    let claim = match e.of {
-        FamilyOf::Each => Claim::Each,
-        FamilyOf::Mean => Claim::Mean,
-        FamilyOf::Max => Claim::Max,
-        FamilyOf::Min => Claim::Min,
-        FamilyOf::Argmax => Claim::Argmax,
-        FamilyOf::Argmin => Claim::Argmin,
-        FamilyOf::ZeroWhere => Claim::Zero,
-        FamilyOf::Monotone => Claim::Monotone {
-            increasing: e.increasing,
-        },
-        FamilyOf::SymmetricAbout => Claim::Symmetric {
-            about: e.about.as_ref().map_or(f64::NAN, |a| a.0),
-        },
-    };
-    let mut groups: HashMap<String, usize> = HashMap::new();
-    let mut marks = Vec::with_capacity(e.points.len());
-    for i in &e.points {
-        let point = &table.study.points[*i as usize];
-        let values = point.values.iter().enumerate();
-        let others: Vec<&StudyValue> = values
-            .filter(|(v, _)| Some(*v) != e.over)
-            .map(|(_, x)| x)
-            .collect();
-        let next = groups.len();
-        marks.push(Mark {
-            along: match e.over.map(|v| &point.values[v]) {
-                Some(StudyValue::Number { si, .. }) => *si,
-                _ => 0.0,
-            },
-            group: *groups.entry(format!("{others:?}")).or_insert(next),
-            result: table.lines[*i as usize].responses[e.response],
-        });
+    if e.of == FamilyOf::Best {
+        return super::optimise::found(table, e);
     }
+    let mark = |i: &u32| {
+        let point = &table.study.points[*i as usize];
+        let along = match e.over.map(|v| &point.values[v]) {
+            Some(StudyValue::Number { si, .. }) => *si,
+            _ => 0.0,
+        };
+        let values = point.values.iter().enumerate();
+        let others = values.filter(|(v, _)| Some(*v) != e.over).map(|(_, x)| x);
+        let others = format!("{:?}", others.collect::<Vec<_>>());
+        let result = table.lines[*i as usize].responses[e.response];
+        (along, others, result)
+    };
+    let marks = marks(e.points.iter().map(mark));
     let low = [e.minimum, e.value.map(|v| v - e.tolerance.unwrap_or(0.0))];
     let high = [e.maximum, e.value.map(|v| v + e.tolerance.unwrap_or(0.0))];
     let low = low.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
     let high = high.into_iter().flatten().fold(f64::INFINITY, f64::min);
-    judge(claim, &marks, (low, high))
+    judge(e.claim(), &marks, (low, high))
 }
 
 // How the table is shown.
@@ -402,14 +410,16 @@ pub fn shown(value: &StudyValue) -> String {
 /// [`exit::USAGE`] when the workflow is no study.
 pub fn tell(args: &ResultsArgs, session: &Session<'_>, records: &[(Id, Record)]) -> Done {
     if session.workflow.study.is_none() {
-        let text = "this workflow is no study: it has no block `study`";
+        let text = "this workflow is no study: it has no block `study` or `optimise`";
         return Err(Stop::new(exit::USAGE, text));
     }
     let table = Table::read(session, records);
     match args.format {
         Format::Json => print(&format!("{:#}\n", as_json(session, &table))),
         Format::Csv => print(&as_csv(&table)),
-        Format::Table => print(&(as_table(&table, usize::MAX) + "\n" + &sum(&table))),
+        Format::Table => {
+            print(&(as_table(&table, usize::MAX) + "\n" + &sum(&table) + &best(&table)))
+        }
     }
 }
 
@@ -422,7 +432,7 @@ pub fn in_short(session: &Session<'_>, found: &Table<'_>) -> String {
     if more > 0 {
         out += &format!("and {more} more: plyflow results --study\n");
     }
-    out
+    out + &best(found)
 }
 
 /// How many points there are of each kind.
@@ -435,6 +445,12 @@ fn sum(table: &Table<'_>) -> String {
         }
     }
     parts.join(", ") + "\n"
+}
+
+/// What an optimisation has led to; empty for a study.
+fn best(table: &Table<'_>) -> String {
+    let trace = table.trace.as_ref();
+    trace.map_or_else(String::new, |t| t.in_words(table))
 }
 
 /// The begin of a text.
@@ -455,14 +471,16 @@ fn as_table(found: &Table<'_>, most: usize) -> String {
     heads.extend(study.responses.iter().map(|r| head(&r.name, &r.unit)));
     let numbers: Vec<usize> = (0..heads.len()).collect();
     let failed = found.count("failed") > 0;
+    heads.extend(found.trace.iter().flat_map(|t| t.heads(study)));
     heads.push("status".into());
     if failed {
         heads.push("cause".into());
     }
-    let line = |(point, line): (&StudyPoint, &Line)| {
+    let line = |(at, (point, line)): (usize, (&StudyPoint, &Line))| {
         let mut cells: Vec<String> = point.values.iter().map(shown).collect();
         let value = |v: &Option<f64>| v.map_or("-".to_owned(), number);
         cells.extend(line.responses.iter().map(value));
+        cells.extend(found.trace.iter().flat_map(|t| t.cells(at, number)));
         cells.push(line.status.word().into());
         if let Status::Failed { step, class, cause } = &line.status {
             let text = format!("{step}: {class}: {cause}");
@@ -472,7 +490,8 @@ fn as_table(found: &Table<'_>, most: usize) -> String {
         }
         cells
     };
-    let lines = study.points.iter().zip(&found.lines).take(most).map(line);
+    let lines = study.points.iter().zip(&found.lines).take(most);
+    let lines = lines.enumerate().map(line);
     let lines: Vec<Vec<String>> = lines.collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     table(&heads, &lines, &numbers)
@@ -484,6 +503,7 @@ pub fn as_csv(found: &Table<'_>) -> String {
     let mut heads = vec!["point".to_owned()];
     heads.extend(study.variables.iter().map(|v| head(&v.name, &v.unit)));
     heads.extend(study.responses.iter().map(|r| head(&r.name, &r.unit)));
+    heads.extend(found.trace.iter().flat_map(|t| t.heads(study)));
     heads.extend(["status", "failed_step", "failure_class", "cause"].map(str::to_owned));
     if !study.samples.is_empty() {
         heads.push("seed".into());
@@ -499,7 +519,7 @@ pub fn as_csv(found: &Table<'_>) -> String {
         cells.join(",") + "\n"
     };
     let mut out = row(heads);
-    for (point, line) in study.points.iter().zip(&found.lines) {
+    for (at, (point, line)) in study.points.iter().zip(&found.lines).enumerate() {
         let mut cells = vec![point.name.clone()];
         cells.extend(point.values.iter().map(shown));
         cells.extend(
@@ -507,6 +527,7 @@ pub fn as_csv(found: &Table<'_>) -> String {
                 .iter()
                 .map(|v| v.map(si_number).unwrap_or_default()),
         );
+        cells.extend(found.trace.iter().flat_map(|t| t.cells(at, si_number)));
         cells.push(line.status.word().into());
         match &line.status {
             Status::Failed { step, class, cause } => {
@@ -565,5 +586,6 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
         "workflow": session.workflow.name,
         "variables": variables.collect::<Vec<_>>(), "responses": responses.collect::<Vec<_>>(),
         "samples": samples.collect::<Vec<_>>(), "points": points,
+        "optimisation": found.trace.as_ref().map(|t| t.as_json(found)),
     })
 }

@@ -99,6 +99,22 @@ fn make(table: &Table<'_>, session: &Session<'_>, path: &Utf8Path) -> Result<(),
         let unit = si(&response.unit);
         writer.array(&name("value"), DType::F64, &[n], unit, &doubles(&values))?;
     }
+    if let Some(trace) = &table.trace {
+        for (name, unit, known) in trace.columns(study) {
+            let rows: Vec<u32> = known.iter().map(|k| k.0).collect();
+            let values: Vec<f64> = known.iter().map(|k| k.1).collect();
+            let n = known.len() as u64;
+            let name = |part: &str| format!("optimisation/{name}/{part}");
+            writer.array(&name("point"), DType::U32, &[n], "1", &wholes(&rows))?;
+            writer.array(
+                &name("value"),
+                DType::F64,
+                &[n],
+                si(&unit),
+                &doubles(&values),
+            )?;
+        }
+    }
     let status = |line: &Line| match line.status {
         Status::Done => 0,
         Status::Failed { .. } => 1,
@@ -157,6 +173,7 @@ fn attributes(table: &Table<'_>, session: &Session<'_>) -> serde_json::Value {
         "failures": failures.collect::<Vec<_>>(),
         "keys": keys.collect::<Vec<_>>(),
         "samples": samples.collect::<Vec<_>>(),
+        "optimisation": table.trace.as_ref().map(|t| t.as_json(table)),
     })
 }
 

@@ -156,7 +156,14 @@ impl<'s> Prospects<'s> {
                 out += &format!("  and {} more\n", open - SHOWN);
             }
         }
-        out + "\n" + &self.cost()
+        out + "\n" + &self.cost() + &super::optimise::ahead(self.study, self.of_a_point())
+    }
+
+    /// What a further point would take (CPU, s): the steps that are not the same for all. `None`: not known.
+    fn of_a_point(&self) -> Option<f64> {
+        let all = self.study.points.len();
+        let own = self.steps.iter().filter(|s| s.count == all || all == 1);
+        own.map(|s| s.took).sum()
     }
 
     fn cost(&self) -> String {
@@ -192,6 +199,7 @@ impl<'s> Prospects<'s> {
             "steps": steps.collect::<Vec<_>>(),
             "estimated_cpu_seconds": self.estimate(),
             "steps_without_estimate": self.without(),
+            "optimisation": super::optimise::ahead_json(self.study, self.of_a_point()),
         })
     }
 }

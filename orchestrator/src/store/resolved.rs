@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use std::os::unix::fs::MetadataExt;
 
 /// Changes whenever the form of the file does.
-const FORM: &[u8] = b"plyflow resolved workflow 3";
+const FORM: &[u8] = b"plyflow resolved workflow 4";
 
 /// What a resolution depends on besides its [`Evidence`], as one hash.
 pub type Circumstances = [u8; 32];

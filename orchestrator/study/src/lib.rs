@@ -11,6 +11,7 @@
 mod expression;
 mod judge;
 mod number;
+pub mod optimise;
 mod points;
 mod range;
 mod sample;
@@ -18,7 +19,7 @@ mod template;
 mod value;
 
 pub use expression::{Expression, ExpressionError, Names};
-pub use judge::{Claim, Found, Mark, judge};
+pub use judge::{Claim, Found, Mark, judge, marks};
 pub use number::{Exact, Quantity};
 pub use points::{MOST_POINTS, Point, Points, Table, Variable};
 pub use range::{Range, Step, range};
@@ -46,6 +47,14 @@ impl Problem {
             expected: None,
             help: None,
         }
+    }
+
+    /// Names what it is about.
+    #[must_use]
+    pub fn of(mut self, text: &str) -> Self {
+        let shown = plyflow_model::text::shortened(text, 80);
+        self.message = format!("`{shown}`: {}", self.message);
+        self
     }
 
     /// States what was expected.

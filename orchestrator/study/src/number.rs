@@ -3,7 +3,9 @@
 use crate::Problem;
 use num_rational::Ratio;
 use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, Signed, Zero};
-use plyflow_model::units::{Dimension, Exponents, Unit, parse_quantity_in, parse_unit};
+use plyflow_model::units::{
+    Digits, Dimension, Exponents, Unit, digits, parse_quantity_in, parse_unit,
+};
 
 /// A number, exact.
 pub type Exact = Ratio<i128>;
@@ -25,61 +27,50 @@ fn ten_to(power: u32) -> Option<i128> {
     10i128.checked_pow(power)
 }
 
-/// The number that a text begins with, without a sign, and what follows it.
-pub(crate) fn leading(text: &str) -> Option<(Exact, &str)> {
-    let digits = |s: &str| s.find(|c: char| !c.is_ascii_digit()).unwrap_or(s.len());
-    let (whole, mut rest) = text.split_at(digits(text));
-    let mut fraction = "";
-    if let Some(r) = rest.strip_prefix('.') {
-        let n = digits(r);
-        if n > 0 || !whole.is_empty() {
-            (fraction, rest) = r.split_at(n);
-        }
-    }
-    if whole.is_empty() && fraction.is_empty() {
+/// The number that a text begins with, without a sign, and what follows it; the number is an error where it has more digits than are
+/// kept.
+pub(crate) fn leading(text: &str) -> Option<(Result<Exact, Problem>, &str)> {
+    if text.starts_with(['-', '+']) {
         return None;
     }
-    let mut power = 0i64;
-    if let Some(r) = rest.strip_prefix(['e', 'E']) {
-        let body = r.strip_prefix(['-', '+']).unwrap_or(r);
-        let n = digits(body);
-        if n > 0 {
-            let e: i64 = body[..n].parse().ok()?;
-            power = if r.starts_with('-') { -e } else { e };
-            rest = &body[n..];
-        }
+    let (digits, rest) = digits(text)?;
+    Some((of_digits(&digits).ok_or_else(too_large), rest))
+}
+
+/// A number of digits; `None` where there are too many.
+fn of_digits(digits: &Digits<'_>) -> Option<Exact> {
+    let fraction = digits.fraction.trim_end_matches('0');
+    let joined = format!("{}{fraction}", digits.whole);
+    let joined = joined.trim_start_matches('0');
+    if joined.is_empty() {
+        return Some(Exact::zero());
     }
-    let fraction = fraction.trim_end_matches('0');
-    let joined = format!("{whole}{fraction}");
+    if joined.len() > MOST_DIGITS as usize {
+        return None;
+    }
     let mantissa: i128 = joined.parse().ok()?;
-    if mantissa == 0 {
-        return Some((Exact::zero(), rest));
-    }
-    let power = power.checked_sub(fraction.len() as i64)?;
+    let power = digits.exponent.checked_sub(fraction.len() as i64)?;
     let size = u32::try_from(power.unsigned_abs()).ok()?;
     let scale = ten_to(size).filter(|_| size <= MOST_DIGITS)?;
     let number = match power < 0 {
         true => Exact::new(mantissa, scale),
         false => Exact::from_integer(mantissa.checked_mul(scale)?),
     };
-    Some((number, rest))
+    Some(if digits.negative { -number } else { number })
 }
 
-/// The number that a text is, with a sign or without.
-pub(crate) fn exact(text: &str) -> Option<Exact> {
-    let body = text.strip_prefix(['-', '+']).unwrap_or(text);
-    let (number, rest) = leading(body)?;
-    let number = if text.starts_with('-') {
-        -number
-    } else {
-        number
-    };
-    rest.is_empty().then_some(number)
+/// The number that a text is, with a sign or without; an error where it has more digits than are kept.
+pub(crate) fn exact(text: &str) -> Option<Result<Exact, Problem>> {
+    let (digits, rest) = digits(text)?;
+    rest.is_empty()
+        .then(|| of_digits(&digits).ok_or_else(too_large))
 }
 
 /// The exact number that the shortest text of a double is.
 pub(crate) fn of_double(value: f64) -> Option<Exact> {
-    exact(&format!("{value:e}")).filter(|_| value.is_finite())
+    exact(&format!("{value:e}"))?
+        .ok()
+        .filter(|_| value.is_finite())
 }
 
 /// The double nearest to a number.
@@ -188,22 +179,29 @@ impl Quantity {
     }
 
     /// Reads `-45 deg` or `0.3`; `None` when the text begins with no number, or its unit is not known.
+    ///
+    /// # Errors
+    /// When the number has more digits than are kept.
     #[must_use]
-    pub fn read(text: &str) -> Option<Self> {
+    pub fn read(text: &str) -> Option<Result<Self, Problem>> {
         let text = text.trim();
         let body = text.strip_prefix(['-', '+']).unwrap_or(text).trim_start();
         let (number, rest) = leading(body)?;
-        let number = if text.starts_with('-') {
-            -number
-        } else {
-            number
-        };
         let rest = rest.trim();
         let unit = match rest.strip_prefix('/') {
             Some(below) => format!("1/{below}"),
             None => rest.to_owned(),
         };
-        Self::new(number, &unit).ok()
+        let one = Self::new(Exact::from_integer(1), &unit).ok()?;
+        let signed = |number: Exact| Self {
+            number: if text.starts_with('-') {
+                -number
+            } else {
+                number
+            },
+            ..one
+        };
+        Some(number.map(signed))
     }
 
     /// Its dimension.
@@ -295,6 +293,30 @@ impl Quantity {
             number: -self.number,
             ..self.clone()
         }
+    }
+
+    /// Its opposite, as a result.
+    ///
+    /// # Errors
+    /// When its scale does not begin at zero.
+    pub fn opposite(&self) -> Result<Self, Problem> {
+        self.computable()?;
+        Ok(self.negated())
+    }
+
+    /// How much this is as a step of `other`: 5 K and 5 degC are the same step of a temperature.
+    ///
+    /// # Errors
+    /// As [`Quantity::in_unit_of`].
+    pub fn as_step_of(&self, other: &Quantity) -> Result<Self, Problem> {
+        if !other.si.has_offset() || self.si.has_offset() {
+            return self.in_unit_of(other);
+        }
+        let kelvin = Self::new(Exact::zero(), &base_unit(other.exponents()))?;
+        Ok(Self {
+            number: self.in_unit_of(&kelvin)?.number,
+            ..other.clone()
+        })
     }
 
     fn computable(&self) -> Result<(), Problem> {
@@ -448,7 +470,7 @@ mod tests {
     use super::*;
 
     fn q(text: &str) -> Quantity {
-        Quantity::read(text).unwrap()
+        Quantity::read(text).unwrap().unwrap()
     }
 
     #[test]
@@ -484,8 +506,31 @@ mod tests {
 
     #[test]
     fn a_text_that_is_no_quantity_is_none() {
-        for text in ["", "deg", "5 mn", "a.yaml", "1e99", "5,5 mm"] {
+        for text in ["", "deg", "5 mn", "a.yaml", "5,5 mm", "--5 mm", "- -5 mm"] {
             assert_eq!(Quantity::read(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn a_number_with_too_many_digits_is_an_error_and_no_text() {
+        let long = "1234567890123456789012345678901 mm";
+        for text in ["1e99", "1e-40 m", "-2e31 deg", long] {
+            let e = Quantity::read(text).unwrap().unwrap_err();
+            assert!(e.message.contains("more digits"), "{text}: {e}");
+        }
+        assert_eq!(
+            q("0000000000000000000000000000000000000000001.50").text(),
+            "1.5"
+        );
+    }
+
+    #[test]
+    fn a_temperature_of_a_scale_that_begins_elsewhere_has_no_opposite() {
+        assert!(q("20 degC").opposite().is_err());
+        assert_eq!(q("5 K").as_step_of(&q("20 degC")).unwrap().text(), "5 degC");
+        assert_eq!(
+            q("5 degC").as_step_of(&q("20 degC")).unwrap().text(),
+            "5 degC"
+        );
     }
 }

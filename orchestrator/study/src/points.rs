@@ -258,7 +258,7 @@ mod tests {
     use super::*;
 
     fn column(name: &str, values: &[&str]) -> (String, Vec<Value>) {
-        let value = |t: &&str| Value::of_cell(t, "");
+        let value = |t: &&str| Value::of_cell(t, "").unwrap();
         (name.to_owned(), values.iter().map(value).collect())
     }
 

@@ -37,6 +37,10 @@ impl Range {
         let to = to
             .in_unit_of(&from)
             .map_err(|p| Problem::new(format!("`from` and `to` do not fit: {}", p.message)))?;
+        if log && from.si.has_offset() {
+            let message = format!("a logarithmic range in {}", from.unit);
+            return Err(Problem::new(message).expected("a unit whose scale begins at zero"));
+        }
         if log && !(from.number.is_positive() && to.number.is_positive()) {
             return Err(Problem::new("a logarithmic range reaches zero or below")
                 .expected("`from` and `to` above zero"));
@@ -56,6 +60,27 @@ impl Range {
         };
         let exact = of_double(value).ok_or_else(too_fine)?;
         Ok(self.value(self.short(&exact).ok_or_else(too_fine)?))
+    }
+
+    /// The fraction of the way at which a value lies; `None` outside of the ends, or for another dimension.
+    #[must_use]
+    pub fn fraction(&self, value: &Value) -> Option<f64> {
+        let Value::Quantity(q) = value else {
+            return None;
+        };
+        let number = q.in_unit_of(&self.from).ok()?.number;
+        let (from, to) = (self.from.number, self.to.number);
+        if number < from.min(to) || number > from.max(to) {
+            return None;
+        }
+        if from == to {
+            return Some(0.5);
+        }
+        let (a, b, x) = (double(&from), double(&to), double(&number));
+        Some(match self.log {
+            false => (x - a) / (b - a),
+            true => (x.fixed_ln() - a.fixed_ln()) / (b.fixed_ln() - a.fixed_ln()),
+        })
     }
 
     fn value(&self, number: Exact) -> Value {
@@ -106,7 +131,7 @@ fn stepped(range: &Range, by: &Quantity) -> Result<Vec<Value>, Problem> {
         return Err(Problem::new("a logarithmic range has no `by`").expected("`count`"));
     }
     let by = by
-        .in_unit_of(&range.from)
+        .as_step_of(&range.from)
         .map_err(|p| Problem::new(format!("`by` does not fit: {}", p.message)))?;
     let (from, to) = (&range.from.number, &range.to.number);
     let way = to.checked_sub(from).ok_or_else(too_fine)?;
@@ -201,7 +226,7 @@ mod tests {
     use super::*;
 
     fn of(from: &str, to: &str, step: &str, log: bool) -> Result<Vec<String>, Problem> {
-        let q = |t: &str| Quantity::read(t).unwrap();
+        let q = |t: &str| Quantity::read(t).unwrap().unwrap();
         let parted = Range::new(q(from), &q(to), log)?;
         let step = match step.strip_prefix('#') {
             Some(n) => Step::Count(n.parse().unwrap()),
@@ -238,6 +263,13 @@ mod tests {
             of("1", "1000", "#4", true).unwrap(),
             ["1", "10", "100", "1000"]
         );
+        for by in ["10 degC", "10 K"] {
+            assert_eq!(
+                of("20 degC", "40 degC", by, false).unwrap(),
+                ["20 degC", "30 degC", "40 degC"]
+            );
+        }
+        assert!(of("1 degC", "40 degC", "#3", true).is_err());
         assert_eq!(of("1 kPa", "1 MPa", "#3", true).unwrap()[1], "31.6228 kPa");
     }
 

@@ -182,7 +182,7 @@ mod tests {
     use crate::Quantity;
 
     fn ask(method: Method, count: u32, seed: u64, names: &[&str]) -> Sample {
-        let q = |t: &str| Quantity::read(t).unwrap();
+        let q = |t: &str| Quantity::read(t).unwrap().unwrap();
         let axis = Axis::Range(Range::new(q("0 deg"), &q("90 deg"), false).unwrap());
         Sample {
             method,

@@ -152,7 +152,7 @@ mod tests {
     fn put(text: &str) -> Result<Option<Written>, ExpressionError> {
         let names = ["angle", "count", "cloth"].map(str::to_owned);
         let of = [
-            Value::of_text("45 deg"),
+            Value::of_text("45 deg").unwrap(),
             Value::of_number("3").unwrap(),
             Value::Text("ncf".into()),
         ];

@@ -62,27 +62,30 @@ pub enum Written {
 
 impl Value {
     /// The value that a text of a file is: a quantity where it is one, else the text.
-    #[must_use]
-    pub fn of_text(given: &str) -> Self {
-        match Quantity::read(given) {
+    ///
+    /// # Errors
+    /// When it is a quantity with more digits than are kept.
+    pub fn of_text(given: &str) -> Result<Self, Problem> {
+        match Quantity::read(given).transpose().map_err(|p| p.of(given))? {
             // A plain number in quotes is text: the file says so.
-            Some(q) if !q.unit.is_empty() => Self::Quantity(q),
-            _ => Self::Text(given.to_owned()),
+            Some(q) if !q.unit.is_empty() => Ok(Self::Quantity(q)),
+            _ => Ok(Self::Text(given.to_owned())),
         }
     }
 
     /// The value that a cell of a table is.
-    #[must_use]
-    pub fn of_cell(cell: &str, unit: &str) -> Self {
+    ///
+    /// # Errors
+    /// When it is a number with more digits than are kept, or the unit is not known.
+    pub fn of_cell(cell: &str, unit: &str) -> Result<Self, Problem> {
         let unit = unit.trim();
-        let bare = crate::number::exact(cell.trim());
-        match (bare, cell) {
-            (Some(number), _) => match Quantity::new(number, unit) {
-                Ok(q) => Self::Quantity(q),
-                Err(_) => Self::Text(cell.to_owned()),
-            },
-            (None, "true") if unit.is_empty() => Self::Bool(true),
-            (None, "false") if unit.is_empty() => Self::Bool(false),
+        match (crate::number::exact(cell.trim()), cell) {
+            (Some(number), _) => {
+                let number = number.map_err(|p| p.of(cell))?;
+                Ok(Self::Quantity(Quantity::new(number, unit)?))
+            }
+            (None, "true") if unit.is_empty() => Ok(Self::Bool(true)),
+            (None, "false") if unit.is_empty() => Ok(Self::Bool(false)),
             (None, cell) => Self::of_text(cell),
         }
     }
@@ -92,10 +95,9 @@ impl Value {
     /// # Errors
     /// When it is no number of a study.
     pub fn of_number(given: &str) -> Result<Self, Problem> {
-        let number = crate::number::exact(given).ok_or_else(|| {
-            Problem::new(format!("`{given}` is too large or too small a number"))
-                .expected("a number between 1e-30 and 1e30")
-        })?;
+        let number = crate::number::exact(given)
+            .unwrap_or_else(|| Err(Problem::new("it is no number")))
+            .map_err(|p| p.of(given))?;
         Ok(Self::Quantity(Quantity::plain(number)))
     }
 

@@ -8,7 +8,9 @@ use proptest::prelude::*;
 
 fn quantity(number: i32, places: u32, unit: &str) -> Quantity {
     let text = format!("{number}e-{places} {unit}");
-    Quantity::read(&text).expect("a quantity")
+    Quantity::read(&text)
+        .expect("a quantity")
+        .expect("few digits")
 }
 
 fn numbers(values: &[Value]) -> Vec<f64> {
@@ -43,13 +45,13 @@ proptest! {
     fn a_value_reads_back_from_its_text(number in -1_000_000i32..1_000_000, places in 0u32..9, unit in 0usize..6) {
         let unit = ["mm", "deg", "N/m", "", "%", "1/mm"][unit];
         let q = quantity(number, places, unit);
-        prop_assert_eq!(Quantity::read(&q.text()), Some(q));
+        prop_assert_eq!(Quantity::read(&q.text()), Some(Ok(q)));
     }
 
     #[test]
     fn samples_lie_in_their_ranges_and_reach_their_slices(count in 1u32..200, seed in any::<u64>(), method in 0usize..3) {
         let method = [Method::Sobol, Method::Random, Method::LatinHypercube][method];
-        let axis = |a: &str, b: &str, log| Axis::Range(Range::new(Quantity::read(a).unwrap(), &Quantity::read(b).unwrap(), log).unwrap());
+        let axis = |a: &str, b: &str, log| Axis::Range(Range::new(Quantity::read(a).unwrap().unwrap(), &Quantity::read(b).unwrap().unwrap(), log).unwrap());
         let asked = Sample { method, count, seed, of: vec![
             ("a".into(), axis("0.1", "0.4", false)),
             ("b".into(), axis("1 kPa", "1 MPa", true)),
@@ -92,7 +94,7 @@ proptest! {
     #[test]
     fn no_text_makes_the_readers_panic(text in "[-+*/().,${}a-z0-9 '\"°<>=!µ%^]{0,40}") {
         let names = ["a".to_owned(), "mm".to_owned()];
-        let of = [Value::of_text("45 deg"), Value::Text("x".into())];
+        let of = [Value::of_text("45 deg").unwrap(), Value::Text("x".into())];
         let kinds: Vec<_> = of.iter().map(Value::kind).collect();
         for bare in [true, false] {
             match Expression::read(&text, Names { all: &names, bare }) {
@@ -103,7 +105,7 @@ proptest! {
         if let Ok(Some(t)) = Template::read(&text, &names, &kinds) {
             drop(t.written(&of));
         }
-        let _ = Value::of_cell(&text, "mm").label();
+        let _ = Value::of_cell(&text, "mm").map(|v| v.label());
     }
 }
 

@@ -293,6 +293,12 @@ fn expectation(
     })
 }
 
+/// Whether a quantity is in a unit whose scale does not begin at zero (`degC`): 5 degC are no difference of 5 degrees.
+fn is_on_a_scale(text: &str) -> bool {
+    let number = plyflow_model::units::digits(text.trim());
+    number.is_some_and(|(_, unit)| parse_unit(unit.trim()).is_ok_and(|u| u.has_offset()))
+}
+
 /// A value with the unit of the result, in SI.
 pub(crate) fn value(
     entry: &Entry,
@@ -323,6 +329,13 @@ pub(crate) fn value(
         // The schema check has spoken.
         _ => return None,
     };
+    if entry.key == "tolerance" && is_on_a_scale(&text) {
+        let message = format!("`tolerance` of `{result}` is a temperature, `{text}`");
+        let d = problems.add(source, &node.span, message);
+        d.given(text)
+            .expected("a difference of temperatures, such as `5 K`");
+        return None;
+    }
     match parse_quantity_in(&text, unit) {
         Ok(value) => Some(value),
         Err(e) => {

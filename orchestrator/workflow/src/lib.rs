@@ -25,6 +25,9 @@ pub use catalog::{Catalog, CatalogEntry, CatalogError};
 pub use diagnostics::{Diagnostic, Diagnostics, Severity};
 pub use evidence::{Evidence, Resolution};
 pub use graph::{dependencies, graph, to_dot, to_mermaid};
-pub use load::{Part, check_part, load, load_with, plugin_search_folders, resolve};
+pub use load::{
+    Part, check_part, load, load_with, plugin_search_folders, resolve, resolve_with_points,
+};
 pub use overrides::Override;
 pub use resolved::ResolvedWorkflow;
+pub use study::PointsOf;

@@ -10,7 +10,7 @@ use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
 use crate::resolved::{FailurePolicy, ResolvedStep, ResolvedWorkflow, Resources};
 use crate::scene::is_word;
-use crate::study::{Asked, Family};
+use crate::study::{Asked, Family, PointsOf};
 use crate::wires::{self, Wiring};
 use crate::yaml::{Entry, Kind, Node};
 use camino::{Utf8Path, Utf8PathBuf};
@@ -114,9 +114,22 @@ pub fn resolve(
     catalog: &dyn Catalog,
     overrides: &[Override],
 ) -> Result<Resolution, Diagnostics> {
+    resolve_with_points(path, catalog, overrides, &|_, _, _| None)
+}
+
+/// As [`resolve`]; `points` gives those that an optimisation is looked at with: its first ones where it gives none.
+///
+/// # Errors
+/// As [`resolve`].
+pub fn resolve_with_points(
+    path: &Utf8Path,
+    catalog: &dyn Catalog,
+    overrides: &[Override],
+    points: &PointsOf<'_>,
+) -> Result<Resolution, Diagnostics> {
     let mut problems = Problems::default();
     let plugins = Plugins::new(catalog);
-    match load_into(path, &plugins, overrides, &mut problems) {
+    match load_into(path, &plugins, overrides, points, &mut problems) {
         Some((workflow, folders)) if problems.count() == 0 => Ok(Resolution {
             workflow,
             evidence: Evidence::new(&problems, folders, &plugins),
@@ -130,6 +143,7 @@ fn load_into(
     path: &Utf8Path,
     catalog: &Plugins<'_>,
     overrides: &[Override],
+    points: &PointsOf<'_>,
     problems: &mut Problems,
 ) -> Option<(ResolvedWorkflow, Vec<Utf8PathBuf>)> {
     let (mut source, mut root) = open(path, problems)?;
@@ -138,9 +152,21 @@ fn load_into(
         return None;
     }
     overrides::apply(&mut root, overrides, &mut source, problems, catalog);
-    let family = match root.get("study") {
-        Some(study) => Some(Family::read(study, &root, &source, problems)?),
-        None => None,
+    let family = match (root.get("study"), root.entry("optimise")) {
+        (Some(_), Some(e)) if e.value.kind != Kind::Null => {
+            let d = problems.add(
+                &source,
+                &e.key_span,
+                "`study` and `optimise` in one workflow",
+            );
+            d.expected("one of them");
+            return None;
+        }
+        (Some(study), _) => Some(Family::read(study, &root, &source, problems)?),
+        (None, Some(e)) => Some(Family::read_optimise(
+            &e.value, &root, points, &source, problems,
+        )?),
+        (None, None) => None,
     };
     let shown = family.as_ref().map(|f| f.first(&root));
     Checker::new(&WORKFLOW, &source, problems)
@@ -161,7 +187,7 @@ fn load_into(
             &e.key_span,
             "`responses` in a workflow without a study",
         );
-        d.expected("a block `study`, or no `responses`");
+        d.expected("a block `study` or `optimise`, or no `responses`");
     }
     let expectations = expect::expectations(&root, &drafts, asked.as_ref(), &source, problems);
     let mut resolve = |draft: &Draft<'_>, i: usize, problems: &mut Problems| {
@@ -173,6 +199,7 @@ fn load_into(
     };
     let expectations = match (&mut study, asked) {
         (Some(study), Some(asked)) => {
+            study.optimisation = asked.optimisation(&root, &source, problems);
             study.responses = asked.responses;
             study.expectations = expectations.of_responses;
             crate::study::at_all_points(expectations.of_results, study, &steps)

@@ -141,9 +141,9 @@ pub(crate) fn put_in_file(node: &mut Node, path: &[Word], value: Node) -> Result
         name: names.join("."),
         span: path[0].span.start..path[path.len() - 1].span.end,
     };
-    // Behind what is set already, so that it has the last word.
+    // Behind what is set already, and in place of what lies in it, so that it has the last word.
     if let Some(Kind::Map(entries)) = entry_mut(node, "set").map(|e| &mut e.value.kind) {
-        entries.retain(|e| e.key != key.name);
+        entries.retain(|e| !covers(&names, &parts(&e.key)));
     }
     put(node, &[set, key], value, false)
 }
@@ -192,6 +192,35 @@ fn item(items: &[Node], word: &str) -> (Option<usize>, Vec<String>) {
     }
 }
 
+/// The words of a path as it is written.
+fn parts(path: &str) -> Vec<&str> {
+    path.split('.').map(str::trim).collect()
+}
+
+/// Whether what lies at a path is within what lies at another one.
+fn covers(path: &[&str], other: &[&str]) -> bool {
+    other.starts_with(path)
+}
+
+/// Reports an entry of `set` that a later one would take away: the places of both cannot be meant.
+fn lost(set: &Entry, from: &Source, problems: &mut Problems) -> bool {
+    let entries = set.value.entries();
+    let before = problems.count();
+    for (i, early) in entries.iter().enumerate() {
+        let of_early = parts(&early.key);
+        let later = entries[i + 1..].iter();
+        if let Some(late) = later
+            .into_iter()
+            .find(|l| covers(&parts(&l.key), &of_early))
+        {
+            let message = format!("`{}` takes `{}` away again", late.key, early.key);
+            let d = problems.add(from, &late.key_span, message);
+            d.help("write the longer path behind the shorter one, or leave one of them out");
+        }
+    }
+    problems.count() > before
+}
+
 /// Puts the entries of `set`, a mapping from paths to values that stands in `from`, into the tree of a file.
 pub(crate) fn apply(
     tree: &mut Node,
@@ -207,6 +236,9 @@ pub(crate) fn apply(
         let message = format!("`set` is {}", set.value.describe());
         let d = problems.add(from, &set.value.span, message);
         d.expected("a mapping from paths to values, such as `{friction.fabric_fabric: 0.1}`");
+        return;
+    }
+    if lost(set, from, problems) {
         return;
     }
     for entry in set.value.entries() {

@@ -192,6 +192,45 @@ pub struct Study {
     pub samples: Vec<(String, u32, u32)>,
     /// Failed points that are borne; none: any number may fail, and the run does not end well.
     pub at_most_failures: Option<u32>,
+    /// Of an optimisation, whose points are those that it has asked for so far.
+    pub optimisation: Option<Optimisation>,
+}
+
+/// What an optimisation looks for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Optimisation {
+    /// Position of the response that is to be small or large.
+    pub objective: usize,
+    /// Whether it is to be large.
+    pub maximise: bool,
+    /// What must hold, as written.
+    pub subject_to: Vec<String>,
+    /// How many comparisons that is.
+    pub constraints: usize,
+    /// The method, as written.
+    pub method: String,
+    /// Chooses its random numbers.
+    pub seed: u32,
+    /// How long it goes on.
+    pub budget: Budget,
+    /// Names the search: all of the block but its budget.
+    pub digest: String,
+    /// The search itself and the points that it has asked for; none where a workflow was read from where it is kept, which those with
+    /// an optimisation are not.
+    #[serde(skip)]
+    pub search: Option<(
+        plyflow_study::optimise::Search,
+        Vec<Vec<plyflow_study::Value>>,
+    )>,
+}
+
+/// How long an optimisation goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Budget {
+    /// So many points.
+    Runs(u32),
+    /// So much CPU time (s).
+    CpuSeconds(f64),
 }
 
 /// A variable of a study.
@@ -278,6 +317,18 @@ pub struct FamilyExpectation {
     pub maximum: Option<f64>,
     /// Where the expectation comes from.
     pub source: Option<String>,
+}
+
+impl FamilyExpectation {
+    /// What is claimed.
+    #[must_use]
+    pub fn claim(&self) -> plyflow_study::Claim {
+        plyflow_study::Claim {
+            of: self.of,
+            increasing: self.increasing,
+            about: self.about.as_ref().map_or(f64::NAN, |a| a.0),
+        }
+    }
 }
 
 /// A stated expectation on a result.

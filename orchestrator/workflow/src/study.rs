@@ -4,10 +4,12 @@
 //! variable is there once. Wires are those of the file, within a point.
 
 mod family;
+mod optimise;
 mod points;
 mod responses;
 
 pub(crate) use family::Asked;
+pub use optimise::PointsOf;
 pub(crate) use responses::at_all_points;
 
 use crate::check::Checker;
@@ -33,6 +35,8 @@ pub(crate) struct Family {
     at_most_failures: Option<u32>,
     /// By the place of the value.
     templates: HashMap<(usize, usize), Template>,
+    /// Of an optimisation: what asks for points, and those that it has asked for.
+    search: Option<optimise::Begun>,
 }
 
 /// Reports what a part of a study is not.
@@ -92,30 +96,44 @@ impl Family {
         if points.all.is_empty() {
             let at = study.entry("where").map_or(place, |e| &e.value.span);
             let d = problems.add(source, at, "the study has no point");
-            d.expected("at least one point for which `where` holds");
+            d.expected(match study.entry("where") {
+                Some(_) => "at least one point for which `where` holds",
+                None => "at least one point",
+            });
             return None;
         }
-        let names: Vec<String> = points.variables.iter().map(|v| v.name.clone()).collect();
         let at_most = study.get("at_most_failures").map(Node::to_json);
-        let mut family = Self {
-            names,
+        let at_most = at_most.and_then(|n| n.as_u64());
+        let family = Self {
+            names: points.variables.iter().map(|v| v.name.clone()).collect(),
             points,
             samples: read.samples,
-            at_most_failures: at_most
-                .and_then(|n| n.as_u64())
-                .and_then(|n| n.try_into().ok()),
+            at_most_failures: at_most.and_then(|n| n.try_into().ok()),
             templates: HashMap::new(),
+            search: None,
         };
+        family.in_steps(root, read.groups, source, problems)
+    }
+
+    /// Finds the variables in the steps. `groups`: those of which at least one must be used. `None` when something is wrong (and reported).
+    fn in_steps(
+        mut self,
+        root: &Node,
+        groups: Vec<(Span, Vec<String>)>,
+        source: &Source,
+        problems: &mut Problems,
+    ) -> Option<Self> {
+        let before = problems.count();
         let steps = root.get("steps").map_or(&[][..], Node::entries);
         let mut used = BTreeSet::new();
         for step in steps {
             for entry in step.value.entries() {
                 let open = OPEN.contains(&entry.key.as_str());
-                used.extend(family.scan(&entry.value, open, &entry.key, source, problems));
+                used.extend(self.scan(&entry.value, open, &entry.key, source, problems));
             }
         }
-        for (span, variables) in read.groups {
-            let place = |name: &String| family.names.iter().position(|n| n == name);
+        for (span, variables) in groups {
+            let place = |name: &String| self.names.iter().position(|n| n == name);
             let any = |name: &String| place(name).is_some_and(|i| used.contains(&i));
             if problems.count() == before && !variables.iter().any(any) {
                 let message = format!("no step depends on `{}`", variables.join("`, `"));
@@ -124,7 +142,7 @@ impl Family {
                     .help("all its points would be the same: name it in a step, or leave it out");
             }
         }
-        (problems.count() == before).then_some(family)
+        (problems.count() == before).then_some(self)
     }
 
     /// Finds the templates below a node, and gives the variables in them.
@@ -383,6 +401,7 @@ impl Family {
             expectations: Vec::new(),
             samples: self.samples.clone(),
             at_most_failures: self.at_most_failures,
+            optimisation: None,
         }
     }
 }

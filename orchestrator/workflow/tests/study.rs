@@ -282,6 +282,16 @@ fn a_study_that_is_wrong_is_told_where_it_is_wrong() {
             &["a grid of 2 variables has no 3 points"],
         ),
         ("  points: [{}]", "5:12", &["no variable"]),
+        (
+            "  vary: {limit: [1e99 deg, 1e-40 deg]}",
+            "5:18",
+            &["`1e99 deg`", "more digits"],
+        ),
+        (
+            "  vary: {point: [4 deg]}",
+            "5:10",
+            &["every table of a study has"],
+        ),
         ("  vary: {}", "5:9", &["no variable"]),
         ("  union: []", "5:3", &["has no parts"]),
         ("  zip: {limit: []}", "5:16", &["no value"]),
@@ -299,6 +309,29 @@ fn a_study_that_is_wrong_is_told_where_it_is_wrong() {
 }
 
 #[test]
+fn a_table_of_points_may_look_as_any_table() {
+    let all = |csv: &str| -> Vec<String> {
+        let study = with(
+            "  points: cases.csv",
+            &[LIMIT, ("damping: 0.1", "damping: ${d}")],
+        );
+        study.write("cases.csv", csv);
+        let study = load(&study).study.unwrap();
+        study.points.into_iter().map(|p| p.name).collect()
+    };
+    let wanted = ["limit=4.5deg,d=0.1", "limit=6deg,d=0.25"];
+    for csv in [
+        "\u{feff}limit [deg];d\r\n4,5;0,1\r\n6,0;0,25\r\n",
+        "sep=;\n\"limit (deg)\";\"d\"\n\"4,5\";\"0,1\"\n6;2,5D-1\n",
+        "limit,d\ndeg,-\n4.5,1e-1\n6,.25\n",
+        "limit / deg\td\n4.5\t0.1\n// more\n6\t0.25\n",
+        "limit;d\n4.5 deg;0.1\n6 deg;0.25\n",
+    ] {
+        assert_eq!(all(csv), wanted, "{csv}");
+    }
+}
+
+#[test]
 fn a_table_that_is_wrong_is_told_with_its_line() {
     for (csv, line, says) in [
         ("limit [furlong]\n4\n", 1, "furlong"),
@@ -306,6 +339,14 @@ fn a_table_that_is_wrong_is_told_with_its_line() {
         ("limit [deg],x\n4\n", 2, "1 cells, and the head 2"),
         ("limit [deg],\"\"\n4,1\n", 1, "cannot name a variable"),
         ("limit [deg],x\n4,\n", 2, "no value for `x`"),
+        ("limit [deg]\n1e99\n", 2, "more digits"),
+        (",,\n\"\"\n", 1, "nothing in it"),
+        (
+            "limit [deg];x\n4,5;1.5\n",
+            2,
+            "one of them is no decimal sign",
+        ),
+        ("limit [deg],status\n4,1\n", 1, "every table of a study has"),
     ] {
         let study = with("  points: cases.csv", &[LIMIT]);
         study.write("cases.csv", csv);
@@ -371,6 +412,50 @@ fn a_value_that_does_not_fit_is_told_where_it_stands_and_at_which_point() {
             "{found}"
         );
     }
+}
+
+const FRICTION: &str = "{tool_diaphragm: 0.5, tool_fabric: 0.2, fabric_fabric: 0.5, fabric_diaphragm: 0.1, diaphragm_diaphragm: 0.5}";
+
+#[test]
+fn what_is_set_is_never_taken_away_by_what_is_set_behind_it() {
+    let block = "  vary:\n    limit: [4 deg, 5 deg]";
+    let set = |set: &str| {
+        let text = format!("scene: {{file: scene.yaml, set: {{{set}}}}}\n      element: m4");
+        with(
+            block,
+            &[LIMIT, ("scene: scene.yaml\n      element: m4", &text)],
+        )
+    };
+    for (wrong, says) in [
+        (
+            "sheets.ply-1.fibre_1: 0 deg, sheets.ply-1: {name: x}",
+            "`sheets.ply-1` takes `sheets.ply-1.fibre_1` away again",
+        ),
+        (
+            "friction.fabric_fabric: 0.1, ' friction . fabric_fabric ': 0.2",
+            "takes `friction.fabric_fabric` away again",
+        ),
+    ] {
+        let told = told(&set(wrong));
+        assert!(told.contains(says) && told.contains(W), "{wrong}\n{told}");
+    }
+    // A longer path behind a shorter one changes a part of it; and the command line has the last word.
+    let study = set(&format!(
+        "friction: {FRICTION}, friction.fabric_fabric: 0.3"
+    ));
+    let friction = |set: &str| {
+        let set = [set.parse().unwrap()];
+        let w = plyflow_workflow::load_with(&study.path(W), &common::catalog(), &set);
+        let w = w.unwrap_or_else(|e| panic!("{}", e.render(false)));
+        step(&w, "coarse").parameters["scene"]["friction"]["fabric_fabric"].clone()
+    };
+    assert_eq!(friction("coarse.damping=0.1"), json!(0.3));
+    assert_eq!(
+        friction("coarse.scene.friction.fabric_fabric=0.4"),
+        json!(0.4)
+    );
+    let whole = format!("coarse.scene.friction={FRICTION}");
+    assert_eq!(friction(&whole), json!(0.5));
 }
 
 #[test]
@@ -456,6 +541,10 @@ fn expectations_that_no_point_can_answer_are_refused() {
             "without the variable",
         ),
         (
+            "response: length, of: max, maximum: 5 mm, value: 1 mm, tolerance: -1 mm",
+            "`tolerance` is negative",
+        ),
+        (
             "response: length, of: argmax, over: limit, value: 4 mm",
             "`4 mm` is a length",
         ),
@@ -495,10 +584,180 @@ fn expectations_that_no_point_can_answer_are_refused() {
         assert!(told.contains(says), "{expect}\n{told}");
         assert_eq!(told.lines().count(), 1, "{expect}\n{told}");
     }
+    for (from, says) in [
+        ("ratio:", "has the name of a column"),
+        ("length:", "has the name of a variable"),
+    ] {
+        let to = if from == "ratio:" { "cause:" } else { "limit:" };
+        let list = RESPONSES.replace(from, to);
+        let told = told(&with(block, &[LIMIT, ("expect:\n", &list)]));
+        assert!(told.contains(says), "{told}");
+    }
     let fanned = RESPONSES.replace("coarse, result", "local, result");
     let told = told(&with(block, &[LIMIT, ("expect:\n", &fanned)]));
     assert!(
         told.contains("has an item for each of a collection"),
         "{told}"
     );
+}
+
+/// The sound study of the other tests as an optimisation with this block.
+fn optimised(block: &str, expect: &str) -> Study {
+    let study = Study::sound();
+    study.mutate(
+        W,
+        "on_failure: keep-going\n",
+        &format!("optimise: {{{block}}}\n"),
+    );
+    study.mutate(W, LIMIT.0, LIMIT.1);
+    study.mutate(W, "expect:\n", &format!("{RESPONSES}{expect}"));
+    study
+}
+
+const OVER: &str = "over: {limit: {from: 4 deg, to: 8 deg}}";
+
+#[test]
+fn an_optimisation_has_the_points_that_it_is_looked_at_with() {
+    let block = format!(
+        "minimise: length, {OVER}, subject_to: [ratio < 0.1 and length > 0 mm], budget: 40, method: simplex, start: {{limit: 7 deg}}"
+    );
+    let study = optimised(&block, "");
+    let of = |w: &ResolvedWorkflow| -> Vec<String> {
+        w.study
+            .as_ref()
+            .unwrap()
+            .points
+            .iter()
+            .map(|p| p.name.clone())
+            .collect()
+    };
+    let first = load(&study);
+    assert_eq!(of(&first), ["limit=7deg", "limit=6deg"]);
+    assert_eq!(
+        step(&first, "defects@limit=6deg").base.as_deref(),
+        Some("defects")
+    );
+    let o = first.study.unwrap().optimisation.unwrap();
+    assert_eq!((o.objective, o.maximise, o.subject_to.len()), (1, false, 1));
+    let at = |digest: &str| {
+        let digest = digest.to_owned();
+        let points = move |name: &str, d: &str, search: &plyflow_study::optimise::Search| {
+            assert_eq!((name, d), (first.name.as_str(), digest.as_str()));
+            let one = |t: &str| search.read(&[t.to_owned()]);
+            Some(
+                ["5 deg", "4.5 deg", "8 deg"]
+                    .into_iter()
+                    .map(|t| one(t).unwrap())
+                    .collect(),
+            )
+        };
+        let catalog = common::catalog();
+        plyflow_workflow::resolve_with_points(&study.path(W), &catalog, &[], &points).unwrap()
+    };
+    let w = at(&o.digest).workflow;
+    assert_eq!(of(&w), ["limit=5deg", "limit=4.5deg", "limit=8deg"]);
+    // What has come of a point: two constraints, of which the second is not met.
+    let o = w.study.as_ref().unwrap().optimisation.as_ref().unwrap();
+    let (_, points) = o.search.as_ref().unwrap();
+    let outcome =
+        |ratio, length| o.outcome(w.study.as_ref().unwrap(), &points[0], &[ratio, length]);
+    let done = plyflow_study::optimise::Outcome::Done {
+        objective: -0.25,
+        excess: vec![0.0, 0.25],
+    };
+    assert_eq!(outcome(Some(0.05), Some(-0.25)), Ok(done));
+    assert_eq!(
+        outcome(None, Some(0.1)),
+        Ok(plyflow_study::optimise::Outcome::Failed)
+    );
+}
+
+#[test]
+fn an_optimisation_that_is_wrong_is_told_where_it_is_wrong() {
+    let rest = "budget: 40, method: simplex";
+    for (block, says) in [
+        (
+            format!("{OVER}, {rest}"),
+            "without `minimise` or `maximise`",
+        ),
+        (
+            format!("minimise: length, maximise: ratio, {OVER}, {rest}"),
+            "`minimise` and `maximise`",
+        ),
+        (
+            format!("minimise: lenght, {OVER}, {rest}"),
+            "did you mean `length`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, subject_to: [ratio < 3 mm]"),
+            "do not go together",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, subject_to: [ratios < 3]"),
+            "did you mean `ratio`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, subject_to: [limit < 3 deg]"),
+            "names no response",
+        ),
+        (
+            format!("minimise: length, {OVER}, budget: soon, method: simplex"),
+            "CPU time, such as `2 h`",
+        ),
+        (
+            format!("minimise: length, {OVER}, budget: 40, method: simplx"),
+            "did you mean `simplex`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, start: {{limit: 9 deg}}"),
+            "cannot begin at `9 deg`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, start: {{limits: 5 deg}}"),
+            "`start` has no `limit`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, population: 8"),
+            "it is for `method: evolution`",
+        ),
+        (
+            format!("minimise: length, {OVER}, {rest}, seeds: 8"),
+            "did you mean `seed`",
+        ),
+        (
+            format!("minimise: length, over: {{limit: [4 deg, 9 deg, 5 deg]}}, {rest}"),
+            "is a choice",
+        ),
+        (
+            format!("minimise: length, over: {{limit: [4 deg, 9 mm]}}, {rest}"),
+            "are of two kinds",
+        ),
+        (
+            format!(
+                "minimise: length, over: {{limit: {{from: 4 deg, to: 8 deg}}, x: {{from: 1, to: 2}}}}, {rest}"
+            ),
+            "no step depends on `x`",
+        ),
+    ] {
+        let told = told(&optimised(&block, ""));
+        assert!(told.contains(says) && told.contains(W), "{block}\n{told}");
+    }
+    let block = format!("minimise: length, {OVER}, {rest}");
+    for (expect, says) in [
+        (
+            "{response: length, of: monotone, over: limit, direction: increasing}",
+            "`of: monotone` in an optimisation",
+        ),
+        (
+            "{response: length, of: best, over: limit, value: 5 mm}",
+            "`5 mm` is a length",
+        ),
+        ("{response: length, of: best}", "states nothing"),
+    ] {
+        let told = told(&optimised(&block, &format!("  - {expect}\n")));
+        assert!(told.contains(says), "{expect}\n{told}");
+    }
+    let best = format!("{RESPONSES}  - {{response: length, of: best, maximum: 1 mm}}\n");
+    let of_study = told(&with(ANGLES, &[LIMIT, ("expect:\n", &best)]));
+    assert!(of_study.contains("`of: best` in a study"), "{of_study}");
 }

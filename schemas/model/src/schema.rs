@@ -24,6 +24,57 @@ pub fn workflow() -> Value {
     schema_of::<Workflow>("workflow", "Plyflow workflow")
 }
 
+/// As [`workflow`], for editors: `${name}` of a study may stand where a step takes a number or a quantity. Whether the file is a study,
+/// and what such a text comes to at each of its points, is checked by the program.
+pub fn workflow_for_editors() -> Value {
+    let mut schema = workflow();
+    let definitions = &mut schema["$defs"];
+    open_fields(&mut definitions["Resources"]);
+    accept_expressions(&mut definitions["Step"]["properties"]["retries"]);
+    schema
+}
+
+/// Lets expressions stand for the values of a mapping's keys.
+fn open_fields(schema: &mut Value) {
+    if let Some(fields) = schema.get_mut("properties").and_then(Value::as_object_mut) {
+        fields.values_mut().for_each(accept_expressions);
+    }
+}
+
+/// Lets a text with `${..}` stand for a value, where no text can stand there anyway, and for the values in it.
+fn accept_expressions(schema: &mut Value) {
+    open_fields(schema);
+    for key in ["items", "additionalProperties"] {
+        if let Some(below) = schema.get_mut(key).filter(|v| v.is_object()) {
+            accept_expressions(below);
+        }
+    }
+    let is = |t: &Value, word: &str| {
+        t == word || t.as_array().is_some_and(|l| l.iter().any(|t| t == word))
+    };
+    let free = |s: &Value| is(&s["type"], "string") && s["pattern"].is_null();
+    let any = |s: &Value| s["anyOf"].as_array().is_some_and(|l| l.iter().any(free));
+    if free(schema) || any(schema) || ["object", "array"].iter().any(|t| is(&schema["type"], t)) {
+        return;
+    }
+    let Some(own) = schema.as_object_mut() else {
+        return;
+    };
+    let mut outside = serde_json::Map::new();
+    for key in ["description", "default"] {
+        if let Some(value) = own.remove(key) {
+            outside.insert(key.into(), value);
+        }
+    }
+    let expression = json!({
+        "type": "string",
+        "pattern": r"\$\{.+\}",
+        "description": "An expression with variables of the study, such as `2 * ${size}`.",
+    });
+    outside.insert("anyOf".into(), json!([std::mem::take(own), expression]));
+    *own = outside;
+}
+
 /// Schema of a scene file.
 pub fn scene() -> Value {
     schema_of::<Scene>("scene", "Plyflow scene")
@@ -42,7 +93,7 @@ pub fn expected() -> Value {
 /// All schemas with their file names, as checked in under `schemas/json/`.
 pub fn all() -> [(&'static str, Value); 4] {
     [
-        ("workflow.schema.json", workflow()),
+        ("workflow.schema.json", workflow_for_editors()),
         ("scene.schema.json", scene()),
         ("material.schema.json", material()),
         ("expected.schema.json", expected()),
@@ -52,7 +103,7 @@ pub fn all() -> [(&'static str, Value); 4] {
 /// Schema of a workflow file that also knows these plugins: `plugin` completes their names, `with` their
 /// parameters and `from` their ports. Plugins that are not among them (a path, say) stay free.
 pub fn workflow_with(manifests: &[Manifest]) -> Value {
-    let mut schema = workflow();
+    let mut schema = workflow_for_editors();
     let steps: Vec<&Manifest> = manifests
         .iter()
         .filter(|m| m.kind == PluginKind::Step)
@@ -74,7 +125,7 @@ pub fn workflow_with(manifests: &[Manifest]) -> Value {
             json!({
                 "if": {"properties": {"plugin": {"const": m.name}}, "required": ["plugin"]},
                 "then": {"properties": {
-                    "with": crate::manifest::schema::parameters(m),
+                    "with": parameters_for_editors(m),
                     "from": {
                         "anyOf": [
                             {"type": "string"},
@@ -86,5 +137,11 @@ pub fn workflow_with(manifests: &[Manifest]) -> Value {
             })
         })
         .collect();
+    schema
+}
+
+fn parameters_for_editors(manifest: &Manifest) -> Value {
+    let mut schema = crate::manifest::schema::parameters(manifest);
+    accept_expressions(&mut schema);
     schema
 }

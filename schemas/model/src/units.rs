@@ -9,7 +9,8 @@ mod quantity;
 mod symbols;
 
 pub use parse::{
-    Unit, check_si, parse_quantity, parse_quantity_in, parse_unit, parse_unit_of, plain_number,
+    Digits, Unit, check_si, digits, parse_quantity, parse_quantity_in, parse_unit, parse_unit_of,
+    plain_number,
 };
 pub use quantity::{
     Acceleration, Angle, Area, ArealMass, Curvature, Density, Energy, Force, ForcePerLength,

@@ -6,8 +6,10 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
+mod optimise;
 mod study;
 
+pub use optimise::{Optimise, OptimiseMethod};
 pub use study::{
     Direction, ExpectResponse, FamilyOf, PointSet, PointsOf, Response, ResponseOf, Sample,
     SampleMethod, Scalar, Scale, Span, Study, Values,
@@ -37,9 +39,12 @@ pub struct Workflow {
     /// Runs the steps at many points: each value of these variables where `${name}` stands in a step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study: Option<Study>,
+    /// Looks for the values of variables with which a response is smallest or largest; in place of `study`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optimise: Option<Optimise>,
     /// The steps by name, in any order.
     pub steps: IndexMap<String, Step>,
-    /// What is read from every point of the study, by name: the columns of its table.
+    /// What is read from every point of the study or optimisation, by name: the columns of its table.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub responses: IndexMap<String, Response>,
     /// What is expected of results: a list, or the path of a JSON file with one, relative to this file.
@@ -144,10 +149,18 @@ pub struct Expect {
     /// What is held against the value and the bounds.
     #[serde(default, skip_serializing_if = "Of::is_each")]
     pub of: Of,
-    /// Expected value, with the unit of the result.
+    /// What is expected of it.
+    #[serde(flatten)]
+    pub stated: Stated,
+}
+
+/// What a number is expected to be, with its unit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Stated {
+    /// Expected value, with the unit of the result (`argmax`, `argmin` of a response: of the variable).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<ResultValue>,
-    /// Allowed absolute deviation from `value`.
+    /// Allowed absolute deviation from `value`; of a response also from zero, from symmetry, or against the direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<ResultValue>,
     /// Lower bound.
@@ -341,7 +354,29 @@ mod tests {
         let Expectable::Result(first) = &expected.expectations[0] else {
             panic!("an expectation on a result");
         };
-        assert_eq!(first.maximum, Some(ResultValue::Number(1.0)));
+        assert_eq!(first.stated.maximum, Some(ResultValue::Number(1.0)));
+    }
+
+    #[test]
+    fn parts_that_formats_share_are_read_and_a_slip_in_them_is_refused() {
+        let study = |more: serde_json::Value| {
+            let mut study =
+                serde_json::json!({"vary": {"a": [1, 2]}, "where": "a > 1", "at_most_failures": 3});
+            study
+                .as_object_mut()
+                .unwrap()
+                .extend(more.as_object().unwrap().clone());
+            serde_json::from_value::<Study>(study)
+        };
+        let read = study(serde_json::json!({})).unwrap();
+        assert_eq!(
+            (read.at_most_failures, read.set.condition.as_deref()),
+            (Some(3), Some("a > 1"))
+        );
+        assert!(read.set.vary.is_some());
+        assert!(study(serde_json::json!({"varry": {}})).is_err());
+        let expect = serde_json::json!({"response": "r", "of": "max", "maximum": 1, "unit": "m"});
+        assert!(serde_json::from_value::<Expectable>(expect).is_err());
     }
 
     #[test]

@@ -37,7 +37,9 @@ fn a_schema_with_plugins_ties_parameters_and_ports_to_the_plugin_s_name() {
     assert_eq!(tie["if"]["properties"]["plugin"]["const"], "detect");
     let then = &tie["then"]["properties"];
     assert_eq!(then["with"]["required"], serde_json::json!(["limit"]));
-    assert_eq!(then["with"]["properties"]["limit"]["x-dimension"], "angle");
+    let limit = &then["with"]["properties"]["limit"]["anyOf"];
+    assert_eq!(limit[0]["x-dimension"], "angle");
+    assert_eq!(limit[1]["pattern"], r"\$\{.+\}");
     assert_eq!(then["from"]["anyOf"][1]["additionalProperties"], false);
 }
 
@@ -71,4 +73,43 @@ fn bounds_of_quantities_have_units_and_bounds_of_numbers_have_none() {
         });
     }
     assert!(seen > 10);
+}
+
+#[test]
+fn an_editor_takes_an_expression_where_a_number_or_a_quantity_stands_and_nowhere_else() {
+    let manifest = plyflow_model::Manifest::parse(
+        r#"{"name": "p", "version": "1", "kind": "step", "role": "r", "summary": "s", "inputs": {}, "output": {"kind": "k"},
+            "parameters": {
+                "size": {"type": "quantity", "dimension": "length", "required": true, "doc": "d"}, "n": {"type": "integer", "default": 1},
+                "x": {"type": "number"}, "on": {"type": "boolean"}, "way": {"type": "choice", "values": ["a", "b"]},
+                "label": {"type": "string"}, "all": {"type": "list", "of": {"type": "number"}},
+                "in": {"type": "object", "fields": {"y": {"type": "number"}}}
+            }}"#,
+    )
+    .unwrap();
+    let schema = plyflow_model::schema::workflow_with(&[manifest]);
+    let accepts = |s: &serde_json::Value| {
+        let any = s["anyOf"].as_array();
+        any.is_some_and(|l| l.iter().any(|s| s["pattern"] == r"\$\{.+\}"))
+    };
+    let with = &schema["$defs"]["Step"]["allOf"][0]["then"]["properties"]["with"]["properties"];
+    for name in ["size", "n", "x", "on", "way"] {
+        assert!(accepts(&with[name]), "{name}: {}", with[name]);
+    }
+    assert!(with["size"]["description"].is_string() && with["n"]["default"] == 1);
+    assert!(!accepts(&with["label"]) && with["label"]["type"] == "string");
+    assert!(accepts(&with["all"]["items"]) && !accepts(&with["all"]));
+    assert!(accepts(&with["in"]["properties"]["y"]));
+    for name in ["cores", "memory", "time_limit"] {
+        assert!(
+            accepts(&schema["$defs"]["Resources"]["properties"][name]),
+            "{name}"
+        );
+    }
+    assert!(accepts(&schema["$defs"]["Step"]["properties"]["retries"]));
+    // What the program checks by is as strict as before.
+    let strict = plyflow_model::schema::workflow();
+    assert!(!accepts(
+        &strict["$defs"]["Resources"]["properties"]["cores"]
+    ));
 }

@@ -298,3 +298,51 @@ fn a_thousand_points_are_one_table() {
     );
     assert_eq!(study.run(&[]), well(3, 1001));
 }
+
+#[test]
+fn expectations_over_a_study_hold_for_a_part_of_it_that_has_their_response() {
+    let study = Study::new(
+        "
+study:
+  vary: {v: [0, 1, 3]}
+steps:
+  one: {plugin: trivial, with: {value: \"${v}\"}}
+  all: {plugin: sum, from: {in: one}}
+responses:
+  v1: {step: one, result: value}
+  total: {step: all, result: sum}
+expect:
+  - {response: v1, maximum: 0.5}
+  - {response: total, maximum: 0.5}
+",
+    );
+    // Only the first is judged, and it is missed.
+    assert_eq!(study.run(&["--until", "one", "--check"]).code, Some(5));
+    assert_eq!(study.run(&["--until", "one@v=0", "--check"]).code, Some(0));
+}
+
+#[test]
+fn points_that_an_expectation_says_nothing_of_are_told() {
+    let study = Study::new(
+        "
+study:
+  vary: {v: [0, 1, 2, 5]}
+steps:
+  one: {plugin: trivial, with: {value: \"abs(${v} - 1)\"}}
+responses:
+  r: {step: one, result: value}
+expect:
+  - {response: r, of: symmetric_about, over: v, about: 1}
+  - {response: r, of: argmin, over: v, value: 1}
+",
+    );
+    assert_eq!(study.run(&["--check"]).code, Some(0));
+    let results = study.results();
+    let names = results["results"].as_array().unwrap().iter();
+    let told = names.map(|r| r["result"].as_str().unwrap_or_default());
+    let told: Vec<&str> = told.filter(|n| n.contains("asymmetry")).collect();
+    assert_eq!(
+        told,
+        ["asymmetry of r about v = 1 (1 of 4 points without a mirror point)"]
+    );
+}

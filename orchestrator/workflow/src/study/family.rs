@@ -8,12 +8,11 @@ use crate::resolved::{FamilyExpectation, StudyResponse};
 use crate::wires::Wiring;
 use crate::yaml::{Kind, Node};
 use plyflow_model::workflow::FamilyOf;
-use plyflow_study::{Claim, Expression, Kind as ValueKind, Mark, Names, Value, judge};
-use std::collections::HashMap;
+use plyflow_study::{Expression, Kind as ValueKind, Names, Value, judge, marks};
 
 /// A study and what is read from its points.
 pub(crate) struct Asked<'a> {
-    family: &'a Family,
+    pub(super) family: &'a Family,
     pub responses: Vec<StudyResponse>,
     /// Names of all, also of those that are wrong (and reported).
     declared: Vec<String>,
@@ -29,13 +28,24 @@ impl<'a> Asked<'a> {
         source: &Source,
         problems: &mut Problems,
     ) -> Self {
-        let responses = super::responses::responses(root, drafts, wiring, source, problems);
+        let responses =
+            super::responses::responses(root, &family.names, (drafts, wiring), source, problems);
         let declared = root.get("responses").map_or(&[][..], Node::entries);
         Self {
             family,
             responses,
             declared: declared.iter().map(|e| e.key.clone()).collect(),
         }
+    }
+
+    /// What an optimisation looks for; `None` for a study, or when something is wrong (and reported).
+    pub fn optimisation(
+        &self,
+        root: &Node,
+        source: &Source,
+        problems: &mut Problems,
+    ) -> Option<crate::resolved::Optimisation> {
+        super::optimise::looked_for(self.family, &self.responses, root, source, problems)
     }
 
     /// Reads an expectation over the points; everything wrong is reported.
@@ -57,11 +67,36 @@ impl<'a> Asked<'a> {
             return None;
         };
         let of = of(item);
+        let searched = self.family.search.is_some();
+        if searched != (of == FamilyOf::Best)
+            && matches!(
+                of,
+                FamilyOf::Best | FamilyOf::Monotone | FamilyOf::SymmetricAbout
+            )
+        {
+            let at = item.get("of").map_or(&item.span, |n| &n.span);
+            let message = format!(
+                "`of: {}` in {}",
+                of.word(),
+                if searched {
+                    "an optimisation"
+                } else {
+                    "a study"
+                }
+            );
+            problems.add(source, at, message).help(match searched {
+                true => "a method chooses the points: expect something `of: best`",
+                false => "it is for `optimise`; use `max`, `min`, `argmax` or `argmin`",
+            });
+            return None;
+        }
         let over = self.over(item, of, source, problems)?;
         let points = self.points(item, of, source, problems)?;
         let variable = over.map(|i| &self.family.points.variables[i]);
         let (unit, what) = match (of, variable) {
-            (FamilyOf::Argmax | FamilyOf::Argmin, Some(v)) => (v.unit.clone(), v.name.as_str()),
+            (FamilyOf::Argmax | FamilyOf::Argmin | FamilyOf::Best, Some(v)) => {
+                (v.unit.clone(), v.name.as_str())
+            }
             _ => (self.responses[response].unit.clone(), name),
         };
         let mut number = |key: &str| {
@@ -70,6 +105,9 @@ impl<'a> Asked<'a> {
         };
         let (expected, tolerance) = (number("value"), number("tolerance"));
         let (minimum, maximum) = (number("minimum"), number("maximum"));
+        if let (Some(_), Some(e)) = (tolerance.filter(|t| *t < 0.0), item.entry("tolerance")) {
+            problems.add(source, &e.value.span, "`tolerance` is negative");
+        }
         let relative = item
             .get("relative_tolerance")
             .and_then(|n| n.to_json().as_f64());
@@ -81,7 +119,7 @@ impl<'a> Asked<'a> {
         };
         stated(item, of, source, problems);
         let si_unit = match (of, variable) {
-            (FamilyOf::Argmax | FamilyOf::Argmin, Some(v)) => v.kind.si_unit(),
+            (FamilyOf::Argmax | FamilyOf::Argmin | FamilyOf::Best, Some(v)) => v.kind.si_unit(),
             _ => unit,
         };
         let found = FamilyExpectation {
@@ -129,7 +167,7 @@ impl<'a> Asked<'a> {
             return Some(None);
         };
         let name = node.text()?;
-        if !needs {
+        if !needs && of != FamilyOf::Best {
             let d = problems.add(
                 source,
                 &node.span,
@@ -187,7 +225,8 @@ impl<'a> Asked<'a> {
             Ok(chosen)
         });
         match chosen {
-            Ok(chosen) if chosen.is_empty() => {
+            // The points of an optimisation are not known before it has run.
+            Ok(chosen) if chosen.is_empty() && self.family.search.is_none() => {
                 let d = problems.add(source, &node.span, "this holds at no point of the study");
                 d.expected("a condition that chooses at least one point");
                 None
@@ -211,7 +250,7 @@ impl<'a> Asked<'a> {
         let variable = &self.family.points.variables[over];
         let value = match &node.kind {
             Kind::Number(n) => Value::of_number(&n.to_string()).ok(),
-            Kind::Text(t) => Some(Value::of_text(t)),
+            Kind::Text(t) => Value::of_text(t).ok(),
             _ => None,
         };
         match value.filter(|v| v.kind() == variable.kind) {
@@ -237,34 +276,30 @@ impl<'a> Asked<'a> {
         source: &Source,
         problems: &mut Problems,
     ) {
-        let claim = match (e.of, &e.about) {
-            (FamilyOf::Monotone, _) => Claim::Monotone { increasing: true },
-            (FamilyOf::SymmetricAbout, Some((about, _))) => Claim::Symmetric { about: *about },
-            _ => return,
-        };
+        if !matches!(e.of, FamilyOf::Monotone | FamilyOf::SymmetricAbout) {
+            return;
+        }
         let Some(over) = e.over else { return };
-        let mut groups: HashMap<String, usize> = HashMap::new();
         let others: Vec<usize> = (0..self.family.names.len())
             .filter(|i| *i != over)
             .collect();
-        let mut marks = Vec::new();
-        for i in &e.points {
+        let mark = |i: &u32| {
             let point = &self.family.points.all[*i as usize];
-            let next = groups.len();
-            let group = point.part(&self.family.points.variables, &others);
-            marks.push(Mark {
-                along: point.values[over].si().unwrap_or(f64::NAN),
-                group: *groups.entry(group).or_insert(next),
-                result: Some(0.0),
-            });
-        }
-        if judge(claim, &marks, (f64::NEG_INFINITY, f64::INFINITY))
+            let along = point.values[over].si().unwrap_or(f64::NAN);
+            (
+                along,
+                point.part(&self.family.points.variables, &others),
+                Some(0.0),
+            )
+        };
+        let marks = marks(e.points.iter().map(mark));
+        if judge(e.claim(), &marks, (f64::NEG_INFINITY, f64::INFINITY))
             .value
             .is_none()
         {
             let name = &self.family.names[over];
-            let (message, expected) = match claim {
-                Claim::Symmetric { .. } => (
+            let (message, expected) = match e.of {
+                FamilyOf::SymmetricAbout => (
                     format!("no two points mirror each other in `{name}`, all else being the same"),
                     "pairs of points at the same distance on both sides of `about`",
                 ),
@@ -280,7 +315,9 @@ impl<'a> Asked<'a> {
 }
 
 fn of(item: &Node) -> FamilyOf {
-    use FamilyOf::{Argmax, Argmin, Each, Max, Mean, Min, Monotone, SymmetricAbout, ZeroWhere};
+    use FamilyOf::{
+        Argmax, Argmin, Best, Each, Max, Mean, Min, Monotone, SymmetricAbout, ZeroWhere,
+    };
     let all = [
         Each,
         Mean,
@@ -291,6 +328,7 @@ fn of(item: &Node) -> FamilyOf {
         Monotone,
         ZeroWhere,
         SymmetricAbout,
+        Best,
     ];
     let word = item.get("of").and_then(Node::text);
     let found = all.into_iter().find(|o| Some(o.word()) == word);
@@ -359,12 +397,5 @@ fn stated(item: &Node, of: FamilyOf, source: &Source, problems: &mut Problems) {
     if !along && given("tolerance") && !given("value") {
         let d = problems.add(source, &item.span, "`tolerance` without `value`");
         d.help("for a bound use `minimum` or `maximum`");
-    }
-    let negative = |key: &str| {
-        let text = item.get(key).map(|n| n.to_json().to_string());
-        text.is_some_and(|t| t.trim_start_matches('"').trim_start().starts_with('-'))
-    };
-    if negative("tolerance") {
-        problems.add(source, &item.span, "`tolerance` is negative");
     }
 }

@@ -4,9 +4,11 @@ use super::{report, within};
 use crate::diagnostics::{Problems, Source};
 use crate::parameters::{named, unreadable};
 use crate::yaml::{Entry, Kind, Node, Span};
+use plyflow_files::number::{Decimal, Signs};
 use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_files::rows::{Head, Lines, RowError, Separator};
 use plyflow_files::text::decode;
+use plyflow_study::optimise::Along;
 use plyflow_study::{
     Axis, Method, Problem, Quantity, Range, Sample, Step, Table, Value, range, sample,
 };
@@ -56,7 +58,68 @@ pub(super) fn read(study: &Node, source: &Source, problems: &mut Problems) -> Op
     })
 }
 
+/// Reads the variables of an optimisation, and where they stand; `None` when something is wrong (and reported).
+pub(super) fn over(
+    node: &Node,
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<Vec<(String, Along)>> {
+    let mut reader = Reader {
+        source,
+        problems,
+        samples: Vec::new(),
+        groups: Vec::new(),
+    };
+    let one = |entry: &Entry| {
+        let name = reader.name(entry);
+        let along = reader.along(&entry.value, &entry.key_span);
+        Some((name?, along?))
+    };
+    let all: Vec<Option<(String, Along)>> = node.entries().iter().map(one).collect();
+    all.into_iter().collect()
+}
+
+/// Reads one value; `None` when something is wrong (and reported).
+pub(super) fn value(node: &Node, source: &Source, problems: &mut Problems) -> Option<Value> {
+    let mut reader = Reader {
+        source,
+        problems,
+        samples: Vec::new(),
+        groups: Vec::new(),
+    };
+    reader.value(node, &node.span)
+}
+
 impl Reader<'_> {
+    /// What a variable of an optimisation may be: a range, its steps, or one of a list.
+    fn along(&mut self, node: &Node, key: &Span) -> Option<Along> {
+        let is_range = matches!(&node.kind, Kind::Map(_));
+        if is_range && node.get("by").is_none() && node.get("count").is_none() {
+            return self.range(node).map(Along::Range);
+        }
+        let values = self.values(node, key)?;
+        let si: Vec<Option<f64>> = values.iter().map(Value::si).collect();
+        let grows = |w: &[Option<f64>]| matches!(w, [Some(a), Some(b)] if a < b);
+        let falls = |w: &[Option<f64>]| matches!(w, [Some(a), Some(b)] if a > b);
+        let ordered = si.windows(2).all(grows) || si.windows(2).all(falls);
+        if let Some(odd) = values.iter().find(|v| v.kind() != values[0].kind()) {
+            let message = format!(
+                "`{}` and `{}` are of two kinds",
+                values[0].text(),
+                odd.text()
+            );
+            self.tell(
+                Problem::new(message).expected("values of one kind"),
+                &node.span,
+            );
+            return None;
+        }
+        Some(match is_range || (ordered && values.len() > 1) {
+            true => Along::Steps(values),
+            false => Along::Choice(values),
+        })
+    }
+
     fn tell(&mut self, problem: Problem, span: &Span) {
         report(problem, span, self.source, self.problems);
     }
@@ -146,6 +209,11 @@ impl Reader<'_> {
         let letter = |c: char| c.is_ascii_alphabetic() || c == '_';
         let all = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let is_name = name.starts_with(letter) && name.chars().all(all) && name.len() <= 64;
+        if is_name && super::responses::is_column(name) {
+            let message = format!("`{name}` is a column that every table of a study has");
+            self.tell(Problem::new(message).expected("another name"), span);
+            return None;
+        }
         if is_name && !TAKEN.contains(&name) {
             return Some(name.to_owned());
         }
@@ -243,7 +311,7 @@ impl Reader<'_> {
     fn value(&mut self, node: &Node, at: &Span) -> Option<Value> {
         match &node.kind {
             Kind::Bool(b) => Some(Value::Bool(*b)),
-            Kind::Text(t) => Some(Value::of_text(t)),
+            Kind::Text(t) => self.told(Value::of_text(t), &node.span),
             Kind::Number(n) => {
                 let value = Value::of_number(&n.to_string());
                 self.told(value, &node.span)
@@ -353,68 +421,49 @@ impl Reader<'_> {
         span: &Span,
         file: &Source,
     ) -> Result<Table, Option<RowError>> {
-        let lines = Lines::new(bytes)?;
-        let (_, first) =
-            (lines.first()).ok_or_else(|| RowError::at(0, "the table has nothing in it"))?;
-        // Blanks part words within a cell too, so that they never part cells here.
-        let mut signs = Separator::of_line(first).into_iter();
-        let sign = signs.find(|s| *s != Separator::Blanks);
-        let mut rows = lines.rows(lines.told.or(sign).unwrap_or(Separator::Comma));
-        let (mut names, mut units, mut all) = (Vec::new(), Vec::new(), Vec::new());
-        while let Some(row) = rows.read()? {
-            let cells: Vec<String> = row.cells.iter().map(str::to_owned).collect();
-            if names.is_empty() {
-                for cell in &cells {
-                    let head = Head::of(cell);
-                    let unit = head.unit.unwrap_or_default();
-                    if let Err(e) = plyflow_model::units::parse_unit(&unit) {
-                        let text =
-                            format!("the head of `{}`: {}; {}", head.name, e.reason(), e.help());
-                        return Err(RowError::at(row.line, text).into());
-                    }
-                    if names.contains(&head.name) {
-                        let text = format!("two columns are named `{}`", head.name);
-                        return Err(RowError::at(row.line, text).into());
-                    }
-                    let at = crate::yaml::span_at(&file.text, row.line, 1);
-                    let is_name = {
-                        let mut of_file = Reader {
-                            source: file,
-                            problems: &mut *self.problems,
-                            samples: Vec::new(),
-                            groups: Vec::new(),
-                        };
-                        of_file.name_at(&head.name, &at)
-                    };
-                    names.push(is_name.ok_or(None)?);
-                    units.push(unit);
-                }
-                continue;
+        let cells = Cells::read(bytes)?;
+        let (line, heads) = &cells.heads;
+        let (mut names, mut units) = (Vec::new(), Vec::new());
+        for head in heads {
+            let unit = head.unit.clone().unwrap_or_default();
+            if let Err(e) = plyflow_model::units::parse_unit(&unit) {
+                let text = format!("the head of `{}`: {}; {}", head.name, e.reason(), e.help());
+                return Err(RowError::at(*line, text).into());
             }
-            if cells.len() != names.len() {
-                let text = format!(
-                    "this row has {} cells, and the head {}",
-                    cells.len(),
-                    names.len()
-                );
-                return Err(RowError::at(row.line, text).into());
+            if names.contains(&head.name) {
+                let text = format!("two columns are named `{}`", head.name);
+                return Err(RowError::at(*line, text).into());
             }
-            let mut values = Vec::with_capacity(cells.len());
-            for ((cell, unit), name) in cells.iter().zip(&units).zip(&names) {
-                let value = Value::of_cell(cell, unit);
+            let at = crate::yaml::span_at(&file.text, *line, 1);
+            let mut of_file = Reader {
+                source: file,
+                problems: &mut *self.problems,
+                samples: Vec::new(),
+                groups: Vec::new(),
+            };
+            names.push(of_file.name_at(&head.name, &at).ok_or(None)?);
+            units.push(unit);
+        }
+        let row = |(line, row): &(usize, Vec<String>)| -> Result<Vec<Value>, RowError> {
+            let columns = row.iter().zip(&units).zip(&names);
+            let value = |((cell, unit), name): ((&String, &String), &String)| {
+                let plain = plyflow_files::number::plain(cell, cells.decimal);
+                let value = Value::of_cell(plain.as_deref().unwrap_or(cell), unit)
+                    .map_err(|p| RowError::at(*line, format!("`{name}`: {p}")))?;
                 if cell.is_empty() || (!unit.is_empty() && !matches!(value, Value::Quantity(_))) {
                     let text = match cell.as_str() {
                         "" => format!("there is no value for `{name}`"),
                         cell => format!("`{cell}` is no number, and `{name}` is in {unit}"),
                     };
-                    return Err(RowError::at(row.line, text).into());
+                    return Err(RowError::at(*line, text));
                 }
-                values.push(value);
-            }
-            all.push(values);
-        }
+                Ok(value)
+            };
+            columns.map(value).collect()
+        };
+        let rows = cells.rows.iter().map(row).collect::<Result<_, _>>()?;
         self.groups.push((span.clone(), names.clone()));
-        Ok(Table { names, rows: all })
+        Ok(Table { names, rows })
     }
 
     fn listed(&mut self, way: &Entry) -> Option<Table> {
@@ -460,6 +509,84 @@ impl Reader<'_> {
         }
         self.groups.push((way.key_span.clone(), names.clone()));
         Some(Table { names, rows })
+    }
+}
+
+/// The cells of a table as its file has them.
+struct Cells {
+    /// Line and cells of the head.
+    heads: (usize, Vec<Head>),
+    /// Line and cells of every row.
+    rows: Vec<(usize, Vec<String>)>,
+    decimal: Decimal,
+}
+
+impl Cells {
+    fn read(bytes: &[u8]) -> Result<Self, RowError> {
+        let lines = Lines::new(bytes)?;
+        let (_, first) =
+            (lines.first()).ok_or_else(|| RowError::at(0, "the table has nothing in it"))?;
+        // Blanks part words within a cell too, so that they never part cells here.
+        let mut signs = Separator::of_line(first).into_iter();
+        let sign = signs.find(|s| *s != Separator::Blanks);
+        let mut reader = lines.rows(lines.told.or(sign).unwrap_or(Separator::Comma));
+        let mut all: Vec<(usize, Vec<String>)> = Vec::new();
+        let mut signs = Signs::default();
+        while let Some(row) = reader.read()? {
+            let cells: Vec<String> = row.cells.iter().map(str::to_owned).collect();
+            if let Some((_, heads)) = all.first()
+                && cells.len() != heads.len()
+            {
+                let text = format!(
+                    "this row has {} cells, and the head {}",
+                    cells.len(),
+                    heads.len()
+                );
+                return Err(RowError::at(row.line, text));
+            }
+            if !all.is_empty() {
+                cells.iter().for_each(|c| signs.note(row.line, c));
+            }
+            all.push((row.line, cells));
+        }
+        let decimal = signs
+            .decide()
+            .map_err(|(line, text)| RowError::at(line, text))?;
+        if all.is_empty() {
+            return Err(RowError::at(0, "the table has nothing in it"));
+        }
+        let (line, heads) = all.remove(0);
+        let mut heads: Vec<Head> = heads.iter().map(|c| Head::of(c)).collect();
+        let number = |cell: &str| plyflow_files::number::plain(cell, decimal).is_some();
+        // Units in a row of their own stand above numbers; words above words are values.
+        if heads.iter().all(|h| h.unit.is_none())
+            && let [(_, below), (_, next), ..] = &all[..]
+        {
+            let unit = |cell: &str| {
+                cell.trim_matches(['[', ']', '(', ')', '-'])
+                    .trim()
+                    .to_owned()
+            };
+            let fits = |(cell, next): (&String, &String)| {
+                let unit = unit(cell);
+                unit.is_empty()
+                    || (!number(cell)
+                        && number(next)
+                        && plyflow_model::units::parse_unit(&unit).is_ok())
+            };
+            let any = below.iter().any(|c| !unit(c).is_empty());
+            if any && below.iter().zip(next).all(fits) {
+                for (head, cell) in heads.iter_mut().zip(below) {
+                    head.unit = Some(unit(cell));
+                }
+                all.remove(0);
+            }
+        }
+        Ok(Self {
+            heads: (line, heads),
+            rows: all,
+            decimal,
+        })
     }
 }
 

@@ -8,11 +8,30 @@ use crate::wires::Wiring;
 use crate::yaml::{Entry, Node};
 use plyflow_model::workflow::ResponseOf;
 
+/// Columns of the table that are always there, so that no variable and no response is named so. Beside them are `key_STEP`
+/// and, of an optimisation, `excess_1` and so on.
+pub(super) const COLUMNS: [&str; 9] = [
+    "asked",
+    "feasible",
+    "best_so_far",
+    "point",
+    "status",
+    "failed_step",
+    "failure_class",
+    "cause",
+    "seed",
+];
+
+/// Whether a name is that of a column that the table of a study has anyway.
+pub(super) fn is_column(name: &str) -> bool {
+    COLUMNS.contains(&name) || name.starts_with("key_") || name.starts_with("excess_")
+}
+
 /// Reads the responses; everything wrong is reported.
 pub(super) fn responses(
     root: &Node,
-    drafts: &[Draft<'_>],
-    wiring: &Wiring,
+    variables: &[String],
+    (drafts, wiring): (&[Draft<'_>], &Wiring),
     source: &Source,
     problems: &mut Problems,
 ) -> Vec<StudyResponse> {
@@ -24,6 +43,17 @@ pub(super) fn responses(
             let d = problems.add(source, &entry.key_span, message);
             d.given(entry.key.clone())
                 .expected("letters, digits, `_` and `-`, at most 64");
+        }
+        let taken = match is_column(&entry.key) {
+            true => Some("a column that every table of a study has"),
+            false => variables
+                .contains(&entry.key)
+                .then_some("a variable of the study"),
+        };
+        if let Some(what) = taken {
+            let message = format!("the response `{}` has the name of {what}", entry.key);
+            let d = problems.add(source, &entry.key_span, message);
+            d.expected("another name: the table has a column for each");
         }
         all.extend(response(entry, drafts, wiring, source, problems));
     }

@@ -273,16 +273,21 @@ fn small(power: i32, rest: &str) -> Option<(i32, &str)> {
     (power != 0 && power.abs() <= 6).then_some((power, rest))
 }
 
-/// A decimal number as its digits, without rounding: sign, digits without point, power of ten.
-struct Decimal<'a> {
-    negative: bool,
-    whole: &'a str,
-    fraction: &'a str,
-    exponent: i64,
+/// A decimal number as its digits, without rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Digits<'a> {
+    /// Whether it has a minus sign.
+    pub negative: bool,
+    /// Digits in front of the point, perhaps none.
+    pub whole: &'a str,
+    /// Digits behind the point, perhaps none.
+    pub fraction: &'a str,
+    /// Power of ten, clamped to what no double reaches.
+    pub exponent: i64,
 }
 
 /// Splits `text` into number and rest; `None` when it does not begin with a number.
-fn decimal(text: &str) -> Option<(Decimal<'_>, &str)> {
+pub fn digits(text: &str) -> Option<(Digits<'_>, &str)> {
     let negative = text.starts_with('-');
     let body = text.strip_prefix(['-', '+']).unwrap_or(text);
     let digits = |s: &str| s.find(|c: char| !c.is_ascii_digit()).unwrap_or(s.len());
@@ -309,7 +314,7 @@ fn decimal(text: &str) -> Option<(Decimal<'_>, &str)> {
         }
     }
     Some((
-        Decimal {
+        Digits {
             negative,
             whole,
             fraction,
@@ -319,7 +324,7 @@ fn decimal(text: &str) -> Option<(Decimal<'_>, &str)> {
     ))
 }
 
-impl Decimal<'_> {
+impl Digits<'_> {
     /// The number times the unit, rounded as rarely as possible: powers of ten and integer factors are
     /// applied to the decimal digits.
     fn times(&self, unit: &Unit) -> f64 {
@@ -417,7 +422,7 @@ fn read_quantity(
         text: text.chars().take(80).collect(),
         dimension,
     };
-    let (number, rest) = decimal(text).ok_or_else(bad)?;
+    let (number, rest) = digits(text).ok_or_else(bad)?;
     if let Some(written) = without_comma(text, rest) {
         return Err(UnitError::Comma {
             text: text.chars().take(80).collect(),

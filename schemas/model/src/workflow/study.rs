@@ -1,6 +1,6 @@
 //! The block `study` of a workflow, its responses, and what is expected of them.
 
-use super::{OnFailure, ResultValue};
+use super::{OnFailure, Stated};
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,6 +9,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
+    /// The points.
+    #[serde(flatten)]
+    pub set: PointSet,
+    /// What a failed point does to the others; that of the workflow when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub on_failure: Option<OnFailure>,
+    /// So many failed points are borne: the run still ends well. One more stops the study.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_most_failures: Option<u32>,
+}
+
+/// A set of points: a study's, or a part of a product or a union.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PointSet {
     /// All combinations of the values of these variables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vary: Option<IndexMap<String, Values>>,
@@ -29,40 +44,6 @@ pub struct Study {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub union: Option<Vec<PointSet>>,
     /// Keeps the points for which this holds, such as `fabric_fabric <= fabric_diaphragm and angle > 0 deg`.
-    #[serde(default, rename = "where", skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
-    /// What a failed point does to the others; that of the workflow when not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub on_failure: Option<OnFailure>,
-    /// So many failed points are borne: the run still ends well. One more stops the study.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub at_most_failures: Option<u32>,
-}
-
-/// A part of a product or a union.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PointSet {
-    /// All combinations of the values of these variables.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub vary: Option<IndexMap<String, Values>>,
-    /// The values of these variables side by side.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub zip: Option<IndexMap<String, Values>>,
-    /// The points one by one: a table (CSV, units in its head), or a list of mappings.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-expected" = "the path of a table (CSV), or a list of points"))]
-    pub points: Option<PointsOf>,
-    /// Points chosen in a region.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sample: Option<Sample>,
-    /// Every point of each part with every point of the others.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub product: Option<Vec<PointSet>>,
-    /// The points of all parts, each once.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub union: Option<Vec<PointSet>>,
-    /// Keeps the points for which this holds.
     #[serde(default, rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<String>,
 }
@@ -200,7 +181,7 @@ pub struct ExpectResponse {
     /// What of the points is held against the value and the bounds.
     #[serde(default, skip_serializing_if = "FamilyOf::is_each")]
     pub of: FamilyOf,
-    /// The variable along which is looked: for `argmax`, `argmin`, `monotone`, `symmetric_about`.
+    /// The variable along which is looked: for `argmax`, `argmin`, `monotone`, `symmetric_about`, and `best` where it is meant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub over: Option<String>,
     /// For `symmetric_about`: the value of the variable at which the points mirror each other.
@@ -212,26 +193,14 @@ pub struct ExpectResponse {
     /// Only the points for which this holds; needed for `zero_where`.
     #[serde(default, rename = "where", skip_serializing_if = "Option::is_none")]
     pub condition: Option<String>,
-    /// Expected value, with the unit of the response (`argmax`, `argmin`: of the variable).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub value: Option<ResultValue>,
-    /// Allowed absolute deviation: from `value`, from zero, from symmetry, or against the direction.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<ResultValue>,
     /// For `monotone`, `zero_where`, `symmetric_about`, instead of `tolerance`: as a part of the largest size of the response in the
     /// whole study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0))]
     pub relative_tolerance: Option<f64>,
-    /// Lower bound.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub minimum: Option<ResultValue>,
-    /// Upper bound.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub maximum: Option<ResultValue>,
-    /// Where the expectation comes from.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub source: Option<String>,
+    /// What is expected of it.
+    #[serde(flatten)]
+    pub stated: Stated,
 }
 
 /// What of the points of a study is held against an expectation.
@@ -257,6 +226,8 @@ pub enum FamilyOf {
     ZeroWhere,
     /// Is the same at points that mirror each other in a value of the variable `over`.
     SymmetricAbout,
+    /// Of an optimisation: at the best point that meets its constraints; with `over`, the value of that variable there.
+    Best,
 }
 
 impl FamilyOf {
@@ -277,6 +248,7 @@ impl FamilyOf {
             Self::Monotone => "monotone",
             Self::ZeroWhere => "zero_where",
             Self::SymmetricAbout => "symmetric_about",
+            Self::Best => "best",
         }
     }
 }

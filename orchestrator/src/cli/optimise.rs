@@ -1,0 +1,348 @@
+//! `run` of a workflow with `optimise`: asks its method for points, runs them as those of a study, tells what became of them, and goes on.
+//!
+//! Every round is a run of the workflow at the points that are new. What a method asks for depends on what it was told alone, and what it is told
+//! is in the store: so the same command goes on after a kill, and asks for the same points.
+
+mod trace;
+
+pub use trace::{Trace, ahead, ahead_json, found, why_not};
+
+use super::args::RunArgs;
+use super::clean::locked;
+use super::open::{Opened, open_at};
+use super::plan::cost_of;
+use super::run::{Interrupts, ROUNDS, conclude, observer, options};
+use super::study::{Line, Status, Table};
+use super::{Done, Stop};
+use crate::engine::core::State;
+use crate::engine::{Depth, Local, Session, Summary};
+use crate::exit;
+use crate::plan::Key;
+use crate::store::{Lock, RunFolder, Store};
+use camino::Utf8Path;
+use plyflow_model::text::one_line;
+use plyflow_study::Value;
+use plyflow_study::optimise::{Asked, Outcome, Search, Told};
+use plyflow_workflow::resolved::{Budget, Optimisation, Study};
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use std::time::Instant;
+
+/// The class of failures that tell nothing of a point.
+const MACHINE: &str = "machine";
+
+// What has been asked for, kept for other commands.
+
+/// The points that an optimisation has asked for, as they are kept beside the journal of a workflow. A run needs none of it: it asks anew.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Kept {
+    /// Names the search.
+    digest: String,
+    /// Whether the method has nothing more to ask.
+    settled: bool,
+    /// What the points took (CPU, s).
+    cpu_seconds: f64,
+    /// Texts of the values.
+    points: Vec<Vec<String>>,
+}
+
+impl Kept {
+    fn read(folder: &RunFolder, digest: &str) -> Option<Self> {
+        let path = folder.root.join("asked.json");
+        let bytes = plyflow_files::open::read(path.as_std_path(), plyflow_files::open::MOST_NOTED);
+        let kept: Self = serde_json::from_slice(&bytes.ok()?).ok()?;
+        (kept.digest == digest).then_some(kept)
+    }
+
+    fn write(&self, folder: &RunFolder) -> std::io::Result<()> {
+        let (path, new) = (
+            folder.root.join("asked.json"),
+            folder.root.join("asked.new"),
+        );
+        std::fs::create_dir_all(&folder.root)?;
+        std::fs::write(&new, serde_json::to_vec(self)?)?;
+        std::fs::rename(new, path)
+    }
+}
+
+/// The points that an optimisation asked for when it ran last.
+pub fn asked_before(
+    root: &Utf8Path,
+    workflow: &str,
+    digest: &str,
+    search: &Search,
+) -> Option<Vec<Vec<Value>>> {
+    let folder = Store::new(root.to_owned()).run(workflow);
+    let kept = Kept::read(&folder, digest)?;
+    kept.points.iter().map(|p| search.read(p)).collect()
+}
+
+// The run.
+
+/// What an opened workflow optimises, if it does.
+pub fn of(opened: &Opened) -> Option<Optimisation> {
+    opened.workflow.study.as_ref()?.optimisation.clone()
+}
+
+/// How far a run has come.
+#[derive(Default)]
+struct Way {
+    told: Vec<Told>,
+    summary: Summary,
+    cpu_seconds: f64,
+    /// Artifacts that have been counted.
+    seen: HashSet<Key>,
+    settled: bool,
+    /// What the machine could not do.
+    broken: Option<String>,
+}
+
+/// Runs an optimisation to the end of its budget.
+///
+/// # Errors
+/// As `run`.
+pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> Done {
+    if !args.until.is_empty() {
+        let text =
+            "--until: an optimisation runs whole, as its method needs the response of every point";
+        return Err(Stop::new(exit::USAGE, text));
+    }
+    let Some((search, _)) = &o.search else {
+        return Err(Stop::new(
+            exit::INTERNAL,
+            "the search of this optimisation is missing",
+        ));
+    };
+    let folder = opened.store.run(&opened.workflow.name);
+    let root = format!("the store {}", opened.store.root());
+    let _store = Lock::shared(&opened.store.lock(), &root).map_err(locked)?;
+    let what = format!("the workflow '{}'", one_line(&opened.workflow.name));
+    let _run = Lock::exclusive(&folder.lock(), &what).map_err(locked)?;
+    let machine = || Stop::machine(format!("running with {root}"));
+    let interrupts = Interrupts::listen().map_err(machine())?;
+    let mut way = Way::default();
+    loop {
+        let mut points = match search.ask(&way.told).map_err(wrong)? {
+            Asked::Points(points) => points,
+            Asked::Settled => Vec::new(),
+        };
+        way.settled = points.is_empty();
+        points.truncate(match o.budget {
+            Budget::Runs(most) => (most as usize).saturating_sub(way.told.len()),
+            Budget::CpuSeconds(most) if way.cpu_seconds >= most => 0,
+            Budget::CpuSeconds(_) => usize::MAX,
+        });
+        keep(&o, &way, &points).write(&folder).map_err(machine())?;
+        if points.is_empty() {
+            break;
+        }
+        let before = way.told.len();
+        round(args, points, &mut way, &interrupts)?;
+        if way.told.len() == before {
+            way.broken
+                .get_or_insert("no point of this round has an answer".into());
+        }
+        if way.summary.interrupted || way.broken.is_some() {
+            break;
+        }
+    }
+    let all: Vec<Vec<Value>> = way.told.iter().map(|t| t.point.clone()).collect();
+    let opened = open_at(&args.workflow, &all)?;
+    let session = opened.look()?;
+    conclude(args, &opened, &session, &way.summary, begun)?;
+    match way.broken {
+        Some(reason) => {
+            let text = format!("{reason}; the same command goes on");
+            Err(Stop::new(exit::STEP_FAILED, text))
+        }
+        None => Ok(()),
+    }
+}
+
+fn wrong(problem: plyflow_study::Problem) -> Stop {
+    Stop::new(
+        exit::INVALID,
+        format!("the optimisation cannot go on: {problem}"),
+    )
+}
+
+fn keep(o: &Optimisation, way: &Way, new: &[Vec<Value>]) -> Kept {
+    let told = way.told.iter().map(|t| &t.point);
+    let text = |p: &Vec<Value>| p.iter().map(Value::text).collect();
+    Kept {
+        digest: o.digest.clone(),
+        settled: way.settled,
+        cpu_seconds: way.cpu_seconds,
+        points: told.chain(new).map(text).collect(),
+    }
+}
+
+/// Runs the workflow at some points and takes up what became of them. A point that has failed before stays so: it is an answer, on which later
+/// points rest. `--force` runs it again.
+fn round(
+    args: &RunArgs,
+    points: Vec<Vec<Value>>,
+    way: &mut Way,
+    interrupts: &Interrupts,
+) -> Result<(), Stop> {
+    let mut opened = open_at(&args.workflow, &points)?;
+    let mut lines = {
+        let session = opened.look()?;
+        let lines = read(&session);
+        way.count(&session);
+        lines
+    };
+    let open: Vec<usize> = (0..points.len())
+        .filter(|i| !args.force.is_empty() || !is_answer(&lines[*i]))
+        .collect();
+    if !open.is_empty() {
+        let study = study_of(&opened);
+        let steps = open.iter().flat_map(|i| study.points[*i].steps.iter());
+        let names: HashSet<&str> = steps
+            .map(|s| opened.workflow.steps[*s].name.as_str())
+            .collect();
+        let mut names: Vec<String> = names.into_iter().map(str::to_owned).collect();
+        names.sort_unstable();
+        opened.restrict(&names)?;
+        let session = execute(args, &opened, way, interrupts)?;
+        let found = read(&session);
+        for i in open {
+            lines[i] = found[i].clone();
+        }
+    }
+    let study = study_of(&opened);
+    let o = study
+        .optimisation
+        .as_ref()
+        .ok_or_else(|| Stop::new(exit::INTERNAL, "the search of this optimisation is missing"))?;
+    for (point, line) in points.into_iter().zip(&lines) {
+        if let Some(why) = no_answer(line) {
+            way.broken.get_or_insert(why);
+        }
+        // Points are told in the order in which they were asked for: behind one without an answer there is none.
+        if !is_answer(line) {
+            break;
+        }
+        let outcome = outcome(o, study, &point, line)?;
+        way.told.push(Told { point, outcome });
+    }
+    Ok(())
+}
+
+fn study_of(opened: &Opened) -> &Study {
+    opened
+        .workflow
+        .study
+        .as_ref()
+        .expect("an optimisation is a study")
+}
+
+fn read(session: &Session<'_>) -> Vec<Line> {
+    Table::read(session, &super::results::records(session)).lines
+}
+
+/// Whether a method can be told what became of a point.
+fn is_answer(line: &Line) -> bool {
+    match &line.status {
+        Status::Done => true,
+        Status::Failed { .. } => no_answer(line).is_none(),
+        Status::NotRun => false,
+    }
+}
+
+/// Why a failure tells nothing of a point, if it does not.
+fn no_answer(line: &Line) -> Option<String> {
+    match &line.status {
+        Status::Failed { step, class, cause } if *class == MACHINE => Some(format!(
+            "{step}: {cause}\na failure of the machine tells nothing of a point, so that the optimisation stopped"
+        )),
+        // Its name has no values in it: it is the same at every point.
+        Status::Failed { step, cause, .. } if !step.contains('@') => Some(format!(
+            "{step}: {cause}\nthis step is the same at every point, so that the optimisation stopped"
+        )),
+        _ => None,
+    }
+}
+
+fn outcome(o: &Optimisation, study: &Study, point: &[Value], line: &Line) -> Result<Outcome, Stop> {
+    match line.status {
+        Status::Done => o
+            .outcome(study, point, &line.responses)
+            .map_err(|e| wrong(e.problem)),
+        _ => Ok(Outcome::Failed),
+    }
+}
+
+/// Runs the wanted steps of an opened workflow.
+fn execute<'o>(
+    args: &RunArgs,
+    opened: &'o Opened,
+    way: &mut Way,
+    interrupts: &Interrupts,
+) -> Result<Session<'o>, Stop> {
+    let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
+    let options = options(args, opened)?;
+    let mut session = Session::new(
+        &opened.workflow,
+        &opened.graph,
+        &opened.store,
+        options,
+        true,
+    )
+    .map_err(machine())?;
+    let mut observer = observer(args);
+    session.look(observer.as_mut());
+    if let Err(stop) = opened.admit(&session) {
+        observer.end();
+        return Err(stop);
+    }
+    let wake = interrupts.poll_end().map_err(machine())?;
+    let mut executor = Local::new("/proc/self/exe".into(), Some(wake));
+    for round in 0.. {
+        let (ended, summary) = session
+            .execute(&mut executor, observer.as_mut(), &|| interrupts.count())
+            .map_err(machine())?;
+        session = ended;
+        // What was there has been counted.
+        way.summary.add(Summary {
+            cached: 0,
+            ..summary
+        });
+        // What the method is told is read first; what is not as it was written is made again, as long as that helps.
+        let lost = match way.summary.interrupted {
+            true => 0,
+            false => session.recheck(&|_| true, Depth::Records, observer.as_mut()),
+        };
+        if lost == 0 {
+            break;
+        }
+        if round == ROUNDS {
+            let text =
+                "damaged each time it was read: look after the disk and the memory of this machine";
+            return Err(Stop::new(exit::DAMAGED, text));
+        }
+    }
+    way.take(&session);
+    Ok(session)
+}
+
+impl Way {
+    /// Counts what the store has already.
+    fn count(&mut self, session: &Session<'_>) {
+        let before = self.seen.len();
+        self.take(session);
+        self.summary.cached += self.seen.len() - before;
+    }
+
+    /// Takes up what artifacts took, each once.
+    fn take(&mut self, session: &Session<'_>) {
+        for instance in session.core.instances() {
+            if let (State::Done { .. }, Some(key)) = (&instance.state, instance.key)
+                && self.seen.insert(key)
+            {
+                let cost = cost_of(session, &key);
+                self.cpu_seconds += cost.map_or(0.0, |c| c.cpu_seconds);
+            }
+        }
+    }
+}
