@@ -217,7 +217,7 @@ const SPAN: usize = 64;
 const GENTLY: f64 = 0.3;
 
 /// Steps for which a slave that is to be caught sleeps at least: almost all of them never touch, and in so few steps none gets far.
-const LATE: u64 = 12;
+const LATE: u64 = 6;
 
 /// A run of [`SPAN`] slaves.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
