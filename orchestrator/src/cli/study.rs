@@ -118,6 +118,9 @@ impl<'s> Table<'s> {
                 let whole = known[&point.steps[r.step]] == Fate::Done;
                 whole.then(|| response(r, ids, &records)).flatten()
             };
+            // What other steps of a failed point had come to when it failed is chance, and a search does not go on with them.
+            let told = study.optimisation.is_none() || !matches!(status, Status::Failed { .. });
+            let value = |r: &StudyResponse| told.then(|| value(r)).flatten();
             let keys = |step: &usize| {
                 let ids = by_step[point.steps[*step]].iter();
                 let keys = ids.filter_map(|id| session.core.instances()[*id].key);
