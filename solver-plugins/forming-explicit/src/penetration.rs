@@ -200,7 +200,9 @@ impl Forming {
                 judge(&c.name, 0.0, touching)
             }
         });
-        let sheets = m.sheet_contacts.iter().map(|c| {
+        // What catches lets in on purpose, by another depth at each place. How deep plies are in each other the watch tells.
+        let holding = m.sheet_contacts.iter().filter(|c| c.let_in.is_none());
+        let sheets = holding.map(|c| {
             let touching = c.items.iter().filter(|i| i.active);
             between(&c.name, c.offset, touching.map(deep).collect())
         });
