@@ -1,14 +1,16 @@
 //! Opens what most commands need: the plugins, the workflow, the store.
 
 use super::args::{Places, Workflow};
+use super::clean::locked;
 use super::{Stop, trust};
 use crate::engine::core::{Limits, State};
 use crate::engine::{Options, Session};
 use crate::exit;
 use crate::plan::{Graph, recipes};
 use crate::progress::Quiet;
-use crate::store::{Store, resolved};
+use crate::store::{Lock, Store, resolved};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::text::one_line;
 use plyflow_plugin_host::{Describer, PluginCatalog};
 use plyflow_workflow::Part;
 use plyflow_workflow::resolved::ResolvedWorkflow;
@@ -265,6 +267,20 @@ fn overrides(set: &[String]) -> Result<Vec<plyflow_workflow::Override>, Stop> {
 }
 
 impl Opened {
+    /// Locks of a run: of the store, which others may run in too, and of this workflow, which only one may run. Held until they are dropped.
+    ///
+    /// # Errors
+    /// [`exit::LOCKED`] when the workflow runs already, or the store is being cleaned.
+    pub fn lock(&self) -> Result<[Lock; 2], Stop> {
+        let store = format!("the store {}", self.store.root());
+        let workflow = format!("the workflow '{}'", one_line(&self.workflow.name));
+        let folder = self.store.run(&self.workflow.name);
+        Ok([
+            Lock::shared(&self.store.lock(), &store).map_err(locked)?,
+            Lock::exclusive(&folder.lock(), &workflow).map_err(locked)?,
+        ])
+    }
+
     /// A session that has looked at the store and will not run anything.
     ///
     /// # Errors

@@ -1,7 +1,6 @@
 //! `run`.
 
 use super::args::{LogFormat, RunArgs};
-use super::clean::locked;
 use super::open::{Opened, cores, open, store_root};
 use super::report;
 use super::results::checked;
@@ -10,7 +9,7 @@ use crate::engine::core::{Instance, Limits, State};
 use crate::engine::{Depth, Failure, Local, Observer, Options, Session, Summary};
 use crate::exit;
 use crate::progress::{Bars, JsonLines, Lines, Quiet, duration_text};
-use crate::store::{Early, Lock, Store};
+use crate::store::{Early, Store};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::text::{one_line, shortened};
 use plyflow_model::units::parse_quantity_in;
@@ -111,14 +110,7 @@ pub fn run(args: &RunArgs) -> Done {
     }
     opened.restrict(&args.until)?;
     let options = options(args, &opened)?;
-    let folder = opened.store.run(&opened.workflow.name);
-    let _store = Lock::shared(
-        &opened.store.lock(),
-        &format!("the store {}", opened.store.root()),
-    )
-    .map_err(locked)?;
-    let what = format!("the workflow '{}'", one_line(&opened.workflow.name));
-    let _run = Lock::exclusive(&folder.lock(), &what).map_err(locked)?;
+    let _locks = opened.lock()?;
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
     let mut session = Session::new_after(
         &opened.workflow,

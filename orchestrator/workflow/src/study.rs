@@ -33,8 +33,8 @@ pub(crate) struct Family {
     pub names: Vec<String>,
     samples: Vec<(String, u32, u32)>,
     at_most_failures: Option<u32>,
-    /// By the place of the value.
-    templates: HashMap<(usize, usize), Template>,
+    /// By what is written there. A place names no value: all that is below an alias stands where the alias does.
+    templates: HashMap<String, Template>,
     /// Of an optimisation: what asks for points, and those that it has asked for.
     search: Option<optimise::Begun>,
 }
@@ -169,8 +169,7 @@ impl Family {
                     }
                     Ok(Some(template)) => {
                         used.extend(template.variables());
-                        let span = (node.span.start, node.span.end);
-                        self.templates.insert(span, template);
+                        self.templates.insert(text.clone(), template);
                     }
                     Err(e) => {
                         let span = within(source, node, text, &e.at);
@@ -195,7 +194,7 @@ impl Family {
 
     /// The variables below a node.
     fn used(&self, node: &Node, found: &mut BTreeSet<usize>) {
-        if let Some(t) = self.templates.get(&(node.span.start, node.span.end)) {
+        if let Some(t) = node.text().and_then(|text| self.templates.get(text)) {
             found.extend(t.variables());
         }
         node.items().iter().for_each(|n| self.used(n, found));
@@ -211,9 +210,8 @@ impl Family {
         values: &[Value],
         fail: &mut dyn FnMut(&Node, plyflow_study::ExpressionError),
     ) -> Node {
-        let at = (node.span.start, node.span.end);
         let kind = match &node.kind {
-            Kind::Text(_) => match self.templates.get(&at).map(|t| t.written(values)) {
+            Kind::Text(text) => match self.templates.get(text).map(|t| t.written(values)) {
                 Some(Ok(Written::Integer(n))) => Kind::Number(n.into()),
                 Some(Ok(Written::Decimal(n))) => match serde_json::Number::from_f64(n) {
                     Some(n) => Kind::Number(n),

@@ -91,6 +91,35 @@ fn steps_are_there_once_for_every_value_that_they_depend_on() {
     assert_eq!((of("comparison@"), of("coarse")), (2 * 3, 1));
 }
 
+/// All that an alias stands for has the place of the alias.
+#[test]
+fn values_behind_an_alias_are_those_of_what_it_stands_for() {
+    let block = "  vary:\n    angle: [0 deg, 45 deg]\n    mu: [0.1]";
+    let set = "scene: &whole {file: scene.yaml, set: {sheets.ply-1.fibre_1: \"-45 deg + ${angle}\", sheets.ply-1.fibre_2: \"45 deg + ${angle}\", friction.fabric_diaphragm: \"${mu}\"}}\n      element: m4";
+    let study = with(block, &[("scene: scene.yaml\n      element: m4", set)]);
+    assert!(
+        study.mutate(
+            W,
+            "{scene: scene.yaml, element: rf4}",
+            "{scene: *whole, element: rf4}"
+        ) > 0
+    );
+    let w = load(&study);
+    let [coarse, local] = ["coarse", "local"].map(|name| {
+        let of = |s: &&ResolvedStep| s.name.starts_with(&format!("{name}@angle=45deg,mu=0.1"));
+        let found = w.steps.iter().find(of);
+        &found
+            .unwrap_or_else(|| panic!("{:?}", names(&w)))
+            .parameters["scene"]
+    });
+    assert_eq!(
+        coarse["sheets"][1]["fibre_2"],
+        json!(format!("{} rad", 90f64.to_radians()))
+    );
+    assert_eq!(coarse["friction"]["fabric_diaphragm"], json!(0.1));
+    assert_eq!(coarse, local);
+}
+
 #[test]
 fn a_regions_sizes_and_coefficients_are_changed_by_path() {
     let at = "scene: {file: scene.yaml, set: {sheets.ply-1.regions.slick.rectangle.length: \"${length}\", sheets.ply-1.regions.slick.friction.upper-film: \"${mu}\"}}\n      element: m4";

@@ -7,9 +7,11 @@ mod agreement;
 mod compression;
 mod output;
 mod read;
+mod region;
 mod sections;
 mod slip;
 mod slipping;
+mod symmetry;
 
 use agreement::Agreement;
 use compression::Compression;
@@ -30,6 +32,7 @@ export_step!(DefectMeasurement);
 struct Parameters {
     compressed_below: f64,
     sections: Vec<Section>,
+    shear_regions: Vec<region::Asked>,
     scan: Option<String>,
     scan_unit: Option<f64>,
     scan_offset: Option<f64>,
@@ -107,6 +110,7 @@ impl Step for DefectMeasurement {
         let limits: Limits = host.parameters()?;
         let p: Parameters = host.parameters()?;
         let asked: Asked = host.parameters()?;
+        region::check(&p.shear_regions)?;
         let corners = p.sections.iter().map(Section::corners);
         let sections = corners.collect::<Result<Vec<_>, _>>()?;
         let phase = |phase, fraction| {
@@ -167,8 +171,10 @@ impl Step for DefectMeasurement {
         let slipping = Slipping::of(host, &measured, &asked)?;
         let mut output = Output::new(host, &run, &measured, agreement.as_ref());
         output.slipping = slipping;
+        output.axis = asked.direction();
         output.bodies()?;
         output.compression(Compression::of(&measured, p.compressed_below))?;
+        output.regions(region::Regions::of(&measured, &p.shear_regions)?)?;
         output.distances()?;
         for (section, path) in p.sections.iter().zip(&sections) {
             output.section(&section.label, path, section.on, &beside)?;
@@ -180,4 +186,27 @@ impl Step for DefectMeasurement {
 
 fn everywhere(ply: &Ply, settings: &Settings) -> Vec<Defect> {
     measure(ply, &vec![true; ply.formed.len()], settings)
+}
+
+/// Names are parts of results' names, and what they name is told apart by them.
+fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Result<(), StepError> {
+    let mut seen: Vec<&str> = Vec::new();
+    for (k, name) in names.enumerate() {
+        let begins = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+        let goes_on = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        if !begins || !name.chars().all(goes_on) {
+            return Err(format!(
+                "{what}[{k}].name: '{name}' cannot be a part of a result's name; expected letters, digits, _ and -, the first a letter, such as A-A"
+            )
+            .into());
+        }
+        if seen.contains(&name) {
+            return Err(format!(
+                "{what}[{k}].name: there is another one '{name}'; give each a name of its own"
+            )
+            .into());
+        }
+        seen.push(name);
+    }
+    Ok(())
 }

@@ -3,14 +3,18 @@
 use crate::agreement::{self, Agreement};
 use crate::compression::{self, Compression};
 use crate::read::{Beside, Run};
+use crate::region::Regions;
 use crate::sections::{Section, Sheet};
 use crate::slipping::Slipping;
+use crate::symmetry::Crests;
 use crate::{Measured, Seen};
 use plyflow_defects::align::Alignment;
 use plyflow_defects::{Defect, Kind, RidgeShear};
 use plyflow_sdk::{Host, Log, On, StepError};
 use plyflow_surface::{SHARP, bin_width, density, weighted_mean, weighted_quantiles};
+use serde::Deserialize;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 
 /// Columns of the table of defects: label, SI unit.
 const COLUMNS: [(&str, &str); 15] = [
@@ -55,6 +59,13 @@ const QUANTILES: [(&str, f64); 4] = [("q50", 0.5), ("q90", 0.9), ("q99", 0.99), 
 /// Fields of the strains along both families of fibres.
 const STRAINS: [&str; 2] = ["fibre_strain_1", "fibre_strain_2"];
 
+/// What is read of a measurement that this one is held against.
+#[derive(Deserialize)]
+struct Other {
+    /// As [`wrinkles`] has them.
+    uppermost: BTreeMap<String, f64>,
+}
+
 /// Writes what was measured.
 pub struct Output<'a> {
     host: &'a Host,
@@ -64,6 +75,9 @@ pub struct Output<'a> {
     plots: Vec<Value>,
     sections: Vec<Value>,
     compression: Option<Compression>,
+    regions: Option<Regions>,
+    /// Direction from which those of crests are told, from x (rad).
+    pub axis: f64,
     /// Between plies, where there are several.
     pub slipping: Option<Slipping>,
 }
@@ -84,6 +98,8 @@ impl<'a> Output<'a> {
             plots: Vec::new(),
             sections: Vec::new(),
             compression: None,
+            regions: None,
+            axis: 0.0,
             slipping: None,
         }
     }
@@ -188,6 +204,13 @@ impl<'a> Output<'a> {
         Ok(())
     }
 
+    /// Results of the shear in regions.
+    pub fn regions(&mut self, found: Regions) -> Result<(), StepError> {
+        found.report(self.host)?;
+        self.regions = Some(found);
+        Ok(())
+    }
+
     /// Cuts tool, plies, scan and the plies of runs beside along a path (x, y in m).
     pub fn section(
         &mut self,
@@ -286,7 +309,13 @@ impl<'a> Output<'a> {
         host.result("wrinkle_count", count(Kind::Wrinkle), "1")?;
         host.result("bridging_count", count(Kind::Bridging), "1")?;
         if let Some(uppermost) = simulated().next_back() {
-            for (what, unit, value) in wrinkles(uppermost) {
+            let told = wrinkles(uppermost);
+            for (what, unit, value) in told {
+                host.result(&format!("uppermost_{what}"), value, unit)?;
+            }
+            self.changes(&told)?;
+            let crests = Crests::of(uppermost, self.axis);
+            for (what, unit, value) in crests.iter().flat_map(Crests::told) {
                 host.result(&format!("uppermost_{what}"), value, unit)?;
             }
         }
@@ -324,6 +353,13 @@ impl<'a> Output<'a> {
             json!({"ply": a.ply, "defects": list})
         });
         tables.extend(self.compression.as_ref().map(Compression::table));
+        tables.extend(self.regions.as_ref().and_then(Regions::table));
+        let uppermost: BTreeMap<&str, f64> = simulated()
+            .next_back()
+            .iter()
+            .flat_map(|m| wrinkles(m))
+            .map(|(what, _, value)| (what, value))
+            .collect();
         let slipping = self.slipping.as_ref();
         tables.extend(slipping.iter().flat_map(|s| s.tables()));
         let plots: Vec<Value> = self
@@ -335,8 +371,24 @@ impl<'a> Output<'a> {
         host.write_attributes(&json!({
             "defects": list, "sections": self.sections, "plots": plots, "maps": self.maps(),
             "alignment": alignment.map(alignment_json), "agreement": agreement, "tables": tables,
-            "fibre_compression": self.compression, "slip": slipping.map(Slipping::told),
+            "fibre_compression": self.compression, "uppermost": uppermost, "slip": slipping.map(Slipping::told),
         }))
+    }
+
+    /// Results of how much longer and higher the wrinkles of the uppermost ply are than in the measurement `against`: shares of what that one has, none
+    /// for what is 0 there.
+    fn changes(&self, now: &[(&'static str, &'static str, f64)]) -> Result<(), StepError> {
+        for input in self.host.inputs_of("against")? {
+            let other: Other = self.host.attributes(&input)?;
+            for (what, unit, value) in now {
+                let before = other.uppermost.get(*what).copied().unwrap_or(0.0);
+                if *unit == "m" && before > 0.0 {
+                    let name = format!("uppermost_{what}_change");
+                    self.host.result(&name, value / before - 1.0, "1")?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Maps of plies and scan.

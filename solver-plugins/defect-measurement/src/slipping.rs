@@ -1,7 +1,7 @@
 //! Slip in the artifact: fields, sections, results.
 
-use crate::Measured;
 use crate::slip::{Course, Faces, Line, Slip, course, mirrored, size};
+use crate::{Measured, check_names};
 use plyflow_defects::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_sdk::{Host, Log, On, StepError};
@@ -61,6 +61,11 @@ pub struct Slipping {
 }
 
 impl Asked {
+    /// Direction along which slip is told, from x (rad).
+    pub fn direction(&self) -> f64 {
+        self.slip_direction
+    }
+
     fn line(&self, section: &AskedSection, faces: &Faces<'_>) -> Result<Line, StepError> {
         let middle = <[f64; 2]>::try_from(&section.at[..])
             .map_err(|_| "slip_sections: `at` is a place [x, y]")?;
@@ -84,26 +89,11 @@ impl Asked {
         })
     }
 
-    /// Names are parts of results' names, and told apart by them.
     fn check(&self) -> Result<(), StepError> {
-        for (k, section) in self.slip_sections.iter().enumerate() {
-            let name = &section.name;
-            let begins = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
-            if !begins
-                || !name
-                    .chars()
-                    .all(|c| c.is_ascii_alphanumeric() || "_-".contains(c))
-            {
-                return Err(format!(
-                    "slip_sections[{k}].name: '{name}' cannot be a part of a result's name; expected letters, digits, _ and -, the first a letter, such as A-A"
-                )
-                .into());
-            }
-            if self.slip_sections[..k].iter().any(|s| s.name == *name) {
-                return Err(format!("slip_sections[{k}].name: there is another section '{name}'; give each a name of its own").into());
-            }
-        }
-        Ok(())
+        check_names(
+            "slip_sections",
+            self.slip_sections.iter().map(|s| s.name.as_str()),
+        )
     }
 }
 

@@ -300,7 +300,7 @@ fn what_is_wrong_with_a_slip_section_is_told() {
         ),
         (
             refused(&two, json!([section("A", 0.0), section("A", 0.01)]), 1e-3),
-            "another section 'A'",
+            "another one 'A'",
         ),
         (
             refused(&two, json!([section("A", 0.0)]), 1e-9),

@@ -396,3 +396,114 @@ fn fibre_compression_is_the_flat_area_below_the_threshold_with_its_mean_and_leas
             .contains("no fibre compression")
     );
 }
+
+/// The wrinkle of the upper ply goes along x through (-35, 0) mm, 60 mm long and 14 mm wide; everywhere the shear is 0.1 rad, but in a place on it
+/// and in one beside it.
+#[test]
+fn shear_of_a_region_is_told_outside_of_wrinkles() {
+    let mut formed = formed();
+    let at = |x: f64, y: f64| {
+        let index = |v: f64, from: f64| ((v - from) / H) as usize;
+        index(y, -0.050) * N[0] + index(x, -0.080)
+    };
+    let shear = |a: &mut MemoryArtifact, ply: usize, cell: usize, value: f64| {
+        a.bodies[ply].fields[0][0].values[cell] = value;
+    };
+    shear(&mut formed, 2, at(-0.035, 0.0006), 0.5);
+    shear(&mut formed, 2, at(-0.035, 0.0206), -0.2);
+    shear(&mut formed, 1, at(-0.035, 0.0006), 0.3);
+    let region = |name: &str, at: [f64; 2], size: [f64; 2]| json!({"name": name, "at": at, "length": size[0], "width": size[1]});
+    let ask = |regions: Value| {
+        let parameters = json!({"shear_regions": regions});
+        run::<DefectMeasurement>(parameters, &[MemoryInput::new("formed", &formed)], &[])
+    };
+    let out = ask(json!([
+        region("around", [-0.035, 0.0], [0.040, 0.060]),
+        region("far", [0.0, -0.040], [0.150, 0.010]),
+        region("crest", [-0.035, 0.0], [0.002, 0.002]),
+    ]))
+    .unwrap();
+    let told = |name: &str| out.result(name);
+    assert_eq!(told("region_shear_max.around.ply_2"), 0.2);
+    assert_eq!(told("region_shear_max.around.ply_1"), 0.3);
+    assert_eq!(told("region_shear_max.around"), 0.3);
+    assert_eq!(told("region_shear_q99.around"), 0.1);
+    let share = told("region_wrinkled_share.around.ply_2");
+    assert!((0.10..0.25).contains(&share), "{share}");
+    assert_eq!(told("region_wrinkled_share.around.ply_1"), 0.0);
+    assert_eq!(told("region_shear_max.far"), 0.1);
+    // All of it is in the wrinkle: nothing is told of this ply, and no zero.
+    assert_eq!(told("region_wrinkled_share.crest.ply_2"), 1.0);
+    assert!(!out.results.contains_key("region_shear_max.crest.ply_2"));
+    for (regions, says) in [
+        (
+            json!([region("away", [0.3, 0.0], [0.01, 0.01])]),
+            "no ply whose shear is known has an element there",
+        ),
+        (
+            json!([region("a b", [0.0; 2], [0.1; 2])]),
+            "cannot be a part of a result's name",
+        ),
+        (
+            json!([
+                region("a", [0.0; 2], [0.1; 2]),
+                region("a", [0.0; 2], [0.1; 2])
+            ]),
+            "another one 'a'",
+        ),
+    ] {
+        let error = ask(regions).err().unwrap().to_string();
+        assert!(error.contains(says), "{error}");
+    }
+}
+
+#[test]
+fn the_direction_of_the_longest_crest_and_its_mirror_images_are_told() {
+    let out = measured(json!({}));
+    assert!(out.result("uppermost_wrinkle_direction").abs() < 0.02);
+    assert!(out.result("uppermost_wrinkle_obliquity") < 0.02);
+    // Along x through (-35, 0) mm: its own image about the length; the image with x turned round is 10 mm away at its nearer end, 70 mm at its middle.
+    assert!(out.result("uppermost_crest_image_y") < 0.001);
+    let ends = out.result("wrinkle_length.ply_2") / 2.0;
+    for image in ["x", "turn"] {
+        let found = out.result(&format!("uppermost_crest_image_{image}"));
+        assert!((found - (0.070 - ends)).abs() < 0.002, "{image}: {found}");
+    }
+    let across = measured(json!({"slip_direction": PI / 2.0}));
+    assert!((across.result("uppermost_wrinkle_direction").abs() - PI / 2.0).abs() < 0.02);
+    assert!(across.result("uppermost_wrinkle_obliquity") < 0.02);
+}
+
+/// A wrinkle that is half as high again, and one that a measurement without wrinkles is held against.
+#[test]
+fn the_growth_of_wrinkles_from_another_measurement_is_told() {
+    let before = measured(json!({}));
+    let mut higher = formed();
+    for p in &mut higher.bodies[2].frames[0] {
+        p[2] += 0.0015 * wrinkle(p[0], p[1]);
+    }
+    let against = |other: &MemoryArtifact| {
+        let inputs = [
+            MemoryInput::new("formed", &higher),
+            MemoryInput::new("against", other),
+        ];
+        run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap()
+    };
+    let out = against(&before);
+    let change = out.result("uppermost_wrinkle_amplitude_change");
+    assert!((change - 0.5).abs() < 0.01, "{change}");
+    let [now, then] = [&out, &before].map(|a| a.result("uppermost_wrinkle_length"));
+    assert!(now > then);
+    for name in [
+        "uppermost_wrinkle_length_change",
+        "uppermost_wrinkle_length_max_change",
+    ] {
+        assert!(
+            (out.result(name) - (now / then - 1.0)).abs() < 1e-12,
+            "{name}"
+        );
+    }
+    let none = measured(json!({"distance_threshold": 0.01}));
+    let out = against(&none);
+    assert!(!out.results.keys().any(|k| k.ends_with("_change")));
+}
