@@ -507,3 +507,84 @@ fn the_growth_of_wrinkles_from_another_measurement_is_told() {
     let out = against(&none);
     assert!(!out.results.keys().any(|k| k.ends_with("_change")));
 }
+
+/// The upper ply with this height over the tool and no other defect.
+fn shaped(height: impl Fn(f64, f64) -> f64) -> MemoryArtifact {
+    let mut run = formed();
+    for (p, flat) in run.bodies[2].frames[0].iter_mut().zip(flat()) {
+        p[2] = TOP + OFFSET + THICKNESS + height(flat[0], flat[1]);
+    }
+    run
+}
+
+/// 1 on a line of this length (half of it to either side) that ends over 10 mm at both ends, at this place along it and beside it.
+fn crest(along: f64, beside: f64, half: f64) -> f64 {
+    bump(beside, 0.007) * bump((along.abs() - half).max(0.0), 0.010)
+}
+
+#[test]
+fn crests_that_meet_in_a_corner_or_a_tee_are_two_wrinkles_and_one_that_bends_is_one() {
+    // One along x from (-60, -20) to (0, -20) mm, one from there along y to (0, 30) mm.
+    let corner = shaped(|x, y| {
+        let first = crest(x + 0.030, y + 0.020, 0.030);
+        0.003 * first.max(crest(y - 0.005, x, 0.025))
+    });
+    let measure = |run_: &MemoryArtifact, parameters: Value| {
+        run::<DefectMeasurement>(parameters, &[MemoryInput::new("formed", run_)], &[]).unwrap()
+    };
+    let out = measure(&corner, json!({}));
+    assert_eq!(out.result("uppermost_wrinkle_count"), 2.0);
+    let list = out.attributes["defects"].as_array().unwrap();
+    let told: Vec<[f64; 2]> = list
+        .iter()
+        .filter(|d| d["type"] == "wrinkle")
+        .map(|d| ["length", "direction"].map(|k| d[k].as_f64().unwrap()))
+        .collect();
+    // Each goes on past its straight part to where it stands off by less than 1 mm, 6.1 mm further out: 10 mm / pi * acos(-1/3).
+    let past = 0.010 / PI * (-1f64 / 3.0).acos();
+    for (found, (length, direction)) in told.iter().zip([(0.060, 0.0), (0.050, PI / 2.0)]) {
+        assert!((found[0] - (length + past)).abs() < 0.003, "{told:?}");
+        assert!((found[1].abs() - direction).abs() < 0.1, "{told:?}");
+    }
+    let whole: f64 = told.iter().map(|t| t[0]).sum();
+    assert!((out.result("uppermost_wrinkle_length") - whole).abs() < 1e-12);
+    // The longer one alone.
+    let main = measure(&corner, json!({"minimum_wrinkle_length": 0.060}));
+    assert_eq!(main.result("uppermost_wrinkle_count"), 1.0);
+    assert_eq!(main.result("uppermost_wrinkle_length"), told[0][0]);
+
+    // From the middle of a crest of 100 mm, 30 mm long: a tee.
+    let tee = shaped(|x, y| {
+        let first = crest(x, y + 0.020, 0.050);
+        0.003 * first.max(crest(y + 0.005, x, 0.015))
+    });
+    let out = measure(&tee, json!({}));
+    for d in out.attributes["defects"].as_array().unwrap() {
+        eprintln!(
+            "DBG {} {} {} {}",
+            d["type"], d["length"], d["direction"], d["centre"]
+        );
+    }
+    assert_eq!(out.result("uppermost_wrinkle_count"), 2.0);
+    let longest = out.result("uppermost_wrinkle_length_max");
+    assert!((longest - (0.100 + 2.0 * past)).abs() < 0.003, "{longest}");
+    // It begins beside the other one.
+    let branch = out.result("uppermost_wrinkle_length") - longest;
+    assert!((branch - (0.030 + past)).abs() < 0.006, "{branch}");
+    let direction = out.attributes["defects"][1]["direction"].as_f64().unwrap();
+    assert!((direction.abs() - PI / 2.0).abs() < 0.1, "{direction}");
+
+    // A quarter of a circle of 40 mm.
+    let arc = shaped(|x, y| {
+        let (x, y) = (x + 0.020, y + 0.020);
+        let along = 0.040 * (y.atan2(x) - PI / 4.0);
+        0.003 * crest(along, x.hypot(y) - 0.040, 0.040 * PI / 4.0)
+    });
+    let out = measure(&arc, json!({}));
+    assert_eq!(out.result("uppermost_wrinkle_count"), 1.0);
+    let length = out.result("uppermost_wrinkle_length");
+    assert!(
+        (length - (0.040 * PI / 2.0 + 2.0 * past)).abs() < 0.004,
+        "{length}"
+    );
+}

@@ -7,6 +7,7 @@
 pub mod align;
 mod area;
 mod cause;
+mod crests;
 mod fields;
 mod measure;
 #[cfg(feature = "steps")]

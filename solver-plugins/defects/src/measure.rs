@@ -2,6 +2,7 @@
 
 use crate::area::{Extent, NONE, extents, sample};
 use crate::cause::Cause;
+use crate::crests::crests;
 use plyflow_fixed::FixedBits;
 use plyflow_surface::vector::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{
@@ -240,7 +241,8 @@ impl Defect {
 /// as a crest is (its most negative principal curvature: in a bend of the tool that is hollow along the crest the other one may be the larger),
 /// beyond the tool's own there by more than `crest_hold` of the curvature threshold, at one of them at least by more than all of it (thresholds with
 /// hysteresis, Canny 1986: a crest whose curvature wavers about one threshold would fall to pieces), with single nodes between
-/// two such pieces where the ply is convex as well; its length is that of its ridge. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
+/// two such pieces where the ply is convex as well; its length is that of its ridge. A crest that turns a corner (60 degrees in the flat ply, over 10 mm to either side)
+/// is one wrinkle up to the corner and another one from it, and so is what branches off from a crest. Its flanks belong to it as far as half a wave of the sinusoid with its amplitude and
 /// curvature reaches along the surface, however steep it is. What else stands off the tool
 /// is bridging.
 pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
@@ -271,11 +273,16 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
             .iter()
             .map(|&i| -limit(i as usize, hold))
             .fold(f64::INFINITY, f64::min);
-        let (topology, formed) = (&ply.topology, &ply.formed);
-        let ridge = ridge_line(topology, formed, &crested, &nodes, bound, &margin);
-        if let Some(ridge) = ridge.filter(|r| r.length >= settings.minimum_wrinkle_length) {
-            wrinkles.push((nodes, ridge));
-        }
+        let long = |r: &Ridge| r.length >= settings.minimum_wrinkle_length;
+        let ridge_of = |nodes: &[u32]| {
+            let (topology, formed) = (&ply.topology, &ply.formed);
+            let ridge = ridge_line(topology, formed, &crested, nodes, bound, &margin);
+            ridge.filter(|r| long(r) && nodes.iter().any(beyond))
+        };
+        // What is curved as a crest reaches at most to half of the flank.
+        let beside = 0.6 * flank(highest_node(ply, &nodes), curvature(&crested, &nodes));
+        let parts = crests(ply, &nodes, beside, ridge_of);
+        wrinkles.extend(parts.into_iter().filter(|(_, r)| long(r)));
     }
     let mut set = vec![NONE; n];
     let mut nearest = vec![f64::INFINITY; n];
