@@ -4,7 +4,7 @@
 use crate::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_surface::Ridge;
-use plyflow_surface::vector::distance;
+use plyflow_surface::vector::{distance, dot, norm, sub};
 
 /// Turn of a crest in the flat ply (rad) that is a corner: more than the 45 degrees by which a line over a mesh's sides and diagonals may turn.
 const CORNER: f64 = std::f64::consts::FRAC_PI_3;
@@ -15,11 +15,14 @@ const REACH: f64 = 0.010;
 /// .. or over so many distances of nodes, on coarser meshes.
 const NODES: f64 = 2.5;
 
+/// Cosine of the least angle at which a branch leaves a crest (45 degrees).
+const LEAVES: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// Nodes of a crest, with its ridge.
 pub type Crest = (Vec<u32>, Ridge);
 
 /// The crests of a connected place (nodes): its ridge, parted at its corners, and those of its branches, of branches of these, and so on. `ridge_of` gives the ridge of nodes that are
-/// connected, `None` for what has none that counts. What lies nearer to a ridge than `beside` (m), along the surface, is its flank and no branch. Every node goes to the crest that is nearest over the place.
+/// connected, `None` for what has none that counts. What lies nearer to a ridge than `beside` (m), along the surface, is its flank and no branch, nor is what goes on beside it. Every node goes to the crest that is nearest over the place.
 pub fn crests(
     ply: &Ply,
     nodes: &[u32],
@@ -41,8 +44,8 @@ pub fn crests(
         let Some(mut ridge) = ridge_of(&region) else {
             continue;
         };
-        if let Some(parent) = parent {
-            join(ply, &mut ridge, &parent, beside);
+        if parent.is_some_and(|p: Ridge| !joined(ply, &mut ridge, &p, beside)) {
+            continue;
         }
         let mut rest = mask(&region);
         let away = lengths(&ridge.nodes, &whole);
@@ -75,28 +78,48 @@ fn reach(ridge: &Ridge) -> f64 {
     REACH.max(NODES * ridge.length / ridge.nodes.len() as f64)
 }
 
-/// Lets a branch begin at the ridge that it leaves, where that is not further than twice what counts as its flank.
-fn join(ply: &Ply, branch: &mut Ridge, parent: &Ridge, beside: f64) {
-    let from = |end: u32| {
+/// Lets a branch begin at the ridge that it leaves, where that is not further than twice what counts as its flank. False of one that goes on beside the ridge
+/// (less than [`LEAVES`] from its direction): a fold that widens to two crests is one.
+fn joined(ply: &Ply, branch: &mut Ridge, parent: &Ridge, beside: f64) -> bool {
+    let nearest = |end: u32| {
         let p = ply.formed[end as usize];
-        let places = parent.nodes.iter().map(|&i| ply.formed[i as usize]);
-        places
-            .map(|q| (distance(p, q), q))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
+        let apart = |i: &u32| distance(p, ply.formed[*i as usize]);
+        let places = parent.nodes.iter().map(apart).enumerate();
+        places.min_by(|a, b| a.1.total_cmp(&b.1))
     };
     let last = branch.nodes.len() - 1;
-    let ends = [
-        (0, branch.nodes[0]),
-        (branch.points.len() - 1, branch.nodes[last]),
-    ];
-    let nearest = ends
-        .into_iter()
-        .filter_map(|(tip, end)| from(end).map(|(d, q)| (d, tip, q)))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((_, tip, q)) = nearest.filter(|n| n.0 <= 2.0 * beside.max(reach(parent))) {
-        branch.points[tip] = q;
-        branch.length = branch.points.windows(2).map(|w| distance(w[0], w[1])).sum();
+    let ends = [0, last].map(|k| nearest(branch.nodes[k]).map(|(at, d)| (d, k, at)));
+    let Some((_, end, at)) = (ends.into_iter().flatten())
+        .filter(|n| n.0 <= 2.0 * beside.max(reach(parent)))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+    else {
+        return true;
+    };
+    // Ways in the flat ply: of the branch from its end on, of the other one around the nearest place.
+    let place = |i: u32| ply.undeformed[i as usize];
+    let reach = reach(parent);
+    let far = |i: &u32, from: u32| distance(place(*i), place(from)) >= reach;
+    let (own, theirs) = (&branch.nodes, parent.nodes[at]);
+    let (begin, goal) = (own[end], own[last - end]);
+    let mut onwards = own.iter().copied();
+    let ahead = if end == 0 {
+        onwards.find(|i| far(i, begin))
+    } else {
+        onwards.rev().find(|i| far(i, begin))
+    };
+    let mut before = parent.nodes[..at].iter().rev().copied();
+    let mut after = parent.nodes[at..].iter().copied();
+    let before = before.find(|i| far(i, theirs)).unwrap_or(theirs);
+    let after = after.find(|i| far(i, theirs)).unwrap_or(theirs);
+    let along = sub(place(after), place(before));
+    let way = sub(place(ahead.unwrap_or(goal)), place(begin));
+    if dot(along, way).abs() > LEAVES * norm(along) * norm(way) {
+        return false;
     }
+    let tip = if end == 0 { 0 } else { branch.points.len() - 1 };
+    branch.points[tip] = ply.formed[parent.nodes[at] as usize];
+    branch.length = branch.points.windows(2).map(|w| distance(w[0], w[1])).sum();
+    true
 }
 
 /// A ridge from its node `a` to its node `b`. Its line has a tip beyond either of its end nodes, which parts in its middle have not.
