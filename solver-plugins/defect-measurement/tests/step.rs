@@ -559,16 +559,10 @@ fn crests_that_meet_in_a_corner_or_a_tee_are_two_wrinkles_and_one_that_bends_is_
         0.003 * first.max(crest(y + 0.005, x, 0.015))
     });
     let out = measure(&tee, json!({}));
-    for d in out.attributes["defects"].as_array().unwrap() {
-        eprintln!(
-            "DBG {} {} {} {}",
-            d["type"], d["length"], d["direction"], d["centre"]
-        );
-    }
     assert_eq!(out.result("uppermost_wrinkle_count"), 2.0);
     let longest = out.result("uppermost_wrinkle_length_max");
     assert!((longest - (0.100 + 2.0 * past)).abs() < 0.003, "{longest}");
-    // It begins beside the other one.
+    // It begins at the crest that it leaves.
     let branch = out.result("uppermost_wrinkle_length") - longest;
     assert!((branch - (0.030 + past)).abs() < 0.006, "{branch}");
     let direction = out.attributes["defects"][1]["direction"].as_f64().unwrap();
