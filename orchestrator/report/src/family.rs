@@ -51,16 +51,28 @@ pub enum Value {
 }
 
 /// A response.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Response {
     /// Name.
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Step of the file that reports it.
-    pub step: String,
-    /// Its name there.
-    pub result: String,
+    /// Where it comes from.
+    pub from: Origin,
+}
+
+/// Where a response comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Origin {
+    /// A result of a step of the file.
+    Step {
+        /// The step.
+        step: String,
+        /// Its name there.
+        result: String,
+    },
+    /// What is computed from the variables, as written.
+    Variables(String),
 }
 
 /// A sample: how the points were chosen.

@@ -31,7 +31,7 @@ mod units;
 mod verdict;
 mod view;
 
-pub use family::{Family, Fate, Point, Response, Sampled, Value, Variable};
+pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable};
 pub use fidelity::{COUNTS, Measure, Way, Ways, ways};
 pub use input::{Expectation, Instance, ReportInput, Verdict};
 pub use summary::summary;

@@ -13,7 +13,7 @@ use plyflow_model::units::si_number;
 use plyflow_model::workflow::{FamilyOf, ResponseOf};
 use plyflow_study::{Found, judge, marks};
 use plyflow_workflow::resolved::{
-    Expectation, FamilyExpectation, Study, StudyPoint, StudyResponse, StudyValue,
+    Expectation, FamilyExpectation, ResponseFrom, Study, StudyPoint, StudyResponse, StudyValue,
 };
 use serde_json::{Value, json};
 use std::collections::{BTreeSet, HashMap};
@@ -88,8 +88,8 @@ impl<'s> Table<'s> {
         let study = session.workflow.study.as_ref().expect("a study");
         let mut steps: Vec<usize> = Vec::new();
         for response in &study.responses {
-            if !steps.contains(&response.step) {
-                steps.push(response.step);
+            if let Some(step) = response.step().filter(|s| !steps.contains(s)) {
+                steps.push(step);
             }
         }
         let records: HashMap<Id, &Record> = records.iter().map(|(id, r)| (*id, r)).collect();
@@ -105,7 +105,7 @@ impl<'s> Table<'s> {
             });
         }
         let mut known: HashMap<usize, Fate> = HashMap::new();
-        let lines = study.points.iter().map(|point| {
+        let lines = study.points.iter().enumerate().map(|(at, point)| {
             let fates: Vec<usize> = point.steps.clone();
             for step in &fates {
                 known
@@ -113,10 +113,17 @@ impl<'s> Table<'s> {
                     .or_insert_with(|| Fate::of(session, *step, &by_step[*step]));
             }
             let status = status(fates.iter().map(|s| &known[s]));
-            let value = |r: &StudyResponse| {
-                let ids = &by_step[point.steps[r.step]];
-                let whole = known[&point.steps[r.step]] == Fate::Done;
-                whole.then(|| response(r, ids, &records)).flatten()
+            let is_done = matches!(status, Status::Done);
+            let value = |r: &StudyResponse| match &r.from {
+                ResponseFrom::Step { step, result, of } => {
+                    let step = point.steps[*step];
+                    let whole = known[&step] == Fate::Done;
+                    whole
+                        .then(|| response(result, *of, &by_step[step], &records))
+                        .flatten()
+                }
+                // A point that has not run, or has failed, has no row of numbers: nobody is to think that it has.
+                ResponseFrom::Variables { values, .. } => is_done.then(|| values[at]),
             };
             // What other steps of a failed point had come to when it failed is chance, and a search does not go on with them.
             let told = study.optimisation.is_none() || !matches!(status, Status::Failed { .. });
@@ -200,16 +207,22 @@ fn status<'f>(fates: impl Iterator<Item = &'f Fate>) -> Status {
     all
 }
 
-fn response(r: &StudyResponse, ids: &[Id], records: &HashMap<Id, &Record>) -> Option<f64> {
+/// `result` of the items of a step, and what is taken `of` them.
+fn response(
+    result: &str,
+    of: Option<ResponseOf>,
+    ids: &[Id],
+    records: &HashMap<Id, &Record>,
+) -> Option<f64> {
     let mut values = Vec::with_capacity(ids.len());
     for id in ids {
         let results = &records.get(id)?.results;
         // What depends on the machine has no place in a table that is the same on every one.
-        let found = results.iter().find(|n| n.name == r.result && !n.measured)?;
+        let found = results.iter().find(|n| n.name == result && !n.measured)?;
         values.push(found.value);
     }
     let sum = || values.iter().sum::<f64>();
-    match r.of {
+    match of {
         None => values.first().copied().filter(|_| values.len() == 1),
         Some(ResponseOf::Sum) => Some(sum()),
         _ if values.is_empty() => None,
@@ -251,9 +264,12 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
     // What `--until` leaves out is not expected either.
     let graph = session.core.graph();
     let wanted = |e: &&FamilyExpectation| {
-        let step = study.responses[e.response].step;
+        let step = study.responses[e.response].step();
         let mut points = e.points.iter().map(|p| &study.points[*p as usize]);
-        points.all(|p| graph.steps[p.steps[step]].wanted)
+        points.all(|p| match step {
+            Some(step) => graph.steps[p.steps[step]].wanted,
+            None => p.steps.iter().all(|s| graph.steps[*s].wanted),
+        })
     };
     let all: Vec<&FamilyExpectation> = study.expectations.iter().filter(wanted).collect();
     if all.is_empty() {
@@ -579,8 +595,7 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
         .variables
         .iter()
         .map(|v| json!({"name": v.name, "unit": v.unit, "si_unit": v.si_unit}));
-    let responses = (study.responses.iter())
-        .map(|r| json!({"name": r.name, "step": study.steps[r.step], "result": r.result, "of": r.of, "unit": r.unit}));
+    let responses = (study.responses.iter()).map(|r| r.origin(&study.steps));
     let samples = study
         .samples
         .iter()

@@ -143,9 +143,7 @@ fn attributes(table: &Table<'_>, session: &Session<'_>) -> serde_json::Value {
     let variables = study.variables.iter().enumerate().map(
         |(i, v)| json!({"name": v.name, "unit": v.unit, "si_unit": v.si_unit, "values": column(i)}),
     );
-    let responses = study.responses.iter().map(|r| {
-        json!({"name": r.name, "unit": r.unit, "step": study.steps[r.step], "result": r.result, "of": r.of})
-    });
+    let responses = study.responses.iter().map(|r| r.origin(&study.steps));
     let failures = table
         .lines
         .iter()

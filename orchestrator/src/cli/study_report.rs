@@ -11,9 +11,9 @@ use crate::exit;
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
 use plyflow_report::{
-    Family, Fate, Point, ReportInput, Response, Sampled, Value, Variable, write_report,
+    Family, Fate, Origin, Point, ReportInput, Response, Sampled, Value, Variable, write_report,
 };
-use plyflow_workflow::resolved::StudyValue;
+use plyflow_workflow::resolved::{ResponseFrom, StudyValue};
 
 /// Names of files keep this many characters of a point's name.
 const LONGEST: usize = 120;
@@ -107,8 +107,15 @@ pub fn family(
             .map(|r| Response {
                 name: r.name.clone(),
                 unit: r.unit.clone(),
-                step: study.steps[r.step].clone(),
-                result: r.result.clone(),
+                from: match &r.from {
+                    ResponseFrom::Step { step, result, .. } => Origin::Step {
+                        step: study.steps[*step].clone(),
+                        result: result.clone(),
+                    },
+                    ResponseFrom::Variables { expression, .. } => {
+                        Origin::Variables(expression.clone())
+                    }
+                },
             })
             .collect(),
         points: points.collect(),

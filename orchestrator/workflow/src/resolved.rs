@@ -276,14 +276,53 @@ pub struct StudyPoint {
 pub struct StudyResponse {
     /// Name.
     pub name: String,
-    /// Position of its step among the steps of the file.
-    pub step: usize,
-    /// Name of the step's result.
-    pub result: String,
     /// Its unit.
     pub unit: String,
-    /// What is taken of several items.
-    pub of: Option<ResponseOf>,
+    /// Where it comes from.
+    pub from: ResponseFrom,
+}
+
+/// Where the value of a response comes from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ResponseFrom {
+    /// A result of a step.
+    Step {
+        /// Position of the step among the steps of the file.
+        step: usize,
+        /// Name of the result.
+        result: String,
+        /// What is taken of several items.
+        of: Option<ResponseOf>,
+    },
+    /// The values of the variables.
+    Variables {
+        /// As written.
+        expression: String,
+        /// For each point (SI).
+        values: Vec<f64>,
+    },
+}
+
+impl StudyResponse {
+    /// Position of the step of the file that reports it, if one does.
+    pub fn step(&self) -> Option<usize> {
+        match self.from {
+            ResponseFrom::Step { step, .. } => Some(step),
+            ResponseFrom::Variables { .. } => None,
+        }
+    }
+
+    /// Where it comes from, for those who read a study's table: `step`, `result` and `of`, or `value`. `steps`: names of the steps of the file.
+    pub fn origin(&self, steps: &[String]) -> serde_json::Value {
+        match &self.from {
+            ResponseFrom::Step { step, result, of } => {
+                serde_json::json!({"name": self.name, "unit": self.unit, "step": steps[*step], "result": result, "of": of})
+            }
+            ResponseFrom::Variables { expression, .. } => {
+                serde_json::json!({"name": self.name, "unit": self.unit, "value": expression})
+            }
+        }
+    }
 }
 
 /// A stated expectation over the points of a study.

@@ -4,10 +4,62 @@ mod common;
 mod points;
 
 use common::Study;
-use plyflow_workflow::resolved::ResolvedWorkflow;
+use plyflow_workflow::resolved::{ResolvedWorkflow, ResponseFrom};
 use points::*;
 
 const RESPONSES: &str = "responses:\n  ratio: {step: coarse, result: kinetic_ratio}\n  length: {step: comparison, result: wrinkle_length}\nexpect:\n";
+
+#[test]
+fn a_response_may_be_computed_from_the_variables() {
+    let block = "  vary:\n    limit: {from: 4 deg, to: 8 deg, by: 2 deg}\n    d: [0.1, 0.2]";
+    let study = |response: &str| {
+        let all = format!(
+            "responses:\n  cost: {response}\nexpect:\n  - {{response: cost, of: max, maximum: 20 deg}}\n"
+        );
+        with(
+            block,
+            &[
+                LIMIT,
+                ("damping: 0.1", "damping: ${d}"),
+                ("expect:\n", &all),
+            ],
+        )
+    };
+    let w = load(&study("{value: limit * (1 + 10 * d)}"));
+    let asked = w.study.as_ref().unwrap();
+    let [cost] = &asked.responses[..] else {
+        panic!("{:?}", asked.responses)
+    };
+    let ResponseFrom::Variables { values, .. } = &cost.from else {
+        panic!("{cost:?}")
+    };
+    assert_eq!((cost.unit.as_str(), cost.step()), ("rad", None));
+    // 4, 6 and 8 deg, each with 0.1 and 0.2.
+    let degrees = [8.0, 12.0, 12.0, 18.0, 16.0, 24.0];
+    assert_eq!(values.len(), degrees.len());
+    for (value, degrees) in values.iter().zip(degrees) {
+        assert!(
+            (value - f64::to_radians(degrees)).abs() < 1e-15,
+            "{values:?}"
+        );
+    }
+    for (response, says) in [
+        ("{value: limits + d}", "did you mean `limit`"),
+        ("{value: limit + d}", "do not go together"),
+        ("{value: limit < 5 deg}", "is no number"),
+        (
+            "{value: limit, step: coarse, result: kinetic_ratio}",
+            "beside what is read from a step",
+        ),
+        ("{value: limit, of: max}", "beside what is read from a step"),
+        ("{step: coarse}", "no `result` of that step"),
+        ("{result: kinetic_ratio}", "no `step` that has that result"),
+        ("{}", "it comes from nowhere"),
+    ] {
+        let found = told(&study(response));
+        assert!(found.contains(says), "{response}: {found}");
+    }
+}
 
 #[test]
 fn expectations_over_a_study_are_read_with_their_units_and_points() {

@@ -101,6 +101,45 @@ fn a_failed_point_is_a_row_and_the_best_point_meets_what_must_hold() {
 }
 
 #[test]
+fn what_is_to_be_small_may_be_computed_from_the_variables() {
+    let block = with_budget(
+        "  subject_to: [s >= 4]\n  method: evolution\n  seed: 3\n",
+        40,
+    )
+    .replace("minimise: r", "minimise: area")
+    .replace("responses:\n", "responses:\n  area: {value: x * y}\n");
+    let study = Study::new(&block);
+    let end = study.run(&[]);
+    assert!(end.code == Some(0) && end.failed > 0, "{end:?}");
+    // x y is least on an edge, 0 at (0, 4); where x is above 3 points fail.
+    let best = &told(&study)["best"];
+    assert!(
+        (0.0..0.8).contains(&best["value"].as_f64().unwrap()),
+        "{best}"
+    );
+    let csv = table(&study).0;
+    assert!(csv.starts_with("point,x,y,area,r,s,"), "{csv}");
+    let number = |text: &str| -> f64 { text.parse().unwrap() };
+    let mut seen = [0, 0];
+    for line in csv.lines().skip(1) {
+        // A point's name has a comma and stands in quotes.
+        let row: Vec<&str> = line.split_once("\",").unwrap().1.split(',').collect();
+        if line.contains(",done,") {
+            assert!(
+                (number(row[2]) - number(row[0]) * number(row[1])).abs() <= 1e-12,
+                "{line}"
+            );
+            seen[0] += 1;
+        } else {
+            assert!(line.contains(",failed,"), "{line}");
+            assert_eq!(row[2], "", "a point that failed has no numbers: {line}");
+            seen[1] += 1;
+        }
+    }
+    assert!(seen.iter().all(|n| *n > 0), "{seen:?}");
+}
+
+#[test]
 fn the_simplex_goes_along_rosenbrock_s_valley_through_the_engine() {
     let study = Study::new(
         "

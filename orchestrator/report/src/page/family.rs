@@ -12,7 +12,7 @@ pub(super) use costs::section as costs;
 
 use crate::family::pictures::{MOST, Pictures};
 use crate::family::scale::Scale;
-use crate::family::{Family, Levels, Response};
+use crate::family::{Family, Levels, Origin, Response};
 use crate::input::ReportInput;
 use crate::units::{number, plural, quantity, shown};
 use maud::{Markup, html};
@@ -167,7 +167,10 @@ fn response(shown: &Shown<'_>, r: usize) -> Result<Markup, String> {
     let [low, high] = range_of(&values);
     Ok(html! {
         section class="response" data-response=(response.name) {
-            h3 { (response.titled()) " " span class="note" { (response.result) " of the step " code { (response.step) } } }
+            h3 { (response.titled()) " " span class="note" { @match &response.from {
+                Origin::Step { step, result } => { (result) " of the step " code { (step) } },
+                Origin::Variables(expression) => { "computed: " code { (expression) } },
+            } } }
             @if values.iter().all(Option::is_none) {
                 p { "No point has a value of it." }
             } @else {

@@ -4,7 +4,9 @@ use super::shapes::{HALF, wavy};
 use super::{Study, key};
 use camino::Utf8Path;
 use plyflow_artifact::On;
-use plyflow_report::{Family, Fate, Point, ReportInput, Response, Sampled, Value, Variable};
+use plyflow_report::{
+    Family, Fate, Origin, Point, ReportInput, Response, Sampled, Value, Variable,
+};
 use serde_json::json;
 
 /// What comes out at a point.
@@ -124,8 +126,10 @@ pub fn family(
             .map(|(n, u)| Response {
                 name: (*n).into(),
                 unit: (*u).into(),
-                step: "formed".into(),
-                result: format!("{n}_max"),
+                from: Origin::Step {
+                    step: "formed".into(),
+                    result: format!("{n}_max"),
+                },
             })
             .collect(),
         points,

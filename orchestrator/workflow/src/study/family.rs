@@ -29,7 +29,7 @@ impl<'a> Asked<'a> {
         problems: &mut Problems,
     ) -> Self {
         let responses =
-            super::responses::responses(root, &family.names, (drafts, wiring), source, problems);
+            super::responses::responses(root, family, (drafts, wiring), source, problems);
         let declared = root.get("responses").map_or(&[][..], Node::entries);
         Self {
             family,

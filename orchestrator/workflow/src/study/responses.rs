@@ -1,12 +1,14 @@
 //! `responses`: what is read from every point; and expectations on results of steps, at every point.
 
+use super::{Family, report, within};
 use crate::diagnostics::{Problems, Source};
 use crate::expect::declared;
 use crate::load::Draft;
-use crate::resolved::{Expectation, ResolvedStep, Study, StudyResponse};
+use crate::resolved::{Expectation, ResolvedStep, ResponseFrom, Study, StudyResponse};
 use crate::wires::Wiring;
-use crate::yaml::{Entry, Node};
+use crate::yaml::{Entry, Kind, Node};
 use plyflow_model::workflow::ResponseOf;
+use plyflow_study::{Expression, ExpressionError, Kind as ValueKind, Names, Value};
 
 /// Columns of the table that are always there, so that no variable and no response is named so. Beside them are `key_STEP`
 /// and, of an optimisation, `excess_1` and so on.
@@ -30,7 +32,7 @@ pub(super) fn is_column(name: &str) -> bool {
 /// Reads the responses; everything wrong is reported.
 pub(super) fn responses(
     root: &Node,
-    variables: &[String],
+    family: &Family,
     (drafts, wiring): (&[Draft<'_>], &Wiring),
     source: &Source,
     problems: &mut Problems,
@@ -46,7 +48,8 @@ pub(super) fn responses(
         }
         let taken = match is_column(&entry.key) {
             true => Some("a column that every table of a study has"),
-            false => variables
+            false => family
+                .names
                 .contains(&entry.key)
                 .then_some("a variable of the study"),
         };
@@ -55,9 +58,100 @@ pub(super) fn responses(
             let d = problems.add(source, &entry.key_span, message);
             d.expected("another name: the table has a column for each");
         }
-        all.extend(response(entry, drafts, wiring, source, problems));
+        all.extend(match origin(entry, source, problems) {
+            Some(Origin::Step) => response(entry, drafts, wiring, source, problems),
+            Some(Origin::Variables) => of_variables(entry, family, source, problems),
+            None => None,
+        });
     }
     all
+}
+
+enum Origin {
+    Step,
+    Variables,
+}
+
+/// Where a response is said to come from; `None`: from nowhere, or from two places (and reported).
+fn origin(entry: &Entry, source: &Source, problems: &mut Problems) -> Option<Origin> {
+    let has = |key: &str| {
+        let given = entry.value.entry(key);
+        given.is_some_and(|e| e.value.kind != Kind::Null)
+    };
+    let message = match (has("value"), has("step"), has("result")) {
+        (false, true, true) => return Some(Origin::Step),
+        (true, false, false) if !has("of") => return Some(Origin::Variables),
+        (true, ..) => "`value` beside what is read from a step",
+        (false, true, false) => "no `result` of that step",
+        (false, false, true) => "no `step` that has that result",
+        (false, false, false) => "it comes from nowhere",
+    };
+    let message = format!("the response `{}`: {message}", entry.key);
+    let d = problems.add(source, &entry.key_span, message);
+    d.expected("`step` and `result`, or `value` alone, such as `value: length * width`");
+    None
+}
+
+/// A number of every point that is computed from the point's variables.
+fn of_variables(
+    entry: &Entry,
+    family: &Family,
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<StudyResponse> {
+    let node = entry.value.get("value")?;
+    let text = node.text()?;
+    let names = Names {
+        all: &family.names,
+        bare: true,
+    };
+    let failed = |e: ExpressionError, point: Option<&str>, problems: &mut Problems| {
+        let mut problem = e.problem;
+        if let Some(point) = point {
+            problem.message = format!("at the point {point}: {}", problem.message);
+        }
+        report(
+            problem,
+            &within(source, node, text, &e.at),
+            source,
+            problems,
+        );
+    };
+    let expression = match Expression::read(text, names) {
+        Ok(expression) => expression,
+        Err(e) => {
+            failed(e, None, problems);
+            return None;
+        }
+    };
+    let (mut values, mut unit) = (Vec::with_capacity(family.points.all.len()), None);
+    for point in &family.points.all {
+        match expression.value(&point.values) {
+            Ok(Value::Quantity(q)) => {
+                unit.get_or_insert_with(|| ValueKind::Quantity(q.exponents()).si_unit());
+                values.push(q.si());
+            }
+            Ok(_) => {
+                let message = format!("the response `{}` is no number", entry.key);
+                let d = problems.add(source, &node.span, message);
+                d.given(text).expected("a number, such as `length * width`");
+                return None;
+            }
+            Err(e) => {
+                failed(e, Some(&point.name), problems);
+                return None;
+            }
+        }
+    }
+    let unit = unit.filter(|u| !u.is_empty()).unwrap_or_else(|| "1".into());
+    Some(StudyResponse {
+        name: entry.key.clone(),
+        unit,
+        from: ResponseFrom::Variables {
+            expression: text.to_owned(),
+            values,
+        },
+    })
 }
 
 fn response(
@@ -94,10 +188,12 @@ fn response(
     }
     Some(StudyResponse {
         name: entry.key.clone(),
-        step: wiring.order.iter().position(|i| *i == at)?,
-        result: name,
         unit,
-        of,
+        from: ResponseFrom::Step {
+            step: wiring.order.iter().position(|i| *i == at)?,
+            result: name,
+            of,
+        },
     })
 }
 

@@ -145,14 +145,19 @@ pub enum SampleMethod {
     Random,
 }
 
-/// What is read from every point of a study.
+/// What is read from every point of a study: a result of a step, or what follows from the point's own values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Response {
     /// Step.
-    pub step: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<String>,
     /// Name of its result.
-    pub result: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub result: Option<String>,
+    /// In the place of both: a number that is computed from the variables, such as `length * width`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<String>,
     /// What is taken of the items of a step that is fanned out; needed there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<ResponseOf>,
