@@ -18,6 +18,7 @@ mod report;
 mod results;
 mod run;
 mod study;
+mod study_expect;
 mod study_file;
 mod study_plan;
 mod study_report;

@@ -167,7 +167,7 @@ pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
             rows.push(absent(e));
         }
     }
-    rows.extend(super::study::rows(session, records));
+    rows.extend(super::study_expect::rows(session, records));
     rows
 }
 

@@ -224,7 +224,7 @@ pub fn profile() -> Vec<Row> {
 pub fn busy() -> Vec<Row> {
     let folder = copy(0.2);
     let place = folder.path().join("workflows/flat-tool");
-    // A third of its process: some minutes in all, where seven others leave little of the machine.
+    // A third of its process: 20 minutes in all on two cores, as seven others leave little of the machine.
     let mut scene =
         std::fs::read_to_string(place.join("scene.yaml")).expect("the flat tool's scene");
     for (whole, third) in [(80, 27), (150, 50), (200, 67), (40, 13)] {
