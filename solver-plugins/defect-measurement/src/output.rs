@@ -376,12 +376,19 @@ impl<'a> Output<'a> {
     }
 
     /// Results of how much longer and higher the wrinkles of the uppermost ply are than in the measurement `against`: shares of what that one has, none
-    /// for what is 0 there.
+    /// for what is 0 there. And whether one of both alone has wrinkles.
     fn changes(&self, now: &[(&'static str, &'static str, f64)]) -> Result<(), StepError> {
         for input in self.host.inputs_of("against")? {
             let other: Other = self.host.attributes(&input)?;
             for (what, unit, value) in now {
-                let before = other.uppermost.get(*what).copied().unwrap_or(0.0);
+                let Some(before) = other.uppermost.get(*what).copied() else {
+                    continue;
+                };
+                if *what == "wrinkle_count" {
+                    let verdict = |count: f64| f64::from(u8::from(count > 0.0));
+                    let change = verdict(*value) - verdict(before);
+                    self.host.result("uppermost_verdict_change", change, "1")?;
+                }
                 if *unit == "m" && before > 0.0 {
                     let name = format!("uppermost_{what}_change");
                     self.host.result(&name, value / before - 1.0, "1")?;

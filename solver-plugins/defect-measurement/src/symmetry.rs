@@ -1,4 +1,4 @@
-//! How the crests of a ply lie: oblique to the tool, and as their own mirror image.
+//! How the crests of a ply lie: oblique to the tool, how far apart, and as their own mirror image.
 
 use crate::Measured;
 use plyflow_defects::{Defect, Kind};
@@ -12,6 +12,9 @@ pub struct Crests {
     pub direction: f64,
     /// Its angle from that axis or from the line across it, whichever is nearer (rad): 0 to pi/4.
     pub obliquity: f64,
+    /// How far the middles of the two longest lie apart in the flat ply, measured along that axis (m); `None` with fewer than two. A middle is the
+    /// mean of the places along a crest.
+    pub distance: Option<f64>,
     /// Mean distance in the flat ply of a place on a crest from the nearest one on the mirror image of all crests (m): with x turned round, with y,
     /// and with both (half a turn).
     pub image: [f64; 3],
@@ -20,38 +23,58 @@ pub struct Crests {
 impl Crests {
     /// Of the wrinkles of a ply, `axis` from x (rad); `None` without one.
     pub fn of(measured: &Measured, axis: f64) -> Option<Self> {
-        let wrinkles: Vec<&Defect> = (measured.defects.iter())
+        let mut wrinkles: Vec<&Defect> = (measured.defects.iter())
             .filter(|d| d.kind == Kind::Wrinkle)
             .collect();
-        let longest = (wrinkles.iter()).max_by(|a, b| a.length.total_cmp(&b.length))?;
-        let direction = turned(longest.direction - axis);
-        let place = |n: &u32| {
-            let p = measured.ply.undeformed[*n as usize];
-            [p[0], p[1]]
+        wrinkles.sort_by(|a, b| b.length.total_cmp(&a.length));
+        let direction = turned(wrinkles.first()?.direction - axis);
+        let places = |d: &Defect| -> Vec<[f64; 2]> {
+            let undeformed = |n: &u32| measured.ply.undeformed[*n as usize];
+            let flat = |p: [f64; 3]| [p[0], p[1]];
+            (d.ridge_nodes.iter())
+                .map(|n| flat(undeformed(n)))
+                .collect()
         };
-        let crests: Vec<[f64; 2]> = wrinkles
-            .iter()
-            .flat_map(|d| d.ridge_nodes.iter().map(place))
-            .collect();
+        let crests: Vec<Vec<[f64; 2]>> = wrinkles.iter().map(|d| places(d)).collect();
+        let distance = match crests.as_slice() {
+            [first, second, ..] => Some(apart(&[first, second].map(|c| middle(c)), axis)),
+            _ => None,
+        };
+        let crests = crests.concat();
         let image = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|way| from_image(&crests, way));
         Some(Self {
             direction,
             obliquity: direction.abs().min(FRAC_PI_2 - direction.abs()),
+            distance,
             image,
         })
     }
 
     /// Names, units and values of its results.
-    pub fn told(&self) -> [(&'static str, &'static str, f64); 5] {
+    pub fn told(&self) -> Vec<(&'static str, &'static str, f64)> {
         let [x, y, turn] = self.image;
-        [
+        let mut told = vec![
             ("wrinkle_direction", "rad", self.direction),
             ("wrinkle_obliquity", "rad", self.obliquity),
             ("crest_image_x", "m", x),
             ("crest_image_y", "m", y),
             ("crest_image_turn", "m", turn),
-        ]
+        ];
+        told.extend(self.distance.map(|d| ("wrinkle_distance", "m", d)));
+        told
     }
+}
+
+/// Mean of places.
+fn middle(places: &[[f64; 2]]) -> [f64; 2] {
+    let sum = |k: usize| places.iter().map(|p| p[k]).sum::<f64>();
+    [0, 1].map(|k| sum(k) / places.len() as f64)
+}
+
+/// How far two places lie apart along an axis (rad).
+fn apart([a, b]: &[[f64; 2]; 2], axis: f64) -> f64 {
+    let (along, across) = (axis.fixed_cos(), axis.fixed_sin());
+    ((b[0] - a[0]) * along + (b[1] - a[1]) * across).abs()
 }
 
 /// A direction of a line, in (-pi/2, pi/2].

@@ -292,6 +292,14 @@ fn the_uppermost_ply_is_counted_and_its_longest_wrinkle_told_apart_from_all_of_t
         .collect();
     assert!((of("uppermost_wrinkle_length") - both[0] - both[1]).abs() < 1e-12);
     assert!(both[0] > 1.2 * both[1] && of("uppermost_wrinkle_length_max") == both[0]);
+    // Both lie along x, one over the other: 35 mm apart across the tool, not at all along it.
+    assert!(of("uppermost_wrinkle_distance") < 0.001);
+    let across =
+        run::<DefectMeasurement>(json!({"slip_direction": PI / 2.0}), &inputs, &[]).unwrap();
+    let distance = across.result("uppermost_wrinkle_distance");
+    assert!((distance - 0.035).abs() < 0.001, "{distance}");
+    let one = measured(json!({}));
+    assert!(!one.results.contains_key("uppermost_wrinkle_distance"));
     // The height is over 1 mm where the fade is over a third (0.5), along the crest.
     let reach = 2.0 * 0.030 * 2.0 / PI * (1.0f64 / 3.0).acos();
     assert!(
@@ -503,9 +511,16 @@ fn the_growth_of_wrinkles_from_another_measurement_is_told() {
             "{name}"
         );
     }
+    assert_eq!(out.result("uppermost_verdict_change"), 0.0);
     let none = measured(json!({"distance_threshold": 0.01}));
     let out = against(&none);
-    assert!(!out.results.keys().any(|k| k.ends_with("_change")));
+    let changes = out.results.keys().filter(|k| k.ends_with("_change"));
+    assert!(changes.eq(["uppermost_verdict_change"]));
+    assert_eq!(out.result("uppermost_verdict_change"), 1.0);
+    let flat = shaped(|_, _| 0.0);
+    let inputs = [("formed", &flat), ("against", &before)].map(|(n, a)| MemoryInput::new(n, a));
+    let out = run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap();
+    assert_eq!(out.result("uppermost_verdict_change"), -1.0);
 }
 
 /// The upper ply with this height over the tool and no other defect.
