@@ -18,6 +18,8 @@ pub const LOCKED: u8 = 6;
 pub const NOT_CONFORMING: u8 = 7;
 /// Something in the store is not what was written, and is not shown; or a step made again has other bytes (`verify --again`).
 pub const DAMAGED: u8 = 8;
+/// Two runs or two artifacts are not the same (`diff`).
+pub const DIFFERENT: u8 = 9;
 /// Stopped by the user (Ctrl-C), SIGTERM or SIGHUP.
 pub const INTERRUPTED: u8 = 130;
 
@@ -33,4 +35,5 @@ Exit codes:
     6  another process is running this workflow
     7  a plugin does not keep the contract (check-plugin)
     8  something in the store is damaged; the same run makes it again
+    9  two runs or artifacts differ (diff)
   130  stopped by Ctrl-C; the same command resumes";

@@ -9,6 +9,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod contents;
+mod difference;
 mod error;
 mod h5;
 mod mesh;
@@ -18,6 +19,7 @@ mod small;
 mod writer;
 
 pub use contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, NamedValue, On};
+pub use difference::{Difference, How, differences};
 pub use error::{ArtifactError, ErrorKind, Result};
 pub use h5::DType;
 pub use reader::Artifact;

@@ -73,6 +73,9 @@ pub enum Command {
         after_help = "Examples:\n  plyflow verify workflow.yaml\n  plyflow verify workflow.yaml --dry-run       # say it, move nothing\n  plyflow verify workflow.yaml --again zones   # make it again from the same inputs and compare\n\nWhat is damaged is moved to the folder `damaged` of the store, and the next run makes it again. Ends with code 8 when something was."
     )]
     Verify(VerifyArgs),
+    /// Say in which numbers two runs, or two artifacts, differ
+    #[command(after_help = DIFF_EXAMPLES)]
+    Diff(DiffArgs),
     /// Remove artifacts that no workflow's last run uses, or all of a store
     #[command(
         after_help = "Examples:\n  plyflow clean workflow.yaml --dry-run\n  plyflow clean workflow.yaml\n  plyflow clean workflow.yaml --all"
@@ -96,6 +99,15 @@ Examples:
   plyflow run workflow.yaml --set detect.over_shear_positive='9 deg'
 
 A run that was stopped or killed resumes with the same command.";
+
+const DIFF_EXAMPLES: &str = "\
+Examples:
+  plyflow diff workflow.yaml other/workflow.yaml                 # the last runs of both, step by step
+  plyflow diff workflow.yaml workflow.yaml --store-b /tmp/store  # the same file, run into two stores
+  plyflow diff a.vtkhdf b.vtkhdf --all                           # two artifacts, every difference
+
+Compared are kind, results, attributes, frames, meshes, fields and arrays, to the bit. What made them (plugins, inputs, keys) and what is
+measured of the machine (times, memory) are not. Ends with code 9 when something differs.";
 
 const PLAN_EXAMPLES: &str = "\
 Examples:
@@ -469,6 +481,36 @@ pub struct VerifyArgs {
     /// Say what is damaged, move nothing
     #[arg(long, short = 'n', conflicts_with = "again")]
     pub dry_run: bool,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `diff`
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    /// A workflow file, or an artifact
+    pub a: Utf8PathBuf,
+    /// What it is held against: another one, or the same file with another store
+    pub b: Utf8PathBuf,
+    /// Only this step; may be repeated
+    #[arg(long = "step", value_name = "STEP")]
+    pub steps: Vec<String>,
+    /// Store of the first workflow [default: .plyflow beside it]
+    #[arg(long, value_name = "DIR")]
+    pub store_a: Option<Utf8PathBuf>,
+    /// Store of the second workflow [default: .plyflow beside it]
+    #[arg(long, value_name = "DIR")]
+    pub store_b: Option<Utf8PathBuf>,
+    /// Look for plugins here first, and trust what lies there; may be repeated
+    #[arg(long, value_name = "DIR")]
+    pub plugins: Vec<Utf8PathBuf>,
+    /// Load libraries that a workflow brings along: all, or the one with this path or BLAKE3; may be repeated
+    #[arg(long, value_name = "LIBRARY", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    pub trust: Vec<String>,
+    /// Show all differences of a step, not only the first twenty
+    #[arg(long)]
+    pub all: bool,
     /// Form
     #[arg(long, value_enum, default_value = "text")]
     pub format: TextOrJson,

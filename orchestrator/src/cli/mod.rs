@@ -4,6 +4,7 @@ mod args;
 mod check_plugin;
 mod clean;
 mod damage;
+mod diff;
 mod explain;
 mod extract;
 mod front;
@@ -133,6 +134,7 @@ fn dispatch(command: Command) -> Done {
         Command::Extract(a) => extract::extract(&a),
         Command::Schema(a) => plugins::schema(&a),
         Command::Verify(a) => verify::verify(&a),
+        Command::Diff(a) => diff::diff(&a),
         Command::Clean(a) => clean::clean(&a),
         Command::Completions { shell } => {
             let mut command = Cli::command();

@@ -1,0 +1,353 @@
+//! `diff`: in which numbers two runs, or two artifacts, differ.
+
+use super::args::{DiffArgs, Places, TextOrJson, Workflow};
+use super::open::open;
+use super::table::number;
+use super::{Done, Stop, print};
+use crate::exit;
+use crate::plan::Key;
+use crate::store::{Flaw, Journal, check_artifact, record_beside};
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_artifact::{Artifact, Difference, How, differences};
+use plyflow_model::text::one_line;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+
+/// So many differences of a step are shown unless all are asked for: thousands of attributes tell no more than twenty.
+const SHOWN: usize = 20;
+
+/// `plyflow diff`.
+///
+/// # Errors
+/// [`exit::DIFFERENT`] when the two are not the same; [`exit::USAGE`] when there is nothing to compare; [`exit::DAMAGED`] when one of them is not what was
+/// written.
+pub fn diff(args: &DiffArgs) -> Done {
+    let pairs = match [&args.a, &args.b].map(|p| is_artifact(p)) {
+        [true, true] => vec![Pair {
+            label: None,
+            paths: [&args.a, &args.b].map(|p| Some(p.clone())),
+        }],
+        [false, false] => pairs(args)?,
+        _ => {
+            let text = format!(
+                "{} and {}: one is an artifact and the other a workflow; give two of a kind",
+                args.a, args.b
+            );
+            return Err(Stop::new(exit::USAGE, text));
+        }
+    };
+    let compared: Vec<Compared> = pairs.iter().map(compare).collect::<Result<_, _>>()?;
+    if args.format == TextOrJson::Json {
+        let steps: Vec<Value> = compared.iter().map(Compared::json).collect();
+        print(&format!("{:#}\n", json!({"compared": steps})))?;
+    } else {
+        print(&text(&compared, args.all))?;
+    }
+    match compared.iter().all(|c| c.outcome.is_same()) {
+        true => Ok(()),
+        false => Err(Stop::silent(exit::DIFFERENT)),
+    }
+}
+
+fn is_artifact(path: &Utf8Path) -> bool {
+    path.extension() == Some("vtkhdf")
+}
+
+/// Two artifacts of a name, or one without its other.
+struct Pair {
+    /// `None`: two files that were named.
+    label: Option<String>,
+    paths: [Option<Utf8PathBuf>; 2],
+}
+
+/// The artifacts of the last runs of two workflows, in the order of the first, those that only the second has behind it.
+fn pairs(args: &DiffArgs) -> Result<Vec<Pair>, Stop> {
+    let places = |store: &Option<Utf8PathBuf>| Places {
+        store: store.clone(),
+        plugins: args.plugins.clone(),
+        trust: args.trust.clone(),
+    };
+    let first = last_run(&args.a, places(&args.store_a), &args.steps)?;
+    let second = last_run(&args.b, places(&args.store_b), &args.steps)?;
+    let find = |all: &[(String, Utf8PathBuf)], label: &str| {
+        let found = all.iter().find(|(l, _)| l == label);
+        found.map(|(_, path)| path.clone())
+    };
+    let mut pairs: Vec<Pair> = Vec::new();
+    for (label, path) in &first {
+        pairs.push(Pair {
+            label: Some(label.clone()),
+            paths: [Some(path.clone()), find(&second, label)],
+        });
+    }
+    for (label, path) in &second {
+        if find(&first, label).is_none() {
+            pairs.push(Pair {
+                label: Some(label.clone()),
+                paths: [None, Some(path.clone())],
+            });
+        }
+    }
+    Ok(pairs)
+}
+
+/// Labels and artifacts of what a workflow ran last, whatever program and plugins it was.
+fn last_run(
+    file: &Utf8Path,
+    places: Places,
+    only: &[String],
+) -> Result<Vec<(String, Utf8PathBuf)>, Stop> {
+    let opened = open(&Workflow {
+        workflow: file.to_owned(),
+        places,
+        set: Vec::new(),
+    })?;
+    if !only.is_empty() {
+        opened.step_indices(only)?;
+    }
+    let store = &opened.store;
+    let nothing = || {
+        let text = format!(
+            "{file} has not run into the store {}; start with: plyflow run {file}",
+            store.root()
+        );
+        Stop::new(exit::USAGE, text)
+    };
+    let path = store.run(&opened.workflow.name).journal();
+    if !path.is_file() {
+        return Err(nothing());
+    }
+    let journal = Journal::read(&path).map_err(Stop::machine(format!("reading {path}")))?;
+    // A journal knows names and items by their hashes alone, so it is asked for all that there can be.
+    let keys = journal.last_keys();
+    let records = keys.iter().filter_map(|key| store.read_record(key).ok());
+    let lengths = records.filter_map(|r| r.collection.map(|labels| labels.len() as u64));
+    let longest = lengths.max().unwrap_or(0);
+    let (mut found, mut named) = (Vec::new(), BTreeSet::new());
+    for (step, plan) in opened.workflow.steps.iter().zip(&opened.graph.steps) {
+        if !only.is_empty() && !only.contains(&step.name) {
+            continue;
+        }
+        for item in indices(plan.dimensions.len(), longest) {
+            let Some(key) = journal.last(&step.name, &item) else {
+                continue;
+            };
+            // A step that failed last has a key and no artifact.
+            if store.artifact(&key).is_file() {
+                found.push((label(&step.name, &item), store.artifact(&key)));
+                named.insert(key);
+            }
+        }
+    }
+    let is_left = |key: &&Key| !named.contains(*key) && store.artifact(key).is_file();
+    let left = keys.iter().filter(is_left).count();
+    if only.is_empty() && left > 0 {
+        super::warn(&format!(
+            "plyflow: {file}: {left} artifacts are of steps that this file no longer has; they are not compared\n"
+        ));
+    }
+    match found.is_empty() {
+        true => Err(nothing()),
+        false => Ok(found),
+    }
+}
+
+/// All indices of items in so many collections with at most so many items each, in order.
+fn indices(collections: usize, length: u64) -> Vec<Vec<u64>> {
+    let mut all = vec![Vec::new()];
+    for _ in 0..collections {
+        let longer = |item: &Vec<u64>| -> Vec<Vec<u64>> {
+            let with = |k| [item.as_slice(), &[k]].concat();
+            (0..length).map(with).collect()
+        };
+        all = all.iter().flat_map(longer).collect();
+    }
+    all
+}
+
+fn label(step: &str, item: &[u64]) -> String {
+    if item.is_empty() {
+        return step.to_owned();
+    }
+    let item: Vec<String> = item.iter().map(u64::to_string).collect();
+    format!("{step}[{}]", item.join(","))
+}
+
+/// What came of comparing two artifacts.
+enum Outcome {
+    /// The files are the same byte by byte.
+    SameBytes,
+    /// All numbers are; something else made them.
+    Same,
+    /// Not the same.
+    Differs(Vec<Difference>),
+    /// One alone is there.
+    OnlyIn(&'static str),
+}
+
+impl Outcome {
+    fn is_same(&self) -> bool {
+        matches!(self, Self::SameBytes | Self::Same)
+    }
+}
+
+struct Compared {
+    label: Option<String>,
+    outcome: Outcome,
+}
+
+fn compare(pair: &Pair) -> Result<Compared, Stop> {
+    let outcome = match &pair.paths {
+        [Some(a), Some(b)] => outcome(a, b)?,
+        [Some(_), None] => Outcome::OnlyIn("first"),
+        [None, _] => Outcome::OnlyIn("second"),
+    };
+    let label = pair.label.clone();
+    Ok(Compared { label, outcome })
+}
+
+fn outcome(a: &Utf8Path, b: &Utf8Path) -> Result<Outcome, Stop> {
+    let hashes = [hash(a)?, hash(b)?];
+    if let [Some(first), Some(second)] = &hashes
+        && first == second
+    {
+        return Ok(Outcome::SameBytes);
+    }
+    let open =
+        |path: &Utf8Path| Artifact::open(path.as_std_path()).map_err(|e| Stop::new(exit::USAGE, e));
+    let found =
+        differences(&open(a)?, &open(b)?).map_err(Stop::machine(format!("reading {a} and {b}")))?;
+    Ok(match found.is_empty() {
+        true => Outcome::Same,
+        false => Outcome::Differs(found),
+    })
+}
+
+/// BLAKE3 of an artifact, by the record beside it, which it is held against; `None` without a record.
+fn hash(path: &Utf8Path) -> Result<Option<String>, Stop> {
+    let record = record_beside(path).and_then(|record| {
+        if let Some(record) = &record {
+            check_artifact(path, record)?;
+        }
+        Ok(record)
+    });
+    match record {
+        Ok(record) => Ok(record.map(|r| r.hash).filter(|h| !h.is_empty())),
+        Err(Flaw::Unsealed) => Ok(None),
+        Err(flaw) => {
+            let text = format!("{}; nothing was compared with it", flaw.text());
+            Err(Stop::new(exit::DAMAGED, text))
+        }
+    }
+}
+
+impl Compared {
+    fn json(&self) -> Value {
+        let (status, list) = match &self.outcome {
+            Outcome::SameBytes => ("same-bytes", &[][..]),
+            Outcome::Same => ("same", &[][..]),
+            Outcome::Differs(list) => ("differs", &list[..]),
+            Outcome::OnlyIn("first") => ("only-in-first", &[][..]),
+            Outcome::OnlyIn(_) => ("only-in-second", &[][..]),
+        };
+        json!({"step": self.label, "status": status, "differences": list})
+    }
+}
+
+fn text(compared: &[Compared], all: bool) -> String {
+    let mut out = String::new();
+    for one in compared {
+        let head = match &one.label {
+            Some(label) => format!("{label}: "),
+            None => String::new(),
+        };
+        out += &match &one.outcome {
+            Outcome::SameBytes => format!("{head}the same bytes\n"),
+            Outcome::Same => format!("{head}the same numbers, made by something else\n"),
+            Outcome::OnlyIn(which) => format!("{head}only in the {which}\n"),
+            Outcome::Differs(list) => {
+                let shown = if all { list.len() } else { SHOWN };
+                let mut text = format!("{head}differs in {}\n", list.len());
+                for d in list.iter().take(shown) {
+                    text += &format!("  {}: {}\n", one_line(&d.place), how(&d.how));
+                }
+                if list.len() > shown {
+                    let more = list.len() - shown;
+                    text += &format!("  and {more} more; all of them: --all\n");
+                }
+                text
+            }
+        };
+    }
+    if compared.len() > 1 {
+        let same = compared.iter().filter(|c| c.outcome.is_same()).count();
+        out += &format!("{same} of {} are the same\n", compared.len());
+    }
+    out
+}
+
+fn how(how: &How) -> String {
+    match how {
+        How::OnlyInFirst => "only in the first".into(),
+        How::OnlyInSecond => "only in the second".into(),
+        How::Other { first, second } => format!("{} | {}", brief(first), brief(second)),
+        How::Number {
+            first,
+            second,
+            unit,
+        } => format!(
+            "{} | {}{}",
+            exact(*first, *second, unit),
+            exact(*second, *first, unit),
+            share(*first, *second)
+        ),
+        How::Numbers {
+            differ,
+            of,
+            largest,
+            at,
+            scale,
+            unit,
+        } => format!(
+            "{differ} of {of} numbers, by at most {} at {at:?}; the largest is {}",
+            with_unit(*largest, unit),
+            with_unit(*scale, unit)
+        ),
+    }
+}
+
+fn with_unit(value: f64, unit: &str) -> String {
+    match unit {
+        "1" | "" => number(value),
+        _ => format!("{} {unit}", number(value)),
+    }
+}
+
+/// A number with as many digits as tell it from the other.
+fn exact(value: f64, other: f64, unit: &str) -> String {
+    match number(value) == number(other) && unit != "1" {
+        true => format!("{value} {unit}"),
+        false if number(value) == number(other) => value.to_string(),
+        false => with_unit(value, unit),
+    }
+}
+
+fn share(first: f64, second: f64) -> String {
+    let share = (second - first) / first;
+    match share.is_finite() {
+        true if share.abs() < 1e-3 => format!(" ({share:+.1e} of the first)"),
+        true => format!(" ({:+.1} %)", 100.0 * share),
+        false => String::new(),
+    }
+}
+
+/// A value on a line of its own.
+fn brief(value: &Value) -> String {
+    const LONGEST: usize = 60;
+    let text = value.to_string();
+    let text = one_line(&text);
+    match text.chars().count() > LONGEST {
+        true => text.chars().take(LONGEST).chain("..".chars()).collect(),
+        false => text.into_owned(),
+    }
+}

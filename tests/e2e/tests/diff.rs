@@ -1,0 +1,98 @@
+//! Two runs are compared step by step, whatever made them.
+
+use plyflow_e2e::{Study, well};
+use serde_json::Value;
+
+const STEPS: &str = "
+steps:
+  parts: {plugin: split, with: {items: 2}}
+  each: {plugin: trivial, with: {value: 1}, for_each: {p: parts}, from: {in: parts}}
+  all: {plugin: sum, from: {in: each}}
+";
+
+/// Status of every step, and how the program ended.
+fn diff(a: &Study, b: &Study, more: &[&str]) -> (Vec<(String, String)>, Option<i32>) {
+    let other = b.path("workflow.yaml");
+    let mut words = vec!["diff", other.to_str().unwrap(), "--format", "json"];
+    words.extend(more);
+    let output = a.call(&words);
+    let told: Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stderr)));
+    let text = |v: &Value| v.as_str().unwrap().to_owned();
+    let steps = told["compared"].as_array().unwrap();
+    let steps = steps.iter().map(|s| (text(&s["step"]), text(&s["status"])));
+    (steps.collect(), output.status.code())
+}
+
+#[test]
+fn runs_of_the_same_steps_are_the_same_and_what_changed_is_named() {
+    let [a, b] = [(); 2].map(|()| Study::new(STEPS));
+    assert_eq!(a.run(&[]), well(4, 0));
+    assert_eq!(b.run(&["--jobs", "1"]), well(4, 0));
+    let (steps, code) = diff(&a, &b, &[]);
+    let names: Vec<&str> = steps.iter().map(|s| s.0.as_str()).collect();
+    assert_eq!(names, ["parts", "each[0]", "each[1]", "all"]);
+    assert!(steps.iter().all(|s| s.1 == "same-bytes"), "{steps:?}");
+    assert_eq!(code, Some(0));
+
+    b.write(&STEPS.replace("value: 1", "value: 2"));
+    assert_eq!(b.run(&[]), well(3, 1));
+    let (steps, code) = diff(&a, &b, &[]);
+    let status: Vec<&str> = steps.iter().map(|s| s.1.as_str()).collect();
+    assert_eq!(status, ["same-bytes", "differs", "differs", "differs"]);
+    assert_eq!(code, Some(9));
+    let (steps, code) = diff(&a, &b, &["--step", "parts"]);
+    assert_eq!((steps.len(), code), (1, Some(0)));
+
+    // An item more, and a step that the other has not.
+    b.write(
+        &(STEPS.replace("items: 2", "items: 3") + "  extra: {plugin: trivial, with: {value: 5}}\n"),
+    );
+    assert_eq!(b.run(&[]).code, Some(0));
+    let (steps, code) = diff(&a, &b, &[]);
+    let only: Vec<&str> = (steps.iter().filter(|s| s.1 == "only-in-second"))
+        .map(|s| s.0.as_str())
+        .collect();
+    assert_eq!(only, ["each[2]", "extra"]);
+    assert_eq!(code, Some(9));
+}
+
+#[test]
+fn the_numbers_that_differ_are_shown_and_a_damaged_artifact_is_not_compared() {
+    let [a, b] = [1, 2].map(|value| {
+        let study = Study::new(&format!(
+            "\nsteps:\n  one: {{plugin: trivial, with: {{value: {value}}}}}\n"
+        ));
+        assert_eq!(study.run(&[]), well(1, 0));
+        study
+    });
+    let file = |study: &Study| {
+        let name = study.artifacts().keys().next().unwrap().clone();
+        study.path(".plyflow/artifacts").join(&name[..2]).join(name)
+    };
+    let files = [file(&a), file(&b)];
+    let ask = || {
+        let words = files.each_ref().map(|f| f.to_str().unwrap().to_owned());
+        let output = std::process::Command::new(plyflow_e2e::program())
+            .arg("diff")
+            .args(&words)
+            .output()
+            .unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (
+            text(output.stdout),
+            text(output.stderr),
+            output.status.code(),
+        )
+    };
+    let (out, _, code) = ask();
+    assert!(out.contains(": 1 | 2 (+100.0 %)"), "{out}");
+    assert_eq!(code, Some(9));
+    let mut bytes = std::fs::read(&files[1]).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(&files[1], bytes).unwrap();
+    let (out, err, code) = ask();
+    assert_eq!((out.as_str(), code), ("", Some(8)));
+    assert!(err.contains("nothing was compared with it"), "{err}");
+}
