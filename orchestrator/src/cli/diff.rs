@@ -23,10 +23,16 @@ const SHOWN: usize = 20;
 /// written.
 pub fn diff(args: &DiffArgs) -> Done {
     let pairs = match [&args.a, &args.b].map(|p| is_artifact(p)) {
-        [true, true] => vec![Pair {
-            label: None,
-            paths: [&args.a, &args.b].map(|p| Some(p.clone())),
-        }],
+        [true, true] => {
+            if !args.steps.is_empty() || args.store_a.is_some() || args.store_b.is_some() {
+                let text = "--step and --store are for workflows; these are two artifacts";
+                return Err(Stop::new(exit::USAGE, text));
+            }
+            vec![Pair {
+                label: None,
+                paths: [&args.a, &args.b].map(|p| Some(p.clone())),
+            }]
+        }
         [false, false] => pairs(args)?,
         _ => {
             let text = format!(
@@ -43,7 +49,8 @@ pub fn diff(args: &DiffArgs) -> Done {
     } else {
         print(&text(&compared, args.all))?;
     }
-    match compared.iter().all(|c| c.outcome.is_same()) {
+    let is_alike = |c: &Compared| c.outcome.is_same() || matches!(c.outcome, Outcome::Neither);
+    match compared.iter().all(is_alike) {
         true => Ok(()),
         false => Err(Stop::silent(exit::DIFFERENT)),
     }
@@ -69,7 +76,7 @@ fn pairs(args: &DiffArgs) -> Result<Vec<Pair>, Stop> {
     };
     let first = last_run(&args.a, places(&args.store_a), &args.steps)?;
     let second = last_run(&args.b, places(&args.store_b), &args.steps)?;
-    let find = |all: &[(String, Utf8PathBuf)], label: &str| {
+    let find = |all: &[Made], label: &str| {
         let found = all.iter().find(|(l, _)| l == label);
         found.map(|(_, path)| path.clone())
     };
@@ -77,34 +84,34 @@ fn pairs(args: &DiffArgs) -> Result<Vec<Pair>, Stop> {
     for (label, path) in &first {
         pairs.push(Pair {
             label: Some(label.clone()),
-            paths: [Some(path.clone()), find(&second, label)],
+            paths: [path.clone(), find(&second, label).flatten()],
         });
     }
     for (label, path) in &second {
         if find(&first, label).is_none() {
             pairs.push(Pair {
                 label: Some(label.clone()),
-                paths: [None, Some(path.clone())],
+                paths: [None, path.clone()],
             });
         }
     }
     Ok(pairs)
 }
 
-/// Labels and artifacts of what a workflow ran last, whatever program and plugins it was.
-fn last_run(
-    file: &Utf8Path,
-    places: Places,
-    only: &[String],
-) -> Result<Vec<(String, Utf8PathBuf)>, Stop> {
+/// Label of a step or item, and its artifact; `None`: it has not run to its end.
+type Made = (String, Option<Utf8PathBuf>);
+
+/// What a workflow ran last, whatever program and plugins it was.
+fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made>, Stop> {
     let opened = open(&Workflow {
         workflow: file.to_owned(),
         places,
         set: Vec::new(),
     })?;
-    if !only.is_empty() {
-        opened.step_indices(only)?;
-    }
+    let wanted = match only {
+        [] => (0..opened.workflow.steps.len()).collect(),
+        names => opened.step_indices(names)?,
+    };
     let store = &opened.store;
     let nothing = || {
         let text = format!(
@@ -124,19 +131,21 @@ fn last_run(
     let lengths = records.filter_map(|r| r.collection.map(|labels| labels.len() as u64));
     let longest = lengths.max().unwrap_or(0);
     let (mut found, mut named) = (Vec::new(), BTreeSet::new());
-    for (step, plan) in opened.workflow.steps.iter().zip(&opened.graph.steps) {
-        if !only.is_empty() && !only.contains(&step.name) {
-            continue;
-        }
-        for item in indices(plan.dimensions.len(), longest) {
-            let Some(key) = journal.last(&step.name, &item) else {
-                continue;
-            };
-            // A step that failed last has a key and no artifact.
-            if store.artifact(&key).is_file() {
-                found.push((label(&step.name, &item), store.artifact(&key)));
-                named.insert(key);
+    for at in wanted {
+        let (step, collections) = (
+            &opened.workflow.steps[at],
+            opened.graph.steps[at].dimensions.len(),
+        );
+        for item in indices(collections, longest) {
+            let key = journal.last(&step.name, &item);
+            // A step that failed last may have a key, and has no artifact.
+            let key = key.filter(|key| store.artifact(key).is_file());
+            // There need not be so many items.
+            if key.is_some() || collections == 0 {
+                let path = key.map(|key| store.artifact(&key));
+                found.push((label(&step.name, &item), path));
             }
+            named.extend(key);
         }
     }
     let is_left = |key: &&Key| !named.contains(*key) && store.artifact(key).is_file();
@@ -146,9 +155,9 @@ fn last_run(
             "plyflow: {file}: {left} artifacts are of steps that this file no longer has; they are not compared\n"
         ));
     }
-    match found.is_empty() {
-        true => Err(nothing()),
-        false => Ok(found),
+    match found.iter().all(|(_, path)| path.is_none()) {
+        true if only.is_empty() => Err(nothing()),
+        _ => Ok(found),
     }
 }
 
@@ -183,6 +192,8 @@ enum Outcome {
     Differs(Vec<Difference>),
     /// One alone is there.
     OnlyIn(&'static str),
+    /// None is: the step failed, or has not run.
+    Neither,
 }
 
 impl Outcome {
@@ -200,7 +211,8 @@ fn compare(pair: &Pair) -> Result<Compared, Stop> {
     let outcome = match &pair.paths {
         [Some(a), Some(b)] => outcome(a, b)?,
         [Some(_), None] => Outcome::OnlyIn("first"),
-        [None, _] => Outcome::OnlyIn("second"),
+        [None, Some(_)] => Outcome::OnlyIn("second"),
+        [None, None] => Outcome::Neither,
     };
     let label = pair.label.clone();
     Ok(Compared { label, outcome })
@@ -249,6 +261,7 @@ impl Compared {
             Outcome::Differs(list) => ("differs", &list[..]),
             Outcome::OnlyIn("first") => ("only-in-first", &[][..]),
             Outcome::OnlyIn(_) => ("only-in-second", &[][..]),
+            Outcome::Neither => ("in-neither", &[][..]),
         };
         json!({"step": self.label, "status": status, "differences": list})
     }
@@ -265,6 +278,7 @@ fn text(compared: &[Compared], all: bool) -> String {
             Outcome::SameBytes => format!("{head}the same bytes\n"),
             Outcome::Same => format!("{head}the same numbers, made by something else\n"),
             Outcome::OnlyIn(which) => format!("{head}only in the {which}\n"),
+            Outcome::Neither => format!("{head}in neither: it failed there, or has not run\n"),
             Outcome::Differs(list) => {
                 let shown = if all { list.len() } else { SHOWN };
                 let mut text = format!("{head}differs in {}\n", list.len());

@@ -14,7 +14,7 @@ use super::run::{Interrupts, ROUNDS, conclude, observer, options};
 use super::study::{Line, Status, Table};
 use super::{Done, Stop};
 use crate::engine::core::State;
-use crate::engine::{Depth, Local, Session, Summary};
+use crate::engine::{Depth, Local, Session, Summary, class_of};
 use crate::exit;
 use crate::plan::Key;
 use crate::store::{RunFolder, Store};
@@ -40,6 +40,9 @@ struct Kept {
     settled: bool,
     /// What the points took (CPU, s).
     cpu_seconds: f64,
+    /// What of that went into steps that failed, of which the store has no record: the number of points when a round was over, and what it took.
+    #[serde(default)]
+    failed: Vec<(usize, f64)>,
     /// Texts of the values.
     points: Vec<Vec<String>>,
 }
@@ -88,6 +91,10 @@ struct Way {
     told: Vec<Told>,
     summary: Summary,
     cpu_seconds: f64,
+    /// What steps took that failed, as [`Kept::failed`]: in this run and in those before.
+    failed: Vec<(usize, f64)>,
+    /// The same of the round that is on (CPU, s).
+    failing: f64,
     /// Artifacts that have been counted.
     seen: HashSet<Key>,
     settled: bool,
@@ -116,7 +123,11 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
     let _locks = opened.lock()?;
     let machine = || Stop::machine(format!("running with {root}"));
     let interrupts = Interrupts::listen().map_err(machine())?;
-    let mut way = Way::default();
+    let kept = Kept::read(&folder, &o.digest);
+    let mut way = Way {
+        failed: kept.map_or(Vec::new(), |k| k.failed),
+        ..Way::default()
+    };
     loop {
         let mut points = match search.ask(&way.told).map_err(wrong)? {
             Asked::Points(points) => points,
@@ -125,7 +136,7 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
         way.settled = points.is_empty();
         points.truncate(match o.budget {
             Budget::Runs(most) => (most as usize).saturating_sub(way.told.len()),
-            Budget::CpuSeconds(most) if way.cpu_seconds >= most => 0,
+            Budget::CpuSeconds(most) if way.used() >= most => 0,
             Budget::CpuSeconds(_) => usize::MAX,
         });
         keep(&o, &way, &points).write(&folder).map_err(machine())?;
@@ -168,7 +179,8 @@ fn keep(o: &Optimisation, way: &Way, new: &[Vec<Value>]) -> Kept {
     Kept {
         digest: o.digest.clone(),
         settled: way.settled,
-        cpu_seconds: way.cpu_seconds,
+        cpu_seconds: way.used(),
+        failed: way.failed.clone(),
         points: told.chain(new).map(text).collect(),
     }
 }
@@ -222,6 +234,7 @@ fn round(
         let outcome = outcome(o, study, &point, line)?;
         way.told.push(Told { point, outcome });
     }
+    way.note_failing();
     Ok(())
 }
 
@@ -244,6 +257,11 @@ fn is_answer(line: &Line) -> bool {
         Status::Failed { .. } => no_answer(line).is_none(),
         Status::NotRun => false,
     }
+}
+
+/// Whether what happened to a step when it ran last is an answer, so that it is not run again.
+pub fn is_answer_of(label: &str, reason: &str) -> bool {
+    class_of(reason) != MACHINE && label.contains('@')
 }
 
 /// Why a failure tells nothing of a point, if it does not.
@@ -293,12 +311,15 @@ fn execute<'o>(
         return Err(stop);
     }
     let wake = interrupts.poll_end().map_err(machine())?;
+    let before = children_seconds();
     let mut executor = Local::new("/proc/self/exe".into(), Some(wake));
+    let mut failed = false;
     for round in 0.. {
         let (ended, summary) = session
             .execute(&mut executor, observer.as_mut(), &|| interrupts.count())
             .map_err(machine())?;
         session = ended;
+        failed |= !summary.failures.is_empty();
         // What was there has been counted.
         way.summary.add(Summary {
             cached: 0,
@@ -318,8 +339,22 @@ fn execute<'o>(
             return Err(Stop::new(exit::DAMAGED, text));
         }
     }
-    way.take(&session);
+    // Its workers end with it, and only then what they took is known.
+    drop(executor);
+    let counted = way.take(&session);
+    if failed {
+        way.failing += (children_seconds() - before - counted).max(0.0);
+    }
     Ok(session)
+}
+
+/// User and system time of all processes that this one has started, they and theirs, and that have ended (s).
+fn children_seconds() -> f64 {
+    let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+    // Fills the structure, which holds numbers alone.
+    unsafe { libc::getrusage(libc::RUSAGE_CHILDREN, &raw mut usage) };
+    let seconds = |t: libc::timeval| t.tv_sec as f64 + t.tv_usec as f64 * 1e-6;
+    seconds(usage.ru_utime) + seconds(usage.ru_stime)
 }
 
 impl Way {
@@ -330,8 +365,24 @@ impl Way {
         self.summary.cached += self.seen.len() - before;
     }
 
-    /// Takes up what artifacts took, each once.
-    fn take(&mut self, session: &Session<'_>) {
+    /// What the points took so far (CPU, s).
+    fn used(&self) -> f64 {
+        let told = self.told.len();
+        let failed = self.failed.iter().filter(|(points, _)| *points <= told);
+        self.cpu_seconds + failed.map(|(_, seconds)| seconds).sum::<f64>()
+    }
+
+    /// Notes what the steps that failed in a round took, beside what earlier attempts at it did.
+    fn note_failing(&mut self) {
+        let seconds = std::mem::take(&mut self.failing);
+        if seconds > 0.0 {
+            self.failed.push((self.told.len(), seconds));
+        }
+    }
+
+    /// Takes up what artifacts took, each once; gives what was new (CPU, s).
+    fn take(&mut self, session: &Session<'_>) -> f64 {
+        let before = self.cpu_seconds;
         for instance in session.core.instances() {
             if let (State::Done { .. }, Some(key)) = (&instance.state, instance.key)
                 && self.seen.insert(key)
@@ -340,5 +391,6 @@ impl Way {
                 self.cpu_seconds += cost.map_or(0.0, |c| c.cpu_seconds);
             }
         }
+        self.cpu_seconds - before
     }
 }

@@ -24,6 +24,8 @@ pub struct Prospects<'s> {
     steps: Vec<Step>,
     /// Positions of the points of which something is missing, and what of them failed last time.
     open: Vec<(usize, Option<String>)>,
+    /// Points of an optimisation that failed: answers, which are not run again.
+    failed: usize,
 }
 
 /// A step of the file, at all points.
@@ -52,9 +54,11 @@ impl<'s> Prospects<'s> {
         for (id, instance) in core.instances().iter().enumerate() {
             by_step[instance.step].push(id);
         }
-        let fates: Vec<Fate> = (0..by_step.len())
+        let mut fates: Vec<Fate> = (0..by_step.len())
             .map(|step| Fate::of(session, step, &by_step[step]))
             .collect();
+        let answered = answered(session, study, &by_step);
+        leave_out_answered(study, &answered, &mut fates);
         let steps = (0..study.steps.len()).map(|at| {
             let mut all: Vec<usize> = study.points.iter().map(|p| p.steps[at]).collect();
             all.sort_unstable();
@@ -85,7 +89,13 @@ impl<'s> Prospects<'s> {
         };
         let open = (0..study.points.len()).filter(is_open);
         let open = open.map(|p| (p, failure(p))).collect();
-        Some(Self { study, steps, open })
+        let failed = answered.iter().filter(|failed| **failed).count();
+        Some(Self {
+            study,
+            steps,
+            open,
+            failed,
+        })
     }
 
     fn estimate(&self) -> f64 {
@@ -107,9 +117,13 @@ impl<'s> Prospects<'s> {
         let (all, open) = (self.study.points.len(), self.open.len());
         let s = if all == 1 { "" } else { "s" };
         let mut out = format!(
-            "study over {}: {all} point{s}, {} done, {open} to run\n",
+            "study over {}: {all} point{s}, {} done, {}{open} to run\n",
             names.join(", "),
-            all - open
+            all - open - self.failed,
+            match self.failed {
+                0 => String::new(),
+                n => format!("{n} failed (not run again), "),
+            }
         );
         out += "\n";
         let row = |s: &Step| {
@@ -195,12 +209,41 @@ impl<'s> Prospects<'s> {
         json!({
             "variables": self.study.variables.iter().map(|v| v.name.as_str()).collect::<Vec<_>>(),
             "points": self.study.points.len(),
+            "points_failed": self.failed,
             "points_to_run": self.open.iter().map(name).collect::<Vec<_>>(),
             "steps": steps.collect::<Vec<_>>(),
             "estimated_cpu_seconds": self.estimate(),
             "steps_without_estimate": self.without(),
             "optimisation": super::optimise::ahead_json(self.study, self.of_a_point()),
         })
+    }
+}
+
+/// For each point whether it is one of an optimisation that failed, which is an answer to its method.
+fn answered(session: &Session<'_>, study: &Study, by_step: &[Vec<Id>]) -> Vec<bool> {
+    let is_answer = |id: &Id| {
+        let failure = session.failed_before(*id);
+        failure.is_some_and(|f| super::optimise::is_answer_of(&f.label, &f.reason))
+    };
+    let point = |steps: &[usize]| {
+        let mut all = steps.iter().flat_map(|s| &by_step[*s]);
+        study.optimisation.is_some() && all.any(is_answer)
+    };
+    study.points.iter().map(|p| point(&p.steps)).collect()
+}
+
+/// Steps that only such points have are not run.
+fn leave_out_answered(study: &Study, answered: &[bool], fates: &mut [Fate]) {
+    let points = || study.points.iter().zip(answered);
+    let of = |wanted: bool| {
+        let those = points().filter(move |(_, failed)| **failed == wanted);
+        those.flat_map(|(p, _)| p.steps.iter().copied())
+    };
+    let needed: BTreeSet<usize> = of(false).collect();
+    for step in of(true).filter(|s| !needed.contains(s)) {
+        if fates[step] != Fate::Cached {
+            fates[step] = Fate::LeftOut;
+        }
     }
 }
 

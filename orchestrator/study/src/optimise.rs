@@ -16,7 +16,6 @@ pub use method::{DEFAULT_POPULATION, Way};
 pub use rank::{Outcome, Told};
 pub use trace::{Entry, best, trace};
 
-use crate::number::text;
 use crate::{Problem, Range, Value};
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
@@ -25,7 +24,7 @@ use std::collections::HashMap;
 /// Most variables of a search: Sobol numbers, which begin one, have so many dimensions.
 pub const MOST_VARIABLES: usize = sobol_burley::NUM_DIMENSIONS as usize;
 
-/// What a variable may be.
+/// What a variable may be. Quantities of one variable have one unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Along {
     /// Anything between two ends.
@@ -46,6 +45,12 @@ impl Along {
                 Ok(values[i.min(values.len() - 1)].clone())
             }
         }
+    }
+
+    /// Whether it is a value of this variable.
+    #[must_use]
+    pub fn holds(&self, value: &Value) -> bool {
+        self.fraction(value).is_some()
     }
 
     /// The fraction of the way at which a value lies; `None`: it is no value of this variable.
@@ -174,11 +179,11 @@ impl Search {
 
 /// A text that only this point has.
 fn key(point: &[Value]) -> String {
-    let one = |v: &Value| match v {
-        Value::Quantity(q) => text(&q.number),
-        other => other.text(),
-    };
-    point.iter().map(one).collect::<Vec<_>>().join("\u{1f}")
+    point
+        .iter()
+        .map(Value::text)
+        .collect::<Vec<_>>()
+        .join("\u{1f}")
 }
 
 /// How many different points of a search there are among some of the unit cube.

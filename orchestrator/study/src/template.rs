@@ -90,7 +90,11 @@ impl Template {
                     .iter()
                     .map(|p| match p {
                         Part::Text(t) => t.clone(),
-                        Part::Variable(i) => of[*i].text().replace(' ', ""),
+                        // Blanks of a text are its own; `45 deg` is put together as `45deg`.
+                        Part::Variable(i) => match &of[*i] {
+                            Value::Text(t) => t.clone(),
+                            other => other.text().replace(' ', ""),
+                        },
                     })
                     .collect(),
             ),
@@ -150,11 +154,12 @@ mod tests {
     use super::*;
 
     fn put(text: &str) -> Result<Option<Written>, ExpressionError> {
-        let names = ["angle", "count", "cloth"].map(str::to_owned);
+        let names = ["angle", "count", "cloth", "spaced"].map(str::to_owned);
         let of = [
             Value::of_text("45 deg").unwrap(),
             Value::of_number("3").unwrap(),
             Value::Text("ncf".into()),
+            Value::Text("woven b".into()),
         ];
         let kinds: Vec<Kind> = of.iter().map(Value::kind).collect();
         let template = Template::read(text, &names, &kinds)?;
@@ -170,6 +175,7 @@ mod tests {
         assert_eq!(put("${count} / 2").unwrap(), Some(Written::Decimal(1.5)));
         assert_eq!(put("../${cloth}.yaml").unwrap(), text("../ncf.yaml"));
         assert_eq!(put("${cloth}-${angle}").unwrap(), text("ncf-45deg"));
+        assert_eq!(put("${spaced}.yaml").unwrap(), text("woven b.yaml"));
         assert_eq!(put("a $${b}").unwrap(), text("a ${b}"));
     }
 

@@ -125,7 +125,14 @@ impl Value {
     #[must_use]
     pub fn label(&self) -> String {
         let given = match self {
-            Self::Quantity(q) => format!("{}{}", text(&q.number), q.unit),
+            // `5 1/s` is not to be read as 51.
+            Self::Quantity(q) => {
+                let unit = match q.unit.strip_prefix('1') {
+                    Some(below) if below.starts_with('/') => below,
+                    _ => &q.unit,
+                };
+                format!("{}{unit}", text(&q.number))
+            }
             other => other.text(),
         };
         let mut out = String::with_capacity(given.len());

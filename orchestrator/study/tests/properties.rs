@@ -114,3 +114,12 @@ fn a_whole_number_stays_one_so_that_a_parameter_takes_it() {
     let value = Value::of_number("3").unwrap();
     assert_eq!(value.written(), Written::Integer(3));
 }
+
+#[test]
+fn a_rate_keeps_its_number_in_the_name_of_a_point() {
+    let label = |text: &str| Value::of_text(text).unwrap().label();
+    assert_eq!(label("5 1/s"), "5/s");
+    assert_eq!(label("51 1/s"), "51/s");
+    assert_eq!(label("5 m/s"), "5m/s");
+    assert_eq!(label("5 deg"), "5deg");
+}

@@ -96,3 +96,29 @@ fn the_numbers_that_differ_are_shown_and_a_damaged_artifact_is_not_compared() {
     assert_eq!((out.as_str(), code), ("", Some(8)));
     assert!(err.contains("nothing was compared with it"), "{err}");
 }
+
+#[test]
+fn points_of_a_study_are_chosen_by_the_plain_name_and_what_failed_in_both_is_told() {
+    let steps = "
+study:
+  vary: {v: [1, 2]}
+steps:
+  one: {plugin: error, with: {value: \"${v}\", beyond: 1}}
+  two: {plugin: trivial, with: {value: \"${v}\"}}
+";
+    let [a, b] = [(); 2].map(|()| {
+        let study = Study::new(steps);
+        assert_eq!(study.run(&[]).failed, 1);
+        study
+    });
+    let status = |more: &[&str]| {
+        let (steps, code) = diff(&a, &b, more);
+        let all: Vec<String> = steps.into_iter().map(|s| s.1).collect();
+        (all, code)
+    };
+    let (all, code) = status(&[]);
+    assert_eq!((all.len(), code), (4, Some(0)));
+    assert_eq!(all.iter().filter(|s| *s == "in-neither").count(), 1);
+    assert_eq!(status(&["--step", "two"]).0, ["same-bytes", "same-bytes"]);
+    assert_eq!(status(&["--step", "one@v=2"]).0, ["in-neither"]);
+}

@@ -101,6 +101,47 @@ fn a_failed_point_is_a_row_and_the_best_point_meets_what_must_hold() {
 }
 
 #[test]
+fn values_of_a_list_are_told_apart_by_what_they_are_and_not_by_how_they_are_written() {
+    let points = |x: &str, start: &str| -> Vec<String> {
+        let block = format!("  method: evolution\n  budget: 40\n  start: {{x: {start}, y: 1}}\n");
+        let over = format!("over: {{x: {x}, y: [1, 2]}}");
+        let text = search(&block)
+            .replace("over: {x: {from: 0, to: 4}, y: {from: 0, to: 4}}", &over)
+            .replace("${x}", "(${x} / (1 m))");
+        let study = Study::new(&text);
+        let end = study.run(&[]);
+        assert_eq!(end.code, Some(0), "{x}: {end:?}");
+        table(&study).0.lines().skip(1).map(str::to_owned).collect()
+    };
+    // One number in two units is two values, one value in two units is one.
+    assert_eq!(points("[1 cm, 1 m]", "1 cm").len(), 4);
+    assert_eq!(points("[9 cm, 90 mm, 100 mm]", "90 mm").len(), 4);
+    // A step of a range, written otherwise: the first point that is asked for.
+    let begun = points("{from: 80 mm, to: 100 mm, by: 10 mm}", "9 cm");
+    let first = |l: &String| l.starts_with("\"x=90mm,y=1\"") && l.contains(",1,");
+    assert!(begun.iter().any(first), "{begun:?}");
+}
+
+#[test]
+fn points_that_fail_use_up_the_time_and_are_not_promised_again() {
+    // Every point fails: there is always another one to ask for.
+    let block = "  method: evolution\n  budget: 200 ms\n";
+    let study = Study::new(&search(block).replace("beyond: 3", "beyond: -1"));
+    let end = study.run(&["--jobs", "2"]);
+    assert!(end.code == Some(0) && end.failed > 0, "{end:?}");
+    assert_eq!(told(&study)["ended"], true);
+    let asked = table(&study).0.lines().count() as u64 - 1;
+    // What has been used up stays so.
+    let again = study.run(&[]);
+    assert_eq!((again.executed, again.failed), (0, 0), "{again:?}");
+    assert_eq!(table(&study).0.lines().count() as u64 - 1, asked);
+    let plan = study.call(&["plan", "--format", "json"]);
+    let plan: Value = serde_json::from_slice(&plan.stdout).expect("a plan in JSON");
+    assert_eq!(plan["study"]["points_failed"], asked, "{plan}");
+    assert_eq!(plan["study"]["points_to_run"], Value::Array(Vec::new()));
+}
+
+#[test]
 fn what_is_to_be_small_may_be_computed_from_the_variables() {
     let block = with_budget(
         "  subject_to: [s >= 4]\n  method: evolution\n  seed: 3\n",

@@ -1,6 +1,6 @@
 //! The grammar: text -> nodes.
 
-use super::unit::unit;
+use super::unit::{unit, variable_in};
 use super::{Compare, ExpressionError, FUNCTIONS, Function, Kind, Names, Node, WORDS};
 use crate::number::{Quantity, leading};
 use crate::{Problem, Value};
@@ -255,6 +255,16 @@ impl<'t> Reader<'t> {
             self.at = self.text.len() - after.len();
             let (taken, unit) = unit(after, self.names);
             self.at += taken;
+            if let Some(name) = variable_in(&unit, self.names) {
+                let message = format!("`{name}` is a variable and stands where a unit would");
+                let help = format!(
+                    "blanks around `/` or `*` part a number from a variable: `1 / {name}`; a unit of that name needs another name for the variable"
+                );
+                return Err(ExpressionError {
+                    at: start..self.at,
+                    problem: Problem::new(message).help(help),
+                });
+            }
             let number = number.map_err(|problem| ExpressionError {
                 at: start..self.at,
                 problem,

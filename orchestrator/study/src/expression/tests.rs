@@ -128,3 +128,26 @@ fn what_does_not_hold_tells_how_far_it_is_from_it() {
     assert_eq!(excess("x == 2 mm or layup == 'L4'"), [1.0]);
     assert_eq!(excess("layup == 'L4' and not (x > 1 m)"), [1.0, 0.0]);
 }
+
+#[test]
+fn a_variable_where_a_unit_would_stand_is_told_and_never_a_unit() {
+    let all = ["h", "angle"].map(str::to_owned);
+    let of = [
+        Value::of_text("2 mm").unwrap(),
+        Value::of_text("45 deg").unwrap(),
+    ];
+    let read = |text: &str, bare| Expression::read(text, Names { all: &all, bare });
+    for text in ["1/h", "2/h", "1/angle", "3 m/h", "h < 1/h"] {
+        let told = read(text, true).unwrap_err().problem;
+        assert!(
+            told.message.contains("stands where a unit would"),
+            "{text}: {told}"
+        );
+    }
+    let value = |text: &str, bare| read(text, bare).unwrap().value(&of).unwrap().si().unwrap();
+    assert_eq!(value("1 / h", true), 500.0);
+    assert_eq!(value("1 /h", true), 500.0);
+    // Where only `${h}` is a variable, it is the hour; and one word behind a number is a unit everywhere.
+    assert_eq!(value("3600/h", false), 1.0);
+    assert_eq!(value("2 h", true), 7200.0);
+}

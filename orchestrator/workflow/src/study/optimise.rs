@@ -7,7 +7,7 @@ use crate::load::WORKFLOW;
 use crate::resolved::{Budget, Optimisation, Study, StudyResponse};
 use crate::yaml::{Kind, Node};
 use plyflow_model::units::{Dimension, parse_quantity};
-use plyflow_study::optimise::{DEFAULT_POPULATION, Outcome, Search, Way};
+use plyflow_study::optimise::{Along, DEFAULT_POPULATION, Outcome, Search, Way};
 use plyflow_study::{Expression, ExpressionError, Names, Points, Quantity, Table, Value};
 use std::collections::HashMap;
 
@@ -116,9 +116,9 @@ fn search(node: &Node, source: &Source, problems: &mut Problems) -> Option<Searc
         None => None,
         Some(e) => {
             let mut values = Vec::new();
-            for (name, _) in &over {
+            for (name, along) in &over {
                 match e.value.get(name) {
-                    Some(v) => values.push(super::points::value(v, source, problems)?),
+                    Some(v) => values.push(begins(v, name, along, source, problems)?),
                     None => {
                         let message = format!("`start` has no `{name}`");
                         let d = problems.add(source, &e.value.span, message);
@@ -143,6 +143,30 @@ fn search(node: &Node, source: &Source, problems: &mut Problems) -> Option<Searc
         seed: whole("seed").unwrap_or(0),
         start,
     })
+}
+
+/// The value at which a variable begins, as the variable writes it.
+fn begins(
+    node: &Node,
+    name: &str,
+    along: &Along,
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<Value> {
+    let given = super::points::value(node, source, problems)?;
+    let value = match along {
+        Along::Steps(all) | Along::Choice(all) => super::points::in_unit_of(&given, &all[0]),
+        Along::Range(_) => Ok(given.clone()),
+    };
+    match value {
+        Ok(value) if along.holds(&value) => Some(value),
+        _ => {
+            let message = format!("`{name}` cannot begin at `{}`", given.text());
+            let d = problems.add(source, &node.span, message);
+            d.expected("one of its values");
+            None
+        }
+    }
 }
 
 fn budget(node: &Node, source: &Source, problems: &mut Problems) -> Option<Budget> {

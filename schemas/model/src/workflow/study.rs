@@ -148,7 +148,7 @@ pub enum SampleMethod {
 /// What is read from every point of a study: a result of a step, or what follows from the point's own values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{"required": ["step", "result"]}, {"required": ["value"]}]))]
+#[schemars(extend("dependentRequired" = {"step": ["result"], "result": ["step"]}, "minProperties" = 1, "not" = {"required": ["step", "value"]}))]
 pub struct Response {
     /// Step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
