@@ -48,7 +48,7 @@ pub enum How {
         of: u64,
         /// The largest difference.
         largest: f64,
-        /// Its index, row-major; of what moves the frame comes first.
+        /// Its index, from 0, row-major. For moving points and for fields: frame, point or cell, component.
         at: Vec<u64>,
         /// The largest size of a number in the first, to see how much that is.
         scale: f64,
@@ -58,7 +58,7 @@ pub enum How {
 }
 
 /// Everything in which two artifacts differ but their provenance: kind, results, collection, attributes, frames, bodies with their fields, arrays.
-/// Nothing when all of it is the same to the bit.
+/// Nothing when all of it is the same: attributes by value, everything else to the bit.
 ///
 /// # Errors
 /// When one of them cannot be read.

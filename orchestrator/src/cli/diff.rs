@@ -25,7 +25,8 @@ pub fn diff(args: &DiffArgs) -> Done {
     let pairs = match [&args.a, &args.b].map(|p| is_artifact(p)) {
         [true, true] => {
             if !args.steps.is_empty() || args.store_a.is_some() || args.store_b.is_some() {
-                let text = "--step and --store are for workflows; these are two artifacts";
+                let text =
+                    "--step, --store-a and --store-b are for workflows; these are two artifacts";
                 return Err(Stop::new(exit::USAGE, text));
             }
             vec![Pair {
@@ -115,8 +116,8 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
     let store = &opened.store;
     let nothing = || {
         let text = format!(
-            "{file} has not run into the store {}; start with: plyflow run {file}",
-            store.root()
+            "{file} has not run into the store {root}; start with: plyflow run {file} --store {root}",
+            root = store.root()
         );
         Stop::new(exit::USAGE, text)
     };
@@ -128,15 +129,18 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
     // A journal knows names and items by their hashes alone, so it is asked for all that there can be.
     let keys = journal.last_keys();
     let records = keys.iter().filter_map(|key| store.read_record(key).ok());
-    let lengths = records.filter_map(|r| r.collection.map(|labels| labels.len() as u64));
-    let longest = lengths.max().unwrap_or(0);
+    let (mut longest, mut recorded) = (0, BTreeSet::new());
+    for record in records {
+        longest = longest.max(record.collection.map_or(0, |labels| labels.len() as u64));
+        recorded.insert(record.item);
+    }
     let (mut found, mut named) = (Vec::new(), BTreeSet::new());
     for at in wanted {
         let (step, collections) = (
             &opened.workflow.steps[at],
             opened.graph.steps[at].dimensions.len(),
         );
-        for item in indices(collections, longest) {
+        for item in indices(collections, longest, &recorded) {
             let key = journal.last(&step.name, &item);
             // A step that failed last may have a key, and has no artifact.
             let key = key.filter(|key| store.artifact(key).is_file());
@@ -161,8 +165,15 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
     }
 }
 
-/// All indices of items in so many collections with at most so many items each, in order.
-fn indices(collections: usize, length: u64) -> Vec<Vec<u64>> {
+/// All indices of items in so many collections with at most so many items each, in order; where these are too many to ask for, those that records tell
+/// of (two items that share an artifact share its record).
+fn indices(collections: usize, length: u64, recorded: &BTreeSet<Vec<u64>>) -> Vec<Vec<u64>> {
+    const MOST: u64 = 100_000;
+    let depth = u32::try_from(collections).unwrap_or(u32::MAX);
+    if length.checked_pow(depth).is_none_or(|n| n > MOST) {
+        let of = recorded.iter().filter(|item| item.len() == collections);
+        return of.cloned().collect();
+    }
     let mut all = vec![Vec::new()];
     for _ in 0..collections {
         let longer = |item: &Vec<u64>| -> Vec<Vec<u64>> {
@@ -295,7 +306,13 @@ fn text(compared: &[Compared], all: bool) -> String {
     }
     if compared.len() > 1 {
         let same = compared.iter().filter(|c| c.outcome.is_same()).count();
-        out += &format!("{same} of {} are the same\n", compared.len());
+        let neither = (compared.iter()).filter(|c| matches!(c.outcome, Outcome::Neither));
+        let neither = neither.count();
+        out += &format!("{same} of {} are the same", compared.len() - neither);
+        if neither > 0 {
+            out += &format!("; {neither} are in neither");
+        }
+        out.push('\n');
     }
     out
 }

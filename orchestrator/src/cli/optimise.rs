@@ -23,7 +23,7 @@ use plyflow_study::Value;
 use plyflow_study::optimise::{Asked, Outcome, Search, Told};
 use plyflow_workflow::resolved::{Budget, Optimisation, Study};
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::time::Instant;
 
 /// The class of failures that tell nothing of a point.
@@ -40,9 +40,9 @@ struct Kept {
     settled: bool,
     /// What the points took (CPU, s).
     cpu_seconds: f64,
-    /// What of that went into steps that failed, of which the store has no record: the number of points when a round was over, and what it took.
+    /// What steps took that failed (CPU, s), by their keys: the store has no record of them.
     #[serde(default)]
-    failed: Vec<(usize, f64)>,
+    failed: BTreeMap<String, f64>,
     /// Texts of the values.
     points: Vec<Vec<String>>,
 }
@@ -91,11 +91,9 @@ struct Way {
     told: Vec<Told>,
     summary: Summary,
     cpu_seconds: f64,
-    /// What steps took that failed, as [`Kept::failed`]: in this run and in those before.
-    failed: Vec<(usize, f64)>,
-    /// The same of the round that is on (CPU, s).
-    failing: f64,
-    /// Artifacts that have been counted.
+    /// As [`Kept::failed`]: of this run and of those before.
+    failed: BTreeMap<String, f64>,
+    /// Keys of artifacts and failures that have been counted.
     seen: HashSet<Key>,
     settled: bool,
     /// What the machine could not do.
@@ -125,7 +123,7 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
     let interrupts = Interrupts::listen().map_err(machine())?;
     let kept = Kept::read(&folder, &o.digest);
     let mut way = Way {
-        failed: kept.map_or(Vec::new(), |k| k.failed),
+        failed: kept.map_or_else(BTreeMap::new, |k| k.failed),
         ..Way::default()
     };
     loop {
@@ -136,7 +134,7 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
         way.settled = points.is_empty();
         points.truncate(match o.budget {
             Budget::Runs(most) => (most as usize).saturating_sub(way.told.len()),
-            Budget::CpuSeconds(most) if way.used() >= most => 0,
+            Budget::CpuSeconds(most) if way.cpu_seconds >= most => 0,
             Budget::CpuSeconds(_) => usize::MAX,
         });
         keep(&o, &way, &points).write(&folder).map_err(machine())?;
@@ -144,7 +142,10 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
             break;
         }
         let before = way.told.len();
-        round(args, points, &mut way, &interrupts)?;
+        round(args, points.clone(), &mut way, &interrupts)?;
+        // What failed in a round that ends the run has taken its time as well.
+        let rest = &points[way.told.len() - before..];
+        keep(&o, &way, rest).write(&folder).map_err(machine())?;
         if way.told.len() == before {
             way.broken
                 .get_or_insert("no point of this round has an answer".into());
@@ -179,7 +180,7 @@ fn keep(o: &Optimisation, way: &Way, new: &[Vec<Value>]) -> Kept {
     Kept {
         digest: o.digest.clone(),
         settled: way.settled,
-        cpu_seconds: way.used(),
+        cpu_seconds: way.cpu_seconds,
         failed: way.failed.clone(),
         points: told.chain(new).map(text).collect(),
     }
@@ -197,7 +198,7 @@ fn round(
     let mut lines = {
         let session = opened.look()?;
         let lines = read(&session);
-        way.count(&session);
+        way.count(&session, !args.force.is_empty());
         lines
     };
     let open: Vec<usize> = (0..points.len())
@@ -234,7 +235,6 @@ fn round(
         let outcome = outcome(o, study, &point, line)?;
         way.told.push(Told { point, outcome });
     }
-    way.note_failing();
     Ok(())
 }
 
@@ -342,9 +342,12 @@ fn execute<'o>(
     // Its workers end with it, and only then what they took is known.
     drop(executor);
     let counted = way.take(&session);
-    if failed {
-        way.failing += (children_seconds() - before - counted).max(0.0);
-    }
+    // What was stopped took some of it, and runs again.
+    let spent = (children_seconds() - before - counted).max(0.0);
+    way.take_failed(
+        &session,
+        (failed && !way.summary.interrupted).then_some(spent),
+    );
     Ok(session)
 }
 
@@ -358,25 +361,28 @@ fn children_seconds() -> f64 {
 }
 
 impl Way {
-    /// Counts what the store has already.
-    fn count(&mut self, session: &Session<'_>) {
+    /// Counts what the store has already, and what failed unless that runs again.
+    fn count(&mut self, session: &Session<'_>, again: bool) {
         let before = self.seen.len();
         self.take(session);
         self.summary.cached += self.seen.len() - before;
+        if !again {
+            self.take_failed(session, None);
+        }
     }
 
-    /// What the points took so far (CPU, s).
-    fn used(&self) -> f64 {
-        let told = self.told.len();
-        let failed = self.failed.iter().filter(|(points, _)| *points <= told);
-        self.cpu_seconds + failed.map(|(_, seconds)| seconds).sum::<f64>()
-    }
-
-    /// Notes what the steps that failed in a round took, beside what earlier attempts at it did.
-    fn note_failing(&mut self) {
-        let seconds = std::mem::take(&mut self.failing);
-        if seconds > 0.0 {
-            self.failed.push((self.told.len(), seconds));
+    /// Takes up what steps took that failed, each once. Of those that have failed now `spent` (CPU, s) is what all of them took together; of others
+    /// it is what was noted then. A step that is another one by now has another key, and nothing of it was noted.
+    fn take_failed(&mut self, session: &Session<'_>, spent: Option<f64>) {
+        let ids = 0..session.core.instances().len();
+        let failed = ids.filter(|id| session.failed_before(*id).is_some());
+        let keys = failed.filter_map(|id| session.core.instances()[id].key);
+        let new: Vec<Key> = keys.filter(|key| self.seen.insert(*key)).collect();
+        for key in &new {
+            if let Some(spent) = spent {
+                self.failed.insert(key.hex(), spent / new.len() as f64);
+            }
+            self.cpu_seconds += self.failed.get(&key.hex()).copied().unwrap_or(0.0);
         }
     }
 

@@ -66,10 +66,10 @@ impl<'s> Prospects<'s> {
             Step::of(session, &study.steps[at], &all, &by_step, &fates)
         });
         let steps = steps.collect();
+        // A step that a failed point shares with another one is run for that one.
         let is_open = |p: &usize| {
-            let of = study.points[*p].steps.iter();
-            of.clone()
-                .any(|s| !matches!(fates[*s], Fate::Cached | Fate::LeftOut))
+            let mut of = study.points[*p].steps.iter();
+            !answered[*p] && of.any(|s| !matches!(fates[*s], Fate::Cached | Fate::LeftOut))
         };
         let failed: Vec<Option<String>> = (by_step.iter())
             .map(|ids| {

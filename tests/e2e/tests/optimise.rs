@@ -139,6 +139,32 @@ fn points_that_fail_use_up_the_time_and_are_not_promised_again() {
     let plan: Value = serde_json::from_slice(&plan.stdout).expect("a plan in JSON");
     assert_eq!(plan["study"]["points_failed"], asked, "{plan}");
     assert_eq!(plan["study"]["points_to_run"], Value::Array(Vec::new()));
+    let kept = std::fs::read_to_string(study.path(".plyflow/runs/study/asked.json")).unwrap();
+    let used = |text: &str| serde_json::from_str::<Value>(text).unwrap()["cpu_seconds"].as_f64();
+    assert!(used(&kept) >= Some(0.2), "{kept}");
+}
+
+#[test]
+fn a_failed_point_is_not_promised_again_where_it_shares_a_step_with_others() {
+    let shared = |value: u32| {
+        let base = format!("steps:\n  base: {{plugin: trivial, with: {{value: {value}}}}}\n");
+        with_budget(EVOLUTION, 24)
+            .replace("steps:\n", &base)
+            .replace("- 2)\"}}", "- 2)\"}, from: {in: base}}")
+    };
+    let study = Study::new(&shared(1));
+    let end = study.run(&[]);
+    assert!(end.code == Some(0) && end.failed > 0, "{end:?}");
+    study.write(&shared(2));
+    let plan = study.call(&["plan", "--format", "json"]);
+    let plan: Value = serde_json::from_slice(&plan.stdout).expect("a plan in JSON");
+    let plan = &plan["study"];
+    let open = plan["points_to_run"].as_array().unwrap().len() as u64;
+    let failed = plan["points_failed"].as_u64().unwrap();
+    assert_eq!((open + failed, failed), (24, end.failed), "{plan}");
+    let text = String::from_utf8(study.call(&["plan"]).stdout).unwrap();
+    let counts = format!("24 points, 0 done, {failed} failed (not run again), {open} to run");
+    assert!(text.contains(&counts), "{text}");
 }
 
 #[test]

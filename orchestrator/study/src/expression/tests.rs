@@ -131,13 +131,10 @@ fn what_does_not_hold_tells_how_far_it_is_from_it() {
 
 #[test]
 fn a_variable_where_a_unit_would_stand_is_told_and_never_a_unit() {
-    let all = ["h", "angle"].map(str::to_owned);
-    let of = [
-        Value::of_text("2 mm").unwrap(),
-        Value::of_text("45 deg").unwrap(),
-    ];
+    let all = ["h", "angle", "s2"].map(str::to_owned);
+    let of = ["2 mm", "45 deg", "3 mm"].map(|t| Value::of_text(t).unwrap());
     let read = |text: &str, bare| Expression::read(text, Names { all: &all, bare });
-    for text in ["1/h", "2/h", "1/angle", "3 m/h", "h < 1/h"] {
+    for text in ["1/h", "2/h", "1/angle", "3 m/h", "h < 1/h", "1/s2", "1/h^2"] {
         let told = read(text, true).unwrap_err().problem;
         assert!(
             told.message.contains("stands where a unit would"),
@@ -150,4 +147,5 @@ fn a_variable_where_a_unit_would_stand_is_told_and_never_a_unit() {
     // Where only `${h}` is a variable, it is the hour; and one word behind a number is a unit everywhere.
     assert_eq!(value("3600/h", false), 1.0);
     assert_eq!(value("2 h", true), 7200.0);
+    assert_eq!(value("4 m2 / h", true), 2000.0);
 }

@@ -78,10 +78,14 @@ pub(super) fn unit(rest: &str, names: Names<'_>) -> (usize, String) {
 }
 
 /// The variable that a unit of several factors, or one below a stroke, seems to be meant for: `1/h` is a number per hour or one over a
-/// variable `h`. Only where names stand alone.
+/// variable `h`, and `1/h2` one over `h2`. Only where names stand alone.
 pub(super) fn variable_in<'n>(unit: &str, names: Names<'n>) -> Option<&'n String> {
-    let is_one = unit.chars().all(is_letter);
-    let mut words = unit.split(|c| !is_letter(c));
-    let named = words.find_map(|word| names.all.iter().find(|n| *n == word));
-    named.filter(|_| names.bare && !is_one)
+    let parts = ['/', '*', '·', '.', ' '];
+    if !names.bare || !unit.contains(parts) {
+        return None;
+    }
+    let factors = unit.split(parts);
+    // With the power and without: `h2` is a name, or the square of `h`.
+    let mut words = factors.flat_map(|f| [f, f.trim_end_matches(|c| !is_letter(c))]);
+    words.find_map(|word| names.all.iter().find(|n| *n == word))
 }
