@@ -247,8 +247,10 @@ impl Found<'_> {
     }
 
     fn fields(&mut self, [a, b]: [&BodyInfo; 2], frames: u64) -> Result<()> {
-        let called =
-            |f: &FieldInfo| format!("field {} ({:?}) of {}", f.name, f.on, a.name).to_lowercase();
+        let called = |f: &FieldInfo| {
+            let on = format!("{:?}", f.on).to_lowercase();
+            format!("field {} ({on}) of {}", f.name, a.name)
+        };
         for field in &b.fields {
             if !a
                 .fields

@@ -25,6 +25,7 @@ pub use catalog::{Describer, PluginCatalog};
 pub use checkpoints::{cost_so_far, damaged_cost};
 pub use describe::{Description, describe, describe_main};
 pub use load::{LoadError, Plugin};
+pub use process::children_seconds;
 pub use supervise::{Orphans, rename_argument, supervise};
 pub use trust::{Ask, Consent, Place, Stranger, Trust, manifest_file};
 pub use worker::{run_job, worker_main};

@@ -19,6 +19,7 @@ use crate::exit;
 use crate::plan::Key;
 use crate::store::{RunFolder, Store};
 use camino::Utf8Path;
+use plyflow_plugin_host::children_seconds;
 use plyflow_study::Value;
 use plyflow_study::optimise::{Asked, Outcome, Search, Told};
 use plyflow_workflow::resolved::{Budget, Optimisation, Study};
@@ -349,15 +350,6 @@ fn execute<'o>(
         (failed && !way.summary.interrupted).then_some(spent),
     );
     Ok(session)
-}
-
-/// User and system time of all processes that this one has started, they and theirs, and that have ended (s).
-fn children_seconds() -> f64 {
-    let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
-    // Fills the structure, which holds numbers alone.
-    unsafe { libc::getrusage(libc::RUSAGE_CHILDREN, &raw mut usage) };
-    let seconds = |t: libc::timeval| t.tv_sec as f64 + t.tv_usec as f64 * 1e-6;
-    seconds(usage.ru_utime) + seconds(usage.ru_stime)
 }
 
 impl Way {

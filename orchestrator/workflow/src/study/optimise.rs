@@ -8,7 +8,7 @@ use crate::resolved::{Budget, Optimisation, Study, StudyResponse};
 use crate::yaml::{Kind, Node};
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_study::optimise::{Along, DEFAULT_POPULATION, Outcome, Search, Way};
-use plyflow_study::{Expression, ExpressionError, Names, Points, Quantity, Table, Value};
+use plyflow_study::{Expression, ExpressionError, Names, Points, Problem, Quantity, Table, Value};
 use std::collections::HashMap;
 
 /// Gives the points with which an optimisation is looked at, by the name of the workflow, what names the search, and the search: none for
@@ -145,6 +145,32 @@ fn search(node: &Node, source: &Source, problems: &mut Problems) -> Option<Searc
     })
 }
 
+/// A value in the unit of another, where both are quantities.
+fn in_unit_of(value: &Value, other: &Value) -> Result<Value, Problem> {
+    match (value, other) {
+        (Value::Quantity(value), Value::Quantity(other)) => {
+            value.in_unit_of(other).map(Value::Quantity)
+        }
+        _ => Ok(value.clone()),
+    }
+}
+
+/// Each value once, quantities in the unit of the first: a method tells values apart, not their spelling.
+pub(super) fn in_one_unit(values: Vec<Value>) -> Result<Vec<Value>, Problem> {
+    let mut all: Vec<Value> = Vec::new();
+    for value in values {
+        let value = match all.first() {
+            Some(first) if first.kind() == value.kind() => in_unit_of(&value, first)?,
+            // Of another kind: told with both, later.
+            _ => value,
+        };
+        if !all.contains(&value) {
+            all.push(value);
+        }
+    }
+    Ok(all)
+}
+
 /// The value at which a variable begins, as the variable writes it.
 fn begins(
     node: &Node,
@@ -155,7 +181,7 @@ fn begins(
 ) -> Option<Value> {
     let given = super::points::value(node, source, problems)?;
     let value = match along {
-        Along::Steps(all) | Along::Choice(all) => super::points::in_unit_of(&given, &all[0]),
+        Along::Steps(all) | Along::Choice(all) => in_unit_of(&given, &all[0]),
         Along::Range(_) => Ok(given.clone()),
     };
     match value {

@@ -79,16 +79,6 @@ pub(super) fn over(
     all.into_iter().collect()
 }
 
-/// A value in the unit of another of its kind.
-pub(super) fn in_unit_of(value: &Value, other: &Value) -> Result<Value, Problem> {
-    match (value, other) {
-        (Value::Quantity(value), Value::Quantity(other)) => {
-            value.in_unit_of(other).map(Value::Quantity)
-        }
-        _ => Ok(value.clone()),
-    }
-}
-
 /// Reads one value; `None` when something is wrong (and reported).
 pub(super) fn value(node: &Node, source: &Source, problems: &mut Problems) -> Option<Value> {
     let mut reader = Reader {
@@ -101,27 +91,6 @@ pub(super) fn value(node: &Node, source: &Source, problems: &mut Problems) -> Op
 }
 
 impl Reader<'_> {
-    /// Each value once, quantities in the unit of the first: a method tells values apart, not their spelling.
-    fn in_one_unit(&mut self, values: Vec<Value>, span: &Span) -> Option<Vec<Value>> {
-        let mut all: Vec<Value> = Vec::new();
-        for value in values {
-            let value = match all.first().unwrap_or(&value).clone() {
-                first if first.kind() == value.kind() => in_unit_of(&value, &first),
-                // Of another kind: told with both.
-                _ => Ok(value),
-            };
-            match value {
-                Ok(value) if all.contains(&value) => {}
-                Ok(value) => all.push(value),
-                Err(problem) => {
-                    self.tell(problem, span);
-                    return None;
-                }
-            }
-        }
-        Some(all)
-    }
-
     /// What a variable of an optimisation may be: a range, its steps, or one of a list.
     fn along(&mut self, node: &Node, key: &Span) -> Option<Along> {
         let is_range = matches!(&node.kind, Kind::Map(_));
@@ -129,7 +98,9 @@ impl Reader<'_> {
             return self.range(node).map(Along::Range);
         }
         let values = self.values(node, key)?;
-        let values = self.in_one_unit(values, &node.span)?;
+        let values = super::optimise::in_one_unit(values)
+            .map_err(|problem| self.tell(problem, &node.span))
+            .ok()?;
         let si: Vec<Option<f64>> = values.iter().map(Value::si).collect();
         let grows = |w: &[Option<f64>]| matches!(w, [Some(a), Some(b)] if a < b);
         let falls = |w: &[Option<f64>]| matches!(w, [Some(a), Some(b)] if a > b);
