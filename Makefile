@@ -10,7 +10,7 @@ PLYFLOW := $(TARGET)/release/plyflow
 DEMO ?= workflows/joggle-spar/workflow.yaml
 CARGO := . ./.tools/env && cargo
 
-.PHONY: help build demo test test-long templates lint bench docs clean
+.PHONY: help build demo test long templates lint bench docs clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -29,9 +29,9 @@ test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	scripts/check-vtk
 	scripts/check-report
 
-test-long: ## run the tests that take many minutes
+long: ## run the tests that take many minutes
 	@scripts/setup
-	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -p plyflow-forming-explicit -- --ignored --nocapture
+	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -p plyflow-faults -p plyflow-forming-explicit -- --ignored --nocapture
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-characterisation --all-features --test calibration -- --ignored --nocapture
 
 templates: build ## build, check and run the element templates outside of the repository

@@ -280,7 +280,7 @@ fn students_error_of_a_mean_holds_in_90_to_99_of_100_tests() {
 }
 
 #[test]
-#[ignore = "minutes: make test-long"]
+#[ignore = "minutes: make long"]
 fn the_told_error_of_a_bending_law_holds_where_strips_are_alike() {
     let mut several = Coverage::default();
     let test = |s| bending(&mut several, &BENDING[1], (5e-3, 0.05e-3), (3, 0.0), s);
@@ -291,7 +291,7 @@ fn the_told_error_of_a_bending_law_holds_where_strips_are_alike() {
 }
 
 #[test]
-#[ignore = "minutes: make test-long"]
+#[ignore = "minutes: make long"]
 fn the_told_errors_of_a_bending_law_hold_for_every_law_overhang_and_noise() {
     for (law, overhang, spacing, noise) in [
         (0, 0.17, 0.34e-3, 0.085e-3),

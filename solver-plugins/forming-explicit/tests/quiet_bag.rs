@@ -235,13 +235,13 @@ fn a_bag_draped_over_a_dome_stays_quiet() {
 }
 
 #[test]
-#[ignore = "minutes: make test-long"]
+#[ignore = "minutes: make long"]
 fn a_flat_bag_stays_quiet_for_a_second() {
     assert_quiet("flat", &flat(1.0), BOUND);
 }
 
 #[test]
-#[ignore = "minutes: make test-long"]
+#[ignore = "minutes: make long"]
 fn a_draped_bag_stays_quiet_for_a_second() {
     assert_quiet("draped", &draped(0.0113, 1.0), BOUND);
 }
@@ -255,7 +255,7 @@ fn a_draped_bag_stays_quiet_whose_plies_have_their_nodes_under_those_of_the_film
 /// (`docs/decisions/0020`). In the coarser ones some 1e-7 of the work goes on swinging
 /// (6.7e-8 becomes 8.4e-8 with films of 11.5 mm): here the bound alone is asked for, not that it grows by less than a fifth.
 #[test]
-#[ignore = "minutes: make test-long"]
+#[ignore = "minutes: make long"]
 fn draped_bags_stay_quiet_whatever_the_mesh_of_the_films() {
     for k in 0..16 {
         let film = 0.010 + 0.00025 * f64::from(k);

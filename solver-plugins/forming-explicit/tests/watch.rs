@@ -95,6 +95,34 @@ fn a_node_that_is_put_through_the_sheet_below_it_is_told_and_one_beside_it_is_no
     assert!(found.depth > 0.6 * (2.4e-4 + 1e-4), "{found:?}");
 }
 
+#[test]
+fn a_film_in_the_other_one_is_told_and_stops_a_run_near_a_ply_and_far_from_all_of_them_is_in_the_table()
+ {
+    let pairs = ["lower/upper", "lower_off_plies/upper"];
+    for (x, expected) in [(0.022, [true, false]), (0.045, [false, true])] {
+        let mut forming = build(&bag(1, |p| {
+            p["scene"]["sheets"][1]["length"] = json!("0.04 m")
+        }));
+        let [low, high] = [0, 2].map(|sheet| node(&forming, sheet, [x, 0.01]));
+        let below = forming.model.x[low][2];
+        let depths = seen(&mut forming, |f| f.model.x[high][2] = below - 2e-4);
+        let found = pairs.map(|name| depths.iter().find(|d| d.pair.name == name).unwrap());
+        assert_eq!(
+            found.map(|d| d.end.depth > 1e-4),
+            expected,
+            "{x}: {found:?}"
+        );
+        let told = depth_warnings(&depths);
+        assert_eq!(
+            told.iter().any(|w| w.contains("'upper'")),
+            expected[0],
+            "{told:?}"
+        );
+        // It stops a run sooner near a ply.
+        assert!(found[0].pair.most < 0.6 * found[1].pair.most && found[1].pair.most.is_finite());
+    }
+}
+
 /// What is seen of a film that lies on a block of 100 mm as if there were no fin of 2 mm on it, 5 mm high, at x = `from` (mm), with a ply of
 /// `length` over the middle.
 fn through_a_fin(from: f64, length: &str) -> Vec<PairDepth> {

@@ -188,6 +188,71 @@ fn around_the_corner_of_a_bowl_the_force_turns_smoothly_and_does_no_work() {
     }
 }
 
+/// A film at the foot of a block's rounded corner, as it lay after forming: its cells on the ground and on the two walls are hollow towards each
+/// other, and the fourth, which lies on the corner's edge, is not. One slave at `place` from the node that they share.
+fn foot_of_a_corner(place: V) -> (QuadMesh, Vec<V>) {
+    let axis = [-0.016, 0.0, 0.016];
+    let mut mesh = QuadMesh::grid(&axis, &axis);
+    let millimetres = [
+        [-18.9, -20.8, 0.0],
+        [-2.0, -18.0, 0.0],
+        [13.9, -11.1, 0.0],
+        [-17.8, -4.7, 0.0],
+        [0.0, 0.0, 0.0],
+        [11.4, 2.3, 13.2],
+        [-15.5, 10.9, 0.0],
+        [0.3, 11.7, 11.7],
+        [7.2, 9.3, 28.9],
+    ];
+    for (p, at) in mesh.points.iter_mut().zip(millimetres) {
+        *p = scale(at, 1e-3);
+    }
+    let mut x = mesh.points.clone();
+    x.push(place);
+    (mesh, x)
+}
+
+#[test]
+fn at_the_foot_of_a_corner_the_force_turns_smoothly_between_ground_and_both_walls_and_does_no_work()
+{
+    // Where the slave is pressed into the foot with some 2 to 10 % of the distance at which it touches.
+    let middle: V = [-1.75e-4, -2.3e-4, 4.3e-4];
+    for (radius, upright) in [(4e-6, false), (2e-5, false), (5e-5, false), (2e-5, true)] {
+        const STEPS: usize = 720;
+        let at = |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / STEPS as f64;
+            let (a, b) = (radius * angle.cos(), radius * angle.sin());
+            // Along the line between the walls, and across it or upwards.
+            let way = if upright {
+                [0.8 * a, -0.6 * a, b]
+            } else {
+                [0.8 * a + 0.6 * b, -0.6 * a + 0.8 * b, 0.0]
+            };
+            let (mesh, x) = foot_of_a_corner(add(middle, way));
+            let (_, f) = evaluate(&mesh, &x, 0);
+            (x[x.len() - 1], f[f.len() - 1])
+        };
+        let states: Vec<_> = (0..=STEPS).map(at).collect();
+        let size = states.iter().map(|s| norm(s.1)).fold(0.0, f64::max);
+        assert!(size > 0.5, "{radius} m: {size} N");
+        let (mut work, mut jump) = (0.0, 0.0f64);
+        for (a, b) in states.iter().zip(&states[1..]) {
+            work += 0.5 * dot(add(a.1, b.1), sub(b.0, a.0));
+            jump = jump.max(norm(sub(b.1, a.1)));
+        }
+        let way = std::f64::consts::TAU * radius;
+        assert!(
+            jump < 0.05 * size,
+            "{radius} m: a jump of {jump} N of {size} N"
+        );
+        assert!(
+            work.abs() < 2e-2 * size * way,
+            "{radius} m: {work} J of {} J",
+            size * way
+        );
+    }
+}
+
 #[test]
 fn force_turns_smoothly_across_a_valley() {
     let sideways = |x: f64| {
@@ -329,6 +394,11 @@ fn a_slave_that_is_found_deep_inside_is_not_flung_out() {
 /// The share that contacts hand to their multipliers between a sheet of 12 x 12 mm in elements of 1 mm and one above it of elements of
 /// `size` (m), both of 1 kg/m2.
 fn augmentation(size: f64) -> f64 {
+    between_sheets(size).contact_augmentation()
+}
+
+/// The same two sheets.
+fn between_sheets(size: f64) -> Model {
     let meshes = [1e-3, size].map(|size| {
         let axis = even_axis(0.0, 0.012, size);
         QuadMesh::grid(&axis, &axis)
@@ -362,7 +432,7 @@ fn augmentation(size: f64) -> f64 {
     );
     model.sheet_contacts.push(between);
     model.set_contact_stiffness(&contact);
-    model.contact_augmentation()
+    model
 }
 
 #[test]
@@ -375,6 +445,27 @@ fn multipliers_grow_more_slowly_where_one_sheet_has_far_more_mass_in_a_node() {
     let expected = 2.0 * default.damping_ratio * default.stiffness_factor.sqrt() / 36.0 / 16.0;
     let got = augmentation(6e-3);
     assert!((got / expected - 1.0).abs() < 1e-9, "{got}, not {expected}");
+}
+
+#[test]
+fn multipliers_of_light_nodes_at_a_corner_grow_more_slowly_by_themselves() {
+    let default = ContactSettings::default();
+    let model = between_sheets(2e-3);
+    let follows: Vec<f64> = (model.sheet_contacts[0].items.iter())
+        .map(SlaveItem::follows)
+        .collect();
+    // In masses of a small element the corner's node has a quarter; those of the cell that it touches have 1, 2, 4 and 2.
+    let most = default.largest_augmentation(0.25 / 2.25);
+    let expected = most / default.augmentation;
+    assert!(expected < 0.8);
+    for corner in [0, 12, 13 * 12, 13 * 13 - 1] {
+        let got = follows[corner];
+        assert!(
+            got <= expected && got > expected - 1.0 / 255.0,
+            "{got}, not {expected}"
+        );
+    }
+    assert_eq!(follows.iter().filter(|f| **f == 1.0).count(), 13 * 13 - 4);
 }
 
 /// A plate with a slot from its middle to its far rim, 4 mm wide, and a slave over its left arm.

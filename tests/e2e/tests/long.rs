@@ -1,4 +1,4 @@
-//! Minutes, not seconds: `make test-long`.
+//! Minutes, not seconds: `make long`.
 
 use plyflow_e2e::{artifacts, ended, program, repository, signal, wait_for, workers_of};
 use std::path::Path;
@@ -62,7 +62,7 @@ impl Moments {
 }
 
 #[test]
-#[ignore = "minutes: make test-long"]
+#[ignore = "minutes: make long"]
 fn the_coarse_joggle_spar_killed_at_20_random_moments_ends_with_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let (whole, killed) = (folder.path().join("whole"), folder.path().join("killed"));
@@ -103,7 +103,7 @@ fn the_coarse_joggle_spar_killed_at_20_random_moments_ends_with_the_same_bytes()
 }
 
 #[test]
-#[ignore = "minutes: make test-long"]
+#[ignore = "minutes: make long"]
 fn the_coarse_joggle_spar_has_the_same_bytes_with_1_and_2_jobs() {
     let folder = tempfile::tempdir().unwrap();
     let (one, two) = (folder.path().join("one"), folder.path().join("two"));

@@ -5,16 +5,18 @@
 //! really lies between them, allow. See decision 34.
 
 mod edges;
+mod pairs;
 mod rigid;
 mod sheet;
 mod told;
 mod watcher;
 
+pub use pairs::{Kind, Pair};
 pub use told::{DEPTH_BOUND, PairDepth, depth_attributes, depth_warnings};
 
 use crate::run::Forming;
+use pairs::{Numbers, pairs};
 use plyflow_mechanics::vec3::{V, cross, norm, sub};
-use plyflow_model::scene::SheetKind;
 use rayon::prelude::*;
 use rigid::{Hint, Triangles, from_plate};
 use serde::{Deserialize, Serialize};
@@ -77,34 +79,6 @@ pub struct Watched {
     anew_at: Option<u64>,
 }
 
-/// What is held against what in a pair.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Nodes against a part or a sheet.
-    Nodes,
-    /// The tool's edges against the cells of a sheet.
-    Edges,
-    /// A film's nodes against the cells of a ply. Plies carry films at their nodes; between them a film hangs through.
-    Hangs,
-}
-
-/// Two bodies that must stay outside of each other.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pair {
-    /// Their names, from the tool upwards; of a part its own first.
-    pub name: String,
-    /// What is held.
-    pub kind: Kind,
-    /// Thickness (m) of the thinner sheet.
-    pub thinner: f64,
-    /// Depth (m) at the end beyond which it is told.
-    pub bound: f64,
-    /// Depth (m) beyond which the run stops.
-    pub most: f64,
-    /// Whether one of them is a ply.
-    pub of_ply: bool,
-}
-
 /// What a rigid part is made of.
 enum Shape {
     Tool(Triangles),
@@ -138,10 +112,7 @@ pub struct Watch {
     parts: Vec<Part>,
     sheets: Vec<Watcher>,
     pairs: Vec<Pair>,
-    /// By film and ply: number of the pair of what hangs through.
-    hangs: Vec<Option<usize>>,
-    /// By film: number of the pair of edges of the tool that are an element away from all plies.
-    beyond: Vec<Option<usize>>,
+    numbers: Numbers,
     /// By sheet, node and part.
     clear: Vec<Vec<Clear>>,
     /// By pair of a part and a sheet: how far (m) the nearest node was from touching at the last look.
@@ -222,7 +193,7 @@ impl Watch {
             })
             .collect();
         let sizes: Vec<f64> = sheets.iter().map(|s| s.size).collect();
-        let (pairs, hangs, beyond) = pairs(forming, &parts, &sizes);
+        let (pairs, numbers) = pairs(forming, &parts, &sizes);
         let never = Clear {
             at: [0.0; 3],
             distance: f64::NEG_INFINITY,
@@ -238,8 +209,7 @@ impl Watch {
             clear,
             nearest: vec![f64::INFINITY; pairs.len()],
             pairs,
-            hangs,
-            beyond,
+            numbers,
             stands_off: !press,
         }
     }
@@ -418,7 +388,7 @@ impl Watch {
             if !there {
                 continue;
             }
-            let pair = self.pair_of_sheets(view.sheet, other);
+            let pair = self.pair_of_sheets_at(scene, [view.sheet, other], place);
             let mut depth = 0.5 * (own.thickness + sheet.thickness) - over;
             let squeezed = depth.max(0.0);
             let least = self.floor(pair, scene.last).max(deepest[pair].depth);
@@ -518,12 +488,13 @@ impl Watch {
                 error: self.parts[0].error,
                 floor,
             };
-            let Some(beyond) = self.beyond[k] else {
+            let Some(beyond) = self.numbers.beyond[k] else {
                 [deepest[pair], _] = self.edges.deepest(k, triangles, &look, |_| true);
                 continue;
             };
             // What a film does an element away from all plies no ply feels.
-            let plies = || (self.beyond.iter().zip(trees)).filter(|(film, _)| film.is_none());
+            let plies =
+                || (self.numbers.beyond.iter().zip(trees)).filter(|(film, _)| film.is_none());
             let on_plies = |at: V| {
                 let mut trees = plies().filter_map(|(_, tree)| tree.as_ref());
                 trees.any(|tree| {
@@ -551,103 +522,32 @@ impl Watch {
         self.parts.len() * self.sheets.len() + sheet
     }
 
+    /// As [`Watch::pair_of_sheets`], of a node at a place: what films do an element away from all plies, by the boxes around these, is a pair of its own.
+    fn pair_of_sheets_at(&self, scene: &Scene<'_>, [a, b]: [usize; 2], place: V) -> usize {
+        let pair = self.pair_of_sheets(a, b);
+        let Some([_, off]) = self.numbers.films.filter(|[films, _]| *films == pair) else {
+            return pair;
+        };
+        let reach = self.sheets[a].size.max(self.sheets[b].size);
+        let in_reach = |[low, high]: &[V; 2]| {
+            (0..3).all(|k| (low[k] - reach..=high[k] + reach).contains(&place[k]))
+        };
+        let plies =
+            (self.numbers.beyond.iter().zip(scene.boxes)).filter(|(film, _)| film.is_none());
+        match plies.map(|(_, bounds)| bounds).any(in_reach) {
+            true => pair,
+            false => off,
+        }
+    }
+
     /// Pair of the nodes of sheet `a` with the cells of sheet `b`.
     fn pair_of_sheets(&self, a: usize, b: usize) -> usize {
-        if let Some(pair) = self.hangs[a * self.sheets.len() + b] {
+        if let Some(pair) = self.numbers.hangs[a * self.sheets.len() + b] {
             return pair;
         }
         let (low, high) = (a.min(b), a.max(b));
         (self.parts.len() + 1) * self.sheets.len() + high * (high - 1) / 2 + low
     }
-}
-
-/// The pairs: parts with sheets, edges of the tool with sheets, sheets with each other; by film and ply the number of what hangs through, and by film
-/// that of edges off the plies.
-fn pairs(
-    forming: &Forming,
-    parts: &[Part],
-    sizes: &[f64],
-) -> (Vec<Pair>, Vec<Option<usize>>, Vec<Option<usize>>) {
-    let stack = &forming.stack;
-    let is_ply = |k: usize| stack[k].scene.kind == SheetKind::Ply;
-    let plies = (0..stack.len()).filter(|k| is_ply(*k));
-    let thinnest = plies
-        .map(|k| stack[k].thickness)
-        .fold(f64::INFINITY, f64::min);
-    let name = |k: usize| stack[k].scene.name.as_str();
-    let mut all = Vec::new();
-    for part in parts {
-        for (k, s) in stack.iter().enumerate() {
-            let thinner = s.thickness;
-            all.push(Pair {
-                name: format!("{}/{}", part.name, name(k)),
-                kind: Kind::Nodes,
-                thinner,
-                bound: DEPTH_BOUND * thinner,
-                // A film may land on the bed harder than it is thick.
-                most: thinner.max(if is_ply(k) { 0.0 } else { thinnest }),
-                of_ply: is_ply(k),
-            });
-        }
-    }
-    let edges = |k: usize| Pair {
-        name: format!("tool_edges/{}", name(k)),
-        kind: Kind::Edges,
-        thinner: stack[k].thickness,
-        bound: stack[k].thickness.max(thinnest),
-        most: 0.5 * sizes[k],
-        of_ply: is_ply(k),
-    };
-    all.extend((0..stack.len()).map(edges));
-    let pair = |low: usize, high: usize| {
-        let [a, b] = [low, high].map(|k| stack[k].thickness);
-        Pair {
-            name: format!("{}/{}", name(low), name(high)),
-            kind: Kind::Nodes,
-            thinner: a.min(b),
-            bound: DEPTH_BOUND * a.min(b),
-            // Until their middles have crossed.
-            most: 0.5 * (a + b),
-            of_ply: true,
-        }
-    };
-    // No ply feels what films do to each other beside the plies; they fold there, and only the nodes of the upper one are held off.
-    let films = |low: usize, high: usize| Pair {
-        bound: DEPTH_BOUND * thinnest,
-        most: thinnest.max(0.25 * sizes[low].min(sizes[high])),
-        of_ply: false,
-        ..pair(low, high)
-    };
-    for high in 1..stack.len() {
-        all.extend((0..high).map(|low| match is_ply(low) || is_ply(high) {
-            true => pair(low, high),
-            false => films(low, high),
-        }));
-    }
-    let mut hangs = vec![None; stack.len() * stack.len()];
-    for film in (0..stack.len()).filter(|k| !is_ply(*k)) {
-        for ply in (0..stack.len()).filter(|k| is_ply(*k)) {
-            hangs[film * stack.len() + ply] = Some(all.len());
-            let both = pair(film.min(ply), film.max(ply));
-            all.push(Pair {
-                name: format!("between_nodes/{}", both.name),
-                kind: Kind::Hangs,
-                bound: f64::INFINITY,
-                most: f64::INFINITY,
-                ..both
-            });
-        }
-    }
-    let mut beyond = vec![None; stack.len()];
-    for film in (0..stack.len()).filter(|k| !is_ply(*k)) {
-        beyond[film] = Some(all.len());
-        all.push(Pair {
-            name: format!("tool_edges_off_plies/{}", name(film)),
-            bound: f64::INFINITY,
-            ..edges(film)
-        });
-    }
-    (all, hangs, beyond)
 }
 
 /// Side (m) of a square as large as the median cell over the tool of a sheet that lies flat; of one that lies nowhere over it, of all its cells.

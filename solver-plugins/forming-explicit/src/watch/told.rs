@@ -96,7 +96,7 @@ pub fn depth_warnings(depths: &[PairDepth]) -> Vec<String> {
             _ => format!(
                 "'{one}' and '{other}' end {mm:.3} mm deep in each other at {at}: {:.0} % of the thinner one, bound {:.0} %. The result is wrong there by as much. Take smaller elements there, or a smaller `time_step`, with which contacts are stiffer",
                 100.0 * d.share(),
-                100.0 * DEPTH_BOUND,
+                100.0 * d.pair.bound / d.pair.thinner,
             ),
         }
     })

@@ -19,10 +19,10 @@ fn width(a: &Closest, b: &Closest, offset: f64) -> f64 {
     WIDTH * offset * (1.0 - dot(a.arm, b.arm) / (a.distance2 * b.distance2).sqrt())
 }
 
-/// Whether a face next to the closest shares its slave. Where neither of those next to it does, none across the corner does.
+/// Whether a face may have a share in the slave of the closest one beside that, or beside another face that has one.
 #[inline]
-pub(super) fn shares(first: &Closest, other: &Closest, offset: f64) -> bool {
-    let e = width(first, other, offset);
+pub(super) fn shares(first: &Closest, beside: &Closest, other: &Closest, offset: f64) -> bool {
+    let e = width(beside, other, offset);
     e > 1e-9 * offset && other.distance2.sqrt() - first.distance2.sqrt() < e
 }
 
@@ -82,8 +82,13 @@ fn blend(found: &Found, offset: f64) -> Option<(f64, [f64; ALL])> {
             e[i][j] = between(i, j);
         }
     }
-    // The ring is 0, 1, 3, 2.
-    let less = ACROSS * e[1][0].min(e[2][0]);
+    // The ring is 0, 1, 3, 2. Of three faces the one between the others is the first, or that next to it which is there: so three faces
+    // share alike, whichever is the closest.
+    let less = match (faces[1], faces[2]) {
+        (Some(_), None) => ACROSS * e[1][0].min(e[3][1]),
+        (None, Some(_)) => ACROSS * e[2][0].min(e[3][2]),
+        _ => ACROSS * e[1][0].min(e[2][0]),
+    };
     for (i, j) in [(2, 1), (3, 0)] {
         e[i][j] = (e[i][j] - less).max(0.0);
     }

@@ -30,6 +30,7 @@ pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSur
 pub use search::{Surface, shape};
 pub use sheets::SheetContact;
 pub use slave::SlaveItem;
+pub(crate) use slave::WHOLE;
 
 /// Runs of slaves that a thread takes at most without leaving some to the others: how much there is to do in one is not known before.
 const TOGETHER: usize = 8;

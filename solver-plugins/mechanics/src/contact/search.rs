@@ -232,6 +232,36 @@ fn around(
     Some(found).filter(|c| c.free == [true; 2])
 }
 
+/// Closest point of the cell across a corner, where of the two cells next to `first` only `a` is hollow towards it: the surface folds away across
+/// the side `edge`. At the foot of a block's corner a slave touches the ground and both walls, and these meet at the corner alone, or across
+/// a ridge. Each of them is the closest in turn, and if it did not know of the other the slave would run to and fro between them.
+#[inline(never)]
+fn past_a_ridge(
+    s: &Surface<'_>,
+    first: &Closest,
+    a: &Closest,
+    edge: usize,
+    p: V,
+    open: impl Fn(u32) -> bool,
+) -> Option<Closest> {
+    let next = s.neighbours[first.cell as usize][edge];
+    // Of the cell across the side no more is needed than which it is.
+    let b = match mirrored_in(next) {
+        Some(plane) => Closest {
+            image: [plane == 0, plane == 1],
+            xi: middle(edge),
+            ..*first
+        },
+        None if next == NONE => return None,
+        None => Closest {
+            cell: next,
+            image: [false; 2],
+            ..*first
+        },
+    };
+    around(s, first, [a, &b], p, open)
+}
+
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
 /// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
 /// neighbour closer. The walk enters only cells that are `open` to it.
@@ -251,11 +281,14 @@ pub(super) fn track(
     // A neighbour that is folded back over the slave (by more than a right angle) is as near as the slave's own
     // cell from further off its side. Found too late, it would stand deep inside from one step to the next.
     let reach = if every(16) { 4.0 } else { 1.0 };
+    // By coordinate, the side that the place is near.
+    let mut sides = [None; 2];
     for _ in 0..12 {
         let near = s.neighbours[best.cell as usize];
         let band = 1.0 - (reach * best.distance2.sqrt() / best.half).min(0.5);
         let here = best;
         others = [None; FACES];
+        sides = [None; 2];
         for k in 0..2 {
             let place = here.xi[k];
             if place.abs() < band || (place.abs() < 1.0 && !careful) {
@@ -268,6 +301,7 @@ pub(super) fn track(
                 (_, true) => 2,
                 (_, false) => 0,
             };
+            sides[k] = Some(edge);
             if let Some(plane) = mirrored_in(near[edge]) {
                 // Across the plane the surface goes on as its own image, which is never closer.
                 let image = [plane == 0, plane == 1];
@@ -294,10 +328,28 @@ pub(super) fn track(
     // Only where the ways to both cells are perpendicular across their common side does the surface fold towards the slave;
     // along it they may end on a ridge, as on a saddle.
     for k in 0..2 {
-        others[k] = others[k].filter(|c| best.free[k] && shares(&best, c, offset));
+        others[k] = others[k].filter(|_| best.free[k]);
     }
-    if let [Some(a), Some(b), _] = &others {
-        others[2] = around(s, &best, [a, b], p, open);
+    others[2] = match (&others, sides) {
+        ([Some(a), Some(b), _], _) => around(s, &best, [a, b], p, open),
+        ([Some(a), None, _], [_, Some(edge)]) | ([None, Some(a), _], [Some(edge), _]) => {
+            past_a_ridge(s, &best, a, edge, p, open)
+        }
+        _ => None,
+    };
+    let beside = [Some(&best), others[0].as_ref(), others[1].as_ref()];
+    let reaches = |c: &Closest| {
+        beside
+            .into_iter()
+            .flatten()
+            .any(|b| shares(&best, b, c, offset))
+    };
+    others[2] = others[2].filter(reaches);
+    // Beside a cell across the corner the others count for what the two share, also where they have no share themselves.
+    if others[2].is_none() {
+        for other in &mut others[..2] {
+            *other = other.filter(|c| shares(&best, &best, c, offset));
+        }
     }
     Found {
         first: best,

@@ -49,6 +49,9 @@ pub struct SlaveItem {
     /// By how much nearer than the contact's distance it may come before it touches, in [`LET_IN`] of that
     /// ([`super::SheetContact::let_in`]).
     let_in: u16,
+    /// Share of the contact's augmentation with which its multiplier follows penetrations, in [`WHOLE`]: less than all of a light node that a
+    /// heavy sheet rides on ([`super::ContactSettings::largest_augmentation`]).
+    pub(crate) follows: u8,
     /// Direction from master to slave at the last search.
     pub(super) direction: V,
     /// Place in the cell, -1..1.
@@ -88,6 +91,7 @@ impl SlaveItem {
             guarded: false,
             between: false,
             let_in: 0,
+            follows: WHOLE,
             direction: [0.0; 3],
             xi,
             stiffness: 0.0,
@@ -126,6 +130,12 @@ impl SlaveItem {
     /// Whether the place of the master that it is nearest to is not past a rim.
     pub(super) fn lies_on_its_cell(&self) -> bool {
         self.cell != NONE && self.xi.iter().all(|x| x.abs() < 1.0 + RIM)
+    }
+
+    /// Share of the contact's augmentation with which its multiplier follows penetrations.
+    #[inline(always)]
+    pub fn follows(&self) -> f64 {
+        f64::from(self.follows) / f64::from(WHOLE)
     }
 
     /// Weights of the cell's nodes.
@@ -196,6 +206,9 @@ impl SlaveItem {
         depth - self.ignored
     }
 }
+
+/// All of a contact's augmentation ([`SlaveItem::follows`]).
+pub(crate) const WHOLE: u8 = u8::MAX;
 
 /// Steps of [`SlaveItem::let_in`], over the distance at which sheets touch.
 const LET_IN: f64 = 1e-4;
@@ -449,7 +462,11 @@ fn react<F: Coulomb>(
     let depth = -gap;
     let gap = -item.admit(depth, rel, law.dt, law.offset);
     let (held, work) = grown(item.multiplier, item.work, law.growth, k, gap);
-    let normal = normal_force(gap, vn, law.dt, k, c, law.follow, held, work);
+    let follow = Follow {
+        share: law.follow.share * item.follows(),
+        ..law.follow
+    };
+    let normal = normal_force(gap, vn, law.dt, k, c, follow, held, work);
     let n = unit(way);
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));

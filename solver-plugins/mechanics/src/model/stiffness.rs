@@ -1,6 +1,7 @@
 //! How stiff contacts are, from the masses that they couple and the step.
 
 use super::*;
+use crate::contact::WHOLE;
 
 /// Share of the thinner sheet from which on a contact is deep ([`SheetContact::deep`]).
 const DEEP: f64 = 0.1;
@@ -14,8 +15,8 @@ impl Model {
         let mass = &self.mass;
         // Of the whole node where a mirror plane cuts it, so that contacts there are as stiff as in the whole model.
         let mirroring = &self.mirroring;
+        let whole = |n: u32| mass[n as usize] / mirroring.share(n);
         let reduced = |node: u32, cell: [u32; 4]| {
-            let whole = |n: u32| mass[n as usize] / mirroring.share(n);
             let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
             mirroring.share(node) / (1.0 / whole(node) + 1.0 / lightest)
         };
@@ -56,6 +57,10 @@ impl Model {
                 .filter(|i| i.cell != crate::mesh::NONE)
             {
                 let nodes = self.cells[item.cell as usize];
+                let (slave, master) =
+                    (whole(item.node), nodes.map(whole).iter().sum::<f64>() / 4.0);
+                let most = c.largest_augmentation(slave.min(master) / slave.max(master));
+                item.follows = (f64::from(WHOLE) * (most / augmentation).min(1.0)) as u8;
                 item.stiffness = share * c.stiffness_factor * reduced(item.node, nodes) / dt2;
                 row[item.node as usize] += counted * item.stiffness;
                 for (k, n) in nodes.iter().enumerate() {

@@ -264,14 +264,14 @@ fn flips() -> usize {
 }
 
 #[test]
-#[ignore = "takes minutes: nine tenths and a half of PLYFLOW_FLIPS random bits (1000) and a fifth as many whole files, of test plugins and real ones"]
+#[ignore = "minutes (make long): nine tenths and a half of PLYFLOW_FLIPS random bits (1000) and a fifth as many whole files, of test plugins and real ones"]
 fn many_damages_to_a_store_give_no_wrong_number_and_are_repaired() {
     Lab::new(Study::new(MIXED), "all").trials(1, flips() * 8 / 10, flips() * 4 / 25);
     Lab::new(real(), "defects").trials(2, flips() * 3 / 20, flips() / 25);
 }
 
 #[test]
-#[ignore = "takes minutes: damages a thirteenth of PLYFLOW_FLIPS (1000) checkpoints"]
+#[ignore = "minutes (make long): damages a thirteenth of PLYFLOW_FLIPS (1000) checkpoints"]
 fn many_damages_to_checkpoints_give_the_same_bytes() {
     checkpoints(3, flips() * 3 / 40);
 }
