@@ -101,7 +101,10 @@ fn a_film_in_the_other_one_is_told_and_stops_a_run_near_a_ply_and_far_from_all_o
     let pairs = ["lower/upper", "lower_off_plies/upper"];
     for (x, expected) in [(0.022, [true, false]), (0.045, [false, true])] {
         let mut forming = build(&bag(1, |p| {
-            p["scene"]["sheets"][1]["length"] = json!("0.04 m")
+            p["scene"]["sheets"][1]["length"] = json!("0.04 m");
+            // Finer than the films: it is these that say how far they may cross.
+            p["element_size"] = json!(0.002);
+            p["diaphragm_element_size"] = json!(0.006);
         }));
         let [low, high] = [0, 2].map(|sheet| node(&forming, sheet, [x, 0.01]));
         let below = forming.model.x[low][2];

@@ -2,13 +2,10 @@
 
 mod common;
 
-use plyflow_mechanics::contact::{
-    ContactSettings, Pace, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem, Surface,
-};
+use plyflow_mechanics::contact::{ContactSettings, Pace, SheetContact, SlaveItem, Surface};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
-use std::sync::Arc;
 
 const OFFSET: f64 = 4e-4;
 
@@ -285,67 +282,6 @@ fn forces_and_moments_balance() {
         assert!(norm(force) < 1e-12 * size);
         assert!(norm(moment) < 1e-9 * size, "fold {fold}: {moment:?}");
     }
-}
-
-struct Incline {
-    normal: V,
-}
-
-impl RigidSurface for Incline {
-    fn distance(&self, p: V) -> (f64, V) {
-        (dot(p, self.normal), self.normal)
-    }
-}
-
-/// Slides a point mass for 0.1 s down a plane of the given angle; distance (m) along it.
-fn slide(angle: f64, friction: f64) -> f64 {
-    let normal = [angle.sin(), 0.0, angle.cos()];
-    let down = [angle.cos(), 0.0, -angle.sin()];
-    let (mass, dt, g) = (0.01, 1e-5, 9.81);
-    let mut item = RigidItem::new(0);
-    item.stiffness = 1e5;
-    item.damping = 10.0;
-    // At rest on the slip spring, as far as friction holds.
-    let held = (mass * g * angle.sin()).min(friction * mass * g * angle.cos());
-    item.slip = scale(down, -held);
-    let surface = Arc::new(Incline { normal });
-    let settings = ContactSettings::default();
-    let mut c = RigidContact::new(
-        "incline".into(),
-        surface,
-        0.0,
-        friction,
-        &settings,
-        vec![item],
-    );
-    // At rest on the penalty spring.
-    let start = scale(normal, -mass * g * angle.cos() / 1e5);
-    let (mut x, mut v) = (vec![start], vec![[0.0; 3]]);
-    for _ in 0..10_000 {
-        c.compute(&x, &v, pace(dt));
-        let f = add(c.items[0].force, [0.0, 0.0, -mass * g]);
-        v[0] = add(v[0], scale(f, dt / mass));
-        x[0] = add(x[0], scale(v[0], dt));
-    }
-    dot(sub(x[0], start), down)
-}
-
-#[test]
-fn block_on_an_incline_sticks_below_the_angle_of_friction() {
-    let mu: f64 = 0.4;
-    assert!(slide(mu.atan() * 0.98, mu).abs() < 2e-6);
-}
-
-#[test]
-fn block_on_an_incline_slides_by_coulombs_law_above_it() {
-    let mu: f64 = 0.4;
-    let angle = mu.atan() * 1.3;
-    let expected = 0.5 * 9.81 * (angle.sin() - mu * angle.cos()) * 0.1f64.powi(2);
-    let got = slide(angle, mu);
-    assert!(
-        (got / expected - 1.0).abs() < 0.01,
-        "{got} against {expected}"
-    );
 }
 
 /// Speed (m/s) upwards at which a slave of 1e-5 kg comes out of a flat sheet, or after a millisecond, that begins at `height` over

@@ -4,7 +4,7 @@ use plyflow_mechanics::contact::{
     ContactSettings, OpenPlate, Pace, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface,
 };
 use plyflow_mechanics::history::constant_speed_way;
-use plyflow_mechanics::vec3::{V, add, dot, norm, scale};
+use plyflow_mechanics::vec3::{V, add, dot, norm, scale, sub};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -257,4 +257,74 @@ fn slack_comes_before_the_force() {
     };
     assert_eq!(force(3.81e-4), 0.0);
     assert!((force(3.7e-4) - 1.0).abs() < 1e-9, "{}", force(3.7e-4));
+}
+
+struct Incline {
+    normal: V,
+}
+
+impl RigidSurface for Incline {
+    fn distance(&self, p: V) -> (f64, V) {
+        (dot(p, self.normal), self.normal)
+    }
+}
+
+/// Slides a point mass for 0.1 s down a plane of the given angle; distance (m) along it.
+fn slide_down(angle: f64, friction: f64) -> f64 {
+    let normal = [angle.sin(), 0.0, angle.cos()];
+    let down = [angle.cos(), 0.0, -angle.sin()];
+    let (mass, dt, g) = (0.01, 1e-5, 9.81);
+    let mut item = RigidItem::new(0);
+    item.stiffness = 1e5;
+    item.damping = 10.0;
+    // At rest on the slip spring, as far as friction holds.
+    let held = (mass * g * angle.sin()).min(friction * mass * g * angle.cos());
+    item.slip = scale(down, -held);
+    let surface = Arc::new(Incline { normal });
+    let settings = ContactSettings::default();
+    let mut c = RigidContact::new(
+        "incline".into(),
+        surface,
+        0.0,
+        friction,
+        &settings,
+        vec![item],
+    );
+    // At rest on the penalty spring.
+    let start = scale(normal, -mass * g * angle.cos() / 1e5);
+    let (mut x, mut v) = (vec![start], vec![[0.0; 3]]);
+    for _ in 0..10_000 {
+        c.compute(
+            &x,
+            &v,
+            Pace {
+                dt,
+                speed: 100.0,
+                acceleration: 1e6,
+                growth: 1.0,
+            },
+        );
+        let f = add(c.items[0].force, [0.0, 0.0, -mass * g]);
+        v[0] = add(v[0], scale(f, dt / mass));
+        x[0] = add(x[0], scale(v[0], dt));
+    }
+    dot(sub(x[0], start), down)
+}
+
+#[test]
+fn block_on_an_incline_sticks_below_the_angle_of_friction() {
+    let mu: f64 = 0.4;
+    assert!(slide_down(mu.atan() * 0.98, mu).abs() < 2e-6);
+}
+
+#[test]
+fn block_on_an_incline_slides_by_coulombs_law_above_it() {
+    let mu: f64 = 0.4;
+    let angle = mu.atan() * 1.3;
+    let expected = 0.5 * 9.81 * (angle.sin() - mu * angle.cos()) * 0.1f64.powi(2);
+    let got = slide_down(angle, mu);
+    assert!(
+        (got / expected - 1.0).abs() < 0.01,
+        "{got} against {expected}"
+    );
 }

@@ -88,9 +88,9 @@ pub(super) fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pa
         }
     };
     // No ply feels what films do to each other beside the plies; they fold there, and only the nodes of the upper one are held off.
-    let films = |low: usize, high: usize| Pair {
+    let films = |low: usize, high: usize, element: f64| Pair {
         bound: DEPTH_BOUND * thinnest,
-        most: thinnest.max(0.25 * sizes[low].min(sizes[high])),
+        most: thinnest.max(element * sizes[low].min(sizes[high])),
         of_ply: false,
         ..pair(low, high)
     };
@@ -100,8 +100,8 @@ pub(super) fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pa
             if is_ply(low) || is_ply(high) {
                 all.push(pair(low, high));
             } else {
-                both_films = Some((all.len(), films(low, high)));
-                all.push(films(low, high));
+                both_films = Some((all.len(), films(low, high, 0.5)));
+                all.push(films(low, high, 0.25));
             }
         }
     }
@@ -132,7 +132,6 @@ pub(super) fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pa
         all.push(Pair {
             name: both.name.replacen('/', "_off_plies/", 1),
             bound: f64::INFINITY,
-            most: thinnest.max(0.5 * sizes.iter().copied().fold(f64::INFINITY, f64::min)),
             ..both
         });
         [near, all.len() - 1]

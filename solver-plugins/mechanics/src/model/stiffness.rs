@@ -61,6 +61,8 @@ impl Model {
                     (whole(item.node), nodes.map(whole).iter().sum::<f64>() / 4.0);
                 let most = c.largest_augmentation(slave.min(master) / slave.max(master));
                 item.follows = (f64::from(WHOLE) * (most / augmentation).min(1.0)) as u8;
+                // None at all would leave every load to the penalty.
+                item.follows = item.follows.max(1);
                 item.stiffness = share * c.stiffness_factor * reduced(item.node, nodes) / dt2;
                 row[item.node as usize] += counted * item.stiffness;
                 for (k, n) in nodes.iter().enumerate() {
