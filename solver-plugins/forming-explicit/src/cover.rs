@@ -10,12 +10,13 @@ use crate::friction::FrictionTable;
 use crate::parameters::Parameters;
 use crate::penetration;
 use plyflow_mechanics::contact::{
-    FrictionLaw, RigidContact, RigidItem, RigidSurface, SheetContact,
+    FrictionLaw, RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem,
 };
 use plyflow_mechanics::mesh::area_vector;
 use plyflow_mechanics::model::Model;
+use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::SheetKind;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -119,8 +120,8 @@ fn hull_area(mut points: Vec<[f64; 2]>) -> f64 {
     (0..hull.len()).map(of_edge).sum()
 }
 
-/// Adds the contacts of plies with all sheets that are not their neighbours in the stack. `sheets`: of the whole stack, from the tool upwards, of a
-/// model that is still flat.
+/// Adds the contacts of plies with all sheets that are not their neighbours in the stack, and those in which nodes of a lower ply or film hold cells
+/// of an upper one. `sheets`: of the whole stack, from the tool upwards, of a model that is still flat.
 ///
 /// # Errors
 /// When a friction coefficient is missing or makes no sense.
@@ -163,15 +164,34 @@ pub fn add_contacts_past(
     }
     for (upper, sheet) in sheets.iter().enumerate() {
         for (lower, below) in sheets.iter().enumerate().take(upper) {
-            if !(is_ply(lower) && is_ply(upper)) {
+            if is_ply(lower) != is_ply(upper) {
                 continue;
             }
             add(model, *below, *sheet, -1.0)?;
             let contact = model.sheet_contacts.last_mut().expect("just added");
             contact.let_in = Some(LET_IN);
+            if !is_ply(lower) {
+                // Where the films are joined they have the same nodes, which lie on cells of their own.
+                let (from, to) = model.sheets[sheet.1].cell_range;
+                let of_both: HashSet<u32> =
+                    model.cells[from..to].iter().flatten().copied().collect();
+                let (cells, x) = (&model.cells, &model.x);
+                let lies_over = |i: &SlaveItem| {
+                    let [at, p] = [place(i, cells, x), x[i.node as usize]];
+                    (at[0] - p[0]).abs().max((at[1] - p[1]).abs()) < 1e-6
+                };
+                (contact.items).retain(|i| !of_both.contains(&i.node) && lies_over(i));
+            }
         }
     }
     Ok(())
+}
+
+/// Where on its cell a slave is nearest to.
+fn place(item: &SlaveItem, cells: &[[u32; 4]], x: &[V]) -> V {
+    let corners = cells[item.cell as usize].map(|n| x[n as usize]);
+    let add = |sum: V, (w, p): (f64, V)| [0, 1, 2].map(|c| sum[c] + w * p[c]);
+    item.weights().into_iter().zip(corners).fold([0.0; 3], add)
 }
 
 /// Share of the distance of two plies by which nodes of the lower one may reach into cells of the upper one before these are held off, besides what

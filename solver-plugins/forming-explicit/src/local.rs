@@ -366,7 +366,31 @@ pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), String> {
         drive.add(sheet);
     }
     forming.model.drive_also(nodes, Box::new(drive));
+    let_drive_decide(forming);
     Ok(())
+}
+
+/// Takes nodes that are driven out of contacts with what does not give way to them: rigid parts, and plies, whose nodes there are driven too. Where
+/// they are has been decided, by runs with finer elements; coarse ones stand elsewhere off tool and plies, and a multiplier
+/// that cannot move its node grows for ever. The films give way.
+fn let_drive_decide(forming: &mut Forming) {
+    let plies: Vec<_> = (forming.bodies.iter())
+        .filter(|b| is_ply(forming, b))
+        .map(|b| forming.model.sheets[b.sheet].cell_range)
+        .collect();
+    let mut all = std::mem::take(&mut forming.model.sheet_contacts);
+    for contact in &mut all {
+        let mut cells = contact.items.iter().map(|i| i.cell as usize);
+        if cells.any(|c| plies.iter().any(|(from, to)| (*from..*to).contains(&c))) {
+            (contact.items).retain(|i| !forming.model.is_driven(i.node));
+        }
+    }
+    forming.model.sheet_contacts = all;
+    let mut all = std::mem::take(&mut forming.model.rigid_contacts);
+    for contact in &mut all {
+        (contact.items).retain(|i| !forming.model.is_driven(i.node));
+    }
+    forming.model.rigid_contacts = all;
 }
 
 fn is_ply(forming: &Forming, body: &Body) -> bool {

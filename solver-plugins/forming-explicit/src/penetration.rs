@@ -200,10 +200,11 @@ impl Forming {
                 judge(&c.name, 0.0, touching)
             }
         });
-        // What catches lets in on purpose, by another depth at each place. How deep plies are in each other the watch tells.
+        // What catches lets in on purpose, by another depth at each place. How deep plies are in each other the watch tells. Where a driven node lies
+        // is not for contact to say.
         let holding = m.sheet_contacts.iter().filter(|c| c.let_in.is_none());
         let sheets = holding.map(|c| {
-            let touching = c.items.iter().filter(|i| i.active);
+            let touching = (c.items.iter()).filter(|i| i.active && !m.is_driven(i.node));
             between(&c.name, c.offset, touching.map(deep).collect())
         });
         let selves = m.self_contacts.iter().map(|c| {

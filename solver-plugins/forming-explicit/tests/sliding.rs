@@ -5,12 +5,14 @@ mod common;
 use common::BuiltIn;
 use common::depth::{Depth, depths};
 use common::scenes::{bag, ply};
+use plyflow_forming_explicit::assembly::inverse_bilinear;
 use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::run::{Forming, Observer};
+use plyflow_mechanics::contact::shape;
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::smooth_step;
-use plyflow_mechanics::model::Pressures;
+use plyflow_mechanics::model::{NodalLoad, Pressures};
 use plyflow_sdk::StepError;
 use serde_json::{Value, json};
 
@@ -157,4 +159,54 @@ fn an_equal_ply_past_the_edge_of_the_one_below_comes_to_rest_on_the_film() {
     for d in depths(&forming) {
         assert!(d.depth < 0.1 * d.thinner, "{d:?}");
     }
+}
+
+#[test]
+fn films_whose_nodes_do_not_lie_on_each_other_hold_each_other_from_both_sides() {
+    let p = stack(&[([0.12, 0.08], 0.0)], |_| {});
+    let mut forming = build_global(&p, &BuiltIn).unwrap();
+    let [lower, upper] = [0, 2].map(|sheet| forming.model.sheets[sheet].nodes.clone());
+    // The films have one mesh: by half an element, nodes of the lower one lie in the middle of cells of the upper one.
+    for n in upper.iter().filter(|n| !lower.contains(n)) {
+        (0..2).for_each(|k| forming.model.x[*n as usize][k] += 6e-3);
+    }
+    let model = &mut forming.model;
+    model.dt = p
+        .time_step
+        .min(p.step_safety * model.critical_step().unwrap());
+    // Beside the ply, and inside of where the films are joined.
+    let away = |n: &u32| {
+        let x = model.x[*n as usize];
+        (x[0] - 0.076).hypot(x[1])
+    };
+    let node = *(lower.iter())
+        .min_by(|a, b| away(a).total_cmp(&away(b)))
+        .unwrap();
+    let force = [0.0, 0.0, 30.0];
+    model.set_loads(vec![NodalLoad {
+        node,
+        force,
+        moment: [0.0; 3],
+    }]);
+    while model.time < 0.1 {
+        let bag = 1e5 * smooth_step(model.time, 0.0, 0.03);
+        model.load_factor = smooth_step(model.time, 0.03, 0.03);
+        model.pressures = Pressures {
+            below: bag,
+            above: bag,
+        };
+        model.step(false).unwrap();
+    }
+    let at = forming.model.x[node as usize];
+    let (from, to) = forming.model.sheets[2].cell_range;
+    let heights = forming.model.cells[from..to].iter().filter_map(|c| {
+        let q = c.map(|n| forming.model.x[n as usize]);
+        let xi = inverse_bilinear(q, at)?;
+        let inside = xi.iter().all(|x| x.abs() <= 1.0);
+        let height = |w: [f64; 4]| (0..4).map(|k| w[k] * q[k][2]).sum::<f64>();
+        inside.then(|| height(shape(xi)) - at[2])
+    });
+    let over: Vec<f64> = heights.collect();
+    // 0.3 mm, less the share that is let in and what straight cells cut off; the films are 0.08 mm thick.
+    assert!(over.len() == 1 && over[0] > 1.5e-4, "{over:?}");
 }

@@ -120,6 +120,72 @@ fn force_is_the_gradient_of_its_energy_inside_cells_and_on_ridges() {
     }
 }
 
+/// What a cell goes on by past its rim (m), of cells of 8 mm.
+const LEDGE: f64 = 2e-3;
+
+#[test]
+fn past_a_rim_the_distance_shrinks_and_the_force_is_the_gradient_of_its_energy() {
+    for share in [0.05, 0.5, 0.95] {
+        let past = share * LEDGE;
+        for place in [[0.008 + past, 0.003], [-0.002, -0.008 - past]] {
+            let held = OFFSET * (1.0 - 0.7 * share * share);
+            let energy = |height: f64| {
+                let mut flat = scene(0.0, place, height);
+                flat.1.iter_mut().rev().skip(1).for_each(|x| x[2] = 0.0);
+                evaluate(&flat.0, &flat.1, 0).0
+            };
+            assert_eq!(energy(1.0001 * held), 0.0, "at {place:?}");
+            let depth = 0.1 * OFFSET;
+            let expected = 0.5e5 * depth * depth;
+            let got = energy(held - depth);
+            assert!((got / expected - 1.0).abs() < 1e-9, "{got} at {place:?}");
+            // The turn of the master's cell under the slave is left out of what the distance changes by.
+            let error = gradient_error(0.0, place, 0.7 * held);
+            assert!(error < 0.02, "at {place:?}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_slave_that_is_drawn_off_a_rim_gives_back_what_it_has_stored_and_no_more() {
+    let (mesh, mut x) = scene(0.0, [0.0, 0.003], OFFSET);
+    x.iter_mut().rev().skip(1).for_each(|x| x[2] = 0.0);
+    let node = x.len() - 1;
+    let (neighbours, normals) = (mesh.neighbours(), vec![[0.0, 0.0, 1.0]; x.len()]);
+    let v = vec![[0.0; 3]; x.len()];
+    let mut c = contact(node as u32, 1);
+    // Outwards, at more than what the distance is at the end of the ledge.
+    let steps = 40_000;
+    let at = |k: i32| {
+        let way = f64::from(k) / f64::from(steps);
+        [0.006 + 0.006 * way, 0.003, 0.6 * OFFSET]
+    };
+    let mut forces = Vec::new();
+    for k in 0..=steps {
+        x[node] = at(k);
+        let surface = Surface {
+            cells: &mesh.cells,
+            neighbours: &neighbours,
+            x: &x,
+            normals: &normals,
+        };
+        let energy = c.compute(&surface, &v, pace(1e-6)).stored;
+        forces.push((energy, c.items[0].force));
+    }
+    let (first, last) = (forces[0], forces[steps as usize]);
+    assert!(first.0 > 0.0 && last.0 == 0.0);
+    let work: f64 = (1..=steps)
+        .map(|k| {
+            let mean = scale(add(forces[k as usize].1, forces[k as usize - 1].1), 0.5);
+            dot(mean, sub(at(k), at(k - 1)))
+        })
+        .sum();
+    assert!((work / first.0 - 1.0).abs() < 0.01, "{work} {}", first.0);
+    // It is let go by and by.
+    let steepest = forces.iter().map(|f| norm(f.1)).fold(0.0, f64::max);
+    assert!(steepest <= 1.05 * norm(first.1), "{steepest}");
+}
+
 #[test]
 fn force_is_the_gradient_of_its_energy_in_a_valley_but_for_the_turn_of_the_fold() {
     // The width of the blend follows the fold; its change is left out of the gradient.

@@ -216,8 +216,10 @@ const SPAN: usize = 64;
 /// How fast multipliers of a contact that catches grow, over others.
 const GENTLY: f64 = 0.3;
 
-/// Steps for which a slave that is to be caught sleeps at least: almost all of them never touch, and in so few steps none gets far.
-const LATE: u64 = 6;
+/// Steps for which a slave that is to be caught sleeps at least, and so many if it comes nearer in them, at the speed that it has, by no more than the
+/// share [`LATE_BY`] of the distance at which sheets touch: almost all of them never touch.
+const LATE: [f64; 2] = [6.0, 16.0];
+const LATE_BY: f64 = 0.005;
 
 /// A run of [`SPAN`] slaves.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
@@ -345,7 +347,9 @@ fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
         return match met {
             Met::Apart(steps) if given.let_in.is_some() => {
                 item.plain = false;
-                Met::Apart(steps.max(LATE))
+                let [least, most] = LATE;
+                let near = law.offset * LATE_BY / (relative_speed(item, s, v) * pace.dt);
+                Met::Apart(steps.max(near.clamp(least, most) as u64))
             }
             met => met,
         };
@@ -410,6 +414,45 @@ fn at_rim(c: &Closest) -> bool {
     c.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM)
 }
 
+/// Whether a closest point lies past a free rim, on what a cell goes on by there.
+#[inline(always)]
+fn past_rim(c: &Closest) -> bool {
+    c.xi.iter().any(|x| x.abs() > 1.0)
+}
+
+/// By how much the distance at which sheets touch is less at the end of what a cell goes on by past a rim.
+const BEVEL: f64 = 0.7;
+
+/// Takes off the distance (m) at which a slave is held what it is less by past a rim, and turns its force accordingly.
+///
+/// A node that slides past the rim of a sheet hands what presses on it over to the rim's nodes, which lie below its cells. Held at the whole
+/// distance to the last, it would drop onto these with the whole of its load at once. So the sheet grows thinner from its rim outwards, by a
+/// parabola, and the rim's nodes take the load while the slave slides.
+#[inline(never)]
+fn bevel(pull: &mut Pull, s: &Surface<'_>, c: &Closest, offset: f64) {
+    let x = s.cells[c.cell as usize].map(|n| s.x[n as usize]);
+    let (a, b) = (0.25 * (1.0 - c.xi[1]), 0.25 * (1.0 + c.xi[1]));
+    let (u, v) = (0.25 * (1.0 - c.xi[0]), 0.25 * (1.0 + c.xi[0]));
+    let along = [combine([-a, a, b, -b], &x), combine([-u, -v, v, u], &x)];
+    let past = c.xi.map(|x| ((x.abs() - 1.0) / RIM).max(0.0));
+    let left = past.map(|s| 1.0 - s * s);
+    pull.gap += BEVEL * offset * (1.0 - left[0] * left[1]);
+    for k in 0..2 {
+        if past[k] == 0.0 || !c.free[k] {
+            continue;
+        }
+        // What the place moves by along one side of the cell while it keeps the other coordinate, unless it is held there.
+        let (own, other) = (along[k], along[1 - k]);
+        let across = if c.free[1 - k] {
+            sub(own, scale(other, dot(own, other) / dot(other, other)))
+        } else {
+            own
+        };
+        let slope = BEVEL * offset * 2.0 * past[k] / RIM * left[1 - k] * c.xi[k].signum();
+        pull.first = add(pull.first, scale(across, slope / dot(across, across)));
+    }
+}
+
 /// Gap and direction of a slave whose closest point is found, and whether it may keep both for some steps; `None`: it lies
 /// beyond a fold.
 #[inline(always)]
@@ -431,8 +474,12 @@ fn pull_of(
     // negative one. Anything else lies beyond a fold.
     let at_rim = at_rim(first);
     if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
-        let (pull, alone) = pulled(found, offset);
-        return Some((pull, alone && !at_rim));
+        let (mut pull, alone) = pulled(found, offset);
+        let past = past_rim(first);
+        if past {
+            bevel(&mut pull, s, first, offset);
+        }
+        return Some((pull, alone && !past));
     }
     // Where a sheet is bent sharply, what lies between its nodes' normals is far from those of its cells.
     let on_own_side = |n: V| side * dot(first.arm, n) > 0.1 * distance;
