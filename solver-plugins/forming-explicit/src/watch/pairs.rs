@@ -87,7 +87,7 @@ pub(super) fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pa
             of_ply: true,
         }
     };
-    // No ply feels what films do to each other beside the plies; they fold there, and only the nodes of the upper one are held off.
+    // No ply feels what films do to each other beside the plies; they fold there.
     let films = |low: usize, high: usize, element: f64| Pair {
         bound: DEPTH_BOUND * thinnest,
         most: thinnest.max(element * sizes[low].min(sizes[high])),
