@@ -169,7 +169,7 @@ pub fn add_contacts_past(
             }
             add(model, *below, *sheet, -1.0)?;
             let contact = model.sheet_contacts.last_mut().expect("just added");
-            contact.let_in = Some(LET_IN);
+            contact.let_in = Some(if is_ply(lower) { LET_IN } else { FILMS_LET_IN });
             if !is_ply(lower) {
                 // Where the films are joined they have the same nodes, which lie on cells of their own.
                 let (from, to) = model.sheets[sheet.1].cell_range;
@@ -200,6 +200,10 @@ fn place(item: &SlaveItem, cells: &[[u32; 4]], x: &[V]) -> V {
 /// The nodes of the upper one, which lie on the lower one, carry what presses the two together. Held at the same distance the nodes of the lower
 /// one would share in it, in shares that no physics gives, and where nodes lie on nodes a bag at rest trembles.
 const LET_IN: f64 = 0.05;
+
+/// The same share for films: these are only to be kept from crossing. How deep one is in the other beside the plies matters to nobody, and what catches
+/// there puts work in (`docs/decisions/0050-what-slides-off-an-edge.md`).
+const FILMS_LET_IN: f64 = 0.25;
 
 /// A rigid part as the sheets of a stack meet it.
 pub struct RigidPart {

@@ -370,7 +370,7 @@ pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), String> {
     Ok(())
 }
 
-/// Takes nodes that are driven out of contacts with what does not give way to them: rigid parts, and plies, whose nodes there are driven too. Where
+/// Takes nodes that are driven out of contacts with what does not give way to them: rigid parts, and plies (their own among them), whose nodes there are driven too. Where
 /// they are has been decided, by runs with finer elements; coarse ones stand elsewhere off tool and plies, and a multiplier
 /// that cannot move its node grows for ever. The films give way.
 fn let_drive_decide(forming: &mut Forming) {
@@ -391,6 +391,11 @@ fn let_drive_decide(forming: &mut Forming) {
         (contact.items).retain(|i| !forming.model.is_driven(i.node));
     }
     forming.model.rigid_contacts = all;
+    let mut all = std::mem::take(&mut forming.model.self_contacts);
+    for contact in &mut all {
+        contact.retain(|n| !forming.model.is_driven(n));
+    }
+    forming.model.self_contacts = all;
 }
 
 fn is_ply(forming: &Forming, body: &Body) -> bool {

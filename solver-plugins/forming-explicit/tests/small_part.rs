@@ -225,7 +225,7 @@ fn a_run_that_is_fed_its_own_motion_repeats_itself_and_one_that_is_fed_more_foll
             "{:?}",
             outcome.health
         );
-        let too_deep = |w: &&String| w.contains("ply_1") && w.contains("reach into each other");
+        let too_deep = |w: &&String| w.contains("ply_1") && w.contains("into each other");
         let told: Vec<&String> = outcome.warnings.iter().filter(too_deep).collect();
         assert!(told.is_empty(), "{told:?}");
         let way = |body: usize, n: usize| {

@@ -2,70 +2,11 @@
 
 mod common;
 
-use plyflow_mechanics::contact::{ContactSettings, Pace, SheetContact, SlaveItem, Surface};
+use common::slave::{OFFSET, contact, evaluate, gradient_error, gradient_error_of, pace, scene};
+use plyflow_mechanics::contact::{ContactSettings, SheetContact, SlaveItem, Surface};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
-
-const OFFSET: f64 = 4e-4;
-
-/// Of nodes that never sleep for long.
-fn pace(dt: f64) -> Pace {
-    Pace {
-        dt,
-        speed: 100.0,
-        acceleration: 1e6,
-        growth: 1.0,
-    }
-}
-
-/// Two by two cells of 8 mm, folded along x = 0 by `fold` (rad, positive: a valley) and warped a little; one
-/// slave above at `place` and `height` over the middle line of the fold.
-fn scene(fold: f64, place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
-    let axis = [-0.008, 0.0, 0.008];
-    let mut mesh = QuadMesh::grid(&axis, &axis);
-    for (i, p) in mesh.points.iter_mut().enumerate() {
-        p[2] = p[0].abs() * (0.5 * fold).tan() + 1e-5 * ((i * 7) % 5) as f64;
-    }
-    let mut x = mesh.points.clone();
-    let ground = place[0].abs() * (0.5 * fold).tan();
-    x.push([place[0], place[1], ground + height]);
-    (mesh, x)
-}
-
-fn contact(slave: u32, cell: u32) -> SheetContact {
-    let mut item = SlaveItem::new(slave, cell, [0.0; 2]);
-    item.stiffness = 1e5;
-    let settings = ContactSettings {
-        stiffness_factor: 0.0,
-        slip_factor: 0.5,
-        damping_ratio: 0.0,
-        augmentation: 0.0,
-    };
-    SheetContact::new("test".into(), 1.0, OFFSET, 0.0, &settings, vec![item])
-}
-
-/// Energy (J) and forces (N) of a fresh contact.
-fn evaluate(mesh: &QuadMesh, x: &[V], cell: u32) -> (f64, Vec<V>) {
-    let normals = vec![[0.0, 0.0, 1.0]; x.len()];
-    let neighbours = mesh.neighbours();
-    let surface = Surface {
-        cells: &mesh.cells,
-        neighbours: &neighbours,
-        x,
-        normals: &normals,
-    };
-    let mut c = contact(x.len() as u32 - 1, cell);
-    let v = vec![[0.0; 3]; x.len()];
-    let mut energy = 0.0;
-    // The first search starts afar; the second is at the place.
-    for _ in 0..2 {
-        energy = c.compute(&surface, &v, pace(1e-6)).stored;
-    }
-    let mut f = vec![[0.0; 3]; x.len()];
-    c.scatter(&mesh.cells, &mut f);
-    (energy, f)
-}
 
 /// The same cells as a bowl: four planes that meet at the slave's corner, with folds of `folds` (rad).
 fn bowl(folds: [f64; 2], place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
@@ -81,31 +22,6 @@ fn bowl(folds: [f64; 2], place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
     (mesh, x)
 }
 
-fn gradient_error(fold: f64, place: [f64; 2], height: f64) -> f64 {
-    gradient_error_of(scene(fold, place, height))
-}
-
-fn gradient_error_of((mesh, x): (QuadMesh, Vec<V>)) -> f64 {
-    let place = x[x.len() - 1];
-    let (energy, f) = evaluate(&mesh, &x, 0);
-    assert!(energy > 0.0, "not in touch at {place:?}");
-    let size = norm(*f.last().unwrap());
-    let h = 1e-8;
-    let mut worst = 0.0f64;
-    for n in 0..x.len() {
-        for c in 0..3 {
-            let at = |d: f64| {
-                let mut y = x.clone();
-                y[n][c] += d;
-                evaluate(&mesh, &y, 0).0
-            };
-            let slope = (at(h) - at(-h)) / (2.0 * h);
-            worst = worst.max((f[n][c] + slope).abs() / size);
-        }
-    }
-    worst
-}
-
 #[test]
 fn force_is_the_gradient_of_its_energy_inside_cells_and_on_ridges() {
     for (fold, place) in [
@@ -118,72 +34,6 @@ fn force_is_the_gradient_of_its_energy_inside_cells_and_on_ridges() {
         let error = gradient_error(fold, place, 0.8 * OFFSET);
         assert!(error < 1e-4, "fold {fold} at {place:?}: {error}");
     }
-}
-
-/// What a cell goes on by past its rim (m), of cells of 8 mm.
-const LEDGE: f64 = 2e-3;
-
-#[test]
-fn past_a_rim_the_distance_shrinks_and_the_force_is_the_gradient_of_its_energy() {
-    for share in [0.05, 0.5, 0.95] {
-        let past = share * LEDGE;
-        for place in [[0.008 + past, 0.003], [-0.002, -0.008 - past]] {
-            let held = OFFSET * (1.0 - 0.7 * share * share);
-            let energy = |height: f64| {
-                let mut flat = scene(0.0, place, height);
-                flat.1.iter_mut().rev().skip(1).for_each(|x| x[2] = 0.0);
-                evaluate(&flat.0, &flat.1, 0).0
-            };
-            assert_eq!(energy(1.0001 * held), 0.0, "at {place:?}");
-            let depth = 0.1 * OFFSET;
-            let expected = 0.5e5 * depth * depth;
-            let got = energy(held - depth);
-            assert!((got / expected - 1.0).abs() < 1e-9, "{got} at {place:?}");
-            // The turn of the master's cell under the slave is left out of what the distance changes by.
-            let error = gradient_error(0.0, place, 0.7 * held);
-            assert!(error < 0.02, "at {place:?}: {error}");
-        }
-    }
-}
-
-#[test]
-fn a_slave_that_is_drawn_off_a_rim_gives_back_what_it_has_stored_and_no_more() {
-    let (mesh, mut x) = scene(0.0, [0.0, 0.003], OFFSET);
-    x.iter_mut().rev().skip(1).for_each(|x| x[2] = 0.0);
-    let node = x.len() - 1;
-    let (neighbours, normals) = (mesh.neighbours(), vec![[0.0, 0.0, 1.0]; x.len()]);
-    let v = vec![[0.0; 3]; x.len()];
-    let mut c = contact(node as u32, 1);
-    // Outwards, at more than what the distance is at the end of the ledge.
-    let steps = 40_000;
-    let at = |k: i32| {
-        let way = f64::from(k) / f64::from(steps);
-        [0.006 + 0.006 * way, 0.003, 0.6 * OFFSET]
-    };
-    let mut forces = Vec::new();
-    for k in 0..=steps {
-        x[node] = at(k);
-        let surface = Surface {
-            cells: &mesh.cells,
-            neighbours: &neighbours,
-            x: &x,
-            normals: &normals,
-        };
-        let energy = c.compute(&surface, &v, pace(1e-6)).stored;
-        forces.push((energy, c.items[0].force));
-    }
-    let (first, last) = (forces[0], forces[steps as usize]);
-    assert!(first.0 > 0.0 && last.0 == 0.0);
-    let work: f64 = (1..=steps)
-        .map(|k| {
-            let mean = scale(add(forces[k as usize].1, forces[k as usize - 1].1), 0.5);
-            dot(mean, sub(at(k), at(k - 1)))
-        })
-        .sum();
-    assert!((work / first.0 - 1.0).abs() < 0.01, "{work} {}", first.0);
-    // It is let go by and by.
-    let steepest = forces.iter().map(|f| norm(f.1)).fold(0.0, f64::max);
-    assert!(steepest <= 1.05 * norm(first.1), "{steepest}");
 }
 
 #[test]
@@ -468,61 +318,6 @@ fn multipliers_of_light_nodes_at_a_corner_grow_more_slowly_by_themselves() {
         );
     }
     assert_eq!(follows.iter().filter(|f| **f == 1.0).count(), 13 * 13 - 4);
-}
-
-/// A plate with a slot from its middle to its far rim, 4 mm wide, and a slave over its left arm.
-fn slotted() -> (QuadMesh, Vec<u32>) {
-    let axis = |n: u32| (0..=n).map(|k| 0.004 * f64::from(k)).collect::<Vec<_>>();
-    let mut mesh = QuadMesh::grid(&axis(5), &axis(6));
-    let centre = |c: &[u32; 4]| {
-        let sum = |k: usize| c.iter().map(|n| mesh.points[*n as usize][k]).sum::<f64>();
-        [0.25 * sum(0), 0.25 * sum(1)]
-    };
-    let in_slot = |c: &[u32; 4]| {
-        let [x, y] = centre(c);
-        (0.008..0.012).contains(&x) && y > 0.008
-    };
-    let cells: Vec<[u32; 4]> = mesh.cells.iter().copied().filter(|c| !in_slot(c)).collect();
-    mesh.cells = cells;
-    let rim = (0..mesh.cells.len() as u32).collect();
-    (mesh, rim)
-}
-
-#[test]
-fn a_slave_that_crosses_a_slot_is_held_by_what_is_beyond() {
-    let (mesh, rim) = slotted();
-    let neighbours = mesh.neighbours();
-    let mut x = mesh.points.clone();
-    let node = x.len() as u32;
-    x.push([0.006, 0.018, 2e-3]);
-    let normals = vec![[0.0, 0.0, 1.0]; x.len()];
-    let v = vec![[0.0; 3]; x.len()];
-    let held = |rim: &[u32]| {
-        let mut x = x.clone();
-        let mut c = contact(node, 0);
-        c.rim = rim.to_vec();
-        // Over the slot and down onto the right arm.
-        for k in 0..=400 {
-            let way = f64::from(k) / 400.0;
-            let height = if way < 0.7 {
-                2e-3
-            } else {
-                2e-3 - 1.8e-3 * (way - 0.7) / 0.3
-            };
-            x[node as usize] = [0.006 + 0.009 * way, 0.018, height];
-            let surface = Surface {
-                cells: &mesh.cells,
-                neighbours: &neighbours,
-                x: &x,
-                normals: &normals,
-            };
-            c.compute(&surface, &v, pace(1e-6));
-        }
-        c.items[0].penetration
-    };
-    assert!((held(&rim) - 2e-4).abs() < 1e-9, "{}", held(&rim));
-    // What it is for: the walk along the rim alone stays at the left arm.
-    assert_eq!(held(&[]), 0.0);
 }
 
 #[test]

@@ -227,6 +227,13 @@ impl SelfContact {
         total
     }
 
+    /// Keeps only those slaves for which `keep` says so; what touches is found again.
+    pub fn retain(&mut self, keep: impl Fn(u32) -> bool) {
+        self.slaves.retain(|n| keep(*n));
+        self.items.clear();
+        self.search = Search::default();
+    }
+
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
     pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
         scatter(self.items.iter().map(|i| &i.slave), cells, f);

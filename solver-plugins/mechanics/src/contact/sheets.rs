@@ -15,7 +15,7 @@ use super::slave::{
 use super::{ContactEnergy, ContactSettings, Follow, Pace, SWIFT, TOGETHER, content, waking};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
-use crate::vec3::{V, add, dot, scale, sub, unit};
+use crate::vec3::{V, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -324,7 +324,7 @@ fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
     let p = s.x[item.node as usize];
     let mut found = track(s, item, p, law.offset, iterations, |_| true);
     let looks_around = !item.active || item.turn.is_multiple_of(4 * SEARCH_INTERVAL);
-    if !given.rim.is_empty() && looks_around && at_rim(&found.first) {
+    if !given.rim.is_empty() && looks_around && past_rim(&found.first) {
         found = elsewhere(item, s, given.rim, law.offset, found);
     }
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
@@ -386,7 +386,9 @@ fn elsewhere(item: &SlaveItem, s: &Surface<'_>, rim: &[u32], offset: f64, found:
     };
     let start = SlaveItem::new(item.node, cell, [0.0; 2]);
     let other = track(s, &start, p, offset, 3, |_| true);
-    if other.first.distance2 < found.first.distance2 {
+    // In a slot that is narrower than two ledges both are below it.
+    let gap = |c: &Closest| c.distance2.sqrt() + Ledge::under(s, c, offset).less();
+    if gap(&other.first) < gap(&found.first) {
         other
     } else {
         found
@@ -420,36 +422,75 @@ fn past_rim(c: &Closest) -> bool {
     c.xi.iter().any(|x| x.abs() > 1.0)
 }
 
-/// By how much the distance at which sheets touch is less at the end of what a cell goes on by past a rim.
+/// Share by which the distance at which sheets touch is less at the end of what a cell goes on by past a rim, unless that is steeper than [`SLOPE`].
 const BEVEL: f64 = 0.7;
 
-/// Takes off the distance (m) at which a slave is held what it is less by past a rim, and turns its force accordingly.
+/// Steepest slope of that. A contact along a slope is stiffer, by 1 + slope squared, which the step must bear.
+const SLOPE: f64 = 0.5;
+
+/// What a cell goes on by past a free rim, at a place on it.
 ///
 /// A node that slides past the rim of a sheet hands what presses on it over to the rim's nodes, which lie below its cells. Held at the whole
 /// distance to the last, it would drop onto these with the whole of its load at once. So the sheet grows thinner from its rim outwards, by a
 /// parabola, and the rim's nodes take the load while the slave slides.
-#[inline(never)]
-fn bevel(pull: &mut Pull, s: &Surface<'_>, c: &Closest, offset: f64) {
-    let x = s.cells[c.cell as usize].map(|n| s.x[n as usize]);
-    let (a, b) = (0.25 * (1.0 - c.xi[1]), 0.25 * (1.0 + c.xi[1]));
-    let (u, v) = (0.25 * (1.0 - c.xi[0]), 0.25 * (1.0 + c.xi[0]));
-    let along = [combine([-a, a, b, -b], &x), combine([-u, -v, v, u], &x)];
-    let past = c.xi.map(|x| ((x.abs() - 1.0) / RIM).max(0.0));
-    let left = past.map(|s| 1.0 - s * s);
-    pull.gap += BEVEL * offset * (1.0 - left[0] * left[1]);
-    for k in 0..2 {
-        if past[k] == 0.0 || !c.free[k] {
-            continue;
+struct Ledge {
+    /// By coordinate: 0 at the rim, 1 where the ledge ends.
+    past: [f64; 2],
+    /// By coordinate: sides of the cell there, per unit of it (m).
+    along: [V; 2],
+    /// By how much the distance in touch is less where it ends (m).
+    most: f64,
+}
+
+impl Ledge {
+    /// The ledge that a closest point lies on; `offset`: the distance in touch (m).
+    #[inline(never)]
+    fn under(s: &Surface<'_>, c: &Closest, offset: f64) -> Self {
+        let x = s.cells[c.cell as usize].map(|n| s.x[n as usize]);
+        let (a, b) = (0.25 * (1.0 - c.xi[1]), 0.25 * (1.0 + c.xi[1]));
+        let (u, v) = (0.25 * (1.0 - c.xi[0]), 0.25 * (1.0 + c.xi[0]));
+        let along = [combine([-a, a, b, -b], &x), combine([-u, -v, v, u], &x)];
+        // Half the cell's shorter height.
+        let longer = norm(along[0]).max(norm(along[1]));
+        let half = norm(cross(along[0], along[1])) / longer;
+        Self {
+            past: c.xi.map(|x| ((x.abs() - 1.0) / RIM).max(0.0)),
+            along,
+            most: (BEVEL * offset).min(0.5 * SLOPE * RIM * half),
         }
-        // What the place moves by along one side of the cell while it keeps the other coordinate, unless it is held there.
-        let (own, other) = (along[k], along[1 - k]);
-        let across = if c.free[1 - k] {
-            sub(own, scale(other, dot(own, other) / dot(other, other)))
-        } else {
-            own
-        };
-        let slope = BEVEL * offset * 2.0 * past[k] / RIM * left[1 - k] * c.xi[k].signum();
-        pull.first = add(pull.first, scale(across, slope / dot(across, across)));
+    }
+
+    /// By coordinate, what is left of the sheet there: 1 at the rim, 0 where the ledge ends.
+    fn left(&self) -> [f64; 2] {
+        self.past.map(|p| 1.0 - p * p)
+    }
+
+    /// By how much the distance in touch is less (m).
+    fn less(&self) -> f64 {
+        let [a, b] = self.left();
+        self.most * (1.0 - a * b)
+    }
+
+    /// Takes that off the distance at which a slave is held, and turns its force accordingly.
+    #[inline(never)]
+    fn bevel(&self, pull: &mut Pull, c: &Closest) {
+        let left = self.left();
+        pull.gap += self.less();
+        for k in 0..2 {
+            let slope = self.most * 2.0 * self.past[k] / RIM * left[1 - k] * c.xi[k].signum();
+            // Where the ledge ends, the place is held.
+            if slope == 0.0 || !c.free[k] {
+                continue;
+            }
+            // What the place moves by along one side of the cell while it keeps the other coordinate, unless it is held there.
+            let (own, other) = (self.along[k], self.along[1 - k]);
+            let across = if c.free[1 - k] {
+                sub(own, scale(other, dot(own, other) / dot(other, other)))
+            } else {
+                own
+            };
+            pull.first = add(pull.first, scale(across, slope / dot(across, across)));
+        }
     }
 }
 
@@ -469,26 +510,28 @@ fn pull_of(
     let up = combine(first.weights, &nodes.map(|n| s.normals[n as usize]));
     let distance = first.distance2.sqrt();
     let height = side * dot(first.arm, up);
+    let past = past_rim(first);
+    let bevelled = |(mut pull, alone): (Pull, bool)| {
+        if past {
+            Ledge::under(s, first, offset).bevel(&mut pull, first);
+        }
+        (pull, alone && !past)
+    };
     // At a free rim the sheet is round: there the gap is the distance, wherever the slave lies. On its
     // own side, it is so too; a slave whose mid-surface has just passed through the master's has a
     // negative one. Anything else lies beyond a fold.
     let at_rim = at_rim(first);
     if height > 0.5 * distance || (at_rim && distance > 0.2 * offset) {
-        let (mut pull, alone) = pulled(found, offset);
-        let past = past_rim(first);
-        if past {
-            bevel(&mut pull, s, first, offset);
-        }
-        return Some((pull, alone && !past));
+        return Some(bevelled(pulled(found, offset)));
     }
     // Where a sheet is bent sharply, what lies between its nodes' normals is far from those of its cells.
     let on_own_side = |n: V| side * dot(first.arm, n) > 0.1 * distance;
     if own_normal(s, first).is_some_and(on_own_side) {
-        return Some(pulled(found, offset));
+        return Some(bevelled(pulled(found, offset)));
     }
     let through = (item.active || clearing) && height < -0.5 * distance && height > -offset;
     let pull = || Pull::plain(height - offset, scale(up, side));
-    through.then(|| (pull(), false))
+    through.then(|| bevelled((pull(), false)))
 }
 
 /// Unit normal of the cell at the closest point on it, or of it and the next one where that point lies on the edge between them; `None` at a

@@ -1,7 +1,7 @@
 //! One node of a sheet on another sheet: its state, its force in touch, and where that goes.
 
 use super::friction::{Coulomb, Sliding};
-use super::search::{Closest, FACES, Found, RIM, Surface, combine, shape};
+use super::search::{Closest, FACES, Found, Surface, combine, shape};
 use super::{ContactEnergy, Follow, friction_force, grown, normal_force};
 use crate::mesh::NONE;
 use crate::mirror::{Image, reflect};
@@ -127,9 +127,9 @@ impl SlaveItem {
         self.between
     }
 
-    /// Whether the place of the master that it is nearest to is not past a rim.
+    /// Whether the place of the master that it is nearest to is not past a rim. Past it the master grows thinner ([`super::sheets`]).
     pub(super) fn lies_on_its_cell(&self) -> bool {
-        self.cell != NONE && self.xi.iter().all(|x| x.abs() < 1.0 + RIM)
+        self.cell != NONE && self.xi.iter().all(|x| x.abs() <= 1.0)
     }
 
     /// Share of the contact's augmentation with which its multiplier follows penetrations.

@@ -1,5 +1,8 @@
 //! A fabric for tests, behind the C ABI.
 
+#[allow(dead_code)]
+pub mod slave;
+
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
 use plyflow_kernels::{fabric::Fabric, m4::M4, s4::S4};
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};

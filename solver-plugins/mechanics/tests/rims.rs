@@ -1,0 +1,351 @@
+//! Slaves that slide past the rim of a sheet: the sheet grows thinner there, and hands them over by and by.
+
+mod common;
+
+use common::slave::{OFFSET, contact, evaluate, gradient_errors, pace, scene, scene_of};
+use plyflow_mechanics::contact::{
+    ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem, Surface,
+};
+use plyflow_mechanics::mesh::{QuadMesh, even_axis};
+use plyflow_mechanics::model::{Drive, Model, StepSettings};
+use plyflow_mechanics::vec3::{V, add, dot, norm, scale, sub};
+use std::sync::Arc;
+
+/// What a cell goes on by past its rim, over its length.
+const LEDGE: f64 = 0.25;
+
+/// Distance (m) at which a slave is held there, by what is left of the ledge along both sides of a cell of the length `cell` (m): less by
+/// seven tenths at the end, or by what a parabola falls that is as steep as 1 in 2 there.
+fn held(cell: f64, past: [f64; 2]) -> f64 {
+    let most = (0.7 * OFFSET).min(0.5 * 0.5 * LEDGE * cell);
+    OFFSET - most * (1.0 - (1.0 - past[0] * past[0]) * (1.0 - past[1] * past[1]))
+}
+
+/// A flat sheet of four cells of the length `cell` (m) and a slave at `height` (m) over its plane, past its rims x = cell and y = -cell by the shares `past`
+/// of the ledge, or as far inside of the sheet as in its middle where that is 0.
+fn beside(cell: f64, past: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
+    let at = |p: f64, inside: f64| if p > 0.0 { 1.0 + LEDGE * p } else { inside };
+    let place = [cell * at(past[0], 0.4), -cell * at(past[1], 0.3)];
+    let (mesh, mut x) = scene_of(cell, 0.0, place, height);
+    x.iter_mut().rev().skip(1).for_each(|x| x[2] = 0.0);
+    (mesh, x)
+}
+
+/// Sizes of cells (m), and shares of their ledges along both sides: past one rim, past the other, at their corner.
+fn places() -> impl Iterator<Item = (f64, [f64; 2])> {
+    let shares = [0.05, 0.5, 0.95];
+    let rims = move || shares.into_iter().flat_map(|a| [[a, 0.0], [0.0, a]]);
+    let corners = move || shares.into_iter().flat_map(move |a| shares.map(|b| [a, b]));
+    [0.008, 0.001]
+        .into_iter()
+        .flat_map(move |cell| rims().chain(corners()).map(move |p| (cell, p)))
+}
+
+#[test]
+fn past_a_rim_the_distance_shrinks_and_the_force_is_the_gradient_of_its_energy() {
+    for (cell, past) in places() {
+        let held = held(cell, past);
+        let energy = |height: f64| {
+            let (mesh, x) = beside(cell, past, height);
+            evaluate(&mesh, &x, 0).0
+        };
+        assert_eq!(energy(1.0001 * held), 0.0, "{cell} m, {past:?}");
+        let depth = 0.1 * OFFSET;
+        let expected = 0.5e5 * depth * depth;
+        let got = energy(held - depth);
+        assert!(
+            (got / expected - 1.0).abs() < 1e-9,
+            "{cell} m, {past:?}: {got} J"
+        );
+        let [slave, master] = gradient_errors(beside(cell, past, 0.7 * held));
+        assert!(slave < 1e-4, "{cell} m, {past:?}: {slave}");
+        // The way from the place to the slave turns with the master's cell, which moves the place along the ledge: that is left out. Of the force it is
+        // the slope, 1 in 2 at most, times that way over the cell's length.
+        let left_out = 0.5 * held / cell;
+        assert!(master < left_out, "{cell} m, {past:?}: {master}");
+    }
+}
+
+#[test]
+fn past_a_rim_a_contact_is_not_stiffer_than_a_step_can_bear() {
+    for (cell, past) in places() {
+        let (mesh, x) = beside(cell, past, 0.7 * held(cell, past));
+        let (energy, f) = evaluate(&mesh, &x, 0);
+        let depth = (energy / 0.5e5).sqrt();
+        // Force over depth: the stiffness times the length of the gradient, by which the stiffness against the motion is once more.
+        let gradient = norm(f[f.len() - 1]) / (1e5 * depth);
+        assert!(
+            gradient * gradient < 1.0 + 2.0 * 0.5 * 0.5,
+            "{cell} m, {past:?}: {gradient}"
+        );
+    }
+}
+
+#[test]
+fn past_a_rim_a_slave_that_passes_the_middle_of_the_sheet_is_pushed_as_before() {
+    let past = [0.5, 0.0];
+    let (mesh, mut x) = beside(0.008, past, OFFSET);
+    let (neighbours, normals) = (mesh.neighbours(), vec![[0.0, 0.0, 1.0]; x.len()]);
+    let v = vec![[0.0; 3]; x.len()];
+    let node = x.len() - 1;
+    let mut c = contact(node as u32, 1);
+    for k in 0..=1000 {
+        let height = OFFSET * (1.0 - 1.3 * f64::from(k) / 1000.0);
+        x[node][2] = height;
+        let surface = Surface {
+            cells: &mesh.cells,
+            neighbours: &neighbours,
+            x: &x,
+            normals: &normals,
+        };
+        c.compute(&surface, &v, pace(1e-6));
+        // Where the two planes are the same, no way out is better than another.
+        if height.abs() < 0.02 * OFFSET {
+            continue;
+        }
+        let depth = (held(0.008, past) - height).max(0.0);
+        let got = c.items[0].penetration;
+        assert!(
+            (got - depth).abs() < 1e-3 * OFFSET,
+            "{height} m: {got} m, not {depth}"
+        );
+    }
+}
+
+#[test]
+fn a_slave_that_is_drawn_off_a_rim_gives_back_what_it_has_stored_and_no_more() {
+    let (mesh, mut x) = scene(0.0, [0.0, 0.003], OFFSET);
+    x.iter_mut().rev().skip(1).for_each(|x| x[2] = 0.0);
+    let node = x.len() - 1;
+    let (neighbours, normals) = (mesh.neighbours(), vec![[0.0, 0.0, 1.0]; x.len()]);
+    let v = vec![[0.0; 3]; x.len()];
+    let mut c = contact(node as u32, 1);
+    // Outwards, at more than what the distance is at the end of the ledge.
+    let steps = 40_000;
+    let at = |k: i32| {
+        let way = f64::from(k) / f64::from(steps);
+        [0.006 + 0.006 * way, 0.003, 0.6 * OFFSET]
+    };
+    let mut forces = Vec::new();
+    for k in 0..=steps {
+        x[node] = at(k);
+        let surface = Surface {
+            cells: &mesh.cells,
+            neighbours: &neighbours,
+            x: &x,
+            normals: &normals,
+        };
+        let energy = c.compute(&surface, &v, pace(1e-6)).stored;
+        forces.push((energy, c.items[0].force));
+    }
+    let (first, last) = (forces[0], forces[steps as usize]);
+    assert!(first.0 > 0.0 && last.0 == 0.0);
+    let work: f64 = (1..=steps)
+        .map(|k| {
+            let mean = scale(add(forces[k as usize].1, forces[k as usize - 1].1), 0.5);
+            dot(mean, sub(at(k), at(k - 1)))
+        })
+        .sum();
+    assert!((work / first.0 - 1.0).abs() < 0.01, "{work} {}", first.0);
+    // It is let go by and by.
+    let steepest = forces.iter().map(|f| norm(f.1)).fold(0.0, f64::max);
+    assert!(steepest <= 1.05 * norm(first.1), "{steepest}");
+}
+
+/// A plate of cells of 4 mm with a slot from its middle to its far rim, `width` (m) wide from x = 8 mm on, and the cells at its rim.
+fn slotted(width: f64) -> (QuadMesh, Vec<u32>) {
+    let axis = |n: u32| (0..=n).map(|k| 0.004 * f64::from(k)).collect::<Vec<_>>();
+    let mut mesh = QuadMesh::grid(&axis(5), &axis(6));
+    let centre = |c: &[u32; 4]| {
+        let sum = |k: usize| c.iter().map(|n| mesh.points[*n as usize][k]).sum::<f64>();
+        [0.25 * sum(0), 0.25 * sum(1)]
+    };
+    let in_slot = |c: &[u32; 4]| {
+        let [x, y] = centre(c);
+        (0.008..0.012).contains(&x) && y > 0.008
+    };
+    let cells: Vec<[u32; 4]> = mesh.cells.iter().copied().filter(|c| !in_slot(c)).collect();
+    mesh.cells = cells;
+    let beyond = mesh.points.iter_mut().filter(|p| p[0] > 0.0119);
+    beyond.for_each(|p| p[0] -= 0.004 - width);
+    let rim = (0..mesh.cells.len() as u32).collect();
+    (mesh, rim)
+}
+
+#[test]
+fn a_slave_that_crosses_a_slot_is_held_by_what_is_beyond() {
+    let (mesh, rim) = slotted(0.004);
+    let neighbours = mesh.neighbours();
+    let mut x = mesh.points.clone();
+    let node = x.len() as u32;
+    x.push([0.006, 0.018, 2e-3]);
+    let normals = vec![[0.0, 0.0, 1.0]; x.len()];
+    let v = vec![[0.0; 3]; x.len()];
+    let held = |rim: &[u32]| {
+        let mut x = x.clone();
+        let mut c = contact(node, 0);
+        c.rim = rim.to_vec();
+        // Over the slot and down onto the right arm.
+        for k in 0..=400 {
+            let way = f64::from(k) / 400.0;
+            let height = if way < 0.7 {
+                2e-3
+            } else {
+                2e-3 - 1.8e-3 * (way - 0.7) / 0.3
+            };
+            x[node as usize] = [0.006 + 0.009 * way, 0.018, height];
+            let surface = Surface {
+                cells: &mesh.cells,
+                neighbours: &neighbours,
+                x: &x,
+                normals: &normals,
+            };
+            c.compute(&surface, &v, pace(1e-6));
+        }
+        c.items[0].penetration
+    };
+    assert!((held(&rim) - 2e-4).abs() < 1e-9, "{}", held(&rim));
+    // What it is for: the walk along the rim alone stays at the left arm.
+    assert_eq!(held(&[]), 0.0);
+}
+
+#[test]
+fn in_a_slot_narrower_than_two_ledges_a_slave_is_held_by_the_one_that_is_thicker_there() {
+    let (mesh, rim) = slotted(0.0015);
+    let neighbours = mesh.neighbours();
+    let mut x = mesh.points.clone();
+    let node = x.len();
+    x.push([0.0; 3]);
+    let normals = vec![[0.0, 0.0, 1.0]; x.len()];
+    let v = vec![[0.0; 3]; x.len()];
+    // From the left arm, and back.
+    let mut c = contact(node as u32, 0);
+    c.rim = rim;
+    let way = |k: i32| 0.011 - 0.005 * f64::from((k - 400).abs()) / 400.0;
+    for k in 0..=800 {
+        let at = way(k);
+        x[node] = [at, 0.018, 0.5 * OFFSET];
+        let surface = Surface {
+            cells: &mesh.cells,
+            neighbours: &neighbours,
+            x: &x,
+            normals: &normals,
+        };
+        // Slaves in touch look for other stretches of the rim from time to time.
+        for _ in 0..20 {
+            c.compute(&surface, &v, pace(1e-6));
+        }
+        let past = [at - 0.008, 0.0095 - at].map(|p| (p / 0.001).max(0.0));
+        let thicker = past.map(|p| if p > 1.0 { 0.0 } else { held(0.004, [p, 0.0]) });
+        let expected = (thicker[0].max(thicker[1]) - 0.5 * OFFSET).max(0.0);
+        let got = c.items[0].penetration;
+        assert!(
+            (got - expected).abs() < 0.01 * OFFSET,
+            "{at} m: {got} m, not {expected}"
+        );
+    }
+}
+
+/// Draws a sheet over the rim of one that lies on a rigid plane, down the ledge, at a depth of 1 % of their distance.
+struct DrawnOff {
+    start: Vec<V>,
+    /// How many nodes of those driven lie still.
+    still: usize,
+    duration: f64,
+}
+
+const CELL: f64 = 0.008;
+
+impl Drive for DrawnOff {
+    fn position(&self, k: usize, t: f64) -> V {
+        let x = self.start[k];
+        if k < self.still {
+            return x;
+        }
+        // Its leading nodes begin 1 mm before the rim, at x = 16 mm.
+        let at = x[0] + 0.0045 * t / self.duration;
+        let past = ((at - 0.016) / (LEDGE * CELL)).clamp(0.0, 1.0);
+        [at, x[1], x[2] - (OFFSET - held(CELL, [past, 0.0]))]
+    }
+}
+
+#[test]
+fn over_a_tool_a_slave_goes_down_the_ledge_and_the_tool_does_not_hold_it_up() {
+    let axis = even_axis(0.0, 0.016, CELL);
+    let lower = QuadMesh::grid(&axis, &axis);
+    let n = lower.points.len() as u32;
+    let half = 0.5 * OFFSET;
+    let mut points: Vec<V> = lower
+        .points
+        .iter()
+        .map(|p| add(*p, [0.0, 0.0, half]))
+        .collect();
+    // Its trailing nodes stay over the lower sheet.
+    let over = [0.007, 0.0, half + 0.99 * OFFSET];
+    points.extend(
+        lower
+            .points
+            .iter()
+            .map(|p| add([0.5 * p[0], p[1], p[2]], over)),
+    );
+    let settings = StepSettings {
+        target_step: 1e-6,
+        safety: 0.9,
+        damping: 0.0,
+    };
+    let mut upper = lower.clone();
+    upper.points = points[n as usize..].to_vec();
+    let specs = vec![
+        common::sheet("lower", &lower, 0, common::membrane()),
+        common::sheet("upper", &upper, n, common::membrane()),
+    ];
+    let mut model = Model::new(points.clone(), specs, settings).unwrap();
+    let duration = 4e-4;
+    let drive = DrawnOff {
+        start: points.clone(),
+        still: n as usize,
+        duration,
+    };
+    model.set_driven((0..2 * n).collect(), Box::new(drive));
+    let contact = ContactSettings::default();
+    let nodes = n..2 * n;
+    let items = nodes
+        .clone()
+        .map(|k| SlaveItem::new(k, 0, [0.0; 2]))
+        .collect();
+    let between = SheetContact::new("between".into(), 1.0, OFFSET, 0.0, &contact, items);
+    model.sheet_contacts.push(between);
+    let ground = Arc::new(Plane { height: 0.0 });
+    let items = nodes.map(RigidItem::new).collect();
+    let mut through = RigidContact::new("tool".into(), ground, 1.5 * OFFSET, 0.0, &contact, items)
+        .with_slack(0.02 * OFFSET);
+    through.through = vec![0];
+    model.rigid_contacts.push(through);
+    model.set_contact_stiffness(&contact);
+    let leading: Vec<usize> = (0..n as usize)
+        .filter(|k| points[n as usize + k][0] > 0.0149)
+        .collect();
+    assert_eq!(leading.len(), 3);
+    let (mut over_ledge, mut off) = (0, 0);
+    while model.time < duration {
+        model.step(false).unwrap();
+        for k in &leading {
+            let (sheet, tool) = (
+                &model.sheet_contacts[0].items[*k],
+                &model.rigid_contacts[0].items[*k],
+            );
+            let at = model.x[sheet.node as usize][0];
+            assert_eq!(tool.normal_force, 0.0, "held up by the tool at {at} m");
+            if (0.0161..0.0179).contains(&at) {
+                over_ledge += 1;
+                assert!(sheet.normal_force > 0.0, "let go at {at} m");
+            }
+            // The end of the ledge is round.
+            if at > 0.0183 {
+                off += 1;
+                assert!(!sheet.active, "held at {at} m");
+            }
+        }
+    }
+    assert!(over_ledge > 100 && off > 10, "{over_ledge} {off}");
+}
