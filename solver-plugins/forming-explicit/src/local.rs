@@ -370,9 +370,9 @@ pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), String> {
     Ok(())
 }
 
-/// Takes nodes that are driven out of contacts with what does not give way to them: rigid parts, and plies (their own among them), whose nodes there are driven too. Where
-/// they are has been decided, by runs with finer elements; coarse ones stand elsewhere off tool and plies, and a multiplier
-/// that cannot move its node grows for ever. The films give way.
+/// Takes nodes that are driven out of contacts with what does not give way to them: rigid parts, other plies, whose nodes there are driven too, and
+/// folds of their own ply, which are mostly driven as a whole. Where they are has been decided, by runs with finer elements; coarse ones stand
+/// elsewhere off tool and plies, and a multiplier that cannot move its node grows for ever. The films give way.
 fn let_drive_decide(forming: &mut Forming) {
     let plies: Vec<_> = (forming.bodies.iter())
         .filter(|b| is_ply(forming, b))

@@ -208,7 +208,8 @@ impl Forming {
             between(&c.name, c.offset, touching.map(deep).collect())
         });
         let selves = m.self_contacts.iter().map(|c| {
-            let touching = c.items.iter().map(|i| &i.slave).filter(|i| i.active);
+            let touching = c.items.iter().map(|i| &i.slave);
+            let touching = touching.filter(|i| i.active && !m.is_driven(i.node));
             judge(&c.name, 0.0, touching.map(deep).collect())
         });
         rigid.chain(sheets).chain(selves).collect()

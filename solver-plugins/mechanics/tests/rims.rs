@@ -4,7 +4,8 @@ mod common;
 
 use common::slave::{OFFSET, contact, evaluate, gradient_errors, pace, scene, scene_of};
 use plyflow_mechanics::contact::{
-    ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem, Surface,
+    ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem, Surface, ledge,
+    rim_height,
 };
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Model, StepSettings};
@@ -75,7 +76,7 @@ fn past_a_rim_a_contact_is_not_stiffer_than_a_step_can_bear() {
         // Force over depth: the stiffness times the length of the gradient, by which the stiffness against the motion is once more.
         let gradient = norm(f[f.len() - 1]) / (1e5 * depth);
         assert!(
-            gradient * gradient < 1.0 + 2.0 * 0.5 * 0.5,
+            gradient * gradient < 1.0 + 0.5 * 0.5 + 1e-6,
             "{cell} m, {past:?}: {gradient}"
         );
     }
@@ -211,39 +212,135 @@ fn a_slave_that_crosses_a_slot_is_held_by_what_is_beyond() {
 
 #[test]
 fn in_a_slot_narrower_than_two_ledges_a_slave_is_held_by_the_one_that_is_thicker_there() {
-    let (mesh, rim) = slotted(0.0015);
-    let neighbours = mesh.neighbours();
+    // Cells of the right arm as long as those of the left one, and four times as long.
+    for right in [0.004, 0.016] {
+        let (mut mesh, rim) = slotted(0.0015);
+        for p in mesh.points.iter_mut().filter(|p| p[0] > 0.0096) {
+            p[0] = 0.0095 + (p[0] - 0.0095) / 0.004 * right;
+        }
+        let neighbours = mesh.neighbours();
+        let mut x = mesh.points.clone();
+        let node = x.len();
+        x.push([0.0; 3]);
+        let normals = vec![[0.0, 0.0, 1.0]; x.len()];
+        let v = vec![[0.0; 3]; x.len()];
+        let mut c = contact(node as u32, 0);
+        c.rim = rim.clone();
+        c.ledge = ledge(OFFSET, 0.004);
+        // From the left arm to the right one and back, at a height at which it is always held.
+        const STEPS: i32 = 20_000;
+        for k in 0..=2 * STEPS {
+            let at = 0.011 - 0.005 * f64::from((k - STEPS).abs()) / f64::from(STEPS);
+            x[node] = [at, 0.018, 0.3 * OFFSET];
+            let surface = Surface {
+                cells: &mesh.cells,
+                neighbours: &neighbours,
+                x: &x,
+                normals: &normals,
+            };
+            c.compute(&surface, &v, pace(1e-6));
+            let past = [(at - 0.008) / 0.001, (0.0095 - at) / (0.25 * right)];
+            let thick = past.map(|p| match p {
+                p if p > 1.0 => 0.0,
+                p => held(0.004, [p.max(0.0), 0.0]),
+            });
+            let expected = thick[0].max(thick[1]) - 0.3 * OFFSET;
+            let got = c.items[0].penetration;
+            // It looks for other stretches of the rim in every sixteenth step.
+            assert!(
+                (got - expected).abs() < 0.02 * OFFSET,
+                "{right} m, {at} m: {got} m, not {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn along_a_rim_of_unequal_and_slanting_cells_the_distance_is_one() {
+    // Rows of cells that are 4 and 2 mm wide along the rim y = -4 mm, of 4 mm and, inwards, slanting.
+    let mut mesh = QuadMesh::grid(&[-0.004, 0.0, 0.002], &[-0.004, 0.0, 0.003]);
+    for p in mesh.points.iter_mut().filter(|p| p[1] == 0.0) {
+        p[0] += 0.001;
+    }
+    let (neighbours, node) = (mesh.neighbours(), mesh.points.len());
     let mut x = mesh.points.clone();
-    let node = x.len();
     x.push([0.0; 3]);
     let normals = vec![[0.0, 0.0, 1.0]; x.len()];
     let v = vec![[0.0; 3]; x.len()];
-    // From the left arm, and back.
     let mut c = contact(node as u32, 0);
-    c.rim = rim;
-    let way = |k: i32| 0.011 - 0.005 * f64::from((k - 400).abs()) / 400.0;
-    for k in 0..=800 {
-        let at = way(k);
-        x[node] = [at, 0.018, 0.5 * OFFSET];
+    c.ledge = ledge(
+        OFFSET,
+        rim_height(&mesh.cells, &neighbours, &x[..node]).unwrap(),
+    );
+    let mut depths = Vec::new();
+    for k in 0..=4000 {
+        x[node] = [-0.003 + 1e-6 * f64::from(k), -0.0049, 0.4 * OFFSET];
         let surface = Surface {
             cells: &mesh.cells,
             neighbours: &neighbours,
             x: &x,
             normals: &normals,
         };
-        // Slaves in touch look for other stretches of the rim from time to time.
-        for _ in 0..20 {
-            c.compute(&surface, &v, pace(1e-6));
-        }
-        let past = [at - 0.008, 0.0095 - at].map(|p| (p / 0.001).max(0.0));
-        let thicker = past.map(|p| if p > 1.0 { 0.0 } else { held(0.004, [p, 0.0]) });
-        let expected = (thicker[0].max(thicker[1]) - 0.5 * OFFSET).max(0.0);
-        let got = c.items[0].penetration;
-        assert!(
-            (got - expected).abs() < 0.01 * OFFSET,
-            "{at} m: {got} m, not {expected}"
-        );
+        c.compute(&surface, &v, pace(1e-6));
+        depths.push(c.items[0].penetration);
     }
+    let (least, most) = (depths.iter()).fold((1.0, 0.0), |(a, b), d| (d.min(a), d.max(b)));
+    assert!(
+        least > 0.1 * OFFSET && most - least < 0.01 * OFFSET,
+        "{least} to {most} m"
+    );
+}
+
+#[test]
+fn a_slave_beneath_the_end_of_a_ledge_that_comes_inwards_is_not_flung_up() {
+    let (mesh, mut x) = beside(0.008, [1.0, 0.0], -0.24 * OFFSET);
+    let (neighbours, normals) = (mesh.neighbours(), vec![[0.0, 0.0, 1.0]; x.len()]);
+    let v = vec![[0.0; 3]; x.len()];
+    let node = x.len() - 1;
+    let mut c = contact(node as u32, 1);
+    let mut energies = Vec::new();
+    for k in 0..=2000 {
+        x[node][0] = 0.010_05 - 1e-7 * f64::from(k);
+        let surface = Surface {
+            cells: &mesh.cells,
+            neighbours: &neighbours,
+            x: &x,
+            normals: &normals,
+        };
+        energies.push(c.compute(&surface, &v, pace(1e-6)).stored);
+    }
+    let jump = (energies.windows(2))
+        .map(|e| (e[1] - e[0]).abs())
+        .fold(0.0, f64::max);
+    let whole = 0.5e5 * OFFSET * OFFSET;
+    assert!(
+        energies.iter().any(|e| *e > 1e-4 * whole),
+        "it is never held"
+    );
+    assert!(jump < 0.01 * whole, "{jump} J of {whole} J");
+}
+
+#[test]
+fn past_the_rim_of_a_flank_whose_nodes_have_other_normals_the_distance_shrinks_too() {
+    let fold = -2.4f64;
+    let (sin, cos) = (0.5 * fold).sin_cos();
+    // On the flank x > 0, half of the ledge past its rim y = -8 mm; the normals of all nodes are those of the ridge.
+    let place = [0.0035, -0.009];
+    let energy = |height: f64| {
+        let (mut mesh, mut x) = scene(fold, place, height / cos);
+        for p in mesh.points.iter_mut().chain(&mut x[..9]) {
+            p[2] = p[0].abs() * sin / cos;
+        }
+        evaluate(&mesh, &x, 1).0
+    };
+    let held = held(0.008, [0.5, 0.0]);
+    assert_eq!(energy(1.001 * held), 0.0);
+    let depth = 0.1 * OFFSET;
+    let (got, expected) = (energy(held - depth), 0.5e5 * depth * depth);
+    assert!(
+        (got / expected - 1.0).abs() < 1e-6,
+        "{got} J, not {expected}"
+    );
 }
 
 /// Draws a sheet over the rim of one that lies on a rigid plane, down the ledge, at a depth of 1 % of their distance.
@@ -300,7 +397,7 @@ fn over_a_tool_a_slave_goes_down_the_ledge_and_the_tool_does_not_hold_it_up() {
         common::sheet("upper", &upper, n, common::membrane()),
     ];
     let mut model = Model::new(points.clone(), specs, settings).unwrap();
-    let duration = 4e-4;
+    let duration = 2e-3;
     let drive = DrawnOff {
         start: points.clone(),
         still: n as usize,
@@ -318,7 +415,7 @@ fn over_a_tool_a_slave_goes_down_the_ledge_and_the_tool_does_not_hold_it_up() {
     let ground = Arc::new(Plane { height: 0.0 });
     let items = nodes.map(RigidItem::new).collect();
     let mut through = RigidContact::new("tool".into(), ground, 1.5 * OFFSET, 0.0, &contact, items)
-        .with_slack(0.02 * OFFSET);
+        .with_slack(0.05 * OFFSET);
     through.through = vec![0];
     model.rigid_contacts.push(through);
     model.set_contact_stiffness(&contact);

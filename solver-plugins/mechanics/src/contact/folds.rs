@@ -230,6 +230,7 @@ impl SelfContact {
     /// Keeps only those slaves for which `keep` says so; what touches is found again.
     pub fn retain(&mut self, keep: impl Fn(u32) -> bool) {
         self.slaves.retain(|n| keep(*n));
+        self.blocks.retain(keep);
         self.items.clear();
         self.search = Search::default();
     }

@@ -28,7 +28,7 @@ pub use friction::{
 pub use regions::{NodeLaws, Partner, RegionalFriction};
 pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
 pub use search::{Surface, shape};
-pub use sheets::SheetContact;
+pub use sheets::{SheetContact, ledge, rim_height};
 pub use slave::SlaveItem;
 pub(crate) use slave::WHOLE;
 

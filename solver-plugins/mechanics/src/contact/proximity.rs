@@ -115,6 +115,13 @@ impl Blocks {
         Self { blocks }
     }
 
+    /// Keeps only those nodes for which `keep` says so.
+    pub(super) fn retain(&mut self, keep: impl Fn(u32) -> bool) {
+        for block in &mut self.blocks {
+            block.nodes.retain(|n| keep(*n));
+        }
+    }
+
     /// All pairs within reach, by node and then by distance.
     pub(super) fn candidates(&self, s: &Surface<'_>, reach: &Reach<'_>) -> Vec<Candidate> {
         let extents: Vec<Extent> = self.blocks.par_iter().map(|b| b.extent(s)).collect();

@@ -462,7 +462,8 @@ impl<F: Coulomb> Looking<'_, F> {
             if self.cycle >= u64::from(*wake) {
                 if *between == Between::Gone {
                     item.part();
-                    *wake = waking(self.cycle, 1);
+                    // Until about when this is looked at again. It is not held then, either, before it has come clear.
+                    *wake = waking(self.cycle, INTERVAL);
                     span.wake = span.wake.min(*wake);
                     continue;
                 }

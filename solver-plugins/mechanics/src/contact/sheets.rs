@@ -39,6 +39,8 @@ pub struct SheetContact {
     /// come nearer before they do, besides what straight cells cut off curved sheets. What is let in does not change while a slave touches: that
     /// would make energy. `None`: slaves touch at that distance.
     pub let_in: Option<f64>,
+    /// By how much (m) the distance at which slaves touch is less where what the master's cells go on by past its rims ends.
+    pub ledge: f64,
     /// Whether slaves are pushed out from wherever they are: also from so deep inside of the master that motion cannot have brought
     /// them there. That makes energy, and is for models that are put together by hand and damped.
     pub clearing: bool,
@@ -78,6 +80,7 @@ impl SheetContact {
             augmentation: settings.augmentation,
             deep: f64::INFINITY,
             let_in: None,
+            ledge: BEVEL * offset,
             clearing: false,
             share: 1.0,
             counted: 1.0,
@@ -143,6 +146,7 @@ impl SheetContact {
             v,
             side,
             let_in: self.let_in,
+            ledge: self.ledge,
             rim: &self.rim,
             pace,
             cycle: self.cycle,
@@ -203,6 +207,7 @@ impl SheetContact {
     /// What changes: slaves and their sleep.
     pub(crate) fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
         a.value(&mut self.cycle)?;
+        a.value(&mut self.ledge)?;
         a.value(&mut self.wakes)?;
         a.value(&mut self.spans)?;
         a.values(&mut self.items)
@@ -237,6 +242,7 @@ struct Following<'a, F> {
     v: &'a [V],
     side: f64,
     let_in: Option<f64>,
+    ledge: f64,
     rim: &'a [u32],
     pace: Pace,
     cycle: u64,
@@ -325,15 +331,17 @@ fn follow<F: Coulomb>(item: &mut SlaveItem, given: &Following<'_, F>) -> Met {
     let mut found = track(s, item, p, law.offset, iterations, |_| true);
     let looks_around = !item.active || item.turn.is_multiple_of(4 * SEARCH_INTERVAL);
     if !given.rim.is_empty() && looks_around && past_rim(&found.first) {
-        found = elsewhere(item, s, given.rim, law.offset, found);
+        found = elsewhere(item, given, law.offset, found);
     }
+    // One that is held from below the end of a ledge, as far as it is off that, is not to be held from above when it comes inwards.
+    item.guarded |= item.active && ends_at(item.xi) && !at_rim(&found.first);
     (item.cell, item.xi) = (found.first.cell, found.first.xi);
     if let Some(base) = given.let_in.filter(|_| !item.active) {
         item.let_in(s, base, given.law.offset);
         own = Some(law_of(item, given));
     }
     let law = own.as_ref().unwrap_or(&given.law);
-    let Some((pull, plain)) = pull_of(item, s, &found, given.side, law.offset, law.clearing) else {
+    let Some((pull, plain)) = pull_of(item, s, &found, given, law.offset) else {
         item.part();
         return Met::Apart(0);
     };
@@ -370,24 +378,35 @@ fn law_of<'a, F: Coulomb>(item: &SlaveItem, given: &Following<'a, F>) -> Law<'a,
     }
 }
 
-/// The closest point of the surface for a slave beside its rim, whose closest point so far is `found`: the walk along a rim that is not convex
+/// The closest point of the surface for a slave past its rim, whose closest point so far is `found`: the walk along a rim that is not convex
 /// may end at a stretch that is nearest only of those around.
 #[inline(never)]
-fn elsewhere(item: &SlaveItem, s: &Surface<'_>, rim: &[u32], offset: f64, found: Found) -> Found {
+fn elsewhere<F: Coulomb>(
+    item: &SlaveItem,
+    given: &Following<'_, F>,
+    offset: f64,
+    found: Found,
+) -> Found {
+    let s = &given.surface;
     let p = s.x[item.node as usize];
+    let own = s.cells[found.first.cell as usize];
+    // The walk knows what is around the cell that it has ended at.
+    let others =
+        (given.rim.iter()).filter(|c| !s.cells[**c as usize].iter().any(|n| own.contains(n)));
+    // A cell is no nearer than its middle less half its diagonal.
     let apart = |cell: &u32| {
-        let corners = s.cells[*cell as usize].map(|n| s.x[n as usize]);
-        let way = sub(p, combine([0.25; 4], &corners));
-        dot(way, way)
+        let x = s.cells[*cell as usize].map(|n| s.x[n as usize]);
+        let way = norm(sub(p, combine([0.25; 4], &x)));
+        way - 0.5 * norm(sub(x[2], x[0])).max(norm(sub(x[3], x[1])))
     };
-    let nearer = |a: &u32, b: &u32| apart(a).total_cmp(&apart(b)).then(a.cmp(b));
-    let Some(cell) = rim.iter().copied().min_by(nearer) else {
+    let nearer = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    let Some((_, cell)) = others.map(|c| (apart(c), *c)).min_by(nearer) else {
         return found;
     };
     let start = SlaveItem::new(item.node, cell, [0.0; 2]);
     let other = track(s, &start, p, offset, 3, |_| true);
     // In a slot that is narrower than two ledges both are below it.
-    let gap = |c: &Closest| c.distance2.sqrt() + Ledge::under(s, c, offset).less();
+    let gap = |c: &Closest| c.distance2.sqrt() + Ledge::under(c, given.ledge).less();
     if gap(&other.first) < gap(&found.first) {
         other
     } else {
@@ -411,9 +430,15 @@ fn apart(
     Met::Apart(steps)
 }
 
-/// Whether a closest point lies on a free rim.
+/// Whether a closest point lies where what a cell goes on by past a free rim ends.
 fn at_rim(c: &Closest) -> bool {
-    c.xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM)
+    ends_at(c.xi)
+}
+
+/// Whether what a cell goes on by past a rim ends at a place in it.
+#[inline(always)]
+fn ends_at(xi: [f64; 2]) -> bool {
+    xi.iter().any(|x| x.abs() > 1.0 + 0.999 * RIM)
 }
 
 /// Whether a closest point lies past a free rim, on what a cell goes on by there.
@@ -428,6 +453,34 @@ const BEVEL: f64 = 0.7;
 /// Steepest slope of that. A contact along a slope is stiffer, by 1 + slope squared, which the step must bear.
 const SLOPE: f64 = 0.5;
 
+/// Share of the cells at a sheet's rims that are shorter across the rim than what its slope is told from.
+const SHORTER: f64 = 0.1;
+
+/// [`SheetContact::ledge`] of sheets that touch at the distance `offset` (m), where the cells at the master's rims are `height` (m) long
+/// across these ([`rim_height`]).
+pub fn ledge(offset: f64, height: f64) -> f64 {
+    (BEVEL * offset).min(0.25 * SLOPE * RIM * height)
+}
+
+/// How long (m) cells at rims are across these: nine in ten are longer. `cells`, `neighbours`: those of one sheet; `x`: positions of all nodes (m).
+/// `None`: the sheet has no rim.
+pub fn rim_height(cells: &[[u32; 4]], neighbours: &[[u32; 4]], x: &[V]) -> Option<f64> {
+    let heights = cells.iter().zip(neighbours).flat_map(|(cell, near)| {
+        let x = cell.map(|n| x[n as usize]);
+        let [south, east, north, west] = [0, 1, 2, 3].map(|k| sub(x[(k + 1) % 4], x[k]));
+        // Middle lines; sides 0 and 2 run along the first.
+        let lines = [sub(south, north), sub(east, west)].map(|l| scale(l, 0.5));
+        let area = norm(cross(lines[0], lines[1]));
+        let rims = (0..4).filter(|k| near[*k] == NONE);
+        rims.map(move |k| area / norm(lines[k % 2]))
+    });
+    let mut heights: Vec<f64> = heights.collect();
+    heights.sort_by(f64::total_cmp);
+    heights
+        .get((SHORTER * heights.len() as f64) as usize)
+        .copied()
+}
+
 /// What a cell goes on by past a free rim, at a place on it.
 ///
 /// A node that slides past the rim of a sheet hands what presses on it over to the rim's nodes, which lie below its cells. Held at the whole
@@ -436,28 +489,16 @@ const SLOPE: f64 = 0.5;
 struct Ledge {
     /// By coordinate: 0 at the rim, 1 where the ledge ends.
     past: [f64; 2],
-    /// By coordinate: sides of the cell there, per unit of it (m).
-    along: [V; 2],
-    /// By how much the distance in touch is less where it ends (m).
+    /// By how much the distance in touch is less there (m).
     most: f64,
 }
 
 impl Ledge {
-    /// The ledge that a closest point lies on; `offset`: the distance in touch (m).
-    #[inline(never)]
-    fn under(s: &Surface<'_>, c: &Closest, offset: f64) -> Self {
-        let x = s.cells[c.cell as usize].map(|n| s.x[n as usize]);
-        let (a, b) = (0.25 * (1.0 - c.xi[1]), 0.25 * (1.0 + c.xi[1]));
-        let (u, v) = (0.25 * (1.0 - c.xi[0]), 0.25 * (1.0 + c.xi[0]));
-        let along = [combine([-a, a, b, -b], &x), combine([-u, -v, v, u], &x)];
-        // Half the cell's shorter height.
-        let longer = norm(along[0]).max(norm(along[1]));
-        let half = norm(cross(along[0], along[1])) / longer;
-        Self {
-            past: c.xi.map(|x| ((x.abs() - 1.0) / RIM).max(0.0)),
-            along,
-            most: (BEVEL * offset).min(0.5 * SLOPE * RIM * half),
-        }
+    /// The ledge that a closest point lies on. `most` ([`SheetContact::ledge`]) is one for the whole sheet: it is nothing that differs from cell to cell or
+    /// changes with them, which would make energy.
+    fn under(c: &Closest, most: f64) -> Self {
+        let past = c.xi.map(|x| ((x.abs() - 1.0) / RIM).max(0.0));
+        Self { past, most }
     }
 
     /// By coordinate, what is left of the sheet there: 1 at the rim, 0 where the ledge ends.
@@ -473,9 +514,13 @@ impl Ledge {
 
     /// Takes that off the distance at which a slave is held, and turns its force accordingly.
     #[inline(never)]
-    fn bevel(&self, pull: &mut Pull, c: &Closest) {
-        let left = self.left();
+    fn bevel(&self, pull: &mut Pull, s: &Surface<'_>, c: &Closest) {
         pull.gap += self.less();
+        let x = s.cells[c.cell as usize].map(|n| s.x[n as usize]);
+        let (a, b) = (0.25 * (1.0 - c.xi[1]), 0.25 * (1.0 + c.xi[1]));
+        let (u, v) = (0.25 * (1.0 - c.xi[0]), 0.25 * (1.0 + c.xi[0]));
+        let along = [combine([-a, a, b, -b], &x), combine([-u, -v, v, u], &x)];
+        let left = self.left();
         for k in 0..2 {
             let slope = self.most * 2.0 * self.past[k] / RIM * left[1 - k] * c.xi[k].signum();
             // Where the ledge ends, the place is held.
@@ -483,7 +528,7 @@ impl Ledge {
                 continue;
             }
             // What the place moves by along one side of the cell while it keeps the other coordinate, unless it is held there.
-            let (own, other) = (self.along[k], self.along[1 - k]);
+            let (own, other) = (along[k], along[1 - k]);
             let across = if c.free[1 - k] {
                 sub(own, scale(other, dot(own, other) / dot(other, other)))
             } else {
@@ -497,14 +542,14 @@ impl Ledge {
 /// Gap and direction of a slave whose closest point is found, and whether it may keep both for some steps; `None`: it lies
 /// beyond a fold.
 #[inline(always)]
-fn pull_of(
+fn pull_of<F: Coulomb>(
     item: &SlaveItem,
     s: &Surface<'_>,
     found: &Found,
-    side: f64,
+    given: &Following<'_, F>,
     offset: f64,
-    clearing: bool,
 ) -> Option<(Pull, bool)> {
+    let (side, ledge, clearing) = (given.side, given.ledge, given.law.clearing);
     let first = &found.first;
     let nodes = s.cells[first.cell as usize];
     let up = combine(first.weights, &nodes.map(|n| s.normals[n as usize]));
@@ -513,7 +558,7 @@ fn pull_of(
     let past = past_rim(first);
     let bevelled = |(mut pull, alone): (Pull, bool)| {
         if past {
-            Ledge::under(s, first, offset).bevel(&mut pull, first);
+            Ledge::under(first, ledge).bevel(&mut pull, s, first);
         }
         (pull, alone && !past)
     };

@@ -1,7 +1,7 @@
 //! How stiff contacts are, from the masses that they couple and the step.
 
 use super::*;
-use crate::contact::WHOLE;
+use crate::contact::{WHOLE, ledge, rim_height};
 
 /// Share of the thinner sheet from which on a contact is deep ([`SheetContact::deep`]).
 const DEEP: f64 = 0.1;
@@ -40,8 +40,20 @@ impl Model {
                 row[item.node as usize] += counted * item.stiffness;
             }
         }
+        let (cells, neighbours, x) = (&self.cells, &self.neighbours, &self.x);
+        let heights = self.sheets.iter().map(|sheet| {
+            let (from, to) = sheet.cell_range;
+            let height = rim_height(&cells[from..to], &neighbours[from..to], x);
+            (from..to, height)
+        });
+        let heights: Vec<_> = heights.collect();
         for contact in &mut self.sheet_contacts {
             contact.augmentation = augmentation;
+            let on = (contact.items.iter().map(|i| i.cell)).find(|c| *c != crate::mesh::NONE);
+            let master = on.and_then(|c| heights.iter().find(|h| h.0.contains(&(c as usize))));
+            if let Some((_, Some(height))) = master {
+                contact.ledge = ledge(contact.offset, *height);
+            }
             let items = contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
             // Where they are kept further apart than they are thick, what is between them is to spare.
             let both = items.map(|i| {

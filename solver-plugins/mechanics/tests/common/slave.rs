@@ -1,6 +1,8 @@
 //! One slave on a sheet, and what it must be held by: the gradient of its own energy.
 
-use plyflow_mechanics::contact::{ContactSettings, Pace, SheetContact, SlaveItem, Surface};
+use plyflow_mechanics::contact::{
+    ContactSettings, Pace, SheetContact, SlaveItem, Surface, ledge, rim_height,
+};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::vec3::{V, norm};
 
@@ -59,6 +61,8 @@ pub fn evaluate(mesh: &QuadMesh, x: &[V], cell: u32) -> (f64, Vec<V>) {
         normals: &normals,
     };
     let mut c = contact(x.len() as u32 - 1, cell);
+    let height = rim_height(&mesh.cells, &neighbours, x).expect("a rim");
+    c.ledge = ledge(OFFSET, height);
     let v = vec![[0.0; 3]; x.len()];
     let mut energy = 0.0;
     // The first search starts afar; the second is at the place.
