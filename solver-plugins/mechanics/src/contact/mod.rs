@@ -12,6 +12,7 @@
 mod blend;
 mod folds;
 mod friction;
+mod ledge;
 mod proximity;
 mod regions;
 mod rigid;
@@ -25,10 +26,11 @@ pub use friction::{
     AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, PressureDependence, SheetCells,
     VaryingFriction, Whose,
 };
+pub use ledge::{ledge, rim_height};
 pub use regions::{NodeLaws, Partner, RegionalFriction};
 pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface};
 pub use search::{Surface, shape};
-pub use sheets::{SheetContact, ledge, rim_height};
+pub use sheets::SheetContact;
 pub use slave::SlaveItem;
 pub(crate) use slave::WHOLE;
 
