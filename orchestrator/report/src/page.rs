@@ -94,7 +94,9 @@ fn head(
     study: Option<&family::Shown<'_>>,
     large: bool,
 ) -> Markup {
-    let warnings = verdict::warnings(input, material, large);
+    // What is of single points stands in their places: before the table it would bury what all of them say.
+    let apart = study.is_some();
+    let warnings = verdict::warnings(input, material, apart);
     html! {
         header {
             p class="kind" { @if study.is_some() { "Study" } @else { "Forming report" } }
@@ -104,7 +106,7 @@ fn head(
                 @let whole = s.family.count("done") == s.family.points.len();
                 p class={ "verdict " (class(if whole { Tone::Good } else { Tone::Bad })) } { (s.family.counts()) }
             }
-            @for study in material.studies.iter().filter(|_| !large) {
+            @for study in material.studies.iter().filter(|_| !apart) {
                 @let (tone, text) = verdict::of_study(study);
                 @if !text.is_empty() {
                     p class={ "verdict " (class(tone)) } {
@@ -130,7 +132,7 @@ fn head(
                     dl { @for (label, texts) in verdict::by_step(&warnings) { dt { (label) } dd { (texts.join("\n")) } } }
                 }
             }
-            @if let Some(s) = study.filter(|_| large) { (family::warned(s)) }
+            @if let Some(s) = study { (family::warned(s)) }
             (contents(material, input, large))
         }
     }

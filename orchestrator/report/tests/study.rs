@@ -321,6 +321,21 @@ fn warnings_of_points_are_counted_and_stand_in_their_places() {
 }
 
 #[test]
+fn what_points_of_a_small_study_say_stands_in_their_places_too_and_not_before_the_table() {
+    let (_dir, folder) = folder();
+    let mut input = sweep(&folder, 45);
+    let points = input.family.as_ref().unwrap().points.len();
+    let warnings = &mut input.instances[0].record.warnings;
+    warnings.push("the ply slides off".into());
+    let text = page(&input, &folder);
+    let (head, rest) = text.split_once("</header>").unwrap();
+    let told = format!("of {points} points warn of something");
+    assert!(plain(head).contains(&told), "{}", plain(head));
+    assert!(!head.contains("the ply slides off") && !head.contains("kinetic"));
+    assert!(section(rest, "places").contains("the ply slides off"));
+}
+
+#[test]
 fn the_page_of_a_point_is_linked_where_it_was_written() {
     let (_dir, folder) = folder();
     let mut input = sweep(&folder, 45);
