@@ -1,4 +1,4 @@
-//! What a sheet goes on by past its rims, and how it ends there.
+//! What a sheet goes on by past its rims, and how it ends there: ours, `docs/decisions/0050-what-slides-off-an-edge.md`.
 
 use super::search::{Closest, RIM, Surface, combine};
 use super::slave::Pull;
@@ -31,7 +31,7 @@ const SLOPE: f64 = 0.5;
 /// Share of the cells at a sheet's rims that are shorter across the rim than what its slope is told from.
 const SHORTER: f64 = 0.1;
 
-/// [`super::SheetContact::ledge`] of sheets that touch at the distance `offset` (m), where the cells at the master's rims are `height` (m) long
+/// [`super::SheetContact::ledge`] (m) of sheets that touch at the distance `offset` (m), where the cells at the master's rims are `height` (m) long
 /// across these ([`rim_height`]).
 pub fn ledge(offset: f64, height: f64) -> f64 {
     (BEVEL * offset).min(0.25 * SLOPE * RIM * height)
