@@ -32,6 +32,21 @@ fn beside(cell: f64, past: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
     (mesh, x)
 }
 
+/// What a contact sees of a sheet.
+fn surface_of<'a>(
+    mesh: &'a QuadMesh,
+    neighbours: &'a [[u32; 4]],
+    x: &'a [V],
+    normals: &'a [V],
+) -> Surface<'a> {
+    Surface {
+        cells: &mesh.cells,
+        neighbours,
+        x,
+        normals,
+    }
+}
+
 /// Sizes of cells (m), and shares of their ledges along both sides: past one rim, past the other, at their corner.
 fn places() -> impl Iterator<Item = (f64, [f64; 2])> {
     let shares = [0.05, 0.5, 0.95];
@@ -93,12 +108,7 @@ fn past_a_rim_a_slave_that_passes_the_middle_of_the_sheet_is_pushed_as_before() 
     for k in 0..=1000 {
         let height = OFFSET * (1.0 - 1.3 * f64::from(k) / 1000.0);
         x[node][2] = height;
-        let surface = Surface {
-            cells: &mesh.cells,
-            neighbours: &neighbours,
-            x: &x,
-            normals: &normals,
-        };
+        let surface = surface_of(&mesh, &neighbours, &x, &normals);
         c.compute(&surface, &v, pace(1e-6));
         // Where the two planes are the same, no way out is better than another.
         if height.abs() < 0.02 * OFFSET {
@@ -130,12 +140,7 @@ fn a_slave_that_is_drawn_off_a_rim_gives_back_what_it_has_stored_and_no_more() {
     let mut forces = Vec::new();
     for k in 0..=steps {
         x[node] = at(k);
-        let surface = Surface {
-            cells: &mesh.cells,
-            neighbours: &neighbours,
-            x: &x,
-            normals: &normals,
-        };
+        let surface = surface_of(&mesh, &neighbours, &x, &normals);
         let energy = c.compute(&surface, &v, pace(1e-6)).stored;
         forces.push((energy, c.items[0].force));
     }
@@ -195,12 +200,7 @@ fn a_slave_that_crosses_a_slot_is_held_by_what_is_beyond() {
                 2e-3 - 1.8e-3 * (way - 0.7) / 0.3
             };
             x[node as usize] = [0.006 + 0.009 * way, 0.018, height];
-            let surface = Surface {
-                cells: &mesh.cells,
-                neighbours: &neighbours,
-                x: &x,
-                normals: &normals,
-            };
+            let surface = surface_of(&mesh, &neighbours, &x, &normals);
             c.compute(&surface, &v, pace(1e-6));
         }
         c.items[0].penetration
@@ -232,12 +232,7 @@ fn in_a_slot_narrower_than_two_ledges_a_slave_is_held_by_the_one_that_is_thicker
         for k in 0..=2 * STEPS {
             let at = 0.011 - 0.005 * f64::from((k - STEPS).abs()) / f64::from(STEPS);
             x[node] = [at, 0.018, 0.3 * OFFSET];
-            let surface = Surface {
-                cells: &mesh.cells,
-                neighbours: &neighbours,
-                x: &x,
-                normals: &normals,
-            };
+            let surface = surface_of(&mesh, &neighbours, &x, &normals);
             c.compute(&surface, &v, pace(1e-6));
             let past = [(at - 0.008) / 0.001, (0.0095 - at) / (0.25 * right)];
             let thick = past.map(|p| match p {
@@ -275,12 +270,7 @@ fn along_a_rim_of_unequal_and_slanting_cells_the_distance_is_one() {
     let mut depths = Vec::new();
     for k in 0..=4000 {
         x[node] = [-0.003 + 1e-6 * f64::from(k), -0.0049, 0.4 * OFFSET];
-        let surface = Surface {
-            cells: &mesh.cells,
-            neighbours: &neighbours,
-            x: &x,
-            normals: &normals,
-        };
+        let surface = surface_of(&mesh, &neighbours, &x, &normals);
         c.compute(&surface, &v, pace(1e-6));
         depths.push(c.items[0].penetration);
     }
@@ -301,12 +291,7 @@ fn a_slave_beneath_the_end_of_a_ledge_that_comes_inwards_is_not_flung_up() {
     let mut energies = Vec::new();
     for k in 0..=2000 {
         x[node][0] = 0.010_05 - 1e-7 * f64::from(k);
-        let surface = Surface {
-            cells: &mesh.cells,
-            neighbours: &neighbours,
-            x: &x,
-            normals: &normals,
-        };
+        let surface = surface_of(&mesh, &neighbours, &x, &normals);
         energies.push(c.compute(&surface, &v, pace(1e-6)).stored);
     }
     let jump = (energies.windows(2))
