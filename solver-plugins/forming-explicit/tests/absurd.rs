@@ -5,9 +5,9 @@ mod common;
 use common::BuiltIn;
 use common::scenes::{bag, gentle_press, press};
 use plyflow_forming_explicit::absurd::{check, off_the_tool};
-use plyflow_forming_explicit::build_global;
 use plyflow_forming_explicit::parameters::Parameters;
 use plyflow_forming_explicit::watch::{Watch, Watched};
+use plyflow_forming_explicit::{Feedback, LocalSheet, build_global, feed_back};
 use serde_json::{Value, json};
 
 fn judged(p: &Parameters) -> Result<(), String> {
@@ -119,4 +119,30 @@ fn a_ply_that_ends_off_the_tool_is_no_result() {
     for part in ["ply 'ply_1' is nowhere on the tool", "5.0 mm away"] {
         assert!(told.contains(part), "'{part}' in: {told}");
     }
+}
+
+#[test]
+fn a_ply_that_is_driven_everywhere_is_not_told_to_be_off_the_tool() {
+    let mut forming = build_global(&bag(1, |_| {}), &BuiltIn).unwrap();
+    let body = forming.bodies.iter().find(|b| b.name == "ply_1").unwrap();
+    let points = forming.reference_points(body);
+    let all: Vec<u32> = (0..points.len() as u32).collect();
+    let sheet = LocalSheet {
+        name: body.name.clone(),
+        cells: body.cells.clone(),
+        position: vec![points.clone(); 2],
+        velocity: vec![vec![[0.0; 3]; points.len()]; 2],
+        points,
+        driven: all,
+        normal: Vec::new(),
+        normal_rate: Vec::new(),
+        pull: Vec::new(),
+        stiffness: Vec::new(),
+        start: None,
+    };
+    let (time, sheets) = (vec![0.0, 1.0], vec![sheet]);
+    feed_back(&mut forming, Feedback { time, sheets }).unwrap();
+    let (mut watch, mut watched) = (Watch::new(&forming), Watched::default());
+    watch.look(&forming, &mut watched, true);
+    assert_eq!(off_the_tool(&forming, &watch), None);
 }

@@ -220,9 +220,11 @@ impl Watch {
     }
 
     /// Of a rigid part and a sheet of the stack: how far (m) the nearest node was from touching at the last look that ended a run.
+    /// `None` where no node was looked at, because something else drives them all.
     pub fn nearest(&self, part: &str, sheet: usize) -> Option<f64> {
         let k = self.parts.iter().position(|p| p.name == part)?;
-        Some(self.nearest[self.pair_with_part(k, sheet)])
+        let near = self.nearest[self.pair_with_part(k, sheet)];
+        near.is_finite().then_some(near)
     }
 
     /// Looks at everything as it is now. `last`: at the end of the run.
