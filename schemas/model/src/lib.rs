@@ -4,6 +4,7 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+pub mod artifact;
 pub mod budget;
 pub mod canonical;
 pub mod friction;

@@ -1,0 +1,51 @@
+//! The kind `boundary`: what drives a fine run of a zone, or a coarse run of the whole again.
+
+use super::{Attributes, Sheet, Zone};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Attributes of the kind `boundary`, of a zone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Boundary {
+    /// The zone.
+    pub zone: Zone,
+    /// Name of the scene that the coarse run formed; `null` when that does not tell it.
+    pub scene: Option<String>,
+    /// Number of frames.
+    pub frames: usize,
+    /// When the fine run begins (s).
+    pub start_time: f64,
+    /// Of the plies (m).
+    pub element_size: f64,
+    /// Of the films (m).
+    pub film_element_size: f64,
+    /// The sheets in the zone, as the coarse run tells them, in the order of the stack.
+    pub sheets: Vec<Sheet>,
+    /// Largest distance, where lines of the coarse mesh cross the cut, between fine edges and the coarse surface (m).
+    pub interpolation_error: f64,
+}
+
+impl Attributes for Boundary {
+    const KIND: &'static str = "boundary";
+}
+
+/// Attributes of the kind `boundary`, of what fine runs feed back to a coarse one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Feedback {
+    /// `null`: it drives the whole.
+    pub zone: Option<Zone>,
+    /// Name of the scene that the coarse run formed; `null` when that does not tell it.
+    pub scene: Option<String>,
+    /// Number of frames.
+    pub frames: usize,
+    /// Of the coarse plies (m).
+    pub element_size: f64,
+    /// Width of the strip along the cuts in which the coarse run is left free (m).
+    pub overlap: f64,
+    /// Names of the zones whose motion is fed back.
+    pub fed_back: Vec<String>,
+}
+
+impl Attributes for Feedback {
+    const KIND: &'static str = "boundary";
+}

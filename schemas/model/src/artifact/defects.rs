@@ -1,0 +1,56 @@
+//! The kind `defects`: what a detection flags on the plies of a formed run.
+
+use super::Attributes;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Attributes of the kind `defects`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Defects {
+    /// From where on something is flagged.
+    pub thresholds: Thresholds,
+    /// What was found, in the order of the stack.
+    pub plies: Vec<PlyDefects>,
+}
+
+impl Attributes for Defects {
+    const KIND: &'static str = "defects";
+}
+
+/// From where on something is flagged.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Thresholds {
+    /// Cells above this shear angle are flagged (rad).
+    pub over_shear_positive: f64,
+    /// Cells below this shear angle are flagged (rad).
+    pub over_shear_negative: f64,
+    /// Nodes above this distance do not conform (m).
+    pub distance_threshold: f64,
+    /// Nodes whose closest point is nearer to the tool's foot are not judged (m).
+    pub foot_margin: f64,
+}
+
+/// What was found on a ply.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlyDefects {
+    /// Its name.
+    pub name: String,
+    /// Undeformed flagged area (m2).
+    pub flagged_area: f64,
+    /// Undeformed area that is sheared too far (m2).
+    pub over_shear_area: f64,
+    /// Undeformed area that does not conform to the tool (m2).
+    pub poor_conformity_area: f64,
+    /// Smallest shear angle (rad).
+    pub shear_min: f64,
+    /// Largest shear angle (rad).
+    pub shear_max: f64,
+    /// Largest distance of a judged node from the tool, less the ply's offset (m).
+    pub distance_max: f64,
+    /// Of a ply that is not draped everywhere: undeformed area that has no shape (m2), of which nothing is in the other numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub undraped_area: Option<f64>,
+    /// What of that lies where the fabric locks, or behind (m2).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub locked_area: Option<f64>,
+}
