@@ -6,6 +6,7 @@ use crate::read::Ply;
 use crate::study::Study;
 use crate::units::{number, quantity, shown};
 use maud::{Markup, html};
+use plyflow_model::artifact::Defects;
 
 /// A sheet that moved less than this (m) lies flat.
 const LEAST_DEFLECTION: f64 = 1e-5;
@@ -79,19 +80,15 @@ impl Field {
 
     /// Limits of the detection (SI), drawn on the scale.
     fn limits(self, study: &Study) -> Vec<f64> {
-        let names: &[&str] = match self {
-            Self::Shear => &["over_shear_negative", "over_shear_positive"],
-            Self::Distance => &["distance_threshold"],
-            Self::Curvature | Self::Deflection => &[],
-        };
-        let Some(d) = &study.detection else {
+        let Some(Defects { thresholds: t, .. }) = &study.detection else {
             return Vec::new();
         };
-        names
-            .iter()
-            .filter_map(|n| d.thresholds.get(*n))
-            .copied()
-            .collect()
+        let told = match self {
+            Self::Shear => [t.over_shear_negative, t.over_shear_positive],
+            Self::Distance => [t.distance_threshold, None],
+            Self::Curvature | Self::Deflection => [None; 2],
+        };
+        told.into_iter().flatten().collect()
     }
 
     /// The scale of all maps of this quantity in a study, global and local, so that colours compare; `None`

@@ -5,12 +5,13 @@
 
 use crate::colour::{Palette, Scale, end_of_scale};
 use crate::field::bar;
-use crate::plots::{in_words, pretty, to_si};
+use crate::plots::{in_words, pretty, to_si, without_list};
 use crate::raster::{Camera, Canvas, Paint, Triangles, Vec3};
 use crate::units::number;
 use crate::view::{Sharpness, px};
 use maud::{Markup, html};
 use plyflow_artifact::{Artifact, On};
+use plyflow_model::artifact;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -20,23 +21,6 @@ const PANELS: usize = 12;
 const WIDTHS: [f64; 2] = [430.0, 300.0];
 /// The scale shows this share of the values.
 const SHOWN: f64 = 0.998;
-
-/// A map as the attributes give it.
-#[derive(Debug, Deserialize)]
-struct Given {
-    name: String,
-    title: Option<String>,
-    #[serde(default)]
-    unit: String,
-    panels: Vec<Value>,
-}
-
-#[derive(Debug, Deserialize)]
-struct GivenPanel {
-    label: String,
-    body: String,
-    field: String,
-}
 
 /// A map that can be drawn.
 #[derive(Debug)]
@@ -81,15 +65,15 @@ pub(crate) fn read(
     };
     let (mut maps, mut room) = (Vec::new(), room);
     for (i, value) in all.iter().enumerate() {
-        match Given::deserialize(value) {
-            Ok(given) if given.panels.len() > room => {
+        match without_list::<artifact::Map>(value, "panels") {
+            Ok((given, panels)) if panels.len() > room => {
                 wrong.push(format!(
                     "map '{}': it is not drawn: the page is full",
                     given.name
                 ));
             }
-            Ok(given) => {
-                let map = map(&given, artifact, wrong);
+            Ok((given, panels)) => {
+                let map = map(&given, &panels, artifact, wrong);
                 room -= map.as_ref().map_or(0, |m| m.panels.len());
                 maps.extend(map);
             }
@@ -102,16 +86,21 @@ pub(crate) fn read(
     maps
 }
 
-fn map(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<Map> {
+fn map(
+    given: &artifact::Map,
+    told: &[Value],
+    artifact: &Artifact,
+    wrong: &mut Vec<String>,
+) -> Option<Map> {
     let of = |text: String| format!("map '{}': {text}", given.name);
-    if given.panels.len() > PANELS {
-        let all = given.panels.len();
+    if told.len() > PANELS {
+        let all = told.len();
         wrong.push(of(format!(
             "the first {PANELS} of its {all} panels are drawn"
         )));
     }
     let (mut panels, mut factor) = (Vec::new(), 1.0);
-    for (i, value) in given.panels.iter().enumerate().take(PANELS) {
+    for (i, value) in told.iter().enumerate().take(PANELS) {
         match panel(value, &given.unit, artifact) {
             Ok((panel, per)) => {
                 factor = per;
@@ -155,7 +144,7 @@ fn map(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<Ma
 
 /// A panel, and the factor from SI to the unit.
 fn panel(value: &Value, unit: &str, artifact: &Artifact) -> Result<(Panel, f64), String> {
-    let given = GivenPanel::deserialize(value).map_err(|e| e.to_string())?;
+    let given = artifact::Panel::deserialize(value).map_err(|e| e.to_string())?;
     let text = |e: plyflow_artifact::ArtifactError| e.to_string();
     let body = artifact.body(&given.body).map_err(text)?;
     let frame = artifact.contents().frames.checked_sub(1);

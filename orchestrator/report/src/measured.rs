@@ -5,6 +5,7 @@ use crate::raster::Vec3;
 use crate::read::{Facts, open};
 use camino::Utf8Path;
 use plyflow_artifact::{Artifact, On};
+use plyflow_model::artifact::MeasuredDefect;
 use serde::Deserialize;
 
 /// What a measurement found, in the order of its table.
@@ -14,20 +15,12 @@ pub(crate) struct Measured {
     pub(crate) places: Vec<Place>,
 }
 
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct Given {
-    on: String,
-    number: u32,
-    ridge: Vec<Vec3>,
-}
-
 /// Reads the defects that the attributes of a measurement list, with the nodes that the artifact gives them; those on bodies
 /// without cells of four nodes (scans) have no flat shape, and no place.
 pub(crate) fn read(path: &Utf8Path, facts: &Facts, instance: usize) -> Result<Measured, String> {
     let list = &facts.attributes["defects"];
-    let list =
-        Vec::<Given>::deserialize(list).map_err(|e| format!("its attribute 'defects': {e}"))?;
+    let list = Vec::<MeasuredDefect>::deserialize(list)
+        .map_err(|e| format!("its attribute 'defects': {e}"))?;
     let artifact = open(path)?;
     let mut places = Vec::new();
     for (row, given) in list.iter().enumerate() {
@@ -55,7 +48,7 @@ type Cells = (Vec<Vec3>, Vec<Vec3>, Vec<[u32; 4]>);
 
 /// Flat and formed points of the body of a defect, and the cells of which half of the nodes bear its number;
 /// where there is none, those of which one does.
-fn cells_of(artifact: &Artifact, given: &Given) -> Result<Option<Cells>, String> {
+fn cells_of(artifact: &Artifact, given: &MeasuredDefect) -> Result<Option<Cells>, String> {
     let Ok(body) = artifact.body(&given.on) else {
         return Ok(None);
     };
@@ -70,7 +63,7 @@ fn cells_of(artifact: &Artifact, given: &Given) -> Result<Option<Cells>, String>
     let formed = artifact.frame_points(&given.on, frame).map_err(text)?;
     let number = artifact.frame_field(&given.on, frame, On::Points, "defect");
     let number = number.map_err(text)?;
-    let bears = |i: &u32| (number[*i as usize] - f64::from(given.number)).abs() < 0.5;
+    let bears = |i: &u32| (number[*i as usize] - given.number as f64).abs() < 0.5;
     let with = |least: usize| -> Vec<[u32; 4]> {
         let mine = |c: &&[u32; 4]| c.iter().filter(|i| bears(i)).count() >= least;
         cells

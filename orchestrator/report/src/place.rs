@@ -3,7 +3,8 @@
 use crate::locate::Locator;
 use crate::raster::Vec3;
 use crate::read::{Marked, Ply};
-use crate::study::{Defect, Study};
+use crate::study::Study;
+use plyflow_model::artifact::{ComparedDefect, Defect, DefectKind, Role};
 use std::collections::BTreeMap;
 
 /// A ring around a defect of which no node is known has at least this radius (m).
@@ -52,14 +53,14 @@ pub(crate) fn id_of_row(instance: usize, row: usize) -> String {
 /// Places of all defects of a study that lie on a ply which the page has: those of the comparison and of measurements.
 pub(crate) fn places(study: &Study, n: usize) -> Vec<Place> {
     let mut all = Vec::new();
-    let defects = study.comparison.iter().flat_map(|c| &c.defects);
-    let mut named: BTreeMap<String, Vec<&Defect>> = BTreeMap::new();
+    let defects = study.comparison.iter().flat_map(|c| &c.told.defects);
+    let mut named: BTreeMap<String, Vec<&ComparedDefect>> = BTreeMap::new();
     for d in defects {
         named.entry(d.id.clone()).or_default().push(d);
     }
-    let is_local = |d: &Defect| {
+    let is_local = |d: &ComparedDefect| {
         let c = study.comparison.as_ref();
-        c.is_some_and(|c| c.role(&d.model) == "local")
+        c.is_some_and(|c| c.told.role(&d.model) == Some(Role::Local))
     };
     for (id, models) in named {
         let d = models.iter().find(|d| is_local(d)).unwrap_or(&models[0]);
@@ -80,15 +81,16 @@ pub(crate) fn places(study: &Study, n: usize) -> Vec<Place> {
 }
 
 /// A defect on the finer ply of its zone: the marked cells of its kind that hang together about its centre.
-fn of_local(study: &Study, d: &Defect) -> Option<Place> {
+fn of_local(study: &Study, d: &ComparedDefect) -> Option<Place> {
     let local = study.locals.iter().find(|l| l.zone == d.zone)?;
     let ply = local.plies.iter().find(|p| p.name == d.ply)?;
-    let others = study.comparison.iter().flat_map(|c| c.local());
+    let others = study.comparison.iter().flat_map(|c| c.told.local_defects());
     let rivals: Vec<[f64; 2]> = others
-        .filter(|o| o.id != d.id && o.zone == d.zone && o.ply == d.ply && o.kind == d.kind)
-        .map(|o| o.centre)
+        .filter(|o| o.id != d.id && o.zone == d.zone && o.ply == d.ply)
+        .filter(|o| o.found.kind == d.found.kind)
+        .map(|o| o.found.centre)
         .collect();
-    let cells = cells_of(ply, d, &rivals);
+    let cells = cells_of(ply, &d.found, &rivals);
     let mut place = if cells.is_empty() {
         ring(ply, d)?
     } else {
@@ -100,10 +102,9 @@ fn of_local(study: &Study, d: &Defect) -> Option<Place> {
 
 /// The cells of a defect; where it hangs together with others of its kind, those that lie nearer to its centre.
 fn cells_of(ply: &Ply, d: &Defect, rivals: &[[f64; 2]]) -> Vec<[u32; 4]> {
-    let kind = if d.is_wrinkle() {
-        Marked::Wrinkle
-    } else {
-        Marked::Other
+    let kind = match d.kind {
+        DefectKind::Wrinkle => Marked::Wrinkle,
+        DefectKind::Bridging => Marked::Other,
     };
     let marked = ply.cells.iter().zip(&ply.marked);
     let marked: Vec<[u32; 4]> = marked
@@ -215,15 +216,16 @@ fn rings(cells: &[[u32; 4]]) -> Vec<Vec<u32>> {
 }
 
 /// A circle about the centre of a defect, of its size.
-fn ring(ply: &Ply, d: &Defect) -> Option<Place> {
+fn ring(ply: &Ply, of: &ComparedDefect) -> Option<Place> {
     let locator = Locator::new(&ply.flat, &ply.cells);
     let on = |at: [f64; 2]| {
         let (nodes, weights) = locator.locate(at)?;
         let part = |k: usize, d: usize| weights[k] * ply.formed[nodes[k] as usize][d];
         Some([0, 1, 2].map(|d| (0..3).map(|k| part(k, d)).sum()))
     };
+    let d = &of.found;
     let radius = (d.area.max(0.0) / std::f64::consts::PI).sqrt();
-    let radius = radius.max(d.length / 2.0).max(LEAST_RADIUS);
+    let radius = radius.max(of.length / 2.0).max(LEAST_RADIUS);
     let mut line = Line::default();
     for k in 0..=RING {
         let a = (k % RING) as f64 / RING as f64 * std::f64::consts::TAU;
@@ -292,6 +294,7 @@ fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     /// A lattice of n x n unit cells.
     fn lattice(n: u32) -> (Vec<Vec3>, Vec<[u32; 4]>) {
@@ -338,10 +341,10 @@ mod tests {
             cells,
             ..Ply::default()
         };
-        let defect = |x: f64| Defect {
-            kind: "wrinkle".into(),
-            centre: [x, 4.5],
-            ..Defect::default()
+        let defect = |x: f64| -> Defect {
+            let told =
+                json!({"type": "wrinkle", "amplitude": 1e-3, "area": 1e-4, "centre": [x, 4.5]});
+            serde_json::from_value(told).unwrap()
         };
         assert_eq!(cells_of(&ply, &defect(7.0), &[[1.5, 4.5]]).len(), 2);
         assert_eq!(cells_of(&ply, &defect(0.4), &[[2.4, 4.5]]).len(), 1);

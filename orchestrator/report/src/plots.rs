@@ -3,9 +3,10 @@
 //! A plot comes from a plugin that anybody may have written: what is wrong with one is a warning of the report, and
 //! the rest is drawn.
 
-use crate::plot::{Boxes, Plot, Series, Style};
+use crate::plot::{self, Boxes};
 use maud::{Markup, html};
 use plyflow_artifact::Artifact;
+use plyflow_model::artifact::{Axis, Paths, Plot, Series, Style};
 use plyflow_model::units::{parse_quantity_in, parse_unit};
 use serde::Deserialize;
 use serde_json::Value;
@@ -16,34 +17,6 @@ const SERIES: usize = 12;
 const VALUES: u64 = 20_000_000;
 /// Size of a plot on the page (px).
 const SIZE: [f64; 2] = [560.0, 330.0];
-
-/// A plot as the attributes give it.
-#[derive(Debug, Deserialize)]
-struct Given {
-    name: String,
-    title: Option<String>,
-    /// Stands below it.
-    note: Option<String>,
-    x: GivenAxis,
-    y: GivenAxis,
-    series: Vec<Value>,
-}
-
-#[derive(Debug, Deserialize)]
-struct GivenAxis {
-    label: String,
-    #[serde(default)]
-    unit: String,
-}
-
-#[derive(Debug, Deserialize)]
-struct GivenSeries {
-    label: String,
-    x: String,
-    y: String,
-    #[serde(default)]
-    style: Option<String>,
-}
 
 /// Draws the plots that the attributes of an artifact describe, at most `room` of them, in their order. What is wrong
 /// is said in `wrong`, one text each.
@@ -73,17 +46,27 @@ pub(crate) fn drawn(
     }
     let mut plots = Vec::new();
     for (i, value) in all.iter().enumerate().take(room) {
-        let given = match Given::deserialize(value) {
-            Ok(given) => given,
+        match without_list(value, "series") {
+            Ok((given, series)) => plots.extend(plot(&given, &series, artifact, wrong)),
             Err(e) => {
                 let name = value["name"].as_str().unwrap_or_default();
                 wrong.push(format!("plot {} '{name}' of its attributes: {e}", i + 1));
-                continue;
             }
-        };
-        plots.extend(plot(&given, artifact, wrong));
+        }
     }
     plots
+}
+
+/// What has a list without what is in that, and the list as it is told: each of its entries is read by itself, so that a wrong one does not
+/// keep the others from being drawn.
+pub(crate) fn without_list<T: for<'de> Deserialize<'de>>(
+    value: &Value,
+    list: &str,
+) -> serde_json::Result<(T, Vec<Value>)> {
+    let mut value = value.clone();
+    let told = value.get_mut(list).and_then(Value::as_array_mut);
+    let told = told.map(std::mem::take).unwrap_or_default();
+    Ok((T::deserialize(value)?, told))
 }
 
 pub(crate) fn in_words(value: &Value) -> &'static str {
@@ -97,7 +80,12 @@ pub(crate) fn in_words(value: &Value) -> &'static str {
     }
 }
 
-fn plot(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<Markup> {
+fn plot(
+    given: &Plot,
+    told: &[Value],
+    artifact: &Artifact,
+    wrong: &mut Vec<String>,
+) -> Option<Markup> {
     let of = |text: String| format!("plot '{}': {text}", given.name);
     for (axis, which) in [(&given.x, "x"), (&given.y, "y")] {
         if let Err(e) = parse_unit(&axis.unit) {
@@ -105,32 +93,29 @@ fn plot(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<M
             return None;
         }
     }
-    if given.series.len() > SERIES {
+    if told.len() > SERIES {
         wrong.push(of(format!(
             "the first {SERIES} of its {} series are drawn",
-            given.series.len()
+            told.len()
         )));
     }
     let (mut series, mut boxes) = (Vec::new(), Vec::new());
-    for (i, value) in given.series.iter().enumerate().take(SERIES) {
-        if value["style"] == "box" {
-            match spread(value, given, artifact, i) {
-                Ok(one) => boxes.push(one),
-                Err(e) => wrong.push(of(format!("series {}: {e}", i + 1))),
-            }
-            continue;
-        }
-        match one(value, given, artifact, i, wrong) {
-            Ok(one) => series.push(one),
-            Err(e) => wrong.push(of(format!("series {}: {e}", i + 1))),
+    for (i, value) in told.iter().enumerate().take(SERIES) {
+        let read = one(value, i, &of, wrong);
+        let drawn = read.and_then(|one| match one.style {
+            Some(Style::Box) => spread(&one, given, artifact, i).map(|b| boxes.push(b)),
+            _ => line(&one, given, artifact, i).map(|l| series.push(l)),
+        });
+        if let Err(e) = drawn {
+            wrong.push(of(format!("series {}: {e}", i + 1)));
         }
     }
-    let (x_label, y_label) = (given.x.labelled(), given.y.labelled());
-    let drawn = Plot {
+    let (x_label, y_label) = (labelled(&given.x), labelled(&given.y));
+    let drawn = plot::Plot {
         title: given.title.as_deref().unwrap_or(&given.name),
         x_label: &x_label,
         y_label: &y_label,
-        legend_of_one: (series.iter().any(|s| !s.name.is_empty()))
+        legend_of_one: (series.iter().any(|s: &plot::Series<'_>| !s.name.is_empty()))
             || boxes.iter().any(|b: &Boxes<'_>| !b.name.is_empty()),
         series,
         boxes,
@@ -150,13 +135,11 @@ fn plot(given: &Given, artifact: &Artifact, wrong: &mut Vec<String>) -> Option<M
     })
 }
 
-impl GivenAxis {
-    /// The label with its unit.
-    fn labelled(&self) -> String {
-        match pretty(&self.unit).as_str() {
-            "" | "1" => self.label.clone(),
-            unit => format!("{} ({unit})", self.label),
-        }
+/// The label of an axis with its unit.
+fn labelled(axis: &Axis) -> String {
+    match pretty(&axis.unit).as_str() {
+        "" | "1" => axis.label.clone(),
+        unit => format!("{} ({unit})", axis.label),
     }
 }
 
@@ -175,64 +158,75 @@ pub(crate) fn pretty(unit: &str) -> String {
     out
 }
 
+/// A series as it is told. One in a style that there is not is drawn as a line, which is said.
 fn one(
     value: &Value,
-    plot: &Given,
+    number: usize,
+    of: &dyn Fn(String) -> String,
+    wrong: &mut Vec<String>,
+) -> Result<Series, String> {
+    let text = |e: serde_json::Error| e.to_string();
+    let style = &value["style"];
+    let Some(odd) = style
+        .as_str()
+        .filter(|_| Style::deserialize(style).is_err())
+    else {
+        return Series::deserialize(value).map_err(text);
+    };
+    let mut plain = value.clone();
+    plain["style"] = Value::Null;
+    let series = Series::deserialize(plain).map_err(text)?;
+    wrong.push(of(format!(
+        "series {} has the style '{odd}' and is drawn as a line; there are: line, dashed, points, box",
+        number + 1
+    )));
+    Ok(series)
+}
+
+/// A series of lines or points.
+fn line(
+    given: &Series,
+    plot: &Plot,
     artifact: &Artifact,
     number: usize,
-    wrong: &mut Vec<String>,
-) -> Result<Series<'static>, String> {
-    let given = GivenSeries::deserialize(value).map_err(|e| e.to_string())?;
-    let style = match given.style.as_deref() {
-        None | Some("line") => Style::Line,
-        Some("dashed") => Style::Dashed,
-        Some("points") => Style::Points,
-        Some(other) => {
-            wrong.push(format!(
-                "plot '{}': series {} has the style '{other}' and is drawn as a line; there are: line, dashed, points, box",
-                plot.name,
-                number + 1
-            ));
-            Style::Line
-        }
+) -> Result<plot::Series<'static>, String> {
+    let Paths::One(path) = &given.y else {
+        return Err("`y` lists seven arrays, as that of the style 'box' does; expected one".into());
     };
     let x = values(artifact, &given.x, &plot.x.unit)?;
-    let y = values(artifact, &given.y, &plot.y.unit)?;
+    let y = values(artifact, path, &plot.y.unit)?;
     if x.len() != y.len() {
-        return Err(unequal(&given.x, x.len(), &given.y, y.len()));
+        return Err(unequal(&given.x, x.len(), path, y.len()));
     }
     if x.is_empty() {
         return Err(format!("'{}' is empty", given.x));
     }
-    Ok(Series {
-        name: given.label.into(),
+    Ok(plot::Series {
+        name: given.label.clone().into(),
         colour: number,
-        style,
+        style: match given.style {
+            Some(Style::Dashed) => plot::Style::Dashed,
+            Some(Style::Points) => plot::Style::Points,
+            Some(Style::Line | Style::Box) | None => plot::Style::Line,
+        },
         x: x.into(),
         y: y.into(),
     })
 }
 
 /// A series of box plots.
-#[derive(Debug, Deserialize)]
-struct GivenBoxes {
-    label: String,
-    x: String,
-    /// Lower extreme, whisker and quartile, median, upper quartile, whisker and extreme.
-    y: [String; 7],
-}
-
 fn spread(
-    value: &Value,
-    plot: &Given,
+    given: &Series,
+    plot: &Plot,
     artifact: &Artifact,
     number: usize,
 ) -> Result<Boxes<'static>, String> {
-    let given = GivenBoxes::deserialize(value)
-        .map_err(|e| format!("{e} (`y` of the style 'box' lists seven arrays)"))?;
+    let Paths::Spread(paths) = &given.y else {
+        return Err("`y` is one array (`y` of the style 'box' lists seven arrays)".into());
+    };
     let x = values(artifact, &given.x, &plot.x.unit)?;
     let mut spread = vec![[0.0; 7]; x.len()];
-    for (k, path) in given.y.iter().enumerate() {
+    for (k, path) in paths.iter().enumerate() {
         let column = values(artifact, path, &plot.y.unit)?;
         if column.len() != x.len() {
             return Err(unequal(&given.x, x.len(), path, column.len()));
@@ -242,7 +236,7 @@ fn spread(
         }
     }
     Ok(Boxes {
-        name: given.label.into(),
+        name: given.label.clone().into(),
         colour: number,
         x,
         spread,

@@ -4,7 +4,6 @@ use crate::others::{self, Other};
 use crate::raster::{Triangles, Vec3};
 use camino::Utf8Path;
 use plyflow_artifact::{Artifact, On};
-use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -75,111 +74,6 @@ impl Facts {
             .filter(move |i| i["port"] == port)
             .filter_map(|i| i["key"].as_str())
     }
-}
-
-/// Attributes of a forming run.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct FormingFacts {
-    pub(crate) sheets: Vec<Sheet>,
-    pub(crate) element_size: f64,
-    pub(crate) zone: Value,
-    pub(crate) cycles: f64,
-    pub(crate) element_cycles: f64,
-    pub(crate) elements: f64,
-    pub(crate) energy: Energy,
-    pub(crate) penetration: BTreeMap<String, Penetration>,
-    /// Share of the thinner body up to which bodies may reach into each other.
-    pub(crate) overlap_bound: Option<f64>,
-    /// The same on the way; of runs that do not tell it that of the end.
-    pub(crate) overlap_peak_bound: Option<f64>,
-    /// By pair, what the watch found.
-    pub(crate) depth: BTreeMap<String, Depth>,
-    pub(crate) warnings: Vec<String>,
-}
-
-impl FormingFacts {
-    /// Names of the plies in the order of the stack.
-    pub(crate) fn plies(&self) -> Vec<String> {
-        self.sheets
-            .iter()
-            .filter(|s| s.kind == "ply")
-            .map(|s| s.name.clone())
-            .collect()
-    }
-}
-
-/// A sheet of a forming run.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Sheet {
-    pub(crate) name: String,
-    pub(crate) kind: String,
-}
-
-/// Health of a run's energies.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Energy {
-    pub(crate) peak_drift_ratio: Option<f64>,
-    pub(crate) peak_kinetic_ratio: Option<f64>,
-    pub(crate) kinetic_bound_kept: Option<bool>,
-    pub(crate) hourglass_ratio: Option<f64>,
-}
-
-/// Penetration of a contact pair at the end.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Penetration {
-    /// Largest (m).
-    pub(crate) max: f64,
-    /// 99.9 % quantile (m).
-    pub(crate) q999: f64,
-    /// What the bodies themselves share of the thinner one, by the quantile.
-    pub(crate) overlap: Option<f64>,
-    /// Over the whole run.
-    pub(crate) peak: Option<PenetrationPeak>,
-}
-
-/// How deep bodies are in each other at the end of a run.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Depth {
-    /// m.
-    pub(crate) end: f64,
-    /// Of the thinner sheet.
-    pub(crate) share: f64,
-    /// Depth (m) that may be.
-    pub(crate) bound: Option<f64>,
-    pub(crate) place: Option<[f64; 3]>,
-    /// The deepest of all rows.
-    pub(crate) peak: DepthPeak,
-}
-
-/// The deepest of a pair over a run.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct DepthPeak {
-    /// m.
-    pub(crate) depth: f64,
-    /// Of the thinner sheet.
-    pub(crate) share: f64,
-    /// s.
-    pub(crate) time: f64,
-    pub(crate) place: Option<[f64; 3]>,
-}
-
-/// Largest penetrations of a contact pair over a run.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct PenetrationPeak {
-    /// Largest (m), and when (s).
-    pub(crate) max: f64,
-    pub(crate) max_time: f64,
-    /// Largest 99.9 % quantile (m).
-    pub(crate) q999: f64,
-    /// The largest share of the thinner body, by that.
-    pub(crate) overlap: f64,
 }
 
 /// Histories by name, all of one length; empty when there is none.

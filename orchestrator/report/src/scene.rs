@@ -8,9 +8,10 @@ use crate::locate::Locator;
 use crate::place::{Place, normal};
 use crate::raster::Vec3;
 use crate::read::Ply;
-use crate::study::{Study, Zone};
+use crate::study::Study;
 use crate::view::{Sharpness, lift};
 use pack::{Extent, Stream, script_json};
+use plyflow_model::artifact::Zone;
 use serde::Serialize;
 use thin::Thinned;
 

@@ -4,12 +4,15 @@ use crate::input::{Instance, ReportInput};
 use crate::maps::{self, Map};
 use crate::place::id_of_row;
 use crate::plots;
-use crate::read::{Facts, FormingFacts, History, Ply, open, shown_sheet};
+use crate::read::{Facts, History, Ply, open, shown_sheet};
 use crate::study::Run;
 use crate::tables;
 use maud::Markup;
+use plyflow_model::artifact::{Coupon, ElementCount, Forming, TextFile};
 use serde::Deserialize;
 
+/// What a step carries for people.
+const CARRIED: [&str; 4] = ["plots", "files", "tables", "maps"];
 /// Plots that are drawn on a page.
 const PLOTS: usize = 120;
 /// The drawn plots of a page are together about this long at most (bytes).
@@ -40,13 +43,6 @@ pub(crate) struct Shown {
     pub(crate) sheet: Option<Ply>,
     /// Energies of a coupon, if it has a history.
     pub(crate) run: Option<Run>,
-}
-
-/// A text file that an artifact carries.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub(crate) struct TextFile {
-    pub(crate) name: String,
-    pub(crate) text: String,
 }
 
 /// Reads what is shown of all steps, in their order; what is wrong is added to `problems`.
@@ -94,8 +90,7 @@ fn one(
 ) -> Option<Shown> {
     let a = &facts.attributes;
     let numbers = matches!(facts.kind.as_str(), "coupon" | "characterisation");
-    let carried = ["plots", "files", "tables", "maps"];
-    if !numbers && carried.iter().all(|what| a[*what].is_null()) {
+    if !numbers && CARRIED.iter().all(|what| a[*what].is_null()) {
         return None;
     }
     let mut shown = Shown {
@@ -136,25 +131,37 @@ fn files(value: &serde_json::Value, wrong: &mut Vec<String>) -> Vec<TextFile> {
     })
 }
 
+/// What a coupon tells besides what it carries, which is read entry by entry.
+fn coupon(facts: &Facts, wrong: &mut Vec<String>) -> Coupon {
+    let mut told = facts.attributes.clone();
+    if let Some(told) = told.as_object_mut() {
+        told.retain(|key, _| !CARRIED.contains(&key.as_str()));
+    }
+    Coupon::deserialize(told).unwrap_or_else(|e| {
+        wrong.push(format!("its attributes: {e}"));
+        Coupon::default()
+    })
+}
+
 /// The energies of a coupon, which has the histories of a forming run.
 fn run(instance: &Instance, facts: &Facts, wrong: &mut Vec<String>) -> Option<Run> {
     let history = History::read(&instance.artifact)
         .map_err(|e| wrong.push(e))
         .ok()?;
     history.internal()?;
-    let a = &facts.attributes;
-    let number = |name: &str| a[name].as_f64().unwrap_or(0.0);
-    let (elements, cycles) = (number("elements"), number("cycles"));
+    let told = coupon(facts, wrong);
+    let elements = told.elements.map_or(0, ElementCount::all);
+    let cycles = told.cycles.unwrap_or(0);
     Some(Run {
         label: instance.label(),
         instance: 0,
-        facts: FormingFacts {
-            energy: serde_json::from_value(a["energy"].clone()).unwrap_or_default(),
-            element_size: number("element_size"),
-            element_cycles: elements * cycles,
+        facts: Forming {
+            energy: told.energy,
+            element_size: told.element_size.unwrap_or(0.0),
+            element_cycles: Some(elements as f64 * cycles as f64),
             elements,
-            cycles,
-            ..FormingFacts::default()
+            cycles: Some(cycles),
+            ..Forming::default()
         },
         kinetic_bound: facts.provenance["parameters"]["kinetic_bound"].as_f64(),
         history,

@@ -1,14 +1,15 @@
 //! The runs of a workflow as studies: a global run, its defects and zones, its local runs, their comparison.
 
-pub(crate) use crate::comparison::{Comparison, Defect, Model};
+pub(crate) use crate::comparison::Comparison;
 use crate::input::{Instance, ReportInput};
 use crate::measured::{self, Measured};
 use crate::others;
-use crate::read::{self, Facts, FormingFacts, History, Ply, Tool};
+use crate::read::{self, Facts, History, Ply, Tool};
 use crate::steps::{self, Shown};
+use plyflow_model::artifact::{Defects, Forming, Zone, Zones, current_zones};
 use serde::Deserialize;
 use serde_json::Value;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Studies of which pictures are drawn; of more only tables are shown.
 const DRAWN: usize = 6;
@@ -25,7 +26,7 @@ pub(crate) struct Study {
     /// Its plies, formed, with what the detection found.
     pub(crate) plies: Vec<Ply>,
     /// What the detection tells of itself; absent without one.
-    pub(crate) detection: Option<Detection>,
+    pub(crate) detection: Option<Defects>,
     /// Zones; absent when no step looked for them.
     pub(crate) zones: Option<Vec<Zone>>,
     /// One entry per zone with something to show.
@@ -48,7 +49,7 @@ pub(crate) struct Run {
     /// Index of its instance.
     pub(crate) instance: usize,
     /// Its attributes.
-    pub(crate) facts: FormingFacts,
+    pub(crate) facts: Forming,
     /// Bound on kinetic over internal energy that it was given.
     pub(crate) kinetic_bound: Option<f64>,
     /// Its history.
@@ -64,64 +65,6 @@ pub(crate) struct Local {
     pub(crate) run: Option<Run>,
     /// Its plies, formed.
     pub(crate) plies: Vec<Ply>,
-}
-
-/// A zone.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Zone {
-    pub(crate) name: String,
-    #[serde(rename = "box")]
-    pub(crate) bounds: [f64; 4],
-    pub(crate) free_sides: [bool; 4],
-    pub(crate) plies: Vec<String>,
-    pub(crate) flagged_area: f64,
-    /// Names of zones in whose places it is.
-    pub(crate) replaces: Vec<String>,
-}
-
-impl Zone {
-    fn is(&self, told: &Value) -> bool {
-        let bounds: Option<[f64; 4]> = serde_json::from_value(told["box"].clone()).ok();
-        told["name"] == self.name.as_str() && bounds.is_none_or(|b| b == self.bounds)
-    }
-}
-
-/// Zones and the lists in which some are drawn again: a zone takes the place of the one of its name, and of those that it
-/// replaces.
-fn current(lists: impl Iterator<Item = Vec<Zone>>) -> Vec<Zone> {
-    let mut all: Vec<Zone> = Vec::new();
-    for again in lists {
-        let gone = |z: &Zone| {
-            let by = |a: &Zone| a.name == z.name || a.replaces.contains(&z.name);
-            again.iter().any(by)
-        };
-        all.retain(|z| !gone(z));
-        all.extend(again);
-    }
-    all.sort_by(|a, b| (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name)));
-    all
-}
-
-/// Attributes of a detection.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct Detection {
-    pub(crate) thresholds: BTreeMap<String, f64>,
-    pub(crate) plies: Vec<DetectionPly>,
-}
-
-/// What a detection found on a ply.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(default)]
-pub(crate) struct DetectionPly {
-    pub(crate) name: String,
-    pub(crate) flagged_area: f64,
-    pub(crate) over_shear_area: f64,
-    pub(crate) poor_conformity_area: f64,
-    pub(crate) shear_min: f64,
-    pub(crate) shear_max: f64,
-    pub(crate) distance_max: f64,
 }
 
 /// Everything that is read for a report.
@@ -216,6 +159,12 @@ impl Reader<'_> {
         self.all.facts[at]
             .as_ref()
             .is_some_and(|f| f.attributes["zone"].is_object())
+    }
+
+    /// The zone of a local run.
+    fn zone(&self, at: usize) -> Option<Zone> {
+        let facts = self.all.facts[at].as_ref()?;
+        Zone::deserialize(&facts.attributes["zone"]).ok()
     }
 
     fn studies(&mut self) {
@@ -314,32 +263,29 @@ impl Reader<'_> {
             study.detection = self.attributes(at);
         }
         if !zones_at.is_empty() {
-            #[derive(Deserialize, Default)]
-            struct Zones {
-                zones: Vec<Zone>,
-            }
             let lists: Vec<Zones> = (zones_at.iter())
                 .filter_map(|at| self.attributes(*at))
                 .collect();
-            study.zones = Some(current(lists.into_iter().map(|z| z.zones)));
+            let all = lists.into_iter().flat_map(|list| list.zones).collect();
+            study.zones = Some(current_zones(all).0);
         }
         let compared = self.comparisons(zones_at, global);
         let comparison = compared.as_ref().map(|(drawn, _)| *drawn);
         let others = compared.map(|(_, others)| others).unwrap_or_default();
         if let Some(at) = comparison {
-            study.comparison = self.attributes(at).map(|found| Comparison {
+            study.comparison = self.attributes(at).map(|told| Comparison {
+                told,
                 label: self.instance(at).label(),
                 missed: Comparison::missed_by(&self.instance(at).record.results),
                 others: (others.iter().map(|o| self.instance(*o).label())).collect(),
-                ..found
             });
         }
         self.read_global(&mut study, global, detection);
         let mut locals: Vec<usize> = zones_at.iter().flat_map(|z| self.local_runs(*z)).collect();
         let zones = study.zones.clone().unwrap_or_default();
         locals.retain(|at| {
-            let facts = self.all.facts[*at].as_ref();
-            facts.is_some_and(|f| zones.iter().any(|z| z.is(&f.attributes["zone"])))
+            let own = self.zone(*at);
+            own.is_some_and(|own| zones.iter().any(|z| z.is(&own)))
         });
         let locals = self.one_of_each_zone(locals, comparison);
         self.read_locals(&mut study, &locals, comparison);
@@ -419,7 +365,7 @@ impl Reader<'_> {
             let passed_over = place.map_or(usize::MAX, |k| compared.len() - k);
             (passed_over, size.unwrap_or(f64::INFINITY))
         };
-        let zone = |at: usize| facts(at).map(|f| &f.attributes["zone"]);
+        let zone = |at: usize| self.zone(at);
         let mut kept: Vec<usize> = Vec::new();
         for at in runs {
             match kept.iter_mut().find(|k| zone(**k) == zone(at)) {
@@ -461,7 +407,7 @@ impl Reader<'_> {
     }
 
     fn run_without_history(&mut self, at: usize) -> Option<Run> {
-        let facts: FormingFacts = self.attributes(at)?;
+        let facts: Forming = self.attributes(at)?;
         let provenance = &self.all.facts[at].as_ref()?.provenance;
         let kinetic_bound = provenance["parameters"]["kinetic_bound"].as_f64();
         Some(Run {
@@ -493,7 +439,7 @@ impl Reader<'_> {
                 let names = study
                     .global
                     .as_ref()
-                    .map(|g| g.facts.plies())
+                    .map(|g| names_of_plies(&g.facts))
                     .unwrap_or_default();
                 self.noted(&label, read::formed_plies(&path, &names))
             }
@@ -514,11 +460,10 @@ impl Reader<'_> {
         }
         for at in runs {
             let Some(run) = self.run(*at) else { continue };
-            let zone = run.facts.zone["name"].as_str().unwrap_or("?").to_owned();
-            let model = study.comparison.as_ref().and_then(|c| {
-                let of_zone = |m: &&Model| m.role == "local" && m.zone.as_deref() == Some(&zone);
-                c.models.iter().find(of_zone).map(|m| m.name.clone())
-            });
+            let zone = run.facts.zone.as_ref().map_or("?", |z| &z.name).to_owned();
+            let compared = study.comparison.as_ref();
+            let model = compared.and_then(|c| c.told.local_of(&zone));
+            let model = model.map(|m| m.name.clone());
             let mut plies: Vec<Ply> = Vec::new();
             judged.retain_mut(|(about, ply)| {
                 let mine = model.is_some() && about["model"].as_str() == model.as_deref();
@@ -529,7 +474,7 @@ impl Reader<'_> {
             });
             if plies.is_empty() && self.pictures {
                 let path = self.instance(*at).artifact.clone();
-                let read = read::formed_plies(&path, &run.facts.plies());
+                let read = read::formed_plies(&path, &names_of_plies(&run.facts));
                 plies = self.noted(&run.label.clone(), read).unwrap_or_default();
             } else if self.pictures {
                 let added = others::add(&self.instance(*at).artifact, &mut plies);
@@ -544,29 +489,7 @@ impl Reader<'_> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn a_zone_drawn_again_takes_the_place_of_its_own_and_of_those_that_it_replaces() {
-        let zone = |name: &str, to: f64, replaces: &[&str]| Zone {
-            name: name.into(),
-            bounds: [0.0, 0.0, to, to],
-            replaces: replaces.iter().map(|r| (*r).to_owned()).collect(),
-            ..Zone::default()
-        };
-        let first = vec![
-            zone("A", 1.0, &[]),
-            zone("B", 1.0, &[]),
-            zone("C", 1.0, &[]),
-        ];
-        let lists = [first, vec![zone("B", 2.0, &["A"])], Vec::new()];
-        let found = current(lists.into_iter());
-        let names: Vec<&str> = found.iter().map(|z| z.name.as_str()).collect();
-        assert_eq!(names, ["B", "C"]);
-        assert!(found[0].is(&json!({"name": "B", "box": [0.0, 0.0, 2.0, 2.0]})));
-        assert!(!found[0].is(&json!({"name": "B", "box": [0.0, 0.0, 1.0, 1.0]})));
-    }
+/// Names of the plies in the order of the stack.
+fn names_of_plies(facts: &Forming) -> Vec<String> {
+    facts.plies().map(|s| s.name.clone()).collect()
 }

@@ -82,20 +82,21 @@ fn zone_table(study: &Study) -> String {
 
 fn defect_table(c: &Comparison) -> String {
     let rows: Vec<Vec<String>> = c
-        .local()
+        .told
+        .local_defects()
         .take(LONGEST)
         .map(|d| {
             vec![
                 d.id.clone(),
                 d.ply.clone(),
-                d.kind.clone(),
-                if d.is_wrinkle() {
+                d.found.kind.name().to_owned(),
+                if d.found.is_wrinkle() {
                     quantity(d.length, "m", 3)
                 } else {
                     String::new()
                 },
-                quantity(d.amplitude, "m", 3),
-                quantity(d.area, "m2", 3),
+                quantity(d.found.amplitude, "m", 3),
+                quantity(d.found.area, "m2", 3),
             ]
         })
         .collect();

@@ -3,6 +3,7 @@
 use crate::plots::in_words;
 use crate::units::{duration, number, shown};
 use maud::{Markup, html};
+use plyflow_model::artifact::{Cell, Column, Table};
 use plyflow_model::job::NamedResult;
 use plyflow_model::units::check_si;
 use serde::Deserialize;
@@ -11,53 +12,49 @@ use serde_json::Value;
 /// Rows of a table that are shown.
 const ROWS: usize = 200;
 
-/// A table as the attributes give it.
-#[derive(Debug, Deserialize)]
-struct Given {
-    name: String,
-    title: Option<String>,
-    columns: Vec<Column>,
-    rows: Vec<Vec<Value>>,
-}
-
-#[derive(Debug, Deserialize)]
-struct Column {
-    label: String,
-    /// SI unit of its numbers.
-    #[serde(default)]
-    unit: String,
-    /// Where its numbers are not in the artifact, being measured: the result of the step that a row has, with `{k}` for the text of the
-    /// row's cell k.
-    measured: Option<String>,
-}
-
-impl Given {
-    /// Takes the unit from columns whose unit is none of SI, and says so: in which unit their numbers are is not known then.
-    fn drop_odd_units(&mut self) -> Vec<String> {
-        let mut wrong = Vec::new();
-        for column in self.columns.iter_mut().filter(|c| !c.unit.is_empty()) {
-            if let Err(e) = check_si(&column.unit) {
-                let (table, label) = (&self.name, &column.label);
-                wrong.push(format!("table '{table}': column '{label}': {e}"));
-                column.unit.clear();
-            }
+/// A table as it is told; what is no cell is a text, as it is written.
+fn read(value: &Value) -> serde_json::Result<Table> {
+    let mut value = value.clone();
+    let rows = value.get_mut("rows").and_then(Value::as_array_mut);
+    let rows = rows.into_iter().flatten();
+    for cell in rows.filter_map(Value::as_array_mut).flatten() {
+        if let Value::Bool(_) | Value::Array(_) | Value::Object(_) = cell {
+            *cell = Value::String(cell.to_string());
         }
-        wrong
     }
+    Table::deserialize(value)
 }
 
-impl Column {
-    /// The result that a row has in this column.
-    fn result<'a>(&self, row: &[Value], results: &'a [NamedResult]) -> Option<&'a NamedResult> {
-        let mut name = self.measured.clone()?;
-        for (k, cell) in row.iter().enumerate() {
-            let place = format!("{{{k}}}");
-            if name.contains(&place) {
-                name = name.replace(&place, cell.as_str()?);
-            }
+/// Takes the unit from columns whose unit is none of SI, and says so: in which unit their numbers are is not known then.
+fn drop_odd_units(table: &mut Table) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for column in table.columns.iter_mut().filter(|c| !c.unit.is_empty()) {
+        if let Err(e) = check_si(&column.unit) {
+            let (table, label) = (&table.name, &column.label);
+            wrong.push(format!("table '{table}': column '{label}': {e}"));
+            column.unit.clear();
         }
-        results.iter().find(|r| r.name == name)
     }
+    wrong
+}
+
+/// The result that a row has in a column of what was measured.
+fn result<'a>(
+    column: &Column,
+    row: &[Cell],
+    results: &'a [NamedResult],
+) -> Option<&'a NamedResult> {
+    let mut name = column.measured.clone()?;
+    for (k, cell) in row.iter().enumerate() {
+        let place = format!("{{{k}}}");
+        if name.contains(&place) {
+            let Cell::Text(text) = cell else {
+                return None;
+            };
+            name = name.replace(&place, text);
+        }
+    }
+    results.iter().find(|r| r.name == name)
 }
 
 /// Draws the tables that the attributes of an artifact describe. What is wrong is said in `wrong`, one text each.
@@ -82,9 +79,9 @@ pub(crate) fn drawn(
     };
     let mut tables = Vec::new();
     for (i, value) in all.iter().enumerate() {
-        match Given::deserialize(value) {
+        match read(value) {
             Ok(mut given) => {
-                wrong.extend(given.drop_odd_units());
+                wrong.extend(drop_odd_units(&mut given));
                 tables.push(table(&given, results, id, wrong));
             }
             Err(e) => {
@@ -97,7 +94,7 @@ pub(crate) fn drawn(
 }
 
 fn table(
-    given: &Given,
+    given: &Table,
     results: &[NamedResult],
     id: &dyn Fn(usize) -> String,
     wrong: &mut Vec<String>,
@@ -126,7 +123,7 @@ fn table(
             || given
                 .rows
                 .iter()
-                .any(|r| r.get(k).is_some_and(Value::is_number))
+                .any(|r| matches!(r.get(k), Some(Cell::Count(_) | Cell::Number(_))))
     };
     let class = |k: usize| if numeric(k) { "n" } else { "" };
     html! {
@@ -134,7 +131,7 @@ fn table(
         div class="scroll" { table {
             thead { tr { @for (k, c) in given.columns.iter().enumerate() { th class=(class(k)) { (heading(c)) } } } }
             tbody { @for (i, row) in given.rows.iter().enumerate().take(ROWS) { tr data-defect=[(given.name == "defects").then(|| id(i))] {
-                @for (k, (c, v)) in given.columns.iter().zip(row).enumerate() { td class=(class(k)) { (cell(c, v, c.result(row, results))) } }
+                @for (k, (c, v)) in given.columns.iter().zip(row).enumerate() { td class=(class(k)) { (cell(c, v, result(c, row, results))) } }
             } } }
         } }
     }
@@ -149,18 +146,19 @@ fn heading(c: &Column) -> String {
     }
 }
 
-fn cell(c: &Column, value: &Value, measured: Option<&NamedResult>) -> String {
+fn cell(c: &Column, value: &Cell, measured: Option<&NamedResult>) -> String {
     if let Some(result) = measured {
         return match result.unit.as_str() {
             "s" => duration(result.value),
             unit => number(result.value * shown(unit).0, 4),
         };
     }
+    let told = |v: f64| number(v * shown(&c.unit).0, 4);
     match value {
-        Value::Null => "–".to_owned(),
-        Value::String(text) => text.clone(),
-        Value::Number(n) => number(n.as_f64().unwrap_or(f64::NAN) * shown(&c.unit).0, 4),
-        other => other.to_string(),
+        Cell::Empty => "–".to_owned(),
+        Cell::Text(text) => text.clone(),
+        Cell::Count(n) => told(*n as f64),
+        Cell::Number(v) => told(*v),
     }
 }
 
@@ -193,6 +191,21 @@ mod tests {
         );
         assert!(drawn(&json!({"tables": 3}), &[], &|i| i.to_string(), &mut wrong).is_empty());
         assert!(wrong[2].contains("a number"), "{wrong:?}");
+    }
+
+    #[test]
+    fn what_is_no_cell_is_shown_as_it_is_written() {
+        let about = json!({"tables": [{"name": "t", "columns": [{"label": "a"}, {"label": "b"}], "rows": [[true, [1, "x"]]]},
+            {"name": "odd", "columns": [{"label": "a"}], "rows": [3]}]});
+        let mut wrong = Vec::new();
+        let tables = drawn(&about, &[], &|i| i.to_string(), &mut wrong);
+        let text = &tables[0].0;
+        assert!(
+            text.contains(">true<") && text.contains(">[1,&quot;x&quot;]<"),
+            "{text}"
+        );
+        assert_eq!((tables.len(), wrong.len()), (1, 1), "{wrong:?}");
+        assert!(wrong[0].contains("table 2 'odd'"), "{wrong:?}");
     }
 
     #[test]

@@ -31,19 +31,16 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
         None => {}
     }
     if let Some(c) = study.comparison.as_ref().filter(|_| tone == Tone::Found) {
-        let wrinkles: Vec<f64> = c
-            .local()
-            .filter(|d| d.is_wrinkle())
-            .map(|d| d.length)
-            .collect();
-        let bridging = c.local().filter(|d| !d.is_wrinkle()).count();
+        let (of_wrinkles, bridging): (Vec<_>, Vec<_>) =
+            (c.told.local_defects()).partition(|d| d.found.is_wrinkle());
+        let wrinkles: Vec<f64> = of_wrinkles.iter().map(|d| d.length).collect();
         let longest = wrinkles.iter().copied().fold(0.0, f64::max);
         parts.push(match wrinkles.len() {
             0 => "no wrinkles".into(),
             1 => format!("1 wrinkle, {} long", quantity(longest, "m", 3)),
             n => format!("{n} wrinkles, longest {}", quantity(longest, "m", 3)),
         });
-        parts.push(match bridging {
+        parts.push(match bridging.len() {
             0 => "no bridging".into(),
             n => plural(n, "bridging area", "bridging areas"),
         });
@@ -54,9 +51,10 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
     }
     let runs = runs(study);
     let kept: Vec<bool> = (runs.iter())
-        .filter_map(|(_, r)| r.facts.energy.kinetic_bound_kept)
+        .filter_map(|(_, r)| r.facts.energy?.kinetic_bound_kept)
         .collect();
-    let is_missed = |(_, r): &&(&str, &Run)| r.facts.energy.kinetic_bound_kept == Some(false);
+    let is_missed =
+        |(_, r): &&(&str, &Run)| r.facts.energy.and_then(|e| e.kinetic_bound_kept) == Some(false);
     if kept.iter().all(|k| *k) && !kept.is_empty() {
         parts.push(kinetic_text(&runs));
     } else if let Some((label, _)) = runs.iter().find(is_missed) {
@@ -68,7 +66,12 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
             kept.len(),
         ));
     }
-    let drift = |r: &Run| r.facts.energy.peak_drift_ratio.unwrap_or(0.0);
+    let drift = |r: &Run| {
+        r.facts
+            .energy
+            .and_then(|e| e.peak_drift_ratio)
+            .unwrap_or(0.0)
+    };
     let worst = (runs.iter()).max_by(|a, b| drift(a.1).total_cmp(&drift(b.1)));
     if let Some((label, run)) = worst.filter(|(_, r)| drift(r) > DRIFT_BOUND) {
         tone = Tone::Bad;
@@ -80,7 +83,7 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
 
 /// How far below their bounds the kinetic energies of runs stayed that all kept theirs.
 fn kinetic_text(runs: &[(&str, &Run)]) -> String {
-    let of_bound = |r: &Run| Some((r.facts.energy.peak_kinetic_ratio?, r.kinetic_bound?));
+    let of_bound = |r: &Run| Some((r.facts.energy?.peak_kinetic_ratio?, r.kinetic_bound?));
     let known: Vec<(f64, f64)> = runs.iter().filter_map(|(_, r)| of_bound(r)).collect();
     let nearest = (known.iter()).max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
     match nearest {

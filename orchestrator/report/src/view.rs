@@ -6,9 +6,9 @@ use crate::locate::{Locator, bounds};
 use crate::place::Place;
 use crate::raster::{Camera, Canvas, Paint, Vec3};
 use crate::read::{Marked, Ply, Tool};
-use crate::study::Zone;
 use crate::units::number;
 use maud::{Markup, html};
+use plyflow_model::artifact::Zone;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -234,13 +234,8 @@ pub(crate) fn formed(
         ply,
         bias,
     };
-    let edge = Zone {
-        bounds: bounds(&ply.flat)
-            .as_flattened()
-            .try_into()
-            .unwrap_or_default(),
-        ..Zone::default()
-    };
+    let all = bounds(&ply.flat).as_flattened().try_into();
+    let edge = Zone::new("", all.unwrap_or_default());
     let (w, h) = (size[0] as f64 / sharp.0, size[1] as f64 / sharp.0);
     let what = format!("{}, formed ply {}", legend.title(), ply.name);
     Ok(html! {

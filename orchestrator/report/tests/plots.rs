@@ -124,6 +124,36 @@ fn what_is_wrong_with_a_plot_is_a_warning_and_the_rest_is_drawn() {
             true,
         ),
         (
+            json!([a_plot(
+                "p",
+                vec![
+                    good(),
+                    json!({"label": "s", "x": "t", "y": "u", "style": "box"})
+                ]
+            )]),
+            &["series 2", "'box' lists seven arrays"],
+            true,
+        ),
+        (
+            json!([a_plot(
+                "p",
+                vec![
+                    good(),
+                    json!({"label": "s", "x": "t", "y": ["u", "u"], "style": "box"})
+                ]
+            )]),
+            &["series 2", "'box' a list of seven arrays"],
+            true,
+        ),
+        (
+            json!([a_plot(
+                "p",
+                vec![good(), json!({"label": "s", "x": "t", "y": vec!["u"; 7]})]
+            )]),
+            &["series 2", "lists seven arrays", "expected one"],
+            true,
+        ),
+        (
             json!([{"name": "p", "x": {"label": "t", "unit": "sek"}, "y": {"label": "u", "unit": "mm"}, "series": [good()]}]),
             &["plot 'p'", "x axis", "unknown unit `sek`"],
             false,
@@ -261,6 +291,41 @@ fn a_coupon_shows_its_numbers_beside_what_is_expected_its_curves_and_its_sheet()
     }
     // Shear and deflection on the flat sheet, and the deformed one.
     assert_eq!(page.matches("data:image/png;base64,").count(), 3);
+}
+
+#[test]
+fn what_is_wrong_with_a_coupon_is_a_warning_and_its_energies_are_drawn_all_the_same() {
+    let rows = |v: [f64; 3]| v.to_vec();
+    let arrays = [
+        ("history/time", "s", rows([0.0, 0.5, 1.0])),
+        ("history/kinetic", "J", rows([0.0, 0.01, 0.0])),
+        ("history/membrane", "J", rows([0.0, 0.5, 1.0])),
+    ];
+    let broken = json!([{"name": "p"}]);
+    let energy = json!({"peak_drift_ratio": 0.0456});
+    let cases = [
+        (
+            json!({"plots": broken, "energy": energy}),
+            vec!["plot 1 'p'"],
+        ),
+        (
+            json!({"plots": broken, "elements": "many"}),
+            vec!["plot 1 'p'", "frame: its attributes"],
+        ),
+    ];
+    for (about, says) in cases {
+        let (_keep, folder) = folder();
+        let mut study = Study::new(&folder);
+        study.artifact(("frame", &[]), "coupon", &arrays, &about, vec![]);
+        let mut input = study.input();
+        input.expectations.clear();
+        let page = page(&input, &folder);
+        let told = warnings(&page);
+        assert_eq!(told.matches("frame: ").count(), says.len(), "{told}");
+        assert!(says.iter().all(|s| told.contains(s)), "{told}");
+        assert!(page.contains("Kinetic over internal energy"), "{about}");
+        assert_eq!(page.contains("4.56 %"), about["energy"].is_object());
+    }
 }
 
 #[test]

@@ -459,6 +459,8 @@ pub enum SchemaKind {
     Material,
     /// Files of expectations
     Expected,
+    /// Attributes of artifacts, by kind
+    Artifacts,
 }
 
 /// `verify`

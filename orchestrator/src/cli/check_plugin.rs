@@ -13,16 +13,17 @@ use crate::engine::executor::{Executor, Outcome, Report, Task};
 use crate::engine::local::Local;
 use crate::exit;
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::artifact::{
+    CONFORMANCE_MARK, CheckOutcome, ConformanceCheck, ConformanceLine, ConformanceRule,
+    ConformanceSubject,
+};
 use plyflow_model::job::{JOB_VERSION, Job, Message};
 use plyflow_model::manifest::PluginKind;
 use plyflow_plugin_host::PluginCatalog;
 use plyflow_workflow::resolved::{PluginId, ResolvedStep};
 use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
-use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::json;
 
-/// How the step marks the lines that hold a check.
-const MARK: &str = "conformance: ";
 /// The materials that an element is judged with when none is given: name and file.
 const MATERIALS: [(&str, &str); 2] = [
     (
@@ -35,47 +36,23 @@ const MATERIALS: [(&str, &str); 2] = [
     ),
 ];
 
-/// One check as it is shown.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Check {
-    name: String,
-    outcome: String,
-    seen: String,
-    expected: String,
-    remedy: String,
-    #[serde(default)]
-    measured: Option<f64>,
-    #[serde(default)]
-    limit: Option<f64>,
-}
-
-impl Check {
-    fn new(name: &str, outcome: &str, seen: String, expected: &str, remedy: &str) -> Self {
-        Self {
-            name: name.into(),
-            outcome: outcome.into(),
-            seen,
-            expected: expected.into(),
-            remedy: remedy.into(),
-            measured: None,
-            limit: None,
-        }
+/// A check of which no number is known.
+fn check(rule: ConformanceRule, outcome: CheckOutcome, seen: String) -> ConformanceCheck {
+    ConformanceCheck {
+        rule,
+        outcome,
+        seen,
+        measured: None,
+        limit: None,
     }
 }
 
-/// What a component was judged as, e.g. an element with one material, and its checks.
-#[derive(Debug, Serialize)]
-struct Subject {
-    subject: String,
-    checks: Vec<Check>,
-}
-
-/// A check that is under way, as the step tells it.
-#[derive(Deserialize)]
-struct Begun {
-    name: String,
-    expected: String,
-    remedy: String,
+fn rule(name: &str, expected: &str, remedy: &str) -> ConformanceRule {
+    ConformanceRule {
+        name: name.into(),
+        expected: expected.into(),
+        remedy: remedy.into(),
+    }
 }
 
 /// `plyflow check-plugin`.
@@ -303,8 +280,8 @@ impl Drop for Folder {
 struct Verdict {
     plugin: String,
     about: String,
-    subjects: Vec<Subject>,
-    under_way: Option<(String, Begun)>,
+    subjects: Vec<ConformanceSubject>,
+    under_way: Option<(String, ConformanceRule)>,
     notes: Vec<String>,
 }
 
@@ -324,10 +301,10 @@ impl Verdict {
         self.about = format!("{kind} '{}' {} by {}", e.id.name, e.id.version, m.vendor);
     }
 
-    fn add(&mut self, subject: &str, check: Check) {
+    fn add(&mut self, subject: &str, check: ConformanceCheck) {
         match self.subjects.last_mut() {
             Some(last) if last.subject == subject => last.checks.push(check),
-            _ => self.subjects.push(Subject {
+            _ => self.subjects.push(ConformanceSubject {
                 subject: subject.to_owned(),
                 checks: vec![check],
             }),
@@ -343,7 +320,7 @@ impl Verdict {
         let seen = format!("{} loads in a process of its own", e.id.path);
         self.add(
             "library",
-            Check::new("load", "passed", seen, expected, remedy),
+            check(rule("load", expected, remedy), CheckOutcome::Passed, seen),
         );
         let m = &e.manifest;
         let mut bare: Vec<&str> = m
@@ -370,7 +347,7 @@ impl Verdict {
         let (outcome, seen) = if bare.is_empty() {
             let n = m.parameters.len();
             (
-                "passed",
+                CheckOutcome::Passed,
                 format!(
                     "{n} parameters, {} fields, {} results",
                     m.fields.len(),
@@ -378,7 +355,10 @@ impl Verdict {
                 ),
             )
         } else {
-            ("failed", format!("no text for: {}", bare.join(", ")))
+            (
+                CheckOutcome::Failed,
+                format!("no text for: {}", bare.join(", ")),
+            )
         };
         let (expected, remedy) = (
             "the manifest has a summary, and a `doc` for every parameter, field and result",
@@ -386,35 +366,32 @@ impl Verdict {
         );
         self.add(
             "library",
-            Check::new("manifest", outcome, seen, expected, remedy),
+            check(rule("manifest", expected, remedy), outcome, seen),
         );
     }
 
     fn broken(&mut self, reason: &str) {
-        let check = Check::new(
+        let rule = rule(
             "load",
-            "failed",
-            reason.to_owned(),
             "the library loads and exports a descriptor of this ABI with a manifest after schemas/manifest.md",
             "repair what the message says; `plyflow plugins PATH` shows the manifest as it is understood",
         );
+        let check = check(rule, CheckOutcome::Failed, reason.to_owned());
         self.add("library", check);
     }
 
     /// A line of the step's log.
     fn hear(&mut self, text: &str) {
-        let Some(value) = text
-            .strip_prefix(MARK)
-            .and_then(|json| serde_json::from_str::<Value>(json).ok())
+        let json = text.strip_prefix(CONFORMANCE_MARK);
+        let Some(line) = json.and_then(|json| serde_json::from_str::<ConformanceLine>(json).ok())
         else {
             return;
         };
-        let subject = value["subject"].as_str().unwrap_or_default();
-        if let Ok(begun) = Begun::deserialize(&value["begins"]) {
-            self.under_way = Some((subject.to_owned(), begun));
-        } else if let Ok(check) = Check::deserialize(&value["ends"]) {
+        if let Some(begun) = line.begins {
+            self.under_way = Some((line.subject, begun));
+        } else if let Some(check) = line.ends {
             self.under_way = None;
-            self.add(subject, check);
+            self.add(&line.subject, check);
         }
     }
 
@@ -432,16 +409,16 @@ impl Verdict {
             }
         };
         let (subject, begun) = self.under_way.take().unwrap_or_else(|| {
-            let begun = Begun {
-                name: "process".into(),
-                expected: "the plugin leaves the process alone".into(),
-                remedy: "look for what runs when the library is loaded or unloaded".into(),
-            };
+            let begun = rule(
+                "process",
+                "the plugin leaves the process alone",
+                "look for what runs when the library is loaded or unloaded",
+            );
             ("library".into(), begun)
         });
         let own: Vec<&str> = log
             .lines()
-            .filter(|l| !l.contains(MARK) && !l.starts_with("the worker"))
+            .filter(|l| !l.contains(CONFORMANCE_MARK) && !l.starts_with("the worker"))
             .collect();
         let last = own
             .last()
@@ -452,7 +429,8 @@ impl Verdict {
             begun.remedy
         );
         let seen = format!("{died}{last}");
-        let check = Check::new(&begun.name, "failed", seen, &begun.expected, &remedy);
+        let rule = rule(&begun.name, &begun.expected, &remedy);
+        let check = check(rule, CheckOutcome::Failed, seen);
         self.add(&subject, check);
         self.notes
             .push("checks after this one were not made".into());
@@ -460,11 +438,15 @@ impl Verdict {
     }
 
     fn show(&self, format: TextOrJson) -> Done {
-        let count = |outcome: &str| {
+        let count = |outcome: CheckOutcome| {
             let all = self.subjects.iter().flat_map(|s| &s.checks);
             all.filter(|c| c.outcome == outcome).count()
         };
-        let (passed, failed, skipped) = (count("passed"), count("failed"), count("skipped"));
+        let (passed, failed, skipped) = (
+            count(CheckOutcome::Passed),
+            count(CheckOutcome::Failed),
+            count(CheckOutcome::Skipped),
+        );
         if format == TextOrJson::Json {
             let value = json!({
                 "plugin": self.plugin, "about": self.about, "passed": passed, "failed": failed,
@@ -488,20 +470,20 @@ impl Verdict {
         for subject in &self.subjects {
             out += &format!("\n{}\n", subject.subject);
             for c in &subject.checks {
-                let word = if c.outcome == "failed" {
-                    "FAILED"
-                } else {
-                    &c.outcome
+                let word = match c.outcome {
+                    CheckOutcome::Passed => "passed",
+                    CheckOutcome::Failed => "FAILED",
+                    CheckOutcome::Skipped => "skipped",
                 };
-                out += &format!("  {word:7} {:26} {}", c.name, c.seen);
+                out += &format!("  {word:7} {:26} {}", c.rule.name, c.seen);
                 if let (Some(measured), Some(limit)) = (c.measured, c.limit) {
                     out += &format!(" [{measured:.3e}, allowed {limit:.3e}]");
                 }
                 out += "\n";
-                if c.outcome == "failed" {
+                if c.outcome == CheckOutcome::Failed {
                     out += &format!(
                         "          expected: {}\n          to do: {}\n",
-                        c.expected, c.remedy
+                        c.rule.expected, c.rule.remedy
                     );
                 }
             }

@@ -8,15 +8,9 @@ use super::{Done, Stop, print};
 use crate::exit;
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::Artifact;
+use plyflow_model::artifact::TextFile;
 use serde::Deserialize;
 use serde_json::Value;
-
-/// A text file that an artifact carries in its attributes.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-struct TextFile {
-    name: String,
-    text: String,
-}
 
 /// `plyflow extract`.
 ///

@@ -188,6 +188,7 @@ pub fn schema(args: &SchemaArgs) -> Done {
         SchemaKind::Scene => schema::scene(),
         SchemaKind::Material => schema::material(),
         SchemaKind::Expected => schema::expected(),
+        SchemaKind::Artifacts => schema::artifacts(),
         SchemaKind::Workflow => {
             let folders = folders(&args.places, None)?;
             let catalog = catalog(folders, &args.places, &store_root(&args.places, None))?;

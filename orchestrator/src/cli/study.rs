@@ -444,7 +444,7 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
         .variables
         .iter()
         .map(|v| json!({"name": v.name, "unit": v.unit, "si_unit": v.si_unit}));
-    let responses = (study.responses.iter()).map(|r| r.origin(&study.steps));
+    let responses = (study.responses.iter()).map(|r| r.told(&study.steps));
     let samples = study
         .samples
         .iter()
@@ -453,6 +453,6 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
         "workflow": session.workflow.name,
         "variables": variables.collect::<Vec<_>>(), "responses": responses.collect::<Vec<_>>(),
         "samples": samples.collect::<Vec<_>>(), "points": points,
-        "optimisation": found.trace.as_ref().map(|t| t.as_json(found)),
+        "optimisation": found.trace.as_ref().and_then(|t| t.told(found)),
     })
 }

@@ -6,12 +6,12 @@ use super::study::{Line, Status, Table, as_csv};
 use crate::engine::Session;
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::{ArtifactError, ArtifactWriter, DType};
+use plyflow_model::artifact::{
+    self, Attributes, StudyFailure, StudyKeys, StudySamples, StudyTable, StudyVariable,
+};
 use plyflow_workflow::resolved::{StudyPoint, StudyValue};
 use serde_json::json;
 use std::io;
-
-/// Kind of the artifact.
-pub const KIND: &str = "study-table";
 
 /// The files of a workflow's table: `study.csv` and `study.h5` for `workflow.yaml`, `study-coarse.csv` for `workflow-coarse.yaml`,
 /// `flat-study.csv` for `flat.yaml`.
@@ -70,8 +70,9 @@ fn wholes(values: &[u32]) -> Vec<u8> {
 /// have one. Everything that is text is in the attributes.
 fn make(table: &Table<'_>, session: &Session<'_>, path: &Utf8Path) -> Result<(), ArtifactError> {
     let study = table.study;
-    let mut writer = ArtifactWriter::create(path.as_std_path(), KIND)?;
-    writer.attributes(&attributes(table, session).to_string())?;
+    let mut writer = ArtifactWriter::create(path.as_std_path(), StudyTable::KIND)?;
+    // By way of a value, whose keys are sorted: the text hangs on what is told, not on the order of a type's fields.
+    writer.attributes(&json!(attributes(table, session)).to_string())?;
     let n = study.points.len() as u64;
     for (i, variable) in study.variables.iter().enumerate() {
         let number = |p: &StudyPoint| match &p.values[i] {
@@ -130,49 +131,58 @@ fn si(unit: &str) -> &str {
     if unit.is_empty() { "1" } else { unit }
 }
 
-fn attributes(table: &Table<'_>, session: &Session<'_>) -> serde_json::Value {
+fn attributes(table: &Table<'_>, session: &Session<'_>) -> StudyTable {
     let study = table.study;
-    let column = |i: usize| -> Vec<serde_json::Value> {
-        let text = |p: &StudyPoint| match &p.values[i] {
-            StudyValue::Text(t) => json!(t),
-            StudyValue::Bool(b) => json!(b),
-            StudyValue::Number { shown, .. } => json!(shown),
-        };
-        study.points.iter().map(text).collect()
-    };
-    let variables = study.variables.iter().enumerate().map(
-        |(i, v)| json!({"name": v.name, "unit": v.unit, "si_unit": v.si_unit, "values": column(i)}),
-    );
-    let responses = study.responses.iter().map(|r| r.origin(&study.steps));
-    let failures = table
-        .lines
-        .iter()
-        .enumerate()
-        .filter_map(|(i, line)| match &line.status {
-            Status::Failed { step, class, cause } => {
-                Some(json!({"point": i, "step": step, "class": class, "cause": cause}))
-            }
-            _ => None,
-        });
-    let keys = table.steps.iter().enumerate().map(|(i, step)| {
-        let keys: Vec<&str> = table.lines.iter().map(|l| l.keys[i].as_str()).collect();
-        json!({"step": study.steps[*step], "keys": keys})
+    let variables = study.variables.iter().enumerate();
+    let variables = variables.map(|(i, v)| StudyVariable {
+        name: v.name.clone(),
+        unit: v.unit.clone(),
+        si_unit: v.si_unit.clone(),
+        values: study.points.iter().map(|p| told(&p.values[i])).collect(),
     });
-    let samples = study
-        .samples
-        .iter()
-        .map(|s| json!({"method": s.0, "count": s.1, "seed": s.2}));
-    json!({
-        "workflow": session.workflow.name,
-        "points": study.points.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(),
-        "variables": variables.collect::<Vec<_>>(),
-        "responses": responses.collect::<Vec<_>>(),
-        "status": ["done", "failed", "not run"],
-        "failures": failures.collect::<Vec<_>>(),
-        "keys": keys.collect::<Vec<_>>(),
-        "samples": samples.collect::<Vec<_>>(),
-        "optimisation": table.trace.as_ref().map(|t| t.as_json(table)),
-    })
+    let failures = table.lines.iter().enumerate();
+    let failures = failures.filter_map(|(point, line)| match &line.status {
+        Status::Failed { step, class, cause } => Some(StudyFailure {
+            point,
+            step: step.clone(),
+            class: (*class).into(),
+            cause: cause.clone(),
+        }),
+        _ => None,
+    });
+    let keys = table.steps.iter().enumerate().map(|(i, step)| StudyKeys {
+        step: study.steps[*step].clone(),
+        keys: table.lines.iter().map(|l| l.keys[i].clone()).collect(),
+    });
+    let samples = study.samples.iter().map(|s| StudySamples {
+        method: s.0.clone(),
+        count: s.1,
+        seed: s.2,
+    });
+    StudyTable {
+        workflow: session.workflow.name.clone(),
+        points: study.points.iter().map(|p| p.name.clone()).collect(),
+        variables: variables.collect(),
+        responses: study
+            .responses
+            .iter()
+            .map(|r| r.told(&study.steps))
+            .collect(),
+        status: StudyTable::STATUS.map(str::to_owned).into(),
+        failures: failures.collect(),
+        keys: keys.collect(),
+        samples: samples.collect(),
+        optimisation: table.trace.as_ref().and_then(|t| t.told(table)),
+    }
+}
+
+/// A value of a variable in the unit in which it is shown.
+fn told(value: &StudyValue) -> artifact::StudyValue {
+    match value {
+        StudyValue::Text(t) => artifact::StudyValue::Text(t.clone()),
+        StudyValue::Bool(b) => artifact::StudyValue::Bool(*b),
+        StudyValue::Number { shown, .. } => artifact::StudyValue::Number(*shown),
+    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! the planner and the engine need, and nothing of YAML.
 
 use camino::Utf8PathBuf;
+use plyflow_model::artifact::{self, StudyOrigin};
 use plyflow_model::workflow::{FamilyOf, ResponseOf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -312,15 +313,22 @@ impl StudyResponse {
         }
     }
 
-    /// Where it comes from, for those who read a study's table: `step`, `result` and `of`, or `value`. `steps`: names of the steps of the file.
-    pub fn origin(&self, steps: &[String]) -> serde_json::Value {
-        match &self.from {
-            ResponseFrom::Step { step, result, of } => {
-                serde_json::json!({"name": self.name, "unit": self.unit, "step": steps[*step], "result": result, "of": of})
-            }
-            ResponseFrom::Variables { expression, .. } => {
-                serde_json::json!({"name": self.name, "unit": self.unit, "value": expression})
-            }
+    /// As it stands in a study's table. `steps`: names of the steps of the file.
+    pub fn told(&self, steps: &[String]) -> artifact::StudyResponse {
+        let from = match &self.from {
+            ResponseFrom::Step { step, result, of } => StudyOrigin::Step {
+                step: steps[*step].clone(),
+                result: result.clone(),
+                of: *of,
+            },
+            ResponseFrom::Variables { expression, .. } => StudyOrigin::Variables {
+                value: expression.clone(),
+            },
+        };
+        artifact::StudyResponse {
+            name: self.name.clone(),
+            unit: self.unit.clone(),
+            from,
         }
     }
 }

@@ -1,5 +1,6 @@
-//! JSON Schemas (draft 2020-12) of the files that users write, generated from the types.
+//! JSON Schemas (draft 2020-12) of the files that users write and of what artifacts tell, generated from the types.
 
+use crate::artifact;
 use crate::manifest::{Manifest, PluginKind};
 use crate::material::Material;
 use crate::scene::Scene;
@@ -90,13 +91,63 @@ pub fn expected() -> Value {
     schema_of::<Expected>("expected", "Plyflow expectations")
 }
 
+/// The attributes of the artifacts, by kind.
+#[derive(JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[allow(
+    dead_code,
+    reason = "says which kinds there are; nothing has all of them"
+)]
+struct Artifacts {
+    /// A formed stack of sheets.
+    forming: artifact::Forming,
+    /// What a detection flags on the plies of a formed run.
+    defects: artifact::Defects,
+    /// Where finer runs look closer; a collection.
+    zones: artifact::Zones,
+    /// What drives the fine run of a zone, or a coarse run of the whole again.
+    boundary: Boundary,
+    /// Wrinkles, bridging and shear of coarse, fine and reference runs at the same places.
+    comparison: artifact::Comparison,
+    /// Wrinkles and bridging of a run or a scan by themselves, sections and slip.
+    measurement: artifact::Measurement,
+    /// How results settle as a mesh is refined.
+    mesh_study: artifact::MeshStudy,
+    /// A run of a test on a coupon.
+    coupon: artifact::Coupon,
+    /// A law fitted to test data.
+    characterisation: artifact::Characterisation,
+    /// Wrinkles of a formed ply on circles about a vertical axis.
+    census: artifact::Census,
+    /// Censuses of several runs.
+    census_comparison: artifact::CensusComparison,
+    /// How far a component keeps the contract of its kind.
+    conformance: artifact::Conformance,
+    /// The table of a study; not a step's artifact.
+    study_table: artifact::StudyTable,
+}
+
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "says of what forms a boundary is")]
+enum Boundary {
+    Zone(artifact::Boundary),
+    Feedback(artifact::Feedback),
+}
+
+/// Schema of the attributes of artifacts: a property for each kind.
+pub fn artifacts() -> Value {
+    schema_of::<Artifacts>("artifacts", "Attributes of Plyflow's artifacts")
+}
+
 /// All schemas with their file names, as checked in under `schemas/json/`.
-pub fn all() -> [(&'static str, Value); 4] {
+pub fn all() -> [(&'static str, Value); 5] {
     [
         ("workflow.schema.json", workflow_for_editors()),
         ("scene.schema.json", scene()),
         ("material.schema.json", material()),
         ("expected.schema.json", expected()),
+        ("artifacts.schema.json", artifacts()),
     ]
 }
 

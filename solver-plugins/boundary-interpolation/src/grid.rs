@@ -1,11 +1,9 @@
 //! Fine structured meshes of a zone's sheets, in the undeformed plane.
 
 use plyflow_mechanics::mesh::{even_axis, multiples_axis};
+use plyflow_model::artifact::Rectangle;
 use plyflow_model::outline::{sides, signed_area, winds};
 use plyflow_surface::flat_bounds;
-
-/// `[x0, y0, x1, y1]` (m).
-pub type Rectangle = [f64; 4];
 
 /// Sides in the order left, right, bottom, top.
 pub const SIDES: usize = 4;

@@ -1,9 +1,9 @@
 //! When a fine run begins that need not begin with the process, and where its nodes are then.
 
 use crate::cut::Placed;
-use crate::grid::Rectangle;
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mesh::{NONE, QuadMesh};
+use plyflow_model::artifact::Rectangle;
 use plyflow_sdk::{BodyInfo, Host, Input, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, add, cross, distance, dot, norm, scale, sub};
 use plyflow_surface::weighted_quantiles;

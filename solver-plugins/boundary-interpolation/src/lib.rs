@@ -11,19 +11,20 @@ mod place;
 mod pull;
 
 pub use cut::Placed;
-pub use grid::{Grid, Rectangle, film_grid, ply_grid, ply_part};
+pub use grid::{Grid, film_grid, ply_grid, ply_part};
 
 use place::Place;
 use pull::{FORCES, Pull};
 
 use plyflow_mechanics::history::{linear, spline_slopes};
+use plyflow_model::artifact::{
+    Boundary, Forming, MeshStudy, PlainBody, Rectangle, Sheet, Zone, Zones,
+};
 use plyflow_model::budget::{self, Wanted};
-use plyflow_model::scene::first_axis;
 use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
 use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::{Vec3, distance};
 use serde::Deserialize;
-use serde_json::{Value, json};
 
 /// The step.
 pub struct BoundaryInterpolation;
@@ -40,21 +41,9 @@ struct Parameters {
     cut_stiffness: Option<f64>,
 }
 
-#[derive(Deserialize)]
-struct Sheet {
-    name: String,
-    kind: String,
-    outline: Option<Vec<[f64; 2]>>,
-    #[serde(default)]
-    holes: Vec<Vec<[f64; 2]>>,
-    fibre_1: Option<f64>,
-    fibre_2: Option<f64>,
-}
-
 /// A sheet of the zone with its motion.
 struct Driven {
-    attributes: Value,
-    name: String,
+    sheet: Sheet,
     fine: Placed,
     /// `[f][k][3]` (m).
     position: Vec<f64>,
@@ -86,10 +75,9 @@ impl Step for BoundaryInterpolation {
         if let Some(advised) = advised_size(host, &zone)? {
             p.element_size = bounded_size(host, &zone, advised, p.element_size)?;
         }
-        let bounds: Rectangle = serde_json::from_value(zone["box"].clone())
-            .map_err(|e| format!("box of zone {}: {e}", zone["name"]))?;
+        let bounds = zone.bounds;
         let input = host.input("formed")?;
-        let attributes: Value = host.attributes(&input)?;
+        let run: Forming = host.attributes(&input)?;
         let meshes = host.meshes(&input)?;
         if meshes.times.len() < 2 {
             let n = meshes.times.len();
@@ -100,9 +88,9 @@ impl Step for BoundaryInterpolation {
             )
             .into());
         }
-        let listed = attributes["sheets"].as_array().cloned().unwrap_or_default();
-        let joint = film_bounds(host, &input, &meshes, &listed)?;
-        let first = first_frame(host, &input, &meshes, &listed, bounds, &p)?;
+        let listed = &run.sheets;
+        let joint = film_bounds(host, &input, &meshes, listed)?;
+        let first = first_frame(host, &input, &meshes, listed, bounds, &p)?;
         let mut sheets = Vec::new();
         for (i, sheet) in listed.iter().enumerate() {
             host.check_cancelled()?;
@@ -125,27 +113,27 @@ impl Step for BoundaryInterpolation {
         if sheets.is_empty() {
             return Err(format!(
                 "no sheet of '{}' reaches into zone {} at {bounds:?} m",
-                input.step, zone["name"]
+                input.step, zone.name
             )
             .into());
         }
-        if !sheets.iter().any(|s| s.attributes["kind"] == "ply") {
-            return Err(too_small(&input.step, &zone["name"], bounds, p.element_size).into());
+        if !sheets.iter().any(|s| s.sheet.is_ply()) {
+            return Err(too_small(&input.step, &zone, p.element_size).into());
         }
         write(host, &meshes.times, first, &sheets)?;
         let times = &meshes.times[first..];
         write_histories(host, &input, times)?;
         let error = sheets.iter().map(|s| s.error).fold(0.0, f64::max);
-        host.write_attributes(&json!({
-            "zone": zone,
-            "scene": attributes["scene"],
-            "frames": times.len(),
-            "start_time": times[0],
-            "element_size": p.element_size,
-            "film_element_size": p.film_element_size.unwrap_or(p.element_size),
-            "sheets": sheets.iter().map(|s| &s.attributes).collect::<Vec<_>>(),
-            "interpolation_error": error,
-        }))?;
+        host.write_attributes(&Boundary {
+            zone,
+            scene: run.scene,
+            frames: times.len(),
+            start_time: times[0],
+            element_size: p.element_size,
+            film_element_size: p.film_element_size.unwrap_or(p.element_size),
+            sheets: sheets.iter().map(|s| s.sheet.clone()).collect(),
+            interpolation_error: error,
+        })?;
         let count = |get: fn(&Driven) -> usize| sheets.iter().map(get).sum::<usize>() as f64;
         host.result("start_time", times[0], "s")?;
         host.result("interpolation_error", error, "m")?;
@@ -155,12 +143,13 @@ impl Step for BoundaryInterpolation {
 }
 
 /// Why a zone has no ply.
-fn too_small(step: &str, zone: &Value, bounds: Rectangle, element_size: f64) -> String {
+fn too_small(step: &str, zone: &Zone, element_size: f64) -> String {
     let millimetres = |v: f64| (1e6 * v).round() / 1e3;
-    let [x0, y0, x1, y1] = bounds.map(millimetres);
+    let name = &zone.name;
+    let [x0, y0, x1, y1] = zone.bounds.map(millimetres);
     let size = millimetres(element_size);
     format!(
-        "no ply of '{step}' has a whole element of {size} mm in zone {zone} (x {x0} to {x1} mm, y {y0} to {y1} mm); expected a zone that is at least \
+        "no ply of '{step}' has a whole element of {size} mm in zone {name} (x {x0} to {x1} mm, y {y0} to {y1} mm); expected a zone that is at least \
          one element wide and lies on a ply. Draw it larger (`boxes` of zone-extraction), or take a smaller `element_size`"
     )
 }
@@ -170,7 +159,7 @@ fn first_frame(
     host: &Host,
     input: &Input,
     meshes: &Meshes,
-    sheets: &[Value],
+    sheets: &[Sheet],
     zone: Rectangle,
     p: &Parameters,
 ) -> Result<usize, StepError> {
@@ -181,10 +170,9 @@ fn first_frame(
         ),
         (Some(time), None) => late::frame_at(&meshes.times, time, &input.step)?,
         (None, Some(bend)) => {
-            let plies = sheets.iter().filter(|s| s["kind"] == "ply");
             let mut bends = Vec::new();
-            for name in plies.filter_map(|s| s["name"].as_str()) {
-                let body = meshes.body(name)?;
+            for ply in sheets.iter().filter(|s| s.is_ply()) {
+                let body = meshes.body(&ply.name)?;
                 bends.push(late::sharpest_bends(host, input, body, zone, meshes.times.len())?);
             }
             late::frame_before_bend(&bends, bend)
@@ -199,18 +187,17 @@ fn first_frame(
 }
 
 /// The zone at the step's own place in the fan-out over the zones.
-fn own_zone(host: &Host) -> Result<Value, StepError> {
+fn own_zone(host: &Host) -> Result<Zone, StepError> {
     let (input, formed) = (host.input("zones")?, host.input("formed")?);
-    let attributes: Value = host.attributes(&input)?;
-    let zones = attributes["zones"].as_array().cloned().unwrap_or_default();
+    let Zones { zones, .. } = host.attributes(&input)?;
     let item = host.item()?;
-    let run: Value = host.attributes(&formed)?;
+    let run: Forming = host.attributes(&formed)?;
     let place = match place::of_zone(&item, &input.item, &formed.item) {
         Place::One(index) => Some(index),
         // The coarse run has all of the places: one of them is the zone's when it is the run of a zone.
         Place::None => item.last().map(|&i| i as usize).filter(|&i| {
-            let own = &run["zone"]["name"];
-            own.is_string() && zones.get(i).is_some_and(|z| z["name"] == *own)
+            let own = run.zone.as_ref().map(|z| &z.name);
+            own.is_some() && zones.get(i).map(|z| &z.name) == own
         }),
         Place::Several if zones.len() == 1 => None,
         Place::Several => {
@@ -253,9 +240,9 @@ fn own_zone(host: &Host) -> Result<Value, StepError> {
 }
 
 /// An advised element size, or the least that may be taken (m); tells which.
-fn bounded_size(host: &Host, zone: &Value, advised: f64, least: f64) -> Result<f64, StepError> {
+fn bounded_size(host: &Host, zone: &Zone, advised: f64, least: f64) -> Result<f64, StepError> {
     if advised < least {
-        let name = zone["name"].as_str().unwrap_or("?");
+        let name = &zone.name;
         let [advised, least] = [advised, least].map(|v| 1e3 * v);
         let text = format!(
             "zone {name}: {advised:.3} mm are advised, finer than `element_size`: {least} mm are taken, and the error will be larger than aimed at"
@@ -268,27 +255,25 @@ fn bounded_size(host: &Host, zone: &Value, advised: f64, least: f64) -> Result<f
 }
 
 /// The element size (m) that a mesh study advises for a zone, if there is one.
-fn advised_size(host: &Host, zone: &Value) -> Result<Option<f64>, StepError> {
+fn advised_size(host: &Host, zone: &Zone) -> Result<Option<f64>, StepError> {
     let studies = host.inputs_of("meshes")?;
     let Some(study) = studies.first() else {
         return Ok(None);
     };
-    let attributes: Value = host.attributes(study)?;
-    let zones = attributes["zones"].as_array().cloned().unwrap_or_default();
-    let own = zones.iter().find(|z| z["name"] == zone["name"]);
-    let told = own.map_or(&Value::Null, |z| &z["box"]);
-    if told.is_array() && *told != zone["box"] {
+    let MeshStudy { zones, .. } = host.attributes(study)?;
+    let own = zones.iter().find(|z| z.name == zone.name);
+    if let Some(told) = own.map(|z| z.bounds).filter(|b| !zone.has_box(*b)) {
         return Err(format!(
-            "'{}' advises an element size for zone {} with the box {told} m; here it has the box {} m. Take a study of the runs of this list of zones",
-            study.step, zone["name"], zone["box"]
+            "'{}' advises an element size for zone {} with the box {told:?} m; here it has the box {:?} m. Take a study of the runs of this list of zones",
+            study.step, zone.name, zone.bounds
         )
         .into());
     }
-    match own.and_then(|z| z["element_size"].as_f64()) {
+    match own.map(|z| z.element_size) {
         Some(size) if size > 0.0 => Ok(Some(size)),
         _ => Err(format!(
             "'{}' advises no element size for zone {}; it must compare runs of this zone, not of the whole scene",
-            study.step, zone["name"]
+            study.step, zone.name
         )
         .into()),
     }
@@ -299,13 +284,11 @@ fn drive(
     host: &Host,
     input: &Input,
     meshes: &Meshes,
-    attributes: &Value,
+    sheet: &Sheet,
     (zone, joint): (Rectangle, Rectangle),
     first: usize,
     p: &Parameters,
 ) -> Result<Option<Driven>, StepError> {
-    let sheet: Sheet = serde_json::from_value(attributes.clone())
-        .map_err(|e| format!("attribute `sheets` of '{}': {e}", input.step))?;
     let body = meshes.body(&sheet.name)?;
     if body.nodes_per_cell != 4 {
         let n = body.nodes_per_cell;
@@ -316,16 +299,16 @@ fn drive(
         .into());
     }
     let (points, cells) = host.mesh(input, body)?;
-    let ply = sheet.kind == "ply";
+    let ply = sheet.is_ply();
     let within = if ply { bounds(&points) } else { joint };
-    let Some(grid) = part(&sheet, within, zone, p)? else {
+    let Some(grid) = part(sheet, within, zone, p)? else {
         return Ok(None);
     };
     let fine =
         Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
     let motion = follow(host, input, meshes, body, &fine, ply)?;
     let held = |stiffness: f64| {
-        let axis = axis(input, &sheet)?;
+        let axis = axis(input, sheet)?;
         let cut = Pull::new(&fine.grid, &fine.driven_nodes, &points, &cells, axis);
         pulls(host, input, meshes, body, &cut, stiffness)
     };
@@ -341,8 +324,7 @@ fn drive(
         host.log(Log::Warn, &text);
     }
     Ok(Some(Driven {
-        attributes: attributes.clone(),
-        name: sheet.name,
+        sheet: sheet.clone(),
         fine,
         position: motion.position,
         normal: motion.normal,
@@ -398,7 +380,7 @@ fn film_bounds(
     host: &Host,
     input: &Input,
     meshes: &Meshes,
-    listed: &[Value],
+    listed: &[Sheet],
 ) -> Result<Rectangle, StepError> {
     let mut common = [
         f64::NEG_INFINITY,
@@ -406,8 +388,8 @@ fn film_bounds(
         f64::INFINITY,
         f64::INFINITY,
     ];
-    for sheet in listed.iter().filter(|s| s["kind"] != "ply") {
-        let body = meshes.body(sheet["name"].as_str().unwrap_or_default())?;
+    for sheet in listed.iter().filter(|s| !s.is_ply()) {
+        let body = meshes.body(&sheet.name)?;
         let of = bounds(&host.mesh(input, body)?.0);
         for k in 0..2 {
             common[k] = common[k].max(of[k]);
@@ -438,11 +420,11 @@ fn part(
     p: &Parameters,
 ) -> Result<Option<Grid>, StepError> {
     let (parameter, size) = match p.film_element_size {
-        Some(size) if sheet.kind != "ply" => ("film_element_size", size),
+        Some(size) if !sheet.is_ply() => ("film_element_size", size),
         _ => ("element_size", p.element_size),
     };
     allow(zone, &sheet.name, parameter, size)?;
-    if sheet.kind != "ply" {
+    if !sheet.is_ply() {
         return Ok(film_grid(zone, bounds, p.film_margin, size));
     }
     let outline = sheet.outline.clone().unwrap_or_else(|| corners(bounds));
@@ -458,14 +440,13 @@ fn part(
 
 /// Direction (rad, from x) of the first of the axes in which the coarse run tells a ply's membrane forces.
 fn axis(input: &Input, sheet: &Sheet) -> Result<f64, StepError> {
-    let (Some(first), Some(second)) = (sheet.fibre_1, sheet.fibre_2) else {
-        return Err(format!(
+    sheet.axis().ok_or_else(|| {
+        format!(
             "`cut_stiffness` is given, and ply '{}' of '{}' does not tell where its fibres lie (`fibre_1`, `fibre_2`). Leave out `cut_stiffness`, or run that step again",
             sheet.name, input.step
         )
-        .into());
-    };
-    Ok(first_axis(first, second))
+        .into()
+    })
 }
 
 /// What the surroundings pull at a cut with, through the frames of the coarse sheet `body`. `stiffness`: theirs, of the cut's length (N/m2).
@@ -514,9 +495,15 @@ fn write(host: &Host, times: &[f64], first: usize, sheets: &[Driven]) -> Result<
     host.write_f64("time", &[f], "s", &times[first..])?;
     for s in sheets {
         let (k, n) = (s.fine.driven_nodes.len(), s.fine.points.len());
-        host.define_mesh(&s.name, &s.fine.points, 4, &s.fine.grid.cells, &json!({}))?;
+        host.define_mesh(
+            &s.sheet.name,
+            &s.fine.points,
+            4,
+            &s.fine.grid.cells,
+            &PlainBody {},
+        )?;
         host.write_u32(
-            &format!("{}/driven_nodes", s.name),
+            &format!("{}/driven_nodes", s.sheet.name),
             &[k],
             &s.fine.driven_nodes,
         )?;
@@ -528,18 +515,28 @@ fn write(host: &Host, times: &[f64], first: usize, sheets: &[Driven]) -> Result<
             let Some(values) = values else { continue };
             let slopes = spline_slopes(times, values, 3 * k);
             let [values, slopes] = [values, &slopes].map(|v| &v[3 * k * first..]);
-            host.write_f64(&format!("{}/{what}", s.name), &[f, k, 3], unit, values)?;
-            host.write_f64(&format!("{}/{rate}", s.name), &[f, k, 3], rate_unit, slopes)?;
+            host.write_f64(
+                &format!("{}/{what}", s.sheet.name),
+                &[f, k, 3],
+                unit,
+                values,
+            )?;
+            host.write_f64(
+                &format!("{}/{rate}", s.sheet.name),
+                &[f, k, 3],
+                rate_unit,
+                slopes,
+            )?;
         }
         if let Some(pull) = &s.pull {
             host.write_f64(
-                &format!("{}/pull", s.name),
+                &format!("{}/pull", s.sheet.name),
                 &[f, k, 3],
                 "N",
                 &pull.force[3 * k * first..],
             )?;
             host.write_f64(
-                &format!("{}/stiffness", s.name),
+                &format!("{}/stiffness", s.sheet.name),
                 &[k],
                 "N/m",
                 &pull.stiffness,
@@ -547,9 +544,9 @@ fn write(host: &Host, times: &[f64], first: usize, sheets: &[Driven]) -> Result<
         }
         if let Some(start) = &s.start {
             let shape = [start.states, n, 3];
-            host.write_f64(&format!("{}/path", s.name), &shape, "m", &start.path)?;
+            host.write_f64(&format!("{}/path", s.sheet.name), &shape, "m", &start.path)?;
             host.write_f64(
-                &format!("{}/start_velocity", s.name),
+                &format!("{}/start_velocity", s.sheet.name),
                 &[n, 3],
                 "m/s",
                 &start.velocity,

@@ -433,7 +433,7 @@ fn the_zone_is_told_from_the_pass_in_whichever_order_a_step_is_fanned_out() {
         "{error}"
     );
     // A run of the zone itself may drive a finer one.
-    formed.attributes["zone"] = json!({"name": "B"});
+    formed.attributes["zone"] = zones().attributes["zones"][1].clone();
     let out = of_pass(&formed, size.clone(), &[1], &[1]).unwrap();
     assert_eq!(out.attributes["zone"]["name"], "B");
     assert!(of_pass(&formed, size, &[0], &[0]).is_err());
@@ -449,10 +449,7 @@ fn a_missing_zone_and_a_still_run_are_named() {
     let error = interpolate(&coarse(0.0), json!({"element_size": 0.01}), &[]).unwrap_err();
     assert!(error.contains("for_each"), "{error}");
     let error = interpolate(&coarse(0.0), json!({"element_size": 0.11}), &[1]).unwrap_err();
-    assert!(
-        error.contains("110 mm in zone \"B\" (x 0 to 100 mm"),
-        "{error}"
-    );
+    assert!(error.contains("110 mm in zone B (x 0 to 100 mm"), "{error}");
     let mut still = coarse(0.0);
     still.times.truncate(1);
     let error = interpolate(&still, json!({"element_size": 0.01}), &[0]).unwrap_err();
@@ -477,15 +474,17 @@ fn a_first_frame_that_is_not_the_undeformed_state_brings_a_warning() {
 fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than_asked_for() {
     let study = |zones: Value| MemoryArtifact {
         kind: "mesh-study".into(),
-        attributes: json!({"zones": zones}),
+        attributes: json!({"target_error": 0.1, "zones": zones}),
         ..Default::default()
     };
     let name = &zones().attributes["zones"][0]["name"];
     let bounds = &zones().attributes["zones"][0]["box"];
     let taken = |advised: f64, least: f64| {
         let (formed, zones) = (coarse(0.0), zones());
-        let study = study(json!([{"name": "Z", "element_size": 1.0},
-            {"name": name, "box": bounds, "element_size": advised}]));
+        let study = study(
+            json!([{"name": "Z", "box": [0.0, 0.0, 1.0, 1.0], "element_size": 1.0, "finest_error": 0.1},
+            {"name": name, "box": bounds, "element_size": advised, "finest_error": 0.1}]),
+        );
         let inputs = [
             MemoryInput::new("formed", &formed),
             MemoryInput::new("zones", &zones),
@@ -509,7 +508,7 @@ fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than
     let (size, few, warned) = taken(0.005, 0.010);
     assert_eq!((size, warned), (0.010, true));
     assert!(many > 3.0 * few);
-    let (formed, zones, of_the_whole) = (coarse(0.0), zones(), study(Value::Null));
+    let (formed, zones, of_the_whole) = (coarse(0.0), zones(), study(json!([])));
     let inputs = [
         MemoryInput::new("formed", &formed),
         MemoryInput::new("zones", &zones),
@@ -521,8 +520,9 @@ fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than
         error.contains("advises no element size for zone"),
         "{error}"
     );
-    let of_another =
-        study(json!([{"name": name, "box": [0.0, 0.0, 1.0, 1.0], "element_size": 0.004}]));
+    let of_another = study(
+        json!([{"name": name, "box": [0.0, 0.0, 1.0, 1.0], "element_size": 0.004, "finest_error": 0.1}]),
+    );
     let inputs = [
         inputs[0],
         inputs[1],
@@ -531,7 +531,7 @@ fn a_zone_takes_the_size_that_a_mesh_study_of_its_runs_advises_and_no_finer_than
     let parameters = json!({"element_size": 0.01});
     let error = run::<BoundaryInterpolation>(parameters, &inputs, &[0]).unwrap_err();
     assert!(
-        error.contains("with the box [0.0,0.0,1.0,1.0] m"),
+        error.contains("with the box [0.0, 0.0, 1.0, 1.0] m"),
         "{error}"
     );
 }

@@ -1,6 +1,7 @@
 //! Runs held against one of them: their distributions as ratios, their sections as distances.
 
-use crate::run::{Curve, Field, Run};
+use crate::run::{Field, Run};
+use plyflow_model::artifact::CensusCurve;
 use plyflow_sdk::{Host, StepError};
 use plyflow_surface::weighted_mean;
 
@@ -28,8 +29,7 @@ pub fn results(host: &Host, runs: &[Run], reference: &str) -> Result<(), StepErr
             }
         }
         for curve in first.curves.iter().filter(|c| c.plot == "cross_sections") {
-            let same = |c: &&Curve| (&c.plot, &c.label) == (&curve.plot, &curve.label);
-            let Some(own) = run.curves.iter().find(same) else {
+            let Some(own) = run.curves.iter().find(|c| c.is(curve)) else {
                 continue;
             };
             let (a, b) = (profile(host, first, curve)?, profile(host, run, own)?);
@@ -51,7 +51,7 @@ fn ratio(of: Option<&Field>, to: Option<&Field>) -> Option<f64> {
 }
 
 /// Distance along the section and height (m), in the order of the distance.
-fn profile(host: &Host, run: &Run, curve: &Curve) -> Result<Vec<[f64; 2]>, StepError> {
+fn profile(host: &Host, run: &Run, curve: &CensusCurve) -> Result<Vec<[f64; 2]>, StepError> {
     let x = host.array_f64(&run.input, &curve.x)?.0;
     let y = host.array_f64(&run.input, &curve.y)?.0;
     Ok(x.into_iter().zip(y).map(|(x, y)| [x, y]).collect())

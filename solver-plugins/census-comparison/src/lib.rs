@@ -12,12 +12,12 @@ mod run;
 mod table;
 
 pub use against::relative_distance;
-pub use run::{Choice, Run, Section};
+pub use run::{Choice, Run};
 pub use table::{never_falls, never_rises};
 
+use plyflow_model::artifact;
 use plyflow_sdk::{Host, Step, StepError, export_step};
 use serde::Deserialize;
-use serde_json::json;
 
 /// The step.
 pub struct CensusComparison;
@@ -41,9 +41,12 @@ impl Step for CensusComparison {
         let (densities, maps) = output::fields(host, &runs)?;
         plots.extend(densities);
         let table = table::table(&runs);
-        host.write_attributes(&json!({
-            "runs": table::list(&runs), "tables": [table], "plots": plots, "maps": maps,
-        }))?;
+        host.write_attributes(&artifact::CensusComparison {
+            runs: table::list(&runs),
+            tables: vec![table],
+            plots,
+            maps,
+        })?;
         table::results(host, &runs)?;
         p.reference
             .map_or(Ok(()), |r| against::results(host, &runs, &r))

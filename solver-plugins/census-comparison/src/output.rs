@@ -1,9 +1,9 @@
 //! Curves of all runs over each other, and their plies side by side.
 
 use crate::run::{Field, Run};
+use plyflow_model::artifact::{Axis, CensusRunBody, Map, Panel, Plot, Series};
 use plyflow_sdk::{Host, StepError};
 use plyflow_surface::{bin_width, density, weighted_quantiles};
-use serde_json::{Value, json};
 
 /// Plots of a census that are laid over each other: name, x label, unit of x, and its SI unit.
 const OVERLAID: [(&str, &str, &str, &str); 3] = [
@@ -16,7 +16,7 @@ const OVERLAID: [(&str, &str, &str, &str); 3] = [
 ///
 /// # Errors
 /// When a curve cannot be read or written.
-pub fn overlaid(host: &Host, runs: &[Run]) -> Result<Vec<Value>, StepError> {
+pub fn overlaid(host: &Host, runs: &[Run]) -> Result<Vec<Plot>, StepError> {
     let mut plots = Vec::new();
     let first = runs
         .first()
@@ -27,33 +27,32 @@ pub fn overlaid(host: &Host, runs: &[Run]) -> Result<Vec<Value>, StepError> {
             let mut series = Vec::new();
             // Older censuses round labels: of those with one label each has its own place.
             let before = first.iter().filter(|c| c.plot == plot).take(k);
-            let place = before.filter(|c| same_curve(leader, c)).count();
+            let place = before.filter(|c| c.is(leader)).count();
             for run in runs {
-                let same = |c: &&_| same_curve(leader, c);
-                let Some(curve) = run.curves.iter().filter(same).nth(place) else {
+                let mut same = run.curves.iter().filter(|c| c.is(leader));
+                let Some(curve) = same.nth(place) else {
                     continue;
                 };
-                let mut paths = Vec::new();
-                for (what, path, unit) in [("x", &curve.x, si), ("y", &curve.y, "m")] {
+                let copy = |what: &str, path: &str, unit: &str| -> Result<String, StepError> {
                     let (values, shape) = host.array_f64(&run.input, path)?;
                     let to = format!("curves/{}/{plot}_{k}/{what}", run.name);
                     host.write_f64(&to, &shape, unit, &values)?;
-                    paths.push(to);
-                }
-                series.push(json!({"label": run.label, "x": paths[0], "y": paths[1]}));
+                    Ok(to)
+                };
+                let (x, y) = (copy("x", &curve.x, si)?, copy("y", &curve.y, "m")?);
+                series.push(Series::new(&run.label, x, y));
             }
-            plots.push(json!({
-                "name": format!("{plot}_{k}"), "title": leader.label,
-                "x": {"label": x_label, "unit": unit}, "y": {"label": "height", "unit": "mm"},
-                "series": series,
-            }));
+            plots.push(Plot {
+                name: format!("{plot}_{k}"),
+                title: Some(leader.label.clone()),
+                note: None,
+                x: Axis::new(x_label, unit),
+                y: Axis::new("height", "mm"),
+                series,
+            });
         }
     }
     Ok(plots)
-}
-
-fn same_curve(a: &crate::run::Curve, b: &crate::run::Curve) -> bool {
-    (&a.plot, &a.label) == (&b.plot, &b.label)
 }
 
 /// A quantity over the plies.
@@ -89,14 +88,16 @@ const QUANTITIES: [Quantity; 2] = [
 ///
 /// # Errors
 /// When the host refuses.
-pub fn fields(host: &Host, runs: &[Run]) -> Result<(Vec<Value>, Vec<Value>), StepError> {
+pub fn fields(host: &Host, runs: &[Run]) -> Result<(Vec<Plot>, Vec<Map>), StepError> {
     for run in runs {
         host.define_mesh(
             &run.name,
             &run.flat,
             4,
             &run.cells,
-            &json!({"label": run.label}),
+            &CensusRunBody {
+                label: run.label.clone(),
+            },
         )?;
     }
     host.begin_frame(0.0)?;
@@ -111,11 +112,20 @@ pub fn fields(host: &Host, runs: &[Run]) -> Result<(Vec<Value>, Vec<Value>), Ste
     host.end_frame()?;
     let (mut plots, mut maps) = (Vec::new(), Vec::new());
     for q in &QUANTITIES {
-        let panels: Vec<Value> = (runs.iter().filter(|r| (q.of)(r).is_some()))
-            .map(|r| json!({"label": r.label, "body": r.name, "field": q.name}))
-            .collect();
+        let panel = |r: &Run| Panel {
+            label: r.label.clone(),
+            body: r.name.clone(),
+            field: q.name.into(),
+        };
+        let there = runs.iter().filter(|r| (q.of)(r).is_some());
+        let panels: Vec<Panel> = there.map(panel).collect();
         if !panels.is_empty() {
-            maps.push(json!({"name": q.name, "title": q.title, "unit": q.shown, "panels": panels}));
+            maps.push(Map {
+                name: q.name.into(),
+                title: Some(q.title.into()),
+                unit: q.shown.into(),
+                panels,
+            });
         }
         plots.extend(densities(host, runs, q)?);
     }
@@ -123,7 +133,7 @@ pub fn fields(host: &Host, runs: &[Run]) -> Result<(Vec<Value>, Vec<Value>), Ste
 }
 
 /// The densities of a quantity in bins that all runs share, so that their heights compare.
-fn densities(host: &Host, runs: &[Run], q: &Quantity) -> Result<Option<Value>, StepError> {
+fn densities(host: &Host, runs: &[Run], q: &Quantity) -> Result<Option<Plot>, StepError> {
     let fields: Vec<(&Run, &Field)> = (runs.iter())
         .filter_map(|r| Some((r, (q.of)(r).as_ref()?)))
         .collect();
@@ -142,12 +152,14 @@ fn densities(host: &Host, runs: &[Run], q: &Quantity) -> Result<Option<Value>, S
         let density = density(&f.values, &f.weights, width, count);
         let path = format!("curves/{}/{}_density", run.name, q.name);
         host.write_f64(&path, &[count], q.inverse, &density)?;
-        series.push(json!({"label": run.label, "x": value, "y": path}));
+        series.push(Series::new(&run.label, &value, path));
     }
-    Ok(Some(json!({
-        "name": format!("{}_density", q.name), "title": format!("{}, by area", q.title),
-        "x": {"label": q.title.to_lowercase(), "unit": q.shown},
-        "y": {"label": "probability density", "unit": format!("1/{}", q.shown)},
-        "series": series,
-    })))
+    Ok(Some(Plot {
+        name: format!("{}_density", q.name),
+        title: Some(format!("{}, by area", q.title)),
+        note: None,
+        x: Axis::new(q.title.to_lowercase(), q.shown),
+        y: Axis::new("probability density", format!("1/{}", q.shown)),
+        series,
+    }))
 }

@@ -1,5 +1,6 @@
 //! The censuses that arrive.
 
+use plyflow_model::artifact::{Census, CensusCurve, CrossSection, Wrinkle};
 use plyflow_sdk::{Host, Input, On, StepError};
 use plyflow_surface::Topology;
 use plyflow_surface::vector::Vec3;
@@ -14,56 +15,6 @@ pub struct Choice {
     pub label: Option<String>,
     /// Constant bending stiffness (N m).
     pub bending_stiffness: Option<f64>,
-}
-
-/// Attributes of a census.
-#[derive(Debug, Deserialize)]
-struct Census {
-    ply: String,
-    circles: Vec<Circle>,
-    curves: Vec<Curve>,
-    #[serde(default)]
-    cross_sections: Vec<Section>,
-}
-
-/// A cross section of a census.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Section {
-    /// In plots.
-    pub label: String,
-    /// In the names of results.
-    pub result: String,
-}
-
-#[derive(Debug, Deserialize)]
-struct Circle {
-    wrinkles: Vec<Wrinkle>,
-}
-
-/// A wrinkle on the first circle.
-#[derive(Debug, Clone, Copy, Deserialize)]
-pub struct Wrinkle {
-    /// Over the base (m), negative downwards.
-    pub height: f64,
-    /// At half height (m).
-    pub width: f64,
-    /// Of the line of its tops (m).
-    pub length: f64,
-    /// Mean shear angle (rad).
-    pub shear: f64,
-}
-
-/// A curve of a census.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Curve {
-    /// The plot that shows it.
-    pub plot: String,
-    /// Its label there.
-    pub label: String,
-    /// Paths of its arrays.
-    pub x: String,
-    /// Paths of its arrays.
-    pub y: String,
 }
 
 /// A field of a ply with the undeformed areas (m2) that its values stand for.
@@ -91,9 +42,9 @@ pub struct Run {
     /// Wrinkles on the first circle.
     pub wrinkles: Vec<Wrinkle>,
     /// Its curves.
-    pub curves: Vec<Curve>,
+    pub curves: Vec<CensusCurve>,
     /// Its cross sections.
-    pub sections: Vec<Section>,
+    pub sections: Vec<CrossSection>,
     /// The ply: undeformed and formed points (m), quads.
     pub flat: Vec<Vec3>,
     /// Formed.

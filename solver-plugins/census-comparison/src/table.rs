@@ -1,9 +1,9 @@
 //! The table of the runs, and how their wrinkles change with the bending stiffness.
 
-use crate::run::{Field, Run, Wrinkle};
+use crate::run::{Field, Run};
+use plyflow_model::artifact::{Cell, CensusRun, Column, Table, Wrinkle};
 use plyflow_sdk::{Host, StepError};
 use plyflow_surface::{weighted_mean, weighted_quantiles};
-use serde_json::{Value, json};
 
 /// Columns of the table: label, SI unit.
 const COLUMNS: [(&str, &str); 13] = [
@@ -23,14 +23,16 @@ const COLUMNS: [(&str, &str); 13] = [
 ];
 
 /// The table as in the data model.
-pub fn table(runs: &[Run]) -> Value {
-    let columns = COLUMNS.map(|(label, unit)| json!({"label": label, "unit": unit}));
-    let rows: Vec<Value> = runs.iter().map(row).collect();
-    json!({"name": "runs", "title": "Wrinkles on the first circle, and distributions over the ply",
-           "columns": columns, "rows": rows})
+pub fn table(runs: &[Run]) -> Table {
+    Table {
+        name: "runs".into(),
+        title: Some("Wrinkles on the first circle, and distributions over the ply".into()),
+        columns: COLUMNS.map(|(label, unit)| Column::new(label, unit)).into(),
+        rows: runs.iter().map(row).collect(),
+    }
 }
 
-fn row(run: &Run) -> Value {
+fn row(run: &Run) -> Vec<Cell> {
     let w = &run.wrinkles;
     let signs = w.iter().filter(|w| w.shear > 0.0).count();
     let largest = w.iter().map(|w| w.height.abs()).reduce(f64::max);
@@ -41,21 +43,21 @@ fn row(run: &Run) -> Value {
         (mean, q)
     };
     let (deviation, moment) = (spread(&run.deviation), spread(&run.bending_moment));
-    json!([
-        run.label,
-        run.bending_stiffness,
-        w.len(),
-        signs,
-        w.len() - signs,
-        mean(w, |w| w.height.abs()),
-        largest,
-        mean(w, |w| w.width),
-        mean(w, |w| w.length),
-        deviation.0,
-        deviation.1,
-        moment.0,
-        moment.1
-    ])
+    vec![
+        (&run.label).into(),
+        run.bending_stiffness.into(),
+        w.len().into(),
+        signs.into(),
+        (w.len() - signs).into(),
+        mean(w, |w| w.height.abs()).into(),
+        largest.into(),
+        mean(w, |w| w.width).into(),
+        mean(w, |w| w.length).into(),
+        deviation.0.into(),
+        deviation.1.into(),
+        moment.0.into(),
+        moment.1.into(),
+    ]
 }
 
 /// Over the wrinkles; `None` without one.
@@ -65,8 +67,12 @@ fn mean(of: &[Wrinkle], what: fn(&Wrinkle) -> f64) -> Option<f64> {
 }
 
 /// The runs for programs.
-pub fn list(runs: &[Run]) -> Vec<Value> {
-    let one = |r: &Run| json!({"name": r.name, "label": r.label, "bending_stiffness": r.bending_stiffness});
+pub fn list(runs: &[Run]) -> Vec<CensusRun> {
+    let one = |r: &Run| CensusRun {
+        name: r.name.clone(),
+        label: r.label.clone(),
+        bending_stiffness: r.bending_stiffness,
+    };
     runs.iter().map(one).collect()
 }
 

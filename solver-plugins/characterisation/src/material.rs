@@ -2,6 +2,7 @@
 
 use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_files::text::decode;
+use plyflow_model::artifact::Characterisation;
 use plyflow_model::material::Material;
 use plyflow_sdk::{Host, StepError};
 use serde_json::{Map, Value, json};
@@ -73,13 +74,10 @@ impl Template {
                 Ok(Some(Self::parse(&text, name.unwrap_or(path))?))
             }
             (None, Some(input)) => {
-                let attributes: Value = host.attributes(input)?;
-                let files = attributes["files"].as_array().cloned().unwrap_or_default();
+                let told: Characterisation = host.attributes(input)?;
                 let origin = format!("step '{}'", input.step);
-                let found = files
-                    .iter()
-                    .filter_map(|f| f["text"].as_str())
-                    .find_map(|text| Self::parse(text, &origin).ok());
+                let mut texts = told.files.iter().map(|f| &f.text);
+                let found = texts.find_map(|text| Self::parse(text, &origin).ok());
                 found.map(Some).ok_or_else(|| {
                     format!(
                         "step '{}' made no complete material file; give it a `template`",

@@ -9,11 +9,12 @@ use plyflow_characterisation::cantilever::{
 };
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
-use plyflow_characterisation::output::{Output, Series};
+use plyflow_characterisation::output::Output;
 use plyflow_characterisation::profile::{Choice, Method, Profile};
 use plyflow_characterisation::voce::Saturation;
 use plyflow_characterisation::{Dimension, GRAVITY};
 use plyflow_fixed::FixedBits;
+use plyflow_model::artifact::{Series, Style};
 use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::json;
@@ -96,8 +97,8 @@ impl Step for CharacteriseBending {
             &note,
         )?;
         out.file(&name, &text);
-        out.attribute("sources", json!(names));
-        out.attribute("bending", json!(p.bending));
+        out.about.sources = Some(names);
+        out.about.bending = Some(p.bending);
         write_results(&mut out, &found, &profiles);
         for (i, k) in p.report_at.iter().enumerate() {
             out.result(&format!("moment.{}", i + 1), law.moment(*k), "N");
@@ -252,7 +253,7 @@ fn write_profiles(out: &mut Output, found: &Bending, profiles: &[Profile], names
         let [x, z] = ["x", "z"].map(|n| format!("curves/measured_{}/{n}", i + 1));
         out.curve(&x, "m", &profile.x);
         out.curve(&z, "m", &negative(&profile.deflection));
-        hanging.push(Series::new(name, &x, &z, "points"));
+        hanging.push(Series::new(name, &x, &z).drawn(Style::Points));
     }
     for (i, (specimen, name)) in found.specimens.iter().zip(names).enumerate() {
         let s = &specimen.profile.stations;
@@ -266,27 +267,22 @@ fn write_profiles(out: &mut Output, found: &Bending, profiles: &[Profile], names
             1 => "fit".to_owned(),
             _ => format!("fit of {name}"),
         };
-        hanging.push(Series::new(&label, &path("x"), &path("z"), "line"));
-        along.push(Series::new(
-            &label,
-            &path("arc"),
-            &path("curvature"),
-            "line",
-        ));
+        hanging.push(Series::new(&label, path("x"), path("z")).drawn(Style::Line));
+        along.push(Series::new(&label, path("arc"), path("curvature")).drawn(Style::Line));
     }
     out.plot(
         "profile",
         "Hanging strip",
         ("distance from the clamp", "mm"),
         ("height", "mm"),
-        &hanging,
+        hanging,
     );
     out.plot(
         "curvature",
         "Curvature along the strip",
         ("arc from the clamp", "mm"),
         ("curvature", "1/mm"),
-        &along,
+        along,
     );
 }
 
@@ -306,7 +302,7 @@ fn write_law(out: &mut Output, found: &Bending, names: &[String]) {
             1 => "from the profile",
             _ => name,
         };
-        measured.push(Series::new(label, &k, &m, "points"));
+        measured.push(Series::new(label, &k, &m).drawn(Style::Points));
     }
     let of = |f: &dyn Fn(f64) -> f64| found.curvature.iter().map(|k| f(*k)).collect::<Vec<f64>>();
     let law = found.voce.law;
@@ -315,21 +311,21 @@ fn write_law(out: &mut Output, found: &Bending, names: &[String]) {
     out.curve("curves/law/moment_error", "N", &found.moment_error);
     out.curve("curves/law/stiffness", "N m", &of(&|k| law.moment(k) / k));
     let k = ("curvature", "1/mm");
-    let voce = |y: &str| Series::new("Voce", "curves/law/curvature", y, "line");
+    let voce = |y: &str| Series::new("Voce", "curves/law/curvature", y).drawn(Style::Line);
     measured.push(voce("curves/law/moment"));
     out.plot(
         "moment",
         "Moment over curvature",
         k,
         ("moment per width", "N"),
-        &measured,
+        measured,
     );
     out.plot(
         "stiffness",
         "Secant bending stiffness",
         k,
         ("bending stiffness", "N mm"),
-        &[voce("curves/law/stiffness")],
+        vec![voce("curves/law/stiffness")],
     );
 }
 

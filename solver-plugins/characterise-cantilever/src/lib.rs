@@ -11,8 +11,9 @@ use plyflow_characterisation::cantilever::{
 use plyflow_characterisation::confidence::student;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
-use plyflow_characterisation::output::{Output, Series};
+use plyflow_characterisation::output::Output;
 use plyflow_fixed::FixedBits;
+use plyflow_model::artifact::{Series, Style};
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::json;
@@ -100,9 +101,9 @@ impl Step for CharacteriseCantilever {
             "Bending stiffness by specimen",
             ("specimen", "1"),
             ("bending stiffness", "N mm"),
-            &[
-                Series::new("measured", number, "curves/specimens/stiffness", "points"),
-                Series::new("mean", number, "curves/specimens/mean", "dashed"),
+            vec![
+                Series::new("measured", number, "curves/specimens/stiffness").drawn(Style::Points),
+                Series::new("mean", number, "curves/specimens/mean").drawn(Style::Dashed),
             ],
         );
         let relative = if mean > 0.0 {
@@ -125,8 +126,8 @@ impl Step for CharacteriseCantilever {
             &note,
         )?;
         out.file(&name, &text);
-        out.attribute("source", json!(table.source));
-        out.attribute("bending", json!(p.bending));
+        out.about.source = Some(table.source);
+        out.about.bending = Some(p.bending);
         out.result("bending_stiffness", mean, "N m");
         out.result("bending_stiffness_deviation", deviation, "N m");
         if n > 1 {

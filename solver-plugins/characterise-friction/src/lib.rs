@@ -7,12 +7,12 @@ use plyflow_characterisation::cantilever::mean_and_deviation;
 use plyflow_characterisation::confidence::student;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::significant;
-use plyflow_characterisation::output::{Output, Series};
+use plyflow_characterisation::output::Output;
 use plyflow_characterisation::sled::{Pull, evaluate};
 use plyflow_characterisation::{Dimension, GRAVITY};
+use plyflow_model::artifact::{Series, Style};
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
-use serde_json::json;
 
 /// The step.
 pub struct CharacteriseFriction;
@@ -112,7 +112,7 @@ impl Step for CharacteriseFriction {
             let coefficient: Vec<f64> = table.values("force")?.iter().map(|f| f / normal).collect();
             out.curve(&x, "m", table.values("displacement")?);
             out.curve(&y, "1", &coefficient);
-            series.push(Series::new(&table.source, &x, &y, "line"));
+            series.push(Series::new(&table.source, &x, &y).drawn(Style::Line));
         }
         let of = |f: fn(&Pull) -> f64| mean_and_deviation(&pulls.iter().map(f).collect::<Vec<_>>());
         let [dynamic, dynamic_deviation] = of(|p| p.dynamic_coefficient);
@@ -121,19 +121,21 @@ impl Step for CharacteriseFriction {
         let peak = (!peaks.is_empty()).then(|| mean_and_deviation(&peaks));
         out.curve("curves/mean/displacement", "m", &[p.from, p.to]);
         out.curve("curves/mean/coefficient", "1", &[dynamic; 2]);
-        series.push(Series::new(
-            "dynamic mean",
-            "curves/mean/displacement",
-            "curves/mean/coefficient",
-            "dashed",
-        ));
+        series.push(
+            Series::new(
+                "dynamic mean",
+                "curves/mean/displacement",
+                "curves/mean/coefficient",
+            )
+            .drawn(Style::Dashed),
+        );
         let y = ("force over normal force", "1");
         out.plot(
             "friction",
             "Pulling force over normal force",
             ("displacement", "mm"),
             y,
-            &series,
+            series,
         );
         out.file(
             "friction.yaml",
@@ -150,7 +152,7 @@ impl Step for CharacteriseFriction {
                 significant(dynamic)
             ),
         );
-        out.attribute("pair", json!(p.pair));
+        out.about.pair = Some(p.pair);
         out.result("dynamic_coefficient", dynamic, "1");
         out.result("dynamic_deviation", dynamic_deviation, "1");
         // Of several pulls their spread; it has what one pull tells of itself in it.

@@ -6,12 +6,13 @@
 use plyflow_characterisation::Dimension;
 use plyflow_characterisation::csv::{Column, read};
 use plyflow_characterisation::material::{self, Block, Template, quantity, significant};
-use plyflow_characterisation::output::{Output, Series};
+use plyflow_characterisation::output::Output;
 use plyflow_characterisation::picture_frame::{
     Frame, LIMITS, Law, Shear, Test, ZeroChoice, characterise,
 };
 use plyflow_characterisation::yarns::{MUCH_WORSE, Refused, Yarns, YarnsFit};
 use plyflow_characterisation::zero::Start;
+use plyflow_model::artifact::{Series, Style};
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -128,7 +129,7 @@ fn read_tests(
         let signed = |v: &[f64]| v.iter().map(|v| sign * v).collect::<Vec<_>>();
         out.curve(&x, "rad", &signed(&test.points.angle));
         out.curve(&y, "N/m", &signed(&test.points.force));
-        series.push(Series::new(&table.source, &x, &y, "points"));
+        series.push(Series::new(&table.source, &x, &y).drawn(Style::Points));
         tests.push(test);
     }
     Ok((tests, series))
@@ -305,10 +306,10 @@ fn write_fit(out: &mut Output, shear: &Shear, both: bool, mut series: Vec<Series
         &of(&|g| shear.force(g)),
     );
     let x = "curves/fit/shear_angle";
-    series.push(Series::new("fit", x, "curves/fit/normalised_force", "line"));
+    series.push(Series::new("fit", x, "curves/fit/normalised_force").drawn(Style::Line));
     if shear.stitch.is_some() {
         out.curve("curves/fit/yarns", "N/m", &of(&|g| shear.yarns(g).odd(g)));
-        series.push(Series::new("yarns", x, "curves/fit/yarns", "dashed"));
+        series.push(Series::new("yarns", x, "curves/fit/yarns").drawn(Style::Dashed));
     }
     for (law, which) in laws(shear) {
         let path = if which.starts_with("negative") {
@@ -324,7 +325,7 @@ fn write_fit(out: &mut Output, shear: &Shear, both: bool, mut series: Vec<Series
         );
     }
     let axes = [("shear angle", "deg"), ("normalised shear force", "N/m")];
-    out.plot("shear", "Normalised shear force", axes[0], axes[1], &series);
+    out.plot("shear", "Normalised shear force", axes[0], axes[1], series);
 }
 
 /// Says what becomes of the template's law for negative shear, where that may not be what is meant. `turned`: its stitch is stretched there.

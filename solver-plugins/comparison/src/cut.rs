@@ -1,38 +1,16 @@
 //! The cut between coarse and fine: the work that passes through it in either run, and how far its influence reaches into a zone.
 
-use crate::models::{Model, Role, Zone, bounds_in_whole, bounds_of};
+use crate::models::{Model, bounds_in_whole, bounds_of};
 use plyflow_defects::{Ply, distance_at};
+use plyflow_model::artifact::{Cut, Layer, Passage, Rectangle, Role, Strip, Work, Zone};
 use plyflow_sdk::{BodyInfo, Host, Meshes, StepError};
 use plyflow_surface::vector::{Vec3, distance, dot, sub};
 use plyflow_surface::{Location, QuadLocator, traction};
-use serde::Serialize;
 
 /// How far inside of the cut the material is looked at that pulls at it, over the zone's own element size.
 const INSIDE: f64 = 0.01;
 /// Fields that hold S11, S22, S12 (N/m).
 const FORCES: [&str; 3] = ["membrane_force_1", "membrane_force_2", "membrane_force_12"];
-
-/// Work through the cut of one ply, from the first frame to the last (J).
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Work {
-    /// Done on the zone.
-    pub net: f64,
-    /// Sum of the sizes of what passes by place and time, either way: what the net work is small or large against.
-    pub gross: f64,
-}
-
-/// Both runs' work through the cut of one ply of a zone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Passage {
-    /// Zone.
-    pub zone: String,
-    /// Ply.
-    pub ply: String,
-    /// In the global run.
-    pub global: Work,
-    /// In the local run.
-    pub local: Work,
-}
 
 /// A piece of the cut.
 struct Piece {
@@ -45,7 +23,7 @@ struct Piece {
 }
 
 /// The cut of a ply that fills `around` (m) in pieces of at most `size` (m). `cuts`: see [`Zone::cuts`].
-fn pieces(zone: &Zone, cuts: [bool; 4], around: [f64; 4], size: f64) -> Vec<Piece> {
+fn pieces(zone: &Zone, cuts: [bool; 4], around: Rectangle, size: f64) -> Vec<Piece> {
     let mut b = zone.bounds;
     for d in 0..2 {
         b[d] = b[d].max(around[d]);
@@ -220,21 +198,6 @@ fn write_works(host: &Host, passages: &[Passage], zones: &[Zone]) -> Result<(), 
     Ok(())
 }
 
-/// How far a local run is from the reference in a strip along its cut.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Strip {
-    /// Least and largest distance from the cut in the flat ply (m).
-    pub from: f64,
-    /// See `from`.
-    pub to: f64,
-    /// Root mean square distance of its nodes from where the reference has them (m).
-    pub position: f64,
-    /// The same of nodal distances from the tool (m), over nodes that are judged in both.
-    pub standing_off: f64,
-    /// Nodes.
-    pub nodes: usize,
-}
-
 /// What is added up for a strip.
 #[derive(Clone, Copy, Default)]
 struct Sums {
@@ -242,15 +205,6 @@ struct Sums {
     nodes: usize,
     standing_off: f64,
     judged: usize,
-}
-
-/// The strips of one zone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Layer {
-    /// Zone.
-    pub zone: String,
-    /// From the cut inwards.
-    pub strips: Vec<Strip>,
 }
 
 /// Strips one element of the global run wide, by zone; none without a reference.
@@ -280,14 +234,9 @@ pub fn layers(models: &[Model], zones: &[Zone]) -> Vec<Layer> {
 ///
 /// # Errors
 /// When the host refuses a result.
-pub fn write(
-    host: &Host,
-    passages: &[Passage],
-    layers: &[Layer],
-    zones: &[Zone],
-) -> Result<(), StepError> {
-    write_works(host, passages, zones)?;
-    for layer in layers {
+pub fn write(host: &Host, cut: &Cut, zones: &[Zone]) -> Result<(), StepError> {
+    write_works(host, &cut.work, zones)?;
+    for layer in &cut.layers {
         let (at, inside) = layer.strips.split_at(1);
         let zone = &layer.zone;
         for (name, strips) in [("cut_error", at), ("inner_error", inside)] {

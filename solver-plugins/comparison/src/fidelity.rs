@@ -1,12 +1,11 @@
 //! How far the ways to the answer are from the reference: the fine runs of the zones, the coarse run by itself, and others.
 
-use crate::models::{Model, PassedOver, Role, Zone};
+use crate::models::{Model, PassedOver};
 use plyflow_defects::pairs::{PairErrors, Pairs, apart, measure_for_pairs};
 use plyflow_defects::{Defect, FieldErrors, Settings};
+use plyflow_model::artifact::{self, Role, Yardstick, Zone};
 use plyflow_sdk::{Host, StepError};
 use plyflow_surface::vector::Vec3;
-use serde::Serialize;
-use serde_json::{Map, Value, json};
 
 /// A defect and the name of its ply.
 type Found<'a> = (&'a str, &'a Defect);
@@ -53,15 +52,18 @@ impl Way {
         }
     }
 
-    /// As in the data model.
-    pub fn to_json(&self) -> Value {
-        let errors: Map<String, Value> = (self.errors.iter())
-            .map(|(name, value, _)| ((*name).to_owned(), json!(value)))
-            .collect();
-        json!({
-            "model": self.model, "elements": self.elements, "element_cycles": self.element_cycles,
-            "start_time": self.began_late, "errors": errors,
-        })
+    /// As the attributes have it.
+    pub fn told(&self) -> artifact::Way {
+        let errors = self.errors.iter();
+        artifact::Way {
+            model: self.model.clone(),
+            elements: self.elements,
+            element_cycles: self.element_cycles,
+            start_time: self.began_late,
+            errors: errors
+                .map(|(name, v, _)| ((*name).to_owned(), *v))
+                .collect(),
+        }
     }
 }
 
@@ -78,25 +80,13 @@ pub fn write(host: &Host, ways: &[Way]) -> Result<(), StepError> {
     Ok(())
 }
 
-/// What the ways to the answer are measured by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Yardstick {
-    /// A fine run of the whole scene.
-    Reference,
-    /// Without one: the fine runs of the zones, in these.
-    Zones,
-}
-
-impl Yardstick {
-    /// The one that there is; `None` when nothing was refined.
-    pub fn of(models: &[Model]) -> Option<Self> {
-        let has = |role| models.iter().any(|m| m.role == role);
-        if has(Role::Reference) {
-            Some(Self::Reference)
-        } else {
-            has(Role::Local).then_some(Self::Zones)
-        }
+/// What the ways to the answer are measured by; `None` when nothing was refined.
+pub fn yardstick(models: &[Model]) -> Option<Yardstick> {
+    let has = |role| models.iter().any(|m| m.role == role);
+    if has(Role::Reference) {
+        Some(Yardstick::Reference)
+    } else {
+        has(Role::Local).then_some(Yardstick::Zones)
     }
 }
 
@@ -123,7 +113,7 @@ pub fn measure_ways(
     zones: &[Zone],
     settings: &Settings,
 ) -> Result<Measured, StepError> {
-    let Some(yardstick) = Yardstick::of(models) else {
+    let Some(yardstick) = yardstick(models) else {
         return Ok(Measured::default());
     };
     let of = |role| -> Vec<&Model> { models.iter().filter(|m| m.role == role).collect() };
@@ -187,7 +177,8 @@ pub fn measure_ways(
 
 /// How far the fields of a way are from the reference; from fine runs of zones that stand in for it, each in its zone.
 fn fields(way: &[&Model], reference: &[&Model], zones: &[Zone]) -> Vec<Told> {
-    let counts = |run: usize, at: &[f64]| reference[run].zone.is_none_or(|z| zones[z].holds(at));
+    let counts =
+        |run: usize, at: &[f64]| reference[run].zone.is_none_or(|z| zones[z].holds(at, 0.0));
     let [way, plies] =
         [way, reference].map(|all| all.iter().map(|m| &m.plies[..]).collect::<Vec<_>>());
     let Some(errors) = FieldErrors::of(&way, &plies, counts) else {
@@ -209,9 +200,9 @@ fn defects_of(
 ) -> Vec<(String, Vec<Defect>)> {
     let counts = |m: &Model, at: &Vec3| match (yardstick, m.zone) {
         // The mesh of a zone reaches past it, to the nearest lines of the whole's.
-        (_, Some(own)) => zones[own].holds(at),
+        (_, Some(own)) => zones[own].holds(at, 0.0),
         (Yardstick::Reference, None) => true,
-        (Yardstick::Zones, None) => zones.iter().any(|z| z.holds(at)),
+        (Yardstick::Zones, None) => zones.iter().any(|z| z.holds(at, 0.0)),
     };
     let mut found = Vec::new();
     for m in models {

@@ -9,14 +9,13 @@ mod fidelity;
 mod models;
 mod table;
 
-pub use cut::{Layer, Passage, Strip, Work};
-pub use fidelity::{Measured, Way, Yardstick};
-pub use models::{Model, PassedOver, Role, Zone};
+pub use fidelity::{Measured, Way};
+pub use models::{Model, PassedOver};
 pub use table::{Entry, defect_table};
 
 use plyflow_defects::{Kind, Limits, Ply, QUANTILES, Settings, quantiles};
+use plyflow_model::artifact::{self, ComparedBody, ComparedModel, Cut, PlyShear, Role, Zone};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
-use serde_json::{Value, json};
 
 /// The step.
 pub struct Comparison;
@@ -54,9 +53,10 @@ impl Step for Comparison {
                 "there is no zone: nothing was refined, the global run stands alone",
             );
         }
-        let passages = cut::passages(host, &models, &zones)?;
-        let layers = cut::layers(&models, &zones);
-        let cut = json!({"work": passages, "layers": layers});
+        let cut = Cut {
+            work: cut::passages(host, &models, &zones)?,
+            layers: cut::layers(&models, &zones),
+        };
         let measured = fidelity::measure_ways(host, &models, &passed_over, &zones, &settings)?;
         write_attributes(host, &models, &zones, &table, &cut, &measured.ways)?;
         write_bodies(host, &models, &table)?;
@@ -64,7 +64,7 @@ impl Step for Comparison {
         write_reference_defects(host, &models, &table)?;
         fidelity::write(host, &measured.ways)?;
         fidelity::write(host, &measured.local)?;
-        cut::write(host, &passages, &layers, &zones)?;
+        cut::write(host, &cut, &zones)?;
         write_costs(host, &models, &passed_over)
     }
 }
@@ -74,32 +74,41 @@ fn write_attributes(
     models: &[Model],
     zones: &[Zone],
     table: &[Entry],
-    cut: &Value,
+    cut: &Cut,
     ways: &[Way],
 ) -> Result<(), StepError> {
-    let list: Vec<Value> = (models.iter())
-        .map(|m| {
-            json!({"name": m.name, "role": m.role, "zone": m.zone.map(|z| &zones[z].name),
-                   "element_size": m.element_size, "elements": m.elements, "element_cycles": m.element_cycles})
-        })
-        .collect();
-    let mut shear = Vec::new();
-    for m in models {
-        for p in &m.plies {
-            let [min, max] = range(&p.shear_angle);
-            let quantiles = quantiles(&p.shear_angle, &QUANTILES);
-            shear.push(json!({"model": m.name, "ply": p.name, "min": min, "max": max, "quantiles": quantiles}));
-        }
-    }
-    let defects: Vec<Value> = table.iter().map(|e| e.to_json(models, zones)).collect();
-    host.write_attributes(&json!({
-        "zones": zones.iter().map(|z| &z.name).collect::<Vec<_>>(),
-        // A zone that is drawn again keeps its name.
-        "zone_boxes": zones.iter().map(|z| z.bounds).collect::<Vec<_>>(),
-        "models": list, "defects": defects, "shear": shear, "quantiles": QUANTILES, "cut": cut,
-        "measured_by": Yardstick::of(models),
-        "ways": ways.iter().map(Way::to_json).collect::<Vec<_>>(),
-    }))
+    let model = |m: &Model| ComparedModel {
+        name: m.name.clone(),
+        role: m.role,
+        zone: m.zone.map(|z| zones[z].name.clone()),
+        element_size: m.element_size,
+        elements: m.elements,
+        element_cycles: m.element_cycles,
+    };
+    let plies = |m: &Model| -> Vec<PlyShear> {
+        let one = |p: &Ply| {
+            let [min, max] = range(&p.shear_angle).map(|v| v.is_finite().then_some(v));
+            PlyShear {
+                model: m.name.clone(),
+                ply: p.name.clone(),
+                min,
+                max,
+                quantiles: quantiles(&p.shear_angle, &QUANTILES),
+            }
+        };
+        m.plies.iter().map(one).collect()
+    };
+    host.write_attributes(&artifact::Comparison {
+        zones: zones.iter().map(|z| z.name.clone()).collect(),
+        zone_boxes: zones.iter().map(|z| z.bounds).collect(),
+        models: models.iter().map(model).collect(),
+        defects: table.iter().map(|e| e.told(models, zones)).collect(),
+        shear: models.iter().flat_map(plies).collect(),
+        quantiles: QUANTILES.to_vec(),
+        cut: cut.clone(),
+        measured_by: fidelity::yardstick(models),
+        ways: ways.iter().map(Way::told).collect(),
+    })
 }
 
 fn range(values: &[f64]) -> [f64; 2] {
@@ -121,7 +130,10 @@ fn write_bodies(host: &Host, models: &[Model], table: &[Entry]) -> Result<(), St
     for (_, m) in &local {
         for p in &m.plies {
             let (_, cells) = p.topology.connectivity();
-            let about = json!({"model": m.name, "ply": p.name});
+            let about = ComparedBody {
+                model: m.name.clone(),
+                ply: p.name.clone(),
+            };
             host.define_mesh(&name(m, p), &p.formed, 4, cells, &about)?;
         }
     }

@@ -1,104 +1,18 @@
 //! Reading the models that are compared.
 
-use plyflow_defects::of_run::{self, Sheet};
-use plyflow_defects::{Ply, Settings, Tool};
-use plyflow_model::scene::first_axis;
+use plyflow_defects::{Ply, Settings, Tool, of_run};
+use plyflow_model::artifact::{Forming, Rectangle, Role, Sheet, Zone, Zones, current_zones};
 use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::flat_bounds;
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Places on the side of a zone lie in it, however they were rounded (m).
-const ROUNDING: f64 = 1e-6;
-
-/// A zone, as its step wrote it.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Zone {
-    /// A, B, ..
-    pub name: String,
-    /// `[x0, y0, x1, y1]` (m).
-    #[serde(rename = "box")]
-    pub bounds: [f64; 4],
-    /// Left, right, bottom, top.
-    pub free_sides: [bool; 4],
-    /// Zones that it takes the place of.
-    #[serde(default)]
-    pub replaces: Vec<String>,
-}
-
-impl Zone {
-    /// Whether a place of the flat ply (m) lies in it or on its sides.
-    pub fn holds(&self, at: &[f64]) -> bool {
-        let [low, high] = [&self.bounds[..2], &self.bounds[2..]];
-        (0..2).all(|d| at[d] > low[d] - ROUNDING && at[d] < high[d] + ROUNDING)
-    }
-
-    /// Left, right, bottom, top: whether a ply that fills `whole` (`[x0, y0, x1, y1]`, m) in the whole and `own` in the zone's run is cut there. Not so
-    /// at a free side, nor where the ply ends at the side or inside of it, nor where the zone's mesh, which goes on to the next line, has come to the ply's end:
-    /// that is its own edge.
-    pub fn cuts(&self, whole: [f64; 4], own: [f64; 4]) -> [bool; 4] {
-        [0, 1, 2, 3].map(|side| {
-            let k = side / 2 + 2 * (side % 2);
-            let outward = if side % 2 == 0 { -1.0 } else { 1.0 };
-            let goes_on = |from: f64| outward * (whole[k] - from) > ROUNDING;
-            !self.free_sides[side] && goes_on(self.bounds[k]) && goes_on(own[k])
-        })
-    }
-
-    fn area(&self) -> f64 {
-        let [x0, y0, x1, y1] = self.bounds;
-        (x1 - x0) * (y1 - y0)
-    }
-
-    /// Whether an attribute `zone` is this one: of its name and, if it tells one, its box.
-    fn is(&self, told: &Value) -> bool {
-        let bounds: Option<[f64; 4]> = serde_json::from_value(told["box"].clone()).ok();
-        let near = |b: [f64; 4]| b.iter().zip(self.bounds).all(|(a, b)| (a - b).abs() < 1e-9);
-        told["name"] == self.name.as_str() && bounds.is_none_or(near)
-    }
-}
-
-/// The zones that count, by name, and those in whose places they are: of one name the largest counts, and none that
-/// another one replaces.
+/// The zones that count, by name, and those in whose places they are ([`current_zones`]).
 pub fn read_zones(host: &Host) -> Result<(Vec<Zone>, Vec<Zone>), StepError> {
     let mut all = Vec::new();
     for input in host.inputs_of("zones")? {
-        let attributes: Value = host.attributes(&input)?;
-        let zones: Vec<Zone> = serde_json::from_value(attributes["zones"].clone())
-            .map_err(|e| format!("attribute `zones` of '{}': {e}", input.step))?;
-        all.extend(zones);
+        all.extend(host.attributes::<Zones>(&input)?.zones);
     }
-    let replaced: Vec<String> = all.iter().flat_map(|z| z.replaces.clone()).collect();
-    // One name after the other, the largest first; A to Z before AA.
-    all.sort_by(|a, b| {
-        let by_name = (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name));
-        by_name.then(b.area().total_cmp(&a.area()))
-    });
-    let (mut current, mut superseded) = (Vec::<Zone>::new(), Vec::new());
-    for zone in all {
-        let taken = current.last().is_some_and(|z| z.name == zone.name);
-        if taken || replaced.contains(&zone.name) {
-            superseded.push(zone);
-        } else {
-            current.push(zone);
-        }
-    }
-    Ok((current, superseded))
-}
-
-/// Which part a model plays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Role {
-    /// Coarse run of the whole scene.
-    Global,
-    /// Fine run of a zone.
-    Local,
-    /// Another run of the whole scene.
-    Other,
-    /// Fine run of the whole scene.
-    Reference,
+    Ok(current_zones(all))
 }
 
 /// A formed model.
@@ -122,14 +36,14 @@ pub struct Model {
     pub plies: Vec<Ply>,
     /// As many: what the run tells of them.
     pub sheets: Vec<Sheet>,
-    /// Direction of the first fibres of each ply that tells it, in the flat ply (rad), by its name.
+    /// Direction of the first axis of each ply's membrane forces in the flat ply (rad), where the run tells it, by its name.
     pub axes: BTreeMap<String, f64>,
     /// Where it came from, for its cost.
     pub input: Input,
 }
 
 /// The box around a ply in the flat mesh of the global run (`[x0, y0, x1, y1]`, m); without end when that has no such ply.
-pub fn bounds_in_whole(models: &[Model], ply: &str) -> [f64; 4] {
+pub fn bounds_in_whole(models: &[Model], ply: &str) -> Rectangle {
     let global = models.iter().find(|m| m.role == Role::Global);
     let found = global.and_then(|m| m.plies.iter().find(|p| p.name == ply));
     found.map_or(
@@ -139,19 +53,8 @@ pub fn bounds_in_whole(models: &[Model], ply: &str) -> [f64; 4] {
 }
 
 /// The box around a ply in its flat mesh (`[x0, y0, x1, y1]`, m).
-pub fn bounds_of(ply: &Ply) -> [f64; 4] {
+pub fn bounds_of(ply: &Ply) -> Rectangle {
     flat_bounds(ply.undeformed.iter().map(|p| [p[0], p[1]]))
-}
-
-#[derive(Deserialize)]
-struct Formed {
-    sheets: Vec<Sheet>,
-    #[serde(default)]
-    element_size: f64,
-    #[serde(default)]
-    element_cycles: f64,
-    #[serde(default)]
-    zone: Value,
 }
 
 /// Runs that are not measured, and cost.
@@ -205,8 +108,8 @@ pub fn read_models(
     let global = global.ok_or("global: no run arrives")?;
     passed_over.earlier_coarse = passed_over.earlier.len();
     for input in &passed_over.earlier {
-        let formed: Formed = host.attributes(input)?;
-        passed_over.earlier_cycles += formed.element_cycles;
+        let formed: Forming = host.attributes(input)?;
+        passed_over.earlier_cycles += cycles(&formed);
         passed_over.earlier_from_start |= is_from_start(host, input, &formed)?;
     }
     let passes = 1 + passed_over.earlier.len();
@@ -217,7 +120,7 @@ pub fn read_models(
     for input in host.inputs_of("local")? {
         host.check_cancelled()?;
         let Some(zone) = zone_of(host, &input, zones, superseded)? else {
-            passed_over.superseded_cycles += host.attributes::<Formed>(&input)?.element_cycles;
+            passed_over.superseded_cycles += cycles(&host.attributes(&input)?);
             passed_over.superseded.push(input);
             continue;
         };
@@ -244,9 +147,9 @@ pub fn read_models(
     models.extend(local);
     models.extend(read_wholes(host, &tool, settings)?);
     for input in host.inputs_of("earlier")? {
-        let formed: Formed = host.attributes(&input)?;
-        passed_over.earlier_coarse += usize::from(formed.zone.is_null());
-        passed_over.earlier_cycles += formed.element_cycles;
+        let formed: Forming = host.attributes(&input)?;
+        passed_over.earlier_coarse += usize::from(formed.zone.is_none());
+        passed_over.earlier_cycles += cycles(&formed);
         passed_over.earlier_from_start |= is_from_start(host, &input, &formed)?;
         passed_over.earlier.push(input);
     }
@@ -269,6 +172,11 @@ fn same_pass(first: &Input, second: &Input, zone: &str, passes: usize) -> String
     format!("local: two local runs belong to zone {zone}, {a} and {b}; {why}")
 }
 
+/// Cells times cycles of a run, as far as it tells them.
+fn cycles(formed: &Forming) -> f64 {
+    formed.element_cycles.unwrap_or_default()
+}
+
 /// When a run began, if that was late (s).
 fn began_late(meshes: &Meshes) -> Option<f64> {
     let first = meshes.times.first().copied();
@@ -276,8 +184,8 @@ fn began_late(meshes: &Meshes) -> Option<f64> {
 }
 
 /// Whether a run is one of the whole from the beginning of the process.
-fn is_from_start(host: &Host, input: &Input, formed: &Formed) -> Result<bool, StepError> {
-    Ok(formed.zone.is_null() && began_late(&host.meshes(input)?).is_none())
+fn is_from_start(host: &Host, input: &Input, formed: &Forming) -> Result<bool, StepError> {
+    Ok(formed.zone.is_none() && began_late(&host.meshes(input)?).is_none())
 }
 
 /// Others and the reference, in that order, with their own tools or the global run's.
@@ -320,24 +228,24 @@ fn zone_of(
     zones: &[Zone],
     superseded: &[Zone],
 ) -> Result<Option<usize>, StepError> {
-    let formed: Formed = host.attributes(input)?;
-    let named = formed.zone["name"].as_str();
+    let formed: Forming = host.attributes(input)?;
+    let named = formed.zone.as_ref();
     let index = match named {
-        Some(_) => zones.iter().position(|z| z.is(&formed.zone)),
+        Some(own) => zones.iter().position(|z| z.is(own)),
         None => match input.item[..] {
             [i] => Some(i as usize).filter(|&i| i < zones.len()),
             // Which of several places is that of the zone the run would have to tell.
             _ => None,
         },
     };
-    if index.is_none() && superseded.iter().any(|z| z.is(&formed.zone)) {
+    if index.is_none() && named.is_some_and(|own| superseded.iter().any(|z| z.is(own))) {
         return Ok(None);
     }
     index.map(Some).ok_or_else(|| {
         let names: Vec<&str> = zones.iter().map(|z| z.name.as_str()).collect();
         let what = named.map_or(
             "names no zone (attribute `zone`), and its item is no place in a fan-out over the zones alone".to_owned(),
-            |n| format!("is of zone '{n}' (or of a box that no zone of that name has)"),
+            |own| format!("is of zone '{}' (or of a box that no zone of that name has)", own.name),
         );
         format!(
             "local run '{}' {:?} {what}; the zones are: {}",
@@ -357,14 +265,11 @@ fn read(
     tool: &Tool,
     settings: &Settings,
 ) -> Result<Model, StepError> {
-    let formed: Formed = host.attributes(&input)?;
+    let formed: Forming = host.attributes(&input)?;
     let meshes = host.meshes(&input)?;
     let frame = of_run::last_frame(&input, &meshes)?;
     let mut plies = Vec::new();
-    let sheets: Vec<Sheet> = (formed.sheets.iter())
-        .filter(|s| s.is_ply())
-        .cloned()
-        .collect();
+    let sheets: Vec<Sheet> = formed.plies().cloned().collect();
     for sheet in &sheets {
         let body = meshes.body(&sheet.name)?;
         if body.nodes_per_cell != 4 {
@@ -400,10 +305,10 @@ fn read(
             .filter(|b| b.name != "tool")
             .map(|b| b.cells)
             .sum(),
-        element_cycles: formed.element_cycles,
+        element_cycles: cycles(&formed),
         began_late: began_late(&meshes),
         axes: (formed.sheets.iter())
-            .filter_map(|s| Some((s.name.clone(), first_axis(s.fibre_1?, s.fibre_2?))))
+            .filter_map(|s| Some((s.name.clone(), s.axis()?)))
             .collect(),
         plies,
         sheets,

@@ -1,10 +1,10 @@
 //! The table of defects: numbering, and which defect of one model is which of another.
 
-use crate::models::{Model, Role, Zone, bounds_in_whole, bounds_of};
+use crate::models::{Model, bounds_in_whole, bounds_of};
 use plyflow_defects::of_run::neighbours;
 use plyflow_defects::pairs::{apart, same_within, unlike};
 use plyflow_defects::{Defect, Kind, Limits, Settings, find_causes, measure};
-use serde_json::{Value, json};
+use plyflow_model::artifact::{ComparedDefect, Role, Zone};
 
 /// A defect with its place in the table.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,33 +30,22 @@ impl Entry {
         self.cut_sides.contains(&true)
     }
 
-    /// As in the data model.
-    pub fn to_json(&self, models: &[Model], zones: &[Zone]) -> Value {
+    /// As the attributes have it.
+    pub fn told(&self, models: &[Model], zones: &[Zone]) -> ComparedDefect {
         let d = &self.defect;
-        let shear = d.ridge_shear.as_ref();
-        json!({
-            "id": self.id,
-            "model": models[self.model].name,
-            "zone": zones[self.zone].name,
-            "ply": self.ply,
-            "type": d.kind.name(),
-            "cause": d.cause,
-            "length": d.length,
-            "amplitude": d.amplitude,
-            "area": d.area,
-            "centre": d.centre,
-            "curvature_max": d.curvature_max,
-            "radius": d.radius(),
-            "direction": d.ridge_direction(),
-            "shear_min": d.shear.map(|s| s[0]),
-            "shear_max": d.shear.map(|s| s[1]),
-            "ridge_shear": shear.map(|s| s.mean),
-            "ridge_shear_min": shear.map(|s| s.min),
-            "ridge_shear_max": shear.map(|s| s.max),
-            "ridge_shear_profile": shear.map(|s| &s.profile),
-            "touches_cut": self.touches_cut(),
-            "cut_sides": self.cut_sides,
-        })
+        ComparedDefect {
+            id: self.id.clone(),
+            model: models[self.model].name.clone(),
+            zone: zones[self.zone].name.clone(),
+            ply: self.ply.clone(),
+            found: d.told(),
+            length: d.length,
+            curvature_max: d.curvature_max,
+            shear_min: d.shear.map(|s| s[0]),
+            shear_max: d.shear.map(|s| s[1]),
+            touches_cut: self.touches_cut(),
+            cut_sides: self.cut_sides,
+        }
     }
 }
 
@@ -105,7 +94,7 @@ fn entries_of(
     let mut found = Vec::new();
     // The stack is listed from the tool upwards.
     for (k, ply) in model.plies.iter().enumerate().rev() {
-        let within = |p: &[f64; 3]| z.holds(p);
+        let within = |p: &[f64; 3]| z.holds(p, 0.0);
         // The mesh of a zone reaches past it, to the nearest lines of the whole's.
         let inside: Vec<bool> = ply.undeformed.iter().map(within).collect();
         let mut measured = measure(ply, &inside, settings);

@@ -77,7 +77,7 @@ fn formed(ply: MemoryBody, size: f64, zone: Value) -> MemoryArtifact {
     MemoryArtifact {
         kind: "forming".into(),
         attributes: json!({
-            "sheets": [{"name": "ply_1", "kind": "ply", "offset": 0.0, "fibre_1": AXIS, "fibre_2": AXIS + FRAC_PI_2}],
+            "sheets": [{"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": 0.0, "fibre_1": AXIS, "fibre_2": AXIS + FRAC_PI_2}],
             "element_size": size, "zone": zone,
         }),
         times,

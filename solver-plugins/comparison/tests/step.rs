@@ -151,7 +151,7 @@ fn a_wrinkle_has_its_cause_and_the_shear_along_its_crest_as_a_measurement_would_
         sheets[0]["fibre_1"] = json!(0.0);
         sheets[0]["fibre_2"] = json!(PI / 2.0);
         sheets.push(
-            json!({"name": "ply_2", "kind": "ply", "offset": OFFSET + 0.0004,
+            json!({"name": "ply_2", "kind": "ply", "thickness": 0.0004, "offset": OFFSET + 0.0004,
             "fibre_1": PI / 4.0, "fibre_2": 3.0 * PI / 4.0}),
         );
         let mut other = run_off.bodies[1].clone();

@@ -30,10 +30,11 @@ mod subject;
 pub use element::check_element;
 pub use material::check_material;
 
-use serde::{Deserialize, Serialize};
+pub use plyflow_model::artifact::CheckOutcome as Outcome;
+use plyflow_model::artifact::{ConformanceCheck, ConformanceRule};
 
 /// What is demanded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rule {
     /// Name of the check, e.g. `batch-independence`.
     pub name: &'static str,
@@ -43,23 +44,10 @@ pub struct Rule {
     pub remedy: &'static str,
 }
 
-/// How a check ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Outcome {
-    /// As demanded.
-    Passed,
-    /// Not as demanded.
-    Failed,
-    /// There was nothing to check, or an earlier failure makes it meaningless.
-    Skipped,
-}
-
 /// One check that has ended.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Check {
     /// What was demanded.
-    #[serde(flatten)]
     pub rule: Rule,
     /// How it ended.
     pub outcome: Outcome,
@@ -69,6 +57,30 @@ pub struct Check {
     pub measured: Option<f64>,
     /// The largest that is allowed.
     pub limit: Option<f64>,
+}
+
+impl Rule {
+    /// For the artifact.
+    pub fn told(&self) -> ConformanceRule {
+        ConformanceRule {
+            name: self.name.into(),
+            expected: self.expected.into(),
+            remedy: self.remedy.into(),
+        }
+    }
+}
+
+impl Check {
+    /// For the artifact.
+    pub fn told(&self) -> ConformanceCheck {
+        ConformanceCheck {
+            rule: self.rule.told(),
+            outcome: self.outcome,
+            seen: self.seen.clone(),
+            measured: self.measured,
+            limit: self.limit,
+        }
+    }
 }
 
 /// Hears of checks as they go.

@@ -5,7 +5,7 @@
 //! the fibres to lock, so the force must not depend on how the mesh lies. Runs with other meshes,
 //! wired to the port `others`, are compared with this one at equal displacements.
 
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::rotated_mesh::{least_jacobian, turned_rectangle};
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
@@ -15,6 +15,7 @@ use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Drive, Fixed};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::Style;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;
 
@@ -318,7 +319,7 @@ fn write(
     host.result("centre_shear_end", last(&test.shear), "rad")?;
     host.result("fibre_strain_largest", test.fibre_strain, "1")?;
     host.result("least_jacobian", jacobian, "1")?;
-    out.attribute("mesh_angle", p.mesh_angle.into());
+    out.about.mesh_angle = Some(p.mesh_angle);
     out.finish(&p.common, specimen, outcome)
 }
 

@@ -7,7 +7,7 @@
 //! Places are written with the clamp line at x = 0 (see [`crate::strip`]) and z negative downwards, whichever
 //! face looks up.
 
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
@@ -19,6 +19,7 @@ use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;
@@ -275,8 +276,8 @@ impl Done<'_> {
             .last()
             .map_or(0.0, |l| l.kinetic / l.internal());
         host.result("kinetic_ratio_at_end", rest, "1")?;
-        out.attribute("overhang", self.p.overhang.into());
-        out.attribute("family", self.p.family.into());
+        out.about.overhang = Some(self.p.overhang);
+        out.about.family = Some(self.p.family);
         out.finish(&self.p.common, specimen, outcome)
     }
 

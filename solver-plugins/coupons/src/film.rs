@@ -7,7 +7,7 @@
 //!
 //! Nominal stress is the mean force of both ends over the undeformed section.
 
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
@@ -16,6 +16,7 @@ use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;

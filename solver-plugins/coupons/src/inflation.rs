@@ -3,7 +3,7 @@
 //! The pressure rises smoothly to its end value and is held there. A film has a limit point: beyond that
 //! pressure there is no equilibrium near by and the disc runs away. The test then stops and says so.
 
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
@@ -13,6 +13,7 @@ use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;
@@ -298,7 +299,7 @@ fn write(
     // Vertical balance of the film: the rim carries the pressure on the plane disc below the dome.
     let carried = -test.rim.1 / (std::f64::consts::PI * p.radius * p.radius);
     host.result("rim_balance", carried / pressure, "1")?;
-    out.attribute("radius", p.radius.into());
+    out.about.radius = Some(p.radius);
     out.finish(&p.common, specimen, outcome)
 }
 

@@ -3,32 +3,20 @@
 use crate::run::Outcome;
 use crate::specimen::{Common, Specimen};
 use plyflow_mechanics::energy::Ledger;
+use plyflow_model::artifact::{self, Axis, Coupon, ElementCount, Energy, Series, Style};
 use plyflow_sdk::{Host, Log, StepError};
-use serde_json::{Value, json};
-
-/// How a series of a plot is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Style {
-    /// A line.
-    Line,
-    /// A dashed line: theory, other runs.
-    Dashed,
-    /// Points: measurements, tables.
-    Points,
-}
 
 /// Collects curves and plots and writes the attributes at the end.
 pub struct Output<'a> {
     host: &'a Host,
-    plots: Vec<Value>,
-    attributes: serde_json::Map<String, Value>,
-    warnings: Vec<String>,
+    /// The attributes so far; a test tells here what it was given.
+    pub about: Coupon,
 }
 
 /// A plot under construction.
 pub struct Plot<'o, 'a> {
     output: &'o mut Output<'a>,
-    plot: Value,
+    plot: artifact::Plot,
 }
 
 impl<'a> Output<'a> {
@@ -36,9 +24,7 @@ impl<'a> Output<'a> {
     pub fn new(host: &'a Host) -> Self {
         Self {
             host,
-            plots: Vec::new(),
-            attributes: serde_json::Map::new(),
-            warnings: Vec::new(),
+            about: Coupon::default(),
         }
     }
 
@@ -60,32 +46,29 @@ impl<'a> Output<'a> {
         x: (&str, &str),
         y: (&str, &str),
     ) -> Plot<'o, 'a> {
-        let plot = json!({
-            "name": name, "title": title, "series": [],
-            "x": {"label": x.0, "unit": x.1}, "y": {"label": y.0, "unit": y.1},
-        });
+        let plot = artifact::Plot {
+            name: name.into(),
+            title: Some(title.into()),
+            note: None,
+            x: Axis::new(x.0, x.1),
+            y: Axis::new(y.0, y.1),
+            series: Vec::new(),
+        };
         Plot { output: self, plot }
-    }
-
-    /// An attribute of the artifact.
-    pub fn attribute(&mut self, name: &str, value: Value) {
-        self.attributes.insert(name.into(), value);
     }
 
     /// Something that the user should know.
     pub fn warn(&mut self, text: String) {
         self.host.log(Log::Warn, &text);
-        self.warnings.push(text);
+        self.about.warnings.push(text);
     }
 
     /// Writes the attributes, with plots and warnings, and nothing else: for tests with results of their own.
     ///
     /// # Errors
     /// When the host refuses.
-    pub fn attributes_only(mut self) -> Result<(), StepError> {
-        self.attribute("warnings", json!(self.warnings));
-        self.attribute("plots", json!(self.plots));
-        self.host.write_attributes(&Value::Object(self.attributes))
+    pub fn attributes_only(self) -> Result<(), StepError> {
+        self.host.write_attributes(&self.about)
     }
 
     /// Writes the energy history, the results that every test has, and the attributes. Declares nothing
@@ -142,21 +125,21 @@ impl<'a> Output<'a> {
         }
         let elements = specimen.model.element_count();
         let element_cycles = elements as f64 * outcome.cycles as f64;
-        self.attribute("element", json!(p.element.plugin));
-        self.attribute("material", json!(p.material.name));
-        self.attribute("element_size", json!(p.element_size));
-        self.attribute("elements", json!(elements));
-        self.attribute("cycles", json!(outcome.cycles));
-        self.attribute("time_step", json!(outcome.smallest_step));
-        self.attribute(
-            "energy",
-            json!({
-                "peak_drift_ratio": h.peak_drift_ratio,
-                "peak_kinetic_ratio": h.peak_kinetic_ratio,
-                "kinetic_bound_kept": h.peak_kinetic_ratio <= p.kinetic_bound,
-                "hourglass_ratio": outcome.hourglass_ratio,
+        self.about = Coupon {
+            element: Some(p.element.plugin.clone()),
+            material: Some(p.material.name.clone()),
+            element_size: Some(p.element_size),
+            elements: Some(ElementCount::All(elements as u64)),
+            cycles: Some(outcome.cycles),
+            time_step: Some(outcome.smallest_step),
+            energy: Some(Energy {
+                peak_drift_ratio: Some(h.peak_drift_ratio),
+                peak_kinetic_ratio: Some(h.peak_kinetic_ratio),
+                kinetic_bound_kept: Some(h.peak_kinetic_ratio <= p.kinetic_bound),
+                hourglass_ratio: Some(outcome.hourglass_ratio),
             }),
-        );
+            ..self.about
+        };
         let host = self.host;
         self.attributes_only()?;
         let added: f64 = specimen.model.sheets.iter().map(|s| s.added_mass).sum();
@@ -176,19 +159,12 @@ impl Plot<'_, '_> {
     /// Adds a series; `x` and `y` are whole paths of arrays.
     #[must_use]
     pub fn series(mut self, label: &str, x: &str, y: &str, style: Style) -> Self {
-        let style = match style {
-            Style::Line => "line",
-            Style::Dashed => "dashed",
-            Style::Points => "points",
-        };
-        if let Some(list) = self.plot["series"].as_array_mut() {
-            list.push(json!({"label": label, "x": x, "y": y, "style": style}));
-        }
+        self.plot.series.push(Series::new(label, x, y).drawn(style));
         self
     }
 
     /// Puts it into the artifact.
     pub fn done(self) {
-        self.output.plots.push(self.plot);
+        self.output.about.plots.push(self.plot);
     }
 }

@@ -6,7 +6,7 @@
 //! equal power; a law of normalised shear force gives `F = 2 F_norm(g) L cos((pi/2 - g)/2)`
 //! (numerics: dW/dg = F_norm cos g per undeformed area).
 
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::{Outcome, SAMPLES, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
@@ -16,6 +16,7 @@ use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;
@@ -343,7 +344,7 @@ fn write(
     host.result("force_peak", peak, "N")?;
     host.result("shear_min", test.extremes[0], "rad")?;
     host.result("shear_max", test.extremes[1], "rad")?;
-    out.attribute("side", p.side.into());
+    out.about.side = Some(p.side);
     out.finish(&p.common, specimen, outcome)
 }
 

@@ -17,13 +17,14 @@
 
 mod shape;
 
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use crate::strip::{self, CLAMPED, Grid, axis_of_family, check_family, fibre_strain, rows};
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::sheet::Pressed;
+use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;
@@ -352,8 +353,8 @@ fn write(
     let path = most(&p.path);
     host.result("curvature_error", test.curvature_error / path, "1")?;
     host.result("fibre_strain_largest", test.fibre_strain, "1")?;
-    out.attribute("family", p.family.into());
-    out.attribute("shear_angle", p.shear_angle.into());
-    out.attribute("rotations", test.rotates.into());
+    out.about.family = Some(p.family);
+    out.about.shear_angle = Some(p.shear_angle);
+    out.about.rotations = Some(test.rotates);
     out.finish(&p.common, specimen, outcome)
 }

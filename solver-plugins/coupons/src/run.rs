@@ -2,6 +2,7 @@
 
 use crate::specimen::{Common, Specimen};
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, judge};
+use plyflow_model::artifact::SpecimenBody;
 use plyflow_sdk::{Host, On, Progress, StepError};
 use std::time::Instant;
 
@@ -68,7 +69,7 @@ pub fn run(
         &specimen.mesh.points,
         4,
         &cells,
-        &serde_json::json!({"kind": "ply", "thickness": p.thickness()}),
+        &SpecimenBody::new(p.thickness()),
     )?;
     let end = test.duration();
     let started = Instant::now();

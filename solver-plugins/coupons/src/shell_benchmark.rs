@@ -4,7 +4,7 @@
 //!
 //! The numbers of the paper have no units; here they are SI (m, N, Pa).
 
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::specimen::{Common, Specimen};
 use plyflow_characterisation::csv::{self, Column};
 use plyflow_fixed::FixedBits;
@@ -13,6 +13,7 @@ use plyflow_mechanics::model::{Drive, Fixed, NodalLoad};
 use plyflow_mechanics::relax::{Tolerance, relax};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::{ElementCount, SpecimenBody, Style};
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, On, Progress, StepError};
 use serde::Deserialize;
@@ -326,7 +327,7 @@ fn load(
     specimen: &mut Specimen,
 ) -> Result<Vec<State>, StepError> {
     let cells: Vec<u32> = specimen.mesh.cells.iter().flatten().copied().collect();
-    let attributes = serde_json::json!({"kind": "ply", "thickness": p.common.thickness()});
+    let attributes = SpecimenBody::new(p.common.thickness());
     host.define_mesh("specimen", &specimen.mesh.points, 4, &cells, &attributes)?;
     let tolerance = Tolerance {
         balance: p.balance,
@@ -460,8 +461,8 @@ fn write(
     let work = specimen.model.element_count() as f64 * specimen.model.cycle as f64;
     let seconds = started.elapsed().as_secs_f64().max(1e-9);
     host.measured("element_cycle_rate", work / seconds, "1/s")?;
-    out.attribute("element", p.common.element.plugin.clone().into());
-    out.attribute("elements", serde_json::json!(p.elements));
+    out.about.element = Some(p.common.element.plugin.clone());
+    out.about.elements = Some(ElementCount::Along(p.elements.map(|n| n as u64)));
     out.attributes_only()
 }
 

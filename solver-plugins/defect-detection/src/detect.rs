@@ -1,11 +1,12 @@
 //! The criteria of thesis 5.2.2 on one ply.
 
+use plyflow_model::artifact::{self, PlyDefects};
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Surface, Topology, curvatures, nodal_distances};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 /// When a place counts as a defect.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Thresholds {
     /// Cells above this shear angle are flagged (rad).
     pub over_shear_positive: f64,
@@ -17,9 +18,24 @@ pub struct Thresholds {
     pub foot_margin: f64,
 }
 
+impl Thresholds {
+    /// For the artifact.
+    pub fn told(&self) -> artifact::Thresholds {
+        artifact::Thresholds {
+            over_shear_positive: Some(self.over_shear_positive),
+            over_shear_negative: Some(self.over_shear_negative),
+            distance_threshold: Some(self.distance_threshold),
+            foot_margin: Some(self.foot_margin),
+            other: serde_json::Map::new(),
+        }
+    }
+}
+
 /// A formed ply.
 #[derive(Debug, Clone, Copy)]
 pub struct Ply<'a> {
+    /// Its name.
+    pub name: &'a str,
     /// Its mesh of quads.
     pub topology: &'a Topology,
     /// `[nodes]` flat positions (m).
@@ -47,25 +63,8 @@ pub struct Detection {
     pub poor_conformity: Vec<bool>,
     /// `[cells]`: over-sheared, or with a node that does not conform.
     pub flag: Vec<bool>,
-    /// Summary.
-    pub summary: Summary,
-}
-
-/// The numbers of a ply.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Summary {
-    /// Undeformed area of flagged cells (m2).
-    pub flagged_area: f64,
-    /// Undeformed area of over-sheared cells (m2).
-    pub over_shear_area: f64,
-    /// Undeformed area of cells with a node that does not conform (m2).
-    pub poor_conformity_area: f64,
-    /// Smallest shear angle (rad).
-    pub shear_min: f64,
-    /// Largest shear angle (rad).
-    pub shear_max: f64,
-    /// Largest distance of a judged node (m); zero when none is judged.
-    pub distance_max: f64,
+    /// Its numbers; areas that are not draped are not known here.
+    pub summary: PlyDefects,
 }
 
 /// Judges a ply against the tool.
@@ -108,7 +107,8 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
             .fold(0.0, |sum, a| sum + a)
     };
     let judged = distances.iter().filter(|d| d.judged).map(|d| d.value);
-    let summary = Summary {
+    let summary = PlyDefects {
+        name: ply.name.to_owned(),
         flagged_area: area(&flag),
         over_shear_area: area(&over_shear),
         poor_conformity_area: area(&poor),
@@ -125,6 +125,8 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
             .reduce(f64::max)
             .unwrap_or(0.0),
         distance_max: judged.reduce(f64::max).unwrap_or(0.0),
+        undraped_area: None,
+        locked_area: None,
     };
     Detection {
         nodal_distance: distances.iter().map(|d| d.value).collect(),

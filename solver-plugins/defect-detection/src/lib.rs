@@ -5,31 +5,18 @@
 
 mod detect;
 
-pub use detect::{Detection, Ply, Summary, Thresholds, detect};
+pub use detect::{Detection, Ply, Thresholds, detect};
 
+use plyflow_model::artifact::{Defects, Forming, PlainBody, PlyDefects, Sheet};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::draped::{DRAPED, DrapedPart, Formed};
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Surface, Topology, of_run};
-use serde::Deserialize;
-use serde_json::{Value, json};
 
 /// The step.
 pub struct DefectDetection;
 
 export_step!(DefectDetection);
-
-#[derive(Deserialize)]
-struct Run {
-    sheets: Vec<Sheet>,
-}
-
-#[derive(Deserialize)]
-struct Sheet {
-    name: String,
-    kind: String,
-    offset: f64,
-}
 
 struct Judged {
     name: String,
@@ -42,10 +29,6 @@ struct Judged {
     found: Detection,
     /// `[cells]` whether a net reaches the cell; `None`: all are formed.
     draped: Option<Vec<bool>>,
-    /// Undeformed area that is not draped (m2).
-    undraped_area: f64,
-    /// What of that lies where the fabric locks, or behind (m2).
-    locked_area: f64,
 }
 
 impl Step for DefectDetection {
@@ -54,8 +37,8 @@ impl Step for DefectDetection {
     fn run(host: &Host) -> Result<(), StepError> {
         let thresholds: Thresholds = host.parameters()?;
         let input = host.input("formed")?;
-        let formed: Run = host.attributes(&input)?;
-        let plies: Vec<&Sheet> = formed.sheets.iter().filter(|s| s.kind == "ply").collect();
+        let formed: Forming = host.attributes(&input)?;
+        let plies: Vec<&Sheet> = formed.plies().collect();
         let meshes = host.meshes(&input)?;
         let Some(frame) = meshes.times.len().checked_sub(1) else {
             return Err(format!(
@@ -115,6 +98,7 @@ fn judge(
     let topology = Topology::new(part.flat.len(), 4, &part.cells);
     let missing = of_run::missing_below(host, input, &sheet.name)?.map(|m| part.at_nodes(m));
     let ply = Ply {
+        name: &sheet.name,
         missing: missing.as_deref(),
         topology: &topology,
         undeformed: &part.flat,
@@ -133,8 +117,6 @@ fn judge(
         shear_angle,
         found,
         draped: None,
-        undraped_area: 0.0,
-        locked_area: 0.0,
     };
     if let Some(part) = part.part {
         judged.spread(part);
@@ -155,15 +137,18 @@ impl Judged {
         f.over_shear = part.to_cells(&f.over_shear, false);
         f.flag = part.to_cells(&f.flag, false);
         let areas = Topology::new(nodes, 4, &self.cells).cell_areas(&self.undeformed);
+        let (mut undraped, mut locked) = (0.0, 0.0);
         for (c, area) in areas.iter().enumerate() {
             if !part.draped[c] {
-                self.undraped_area += area;
+                undraped += area;
                 if part.locked[c] {
-                    self.locked_area += area;
+                    locked += area;
                     f.flag[c] = true;
                 }
             }
         }
+        f.summary.undraped_area = Some(undraped);
+        f.summary.locked_area = Some(locked);
         self.draped = Some(part.draped);
     }
 }
@@ -197,7 +182,7 @@ fn write(
     thresholds: &Thresholds,
 ) -> Result<(), StepError> {
     for p in plies {
-        host.define_mesh(&p.name, &p.points, 4, &p.cells, &json!({}))?;
+        host.define_mesh(&p.name, &p.points, 4, &p.cells, &PlainBody {})?;
     }
     host.begin_frame(time)?;
     for p in plies {
@@ -247,23 +232,19 @@ fn write(
         )?;
     }
     host.end_frame()?;
-    let mut list = Vec::new();
-    for p in plies {
-        let mut entry = serde_json::to_value(p.found.summary)?;
-        entry["name"] = Value::from(p.name.as_str());
-        if p.draped.is_some() {
-            entry["undraped_area"] = Value::from(p.undraped_area);
-            entry["locked_area"] = Value::from(p.locked_area);
-        }
-        list.push(entry);
-    }
-    host.write_attributes(&json!({"thresholds": thresholds, "plies": list}))?;
-    let all = |get: fn(&Summary) -> f64| plies.iter().map(move |p| get(&p.found.summary));
+    host.write_attributes(&Defects {
+        thresholds: thresholds.told(),
+        plies: plies.iter().map(|p| p.found.summary.clone()).collect(),
+    })?;
+    let all = |get: fn(&PlyDefects) -> f64| plies.iter().map(move |p| get(&p.found.summary));
     host.result("flagged_area", all(|s| s.flagged_area).sum(), "m2")?;
     if plies.iter().any(|p| p.draped.is_some()) {
-        let sum = |of: fn(&Judged) -> f64| plies.iter().map(of).sum();
-        host.result("undraped_area", sum(|p| p.undraped_area), "m2")?;
-        host.result("locked_area", sum(|p| p.locked_area), "m2")?;
+        let sum = |of: fn(&PlyDefects) -> Option<f64>| {
+            let each = plies.iter().map(|p| of(&p.found.summary).unwrap_or(0.0));
+            each.sum()
+        };
+        host.result("undraped_area", sum(|s| s.undraped_area), "m2")?;
+        host.result("locked_area", sum(|s| s.locked_area), "m2")?;
     }
     host.result("over_shear_area", all(|s| s.over_shear_area).sum(), "m2")?;
     host.result(

@@ -84,8 +84,8 @@ fn formed(z: impl Fn(f64, f64) -> f64, shear: impl Fn(usize) -> f64) -> MemoryAr
     };
     MemoryArtifact {
         kind: "forming".into(),
-        attributes: json!({"sheets": [{"name": "film", "kind": "diaphragm", "offset": 0.00004},
-                                      {"name": "ply_1", "kind": "ply", "offset": OFFSET}]}),
+        attributes: json!({"sheets": [{"name": "film", "kind": "diaphragm", "thickness": 0.00008, "offset": 0.00004},
+                                      {"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": OFFSET}]}),
         times: vec![0.0, 1.0],
         bodies: vec![tool(), ply],
         ..Default::default()

@@ -14,10 +14,10 @@ mod slipping;
 mod symmetry;
 
 use agreement::Agreement;
-use compression::Compression;
 use output::Output;
-use plyflow_defects::of_run::{Sheet, neighbours};
+use plyflow_defects::of_run::neighbours;
 use plyflow_defects::{Defect, Limits, Ply, Settings, find_causes, measure};
+use plyflow_model::artifact::{Column, SectionOn, Sheet};
 use plyflow_sdk::{Host, Log, Progress, Step, StepError, export_step};
 use serde::Deserialize;
 use slipping::{Asked, Slipping};
@@ -51,16 +51,7 @@ struct Section {
     /// `[x, y]` (m) each, instead of both ends.
     path: Option<Vec<Vec<f64>>>,
     #[serde(default)]
-    on: Seen,
-}
-
-/// What the places of a section are told in.
-#[derive(Deserialize, Clone, Copy, Default, PartialEq)]
-#[serde(rename_all = "kebab-case")]
-enum Seen {
-    #[default]
-    FromAbove,
-    FlatPly,
+    on: SectionOn,
 }
 
 impl Section {
@@ -173,7 +164,7 @@ impl Step for DefectMeasurement {
         output.slipping = slipping;
         output.axis = asked.direction();
         output.bodies()?;
-        output.compression(Compression::of(&measured, p.compressed_below))?;
+        output.compression(compression::of(&measured, p.compressed_below))?;
         output.regions(region::Regions::of(&measured, &p.shear_regions)?)?;
         output.distances()?;
         for (section, path) in p.sections.iter().zip(&sections) {
@@ -186,6 +177,12 @@ impl Step for DefectMeasurement {
 
 fn everywhere(ply: &Ply, settings: &Settings) -> Vec<Defect> {
     measure(ply, &vec![true; ply.formed.len()], settings)
+}
+
+/// Columns of a table: label, SI unit.
+fn columns(of: &[(&str, &str)]) -> Vec<Column> {
+    let column = |(label, unit): &(&str, &str)| Column::new(*label, *unit);
+    of.iter().map(column).collect()
 }
 
 /// Names are parts of results' names, and what they name is told apart by them.

@@ -1,20 +1,21 @@
 //! The artifact: bodies with their fields, tables of defects, sections, distributions.
 
 use crate::agreement::{self, Agreement};
-use crate::compression::{self, Compression};
+use crate::compression;
 use crate::read::{Beside, Run};
 use crate::region::Regions;
 use crate::sections::{Section, Sheet};
 use crate::slipping::Slipping;
 use crate::symmetry::Crests;
-use crate::{Measured, Seen};
+use crate::{Measured, columns};
 use plyflow_defects::align::Alignment;
-use plyflow_defects::{Defect, Kind, RidgeShear};
+use plyflow_defects::{Cause, Defect, Kind};
+use plyflow_model::artifact::{
+    self, Axis, Cell, FibreCompression, Map, MeasuredBody, MeasuredDefect, Measurement, Panel,
+    Plot, ScanAgreement, ScanAlignment, ScanDefect, SectionOn, Series, Table,
+};
 use plyflow_sdk::{Host, Log, On, StepError};
 use plyflow_surface::{SHARP, bin_width, density, weighted_mean, weighted_quantiles};
-use serde::Deserialize;
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
 
 /// Columns of the table of defects: label, SI unit.
 const COLUMNS: [(&str, &str); 15] = [
@@ -59,22 +60,15 @@ const QUANTILES: [(&str, f64); 4] = [("q50", 0.5), ("q90", 0.9), ("q99", 0.99), 
 /// Fields of the strains along both families of fibres.
 const STRAINS: [&str; 2] = ["fibre_strain_1", "fibre_strain_2"];
 
-/// What is read of a measurement that this one is held against.
-#[derive(Deserialize)]
-struct Other {
-    /// As [`wrinkles`] has them.
-    uppermost: BTreeMap<String, f64>,
-}
-
 /// Writes what was measured.
 pub struct Output<'a> {
     host: &'a Host,
     run: &'a Run,
     measured: &'a [Measured],
     agreement: Option<&'a Agreement>,
-    plots: Vec<Value>,
-    sections: Vec<Value>,
-    compression: Option<Compression>,
+    plots: Vec<Plot>,
+    sections: Vec<artifact::Section>,
+    compression: Option<FibreCompression>,
     regions: Option<Regions>,
     /// Direction from which those of crests are told, from x (rad).
     pub axis: f64,
@@ -109,7 +103,10 @@ impl<'a> Output<'a> {
         let host = self.host;
         for m in self.measured {
             let (corners, cells) = m.ply.topology.connectivity();
-            let about = json!({"ply": m.ply.name, "simulated": m.simulated});
+            let about = MeasuredBody {
+                ply: m.ply.name.clone(),
+                simulated: m.simulated,
+            };
             host.define_mesh(&m.ply.name, &m.ply.undeformed, corners, cells, &about)?;
         }
         host.begin_frame(self.run.time)?;
@@ -178,27 +175,35 @@ impl<'a> Output<'a> {
                 "1/m",
                 &density(&values, &weights, width, count),
             )?;
-            series.push(json!({"label": p.name, "x": x, "y": y}));
+            series.push(Series {
+                label: p.name.clone(),
+                x,
+                y: y.into(),
+                style: None,
+            });
         }
-        self.plots.push(json!({
-            "name": "distance_density", "title": "Distance from the tool, by area",
-            "x": {"label": "distance", "unit": "mm"}, "y": {"label": "probability density", "unit": "1/mm"},
-            "series": series,
-        }));
+        self.plots.push(Plot {
+            name: "distance_density".into(),
+            title: Some("Distance from the tool, by area".into()),
+            note: None,
+            x: Axis::new("distance", "mm"),
+            y: Axis::new("probability density", "1/mm"),
+            series,
+        });
         Ok(())
     }
 
     /// Results of fibre compression, and by how much it has fallen from the measurement `against`. `None`: the run does not tell it.
-    pub fn compression(&mut self, found: Option<Compression>) -> Result<(), StepError> {
+    pub fn compression(&mut self, found: Option<FibreCompression>) -> Result<(), StepError> {
         let host = self.host;
         for input in host.inputs_of("against")? {
             match &found {
-                Some(found) => found.against(host, &input)?,
+                Some(found) => compression::against(host, found, &input)?,
                 None => return Err(compression::unknown(self.run.step())),
             }
         }
         if let Some(found) = &found {
-            found.report(host)?;
+            compression::report(host, found)?;
         }
         self.compression = found;
         Ok(())
@@ -216,7 +221,7 @@ impl<'a> Output<'a> {
         &mut self,
         label: &str,
         path: &[[f64; 2]],
-        on: Seen,
+        on: SectionOn,
         beside: &[Beside],
     ) -> Result<(), StepError> {
         let number = self.sections.len();
@@ -256,7 +261,7 @@ impl<'a> Output<'a> {
     }
 
     /// A row for each defect of the ply or the scan, those of both first; and the same for programs.
-    fn beside_each_other(&self, a: &Agreement) -> (Vec<Value>, Vec<Value>) {
+    fn beside_each_other(&self, a: &Agreement) -> (Vec<Vec<Cell>>, Vec<ScanDefect>) {
         let both = a.pairs.both.iter().map(|&(i, j)| (Some(i), Some(j)));
         let missed = a.pairs.missed.iter().map(|&j| (None, Some(j)));
         let wrong = a.pairs.wrong.iter().map(|&i| (Some(i), None));
@@ -280,23 +285,28 @@ impl<'a> Output<'a> {
             let (s1, s2) = (ours.map(area), theirs.map(area));
             let (l1, l2) = (ours.and_then(length), theirs.and_then(length));
             let (from_ply, from_scan) = (told(numbers[0], ours), told(numbers[1], theirs));
-            rows.push(json!([
-                one.kind.name(),
-                from_ply,
-                from_scan,
-                l1,
-                l2,
-                a1,
-                a2,
-                s1,
-                s2,
-                one.centre[0],
-                one.centre[1],
-            ]));
-            list.push(json!({
-                "type": one.kind.name(), "simulated": numbers[0], "scanned": numbers[1], "length": [l1, l2],
-                "amplitude": [a1, a2], "area": [s1, s2], "centre": one.centre,
-            }));
+            rows.push(vec![
+                one.kind.name().into(),
+                from_ply.into(),
+                from_scan.into(),
+                l1.into(),
+                l2.into(),
+                a1.into(),
+                a2.into(),
+                s1.into(),
+                s2.into(),
+                one.centre[0].into(),
+                one.centre[1].into(),
+            ]);
+            list.push(ScanDefect {
+                kind: one.kind,
+                simulated: numbers[0],
+                scanned: numbers[1],
+                length: [l1, l2],
+                amplitude: [a1, a2],
+                area: [s1, s2],
+                centre: one.centre,
+            });
         }
         (rows, list)
     }
@@ -319,7 +329,7 @@ impl<'a> Output<'a> {
                 host.result(&format!("uppermost_{what}"), value, unit)?;
             }
         }
-        let (mut rows, mut list) = (Vec::new(), Vec::new());
+        let (mut rows, mut defects) = (Vec::new(), Vec::new());
         for m in self.measured {
             let name = &m.ply.name;
             let area = of(m, Kind::Bridging).fold(0.0, |s, d| s + d.area);
@@ -332,54 +342,54 @@ impl<'a> Output<'a> {
             tell_sharpest(host, m);
             for (k, d) in m.defects.iter().enumerate() {
                 rows.push(row(name, k + 1, d));
-                list.push(entry(m, k + 1, d));
+                defects.push(entry(m, k + 1, d));
             }
         }
         if let Some(a) = alignment {
             host.result("scan_rms", a.rms, "m")?;
             host.result("scan_freedoms", a.decided as f64, "1")?;
         }
-        let columns = |of: &[(&str, &str)]| -> Vec<Value> {
-            let column = |(label, unit): &(&str, &str)| json!({"label": label, "unit": unit});
-            of.iter().map(column).collect()
-        };
-        let mut tables = vec![
-            json!({"name": "defects", "title": "Defects", "columns": columns(&COLUMNS), "rows": rows}),
-        ];
+        let mut tables = vec![table("defects", "Defects", &COLUMNS, rows)];
         let agreement = self.agreement.map(|a| {
-            let (rows, list) = self.beside_each_other(a);
+            let (rows, defects) = self.beside_each_other(a);
             let title = format!("{} and the scan", a.ply);
-            tables.push(json!({"name": "agreement", "title": title, "columns": columns(&BOTH), "rows": rows}));
-            json!({"ply": a.ply, "defects": list})
+            tables.push(table("agreement", &title, &BOTH, rows));
+            ScanAgreement {
+                ply: a.ply.clone(),
+                defects,
+            }
         });
-        tables.extend(self.compression.as_ref().map(Compression::table));
+        tables.extend(self.compression.as_ref().map(compression::table));
         tables.extend(self.regions.as_ref().and_then(Regions::table));
-        let uppermost: BTreeMap<&str, f64> = simulated()
+        let uppermost = simulated()
             .next_back()
             .iter()
             .flat_map(|m| wrinkles(m))
-            .map(|(what, _, value)| (what, value))
+            .map(|(what, _, value)| (what.to_owned(), value))
             .collect();
-        let slipping = self.slipping.as_ref();
+        let maps = self.maps();
+        let (slipping, mut plots) = (self.slipping.as_ref(), self.plots);
         tables.extend(slipping.iter().flat_map(|s| s.tables()));
-        let plots: Vec<Value> = self
-            .plots
-            .iter()
-            .cloned()
-            .chain(slipping.iter().flat_map(|s| s.plots()))
-            .collect();
-        host.write_attributes(&json!({
-            "defects": list, "sections": self.sections, "plots": plots, "maps": self.maps(),
-            "alignment": alignment.map(alignment_json), "agreement": agreement, "tables": tables,
-            "fibre_compression": self.compression, "uppermost": uppermost, "slip": slipping.map(Slipping::told),
-        }))
+        plots.extend(slipping.iter().flat_map(|s| s.plots()));
+        host.write_attributes(&Measurement {
+            defects,
+            sections: self.sections,
+            alignment: alignment.map(told_alignment),
+            agreement,
+            fibre_compression: self.compression,
+            uppermost,
+            slip: slipping.map(Slipping::told),
+            plots,
+            maps,
+            tables,
+        })
     }
 
     /// Results of how much longer and higher the wrinkles of the uppermost ply are than in the measurement `against`: shares of what that one has, none
     /// for what is 0 there. And whether one of both alone has wrinkles.
     fn changes(&self, now: &[(&'static str, &'static str, f64)]) -> Result<(), StepError> {
         for input in self.host.inputs_of("against")? {
-            let other: Other = self.host.attributes(&input)?;
+            let other: Measurement = self.host.attributes(&input)?;
             for (what, unit, value) in now {
                 let Some(before) = other.uppermost.get(*what).copied() else {
                     continue;
@@ -399,14 +409,14 @@ impl<'a> Output<'a> {
     }
 
     /// Maps of plies and scan.
-    fn maps(&self) -> Vec<Value> {
+    fn maps(&self) -> Vec<Map> {
         let simulated = || self.measured.iter().filter(|m| m.simulated);
         let scan = || self.measured.iter().filter(|m| !m.simulated);
-        let map = |(field, title, unit): (&str, &str, &str), of: Vec<&Measured>| {
-            let panels = of
-                .iter()
-                .map(|m| json!({"label": m.ply.name, "body": m.ply.name, "field": field}));
-            json!({"name": field, "title": title, "unit": unit, "panels": panels.collect::<Vec<_>>()})
+        let map = |(field, title, unit): (&str, &str, &str), of: Vec<&Measured>| Map {
+            name: field.to_owned(),
+            title: Some(title.to_owned()),
+            unit: unit.to_owned(),
+            panels: of.into_iter().map(|m| panel(m, field)).collect(),
         };
         let mut maps = vec![
             map(
@@ -501,42 +511,65 @@ fn tell_sharpest(host: &Host, m: &Measured) {
     host.log(if m.simulated { Log::Info } else { Log::Warn }, &text);
 }
 
-fn row(name: &str, number: usize, d: &Defect) -> Value {
-    let shear = |get: fn(&RidgeShear) -> f64| d.ridge_shear.as_ref().map(get);
-    json!([
-        number.to_string(),
-        name,
-        d.kind.name(),
-        d.cause,
-        length(d),
-        d.amplitude,
-        d.radius(),
-        sharpness(d),
-        d.area,
-        d.ridge_direction(),
-        d.centre[0],
-        d.centre[1],
-        shear(|s| s.mean),
-        shear(|s| s.min),
-        shear(|s| s.max)
-    ])
+fn panel(m: &Measured, field: &str) -> Panel {
+    Panel {
+        label: m.ply.name.clone(),
+        body: m.ply.name.clone(),
+        field: field.to_owned(),
+    }
 }
 
-fn entry(m: &Measured, number: usize, d: &Defect) -> Value {
+fn table(name: &str, title: &str, head: &[(&str, &str)], rows: Vec<Vec<Cell>>) -> Table {
+    Table {
+        name: name.to_owned(),
+        title: Some(title.to_owned()),
+        columns: columns(head),
+        rows,
+    }
+}
+
+/// As [`COLUMNS`].
+fn row(name: &str, number: usize, d: &Defect) -> Vec<Cell> {
     let shear = d.ridge_shear.as_ref();
-    json!({
-        "on": m.ply.name, "number": number, "type": d.kind.name(), "cause": d.cause, "length": length(d),
-        "amplitude": d.amplitude, "radius": d.radius(), "crest_sharpness": sharpness(d), "area": d.area, "direction": d.ridge_direction(),
-        "centre": d.centre, "shear": d.shear, "ridge_shear": shear.map(|s| s.mean), "ridge_shear_min": shear.map(|s| s.min),
-        "ridge_shear_max": shear.map(|s| s.max), "ridge_shear_profile": shear.map(|s| &s.profile), "ridge": d.ridge,
-    })
+    vec![
+        number.to_string().into(),
+        name.into(),
+        d.kind.name().into(),
+        d.cause.map(Cause::name).into(),
+        length(d).into(),
+        d.amplitude.into(),
+        d.radius().into(),
+        sharpness(d).into(),
+        d.area.into(),
+        d.ridge_direction().into(),
+        d.centre[0].into(),
+        d.centre[1].into(),
+        shear.map(|s| s.mean).into(),
+        shear.map(|s| s.min).into(),
+        shear.map(|s| s.max).into(),
+    ]
 }
 
-/// Turn as a quaternion (i, j, k, w), shift in m: of the scan as given.
-fn alignment_json(a: &Alignment) -> Value {
+fn entry(m: &Measured, number: usize, d: &Defect) -> MeasuredDefect {
+    MeasuredDefect {
+        on: m.ply.name.clone(),
+        number,
+        found: d.told(),
+        length: length(d),
+        crest_sharpness: sharpness(d),
+        shear: d.shear,
+        ridge: d.ridge.clone(),
+    }
+}
+
+/// As the attributes have it: of the scan as given.
+fn told_alignment(a: &Alignment) -> ScanAlignment {
     let (q, t) = (a.motion.rotation.coords, a.motion.translation.vector);
-    json!({
-        "quaternion": [q.x, q.y, q.z, q.w], "shift": [t.x, t.y, t.z], "rms": a.rms, "passes": a.passes,
-        "freedoms": a.decided,
-    })
+    ScanAlignment {
+        quaternion: [q.x, q.y, q.z, q.w],
+        shift: [t.x, t.y, t.z],
+        rms: a.rms,
+        passes: a.passes,
+        freedoms: a.decided,
+    }
 }

@@ -3,15 +3,13 @@
 use crate::output::SCAN;
 use crate::{Align, Parameters, sections};
 use plyflow_defects::align::{Alignment, MOST_PASSES, Settings, align_where};
-use plyflow_defects::of_run::Sheet;
 use plyflow_defects::{Ply, Tool, of_run, scan};
+use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_sdk::{Host, Input, Log, StepError};
 use plyflow_surface::draped;
 use plyflow_surface::of_run::Stack;
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Closest, Surface, Topology, triangles};
-use serde::Deserialize;
-use serde_json::Value;
 use std::path::Path;
 
 /// A formed run.
@@ -28,19 +26,11 @@ pub struct Run {
     outer: f64,
 }
 
-#[derive(Deserialize)]
-struct Formed {
-    sheets: Vec<Sheet>,
-    /// Of a run of a zone.
-    #[serde(default)]
-    zone: Value,
-}
-
 impl Run {
     /// Reads tool and list of plies of the input `formed`.
     pub fn read(host: &Host) -> Result<Self, StepError> {
         let input = host.input("formed")?;
-        let formed: Formed = host.attributes(&input)?;
+        let formed: Forming = host.attributes(&input)?;
         let meshes = host.meshes(&input)?;
         let frame = of_run::last_frame(&input, &meshes)?;
         let faces = formed.sheets.iter().map(|s| s.offset + 0.5 * s.thickness);
@@ -108,18 +98,18 @@ impl Beside {
     pub fn read(host: &Host) -> Result<Vec<Self>, StepError> {
         let mut all = Vec::new();
         for input in host.inputs_of("beside")? {
-            let formed: Formed = host.attributes(&input)?;
+            let formed: Forming = host.attributes(&input)?;
             let meshes = host.meshes(&input)?;
             let frame = of_run::last_frame(&input, &meshes)?;
             let items: String = input.item.iter().map(|i| format!("_{i}")).collect();
             let run = format!("{}{items}", input.step);
-            for sheet in formed.sheets.iter().filter(|s| s.is_ply()) {
+            for sheet in formed.plies() {
                 let body = meshes.body(&sheet.name)?;
                 let part = draped::Formed::read(host, &input, body, frame)?;
                 let ply = &sheet.name;
                 all.push(Self {
-                    label: match formed.zone["name"].as_str() {
-                        Some(zone) => format!("{ply}, zone {zone}"),
+                    label: match &formed.zone {
+                        Some(zone) => format!("{ply}, zone {}", zone.name),
                         None => format!("{ply} of {run}"),
                     },
                     name: format!("{run}/{ply}"),

@@ -1,11 +1,11 @@
 //! Shear in a place of the flat plies, outside of their wrinkles.
 
-use crate::{Measured, check_names};
+use crate::{Measured, check_names, columns};
 use plyflow_defects::Kind;
+use plyflow_model::artifact::{Cell, Table};
 use plyflow_sdk::{Host, StepError};
 use plyflow_surface::weighted_quantiles;
 use serde::Deserialize;
-use serde_json::{Value, json};
 
 /// Columns of the table: label, SI unit.
 const COLUMNS: [(&str, &str); 5] = [
@@ -110,17 +110,27 @@ impl Regions {
     }
 
     /// The table of the report; `None` when no region was asked for.
-    pub fn table(&self) -> Option<Value> {
-        let columns = COLUMNS.map(|(label, unit)| json!({"label": label, "unit": unit}));
-        let row = |name: &str, ply: &str, s: &Shear| {
-            json!([name, ply, s.largest, s.largest.map(|_| s.q99), s.wrinkled])
+    pub fn table(&self) -> Option<Table> {
+        let row = |name: &String, ply: &String, s: &Shear| -> Vec<Cell> {
+            let q99 = s.largest.map(|_| s.q99);
+            vec![
+                name.into(),
+                ply.into(),
+                s.largest.into(),
+                q99.into(),
+                s.wrinkled.into(),
+            ]
         };
-        let rows: Vec<Value> = self
-            .found
-            .iter()
+        let found = self.found.iter();
+        let rows: Vec<Vec<Cell>> = found
             .flat_map(|(name, plies)| plies.iter().map(move |(ply, s)| row(name, ply, s)))
             .collect();
-        (!rows.is_empty()).then(|| json!({"name": "region_shear", "title": "Shear outside of wrinkles", "columns": columns, "rows": rows}))
+        (!rows.is_empty()).then(|| Table {
+            name: "region_shear".into(),
+            title: Some("Shear outside of wrinkles".into()),
+            columns: columns(&COLUMNS),
+            rows,
+        })
     }
 }
 

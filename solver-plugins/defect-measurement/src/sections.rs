@@ -1,11 +1,10 @@
 //! Sections: where tool, plies and scan are cut along a path.
 
-use crate::Seen;
 use plyflow_defects::Ply;
+use plyflow_model::artifact::{self, Axis, Plot, SectionOn, Series};
 use plyflow_sdk::{Host, StepError};
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{SectionPoint, Surface, Topology, path_section, stations, triangles};
-use serde_json::{Value, json};
 
 /// A surface that a section may cut.
 pub struct Sheet<'a> {
@@ -49,7 +48,7 @@ pub struct Section<'a> {
     /// Its corners (x, y in m).
     pub path: &'a [[f64; 2]],
     /// What these are told in.
-    pub on: Seen,
+    pub on: SectionOn,
     /// Its place among all.
     pub number: usize,
 }
@@ -63,12 +62,12 @@ impl Section<'_> {
         host: &Host,
         tool: &Surface,
         sheets: &[Sheet<'_>],
-    ) -> Result<(Value, Value), StepError> {
+    ) -> Result<(artifact::Section, Plot), StepError> {
         let (label, path, number) = (self.label, self.path, self.number);
         let along = stations(path);
         // The path as seen from above, and what its corners are told by.
         let mut above = (path.to_vec(), along.clone());
-        if self.on == Seen::FlatPly {
+        if self.on == SectionOn::FlatPly {
             let lowest = sheets.iter().find_map(|s| Some((s, s.flat?)));
             let line = lowest.and_then(|(s, flat)| s.cut(flat, path, &along));
             let line = line.unwrap_or_default();
@@ -81,7 +80,7 @@ impl Section<'_> {
         let of_tool = path_section(points, points, facets, &above.0, &above.1);
         let mut lines = vec![("tool", "tool", of_tool.into_iter().next())];
         for sheet in sheets {
-            let line = match sheet.flat.filter(|_| self.on == Seen::FlatPly) {
+            let line = match sheet.flat.filter(|_| self.on == SectionOn::FlatPly) {
                 Some(flat) => sheet.cut(flat, path, &along),
                 None => sheet.cut(sheet.formed, &above.0, &above.1),
             };
@@ -102,19 +101,33 @@ impl Section<'_> {
             let heights: Vec<f64> = line.iter().map(|p| p.place[2]).collect();
             host.write_f64(&x, &[line.len()], "m", &stations)?;
             host.write_f64(&y, &[line.len()], "m", &heights)?;
-            series.push(json!({"label": label, "x": x, "y": y}));
+            series.push(Series {
+                label: (*label).to_owned(),
+                x,
+                y: y.into(),
+                style: None,
+            });
         }
-        let (seen, axis) = match self.on {
-            Seen::FromAbove => ("from-above", "along the section"),
-            Seen::FlatPly => ("flat-ply", "along the section in the flat ply"),
+        let axis = match self.on {
+            SectionOn::FromAbove => "along the section",
+            SectionOn::FlatPly => "along the section in the flat ply",
         };
-        let told = json!({
-            "label": label, "from": path[0], "to": path[path.len() - 1], "path": path, "on": seen, "lines": series,
-        });
-        let plot = json!({
-            "name": format!("section_{number}"), "title": format!("Section {label}"),
-            "x": {"label": axis, "unit": "mm"}, "y": {"label": "height", "unit": "mm"}, "series": told["lines"],
-        });
+        let plot = Plot {
+            name: format!("section_{number}"),
+            title: Some(format!("Section {label}")),
+            note: None,
+            x: Axis::new(axis, "mm"),
+            y: Axis::new("height", "mm"),
+            series: series.clone(),
+        };
+        let told = artifact::Section {
+            label: label.to_owned(),
+            from: path[0],
+            to: path[path.len() - 1],
+            path: path.to_vec(),
+            on: self.on,
+            lines: series,
+        };
         Ok((told, plot))
     }
 }

@@ -1,13 +1,15 @@
 //! Slip in the artifact: fields, sections, results.
 
 use crate::slip::{Course, Faces, Line, Slip, course, mirrored, size};
-use crate::{Measured, check_names};
+use crate::{Measured, check_names, columns};
 use plyflow_defects::Ply;
 use plyflow_fixed::FixedBits;
+use plyflow_model::artifact::{
+    Axis, Cell, Plot, PlySlip, Series, SlipCourse, SlipPair, SlipSection, Table,
+};
 use plyflow_sdk::{Host, Log, On, StepError};
 use plyflow_surface::weighted_mean;
 use serde::Deserialize;
-use serde_json::{Value, json};
 
 /// More stations on either side of a section's middle are not looked at.
 const STATIONS: f64 = 100_000.0;
@@ -15,6 +17,29 @@ const STATIONS: f64 = 100_000.0;
 const ONE_SIDED: f64 = 0.5;
 /// The parts of slip, as results, arrays and fields name them.
 const PARTS: [&str; 2] = ["along", "across"];
+
+/// Columns of the table of plies that lie on each other: label, SI unit.
+const PAIR_COLUMNS: [(&str, &str); 6] = [
+    ("ply", ""),
+    ("over", ""),
+    ("largest slip", "m"),
+    ("mean", "m"),
+    ("largest along", "m"),
+    ("largest across", "m"),
+];
+
+/// Columns of the table of sections: label, SI unit.
+const SECTION_COLUMNS: [(&str, &str); 9] = [
+    ("section", ""),
+    ("ply", ""),
+    ("over", ""),
+    ("part", ""),
+    ("largest", "m"),
+    ("mean", "m"),
+    ("symmetric part (rms)", "m"),
+    ("antisymmetric part (rms)", "m"),
+    ("share of the antisymmetric", "1"),
+];
 
 /// What the manifest has of slip.
 #[derive(Deserialize)]
@@ -55,7 +80,7 @@ pub struct Slipping {
     /// By ply, from the tool upwards; empty of one that lies on none.
     fields: Vec<(String, Field)>,
     names: Vec<String>,
-    pairs: Vec<Value>,
+    pairs: Vec<SlipPair>,
     cuts: Vec<Cut>,
     sections: Vec<String>,
 }
@@ -206,10 +231,16 @@ impl Slipping {
         ] {
             host.result(&format!("{name}.{lower}.{upper}"), value, "m")?;
         }
-        self.pairs.push(json!({
-            "lower": lower, "upper": upper, "area": weights.iter().sum::<f64>(), "max": max, "mean": mean,
-            "along_max": largest[0], "across_max": largest[1],
-        }));
+        let [along_max, across_max] = largest;
+        self.pairs.push(SlipPair {
+            lower,
+            upper,
+            area: weights.iter().sum(),
+            max,
+            mean,
+            along_max,
+            across_max,
+        });
         Ok(())
     }
 
@@ -317,22 +348,30 @@ impl Slipping {
     }
 
     /// A plot for each pair and part, with a line for each section.
-    pub fn plots(&self) -> Vec<Value> {
+    pub fn plots(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
         for pair in &self.pairs {
-            let [lower, upper] = ["lower", "upper"].map(|n| pair[n].as_str().unwrap_or_default());
+            let (lower, upper) = (&pair.lower, &pair.upper);
             for part in PARTS {
-                let of_pair = self.cuts.iter().filter(|c| c.pair == [lower, upper]);
-                let series: Vec<Value> = of_pair
-                    .map(|c| json!({"label": self.sections[c.section], "x": self.path(c, "station"), "y": self.path(c, part)}))
-                    .collect();
+                let of_pair = |c: &&Cut| c.pair.each_ref() == [lower, upper];
+                let line = |c: &Cut| Series {
+                    label: self.sections[c.section].clone(),
+                    x: self.path(c, "station"),
+                    y: self.path(c, part).into(),
+                    style: None,
+                };
+                let series: Vec<Series> = self.cuts.iter().filter(of_pair).map(line).collect();
                 if !series.is_empty() {
-                    plots.push(json!({
-                        "name": format!("slip_{part}_{lower}_{upper}"),
-                        "title": format!("Slip of {upper} over {lower}, {}", self.in_words(part)),
-                        "x": {"label": "along the section in the flat ply, from its middle", "unit": "mm"}, "y": {"label": "slip", "unit": "mm"},
-                        "series": series,
-                    }));
+                    let axis = "along the section in the flat ply, from its middle";
+                    let title = format!("Slip of {upper} over {lower}, {}", self.in_words(part));
+                    plots.push(Plot {
+                        name: format!("slip_{part}_{lower}_{upper}"),
+                        title: Some(title),
+                        note: None,
+                        x: Axis::new(axis, "mm"),
+                        y: Axis::new("slip", "mm"),
+                        series,
+                    });
                 }
             }
         }
@@ -347,88 +386,77 @@ impl Slipping {
         })
     }
 
-    /// For programs.
-    pub fn told(&self) -> Value {
-        let course = |c: &Course| {
-            let parity = c.parity.as_ref();
-            json!({
-                "max": c.max, "mean": c.mean, "symmetric": parity.map(|p| p.symmetric),
-                "antisymmetric": parity.map(|p| p.antisymmetric), "asymmetry": parity.and_then(|p| p.asymmetry()),
-            })
-        };
+    /// As the attributes have it.
+    pub fn told(&self) -> PlySlip {
         let cut = |c: &Cut| {
-            json!({
-                "name": self.sections[c.section], "lower": c.pair[0], "upper": c.pair[1],
-                "along": course(&c.courses[0]), "across": course(&c.courses[1]),
-            })
+            let [lower, upper] = c.pair.clone();
+            let [along, across] = c.courses.map(told);
+            SlipSection {
+                name: self.sections[c.section].clone(),
+                lower,
+                upper,
+                along,
+                across,
+            }
         };
-        let cuts: Vec<Value> = self.cuts.iter().map(cut).collect();
-        json!({"direction": self.direction, "plies": self.names, "pairs": self.pairs, "sections": cuts})
+        PlySlip {
+            direction: self.direction,
+            plies: self.names.clone(),
+            pairs: self.pairs.clone(),
+            sections: self.cuts.iter().map(cut).collect(),
+        }
     }
 
     /// Tables of the report.
-    pub fn tables(&self) -> Vec<Value> {
-        let columns = |of: &[(&str, &str)]| -> Vec<Value> {
-            of.iter()
-                .map(|(label, unit)| json!({"label": label, "unit": unit}))
-                .collect()
+    pub fn tables(&self) -> Vec<Table> {
+        let row = |p: &SlipPair| -> Vec<Cell> {
+            let numbers = [p.max, p.mean, p.along_max, p.across_max];
+            let names = [&p.upper, &p.lower].map(Cell::from);
+            names.into_iter().chain(numbers.map(Cell::from)).collect()
         };
-        let row = |p: &Value| {
-            json!([
-                p["upper"],
-                p["lower"],
-                p["max"],
-                p["mean"],
-                p["along_max"],
-                p["across_max"]
-            ])
-        };
-        let pairs = columns(&[
-            ("ply", ""),
-            ("over", ""),
-            ("largest slip", "m"),
-            ("mean", "m"),
-            ("largest along", "m"),
-            ("largest across", "m"),
-        ]);
-        let rows: Vec<Value> = self.pairs.iter().map(row).collect();
         let title = format!("Slip between plies, {}", self.in_words("along and across"));
-        let mut tables =
-            vec![json!({"name": "slip", "title": title, "columns": pairs, "rows": rows})];
+        let mut tables = vec![Table {
+            name: "slip".into(),
+            title: Some(title),
+            columns: columns(&PAIR_COLUMNS),
+            rows: self.pairs.iter().map(row).collect(),
+        }];
         if !self.cuts.is_empty() {
-            let row = |c: &Cut, p: usize| {
-                let course = &c.courses[p];
-                let parity = course.parity.as_ref();
-                json!([
-                    self.sections[c.section],
-                    c.pair[1],
-                    c.pair[0],
-                    PARTS[p],
-                    course.max,
-                    course.mean,
-                    parity.map(|p| p.symmetric),
-                    parity.map(|p| p.antisymmetric),
-                    parity.and_then(|p| p.asymmetry()),
-                ])
+            let row = |c: &Cut, p: usize| -> Vec<Cell> {
+                let course = told(c.courses[p]);
+                let [lower, upper] = &c.pair;
+                vec![
+                    (&self.sections[c.section]).into(),
+                    upper.into(),
+                    lower.into(),
+                    PARTS[p].into(),
+                    course.max.into(),
+                    course.mean.into(),
+                    course.symmetric.into(),
+                    course.antisymmetric.into(),
+                    course.asymmetry.into(),
+                ]
             };
-            let rows: Vec<Value> = self
-                .cuts
-                .iter()
-                .flat_map(|c| [row(c, 0), row(c, 1)])
-                .collect();
-            let head = columns(&[
-                ("section", ""),
-                ("ply", ""),
-                ("over", ""),
-                ("part", ""),
-                ("largest", "m"),
-                ("mean", "m"),
-                ("symmetric part (rms)", "m"),
-                ("antisymmetric part (rms)", "m"),
-                ("share of the antisymmetric", "1"),
-            ]);
-            tables.push(json!({"name": "slip_sections", "title": "Slip along sections", "columns": head, "rows": rows}));
+            let both = |c: &Cut| [row(c, 0), row(c, 1)];
+            tables.push(Table {
+                name: "slip_sections".into(),
+                title: Some("Slip along sections".into()),
+                columns: columns(&SECTION_COLUMNS),
+                rows: self.cuts.iter().flat_map(both).collect(),
+            });
         }
         tables
+    }
+}
+
+/// As the attributes have it.
+fn told(course: Course) -> SlipCourse {
+    let parity = course.parity;
+    SlipCourse {
+        max: course.max,
+        mean: course.mean,
+        symmetric: parity.map(|p| p.symmetric),
+        antisymmetric: parity.map(|p| p.antisymmetric),
+        asymmetry: parity.and_then(|p| p.asymmetry()),
     }
 }

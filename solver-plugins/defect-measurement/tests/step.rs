@@ -121,7 +121,7 @@ fn sections_show_runs_beside_as_far_as_they_meet_them() {
     let whole = formed();
     // Of a zone, 1 mm higher; and a run whose plies lie elsewhere.
     let mut zone = formed();
-    zone.attributes["zone"] = json!({"name": "B"});
+    zone.attributes["zone"] = json!({"name": "B", "box": [-0.08, -0.05, 0.08, 0.05], "free_sides": [false, false, false, false]});
     let mut elsewhere = formed();
     for (run, shift) in [(&mut zone, [0.0, 0.001]), (&mut elsewhere, [0.5, 0.0])] {
         for p in run.bodies[1..].iter_mut().flat_map(|b| &mut b.frames[0]) {

@@ -1,29 +1,12 @@
 //! What a wrinkle most likely comes from, by what the fields say about its place.
 
-use crate::measure::{Defect, Kind, Ply, mean_along};
+use crate::measure::{Defect, Ply, mean_along};
 use plyflow_fixed::FixedBits;
+use plyflow_model::artifact::{Cause, DefectKind as Kind};
 use plyflow_surface::flat_bounds;
 use plyflow_surface::vector::distance;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::f64::consts::FRAC_PI_2;
-
-/// Likely causes, in the order in which they are looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Cause {
-    /// The fabric is sheared beyond its limits along the crest (thesis 5.2.2).
-    OverShear,
-    /// Little shear, but the ply bridges close by: what it lacks there it has too much of here (thesis 5.5: AW2, BW2).
-    Bridging,
-    /// Little shear and no bridging; a ply with other fibre directions lies on or under it, and fibres are compressed on the crest
-    /// (thesis chapter 6).
-    InterPlyCompression,
-    /// None of these, but fibres are compressed on the crest, of whichever family they are more: the ply has been pushed together along
-    /// its yarns (thesis 4.4.3: where positive shear meets negative).
-    FibreCompression,
-    /// None of these.
-    Undetermined,
-}
 
 /// When a cause is taken for likely.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

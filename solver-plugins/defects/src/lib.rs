@@ -16,6 +16,7 @@ pub mod pairs;
 mod points;
 pub mod scan;
 
-pub use cause::{Cause, Limits, Neighbour, find_causes, relative_angle};
+pub use cause::{Limits, Neighbour, find_causes, relative_angle};
 pub use fields::{FieldErrors, QUANTILES, distance_at};
-pub use measure::{Defect, Kind, Ply, RidgeShear, Settings, Tool, measure, quantiles};
+pub use measure::{Defect, Ply, RidgeShear, Settings, Tool, measure, quantiles};
+pub use plyflow_model::artifact::{Cause, DefectKind as Kind};

@@ -1,9 +1,9 @@
 //! Wrinkles and bridging of one formed ply.
 
 use crate::area::{Extent, NONE, extents, sample};
-use crate::cause::Cause;
 use crate::crests::crests;
 use plyflow_fixed::FixedBits;
+use plyflow_model::artifact::{self, Cause, DefectKind as Kind};
 use plyflow_surface::vector::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{
     Crests, Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances,
@@ -157,25 +157,6 @@ fn as_crest(seen: &Curvature) -> Curvature {
     }
 }
 
-/// Kinds of defect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
-    /// A crest, curved beyond the threshold, that stands off the tool, with its flanks.
-    Wrinkle,
-    /// Standing off the tool without such a crest.
-    Bridging,
-}
-
-impl Kind {
-    /// Its name in artifacts.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Wrinkle => "wrinkle",
-            Self::Bridging => "bridging",
-        }
-    }
-}
-
 /// The shear angle along the crest of a wrinkle, at the nodes along it (rad).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RidgeShear {
@@ -232,6 +213,24 @@ impl Defect {
     /// [`Self::direction`] of what has a ridge (rad).
     pub fn ridge_direction(&self) -> Option<f64> {
         (self.kind == Kind::Wrinkle).then_some(self.direction)
+    }
+
+    /// As the attributes of artifacts tell it.
+    pub fn told(&self) -> artifact::Defect {
+        let shear = self.ridge_shear.as_ref();
+        artifact::Defect {
+            kind: self.kind,
+            cause: self.cause,
+            amplitude: self.amplitude,
+            area: self.area,
+            centre: self.centre,
+            radius: self.radius(),
+            direction: self.ridge_direction(),
+            ridge_shear: shear.map(|s| s.mean),
+            ridge_shear_min: shear.map(|s| s.min),
+            ridge_shear_max: shear.map(|s| s.max),
+            ridge_shear_profile: shear.map(|s| s.profile.clone()),
+        }
     }
 }
 

@@ -1,39 +1,10 @@
 //! Tool and plies of a formed run: the same for every step that measures defects.
 
 use crate::{Neighbour, Ply, Tool};
+pub use plyflow_model::artifact::Sheet;
 use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::draped::Formed;
 use plyflow_surface::{Topology, of_run};
-use serde::Deserialize;
-
-/// A sheet of the stack, as a run's attribute `sheets` has it.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Sheet {
-    /// Its name, that of its body too.
-    pub name: String,
-    kind: String,
-    /// Of its mid-surface from the tool where everything lies on it (m).
-    pub offset: f64,
-    /// (m).
-    #[serde(default)]
-    pub thickness: f64,
-    /// Direction of the first fibres in the flat ply, from x (rad).
-    pub fibre_1: Option<f64>,
-    /// Of the second (rad).
-    pub fibre_2: Option<f64>,
-}
-
-impl Sheet {
-    /// Whether it is a ply of the preform.
-    pub fn is_ply(&self) -> bool {
-        self.kind == "ply"
-    }
-
-    /// Directions of both fibre families in the flat ply (rad).
-    pub fn fibres(&self) -> Option<[f64; 2]> {
-        Some([self.fibre_1?, self.fibre_2?])
-    }
-}
 
 /// The plies next to the one at place `k` of which the run tells the fibre directions, as [`crate::find_causes`] asks for them. `plies`: as many
 /// as `sheets`, in the order of the stack.

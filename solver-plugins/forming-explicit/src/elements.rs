@@ -8,11 +8,8 @@ use plyflow_mechanics::mesh::{Patch, QuadMesh};
 use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, part_patches, reflect};
 use plyflow_mechanics::sheet::Elsewhere;
 use plyflow_mechanics::vec3::V;
-use serde_json::Value;
+use plyflow_model::artifact::Rectangle;
 use std::sync::Arc;
-
-/// A zone's box in the undeformed plane: x0, y0, x1, y1 (m).
-pub type Rectangle = [f64; 4];
 
 /// Makes the element of a sheet with its material.
 ///
@@ -84,20 +81,6 @@ fn of_material(
     };
     unsafe { ElementInstance::create(&found, &parameters, material, &what) }
         .map_err(|e| e.to_string())
-}
-
-/// The boxes of the zones of an artifact (`from`: its step), from its attributes.
-///
-/// # Errors
-/// When they are not those of zones.
-pub fn boxes(attributes: &Value, from: &str) -> Result<Vec<Rectangle>, String> {
-    let zones = attributes["zones"].as_array();
-    let zones = zones.ok_or_else(|| format!("'{from}' holds no list of zones"))?;
-    let of = |zone: &Value| {
-        serde_json::from_value(zone["box"].clone())
-            .map_err(|e| format!("the box of zone {} of '{from}': {e}", zone["name"]))
-    };
-    zones.iter().map(of).collect()
 }
 
 /// A box holds what is nearer to it than this (m): whether a centre that lies on its side counts must not hang on rounding.
@@ -197,7 +180,6 @@ pub fn patches(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn a_place_counts_as_in_a_zone_with_its_mirror_images() {
@@ -207,16 +189,5 @@ mod tests {
         assert!(!is(0.02, 0.019, [false; 2]) && !is(0.085, 0.005, [false; 2]));
         assert!(is(0.085, 0.005, [true, false]) && !is(0.085, 0.005, [false, true]));
         assert!(!is_in(&[], [0.0; 3], Planes::default()));
-    }
-
-    #[test]
-    fn boxes_are_those_of_the_artifact_and_others_are_refused() {
-        let zone = |b: Value| json!({"zones": [{"name": "A", "box": b}]});
-        let read = boxes(&zone(json!([0.0, 0.1, 0.2, 0.3])), "zones");
-        assert_eq!(read, Ok(vec![[0.0, 0.1, 0.2, 0.3]]));
-        assert_eq!(boxes(&json!({"zones": []}), "zones"), Ok(Vec::new()));
-        let text = boxes(&zone(json!([0.0, 0.1])), "zones").unwrap_err();
-        assert!(text.contains("zone \"A\" of 'zones'"), "{text}");
-        assert!(boxes(&json!({}), "coarse").is_err());
     }
 }

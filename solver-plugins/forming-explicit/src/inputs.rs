@@ -1,14 +1,13 @@
 //! What the step is given by others: an element size, zones, the boundary of a zone.
 
-use crate::elements::{self, Rectangle};
 use crate::late::Start;
 use crate::local::{LocalInput, LocalSheet};
 use crate::parameters::Parameters;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::{Boundary, MeshStudy, Rectangle, Zones};
 use plyflow_model::material::MaterialEntry;
 use plyflow_model::scene::{Scene, SheetKind};
 use plyflow_sdk::{Host, Input, Log, StepError};
-use serde_json::Value;
 
 /// The element size (m) that a mesh study advises, if there is one.
 pub fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
@@ -22,8 +21,11 @@ pub fn advised_size(host: &Host) -> Result<Option<f64>, StepError> {
                 .into(),
         );
     }
-    let attributes: Value = host.attributes(study)?;
-    match attributes["advised_element_size"].as_f64() {
+    let MeshStudy {
+        advised_element_size,
+        ..
+    } = host.attributes(study)?;
+    match advised_element_size {
         Some(size) if size > 0.0 => Ok(Some(size)),
         _ => Err(format!("'{}' advises no element size", study.step).into()),
     }
@@ -62,8 +64,8 @@ pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, Step
     }
     let mut all = Vec::new();
     for input in &inputs {
-        let attributes: Value = host.attributes(input)?;
-        all.extend(elements::boxes(&attributes, &input.step)?);
+        let Zones { zones, .. } = host.attributes(input)?;
+        all.extend(zones.iter().map(|z| z.bounds));
     }
     if all.is_empty() {
         let text = format!("'{}' holds no zone: no ply bends", steps.join(", "));
@@ -73,8 +75,8 @@ pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, Step
 }
 
 pub fn read_boundary(host: &Host, input: &Input, scene: &Scene) -> Result<LocalInput, StepError> {
-    let attributes: Value = host.attributes(input)?;
-    fits(scene, &attributes, &input.step)?;
+    let boundary: Boundary = host.attributes(input)?;
+    fits(scene, &boundary, &input.step)?;
     let series = |name: &str| host.array_f64(input, name).map(|(v, _)| v);
     let (time, sheets) = read_motion(host, input)?;
     Ok(LocalInput {
@@ -83,30 +85,28 @@ pub fn read_boundary(host: &Host, input: &Input, scene: &Scene) -> Result<LocalI
         frame: series("frame_height")?,
         time,
         sheets,
-        zone: attributes["zone"].clone(),
-        element_size: attributes["element_size"].as_f64().unwrap_or(0.0),
+        zone: boundary.zone,
+        element_size: boundary.element_size,
     })
 }
 
 /// Whether a boundary is of this scene: its name, and what the run that it was made of told of its sheets.
-fn fits(scene: &Scene, boundary: &Value, step: &str) -> Result<(), String> {
+fn fits(scene: &Scene, boundary: &Boundary, step: &str) -> Result<(), String> {
     let differs = |what: &str, there: &str, here: &str| {
         Err(format!(
             "scene: {what} is {here}, and {there} in the run that '{step}' was made of; expected the same scene for a zone as for the whole"
         ))
     };
-    if let Some(there) = boundary["scene"].as_str().filter(|n| *n != scene.name) {
+    if let Some(there) = boundary.scene.as_ref().filter(|n| **n != scene.name) {
         return differs(
             "its name",
             &format!("'{there}'"),
             &format!("'{}'", scene.name),
         );
     }
-    for told in boundary["sheets"].as_array().into_iter().flatten() {
-        let Some(name) = told["name"].as_str() else {
-            continue;
-        };
-        let Some(sheet) = scene.sheets.iter().find(|s| s.name == name) else {
+    for told in &boundary.sheets {
+        let name = &told.name;
+        let Some(sheet) = scene.sheets.iter().find(|s| s.name == *name) else {
             return differs(&format!("sheet '{name}'"), "there", "not there");
         };
         let thickness = match &sheet.material {
@@ -114,23 +114,16 @@ fn fits(scene: &Scene, boundary: &Value, step: &str) -> Result<(), String> {
             _ => None,
         };
         let fibres = (sheet.kind == SheetKind::Ply).then_some(());
-        let here = [
-            ("thickness", "mm", 1e3, thickness),
-            (
-                "fibre_1",
-                "deg",
-                1f64.to_degrees(),
-                fibres.map(|()| sheet.fibre_1.si()),
-            ),
-            (
-                "fibre_2",
-                "deg",
-                1f64.to_degrees(),
-                fibres.and(sheet.fibre_2.map(|a| a.si())),
-            ),
+        let degree = 1f64.to_degrees();
+        let fibre_1 = fibres.map(|()| sheet.fibre_1.si());
+        let fibre_2 = fibres.and(sheet.fibre_2.map(|a| a.si()));
+        let held = [
+            ("thickness", "mm", 1e3, Some(told.thickness), thickness),
+            ("fibre_1", "deg", degree, told.fibre_1, fibre_1),
+            ("fibre_2", "deg", degree, told.fibre_2, fibre_2),
         ];
-        for (what, unit, factor, here) in here {
-            if let (Some(there), Some(here)) = (told[what].as_f64(), here)
+        for (what, unit, factor, there, here) in held {
+            if let (Some(there), Some(here)) = (there, here)
                 && (there - here).abs() > 1e-6 * here.abs().max(1e-6)
             {
                 let text = |v: f64| format!("{:.4} {unit}", factor * v);

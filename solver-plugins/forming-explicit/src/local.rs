@@ -14,6 +14,7 @@ use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::model::{Drive, Hold, Model};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
+use plyflow_model::artifact::Zone;
 use plyflow_model::scene::{Process, Scene, SheetKind};
 use plyflow_tooling::RigidTool;
 
@@ -58,7 +59,7 @@ pub struct LocalInput {
     /// Frame height (m).
     pub frame: Vec<f64>,
     /// The zone, as its artifact describes it.
-    pub zone: serde_json::Value,
+    pub zone: Zone,
     /// Element size (m).
     pub element_size: f64,
 }

@@ -17,10 +17,11 @@ use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::component::element_fields;
 use plyflow_mechanics::contact::ContactEnergy;
 use plyflow_mechanics::energy::SheetEnergy;
+use plyflow_model::artifact::{self, MeshQuality, RigidBody, SheetBody};
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::{Host, Log, Progress, StepError};
 use plyflow_tooling::FieldError;
-use serde_json::json;
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 struct HostComponents<'a>(&'a Host);
@@ -85,7 +86,7 @@ fn tell_bending(host: &Host, forming: &Forming, p: &Parameters) -> Result<(), St
 
 /// Tells the meshes of the tool and of a press's parts.
 fn define_rigid(host: &Host, forming: &Forming) -> Result<(), StepError> {
-    let about = json!({"rigid": true});
+    let about = RigidBody::ATTRIBUTES;
     let tool = &forming.tool;
     let triangles: Vec<u32> = tool.triangles.iter().flatten().copied().collect();
     host.define_mesh("tool", &tool.points, 3, &triangles, &about)?;
@@ -175,9 +176,11 @@ fn form(host: &Host, p: &Parameters) -> Result<(), StepError> {
 fn define(host: &Host, forming: &Forming, body: &Body) -> Result<(), StepError> {
     let cells: Vec<u32> = body.cells.iter().flatten().copied().collect();
     let sheet = &forming.stack[body.sheet];
-    let attributes = json!({
-        "kind": sheet.scene.kind, "thickness": sheet.thickness, "offset": sheet.offset,
-    });
+    let attributes = SheetBody {
+        kind: sheet.scene.kind,
+        thickness: sheet.thickness,
+        offset: sheet.offset,
+    };
     host.define_mesh(
         &body.name,
         &forming.reference_points(body),
@@ -262,62 +265,52 @@ fn write_energies(host: &Host, forming: &Forming, outcome: &Outcome) -> Result<(
     Ok(())
 }
 
-fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<serde_json::Value> {
+fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<artifact::Sheet> {
     let sheets = forming.bodies.iter().zip(&forming.stack);
     sheets
         .map(|(body, s)| {
-            let film = s.scene.kind == SheetKind::Diaphragm;
-            let choice = if film {
-                &p.diaphragm_element
-            } else {
-                &p.element
+            let choice = match s.scene.kind {
+                SheetKind::Diaphragm => &p.diaphragm_element,
+                SheetKind::Ply => &p.element,
             };
-            let mut value = json!({
-                "name": body.name,
-                "kind": s.scene.kind,
-                "material": s.material.name,
-                "thickness": s.thickness,
-                "offset": s.offset,
-                "areal_mass": s.material.areal_mass.si(),
-                "added_mass": forming.copies() * forming.model.sheets[body.sheet].added_mass,
-                "element": choice.plugin,
-            });
+            let added = forming.copies() * forming.model.sheets[body.sheet].added_mass;
+            let mut sheet = artifact::Sheet {
+                material: Some(s.material.name.clone()),
+                areal_mass: Some(s.material.areal_mass.si()),
+                added_mass: Some(added),
+                element: Some(choice.plugin.clone()),
+                regions: crate::regions::attributes(&s.scene),
+                mesh_quality: body.quality.as_ref().map(mesh_quality),
+                ..artifact::Sheet::new(&body.name, s.scene.kind, s.thickness, s.offset)
+            };
             if let Some([cells, _]) = forming.model.bending_cells(body.sheet) {
-                value["element_elsewhere"] = json!(p.element_elsewhere.as_ref().map(|e| &e.plugin));
-                value["bending_elements"] = json!(forming.model.planes().copies() * cells);
+                let elsewhere = p.element_elsewhere.as_ref();
+                sheet.element_elsewhere = elsewhere.map(|e| e.plugin.clone());
+                sheet.bending_elements = Some(forming.model.planes().copies() * cells);
             }
             if let Ok(blank) = crate::assembly::blank(s) {
-                value["fibre_1"] = s.scene.fibre_1.si().into();
-                value["fibre_2"] = s
-                    .scene
-                    .fibre_2
-                    .map_or(s.scene.fibre_1.si() + std::f64::consts::FRAC_PI_2, |a| {
-                        a.si()
-                    })
-                    .into();
-                value["outline"] = json!(blank.outline());
-                if !blank.holes().is_empty() {
-                    value["holes"] = json!(blank.holes());
-                }
+                let first = s.scene.fibre_1.si();
+                let across = first + std::f64::consts::FRAC_PI_2;
+                sheet.fibre_1 = Some(first);
+                sheet.fibre_2 = Some(s.scene.fibre_2.map_or(across, |a| a.si()));
+                sheet.outline = Some(blank.outline().to_vec());
+                sheet.holes = blank.holes().to_vec();
             }
-            let regions = crate::regions::attributes(&s.scene);
-            if !regions.is_empty() {
-                value["regions"] = regions.into();
-            }
-            if let Some(q) = &body.quality {
-                value["mesh_quality"] = json!({
-                    "least_scaled_jacobian": q.least_scaled_jacobian,
-                    "least_angle": q.least_angle,
-                    "largest_angle": q.largest_angle,
-                    "edge_ratio": q.edge_ratio,
-                    "least_edge": q.least_edge,
-                    "area_error": q.area_error,
-                    "worst_at": q.worst_at,
-                });
-            }
-            value
+            sheet
         })
         .collect()
+}
+
+fn mesh_quality(q: &plyflow_blank::Quality) -> MeshQuality {
+    MeshQuality {
+        least_scaled_jacobian: q.least_scaled_jacobian,
+        least_angle: q.least_angle,
+        largest_angle: q.largest_angle,
+        edge_ratio: q.edge_ratio,
+        least_edge: q.least_edge,
+        area_error: q.area_error,
+        worst_at: q.worst_at,
+    }
 }
 
 /// What is poor about the meshes of outlined plies.
@@ -392,26 +385,34 @@ fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<St
 fn penetration_attributes(
     now: &[Penetration],
     peaks: &[PenetrationPeak],
-) -> serde_json::Map<String, serde_json::Value> {
+) -> BTreeMap<String, artifact::Penetration> {
     (now.iter().zip(peaks))
         .map(|(p, peak)| {
-            let of = json!({
-                "max": p.largest, "q999": p.q999, "overlap": p.overlap(), "place": p.place,
-                "peak": {
-                    "max": peak.largest, "max_time": peak.largest_time, "place": peak.place,
-                    "q999": peak.q999, "q999_time": peak.q999_time, "q999_place": peak.q999_place, "overlap": p.overlap_of(peak.q999),
-                },
-            });
+            let of = artifact::Penetration {
+                max: p.largest,
+                q999: p.q999,
+                overlap: Some(p.overlap()),
+                place: p.place,
+                peak: Some(artifact::PenetrationPeak {
+                    max: peak.largest,
+                    max_time: peak.largest_time,
+                    place: peak.place,
+                    q999: peak.q999,
+                    q999_time: peak.q999_time,
+                    q999_place: peak.q999_place,
+                    overlap: Some(p.overlap_of(peak.q999)),
+                }),
+            };
             (p.pair.clone(), of)
         })
         .collect()
 }
 
 /// By how much what contacts see of rigid parts differs from their triangles, and where.
-fn field_error_attributes(forming: &Forming) -> serde_json::Map<String, serde_json::Value> {
+fn field_error_attributes(forming: &Forming) -> BTreeMap<String, artifact::FieldError> {
     let of = |(part, e): &(&str, FieldError)| {
-        let value = json!({"max": e.largest, "place": e.at});
-        ((*part).to_owned(), value)
+        let (max, place) = (e.largest, e.at);
+        ((*part).to_owned(), artifact::FieldError { max, place })
     };
     forming.field_errors.iter().map(of).collect()
 }
@@ -429,34 +430,35 @@ fn write_summary(
     let warnings = warnings(forming, outcome, &penetrations);
     let elements = m.element_count();
     let element_cycles = elements as f64 * outcome.cycles as f64;
-    host.write_attributes(&json!({
-        "scene": p.scene.name,
-        "sheets": sheet_attributes(forming, p),
-        "contact_by_place": true,
-        "symmetry": crate::symmetry::words(m.planes()),
-        "element_size": forming.element_size,
-        "zone": forming.zone,
-        "time_step": outcome.smallest_step,
-        "cycles": outcome.cycles,
-        "element_cycles": element_cycles,
-        "elements": elements,
-        "energy": {
-            "peak_drift_ratio": h.peak_drift_ratio,
-            "peak_kinetic_ratio": h.peak_kinetic_ratio,
-            "kinetic_bound_kept": h.peak_kinetic_ratio <= p.kinetic_bound,
-            "hourglass_ratio": h.hourglass_ratio,
-        },
-        "penetration": penetration_attributes(&penetrations, &outcome.peaks),
-        "overlap_bound": OVERLAP_BOUND,
-        "overlap_peak_bound": OVERLAP_PEAK_BOUND,
-        "tool_field_error": field_error_attributes(forming),
-        "depth": depth_attributes(&outcome.depths),
-        "depth_bound": DEPTH_BOUND,
-        "warnings": warnings,
-    }))?;
     for w in &warnings {
         host.log(Log::Warn, w);
     }
+    host.write_attributes(&artifact::Forming {
+        scene: Some(p.scene.name.clone()),
+        sheets: sheet_attributes(forming, p),
+        contact_by_place: true,
+        symmetry: Some(crate::symmetry::mirror_planes(m.planes())),
+        element_size: forming.element_size,
+        net_spacing: None,
+        zone: forming.zone.clone(),
+        time_step: Some(outcome.smallest_step),
+        cycles: Some(outcome.cycles),
+        element_cycles: Some(element_cycles),
+        elements: elements as u64,
+        energy: Some(artifact::Energy {
+            peak_drift_ratio: Some(h.peak_drift_ratio),
+            peak_kinetic_ratio: Some(h.peak_kinetic_ratio),
+            kinetic_bound_kept: Some(h.peak_kinetic_ratio <= p.kinetic_bound),
+            hourglass_ratio: Some(h.hourglass_ratio),
+        }),
+        penetration: Some(penetration_attributes(&penetrations, &outcome.peaks)),
+        overlap_bound: Some(OVERLAP_BOUND),
+        overlap_peak_bound: Some(OVERLAP_PEAK_BOUND),
+        tool_field_error: field_error_attributes(forming),
+        depth: Some(depth_attributes(&outcome.depths)),
+        depth_bound: Some(DEPTH_BOUND),
+        warnings,
+    })?;
     write_health(host, outcome, &penetrations)?;
     let errors = forming.field_errors.iter().map(|(_, e)| e.largest);
     host.result("tool_field_error", errors.fold(0.0, f64::max), "m")?;

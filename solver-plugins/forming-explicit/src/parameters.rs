@@ -1,7 +1,7 @@
 //! The resolved parameters.
 
-use crate::elements::Rectangle;
 use crate::run::Control;
+use plyflow_model::artifact::Rectangle;
 use plyflow_model::scene::Scene;
 use serde::Deserialize;
 

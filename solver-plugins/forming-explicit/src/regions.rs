@@ -10,10 +10,10 @@ use plyflow_mechanics::mirror::{Planes, reflect};
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::OtherMaterial;
 use plyflow_mechanics::vec3::V;
+use plyflow_model::artifact::RegionFacts;
 use plyflow_model::outline::Point;
 use plyflow_model::regions::{PlyRegion, Stitches, area, asymmetry, holds};
 use plyflow_model::scene::Sheet;
-use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// A region where it lies over the tool.
@@ -184,11 +184,13 @@ pub fn check(
 }
 
 /// What the artifact tells of the regions of a sheet.
-pub fn attributes(sheet: &Sheet) -> Vec<Value> {
-    let of = |placed: &Placed<'_>| {
-        let r = placed.region;
-        let partners: Vec<&String> = r.friction.keys().collect();
-        json!({"name": r.name, "outline": placed.corners, "area": area(&placed.corners), "friction": partners, "stitches": r.stitches})
+pub fn attributes(sheet: &Sheet) -> Vec<RegionFacts> {
+    let of = |placed: &Placed<'_>| RegionFacts {
+        name: placed.region.name.clone(),
+        outline: placed.corners.clone(),
+        area: area(&placed.corners),
+        friction: placed.region.friction.keys().cloned().collect(),
+        stitches: placed.region.stitches,
     };
     of_sheet(sheet).map_or_else(|_| Vec::new(), |all| all.iter().map(of).collect())
 }

@@ -18,6 +18,7 @@ use plyflow_mechanics::contact::{ContactEnergy, OpenPlate, RigidContact, RigidSu
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, SheetEnergy, judge};
 use plyflow_mechanics::model::{Clock, Model};
 use plyflow_mechanics::vec3::{V, dot, norm};
+use plyflow_model::artifact::Zone;
 use plyflow_model::scene::Scene;
 use plyflow_tooling::{FieldError, ToolMesh};
 use serde::{Deserialize, Serialize};
@@ -172,7 +173,7 @@ pub struct Forming {
     /// What the user should know of the tool.
     pub tool_warnings: Vec<String>,
     /// The zone of a local run.
-    pub zone: Option<serde_json::Value>,
+    pub zone: Option<Zone>,
     /// Where a run that begins late begins.
     pub(crate) start: Option<Beginning>,
     /// Edge of the plies' elements (m).

@@ -29,14 +29,15 @@ pub fn planes(scene: &Scene) -> Planes {
     Planes([has(MirrorPlane::X), has(MirrorPlane::Y)])
 }
 
-/// Words for planes, as in a scene.
-pub fn words(planes: Planes) -> Vec<&'static str> {
+/// The mirror planes of a model.
+pub fn mirror_planes(planes: Planes) -> Vec<MirrorPlane> {
     let all = [MirrorPlane::X, MirrorPlane::Y].into_iter().zip(planes.0);
-    all.filter(|p| p.1).map(|p| p.0.word()).collect()
+    all.filter(|p| p.1).map(|p| p.0).collect()
 }
 
 fn given(planes: Planes) -> String {
-    format!("symmetry: [{}]", words(planes).join(", "))
+    let words = mirror_planes(planes).into_iter().map(MirrorPlane::word);
+    format!("symmetry: [{}]", words.collect::<Vec<_>>().join(", "))
 }
 
 /// What a mirror plane does to the fibre families of a sheet.

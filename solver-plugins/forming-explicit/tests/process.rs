@@ -10,6 +10,7 @@ use plyflow_forming_explicit::{LocalInput, LocalSheet, Start, build_global, buil
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::linear;
 use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_model::artifact::Zone;
 use plyflow_sdk::StepError;
 use serde_json::{Value, json};
 
@@ -169,7 +170,7 @@ fn zone(p: &Parameters, begin: f64) -> Forming {
         cavity: vec![1e5; 2],
         bag: vec![1e5; 2],
         frame: vec![0.04; 2],
-        zone: Value::Null,
+        zone: Zone::new("A", [-0.03, -0.03, 0.03, 0.03]),
         element_size: 0.015,
     };
     build_local(p, input, &BuiltIn).unwrap()

@@ -436,7 +436,7 @@ impl Whole {
             frame: of(|r| r.frame),
             sheets: (0..4).map(sheet).collect(),
             time,
-            zone: json!({"name": "A"}),
+            zone: plyflow_model::artifact::Zone::new("A", [-0.03, -0.03, 0.03, 0.03]),
             element_size: 0.007,
         }
     }

@@ -6,13 +6,13 @@ use crate::root::drop_on;
 use crate::surface::SmoothSurface;
 use plyflow_blank::Quality;
 use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_model::artifact::{FieldError, Forming, RigidBody, Sheet, SheetBody};
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
 use plyflow_surface::vector::distance;
 use plyflow_tooling::{ToolMesh, given};
 use serde::Deserialize;
-use serde_json::{Value, json};
 use std::time::Instant;
 
 /// Parameters of the step, SI.
@@ -78,7 +78,13 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
         host,
         &p,
         &done,
-        (of_tool, json!({"tool": {"max": off, "place": at}})),
+        (
+            of_tool,
+            FieldError {
+                max: off,
+                place: at,
+            },
+        ),
         seconds,
     )
 }
@@ -240,13 +246,15 @@ fn write_bodies(
         let z = above + d.ply.offset;
         let flat: Vec<[f64; 3]> = d.mesh.points.iter().map(|q| [q[0], q[1], z]).collect();
         let cells = d.mesh.cells.as_flattened();
-        let about = json!({
-            "kind": d.ply.scene.kind, "thickness": d.ply.material.thickness.si(), "offset": d.ply.offset,
-        });
+        let about = SheetBody {
+            kind: d.ply.scene.kind,
+            thickness: d.ply.material.thickness.si(),
+            offset: d.ply.offset,
+        };
         host.define_mesh(&d.ply.scene.name, &flat, 4, cells, &about)?;
     }
     let facets = tool.triangles.as_flattened();
-    host.define_mesh("tool", &tool.points, 3, facets, &json!({"rigid": true}))?;
+    host.define_mesh("tool", &tool.points, 3, facets, &RigidBody::ATTRIBUTES)?;
     host.begin_frame(0.0)?;
     for d in done {
         let name = &d.ply.scene.name;
@@ -277,28 +285,21 @@ fn number(why: Stop) -> f64 {
     }
 }
 
-fn sheet(d: &Done) -> Value {
-    let s = &d.ply.scene;
+fn sheet(d: &Done) -> Sheet {
+    let (s, material) = (&d.ply.scene, &d.ply.material);
     let [first, second] = d.ply.stated();
-    let mut value = json!({
-        "name": s.name,
-        "kind": s.kind,
-        "material": d.ply.material.name,
-        "thickness": d.ply.material.thickness.si(),
-        "offset": d.ply.offset,
-        "areal_mass": d.ply.material.areal_mass.si(),
-        "added_mass": 0.0,
-        "element": null,
-        "fibre_1": first,
-        "fibre_2": second,
-        "outline": d.ply.blank.outline(),
-        "start": d.start,
-        "net_nodes": d.net_nodes,
-    });
-    if !d.ply.blank.holes().is_empty() {
-        value["holes"] = json!(d.ply.blank.holes());
+    Sheet {
+        material: Some(material.name.clone()),
+        areal_mass: Some(material.areal_mass.si()),
+        added_mass: Some(0.0),
+        fibre_1: Some(first),
+        fibre_2: Some(second),
+        outline: Some(d.ply.blank.outline().to_vec()),
+        holes: d.ply.blank.holes().to_vec(),
+        start: Some(d.start),
+        net_nodes: Some(d.net_nodes),
+        ..Sheet::new(&s.name, s.kind, material.thickness.si(), d.ply.offset)
     }
-    value
 }
 
 /// One text per ply and reason.
@@ -350,7 +351,7 @@ fn write_summary(
     host: &Host,
     p: &Parameters,
     done: &[Done],
-    (mut texts, field_error): (Vec<String>, Value),
+    (mut texts, field_error): (Vec<String>, FieldError),
     seconds: f64,
 ) -> Result<(), StepError> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -381,16 +382,27 @@ fn write_summary(
     for w in &texts {
         host.log(Log::Warn, w);
     }
-    host.write_attributes(&json!({
-        "scene": p.scene.name,
-        "sheets": done.iter().map(sheet).collect::<Vec<_>>(),
-        "element_size": p.element_size,
-        "net_spacing": p.net_spacing.unwrap_or(0.25 * p.element_size),
-        "zone": null,
-        "elements": elements,
-        "tool_field_error": field_error,
-        "warnings": texts,
-    }))?;
+    host.write_attributes(&Forming {
+        scene: Some(p.scene.name.clone()),
+        sheets: done.iter().map(sheet).collect(),
+        contact_by_place: false,
+        symmetry: None,
+        element_size: p.element_size,
+        net_spacing: Some(p.net_spacing.unwrap_or(0.25 * p.element_size)),
+        zone: None,
+        time_step: None,
+        cycles: None,
+        element_cycles: None,
+        elements: elements as u64,
+        energy: None,
+        penetration: None,
+        overlap_bound: None,
+        overlap_peak_bound: None,
+        tool_field_error: [("tool".to_owned(), field_error)].into(),
+        depth: None,
+        depth_bound: None,
+        warnings: texts,
+    })?;
     let strain = done.iter().map(|d| d.fibre_strain).fold(0.0, f64::max);
     let nodes = done.iter().map(|d| d.net_nodes).sum::<usize>() as f64;
     host.result("shear_max", high, "rad")?;

@@ -8,12 +8,13 @@ mod zones;
 
 pub use advice::{Advice, advise};
 use plyflow_fixed::FixedBits;
-
+use plyflow_model::artifact::{
+    Axis, Cell, Column, Forming, MeshStudy, Paths, Plot, Series, Style, Table,
+};
 use plyflow_sdk::{Host, Input, Log, Step, StepError, export_step};
 use plyflow_surface::draped;
 use plyflow_surface::{Topology, weighted_quantiles};
 use serde::Deserialize;
-use serde_json::{Value, json};
 
 /// The step.
 pub struct MeshComparison;
@@ -24,24 +25,6 @@ export_step!(MeshComparison);
 struct Parameters {
     target_error: f64,
     foot_margin: f64,
-}
-
-#[derive(Deserialize)]
-struct Formed {
-    sheets: Vec<Sheet>,
-    element_size: f64,
-    elements: u64,
-    /// Of a local run.
-    #[serde(default)]
-    zone: Value,
-}
-
-#[derive(Deserialize)]
-struct Sheet {
-    name: String,
-    kind: String,
-    /// (m)
-    offset: Option<f64>,
 }
 
 /// What is told of the shear angles: name, title, share of the area that has less.
@@ -101,13 +84,13 @@ impl Step for MeshComparison {
 }
 
 fn read(host: &Host, input: Input) -> Result<Run, StepError> {
-    let formed: Formed = host.attributes(&input)?;
+    let formed: Forming = host.attributes(&input)?;
     let meshes = host.meshes(&input)?;
     let Some(frame) = meshes.times.len().checked_sub(1) else {
         return Err(format!("'{}' has no frame", input.step).into());
     };
     let (mut angles, mut areas) = (Vec::new(), Vec::new());
-    for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
+    for sheet in formed.plies() {
         let body = meshes.body(&sheet.name)?;
         let part = draped::Formed::read(host, &input, body, frame)?;
         let topology = Topology::new(part.flat.len(), body.nodes_per_cell, &part.cells);
@@ -170,12 +153,12 @@ fn write(host: &Host, runs: &[Run], finest: &Run, target: f64) -> Result<(), Ste
         if extremes > 0.0 {
             falling.push((run.element_size, extremes));
         }
-        let mut row = vec![json!(step), json!(run.element_size), json!(run.elements)];
+        let mut row: Vec<Cell> = vec![step.into(), run.element_size.into(), run.elements.into()];
         // What was measured is in no artifact: these cells are told from the results.
-        row.extend([Value::Null, Value::Null]);
-        row.extend(run.shear.map(Value::from));
-        row.extend([quartiles, extremes].map(Value::from));
-        rows.push(Value::from(row));
+        row.extend([Cell::Empty, Cell::Empty]);
+        row.extend(run.shear.map(Cell::from));
+        row.extend([quartiles, extremes].map(Cell::from));
+        rows.push(row);
     }
     if let Some(order) = slope(&falling) {
         host.result("extreme_order", order, "1")?;
@@ -191,32 +174,67 @@ fn write(host: &Host, runs: &[Run], finest: &Run, target: f64) -> Result<(), Ste
         host.log(Log::Warn, &text);
     }
     host.write_f64("study/element_size", &[runs.len()], "m", &sizes)?;
-    let mut paths = Vec::new();
     for (k, (name, _, _)) in TOLD.iter().enumerate() {
         let values: Vec<f64> = runs.iter().map(|r| r.shear[k]).collect();
-        let path = format!("study/{name}");
-        host.write_f64(&path, &[runs.len()], "rad", &values)?;
-        paths.push(path);
+        host.write_f64(&path(name), &[runs.len()], "rad", &values)?;
     }
-    let column = |label: &str, unit: &str| json!({"label": label, "unit": unit});
+    host.write_attributes(&MeshStudy {
+        target_error: target,
+        finest: Some(finest.input.step.clone()),
+        finest_error: Some(advice.finest_error),
+        advised_element_size: Some(advice.size),
+        zones: Vec::new(),
+        tables: vec![Table {
+            name: "meshes".into(),
+            title: Some("Shear angles over the element size".into()),
+            columns: columns(),
+            rows,
+        }],
+        plots: vec![plot()],
+    })
+}
+
+/// Path of the array of one of [`TOLD`].
+fn path(name: &str) -> String {
+    format!("study/{name}")
+}
+
+/// Columns of the table of the runs.
+fn columns() -> Vec<Column> {
     let mut columns = vec![
-        column("run", ""),
-        column("element size", "m"),
-        column("elements", ""),
-        json!({"label": "CPU", "unit": "s", "measured": "cost.{0}.cpu_seconds"}),
-        json!({"label": "wall", "unit": "s", "measured": "cost.{0}.wall_seconds"}),
+        Column::new("run", ""),
+        Column::new("element size", "m"),
+        Column::new("elements", ""),
+        measured("CPU", "cost.{0}.cpu_seconds"),
+        measured("wall", "cost.{0}.wall_seconds"),
     ];
-    columns.extend(TOLD.map(|t| column(t.1, "rad")));
-    columns.extend(["quartiles' error", "extremes' error"].map(|label| column(label, "")));
-    host.write_attributes(&json!({
-        "finest": finest.input.step,
-        "target_error": target,
-        "advised_element_size": advice.size,
-        "finest_error": advice.finest_error,
-        "tables": [{"name": "meshes", "title": "Shear angles over the element size", "columns": columns, "rows": rows}],
-        "plots": [{"name": "shear", "title": "Shear angles over the element size",
-                   "note": "By undeformed area of all plies. Box: 25 to 75 %; bar: median; whiskers: 1 and 99 %; points: smallest and largest.",
-                   "x": {"label": "element size", "unit": "mm"}, "y": {"label": "shear angle", "unit": "deg"},
-                   "series": [{"label": "", "style": "box", "x": "study/element_size", "y": paths}]}],
-    }))
+    columns.extend(TOLD.map(|t| Column::new(t.1, "rad")));
+    columns.extend(["quartiles' error", "extremes' error"].map(|label| Column::new(label, "")));
+    columns
+}
+
+/// A column of seconds that are told from the results.
+fn measured(label: &str, result: &str) -> Column {
+    Column {
+        measured: Some(result.to_owned()),
+        ..Column::new(label, "s")
+    }
+}
+
+/// Box plots of the shear angles over the element size.
+fn plot() -> Plot {
+    let note = "By undeformed area of all plies. Box: 25 to 75 %; bar: median; whiskers: 1 and 99 %; points: smallest and largest.";
+    Plot {
+        name: "shear".into(),
+        title: Some("Shear angles over the element size".into()),
+        note: Some(note.into()),
+        x: Axis::new("element size", "mm"),
+        y: Axis::new("shear angle", "deg"),
+        series: vec![Series {
+            label: String::new(),
+            x: path("element_size"),
+            y: Paths::Spread(TOLD.map(|t| path(t.0))),
+            style: Some(Style::Box),
+        }],
+    }
 }

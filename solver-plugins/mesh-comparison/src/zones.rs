@@ -1,17 +1,27 @@
 //! Local runs of zones with meshes of different fineness: how far their distances from the tool are from those of the finest.
 
-use crate::Formed;
 use crate::advice::{Advice, advise};
+use crate::measured;
 use plyflow_defects::{FieldErrors, Ply, of_run};
+use plyflow_model::artifact::{Cell, Column, Forming, MeshStudy, Table, Zone, ZoneAdvice};
 use plyflow_sdk::{Host, Input, Log, StepError};
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
+
+/// Columns of the table without the fifth, which is of what was measured: label, SI unit.
+const COLUMNS: [(&str, &str); 7] = [
+    ("run", ""),
+    ("zone", ""),
+    ("element size", "m"),
+    ("elements", ""),
+    ("error", ""),
+    ("error of position", "m"),
+    ("advised size", "m"),
+];
 
 /// A run of a zone.
 struct Run {
     input: Input,
-    /// The zone's box in the undeformed plane, as its list has it.
-    bounds: Value,
+    zone: Zone,
     element_size: f64,
     elements: u64,
     plies: Vec<Ply>,
@@ -24,17 +34,12 @@ struct Run {
 pub fn given(host: &Host, inputs: &[Input]) -> Result<bool, StepError> {
     let mut of_zones = Vec::new();
     for input in inputs {
-        of_zones.push(zone_of(host, input)?.is_some());
+        of_zones.push(host.attributes::<Forming>(input)?.zone.is_some());
     }
     if of_zones.windows(2).any(|w| w[0] != w[1]) {
         return Err("some of the runs are of zones and others of the whole scene; compare them in two steps".into());
     }
     Ok(of_zones.first() == Some(&true))
-}
-
-fn zone_of(host: &Host, input: &Input) -> Result<Option<String>, StepError> {
-    let formed: Formed = host.attributes(input)?;
-    Ok(formed.zone["name"].as_str().map(str::to_owned))
 }
 
 /// Compares the runs of every zone and advises an element size for each. `target`: the relative error that it is for. `foot_margin`: nodes nearer to the
@@ -52,9 +57,10 @@ pub fn compare(
     for input in inputs {
         host.check_cancelled()?;
         // A to Z before AA.
-        if let Some(zone) = zone_of(host, &input)? {
-            let runs = by_zone.entry((zone.len(), zone)).or_default();
-            runs.push(read(host, input, foot_margin)?);
+        if let Some(run) = read(host, input, foot_margin)? {
+            let name = run.zone.name.clone();
+            let runs = by_zone.entry((name.len(), name)).or_default();
+            runs.push(run);
         }
     }
     let (mut rows, mut advised) = (Vec::new(), Vec::new());
@@ -62,32 +68,28 @@ pub fn compare(
         host.check_cancelled()?;
         runs.sort_by(|a, b| a.element_size.total_cmp(&b.element_size));
         let advice = one(host, zone, runs, target, &mut rows)?;
-        advised.push(
-            json!({"name": zone, "box": runs[0].bounds, "element_size": advice.size,
-            "finest_error": advice.finest_error}),
-        );
+        advised.push(ZoneAdvice {
+            name: zone.clone(),
+            bounds: runs[0].zone.bounds,
+            element_size: advice.size,
+            finest_error: advice.finest_error,
+        });
     }
-    let head = [
-        ("run", ""),
-        ("zone", ""),
-        ("element size", "m"),
-        ("elements", ""),
-        ("error", ""),
-        ("error of position", "m"),
-        ("advised size", "m"),
-    ];
-    let mut columns = head
-        .map(|(label, unit)| json!({"label": label, "unit": unit}))
+    let mut columns = COLUMNS
+        .map(|(label, unit)| Column::new(label, unit))
         .to_vec();
-    columns.insert(
-        4,
-        json!({"label": "CPU", "unit": "s", "measured": "cost.{0}.{1}.cpu_seconds"}),
-    );
-    host.write_attributes(&json!({
-        "target_error": target,
-        "zones": advised,
-        "tables": [{"name": "meshes", "title": "Distances from the tool in zones over the element size", "columns": columns, "rows": rows}],
-    }))
+    columns.insert(4, measured("CPU", "cost.{0}.{1}.cpu_seconds"));
+    host.write_attributes(&MeshStudy {
+        target_error: target,
+        zones: advised,
+        tables: vec![Table {
+            name: "meshes".into(),
+            title: Some("Distances from the tool in zones over the element size".into()),
+            columns,
+            rows,
+        }],
+        ..MeshStudy::default()
+    })
 }
 
 /// The runs of one zone, the finest first; gives the advice for it.
@@ -96,7 +98,7 @@ fn one(
     zone: &str,
     runs: &[Run],
     target: f64,
-    rows: &mut Vec<Value>,
+    rows: &mut Vec<Vec<Cell>>,
 ) -> Result<Advice, StepError> {
     let [finest, next, ..] = runs else {
         return Err(format!(
@@ -104,11 +106,11 @@ fn one(
         )
         .into());
     };
-    if let Some(other) = runs.iter().find(|r| r.bounds != finest.bounds) {
+    if let Some(other) = runs.iter().find(|r| !finest.zone.is(&r.zone)) {
         let (a, b) = (&finest.input.step, &other.input.step);
         return Err(format!(
-            "zone {zone} of '{a}' has the box {}, that of '{b}' {}; take runs of one list of zones",
-            finest.bounds, other.bounds
+            "zone {zone} of '{a}' has the box {:?}, that of '{b}' {:?}; take runs of one list of zones",
+            finest.zone.bounds, other.zone.bounds
         )
         .into());
     }
@@ -141,17 +143,16 @@ fn one(
         ] {
             host.measured(&format!("cost.{step}.{zone}.{what}"), seconds, "s")?;
         }
-        let elements = run.elements;
-        rows.push(json!([
-            step,
-            zone,
-            run.element_size,
-            elements,
-            null,
-            error,
-            position,
-            null
-        ]));
+        rows.push(vec![
+            step.into(),
+            zone.into(),
+            run.element_size.into(),
+            run.elements.into(),
+            Cell::Empty,
+            error.into(),
+            position.into(),
+            Cell::Empty,
+        ]);
     }
     let advice = advise(&measured, target);
     host.result(&format!("finest_error.{zone}"), advice.finest_error, "1")?;
@@ -159,37 +160,31 @@ fn one(
     if let Some(text) = &advice.doubt {
         host.log(Log::Warn, &format!("zone {zone}: {text}"));
     }
-    rows.push(json!([
-        null,
-        zone,
-        null,
-        null,
-        null,
-        null,
-        null,
-        advice.size
-    ]));
+    let mut row = vec![Cell::Empty; COLUMNS.len() + 1];
+    row[1] = zone.into();
+    row[COLUMNS.len()] = advice.size.into();
+    rows.push(row);
     Ok(advice)
 }
 
-fn read(host: &Host, input: Input, foot_margin: f64) -> Result<Run, StepError> {
-    let formed: Formed = host.attributes(&input)?;
+/// `None`: it is of the whole.
+fn read(host: &Host, input: Input, foot_margin: f64) -> Result<Option<Run>, StepError> {
+    let formed: Forming = host.attributes(&input)?;
+    let Some(zone) = formed.zone.clone() else {
+        return Ok(None);
+    };
     let frame = of_run::last_frame(&input, &host.meshes(&input)?)?;
     let tool = of_run::tool(host, &input)?;
     let mut plies = Vec::new();
-    for sheet in formed.sheets.iter().filter(|s| s.kind == "ply") {
-        let (name, step) = (sheet.name.as_str(), &input.step);
-        let offset = sheet.offset;
-        let offset = offset
-            .ok_or_else(|| format!("ply '{name}' of '{step}' has no offset from the tool"))?;
-        let place = (name, offset);
+    for sheet in formed.plies() {
+        let place = (sheet.name.as_str(), sheet.offset);
         plies.push(of_run::ply(host, &input, frame, place, &tool, foot_margin)?);
     }
-    Ok(Run {
+    Ok(Some(Run {
+        zone,
         plies,
-        bounds: formed.zone["box"].clone(),
         element_size: formed.element_size,
         elements: formed.elements,
         input,
-    })
+    }))
 }

@@ -32,7 +32,8 @@ fn strip(n: usize, g: impl Fn(f64) -> f64) -> MemoryArtifact {
     MemoryArtifact {
         kind: "forming".into(),
         attributes: json!({"element_size": h, "elements": n,
-            "sheets": [{"name": "film", "kind": "diaphragm"}, {"name": "ply_1", "kind": "ply"}]}),
+            "sheets": [{"name": "film", "kind": "diaphragm", "thickness": 5e-5, "offset": 2.5e-5},
+                {"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": 2.5e-4}]}),
         times: vec![1.0],
         bodies: vec![ply],
         ..Default::default()

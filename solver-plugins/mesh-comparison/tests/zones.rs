@@ -33,8 +33,9 @@ fn zone(name: &str, size: f64) -> MemoryArtifact {
     };
     MemoryArtifact {
         kind: "forming".into(),
-        attributes: json!({"element_size": size, "elements": 1, "zone": {"name": name, "box": [-0.1, -0.1, 0.1, 0.1]},
-            "sheets": [{"name": "ply_1", "kind": "ply", "offset": 0.0}]}),
+        attributes: json!({"element_size": size, "elements": 1, 
+            "zone": {"name": name, "box": [-0.1, -0.1, 0.1, 0.1], "free_sides": [false, false, false, false]},
+            "sheets": [{"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": 0.0}]}),
         times: vec![1.0],
         bodies: vec![tool, ply],
         ..Default::default()

@@ -9,17 +9,15 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 use plyflow_conformance::{Check, Outcome, Rule, Sink, check_element, check_material};
+use plyflow_model::artifact::{CONFORMANCE_MARK, Conformance, ConformanceLine, ConformanceSubject};
 use plyflow_model::material::Material;
 use plyflow_sdk::abi::*;
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use serde::Deserialize;
-use serde_json::{Value, json};
-
-/// Marks a log line that holds a check.
-pub const MARK: &str = "conformance: ";
+use serde_json::Value;
 
 /// The step.
-pub struct Conformance;
+pub struct PluginConformance;
 
 #[derive(Deserialize)]
 struct Component {
@@ -41,23 +39,30 @@ struct Teller<'a> {
 }
 
 impl Teller<'_> {
-    fn tell(&self, what: &str, value: &impl serde::Serialize) {
-        let line = json!({"subject": self.subject, what: value});
-        self.host.log(Log::Info, &format!("{MARK}{line}"));
+    fn tell(&self, begins: Option<&Rule>, ends: Option<&Check>) {
+        let line = ConformanceLine {
+            subject: self.subject.clone(),
+            begins: begins.map(Rule::told),
+            ends: ends.map(Check::told),
+        };
+        if let Ok(line) = serde_json::to_string(&line) {
+            self.host
+                .log(Log::Info, &format!("{CONFORMANCE_MARK}{line}"));
+        }
     }
 }
 
 impl Sink for Teller<'_> {
     fn begins(&mut self, rule: &Rule) {
-        self.tell("begins", rule);
+        self.tell(Some(rule), None);
     }
 
     fn ends(&mut self, check: &Check) {
-        self.tell("ends", check);
+        self.tell(None, Some(check));
     }
 }
 
-impl Step for Conformance {
+impl Step for PluginConformance {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
@@ -65,7 +70,7 @@ impl Step for Conformance {
         if p.materials.is_empty() {
             return Err("materials: the list is empty; give at least one material".into());
         }
-        let mut all: Vec<Value> = Vec::new();
+        let mut subjects = Vec::new();
         let mut refused = 0;
         let mut count = [0usize; 3];
         for material in &p.materials {
@@ -96,9 +101,12 @@ impl Step for Conformance {
                     Outcome::Skipped => 2,
                 }] += 1;
             }
-            all.push(json!({"subject": teller.subject, "checks": checks}));
+            subjects.push(ConformanceSubject {
+                subject: teller.subject,
+                checks: checks.iter().map(Check::told).collect(),
+            });
         }
-        host.write_attributes(&json!({"subjects": all}))?;
+        host.write_attributes(&Conformance { subjects })?;
         for (name, n) in ["passed", "failed", "skipped"].into_iter().zip(count) {
             host.result(name, n as f64, "1")?;
         }
@@ -173,4 +181,4 @@ fn declared_fields(manifest: &str) -> Option<[usize; 2]> {
     Some([fields.len() - patch, patch])
 }
 
-export_step!(Conformance);
+export_step!(PluginConformance);

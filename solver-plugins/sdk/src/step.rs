@@ -225,7 +225,17 @@ impl Host {
     }
 
     fn json<T: DeserializeOwned>(&self, s: pf_str, what: &str) -> Result<T, StepError> {
-        serde_json::from_str(self.text(s)).map_err(|e| StepError::Failed(format!("{what}: {e}")))
+        let mut text = serde_json::Deserializer::from_str(self.text(s));
+        serde_path_to_error::deserialize(&mut text).map_err(|e| {
+            let path = e.path().to_string();
+            // A lone dot: the whole.
+            let place = if path == "." {
+                String::new()
+            } else {
+                format!(" `{path}`:")
+            };
+            StepError::Failed(format!("{what}:{place} {}", e.inner()))
+        })
     }
 
     /// Writes a log line.

@@ -1,32 +1,9 @@
 //! Surfaces of the bodies of a run.
 
 use crate::{QuadLocator, Surface, triangles};
+use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_model::outline::{Point, Region};
 use plyflow_sdk::{Host, Input, Meshes, StepError};
-use serde::Deserialize;
-
-/// What a run tells of its stack.
-#[derive(Deserialize)]
-struct Run {
-    sheets: Vec<Sheet>,
-    /// Whether sheets touch what really lies under them, and not the whole stack everywhere.
-    #[serde(default)]
-    contact_by_place: bool,
-}
-
-#[derive(Deserialize)]
-struct Sheet {
-    name: String,
-    #[serde(default)]
-    kind: String,
-    #[serde(default)]
-    thickness: f64,
-    /// Of the whole ply, whatever part of it the run has (m); some runs do not tell it.
-    #[serde(default)]
-    outline: Vec<Point>,
-    #[serde(default)]
-    holes: Vec<Vec<Point>>,
-}
 
 /// Places on the edge of a ply lie on it, however they were rounded (m).
 const ROUNDING: f64 = 1e-6;
@@ -46,24 +23,26 @@ impl Lying {
         meshes: &Meshes,
         sheet: &Sheet,
     ) -> Result<Option<Self>, StepError> {
-        if sheet.kind != "ply" {
+        if !sheet.is_ply() {
             return Ok(None);
         }
         // By the whole ply's outline: in a run of a zone its mesh may end before the upper one's, where the ply itself goes on.
-        let covers: Box<dyn Fn(Point) -> bool> =
-            match Region::new(sheet.outline.clone(), sheet.holes.clone()) {
-                Ok(region) => Box::new(move |at| {
-                    region.contains(at) || region.distance_to_edge(at) <= ROUNDING
-                }),
-                Err(_) => {
-                    let body = meshes.body(&sheet.name)?;
-                    let (points, cells) = host.mesh(input, body)?;
-                    let Some(locator) = QuadLocator::new(&points, &cells) else {
-                        return Ok(None);
-                    };
-                    Box::new(move |[x, y]| locator.locate(x, y, ROUNDING).is_some())
-                }
-            };
+        let covers: Box<dyn Fn(Point) -> bool> = match Region::new(
+            sheet.outline.clone().unwrap_or_default(),
+            sheet.holes.clone(),
+        ) {
+            Ok(region) => {
+                Box::new(move |at| region.contains(at) || region.distance_to_edge(at) <= ROUNDING)
+            }
+            Err(_) => {
+                let body = meshes.body(&sheet.name)?;
+                let (points, cells) = host.mesh(input, body)?;
+                let Some(locator) = QuadLocator::new(&points, &cells) else {
+                    return Ok(None);
+                };
+                Box::new(move |[x, y]| locator.locate(x, y, ROUNDING).is_some())
+            }
+        };
         Ok(Some(Self {
             name: sheet.name.clone(),
             thickness: sheet.thickness,
@@ -92,7 +71,7 @@ impl Stack {
     /// # Errors
     /// When the run's meshes cannot be read.
     pub fn read(host: &Host, input: &Input) -> Result<Option<Self>, StepError> {
-        let run: Run = host.attributes(input)?;
+        let run: Forming = host.attributes(input)?;
         if !run.contact_by_place {
             return Ok(None);
         }
@@ -154,7 +133,7 @@ fn missing(
     name: &str,
     others: impl Fn(&[Sheet], usize) -> &[Sheet],
 ) -> Result<Option<Vec<f64>>, StepError> {
-    let run: Run = host.attributes(input)?;
+    let run: Forming = host.attributes(input)?;
     if !run.contact_by_place {
         return Ok(None);
     }

@@ -19,17 +19,19 @@ mod waves;
 use plyflow_fixed::FixedBits;
 pub use surface::{Cut, Hit};
 pub use trace::Trace;
-pub use waves::{Criteria, Side, Wave, median, waves};
+pub use waves::{Criteria, Side, median, waves};
 
 use parameters::Parameters;
 use plot::{Curve, Plots};
+use plyflow_model::artifact::{
+    Census, CensusBody, CensusCircle, CrossSection, Forming, Map, Panel, SectionWrinkle, Sheet,
+    Wrinkle,
+};
 use plyflow_sdk::{Host, Input, On, Step, StepError, export_step};
 use plyflow_surface::Topology;
 use plyflow_surface::draped::DrapedPart;
 use plyflow_surface::vector::Vec3;
 use plyflow_surface::{weighted_mean, weighted_quantiles};
-use serde::Deserialize;
-use serde_json::{Value, json};
 use spread::Spread;
 use std::f64::consts::TAU;
 
@@ -37,21 +39,6 @@ use std::f64::consts::TAU;
 pub struct WrinkleCensus;
 
 export_step!(WrinkleCensus);
-
-#[derive(Deserialize)]
-struct Formed {
-    sheets: Vec<Sheet>,
-}
-
-#[derive(Deserialize)]
-struct Sheet {
-    name: String,
-    kind: String,
-    #[serde(default)]
-    thickness: f64,
-    #[serde(default)]
-    offset: f64,
-}
 
 /// A ply in its last frame.
 struct Ply {
@@ -103,13 +90,20 @@ impl Step for WrinkleCensus {
         let across = cross_sections(host, &p, &cut, &mut plots)?;
         let deviation = (!rests.is_empty()).then(|| deviation::deviations(&ply.points, &rests));
         let maps = fields(host, &p, &ply, deviation, &mut plots)?;
-        let list: Vec<Value> = (p.circles.iter().zip(&counted))
-            .map(|(radius, waves)| json!({"radius": radius, "wrinkles": waves}))
-            .collect();
-        host.write_attributes(&json!({
-            "ply": ply.name, "circles": list, "threshold": p.threshold, "prominence": p.criteria().prominence,
-            "cross_sections": across, "curves": plots.curves, "plots": plots.plots, "maps": maps,
-        }))?;
+        let circles = (p.circles.iter().zip(&counted)).map(|(&radius, waves)| CensusCircle {
+            radius,
+            wrinkles: waves.clone(),
+        });
+        host.write_attributes(&Census {
+            ply: ply.name,
+            circles: circles.collect(),
+            threshold: Some(p.threshold),
+            prominence: Some(p.criteria().prominence),
+            cross_sections: across,
+            curves: plots.curves,
+            plots: plots.plots,
+            maps,
+        })?;
         results(host, &counted[0], inner)
     }
 }
@@ -121,8 +115,8 @@ fn last_frame(host: &Host, input: &Input) -> Result<usize, StepError> {
 }
 
 fn read(host: &Host, input: &Input, frame: usize, wanted: Option<&str>) -> Result<Ply, StepError> {
-    let formed: Formed = host.attributes(input)?;
-    let plies: Vec<&Sheet> = formed.sheets.iter().filter(|s| s.kind == "ply").collect();
+    let formed: Forming = host.attributes(input)?;
+    let plies: Vec<&Sheet> = formed.plies().collect();
     let sheet = match wanted {
         Some(name) => plies.iter().find(|s| s.name == name).ok_or_else(|| {
             let there: Vec<&str> = plies.iter().map(|s| s.name.as_str()).collect();
@@ -173,7 +167,7 @@ fn circles(
     p: &Parameters,
     around: &dyn Fn(f64) -> Vec<Option<Hit>>,
     plots: &mut Plots,
-) -> Result<Vec<Vec<Wave>>, StepError> {
+) -> Result<Vec<Vec<Wrinkle>>, StepError> {
     let (mut counted, mut series) = (Vec::new(), Vec::new());
     for (k, radius) in p.circles.iter().enumerate() {
         let hits = around(*radius);
@@ -282,7 +276,7 @@ fn cross_sections(
     p: &Parameters,
     cut: &Cut<'_>,
     plots: &mut Plots,
-) -> Result<Vec<Value>, StepError> {
+) -> Result<Vec<CrossSection>, StepError> {
     let (mut series, mut counted) = (Vec::new(), Vec::new());
     let names = result_names(p)?;
     for (k, (across, name)) in p.cross_sections.iter().zip(names).enumerate() {
@@ -316,11 +310,20 @@ fn cross_sections(
         let count = found.len() as f64;
         host.result(&format!("section_wrinkles.{name}"), count, "1")?;
         host.result(&format!("section_height.{name}"), highest, "m")?;
-        let list: Vec<Value> = (found.iter())
-            .map(|w| json!({"place": w.angle / TAU * spacing * closed.len() as f64 - half_length(p), "z": w.z, "height": w.height,
-                            "prominence": w.prominence, "width": w.width, "shear": w.shear}))
-            .collect();
-        counted.push(json!({"label": across.label, "result": name, "wrinkles": list}));
+        let places = closed.len() as f64;
+        let listed = |w: &Wrinkle| SectionWrinkle {
+            place: w.angle / TAU * spacing * places - half_length(p),
+            z: w.z,
+            height: w.height,
+            prominence: w.prominence,
+            width: w.width,
+            shear: w.shear,
+        };
+        counted.push(CrossSection {
+            label: across.label.clone(),
+            result: name,
+            wrinkles: found.iter().map(listed).collect(),
+        });
     }
     let axis = ["distance along the section", "mm"];
     plots.heights("cross_sections", "Sections across", axis, series);
@@ -362,7 +365,7 @@ fn fields(
     ply: &Ply,
     deviation: Option<Vec<f64>>,
     plots: &mut Plots,
-) -> Result<Vec<Value>, StepError> {
+) -> Result<Vec<Map>, StepError> {
     let topology = Topology::new(ply.flat.len(), 4, &ply.cells);
     let mut spreads = Vec::new();
     if let Some(values) = deviation {
@@ -399,7 +402,9 @@ fn fields(
         &ply.flat,
         4,
         &ply.cells,
-        &json!({"ply": ply.name}),
+        &CensusBody {
+            ply: ply.name.clone(),
+        },
     )?;
     host.begin_frame(0.0)?;
     host.write_points(&ply.name, &ply.points)?;
@@ -407,8 +412,16 @@ fn fields(
     let mut maps = Vec::new();
     for s in &spreads {
         host.write_field(&ply.name, s.on, s.name, 1, s.unit, &s.values)?;
-        maps.push(json!({"name": s.name, "title": s.title, "unit": s.shown,
-                         "panels": [{"label": ply.name, "body": ply.name, "field": s.name}]}));
+        maps.push(Map {
+            name: s.name.into(),
+            title: Some(s.title.into()),
+            unit: s.shown.into(),
+            panels: vec![Panel {
+                label: ply.name.clone(),
+                body: ply.name.clone(),
+                field: s.name.into(),
+            }],
+        });
     }
     host.end_frame()?;
     Ok(maps)
@@ -432,12 +445,12 @@ fn dome(
     host.result("dome_deviation_largest", largest, "m")
 }
 
-fn results(host: &Host, waves: &[Wave], inner: f64) -> Result<(), StepError> {
-    let mean = |of: &dyn Fn(&Wave) -> bool, what: fn(&Wave) -> f64| {
+fn results(host: &Host, waves: &[Wrinkle], inner: f64) -> Result<(), StepError> {
+    let mean = |of: &dyn Fn(&Wrinkle) -> bool, what: fn(&Wrinkle) -> f64| {
         let values: Vec<f64> = waves.iter().filter(|w| of(w)).map(what).collect();
         values.iter().sum::<f64>() / values.len().max(1) as f64
     };
-    let count = |of: &dyn Fn(&Wave) -> bool| waves.iter().filter(|w| of(w)).count() as f64;
+    let count = |of: &dyn Fn(&Wrinkle) -> bool| waves.iter().filter(|w| of(w)).count() as f64;
     host.result("wrinkles", count(&|_| true), "1")?;
     for k in 0..4 {
         let name = format!("wrinkles_q{}", k + 1);
@@ -449,7 +462,7 @@ fn results(host: &Host, waves: &[Wave], inner: f64) -> Result<(), StepError> {
     host.result("width_mean", mean(&|_| true, |w| w.width), "m")?;
     host.result("length_mean", mean(&|_| true, |w| w.length), "m")?;
     for (sign, positive) in [("positive", true), ("negative", false)] {
-        let of = move |w: &Wave| (w.shear > 0.0) == positive;
+        let of = move |w: &Wrinkle| (w.shear > 0.0) == positive;
         host.result(&format!("wrinkles_{sign}_shear"), count(&of), "1")?;
         host.result(&format!("width_{sign}_shear"), mean(&of, |w| w.width), "m")?;
         host.result(
@@ -459,7 +472,7 @@ fn results(host: &Host, waves: &[Wave], inner: f64) -> Result<(), StepError> {
         )?;
     }
     for (name, what) in [
-        ("width", (|w| w.width) as fn(&Wave) -> f64),
+        ("width", (|w| w.width) as fn(&Wrinkle) -> f64),
         ("length", |w| w.length),
     ] {
         let of = |positive: bool| mean(&|w| (w.shear > 0.0) == positive, what);

@@ -1,16 +1,16 @@
 //! Curves of the artifact and the plots that show them.
 
 use crate::spread::Spread;
+use plyflow_model::artifact::{Axis, CensusCurve, Plot, Series};
 use plyflow_sdk::{Host, StepError};
-use serde_json::{Value, json};
 
 /// The plots so far, and the curves by what they show.
 #[derive(Default)]
 pub struct Plots {
     /// As in the data model.
-    pub plots: Vec<Value>,
-    /// `{"plot", "label", "x", "y"}`: which arrays are the curve of that label in that plot.
-    pub curves: Vec<Value>,
+    pub plots: Vec<Plot>,
+    /// Which arrays are the curve of a label in a plot.
+    pub curves: Vec<CensusCurve>,
 }
 
 /// A curve: labels and units of the two arrays, and their values.
@@ -30,29 +30,37 @@ impl Plots {
     ///
     /// # Errors
     /// When the host refuses.
-    pub fn curve(&mut self, host: &Host, plot: &str, c: &Curve<'_>) -> Result<Value, StepError> {
-        let mut paths = Vec::new();
-        for (name, unit, values) in [c.x, c.y] {
+    pub fn curve(&mut self, host: &Host, plot: &str, c: &Curve<'_>) -> Result<Series, StepError> {
+        let write = |(name, unit, values): (&str, &str, &[f64])| -> Result<String, StepError> {
             let path = format!("curves/{}/{name}", c.name);
             host.write_f64(&path, &[values.len()], unit, values)?;
-            paths.push(path);
-        }
-        let (x, y) = (&paths[0], &paths[1]);
-        self.curves
-            .push(json!({"plot": plot, "label": c.label, "x": x, "y": y}));
-        Ok(json!({"label": c.label, "x": x, "y": y}))
+            Ok(path)
+        };
+        let (x, y) = (write(c.x)?, write(c.y)?);
+        let series = Series::new(&c.label, &x, &y);
+        self.curves.push(CensusCurve {
+            plot: plot.into(),
+            label: c.label.clone(),
+            x,
+            y,
+        });
+        Ok(series)
     }
 
     /// Heights over an angle (deg) or a distance (mm).
-    pub fn heights(&mut self, name: &str, title: &str, x: [&str; 2], series: Vec<Value>) {
+    pub fn heights(&mut self, name: &str, title: &str, x: [&str; 2], series: Vec<Series>) {
         if series.is_empty() {
             return;
         }
         let [label, unit] = x;
-        self.plots.push(json!({
-            "name": name, "title": title, "x": {"label": label, "unit": unit},
-            "y": {"label": "height", "unit": "mm"}, "series": series,
-        }));
+        self.plots.push(Plot {
+            name: name.into(),
+            title: Some(title.into()),
+            note: None,
+            x: Axis::new(label, unit),
+            y: Axis::new("height", "mm"),
+            series,
+        });
     }
 
     /// Writes a probability density and its plot.
@@ -75,12 +83,14 @@ impl Plots {
         };
         let plot = format!("{}_density", of.name);
         let series = self.curve(host, &plot, &curve)?;
-        self.plots.push(json!({
-            "name": plot, "title": format!("{}, by area", of.title),
-            "x": {"label": of.title.to_lowercase(), "unit": of.shown},
-            "y": {"label": "probability density", "unit": format!("1/{}", of.shown)},
-            "series": [series],
-        }));
+        self.plots.push(Plot {
+            name: plot,
+            title: Some(format!("{}, by area", of.title)),
+            note: None,
+            x: Axis::new(of.title.to_lowercase(), of.shown),
+            y: Axis::new("probability density", format!("1/{}", of.shown)),
+            series: vec![series],
+        });
         Ok(())
     }
 }

@@ -1,8 +1,9 @@
 //! How long wrinkles are: their tops followed over neighbouring circles.
 
 use crate::surface::Hit;
-use crate::waves::{Criteria, Side, Wave, waves};
+use crate::waves::{Criteria, Side, waves};
 use plyflow_fixed::FixedBits;
+use plyflow_model::artifact::Wrinkle;
 use std::f64::consts::{PI, TAU};
 
 /// The circles on which wrinkles are followed.
@@ -21,7 +22,7 @@ impl Trace<'_> {
     /// Gives the wrinkles of the circle of that radius (m) their lengths: of the line through their tops inwards and
     /// outwards, as far as the next circle has a wrinkle whose top is no farther from the last one along the circle than half
     /// of the wider of the two and the distance of the circles.
-    pub fn lengths(&self, radius: f64, of: &mut [Wave]) {
+    pub fn lengths(&self, radius: f64, of: &mut [Wrinkle]) {
         // All wrinkles of a circle leave to the same side. Others follow it: in a corner of the ply little more than the
         // wrinkle may be left to judge by.
         let Some(first) = of.first() else { return };
@@ -32,7 +33,7 @@ impl Trace<'_> {
         };
         let what = Criteria { side, ..self.what };
         for outwards in [-1.0, 1.0] {
-            let mut heads: Vec<Option<(f64, Wave)>> =
+            let mut heads: Vec<Option<(f64, Wrinkle)>> =
                 of.iter().map(|w| Some((radius, *w))).collect();
             for k in 1.. {
                 let r = radius + outwards * self.step * f64::from(k);
@@ -53,8 +54,8 @@ impl Trace<'_> {
     }
 
     /// The wrinkle on the circle of radius `r` (m) that goes on from `last`.
-    fn next(&self, last: &Wave, r: f64, there: &[Wave]) -> Option<Wave> {
-        let apart = |w: &Wave| r * turn(last, w).abs();
+    fn next(&self, last: &Wrinkle, r: f64, there: &[Wrinkle]) -> Option<Wrinkle> {
+        let apart = |w: &Wrinkle| r * turn(last, w).abs();
         let near = there
             .iter()
             .filter(|w| apart(w) <= 0.5 * w.width.max(last.width) + self.step);
@@ -63,12 +64,12 @@ impl Trace<'_> {
 }
 
 /// Angle from one top to another, -pi to pi (rad).
-fn turn(a: &Wave, b: &Wave) -> f64 {
+fn turn(a: &Wrinkle, b: &Wrinkle) -> f64 {
     (b.angle - a.angle + PI).rem_euclid(TAU) - PI
 }
 
 /// Distance of two tops in space (m).
-fn distance((r, a): (f64, &Wave), (s, b): (f64, &Wave)) -> f64 {
+fn distance((r, a): (f64, &Wrinkle), (s, b): (f64, &Wrinkle)) -> f64 {
     let plan = r * r + s * s - 2.0 * r * s * turn(a, b).fixed_cos();
     (plan.max(0.0) + (a.z - b.z).powi(2)).sqrt()
 }

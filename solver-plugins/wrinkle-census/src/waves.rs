@@ -6,8 +6,9 @@
 //! profile has as many tops as troughs of any prominence: the number of wrinkles is the same from either side.
 
 use crate::surface::Hit;
-use serde::{Deserialize, Serialize};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use plyflow_model::artifact::Wrinkle;
+use serde::Deserialize;
+use std::f64::consts::TAU;
 
 /// To which side wrinkles leave the ply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -30,34 +31,6 @@ pub struct Criteria {
     pub prominence: f64,
     /// Its side.
     pub side: Side,
-}
-
-/// A wrinkle where a circle crosses it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Wave {
-    /// Angle from x of the middle of the arc that is its width, 0 to 2 pi (rad): a top that lies flat on a plate has no place.
-    pub angle: f64,
-    /// z of its top (m).
-    pub z: f64,
-    /// Its top over the circle's base (m); negative: under it.
-    pub height: f64,
-    /// How far its top stands over the higher of the two saddles that part it from higher tops (m); for the
-    /// highest top of a circle over the circle's lowest place.
-    pub prominence: f64,
-    /// Length of the arc about its top on which it is at least half as high (m), no farther than the lowest places
-    /// between it and its neighbours.
-    pub width: f64,
-    /// Mean shear angle over that arc (rad).
-    pub shear: f64,
-    /// Length of the line of its tops over neighbouring circles (m); 0 unless traced.
-    pub length: f64,
-}
-
-impl Wave {
-    /// 0 to 3: in which quarter of the circle it is, counted from x > 0, y > 0 counter-clockwise.
-    pub fn quadrant(&self) -> usize {
-        (self.angle / FRAC_PI_2) as usize % 4
-    }
 }
 
 /// The height that half of the points exceed (m); `None` without points.
@@ -139,7 +112,7 @@ impl Profile {
 /// least the wanted prominence that stand over the circle's base by at least the wanted height. The base is the
 /// median height of what lies on no wrinkle, that is, farther from every such top than where the profile has fallen by half
 /// of its prominence.
-pub fn waves(hits: &[Option<Hit>], radius: f64, what: &Criteria) -> Vec<Wave> {
+pub fn waves(hits: &[Option<Hit>], radius: f64, what: &Criteria) -> Vec<Wrinkle> {
     let Some(sign) = sign(hits, what.side) else {
         return Vec::new();
     };
@@ -176,7 +149,7 @@ pub fn waves(hits: &[Option<Hit>], radius: f64, what: &Criteria) -> Vec<Wave> {
         let inside = (i - reach[0] as isize)..=(i + reach[1] as isize);
         let shears = inside.filter_map(|j| hits[j.rem_euclid(n) as usize].map(|h| h.shear));
         let (sum, count) = shears.fold((0.0, 0.0), |(s, c), v| (s + v, c + 1.0));
-        found.push(Wave {
+        found.push(Wrinkle {
             angle: angle(i as f64 + 0.5 * (reach[1] - reach[0])).rem_euclid(TAU),
             z: sign * (base + height),
             height: sign * height,
@@ -315,7 +288,7 @@ mod tests {
         for side in [Side::Up, Side::Down] {
             let found = waves(&circle(cut), 0.1, &Criteria { side, ..WHAT });
             assert_eq!(found.len(), 5, "{found:?}");
-            let all = |of: fn(&Wave) -> f64, near: f64| {
+            let all = |of: fn(&Wrinkle) -> f64, near: f64| {
                 let off = found.iter().map(|w| (of(w).abs() - near).abs());
                 off.fold(0.0, f64::max) < 1e-9
             };

@@ -1,6 +1,8 @@
 //! From flagged cells to zones, all in the undeformed plane.
 
-use serde::{Deserialize, Serialize};
+use plyflow_model::artifact::{Rectangle, Zone};
+use serde::Deserialize;
+use serde_json::Map;
 
 /// How zones are drawn.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -32,28 +34,6 @@ pub struct FlaggedCell {
     pub area: f64,
 }
 
-/// `[x0, y0, x1, y1]` (m).
-pub type Rectangle = [f64; 4];
-
-/// A zone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Zone {
-    /// A, B, .. from left to right.
-    pub name: String,
-    /// Scaled and clipped.
-    #[serde(rename = "box")]
-    pub bounds: Rectangle,
-    /// Around the flagged cells.
-    pub defect_box: Rectangle,
-    /// Left, right, bottom, top: whether the side lies on the edge of the blank.
-    pub free_sides: [bool; 4],
-    /// Indices of the plies with flagged cells in it.
-    #[serde(skip)]
-    pub plies: Vec<usize>,
-    /// Undeformed flagged area in it, summed over the plies (m2).
-    pub flagged_area: f64,
-}
-
 /// Why no zones could be drawn.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExtractError {
@@ -79,12 +59,13 @@ pub enum ExtractError {
     },
 }
 
-/// Draws the zones of a `blank` (the box around all plies). Without flagged cells and boxes there are none.
+/// Draws the zones of a `blank` (the box around all plies). Without flagged cells and boxes there are none. `names`: of the plies.
 ///
 /// # Errors
 /// When a hand-drawn box is not a box or lies off the blank.
 pub fn extract(
     cells: &[FlaggedCell],
+    names: &[String],
     blank: Rectangle,
     settings: &Settings,
 ) -> Result<Vec<Zone>, ExtractError> {
@@ -108,19 +89,16 @@ pub fn extract(
         Zone {
             name: name(i),
             bounds,
-            defect_box,
+            defect_box: Some(defect_box),
             free_sides: free_sides(bounds, blank),
-            plies,
+            plies: plies.iter().map(|&p| names[p].clone()).collect(),
             // A fold: the sum of nothing is -0 in Rust.
             flagged_area: cells.iter().filter(inside).fold(0.0, |sum, c| sum + c.area),
+            replaces: Vec::new(),
+            other: Map::new(),
         }
     };
     Ok(zones.drain(..).enumerate().map(describe).collect())
-}
-
-/// Area of a box (m2).
-pub fn area(b: Rectangle) -> f64 {
-    (b[2] - b[0]) * (b[3] - b[1])
 }
 
 /// A .. Z, AA, AB, ..

@@ -1,31 +1,10 @@
 //! Zones whose local run shows a defect at the cut: they are drawn again, larger, and run again.
 
-use crate::extract::{Rectangle, Settings, area, free_sides, hull, near, onto_edges, tidy};
-use serde::{Deserialize, Serialize};
+use crate::extract::{Settings, free_sides, hull, near, onto_edges, tidy};
+use plyflow_model::artifact::{Rectangle, Zone};
 
-/// A zone as its step wrote it, and as it is written again.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Drawn {
-    /// A, B, ..
-    pub name: String,
-    /// `[x0, y0, x1, y1]` (m).
-    #[serde(rename = "box")]
-    pub bounds: Rectangle,
-    /// Around the flagged cells (m).
-    pub defect_box: Rectangle,
-    /// Left, right, bottom, top: whether the side lies on the edge of the blank.
-    pub free_sides: [bool; 4],
-    /// Plies with flagged cells in it.
-    pub plies: Vec<String>,
-    /// (m2)
-    pub flagged_area: f64,
-    /// Zones that it takes the place of, beside the one of its own name.
-    #[serde(default)]
-    pub replaces: Vec<String>,
-}
-
-/// A defect of a local run.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+/// What growing asks of a defect of a local run.
+#[derive(Debug, Clone, PartialEq)]
 pub struct AtCut {
     /// Such as CW1.
     pub id: String,
@@ -35,36 +14,22 @@ pub struct AtCut {
     pub cut_sides: [bool; 4],
 }
 
-/// The zones that count, by name (A to Z before AA), of several lists in any order: of one name the largest, and none that another one replaces. So
-/// `comparison` takes them too.
-pub fn current(zones: Vec<Drawn>) -> Vec<Drawn> {
-    let replaced: Vec<String> = zones.iter().flat_map(|z| z.replaces.clone()).collect();
-    let mut all = zones;
-    all.sort_by(|a, b| {
-        let by_name = (a.name.len(), &a.name).cmp(&(b.name.len(), &b.name));
-        by_name.then(area(b.bounds).total_cmp(&area(a.bounds)))
-    });
-    all.dedup_by(|later, first| later.name == first.name);
-    all.retain(|z| !replaced.contains(&z.name));
-    all
-}
-
 /// Those of the `zones` that have a defect at their cut, drawn larger: every side that one reaches is moved out by
 /// `growth` times the zone's size across it. Where a zone then meets others, one zone takes the place of all, with the name of the first. With them
 /// the texts that tell why.
 pub fn grow(
-    zones: &[Drawn],
+    zones: &[Zone],
     defects: &[AtCut],
     blank: Rectangle,
     settings: &Settings,
-) -> Vec<(Drawn, String)> {
-    let mut all: Vec<(Drawn, Option<String>)> = (zones.iter())
+) -> Vec<(Zone, String)> {
+    let mut all: Vec<(Zone, Option<String>)> = (zones.iter())
         .map(|z| match reached(z, defects) {
             (_, ids) if ids.is_empty() => (z.clone(), None),
             (sides, ids) => (larger(z, sides, blank, settings), Some(ids.join(", "))),
         })
         .collect();
-    let pair = |all: &[(Drawn, Option<String>)]| {
+    let pair = |all: &[(Zone, Option<String>)]| {
         let grown = (0..all.len()).filter(|&i| all[i].1.is_some());
         let mut pairs = grown.flat_map(|i| {
             (0..all.len())
@@ -77,7 +42,10 @@ pub fn grow(
         let (b, why) = all.remove(j);
         let a = &mut all[i];
         a.0.bounds = hull(a.0.bounds, b.bounds);
-        a.0.defect_box = hull(a.0.defect_box, b.defect_box);
+        a.0.defect_box = match (a.0.defect_box, b.defect_box) {
+            (Some(a), Some(b)) => Some(hull(a, b)),
+            (a, b) => a.or(b),
+        };
         a.0.free_sides = free_sides(a.0.bounds, blank);
         a.0.plies.extend(b.plies);
         a.0.plies.sort();
@@ -94,7 +62,7 @@ pub fn grow(
 }
 
 /// The sides of its cut that defects of a zone reach, and their names.
-fn reached(zone: &Drawn, defects: &[AtCut]) -> ([bool; 4], Vec<String>) {
+fn reached(zone: &Zone, defects: &[AtCut]) -> ([bool; 4], Vec<String>) {
     let own = defects.iter().filter(|d| d.zone == zone.name);
     own.filter(|d| d.cut_sides.contains(&true)).fold(
         ([false; 4], Vec::new()),
@@ -105,7 +73,7 @@ fn reached(zone: &Drawn, defects: &[AtCut]) -> ([bool; 4], Vec<String>) {
     )
 }
 
-fn larger(zone: &Drawn, sides: [bool; 4], blank: Rectangle, s: &Settings) -> Drawn {
+fn larger(zone: &Zone, sides: [bool; 4], blank: Rectangle, s: &Settings) -> Zone {
     let mut bounds = zone.bounds;
     for d in 0..2 {
         let step = s.growth * (zone.bounds[d + 2] - zone.bounds[d]);
@@ -117,7 +85,7 @@ fn larger(zone: &Drawn, sides: [bool; 4], blank: Rectangle, s: &Settings) -> Dra
         }
     }
     let bounds = onto_edges(bounds, blank, s.join_distance);
-    Drawn {
+    Zone {
         bounds,
         free_sides: free_sides(bounds, blank),
         replaces: Vec::new(),

@@ -6,15 +6,16 @@
 mod extract;
 mod grow;
 
-pub use extract::{ExtractError, FlaggedCell, Rectangle, Settings, Zone, area, extract};
-pub use grow::{AtCut, Drawn, current, grow};
+pub use extract::{ExtractError, FlaggedCell, Settings, extract};
+pub use grow::{AtCut, grow};
 
 use extract::tidy;
+use plyflow_model::artifact::{
+    ComparedDefect, Comparison, Rectangle, Zone, Zones, area, current_zones,
+};
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use plyflow_surface::Topology;
 use plyflow_surface::vector::Vec3;
-use serde::Deserialize;
-use serde_json::{Value, json};
 
 /// The step.
 pub struct ZoneExtraction;
@@ -38,66 +39,23 @@ impl Step for ZoneExtraction {
 /// Zones around the defects of a run.
 fn first(host: &Host, settings: &Settings) -> Result<(), StepError> {
     let (plies, cells, blank) = read(host)?;
-    let zones = extract(&cells, blank, settings)?;
+    let zones = extract(&cells, &plies, blank, settings)?;
     if zones.is_empty() {
         host.log(Log::Info, "no defect is large enough for a zone");
     }
-    let mut list = Vec::new();
-    for zone in &zones {
-        let mut entry = serde_json::to_value(zone)?;
-        entry["plies"] = zone
-            .plies
-            .iter()
-            .map(|&p| Value::from(plies[p].as_str()))
-            .collect();
-        list.push((zone.name.clone(), zone.bounds, entry));
-    }
-    write(host, settings, blank, list)
-}
-
-#[derive(Deserialize)]
-struct Previous {
-    zones: Vec<Drawn>,
-    blank: Rectangle,
-}
-
-#[derive(Deserialize)]
-struct Compared {
-    /// Names of all zones that were compared.
-    #[serde(default)]
-    zones: Vec<String>,
-    /// Their boxes in the same order (m); older comparisons have none.
-    #[serde(default)]
-    zone_boxes: Vec<Rectangle>,
-    models: Vec<Model>,
-    defects: Vec<Found>,
-}
-
-#[derive(Deserialize)]
-struct Model {
-    name: String,
-    role: String,
-}
-
-#[derive(Deserialize)]
-struct Found {
-    model: String,
-    #[serde(flatten)]
-    defect: AtCut,
+    write(host, settings, blank, zones)
 }
 
 /// Those of the zones again, larger, whose local runs show a defect at the cut.
 fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
     let (zones, blank) = drawn_before(host)?;
-    let compared: Compared = host.attributes(&host.input("comparison")?)?;
-    let is_local = |name: &str| {
-        let mut models = compared.models.iter();
-        models.any(|m| m.name == name && m.role == "local")
+    let compared: Comparison = host.attributes(&host.input("comparison")?)?;
+    let at_cut = |d: &ComparedDefect| AtCut {
+        id: d.id.clone(),
+        zone: d.zone.clone(),
+        cut_sides: d.cut_sides,
     };
-    let defects: Vec<AtCut> = (compared.defects.iter())
-        .filter(|f| is_local(&f.model))
-        .map(|f| f.defect.clone())
-        .collect();
+    let defects: Vec<AtCut> = compared.local_defects().map(at_cut).collect();
     let known = |name: &&String| zones.iter().any(|z| z.name == **name);
     let missing: Vec<&str> = (compared.zones.iter())
         .filter(|n| !known(n))
@@ -112,7 +70,7 @@ fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
     }
     for (name, compared) in compared.zones.iter().zip(&compared.zone_boxes) {
         let given = zones.iter().find(|z| z.name == *name);
-        if let Some(given) = given.filter(|z| !same(z.bounds, *compared)) {
+        if let Some(given) = given.filter(|z| !z.has_box(*compared)) {
             let text = format!(
                 "zones: zone {name} was compared with the box {:?} mm, of the lists given here the one that counts has it with {:?} mm: what reached the cut of the one says \
                  nothing of the other. Give all lists of zones that the comparison has, and no others",
@@ -143,7 +101,7 @@ fn again(host: &Host, settings: &Settings) -> Result<(), StepError> {
             zone.name
         );
         host.log(Log::Info, &text);
-        list.push((zone.name.clone(), zone.bounds, serde_json::to_value(&zone)?));
+        list.push(zone);
     }
     write(host, settings, blank, list)
 }
@@ -153,18 +111,16 @@ fn in_mm(bounds: Rectangle) -> Rectangle {
     bounds.map(|b| (1e4 * b).round() / 10.0)
 }
 
-/// Whether two boxes are one, however they were rounded on their ways.
-fn same(a: Rectangle, b: Rectangle) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9)
-}
-
 /// The zones that count of all lists given, and the box around the blank (m).
-fn drawn_before(host: &Host) -> Result<(Vec<Drawn>, Rectangle), StepError> {
+fn drawn_before(host: &Host) -> Result<(Vec<Zone>, Rectangle), StepError> {
     let (mut zones, mut blank) = (Vec::new(), None);
     for input in host.inputs_of("zones")? {
-        let previous: Previous = host.attributes(&input)?;
+        let previous: Zones = host.attributes(&input)?;
         zones.extend(previous.zones);
-        let (step, given) = (input.step, previous.blank);
+        let step = input.step;
+        let given = previous.blank.ok_or_else(|| {
+            format!("zones: '{step}' does not tell the box around the blank (attribute `blank`), in which zones may grow")
+        })?;
         match &blank {
             None => blank = Some((step, given)),
             Some((first, expected)) if *expected != given => {
@@ -177,17 +133,16 @@ fn drawn_before(host: &Host) -> Result<(Vec<Drawn>, Rectangle), StepError> {
         }
     }
     let (_, blank) = blank.ok_or("zones: no list arrives")?;
-    Ok((current(zones), blank))
+    Ok((current_zones(zones).0, blank))
 }
 
-/// Writes zones: name, box, and as in the data model.
 fn write(
     host: &Host,
     settings: &Settings,
     blank: Rectangle,
-    zones: Vec<(String, Rectangle, Value)>,
+    zones: Vec<Zone>,
 ) -> Result<(), StepError> {
-    let covered = zones.iter().fold(0.0, |sum, z| sum + area(z.1));
+    let covered = zones.iter().fold(0.0, |sum, z| sum + z.area());
     let fraction = covered / area(blank);
     if fraction > settings.maximum_fraction {
         host.log(
@@ -200,10 +155,13 @@ fn write(
             ),
         );
     }
-    let (names, list): (Vec<String>, Vec<Value>) = zones.into_iter().map(|z| (z.0, z.2)).unzip();
-    host.write_attributes(&json!({
-        "zones": list, "scale": settings.scale, "blank": blank, "ply_fraction": fraction,
-    }))?;
+    let names: Vec<String> = zones.iter().map(|z| z.name.clone()).collect();
+    host.write_attributes(&Zones {
+        zones,
+        scale: Some(settings.scale),
+        blank: Some(blank),
+        ply_fraction: Some(fraction),
+    })?;
     host.collection(&names)?;
     host.result("zone_count", names.len() as f64, "1")?;
     host.result("ply_fraction", fraction, "1")

@@ -1,12 +1,15 @@
 //! Zones from flags that are known.
 
+use plyflow_model::artifact::{
+    ComparedDefect, ComparedModel, Defect, DefectKind, Role, Zone, current_zones,
+};
 use plyflow_sdk::On;
 use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
 use plyflow_zone_extraction::{
-    AtCut, Drawn, FlaggedCell, Settings, ZoneExtraction, current, extract, grow,
+    AtCut, ExtractError, FlaggedCell, Settings, ZoneExtraction, extract, grow,
 };
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 const BLANK: [f64; 4] = [-0.240, -0.150, 0.240, 0.150];
 
@@ -20,6 +23,16 @@ fn settings() -> Settings {
         boxes: Vec::new(),
         growth: 0.25,
     }
+}
+
+/// Zones of plies that are called by their numbers.
+fn draw(
+    cells: &[FlaggedCell],
+    blank: [f64; 4],
+    settings: &Settings,
+) -> Result<Vec<Zone>, ExtractError> {
+    let names: Vec<String> = (0..4).map(|k| format!("ply_{k}")).collect();
+    extract(cells, &names, blank, settings)
 }
 
 /// Cells of 10 mm that fill a box.
@@ -45,7 +58,7 @@ fn close(a: [f64; 4], b: [f64; 4]) -> bool {
 
 #[test]
 fn a_box_grows_by_the_scale_about_its_centre() {
-    let zones = extract(
+    let zones = draw(
         &patch(0, [-0.050, -0.040, 0.050, 0.040]),
         BLANK,
         &settings(),
@@ -56,7 +69,10 @@ fn a_box_grows_by_the_scale_about_its_centre() {
         close(zones[0].bounds, [-0.0575, -0.046, 0.0575, 0.046]),
         "{zones:?}"
     );
-    assert!(close(zones[0].defect_box, [-0.050, -0.040, 0.050, 0.040]));
+    assert!(close(
+        zones[0].defect_box.unwrap(),
+        [-0.050, -0.040, 0.050, 0.040]
+    ));
     assert_eq!(zones[0].free_sides, [false; 4]);
     assert!((zones[0].flagged_area - 80e-4).abs() < 1e-12);
 }
@@ -66,28 +82,28 @@ fn zones_are_named_from_left_to_right_whatever_the_order_of_the_cells() {
     let mut cells = patch(0, [0.100, -0.020, 0.150, 0.020]);
     cells.extend(patch(1, [-0.200, 0.000, -0.150, 0.050]));
     cells.extend(patch(0, [-0.030, -0.100, 0.000, -0.060]));
-    let zones = extract(&cells, BLANK, &settings()).unwrap();
+    let zones = draw(&cells, BLANK, &settings()).unwrap();
     let names: Vec<&str> = zones.iter().map(|z| z.name.as_str()).collect();
     assert_eq!(names, ["A", "B", "C"]);
-    assert_eq!(zones[0].plies, [1]);
+    assert_eq!(zones[0].plies, ["ply_1"]);
     cells.reverse();
-    assert_eq!(extract(&cells, BLANK, &settings()).unwrap(), zones);
+    assert_eq!(draw(&cells, BLANK, &settings()).unwrap(), zones);
 }
 
 #[test]
 fn defects_on_different_plies_within_the_join_distance_are_one() {
     let mut cells = patch(0, [-0.050, -0.040, -0.010, 0.040]);
     cells.extend(patch(1, [0.000, -0.040, 0.050, 0.040]));
-    let zones = extract(&cells, BLANK, &settings()).unwrap();
+    let zones = draw(&cells, BLANK, &settings()).unwrap();
     assert_eq!(zones.len(), 1, "a gap of 10 mm");
-    assert_eq!(zones[0].plies, [0, 1]);
+    assert_eq!(zones[0].plies, ["ply_0", "ply_1"]);
     let apart = Settings {
         join_distance: 0.005,
         scale: 1.0,
         minimum_size: 0.0,
         ..settings()
     };
-    assert_eq!(extract(&cells, BLANK, &apart).unwrap().len(), 2);
+    assert_eq!(draw(&cells, BLANK, &apart).unwrap().len(), 2);
 }
 
 #[test]
@@ -100,14 +116,17 @@ fn scaled_boxes_that_overlap_are_merged_until_none_do() {
         minimum_size: 0.0,
         ..settings()
     };
-    let zones = extract(&cells, BLANK, &s).unwrap();
+    let zones = draw(&cells, BLANK, &s).unwrap();
     assert_eq!(zones.len(), 1, "{zones:?}");
-    assert!(close(zones[0].defect_box, [-0.150, -0.020, 0.076, 0.020]));
+    assert!(close(
+        zones[0].defect_box.unwrap(),
+        [-0.150, -0.020, 0.076, 0.020]
+    ));
 }
 
 #[test]
 fn sides_past_or_near_the_blank_s_edge_lie_on_it_and_are_free() {
-    let zones = extract(
+    let zones = draw(
         &patch(0, [-0.240, 0.080, -0.200, 0.140]),
         BLANK,
         &settings(),
@@ -122,9 +141,9 @@ fn sides_past_or_near_the_blank_s_edge_lie_on_it_and_are_free() {
 fn specks_get_no_zone_even_when_both_plies_have_them() {
     let mut cells = patch(0, [0.0, 0.0, 0.010, 0.010]);
     cells.extend(patch(1, [0.0, 0.0, 0.010, 0.010]));
-    assert!(extract(&cells, BLANK, &settings()).unwrap().is_empty());
+    assert!(draw(&cells, BLANK, &settings()).unwrap().is_empty());
     cells.extend(patch(1, [0.010, 0.0, 0.020, 0.010]));
-    let zones = extract(&cells, BLANK, &settings()).unwrap();
+    let zones = draw(&cells, BLANK, &settings()).unwrap();
     assert!(
         (zones[0].bounds[2] - zones[0].bounds[0] - 0.040).abs() < 1e-12,
         "smallest size"
@@ -138,7 +157,7 @@ fn drawn_boxes_are_taken_as_they_are_and_bad_ones_are_named() {
         ..settings()
     };
     let cells = patch(0, [0.0, 0.0, 0.050, 0.050]);
-    let zones = extract(
+    let zones = draw(
         &cells,
         BLANK,
         &with(vec![vec![0.1, -0.2, 0.2, 0.1], vec![-0.1, 0.0, 0.02, 0.02]]),
@@ -147,14 +166,14 @@ fn drawn_boxes_are_taken_as_they_are_and_bad_ones_are_named() {
     assert!(close(zones[0].bounds, [0.1, -0.150, 0.2, 0.1]));
     assert_eq!((zones[0].flagged_area, zones[0].plies.len()), (0.0, 0));
     assert!((zones[1].flagged_area - 4e-4).abs() < 1e-12);
-    let error = extract(&cells, BLANK, &with(vec![vec![0.1, 0.2]]))
+    let error = draw(&cells, BLANK, &with(vec![vec![0.1, 0.2]]))
         .unwrap_err()
         .to_string();
     assert!(
         error.contains("box 0") && error.contains("[0.1, 0.2]"),
         "{error}"
     );
-    let error = extract(&cells, BLANK, &with(vec![vec![1.0, 0.0, 2.0, 0.1]]))
+    let error = draw(&cells, BLANK, &with(vec![vec![1.0, 0.0, 2.0, 0.1]]))
         .unwrap_err()
         .to_string();
     assert!(error.contains("outside of the blank"), "{error}");
@@ -247,15 +266,58 @@ fn artifact_follows_the_data_model_and_warns_when_zones_cover_too_much() {
     assert!(out.log[0].contains("100 %"), "{:?}", out.log);
 }
 
-fn drawn(name: &str, bounds: [f64; 4]) -> Drawn {
-    Drawn {
+fn drawn(name: &str, bounds: [f64; 4]) -> Zone {
+    Zone {
         name: name.into(),
         bounds,
-        defect_box: bounds,
+        defect_box: Some(bounds),
         free_sides: [false; 4],
         plies: vec!["ply_1".into()],
         flagged_area: 1e-3,
         replaces: Vec::new(),
+        other: Map::new(),
+    }
+}
+
+/// A run of a comparison.
+fn model(role: Role, zone: Option<&str>) -> ComparedModel {
+    let name = zone.map_or("global".to_owned(), |zone| format!("local.{zone}"));
+    ComparedModel {
+        name,
+        role,
+        zone: zone.map(str::to_owned),
+        element_size: 0.004,
+        elements: 100,
+        element_cycles: 1e6,
+    }
+}
+
+/// A wrinkle of a comparison, at the right side of a zone's cut.
+fn defect(id: &str, model: &str, zone: &str) -> ComparedDefect {
+    ComparedDefect {
+        id: id.into(),
+        model: model.into(),
+        zone: zone.into(),
+        ply: "ply_1".into(),
+        found: Defect {
+            kind: DefectKind::Wrinkle,
+            cause: None,
+            amplitude: 0.002,
+            area: 1e-4,
+            centre: [0.0, 0.0],
+            radius: None,
+            direction: None,
+            ridge_shear: None,
+            ridge_shear_min: None,
+            ridge_shear_max: None,
+            ridge_shear_profile: None,
+        },
+        length: 0.02,
+        curvature_max: 100.0,
+        shear_min: None,
+        shear_max: None,
+        touches_cut: true,
+        cut_sides: [false, true, false, false],
     }
 }
 
@@ -280,7 +342,7 @@ fn zones_that_lie_nearer_than_the_join_distance_are_one() {
         });
         cells.extend(shifted);
         // What is left between the cells, 12.5 mm and more, parts the defects.
-        assert_eq!(extract(&cells, BLANK, &settings()).unwrap().len(), count);
+        assert_eq!(draw(&cells, BLANK, &settings()).unwrap().len(), count);
     }
 }
 
@@ -336,7 +398,7 @@ fn a_second_pass_sees_the_zones_that_the_first_one_left_alone() {
         attributes: json!({"zones": zones, "blank": blank}),
         ..Default::default()
     };
-    let again = Drawn {
+    let again = Zone {
         replaces: vec!["B".into()],
         ..drawn("A", [0.0, 0.0, 0.100, 0.050])
     };
@@ -354,8 +416,8 @@ fn a_second_pass_sees_the_zones_that_the_first_one_left_alone() {
         kind: "comparison".into(),
         attributes: json!({
             "zones": ["A", "C"],
-            "models": [{"name": "local.A", "role": "local"}, {"name": "local.C", "role": "local"}],
-            "defects": [{"id": "AW1", "model": "local.A", "zone": "A", "cut_sides": [false, true, false, false]}]}),
+            "models": [model(Role::Local, Some("A")), model(Role::Local, Some("C"))],
+            "defects": [defect("AW1", "local.A", "A")]}),
         ..Default::default()
     };
     let given = |lists: &[&MemoryArtifact]| {
@@ -443,7 +505,7 @@ fn a_zone_that_was_compared_with_another_box_is_told() {
 
 #[test]
 fn of_several_lists_the_largest_of_a_name_counts_and_none_that_is_replaced() {
-    let replacing = |name: &str, bounds: [f64; 4], others: &[&str]| Drawn {
+    let replacing = |name: &str, bounds: [f64; 4], others: &[&str]| Zone {
         replaces: others.iter().map(|o| (*o).to_owned()).collect(),
         ..drawn(name, bounds)
     };
@@ -456,7 +518,7 @@ fn of_several_lists_the_largest_of_a_name_counts_and_none_that_is_replaced() {
         replacing("A", square(0.02), &["B"]),
         drawn("A", square(0.03)),
     ];
-    let found = current(zones);
+    let found = current_zones(zones).0;
     let told: Vec<(&str, f64)> = found
         .iter()
         .map(|z| (z.name.as_str(), z.bounds[2]))
@@ -472,12 +534,11 @@ fn the_step_gives_only_what_is_drawn_again_and_wants_one_way_of_two() {
         attributes,
         ..Default::default()
     };
-    let defect = |model: &str, zone: &str| json!({"id": "W", "model": model, "zone": zone, "cut_sides": [false, true, false, false]});
     let comparison = MemoryArtifact {
         kind: "comparison".into(),
         attributes: json!({
-            "models": [{"name": "global", "role": "global"}, {"name": "local.A", "role": "local"}],
-            "defects": [defect("global", "B"), defect("local.A", "A")]}),
+            "models": [model(Role::Global, None), model(Role::Local, Some("A"))],
+            "defects": [defect("W", "global", "B"), defect("W", "local.A", "A")]}),
         ..Default::default()
     };
     let inputs = [

@@ -8,11 +8,11 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 use plyflow_mechanics::history::{hermite, locate, spline_slopes};
+use plyflow_model::artifact::{Feedback, Forming, PlainBody, Zone, which_count};
 use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
 use plyflow_surface::vector::{Vec3, add, distance, scale, sub};
 use plyflow_surface::{Location, QuadLocator, SmoothSheet, StandOff, Topology, flat_bounds};
 use serde::Deserialize;
-use serde_json::{Value, json};
 
 /// The step.
 pub struct ZoneFeedback;
@@ -35,60 +35,10 @@ const SAME_PLACE: f64 = 1e-6;
 /// Share of the coarse run's time in which nodes go over from its motion to that of a zone that begins late.
 const LEADING_OVER: f64 = 0.05;
 
-/// A zone as its fine run tells it.
-#[derive(Deserialize)]
-struct Zone {
-    name: String,
-    /// `[x0, y0, x1, y1]` (m).
-    #[serde(rename = "box")]
-    bounds: [f64; 4],
-    /// Left, right, bottom, top.
-    free_sides: [bool; 4],
-    /// Names of the zones in whose places it is.
-    #[serde(default)]
-    replaces: Vec<String>,
-}
-
-impl Zone {
-    /// Of its box (m2).
-    fn area(&self) -> f64 {
-        let [x0, y0, x1, y1] = self.bounds;
-        (x1 - x0) * (y1 - y0)
-    }
-
-    /// Whether a place of the flat ply lies in the zone and at least `overlap` (m) from its cut sides.
-    fn holds(&self, at: Vec3, overlap: f64) -> bool {
-        (0..4).all(|side| {
-            let (d, outward) = (side / 2, if side % 2 == 0 { -1.0 } else { 1.0 });
-            let inside = outward * (self.bounds[d + 2 * (side % 2)] - at[d]);
-            let least = if self.free_sides[side] { 0.0 } else { overlap };
-            inside >= least - SAME_PLACE
-        })
-    }
-}
-
 struct Fine {
     input: Input,
     meshes: Meshes,
     zone: Zone,
-}
-
-#[derive(Deserialize)]
-struct Coarse {
-    scene: Value,
-    sheets: Vec<Sheet>,
-    #[serde(default)]
-    element_size: f64,
-    #[serde(default)]
-    symmetry: Vec<String>,
-    #[serde(default)]
-    zone: Value,
-}
-
-#[derive(Deserialize)]
-struct Sheet {
-    name: String,
-    kind: String,
 }
 
 /// The driven nodes of one ply.
@@ -106,7 +56,7 @@ impl Step for ZoneFeedback {
     fn run(host: &Host) -> Result<(), StepError> {
         let p: Parameters = host.parameters()?;
         let formed = host.input("formed")?;
-        let coarse: Coarse = host.attributes(&formed)?;
+        let coarse: Forming = host.attributes(&formed)?;
         check(&formed, &coarse)?;
         let overlap = p.overlap.unwrap_or(OVERLAP * coarse.element_size);
         if overlap <= 0.0 {
@@ -121,7 +71,7 @@ impl Step for ZoneFeedback {
         let fine = fine_runs(host)?;
         host.write_f64("time", &[meshes.times.len()], "s", &meshes.times)?;
         let mut change = Vec::new();
-        for sheet in coarse.sheets.iter().filter(|s| s.kind == "ply") {
+        for sheet in coarse.plies() {
             host.progress(&Progress {
                 phase: "reading the fine motion",
                 ..Default::default()
@@ -142,10 +92,14 @@ impl Step for ZoneFeedback {
                 "no coarse node lies deep enough in a zone: nothing is fed back; a smaller `overlap` or larger zones would",
             );
         }
-        host.write_attributes(&json!({
-            "zone": null, "scene": coarse.scene, "frames": meshes.times.len(), "element_size": coarse.element_size,
-            "overlap": overlap, "fed_back": fine.iter().map(|f| &f.zone.name).collect::<Vec<_>>(),
-        }))?;
+        host.write_attributes(&Feedback {
+            zone: None,
+            scene: coarse.scene,
+            frames: meshes.times.len(),
+            element_size: coarse.element_size,
+            overlap,
+            fed_back: fine.iter().map(|f| f.zone.name.clone()).collect(),
+        })?;
         let squares: f64 = change.iter().map(|c| c * c).sum();
         let mean = (squares / change.len().max(1) as f64).sqrt();
         host.result("driven_nodes", change.len() as f64, "1")?;
@@ -161,15 +115,15 @@ impl Step for ZoneFeedback {
     }
 }
 
-fn check(formed: &Input, coarse: &Coarse) -> Result<(), StepError> {
+fn check(formed: &Input, coarse: &Forming) -> Result<(), StepError> {
     let step = &formed.step;
-    if !coarse.zone.is_null() {
+    if coarse.zone.is_some() {
         return Err(format!(
             "`formed`: '{step}' is the run of a zone; the coarse run of the whole scene is expected"
         )
         .into());
     }
-    if !coarse.symmetry.is_empty() {
+    if coarse.symmetry.as_ref().is_some_and(|s| !s.is_empty()) {
         let text = format!(
             "'{step}' was computed beside mirror planes; feeding back is for scenes without `symmetry`. Leave it out of the scene"
         );
@@ -181,10 +135,10 @@ fn check(formed: &Input, coarse: &Coarse) -> Result<(), StepError> {
 fn fine_runs(host: &Host) -> Result<Vec<Fine>, StepError> {
     let mut list = Vec::new();
     for input in host.inputs_of("local")? {
-        let attributes: Value = host.attributes(&input)?;
-        let zone: Zone = serde_json::from_value(attributes["zone"].clone()).map_err(|e| {
+        let run: Forming = host.attributes(&input)?;
+        let zone = run.zone.ok_or_else(|| {
             let step = &input.step;
-            format!("`local`: '{step}' is no run of a zone (attribute `zone`: {e})")
+            format!("`local`: '{step}' is no run of a zone (its attribute `zone` is null)")
         })?;
         let meshes = host.meshes(&input)?;
         if meshes.times.len() < 2 {
@@ -211,21 +165,11 @@ fn fine_runs(host: &Host) -> Result<Vec<Fine>, StepError> {
     Ok(list)
 }
 
-/// The runs that count, in the order in which they are given, and the others: none of a zone that another one replaces, and of one
-/// zone that of its largest box, of several with that the last. So `comparison` and `zone-extraction` take them too.
+/// The runs that count, in the order in which they are given, and the others ([`which_count`]).
 fn current(list: Vec<Fine>) -> (Vec<Fine>, Vec<Fine>) {
-    let counts = |i: usize| {
-        let own = &list[i].zone;
-        let replaced = list.iter().any(|f| f.zone.replaces.contains(&own.name));
-        let better = |(j, other): (usize, &Fine)| {
-            let by_area = other.zone.area().total_cmp(&own.area());
-            other.zone.name == own.name && by_area.then(j.cmp(&i)).is_gt()
-        };
-        !replaced && !list.iter().enumerate().any(better)
-    };
-    let taken: Vec<bool> = (0..list.len()).map(counts).collect();
-    let mut taken = taken.into_iter();
-    list.into_iter().partition(|_| taken.next() == Some(true))
+    let zones: Vec<&Zone> = list.iter().map(|f| &f.zone).collect();
+    let mut counts = which_count(&zones).into_iter();
+    list.into_iter().partition(|_| counts.next() == Some(true))
 }
 
 /// Motion of the nodes of a coarse ply that lie deep in a zone, at the coarse frames.
@@ -257,7 +201,7 @@ fn drive(
         };
         let stand_off = StandOff::new(&points, &topology, found.cell_area);
         let deep = |(i, _): &(u32, Vec<Vec3>)| {
-            !taken[*i as usize] && run.zone.holds(points[*i as usize], overlap)
+            !taken[*i as usize] && run.zone.holds(&points[*i as usize], overlap)
         };
         let mut ways: Vec<(u32, Vec<Vec3>)> =
             found.ways.iter().filter(|w| deep(w)).cloned().collect();
@@ -318,7 +262,7 @@ fn on_fine(
         return Ok(None);
     };
     let within = |(i, at): (usize, &Vec3)| {
-        let inside = run.zone.holds(*at, 0.0);
+        let inside = run.zone.holds(at, 0.0);
         let place = inside.then(|| locator.locate(at[0], at[1], SAME_PLACE))?;
         Some((i as u32, place?))
     };
@@ -368,7 +312,7 @@ fn write(
     driven: &Driven,
 ) -> Result<(), StepError> {
     let (points, cells) = host.mesh(formed, meshes.body(ply)?)?;
-    host.define_mesh(ply, &points, 4, &cells, &json!({}))?;
+    host.define_mesh(ply, &points, 4, &cells, &PlainBody {})?;
     let (f, k) = (meshes.times.len(), driven.nodes.len());
     let nodes: Vec<u32> = driven.nodes.iter().map(|(i, _)| *i).collect();
     host.write_u32(&format!("{ply}/driven_nodes"), &[k], &nodes)?;

@@ -27,7 +27,7 @@ fn formed(b: [f64; 4], size: f64, times: &[f64], draw_in: f64, zone: Value) -> M
         kind: "forming".into(),
         attributes: json!({
             "scene": "s", "element_size": size, "zone": zone, "symmetry": [],
-            "sheets": [{"name": "film", "kind": "diaphragm"}, {"name": "ply_1", "kind": "ply"}],
+            "sheets": [{"name": "film", "kind": "diaphragm", "thickness": 4e-5, "offset": 2e-5}, {"name": "ply_1", "kind": "ply", "thickness": 4e-4, "offset": 2e-4}],
         }),
         times: times.to_vec(),
         bodies: vec![MemoryBody {

@@ -11,6 +11,7 @@ use crate::units::shown;
 use camino::Utf8Path;
 use maud::{Markup, html};
 use plyflow_artifact::{Artifact, BodyInfo, On};
+use plyflow_model::artifact::Forming;
 use rayon::prelude::*;
 
 /// Pictures on a page.
@@ -312,13 +313,12 @@ fn uppermost<'a>(artifact: &'a Artifact, kind: &str) -> Option<&'a BodyInfo> {
         // Bodies stand in the order of the stack, from the tool.
         "measurement" | "defects" => sheets().next_back(),
         "forming" => {
-            let told: serde_json::Value = serde_json::from_str(artifact.attributes()).ok()?;
-            if told["zone"].is_object() {
+            let told: Forming = serde_json::from_str(artifact.attributes()).ok()?;
+            if told.zone.is_some() {
                 return None;
             }
-            let list = told["sheets"].as_array()?;
-            let ply = list.iter().rev().find(|s| s["kind"] == "ply")?;
-            sheets().find(|b| ply["name"] == b.name.as_str())
+            let ply = told.plies().last()?;
+            sheets().find(|b| b.name == ply.name)
         }
         _ => sheets().find(|b| b.moving && b.name != "tool"),
     }

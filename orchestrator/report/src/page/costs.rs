@@ -31,7 +31,7 @@ fn rate(i: &Instance, run: &Run) -> f64 {
         .iter()
         .find(|r| r.name == "element_cycle_rate");
     let wall = i.record.cost.wall_seconds.max(1e-9);
-    told.map_or(run.facts.element_cycles / wall, |r| r.value)
+    told.map_or(run.facts.element_cycles.unwrap_or(0.0) / wall, |r| r.value)
 }
 
 /// Table and bars; forming runs with their elements and rate.
@@ -72,9 +72,9 @@ fn row(i: &Instance, run: Option<&Run>) -> Markup {
     html! {
         tr {
             th { (i.label()) } td { (i.record.kind) }
-            td class="n" { @if let Some(r) = run { (told(r.facts.elements, count)) } }
-            td class="n" { @if let Some(r) = run { (told(r.facts.cycles, count)) } }
-            td class="n" { @if let Some(r) = run { (told(r.facts.element_cycles * 1e-6, |v| fixed(v, 1))) } }
+            td class="n" { @if let Some(r) = run { (told(r.facts.elements as f64, count)) } }
+            td class="n" { @if let Some(r) = run { (told(r.facts.cycles.unwrap_or(0) as f64, count)) } }
+            td class="n" { @if let Some(r) = run { (told(r.facts.element_cycles.unwrap_or(0.0) * 1e-6, |v| fixed(v, 1))) } }
             td class="n" { (duration(c.wall_seconds)) } td class="n" { (duration(c.cpu_seconds)) }
             td class="n" { (c.threads) } td class="n" { (bytes(c.peak_memory)) }
             td class="n" { @if let Some(r) = run { (told(rate(i, r) * 1e-6, |v| fixed(v, 2))) } }

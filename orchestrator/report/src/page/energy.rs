@@ -1,10 +1,10 @@
 //! Energies, loads and contact over time.
 
 use crate::plot::{Plot, Series, Style};
-use crate::read::PenetrationPeak;
 use crate::study::{Material, Run};
 use crate::units::{fixed, number};
 use maud::{Markup, html};
+use plyflow_model::artifact::PenetrationPeak;
 
 /// A column of a history, its name in the legend, its colour, and what makes the plot's unit of SI.
 type Column = (&'static str, &'static str, usize, f64);
@@ -90,7 +90,7 @@ fn health(runs: &[(bool, &Run)]) -> Markup {
             thead { tr { th { "run" } th class="n" { "peak kinetic / internal" } th class="n" { "bound" } th { "kept" }
                 th class="n" { "peak drift / external work" } th class="n" { "hourglass / internal" } } }
             tbody { @for (_, r) in runs {
-                @let e = &r.facts.energy;
+                @let e = r.facts.energy.unwrap_or_default();
                 tr { th { (r.label) } td class="n" { (percent(e.peak_kinetic_ratio)) } td class="n" { (percent(r.kinetic_bound)) }
                     @match e.kinetic_bound_kept {
                         Some(true) => td class="met" { "✓ kept" },
@@ -217,7 +217,9 @@ fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64], blank: Plot<'
 }
 
 fn penetrations(runs: &[(bool, &Run)]) -> Markup {
-    let any = runs.iter().any(|(_, r)| !r.facts.penetration.is_empty());
+    let any = runs
+        .iter()
+        .any(|(_, r)| r.facts.penetration.as_ref().is_some_and(|p| !p.is_empty()));
     let bound = runs.iter().find_map(|(_, r)| r.facts.overlap_bound);
     let on_the_way = |r: &Run| r.facts.overlap_peak_bound.or(r.facts.overlap_bound);
     let later = runs.iter().find_map(|(_, r)| r.facts.overlap_peak_bound);
@@ -233,7 +235,7 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
                         th class="n" { "largest at (s)" }
                     }
                 }
-                tbody { @for (_, r) in runs { @for (i, (pair, p)) in r.facts.penetration.iter().enumerate() {
+                tbody { @for (_, r) in runs { @for (i, (pair, p)) in r.facts.penetration.iter().flatten().enumerate() {
                     tr { th { @if i == 0 { (r.label) } } td { (pair) } (depths(p.max, p.q999, p.overlap, r.facts.overlap_bound)) (peak(p.peak.as_ref(), on_the_way(r))) }
                 } } }
             } }
@@ -243,7 +245,9 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
 
 /// What the watch found, by pair.
 fn watched(runs: &[(bool, &Run)]) -> Markup {
-    let any = runs.iter().any(|(_, r)| !r.facts.depth.is_empty());
+    let any = runs
+        .iter()
+        .any(|(_, r)| r.facts.depth.as_ref().is_some_and(|d| !d.is_empty()));
     let place = |at: Option<[f64; 3]>| {
         at.map_or("–".into(), |at| at.map(|c| fixed(1e3 * c, 1)).join(", "))
     };
@@ -260,7 +264,7 @@ fn watched(runs: &[(bool, &Run)]) -> Markup {
                         th class="n" { "at (s)" }
                     }
                 }
-                tbody { @for (_, r) in runs { @for (i, (pair, d)) in r.facts.depth.iter().enumerate() {
+                tbody { @for (_, r) in runs { @for (i, (pair, d)) in r.facts.depth.iter().flatten().enumerate() {
                     @let class = if d.bound.is_some_and(|b| d.end > b) { "n missed" } else { "n" };
                     tr { th { @if i == 0 { (r.label) } } td { (pair) }
                         td class=(class) { (number(d.end * 1e3, 3)) } td class="n" { (percent(Some(d.share))) } td class="n" { (place(d.place)) }
@@ -287,7 +291,7 @@ fn depths(max: f64, q999: f64, overlap: Option<f64>, bound: Option<f64>) -> Mark
 fn peak(peak: Option<&PenetrationPeak>, bound: Option<f64>) -> Markup {
     html! {
         @match peak {
-            Some(p) => { (depths(p.max, p.q999, Some(p.overlap), bound)) td class="n" { (fixed(p.max_time, 3)) } }
+            Some(p) => { (depths(p.max, p.q999, p.overlap, bound)) td class="n" { (fixed(p.max_time, 3)) } }
             None => @for _ in 0..4 { td class="n" { "–" } },
         }
     }

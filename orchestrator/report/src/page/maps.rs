@@ -3,10 +3,11 @@
 use crate::field::{Field, Legend};
 use crate::place::{Place, id_of};
 use crate::read::Ply;
-use crate::study::{Defect, Local, Study};
+use crate::study::{Local, Study};
 use crate::units::quantity;
 use crate::view::{FormedView, Mark, Overlay, Sharpness, Side, flat, formed};
 use maud::{Markup, html};
+use plyflow_model::artifact::ComparedDefect;
 use rayon::prelude::*;
 
 /// Widths on the page (px).
@@ -134,10 +135,11 @@ fn zone(
     places: &[Place],
     sharp: Sharpness,
 ) -> Result<Markup, String> {
-    let compared = (study.comparison.as_ref()).filter(|c| c.has_local(&local.zone));
-    let defects: Vec<&Defect> = compared
+    let compared = (study.comparison.as_ref()).map(|c| &c.told);
+    let compared = compared.filter(|c| c.local_of(&local.zone).is_some());
+    let defects: Vec<&ComparedDefect> = compared
         .iter()
-        .flat_map(|c| c.local())
+        .flat_map(|c| c.local_defects())
         .filter(|d| d.zone == local.zone)
         .collect();
     let mut rows = Vec::new();
@@ -147,7 +149,7 @@ fn zone(
             .filter(|d| d.ply == ply.name)
             .map(|d| Mark {
                 text: d.id.clone(),
-                at: d.centre,
+                at: d.found.centre,
                 id: id_of(n, &d.id),
             })
             .collect();

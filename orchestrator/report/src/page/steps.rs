@@ -4,11 +4,12 @@ use super::tables::{expected_text, got_text, verdict_and_source};
 use crate::field::Field;
 use crate::input::{Expectation, Instance, ReportInput};
 use crate::read::Ply;
-use crate::steps::{Shown, TextFile};
+use crate::steps::Shown;
 use crate::study::{Material, Study};
 use crate::units::{bytes, quantity};
 use crate::view::{FormedView, Overlay, Sharpness, Side, flat, formed};
 use maud::{Markup, html};
+use plyflow_model::artifact::TextFile;
 
 /// Width of a picture on the page (px).
 const PICTURE: f64 = 430.0;

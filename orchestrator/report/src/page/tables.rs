@@ -2,10 +2,11 @@
 
 use crate::input::{Expectation, ReportInput, Verdict, label};
 use crate::place::{Place, id_of};
-use crate::study::{Comparison, Defect, Study};
+use crate::study::Study;
 use crate::units::{fixed, number, quantity, shown};
 use crate::verdict;
 use maud::{Markup, html};
+use plyflow_model::artifact::{Cause, ComparedDefect, Comparison, Role};
 use std::collections::BTreeMap;
 
 /// Tables of steps are shown up to this many rows.
@@ -73,21 +74,21 @@ fn sides(free: [bool; 4]) -> String {
 
 /// A defect in all models that have it, in the order of `roles`.
 struct Row<'a> {
-    first: &'a Defect,
-    models: Vec<Option<&'a Defect>>,
+    first: &'a ComparedDefect,
+    models: Vec<Option<&'a ComparedDefect>>,
 }
 
 /// Defects by id, wrinkles before bridging in each zone, with one entry per role.
-fn defect_rows<'a>(c: &'a Comparison, roles: &[&str]) -> Vec<Row<'a>> {
+fn defect_rows<'a>(c: &'a Comparison, roles: &[Role]) -> Vec<Row<'a>> {
     let mut rows: BTreeMap<(String, bool, usize, String), Row<'a>> = BTreeMap::new();
     for d in &c.defects {
-        let Some(column) = roles.iter().position(|r| *r == c.role(&d.model)) else {
+        let Some(column) = roles.iter().position(|r| c.role(&d.model) == Some(*r)) else {
             continue;
         };
         let digits = d.id.trim_start_matches(|ch: char| !ch.is_ascii_digit());
         let rank = digits.parse().unwrap_or(usize::MAX);
         let row = rows
-            .entry((d.zone.clone(), !d.is_wrinkle(), rank, d.id.clone()))
+            .entry((d.zone.clone(), !d.found.is_wrinkle(), rank, d.id.clone()))
             .or_insert_with(|| Row {
                 first: d,
                 models: vec![None; roles.len()],
@@ -97,37 +98,38 @@ fn defect_rows<'a>(c: &'a Comparison, roles: &[&str]) -> Vec<Row<'a>> {
     rows.into_values().collect()
 }
 
-type Measure = (&'static str, fn(&Defect) -> String);
+type Measure = (&'static str, fn(&ComparedDefect) -> String);
 
 const MEASURES: [Measure; 8] = [
     ("likely cause", |d| {
-        d.cause.clone().unwrap_or_else(|| "–".into())
+        d.found.cause.map_or("–", Cause::name).to_owned()
     }),
     ("length (mm)", |d| {
-        if d.is_wrinkle() {
+        if d.found.is_wrinkle() {
             fixed(d.length * 1e3, 1)
         } else {
             "–".into()
         }
     }),
-    ("amplitude (mm)", |d| fixed(d.amplitude * 1e3, 2)),
-    ("area (mm²)", |d| fixed(d.area * 1e6, 0)),
+    ("amplitude (mm)", |d| fixed(d.found.amplitude * 1e3, 2)),
+    ("area (mm²)", |d| fixed(d.found.area * 1e6, 0)),
     ("least radius (mm)", |d| {
-        told(d.radius, |r| fixed(r * 1e3, 1))
+        told(d.found.radius, |r| fixed(r * 1e3, 1))
     }),
     ("direction (deg)", |d| {
-        told(d.direction, |a| fixed(a.to_degrees(), 0))
+        told(d.found.direction, |a| fixed(a.to_degrees(), 0))
     }),
     ("shear (deg)", |d| {
-        format!(
-            "{} … {}",
-            fixed(d.shear_min.to_degrees(), 1),
-            fixed(d.shear_max.to_degrees(), 1)
-        )
+        let degrees = |v: f64| fixed(v.to_degrees(), 1);
+        match (d.shear_min, d.shear_max) {
+            (Some(min), Some(max)) => format!("{} … {}", degrees(min), degrees(max)),
+            _ => "–".into(),
+        }
     }),
     ("shear along the crest (deg): mean (from … to)", |d| {
         let degrees = |v: f64| fixed(v.to_degrees(), 1);
-        match (d.ridge_shear, d.ridge_shear_min, d.ridge_shear_max) {
+        let f = &d.found;
+        match (f.ridge_shear, f.ridge_shear_min, f.ridge_shear_max) {
             (Some(mean), Some(min), Some(max)) => {
                 format!("{} ({} … {})", degrees(mean), degrees(min), degrees(max))
             }
@@ -146,11 +148,11 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
     let Some(c) = &study.comparison else {
         return html! {};
     };
-    let mut roles = vec!["local", "global"];
-    if c.models.iter().any(|m| m.role == "reference") {
-        roles.push("reference");
+    let mut roles = vec![Role::Local, Role::Global];
+    if c.told.models.iter().any(|m| m.role == Role::Reference) {
+        roles.push(Role::Reference);
     }
-    let rows = defect_rows(c, &roles);
+    let rows = defect_rows(&c.told, &roles);
     let no_zones = study.zones.as_deref().unwrap_or_default().is_empty();
     html! {
         section id={ "defects-" (n) } {
@@ -171,12 +173,12 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
                     thead {
                         tr { th rowspan="2" { "id" } th rowspan="2" { "zone" } th rowspan="2" { "ply" } th rowspan="2" { "type" }
                             @for (name, _) in MEASURES { th class="group" colspan=(roles.len()) { (name) } } th rowspan="2" { "remark" } }
-                        tr { @for _ in MEASURES { @for role in &roles { th class="n" { (role) } } } }
+                        tr { @for _ in MEASURES { @for role in &roles { th class="n" { (role.name()) } } } }
                     }
                     tbody { @for row in &rows {
                         @let id = id_of(n, &row.first.id);
                         tr data-defect=[places.iter().any(|p| p.id == id).then_some(&id)] {
-                            th { (row.first.id) } td { (row.first.zone) } td { (row.first.ply) } td { (row.first.kind) }
+                            th { (row.first.id) } td { (row.first.zone) } td { (row.first.ply) } td { (row.first.found.kind.name()) }
                             @for (_, measure) in MEASURES { @for (i, d) in row.models.iter().enumerate() {
                                 td class=(if i == 0 { "n first" } else { "n" }) { (d.map_or("–".to_owned(), measure)) }
                             } }

@@ -157,7 +157,7 @@ fn ply(study: &mut Study, label: &str, step: &str, wave: f64, with_ply: bool) {
         w.frame_field("ply_1", On::Cells, "shear_angle", 1, "rad", &shear)
             .unwrap();
         w.end_frame().unwrap();
-        let attributes = json!({"sheets": [{"name": "ply_1", "kind": "ply"}], "zone": null, "element_size": 0.004,
+        let attributes = json!({"sheets": [{"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": 0.0002}], "zone": null, "element_size": 0.004,
             "warnings": if wave > 1.4 { json!(["the ply <folds>"]) } else { json!([]) }});
         w.attributes(&attributes.to_string()).unwrap();
     }

@@ -122,10 +122,10 @@ impl Study {
         }
         history(&mut w, self.press);
         let elements: usize = sheets.iter().map(|(_, s)| s.cells.len() / 4).sum();
-        let zone_json = zone.map_or(Value::Null, |(name, b)| json!({"name": name, "box": b}));
+        let zone_json = zone.map_or(Value::Null, |(name, b)| json!({"name": name, "box": b, "free_sides": [false, false, name == "A", false]}));
         let list: Vec<Value> = sheets
             .iter()
-            .map(|(n, _)| json!({"name": n, "kind": "ply", "offset": 0.001}))
+            .map(|(n, _)| json!({"name": n, "kind": "ply", "thickness": 0.0004, "offset": 0.001}))
             .collect();
         let attributes = json!({
             "scene": "half-pipe", "sheets": list, "element_size": size, "zone": zone_json, "cycles": 40000,
@@ -245,15 +245,17 @@ impl Study {
     ) {
         let mut w = self.create(step, "comparison");
         let mut defects = Vec::new();
-        let mut models = vec![json!({"name": "global", "role": "global", "zone": null})];
+        let of_model = |name: &str, role: &str, zone: Option<&str>| json!({"name": name, "role": role, "zone": zone, "element_size": 0.004, "elements": 1000, "element_cycles": 4e7});
+        let mut models = vec![of_model("global", "global", None)];
         for (zone, bounds) in zones {
             let model = format!("local.{zone}");
-            models.push(json!({"name": model, "role": "local", "zone": zone}));
+            models.push(of_model(&model, "local", Some(zone)));
             let (cx, cy) = ((bounds[0] + bounds[2]) / 2.0, (bounds[1] + bounds[3]) / 2.0);
             let defect = |model: &str, ply: &str, id: String, kind: &str, length: f64| {
                 json!({"id": id, "model": model, "zone": zone, "ply": ply, "type": kind, "length": length, "amplitude": 0.0052,
                     "area": 4.1e-4, "centre": [cx, cy], "curvature_max": 171.0, "radius": 1.0 / 171.0, "direction": if kind == "wrinkle" { json!(-0.5) } else { Value::Null },
-                    "cause": if kind == "wrinkle" { json!("bridging") } else { Value::Null }, "ridge_shear": 0.05, "ridge_shear_min": 0.02, "ridge_shear_max": 0.09, "shear_min": -0.2, "shear_max": 0.31, "touches_cut": zone == &"B"})
+                    "cause": if kind == "wrinkle" { json!("bridging") } else { Value::Null }, "ridge_shear": 0.05, "ridge_shear_min": 0.02, "ridge_shear_max": 0.09, "shear_min": -0.2, "shear_max": 0.31, "touches_cut": zone == &"B",
+                    "cut_sides": [zone == &"B", false, false, false]})
             };
             defects.push(defect(
                 &model,
@@ -360,7 +362,10 @@ impl Study {
             .map(|k| (-0.055 + 0.0025 * f64::from(k)) / RADIUS)
             .map(|a| [-0.05, r * a.sin(), r * a.cos()])
             .collect();
-        let defect = |number: u32, ridge: &[[f64; 3]]| json!({"on": "ply_2", "number": number, "type": "wrinkle", "ridge": ridge});
+        let defect = |number: u32, ridge: &[[f64; 3]]| {
+            json!({"on": "ply_2", "number": number, "type": "wrinkle", "length": 0.021, "amplitude": 0.0052, "area": 4.1e-4,
+            "centre": [0.0, 0.0], "ridge": ridge})
+        };
         let columns = [
             json!({"label": "defect"}),
             json!({"label": "length", "unit": "m"}),

@@ -5,6 +5,7 @@ use super::super::table::number;
 use super::{Kept, is_answer, outcome};
 use crate::engine::Session;
 use crate::progress::duration_text;
+use plyflow_model::artifact::{StudyBest, StudyOptimisation};
 use plyflow_study::Found;
 use plyflow_study::optimise::{Entry, Outcome, Told, best, trace};
 use plyflow_workflow::resolved::{Budget, FamilyExpectation, Study, StudyPoint, StudyValue};
@@ -173,19 +174,28 @@ impl Trace {
         }
     }
 
-    /// For programs.
-    pub fn as_json(&self, table: &Table<'_>) -> serde_json::Value {
+    /// For programs; `None` for a study.
+    pub fn told(&self, table: &Table<'_>) -> Option<StudyOptimisation> {
         let study = table.study;
-        let best = best(&self.told);
-        let o = study.optimisation.as_ref();
+        let o = study.optimisation.as_ref()?;
         let response = &study.responses[self.objective];
-        json!({
-            "objective": response.name, "unit": response.unit, "maximise": self.maximise,
-            "subject_to": o.map(|o| o.subject_to.clone()), "method": o.map(|o| o.method.clone()), "seed": o.map(|o| o.seed),
-            "told": self.told.len(), "ended": self.ended, "settled": self.settled,
-            "feasible": self.entries.iter().map(|e| e.feasible).collect::<Vec<_>>(),
-            "best_so_far": (0..self.told.len()).map(|i| self.best_so_far(i)).collect::<Vec<_>>(),
-            "best": best.map(|at| json!({"point": study.points[at].name, "value": self.value(at)})),
+        let best = best(&self.told).map(|at| StudyBest {
+            point: study.points[at].name.clone(),
+            value: self.value(at),
+        });
+        Some(StudyOptimisation {
+            objective: response.name.clone(),
+            unit: response.unit.clone(),
+            maximise: self.maximise,
+            subject_to: o.subject_to.clone(),
+            method: o.method.clone(),
+            seed: o.seed,
+            told: self.told.len(),
+            ended: self.ended,
+            settled: self.settled,
+            feasible: self.entries.iter().map(|e| e.feasible).collect(),
+            best_so_far: (0..self.told.len()).map(|i| self.best_so_far(i)).collect(),
+            best,
         })
     }
 }

@@ -10,18 +10,25 @@ pub struct Boundary {
     /// The zone.
     pub zone: Zone,
     /// Name of the scene that the coarse run formed; `null` when that does not tell it.
+    #[serde(default)]
     pub scene: Option<String>,
     /// Number of frames.
+    #[serde(default)]
     pub frames: usize,
     /// When the fine run begins (s).
+    #[serde(default)]
     pub start_time: f64,
     /// Of the plies (m).
+    #[serde(default)]
     pub element_size: f64,
     /// Of the films (m).
+    #[serde(default)]
     pub film_element_size: f64,
     /// The sheets in the zone, as the coarse run tells them, in the order of the stack.
+    #[serde(default)]
     pub sheets: Vec<Sheet>,
     /// Largest distance, where lines of the coarse mesh cross the cut, between fine edges and the coarse surface (m).
+    #[serde(default)]
     pub interpolation_error: f64,
 }
 

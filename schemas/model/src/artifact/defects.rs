@@ -3,6 +3,7 @@
 use super::Attributes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 /// Attributes of the kind `defects`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -17,17 +18,24 @@ impl Attributes for Defects {
     const KIND: &'static str = "defects";
 }
 
-/// From where on something is flagged.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// From where on something is flagged. A detection with other criteria tells its own.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Thresholds {
     /// Cells above this shear angle are flagged (rad).
-    pub over_shear_positive: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_shear_positive: Option<f64>,
     /// Cells below this shear angle are flagged (rad).
-    pub over_shear_negative: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_shear_negative: Option<f64>,
     /// Nodes above this distance do not conform (m).
-    pub distance_threshold: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_threshold: Option<f64>,
     /// Nodes whose closest point is nearer to the tool's foot are not judged (m).
-    pub foot_margin: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub foot_margin: Option<f64>,
+    /// What a step of somebody else tells besides (SI).
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
 }
 
 /// What was found on a ply.

@@ -3,14 +3,14 @@
 use super::{Attributes, Zone};
 use crate::outline::Point;
 use crate::regions::Stitches;
-use crate::scene::{SheetKind, first_axis};
+use crate::scene::{MirrorPlane, SheetKind, first_axis};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
 /// Attributes of the kind `forming`. A kinematic drape has neither mass nor contact: it leaves out what comes from these.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Forming {
     /// Name of the scene.
     #[serde(default)]
@@ -20,9 +20,9 @@ pub struct Forming {
     /// Whether sheets touch what really lies under them: where plies below end, a ply lies lower than its `offset` by their thickness. Left out: no.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub contact_by_place: bool,
-    /// `x`, `y`: the mirror planes beside which a part was computed. Meshes, fields and energies are the whole's all the same.
+    /// The mirror planes beside which a part was computed. Meshes, fields and energies are the whole's all the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub symmetry: Option<Vec<String>>,
+    pub symmetry: Option<Vec<MirrorPlane>>,
     /// Of the plies (m).
     #[serde(default)]
     pub element_size: f64,
@@ -331,3 +331,7 @@ impl RigidBody {
     /// The attributes of every rigid body.
     pub const ATTRIBUTES: Self = Self { rigid: true };
 }
+
+/// Attributes of a body of which nothing is told.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlainBody {}

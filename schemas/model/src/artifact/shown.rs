@@ -56,6 +56,27 @@ pub struct Series {
     pub style: Option<Style>,
 }
 
+impl Series {
+    /// Of a label and the paths of its arrays, in the style that is usual.
+    pub fn new(label: impl Into<String>, x: impl Into<String>, y: impl Into<Paths>) -> Self {
+        Self {
+            label: label.into(),
+            x: x.into(),
+            y: y.into(),
+            style: None,
+        }
+    }
+
+    /// The same, drawn so.
+    #[must_use]
+    pub fn drawn(self, style: Style) -> Self {
+        Self {
+            style: Some(style),
+            ..self
+        }
+    }
+}
+
 /// Path of an array, or of the seven arrays of box plots.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(

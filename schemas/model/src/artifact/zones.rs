@@ -24,11 +24,14 @@ pub struct Zones {
     /// The zones, in the order of the labels.
     pub zones: Vec<Zone>,
     /// Factor by which boxes were scaled about their middles.
-    pub scale: f64,
-    /// `[x0, y0, x1, y1]` (m), the box around the blank.
-    pub blank: Rectangle,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// `[x0, y0, x1, y1]` (m), the box around the blank. Zones can only be drawn again where it is told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blank: Option<Rectangle>,
     /// Areas of the zones over that of the blank's box.
-    pub ply_fraction: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ply_fraction: Option<f64>,
 }
 
 impl Attributes for Zones {
@@ -63,6 +66,20 @@ pub struct Zone {
 }
 
 impl Zone {
+    /// A zone that is cut at all four sides, of which nothing else is told.
+    pub fn new(name: impl Into<String>, bounds: Rectangle) -> Self {
+        Self {
+            name: name.into(),
+            bounds,
+            defect_box: None,
+            free_sides: [false; 4],
+            plies: Vec::new(),
+            flagged_area: 0.0,
+            replaces: Vec::new(),
+            other: Map::new(),
+        }
+    }
+
     /// Area of its box (m2).
     pub fn area(&self) -> f64 {
         area(self.bounds)
@@ -104,7 +121,8 @@ impl Zone {
 
 /// Of a side (left, right, bottom, top): the axis across it, and which way along that is outward.
 fn direction(side: usize) -> (usize, f64) {
-    (side / 2, if side % 2 == 0 { -1.0 } else { 1.0 })
+    let outward = [-1.0, 1.0][side % 2];
+    (side / 2, outward)
 }
 
 /// Of zones that were drawn in several goes, in the order in which they were given, which of them count: none that another one replaces, and of one
@@ -135,14 +153,8 @@ mod tests {
 
     fn zone(name: &str, bounds: Rectangle, replaces: &[&str]) -> Zone {
         Zone {
-            name: name.into(),
-            bounds,
-            defect_box: None,
-            free_sides: [false; 4],
-            plies: Vec::new(),
-            flagged_area: 0.0,
             replaces: replaces.iter().map(|&r| r.into()).collect(),
-            other: Map::new(),
+            ..Zone::new(name, bounds)
         }
     }
 

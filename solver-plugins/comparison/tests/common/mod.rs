@@ -80,7 +80,7 @@ pub fn formed(bodies: Vec<MemoryBody>, size: f64, zone: Value) -> MemoryArtifact
         ..Default::default()
     };
     let sheets: Vec<Value> = (bodies.iter().enumerate())
-        .map(|(i, b)| json!({"name": b.name, "kind": "ply", "offset": OFFSET + 0.0004 * i as f64}))
+        .map(|(i, b)| json!({"name": b.name, "kind": "ply", "thickness": 0.0004, "offset": OFFSET + 0.0004 * i as f64}))
         .collect();
     let elements: usize = bodies.iter().map(|b| b.cells.len() / 4).sum();
     MemoryArtifact {

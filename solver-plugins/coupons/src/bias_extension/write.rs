@@ -1,10 +1,11 @@
 //! Curves, plots and results of a bias extension.
 
 use super::{Histories, Parameters, net_angle};
-use crate::output::{Output, Style};
+use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::Outcome;
 use crate::specimen::Specimen;
+use plyflow_model::artifact::Style;
 use plyflow_sdk::{Host, StepError};
 
 /// A finished test.
@@ -39,11 +40,11 @@ impl Done<'_> {
         .done();
         self.results(host, &mut out)?;
         let p = self.p;
-        out.attribute("length", p.length.into());
-        out.attribute("width", p.width.into());
-        out.attribute("pull_time", p.pull_time.into());
-        out.attribute("imperfection", p.imperfection.into());
-        out.attribute("seed", p.seed.into());
+        out.about.length = Some(p.length);
+        out.about.width = Some(p.width);
+        out.about.pull_time = Some(p.pull_time);
+        out.about.imperfection = Some(p.imperfection);
+        out.about.seed = Some(p.seed);
         out.finish(&p.common, specimen, outcome)
     }
 

@@ -3,7 +3,8 @@
 use super::{Deep, Kind, Pair, Peak, Watch, Watched};
 use crate::run::Forming;
 use plyflow_mechanics::vec3::V;
-use serde_json::{Map, Value, json};
+use plyflow_model::artifact::{Depth, DepthPeak};
+use std::collections::BTreeMap;
 
 /// Share of the thinner sheet beyond which a depth at the end is told.
 pub const DEPTH_BOUND: f64 = 0.1;
@@ -104,16 +105,24 @@ pub fn depth_warnings(depths: &[PairDepth]) -> Vec<String> {
 }
 
 /// By pair, for the artifact.
-pub fn depth_attributes(depths: &[PairDepth]) -> Map<String, Value> {
+pub fn depth_attributes(depths: &[PairDepth]) -> BTreeMap<String, Depth> {
     let place = |d: &Deep| (d.depth > 0.0).then_some(d.place);
     // Most pairs of a stack never meet.
     let met = depths.iter().filter(|d| d.peak.deep.depth > 0.0);
     met.map(|d| {
-            let of = json!({
-                "end": d.end.depth, "place": place(&d.end), "share": d.share(), "bound": d.pair.bound.is_finite().then_some(d.pair.bound),
-                "peak": {"depth": d.peak.deep.depth, "time": d.peak.time, "place": place(&d.peak.deep), "share": d.peak_share()},
-            });
-            (d.pair.name.clone(), of)
-        })
-        .collect()
+        let of = Depth {
+            end: d.end.depth,
+            place: place(&d.end),
+            share: d.share(),
+            bound: d.pair.bound.is_finite().then_some(d.pair.bound),
+            peak: DepthPeak {
+                depth: d.peak.deep.depth,
+                time: d.peak.time,
+                place: place(&d.peak.deep),
+                share: d.peak_share(),
+            },
+        };
+        (d.pair.name.clone(), of)
+    })
+    .collect()
 }

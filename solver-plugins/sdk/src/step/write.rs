@@ -3,13 +3,19 @@
 use super::{Host, On, StepError, check};
 use plyflow_abi::*;
 
+/// As JSON. By way of a value, whose keys are sorted: the text hangs on what is told, not on the order of a type's fields.
+fn json_text(value: &impl serde::Serialize) -> Result<String, StepError> {
+    let value = serde_json::to_value(value).map_err(|e| StepError::Failed(e.to_string()))?;
+    Ok(value.to_string())
+}
+
 impl Host {
     /// Writes the artifact's attributes (once; a JSON object).
     ///
     /// # Errors
     /// When the host refuses.
     pub fn write_attributes(&self, value: &impl serde::Serialize) -> Result<(), StepError> {
-        let text = serde_json::to_string(value).map_err(|e| StepError::Failed(e.to_string()))?;
+        let text = json_text(value)?;
         check(call!(self.attributes_write(pf_str::new(&text))), || {
             "writing attributes".into()
         })
@@ -78,7 +84,7 @@ impl Host {
         points: &[[f64; 3]],
         k: usize,
         cells: &[u32],
-        attributes: &serde_json::Value,
+        attributes: &impl serde::Serialize,
     ) -> Result<(), StepError> {
         if !matches!(k, 3 | 4) || !cells.len().is_multiple_of(k) {
             return Err(StepError::Failed(format!(
@@ -86,7 +92,7 @@ impl Host {
                 cells.len()
             )));
         }
-        let json = attributes.to_string();
+        let json = json_text(attributes)?;
         let (n, m) = (points.len() as u64, (cells.len() / k) as u64);
         let (p, c) = (points.as_ptr().cast(), cells.as_ptr());
         let (b, j) = (pf_str::new(body), pf_str::new(&json));
