@@ -2,8 +2,8 @@
 
 use plyflow_boundary_interpolation::BoundaryInterpolation;
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::{Vec3, unit};
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};
 

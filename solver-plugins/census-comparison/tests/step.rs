@@ -2,8 +2,8 @@
 
 use plyflow_census_comparison::{CensusComparison, never_falls, never_rises, relative_distance};
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 
 /// Cells along a side of 0.1 m.

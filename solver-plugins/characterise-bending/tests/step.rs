@@ -2,7 +2,7 @@
 
 use plyflow_characterisation::synthetic::{BENDING, PublishedBending};
 use plyflow_characterise_bending::CharacteriseBending;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryInput, run};
+use plyflow_testing::{MemoryArtifact, MemoryInput, run};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! The step on overhangs of known stiffness.
 
 use plyflow_characterise_cantilever::CharacteriseCantilever;
-use plyflow_surface::memory_host::run;
+use plyflow_testing::run;
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -2,7 +2,7 @@
 
 use plyflow_characterisation::synthetic::{Noise, sled_coefficient};
 use plyflow_characterise_friction::CharacteriseFriction;
-use plyflow_surface::memory_host::run;
+use plyflow_testing::run;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -95,7 +95,7 @@ fn a_window_from_the_first_row_has_no_static_coefficient() {
         let with = json!({"pulls": [path], "normal_force": 5.0, "from": from});
         run::<CharacteriseFriction>(with, &[], &[]).unwrap()
     };
-    let text = |out: &plyflow_surface::memory_host::MemoryArtifact| {
+    let text = |out: &plyflow_testing::MemoryArtifact| {
         out.attributes["files"][0]["text"]
             .as_str()
             .unwrap()

@@ -3,7 +3,7 @@
 use plyflow_characterisation::synthetic::{Noise, frame_force, ncf_shear, woven_shear};
 use plyflow_characterise_picture_frame::CharacterisePictureFrame;
 use plyflow_model::units::{Dimension, parse_quantity};
-use plyflow_surface::memory_host::{MemoryArtifact, run};
+use plyflow_testing::{MemoryArtifact, run};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

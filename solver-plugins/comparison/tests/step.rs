@@ -6,7 +6,7 @@ use common::*;
 use plyflow_comparison::Comparison;
 use plyflow_defects::quantiles;
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryField, MemoryInput, run};
+use plyflow_testing::{MemoryArtifact, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 

@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use plyflow_comparison::Comparison;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryInput, run};
+use plyflow_testing::{MemoryArtifact, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 

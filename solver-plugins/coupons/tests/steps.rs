@@ -4,7 +4,7 @@
 use plyflow_abi::{PF_KIND_ELEMENT, pf_component, pf_str};
 use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4};
 use plyflow_sdk::{Host, Step, StepError, element_table, material_table};
-use plyflow_surface::memory_host::{Machine, MemoryArtifact, MemoryInput, run_on};
+use plyflow_testing::{Machine, MemoryArtifact, MemoryInput, run_on};
 use serde_json::{Value, json};
 
 macro_rules! step {
@@ -108,9 +108,8 @@ fn content(a: &MemoryArtifact) -> Vec<(String, Vec<u64>)> {
             list.push((format!("frame {k}"), bits(frame.as_flattened())));
         }
         for (k, fields) in body.fields.iter().enumerate() {
-            let named = |f: &plyflow_surface::memory_host::MemoryField| {
-                (format!("{} {k}", f.name), bits(&f.values))
-            };
+            let named =
+                |f: &plyflow_testing::MemoryField| (format!("{} {k}", f.name), bits(&f.values));
             list.extend(fields.iter().map(named));
         }
     }

@@ -2,8 +2,8 @@
 
 use plyflow_defect_detection::DefectDetection;
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::json;
 
 const HEIGHT: f64 = 0.060;

@@ -175,12 +175,7 @@ impl<'a> Output<'a> {
                 "1/m",
                 &density(&values, &weights, width, count),
             )?;
-            series.push(Series {
-                label: p.name.clone(),
-                x,
-                y: y.into(),
-                style: None,
-            });
+            series.push(Series::new(&p.name, x, y));
         }
         self.plots.push(Plot {
             name: "distance_density".into(),
@@ -349,6 +344,16 @@ impl<'a> Output<'a> {
             host.result("scan_rms", a.rms, "m")?;
             host.result("scan_freedoms", a.decided as f64, "1")?;
         }
+        self.attributes(rows, defects, alignment)
+    }
+
+    /// `rows`: of the table of `defects`.
+    fn attributes(
+        self,
+        rows: Vec<Vec<Cell>>,
+        defects: Vec<MeasuredDefect>,
+        alignment: Option<&Alignment>,
+    ) -> Result<(), StepError> {
         let mut tables = vec![table("defects", "Defects", &COLUMNS, rows)];
         let agreement = self.agreement.map(|a| {
             let (rows, defects) = self.beside_each_other(a);
@@ -361,23 +366,19 @@ impl<'a> Output<'a> {
         });
         tables.extend(self.compression.as_ref().map(compression::table));
         tables.extend(self.regions.as_ref().and_then(Regions::table));
-        let uppermost = simulated()
-            .next_back()
-            .iter()
-            .flat_map(|m| wrinkles(m))
-            .map(|(what, _, value)| (what.to_owned(), value))
-            .collect();
+        let uppermost = self.measured.iter().rfind(|m| m.simulated);
+        let uppermost = uppermost.into_iter().flat_map(wrinkles);
         let maps = self.maps();
         let (slipping, mut plots) = (self.slipping.as_ref(), self.plots);
         tables.extend(slipping.iter().flat_map(|s| s.tables()));
         plots.extend(slipping.iter().flat_map(|s| s.plots()));
-        host.write_attributes(&Measurement {
+        self.host.write_attributes(&Measurement {
             defects,
             sections: self.sections,
             alignment: alignment.map(told_alignment),
             agreement,
             fibre_compression: self.compression,
-            uppermost,
+            uppermost: uppermost.map(|(what, _, v)| (what.to_owned(), v)).collect(),
             slip: slipping.map(Slipping::told),
             plots,
             maps,

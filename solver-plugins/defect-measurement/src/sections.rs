@@ -101,12 +101,7 @@ impl Section<'_> {
             let heights: Vec<f64> = line.iter().map(|p| p.place[2]).collect();
             host.write_f64(&x, &[line.len()], "m", &stations)?;
             host.write_f64(&y, &[line.len()], "m", &heights)?;
-            series.push(Series {
-                label: (*label).to_owned(),
-                x,
-                y: y.into(),
-                style: None,
-            });
+            series.push(Series::new(*label, x, y));
         }
         let axis = match self.on {
             SectionOn::FromAbove => "along the section",

@@ -354,11 +354,9 @@ impl Slipping {
             let (lower, upper) = (&pair.lower, &pair.upper);
             for part in PARTS {
                 let of_pair = |c: &&Cut| c.pair.each_ref() == [lower, upper];
-                let line = |c: &Cut| Series {
-                    label: self.sections[c.section].clone(),
-                    x: self.path(c, "station"),
-                    y: self.path(c, part).into(),
-                    style: None,
+                let line = |c: &Cut| {
+                    let [x, y] = ["station", part].map(|what| self.path(c, what));
+                    Series::new(&self.sections[c.section], x, y)
                 };
                 let series: Vec<Series> = self.cuts.iter().filter(of_pair).map(line).collect();
                 if !series.is_empty() {

@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use plyflow_defect_measurement::DefectMeasurement;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryInput, run};
+use plyflow_testing::{MemoryArtifact, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -227,7 +227,7 @@ fn what_a_net_does_not_reach_is_no_bridging_and_told() {
     for (shear, draped) in ply.fields[0][0].values.iter_mut().zip(&draped) {
         *shear = if *draped > 0.5 { *shear } else { 1.4 };
     }
-    ply.fields[0].push(plyflow_surface::memory_host::MemoryField {
+    ply.fields[0].push(plyflow_testing::MemoryField {
         name: "draped".into(),
         on: plyflow_sdk::On::Cells,
         components: 1,

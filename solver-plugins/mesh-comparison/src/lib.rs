@@ -224,17 +224,14 @@ fn measured(label: &str, result: &str) -> Column {
 /// Box plots of the shear angles over the element size.
 fn plot() -> Plot {
     let note = "By undeformed area of all plies. Box: 25 to 75 %; bar: median; whiskers: 1 and 99 %; points: smallest and largest.";
+    let spread = Paths::Spread(TOLD.map(|t| path(t.0)));
+    let series = Series::new("", path("element_size"), spread);
     Plot {
         name: "shear".into(),
         title: Some("Shear angles over the element size".into()),
         note: Some(note.into()),
         x: Axis::new("element size", "mm"),
         y: Axis::new("shear angle", "deg"),
-        series: vec![Series {
-            label: String::new(),
-            x: path("element_size"),
-            y: Paths::Spread(TOLD.map(|t| path(t.0))),
-            style: Some(Style::Box),
-        }],
+        series: vec![series.drawn(Style::Box)],
     }
 }

@@ -2,7 +2,7 @@
 
 use plyflow_mesh_comparison::{MeshComparison, advise};
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::json;
 
 /// A strip of `n` cells over 0.1 m with shear angles g(x) (rad), each cell with that of its middle.

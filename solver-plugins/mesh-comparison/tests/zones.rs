@@ -1,7 +1,7 @@
 //! Runs of zones whose distances from the tool are known.
 
 use plyflow_mesh_comparison::MeshComparison;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryInput, flat_grid, run};
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryInput, flat_grid, run};
 use serde_json::{Value, json};
 
 /// A ply of 80 x 40 mm over a flat tool that stands off it by (1 + 25 h) times a ramp, which every mesh has exactly.

@@ -32,7 +32,5 @@ pub use traction::traction;
 
 #[cfg(feature = "steps")]
 pub mod draped;
-#[cfg(feature = "memory-host")]
-pub mod memory_host;
 #[cfg(feature = "steps")]
 pub mod of_run;

@@ -1,8 +1,8 @@
 //! The step on surfaces whose wrinkles, deviations and moments are known.
 
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_wrinkle_census::WrinkleCensus;
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};

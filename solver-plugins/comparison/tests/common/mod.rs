@@ -3,9 +3,7 @@
 
 use plyflow_comparison::Comparison;
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{
-    MemoryArtifact, MemoryBody, MemoryField, MemoryInput, flat_grid, run,
-};
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, flat_grid, run};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 

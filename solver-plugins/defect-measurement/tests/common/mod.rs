@@ -3,8 +3,8 @@
 
 use plyflow_defect_measurement::DefectMeasurement;
 use plyflow_sdk::On;
-use plyflow_surface::memory_host::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_surface::vector::Vec3;
+use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::fmt::Write;

@@ -4,9 +4,9 @@
 //! It refuses what the contract refuses: NaN and infinities, sizes that do not match, artifacts of the wrong
 //! kind, results that the manifest does not declare, a collection that it does not announce.
 
+// Tests alone use this: what is wrong ends them.
 mod services;
 
-use crate::vector::Vec3;
 use plyflow_model::manifest::{Manifest, Shape};
 use plyflow_model::units::parse_quantity;
 use plyflow_sdk::abi::{PF_OK, pf_component};
@@ -14,6 +14,9 @@ use plyflow_sdk::{On, Step, run_step};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
+
+/// A point (m).
+pub(crate) type Vec3 = [f64; 3];
 
 /// A field of a body in one frame.
 #[derive(Debug, Clone, PartialEq)]

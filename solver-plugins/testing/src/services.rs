@@ -1,7 +1,7 @@
 //! The service table of the host in memory.
 
-use super::{Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput};
-use crate::vector::Vec3;
+use crate::Vec3;
+use crate::{Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput};
 use plyflow_model::manifest::Manifest;
 use plyflow_sdk::On;
 use plyflow_sdk::abi::*;
