@@ -391,6 +391,10 @@ impl<'a> Output<'a> {
     fn changes(&self, now: &[(&'static str, &'static str, f64)]) -> Result<(), StepError> {
         for input in self.host.inputs_of("against")? {
             let other: Measurement = self.host.attributes(&input)?;
+            if other.uppermost.is_empty() {
+                let step = &input.step;
+                return Err(format!("against: '{step}' tells nothing of its uppermost ply (attribute `uppermost`); expected a measurement of the plies of a run").into());
+            }
             for (what, unit, value) in now {
                 let Some(before) = other.uppermost.get(*what).copied() else {
                     continue;

@@ -521,6 +521,18 @@ fn the_growth_of_wrinkles_from_another_measurement_is_told() {
     let inputs = [("formed", &flat), ("against", &before)].map(|(n, a)| MemoryInput::new(n, a));
     let out = run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap();
     assert_eq!(out.result("uppermost_verdict_change"), -1.0);
+    let mut silent = before.clone();
+    silent
+        .attributes
+        .as_object_mut()
+        .unwrap()
+        .remove("uppermost");
+    let inputs = [("formed", &flat), ("against", &silent)].map(|(n, a)| MemoryInput::new(n, a));
+    let error = run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap_err();
+    assert!(
+        error.contains("against: ") && error.contains("uppermost"),
+        "{error}"
+    );
 }
 
 /// The upper ply with this height over the tool and no other defect.
