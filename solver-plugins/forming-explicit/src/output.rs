@@ -30,12 +30,12 @@ impl Components for HostComponents<'_> {
     fn element(&self, name: &str) -> Result<pf_component, String> {
         self.0
             .component(PF_KIND_ELEMENT, name)
-            .map_err(|e| format!("{e:?}"))
+            .map_err(|e| e.text().to_owned())
     }
     fn material(&self, name: &str) -> Result<pf_component, String> {
         self.0
             .component(PF_KIND_MATERIAL, name)
-            .map_err(|e| format!("{e:?}"))
+            .map_err(|e| e.text().to_owned())
     }
 }
 

@@ -26,6 +26,16 @@ pub enum StepError {
     Failed(String),
 }
 
+impl StepError {
+    /// What a user reads of it.
+    pub fn text(&self) -> &str {
+        match self {
+            Self::Cancelled => "the host asked to stop",
+            Self::Failed(text) => text,
+        }
+    }
+}
+
 impl<T: std::fmt::Display> From<T> for StepError {
     fn from(value: T) -> Self {
         Self::Failed(value.to_string())
