@@ -3,6 +3,8 @@
 use crate::read::{Ply, last_frame, open};
 use camino::Utf8Path;
 use plyflow_artifact::{Artifact, BodyInfo, On};
+use plyflow_model::artifact::ComparedBody;
+use serde::Deserialize;
 
 /// Fields that the plies of a report have under names of their own, and places.
 const KNOWN: [&str; 4] = [
@@ -75,7 +77,7 @@ pub(crate) fn of_body(
             }
         };
         // Of a comparison: codes of what was found there. As numbers on a scale the rim of the one kind would look like the other.
-        if name == "defect" && body.attributes["model"].is_string() {
+        if name == "defect" && ComparedBody::deserialize(&body.attributes).is_ok() {
             for (code, kind) in [(1.0, "Wrinkle"), (2.0, "Bridging")] {
                 let is = |v: &f64| f64::from(u8::from(*v == code));
                 push(

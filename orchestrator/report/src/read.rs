@@ -4,6 +4,8 @@ use crate::others::{self, Other};
 use crate::raster::{Triangles, Vec3};
 use camino::Utf8Path;
 use plyflow_artifact::{Artifact, On};
+use plyflow_model::artifact::ComparedBody;
+use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -201,9 +203,8 @@ pub(crate) fn quads(name: &str, cells: &[u32], k: u32) -> Result<Vec<[u32; 4]>, 
     Ok(cells.as_chunks::<4>().0.to_vec())
 }
 
-/// The plies of a `defects` or `comparison` artifact: bodies that are formed and know their flat place, with the
-/// attributes of the body.
-pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Value, Ply)>, String> {
+/// The plies of a `defects` or `comparison` artifact: bodies that are formed and know their flat place; of the latter with their model.
+pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Option<ComparedBody>, Ply)>, String> {
     let artifact = open(path)?;
     if artifact.contents().bodies.is_empty() {
         return Ok(Vec::new());
@@ -230,11 +231,9 @@ pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Value, Ply)>, String>
                 .collect(),
             _ => vec![Marked::No; cells.len()],
         };
+        let about = ComparedBody::deserialize(&body.attributes).ok();
         let ply = Ply {
-            name: body.attributes["ply"]
-                .as_str()
-                .unwrap_or(&body.name)
-                .to_owned(),
+            name: about.as_ref().map_or(&body.name, |a| &a.ply).clone(),
             flat: flat.as_chunks::<3>().0.to_vec(),
             formed,
             shear: read(On::Cells, "shear_angle"),
@@ -245,7 +244,7 @@ pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Value, Ply)>, String>
             others: others::of_body(&artifact, body, frame, &cells),
             cells,
         };
-        all.push((body.attributes.clone(), ply));
+        all.push((about, ply));
     }
     Ok(all)
 }

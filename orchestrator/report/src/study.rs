@@ -6,9 +6,8 @@ use crate::measured::{self, Measured};
 use crate::others;
 use crate::read::{self, Facts, History, Ply, Tool};
 use crate::steps::{self, Shown};
-use plyflow_model::artifact::{Defects, Forming, Zone, Zones, current_zones};
+use plyflow_model::artifact::{ComparedBody, Defects, Forming, Zone, Zones, current_zones};
 use serde::Deserialize;
-use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// Studies of which pictures are drawn; of more only tables are shown.
@@ -452,7 +451,7 @@ impl Reader<'_> {
     }
 
     fn read_locals(&mut self, study: &mut Study, runs: &[usize], comparison: Option<usize>) {
-        let mut judged: Vec<(Value, Ply)> = Vec::new();
+        let mut judged: Vec<(Option<ComparedBody>, Ply)> = Vec::new();
         if let (Some(at), true) = (comparison, self.pictures) {
             let label = self.instance(at).label();
             let read = read::judged_plies(&self.instance(at).artifact);
@@ -466,7 +465,8 @@ impl Reader<'_> {
             let model = model.map(|m| m.name.clone());
             let mut plies: Vec<Ply> = Vec::new();
             judged.retain_mut(|(about, ply)| {
-                let mine = model.is_some() && about["model"].as_str() == model.as_deref();
+                let of = about.as_ref().map(|a| a.model.as_str());
+                let mine = model.is_some() && of == model.as_deref();
                 if mine {
                     plies.push(std::mem::take(ply));
                 }

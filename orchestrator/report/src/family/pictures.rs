@@ -11,8 +11,9 @@ use crate::units::shown;
 use camino::Utf8Path;
 use maud::{Markup, html};
 use plyflow_artifact::{Artifact, BodyInfo, On};
-use plyflow_model::artifact::Forming;
+use plyflow_model::artifact::{CensusBody, Forming};
 use rayon::prelude::*;
+use serde::Deserialize;
 
 /// Pictures on a page.
 pub(crate) const MOST: usize = 240;
@@ -296,7 +297,7 @@ fn read(path: &Utf8Path, kind: &str) -> Result<Sheet, String> {
         },
     };
     Ok(Sheet {
-        name: body.attributes["ply"].as_str().unwrap_or(name).to_owned(),
+        name: CensusBody::deserialize(&body.attributes).map_or(name.to_owned(), |told| told.ply),
         mesh: Triangles::new(points.len(), cells.as_flattened(), 4),
         used: cells.as_flattened().to_vec(),
         points,
