@@ -4,7 +4,9 @@
 //! It refuses what the contract refuses: NaN and infinities, sizes that do not match, artifacts of the wrong
 //! kind, results that the manifest does not declare, a collection that it does not announce.
 
-// Tests alone use this: what is wrong ends them.
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod services;
 
 use plyflow_model::manifest::{Manifest, Shape};
