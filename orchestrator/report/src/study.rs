@@ -6,8 +6,12 @@ use crate::measured::{self, Measured};
 use crate::others;
 use crate::read::{self, Facts, History, Ply, Tool};
 use crate::steps::{self, Shown};
-use plyflow_model::artifact::{ComparedBody, Defects, Forming, Zone, Zones, current_zones};
+use plyflow_model::artifact::{
+    self, Attributes, Boundary, ComparedBody, Defects, Forming, Measurement, Zone, Zones,
+    current_zones,
+};
 use serde::Deserialize;
+use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// Studies of which pictures are drawn; of more only tables are shown.
@@ -161,14 +165,14 @@ impl Reader<'_> {
     }
 
     /// The zone of a local run.
-    fn zone(&self, at: usize) -> Option<Zone> {
-        let facts = self.all.facts[at].as_ref()?;
-        Zone::deserialize(&facts.attributes["zone"]).ok()
+    fn zone(&self, at: usize) -> Result<Zone, serde_json::Error> {
+        let facts = self.all.facts[at].as_ref();
+        Zone::deserialize(facts.map_or(&Value::Null, |f| &f.attributes["zone"]))
     }
 
     fn studies(&mut self) {
         let forming: Vec<usize> = (0..self.all.facts.len())
-            .filter(|at| self.kind(*at) == "forming")
+            .filter(|at| self.kind(*at) == Forming::KIND)
             .collect();
         let references: BTreeSet<&str> = self
             .all
@@ -179,7 +183,7 @@ impl Reader<'_> {
             .collect();
         let mut plans: Vec<Plan> = Vec::new();
         for at in forming.iter().copied().filter(|at| !self.is_local(*at)) {
-            let detections = self.takers("defects", at);
+            let detections = self.takers(Defects::KIND, at);
             if detections.is_empty() && !references.contains(self.key(at)) {
                 plans.push(Plan::of_run(at));
             }
@@ -232,7 +236,7 @@ impl Reader<'_> {
     /// Lists of zones that were drawn from what `giver` gave, each with those drawn again after a first look, and so on; one that
     /// is empty where none was.
     fn zone_lists(&self, giver: usize) -> Vec<Vec<usize>> {
-        let takers = self.takers("zones", giver);
+        let takers = self.takers(Zones::KIND, giver);
         let is_first = |at: &&usize| {
             let facts = self.all.facts[**at].as_ref();
             !takers
@@ -283,7 +287,11 @@ impl Reader<'_> {
         let mut locals: Vec<usize> = zones_at.iter().flat_map(|z| self.local_runs(*z)).collect();
         let zones = study.zones.clone().unwrap_or_default();
         locals.retain(|at| {
-            let own = self.zone(*at);
+            let label = self.instance(*at).label();
+            let own = self
+                .zone(*at)
+                .map_err(|e| format!("its attribute 'zone': {e}"));
+            let own = self.noted(&label, own);
             own.is_some_and(|own| zones.iter().any(|z| z.is(&own)))
         });
         let locals = self.one_of_each_zone(locals, comparison);
@@ -306,7 +314,7 @@ impl Reader<'_> {
     /// compares the same list.
     fn comparisons(&self, zones: &[usize], global: usize) -> Option<(usize, Vec<usize>)> {
         zones.iter().rev().find_map(|z| {
-            let mut all = self.takers("comparison", *z);
+            let mut all = self.takers(artifact::Comparison::KIND, *z);
             let of_run = |at: &usize| {
                 let facts = self.all.facts[*at].as_ref();
                 facts.is_some_and(|f| f.took(self.key(global)))
@@ -338,7 +346,7 @@ impl Reader<'_> {
         if !self.pictures {
             return;
         }
-        for at in self.takers("measurement", global) {
+        for at in self.takers(Measurement::KIND, global) {
             let Some(facts) = self.all.facts[at].as_ref() else {
                 continue;
             };
@@ -364,7 +372,7 @@ impl Reader<'_> {
             let passed_over = place.map_or(usize::MAX, |k| compared.len() - k);
             (passed_over, size.unwrap_or(f64::INFINITY))
         };
-        let zone = |at: usize| self.zone(at);
+        let zone = |at: usize| self.zone(at).ok();
         let mut kept: Vec<usize> = Vec::new();
         for at in runs {
             match kept.iter_mut().find(|k| zone(**k) == zone(at)) {
@@ -378,10 +386,10 @@ impl Reader<'_> {
 
     /// Forming runs whose boundary was made for the zones of an instance.
     fn local_runs(&self, zones: usize) -> Vec<usize> {
-        let boundaries = self.takers("boundary", zones);
+        let boundaries = self.takers(Boundary::KIND, zones);
         boundaries
             .into_iter()
-            .flat_map(|b| self.takers("forming", b))
+            .flat_map(|b| self.takers(Forming::KIND, b))
             .collect()
     }
 

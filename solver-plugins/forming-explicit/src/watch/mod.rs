@@ -223,8 +223,8 @@ impl Watch {
     /// `None` where no node was looked at, because something else drives them all.
     pub fn nearest(&self, part: &str, sheet: usize) -> Option<f64> {
         let k = self.parts.iter().position(|p| p.name == part)?;
-        let near = self.nearest[self.pair_with_part(k, sheet)];
-        near.is_finite().then_some(near)
+        let looked_at = self.sheets[sheet].free.contains(&true);
+        looked_at.then(|| self.nearest[self.pair_with_part(k, sheet)])
     }
 
     /// Looks at everything as it is now. `last`: at the end of the run.
