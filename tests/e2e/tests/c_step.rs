@@ -12,7 +12,7 @@ steps:
 
 /// Builds the template into the study's folder, with a change to its source.
 fn build(study: &Study, change: impl Fn(String) -> String) {
-    let template = repository().join("solver-plugins/template-step-c");
+    let template = repository().join("solver-plugins/door/templates/step-c");
     let source = std::fs::read_to_string(template.join("step.c")).unwrap();
     std::fs::write(study.path("step.c"), change(source)).unwrap();
     let built = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()))

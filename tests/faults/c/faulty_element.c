@@ -2,7 +2,7 @@
  */
 
 #define plyflow_plugin sound_plugin
-#include "../../../solver-plugins/template-element-c/element.c"
+#include "../../../solver-plugins/door/templates/element-c/element.c"
 #undef plyflow_plugin
 
 #include <unistd.h>

@@ -12,7 +12,7 @@ fn a_step_in_c_runs_when_built_with_only_the_header() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| Utf8PathBuf::from_path_buf(dir.path().join(name)).unwrap();
     let template =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../solver-plugins/template-step-c");
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../solver-plugins/door/templates/step-c");
     let built = Command::new("make")
         .args(["--silent", "CFLAGS=-O2 -Wall -Wextra -Wpedantic -Werror"])
         .arg(format!("OUT={}", at("libdouble_time.so")))

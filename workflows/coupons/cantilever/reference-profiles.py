@@ -8,7 +8,7 @@
 moment at the clamp is found by bisection, the equations are integrated by fourth-order Runge-Kutta.
 
 Needs nothing but Python 3. Run it in this folder; the files are in the repository, so nobody has to. A Rust
-test (solver-plugins/coupons/tests/elastica.rs) checks them with another method."""
+test (solver-plugins/lib/coupons/tests/elastica.rs) checks them with another method."""
 
 from math import cos, exp, sin
 

@@ -1,0 +1,583 @@
+//! `s4`: a four-node shell with rotations (the S4R of the thesis): one point in its plane, three
+//! layers through its thickness, hourglass control, nonlinear bending along the fibres.
+//!
+//! # Kinematics
+//!
+//! Every element keeps its own four unit directors d_I (start: its unit normal), which turn with the
+//! nodes by the exact rotation `spin * dt`. So elements may meet at an angle in the reference, and
+//! rotations may have any size. With the one-point gradient of [`crate::quad`], `g_a = x,a` and `d,a`,
+//!
+//! `C_ab = g_a . g_b`, `k_ab = -c (d,a . g_b + d,b . g_a) / 2`, `c = 1 + |q_d|^2 / 32`,
+//!
+//! with the directors' hourglass mode q_d; without it, c = 1, this is `n . x,ab` when d is normal to the surface (differentiate `d . x,b = 0`), and both vanish
+//! under rigid motion. The factor c gives the slopes of the directors the length that the mode takes off them: four unit
+//! vectors turned to and fro by b have a mean shorter by cos b, so that an element that is bent by more than about 0.4 rad from side to side
+//! could unbend by this mode, against nothing but its hourglass control (`docs/decisions/0039`). Each side I-J has the transverse shear `e_IJ = (x_J - x_I) . (d_I + d_J) / 2`
+//! less its value in the reference; it is zero for a side bent to an arc with normal directors, and
+//! for every constant curvature (trapezoidal rule of a linear slope), whatever the element's shape.
+//! The means of opposite sides give the transverse shear `gamma_a` at the point; their differences
+//! `e_12 - e_43`, `e_14 - e_23` are two of the four modes that the point does not see (the warping
+//! w = xi eta less the twist that the directors show, and the turning of the directors about the
+//! normal): together these are the assumed strains of MITC4 (Dvorkin and Bathe 1984), written
+//! without a reference normal. Constant curvature and constant twist are free of hourglass energy.
+//!
+//! # Energy of an element
+//!
+//! `A sum_i w_i W_m(C11, C22, C12 - 2 z_i k12) + A W_b(k) + gamma K gamma / 2 + hourglass`.
+//!
+//! Layers (thesis eqs 3.5-3.9): one material point in the middle and one in each surface layer,
+//! `w = [t/h, (1 - t/h)/2, (1 - t/h)/2]`, `z = [0, +(h + t)/4, -(h + t)/4]`: with a surface modulus
+//! these give eq. 3.8. The fibres' bending is the material's moment law, so the layers see no fibre
+//! bending strain; they see the twist, and their shear stresses give the thesis' only twist stiffness
+//! (eqs 3.19, 3.20: G12 acts in the surface layers too). The weights add to one: a flat sheet has the
+//! material's membrane response exactly, and the stitch fails layer by layer. All layers carry the
+//! whole metric and not the shear alone: then the sum is one energy, and forces are its gradient.
+//! With `twist: material` the middle is the only point, and M12 comes from the material's moments.
+//!
+//! `bending: total` takes M(k) of the material: the force is the exact gradient of the energy.
+//! `bending: lagged-tangent` (the thesis, 3.3.3) adds `dM/dk` at the previous curvature times the
+//! change of curvature, for each fibre family by itself, and reports the work done as energy. Every step
+//! then leaves an error of `M'' dk^2 / 2`, always of the same sign: moments creep away from the law, and in long
+//! runs a strip at rest can come alive (`docs/decisions/0011`).
+//! Tangents across families are not in the material's contract, so it also refuses a material
+//! that couples them (an isotropic plate).
+//!
+//! `thickening: p`: the section bends with `A J^-p W_b(k)`, J = sqrt(det C), as in [`crate::rf4`]; the membrane's
+//! stress has `-p J^-p W_b C^-1` besides. The layers' twist is left as it is.
+//!
+//! # Penalty of transverse shear
+//!
+//! `K = transverse_shear * 12 D A S`, `S_ab = sum_I b_Ia b_Ib` (1/L^2 along the sides of a
+//! rectangle), D the bending tangent of the stiffer family at zero curvature: MacNeal's residual
+//! bending flexibility (1978), with which one point makes a beam element exact for thin beams. It
+//! falls with the element's size, does not lock, and is softer than a physical shear modulus, which
+//! may be put in series (`transverse_shear_modulus`, with the factor 5/6).
+//!
+//! # Rotary inertia
+//!
+//! `max(physical, 8 K_theta / lambda)` with the bound K_theta of the rotational stiffness at rest and
+//! lambda = omega^2 of the membrane: rotations then cost at most 6 % of the membrane's time step.
+//! Both scale with the thickness squared: the inertia is 16 times the physical one of the NCF at every
+//! element size, that of a sheet 4 times as thick, which no wave longer than some 10 thicknesses notices.
+//!
+//! Forces are `dW/dx`; moments are `d_I x dW/dd_I` and have no part along d_I (no drilling).
+//! Elements are wound counter-clockwise about the normal.
+
+mod bounds;
+mod forces;
+mod lag;
+mod rotation;
+
+use crate::quad::{self, Hourglass, MAX_LANES, Rows, material_frame};
+use crate::{WIDTH, thickening};
+use plyflow_sdk::abi::{PF_BAD_SHAPE, PF_OK};
+use plyflow_sdk::{
+    Aligned, BendingBatch, Constants, Element, ElementBatch, ElementSizes, MaterialRef,
+    MembraneBatch,
+};
+
+/// Rows of constants after those of [`crate::quad`].
+mod row {
+    /// Unit normal of the reference (3).
+    pub const NORMAL: usize = crate::quad::CONSTANTS;
+    /// (X1 - X2 + X3 - X4) . normal (m).
+    pub const WARP: usize = NORMAL + 3;
+    /// K11, K22, K12 of transverse shear, times the area (N m).
+    pub const SHEAR: usize = WARP + 1;
+    /// Stiffness of e_12 - e_43 and of e_14 - e_23 (N/m).
+    pub const EDGE: usize = SHEAR + 3;
+    /// Stiffness of the directors' hourglass mode (N m).
+    pub const DIRECTOR: usize = EDGE + 2;
+    /// Rotary inertia of a node (kg m2).
+    pub const INERTIA: usize = DIRECTOR + 1;
+    pub const COUNT: usize = INERTIA + 1;
+}
+
+/// Rows of history: directors `[4][3]`; with lagged tangents also those of [`lag`]; then the
+/// material's bending history.
+const DIRECTORS: usize = 12;
+/// Rows of fields: those of [`crate::quad`], then curvatures and moments along the two fibre families.
+const FIELDS: usize = quad::FIELDS + 4;
+/// The rotations' share of omega^2.
+const ROTATION_SHARE: f64 = 0.125;
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum BendingRule {
+    LaggedTangent,
+    Total,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Twist {
+    Layers,
+    Material,
+}
+
+/// Parameters; see the manifest.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Parameters {
+    bending: BendingRule,
+    twist: Twist,
+    core_share: f64,
+    transverse_shear: f64,
+    transverse_shear_modulus: Option<f64>,
+    hourglass: f64,
+    hourglass_floor: f64,
+    hourglass_shear: f64,
+    hourglass_director: f64,
+    thickening: u32,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            bending: BendingRule::Total,
+            twist: Twist::Layers,
+            core_share: 1.0 / 3.0,
+            transverse_shear: 1.0,
+            transverse_shear_modulus: None,
+            hourglass: 1.0,
+            hourglass_floor: 3000.0,
+            hourglass_shear: 1.0,
+            hourglass_director: 0.05,
+            thickening: 0,
+        }
+    }
+}
+
+impl Parameters {
+    fn parse(text: &str) -> Result<Self, String> {
+        let p: Self =
+            serde_json::from_str(text).map_err(|e| format!("parameters of element 's4': {e}"))?;
+        if !(0.0..1.0).contains(&p.core_share) {
+            return Err(format!(
+                "core_share: given {}; expected at least 0 and below 1 (thickness of the central \
+                 layer over that of the sheet)",
+                p.core_share
+            ));
+        }
+        let modulus = p.transverse_shear_modulus.unwrap_or(1.0);
+        if !(modulus > 0.0 && modulus.is_finite()) {
+            return Err(format!(
+                "transverse_shear_modulus: given {modulus} Pa; expected a finite value above 0"
+            ));
+        }
+        thickening::check(p.thickening)?;
+        if p.thickening > 0 && p.bending == BendingRule::LaggedTangent {
+            return Err(format!(
+                "thickening: given {} with 'bending: lagged-tangent', whose moments grow step by step and have no \
+                 energy to thicken: set 'bending: total' or 'thickening: 0'",
+                p.thickening
+            ));
+        }
+        for (name, value) in [
+            ("transverse_shear", p.transverse_shear),
+            ("hourglass_shear", p.hourglass_shear),
+            ("hourglass_director", p.hourglass_director),
+        ] {
+            // Zero leaves a motion without resistance; beyond 1000 it would only cost time steps.
+            if !(value > 0.0 && value <= 1e3) {
+                return Err(format!(
+                    "{name}: given {value}; expected above 0, at most 1000"
+                ));
+            }
+        }
+        Ok(p)
+    }
+}
+
+/// Bending of a material in its undeformed state.
+#[derive(Clone, Copy, Debug)]
+struct Rest {
+    /// Largest dM/dk of the two families, both signs (N m).
+    stiffness: f64,
+    /// dM12/dk12 (N m).
+    twist: f64,
+    /// Whether one family's curvature gives the other a moment.
+    coupled: bool,
+}
+
+impl Rest {
+    fn of(material: &MaterialRef) -> Result<Self, String> {
+        let sizes = material.sizes();
+        if !sizes.has_bending {
+            return Err(
+                "element 's4' needs a material with bending stiffness; this one has none: \
+                        give the fabric a 'bending' block, or use the membrane 'm4'"
+                    .into(),
+            );
+        }
+        // A surface strain of about 1e-9: small against every law's scale.
+        let k = 1e-9 / sizes.thickness;
+        let mut metric = Rows::<{ 3 * WIDTH }>::zeros();
+        metric.0[..2 * WIDTH].fill(1.0);
+        let mut curvature = Rows::<{ 3 * WIDTH }>::zeros();
+        for (lane, (r, sign)) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)]
+            .into_iter()
+            .enumerate()
+        {
+            curvature.0[r * WIDTH + lane] = sign * k;
+        }
+        let mut history = Aligned::zeros(sizes.bending_history * WIDTH);
+        let mut moment = Rows::<{ 3 * WIDTH }>::zeros();
+        let mut energy = Rows::<WIDTH>::zeros();
+        let mut tangent = Rows::<{ 3 * WIDTH }>::zeros();
+        let code = material.bending(&mut BendingBatch {
+            lanes: WIDTH,
+            dt: 0.0,
+            metric: &metric.0,
+            curvature: &curvature.0,
+            history: &mut history,
+            moment: &mut moment.0,
+            energy: &mut energy.0,
+            tangent: Some(&mut tangent.0),
+        });
+        let stiffness = tangent.0[..2 * WIDTH].iter().fold(0.0f64, |m, t| m.max(*t));
+        let twist = tangent.0[2 * WIDTH];
+        let finite = tangent.0.iter().all(|t| t.is_finite());
+        if code != PF_OK || !(finite && stiffness > 0.0 && twist >= 0.0) {
+            return Err(format!(
+                "the material's moments at rest gave code {code}, largest tangent {stiffness} N m \
+                 and twist tangent {twist} N m: expected code 0, finite tangents, bending above 0"
+            ));
+        }
+        let m = &moment.0;
+        let cross = m[WIDTH].abs().max(m[2].abs());
+        Ok(Self {
+            stiffness,
+            twist,
+            coupled: cross > 1e-6 * m[0].abs().max(m[WIDTH + 2].abs()),
+        })
+    }
+}
+
+/// Weights of the layers: middle, one surface layer, and the height of a surface layer (m).
+#[derive(Clone, Copy, Debug)]
+struct Layers {
+    core: f64,
+    surface: f64,
+    height: f64,
+}
+
+/// The formulation for one material.
+pub struct S4 {
+    plane: Hourglass,
+    parameters: Parameters,
+    rest: Rest,
+    /// None: the middle alone, twist from the material.
+    layers: Option<Layers>,
+    thickness: f64,
+    areal_mass: f64,
+    bending_history: usize,
+}
+
+impl S4 {
+    fn points(&self) -> usize {
+        if self.layers.is_some() { 3 } else { 1 }
+    }
+
+    fn lagged(&self) -> bool {
+        self.parameters.bending == BendingRule::LaggedTangent
+    }
+
+    /// Where the material's bending history starts.
+    fn material_rows(&self) -> usize {
+        DIRECTORS + if self.lagged() { lag::HISTORY } else { 0 }
+    }
+}
+
+impl Element for S4 {
+    const MANIFEST: &'static str = include_str!("s4/manifest.json");
+
+    fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
+        let p = Parameters::parse(parameters)?;
+        let plane = Hourglass::new(p.hourglass, p.hourglass_floor, 0.0, material)?;
+        let rest = Rest::of(material)?;
+        if rest.coupled && p.bending == BendingRule::LaggedTangent {
+            return Err(
+                "bending: lagged-tangent adds moments family by family, but the curvature of one \
+                 family gives the other a moment in this material: set 'bending: total' (and, for \
+                 an isotropic plate, 'twist: material')"
+                    .into(),
+            );
+        }
+        let sizes = material.sizes();
+        let layers = (p.twist == Twist::Layers).then_some(Layers {
+            core: p.core_share,
+            surface: 0.5 * (1.0 - p.core_share),
+            height: 0.25 * (1.0 + p.core_share) * sizes.thickness,
+        });
+        Ok(Self {
+            plane,
+            parameters: p,
+            rest,
+            layers,
+            thickness: sizes.thickness,
+            areal_mass: sizes.areal_mass,
+            bending_history: sizes.bending_history,
+        })
+    }
+
+    fn sizes(&self) -> ElementSizes {
+        ElementSizes {
+            nodes: 4,
+            dofs_per_node: 6,
+            constants: row::COUNT,
+            history: self.material_rows() + self.bending_history,
+            material_points: self.points(),
+            fields: FIELDS,
+            ignores_velocity: true,
+            ..Default::default()
+        }
+    }
+
+    fn initialise(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) {
+        let n = batch.lanes;
+        let mut step = vec![0.0; n];
+        quad::initialise(
+            &mut ElementBatch {
+                lanes: n,
+                dt: 0.0,
+                position: batch.position,
+                velocity: &[],
+                spin: &[],
+                axis: batch.axis,
+                constants: Constants::Open(&mut batch.constants),
+                history: &mut [],
+                material_history: &mut [],
+                force: &mut [],
+                moment: &mut [],
+                energy: &mut [],
+                fields: None,
+                mass: &mut *batch.mass,
+                inertia: &mut [],
+                critical_step: Some(&mut step),
+            },
+            material,
+            self.plane,
+        );
+        for l in 0..n {
+            let x: [V3; 4] = core::array::from_fn(|i| {
+                core::array::from_fn(|k| batch.position[(3 * i + k) * n + l])
+            });
+            let axis: V3 = core::array::from_fn(|k| batch.axis[k * n + l]);
+            let constants = &mut batch.constants;
+            self.plate_constants(&x, axis, constants, n, l);
+            // Bound of the rotational stiffness at rest against omega^2 of the membrane.
+            let rotational = bounds::at_rest(self, constants, n, l, &x);
+            let lambda = 4.0 / (step[l] * step[l]);
+            let mass = batch.mass[l];
+            let physical = mass * self.thickness * self.thickness / 12.0;
+            let inertia = physical.max(rotational / (ROTATION_SHARE * lambda));
+            constants[row::INERTIA * n + l] = inertia;
+            for i in 0..4 {
+                if !batch.inertia.is_empty() {
+                    batch.inertia[i * n + l] = inertia;
+                }
+            }
+            step[l] = 2.0
+                / (lambda + rotational / inertia + bounds::plate(constants, n, l) / mass).sqrt();
+        }
+        if let Some(to) = batch.critical_step.as_deref_mut() {
+            to[..n].copy_from_slice(&step);
+        }
+    }
+
+    fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
+        let rows = 12 * batch.lanes;
+        if batch.spin.len() < rows || batch.moment.len() < rows {
+            return PF_BAD_SHAPE; // A caller that does not know rotations.
+        }
+        match batch.lanes {
+            0..=16 => self.forces_with(batch, material, forces::Scratch::<16>::new().view()),
+            17..=32 => self.forces_with(batch, material, forces::Scratch::<32>::new().view()),
+            _ => self.forces_with(batch, material, forces::Scratch::<MAX_LANES>::new().view()),
+        }
+    }
+}
+
+type V3 = [f64; 3];
+
+impl S4 {
+    /// The rows after those of the membrane, of one lane.
+    fn plate_constants(&self, x: &[V3; 4], axis: V3, constants: &mut [f64], n: usize, l: usize) {
+        let sub = |a: V3, b: V3| -> V3 { core::array::from_fn(|k| a[k] - b[k]) };
+        let dot = |a: V3, b: V3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (d13, d24) = (sub(x[0], x[2]), sub(x[1], x[3]));
+        let cross: V3 = core::array::from_fn(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            d13[i] * d24[j] - d13[j] * d24[i]
+        });
+        let (_, _, normal) = material_frame(axis, cross);
+        let mode: V3 = core::array::from_fn(|k| (x[0][k] - x[1][k]) + (x[2][k] - x[3][k]));
+        let b = |r: usize| constants[r * n + l];
+        let s11 = 2.0 * (b(0) * b(0) + b(1) * b(1));
+        let s22 = 2.0 * (b(2) * b(2) + b(3) * b(3));
+        let s12 = 2.0 * (b(0) * b(2) + b(1) * b(3));
+        let area = b(6);
+        let penalty = 12.0 * self.parameters.transverse_shear * self.rest.stiffness;
+        let (mut k11, mut k22, mut k12) = (penalty * s11, penalty * s22, penalty * s12);
+        if let Some(modulus) = self.parameters.transverse_shear_modulus {
+            // (K^-1 + 1/G)^-1 = K (1 + K/G)^-1: both are functions of K, so they commute.
+            let limit = 5.0 / 6.0 * modulus * self.thickness;
+            let (a, d, c) = (1.0 + k11 / limit, 1.0 + k22 / limit, k12 / limit);
+            let det = a * d - c * c;
+            (k11, k22, k12) = (
+                (k11 * d - k12 * c) / det,
+                (k22 * a - k12 * c) / det,
+                (k12 * a - k11 * c) / det,
+            );
+        }
+        // The bending stiffness that this shear stiffness stands for, and what a fully integrated
+        // element has for the differences of opposite sides.
+        let effective = (k11 + k22) / (12.0 * (s11 + s22)).max(f64::MIN_POSITIVE);
+        let edge = |sign: f64| {
+            let side: V3 = core::array::from_fn(|k| 0.5 * (d24[k] - sign * d13[k]));
+            let square = dot(side, side).max(f64::MIN_POSITIVE);
+            self.parameters.hourglass_shear * effective * area / (square * square)
+        };
+        let values = [
+            normal[0],
+            normal[1],
+            normal[2],
+            dot(mode, normal),
+            area * k11,
+            area * k22,
+            area * k12,
+            edge(1.0),
+            edge(-1.0),
+            self.parameters.hourglass_director * self.rest.stiffness / 6.0,
+        ];
+        for (r, v) in values.into_iter().enumerate() {
+            constants[(row::NORMAL + r) * n + l] = v;
+        }
+    }
+
+    fn forces_with(
+        &self,
+        batch: &mut ElementBatch<'_>,
+        material: &MaterialRef,
+        mut s: forces::View<'_>,
+    ) -> i32 {
+        let n = batch.lanes;
+        let (directors, rest) = batch.history.split_at_mut(DIRECTORS * n);
+        let height = self.layers.map(|l| l.height);
+        forces::kinematics(
+            batch.position,
+            batch.spin,
+            batch.dt,
+            &batch.constants,
+            n,
+            height,
+            directors,
+            &mut s,
+        );
+        let wanted = batch.critical_step.is_some();
+        let code = self.membrane(
+            batch.material_history,
+            material,
+            n,
+            batch.dt,
+            &mut s,
+            wanted,
+        );
+        if code != PF_OK {
+            return code;
+        }
+        let (lagged, law) = rest.split_at_mut((self.material_rows() - DIRECTORS) * n);
+        let code = material.bending(&mut BendingBatch {
+            lanes: n,
+            dt: batch.dt,
+            metric: &s.metric[..3 * n],
+            curvature: &s.curvature[..3 * n],
+            history: law,
+            moment: &mut s.moment[..3 * n],
+            energy: &mut s.bending[..n],
+            tangent: Some(&mut s.tangent[..3 * n]),
+        });
+        if code != PF_OK {
+            return code;
+        }
+        if self.lagged() {
+            lag::moments(n, s.curvature, s.tangent, lagged, s.moment, s.bending);
+        }
+        let power = self.parameters.thickening;
+        if power > 0 {
+            thickening::scale(power, n, s.metric, s.moment, s.tangent, s.bending);
+            s.swell.copy_from_slice(s.bending);
+        }
+        if let Some(layers) = &self.layers {
+            forces::superpose(n, layers, &mut s);
+        }
+        if power > 0 {
+            forces::swell(power, n, &mut s);
+        }
+        forces::forces(
+            batch.position,
+            directors,
+            &batch.constants,
+            n,
+            &s,
+            batch.force,
+            batch.moment,
+            batch.energy,
+        );
+        if let Some(step) = batch.critical_step.as_deref_mut() {
+            bounds::critical_step(
+                self,
+                batch.position,
+                directors,
+                &batch.constants,
+                n,
+                &s,
+                step,
+            );
+        }
+        if let Some(fields) = batch.fields.as_deref_mut() {
+            fields_of(n, &s, fields);
+        }
+        PF_OK
+    }
+
+    /// The material at every layer.
+    fn membrane(
+        &self,
+        history: &mut [f64],
+        material: &MaterialRef,
+        n: usize,
+        dt: f64,
+        s: &mut forces::View<'_>,
+        wanted: bool,
+    ) -> i32 {
+        let rows = material.sizes().membrane_history * n;
+        for p in 0..self.points() {
+            let code = material.membrane(&mut MembraneBatch {
+                lanes: n,
+                dt,
+                metric: &s.metric[3 * p * n..3 * (p + 1) * n],
+                history: &mut history[p * rows..(p + 1) * rows],
+                stress: &mut s.stress[3 * p * n..3 * (p + 1) * n],
+                energy: &mut s.energy[p * n..(p + 1) * n],
+                stiffness: wanted.then_some(&mut s.stiffness[2 * p * n..2 * (p + 1) * n]),
+            });
+            if code != PF_OK {
+                return code;
+            }
+        }
+        PF_OK
+    }
+}
+
+fn fields_of(n: usize, s: &forces::View<'_>, fields: &mut [f64]) {
+    quad::fields_of(n, s.metric, s.stress, fields);
+    for l in 0..n {
+        for a in 0..2 {
+            let stretch = s.metric[a * n + l].max(f64::MIN_POSITIVE);
+            fields[(quad::FIELDS + a) * n + l] = s.curvature[a * n + l] / stretch;
+            fields[(quad::FIELDS + 2 + a) * n + l] = s.moment[a * n + l];
+        }
+    }
+}
