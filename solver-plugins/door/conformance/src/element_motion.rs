@@ -2,11 +2,12 @@
 
 use crate::breaches::{Ask, Breaches};
 use crate::element::{STRAIN, once};
-use crate::linear::{V, cross, largest_eigenvalue, rotation};
+use crate::linear::{largest_eigenvalue, rotation};
 use crate::shapes::{Elements, moved};
 use crate::subject::{Answer, Masses, Motion, State, Subject};
 use crate::{Run, Seen, Sequence, rules, worse};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, cross};
 
 pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, lanes: usize) {
     let elements = Elements::new(subject.nodes(), lanes, 31);
@@ -453,8 +454,8 @@ fn path(
     elements: &Elements,
     position: &[f64],
     spin: &[f64],
-    q: &[V; 3],
-    shift: V,
+    q: &[Vec3; 3],
+    shift: Vec3,
     turning: usize,
 ) -> Answer {
     let lanes = elements.lanes;
@@ -495,7 +496,7 @@ fn path(
 }
 
 /// The rotation vector of a rotation by less than 180 degrees.
-fn axis_of(q: &[V; 3]) -> V {
+fn axis_of(q: &[Vec3; 3]) -> Vec3 {
     let cosine = 0.5 * (q[0][0] + q[1][1] + q[2][2] - 1.0);
     let angle = cosine.clamp(-1.0, 1.0).fixed_acos();
     let twice = [q[2][1] - q[1][2], q[0][2] - q[2][0], q[1][0] - q[0][1]];

@@ -1,23 +1,10 @@
 //! Small dense matrices and vectors.
 
 use plyflow_fixed::FixedBits;
-
-pub(crate) type V = [f64; 3];
-
-pub(crate) fn dot(a: V, b: V) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(crate) fn cross(a: V, b: V) -> V {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
+use plyflow_geometry::vec3::{Vec3, dot};
 
 /// The rotation by the vector `w` (rad), row by row (Rodrigues).
-pub(crate) fn rotation(w: V) -> [V; 3] {
+pub(crate) fn rotation(w: Vec3) -> [Vec3; 3] {
     let angle = dot(w, w).sqrt();
     let n = w.map(|c| c / angle.max(f64::MIN_POSITIVE));
     let (s, c) = angle.fixed_sin_cos();
@@ -30,7 +17,7 @@ pub(crate) fn rotation(w: V) -> [V; 3] {
     })
 }
 
-pub(crate) fn turn(q: &[V; 3], v: V) -> V {
+pub(crate) fn turn(q: &[Vec3; 3], v: Vec3) -> Vec3 {
     q.map(|row| dot(row, v))
 }
 
@@ -89,7 +76,7 @@ pub(crate) fn largest_eigenpair(a: &[f64], n: usize) -> (f64, Vec<f64>) {
 }
 
 /// Spectral norm of a 3 x 3 matrix.
-pub(crate) fn norm(b: &[V; 3]) -> f64 {
+pub(crate) fn norm(b: &[Vec3; 3]) -> f64 {
     let mut square = [0.0; 9];
     for i in 0..3 {
         for j in 0..3 {

@@ -1,12 +1,13 @@
 //! Checks of an element's patch part.
 
 use crate::breaches::{Ask, Breaches, DT};
-use crate::linear::{V, cross, norm, rotation};
+use crate::linear::{norm, rotation};
 use crate::meeting::{THREADS, meet_in_turn};
 use crate::neighbours::{self, mixed, of_lanes};
 use crate::shapes::{Patches, moved};
 use crate::subject::{PatchAnswer, PatchState, Subject};
 use crate::{Run, Seen, rules, worse};
+use plyflow_geometry::vec3::{Vec3, cross};
 
 const LANES: usize = 16;
 /// Calls of a thread between two looks at whether enough have met.
@@ -244,7 +245,7 @@ impl<'a> Case<'a> {
 
     fn balance(&self) -> Seen {
         let n = self.patches.lanes;
-        let vector = |x: &[f64], k: usize, l: usize| -> V {
+        let vector = |x: &[f64], k: usize, l: usize| -> Vec3 {
             std::array::from_fn(|c| x[(3 * k + c) * n + l])
         };
         let (mut worst, mut turning) = (0.0f64, 0.0f64);
@@ -352,7 +353,7 @@ impl<'a> Case<'a> {
             for i in 0..self.patches.count[l] as usize {
                 let sum: f64 = (0..slots)
                     .map(|j| {
-                        let block: [V; 3] = std::array::from_fn(|a| {
+                        let block: [Vec3; 3] = std::array::from_fn(|a| {
                             std::array::from_fn(|b| k[(3 * i + a) * rows + 3 * j + b])
                         });
                         norm(&block)

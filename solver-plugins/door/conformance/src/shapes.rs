@@ -2,8 +2,9 @@
 //! direction of the material axes.
 
 use crate::Sequence;
-use crate::linear::{V, cross, dot, rotation, turn};
+use crate::linear::{rotation, turn};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, cross, dot};
 
 /// Elements side by side, one in each lane.
 #[derive(Clone)]
@@ -63,13 +64,13 @@ impl Elements {
     }
 
     /// A node of a lane in `[nodes][3][lanes]`.
-    pub(crate) fn node(&self, x: &[f64], k: usize, l: usize) -> V {
+    pub(crate) fn node(&self, x: &[f64], k: usize, l: usize) -> Vec3 {
         std::array::from_fn(|c| x[(3 * k + c) * self.lanes + l])
     }
 
     /// Undeformed area of a lane's plane element (m2).
     pub(crate) fn area(&self, l: usize) -> f64 {
-        let x: Vec<V> = (0..self.nodes)
+        let x: Vec<Vec3> = (0..self.nodes)
             .map(|k| self.node(&self.reference, k, l))
             .collect();
         let mut twice = [0.0; 3];
@@ -86,7 +87,7 @@ impl Elements {
         let mut s = Sequence(seed);
         let mut x = self.reference.clone();
         for l in 0..self.lanes {
-            let gradient: [V; 3] = std::array::from_fn(|_| std::array::from_fn(|_| s.next()));
+            let gradient: [Vec3; 3] = std::array::from_fn(|_| std::array::from_fn(|_| s.next()));
             for k in 0..self.nodes {
                 let p = self.node(&self.reference, k, l);
                 for c in 0..3 {
@@ -118,7 +119,7 @@ pub(crate) fn pick(rows: &[f64], lanes: usize, order: &[usize]) -> Vec<f64> {
 }
 
 /// Every row of vectors `[n][3][lanes]` turned and shifted.
-pub(crate) fn moved(x: &[f64], lanes: usize, q: &[V; 3], shift: V) -> Vec<f64> {
+pub(crate) fn moved(x: &[f64], lanes: usize, q: &[Vec3; 3], shift: Vec3) -> Vec<f64> {
     let mut to = vec![0.0; x.len()];
     for k in 0..x.len() / (3 * lanes) {
         for l in 0..lanes {
@@ -211,14 +212,14 @@ impl Patches {
         for l in 0..n {
             let size = self.area[l].sqrt();
             let at =
-                |k: usize| -> V { std::array::from_fn(|c| self.reference[(3 * k + c) * n + l]) };
+                |k: usize| -> Vec3 { std::array::from_fn(|c| self.reference[(3 * k + c) * n + l]) };
             let centre = at(0);
             let curvature = [s.next(), s.next(), s.next()].map(|k| 0.1 * k / size);
-            let gradient: [V; 3] =
+            let gradient: [Vec3; 3] =
                 std::array::from_fn(|_| std::array::from_fn(|_| 0.01 * s.next()));
             for k in 1..self.count[l] as usize {
                 let p = at(k);
-                let d: V = std::array::from_fn(|c| p[c] - centre[c]);
+                let d: Vec3 = std::array::from_fn(|c| p[c] - centre[c]);
                 let up = 0.5 * (curvature[0] * d[0] * d[0] + curvature[1] * d[1] * d[1])
                     + curvature[2] * d[0] * d[1];
                 for c in 0..3 {

@@ -1,12 +1,12 @@
 //! Elements on meshes that follow an outline: a uniform strain is uniform, a parabola's curvature is that of the parabola.
 
 use plyflow_blank::mesh_region;
+use plyflow_geometry::vec3::{V, norm};
 use plyflow_kernels::{fabric::Fabric, m4::M4, rf4::Rf4};
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::mesh::{QuadMesh, limit_patches};
 use plyflow_mechanics::model::{Drive, Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::{V, norm};
 use plyflow_model::outline::{Point, Region};
 use plyflow_sdk::abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
 use plyflow_sdk::{Element, element_table, material_table};

@@ -15,10 +15,10 @@ use crate::strip::{
     self, CLAMPED, Grid, axis_of_family, check_family, fibre_strain, largest, rows,
 };
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
-use plyflow_mechanics::vec3::V;
 use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, Step, StepError};

@@ -1,13 +1,13 @@
 //! A specimen: one sheet of a material, meshed, with an element formulation.
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL};
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::component::{
     ElementField, ElementInstance, MaterialInstance, element_fields,
 };
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::V;
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::material::Material;
 use plyflow_sdk::{Host, StepError};

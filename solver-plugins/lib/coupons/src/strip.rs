@@ -9,9 +9,9 @@
 //! line must be one of those, or the strip is clamped a tenth of an element off.
 
 use crate::specimen::{Common, Specimen, element};
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_mechanics::vec3::V;
 use plyflow_sdk::{Host, StepError};
 
 /// Clamped columns of nodes at an end.

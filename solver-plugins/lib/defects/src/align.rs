@@ -4,8 +4,8 @@
 use nalgebra::{
     DMatrix, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
 };
+use plyflow_geometry::vec3::{Vec3, add, scale, unit};
 use plyflow_surface::Surface;
-use plyflow_surface::vector::{Vec3, add, scale, unit};
 
 /// How points are aligned.
 #[derive(Debug, Clone, Copy, PartialEq)]

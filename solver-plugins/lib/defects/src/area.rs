@@ -2,7 +2,7 @@
 
 use crate::measure::Ply;
 use nalgebra::{Matrix3, Vector3};
-use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Of no set.
 pub(crate) const NONE: usize = usize::MAX;

@@ -2,9 +2,9 @@
 
 use crate::measure::{Defect, Ply, mean_along};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::rectangle;
+use plyflow_geometry::vec3::distance;
 use plyflow_model::artifact::{Cause, DefectKind as Kind};
-use plyflow_surface::flat_bounds;
-use plyflow_surface::vector::distance;
 use serde::Deserialize;
 use std::f64::consts::FRAC_PI_2;
 
@@ -81,11 +81,11 @@ pub fn find_causes(
 
 /// Whether a cell of a flat ply holds one of the places (m).
 fn lies_at(ply: &Ply, places: &[[f64; 2]]) -> bool {
-    let around = flat_bounds(places.iter().copied());
+    let around = rectangle::around(places.iter().copied());
     (0..ply.topology.cells()).any(|c| {
         let at = |&i: &u32| [0, 1].map(|k| ply.undeformed[i as usize][k]);
         let corners: Vec<[f64; 2]> = ply.topology.cell(c).iter().map(at).collect();
-        let own = flat_bounds(corners.iter().copied());
+        let own = rectangle::around(corners.iter().copied());
         let apart =
             |d: usize| own[d] > around[d + 2] + ROUNDING || own[d + 2] < around[d] - ROUNDING;
         !(apart(0) || apart(1)) && places.iter().any(|p| holds(&corners, *p))

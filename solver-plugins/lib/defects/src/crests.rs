@@ -3,8 +3,8 @@
 
 use crate::Ply;
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{distance, dot, norm, sub};
 use plyflow_surface::Ridge;
-use plyflow_surface::vector::{distance, dot, norm, sub};
 
 /// Turn of a crest in the flat ply (rad) that is a corner: more than the 45 degrees by which a line over a mesh's sides and diagonals may turn.
 const CORNER: f64 = std::f64::consts::FRAC_PI_3;

@@ -1,8 +1,9 @@
 //! How far the positions, the distances from the tool and the shear angles of one way to the answer are from those of another.
 
 use crate::measure::Ply;
-use plyflow_surface::vector::distance;
-use plyflow_surface::{Location, QuadLocator, weighted_quantiles};
+use plyflow_geometry::vec3::distance;
+use plyflow_geometry::{Location, QuadLocator};
+use plyflow_surface::weighted_quantiles;
 
 /// Shear angles are told at these quantiles.
 pub const QUANTILES: [f64; 5] = [0.01, 0.25, 0.5, 0.75, 0.99];

@@ -3,8 +3,8 @@
 use crate::area::{Extent, NONE, extents, sample};
 use crate::crests::crests;
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_model::artifact::{self, Cause, DefectKind as Kind};
-use plyflow_surface::vector::{Vec3, cross, distance, dot, scale, sub, unit};
 use plyflow_surface::{
     Crests, Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances,
     ridge_line, sharpness,

@@ -3,8 +3,8 @@
 use plyflow_files::number::{Decimal, Signs, value};
 use plyflow_files::rows::{Cells, Head, Lines, RowError, Separator, names};
 use plyflow_files::text::shown;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::units::{Dimension, parse_quantity, parse_unit};
-use plyflow_surface::vector::Vec3;
 
 /// A table that was read.
 pub(crate) struct Points {

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use plyflow_files::open::{FileError, MOST_DATA};
 use plyflow_files::text::excerpt;
 use plyflow_files::{open, stl};
-use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use plyflow_tooling::facets;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;

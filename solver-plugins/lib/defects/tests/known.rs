@@ -4,7 +4,7 @@ use plyflow_defects::scan::join;
 use plyflow_defects::{
     Cause, Defect, FieldErrors, Kind, Limits, Neighbour, Ply, Settings, Tool, find_causes, measure,
 };
-use plyflow_surface::vector::{Vec3, distance};
+use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_surface::{Surface, Topology, triangles};
 use std::f64::consts::PI;
 

@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use plyflow_defects::align::{MOST_PASSES, Settings, align};
 use plyflow_defects::scan::{orient, read};
 use plyflow_files::stl::write;
+use plyflow_geometry::vec3::{Vec3, add, cross, distance, scale, sub, unit};
 use plyflow_model::scene::Tool;
 use plyflow_surface::Surface;
-use plyflow_surface::vector::{Vec3, add, cross, distance, scale, sub, unit};
 use std::fs;
 
 fn spar() -> plyflow_tooling::ToolMesh {

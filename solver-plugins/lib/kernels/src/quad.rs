@@ -12,6 +12,7 @@
 
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
 use plyflow_sdk::abi::PF_OK;
 use plyflow_sdk::{Aligned, ElementBatch, MaterialRef, MembraneBatch};
 
@@ -102,28 +103,14 @@ pub fn stiffness_at_rest(material: &MaterialRef) -> Result<(f64, f64), String> {
     Ok((largest, shear))
 }
 
-type V3 = [f64; 3];
-
-fn sub(a: V3, b: V3) -> V3 {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-fn dot(a: V3, b: V3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-fn cross(a: V3, b: V3) -> V3 {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-fn unit(a: V3) -> V3 {
+/// a / |a|, by division: [`plyflow_geometry::vec3::unit`] multiplies, which rounds differently.
+fn unit(a: Vec3) -> Vec3 {
     let l = dot(a, a).sqrt().max(f64::MIN_POSITIVE);
     [a[0] / l, a[1] / l, a[2] / l]
 }
 
 /// Orthonormal e1, e2, n: e1 is `axis` projected on the plane with normal along `normal`.
-pub fn material_frame(axis: V3, normal: V3) -> (V3, V3, V3) {
+pub fn material_frame(axis: Vec3, normal: Vec3) -> (Vec3, Vec3, Vec3) {
     let n = unit(normal);
     let p = dot(axis, n);
     let mut e1 = sub(axis, [p * n[0], p * n[1], p * n[2]]);
@@ -146,14 +133,15 @@ pub fn initialise(batch: &mut ElementBatch<'_>, material: &MaterialRef, hourglas
     let n = batch.lanes;
     let areal_mass = material.sizes().areal_mass;
     for l in 0..n {
-        let x = |i: usize| -> V3 { core::array::from_fn(|k| batch.position[(3 * i + k) * n + l]) };
-        let axis: V3 = core::array::from_fn(|k| batch.axis[k * n + l]);
+        let x =
+            |i: usize| -> Vec3 { core::array::from_fn(|k| batch.position[(3 * i + k) * n + l]) };
+        let axis: Vec3 = core::array::from_fn(|k| batch.axis[k * n + l]);
         let (d13, d24) = (sub(x(0), x(2)), sub(x(1), x(3)));
         let normal = cross(d13, d24);
         let (e1, e2, _) = material_frame(axis, normal);
         let (u13, v13, u24, v24) = (dot(d13, e1), dot(d13, e2), dot(d24, e1), dot(d24, e2));
         let twice = (u13 * v24 - u24 * v13).max(f64::MIN_POSITIVE);
-        let h: V3 = core::array::from_fn(|k| x(0)[k] - x(1)[k] + x(2)[k] - x(3)[k]);
+        let h: Vec3 = core::array::from_fn(|k| x(0)[k] - x(1)[k] + x(2)[k] - x(3)[k]);
         let row = [
             v24 / twice,
             -v13 / twice,

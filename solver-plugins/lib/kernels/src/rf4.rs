@@ -29,6 +29,7 @@
 use crate::m4::Parameters;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
 use crate::{Lanes, WIDTH, dispatch, thickening};
+use plyflow_geometry::Vec3;
 use plyflow_sdk::abi::PF_OK;
 use plyflow_sdk::{
     Aligned, BendingBatch, Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch,
@@ -88,10 +89,10 @@ impl Element for Rf4 {
         let n = batch.lanes;
         for l in 0..n {
             let count = (batch.count[l] as usize).clamp(1, PATCH_NODES);
-            let x: [V3; PATCH_NODES] = core::array::from_fn(|i| {
+            let x: [Vec3; PATCH_NODES] = core::array::from_fn(|i| {
                 core::array::from_fn(|k| batch.position[(3 * i + k) * n + l])
             });
-            let axis: V3 = core::array::from_fn(|k| batch.axis[k * n + l]);
+            let axis: Vec3 = core::array::from_fn(|k| batch.axis[k * n + l]);
             let weights = fit(&x[..count], axis);
             batch.constants[l] = batch.area[l];
             batch.constants[n + l] = count as f64;
@@ -155,8 +156,6 @@ fn forces_with(
     PF_OK
 }
 
-type V3 = [f64; 3];
-
 /// Eigenvalues and eigenvectors (columns) of a symmetric matrix by cyclic Jacobi rotations.
 fn eigen<const N: usize>(mut a: [[f64; N]; N]) -> ([f64; N], [[f64; N]; N]) {
     let mut v: [[f64; N]; N] =
@@ -188,7 +187,7 @@ fn eigen<const N: usize>(mut a: [[f64; N]; N]) -> ([f64; N], [[f64; N]; N]) {
 }
 
 /// Normal of the undeformed plane of a patch, oriented as the module says.
-fn plane_normal(x: &[V3]) -> V3 {
+fn plane_normal(x: &[Vec3]) -> Vec3 {
     let mut covariance = [[0.0; 3]; 3];
     for p in x {
         for i in 0..3 {
@@ -199,7 +198,7 @@ fn plane_normal(x: &[V3]) -> V3 {
     }
     let (values, vectors) = eigen(covariance);
     let least = (0..3).fold(0, |m, i| if values[i] < values[m] { i } else { m });
-    let n: V3 = core::array::from_fn(|k| vectors[k][least]);
+    let n: Vec3 = core::array::from_fn(|k| vectors[k][least]);
     let sign = [n[2], n[1], n[0]]
         .into_iter()
         .find(|c| c.abs() > 1e-6)
@@ -208,10 +207,10 @@ fn plane_normal(x: &[V3]) -> V3 {
 }
 
 /// Weights `[node - 1][term]` of the nodes after the centre; the centre's are minus their sum.
-fn fit(x: &[V3], axis: V3) -> [[f64; TERMS]; PATCH_NODES - 1] {
+fn fit(x: &[Vec3], axis: Vec3) -> [[f64; TERMS]; PATCH_NODES - 1] {
     let mut weights = [[0.0; TERMS]; PATCH_NODES - 1];
     let (e1, e2, _) = material_frame(axis, plane_normal(x));
-    let along = |p: &V3, e: &V3| (0..3).map(|k| (p[k] - x[0][k]) * e[k]).sum::<f64>();
+    let along = |p: &Vec3, e: &Vec3| (0..3).map(|k| (p[k] - x[0][k]) * e[k]).sum::<f64>();
     let local: Vec<[f64; 2]> = x[1..]
         .iter()
         .map(|p| [along(p, &e1), along(p, &e2)])
@@ -476,9 +475,10 @@ fn row_sums(constants: &[f64], n: usize, power: u32, s: &View<'_>, stiffness: &m
     for l in 0..n {
         let area = constants[l];
         let count = (constants[n + l] as usize).clamp(1, PATCH_NODES);
-        let three =
-            |from: &[f64], r: usize| -> V3 { core::array::from_fn(|k| from[(3 * r + k) * n + l]) };
-        let dot = |a: V3, b: V3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let three = |from: &[f64], r: usize| -> Vec3 {
+            core::array::from_fn(|k| from[(3 * r + k) * n + l])
+        };
+        let dot = |a: Vec3, b: Vec3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let dual = [three(s.dual, 0), three(s.dual, 1)];
         let second = [three(s.second, 0), three(s.second, 1), three(s.second, 2)];
         let dual_length = dual.map(|a| dot(a, a).sqrt());

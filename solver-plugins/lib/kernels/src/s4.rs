@@ -70,6 +70,7 @@ mod rotation;
 
 use crate::quad::{self, Hourglass, MAX_LANES, Rows, material_frame};
 use crate::{WIDTH, thickening};
+use plyflow_geometry::Vec3;
 use plyflow_sdk::abi::{PF_BAD_SHAPE, PF_OK};
 use plyflow_sdk::{
     Aligned, BendingBatch, Constants, Element, ElementBatch, ElementSizes, MaterialRef,
@@ -360,10 +361,10 @@ impl Element for S4 {
             self.plane,
         );
         for l in 0..n {
-            let x: [V3; 4] = core::array::from_fn(|i| {
+            let x: [Vec3; 4] = core::array::from_fn(|i| {
                 core::array::from_fn(|k| batch.position[(3 * i + k) * n + l])
             });
-            let axis: V3 = core::array::from_fn(|k| batch.axis[k * n + l]);
+            let axis: Vec3 = core::array::from_fn(|k| batch.axis[k * n + l]);
             let constants = &mut batch.constants;
             self.plate_constants(&x, axis, constants, n, l);
             // Bound of the rotational stiffness at rest against omega^2 of the membrane.
@@ -399,20 +400,25 @@ impl Element for S4 {
     }
 }
 
-type V3 = [f64; 3];
-
 impl S4 {
     /// The rows after those of the membrane, of one lane.
-    fn plate_constants(&self, x: &[V3; 4], axis: V3, constants: &mut [f64], n: usize, l: usize) {
-        let sub = |a: V3, b: V3| -> V3 { core::array::from_fn(|k| a[k] - b[k]) };
-        let dot = |a: V3, b: V3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    fn plate_constants(
+        &self,
+        x: &[Vec3; 4],
+        axis: Vec3,
+        constants: &mut [f64],
+        n: usize,
+        l: usize,
+    ) {
+        let sub = |a: Vec3, b: Vec3| -> Vec3 { core::array::from_fn(|k| a[k] - b[k]) };
+        let dot = |a: Vec3, b: Vec3| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let (d13, d24) = (sub(x[0], x[2]), sub(x[1], x[3]));
-        let cross: V3 = core::array::from_fn(|k| {
+        let cross: Vec3 = core::array::from_fn(|k| {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             d13[i] * d24[j] - d13[j] * d24[i]
         });
         let (_, _, normal) = material_frame(axis, cross);
-        let mode: V3 = core::array::from_fn(|k| (x[0][k] - x[1][k]) + (x[2][k] - x[3][k]));
+        let mode: Vec3 = core::array::from_fn(|k| (x[0][k] - x[1][k]) + (x[2][k] - x[3][k]));
         let b = |r: usize| constants[r * n + l];
         let s11 = 2.0 * (b(0) * b(0) + b(1) * b(1));
         let s22 = 2.0 * (b(2) * b(2) + b(3) * b(3));
@@ -435,7 +441,7 @@ impl S4 {
         // element has for the differences of opposite sides.
         let effective = (k11 + k22) / (12.0 * (s11 + s22)).max(f64::MIN_POSITIVE);
         let edge = |sign: f64| {
-            let side: V3 = core::array::from_fn(|k| 0.5 * (d24[k] - sign * d13[k]));
+            let side: Vec3 = core::array::from_fn(|k| 0.5 * (d24[k] - sign * d13[k]));
             let square = dot(side, side).max(f64::MIN_POSITIVE);
             self.parameters.hourglass_shear * effective * area / (square * square)
         };

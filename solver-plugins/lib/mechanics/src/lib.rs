@@ -90,48 +90,4 @@ pub enum MechanicsError {
     },
 }
 
-/// Three-vectors as plain arrays.
-pub mod vec3 {
-    /// A point or vector.
-    pub type V = [f64; 3];
-    /// a + b.
-    #[inline(always)]
-    pub fn add(a: V, b: V) -> V {
-        [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-    }
-    /// a - b.
-    #[inline(always)]
-    pub fn sub(a: V, b: V) -> V {
-        [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-    }
-    /// s a.
-    #[inline(always)]
-    pub fn scale(a: V, s: f64) -> V {
-        [a[0] * s, a[1] * s, a[2] * s]
-    }
-    /// a . b.
-    #[inline(always)]
-    pub fn dot(a: V, b: V) -> f64 {
-        a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    }
-    /// a x b.
-    #[inline(always)]
-    pub fn cross(a: V, b: V) -> V {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    }
-    /// |a|.
-    #[inline(always)]
-    pub fn norm(a: V) -> f64 {
-        dot(a, a).sqrt()
-    }
-    /// a / |a|; zero stays zero.
-    #[inline(always)]
-    pub fn unit(a: V) -> V {
-        let n = norm(a);
-        if n > 0.0 { scale(a, 1.0 / n) } else { a }
-    }
-}
+pub use plyflow_geometry::vec3;

@@ -2,7 +2,7 @@
 //! offset.
 
 use crate::closest::Surface;
-use crate::vector::Vec3;
+use plyflow_geometry::vec3::Vec3;
 
 /// Distance of a node from the tool.
 #[derive(Debug, Clone, Copy, PartialEq)]

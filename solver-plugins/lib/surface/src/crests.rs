@@ -1,10 +1,11 @@
 //! How sharply a tool itself is crested.
 
-use crate::closest::{Surface, closest_on_triangle};
+use crate::closest::Surface;
 use crate::curvature::{Curvature, curvatures};
 use crate::topology::Topology;
-use crate::vector::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::closest_on_triangle;
+use plyflow_geometry::vec3::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 use std::collections::BTreeMap;
 
 /// Facets of parametric tools have no longer sides (m): what is known at their corners goes for all of them.

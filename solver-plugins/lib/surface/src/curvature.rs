@@ -2,9 +2,9 @@
 //! beside the quadric (`docs/decisions/0021`).
 
 use crate::topology::Topology;
-use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use nalgebra::{SMatrix, SVector};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 
 /// Curvature of a surface at a node. Signs: positive where the surface bends towards its normal (a valley

@@ -1,7 +1,7 @@
 //! What of a ply is a result: a net that does not reach everywhere leaves cells that only hang on.
 
 use crate::Topology;
-use crate::vector::Vec3;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::{BodyInfo, Host, Input, Log, StepError};
 
 /// Field of cells: 1 where a net reaches all of the cell. Runs without it are formed everywhere.

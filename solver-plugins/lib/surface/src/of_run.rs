@@ -1,6 +1,7 @@
 //! Surfaces of the bodies of a run.
 
-use crate::{QuadLocator, Surface, triangles};
+use crate::{Surface, triangles};
+use plyflow_geometry::QuadLocator;
 use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_model::outline::{Point, Region};
 use plyflow_sdk::{Host, Input, Meshes, StepError};

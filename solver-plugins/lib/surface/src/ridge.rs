@@ -2,10 +2,10 @@
 
 use crate::curvature::Curvature;
 use crate::topology::Topology;
-use crate::vector::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 use petgraph::algo::astar;
 use petgraph::graphmap::UnGraphMap;
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 
 /// The crest line of a region.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Where vertical planes and curtains cut a triangulated surface.
 
-use crate::vector::{Vec3, add, distance, scale, sub};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, add, distance, scale, sub};
 use std::collections::BTreeMap;
 
 /// Ends of lines that lie within this of each other (m) are one place.
@@ -291,11 +291,11 @@ mod tests {
         assert_eq!(lines.len(), 2);
         assert!((line_length(&lines[0]) - 3.0).abs() < 1e-12);
         assert!((line_length(&lines[1]) - 0.5).abs() < 1e-12);
-        assert!(crate::vector::distance(lines[0][0], [0.0, 0.2, 0.0]) < 1e-12);
+        assert!(plyflow_geometry::vec3::distance(lines[0][0], [0.0, 0.2, 0.0]) < 1e-12);
         // Through nodes, backwards, and cut short.
         let lines = plane_section(&points, &triangles, [5.0, -1.0], [-1.0, -1.0]);
         assert_eq!(lines.len(), 2);
-        assert!(crate::vector::distance(lines[0][0], [2.0, -1.0, 1.0]) < 1e-12);
+        assert!(plyflow_geometry::vec3::distance(lines[0][0], [2.0, -1.0, 1.0]) < 1e-12);
         assert!(plane_section(&points, &triangles, [9.0, 0.0], [10.0, 0.0]).is_empty());
     }
 
@@ -372,7 +372,7 @@ mod tests {
         for p in &lines[0] {
             let a = 0.3 + p.station / 0.05;
             let at = wound(&[0.01 + 0.05 * a.cos(), 0.02 + 0.05 * a.sin(), 0.0]);
-            let off = crate::vector::distance(p.place, at);
+            let off = plyflow_geometry::vec3::distance(p.place, at);
             assert!(off < 1e-5, "{off} m at {}", p.station);
         }
     }

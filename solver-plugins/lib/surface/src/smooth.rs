@@ -1,8 +1,9 @@
 //! A meshed sheet as a smooth surface through its nodes, and how far nodes stand off it so that elements are as long as the material.
 
-use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
-use crate::{Location, Topology};
+use crate::Topology;
 use nalgebra::DMatrix;
+use plyflow_geometry::Location;
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 
 /// A meshed sheet as a smooth surface through its nodes.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! Who touches whom in a mesh of triangles or quads, and sums over its cells.
 
-use crate::vector::{Vec3, cross, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, cross, norm, scale, sub};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -270,14 +270,17 @@ impl Topology {
                 let p = points[cell[i] as usize];
                 let u = sub(points[cell[(i + 1) % k] as usize], p);
                 let v = sub(points[cell[(i + k - 1) % k] as usize], p);
-                let weight = crate::vector::dot(u, u) * crate::vector::dot(v, v);
+                let weight = plyflow_geometry::vec3::dot(u, u) * plyflow_geometry::vec3::dot(v, v);
                 if weight > 0.0 {
                     let n = &mut normals[cell[i] as usize];
-                    *n = crate::vector::add(*n, scale(cross(u, v), 1.0 / weight));
+                    *n = plyflow_geometry::vec3::add(*n, scale(cross(u, v), 1.0 / weight));
                 }
             }
         }
-        normals.into_iter().map(crate::vector::unit).collect()
+        normals
+            .into_iter()
+            .map(plyflow_geometry::vec3::unit)
+            .collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! What pulls across a line of a sheet.
 
-use crate::vector::{Vec3, sub};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, sub};
 
 /// First Piola-Kirchhoff traction (N/m of undeformed length) across a line with the normal `normal` of the flat ply, in a cell
 /// whose corners were at `then` and are at `now` (m), with resultants `s` (S11, S22, S12, N/m) in axes of which the first

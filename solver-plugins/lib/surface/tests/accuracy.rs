@@ -6,7 +6,7 @@
 
 mod common;
 
-use plyflow_surface::vector::{Vec3, add, cross, norm, scale, sub, unit};
+use plyflow_geometry::vec3::{Vec3, add, cross, norm, scale, sub, unit};
 use plyflow_surface::{Surface, Topology, curvatures, triangles};
 use std::f64::consts::PI;
 

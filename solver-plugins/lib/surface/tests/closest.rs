@@ -2,14 +2,13 @@
 
 mod common;
 
-use plyflow_surface::vector::{Vec3, distance, norm, scale};
-use plyflow_surface::{
-    Feature, QuadLocator, Surface, Topology, TriangleTree, nodal_distances, triangles,
-};
+use plyflow_geometry::vec3::{Vec3, distance, norm, scale};
+use plyflow_geometry::{Feature, QuadLocator, TriangleTree};
+use plyflow_surface::{Surface, Topology, nodal_distances, triangles};
 
 fn brute_force(points: &[Vec3], tris: &[[u32; 3]], p: Vec3) -> f64 {
     // Projected gradient over barycentric coordinates is slow; sample the sides finely and the plane exactly.
-    use plyflow_surface::vector::{add, cross, dot, sub, unit};
+    use plyflow_geometry::vec3::{add, cross, dot, sub, unit};
     tris.iter()
         .map(|t| {
             let [a, b, c] = t.map(|i| points[i as usize]);

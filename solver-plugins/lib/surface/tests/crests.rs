@@ -1,6 +1,6 @@
 //! Crests of tools with few large facets, as files have them.
 
-use plyflow_surface::vector::{Vec3, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 use plyflow_surface::{Crests, Surface, tool_crests};
 
 /// Radius of the fillets (m), facets of each, half the width of the top, half the length.

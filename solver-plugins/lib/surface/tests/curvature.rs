@@ -2,7 +2,7 @@
 
 mod common;
 
-use plyflow_surface::vector::{Vec3, cross, distance, dot, norm, sub};
+use plyflow_geometry::vec3::{Vec3, cross, distance, dot, norm, sub};
 use plyflow_surface::{Curvature, Topology, curvatures, ridge_line};
 use std::f64::consts::PI;
 

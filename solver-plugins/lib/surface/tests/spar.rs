@@ -1,7 +1,7 @@
 //! Distances on the tool of the joggle spar: fillets, ramps, thin facets.
 
+use plyflow_geometry::vec3::{add, cross, norm, scale, sub, unit};
 use plyflow_model::scene::Tool;
-use plyflow_surface::vector::{add, cross, norm, scale, sub, unit};
 use plyflow_surface::{Surface, nodal_distances, tool_crests};
 
 fn spar() -> plyflow_tooling::ToolMesh {

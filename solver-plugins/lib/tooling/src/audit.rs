@@ -2,7 +2,7 @@
 
 use crate::mesh::ToolMesh;
 use crate::tree::{ClosestPoint, SurfaceTree};
-use crate::vector::{V3, add, dot, norm, scale, sub, unit};
+use plyflow_geometry::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 
 /// Largest difference of a tool's distance field from the distance to its triangles, and where it is.
@@ -29,7 +29,7 @@ impl FieldError {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
     /// m.
-    pub at: V3,
+    pub at: Vec3,
     /// Distance to the closest point of the triangles (m), positive outside.
     pub distance: f64,
 }
@@ -37,8 +37,8 @@ pub(crate) struct Place {
 /// A piece of a facet (three corners), or of an edge (the third is the second), with the direction out of it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece {
-    corners: [V3; 3],
-    out: V3,
+    corners: [Vec3; 3],
+    out: Vec3,
     body: u32,
 }
 
@@ -53,7 +53,7 @@ impl Piece {
     }
 
     /// Where it is looked at: of an edge there is no area to have a centre.
-    fn middle(&self) -> V3 {
+    fn middle(&self) -> Vec3 {
         let [a, b, c] = self.corners;
         if b == c {
             scale(add(a, b), 0.5)
@@ -63,13 +63,13 @@ impl Piece {
     }
 
     /// Of a piece of a facet its middle and the direction out of it.
-    pub fn face(&self) -> Option<(V3, V3)> {
+    pub fn face(&self) -> Option<(Vec3, Vec3)> {
         let [_, b, c] = self.corners;
         (b != c).then(|| (self.middle(), self.out))
     }
 
     /// Its middle, and what lies `offset` (m) out of it.
-    pub fn middles(&self, offset: f64) -> [V3; 2] {
+    pub fn middles(&self, offset: f64) -> [Vec3; 2] {
         [self.middle(), add(self.middle(), scale(self.out, offset))]
     }
 
@@ -77,7 +77,7 @@ impl Piece {
     pub fn parts(&self, spacing: f64, visit: &mut impl FnMut(Piece)) {
         let [a, b, c] = self.corners;
         let sides = [[a, b, c], [b, c, a], [c, a, b]];
-        let length = |s: &[V3; 3]| norm(sub(s[1], s[0]));
+        let length = |s: &[Vec3; 3]| norm(sub(s[1], s[0]));
         let longest =
             sides[1..].iter().fold(
                 sides[0],
@@ -137,17 +137,17 @@ impl Survey {
 
     /// Distance to the closest point of the triangles (m): of bodies that stand on or in each other the least of their own distances is that
     /// of what they are together, outside of it and in sign.
-    pub fn distance(&self, at: V3) -> f64 {
+    pub fn distance(&self, at: Vec3) -> f64 {
         let distances = self.trees.iter().map(|t| t.closest(at).signed_distance);
         distances.fold(f64::INFINITY, f64::min)
     }
 
     /// The closest point of the body that a piece is of, and the direction out of the facet there. `hints`: one for each body, where the last
     /// search ended; pieces come neighbour after neighbour.
-    pub fn nearest_of(&self, at: V3, piece: &Piece, hints: &mut [usize]) -> (ClosestPoint, V3) {
+    pub fn nearest_of(&self, at: Vec3, piece: &Piece, hints: &mut [usize]) -> (ClosestPoint, Vec3) {
         let body = piece.body as usize;
-        let (found, place) = self.trees[body].closest_from(at, hints[body]);
-        hints[body] = place;
+        let found = self.trees[body].closest_from(at, hints[body]);
+        hints[body] = found.triangle as usize;
         let normal = self.shells[body].area_normal(found.triangle as usize);
         (found, unit(normal))
     }
@@ -213,8 +213,8 @@ impl Survey {
     pub fn error(
         &self,
         [spacing, offset]: [f64; 2],
-        field: impl Fn(V3) -> f64 + Sync,
-        counts: impl Fn(V3) -> bool + Sync,
+        field: impl Fn(Vec3) -> f64 + Sync,
+        counts: impl Fn(Vec3) -> bool + Sync,
     ) -> FieldError {
         let of = |piece: &Piece| {
             let mut worst = FieldError::default();

@@ -2,7 +2,7 @@
 //!
 //! All of it takes n log n at most, whichever way the facets lie.
 
-use crate::vector::{V3, cross, norm, sub};
+use plyflow_geometry::vec3::{Vec3, cross, norm, sub};
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 use std::cmp::Ordering;
@@ -15,7 +15,7 @@ pub const WELD: f64 = 1e-6;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surface {
     /// Positions, in the order in which the file names them first.
-    pub points: Vec<V3>,
+    pub points: Vec<Vec3>,
     /// Indices into `points`.
     pub triangles: Vec<[u32; 3]>,
     /// For each triangle the facet of the file of which it is, or is a part.
@@ -26,7 +26,7 @@ pub struct Surface {
 /// that are there already, wound alike. Facets that are no higher than that though they have three corners (programs write them where the one side of
 /// a seam has a point that the other has not) take the point on their longest side into the facet beyond it: nothing moves by more than that
 /// part of the diagonal, and what they joined stays joined. At seams where such facets are missing, points on the free edge of a facet part it too.
-pub fn join(corners: &[[V3; 3]]) -> Surface {
+pub fn join(corners: &[[Vec3; 3]]) -> Surface {
     let (points, of_corner, near) = weld(corners.as_flattened());
     let mut surface = Surface {
         points,
@@ -57,7 +57,7 @@ pub fn join(corners: &[[V3; 3]]) -> Surface {
 }
 
 /// The places of corners, those within reach of an earlier one left out; the place that each corner takes; and the reach.
-fn weld(corners: &[V3]) -> (Vec<V3>, Vec<u32>, f64) {
+fn weld(corners: &[Vec3]) -> (Vec<Vec3>, Vec<u32>, f64) {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for p in corners {
         for d in 0..3 {
@@ -76,7 +76,7 @@ fn weld(corners: &[V3]) -> (Vec<V3>, Vec<u32>, f64) {
     let of = |v: f64, d: usize| ((v - low[d]) / width).floor() as i32;
     let mut boxes: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
     let mut equal: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut points: Vec<V3> = Vec::new();
+    let mut points: Vec<Vec3> = Vec::new();
     let places = corners.iter().map(|p| {
         // Adding zero turns -0 into 0.
         let p = p.map(|c| c + 0.0);
@@ -138,7 +138,7 @@ fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
 }
 
 impl Surface {
-    fn corners(&self, [a, b, c]: [u32; 3]) -> [V3; 3] {
+    fn corners(&self, [a, b, c]: [u32; 3]) -> [Vec3; 3] {
         [a, b, c].map(|p| self.points[p as usize])
     }
 
@@ -318,7 +318,7 @@ mod tests {
     use crate::mesh::ToolMesh;
 
     /// A box whose faces are cut into squares of two facets.
-    fn cut_box(size: V3, cuts: [usize; 3], turn: usize) -> Vec<[V3; 3]> {
+    fn cut_box(size: Vec3, cuts: [usize; 3], turn: usize) -> Vec<[Vec3; 3]> {
         let mut facets = Vec::new();
         for axis in 0..3 {
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -372,9 +372,9 @@ mod tests {
         for facet in 0..cube.len() {
             for shift in [0.0, 1e-7, -1e-7] {
                 let [a, b, c] = cube[facet];
-                let mut middle: V3 = [0, 1, 2].map(|d| 0.5 * (a[d] + b[d]));
+                let mut middle: Vec3 = [0, 1, 2].map(|d| 0.5 * (a[d] + b[d]));
                 middle.iter_mut().for_each(|m| *m += shift);
-                let third: V3 = [0, 1, 2].map(|d| a[d] + (b[d] - a[d]) / 3.0);
+                let third: Vec3 = [0, 1, 2].map(|d| a[d] + (b[d] - a[d]) / 3.0);
                 let mut facets = cube.clone();
                 facets.remove(facet);
                 facets.extend([[a, middle, c], [middle, b, c]]);
@@ -412,7 +412,7 @@ mod tests {
     fn a_heap_of_equal_points_is_one_point() {
         // As many as would take a day if each were compared with each.
         let dust = |k: usize| [1e-9 * (k % 977) as f64, 1e-9 * (k % 331) as f64, 0.0];
-        let mut facets: Vec<[V3; 3]> = (0..300_000)
+        let mut facets: Vec<[Vec3; 3]> = (0..300_000)
             .map(|k| [dust(k), dust(3 * k), dust(7 * k)])
             .collect();
         facets.push([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);

@@ -4,8 +4,8 @@ use crate::audit::{FieldError, Piece, Survey};
 use crate::mesh::ToolMesh;
 use crate::sdf::SignedDistanceGrid;
 use crate::tree::SurfaceTree;
-use crate::vector::{V3, dot, norm, scale, sub};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, dot, norm, scale, sub};
 use plyflow_model::material::MaterialEntry;
 use plyflow_model::scene::{Process, Scene, Sheet, SheetKind, Tool};
 
@@ -140,12 +140,12 @@ fn reach(spacing: f64, stack: f64) -> f64 {
 
 /// Whether a sheet can touch a place of the tool: between diaphragms all of it; of a punch, which ends where it is described, what has gone
 /// through the blank.
-fn touched(scene: &Scene, mesh: &ToolMesh) -> impl Fn(V3) -> bool + Sync + use<> {
+fn touched(scene: &Scene, mesh: &ToolMesh) -> impl Fn(Vec3) -> bool + Sync + use<> {
     let from = match &scene.process {
         Process::DoubleDiaphragm(_) => f64::NEG_INFINITY,
         Process::Press(press) => mesh.bounds()[1][2] - press.stroke.si() - stack(scene),
     };
-    move |p: V3| p[2] >= from
+    move |p: Vec3| p[2] >= from
 }
 
 /// Length as text in mm, to three figures.
@@ -161,7 +161,7 @@ fn mm(metres: f64) -> String {
     format!("{text} mm")
 }
 
-fn place(at: V3) -> String {
+fn place(at: Vec3) -> String {
     let [x, y, z] = at.map(|c| 1e3 * c);
     format!("({x:.1}, {y:.1}, {z:.1}) mm")
 }
@@ -212,7 +212,7 @@ fn off(spacing: f64, error: FieldError, ply: f64, would_do: Option<(f64, usize)>
     )
 }
 
-fn size(mesh: &ToolMesh) -> V3 {
+fn size(mesh: &ToolMesh) -> Vec3 {
     let [low, high] = mesh.bounds();
     sub(high, low)
 }
@@ -303,7 +303,7 @@ fn check_frame(scene: &Scene, mesh: &ToolMesh, frame: [f64; 2]) -> Result<(), St
 struct Body<'a> {
     shell: &'a ToolMesh,
     tree: SurfaceTree,
-    bounds: [V3; 2],
+    bounds: [Vec3; 2],
 }
 
 impl<'a> Body<'a> {
@@ -322,7 +322,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    fn corners(&self) -> impl Iterator<Item = V3> {
+    fn corners(&self) -> impl Iterator<Item = Vec3> {
         let points = self.shell.triangles.iter().flatten();
         points.map(|p| self.shell.points[*p as usize])
     }
@@ -350,7 +350,7 @@ impl<'a> Body<'a> {
 
     /// Whether a corner, or a place of the surface of those that are `spacing` (m) apart, lies on or in another body.
     fn reaches(&self, other: &Self, spacing: f64) -> bool {
-        let near = |p: V3| other.tree.closest(p).signed_distance <= FOOT;
+        let near = |p: Vec3| other.tree.closest(p).signed_distance <= FOOT;
         let mut found = self.corners().any(near);
         for facet in 0..self.shell.triangles.len() {
             if found {
@@ -431,9 +431,9 @@ impl Survey {
         &self,
         spacing: f64,
         least: f64,
-        counts: impl Fn(V3) -> bool,
-    ) -> Option<(f64, V3)> {
-        let mut worst = None::<(f64, V3)>;
+        counts: impl Fn(Vec3) -> bool,
+    ) -> Option<(f64, Vec3)> {
+        let mut worst = None::<(f64, Vec3)>;
         let mut hints = vec![0; self.trees().len()];
         for piece in self.pieces() {
             piece.parts(spacing, &mut |part| {

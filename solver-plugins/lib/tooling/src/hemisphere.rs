@@ -4,7 +4,7 @@ use crate::CHORD_TOLERANCE;
 use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
-use crate::vector::{V3, scale, slerp};
+use plyflow_geometry::vec3::{Vec3, scale, slerp};
 use std::f64::consts::FRAC_PI_2;
 
 /// Four octants, each divided evenly; the bottom is the same net pressed flat.
@@ -64,7 +64,7 @@ fn divided(radius: f64, n: usize) -> ToolMesh {
 }
 
 /// Points of the rings 0..=n, each ring once around.
-fn rings(mesh: &mut ToolMesh, n: usize, at: impl Fn(usize, usize, usize) -> V3) -> Vec<Vec<u32>> {
+fn rings(mesh: &mut ToolMesh, n: usize, at: impl Fn(usize, usize, usize) -> Vec3) -> Vec<Vec<u32>> {
     (0..=n)
         .map(|i| {
             if i == 0 {
@@ -103,8 +103,8 @@ fn strips(mesh: &mut ToolMesh, rings: &[Vec<u32>], flip: bool) {
 }
 
 /// The quarter's two horizontal directions.
-fn axes(quarter: usize) -> [V3; 2] {
-    const AXES: [V3; 4] = [
+fn axes(quarter: usize) -> [Vec3; 2] {
+    const AXES: [Vec3; 4] = [
         [1.0, 0.0, 0.0],
         [0.0, 1.0, 0.0],
         [-1.0, 0.0, 0.0],

@@ -22,7 +22,6 @@ mod stl;
 mod sweep;
 mod tetrahedron;
 mod tree;
-mod vector;
 
 pub use audit::FieldError;
 pub use error::ToolError;

@@ -1,6 +1,6 @@
 //! A triangulated surface and what can be said about it.
 
-use crate::vector::{V3, add, cross, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// The surface of a rigid tool. Facets are counter-clockwise seen from outside, so that normals point away
 /// from the tool's body, towards the sheets.
@@ -28,13 +28,13 @@ pub(crate) struct Adjacency {
 impl ToolMesh {
     /// Corners of one facet.
     #[inline]
-    pub fn corners(&self, triangle: usize) -> [V3; 3] {
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|p| self.points[p as usize])
     }
 
     /// Twice the facet's area times its unit normal.
     #[inline]
-    pub(crate) fn area_normal(&self, triangle: usize) -> V3 {
+    pub(crate) fn area_normal(&self, triangle: usize) -> Vec3 {
         let [a, b, c] = self.corners(triangle);
         cross(sub(b, a), sub(c, a))
     }
@@ -54,7 +54,7 @@ impl ToolMesh {
     }
 
     /// Lowest and highest coordinates. Both zero for an empty mesh.
-    pub fn bounds(&self) -> [V3; 2] {
+    pub fn bounds(&self) -> [Vec3; 2] {
         let Some(&first) = self.points.first() else {
             return [[0.0; 3]; 2];
         };
@@ -160,7 +160,7 @@ impl ToolMesh {
     }
 
     /// Adds a point and returns its index.
-    pub(crate) fn push(&mut self, p: V3) -> u32 {
+    pub(crate) fn push(&mut self, p: Vec3) -> u32 {
         self.points.push(p);
         (self.points.len() - 1) as u32
     }

@@ -8,8 +8,8 @@
 use crate::audit::{FieldError, Survey};
 use crate::mesh::ToolMesh;
 use crate::tree::SurfaceTree;
-use crate::vector::V3;
 use finer::{Finer, Wanted};
+use plyflow_geometry::vec3::Vec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -27,15 +27,15 @@ pub struct SignedDistanceGrid {
     spacing: f64,
     reach: f64,
     /// Position of node (0, 0, 0).
-    origin: V3,
+    origin: Vec3,
     /// Nodes along x, y, z.
     nodes: [usize; 3],
     /// Box in which queries are interpolated.
-    box_low: V3,
-    box_high: V3,
+    box_low: Vec3,
+    box_high: Vec3,
     /// Box of the tool.
-    tool_low: V3,
-    tool_high: V3,
+    tool_low: Vec3,
+    tool_high: Vec3,
     /// B-spline coefficients (m), z fastest.
     coefficients: Vec<f32>,
     /// How much less than the distance a value may be at most (m).
@@ -193,7 +193,7 @@ impl SignedDistanceGrid {
     }
 
     /// Lowest and highest coordinates of the tool (m).
-    pub fn tool_bounds(&self) -> [V3; 2] {
+    pub fn tool_bounds(&self) -> [Vec3; 2] {
         [self.tool_low, self.tool_high]
     }
 
@@ -276,7 +276,7 @@ impl SignedDistanceGrid {
 
     /// Cell that holds the point and the place in it, 0..1 along each axis.
     #[inline]
-    fn cell(&self, p: V3) -> Option<([usize; 3], [f32; 3])> {
+    fn cell(&self, p: Vec3) -> Option<([usize; 3], [f32; 3])> {
         let inverse = 1.0 / self.spacing;
         let mut cell = [0; 3];
         let mut part = [0.0; 3];
@@ -293,7 +293,7 @@ impl SignedDistanceGrid {
     }
 
     #[inline]
-    fn interpolate(&self, cell: [usize; 3], part: [f32; 3]) -> (f64, V3) {
+    fn interpolate(&self, cell: [usize; 3], part: [f32; 3]) -> (f64, Vec3) {
         let stride = [self.nodes[1] * self.nodes[2], self.nodes[2]];
         let base = (cell[0] - 1) * stride[0] + (cell[1] - 1) * stride[1] + cell[2] - 1;
         let mut found = evaluate(&self.coefficients, base, stride, part, 1.0 / self.spacing);
@@ -309,8 +309,8 @@ impl SignedDistanceGrid {
         (b[0] * self.blocks[1] + b[1]) * self.blocks[2] + b[2]
     }
 
-    fn distance_to_box(&self, p: V3) -> (f64, V3) {
-        let away: V3 = std::array::from_fn(|k| {
+    fn distance_to_box(&self, p: Vec3) -> (f64, Vec3) {
+        let away: Vec3 = std::array::from_fn(|k| {
             if p[k] < self.tool_low[k] {
                 p[k] - self.tool_low[k]
             } else if p[k] > self.tool_high[k] {
@@ -319,7 +319,7 @@ impl SignedDistanceGrid {
                 0.0
             }
         });
-        let d = crate::vector::norm(away);
+        let d = plyflow_geometry::vec3::norm(away);
         (
             (d - self.nearer).max(0.0),
             if d > 0.0 {
@@ -352,7 +352,7 @@ fn evaluate(
     stride: [usize; 2],
     part: [f32; 3],
     inverse: f64,
-) -> (f64, V3) {
+) -> (f64, Vec3) {
     let [wx, wy, wz] = part.map(weights);
     let [dx, dy, dz] = part.map(slopes);
     // Sums over x and y of rows along z: value, slope along x, slope along y.
@@ -413,7 +413,7 @@ fn slopes(t: f32) -> [f32; 4] {
 }
 
 /// Exact distances at all nodes, z fastest.
-fn sample(tree: &SurfaceTree, origin: V3, spacing: f64, nodes: [usize; 3]) -> Vec<f32> {
+fn sample(tree: &SurfaceTree, origin: Vec3, spacing: f64, nodes: [usize; 3]) -> Vec<f32> {
     let mut samples = vec![0f32; nodes.iter().product()];
     samples
         .par_chunks_mut(nodes[1] * nodes[2])
@@ -428,8 +428,8 @@ fn sample(tree: &SurfaceTree, origin: V3, spacing: f64, nodes: [usize; 3]) -> Ve
                     // Up and down by turns, so that the next node is a neighbour.
                     let k = if j % 2 == 0 { l } else { nodes[2] - 1 - l };
                     let p = [x, y, origin[2] + k as f64 * spacing];
-                    let (closest, place) = tree.closest_from(p, hint);
-                    hint = place;
+                    let closest = tree.closest_from(p, hint);
+                    hint = closest.triangle as usize;
                     slab[j * nodes[2] + k] = closest.signed_distance as f32;
                 }
             }

@@ -3,9 +3,9 @@
 use crate::error::ToolError;
 use crate::facets;
 use crate::mesh::{Adjacency, ToolMesh};
-use crate::vector::{V3, dot, sub};
 use plyflow_files::open::{self, MOST_DATA};
 use plyflow_files::stl::{self, Facets};
+use plyflow_geometry::vec3::{Vec3, dot, sub};
 use std::path::Path;
 
 /// How far above its lowest point, over its height, a tool may be open.
@@ -13,7 +13,7 @@ const FOOT: f64 = 1e-3;
 
 /// Reads a file ([`plyflow_files::stl`]), joins its facets ([`facets::join`]) and checks that they are a surface with a consistent
 /// outside, open at its foot at most.
-pub(crate) fn read(path: &Path, unit: f64, translate: V3) -> Result<ToolMesh, ToolError> {
+pub(crate) fn read(path: &Path, unit: f64, translate: Vec3) -> Result<ToolMesh, ToolError> {
     let surface_error = |problem: String, remedy: &str| ToolError::Surface {
         path: path.to_owned(),
         problem,
@@ -76,13 +76,13 @@ struct Checked<'a> {
     facet: &'a [u32],
     read: &'a Facets,
     unit: f64,
-    translate: V3,
+    translate: Vec3,
 }
 
 impl Checked<'_> {
     /// A point in the file's units.
-    fn point(&self, p: V3) -> String {
-        let q: V3 = std::array::from_fn(|k| (p[k] - self.translate[k]) / self.unit);
+    fn point(&self, p: Vec3) -> String {
+        let q: Vec3 = std::array::from_fn(|k| (p[k] - self.translate[k]) / self.unit);
         format!("({:.4}, {:.4}, {:.4})", q[0], q[1], q[2])
     }
 
@@ -192,7 +192,7 @@ mod tests {
     use crate::hemisphere::hemisphere;
     use std::io::Write;
 
-    fn facets(mesh: &ToolMesh) -> Vec<[V3; 3]> {
+    fn facets(mesh: &ToolMesh) -> Vec<[Vec3; 3]> {
         let all = 0..mesh.triangles.len();
         all.map(|t| mesh.corners(t).map(|p| p.map(|c| 1e3 * c)))
             .collect()

@@ -3,8 +3,8 @@
 
 use crate::mesh::ToolMesh;
 use crate::ramp::Ramp;
-use crate::vector::V3;
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::Vec3;
 use std::f64::consts::FRAC_PI_2;
 
 /// The shape. Theoretical corners are where the top plane meets the planes of the walls.
@@ -105,7 +105,7 @@ impl Sweep {
 
     /// Moves a point of the undeformed shape. The walls and fillets step sideways as they are; the top
     /// stretches between them, from its middle third on.
-    pub fn deform(&self, p: V3) -> V3 {
+    pub fn deform(&self, p: Vec3) -> Vec3 {
         let [x, y, z] = p;
         let side = usize::from(y > 0.0);
         let reach = self.half_width - self.corner.max(self.setback());
@@ -132,7 +132,7 @@ impl Sweep {
     }
 
     /// The deformed point at an offset and height of the profile, over a point of the top's outline.
-    pub fn surface(&self, base: [f64; 2], normal: [f64; 2], profile: (f64, f64)) -> V3 {
+    pub fn surface(&self, base: [f64; 2], normal: [f64; 2], profile: (f64, f64)) -> Vec3 {
         let (d, z) = profile;
         self.deform([base[0] + d * normal[0], base[1] + d * normal[1], z])
     }

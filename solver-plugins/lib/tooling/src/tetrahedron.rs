@@ -4,8 +4,8 @@ use crate::CHORD_TOLERANCE;
 use crate::error::{ToolError, mm};
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
-use crate::vector::{V3, add, cross, dot, norm, scale, slerp, sub, unit};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, slerp, sub, unit};
 use plyflow_model::scene::TetrahedronTool;
 use std::f64::consts::FRAC_PI_6;
 
@@ -56,12 +56,12 @@ pub(crate) fn tetrahedron(t: &TetrahedronTool) -> Result<ToolMesh, ToolError> {
 /// The sphere that rounds the top rolls down the edges.
 struct Shape {
     /// Its centre at the top.
-    centre: V3,
+    centre: Vec3,
     radius: f64,
     /// Along the edges downwards; counter-clockwise seen from above.
-    edges: [V3; 3],
+    edges: [Vec3; 3],
     /// Outward normal of the face between edges i and i + 1.
-    normals: [V3; 3],
+    normals: [Vec3; 3],
 }
 
 impl Shape {
@@ -83,7 +83,7 @@ impl Shape {
     }
 
     /// Directions from the sphere's centre to its part of the surface over edge i: from face i - 1 to face i.
-    fn arc(&self, i: usize, w: f64) -> V3 {
+    fn arc(&self, i: usize, w: f64) -> Vec3 {
         slerp(self.normals[(i + 2) % 3], self.normals[i], w)
     }
 
@@ -237,7 +237,7 @@ mod tests {
             // Distance from the cone of edges that the sphere's centre moves in.
             let q = sub(*p, shape.centre);
             let faces = shape.normals.map(|n| dot(n, q));
-            let along = |e: V3| dot(e, q).max(0.0);
+            let along = |e: Vec3| dot(e, q).max(0.0);
             let edges = shape.edges.map(|e| norm(sub(q, scale(e, along(e)))));
             let nearest = faces.into_iter().fold(f64::NEG_INFINITY, f64::max);
             let on_face = (nearest - shape.radius).abs() < 1e-12;

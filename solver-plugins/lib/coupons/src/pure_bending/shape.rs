@@ -1,9 +1,9 @@
 //! The folded strip.
 
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::model::Drive;
-use plyflow_mechanics::vec3::V;
 
 /// Geometry of the folded strip.
 #[derive(Debug, Clone, Copy)]

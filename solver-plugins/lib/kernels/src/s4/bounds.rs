@@ -10,31 +10,13 @@
 //! strain's derivative by a rotation is never longer than that by its director.
 
 use super::forces::View;
-use super::{S4, V3, row};
+use super::{S4, row};
 use nalgebra::{Matrix3, Vector3};
+use plyflow_geometry::vec3::{Vec3, cross, dot, mix, norm};
 
 /// Largest eigenvalue of the symmetric [[a, c], [c, b]].
 pub(super) fn largest(a: f64, b: f64, c: f64) -> f64 {
     0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt()
-}
-
-fn dot(a: V3, b: V3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: V3, b: V3) -> V3 {
-    core::array::from_fn(|k| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        a[i] * b[j] - a[j] * b[i]
-    })
-}
-
-fn norm(a: V3) -> f64 {
-    dot(a, a).sqrt()
-}
-
-fn mix(p: f64, a: V3, q: f64, b: V3) -> V3 {
-    core::array::from_fn(|k| p * a[k] + q * b[k])
 }
 
 /// What each kind of strain stores over displacements in the plane, across it, and rotations: roots of
@@ -133,8 +115,8 @@ impl Lane {
     /// with the tangents `bending` and `twist`, the directors' hourglass mode. `c`: C11, C22.
     fn rotational(
         &self,
-        along: [V3; 2],
-        across: [V3; 2],
+        along: [Vec3; 2],
+        across: [Vec3; 2],
         bending: f64,
         twist: f64,
         c: [f64; 2],
@@ -155,7 +137,7 @@ impl Lane {
             (h11 + h12).max(2.0 * self.edge[0]),
             (h22 + h12).max(2.0 * self.edge[1]),
         );
-        let longest = |t: [V3; 2]| dot(t[0], t[0]).max(dot(t[1], t[1]));
+        let longest = |t: [Vec3; 2]| dot(t[0], t[0]).max(dot(t[1], t[1]));
         let mut lean = 0.0f64;
         for a in along {
             for o in across {
@@ -178,7 +160,7 @@ impl Lane {
 }
 
 /// Bound of the rotational stiffness (N m) at rest of lane l with reference nodes x.
-pub(super) fn at_rest(s4: &S4, constants: &[f64], n: usize, l: usize, x: &[V3; 4]) -> f64 {
+pub(super) fn at_rest(s4: &S4, constants: &[f64], n: usize, l: usize, x: &[Vec3; 4]) -> f64 {
     let lane = Lane::new(constants, n, l);
     let along = [mix(1.0, x[1], -1.0, x[0]), mix(1.0, x[2], -1.0, x[3])];
     let across = [mix(1.0, x[3], -1.0, x[0]), mix(1.0, x[2], -1.0, x[1])];
@@ -268,7 +250,7 @@ struct Mode {
     /// c^2.
     length: f64,
     /// k0 (1/m).
-    curvature: V3,
+    curvature: Vec3,
     /// Size of `M k0` (N).
     work: f64,
 }
@@ -284,12 +266,12 @@ impl Mode {
 
 /// What the bound needs of the state of one lane.
 struct State {
-    x: [V3; 4],
-    d: [V3; 4],
-    g: [V3; 2],
-    slope: [V3; 2],
+    x: [Vec3; 4],
+    d: [Vec3; 4],
+    g: [Vec3; 2],
+    slope: [Vec3; 2],
     /// Sides 1-2, 4-3, 1-4, 2-3.
-    side: [V3; 4],
+    side: [Vec3; 4],
     metric: [f64; 3],
     stress: [f64; 3],
     moments: [f64; 3],
@@ -301,8 +283,9 @@ struct State {
 
 impl State {
     fn new(s4: &S4, position: &[f64], directors: &[f64], n: usize, l: usize, s: &View<'_>) -> Self {
-        let at = |from: &[f64], r: usize| -> V3 { core::array::from_fn(|k| from[(r + k) * n + l]) };
-        let x: [V3; 4] = core::array::from_fn(|i| at(position, 3 * i));
+        let at =
+            |from: &[f64], r: usize| -> Vec3 { core::array::from_fn(|k| from[(r + k) * n + l]) };
+        let x: [Vec3; 4] = core::array::from_fn(|i| at(position, 3 * i));
         let side = |i: usize, j: usize| mix(1.0, x[j], -1.0, x[i]);
         let tangent = |p: usize, r: usize| s.stiffness[(2 * p + r) * n + l].max(0.0);
         let (mut stiffness, mut layered) = ([tangent(0, 0), tangent(0, 1)], 0.0);
@@ -312,7 +295,7 @@ impl State {
             // dM12/dk12 of the two layers; their tangent is at most the largest one.
             layered = 2.0 * w.height * w.height * outer(1);
         }
-        let t: V3 = at(s.tangent, 0);
+        let t: Vec3 = at(s.tangent, 0);
         let family = if s4.rest.coupled {
             t[0] + t[1]
         } else {
@@ -360,7 +343,7 @@ impl State {
     /// Cosine between the derivatives of the means of opposite sides by the displacements.
     fn skew(&self) -> f64 {
         let d = &self.d;
-        let half = |a: V3, b: V3, c: V3, e: V3| -> V3 {
+        let half = |a: Vec3, b: Vec3, c: Vec3, e: Vec3| -> Vec3 {
             core::array::from_fn(|k| 0.25 * (a[k] + b[k] - c[k] - e[k]))
         };
         dot(half(d[0], d[1], d[2], d[3]), half(d[0], d[3], d[1], d[2])).abs()
@@ -390,7 +373,7 @@ impl State {
             0.0,
             normal,
         );
-        let out = |d: &V3| norm(mix(1.0, *d, -dot(*d, n), n));
+        let out = |d: &Vec3| norm(mix(1.0, *d, -dot(*d, n), n));
         self.d.iter().map(out).fold(0.0, f64::max).min(1.0)
     }
 
@@ -404,7 +387,7 @@ impl State {
         let apart = ((tangent * c11.max(c22)).sqrt() + (shear * (c11 + c22)).sqrt()).powi(2);
         let material = (tangent * stretch).min(apart);
         let narrow = (c11 + c22 - stretch).max(1e-6).sqrt();
-        let q: V3 = core::array::from_fn(|k| {
+        let q: Vec3 = core::array::from_fn(|k| {
             let x = &self.x;
             ((x[0][k] - x[1][k]) + (x[2][k] - x[3][k]))
                 - lane.h[0] * self.g[0][k]
@@ -423,7 +406,7 @@ impl State {
     /// The directors' hourglass mode.
     fn mode(&self, lane: &Lane) -> Mode {
         let (d, [g1, g2], [s1, s2]) = (&self.d, self.g, self.slope);
-        let mode: V3 = core::array::from_fn(|k| {
+        let mode: Vec3 = core::array::from_fn(|k| {
             ((d[0][k] - d[1][k]) + (d[2][k] - d[3][k])) - lane.h[0] * s1[k] - lane.h[1] * s2[k]
         });
         let square = dot(mode, mode);

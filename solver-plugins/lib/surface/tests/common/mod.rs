@@ -1,7 +1,7 @@
 //! Meshes over a rectangle of the plane, mapped onto known surfaces.
 #![allow(dead_code)]
 
-use plyflow_surface::vector::Vec3;
+use plyflow_geometry::vec3::Vec3;
 
 /// The same numbers in [-1, 1) in every run.
 pub fn random() -> impl FnMut() -> f64 {
@@ -48,7 +48,7 @@ pub fn lifted(points: &[[f64; 2]], f: impl Fn(f64, f64) -> f64) -> Vec<Vec3> {
 
 /// An icosahedron refined `levels` times onto a sphere of radius r, outward.
 pub fn sphere(levels: usize, r: f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    use plyflow_surface::vector::{add, scale, unit};
+    use plyflow_geometry::vec3::{add, scale, unit};
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     let mut points: Vec<Vec3> = Vec::new();
     for s in [-1.0, 1.0] {
@@ -57,7 +57,7 @@ pub fn sphere(levels: usize, r: f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         }
     }
     points.iter_mut().for_each(|p| *p = unit(*p));
-    let near = |a: Vec3, b: Vec3| plyflow_surface::vector::distance(a, b) < 1.1;
+    let near = |a: Vec3, b: Vec3| plyflow_geometry::vec3::distance(a, b) < 1.1;
     let mut triangles = Vec::new();
     for i in 0..12 {
         for j in i + 1..12 {
@@ -65,11 +65,11 @@ pub fn sphere(levels: usize, r: f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
                 let [a, b, c] = [points[i], points[j], points[k]];
                 if near(a, b) && near(b, c) && near(a, c) {
                     let t = [i as u32, j as u32, k as u32];
-                    let n = plyflow_surface::vector::cross(
-                        plyflow_surface::vector::sub(b, a),
-                        plyflow_surface::vector::sub(c, a),
+                    let n = plyflow_geometry::vec3::cross(
+                        plyflow_geometry::vec3::sub(b, a),
+                        plyflow_geometry::vec3::sub(c, a),
                     );
-                    let out = plyflow_surface::vector::dot(n, a) > 0.0;
+                    let out = plyflow_geometry::vec3::dot(n, a) > 0.0;
                     triangles.push(if out { t } else { [t[0], t[2], t[1]] });
                 }
             }

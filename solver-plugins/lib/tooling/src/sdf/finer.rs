@@ -9,7 +9,7 @@
 
 use super::{BLOCK, SignedDistanceGrid, evaluate};
 use crate::audit::{FieldError, Piece, Place, Survey};
-use crate::vector::V3;
+use plyflow_geometry::vec3::Vec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -60,7 +60,7 @@ pub(crate) struct Wanted<'a> {
     /// How far out of the surface (m) it counts as well.
     pub offset: f64,
     /// Whether it counts at a place.
-    pub counts: &'a (dyn Fn(V3) -> bool + Sync),
+    pub counts: &'a (dyn Fn(Vec3) -> bool + Sync),
 }
 
 impl Finer {
@@ -79,7 +79,7 @@ impl Finer {
         cell: [usize; 3],
         part: [f32; 3],
         spacing: f64,
-        found: &mut (f64, V3),
+        found: &mut (f64, Vec3),
     ) {
         if self.roots.is_empty() {
             return;
@@ -225,7 +225,7 @@ impl SignedDistanceGrid {
                 return settled.or(worst);
             }
             // What lies near a new brick is looked at again, more closely.
-            let near = |p: V3| next.contains(&self.brick_at(level + 1, p));
+            let near = |p: Vec3| next.contains(&self.brick_at(level + 1, p));
             let (again, error) = self.sort(survey, (&pieces, looked), spacing, wanted, near);
             (pieces, settled) = (again, settled.or(error));
             self.add_level(survey, level + 1, &next);
@@ -240,7 +240,7 @@ impl SignedDistanceGrid {
         self.blocks.map(|b| (b as u32) << level)
     }
 
-    fn brick_at(&self, level: u32, at: V3) -> [u32; 3] {
+    fn brick_at(&self, level: u32, at: Vec3) -> [u32; 3] {
         let size = self.spacing * BLOCK as f64 / f64::from(1 << level);
         let most = self.most(level);
         std::array::from_fn(|k| {
@@ -249,7 +249,7 @@ impl SignedDistanceGrid {
     }
 
     /// Bricks of a level at places, and next to these by half a cell of the level above.
-    fn bricks_at<'a>(&self, level: u32, places: impl Iterator<Item = &'a V3>) -> Bricks {
+    fn bricks_at<'a>(&self, level: u32, places: impl Iterator<Item = &'a Vec3>) -> Bricks {
         let margin = self.spacing / f64::from(1 << level);
         let mut found = Vec::new();
         let mut last = None;
@@ -326,7 +326,7 @@ impl SignedDistanceGrid {
         (pieces, looked): (&[Piece], Vec<Looked>),
         spacing: f64,
         wanted: &Wanted<'_>,
-        near: impl Fn(V3) -> bool + Sync,
+        near: impl Fn(Vec3) -> bool + Sync,
     ) -> (Vec<Piece>, FieldError) {
         let of = |(pieces, looked): (&[Piece], Looked)| {
             let mut errors = looked.parts.into_iter();
@@ -399,7 +399,7 @@ impl SignedDistanceGrid {
             if !asked(node.map(|c| c as i64)) {
                 continue;
             }
-            let at: V3 = std::array::from_fn(|k| {
+            let at: Vec3 = std::array::from_fn(|k| {
                 self.origin[k] + (4 * u64::from(brick[k]) + node[k] as u64) as f64 * spacing
             });
             // Outside of the box there is no field to correct.
@@ -422,7 +422,7 @@ struct Looked {
     /// By part: its largest error (m); not a number where nothing counts.
     parts: Vec<f64>,
     /// Places that are off by too much.
-    failing: Vec<V3>,
+    failing: Vec<Vec3>,
 }
 
 /// Coefficients of a brick: of those nodes that cells of wanted bricks need, the quasi-interpolation of what is left.

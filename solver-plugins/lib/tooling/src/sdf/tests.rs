@@ -1,6 +1,6 @@
 use super::*;
 use crate::hemisphere::hemisphere;
-use crate::vector::{add, scale, sub, unit};
+use plyflow_geometry::vec3::{add, scale, sub, unit};
 use plyflow_model::scene::{FlatTool, Tool};
 use plyflow_model::units::Length;
 
@@ -17,7 +17,7 @@ fn random(n: u64) -> f64 {
 }
 
 /// Points within `band` of the surface above the bed, with their exact distances.
-fn points_near(mesh: &ToolMesh, band: f64, count: usize) -> Vec<(V3, f64)> {
+fn points_near(mesh: &ToolMesh, band: f64, count: usize) -> Vec<(Vec3, f64)> {
     let tree = SurfaceTree::new(&mesh.without_bottom(0.1));
     let mut found = Vec::new();
     let mut n = 0;
@@ -45,7 +45,7 @@ fn spar() -> ToolMesh {
 }
 
 /// Largest error and its 99 % quantile.
-fn errors(grid: &SignedDistanceGrid, points: &[(V3, f64)]) -> [f64; 2] {
+fn errors(grid: &SignedDistanceGrid, points: &[(Vec3, f64)]) -> [f64; 2] {
     let mut e: Vec<f64> = points
         .iter()
         .map(|&(p, d)| (grid.distance_and_gradient(p).0 - d).abs())
@@ -83,11 +83,11 @@ fn gradient_points_from_the_surface_with_nearly_unit_length() {
     let (mut length, mut angle): (f64, f64) = (0.0, 0.0);
     for (p, d) in points_near(&mesh, 2e-3, 20_000) {
         let (_, g) = grid.distance_and_gradient(p);
-        length = length.max((crate::vector::norm(g) - 1.0).abs());
+        length = length.max((plyflow_geometry::vec3::norm(g) - 1.0).abs());
         // Closer than this the direction to a facet says nothing of the surface between its edges.
         if d.abs() > 1e-3 {
             let away = scale(sub(p, tree.closest(p).point), 1.0 / d);
-            angle = angle.max(crate::vector::norm(sub(g, away)));
+            angle = angle.max(plyflow_geometry::vec3::norm(sub(g, away)));
         }
     }
     println!("gradient: length within {length:.4} of 1, direction within {angle:.4} rad");
@@ -162,7 +162,10 @@ fn gradient_is_continuous_across_cell_faces() {
             let (da, ga) = grid.distance_and_gradient(a);
             let (db, gb) = grid.distance_and_gradient(b);
             assert!((da - db).abs() < 2e-8, "{da} {db}");
-            assert!(crate::vector::norm(sub(ga, gb)) < 2e-5, "{ga:?} {gb:?}");
+            assert!(
+                plyflow_geometry::vec3::norm(sub(ga, gb)) < 2e-5,
+                "{ga:?} {gb:?}"
+            );
         }
     }
 }
@@ -198,7 +201,7 @@ fn far_points_are_left_out_and_near_points_are_not() {
     let limit = 4e-3;
     let (mut near, mut far) = (0, 0);
     for n in 0..20_000 {
-        let p: V3 = std::array::from_fn(|k| {
+        let p: Vec3 = std::array::from_fn(|k| {
             let r = random(3 * n + k as u64);
             if k == 2 { 0.08 * r } else { 0.16 * (r - 0.5) }
         });
@@ -233,7 +236,7 @@ fn far_points_are_left_out_and_near_points_are_not() {
 fn many_points_give_the_same_as_one_by_one() {
     let mesh = hemisphere(0.05, 0.006).unwrap();
     let grid = SignedDistanceGrid::build(&mesh, 3e-3, 6e-3);
-    let points: Vec<V3> = (0..500)
+    let points: Vec<Vec3> = (0..500)
         .map(|n| {
             std::array::from_fn(|k| {
                 0.06 * (random(3 * n + k as u64) - if k == 2 { 0.0 } else { 0.5 })
@@ -266,7 +269,7 @@ fn grid_is_the_same_bytes_for_any_number_of_threads() {
 }
 
 /// Where the ray from `axis` outwards crosses the zero of a field (m from the axis).
-fn zero(grid: &SignedDistanceGrid, axis: V3, out: V3, mut near: f64) -> f64 {
+fn zero(grid: &SignedDistanceGrid, axis: Vec3, out: Vec3, mut near: f64) -> f64 {
     for _ in 0..20 {
         near -= grid.distance_and_gradient(add(axis, scale(out, near))).0;
     }
@@ -348,17 +351,17 @@ fn elements_in_a_hollow_are_as_long_as_it_too() {
     for elements in [4, 7] {
         let size = radius * arc / f64::from(elements);
         let field = grid.of_equal_length(size);
-        let length = |on: &dyn Fn(V3) -> f64| {
+        let length = |on: &dyn Fn(Vec3) -> f64| {
             let node = |i: i32| {
                 let angle = arc * (f64::from(i) / f64::from(elements) - 0.5);
                 let down = [angle.sin(), 0.0, -angle.cos()];
                 add([0.0, 0.0, top], scale(down, on(down)))
             };
-            let chord = |i: i32| crate::vector::norm(sub(node(i + 1), node(i)));
+            let chord = |i: i32| plyflow_geometry::vec3::norm(sub(node(i + 1), node(i)));
             (0..elements).map(chord).sum::<f64>()
         };
         // Outside is towards the axis.
-        let on = |out: V3| {
+        let on = |out: Vec3| {
             let at = |r: f64| add([0.0, 0.0, top], scale(out, r));
             (0..20).fold(radius, |r, _| r + field.distance_and_gradient(at(r)).0)
         };
@@ -379,11 +382,14 @@ fn the_shifted_field_is_that_of_the_surface_where_it_is_flat() {
     let p = [0.3 * top[0], 0.0, top[2] + 1e-3];
     let [a, b] = [&grid, &field].map(|g| g.distance_and_gradient(p));
     assert!((a.0 - b.0).abs() < 1e-6, "{} {}", a.0, b.0);
-    assert!(crate::vector::norm(sub(a.1, b.1)) < 1e-3, "{a:?} {b:?}");
+    assert!(
+        plyflow_geometry::vec3::norm(sub(a.1, b.1)) < 1e-3,
+        "{a:?} {b:?}"
+    );
 }
 
 /// A box over `low` to `high` (m).
-fn block(low: V3, high: V3) -> ToolMesh {
+fn block(low: Vec3, high: Vec3) -> ToolMesh {
     let mut mesh = ToolMesh::default();
     for z in [low[2], high[2]] {
         for [x, y] in [

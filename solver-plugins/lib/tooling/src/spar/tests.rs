@@ -1,6 +1,6 @@
 use super::*;
 use crate::sweep::Sweep;
-use crate::vector::{V3, add, cross, dot, scale, sub, unit};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, scale, sub, unit};
 use plyflow_model::scene::{Scene, Tool};
 use plyflow_model::units::{Angle, Length};
 
@@ -25,12 +25,12 @@ pub(crate) fn demo() -> JoggleSpar {
 }
 
 /// Principal curvatures at the middle of a 3 x 3 patch of a regular map.
-fn curvatures(patch: &dyn Fn(f64, f64) -> V3, u: f64, v: f64, d: f64) -> [f64; 2] {
+fn curvatures(patch: &dyn Fn(f64, f64) -> Vec3, u: f64, v: f64, d: f64) -> [f64; 2] {
     let at = |i: f64, j: f64| patch(u + i * d, v + j * d);
-    let half = |a: V3, b: V3| scale(sub(a, b), 0.5 / d);
+    let half = |a: Vec3, b: Vec3| scale(sub(a, b), 0.5 / d);
     let pu = half(at(1.0, 0.0), at(-1.0, 0.0));
     let pv = half(at(0.0, 1.0), at(0.0, -1.0));
-    let second = |a: V3, b: V3, c: V3| scale(add(sub(a, b), sub(c, b)), 1.0 / (d * d));
+    let second = |a: Vec3, b: Vec3, c: Vec3| scale(add(sub(a, b), sub(c, b)), 1.0 / (d * d));
     let puu = second(at(1.0, 0.0), at(0.0, 0.0), at(-1.0, 0.0));
     let pvv = second(at(0.0, 1.0), at(0.0, 0.0), at(0.0, -1.0));
     let puv = scale(
@@ -54,7 +54,7 @@ fn curvatures(patch: &dyn Fn(f64, f64) -> V3, u: f64, v: f64, d: f64) -> [f64; 2
 fn smallest_radius(s: &Sweep) -> f64 {
     let ([low, high], half, radius) = s.top();
     let mut largest: f64 = 0.0;
-    let mut look = |patch: &dyn Fn(f64, f64) -> V3, u: f64, v: f64| {
+    let mut look = |patch: &dyn Fn(f64, f64) -> Vec3, u: f64, v: f64| {
         for k in curvatures(patch, u, v, 2e-5) {
             largest = largest.max(k.abs());
         }

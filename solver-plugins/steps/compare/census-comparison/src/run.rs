@@ -1,9 +1,9 @@
 //! The censuses that arrive.
 
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Census, CensusCurve, CrossSection, Wrinkle};
 use plyflow_sdk::{Host, Input, On, StepError};
 use plyflow_surface::Topology;
-use plyflow_surface::vector::Vec3;
 use serde::Deserialize;
 
 /// A run as the workflow names it.

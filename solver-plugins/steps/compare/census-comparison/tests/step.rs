@@ -1,8 +1,8 @@
 //! Censuses whose numbers are known, side by side.
 
 use plyflow_census_comparison::{CensusComparison, never_falls, never_rises, relative_distance};
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::On;
-use plyflow_surface::vector::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 

@@ -2,10 +2,11 @@
 
 use crate::models::{Model, bounds_in_whole, bounds_of};
 use plyflow_defects::{Ply, distance_at};
+use plyflow_geometry::vec3::{Vec3, distance, dot, sub};
+use plyflow_geometry::{Location, QuadLocator};
 use plyflow_model::artifact::{Cut, Layer, Passage, Rectangle, Role, Strip, Work, Zone};
 use plyflow_sdk::{BodyInfo, Host, Meshes, StepError};
-use plyflow_surface::vector::{Vec3, distance, dot, sub};
-use plyflow_surface::{Location, QuadLocator, traction};
+use plyflow_surface::traction;
 
 /// How far inside of the cut the material is looked at that pulls at it, over the zone's own element size.
 const INSIDE: f64 = 0.01;

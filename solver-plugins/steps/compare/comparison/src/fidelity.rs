@@ -3,9 +3,9 @@
 use crate::models::{Model, PassedOver};
 use plyflow_defects::pairs::{PairErrors, Pairs, apart, measure_for_pairs};
 use plyflow_defects::{Defect, FieldErrors, Settings};
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{self, Role, Yardstick, Zone};
 use plyflow_sdk::{Host, StepError};
-use plyflow_surface::vector::Vec3;
 
 /// A defect and the name of its ply.
 type Found<'a> = (&'a str, &'a Defect);

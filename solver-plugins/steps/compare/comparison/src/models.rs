@@ -1,9 +1,9 @@
 //! Reading the models that are compared.
 
 use plyflow_defects::{Ply, Settings, Tool, of_run};
+use plyflow_geometry::rectangle;
 use plyflow_model::artifact::{Forming, Rectangle, Role, Sheet, Zone, Zones, current_zones};
 use plyflow_sdk::{Host, Input, Meshes, StepError};
-use plyflow_surface::flat_bounds;
 use std::collections::BTreeMap;
 
 /// The zones that count, by name, and those in whose places they are ([`current_zones`]).
@@ -54,7 +54,7 @@ pub fn bounds_in_whole(models: &[Model], ply: &str) -> Rectangle {
 
 /// The box around a ply in its flat mesh (`[x0, y0, x1, y1]`, m).
 pub fn bounds_of(ply: &Ply) -> Rectangle {
-    flat_bounds(ply.undeformed.iter().map(|p| [p[0], p[1]]))
+    rectangle::around(ply.undeformed.iter().map(|p| [p[0], p[1]]))
 }
 
 /// Runs that are not measured, and cost.

@@ -1,9 +1,9 @@
 //! The cut between coarse and fine against closed forms: work through it, and what is wrong beside it.
 
 use plyflow_comparison::Comparison;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::On;
 use plyflow_surface::traction;
-use plyflow_surface::vector::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, flat_grid, run};
 use serde_json::{Value, json};
 use std::f64::consts::FRAC_PI_2;

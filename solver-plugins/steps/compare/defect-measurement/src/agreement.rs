@@ -2,7 +2,7 @@
 
 use plyflow_defects::pairs::{PairErrors, Pairs, measure_for_pairs};
 use plyflow_defects::{Defect, Ply, Settings, Tool};
-use plyflow_surface::vector::{Vec3, add, distance, dot, scale};
+use plyflow_geometry::vec3::{Vec3, add, distance, dot, scale};
 use plyflow_surface::{Closest, Surface, triangles, weighted_mean, weighted_quantiles};
 
 /// Quantiles of the magnitude of the deviation that are told.

@@ -4,11 +4,11 @@ use crate::output::SCAN;
 use crate::{Align, Parameters, sections};
 use plyflow_defects::align::{Alignment, MOST_PASSES, Settings, align_where};
 use plyflow_defects::{Ply, Tool, of_run, scan};
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_sdk::{Host, Input, Log, StepError};
 use plyflow_surface::draped;
 use plyflow_surface::of_run::Stack;
-use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Closest, Surface, Topology, triangles};
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! Sections: where tool, plies and scan are cut along a path.
 
 use plyflow_defects::Ply;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{self, Axis, Plot, SectionOn, Series};
 use plyflow_sdk::{Host, StepError};
-use plyflow_surface::vector::Vec3;
 use plyflow_surface::{SectionPoint, Surface, Topology, path_section, stations, triangles};
 
 /// A surface that a section may cut.

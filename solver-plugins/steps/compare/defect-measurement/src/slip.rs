@@ -2,8 +2,8 @@
 
 use plyflow_defects::Ply;
 use plyflow_fixed::FixedBits;
-use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
-use plyflow_surface::{Location, QuadLocator, flat_bounds};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use plyflow_geometry::{Location, QuadLocator, rectangle};
 
 /// Places on the edge of a ply lie on it, however they were rounded (m).
 const ROUNDING: f64 = 1e-6;
@@ -108,7 +108,7 @@ impl<'a> Faces<'a> {
     /// How far from a place (m) the flat plies reach at most.
     pub fn reach(&self, from: [f64; 2]) -> f64 {
         let nodes = self.all.iter().flat_map(|f| &f.ply.undeformed);
-        let [x0, y0, x1, y1] = flat_bounds(nodes.map(|p| [p[0], p[1]]));
+        let [x0, y0, x1, y1] = rectangle::around(nodes.map(|p| [p[0], p[1]]));
         let off = |low: f64, high: f64, at: f64| (at - low).abs().max((high - at).abs());
         off(x0, x1, from[0]).fixed_hypot(off(y0, y1, from[1]))
     }

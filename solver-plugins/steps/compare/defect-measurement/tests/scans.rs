@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use plyflow_defect_measurement::DefectMeasurement;
-use plyflow_surface::vector::Vec3;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryInput, run};
 use serde_json::{Value, json};
 use std::fmt::Write;

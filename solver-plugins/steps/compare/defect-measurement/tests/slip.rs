@@ -1,8 +1,8 @@
 //! Slip between plies: motions of which it is known.
 
 use plyflow_defect_measurement::DefectMeasurement;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::On;
-use plyflow_surface::vector::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! The criteria of thesis 5.2.2 on one ply.
 
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{self, PlyDefects};
-use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Surface, Topology, curvatures, nodal_distances};
 use serde::Deserialize;
 

@@ -7,10 +7,10 @@ mod detect;
 
 pub use detect::{Detection, Ply, Thresholds, detect};
 
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Defects, Forming, PlainBody, PlyDefects, Sheet};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::draped::{DRAPED, DrapedPart, Formed};
-use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Surface, Topology, of_run};
 
 /// The step.

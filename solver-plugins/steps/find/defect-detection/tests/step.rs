@@ -1,8 +1,8 @@
 //! The step on formed plies whose defects are known.
 
 use plyflow_defect_detection::DefectDetection;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::On;
-use plyflow_surface::vector::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::json;
 

@@ -1,8 +1,8 @@
 //! How far a ply stands off what it rests on.
 
 use crate::Ply;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::{Host, Input, StepError};
-use plyflow_surface::vector::Vec3;
 use plyflow_surface::{Surface, of_run, triangles};
 
 /// What a ply rests on in a press, where the artifact has it.

@@ -23,6 +23,7 @@ pub use waves::{Criteria, Side, median, waves};
 
 use parameters::Parameters;
 use plot::{Curve, Plots};
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{
     Census, CensusBody, CensusCircle, CrossSection, Forming, Map, Panel, SectionWrinkle, Sheet,
     Wrinkle,
@@ -30,7 +31,6 @@ use plyflow_model::artifact::{
 use plyflow_sdk::{Host, Input, On, Step, StepError, export_step};
 use plyflow_surface::Topology;
 use plyflow_surface::draped::DrapedPart;
-use plyflow_surface::vector::Vec3;
 use plyflow_surface::{weighted_mean, weighted_quantiles};
 use spread::Spread;
 use std::f64::consts::TAU;

@@ -1,8 +1,8 @@
 //! Bending moments along the fibres.
 
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::{BodyInfo, Host, Input, On, StepError};
 use plyflow_surface::Topology;
-use plyflow_surface::vector::Vec3;
 
 /// Fields of an element that bends.
 const FIELDS: [&str; 2] = ["bending_moment_1", "bending_moment_2"];

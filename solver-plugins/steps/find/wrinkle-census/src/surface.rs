@@ -1,6 +1,6 @@
 //! A formed ply met by vertical lines.
 
-use plyflow_surface::vector::Vec3;
+use plyflow_geometry::{Bins, Rectangle, Vec3, rectangle};
 
 /// What a vertical line meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,69 +16,44 @@ pub struct Cut<'a> {
     points: &'a [Vec3],
     cells: &'a [u32],
     shear: &'a [f64],
-    low: [f64; 2],
-    size: f64,
-    count: [usize; 2],
-    bins: Vec<Vec<u32>>,
+    around: Rectangle,
+    bins: Bins,
 }
 
 impl<'a> Cut<'a> {
     /// Of a ply with `[n]` points (m), quads (four nodes each) and the `[cells]` shear angles (rad).
     pub fn new(points: &'a [Vec3], cells: &'a [u32], shear: &'a [f64]) -> Self {
-        let bounds = |c: usize| {
-            let of = points.iter().map(|p| p[c]);
-            (
-                of.clone().fold(f64::INFINITY, f64::min),
-                of.fold(f64::NEG_INFINITY, f64::max),
-            )
-        };
-        let ([x0, x1], [y0, y1]) = (bounds(0).into(), bounds(1).into());
+        let flat = |p: &Vec3| [p[0], p[1]];
+        let [x0, y0, x1, y1] = rectangle::around(points.iter().map(flat));
         // About one cell a bin.
         let size = ((x1 - x0) * (y1 - y0) / (cells.len() / 4).max(1) as f64)
             .sqrt()
             .max(1e-9);
         let count = [x1 - x0, y1 - y0].map(|w| (w / size) as usize + 1);
-        let mut cut = Self {
+        let mut bins = Bins::new([x0, y0], [size; 2], count);
+        for (cell, nodes) in cells.chunks_exact(4).enumerate() {
+            let corners = nodes.iter().map(|n| flat(&points[*n as usize]));
+            let [x0, y0, x1, y1] = rectangle::around(corners);
+            bins.insert(cell as u32, [x0, y0], [x1, y1]);
+        }
+        Self {
             points,
             cells,
             shear,
-            low: [x0, y0],
-            size,
-            count,
-            bins: vec![Vec::new(); count[0] * count[1]],
-        };
-        for (cell, nodes) in cells.chunks_exact(4).enumerate() {
-            let place = |c: usize| {
-                let of = nodes.iter().map(|n| cut.place(points[*n as usize][c], c));
-                (of.clone().min().unwrap_or(0), of.max().unwrap_or(0))
-            };
-            let ((i0, i1), (j0, j1)) = (place(0), place(1));
-            for j in j0..=j1 {
-                for i in i0..=i1 {
-                    cut.bins[j * count[0] + i].push(cell as u32);
-                }
-            }
+            around: [x0, y0, x1, y1],
+            bins,
         }
-        cut
-    }
-
-    fn place(&self, x: f64, c: usize) -> usize {
-        (((x - self.low[c]) / self.size).max(0.0) as usize).min(self.count[c] - 1)
     }
 
     /// The place of the ply at `(x, y)` (m) that is seen from above, or `from_below`: of several layers the highest or the lowest.
     /// `None` beside the ply.
     pub fn seen(&self, at: [f64; 2], from_below: bool) -> Option<Hit> {
-        let beyond = |c: usize| {
-            let along = (at[c] - self.low[c]) / self.size;
-            along < 0.0 || along > self.count[c] as f64
-        };
-        if beyond(0) || beyond(1) {
+        let [x0, y0, x1, y1] = self.around;
+        if at[0] < x0 || at[0] > x1 || at[1] < y0 || at[1] > y1 {
             return None;
         }
-        let bin = self.place(at[1], 1) * self.count[0] + self.place(at[0], 0);
         let mut best: Option<Hit> = None;
-        for cell in &self.bins[bin] {
+        for cell in self.bins.at(at) {
             let nodes = &self.cells[4 * *cell as usize..4 * *cell as usize + 4];
             for corners in [[0, 1, 2], [0, 2, 3]] {
                 let triangle = corners.map(|k| self.points[nodes[k] as usize]);

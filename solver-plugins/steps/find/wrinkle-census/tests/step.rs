@@ -1,7 +1,7 @@
 //! The step on surfaces whose wrinkles, deviations and moments are known.
 
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::On;
-use plyflow_surface::vector::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_wrinkle_census::WrinkleCensus;
 use serde_json::{Value, json};

@@ -4,7 +4,7 @@
 use crate::root::{Circle, Miss};
 use crate::surface::DrapeSurface;
 use plyflow_fixed::FixedBits;
-use plyflow_surface::vector::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
+use plyflow_geometry::vec3::{Vec3, add, cross, distance, dot, norm, scale, sub, unit};
 
 /// How the first fibre of each family runs from the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]

@@ -4,10 +4,10 @@ use crate::net::{Net, Node, Stop};
 use crate::surface::DrapeSurface;
 use plyflow_blank::{Blank, Quality};
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, add, scale, sub};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::scene::{Scene, Sheet, SheetKind};
-use plyflow_surface::vector::{Vec3, add, scale, sub};
 use std::f64::consts::FRAC_PI_2;
 
 /// A ply with its place in the stack.

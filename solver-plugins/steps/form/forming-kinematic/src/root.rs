@@ -2,7 +2,7 @@
 
 use crate::surface::DrapeSurface;
 use plyflow_fixed::FixedBits;
-use plyflow_surface::vector::{Vec3, add, dot, scale};
+use plyflow_geometry::vec3::{Vec3, add, dot, scale};
 
 /// Why there is no such point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

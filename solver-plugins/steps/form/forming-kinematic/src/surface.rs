@@ -5,7 +5,7 @@
 //! Triangles, I3D 2001), written as a height over the facet. Sharp edges stay sharp.
 
 use plyflow_fixed::FixedBits;
-use plyflow_surface::vector::{Vec3, add, cross, dot, norm, scale, sub, unit};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use plyflow_tooling::{SurfaceTree, ToolMesh};
 
 /// A surface that a net is draped on.

@@ -3,9 +3,9 @@
 use plyflow_forming_kinematic::drop_on;
 use plyflow_forming_kinematic::net::{Fabric, Generators, Net, Node};
 use plyflow_forming_kinematic::surface::{DrapeSurface, SmoothSurface};
+use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_model::scene::{FlatTool, Tool};
 use plyflow_model::units::Length;
-use plyflow_surface::vector::{Vec3, distance};
 use plyflow_tooling::ToolMesh;
 use std::convert::Infallible;
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -3,9 +3,9 @@
 use plyflow_forming_kinematic::drop_on;
 use plyflow_forming_kinematic::net::{Fabric, Generators, Net};
 use plyflow_forming_kinematic::surface::{DrapeSurface, SmoothSurface};
+use plyflow_geometry::vec3::{Vec3, norm, scale};
 use plyflow_model::scene::{HemisphereTool, Tool};
 use plyflow_model::units::Length;
-use plyflow_surface::vector::{Vec3, norm, scale};
 use plyflow_tooling::ToolMesh;
 use std::convert::Infallible;
 use std::f64::consts::FRAC_PI_2;

@@ -1,7 +1,7 @@
 //! The step behind a host in memory.
 
 use plyflow_forming_kinematic::FormingKinematic;
-use plyflow_surface::vector::{distance, norm};
+use plyflow_geometry::vec3::{distance, norm};
 use plyflow_testing::{MemoryArtifact, run};
 use plyflow_tooling::CHORD_TOLERANCE;
 use serde_json::{Value, json};

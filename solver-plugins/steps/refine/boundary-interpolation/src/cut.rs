@@ -1,8 +1,9 @@
 //! Motion of the nodes on a cut, and how well their straight edges follow the coarse run.
 
 use crate::grid::{Grid, SAME_PLACE, SIDES};
-use plyflow_surface::vector::{Vec3, add, distance, sub, unit};
-use plyflow_surface::{Location, QuadLocator, SmoothSheet, StandOff, Topology};
+use plyflow_geometry::vec3::{Vec3, add, distance, sub, unit};
+use plyflow_geometry::{Location, QuadLocator};
+use plyflow_surface::{SmoothSheet, StandOff, Topology};
 
 /// How far outside of the coarse mesh a node may lie (m): rounding of outlines.
 const SLACK: f64 = 1e-5;

@@ -1,9 +1,9 @@
 //! Fine structured meshes of a zone's sheets, in the undeformed plane.
 
+use plyflow_geometry::rectangle;
 use plyflow_mechanics::mesh::{even_axis, multiples_axis};
 use plyflow_model::artifact::Rectangle;
 use plyflow_model::outline::{sides, signed_area, winds};
-use plyflow_surface::flat_bounds;
 
 /// Sides in the order left, right, bottom, top.
 pub const SIDES: usize = 4;
@@ -44,7 +44,7 @@ pub fn ply_part(
     holes: &[Vec<[f64; 2]>],
     size: f64,
 ) -> Result<Option<Grid>, &'static str> {
-    let ply = flat_bounds(outline.iter().copied());
+    let ply = rectangle::around(outline.iter().copied());
     let box_area = (ply[2] - ply[0]) * (ply[3] - ply[1]);
     // Only an upright rectangle fills its box.
     let rectangle = (signed_area(outline).abs() - box_area).abs() < SAME_PLACE * box_area;
@@ -62,7 +62,7 @@ pub fn ply_part(
     if !material {
         return Ok(None);
     }
-    let part = overlap(zone, ply);
+    let part = rectangle::intersection(zone, ply);
     if is_less_than_a_cell(part, size) {
         return Ok(None);
     }
@@ -101,7 +101,7 @@ fn crosses(zone: Rectangle, contour: &[[f64; 2]]) -> bool {
 /// the nearest that leave the zone inside. Sides where it reaches the ply's edge are free, the others are cut. `None` when less
 /// than one cell of the ply lies in the zone.
 pub fn ply_grid(zone: Rectangle, ply: Rectangle, size: f64) -> Option<Grid> {
-    let part = overlap(zone, ply);
+    let part = rectangle::intersection(zone, ply);
     if is_less_than_a_cell(part, size) {
         return None;
     }
@@ -145,15 +145,6 @@ pub fn film_grid(zone: Rectangle, film: Rectangle, margin: f64, size: f64) -> Op
         lines
     });
     (xs.len() > 1 && ys.len() > 1).then(|| structured(&xs, &ys, [false; SIDES]))
-}
-
-fn overlap(a: Rectangle, b: Rectangle) -> Rectangle {
-    [
-        a[0].max(b[0]),
-        a[1].max(b[1]),
-        a[2].min(b[2]),
-        a[3].min(b[3]),
-    ]
 }
 
 /// Quads between lines (m), which ascend.

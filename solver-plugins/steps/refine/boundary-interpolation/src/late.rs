@@ -2,10 +2,10 @@
 
 use crate::cut::Placed;
 use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{Vec3, add, cross, distance, dot, norm, scale, sub};
 use plyflow_mechanics::mesh::{NONE, QuadMesh};
 use plyflow_model::artifact::Rectangle;
 use plyflow_sdk::{BodyInfo, Host, Input, Meshes, StepError};
-use plyflow_surface::vector::{Vec3, add, cross, distance, dot, norm, scale, sub};
 use plyflow_surface::weighted_quantiles;
 
 /// Where all nodes of a sheet are when the fine run begins late.

@@ -16,14 +16,14 @@ pub use grid::{Grid, film_grid, ply_grid, ply_part};
 use place::Place;
 use pull::{FORCES, Pull};
 
+use plyflow_geometry::rectangle;
+use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_model::artifact::{
     Boundary, Forming, MeshStudy, PlainBody, Rectangle, Sheet, Zone, Zones,
 };
 use plyflow_model::budget::{self, Wanted};
 use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
-use plyflow_surface::flat_bounds;
-use plyflow_surface::vector::{Vec3, distance};
 use serde::Deserialize;
 
 /// The step.
@@ -482,7 +482,7 @@ fn pulls(
 }
 
 fn bounds(points: &[Vec3]) -> Rectangle {
-    flat_bounds(points.iter().map(|p| [p[0], p[1]]))
+    rectangle::around(points.iter().map(|p| [p[0], p[1]]))
 }
 
 fn corners(b: Rectangle) -> Vec<[f64; 2]> {

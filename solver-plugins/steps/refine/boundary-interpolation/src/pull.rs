@@ -1,8 +1,9 @@
 //! What the surroundings of a zone pull at its cut with, in the coarse run.
 
 use crate::grid::{Grid, SAME_PLACE, SIDES};
-use plyflow_surface::vector::{Vec3, add};
-use plyflow_surface::{Location, QuadLocator, traction};
+use plyflow_geometry::vec3::{Vec3, add};
+use plyflow_geometry::{Location, QuadLocator};
+use plyflow_surface::traction;
 
 /// Fields of a coarse ply that hold S11, S22, S12 (N/m).
 pub(crate) const FORCES: [&str; 3] = ["membrane_force_1", "membrane_force_2", "membrane_force_12"];
@@ -111,7 +112,7 @@ impl Pull {
 mod tests {
     use super::*;
     use crate::grid::ply_grid;
-    use plyflow_surface::vector::norm;
+    use plyflow_geometry::vec3::norm;
 
     #[test]
     fn a_zone_is_in_balance_under_the_pulls_of_an_even_tension() {

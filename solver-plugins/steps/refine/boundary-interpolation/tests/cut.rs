@@ -1,7 +1,7 @@
 //! Fine nodes on curved and folded coarse sheets.
 
 use plyflow_boundary_interpolation::{Placed, film_grid};
-use plyflow_surface::vector::{Vec3, distance};
+use plyflow_geometry::vec3::{Vec3, distance};
 
 /// A cylinder of 14 mm that a coarse sheet with lines every 8 mm is bent to, and a cut with nodes every `fine` (m).
 struct Bent {

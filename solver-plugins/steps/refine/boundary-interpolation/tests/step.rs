@@ -1,8 +1,8 @@
 //! The step on a coarse motion that is known.
 
 use plyflow_boundary_interpolation::BoundaryInterpolation;
+use plyflow_geometry::vec3::{Vec3, unit};
 use plyflow_sdk::On;
-use plyflow_surface::vector::{Vec3, unit};
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, PI};

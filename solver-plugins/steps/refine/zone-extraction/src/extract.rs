@@ -1,5 +1,6 @@
 //! From flagged cells to zones, all in the undeformed plane.
 
+use plyflow_geometry::rectangle::{self, hull};
 use plyflow_model::artifact::{Rectangle, Zone};
 use serde::Deserialize;
 use serde_json::Map;
@@ -263,22 +264,12 @@ fn drawn(
         .collect()
 }
 
-pub(crate) fn hull(a: Rectangle, b: Rectangle) -> Rectangle {
-    [
-        a[0].min(b[0]),
-        a[1].min(b[1]),
-        a[2].max(b[2]),
-        a[3].max(b[3]),
-    ]
-}
-
 /// Whether two boxes share area.
 fn overlap(a: Rectangle, b: Rectangle) -> bool {
-    near(a, b, 0.0)
+    rectangle::near(a, b, 0.0)
 }
 
 /// Whether two boxes lie less than `gap` (m) apart.
 pub(crate) fn near(a: Rectangle, b: Rectangle, gap: f64) -> bool {
-    let gap = gap - 1e-9 * f64::from(gap > 0.0);
-    a[0] < b[2] + gap && b[0] < a[2] + gap && a[1] < b[3] + gap && b[1] < a[3] + gap
+    rectangle::near(a, b, gap - 1e-9 * f64::from(gap > 0.0))
 }

@@ -1,6 +1,7 @@
 //! Zones whose local run shows a defect at the cut: they are drawn again, larger, and run again.
 
-use crate::extract::{Settings, free_sides, hull, near, onto_edges, tidy};
+use crate::extract::{Settings, free_sides, near, onto_edges, tidy};
+use plyflow_geometry::rectangle::hull;
 use plyflow_model::artifact::{Rectangle, Zone};
 
 /// What growing asks of a defect of a local run.

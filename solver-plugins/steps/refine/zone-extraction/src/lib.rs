@@ -10,12 +10,12 @@ pub use extract::{ExtractError, FlaggedCell, Settings, extract};
 pub use grow::{AtCut, grow};
 
 use extract::tidy;
+use plyflow_geometry::{Vec3, rectangle};
 use plyflow_model::artifact::{
     ComparedDefect, Comparison, Rectangle, Zone, Zones, area, current_zones,
 };
 use plyflow_sdk::{Host, Log, Step, StepError, export_step};
 use plyflow_surface::Topology;
-use plyflow_surface::vector::Vec3;
 
 /// The step.
 pub struct ZoneExtraction;
@@ -203,12 +203,7 @@ fn read(host: &Host) -> Result<(Vec<String>, Vec<FlaggedCell>, Rectangle), StepE
         return Err(format!("'{}' has no frame", input.step).into());
     };
     let (mut names, mut cells) = (Vec::new(), Vec::new());
-    let mut blank = [
-        f64::INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::NEG_INFINITY,
-    ];
+    let mut blank = rectangle::NOTHING;
     for body in &meshes.bodies {
         let (points, nodes) = host.mesh(&input, body)?;
         let flat = host.frame_field(&input, body, frame, "undeformed")?;
@@ -220,24 +215,9 @@ fn read(host: &Host) -> Result<(Vec<String>, Vec<FlaggedCell>, Rectangle), StepE
         let flags = host.frame_field(&input, body, frame, "flag")?;
         let topology = Topology::new(points.len(), body.nodes_per_cell, &nodes);
         let around = |nodes: &mut dyn Iterator<Item = usize>| {
-            let none = [
-                f64::INFINITY,
-                f64::INFINITY,
-                f64::NEG_INFINITY,
-                f64::NEG_INFINITY,
-            ];
-            nodes.fold(none, |b, i| {
-                let [x, y, _] = flat[i];
-                [b[0].min(x), b[1].min(y), b[2].max(x), b[3].max(y)]
-            })
+            rectangle::around(nodes.map(|i| [flat[i][0], flat[i][1]]))
         };
-        let all = around(&mut (0..points.len()));
-        blank = [
-            blank[0].min(all[0]),
-            blank[1].min(all[1]),
-            blank[2].max(all[2]),
-            blank[3].max(all[3]),
-        ];
+        blank = rectangle::hull(blank, around(&mut (0..points.len())));
         let areas = topology.cell_areas(&flat);
         if body.fields.iter().any(|f| f.name == "draped") {
             let draped = host.frame_field(&input, body, frame, "draped")?;

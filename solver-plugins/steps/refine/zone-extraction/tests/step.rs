@@ -1,10 +1,10 @@
 //! Zones from flags that are known.
 
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{
     ComparedDefect, ComparedModel, Defect, DefectKind, Role, Zone, current_zones,
 };
 use plyflow_sdk::On;
-use plyflow_surface::vector::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_zone_extraction::{
     AtCut, ExtractError, FlaggedCell, Settings, ZoneExtraction, extract, grow,

@@ -7,11 +7,12 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+use plyflow_geometry::vec3::{Vec3, add, distance, scale, sub};
+use plyflow_geometry::{Location, QuadLocator, rectangle};
 use plyflow_mechanics::history::{hermite, locate, spline_slopes};
 use plyflow_model::artifact::{Feedback, Forming, PlainBody, Zone, which_count};
 use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
-use plyflow_surface::vector::{Vec3, add, distance, scale, sub};
-use plyflow_surface::{Location, QuadLocator, SmoothSheet, StandOff, Topology, flat_bounds};
+use plyflow_surface::{SmoothSheet, StandOff, Topology};
 use serde::Deserialize;
 
 /// The step.
@@ -278,7 +279,7 @@ fn on_fine(
         let at = |f: usize| [0, 1, 2].map(|d| motion[(f * places.len() + k) * 3 + d]);
         (*i, (0..times.len()).map(at).collect())
     };
-    let [x0, y0, x1, y1] = flat_bounds(flat.iter().map(|p| [p[0], p[1]]));
+    let [x0, y0, x1, y1] = rectangle::around(flat.iter().map(|p| [p[0], p[1]]));
     Ok(Some(OnFine {
         ways: places.iter().enumerate().map(way).collect(),
         cell_area: (x1 - x0) * (y1 - y0) / (cells.len() / 4) as f64,

@@ -1,6 +1,6 @@
 //! The step on fine motions that are known.
 
-use plyflow_surface::vector::{Vec3, distance};
+use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryInput, flat_grid, run};
 use plyflow_zone_feedback::ZoneFeedback;
 use serde_json::{Value, json};

@@ -3,7 +3,7 @@
 use super::{block, random, together};
 use crate::mesh::ToolMesh;
 use crate::sdf::SignedDistanceGrid;
-use crate::vector::{V3, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 
 const OFFSET: f64 = 8e-4;
 
@@ -13,11 +13,11 @@ fn built(mesh: &ToolMesh, spacing: f64, tolerance: f64) -> (SignedDistanceGrid, 
     (grid, error.largest)
 }
 
-const LOW: V3 = [-0.0113, -0.0087, 0.0];
-const HIGH: V3 = [0.0097, 0.0091, 0.0103];
+const LOW: Vec3 = [-0.0113, -0.0087, 0.0];
+const HIGH: Vec3 = [0.0097, 0.0091, 0.0103];
 
 /// Distance outside of the block that goes on below the bed, in closed form.
-fn outside(p: V3) -> f64 {
+fn outside(p: Vec3) -> f64 {
     let beyond = |k: usize| (LOW[k] - p[k]).max(p[k] - HIGH[k]);
     let d = [beyond(0), beyond(1), p[2] - HIGH[2]];
     let out = norm(d.map(|c| c.max(0.0)));
@@ -29,12 +29,12 @@ fn outside(p: V3) -> f64 {
 }
 
 /// Places from the surface to `OFFSET` out of it.
-fn places(count: usize) -> Vec<V3> {
+fn places(count: usize) -> Vec<Vec3> {
     let mut found = Vec::new();
     let mut n = 0;
     while found.len() < count {
         n += 1;
-        let p: V3 = std::array::from_fn(|k| {
+        let p: Vec3 = std::array::from_fn(|k| {
             LOW[k].min(HIGH[k]) - 1e-3 + random(3 * n + k as u64) * (HIGH[k] - LOW[k] + 2e-3)
         });
         // Half of them close to an edge.
@@ -58,7 +58,7 @@ fn places(count: usize) -> Vec<V3> {
 fn the_field_of_a_sharp_block_is_right_within_what_is_asked_for() {
     let mesh = block(LOW, HIGH);
     let most = |grid: &SignedDistanceGrid| {
-        let error = |p: &V3| (grid.distance_and_gradient(*p).0 - outside(*p)).abs();
+        let error = |p: &Vec3| (grid.distance_and_gradient(*p).0 - outside(*p)).abs();
         places(40_000).iter().map(error).fold(0.0, f64::max)
     };
     let plain = most(&SignedDistanceGrid::build(&mesh, 3e-3, 8e-3));
@@ -176,7 +176,7 @@ fn thin_walls_and_sharp_grooves_are_in_the_field() {
     let mesh = together(&[plate, rib, blocks[0].clone(), blocks[1].clone()]);
     let (grid, told) = built(&mesh, 3e-3, 4e-5);
     assert!(told <= 4e-5, "{told}");
-    let at = |p: V3| grid.distance_and_gradient(p).0;
+    let at = |p: Vec3| grid.distance_and_gradient(p).0;
     // Beside the rib, at both of its faces, in its middle, over it.
     for (p, distance) in [
         ([0.0010, 0.003, 0.009], 5e-4),

@@ -2,8 +2,8 @@
 #![allow(dead_code)] // Not every test file uses all of it.
 
 use plyflow_defect_measurement::DefectMeasurement;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::On;
-use plyflow_surface::vector::Vec3;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use serde_json::{Value, json};
 use std::f64::consts::PI;

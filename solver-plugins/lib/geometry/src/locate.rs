@@ -1,6 +1,6 @@
 //! Location of points in an undeformed quad mesh, seen from above.
 
-use crate::vector::Vec3;
+use crate::{Bins, Vec3, rectangle};
 use plyflow_fixed::FixedBits;
 
 /// A place in a quad mesh: a cell and the bilinear weights of its nodes.
@@ -27,34 +27,13 @@ impl Location {
     }
 }
 
-/// `[x0, y0, x1, y1]` around places in the plane, in their unit; from infinity to minus infinity when there is none.
-pub fn flat_bounds(places: impl IntoIterator<Item = [f64; 2]>) -> [f64; 4] {
-    let none = [
-        f64::INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::NEG_INFINITY,
-    ];
-    places.into_iter().fold(none, |b, p| {
-        [
-            b[0].min(p[0]),
-            b[1].min(p[1]),
-            b[2].max(p[0]),
-            b[3].max(p[1]),
-        ]
-    })
-}
-
 /// Finds cells of a quad mesh by x and y. Cells may be of any convex shape and of very different sizes
 /// (graded films).
 #[derive(Debug, Clone)]
 pub struct QuadLocator {
     corners: Vec<[[f64; 2]; 4]>,
     nodes: Vec<[u32; 4]>,
-    low: [f64; 2],
-    bin: [f64; 2],
-    bins: [usize; 2],
-    lists: Vec<Vec<u32>>,
+    bins: Bins,
 }
 
 impl QuadLocator {
@@ -72,51 +51,31 @@ impl QuadLocator {
         }
         let xy = |i: u32| [points[i as usize][0], points[i as usize][1]];
         let corners: Vec<[[f64; 2]; 4]> = nodes.iter().map(|c| c.map(xy)).collect();
-        let (low, high) = bounds(corners.iter().flatten());
+        let [x0, y0, x1, y1] = rectangle::around(corners.iter().flatten().copied());
         let side = (corners.len() as f64).sqrt().ceil() as usize;
-        let bins = [side, side];
-        let bin = [0, 1].map(|d| ((high[d] - low[d]) / side as f64).max(f64::MIN_POSITIVE));
-        let mut locator = Self {
+        let size = [x1 - x0, y1 - y0].map(|w| (w / side as f64).max(f64::MIN_POSITIVE));
+        let mut bins = Bins::new([x0, y0], size, [side, side]);
+        for (c, quad) in corners.iter().enumerate() {
+            let [x0, y0, x1, y1] = rectangle::around(quad.iter().copied());
+            bins.insert(c as u32, [x0, y0], [x1, y1]);
+        }
+        Some(Self {
             corners,
             nodes,
-            low,
-            bin,
             bins,
-            lists: vec![Vec::new(); side * side],
-        };
-        for c in 0..locator.corners.len() {
-            let (a, b) = bounds(locator.corners[c].iter());
-            let (a, b) = (locator.bin_of(a), locator.bin_of(b));
-            for j in a[1]..=b[1] {
-                for i in a[0]..=b[0] {
-                    locator.lists[j * side + i].push(c as u32);
-                }
-            }
-        }
-        Some(locator)
-    }
-
-    fn bin_of(&self, p: [f64; 2]) -> [usize; 2] {
-        [0, 1].map(|d| {
-            let at = ((p[d] - self.low[d]) / self.bin[d]).floor().max(0.0);
-            (at as usize).min(self.bins[d] - 1)
         })
     }
 
     /// The cell that holds (x, y), or holds it up to `tolerance` (m) outside of its sides; then the weights
     /// are those of the nearest place inside. `None` when there is no such cell.
     pub fn locate(&self, x: f64, y: f64, tolerance: f64) -> Option<Location> {
-        let a = self.bin_of([x - tolerance, y - tolerance]);
-        let b = self.bin_of([x + tolerance, y + tolerance]);
+        let from = self.bins.place([x - tolerance, y - tolerance]);
+        let to = self.bins.place([x + tolerance, y + tolerance]);
         let mut best: Option<(f64, Location)> = None;
-        for j in a[1]..=b[1] {
-            for i in a[0]..=b[0] {
-                for &c in &self.lists[j * self.bins[0] + i] {
-                    let (miss, location) = self.within(c as usize, [x, y]);
-                    if miss <= tolerance && best.as_ref().is_none_or(|(m, _)| miss < *m) {
-                        best = Some((miss, location));
-                    }
-                }
+        for c in self.bins.between(from, to) {
+            let (miss, location) = self.within(c as usize, [x, y]);
+            if miss <= tolerance && best.as_ref().is_none_or(|(m, _)| miss < *m) {
+                best = Some((miss, location));
             }
         }
         best.map(|(_, location)| location)
@@ -166,15 +125,4 @@ impl QuadLocator {
 
 fn weights(s: f64, t: f64) -> [f64; 4] {
     [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
-}
-
-fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 2]>) -> ([f64; 2], [f64; 2]) {
-    let mut range = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for p in points {
-        for d in 0..2 {
-            range.0[d] = range.0[d].min(p[d]);
-            range.1[d] = range.1[d].max(p[d]);
-        }
-    }
-    range
 }
