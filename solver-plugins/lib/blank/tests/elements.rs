@@ -68,8 +68,8 @@ fn held<E: Element>(mesh: &QuadMesh, to: impl Fn(V) -> V) -> Model {
     };
     let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
     let places: Vec<V> = mesh.points.iter().map(|x| to(*x)).collect();
-    model.x = places.clone();
-    model.dt = 1e-9;
+    model.x_mut().copy_from_slice(&places.clone());
+    model.set_step(1e-9);
     let nodes = (0..mesh.points.len() as u32).collect();
     model.set_driven(nodes, Box::new(Held(places)));
     model.step(true).unwrap();

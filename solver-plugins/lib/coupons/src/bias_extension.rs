@@ -193,8 +193,8 @@ impl Test for BiasExtension {
 
     fn sample(&mut self, specimen: &Specimen, t: f64) {
         let h = &mut self.histories;
-        let z = |n: u32| specimen.model.x[n as usize][2];
-        let all = || specimen.model.x.iter().map(|x| x[2]);
+        let z = |n: u32| specimen.model.x()[n as usize][2];
+        let all = || specimen.model.x().iter().map(|x| x[2]);
         h.displacement.push(self.pull.at(t));
         h.force.push(self.sum.0 / self.sum.1.max(1.0));
         self.sum = (0.0, 0.0);

@@ -72,7 +72,7 @@ impl Test for BiasPlane {
     }
 
     fn stepped(&mut self, specimen: &Specimen) {
-        let t = specimen.model.time - specimen.model.dt;
+        let t = specimen.model.time() - specimen.model.dt();
         let reactions = specimen.model.reactions().iter();
         let force: f64 = reactions.zip(&self.side).map(|(r, s)| 0.5 * s * r[0]).sum();
         let displacement = self.extension * smooth_step(t, 0.0, self.time);

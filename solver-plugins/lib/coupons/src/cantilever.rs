@@ -100,7 +100,9 @@ impl Test for Cantilever {
 
     fn apply(&mut self, specimen: &mut Specimen, t: f64) {
         let g = self.gravity * smooth_step(t, 0.0, self.ramp);
-        specimen.model.body_acceleration = [0.0, 0.0, -self.up * g];
+        specimen
+            .model
+            .set_body_acceleration([0.0, 0.0, -self.up * g]);
     }
 
     fn stepped(&mut self, specimen: &Specimen) {
@@ -111,7 +113,7 @@ impl Test for Cantilever {
     fn sample(&mut self, specimen: &Specimen, t: f64) {
         self.time.push(t);
         self.height
-            .push(self.up * specimen.model.x[self.tip as usize][2]);
+            .push(self.up * specimen.model.x()[self.tip as usize][2]);
         self.support.push(self.sum.0 / self.sum.1.max(1.0));
         self.sum = (0.0, 0.0);
         self.fibre_strain = self.fibre_strain.max(fibre_strain(specimen));
@@ -202,7 +204,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     // From the clamp line outwards; an element without rotations has no node there.
     let mut shape = vec![[0.0, 0.0]];
     for i in (0..grid.xs.len()).filter(|i| grid.xs[*i] > 0.0) {
-        let x = specimen.model.x[grid.node(i, middle) as usize];
+        let x = specimen.model.x()[grid.node(i, middle) as usize];
         shape.push([x[0], test.up * x[2]]);
     }
     let done = Done {

@@ -93,7 +93,7 @@ impl Test for Film {
         let reactions = specimen.model.reactions().iter();
         let force: f64 = reactions.zip(&self.side).map(|(r, s)| 0.5 * s * r[0]).sum();
         let ([a, b], at_start) = self.gauge;
-        let strain = (specimen.model.x[b][0] - specimen.model.x[a][0]) / at_start - 1.0;
+        let strain = (specimen.model.x()[b][0] - specimen.model.x()[a][0]) / at_start - 1.0;
         self.sum = (self.sum.0 + force, self.sum.1 + strain, self.sum.2 + 1.0);
     }
 

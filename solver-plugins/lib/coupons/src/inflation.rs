@@ -11,7 +11,7 @@ use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::V;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_mechanics::model::Drive;
+use plyflow_mechanics::model::{Drive, Pressures};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
@@ -77,12 +77,15 @@ impl Test for Inflation {
     }
 
     fn apply(&mut self, specimen: &mut Specimen, t: f64) {
-        specimen.model.pressures.below = self.at(t);
+        specimen.model.set_pressures(Pressures {
+            below: self.at(t),
+            ..specimen.model.pressures()
+        });
     }
 
     fn stepped(&mut self, specimen: &Specimen) {
-        let height = specimen.model.x[self.centre][2];
-        let pressure = specimen.model.pressures.below;
+        let height = specimen.model.x()[self.centre][2];
+        let pressure = specimen.model.pressures().below;
         let rim: f64 = specimen.model.reactions().iter().map(|r| r[2]).sum();
         self.sum = (self.sum.0 + height, self.sum.1 + pressure, self.sum.2 + 1.0);
         self.rim.0 += rim;

@@ -142,7 +142,7 @@ impl<'a> Output<'a> {
         };
         let host = self.host;
         self.attributes_only()?;
-        let added: f64 = specimen.model.sheets.iter().map(|s| s.added_mass).sum();
+        let added: f64 = specimen.model.sheets().iter().map(|s| s.added_mass).sum();
         host.result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
         host.result("drift_ratio", h.peak_drift_ratio, "1")?;
         host.result("hourglass_ratio", outcome.hourglass_ratio, "1")?;

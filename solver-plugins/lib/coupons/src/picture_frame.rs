@@ -129,7 +129,10 @@ impl Test for PictureFrame {
 
     fn stepped(&mut self, specimen: &Specimen) {
         // Reactions belong to the positions before the step.
-        let (t, dt) = (specimen.model.time - specimen.model.dt, specimen.model.dt);
+        let (t, dt) = (
+            specimen.model.time() - specimen.model.dt(),
+            specimen.model.dt(),
+        );
         let angle = self.path.angle(t);
         let (c, s) = ((0.5 * angle).fixed_cos(), (0.5 * angle).fixed_sin());
         let mut moment = 0.0;

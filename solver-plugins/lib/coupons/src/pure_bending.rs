@@ -124,7 +124,7 @@ impl Test for PureBending {
 
     fn stepped(&mut self, specimen: &Specimen) {
         // Reactions belong to the positions before the step.
-        let t = specimen.model.time - specimen.model.dt;
+        let t = specimen.model.time() - specimen.model.dt();
         let (shear, curvature) = self.history.at(t);
         let [work, end] = self.moments(specimen, shear, curvature);
         for (s, v) in self.sum.iter_mut().zip([work, end, curvature, 1.0]) {
@@ -141,7 +141,7 @@ impl Test for PureBending {
             self.moment.push(work / n);
             self.end_moment.push(end / n);
         }
-        let (_, wanted) = self.history.at(specimen.model.time - specimen.model.dt);
+        let (_, wanted) = self.history.at(specimen.model.time() - specimen.model.dt());
         let name = format!("curvature_{}", self.family);
         let patch = specimen.fields.iter().any(|f| f.name == name && f.patch);
         if t <= self.history.begin() {

@@ -82,10 +82,10 @@ pub fn run(
     let mut critical = 0.0;
     let mut looked = None;
     for sample in 0..SAMPLES {
-        let stale = looked.is_none_or(|c| specimen.model.cycle >= c + CRITICAL_EVERY);
+        let stale = looked.is_none_or(|c| specimen.model.cycle() >= c + CRITICAL_EVERY);
         if stale {
             critical = specimen.model.critical_step().map_err(|e| e.to_string())?;
-            looked = Some(specimen.model.cycle);
+            looked = Some(specimen.model.cycle());
         }
         let wanted = p
             .time_step
@@ -97,20 +97,22 @@ pub fn run(
             return Err(format!(
                 "the critical step has fallen to {critical:.3e} s at t = {:.5} s: an element has collapsed. \
                  Try a finer mesh or a larger hourglass stiffness",
-                specimen.model.time
+                specimen.model.time()
             )
             .into());
         }
         let steps = steps as u64;
-        specimen.model.dt = interval / steps as f64;
-        smallest_step = smallest_step.min(specimen.model.dt);
+        specimen.model.set_step(interval / steps as f64);
+        smallest_step = smallest_step.min(specimen.model.dt());
         let start = interval * sample as f64;
         for k in 0..steps {
             // Times from the count, not from a sum.
-            let t = start + specimen.model.dt * k as f64;
-            specimen.model.time = t;
+            let t = start + specimen.model.dt() * k as f64;
             test.apply(specimen, t);
-            specimen.model.step(k == 0).map_err(|e| e.to_string())?;
+            specimen
+                .model
+                .step_from(t, k == 0)
+                .map_err(|e| e.to_string())?;
             test.stepped(specimen);
             if k == 0 {
                 test.sample(specimen, t);
@@ -134,7 +136,7 @@ pub fn run(
         }
     }
     // A step has moved the time to its end.
-    let t = specimen.model.time;
+    let t = specimen.model.time();
     test.apply(specimen, t);
     specimen.model.step(true).map_err(|e| e.to_string())?;
     test.sample(specimen, t);
@@ -152,7 +154,7 @@ pub fn run(
         },
         time,
         ledger,
-        cycles: specimen.model.cycle,
+        cycles: specimen.model.cycle(),
         smallest_step,
         seconds: started.elapsed().as_secs_f64(),
     })
@@ -160,7 +162,7 @@ pub fn run(
 
 fn frame(host: &Host, specimen: &Specimen, t: f64) -> Result<(), StepError> {
     host.begin_frame(t)?;
-    host.write_points("specimen", &specimen.model.x)?;
+    host.write_points("specimen", specimen.model.x())?;
     for f in &specimen.fields {
         let (on, values) = if f.patch {
             (On::Points, specimen.model.patch_field(0, f.row))
@@ -184,11 +186,11 @@ fn report(
     if elapsed < 0.2 {
         return;
     }
-    let cycle = specimen.model.cycle;
+    let cycle = specimen.model.cycle();
     let internal = e.internal();
     host.progress(&Progress {
-        fraction: specimen.model.time / end,
-        simulated_time: specimen.model.time,
+        fraction: specimen.model.time() / end,
+        simulated_time: specimen.model.time(),
         rate: (cycle - shown.1) as f64 / elapsed,
         energy_ratio: if internal > 0.0 {
             e.kinetic / internal

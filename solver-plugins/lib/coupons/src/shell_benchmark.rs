@@ -346,7 +346,7 @@ fn load(
     let mut shown = Instant::now();
     for step in 1..=p.steps {
         let ratio = step as f64 / p.steps as f64;
-        specimen.model.load_factor = p.load * ratio;
+        specimen.model.set_load_factor(p.load * ratio);
         let relaxed = relax(&mut specimen.model, tolerance, |_| {
             host.check_cancelled()?;
             if shown.elapsed().as_secs_f64() > 0.2 {
@@ -373,7 +373,7 @@ fn load(
             .iter()
             .map(|(_, n, d)| {
                 let (x, r) = (
-                    specimen.model.x[*n as usize],
+                    specimen.model.x()[*n as usize],
                     setup.mesh.points[*n as usize],
                 );
                 (0..3).map(|k| d[k] * (x[k] - r[k])).sum()
@@ -408,10 +408,10 @@ impl From<StepError> for Stop {
 /// A frame; its time is the load ratio.
 fn frame(host: &Host, specimen: &Specimen, time: f64) -> Result<(), StepError> {
     host.begin_frame(time)?;
-    host.write_points("specimen", &specimen.model.x)?;
+    host.write_points("specimen", specimen.model.x())?;
     let moved: Vec<f64> = specimen
         .model
-        .x
+        .x()
         .iter()
         .zip(&specimen.mesh.points)
         .flat_map(|(x, r)| (0..3).map(move |k| x[k] - r[k]))
@@ -460,8 +460,8 @@ fn write(
     host.result("hourglass_ratio", hourglass, "1")?;
     host.result("residual", residual, "1")?;
     host.result("elements", specimen.model.element_count() as f64, "1")?;
-    host.result("cycles", specimen.model.cycle as f64, "1")?;
-    let work = specimen.model.element_count() as f64 * specimen.model.cycle as f64;
+    host.result("cycles", specimen.model.cycle() as f64, "1")?;
+    let work = specimen.model.element_count() as f64 * specimen.model.cycle() as f64;
     let seconds = started.elapsed().as_secs_f64().max(1e-9);
     host.measured("element_cycle_rate", work / seconds, "1/s")?;
     out.about.element = Some(p.common.element.plugin.clone());

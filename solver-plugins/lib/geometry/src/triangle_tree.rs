@@ -33,7 +33,7 @@ pub struct TriangleTree {
     triangles: Vec<[u32; 3]>,
     /// Triangle and its corners by place in the tree: what is near in space is near in memory.
     order: Vec<u32>,
-    corners: Vec<[Vec3; 3]>,
+    leaves: Vec<[Vec3; 3]>,
     nodes: Vec<Node>,
 }
 
@@ -69,14 +69,14 @@ impl TriangleTree {
         let count = triangles.len();
         let mut tree = Self {
             points,
-            corners: Vec::new(),
+            leaves: Vec::new(),
             order: (0..count as u32).collect(),
             nodes: Vec::with_capacity(count),
             triangles,
         };
         tree.build(&centres, 0, count);
         tree.nodes.shrink_to_fit();
-        tree.corners = (tree.order.iter())
+        tree.leaves = (tree.order.iter())
             .map(|t| tree.corners(*t as usize))
             .collect();
         Some(tree)
@@ -93,7 +93,7 @@ impl TriangleTree {
     }
 
     /// Corners (m) of a triangle.
-    fn corners(&self, triangle: usize) -> [Vec3; 3] {
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|i| self.points[i as usize])
     }
 
@@ -216,7 +216,7 @@ impl TriangleTree {
                 continue;
             }
             let leaf = node.start as usize..(node.start + node.count) as usize;
-            for (t, corners) in self.order[leaf.clone()].iter().zip(&self.corners[leaf]) {
+            for (t, corners) in self.order[leaf.clone()].iter().zip(&self.leaves[leaf]) {
                 look(&mut best, *t, *corners);
             }
         }

@@ -9,6 +9,7 @@
 //! - [`contact`]: node-to-surface contact between neighbouring sheets of the stack, and of sheet nodes
 //!   with rigid surfaces;
 //! - [`model`]: nodes, sheets, contacts and loads; one central-difference step;
+//! - [`backend`]: the small interface that a driver sees, and a second back-end could have;
 //! - [`relax`]: static equilibrium by explicit steps with kinetic damping;
 //! - [`energy`]: the ledger that says where the work went;
 //! - [`archive`]: what changes during a run as bytes, for checkpoints;
@@ -21,6 +22,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod archive;
+pub mod backend;
 pub mod component;
 pub mod contact;
 pub mod energy;

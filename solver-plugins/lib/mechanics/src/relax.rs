@@ -44,14 +44,14 @@ pub fn relax<E: From<MechanicsError>>(
     tolerance: Tolerance,
     mut every: impl FnMut(&Model) -> Result<(), E>,
 ) -> Result<Relaxed, E> {
-    let begin = model.cycle;
+    let begin = model.cycle();
     let mut before = 0.0;
     let mut peaks = 0;
     model.halt();
     loop {
-        let done = model.cycle - begin;
+        let done = model.cycle() - begin;
         if done.is_multiple_of(CRITICAL) {
-            model.dt = tolerance.safety * model.critical_step()?;
+            model.set_step(tolerance.safety * model.critical_step()?);
         }
         model.step(false)?;
         let kinetic = model.kinetic();

@@ -7,7 +7,7 @@ use plyflow_mechanics::contact::{
     ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem,
 };
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
-use plyflow_mechanics::model::{Drive, Model, StepSettings};
+use plyflow_mechanics::model::{Drive, Model, Pressures, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 use std::sync::Arc;
@@ -61,7 +61,7 @@ fn pressed_stack() -> Model {
         &contact,
         items.collect(),
     );
-    model.rigid_contacts.push(on);
+    model.add_rigid_contact(on);
     // Both grids are the same: a node lies at the corner of the cell that begins with it, or ends.
     let corner = |k: u32| {
         let of = |c: &[u32; 4]| c.iter().position(|i| *i == k);
@@ -73,9 +73,12 @@ fn pressed_stack() -> Model {
     let slaves = (0..n).map(corner).collect();
     let name = "sheet 1 on sheet 0".into();
     let on_sheet = SheetContact::new(name, 1.0, THICKNESS, 0.3, &contact, slaves);
-    model.sheet_contacts.push(on_sheet);
+    model.add_sheet_contact(on_sheet);
     model.set_contact_stiffness(&contact);
-    model.pressures.above = 1e5;
+    model.set_pressures(Pressures {
+        above: 1e5,
+        ..model.pressures()
+    });
     model
 }
 
@@ -101,10 +104,10 @@ fn a_model_that_takes_up_a_state_goes_on_with_the_same_bits() {
     let mut archive = Archive::Load(&bytes);
     other.archive(&mut archive).unwrap();
     assert!(archive.is_at_end());
-    assert_eq!(other.cycle, 777);
+    assert_eq!(other.cycle(), 777);
     steps(&mut other, 500);
     let bits = |v: &[V]| -> Vec<u64> { v.as_flattened().iter().map(|x| x.to_bits()).collect() };
-    assert!(bits(&model.x) == bits(&other.x) && bits(&model.v) == bits(&other.v));
+    assert!(bits(model.x()) == bits(other.x()) && bits(model.v()) == bits(other.v()));
     let spins = |m: &Model| bits(m.spins().unwrap());
     assert!(spins(&model) == spins(&other) && spins(&model).iter().any(|s| *s != 0));
     assert_eq!(ledger, other.energies());

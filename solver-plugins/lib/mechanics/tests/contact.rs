@@ -266,7 +266,7 @@ fn between_sheets(size: f64) -> Model {
     let spec = |k: usize| common::sheet("sheet", &meshes[k], [0, first][k], common::membrane());
     let specs = vec![spec(0), spec(1)];
     let mut model = Model::new(points, specs, settings).unwrap();
-    let above = model.sheets[1].cell_range.0 as u32;
+    let above = model.sheets()[1].cell_range.0 as u32;
     let per_side = (0.012 / size).round();
     let items = (0..first).map(|n| {
         let [i, j] = [0, 1].map(|k| (meshes[0].points[n as usize][k] / size).min(per_side - 0.5));
@@ -282,7 +282,7 @@ fn between_sheets(size: f64) -> Model {
         &contact,
         items.collect(),
     );
-    model.sheet_contacts.push(between);
+    model.add_sheet_contact(between);
     model.set_contact_stiffness(&contact);
     model
 }
@@ -303,7 +303,7 @@ fn multipliers_grow_more_slowly_where_one_sheet_has_far_more_mass_in_a_node() {
 fn multipliers_of_light_nodes_at_a_corner_grow_more_slowly_by_themselves() {
     let default = ContactSettings::default();
     let model = between_sheets(2e-3);
-    let follows: Vec<f64> = (model.sheet_contacts[0].items.iter())
+    let follows: Vec<f64> = (model.sheet_contacts()[0].items.iter())
         .map(SlaveItem::follows)
         .collect();
     // In masses of a small element the corner's node has a quarter; those of the cell that it touches have 1, 2, 4 and 2.

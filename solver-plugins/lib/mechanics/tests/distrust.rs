@@ -74,7 +74,7 @@ fn critical_step<const FAULT: u8>() -> f64 {
     };
     let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
     assert!(model.critical_step().unwrap() > 1e-6);
-    model.x.iter_mut().for_each(|x| x[2] = 1e-3);
+    model.x_mut().iter_mut().for_each(|x| x[2] = 1e-3);
     model.critical_step().unwrap()
 }
 

@@ -94,8 +94,8 @@ fn forces(element: ElementInstance, n: usize) -> Vec<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
     while found.len() < ELASTICA.len() {
         // A breath of weight tells the strip which way to go.
-        let t = model.time;
-        model.body_acceleration = [0.0, 0.0, 0.5 * (1.0 - smooth_step(t, 0.05, 0.1))];
+        let t = model.time();
+        model.set_body_acceleration([0.0, 0.0, 0.5 * (1.0 - smooth_step(t, 0.05, 0.1))]);
         model.step(false).unwrap();
         let end = (found.len() + 1) as f64 * (RAMP + HOLD);
         if t > end - 0.2 * HOLD {
@@ -150,12 +150,12 @@ fn strip_too_coarse_for_its_arc_stops_and_says_where() {
         // Four elements over a hairpin: each would have to bend by a right angle.
         let (mut model, _) = strip(common::stiff_shell(), 4);
         loop {
-            let t = model.time;
-            model.body_acceleration = [0.0, 0.0, 0.5 * (1.0 - smooth_step(t, 0.05, 0.1))];
+            let t = model.time();
+            model.set_body_acceleration([0.0, 0.0, 0.5 * (1.0 - smooth_step(t, 0.05, 0.1))]);
             if let Err(e) = model.step(false) {
                 return Some(e);
             }
-            if model.time > 3.0 * (RAMP + HOLD) {
+            if model.time() > 3.0 * (RAMP + HOLD) {
                 return None;
             }
         }

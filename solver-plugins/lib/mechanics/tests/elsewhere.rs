@@ -64,7 +64,7 @@ fn model(mesh: &QuadMesh, spec: SheetSpec, step: f64) -> Model {
         damping: 0.0,
     };
     let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
-    model.dt = step;
+    model.set_step(step);
     model
 }
 
@@ -84,7 +84,7 @@ fn flapping(
     let edge: Vec<u32> = edge.collect();
     let at = edge.iter().map(|n| mesh.points[*n as usize]).collect();
     model.set_driven(edge, Box::new(Clamp(at)));
-    let moving = model.v.iter_mut().zip(&mesh.points);
+    let moving = model.v_mut().iter_mut().zip(&mesh.points);
     moving.for_each(|(v, p)| v[2] = (100.0 * p[0]).sin() * (1.0 + 2.0 * p[1]));
     model
 }
@@ -115,10 +115,10 @@ fn a_sheet_whose_cells_are_all_of_one_kind_gives_the_bits_of_a_sheet_of_that_kin
     for (mut mixed, mut plain) in pairs {
         steps(&mut mixed, 300);
         steps(&mut plain, 300);
-        assert!(bits(&mixed.x) == bits(&plain.x) && bits(&mixed.v) == bits(&plain.v));
+        assert!(bits(&mixed.x()) == bits(&plain.x()) && bits(&mixed.v()) == bits(&plain.v()));
         assert_eq!(mixed.energies(), plain.energies());
         assert_eq!(mixed.critical_step(), plain.critical_step());
-        assert_eq!(mixed.mass, plain.mass);
+        assert_eq!(mixed.mass(), plain.mass());
     }
 }
 
@@ -137,7 +137,7 @@ fn a_sheet_of_two_elements_has_the_same_bits_on_two_threads_and_from_its_archive
             })
         };
         let (mut one, two) = (on(1), on(2));
-        assert!(bits(&one.x) == bits(&two.x) && bits(&one.v) == bits(&two.v));
+        assert!(bits(one.x()) == bits(two.x()) && bits(one.v()) == bits(two.v()));
         assert!(one.energies().bending > 0.0);
 
         let mut bytes = Vec::new();
@@ -148,7 +148,7 @@ fn a_sheet_of_two_elements_has_the_same_bits_on_two_threads_and_from_its_archive
         other.archive(&mut archive).unwrap();
         assert!(archive.is_at_end());
         steps(&mut other, 200);
-        assert!(bits(&one.x) == bits(&other.x) && bits(&one.v) == bits(&other.v));
+        assert!(bits(one.x()) == bits(other.x()) && bits(one.v()) == bits(other.v()));
         assert_eq!(one.energies(), other.energies());
     }
 }
@@ -157,7 +157,7 @@ fn a_sheet_of_two_elements_has_the_same_bits_on_two_threads_and_from_its_archive
 fn a_free_sheet_of_two_elements_keeps_its_energy() {
     for element in [common::rotation_free, common::stiff_shell] {
         let mut model = flapping(element(), Some(common::membrane()), |p| p[0] > 0.12);
-        model.dt = 0.5 * model.critical_step().unwrap();
+        model.set_step(0.5 * model.critical_step().unwrap());
         steps(&mut model, 1);
         let (mut drift, mut bending) = (0.0f64, 0.0f64);
         let start = model.energies();
@@ -190,7 +190,7 @@ fn hung(whole: bool) -> (Model, QuadMesh) {
     let at = held.iter().map(|n| mesh.points[*n as usize]).collect();
     model.set_driven(held, Box::new(Clamp(at)));
     let fall = 0.2;
-    model.body_acceleration = [0.0, 0.0, -fall];
+    model.set_body_acceleration([0.0, 0.0, -fall]);
     if !whole {
         // 1 kg/m2, 50 mm of it; nodes at the sides have half of what one in the middle has.
         let end = (0..mesh.points.len() as u32).filter(|n| mesh.points[*n as usize][0] > 0.0999);
@@ -231,7 +231,7 @@ fn a_strip_bends_up_to_where_membranes_begin_and_these_hang_from_it_like_a_chain
     let ((mixed, mesh), (loaded, short)) = (hung(true), hung(false));
     let at = |model: &Model, mesh: &QuadMesh, x: f64| {
         let is = |p: &V| (p[0] - x).abs() < 1e-9 && (p[1] - SIZE).abs() < 1e-9;
-        model.x[mesh.points.iter().position(is).unwrap()]
+        model.x()[mesh.points.iter().position(is).unwrap()]
     };
     let (a, b) = (at(&mixed, &mesh, 0.1), at(&loaded, &short, 0.1));
     println!("ends of what bends: {a:?} m, {b:?} m");

@@ -10,7 +10,7 @@ use plyflow_mechanics::contact::{
 };
 use plyflow_mechanics::history::{constant_speed_way, smooth_step};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
-use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, StepSettings};
+use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, Pressures, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::{V, add, dot, scale};
 use std::sync::Arc;
@@ -126,15 +126,15 @@ fn belt(angle: f64, friction: f64) -> f64 {
         &contact,
         items.collect(),
     );
-    model.rigid_contacts.push(on);
+    model.add_rigid_contact(on);
     model.set_contact_stiffness(&contact);
     let holding = 2.0;
     let (mut sum, mut count) = (0.0, 0);
     // The belt slides all along when the last fifth of the way at constant speed begins.
-    while model.time < begin + 0.9 * duration {
-        model.load_factor = holding * smooth_step(model.time, 0.0, begin);
+    while model.time() < begin + 0.9 * duration {
+        model.set_load_factor(holding * smooth_step(model.time(), 0.0, begin));
         model.step(false).unwrap();
-        if model.time > begin + 0.7 * duration {
+        if model.time() > begin + 0.7 * duration {
             sum += model
                 .reactions()
                 .iter()
@@ -254,38 +254,41 @@ fn heavy_sandwich(
     for (k, law) in laws(&model).into_iter().enumerate() {
         let k = k + 1;
         let nodes = first[k]..first[k] + meshes[k].points.len() as u32;
-        let cell0 = model.sheets[k - 1].cell_range.0 as u32;
+        let cell0 = model.sheets()[k - 1].cell_range.0 as u32;
         let items = nodes.map(|n| {
             let (cell, xi) = locate(&meshes[k - 1], points[n as usize]);
             SlaveItem::new(n, cell0 + cell, xi)
         });
         let (name, items) = (format!("{k}"), items.collect());
         let contact = SheetContact::new(name, 1.0, THICKNESS, law, &settings, items);
-        model.sheet_contacts.push(contact);
+        model.add_sheet_contact(contact);
     }
     model.set_contact_stiffness(&settings);
-    model.body_acceleration[2] = -gravity;
+    model.set_body_acceleration([0.0, 0.0, -gravity]);
     let (mut pull, mut faces, mut count) = (0.0, [0.0; 2], 0.0);
     let (mut drift, mut top) = (0.0f64, 0.0f64);
-    while model.time < begin + 0.9 * duration {
-        model.pressures.above = pressure * smooth_step(model.time, 0.0, 0.5 * begin);
+    while model.time() < begin + 0.9 * duration {
+        model.set_pressures(Pressures {
+            above: pressure * smooth_step(model.time(), 0.0, 0.5 * begin),
+            ..model.pressures()
+        });
         model.step(false).unwrap();
-        if model.time > begin + 0.6 * duration {
+        if model.time() > begin + 0.6 * duration {
             pull += model.reactions()[still..].iter().map(|r| r[0]).sum::<f64>();
-            for (face, contact) in faces.iter_mut().zip(&model.sheet_contacts) {
+            for (face, contact) in faces.iter_mut().zip(model.sheet_contacts()) {
                 *face += contact.items.iter().map(|i| i.force[0]).sum::<f64>();
             }
             count += 1.0;
         }
-        if model.cycle.is_multiple_of(20) {
+        if model.cycle().is_multiple_of(20) {
             drift = drift.max(model.energies().drift().abs());
-            top = model.x.iter().map(|x| x[2]).fold(top, f64::max);
+            top = model.x().iter().map(|x| x[2]).fold(top, f64::max);
         }
     }
     Sandwich {
         pull: pull / count,
         faces: faces.map(|f| f / count),
-        lift: model.x[first[2] as usize + 14][2] - 2.0 * THICKNESS,
+        lift: model.x()[first[2] as usize + 14][2] - 2.0 * THICKNESS,
         drift: drift / model.energies().external,
         top,
     }
@@ -317,8 +320,8 @@ fn a_sheet_pulled_from_between_two_under_one_bar_is_held_by_both_faces() {
 
 /// The cells of a sheet of a model.
 fn cells(model: &Model, sheet: usize) -> &[[u32; 4]] {
-    let (c0, c1) = model.sheets[sheet].cell_range;
-    &model.cells[c0..c1]
+    let (c0, c1) = model.sheets()[sheet].cell_range;
+    &model.cells()[c0..c1]
 }
 
 /// A law for slaves of a sheet.
@@ -382,8 +385,8 @@ fn pulls_along_and_across_fibres_differ_by_the_factor_of_the_angle() {
         let got = sandwich(pressure, |m| {
             let sheet = if whose == Whose::Slave { 2 } else { 1 };
             let (s, c) = f64::to_radians(degrees).sin_cos();
-            let first = m.sheets[sheet].cell_range.0;
-            let fibres = FibreField::new(cells(m, sheet), first, &m.x, [c, s, 0.0]);
+            let first = m.sheets()[sheet].cell_range.0;
+            let fibres = FibreField::new(cells(m, sheet), first, m.x(), [c, s, 0.0]);
             let angle = AngleDependence {
                 factors: factors.clone(),
                 whose,
@@ -430,13 +433,16 @@ fn sledge(pressure: f64, law: impl Fn(&Model) -> FrictionLaw) -> f64 {
     let contact = ContactSettings::default();
     let law = law(&model);
     let on = RigidContact::new("floor".into(), floor, 0.0, law, &contact, items);
-    model.rigid_contacts.push(on);
+    model.add_rigid_contact(on);
     model.set_contact_stiffness(&contact);
     let (mut sum, mut count) = (0.0, 0.0);
-    while model.time < begin + 0.9 * duration {
-        model.pressures.above = pressure * smooth_step(model.time, 0.0, 0.5 * begin);
+    while model.time() < begin + 0.9 * duration {
+        model.set_pressures(Pressures {
+            above: pressure * smooth_step(model.time(), 0.0, 0.5 * begin),
+            ..model.pressures()
+        });
         model.step(false).unwrap();
-        if model.time > begin + 0.6 * duration {
+        if model.time() > begin + 0.6 * duration {
             sum += model.reactions().iter().map(|r| r[0]).sum::<f64>();
             count += 1.0;
         }
@@ -459,7 +465,7 @@ fn a_sledge_on_a_rigid_plane_follows_pressure_and_fibres() {
             let angle = AngleDependence {
                 factors: vec![[0.0, 1.0], [std::f64::consts::FRAC_PI_2, 0.6]],
                 whose: Whose::Slave,
-                fibres: FibreField::new(cells(m, 0), 0, &m.x, [c, s, 0.0]),
+                fibres: FibreField::new(cells(m, 0), 0, m.x(), [c, s, 0.0]),
             };
             varying(m, 0, law, Some(angle))
         });
@@ -489,28 +495,28 @@ fn incline(angle: f64, friction: f64) -> (f64, f64) {
     let items = (0..9).map(RigidItem::new).collect();
     let contact = ContactSettings::default();
     let on = RigidContact::new("incline".into(), floor, 0.0, friction, &contact, items);
-    model.rigid_contacts.push(on);
+    model.add_rigid_contact(on);
     model.set_contact_stiffness(&contact);
     let g = 9.81;
-    let speed = |m: &Model| m.v.iter().map(|v| v[0]).sum::<f64>() / 9.0;
+    let speed = |m: &Model| m.v().iter().map(|v| v[0]).sum::<f64>() / 9.0;
     let settle = 0.02;
     let mut seen = [0.0; 2];
     let mut start = 0.0;
-    while model.time < settle + 0.05 {
+    while model.time() < settle + 0.05 {
         // First it lies down on the level plane; then the plane tilts at once.
-        let tilt = if model.time < settle { 0.0 } else { angle };
-        let weight = g * smooth_step(model.time, 0.0, 0.5 * settle);
-        model.body_acceleration = [weight * tilt.sin(), 0.0, -weight * tilt.cos()];
+        let tilt = if model.time() < settle { 0.0 } else { angle };
+        let weight = g * smooth_step(model.time(), 0.0, 0.5 * settle);
+        model.set_body_acceleration([weight * tilt.sin(), 0.0, -weight * tilt.cos()]);
         model.step(false).unwrap();
-        if model.time < settle {
-            start = model.x[4][0];
+        if model.time() < settle {
+            start = model.x()[4][0];
         }
-        if model.time < settle + 0.025 {
+        if model.time() < settle + 0.025 {
             seen[0] = speed(&model);
         }
         seen[1] = speed(&model);
     }
-    (model.x[4][0] - start, (seen[1] - seen[0]) / 0.025)
+    (model.x()[4][0] - start, (seen[1] - seen[0]) / 0.025)
 }
 
 #[test]

@@ -45,7 +45,7 @@ fn model(planes: Planes) -> (Model, QuadMesh) {
     };
     let mut model =
         Model::mirrored(points, vec![spec], settings, Mirrors { planes, ghosts }).unwrap();
-    model.dt = STEP;
+    model.set_step(STEP);
     (model, mesh)
 }
 
@@ -62,11 +62,11 @@ fn deformed(p: V) -> V {
 /// Puts a part to `x` (its own nodes) and makes a step from rest: energies there and forces.
 fn forces(planes: Planes, x: &[V]) -> (f64, f64, Vec<V>, Model) {
     let (mut model, _) = model(planes);
-    model.x[..x.len()].copy_from_slice(x);
+    model.x_mut()[..x.len()].copy_from_slice(x);
     model.place_ghosts();
     model.step(false).unwrap();
     let e = model.energies();
-    let force = |n: usize| model.v[n].map(|v| v * model.mass[n] / STEP);
+    let force = |n: usize| model.v()[n].map(|v| v * model.mass()[n] / STEP);
     let forces = (0..x.len()).map(force).collect();
     (e.membrane + e.hourglass, e.bending, forces, model)
 }
@@ -88,7 +88,7 @@ fn energies_and_forces_of_halves_and_quarters_are_those_of_the_whole() {
         let (m, b, own, model) = forces(planes, &place(&mesh));
         assert!((n * m / membrane - 1.0).abs() < 1e-12, "{m} {membrane}");
         assert!((n * b / bending - 1.0).abs() < 1e-12, "{b} {bending}");
-        assert!((n * model.mass.iter().sum::<f64>() - 0.06 * 0.04).abs() < 1e-12);
+        assert!((n * model.mass().iter().sum::<f64>() - 0.06 * 0.04).abs() < 1e-12);
         for (p, f) in mesh.points.iter().zip(own) {
             let near = |q: &V| norm(sub(*q, *p)) < 1e-9;
             let twin = all[whole.points.iter().position(near).unwrap()];
@@ -144,7 +144,7 @@ fn forces_of_a_quarter_with_ghosts_are_the_gradient_of_its_energy() {
 fn ghosts_follow_their_images_and_rigid_motion_along_a_plane_costs_nothing() {
     let planes = Planes([true, false]);
     let (mut model, mesh) = model(planes);
-    for v in &mut model.v[..mesh.points.len()] {
+    for v in &mut model.v_mut()[..mesh.points.len()] {
         *v = [0.0, 0.3, -0.2];
     }
     for _ in 0..20 {
@@ -152,10 +152,10 @@ fn ghosts_follow_their_images_and_rigid_motion_along_a_plane_costs_nothing() {
     }
     let way = 20.0 * STEP;
     let whole = Whole::new(&mesh.points, &mesh.cells, planes);
-    let ghosts = model.x.len() - mesh.points.len();
+    let ghosts = model.x().len() - mesh.points.len();
     // One row beside the plane.
     assert_eq!(ghosts, 5);
-    for p in &model.x[mesh.points.len()..] {
+    for p in &model.x()[mesh.points.len()..] {
         let stands = [p[0], p[1] - 0.3 * way, p[2] + 0.2 * way];
         let near = |q: &V| norm(sub(*q, stands)) < 1e-12;
         assert!(
@@ -196,7 +196,7 @@ fn a_quarter_that_takes_up_a_state_goes_on_with_the_same_bits() {
         let planes = Planes([true; 2]);
         let (mut model, mesh) = model(planes);
         let x = place(&mesh);
-        model.x[..x.len()].copy_from_slice(&x);
+        model.x_mut()[..x.len()].copy_from_slice(&x);
         model.place_ghosts();
         model
     };
@@ -209,8 +209,8 @@ fn a_quarter_that_takes_up_a_state_goes_on_with_the_same_bits() {
     let mut other = start();
     other.archive(&mut Archive::Load(&bytes)).unwrap();
     steps(&mut other);
-    assert!(model.x == other.x && model.v == other.v);
-    assert!(norm(model.v[3]) > 0.0);
+    assert!(model.x() == other.x() && model.v() == other.v());
+    assert!(norm(model.v()[3]) > 0.0);
 }
 
 /// A trough z = 0.3 |x| along y of elements of 10 mm, and a finer one that is pressed 0.1 mm into it.
@@ -263,14 +263,14 @@ fn troughs(planes: Planes) -> (Model, Vec<V>) {
     let items = (0..upper.points.len()).map(place).collect();
     let start = points.clone();
     let mut model = Model::mirrored(points, specs, settings, mirrors).unwrap();
-    model.dt = 1e-6;
+    model.set_step(1e-6);
     let without = ContactSettings {
         augmentation: 0.0,
         ..contact
     };
     let name = "trough/trough".into();
     let pair = SheetContact::new(name, 1.0, OFFSET, 0.2, &without, items);
-    model.sheet_contacts.push(pair);
+    model.add_sheet_contact(pair);
     model.set_contact_stiffness(&contact);
     (model, start)
 }
@@ -289,12 +289,12 @@ fn in_a_fold_on_a_plane_a_node_touches_the_image_of_the_other_face() {
     for (steps, bound) in [(1, 1e-8), (2, 1e-5)] {
         let (whole, places) = run(Planes::default(), steps);
         let (half, own) = run(Planes([true, false]), steps);
-        let fastest = whole.v.iter().map(|v| norm(*v)).fold(0.0, f64::max);
+        let fastest = whole.v().iter().map(|v| norm(*v)).fold(0.0, f64::max);
         assert!(fastest > 0.1, "{fastest}");
         for (n, p) in own.iter().enumerate() {
             let near = |q: &V| norm(sub(*q, *p)) < 1e-9;
             let twin = places.iter().position(near).unwrap();
-            let (a, b) = (half.v[n], whole.v[twin]);
+            let (a, b) = (half.v()[n], whole.v()[twin]);
             assert!(
                 norm(sub(a, b)) < bound * fastest,
                 "{steps}: {p:?}: {a:?} {b:?}"
@@ -305,10 +305,10 @@ fn in_a_fold_on_a_plane_a_node_touches_the_image_of_the_other_face() {
     let stored = |m: &Model| m.energies().contact;
     assert!((2.0 * stored(&half) / stored(&whole) - 1.0).abs() < 1e-12);
     // Only in the fold is that more than the distance from one face.
-    let line = half.sheet_contacts[0]
+    let line = half.sheet_contacts()[0]
         .items
         .iter()
-        .filter(|i| half.x[i.node as usize][0] == 0.0);
+        .filter(|i| half.x()[i.node as usize][0] == 0.0);
     let deep: Vec<f64> = line.map(|i| i.penetration).collect();
     assert!(deep.iter().all(|d| *d > 1.1e-4 && *d < 1.5e-4), "{deep:?}");
 }
@@ -326,30 +326,30 @@ fn nodes_that_reach_a_plane_are_held_off_it_and_come_back() {
         .filter(|n| mesh.points[*n][0] > 0.0)
         .collect();
     let contact = |m: &Model| {
-        m.rigid_contacts
+        m.rigid_contacts()
             .iter()
             .map(|c| c.items.len())
             .sum::<usize>()
     };
     assert_eq!(contact(&model), far.len());
     let node = far[0];
-    model.x[node][0] = 1e-6;
-    model.x[node][2] = 0.01;
+    model.x_mut()[node][0] = 1e-6;
+    model.x_mut()[node][2] = 0.01;
     model.place_ghosts();
-    model.v[node] = [-20.0, 0.0, 0.0];
+    model.v_mut()[node] = [-20.0, 0.0, 0.0];
     let mut least = f64::INFINITY;
     for _ in 0..200 {
         model.step(false).unwrap();
-        least = least.min(model.x[node][0]);
+        least = least.min(model.x()[node][0]);
     }
     let touched = model
-        .rigid_contacts
+        .rigid_contacts()
         .iter()
         .any(|c| c.name == "symmetry_x/sheet");
     assert!(touched && least < 0.0 && least > -2e-4, "{least}");
     assert!(
-        model.x[node][0] > 0.0 && model.v[node][0] > 0.0,
+        model.x()[node][0] > 0.0 && model.v()[node][0] > 0.0,
         "{:?}",
-        model.x[node]
+        model.x()[node]
     );
 }

@@ -70,7 +70,7 @@ fn incline(angle: f64, ground: &Ground, law: impl Fn(&Model) -> FrictionLaw) -> 
         Ground::Plane => {
             let items = (0..n).map(RigidItem::new).collect();
             let floor = Arc::new(Plane { height: 0.0 });
-            model.rigid_contacts.push(RigidContact::new(
+            model.add_rigid_contact(RigidContact::new(
                 "plane".into(),
                 floor,
                 0.0,
@@ -81,34 +81,34 @@ fn incline(angle: f64, ground: &Ground, law: impl Fn(&Model) -> FrictionLaw) -> 
         }
         Ground::Sheet => {
             // Nodes of the block lie in the middles of the cells below.
-            let first = model.sheets[1].cell_range.0;
+            let first = model.sheets()[1].cell_range.0;
             let under = |k: u32| {
                 let p = points[k as usize];
                 let holds = |c: &[u32; 4]| {
                     let a = points[c[0] as usize];
                     (0..2).all(|d| (p[d] - a[d] - 0.005).abs() < 1e-9)
                 };
-                let cell = model.cells[first..].iter().position(holds).unwrap();
+                let cell = model.cells()[first..].iter().position(holds).unwrap();
                 SlaveItem::new(k, (first + cell) as u32, [0.0; 2])
             };
             let items = (0..n).map(under).collect();
             let on = SheetContact::new("sheet".into(), 1.0, THICKNESS, law, &contact, items);
-            model.sheet_contacts.push(on);
+            model.add_sheet_contact(on);
         }
     }
     model.set_contact_stiffness(&contact);
     let speed = |m: &Model| {
-        let moved: f64 = (0..n as usize).map(|k| m.mass[k] * m.v[k][0]).sum();
-        moved / (0..n as usize).map(|k| m.mass[k]).sum::<f64>()
+        let moved: f64 = (0..n as usize).map(|k| m.mass()[k] * m.v()[k][0]).sum();
+        moved / (0..n as usize).map(|k| m.mass()[k]).sum::<f64>()
     };
     let settle = 0.02;
     let mut seen = [0.0; 2];
-    while model.time < settle + 0.03 {
-        let tilt = if model.time < settle { 0.0 } else { angle };
-        let weight = 9.81 * smooth_step(model.time, 0.0, 0.5 * settle);
-        model.body_acceleration = [weight * tilt.sin(), 0.0, -weight * tilt.cos()];
+    while model.time() < settle + 0.03 {
+        let tilt = if model.time() < settle { 0.0 } else { angle };
+        let weight = 9.81 * smooth_step(model.time(), 0.0, 0.5 * settle);
+        model.set_body_acceleration([weight * tilt.sin(), 0.0, -weight * tilt.cos()]);
         model.step(false).unwrap();
-        if model.time < settle + 0.015 {
+        if model.time() < settle + 0.015 {
             seen[0] = speed(&model);
         }
         seen[1] = speed(&model);
@@ -126,8 +126,8 @@ fn laws(slave: NodeLaws, partner: Partner) -> FrictionLaw {
 
 /// Law 1 for the nodes of these places.
 fn inside(model: &Model, sheet: usize, holds: impl Fn(V) -> bool) -> NodeLaws {
-    NodeLaws::new(&model.sheets[sheet].nodes, |n| {
-        u16::from(holds(model.x[n as usize]))
+    NodeLaws::new(&model.sheets()[sheet].nodes, |n| {
+        u16::from(holds(model.x()[n as usize]))
     })
 }
 
@@ -160,10 +160,10 @@ fn a_block_half_of_which_is_lubricated_slides_by_the_mean_coefficient() {
 fn a_region_of_the_sheet_below_counts_by_the_nodes_of_its_cells_and_the_lesser_of_both_holds() {
     let angle = 0.45f64.atan();
     let below = |m: &Model, reach: f64| {
-        let (first, end) = m.sheets[1].cell_range;
+        let (first, end) = m.sheets()[1].cell_range;
         Partner::Sheet {
             laws: inside(m, 1, |p| p[0] < reach),
-            cells: m.cells[first..end].to_vec(),
+            cells: m.cells()[first..end].to_vec(),
             first_cell: first as u32,
         }
     };
@@ -209,7 +209,7 @@ fn a_sheared_sheet_without_stitches_in_a_part_has_the_mean_of_both_energies_by_a
         let mut spec = common::sheet("sheet", &mesh, 0, common::instance::<M4>(common::STITCHED));
         spec.other_material = other;
         let mut model = Model::new(mesh.points.clone(), vec![spec], STEP).unwrap();
-        for p in &mut model.x {
+        for p in model.x_mut() {
             p[0] += 0.04 * p[1];
         }
         model.step(false).unwrap();

@@ -396,27 +396,27 @@ fn over_a_tool_a_slave_goes_down_the_ledge_and_the_tool_does_not_hold_it_up() {
         .map(|k| SlaveItem::new(k, 0, [0.0; 2]))
         .collect();
     let between = SheetContact::new("between".into(), 1.0, OFFSET, 0.0, &contact, items);
-    model.sheet_contacts.push(between);
+    model.add_sheet_contact(between);
     let ground = Arc::new(Plane { height: 0.0 });
     let items = nodes.map(RigidItem::new).collect();
     let mut through = RigidContact::new("tool".into(), ground, 1.5 * OFFSET, 0.0, &contact, items)
         .with_slack(0.05 * OFFSET);
     through.through = vec![0];
-    model.rigid_contacts.push(through);
+    model.add_rigid_contact(through);
     model.set_contact_stiffness(&contact);
     let leading: Vec<usize> = (0..n as usize)
         .filter(|k| points[n as usize + k][0] > 0.0149)
         .collect();
     assert_eq!(leading.len(), 3);
     let (mut over_ledge, mut off) = (0, 0);
-    while model.time < duration {
+    while model.time() < duration {
         model.step(false).unwrap();
         for k in &leading {
             let (sheet, tool) = (
-                &model.sheet_contacts[0].items[*k],
-                &model.rigid_contacts[0].items[*k],
+                &model.sheet_contacts()[0].items[*k],
+                &model.rigid_contacts()[0].items[*k],
             );
-            let at = model.x[sheet.node as usize][0];
+            let at = model.x()[sheet.node as usize][0];
             assert_eq!(tool.normal_force, 0.0, "held up by the tool at {at} m");
             if (0.0161..0.0179).contains(&at) {
                 over_ledge += 1;

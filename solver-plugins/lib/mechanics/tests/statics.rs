@@ -66,12 +66,12 @@ fn nodal_loads_stretch_a_strip_by_hookes_law_and_the_support_carries_them() {
         moment: [0.0; 3],
     });
     model.set_loads(loads.collect());
-    model.load_factor = total;
+    model.set_load_factor(total);
     rest(&mut model);
     // F = k w (l - 1) with k = 1e5 N/m over the width of 0.1 m.
     let expected = 0.4 * total / (1e5 * 0.1);
     for n in end {
-        let u = model.x[n as usize][0] - 0.4;
+        let u = model.x()[n as usize][0] - 0.4;
         assert!(
             (u / expected - 1.0).abs() < 1e-5,
             "{u} instead of {expected}"
@@ -84,14 +84,14 @@ fn nodal_loads_stretch_a_strip_by_hookes_law_and_the_support_carries_them() {
 #[test]
 fn weight_of_a_hanging_strip_is_carried_by_its_support() {
     let (mut model, end) = strip();
-    model.body_acceleration = [9.81, 0.0, 0.0];
+    model.set_body_acceleration([9.81, 0.0, 0.0]);
     rest(&mut model);
     let weight = 0.4 * 0.1 * 9.81;
     let support: f64 = model.reactions().iter().map(|r| r[0]).sum();
     assert!((support + weight).abs() < 1e-4 * weight, "{support} N");
     // u(L) = w L^2 / (2 k), and one-point elements with lumped masses give it exactly at the nodes.
     let expected = 9.81 * 0.4 * 0.4 / (2.0 * 1e5);
-    let u = model.x[end[1] as usize][0] - 0.4;
+    let u = model.x()[end[1] as usize][0] - 0.4;
     assert!(
         (u / expected - 1.0).abs() < 1e-3,
         "{u} instead of {expected}"
@@ -108,28 +108,28 @@ fn fixed_components_stay_where_they_are() {
     for n in &end {
         model.fix(*n, fixed);
     }
-    model.body_acceleration = [3.0, 5.0, 0.0];
-    let start = model.x.clone();
+    model.set_body_acceleration([3.0, 5.0, 0.0]);
+    let start = model.x().to_vec();
     rest(&mut model);
     for n in end.iter().map(|n| *n as usize) {
-        assert_eq!(model.x[n][0], start[n][0]);
-        assert_ne!(model.x[n][1], start[n][1]);
+        assert_eq!(model.x()[n][0], start[n][0]);
+        assert_ne!(model.x()[n][1], start[n][1]);
     }
     // The other components are free: weight along y sags the end.
-    let lowest = model.x[end[0] as usize][1];
+    let lowest = model.x()[end[0] as usize][1];
     assert!(lowest > 1e-6, "{lowest} m");
 }
 
 #[test]
 fn work_of_weight_and_loads_balances_the_energies() {
     let (mut model, end) = strip();
-    model.body_acceleration = [9.81, 2.0, 0.0];
+    model.set_body_acceleration([9.81, 2.0, 0.0]);
     model.set_loads(vec![NodalLoad {
         node: end[1],
         force: [1.0, 0.5, 0.0],
         moment: [0.0; 3],
     }]);
-    model.dt = 0.5 * model.critical_step().unwrap();
+    model.set_step(0.5 * model.critical_step().unwrap());
     let mut largest = 0.0f64;
     for _ in 0..4000 {
         model.step(false).unwrap();
@@ -155,7 +155,7 @@ impl Surroundings {
     fn of(model: &Model, end: &[u32], stiffness: f64, goes: (f64, [f64; 2])) -> Self {
         let share = |j: usize| if j == 1 { 0.5 } else { 0.25 };
         Self {
-            at: end.iter().map(|n| model.x[*n as usize]).collect(),
+            at: end.iter().map(|n| model.x()[*n as usize]).collect(),
             pull: (0..end.len()).map(|j| 20.0 * share(j)).collect(),
             stiffness: (0..end.len()).map(|j| stiffness * share(j)).collect(),
             goes,
@@ -185,14 +185,14 @@ fn a_held_node_goes_along_its_sheet_to_where_its_surroundings_and_the_model_bala
         let (mut model, end) = damped_strip(500.0);
         let held = Surroundings::of(&model, &end, stiffness, (0.0, [0.0, 1.0]));
         model.drive_also(end.clone(), Box::new(held));
-        model.dt = 0.8 * model.critical_step().unwrap();
+        model.set_step(0.8 * model.critical_step().unwrap());
         for _ in 0..20_000 {
             model.step(false).unwrap();
         }
         // Of the strip: k w / l = 2.5e4 N/m.
         let expected = 20.0 / (1e5 * 0.1 / 0.4 + stiffness);
         for n in end {
-            let [x, _, z] = model.x[n as usize];
+            let [x, _, z] = model.x()[n as usize];
             let u = x - 0.4;
             assert!(
                 (u / expected - 1.0).abs() < 2e-3,
@@ -207,8 +207,8 @@ fn a_held_node_goes_along_its_sheet_to_where_its_surroundings_and_the_model_bala
 fn a_node_that_was_anchored_is_held_from_where_its_surroundings_and_the_model_were_in_balance() {
     let (strip, stiffness, goes) = (1e5 * 0.1 / 0.4, 4e4, 3e-4);
     let (mut model, end) = damped_strip(500.0);
-    model.dt = 0.8 * model.critical_step().unwrap();
-    let settling = 20_000.0 * model.dt;
+    model.set_step(0.8 * model.critical_step().unwrap());
+    let settling = 20_000.0 * model.dt();
     let when = [2.0 * settling, 0.2 * settling];
     let held = Surroundings::of(&model, &end, stiffness, (goes, when));
     model.drive_also(end.clone(), Box::new(held));
@@ -217,7 +217,7 @@ fn a_node_that_was_anchored_is_held_from_where_its_surroundings_and_the_model_we
             model.step(false).unwrap();
         }
         for n in &end {
-            let u = model.x[*n as usize][0] - 0.4;
+            let u = model.x()[*n as usize][0] - 0.4;
             assert!((u / expected - 1.0).abs() < 2e-3, "{what}: {u} {expected}");
         }
     };
@@ -240,7 +240,7 @@ fn a_node_that_was_anchored_is_held_from_where_its_surroundings_and_the_model_we
     for m in [&mut model, &mut other] {
         (0..100).for_each(|_| m.step(false).unwrap());
     }
-    assert_eq!(other.x, model.x);
+    assert_eq!(other.x(), model.x());
 }
 
 #[test]
@@ -316,7 +316,7 @@ fn nodes_that_are_led_come_to_the_normals_that_they_are_given() {
             .map(|n| (n, normal))
             .collect();
         model.lead(mesh.points.clone(), 0.01, &normals).unwrap();
-        assert!(model.v.iter().all(|v| *v == [0.0; 3]));
+        assert!(model.v().iter().all(|v| *v == [0.0; 3]));
         model.energies().bending
     };
     let tilt = 0.01f64;

@@ -51,13 +51,17 @@ impl SurfaceTree {
         let found = self.tree.search(p, f64::INFINITY, Some(hint));
         let Nearest {
             triangle,
-            point,
+            mut point,
             feature,
-            squared,
-        } = found.expect("a tree has a triangle");
+            mut squared,
+        } = found.expect("a tree has a facet");
         let normals = &self.normals[triangle as usize];
         let normal = match feature {
-            Feature::Face => normals[0],
+            Feature::Face => {
+                point = on_face(p, self.tree.corners(triangle as usize));
+                squared = dot(sub(p, point), sub(p, point));
+                normals[0]
+            }
             Feature::Edge(k) => normals[1 + k],
             Feature::Vertex(k) => normals[4 + k],
         };
@@ -72,6 +76,17 @@ impl SurfaceTree {
             },
         }
     }
+}
+
+/// The foot of `p` on the plane of a triangle that it lies over, as [`plyflow_geometry::closest_on_triangle`] gives it, but with its weights
+/// divided, not multiplied by a reciprocal: a last bit of which distance fields, and runs on them, were made.
+fn on_face(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
+    let (ab, ac) = (sub(b, a), sub(c, a));
+    let along = |q: Vec3| (dot(ab, sub(p, q)), dot(ac, sub(p, q)));
+    let ((d1, d2), (d3, d4), (d5, d6)) = (along(a), along(b), along(c));
+    let (va, vb, vc) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
+    let sum = va + vb + vc;
+    add(a, add(scale(ab, vb / sum), scale(ac, vc / sum)))
 }
 
 /// For each facet the normals that decide the sign: face, edges, points. Not unit, directions only.

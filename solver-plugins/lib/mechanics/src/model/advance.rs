@@ -52,31 +52,33 @@ const TOGETHER: usize = 8;
 impl Model {
     /// Velocities and positions of the next step; works of the step.
     pub(super) fn advance(&mut self) {
-        let dt = self.dt;
-        let weight = self.body_acceleration;
-        let loaded =
-            weight != [0.0; 3] || !self.loads.force.is_empty() || !self.sums.pressure.is_empty();
+        let dt = self.state.dt;
+        let weight = self.boundary.body_acceleration;
+        let loaded = weight != [0.0; 3]
+            || !self.boundary.loads.force.is_empty()
+            || !self.elements.sums.pressure.is_empty();
         let moving = self.moving(loaded);
         // None are kept while nothing acts.
-        let loaded_nodes = if loaded { self.x.len() } else { 0 };
-        self.external_force.resize(loaded_nodes, [0.0; 3]);
-        let mut before = std::mem::take(&mut self.scratch.before);
+        let loaded_nodes = if loaded { self.state.x.len() } else { 0 };
+        self.boundary.external_force.resize(loaded_nodes, [0.0; 3]);
+        let mut before = std::mem::take(&mut self.workspace.before);
         before.clear();
-        let places = self.driven.iter().map(|n| *n as usize);
-        before.extend(places.map(|n| (self.x[n], self.v[n])));
-        let (sums, patch_sums) = (&self.sums, &self.patch_sums);
-        let free_mass = free_or_all(&self.free_mass, &self.mass);
-        let fixed = &self.supports.fixed;
-        let own_mass = &self.own_mass;
-        let chunks = self.x.len().div_ceil(NODE_CHUNK);
-        let external = chunks_or_none(&mut self.external_force, NODE_CHUNK, chunks);
-        let (loads, load_factor) = (&self.loads.force, self.load_factor);
-        self.x
+        let places = self.boundary.driven.iter().map(|n| *n as usize);
+        before.extend(places.map(|n| (self.state.x[n], self.state.v[n])));
+        let (sums, patch_sums) = (&self.elements.sums, &self.elements.patch_sums);
+        let free_mass = free_or_all(&self.topology.free_mass, &self.topology.mass);
+        let fixed = &self.boundary.supports.fixed;
+        let own_mass = &self.topology.own_mass;
+        let chunks = self.state.x.len().div_ceil(NODE_CHUNK);
+        let external = chunks_or_none(&mut self.boundary.external_force, NODE_CHUNK, chunks);
+        let (loads, load_factor) = (&self.boundary.loads.force, self.boundary.load_factor);
+        self.state
+            .x
             .par_chunks_mut(NODE_CHUNK)
-            .zip_eq(self.v.par_chunks_mut(NODE_CHUNK))
-            .zip_eq(self.force.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(self.state.v.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(self.state.force.par_chunks_mut(NODE_CHUNK))
             .zip_eq(external)
-            .zip_eq(self.contact_force.par_chunks_mut(NODE_CHUNK))
+            .zip_eq(self.contacts.force.par_chunks_mut(NODE_CHUNK))
             .enumerate()
             .with_max_len(TOGETHER)
             .with_min_len(team::least())
@@ -110,34 +112,34 @@ impl Model {
                     fixed: fixed.get(nodes).unwrap_or_default(),
                 })
             })
-            .collect_into_vec(&mut self.scratch.works);
-        let works = self.scratch.works.iter();
-        self.work = works.fold(NodeWork::default(), |sum, w| sum.add(*w));
+            .collect_into_vec(&mut self.workspace.works);
+        let works = self.workspace.works.iter();
+        self.workspace.work = works.fold(NodeWork::default(), |sum, w| sum.add(*w));
         self.follow(&before);
-        self.scratch.before = before;
-        if !self.work.kinetic.is_finite() {
+        self.workspace.before = before;
+        if !self.workspace.work.kinetic.is_finite() {
             let bad = |v: &V| !v.iter().all(|c| c.is_finite());
-            self.work.bad = self.v.iter().position(bad).map(|n| n as u32);
+            self.workspace.work.bad = self.state.v.iter().position(bad).map(|n| n as u32);
         }
         self.rotate();
-        self.max_speed = self.work.speed.sqrt();
-        self.max_acceleration = self.work.change.sqrt() / dt;
-        self.ledger.external += self.work.external;
-        self.ledger.damping += self.work.damping;
-        self.time += dt;
-        self.last_dt = dt;
-        self.kick = 1.0;
-        self.cycle += 1;
+        self.state.max_speed = self.workspace.work.speed.sqrt();
+        self.state.max_acceleration = self.workspace.work.change.sqrt() / dt;
+        self.state.ledger.external += self.workspace.work.external;
+        self.state.ledger.damping += self.workspace.work.damping;
+        self.state.time += dt;
+        self.state.last_dt = dt;
+        self.state.kick = 1.0;
+        self.state.cycle += 1;
     }
 
     /// What this step does to velocities and spins.
     pub(super) fn moving(&self, loaded: bool) -> Moving {
-        let (dt, alpha) = (self.dt, self.settings.damping);
+        let (dt, alpha) = (self.state.dt, self.topology.settings.damping);
         Moving {
             dt,
             lo: 1.0 / dt - 0.5 * alpha,
             hi: 1.0 / (1.0 / dt + 0.5 * alpha),
-            kick: self.kick,
+            kick: self.state.kick,
             damping: alpha,
             loaded,
         }
@@ -145,37 +147,49 @@ impl Model {
 
     /// Puts the driven nodes where their drive wants them. `before`: their positions and velocities.
     fn follow(&mut self, before: &[(V, V)]) {
-        let Some(drive) = &self.drive else { return };
-        let dt = self.dt;
-        for (k, (n, (x, v))) in self.driven.iter().zip(before).enumerate() {
+        let Some(drive) = &self.boundary.drive else {
+            return;
+        };
+        let dt = self.state.dt;
+        for (k, (n, (x, v))) in self.boundary.driven.iter().zip(before).enumerate() {
             let n = *n as usize;
-            let mut target = drive.position(k, self.time + dt);
-            if let Some(hold) = drive.hold(k, self.time) {
-                let way = hold.in_plane(sub(*x, drive.position(k, self.time)));
-                let creep =
-                    hold.creep(&self.anchors, k, way, self.force[n], dt * dt / self.mass[n]);
+            let mut target = drive.position(k, self.state.time + dt);
+            if let Some(hold) = drive.hold(k, self.state.time) {
+                let way = hold.in_plane(sub(*x, drive.position(k, self.state.time)));
+                let creep = hold.creep(
+                    &self.boundary.anchors,
+                    k,
+                    way,
+                    self.state.force[n],
+                    dt * dt / self.topology.mass[n],
+                );
                 target = add(target, add(way, creep));
             }
             let next = scale(sub(target, *x), 1.0 / dt);
             // What holds the node makes up for the forces on it: its work is external.
             let mean = scale(add(next, *v), 0.5);
-            let inertia = scale(sub(next, *v), self.mass[n] / dt);
-            let external = self.external_force.get(n).copied().unwrap_or_default();
-            let held = sub(inertia, sub(self.force[n], external));
-            self.ledger.external += dot(held, mean) * dt;
-            self.supports.reaction[k] = sub(inertia, self.force[n]);
-            self.x[n] = target;
-            self.v[n] = next;
-            self.work.count(self.mass[n], n, next);
-            self.work.speed = self.work.speed.max(dot(next, next));
+            let inertia = scale(sub(next, *v), self.topology.mass[n] / dt);
+            let external = self
+                .boundary
+                .external_force
+                .get(n)
+                .copied()
+                .unwrap_or_default();
+            let held = sub(inertia, sub(self.state.force[n], external));
+            self.state.ledger.external += dot(held, mean) * dt;
+            self.boundary.supports.reaction[k] = sub(inertia, self.state.force[n]);
+            self.state.x[n] = target;
+            self.state.v[n] = next;
+            self.workspace.work.count(self.topology.mass[n], n, next);
+            self.workspace.work.speed = self.workspace.work.speed.max(dot(next, next));
             let change = sub(next, *v);
-            self.work.change = self.work.change.max(dot(change, change));
+            self.workspace.work.change = self.workspace.work.change.max(dot(change, change));
         }
     }
 
     /// Masses as [`Model::advance`] wants them.
     pub(super) fn set_free_masses(&mut self) {
-        self.free_mass = free_of(&self.mass, &self.driven);
+        self.topology.free_mass = free_of(&self.topology.mass, &self.boundary.driven);
         self.set_free_inertias();
     }
 }

@@ -10,40 +10,45 @@ impl Model {
     /// # Errors
     /// When the bytes cannot be written or are not those of such a model; the model is then of no use.
     pub fn archive(&mut self, a: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        a.numbers(self.x.as_flattened_mut())?;
-        a.numbers(self.v.as_flattened_mut())?;
-        a.numbers(self.normals.as_flattened_mut())?;
-        if let Some(r) = self.rotations.as_deref_mut() {
+        a.numbers(self.state.x.as_flattened_mut())?;
+        a.numbers(self.state.v.as_flattened_mut())?;
+        a.numbers(self.state.normals.as_flattened_mut())?;
+        if let Some(r) = self.state.rotations.as_deref_mut() {
             a.numbers(r.spin.as_flattened_mut())?;
         }
-        a.value(&mut self.pressures)?;
-        a.value(&mut self.last_above)?;
-        a.value(&mut self.time)?;
-        a.value(&mut self.cycle)?;
-        a.value(&mut self.dt)?;
-        a.value(&mut self.last_dt)?;
-        a.value(&mut self.kick)?;
-        a.value(&mut self.load_factor)?;
-        a.value(&mut self.body_acceleration)?;
-        a.value(&mut self.max_speed)?;
-        a.value(&mut self.max_acceleration)?;
-        a.value(&mut self.anchors)?;
-        a.value(&mut self.ledger)?;
-        a.value(&mut self.interfaces)?;
-        for batch in self.blocks.iter_mut().flat_map(|b| &mut b.batches) {
+        a.value(&mut self.boundary.pressures)?;
+        a.value(&mut self.boundary.last_above)?;
+        a.value(&mut self.state.time)?;
+        a.value(&mut self.state.cycle)?;
+        a.value(&mut self.state.dt)?;
+        a.value(&mut self.state.last_dt)?;
+        a.value(&mut self.state.kick)?;
+        a.value(&mut self.boundary.load_factor)?;
+        a.value(&mut self.boundary.body_acceleration)?;
+        a.value(&mut self.state.max_speed)?;
+        a.value(&mut self.state.max_acceleration)?;
+        a.value(&mut self.boundary.anchors)?;
+        a.value(&mut self.state.ledger)?;
+        a.value(&mut self.contacts.interfaces)?;
+        for batch in self.elements.blocks.iter_mut().flat_map(|b| &mut b.batches) {
             a.numbers(&mut batch.history)?;
             a.numbers(&mut batch.material_history)?;
         }
-        for batch in self.patches.iter_mut().flat_map(|b| &mut b.batches) {
+        for batch in self
+            .elements
+            .patches
+            .iter_mut()
+            .flat_map(|b| &mut b.batches)
+        {
             a.numbers(&mut batch.history)?;
         }
-        for contact in &mut self.rigid_contacts {
+        for contact in &mut self.contacts.rigid {
             contact.archive(a)?;
         }
-        for contact in &mut self.sheet_contacts {
+        for contact in &mut self.contacts.sheets {
             contact.archive(a)?;
         }
-        for contact in &mut self.self_contacts {
+        for contact in &mut self.contacts.folds {
             contact.archive(a)?;
         }
         Ok(())

@@ -44,7 +44,7 @@ impl Rates {
 pub(super) struct Buffer<const N: usize>(pub(super) [f64; N]);
 
 /// What the batches of a block are computed in, one after the other.
-pub(super) struct Workspace {
+pub(super) struct BatchWorkspace {
     position: Buffer<{ 12 * LANES }>,
     rates: Rates,
     /// `[4][3][LANES]` (N).
@@ -59,7 +59,7 @@ pub(super) struct Workspace {
     energy: Buffer<{ PF_ENERGIES * LANES }>,
 }
 
-impl Default for Workspace {
+impl Default for BatchWorkspace {
     fn default() -> Self {
         Self {
             position: Buffer([0.0; 12 * LANES]),
@@ -160,7 +160,7 @@ pub(super) struct Motion<'a> {
 }
 
 /// Forces of a batch into `work`; cell areas too where they are needed.
-pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Workspace) {
+pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut BatchWorkspace) {
     let element = present.sheets[batch.sheet as usize].element_of(batch);
     let motion = present.motion;
     gather(&batch.nodes, motion.x, &mut work.position.0);

@@ -241,12 +241,17 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
 
 thread_local! {
     /// What a thread computes blocks in, kept from step to step: neither asked for nor cleared anew.
-    static WORK: RefCell<Box<Workspace>> = RefCell::default();
+    static WORK: RefCell<Box<BatchWorkspace>> = RefCell::default();
     /// The same for blocks of patches.
     static PATCH_WORK: RefCell<Box<PatchWorkspace>> = RefCell::default();
 }
 
-fn run_block(block: &mut Block<Batch>, part: Part<'_>, present: Present<'_>, work: &mut Workspace) {
+fn run_block(
+    block: &mut Block<Batch>,
+    part: Part<'_>,
+    present: Present<'_>,
+    work: &mut BatchWorkspace,
+) {
     part.force.fill(Sum::default());
     part.moment.fill(Sum::default());
     part.pressure.fill(Sum::default());

@@ -31,58 +31,54 @@ impl Model {
     ) -> Result<Self, MechanicsError> {
         let n = points.len();
         let mut model = Self {
-            v: vec![[0.0; 3]; n],
-            mass: vec![0.0; n],
-            start: points.as_slice().into(),
-            normals: vec![[0.0, 0.0, 1.0]; n],
-            sheets: Vec::new(),
-            cells: Vec::new(),
-            neighbours: Vec::new(),
-            sheet_contacts: Vec::new(),
-            self_contacts: Vec::new(),
-            rigid_contacts: Vec::new(),
-            pressures: Pressures::default(),
-            last_above: 0.0,
-            time: 0.0,
-            cycle: 0,
-            dt: settings.target_step,
-            ledger: Ledger::default(),
-            spent: Spent::default(),
-            settings,
-            blocks: Vec::new(),
-            patches: Vec::new(),
-            pressed_below: Vec::new(),
-            cell_place: Vec::new(),
-            sums: Sums::default(),
-            patch_sums: Sums::default(),
-            free_mass: Vec::new(),
-            force: vec![[0.0; 3]; n],
-            contact_force: vec![[0.0; 3]; n],
-            external_force: Vec::new(),
-            own_mass: vec![0.0; n],
-            rotations: None,
-            mirroring: Mirroring::new(mirrors, &points),
-            supports: Supports::default(),
-            body_acceleration: [0.0; 3],
-            load_factor: 1.0,
-            loads: Loads::default(),
-            last_dt: 0.0,
-            shortest_edge: 0.0,
-            contact_room: Vec::new(),
-            kick: 1.0,
-            held: vec![Held::Free; n],
-            driven: Vec::new(),
-            anchors: Anchors::default(),
-            drive: None,
-            max_speed: 0.0,
-            max_acceleration: 0.0,
-            contact: ContactEnergy::default(),
-            interfaces: Vec::new(),
-            step_energies: Vec::new(),
-            work: NodeWork::default(),
-            scratch: Scratch::default(),
-            sharing: Sharing::default(),
-            x: points,
+            topology: Topology {
+                start: points.as_slice().into(),
+                sheets: Vec::new(),
+                cells: Vec::new(),
+                neighbours: Vec::new(),
+                cell_place: Vec::new(),
+                pressed_below: Vec::new(),
+                mass: vec![0.0; n],
+                own_mass: vec![0.0; n],
+                free_mass: Vec::new(),
+                shortest_edge: 0.0,
+                mirroring: Mirroring::new(mirrors, &points),
+                settings,
+            },
+            state: State {
+                x: points,
+                v: vec![[0.0; 3]; n],
+                normals: vec![[0.0, 0.0, 1.0]; n],
+                rotations: None,
+                force: vec![[0.0; 3]; n],
+                time: 0.0,
+                cycle: 0,
+                dt: settings.target_step,
+                last_dt: 0.0,
+                kick: 1.0,
+                max_speed: 0.0,
+                max_acceleration: 0.0,
+                ledger: Ledger::default(),
+            },
+            elements: Elements::default(),
+            contacts: Contacts {
+                force: vec![[0.0; 3]; n],
+                ..Contacts::default()
+            },
+            boundary: Boundary {
+                pressures: Pressures::default(),
+                last_above: 0.0,
+                body_acceleration: [0.0; 3],
+                load_factor: 1.0,
+                loads: Loads::default(),
+                supports: Supports::default(),
+                held: vec![Held::Free; n],
+                driven: Vec::new(),
+                drive: None,
+                anchors: Anchors::default(),
+                external_force: Vec::new(),
+            },
+            workspace: Workspace::default(),
         };
         for spec in specs {
             model.add_sheet(spec)?;
@@ -92,15 +88,19 @@ impl Model {
     }
 
     fn add_sheet(&mut self, spec: SheetSpec) -> Result<(), MechanicsError> {
-        let sheet_index = self.sheets.len() as u32;
-        let (cell0, block0, patch0) = (self.cells.len(), self.blocks.len(), self.patches.len());
+        let sheet_index = self.topology.sheets.len() as u32;
+        let (cell0, block0, patch0) = (
+            self.topology.cells.len(),
+            self.elements.blocks.len(),
+            self.elements.patches.len(),
+        );
         let cells: Vec<[u32; 4]> = spec
             .cells
             .iter()
             .map(|c| c.map(|k| spec.nodes[k as usize]))
             .collect();
         let mesh = QuadMesh {
-            points: self.x.clone(),
+            points: self.state.x.clone(),
             cells: cells.clone(),
         };
         let shift = |c: u32| {
@@ -111,8 +111,11 @@ impl Model {
             }
         };
         let mut neighbours = mesh.neighbours();
-        self.mirroring.mark(&cells, &self.x, &mut neighbours);
-        self.neighbours
+        self.topology
+            .mirroring
+            .mark(&cells, &self.state.x, &mut neighbours);
+        self.topology
+            .neighbours
             .extend(neighbours.into_iter().map(|e| e.map(shift)));
         let material = spec.element.material.reference().sizes();
         let s = spec.element.sizes;
@@ -122,24 +125,28 @@ impl Model {
             .iter()
             .map(|c| {
                 scale(
-                    c.iter().fold([0.0; 3], |m, n| add(m, self.x[*n as usize])),
+                    c.iter()
+                        .fold([0.0; 3], |m, n| add(m, self.state.x[*n as usize])),
                     0.25,
                 )
             })
             .collect();
         let orders = orders(&spec, &centres);
-        self.cell_place
+        self.topology
+            .cell_place
             .resize(cell0 + cells.len(), CellPlace::default());
         let pressed = |c: usize| matches!(spec.pressed[c], Pressed::Below | Pressed::Both);
-        self.pressed_below.extend((0..cells.len()).map(pressed));
+        self.topology
+            .pressed_below
+            .extend((0..cells.len()).map(pressed));
         let groups = (orders.iter()).flat_map(|(e, o)| o.chunks(BLOCK * LANES).map(|g| (*e, g)));
         for (kind, group) in groups {
             let used = group.iter().flat_map(|c| cells[*c as usize]);
             let mut block = Block::new(used);
             for (b, chunk) in group.chunks(LANES).enumerate() {
                 for (l, c) in chunk.iter().enumerate() {
-                    self.cell_place[cell0 + *c as usize] = CellPlace {
-                        block: self.blocks.len() as u32,
+                    self.topology.cell_place[cell0 + *c as usize] = CellPlace {
+                        block: self.elements.blocks.len() as u32,
                         batch: b as u16,
                         lane: l as u16,
                     };
@@ -148,21 +155,21 @@ impl Model {
                 let batch = element_batch(of, &spec, &cells, chunk, &block);
                 block.batches.push(batch);
             }
-            self.blocks.push(block);
+            self.elements.blocks.push(block);
         }
-        if rotates && self.rotations.is_none() {
-            self.rotations = Some(Box::new(Rotations::new(self.x.len())));
+        if rotates && self.state.rotations.is_none() {
+            self.state.rotations = Some(Box::new(Rotations::new(self.state.x.len())));
         }
         if s.patch_nodes > 0 && material.has_bending {
             self.add_patches(sheet_index, &spec, material.bending_history)?;
         }
-        self.cells.extend(cells);
+        self.topology.cells.extend(cells);
         let mut sheet = Sheet {
             name: spec.name,
-            nodes: self.mirroring.own(spec.nodes),
-            cell_range: (cell0, self.cells.len()),
-            block_range: (block0, self.blocks.len()),
-            patch_range: (patch0, self.patches.len()),
+            nodes: self.topology.mirroring.own(spec.nodes),
+            cell_range: (cell0, self.topology.cells.len()),
+            block_range: (block0, self.elements.blocks.len()),
+            patch_range: (patch0, self.elements.patches.len()),
             thickness: material.thickness,
             added_mass: 0.0,
             element: spec.element,
@@ -176,7 +183,7 @@ impl Model {
             &spec.least_areal_mass,
             material.areal_mass,
         )?;
-        self.sheets.push(sheet);
+        self.topology.sheets.push(sheet);
         Ok(())
     }
 
@@ -200,7 +207,7 @@ impl Model {
         let centres: Vec<V> = spec
             .patches
             .iter()
-            .map(|p| self.x[spec.nodes[p.nodes[0] as usize] as usize])
+            .map(|p| self.state.x[spec.nodes[p.nodes[0] as usize] as usize])
             .collect();
         let order = compact_order(&centres, BLOCK * LANES);
         let mut shared = Shared::default();
@@ -215,7 +222,7 @@ impl Model {
                     self.patch_batch(sheet, spec, count, of, &block, bending_history, &mut shared);
                 block.batches.push(batch?);
             }
-            self.patches.push(block);
+            self.elements.patches.push(block);
         }
         Ok(())
     }
@@ -254,7 +261,7 @@ impl Model {
         };
         let mut constants = Aligned::zeros(s.patch_constants * LANES);
         let mut position = Aligned::zeros(s.patch_nodes * 3 * LANES);
-        gather(&batch.nodes, &self.x, &mut position);
+        gather(&batch.nodes, &self.state.x, &mut position);
         let count: Vec<f64> = (0..LANES).map(|l| of(l).nodes.len() as f64).collect();
         let count = Aligned::from(count.as_slice());
         let area: Vec<f64> = (0..LANES).map(|l| of(l).area).collect();
@@ -305,14 +312,14 @@ impl Model {
         let mut mass = Aligned::zeros(4 * LANES);
         let mut inertia = Aligned::zeros(4 * LANES);
         let rates = Rates::zero();
-        let blocks = &mut self.blocks[sheet.block_range.0..sheet.block_range.1];
+        let blocks = &mut self.elements.blocks[sheet.block_range.0..sheet.block_range.1];
         let batches = blocks.iter_mut().flat_map(|b| &mut b.batches);
         let mut shared = Shared::default();
         let cells = orders.iter().flat_map(|(_, order)| order.chunks(LANES));
         let mut added_mass = 0.0;
         for (batch, cells) in batches.zip(cells) {
             let element = sheet.element_of(batch);
-            gather(&batch.nodes, &self.x, &mut position);
+            gather(&batch.nodes, &self.state.x, &mut position);
             let mut constants = Aligned::zeros(element.sizes.constants * LANES);
             let mut raw = empty_element_batch(element, 0.0, &position);
             raw.axis = axis.as_ptr();
@@ -342,7 +349,7 @@ impl Model {
             let layers = |l: usize| batch_layers.get(l).copied().unwrap_or(1.0);
             let mut factors = [1.0; LANES];
             for l in 0..batch.count as usize {
-                let critical = step[l] * self.settings.safety;
+                let critical = step[l] * self.topology.settings.safety;
                 if !(critical > 0.0 && critical.is_finite()) {
                     return Err(MechanicsError::Input(format!(
                         "sheet '{}': an element has a critical step of {} s; its mesh or \
@@ -350,7 +357,7 @@ impl Model {
                         sheet.name, step[l]
                     )));
                 }
-                let factor = (self.settings.target_step / critical)
+                let factor = (self.topology.settings.target_step / critical)
                     .powi(2)
                     .max(least[cells[l] as usize] / areal_mass)
                     .max(1.0);
@@ -358,9 +365,9 @@ impl Model {
                 for k in 0..4 {
                     let own = mass[k * LANES + l] * layers(l);
                     let node = batch.nodes[k][l] as usize;
-                    self.mass[node] += own * factor;
-                    self.own_mass[node] += own;
-                    if let Some(r) = self.rotations.as_deref_mut()
+                    self.topology.mass[node] += own * factor;
+                    self.topology.own_mass[node] += own;
+                    if let Some(r) = self.state.rotations.as_deref_mut()
                         && element.rotates()
                     {
                         r.inertia[node] += inertia[k * LANES + l] * layers(l) * factor;
@@ -378,49 +385,50 @@ impl Model {
     }
 
     fn finish(&mut self) -> Result<(), MechanicsError> {
-        let is_ghost = |n: usize| self.mirroring.is_ghost(n as u32);
+        let is_ghost = |n: usize| self.topology.mirroring.is_ghost(n as u32);
         let without = |(n, m): (usize, &f64)| *m <= 0.0 && !is_ghost(n);
-        if let Some(i) = self.mass.iter().enumerate().position(without) {
+        if let Some(i) = self.topology.mass.iter().enumerate().position(without) {
             return Err(MechanicsError::Input(format!(
                 "node {i} belongs to no element"
             )));
         }
-        let n = self.x.len();
-        let edge = |a: u32, b: u32| norm(sub(self.x[a as usize], self.x[b as usize]));
-        self.shortest_edge = self
+        let n = self.state.x.len();
+        let edge = |a: u32, b: u32| norm(sub(self.state.x[a as usize], self.state.x[b as usize]));
+        self.topology.shortest_edge = self
+            .topology
             .cells
             .iter()
             .flat_map(|c| (0..4).map(move |k| edge(c[k], c[(k + 1) % 4])))
             .fold(f64::INFINITY, f64::min);
-        self.sums = Sums::new(n, &self.blocks);
-        self.sums.area = self.sums.zeros();
+        self.elements.sums = Sums::new(n, &self.elements.blocks);
+        self.elements.sums.area = self.elements.sums.zeros();
         let pressed = |b: &Block<Batch>| b.batches.iter().any(|b| !b.pressed.is_empty());
-        if self.blocks.iter().any(pressed) {
-            self.sums.pressure = self.sums.zeros();
+        if self.elements.blocks.iter().any(pressed) {
+            self.elements.sums.pressure = self.elements.sums.zeros();
         }
-        if self.rotations.is_some() {
-            self.sums.moment = self.sums.zeros();
+        if self.state.rotations.is_some() {
+            self.elements.sums.moment = self.elements.sums.zeros();
         }
-        self.patch_sums = Sums::new(n, &self.patches);
-        self.mirroring.place(&self.patch_sums)?;
+        self.elements.patch_sums = Sums::new(n, &self.elements.patches);
+        self.topology.mirroring.place(&self.elements.patch_sums)?;
         self.set_free_masses();
         self.hold_at_planes();
         self.internal_forces(false, false)?;
-        self.normals();
+        self.compute_normals();
         Ok(())
     }
 
     /// Sets which nodes are driven and by what. The order of `nodes` is that of [`Drive::position`].
     pub fn set_driven(&mut self, nodes: Vec<u32>, drive: Box<dyn Drive>) {
-        self.held.fill(Held::Free);
+        self.boundary.held.fill(Held::Free);
         for n in &nodes {
-            self.held[*n as usize] = Held::Driven;
+            self.boundary.held[*n as usize] = Held::Driven;
         }
-        self.supports.reaction = vec![[0.0; 3]; nodes.len()];
-        self.supports.reaction_moment = vec![[0.0; 3]; nodes.len()];
-        self.driven = nodes;
-        self.drive = Some(drive);
-        self.anchors = Anchors::default();
+        self.boundary.supports.reaction = vec![[0.0; 3]; nodes.len()];
+        self.boundary.supports.reaction_moment = vec![[0.0; 3]; nodes.len()];
+        self.boundary.driven = nodes;
+        self.boundary.drive = Some(drive);
+        self.boundary.anchors = Anchors::default();
         self.set_free_masses();
     }
 }

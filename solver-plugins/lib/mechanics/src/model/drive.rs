@@ -5,10 +5,10 @@ use super::*;
 impl Model {
     /// Drives further nodes, which no drive has yet, besides those that are driven already.
     pub fn drive_also(&mut self, nodes: Vec<u32>, drive: Box<dyn Drive>) {
-        let mut all = std::mem::take(&mut self.driven);
+        let mut all = std::mem::take(&mut self.boundary.driven);
         let first = all.len();
         all.extend(nodes);
-        let drive: Box<dyn Drive> = match self.drive.take() {
+        let drive: Box<dyn Drive> = match self.boundary.drive.take() {
             None => drive,
             Some(old) => Box::new(Both {
                 old,
@@ -21,7 +21,7 @@ impl Model {
 
     /// Whether a node follows a drive.
     pub fn is_driven(&self, node: u32) -> bool {
-        self.held[node as usize] == Held::Driven
+        self.boundary.held[node as usize] == Held::Driven
     }
 }
 

@@ -70,23 +70,28 @@ impl Hold {
 impl Model {
     /// Lets held nodes go with the pull of their surroundings alone, whatever their stiffness, until [`Model::anchor`].
     pub fn loosen(&mut self) {
-        self.anchors.loose = true;
+        self.boundary.anchors.loose = true;
     }
 
     /// Ends what [`Model::loosen`] began: the stiffness of held nodes counts from where they are now, off the positions of their
     /// drive. So what the drive has wrong now is no force, only what it does wrong from now on.
     pub fn anchor(&mut self) {
-        let Some(drive) = &self.drive else { return };
+        let Some(drive) = &self.boundary.drive else {
+            return;
+        };
         let at = |(k, n): (usize, &u32)| {
-            let hold = drive.hold(k, self.time);
+            let hold = drive.hold(k, self.state.time);
             hold.map_or(Anchor::default(), |hold| Anchor {
-                way: hold.in_plane(sub(self.x[*n as usize], drive.position(k, self.time))),
+                way: hold.in_plane(sub(
+                    self.state.x[*n as usize],
+                    drive.position(k, self.state.time),
+                )),
                 normal: hold.normal,
             })
         };
-        self.anchors = Anchors {
+        self.boundary.anchors = Anchors {
             loose: false,
-            at: self.driven.iter().enumerate().map(at).collect(),
+            at: self.boundary.driven.iter().enumerate().map(at).collect(),
         };
     }
 }

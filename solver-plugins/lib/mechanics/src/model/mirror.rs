@@ -149,19 +149,19 @@ impl Mirroring {
 impl Model {
     /// The planes at which the model is cut.
     pub fn planes(&self) -> Planes {
-        self.mirroring.planes
+        self.topology.mirroring.planes
     }
 
     /// Puts the ghosts to their places after [`Model::x`] was changed by hand; steps do it themselves.
     pub fn place_ghosts(&mut self) {
-        self.mirroring.follow(&mut self.x);
+        self.topology.mirroring.follow(&mut self.state.x);
     }
 
     /// Holds the nodes of the planes on them. A rotation about an axis in a plane would turn it: only that about its
     /// normal is free.
     pub(super) fn hold_at_planes(&mut self) {
         let mut fixed = std::collections::BTreeMap::<u32, Fixed>::new();
-        for (n, k) in &self.mirroring.held {
+        for (n, k) in &self.topology.mirroring.held {
             let k = usize::from(*k);
             let of = fixed.entry(*n).or_default();
             of.translations[k] = true;
@@ -177,19 +177,19 @@ impl Model {
     /// Adds the contact of all nodes beside a mirror plane with it, without friction: there they meet their own images.
     /// Call it after [`Model::set_contact_stiffness`].
     pub fn add_plane_contacts(&mut self, settings: &ContactSettings) {
-        let dt2 = self.settings.target_step.powi(2);
-        for k in (0..2).filter(|k| self.mirroring.planes.0[*k]) {
-            let mut seen = vec![false; self.x.len()];
-            for sheet in &self.sheets {
+        let dt2 = self.topology.settings.target_step.powi(2);
+        for k in (0..2).filter(|k| self.topology.mirroring.planes.0[*k]) {
+            let mut seen = vec![false; self.state.x.len()];
+            for sheet in &self.topology.sheets {
                 let mut items = Vec::new();
                 for n in &sheet.nodes {
                     let i = *n as usize;
-                    if std::mem::replace(&mut seen[i], true) || self.x[i][k] == 0.0 {
+                    if std::mem::replace(&mut seen[i], true) || self.state.x[i][k] == 0.0 {
                         continue;
                     }
                     let mut item = RigidItem::new(*n);
-                    item.stiffness = PLANE_STIFFNESS * self.mass[i] / dt2;
-                    let critical = 2.0 * (item.stiffness * self.mass[i]).sqrt();
+                    item.stiffness = PLANE_STIFFNESS * self.topology.mass[i] / dt2;
+                    let critical = 2.0 * (item.stiffness * self.topology.mass[i]).sqrt();
                     item.damping = (settings.damping_ratio * critical) as f32;
                     items.push(item);
                 }
@@ -199,7 +199,8 @@ impl Model {
                     augmentation: 0.0,
                     ..*settings
                 };
-                self.rigid_contacts
+                self.contacts
+                    .rigid
                     .push(RigidContact::new(name, surface, 0.0, 0.0, &without, items));
             }
         }

@@ -1,5 +1,6 @@
 //! Nodes, sheets, contacts and loads; one central-difference step.
 
+mod access;
 mod advance;
 mod archive;
 mod batch;
@@ -8,6 +9,7 @@ mod build;
 mod drive;
 mod hold;
 mod mirror;
+mod parts;
 mod query;
 mod rotation;
 mod shape;
@@ -22,6 +24,7 @@ use blocks::*;
 use hold::Anchors;
 pub use hold::Hold;
 use mirror::Mirroring;
+use parts::*;
 use rotation::Rotations;
 pub use shape::ASK_INTERVAL;
 pub use spent::{Clock, Spent};
@@ -87,126 +90,17 @@ pub struct Pressures {
     pub above: f64,
 }
 
-/// A model. Per-node arrays are in the model's numbering.
+/// A model: sheets with their contacts, what acts on them, and where they are. Per-node arrays are in the model's numbering.
 pub struct Model {
-    /// `[n]` positions (m).
-    pub x: Vec<V>,
-    /// `[n]` velocities at the half step (m/s).
-    pub v: Vec<V>,
-    /// `[n]` masses (kg).
-    pub mass: Vec<f64>,
-    /// `[n]` positions with which it was built (m); shared, so that what needs them keeps no copy of its own.
-    start: Arc<[V]>,
-    /// `[n]` unit normals of the sheets.
-    pub normals: Vec<V>,
-    /// Sheets from the tool upwards.
-    pub sheets: Vec<Sheet>,
-    /// `[cells][4]` model nodes of all sheets' cells.
-    pub cells: Vec<[u32; 4]>,
-    neighbours: Vec<[u32; 4]>,
-    /// Sheet on sheet.
-    pub sheet_contacts: Vec<SheetContact>,
-    /// Sheets on themselves; added by [`Model::add_self_contact`].
-    pub self_contacts: Vec<SelfContact>,
-    /// Sheets on rigid surfaces.
-    pub rigid_contacts: Vec<RigidContact>,
-    /// Pressures, set before each step.
-    pub pressures: Pressures,
-    /// The pressure above (Pa) in the last step.
-    last_above: f64,
-    /// Time (s) of the positions.
-    pub time: f64,
-    /// Steps done.
-    pub cycle: u64,
-    /// Step (s).
-    pub dt: f64,
-    /// Accumulated losses and external work, and the stored energies of the last ledger.
-    pub ledger: Ledger,
-    /// Where the time goes.
-    pub spent: Spent,
-    settings: StepSettings,
-    blocks: Vec<Block<Batch>>,
-    patches: Vec<Block<PatchBatch>>,
-    /// `[cells]` whether the cavity presses from below.
-    pressed_below: Vec<bool>,
-    /// `[cells]` where their elements are.
-    cell_place: Vec<CellPlace>,
-    sums: Sums,
-    patch_sums: Sums,
-    /// `[n]` masses (kg), 0 for driven nodes; empty when none is.
-    free_mass: Vec<f64>,
-    /// `[n]` forces on the nodes in the last step (N).
-    force: Vec<V>,
-    /// `[n]` pressure, weight and nodal loads (N): what does external work on free nodes. Empty when nothing acts.
-    external_force: Vec<V>,
-    /// `[n]` forces of the contacts (N); zero between steps.
-    contact_force: Vec<V>,
-    /// `[n]` masses without scaling (kg): what has weight.
-    own_mass: Vec<f64>,
-    rotations: Option<Box<Rotations>>,
-    mirroring: Mirroring,
-    supports: Supports,
-    /// Acceleration of free fall (m/s2), global axes.
-    pub body_acceleration: V,
-    /// What the nodal loads are multiplied by.
-    pub load_factor: f64,
-    loads: Loads,
-    last_dt: f64,
-    /// Shortest edge of a cell at the start (m).
-    shortest_edge: f64,
-    /// `[n]` stiffness that self-contacts may add to a node (N/m); empty without them.
-    contact_room: Vec<f64>,
-    /// 1, or 1/2 in the first step from rest: velocities live at half steps.
-    kick: f64,
-    held: Vec<Held>,
-    driven: Vec<u32>,
-    drive: Option<Box<dyn Drive>>,
-    anchors: Anchors,
-    max_speed: f64,
-    /// Largest acceleration in the last step (m/s2).
-    max_acceleration: f64,
-    contact: ContactEnergy,
-    /// By contact, rigid ones, sheets on sheets, sheets on themselves: stored at present, lost so far (J).
-    interfaces: Vec<ContactEnergy>,
-    /// The same: stored at present, lost in the last step (J).
-    step_energies: Vec<ContactEnergy>,
-    work: NodeWork,
-    scratch: Scratch,
-    sharing: Sharing,
-}
-
-/// Kept from step to step only for their room: a step allocates nothing.
-#[derive(Default)]
-struct Scratch {
-    /// By chunk of nodes.
-    works: Vec<NodeWork>,
-    /// By driven node: position and velocity before the step.
-    before: Vec<(V, V)>,
-    /// By driven node: spin before the step.
-    spins: Vec<V>,
-    /// Parts of a volume (m3).
-    volumes: Vec<f64>,
-}
-
-/// Where the element of a cell is.
-#[derive(Debug, Clone, Copy, Default)]
-struct CellPlace {
-    block: u32,
-    batch: u16,
-    lane: u16,
-}
-
-/// Sums over nodes of one step (J), and the largest speed and change of speed.
-#[derive(Debug, Clone, Copy, Default)]
-struct NodeWork {
-    kinetic: f64,
-    external: f64,
-    damping: f64,
-    /// Squared (m2/s2).
-    speed: f64,
-    /// Squared (m2/s2).
-    change: f64,
-    bad: Option<u32>,
+    /// What changes from step to step.
+    state: State,
+    /// What stays as it was built.
+    topology: Topology,
+    elements: Elements,
+    contacts: Contacts,
+    /// What holds, drives and presses.
+    boundary: Boundary,
+    workspace: Workspace,
 }
 
 /// Adds the forces of all contacts to `force` (N), one after the other.
@@ -228,28 +122,6 @@ fn scatter_contacts(
     }
 }
 
-impl NodeWork {
-    /// Counts a node of mass or rotary inertia `m` with its new velocity or spin.
-    #[inline(always)]
-    fn count(&mut self, m: f64, node: usize, v: V) {
-        let v2 = dot(v, v);
-        self.kinetic += 0.5 * m * v2;
-        if !v2.is_finite() {
-            self.bad = self.bad.or(Some(node as u32));
-        }
-    }
-
-    fn add(mut self, o: Self) -> Self {
-        self.kinetic += o.kinetic;
-        self.external += o.external;
-        self.damping += o.damping;
-        self.speed = self.speed.max(o.speed);
-        self.change = self.change.max(o.change);
-        self.bad = self.bad.or(o.bad);
-        self
-    }
-}
-
 /// Nodes that are moved together.
 const NODE_CHUNK: usize = 256;
 
@@ -265,44 +137,59 @@ impl Model {
     /// `computed` put on the nodes, by one thread. With `fields`, the elements' fields too.
     fn internal_forces(&mut self, fields: bool, computed: bool) -> Result<(), MechanicsError> {
         let present = Present {
-            sheets: &self.sheets,
+            sheets: &self.topology.sheets,
             motion: Motion {
-                x: &self.x,
-                v: &self.v,
-                spin: self.rotations.as_deref().map_or(&[], |r| &r.spin),
-                dt: self.last_dt,
+                x: &self.state.x,
+                v: &self.state.v,
+                spin: self.state.rotations.as_deref().map_or(&[], |r| &r.spin),
+                dt: self.state.last_dt,
             },
-            pressures: self.pressures,
-            areas: self.cycle.is_multiple_of(NORMAL_INTERVAL),
+            pressures: self.boundary.pressures,
+            areas: self.state.cycle.is_multiple_of(NORMAL_INTERVAL),
             fields,
         };
         let scatter = || {
             if computed {
-                let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
-                let folds = &self.self_contacts;
-                scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
+                let (rigid, sheets) = (&self.contacts.rigid, &self.contacts.sheets);
+                let folds = &self.contacts.folds;
+                scatter_contacts(
+                    rigid,
+                    sheets,
+                    folds,
+                    &self.topology.cells,
+                    &mut self.contacts.force,
+                );
             }
         };
         let elements = || {
-            run_blocks(&mut self.blocks, &mut self.sums, present);
-            run_patch_blocks(&mut self.patches, &mut self.patch_sums, present);
+            run_blocks(&mut self.elements.blocks, &mut self.elements.sums, present);
+            run_patch_blocks(
+                &mut self.elements.patches,
+                &mut self.elements.patch_sums,
+                present,
+            );
         };
         // The first to come takes the first half of the blocks, whose nodes it also moves: they are in its cache.
         team::join(elements, scatter);
-        self.mirroring.hand_over(&mut self.patch_sums.force);
-        let failed = self.blocks.iter().map(|b| b.failed);
-        let failed = failed.chain(self.patches.iter().map(|b| b.failed));
+        self.topology
+            .mirroring
+            .hand_over(&mut self.elements.patch_sums.force);
+        let failed = self.elements.blocks.iter().map(|b| b.failed);
+        let failed = failed.chain(self.elements.patches.iter().map(|b| b.failed));
         match failed.flatten().next() {
-            Some((code, sheet)) => component_status(code, &self.sheets[sheet as usize].name),
+            Some((code, sheet)) => {
+                component_status(code, &self.topology.sheets[sheet as usize].name)
+            }
             None => Ok(()),
         }
     }
 
     /// The nodes' normals and areas, in the steps in which the blocks have summed areas. Normals only tell the
     /// sides of contacts apart.
-    fn normals(&mut self) {
-        let sums = &self.sums;
-        self.normals
+    fn compute_normals(&mut self) {
+        let sums = &self.elements.sums;
+        self.state
+            .normals
             .par_chunks_mut(NODE_CHUNK)
             .enumerate()
             .with_min_len(team::least())
@@ -313,7 +200,9 @@ impl Model {
                     *normal = crate::vec3::unit(*normal);
                 }
             });
-        self.mirroring.level_normals(&mut self.normals);
+        self.topology
+            .mirroring
+            .level_normals(&mut self.state.normals);
     }
 
     /// Forces of all contacts: one piece of parallel work, at whose end alone threads wait for each
@@ -324,55 +213,57 @@ impl Model {
         // picks up under 1 bar over the gaps for which a node sleeps more than a few steps; 10 km/s2 is what 1 bar
         // does to 10 kg/m2.
         let pace = Pace {
-            dt: self.dt,
-            speed: 2.0 * (2.0 * self.max_speed).max(5.0),
-            acceleration: 2.0 * (2.0 * self.max_acceleration).max(1e4),
+            dt: self.state.dt,
+            speed: 2.0 * (2.0 * self.state.max_speed).max(5.0),
+            acceleration: 2.0 * (2.0 * self.state.max_acceleration).max(1e4),
             growth: self.growth(),
         };
-        self.last_above = self.pressures.above;
+        self.boundary.last_above = self.boundary.pressures.above;
         let surface = Surface {
-            cells: &self.cells,
-            neighbours: &self.neighbours,
-            x: &self.x,
-            normals: &self.normals,
+            cells: &self.topology.cells,
+            neighbours: &self.topology.neighbours,
+            x: &self.state.x,
+            normals: &self.state.normals,
         };
         let bearing = Bearing {
-            mass: &self.mass,
-            room: &self.contact_room,
-            step: self.settings.target_step,
+            mass: &self.topology.mass,
+            room: &self.contacts.room,
+            step: self.topology.settings.target_step,
         };
-        let stride = self.max_speed * self.last_dt;
-        let v = &self.v;
-        let (n_rigid, n_sheets) = (self.rigid_contacts.len(), self.sheet_contacts.len());
-        let n = n_rigid + n_sheets + self.self_contacts.len();
-        self.step_energies.resize_with(n, ContactEnergy::default);
-        let (of_rigid, others) = self.step_energies.split_at_mut(n_rigid);
+        let stride = self.state.max_speed * self.state.last_dt;
+        let v = &self.state.v;
+        let (n_rigid, n_sheets) = (self.contacts.rigid.len(), self.contacts.sheets.len());
+        let n = n_rigid + n_sheets + self.contacts.folds.len();
+        self.contacts
+            .step_energies
+            .resize_with(n, ContactEnergy::default);
+        let (of_rigid, others) = self.contacts.step_energies.split_at_mut(n_rigid);
         let (of_sheets, of_folds) = others.split_at_mut(n_sheets);
         let alone = team::is_alone();
         if alone {
-            let f = &mut self.contact_force[..];
-            for (c, energy) in self.rigid_contacts.iter_mut().zip(of_rigid) {
-                *energy = c.compute_onto(&self.x, v, pace, f);
+            let f = &mut self.contacts.force[..];
+            for (c, energy) in self.contacts.rigid.iter_mut().zip(of_rigid) {
+                *energy = c.compute_onto(&self.state.x, v, pace, f);
             }
-            for (c, energy) in self.sheet_contacts.iter_mut().zip(of_sheets) {
+            for (c, energy) in self.contacts.sheets.iter_mut().zip(of_sheets) {
                 *energy = c.compute_onto(&surface, v, pace, f);
             }
-            for (c, energy) in self.self_contacts.iter_mut().zip(of_folds) {
+            for (c, energy) in self.contacts.folds.iter_mut().zip(of_folds) {
                 *energy = c.compute(&surface, v, pace, stride, bearing, Some(&mut *f));
             }
         } else {
             let rigid = || {
-                let contacts = self.rigid_contacts.par_iter_mut().zip_eq(of_rigid);
+                let contacts = self.contacts.rigid.par_iter_mut().zip_eq(of_rigid);
                 let contacts = contacts.with_max_len(1);
-                contacts.for_each(|(c, energy)| *energy = c.compute(&self.x, v, pace));
+                contacts.for_each(|(c, energy)| *energy = c.compute(&self.state.x, v, pace));
             };
             let sheets = || {
-                let contacts = self.sheet_contacts.par_iter_mut().zip_eq(of_sheets);
+                let contacts = self.contacts.sheets.par_iter_mut().zip_eq(of_sheets);
                 let contacts = contacts.with_max_len(1);
                 contacts.for_each(|(c, energy)| *energy = c.compute(&surface, v, pace));
             };
             let folds = || {
-                let contacts = self.self_contacts.par_iter_mut().zip_eq(of_folds);
+                let contacts = self.contacts.folds.par_iter_mut().zip_eq(of_folds);
                 let contacts = contacts.with_max_len(1);
                 contacts.for_each(|(c, energy)| {
                     *energy = c.compute(&surface, v, pace, stride, bearing, None);
@@ -387,20 +278,27 @@ impl Model {
     /// The pressure on the stack over that of the last step, for [`Pace::growth`]: sheets in a bag press on each other in proportion to it. Both are
     /// taken by [`ELSE_PRESSED`] larger.
     fn growth(&self) -> f64 {
-        (self.pressures.above + ELSE_PRESSED) / (self.last_above + ELSE_PRESSED)
+        (self.boundary.pressures.above + ELSE_PRESSED) / (self.boundary.last_above + ELSE_PRESSED)
     }
 
     /// Energies of the contacts, by contact and of all.
     fn count_contacts(&mut self) {
-        for contact in &self.rigid_contacts {
+        for contact in &self.contacts.rigid {
             // What moves the surface does this work on the sheets.
             let (resultant, velocity) = (contact.resultant(), contact.motion.velocity);
-            self.ledger.external += dot(resultant, velocity) * self.dt;
+            self.state.ledger.external += dot(resultant, velocity) * self.state.dt;
         }
-        let n = self.step_energies.len();
-        self.interfaces.resize_with(n, ContactEnergy::default);
+        let n = self.contacts.step_energies.len();
+        self.contacts
+            .interfaces
+            .resize_with(n, ContactEnergy::default);
         let mut total = ContactEnergy::default();
-        for (i, e) in self.interfaces.iter_mut().zip(&self.step_energies) {
+        for (i, e) in self
+            .contacts
+            .interfaces
+            .iter_mut()
+            .zip(&self.contacts.step_energies)
+        {
             total.stored += e.stored;
             total.friction += e.friction;
             total.damping += e.damping;
@@ -408,9 +306,18 @@ impl Model {
             i.friction += e.friction;
             i.damping += e.damping;
         }
-        self.ledger.friction += total.friction;
-        self.ledger.damping += total.damping;
-        self.contact = total;
+        self.state.ledger.friction += total.friction;
+        self.state.ledger.damping += total.damping;
+        self.contacts.energy = total;
+    }
+
+    /// One step that begins at `time` (s): the one way to set the clock. As [`Model::step`] otherwise.
+    ///
+    /// # Errors
+    /// As [`Model::step`].
+    pub fn step_from(&mut self, time: f64, fields: bool) -> Result<(), MechanicsError> {
+        self.state.time = time;
+        self.step(fields)
     }
 
     /// One step. With `fields`, the elements' fields at the positions before the step are kept for
@@ -420,52 +327,58 @@ impl Model {
     /// When a component fails, a velocity is not finite, or an element is none any more ([`MechanicsError::Distorted`]), which is looked at
     /// with `fields` and every some steps.
     pub fn step(&mut self, fields: bool) -> Result<(), MechanicsError> {
-        let mut sharing = std::mem::take(&mut self.sharing);
+        let mut sharing = std::mem::take(&mut self.workspace.sharing);
         let done = sharing.during(|| self.step_of_team(fields));
-        self.sharing = sharing;
+        self.workspace.sharing = sharing;
         done
     }
 
     /// The step, by as many threads as [`team::is_alone`] says.
     fn step_of_team(&mut self, fields: bool) -> Result<(), MechanicsError> {
-        let clock = Clock::of_step(self.cycle);
-        if self.cycle.is_multiple_of(NORMAL_INTERVAL) {
+        let clock = Clock::of_step(self.state.cycle);
+        if self.state.cycle.is_multiple_of(NORMAL_INTERVAL) {
             // Contacts want the normals, and these what the elements sum.
             let part = clock.part();
             self.internal_forces(fields, false)?;
-            part.add_to(&mut self.spent.elements);
+            part.add_to(&mut self.workspace.spent.elements);
             let part = clock.part();
-            self.normals();
-            for contact in &mut self.rigid_contacts {
-                contact.look_between(&self.sheet_contacts);
+            self.compute_normals();
+            for contact in &mut self.contacts.rigid {
+                contact.look_between(&self.contacts.sheets);
             }
             if !self.compute_contacts() {
-                let (rigid, sheets) = (&self.rigid_contacts, &self.sheet_contacts);
-                let folds = &self.self_contacts;
-                scatter_contacts(rigid, sheets, folds, &self.cells, &mut self.contact_force);
+                let (rigid, sheets) = (&self.contacts.rigid, &self.contacts.sheets);
+                let folds = &self.contacts.folds;
+                scatter_contacts(
+                    rigid,
+                    sheets,
+                    folds,
+                    &self.topology.cells,
+                    &mut self.contacts.force,
+                );
             }
-            part.add_to(&mut self.spent.contacts);
+            part.add_to(&mut self.workspace.spent.contacts);
         } else {
             let part = clock.part();
             let on_nodes = self.compute_contacts();
-            part.add_to(&mut self.spent.contacts);
+            part.add_to(&mut self.workspace.spent.contacts);
             let part = clock.part();
             self.internal_forces(fields, !on_nodes)?;
-            part.add_to(&mut self.spent.elements);
+            part.add_to(&mut self.workspace.spent.elements);
         }
         let part = clock.part();
         self.advance();
-        self.mirroring.follow(&mut self.x);
-        part.add_to(&mut self.spent.nodes);
-        clock.add_to(&mut self.spent.all);
+        self.topology.mirroring.follow(&mut self.state.x);
+        part.add_to(&mut self.workspace.spent.nodes);
+        clock.add_to(&mut self.workspace.spent.all);
         let limit = self.speed_limit();
-        if self.work.bad.is_some() || self.max_speed > limit {
+        if self.workspace.work.bad.is_some() || self.state.max_speed > limit {
             return Err(self.unstable(limit));
         }
-        if fields || self.cycle.is_multiple_of(shape::LOOK) {
+        if fields || self.state.cycle.is_multiple_of(shape::LOOK) {
             self.check_shapes()?;
         }
-        if self.cycle.is_multiple_of(ASK_INTERVAL) {
+        if self.state.cycle.is_multiple_of(ASK_INTERVAL) {
             self.check_steps()?;
         }
         Ok(())
@@ -473,30 +386,33 @@ impl Model {
 
     /// A speed (m/s) at which a node crosses a cell in a few steps: no forming motion.
     fn speed_limit(&self) -> f64 {
-        0.2 * self.shortest_edge / self.dt
+        0.2 * self.topology.shortest_edge / self.state.dt
     }
 
     fn unstable(&self, limit: f64) -> MechanicsError {
-        let worst = (0..self.v.len())
-            .max_by(|a, b| norm(self.v[*a]).total_cmp(&norm(self.v[*b])))
+        let worst = (0..self.state.v.len())
+            .max_by(|a, b| norm(self.state.v[*a]).total_cmp(&norm(self.state.v[*b])))
             .unwrap_or(0);
-        let node = self.work.bad.map_or(worst, |n| n as usize);
+        let node = self.workspace.work.bad.map_or(worst, |n| n as usize);
         let sheet = self
+            .topology
             .sheets
             .iter()
             .find(|s| s.nodes.contains(&(node as u32)))
             .map_or("?", |s| s.name.as_str());
         let touching = self
-            .sheet_contacts
+            .contacts
+            .sheets
             .iter()
             .filter(|c| c.items.iter().any(|i| i.node == node as u32 && i.active))
             .map(|c| c.name.as_str())
-            .chain(self.self_contacts.iter().filter_map(|c| {
+            .chain(self.contacts.folds.iter().filter_map(|c| {
                 let touches = |i: &FoldItem| i.slave.node == node as u32 && i.slave.active;
                 c.items.iter().any(touches).then_some(c.name.as_str())
             }))
             .chain(
-                self.rigid_contacts
+                self.contacts
+                    .rigid
                     .iter()
                     .filter(|c| {
                         c.items
@@ -507,17 +423,17 @@ impl Model {
             )
             .collect::<Vec<_>>()
             .join(", ");
-        let x = self.x[node];
+        let x = self.state.x[node];
         MechanicsError::Unstable {
-            time: self.time,
-            cycle: self.cycle,
+            time: self.state.time,
+            cycle: self.state.cycle,
             what: format!(
                 "node {node} of '{sheet}' at ({:.4}, {:.4}, {:.4}) m moves at {:.3e} m/s \
                  (limit {limit:.0} m/s); in contact: {}",
                 x[0],
                 x[1],
                 x[2],
-                norm(self.v[node]),
+                norm(self.state.v[node]),
                 if touching.is_empty() {
                     "nothing"
                 } else {

@@ -7,33 +7,33 @@ impl Model {
     /// Largest share of the penalty force that contacts hand to their multipliers in a step, once
     /// [`Model::set_contact_stiffness`] has set it.
     pub fn contact_augmentation(&self) -> f64 {
-        let rigid = self.rigid_contacts.iter().map(|c| c.augmentation);
-        let sheets = self.sheet_contacts.iter().map(|c| c.augmentation);
+        let rigid = self.contacts.rigid.iter().map(|c| c.augmentation);
+        let sheets = self.contacts.sheets.iter().map(|c| c.augmentation);
         rigid.chain(sheets).fold(0.0, f64::max)
     }
 
     /// `[n]` positions with which it was built (m).
     pub fn start(&self) -> &Arc<[V]> {
-        &self.start
+        &self.topology.start
     }
 
     /// `[cells][4]` what lies across each edge of a cell: a cell, [`crate::mesh::NONE`] at a rim, or one of
     /// [`crate::mirror::MIRRORED`].
     pub fn neighbours(&self) -> &[[u32; 4]] {
-        &self.neighbours
+        &self.topology.neighbours
     }
 
     /// The ledger at the present step.
     pub fn energies(&self) -> Ledger {
-        let mut l = self.ledger;
-        l.kinetic = self.work.kinetic;
-        l.contact = self.contact.stored;
-        for batch in self.blocks.iter().flat_map(|b| &b.batches) {
+        let mut l = self.state.ledger;
+        l.kinetic = self.workspace.work.kinetic;
+        l.contact = self.contacts.energy.stored;
+        for batch in self.elements.blocks.iter().flat_map(|b| &b.batches) {
             l.membrane += batch.energy[PF_ENERGY_MEMBRANE];
             l.bending += batch.energy[PF_ENERGY_BENDING];
             l.hourglass += batch.energy[PF_ENERGY_HOURGLASS];
         }
-        for batch in self.patches.iter().flat_map(|b| &b.batches) {
+        for batch in self.elements.patches.iter().flat_map(|b| &b.batches) {
             l.bending += batch.energy;
         }
         l
@@ -41,24 +41,24 @@ impl Model {
 
     /// Energies by sheet at the present step.
     pub fn sheet_energies(&self) -> Vec<SheetEnergy> {
-        let mut of = vec![SheetEnergy::default(); self.sheets.len()];
-        for batch in self.blocks.iter().flat_map(|b| &b.batches) {
+        let mut of = vec![SheetEnergy::default(); self.topology.sheets.len()];
+        for batch in self.elements.blocks.iter().flat_map(|b| &b.batches) {
             let e = &mut of[batch.sheet as usize];
             e.membrane += batch.energy[PF_ENERGY_MEMBRANE];
             e.bending += batch.energy[PF_ENERGY_BENDING];
             e.hourglass += batch.energy[PF_ENERGY_HOURGLASS];
         }
-        for batch in self.patches.iter().flat_map(|b| &b.batches) {
+        for batch in self.elements.patches.iter().flat_map(|b| &b.batches) {
             of[batch.sheet as usize].bending += batch.energy;
         }
-        let spin = self.rotations.as_deref();
-        let mut counted = vec![false; self.x.len()];
-        for (sheet, e) in self.sheets.iter().zip(&mut of) {
+        let spin = self.state.rotations.as_deref();
+        let mut counted = vec![false; self.state.x.len()];
+        for (sheet, e) in self.topology.sheets.iter().zip(&mut of) {
             for n in sheet.nodes.iter().map(|n| *n as usize) {
                 if std::mem::replace(&mut counted[n], true) {
                     continue;
                 }
-                e.kinetic += 0.5 * self.mass[n] * dot(self.v[n], self.v[n]);
+                e.kinetic += 0.5 * self.topology.mass[n] * dot(self.state.v[n], self.state.v[n]);
                 if let Some(r) = spin {
                     e.kinetic += 0.5 * r.inertia[n] * dot(r.spin[n], r.spin[n]);
                 }
@@ -69,47 +69,49 @@ impl Model {
 
     /// By node of a sheet: sum of a quarter of the area vectors of its cells around it (m2).
     pub fn node_areas(&self, sheet: usize) -> Vec<V> {
-        let sheet = &self.sheets[sheet];
-        let mut areas = vec![[0.0; 3]; self.x.len()];
-        for cell in &self.cells[sheet.cell_range.0..sheet.cell_range.1] {
-            let quarter = scale(area_vector(cell.map(|n| self.x[n as usize])), 0.25);
+        let sheet = &self.topology.sheets[sheet];
+        let mut areas = vec![[0.0; 3]; self.state.x.len()];
+        for cell in &self.topology.cells[sheet.cell_range.0..sheet.cell_range.1] {
+            let quarter = scale(area_vector(cell.map(|n| self.state.x[n as usize])), 0.25);
             for n in cell {
                 areas[*n as usize] = add(areas[*n as usize], quarter);
             }
         }
-        self.mirroring.level(&mut areas);
+        self.topology.mirroring.level(&mut areas);
         sheet.nodes.iter().map(|n| areas[*n as usize]).collect()
     }
 
     /// By contact: its name, and what it stores and has lost so far (J).
     pub fn interface_energies(&self) -> impl Iterator<Item = (&str, ContactEnergy)> {
-        let rigid = self.rigid_contacts.iter().map(|c| c.name.as_str());
-        let sheets = self.sheet_contacts.iter().map(|c| c.name.as_str());
-        let selves = self.self_contacts.iter().map(|c| c.name.as_str());
+        let rigid = self.contacts.rigid.iter().map(|c| c.name.as_str());
+        let sheets = self.contacts.sheets.iter().map(|c| c.name.as_str());
+        let selves = self.contacts.folds.iter().map(|c| c.name.as_str());
         rigid
             .chain(sheets)
             .chain(selves)
-            .zip(self.interfaces.iter().copied())
+            .zip(self.contacts.interfaces.iter().copied())
     }
 
     /// The cell whose element allows the smallest step, and that step (s).
     pub fn weakest_cell(&self) -> Option<(usize, f64)> {
-        let steps: Vec<Vec<f64>> = (self.blocks.par_iter())
+        let steps: Vec<Vec<f64>> = (self.elements.blocks.par_iter())
             .map(|block| {
-                let of =
-                    |b: &Batch| cell_critical_steps(&self.sheets[b.sheet as usize], b, &self.x);
+                let of = |b: &Batch| {
+                    cell_critical_steps(&self.topology.sheets[b.sheet as usize], b, &self.state.x)
+                };
                 block.batches.iter().flat_map(of).collect()
             })
             .collect();
         let at = |place: &CellPlace| {
-            let block = &self.blocks[place.block as usize];
+            let block = &self.elements.blocks[place.block as usize];
             let before = &block.batches[..usize::from(place.batch)];
             let first: usize = before.iter().map(|b| b.count as usize).sum();
             steps[place.block as usize]
                 .get(first + usize::from(place.lane))
                 .copied()
         };
-        self.cell_place
+        self.topology
+            .cell_place
             .iter()
             .map(|p| at(p).unwrap_or(0.0))
             .enumerate()
@@ -121,31 +123,33 @@ impl Model {
     /// # Errors
     /// When a component fails, or an element of a model that has made steps gives none.
     pub fn critical_step(&self) -> Result<f64, MechanicsError> {
-        let (sheets, x) = (&self.sheets, &self.x);
+        let (sheets, x) = (&self.topology.sheets, &self.state.x);
         let steps: Vec<f64> = self
+            .elements
             .blocks
             .par_iter()
             .flat_map_iter(|block| &block.batches)
             .map(|batch| batch_critical_step(&sheets[batch.sheet as usize], batch, x))
             .collect();
         let membrane = steps.into_iter().fold(f64::INFINITY, f64::min);
-        if membrane <= 0.0 && self.cycle > 0 {
+        if membrane <= 0.0 && self.state.cycle > 0 {
             self.check_steps()?;
         }
         let rows: Vec<Vec<(u32, f64)>> = self
+            .elements
             .patches
             .par_iter()
             .flat_map_iter(|block| &block.batches)
             .map(|batch| patch_rows(&sheets[batch.sheet as usize], batch, x))
             .collect();
-        let mut row = vec![0.0; self.x.len()];
+        let mut row = vec![0.0; self.state.x.len()];
         for (n, r) in rows.into_iter().flatten() {
             row[n as usize] += r;
         }
-        self.mirroring.fold(&mut row);
+        self.topology.mirroring.fold(&mut row);
         let bending = row
             .iter()
-            .zip(&self.mass)
+            .zip(&self.topology.mass)
             .filter(|(r, _)| **r > 0.0)
             .map(|(r, m)| r / m)
             .fold(0.0, f64::max);
@@ -167,9 +171,9 @@ impl Model {
         index: usize,
         elsewhere: Option<usize>,
     ) -> Vec<f64> {
-        let (c0, c1) = self.sheets[sheet].cell_range;
+        let (c0, c1) = self.topology.sheets[sheet].cell_range;
         let of = |at: &CellPlace| {
-            let batch = &self.blocks[at.block as usize].batches[usize::from(at.batch)];
+            let batch = &self.elements.blocks[at.block as usize].batches[usize::from(at.batch)];
             let row = if batch.elsewhere {
                 elsewhere
             } else {
@@ -177,15 +181,18 @@ impl Model {
             };
             row.map_or(0.0, |r| batch.fields[r * LANES + usize::from(at.lane)])
         };
-        self.cell_place[c0..c1].iter().map(of).collect()
+        self.topology.cell_place[c0..c1].iter().map(of).collect()
     }
 
     /// Row `index` of the patch fields of a sheet, per mesh-local node (0 where there is no patch: at its edge and within
     /// [`Elsewhere`](crate::sheet::Elsewhere)).
     pub fn patch_field(&self, sheet: usize, index: usize) -> Vec<f64> {
-        let (b0, b1) = self.sheets[sheet].patch_range;
-        let mut values = vec![0.0; self.sheets[sheet].nodes.len()];
-        for b in self.patches[b0..b1].iter().flat_map(|b| &b.batches) {
+        let (b0, b1) = self.topology.sheets[sheet].patch_range;
+        let mut values = vec![0.0; self.topology.sheets[sheet].nodes.len()];
+        for b in self.elements.patches[b0..b1]
+            .iter()
+            .flat_map(|b| &b.batches)
+        {
             for l in 0..b.count as usize {
                 values[b.centres[l] as usize] = b.fields[index * LANES + l];
             }
@@ -195,9 +202,9 @@ impl Model {
 
     /// Of a sheet with two elements: how many cells have its own one, and how many there are.
     pub fn bending_cells(&self, sheet: usize) -> Option<[usize; 2]> {
-        let sheet = &self.sheets[sheet];
+        let sheet = &self.topology.sheets[sheet];
         sheet.elsewhere.as_ref()?;
-        let blocks = &self.blocks[sheet.block_range.0..sheet.block_range.1];
+        let blocks = &self.elements.blocks[sheet.block_range.0..sheet.block_range.1];
         let batches = blocks.iter().flat_map(|b| &b.batches);
         let own = batches.filter(|b| !b.elsewhere).map(|b| b.count as usize);
         Some([own.sum(), sheet.cell_range.1 - sheet.cell_range.0])
@@ -205,12 +212,12 @@ impl Model {
 
     /// Number of elements.
     pub fn element_count(&self) -> usize {
-        self.cells.len()
+        self.topology.cells.len()
     }
 
     /// Number of node patches.
     pub fn patch_count(&self) -> usize {
-        let batches = self.patches.iter().flat_map(|b| &b.batches);
+        let batches = self.elements.patches.iter().flat_map(|b| &b.batches);
         batches.map(|b| b.count as usize).sum()
     }
 
@@ -218,21 +225,22 @@ impl Model {
     /// bilinear surface (whose gradient the pressure is) to second order in the cell's size.
     pub fn volume_below(&mut self) -> f64 {
         // Partial sums of fixed chunks, added in order: the same for any number of threads.
-        self.cells
+        self.topology
+            .cells
             .par_chunks(NODE_CHUNK)
-            .zip_eq(self.pressed_below.par_chunks(NODE_CHUNK))
+            .zip_eq(self.topology.pressed_below.par_chunks(NODE_CHUNK))
             .map(|(cells, pressed)| {
                 let mut volume = 0.0;
                 for (cell, pressed) in cells.iter().zip(pressed) {
                     if *pressed {
-                        let p = cell.map(|n| self.x[n as usize]);
+                        let p = cell.map(|n| self.state.x[n as usize]);
                         let height = 0.25 * (p[0][2] + p[1][2] + p[2][2] + p[3][2]);
                         volume += area_vector(p)[2] * height;
                     }
                 }
                 volume
             })
-            .collect_into_vec(&mut self.scratch.volumes);
-        self.scratch.volumes.iter().sum()
+            .collect_into_vec(&mut self.workspace.volumes);
+        self.workspace.volumes.iter().sum()
     }
 }

@@ -49,29 +49,29 @@ impl Model {
             ));
         }
         let rate = 1.0 / dt;
-        if let Some(mut r) = self.rotations.take() {
-            let (from, mut to) = (self.normals_at(&self.x), self.normals_at(&x));
+        if let Some(mut r) = self.state.rotations.take() {
+            let (from, mut to) = (self.normals_at(&self.state.x), self.normals_at(&x));
             for (n, normal) in normals {
                 let same = dot(*normal, to[*n as usize]) >= 0.0;
                 to[*n as usize] = if same { *normal } else { scale(*normal, -1.0) };
             }
             for (n, spin) in r.spin.iter_mut().enumerate() {
                 *spin = scale(turn_between(from[n], to[n]), rate);
-                if let Some(fixed) = self.supports.fixed.get(n) {
+                if let Some(fixed) = self.boundary.supports.fixed.get(n) {
                     *spin = fixed.rotation(*spin);
                 }
             }
-            self.rotations = Some(r);
+            self.state.rotations = Some(r);
         }
-        for ((v, from), to) in self.v.iter_mut().zip(&self.x).zip(&x) {
+        for ((v, from), to) in self.state.v.iter_mut().zip(&self.state.x).zip(&x) {
             *v = scale(sub(*to, *from), rate);
         }
-        self.x = x;
-        let before = std::mem::replace(&mut self.last_dt, dt);
+        self.state.x = x;
+        let before = std::mem::replace(&mut self.state.last_dt, dt);
         let done = self.internal_forces(false, false);
-        self.last_dt = before;
-        self.v.fill([0.0; 3]);
-        if let Some(r) = self.rotations.as_deref_mut() {
+        self.state.last_dt = before;
+        self.state.v.fill([0.0; 3]);
+        if let Some(r) = self.state.rotations.as_deref_mut() {
             r.spin.fill([0.0; 3]);
         }
         done
@@ -80,7 +80,7 @@ impl Model {
     /// `[n]` sums of the directed areas (m2) of the cells around the nodes, were these at `x`.
     fn normals_at(&self, x: &[V]) -> Vec<V> {
         let mut normals = vec![[0.0; 3]; x.len()];
-        for cell in &self.cells {
+        for cell in &self.topology.cells {
             let area = area_vector(cell.map(|n| x[n as usize]));
             for n in cell {
                 let normal = &mut normals[*n as usize];
@@ -92,16 +92,16 @@ impl Model {
 
     /// `[n]` spins (rad/s) at the half step; `None` when no sheet's nodes rotate.
     pub fn spins(&self) -> Option<&[V]> {
-        self.rotations.as_deref().map(|r| r.spin.as_slice())
+        self.state.rotations.as_deref().map(|r| r.spin.as_slice())
     }
 
     /// Inertias as [`Model::rotate`] wants them.
     pub(super) fn set_free_inertias(&mut self) {
-        let Some(r) = self.rotations.as_deref_mut() else {
+        let Some(r) = self.state.rotations.as_deref_mut() else {
             return;
         };
-        r.free_inertia = free_of(&r.inertia, &self.driven);
-        for (n, fixed) in self.supports.fixed.iter().enumerate() {
+        r.free_inertia = free_of(&r.inertia, &self.boundary.driven);
+        for (n, fixed) in self.boundary.supports.fixed.iter().enumerate() {
             r.fix(n, *fixed);
         }
     }
@@ -109,32 +109,36 @@ impl Model {
     /// Sums the moments; spins of the next half step; their kinetic energy and works. Uses the same central
     /// differences and the same mass-proportional damping as the translations.
     pub(super) fn rotate(&mut self) {
-        let Some(mut r) = self.rotations.take() else {
+        let Some(mut r) = self.state.rotations.take() else {
             return;
         };
-        let mut before = std::mem::take(&mut self.scratch.spins);
+        let mut before = std::mem::take(&mut self.workspace.spins);
         before.clear();
-        before.extend(self.driven.iter().map(|n| r.spin[*n as usize]));
-        let mut works = std::mem::take(&mut self.scratch.works);
+        before.extend(self.boundary.driven.iter().map(|n| r.spin[*n as usize]));
+        let mut works = std::mem::take(&mut self.workspace.works);
         self.turn_all(&mut r, &mut works);
         let mut work = works.iter().fold(NodeWork::default(), |sum, w| sum.add(*w));
-        self.scratch.works = works;
+        self.workspace.works = works;
         self.turn_driven(&mut r, &before, &mut work);
-        self.scratch.spins = before;
+        self.workspace.spins = before;
         if !work.kinetic.is_finite() {
             let bad = |w: &V| !w.iter().all(|c| c.is_finite());
             work.bad = work.bad.or(r.spin.iter().position(bad).map(|n| n as u32));
         }
-        self.work = self.work.add(work);
-        self.rotations = Some(r);
+        self.workspace.work = self.workspace.work.add(work);
+        self.state.rotations = Some(r);
     }
 
     /// Spins of all nodes as if none was driven; works of those that are not, by chunk.
     fn turn_all(&self, r: &mut Rotations, works: &mut Vec<NodeWork>) {
         let moving = self.moving(false);
-        let (sums, loads, factor) = (&self.sums, &self.loads.moment, self.load_factor);
+        let (sums, loads, factor) = (
+            &self.elements.sums,
+            &self.boundary.loads.moment,
+            self.boundary.load_factor,
+        );
         let inertia = free_or_all(&r.free_inertia, &r.inertia);
-        let fixed = &self.supports.fixed;
+        let fixed = &self.boundary.supports.fixed;
         r.spin
             .par_chunks_mut(NODE_CHUNK)
             .enumerate()
@@ -164,29 +168,29 @@ impl Model {
     /// Spins of the driven nodes, which were `before`, and their works.
     fn turn_driven(&mut self, r: &mut Rotations, before: &[V], work: &mut NodeWork) {
         let turning = Turning {
-            dt: self.dt,
-            damping: self.settings.damping,
-            kick: self.kick,
+            dt: self.state.dt,
+            damping: self.topology.settings.damping,
+            kick: self.state.kick,
             inertia: &r.inertia,
-            fixed: &self.supports.fixed,
-            loads: &self.loads.moment,
-            load_factor: self.load_factor,
+            fixed: &self.boundary.supports.fixed,
+            loads: &self.boundary.loads.moment,
+            load_factor: self.boundary.load_factor,
         };
-        let middle = self.time + 0.5 * self.dt;
-        for (k, (n, old)) in self.driven.iter().zip(before).enumerate() {
+        let middle = self.state.time + 0.5 * self.state.dt;
+        for (k, (n, old)) in self.boundary.driven.iter().zip(before).enumerate() {
             let n = *n as usize;
             if turning.inertia[n] <= 0.0 {
                 continue;
             }
-            let moment = self.sums.at(&self.sums.moment, n);
-            r.spin[n] = match self.drive.as_ref().and_then(|d| d.spin(k, middle)) {
+            let moment = self.elements.sums.at(&self.elements.sums.moment, n);
+            r.spin[n] = match self.boundary.drive.as_ref().and_then(|d| d.spin(k, middle)) {
                 None => turning.free(n, *old, moment, work),
                 Some(next) => {
                     let mean = scale(add(next, *old), 0.5);
                     let inertia = scale(sub(next, *old), turning.inertia[n] / turning.dt);
                     let support = sub(inertia, moment);
-                    self.ledger.external += dot(support, mean) * turning.dt;
-                    self.supports.reaction_moment[k] = sub(support, turning.load(n));
+                    self.state.ledger.external += dot(support, mean) * turning.dt;
+                    self.boundary.supports.reaction_moment[k] = sub(support, turning.load(n));
                     work.count(turning.inertia[n], n, next);
                     next
                 }

@@ -76,15 +76,15 @@ impl Model {
     /// # Errors
     /// When one is no element any more: which, where, when, and what has become of it.
     pub fn check_shapes(&self) -> Result<(), MechanicsError> {
-        let at = |x: &[V], cell: usize| self.cells[cell].map(|n| x[n as usize]);
-        for sheet in &self.sheets {
+        let at = |x: &[V], cell: usize| self.topology.cells[cell].map(|n| x[n as usize]);
+        for sheet in &self.topology.sheets {
             let of_element = &sheet.element;
             let bends = of_element.rotates() || of_element.sizes.patch_nodes > 0;
             let bends = bends && sheet.elsewhere.is_none();
             let (first, end) = sheet.cell_range;
             let look = |cell: usize| {
-                let p = at(&self.x, cell);
-                let fault = fault_of(&p, &at(&self.start, cell));
+                let p = at(&self.state.x, cell);
+                let fault = fault_of(&p, &at(&self.topology.start, cell));
                 if !bends {
                     return fault.filter(|f| !matches!(f, Fault::Folded(_)));
                 }
@@ -92,12 +92,12 @@ impl Model {
                     let normal = area_vector(p);
                     let closed = |other: &u32| {
                         let other = *other as usize;
-                        let lies = |other| cosine(normal, area_vector(at(&self.x, other)));
+                        let lies = |other| cosine(normal, area_vector(at(&self.state.x, other)));
                         (other < end && other > cell)
                             .then(|| lies(other))
                             .filter(|c| *c < FOLDED)
                     };
-                    let found = self.neighbours[cell].iter().find_map(closed)?;
+                    let found = self.topology.neighbours[cell].iter().find_map(closed)?;
                     Some(Fault::Closed(angle_of(found)))
                 })
             };
@@ -123,15 +123,16 @@ impl Model {
 
     fn distorted(&self, cell: usize, fault: Fault) -> MechanicsError {
         let sheet = self
+            .topology
             .sheets
             .iter()
             .find(|s| (s.cell_range.0..s.cell_range.1).contains(&cell));
         let (name, first) = sheet.map_or(("?", 0), |s| (s.name.as_str(), s.cell_range.0));
-        let p = self.cells[cell].map(|n| self.x[n as usize]);
+        let p = self.topology.cells[cell].map(|n| self.state.x[n as usize]);
         let middle = scale(add(add(p[0], p[1]), add(p[2], p[3])), 0.25);
         MechanicsError::Distorted {
-            time: self.time,
-            cycle: self.cycle,
+            time: self.state.time,
+            cycle: self.state.cycle,
             sheet: name.into(),
             cell: cell - first,
             place: middle,

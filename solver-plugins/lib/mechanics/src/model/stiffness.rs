@@ -11,10 +11,10 @@ impl Model {
     /// assembled stiffness of every node: 2 sum(k) dt^2 / m stays below `2 * 0.7`, which leaves the rest of
     /// the stability bound 4 to the elements. Contacts that touch where others do not count less ([`SheetContact::counted`]).
     pub fn set_contact_stiffness(&mut self, c: &ContactSettings) {
-        let dt2 = self.settings.target_step.powi(2);
-        let mass = &self.mass;
+        let dt2 = self.topology.settings.target_step.powi(2);
+        let mass = &self.topology.mass;
         // Of the whole node where a mirror plane cuts it, so that contacts there are as stiff as in the whole model.
-        let mirroring = &self.mirroring;
+        let mirroring = &self.topology.mirroring;
         let whole = |n: u32| mass[n as usize] / mirroring.share(n);
         let reduced = |node: u32, cell: [u32; 4]| {
             let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
@@ -24,13 +24,13 @@ impl Model {
             .augmentation
             .min(c.largest_augmentation(self.mass_ratio()));
         let mut thickness = vec![f64::INFINITY; mass.len()];
-        for sheet in &self.sheets {
+        for sheet in &self.topology.sheets {
             for node in &sheet.nodes {
                 thickness[*node as usize] = sheet.thickness;
             }
         }
         let mut row = vec![0.0; mass.len()];
-        for contact in &mut self.rigid_contacts {
+        for contact in &mut self.contacts.rigid {
             contact.augmentation = augmentation;
             let nodes = contact.items.iter().map(|i| thickness[i.node as usize]);
             contact.deep = DEEP * nodes.fold(f64::INFINITY, f64::min);
@@ -40,14 +40,18 @@ impl Model {
                 row[item.node as usize] += counted * item.stiffness;
             }
         }
-        let (cells, neighbours, x) = (&self.cells, &self.neighbours, &self.x);
-        let heights = self.sheets.iter().map(|sheet| {
+        let (cells, neighbours, x) = (
+            &self.topology.cells,
+            &self.topology.neighbours,
+            &self.state.x,
+        );
+        let heights = self.topology.sheets.iter().map(|sheet| {
             let (from, to) = sheet.cell_range;
             let height = rim_height(&cells[from..to], &neighbours[from..to], x);
             (from..to, height)
         });
         let heights: Vec<_> = heights.collect();
-        for contact in &mut self.sheet_contacts {
+        for contact in &mut self.contacts.sheets {
             contact.augmentation = augmentation;
             let on = (contact.items.iter().map(|i| i.cell)).find(|c| *c != crate::mesh::NONE);
             let master = on.and_then(|c| heights.iter().find(|h| h.0.contains(&(c as usize))));
@@ -57,7 +61,7 @@ impl Model {
             let items = contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
             // Where they are kept further apart than they are thick, what is between them is to spare.
             let both = items.map(|i| {
-                let master = self.cells[i.cell as usize][0];
+                let master = self.topology.cells[i.cell as usize][0];
                 let [a, b] = [i.node, master].map(|n| thickness[n as usize]);
                 (contact.offset - 0.5 * (a + b)).max(0.0) + DEEP * a.min(b)
             });
@@ -68,7 +72,7 @@ impl Model {
                 .iter_mut()
                 .filter(|i| i.cell != crate::mesh::NONE)
             {
-                let nodes = self.cells[item.cell as usize];
+                let nodes = self.topology.cells[item.cell as usize];
                 let (slave, master) =
                     (whole(item.node), nodes.map(whole).iter().sum::<f64>() / 4.0);
                 let most = c.largest_augmentation(slave.min(master) / slave.max(master));
@@ -87,16 +91,16 @@ impl Model {
             .zip(mass)
             .map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0))
             .collect();
-        for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
+        for item in self.contacts.rigid.iter_mut().flat_map(|c| &mut c.items) {
             let m = mass[item.node as usize];
             item.stiffness *= limit[item.node as usize];
             item.damping = (2.0 * c.damping_ratio * (item.stiffness * m).sqrt()) as f32;
         }
-        for item in self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items) {
+        for item in self.contacts.sheets.iter_mut().flat_map(|c| &mut c.items) {
             if item.cell == crate::mesh::NONE {
                 continue;
             }
-            let nodes = self.cells[item.cell as usize];
+            let nodes = self.topology.cells[item.cell as usize];
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.stiffness *= least.min(limit[item.node as usize]);
             let reduced = reduced(item.node, nodes);
@@ -109,16 +113,16 @@ impl Model {
     /// The least share that the heaviest node of the lighter one of two sheets in contact has of the other's.
     fn mass_ratio(&self) -> f64 {
         let heaviest = |nodes: &mut dyn Iterator<Item = u32>| {
-            let masses = nodes.map(|n| self.mass[n as usize]);
+            let masses = nodes.map(|n| self.topology.mass[n as usize]);
             masses.fold(0.0, f64::max)
         };
         let of_contact = |contact: &SheetContact| {
             let items = || contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
             let slave = heaviest(&mut items().map(|i| i.node));
-            let master = heaviest(&mut items().flat_map(|i| self.cells[i.cell as usize]));
+            let master = heaviest(&mut items().flat_map(|i| self.topology.cells[i.cell as usize]));
             (slave.min(master) > 0.0).then(|| slave.min(master) / slave.max(master))
         };
-        let ratios = self.sheet_contacts.iter().filter_map(of_contact);
+        let ratios = self.contacts.sheets.iter().filter_map(of_contact);
         ratios.fold(1.0, f64::min)
     }
 
@@ -130,34 +134,34 @@ impl Model {
     /// by `slip_factor`.)
     fn bound_contact_damping(&mut self) {
         const BOUND: f64 = 0.5 * (4.0 - 1.4);
-        let dt = self.settings.target_step;
-        let mut row = vec![0.0; self.mass.len()];
-        for contact in &self.rigid_contacts {
+        let dt = self.topology.settings.target_step;
+        let mut row = vec![0.0; self.topology.mass.len()];
+        for contact in &self.contacts.rigid {
             for item in &contact.items {
                 row[item.node as usize] += contact.counted * f64::from(item.damping);
             }
         }
-        for contact in &self.sheet_contacts {
+        for contact in &self.contacts.sheets {
             let items = contact.items.iter();
             for item in items.filter(|i| i.cell != crate::mesh::NONE) {
                 let damping = 2.0 * contact.counted * item.damping;
                 row[item.node as usize] += damping;
-                for (k, n) in self.cells[item.cell as usize].iter().enumerate() {
+                for (k, n) in self.topology.cells[item.cell as usize].iter().enumerate() {
                     row[*n as usize] += item.weights()[k] * damping;
                 }
             }
         }
-        let of = row.iter().zip(&self.mass);
+        let of = row.iter().zip(&self.topology.mass);
         let limit: Vec<f64> = of
             .map(|(r, m)| (BOUND * m / (dt * r.max(1e-300))).min(1.0))
             .collect();
-        for item in self.rigid_contacts.iter_mut().flat_map(|c| &mut c.items) {
+        for item in self.contacts.rigid.iter_mut().flat_map(|c| &mut c.items) {
             let limited = f64::from(item.damping) * limit[item.node as usize];
             item.damping = limited as f32;
         }
-        let sheets = self.sheet_contacts.iter_mut().flat_map(|c| &mut c.items);
+        let sheets = self.contacts.sheets.iter_mut().flat_map(|c| &mut c.items);
         for item in sheets.filter(|i| i.cell != crate::mesh::NONE) {
-            let nodes = self.cells[item.cell as usize];
+            let nodes = self.topology.cells[item.cell as usize];
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.damping *= least.min(limit[item.node as usize]);
         }
@@ -167,8 +171,8 @@ impl Model {
     /// is near in it does not touch. The other contacts' stiffness is set, or comes to be set, by
     /// [`Model::set_contact_stiffness`].
     pub fn add_self_contact(&mut self, spec: FoldSpec, c: &ContactSettings) {
-        let contact = SelfContact::new(spec, &self.cells, *c);
-        self.self_contacts.push(contact);
+        let contact = SelfContact::new(spec, &self.topology.cells, *c);
+        self.contacts.folds.push(contact);
         self.set_contact_room();
     }
 
@@ -176,27 +180,31 @@ impl Model {
     /// move, so its springs count once. Where they leave little, a node gets a small share all the same: it does
     /// not touch everything at once.
     fn set_contact_room(&mut self) {
-        if self.self_contacts.is_empty() {
+        if self.contacts.folds.is_empty() {
             return;
         }
-        let dt2 = self.settings.target_step.powi(2);
-        let mut used = vec![0.0; self.mass.len()];
-        for contact in &self.rigid_contacts {
+        let dt2 = self.topology.settings.target_step.powi(2);
+        let mut used = vec![0.0; self.topology.mass.len()];
+        for contact in &self.contacts.rigid {
             for item in &contact.items {
                 used[item.node as usize] += 0.5 * contact.counted * item.stiffness;
             }
         }
-        for contact in &self.sheet_contacts {
+        for contact in &self.contacts.sheets {
             let items = contact.items.iter();
             for item in items.filter(|i| i.cell != crate::mesh::NONE) {
                 let stiffness = contact.counted * item.stiffness;
                 used[item.node as usize] += stiffness;
-                for (w, n) in item.weights().iter().zip(self.cells[item.cell as usize]) {
+                for (w, n) in item
+                    .weights()
+                    .iter()
+                    .zip(self.topology.cells[item.cell as usize])
+                {
                     used[n as usize] += w.max(0.0) * stiffness;
                 }
             }
         }
         let left = |(u, m): (&f64, &f64)| (0.7 * m / dt2 - u).max(0.1 * m / dt2);
-        self.contact_room = used.iter().zip(&self.mass).map(left).collect();
+        self.contacts.room = used.iter().zip(&self.topology.mass).map(left).collect();
     }
 }

@@ -114,7 +114,7 @@ fn check_phases(p: &Parameters, forming: &Forming) -> Result<(), String> {
 fn check_masses(p: &Parameters, forming: &Forming) -> Result<(), String> {
     let m = &forming.model;
     let own: f64 = m.own_masses().iter().sum();
-    let added: f64 = m.sheets.iter().map(|s| s.added_mass).sum();
+    let added: f64 = m.sheets().iter().map(|s| s.added_mass).sum();
     if added > MOST_ADDED * own {
         return Err(format!(
             "time_step: given {:.3e} s, least_areal_mass: given {:.3} kg/m2; with these the sheets are given {:.1e} times their own mass ({own:.3e} kg), and move as \
@@ -167,8 +167,8 @@ fn check_drag(p: &Parameters, forming: &Forming) -> Result<(), String> {
         }
         _ => return Ok(()),
     };
-    let area: f64 = (m.sheets.iter())
-        .flat_map(|s| &m.cells[s.cell_range.0..s.cell_range.1])
+    let area: f64 = (m.sheets().iter())
+        .flat_map(|s| &m.cells()[s.cell_range.0..s.cell_range.1])
         .map(|c| {
             let q = c.map(|n| m.start()[n as usize]);
             let d = |a: usize, b: usize| [0, 1].map(|k| q[b][k] - q[a][k]);
@@ -176,7 +176,7 @@ fn check_drag(p: &Parameters, forming: &Forming) -> Result<(), String> {
             0.5 * (ax * by - ay * bx).abs()
         })
         .sum();
-    let areal = m.mass.iter().sum::<f64>() / area.max(1e-12);
+    let areal = m.mass().iter().sum::<f64>() / area.max(1e-12);
     let drag = areal * p.damping * speed;
     if drag > MOST_DRAG * pressure {
         return Err(format!(

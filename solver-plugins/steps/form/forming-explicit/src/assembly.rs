@@ -180,7 +180,7 @@ pub fn add_sheet_contact(
     let settings = contact_settings(p);
     let mut contact = SheetContact::new(name, side, offset, friction, &settings, items);
     contact.rim = cover::crooked_rim(model, index);
-    model.sheet_contacts.push(contact);
+    model.add_sheet_contact(contact);
 }
 
 /// Adds the contact of a ply (its place in the stack, its sheet's number, its nodes that may be slaves) with itself,
@@ -196,7 +196,7 @@ pub fn add_self_contact(
     slaves: &[u32],
     p: &Parameters,
 ) -> Result<(), String> {
-    let (first, end) = model.sheets[index].cell_range;
+    let (first, end) = model.sheets()[index].cell_range;
     if !p.self_contact || first == end {
         return Ok(());
     }
@@ -215,7 +215,7 @@ pub fn add_self_contact(
     let spec = FoldSpec {
         name: format!("{name}/{name}"),
         slaves,
-        cell_range: model.sheets[index].cell_range,
+        cell_range: model.sheets()[index].cell_range,
         thickness: stack[ply].thickness,
         friction,
         undeformed: model.start().clone(),
@@ -382,9 +382,7 @@ pub fn add_contacts(
     for (part, surface) in [("tool", tool.of(model, placed[0].index)), ("bed", bed)] {
         let mu = under(model, part)?;
         let (offset, nodes) = (stack[0].offset, &placed[0].slaves);
-        model
-            .rigid_contacts
-            .push(rigid(name(part, 0), surface, mu, offset, nodes));
+        model.add_rigid_contact(rigid(name(part, 0), surface, mu, offset, nodes));
     }
     let mut pair = |slave: usize, nodes: &[u32], master: usize, side: f64| -> Result<(), String> {
         let on = (master, placed[master].index);
@@ -432,7 +430,7 @@ pub fn add_contacts(
         moves: false,
     };
     cover::add_rigid_contacts(model, stack, &part, sheets[top], 0..0, &friction, p)?;
-    let contact = model.rigid_contacts.last_mut().expect("just added");
+    let contact = model.rigid_contacts_mut().last_mut().expect("just added");
     (contact.share, contact.counted) = (0.5, 0.0);
     for (k, ply) in placed.iter().enumerate().take(top).skip(1) {
         add_self_contact(model, stack, (k, ply.index), &ply.slaves, p)?;
@@ -444,20 +442,20 @@ pub fn add_contacts(
 /// Places slaves on the master in the undeformed plane. A slave beyond the master's edge gets the nearest
 /// cell: it is in touch once it slides onto it.
 fn locate(model: &Model, master: usize, slaves: &[u32]) -> Vec<SlaveItem> {
-    let (c0, c1) = model.sheets[master].cell_range;
+    let (c0, c1) = model.sheets()[master].cell_range;
     if c0 == c1 {
         return slaves
             .iter()
             .map(|n| SlaveItem::new(*n, NONE, [0.0; 2]))
             .collect();
     }
-    let cells = &model.cells[c0..c1];
-    let corners: Vec<[V; 4]> = (cells.iter().map(|c| c.map(|n| model.x[n as usize]))).collect();
+    let cells = &model.cells()[c0..c1];
+    let corners: Vec<[V; 4]> = (cells.iter().map(|c| c.map(|n| model.x()[n as usize]))).collect();
     let bins = Bins::of_cells(&corners);
     slaves
         .iter()
         .map(|n| {
-            let p = model.x[*n as usize];
+            let p = model.x()[*n as usize];
             let inside = bins.near(p).iter().find_map(|c| {
                 let xi = inverse_bilinear(corners[*c as usize], p)?;
                 (xi[0].abs() <= 1.0 + 1e-9 && xi[1].abs() <= 1.0 + 1e-9).then_some((*c, xi))

@@ -238,7 +238,8 @@ impl<'a> Recorder<'a> {
         *course = found;
         let text = format!(
             "goes on from a checkpoint at t = {:.5} s, step {}",
-            forming.model.time, forming.model.cycle
+            forming.model.time(),
+            forming.model.cycle()
         );
         self.host.log(Log::Info, &text);
         Ok(true)

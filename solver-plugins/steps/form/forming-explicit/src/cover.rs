@@ -56,11 +56,11 @@ fn free_edges<'a>(cells: impl Iterator<Item = &'a [u32; 4]> + Clone) -> Vec<[u32
 
 /// Edges (model nodes) that bound a sheet of a model that is still flat. At a mirror plane a sheet does not end.
 fn rim(model: &Model, sheet: usize) -> Vec<[u32; 2]> {
-    let (from, to) = model.sheets[sheet].cell_range;
+    let (from, to) = model.sheets()[sheet].cell_range;
     let planes = model.planes().0;
-    let on = |n: &u32, k: usize| model.x[*n as usize][k].abs() < 1e-9;
+    let on = |n: &u32, k: usize| model.x()[*n as usize][k].abs() < 1e-9;
     let ends = |e: &[u32; 2]| !(0..2).any(|k| planes[k] && e.iter().all(|n| on(n, k)));
-    let mut edges = free_edges(model.cells[from..to].iter());
+    let mut edges = free_edges(model.cells()[from..to].iter());
     edges.retain(ends);
     edges
 }
@@ -76,10 +76,10 @@ fn rim_nodes(model: &Model, sheet: usize) -> Vec<u32> {
 /// The cells along the rim of a sheet of a model that is still flat; none where its rim is convex.
 pub fn crooked_rim(model: &Model, sheet: usize) -> Vec<u32> {
     let edges = rim(model, sheet);
-    let (from, to) = model.sheets[sheet].cell_range;
-    let x = |n: u32| model.x[n as usize];
+    let (from, to) = model.sheets()[sheet].cell_range;
+    let x = |n: u32| model.x()[n as usize];
     let area = |c: &[u32; 4]| area_vector(c.map(x))[2].abs();
-    let areas = model.cells[from..to].iter().map(area);
+    let areas = model.cells()[from..to].iter().map(area);
     let (whole, largest) = areas.fold((0.0, 0.0f64), |(w, l), a| (w + a, l.max(a)));
     let nodes = edges.iter().flatten().map(|n| [x(*n)[0], x(*n)[1]]);
     // Meshed curves are convex but for some hundredths of a cell.
@@ -88,7 +88,7 @@ pub fn crooked_rim(model: &Model, sheet: usize) -> Vec<u32> {
     }
     let ends = rim_nodes(model, sheet);
     let at_rim = |c: &u32| {
-        let corners = model.cells[*c as usize];
+        let corners = model.cells()[*c as usize];
         corners.iter().any(|n| ends.binary_search(n).is_ok())
     };
     (from as u32..to as u32).filter(at_rim).collect()
@@ -144,7 +144,7 @@ pub fn add_contacts_past(
             let mu = law(model, from, to, slave.0)?;
             let on = (master.0, master.1);
             assembly::add_sheet_contact(model, stack, (slave.0, slave.2), on, side, mu, p);
-            let contact = model.sheet_contacts.last_mut().expect("just added");
+            let contact = model.sheet_contacts_mut().last_mut().expect("just added");
             // What lies between holds them apart but at its edges, where all may touch for a moment.
             (contact.share, contact.counted) = (0.5, 0.0);
             Ok(())
@@ -168,20 +168,21 @@ pub fn add_contacts_past(
                 continue;
             }
             add(model, *below, *sheet, -1.0)?;
-            let contact = model.sheet_contacts.last_mut().expect("just added");
+            let mut contact = model.sheet_contacts_mut().pop().expect("just added");
             contact.let_in = Some(if is_ply(lower) { LET_IN } else { FILMS_LET_IN });
             if !is_ply(lower) {
                 // Where the films are joined they have the same nodes, which lie on cells of their own.
-                let (from, to) = model.sheets[sheet.1].cell_range;
+                let (from, to) = model.sheets()[sheet.1].cell_range;
                 let of_both: HashSet<u32> =
-                    model.cells[from..to].iter().flatten().copied().collect();
-                let (cells, x) = (&model.cells, &model.x);
+                    model.cells()[from..to].iter().flatten().copied().collect();
+                let (cells, x) = (model.cells(), model.x());
                 let lies_over = |i: &SlaveItem| {
                     let [at, p] = [place(i, cells, x), x[i.node as usize]];
                     (at[0] - p[0]).abs().max((at[1] - p[1]).abs()) < 1e-6
                 };
                 (contact.items).retain(|i| !of_both.contains(&i.node) && lies_over(i));
             }
+            model.add_sheet_contact(contact);
         }
     }
     Ok(())
@@ -270,16 +271,16 @@ pub fn add_rigid_contacts(
         let other = format!("{}/{own}", stack[other].scene.name);
         let of_both =
             |c: &SheetContact| c.name == other && c.side == side && c.items.len() == nodes.len();
-        let found = model.sheet_contacts.iter().position(of_both);
+        let found = model.sheet_contacts().iter().position(of_both);
         contact.through.extend(found);
     }
     debug_assert!(contact.through.len() == among.len());
-    model.rigid_contacts.push(contact);
+    model.add_rigid_contact(contact);
     if !among.is_empty() {
         let name = name + &beside(stack, among);
         let mut contact = make(model, &film, name)?;
         (contact.share, contact.counted) = (0.5, 0.0);
-        model.rigid_contacts.push(contact);
+        model.add_rigid_contact(contact);
     }
     Ok(())
 }

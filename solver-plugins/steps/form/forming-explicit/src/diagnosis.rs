@@ -54,7 +54,7 @@ pub(crate) fn open_ledger(history: &[HistoryRow], end: f64, bound: f64) -> Optio
 /// A text of what happened, where it shows, what the likely cause is and what to change. `what` opens it.
 pub(crate) fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
     let m = &forming.model;
-    let (t, end) = (m.time, forming.load.duration());
+    let (t, end) = (m.time(), forming.load.duration());
     let mut text = format!(
         "{what}; seen at t = {t:.5} s of {end:.5} s ({}).",
         forming.load.phase(t)
@@ -91,11 +91,11 @@ pub(crate) fn slower(forming: &Forming, known: f64) -> String {
     let m = &forming.model;
     let mut text = format!(
         "steps of {:.3} us instead of {:.3} us from t = {:.5} s of {:.5} s on: what is left takes {:.1} times as long.",
-        1e6 * m.dt,
+        1e6 * m.dt(),
         1e6 * known,
-        m.time,
+        m.time(),
         forming.load.duration(),
-        known / m.dt,
+        known / m.dt(),
     );
     let cell = weakest(forming);
     if let Some(c) = &cell {
@@ -173,28 +173,28 @@ fn weakest(forming: &Forming) -> Option<Weakest> {
     let m = &forming.model;
     let (cell, step) = m.weakest_cell()?;
     let body = (forming.bodies.iter()).find(|b| {
-        let (first, end) = m.sheets[b.sheet].cell_range;
+        let (first, end) = m.sheets()[b.sheet].cell_range;
         (first..end).contains(&cell)
     })?;
-    let nodes = m.cells[cell];
+    let nodes = m.cells()[cell];
     let of = |points: &[V]| nodes.map(|n| points[n as usize]);
     let scene = forming.stack.get(body.sheet).map(|s| &s.scene)?;
     let (shear, strain) = cell_strain(
         of(&forming.reference),
-        of(&m.x),
+        of(m.x()),
         crate::assembly::axis(scene),
     );
     Some(Weakest {
         shear,
         is_film: scene.kind == SheetKind::Diaphragm,
-        over: m.dt / step,
+        over: m.dt() / step,
         text: format!(
             " The step is set by an element of '{}' at {} (before forming {}): at most {:.3} us (it is {:.3} us), shear {:.0} deg, fibre strain {:.1} %.",
             body.name,
-            millimetres(centre(&m.x, &nodes)),
+            millimetres(centre(m.x(), &nodes)),
             millimetres(centre(&forming.reference, &nodes)),
             1e6 * step,
-            1e6 * m.dt,
+            1e6 * m.dt(),
             shear.to_degrees(),
             100.0 * strain,
         ),
@@ -235,15 +235,16 @@ fn deepest(forming: &Forming) -> Option<Deepest> {
 /// The node that moves fastest.
 fn fastest(forming: &Forming) -> String {
     let m = &forming.model;
-    let Some(node) = (0..m.v.len()).max_by(|a, b| norm(m.v[*a]).total_cmp(&norm(m.v[*b]))) else {
+    let Some(node) = (0..m.v().len()).max_by(|a, b| norm(m.v()[*a]).total_cmp(&norm(m.v()[*b])))
+    else {
         return String::new();
     };
-    let sheet = (m.sheets.iter()).find(|s| s.nodes.contains(&(node as u32)));
+    let sheet = (m.sheets().iter()).find(|s| s.nodes.contains(&(node as u32)));
     format!(
         " Fastest: '{}' at {} with {:.1} m/s.",
         sheet.map_or("?", |s| s.name.as_str()),
-        millimetres(m.x[node]),
-        norm(m.v[node])
+        millimetres(m.x()[node]),
+        norm(m.v()[node])
     )
 }
 

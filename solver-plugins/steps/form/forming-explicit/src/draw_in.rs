@@ -43,9 +43,9 @@ impl Forming {
         let mut most = DrawIn::default();
         for (body, sheet) in self.bodies.iter().zip(&self.stack) {
             if sheet.scene.kind == SheetKind::Ply {
-                let (start, end) = m.sheets[body.sheet].cell_range;
-                let (cells, near) = (&m.cells[start..end], &m.neighbours()[start..end]);
-                most.count(cells, near, &self.reference, &m.x);
+                let (start, end) = m.sheets()[body.sheet].cell_range;
+                let (cells, near) = (&m.cells()[start..end], &m.neighbours()[start..end]);
+                most.count(cells, near, &self.reference, m.x());
             }
         }
         most

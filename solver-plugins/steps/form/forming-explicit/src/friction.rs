@@ -441,7 +441,7 @@ impl<'a> FrictionTable<'a> {
         Ok(AngleDependence {
             factors: rows.collect(),
             whose,
-            fibres: FibreField::new(own, first_cell, &model.x, along),
+            fibres: FibreField::new(own, first_cell, model.x(), along),
         })
     }
 }
@@ -483,9 +483,9 @@ fn place(sheet: &Sheet, region: &str, partner: &str) -> String {
 
 /// The cells of a sheet (model nodes) and the number of the first.
 fn cells<'m>(model: &'m Model, sheet: &str) -> (&'m [[u32; 4]], usize) {
-    let found = model.sheets.iter().find(|s| s.name == sheet);
+    let found = model.sheets().iter().find(|s| s.name == sheet);
     let (c0, c1) = found.map_or((0, 0), |s| s.cell_range);
-    (&model.cells[c0..c1], c0)
+    (&model.cells()[c0..c1], c0)
 }
 
 fn check_coefficient(value: f64, place: &str) -> Result<(), String> {

@@ -122,7 +122,7 @@ pub(crate) fn begin(
     let text = |e: plyflow_mechanics::MechanicsError| e.to_string();
     let interval = start.time / (start.path.len() as f64 * f64::from(STEPS));
     for (s, state) in start.path.iter().enumerate() {
-        let from = forming.model.x.clone();
+        let from = forming.model.x().to_vec();
         for k in 1..=STEPS {
             let share = f64::from(k) / f64::from(STEPS);
             let to = |(a, b): (&V, &V)| add(*a, scale(sub(*b, *a), share));
@@ -133,24 +133,24 @@ pub(crate) fn begin(
         }
     }
     clear_tool(forming);
-    let placed = forming.model.x.clone();
+    let placed = forming.model.x().to_vec();
     // What the coarse run's places have wrong by now shall not pull to the end: held nodes are held from where they are in balance with
     // its forces.
     forming.model.loosen();
     settle(forming, step, safety, observer)?;
     forming.model.anchor();
     // Nodes that were driven meanwhile have their velocity from the next step on.
-    forming.model.v.copy_from_slice(&start.velocity);
+    forming.model.v_mut().copy_from_slice(&start.velocity);
     Ok(Some(shift(forming, &placed)))
 }
 
 /// 99.9 % quantile of how far (m) nodes of plies are from where they were `placed`.
 fn shift(forming: &Forming, placed: &[V]) -> f64 {
-    let of_plies = (forming.model.sheets.iter().zip(&forming.stack))
+    let of_plies = (forming.model.sheets().iter().zip(&forming.stack))
         .filter(|(_, sheet)| sheet.scene.kind == SheetKind::Ply)
         .flat_map(|(s, _)| s.nodes.iter().map(|n| *n as usize));
     let mut ways: Vec<f64> = of_plies
-        .map(|n| norm(sub(forming.model.x[n], placed[n])))
+        .map(|n| norm(sub(forming.model.x()[n], placed[n])))
         .collect();
     ways.sort_by(f64::total_cmp);
     let at = (0.999 * ways.len() as f64) as usize;
@@ -161,17 +161,7 @@ fn shift(forming: &Forming, placed: &[V]) -> f64 {
 
 /// Puts nodes that straight coarse edges have led into the rigid parts onto them.
 fn clear_tool(forming: &mut Forming) {
-    let model = &mut forming.model;
-    for contact in &model.rigid_contacts {
-        for item in &contact.items {
-            let x = &mut model.x[item.node as usize];
-            let (distance, out) = contact.surface.distance(*x);
-            let gap = distance - contact.offset;
-            if gap < 0.0 {
-                *x = sub(*x, scale(out, gap));
-            }
-        }
-    }
+    forming.model.clear_rigid();
 }
 
 /// Steps at the time of the start, the nodes of the cut at rest. Contacts that get their whole load at once must not swing through
@@ -185,12 +175,12 @@ fn settle(
 ) -> Result<(), StepError> {
     let model = &mut forming.model;
     let damping = model.damping();
-    model.dt = step.min(safety * model.critical_step().map_err(|e| e.to_string())?);
-    model.set_damping(1.0 / model.dt);
+    model.set_step(step.min(safety * model.critical_step().map_err(|e| e.to_string())?));
+    model.set_damping(1.0 / model.dt());
     model.halt();
     // The coarse run's sheets, interpolated, may reach into each other where they fold.
     let clear = |model: &mut Model, on: bool| {
-        let contacts = model.sheet_contacts.iter_mut();
+        let contacts = model.sheet_contacts_mut().iter_mut();
         contacts.for_each(|c| c.clearing = on);
     };
     clear(model, true);
@@ -229,10 +219,12 @@ fn settle(
 /// A step with the loads of the start, to the time of the start: before it nothing moves, so neither do held nodes go with the cut.
 fn stand(forming: &mut Forming) -> Result<(), String> {
     let start = forming.load.start();
-    forming.model.time = start;
-    let clock = Clock::of_step(forming.model.cycle);
-    forming.load.apply(&mut forming.model);
-    forming.model.spent.count_loads(clock);
-    forming.model.time = start - forming.model.dt;
-    forming.model.step(false).map_err(|e| e.to_string())
+    let clock = Clock::of_step(forming.model.cycle());
+    forming.load.apply(&mut forming.model, start);
+    forming.model.count_loads(clock);
+    let before = start - forming.model.dt();
+    forming
+        .model
+        .step_from(before, false)
+        .map_err(|e| e.to_string())
 }

@@ -362,7 +362,7 @@ pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), String> {
                 own.len()
             ));
         }
-        let all = &forming.model.sheets[body.sheet].nodes;
+        let all = &forming.model.sheets()[body.sheet].nodes;
         nodes.extend(sheet.driven.iter().map(|n| all[*n as usize]));
         drive.add(sheet);
     }
@@ -375,28 +375,9 @@ pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), String> {
 /// folds of their own ply, which are mostly driven as a whole. Where they are has been decided, by runs with finer elements; coarse ones stand
 /// elsewhere off tool and plies, and a multiplier that cannot move its node grows for ever. The films give way.
 fn let_drive_decide(forming: &mut Forming) {
-    let plies: Vec<_> = (forming.bodies.iter())
-        .filter(|b| is_ply(forming, b))
-        .map(|b| forming.model.sheets[b.sheet].cell_range)
-        .collect();
-    let mut all = std::mem::take(&mut forming.model.sheet_contacts);
-    for contact in &mut all {
-        let mut cells = contact.items.iter().map(|i| i.cell as usize);
-        if cells.any(|c| plies.iter().any(|(from, to)| (*from..*to).contains(&c))) {
-            (contact.items).retain(|i| !forming.model.is_driven(i.node));
-        }
-    }
-    forming.model.sheet_contacts = all;
-    let mut all = std::mem::take(&mut forming.model.rigid_contacts);
-    for contact in &mut all {
-        (contact.items).retain(|i| !forming.model.is_driven(i.node));
-    }
-    forming.model.rigid_contacts = all;
-    let mut all = std::mem::take(&mut forming.model.self_contacts);
-    for contact in &mut all {
-        contact.retain(|n| !forming.model.is_driven(n));
-    }
-    forming.model.self_contacts = all;
+    let plies = forming.bodies.iter().filter(|b| is_ply(forming, b));
+    let plies: Vec<usize> = plies.map(|b| b.sheet).collect();
+    forming.model.release_driven(&plies);
 }
 
 fn is_ply(forming: &Forming, body: &Body) -> bool {

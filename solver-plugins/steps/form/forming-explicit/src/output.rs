@@ -240,7 +240,7 @@ fn write_energies(host: &Host, forming: &Forming, outcome: &Outcome) -> Result<(
     ];
     let write = |path: String, data: Vec<f64>| host.write_f64(&path, &[data.len()], "J", &data);
     let rows = &outcome.history;
-    for (k, s) in forming.model.sheets.iter().enumerate() {
+    for (k, s) in forming.model.sheets().iter().enumerate() {
         for (what, of) in sheet {
             let data = rows.iter().map(|r| r.sheets.get(k).map_or(0.0, of));
             write(format!("history/sheets/{}/{what}", s.name), data.collect())?;
@@ -273,7 +273,7 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<artifact::Sheet> {
                 SheetKind::Diaphragm => &p.diaphragm_element,
                 SheetKind::Ply => &p.element,
             };
-            let added = forming.copies() * forming.model.sheets[body.sheet].added_mass;
+            let added = forming.copies() * forming.model.sheets()[body.sheet].added_mass;
             let mut sheet = artifact::Sheet {
                 material: Some(s.material.name.clone()),
                 areal_mass: Some(s.material.areal_mass.si()),
@@ -327,7 +327,7 @@ const LONG: f64 = 20.0;
 
 /// What to say of a process that takes very long.
 fn long_process(forming: &Forming) -> Option<String> {
-    let (duration, step) = (forming.load.duration(), forming.model.dt);
+    let (duration, step) = (forming.load.duration(), forming.model.dt());
     (duration > LONG && forming.zone.is_none()).then(|| {
         format!(
             "the process takes {duration:.0} s of simulated time, {:.1e} steps of {:.2} us: the times of a scene are those in which inertia \
@@ -471,16 +471,16 @@ fn write_summary(
     }
     host.result(
         "added_mass",
-        forming.copies() * m.sheets.iter().map(|s| s.added_mass).sum::<f64>(),
+        forming.copies() * m.sheets().iter().map(|s| s.added_mass).sum::<f64>(),
         "kg",
     )?;
     for (name, part) in [
-        ("contact_share", m.spent.contacts),
-        ("element_share", m.spent.elements),
-        ("node_share", m.spent.nodes),
-        ("load_share", m.spent.loads),
+        ("contact_share", m.spent().contacts),
+        ("element_share", m.spent().elements),
+        ("node_share", m.spent().nodes),
+        ("load_share", m.spent().loads),
     ] {
-        if let Some(share) = m.spent.share(part) {
+        if let Some(share) = m.spent().share(part) {
             host.measured(name, share, "1")?;
         }
     }

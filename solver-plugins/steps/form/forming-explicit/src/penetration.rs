@@ -173,7 +173,7 @@ impl Forming {
         let m = &self.model;
         // Pairs are called by their two bodies; what is no sheet is rigid, and has no thickness.
         let thickness = |pair: &str| -> Vec<f64> {
-            let of = |name: &str| m.sheets.iter().find(|s| s.name == name);
+            let of = |name: &str| m.sheets().iter().find(|s| s.name == name);
             pair.split('/')
                 .filter_map(of)
                 .map(|s| s.thickness)
@@ -187,9 +187,9 @@ impl Forming {
             let spare = offset - 0.5 * thickness(pair).iter().sum::<f64>();
             judge(pair, spare, depths)
         };
-        let at = |node: u32| m.x[node as usize];
+        let at = |node: u32| m.x()[node as usize];
         let deep = |i: &SlaveItem| (i.penetration, at(i.node));
-        let rigid = m.rigid_contacts.iter().map(|c| {
+        let rigid = m.rigid_contacts().iter().map(|c| {
             let touching = c.items.iter().filter(|i| i.penetration > 0.0);
             let depth = |i: &RigidItem| (f64::from(i.penetration) + c.slack, at(i.node));
             let touching = touching.map(depth).collect();
@@ -202,12 +202,12 @@ impl Forming {
         });
         // What catches lets in on purpose, by another depth at each place. How deep plies are in each other the watch tells. Where a driven node lies
         // is not for contact to say.
-        let holding = m.sheet_contacts.iter().filter(|c| c.let_in.is_none());
+        let holding = m.sheet_contacts().iter().filter(|c| c.let_in.is_none());
         let sheets = holding.map(|c| {
             let touching = (c.items.iter()).filter(|i| i.active && !m.is_driven(i.node));
             between(&c.name, c.offset, touching.map(deep).collect())
         });
-        let selves = m.self_contacts.iter().map(|c| {
+        let selves = m.self_contacts().iter().map(|c| {
             let touching = c.items.iter().map(|i| &i.slave);
             let touching = touching.filter(|i| i.active && !m.is_driven(i.node));
             judge(&c.name, 0.0, touching.map(deep).collect())

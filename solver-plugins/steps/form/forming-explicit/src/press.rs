@@ -75,15 +75,15 @@ pub struct PressLoad {
 }
 
 impl PressLoad {
-    /// Moves punch and holder to where they are at the model's time.
-    pub fn apply(&mut self, model: &mut Model) {
-        let (t, dt) = (model.time, model.dt);
+    /// Moves punch and holder to where they are at `t` (s).
+    pub fn apply(&mut self, model: &mut Model, t: f64) {
+        let dt = model.dt();
         let at = |t: f64| -self.stroke.left(t);
         let height = at(t);
         let before = self
             .punch
             .first()
-            .map_or(height, |c| model.rigid_contacts[*c].motion.shift[2]);
+            .map_or(height, |c| model.rigid_contacts()[*c].motion.shift[2]);
         let moved = |height: f64, before: f64| RigidMotion {
             shift: [0.0, 0.0, height],
             velocity: [
@@ -97,12 +97,12 @@ impl PressLoad {
             ],
         };
         for c in &self.punch {
-            model.rigid_contacts[*c].motion = moved(height, before);
+            model.rigid_contacts_mut()[*c].motion = moved(height, before);
         }
         let Some(held) = &mut self.held else { return };
         // The sheets' resistance of the last step: a holder many times their mass barely moves in one.
         let resistance: f64 = (self.holder.iter())
-            .map(|c| model.rigid_contacts[*c].resultant()[2])
+            .map(|c| model.rigid_contacts()[*c].resultant()[2])
             .sum();
         let force = held.force * smooth_step(t, 0.0, HOLD_RISE * self.stroke.forming);
         let drag = HOLDER_DAMPING * held.mass * held.velocity;
@@ -113,7 +113,7 @@ impl PressLoad {
             (held.height, held.velocity) = (held.most, 0.0);
         }
         for c in &self.holder {
-            model.rigid_contacts[*c].motion = moved(held.height, before);
+            model.rigid_contacts_mut()[*c].motion = moved(held.height, before);
         }
     }
 
@@ -128,7 +128,7 @@ impl PressLoad {
 
     /// Force of the punch on the plies, upwards (N).
     pub fn punch_force(&self, model: &Model) -> f64 {
-        let lift = |c: &usize| model.rigid_contacts[*c].resultant()[2];
+        let lift = |c: &usize| model.rigid_contacts()[*c].resultant()[2];
         self.punch.iter().map(lift).sum()
     }
 
@@ -271,7 +271,7 @@ fn add_contacts(
     let settings = assembly::contact_settings(p);
     let friction = FrictionTable::new(scene)?;
     let all = stack.len();
-    let nodes: Vec<Vec<u32>> = (0..all).map(|k| model.sheets[k].nodes.clone()).collect();
+    let nodes: Vec<Vec<u32>> = (0..all).map(|k| model.sheets()[k].nodes.clone()).collect();
     let mut pair = |k: usize, nodes: &[u32], below: usize| -> Result<(), String> {
         let [lower, upper] = [below, k].map(|k| stack[k].scene.name.as_str());
         let touching = Touching {
@@ -301,7 +301,7 @@ fn add_contacts(
         }
     }
     for k in 0..stack.len() {
-        let slaves = model.sheets[k].nodes.clone();
+        let slaves = model.sheets()[k].nodes.clone();
         assembly::add_self_contact(model, stack, (k, k), &slaves, p)?;
     }
     model.set_contact_stiffness(&settings);
@@ -351,16 +351,20 @@ pub fn build_press(
     }
     let mut model = Model::mirrored(points, specs, assembly::step_settings(p), mirrors)
         .map_err(|e| e.to_string())?;
-    model.body_acceleration[2] = match press.weight {
-        None => 0.0,
-        Some(Towards::Die) => STANDARD_GRAVITY,
-        Some(Towards::Holder) => -STANDARD_GRAVITY,
-    };
+    model.set_body_acceleration([
+        0.0,
+        0.0,
+        match press.weight {
+            None => 0.0,
+            Some(Towards::Die) => STANDARD_GRAVITY,
+            Some(Towards::Holder) => -STANDARD_GRAVITY,
+        },
+    ]);
     let parts = rigid_parts(press, &at, grid);
     add_contacts(&mut model, &stack, &parts, scene, p)?;
     model.add_plane_contacts(&assembly::contact_settings(p));
     let of_part = |part: &str| -> Vec<usize> {
-        let contacts = model.rigid_contacts.iter().enumerate();
+        let contacts = model.rigid_contacts().iter().enumerate();
         let of = |name: &str| name.strip_prefix(part).is_some_and(|n| n.starts_with('/'));
         contacts
             .filter(|(_, c)| of(&c.name))
@@ -371,7 +375,7 @@ pub fn build_press(
         Some(Hold::Force(force)) => Some(HeldByForce {
             // What is given holds the whole.
             force: force.si() / planes.copies() as f64,
-            mass: HOLDER_MASS * model.mass.iter().sum::<f64>(),
+            mass: HOLDER_MASS * model.mass().iter().sum::<f64>(),
             most: at.die - at.blank,
             height: 0.0,
             velocity: 0.0,
@@ -389,7 +393,8 @@ pub fn build_press(
         holder: of_part("holder"),
         held,
     };
-    load.apply(&mut model);
+    let start = model.time();
+    load.apply(&mut model, start);
     let reference = model.start().clone();
     let reach = bodies_reach(&reference);
     let (die, holder) = plates(press, &at);

@@ -325,21 +325,20 @@ impl Load {
     }
 
     /// Sets the model's pressures and weight, or the places of the press's parts, for its present time.
-    pub fn apply(&mut self, model: &mut Model) {
-        let t = model.time;
+    pub fn apply(&mut self, model: &mut Model, t: f64) {
         if let Self::Process { cycle, .. } | Self::Given { cycle, .. } = self {
             // Of the bodies' own masses: what mass scaling adds has no weight.
-            model.body_acceleration[2] = cycle.fall(t);
+            model.set_body_acceleration([0.0, 0.0, cycle.fall(t)]);
         }
         match self {
-            Self::Press(p) => p.apply(model),
+            Self::Press(p) => p.apply(model, t),
             Self::Given {
                 time, cavity, bag, ..
             } => {
-                model.pressures = Pressures {
+                model.set_pressures(Pressures {
                     below: linear(time, cavity, t),
                     above: linear(time, bag, t),
-                };
+                });
             }
             Self::Process {
                 cycle,
@@ -362,13 +361,13 @@ impl Load {
                         Some(wanted) => {
                             let left = pumped_volume.get_or_insert(volume);
                             let lag = PUMP_LAG * cycle.durations[2];
-                            *left += (volume - *left) * model.dt / (lag + model.dt);
+                            *left += (volume - *left) * model.dt() / (lag + model.dt());
                             wanted * *left / volume
                         }
                     };
                     below = below.min(1.2 * cycle.bag);
                 }
-                model.pressures = Pressures { below, above };
+                model.set_pressures(Pressures { below, above });
             }
         }
     }

@@ -47,7 +47,7 @@ pub fn of_sheet(sheet: &Sheet) -> Result<Vec<Placed<'_>>, String> {
 
 /// Numbers of the laws that the nodes of a model's sheet have by their places in the flat ply: that of the first region that holds it, else 0.
 pub fn by_node(model: &Model, sheet: &str, regions: &[(Placed<'_>, u16)]) -> NodeLaws {
-    let found = model.sheets.iter().find(|s| s.name == sheet);
+    let found = model.sheets().iter().find(|s| s.name == sheet);
     let start = model.start();
     let law = |n: u32| {
         let holds = |(r, _): &&(Placed<'_>, u16)| r.holds(start[n as usize]);
@@ -88,7 +88,7 @@ pub fn least(model: &Model, sheet: &str, laws: &[FrictionLaw]) -> FrictionLaw {
         _ => false,
     };
     let mut list: Vec<FrictionLaw> = pick(None).into_iter().collect();
-    let nodes = model.sheets.iter().find(|s| s.name == sheet);
+    let nodes = model.sheets().iter().find(|s| s.name == sheet);
     let nodes = nodes.map_or(&[][..], |s| &s.nodes);
     let mut numbers = std::collections::BTreeMap::new();
     for n in nodes {

@@ -274,7 +274,7 @@ pub trait Observer {
 impl Forming {
     /// Positions (m) of a body's points now.
     pub fn points(&self, body: &Body) -> Vec<V> {
-        self.whole_points(body, &self.model.x)
+        self.whole_points(body, self.model.x())
     }
 
     /// Reference points (m) of a body.
@@ -283,7 +283,7 @@ impl Forming {
     }
 
     fn whole_points(&self, body: &Body, x: &[V]) -> Vec<V> {
-        let nodes = &self.model.sheets[body.sheet].nodes;
+        let nodes = &self.model.sheets()[body.sheet].nodes;
         let part: Vec<V> = nodes.iter().map(|n| x[*n as usize]).collect();
         match &body.mirrored {
             Some(m) => m.whole.points(&part),
@@ -314,7 +314,7 @@ impl Forming {
     /// Where the part of that name has moved (m).
     pub fn shift(&self, part: &str) -> V {
         let of = |c: &&RigidContact| c.name.split('/').next() == Some(part);
-        let found = self.model.rigid_contacts.iter().find(of);
+        let found = self.model.rigid_contacts().iter().find(of);
         found.map_or([0.0; 3], |c| c.motion.shift)
     }
 
@@ -332,13 +332,13 @@ impl Forming {
         // Of the whole.
         let n = self.copies();
         HistoryRow {
-            time: m.time,
-            time_step: m.dt,
+            time: m.time(),
+            time_step: m.dt(),
             critical_step: course.critical_step,
             ledger: ledger.times(n),
-            cavity: m.pressures.below,
-            bag: m.pressures.above,
-            frame: self.load.frame_height(m.time),
+            cavity: m.pressures().below,
+            bag: m.pressures().above,
+            frame: self.load.frame_height(m.time()),
             punch_force: n * self.load.press().map_or(0.0, |p| p.punch_force(m)),
             holder_travel: self.load.press().map_or(0.0, PressLoad::holder_travel),
             sheets: m.sheet_energies().iter().map(|e| e.times(n)).collect(),
@@ -373,7 +373,7 @@ impl Forming {
                 observer.between_frames(self, &mut course);
             }
             let steps = self.choose_step(control, interval, &mut course)?;
-            if let Some(known) = course.shorter_steps(self.model.dt) {
+            if let Some(known) = course.shorter_steps(self.model.dt()) {
                 observer.slower(&diagnosis::slower(self, known));
             }
             let start = begin + interval * frame as f64;
@@ -389,9 +389,8 @@ impl Forming {
                 observer,
             )?;
         }
-        self.model.time = end;
-        self.load.apply(&mut self.model);
-        self.model.step(true).map_err(|e| e.to_string())?;
+        self.load.apply(&mut self.model, end);
+        self.model.step_from(end, true).map_err(|e| e.to_string())?;
         observer.frame(self, end)?;
         keep_largest(&mut course.peaks, &self.penetrations(), end);
         self.look(&mut watch, &mut course, true)?;
@@ -434,8 +433,8 @@ impl Forming {
             return Err(diagnosis::of(self, &course.history, &what).into());
         }
         let steps = (interval / wanted).ceil().max(1.0) as u64;
-        self.model.dt = interval / steps as f64;
-        course.smallest_step = course.smallest_step.min(self.model.dt);
+        self.model.set_step(interval / steps as f64);
+        course.smallest_step = course.smallest_step.min(self.model.dt());
         course.critical_step = critical;
         Ok(steps)
     }
@@ -453,11 +452,11 @@ impl Forming {
     ) -> Result<(), plyflow_sdk::StepError> {
         for k in 0..steps {
             // Times from the count, not from a sum: frames fall on the same instants in every run.
-            self.model.time = start + self.model.dt * k as f64;
-            let clock = Clock::of_step(self.model.cycle);
-            self.load.apply(&mut self.model);
-            self.model.spent.count_loads(clock);
-            match self.model.step(k == 0) {
+            let at = start + self.model.dt() * k as f64;
+            let clock = Clock::of_step(self.model.cycle());
+            self.load.apply(&mut self.model, at);
+            self.model.count_loads(clock);
+            match self.model.step_from(at, k == 0) {
                 Ok(()) => {}
                 // The diagnosis has its own cause and remedy.
                 Err(MechanicsError::Unstable { cycle, what, .. }) => {
@@ -469,7 +468,7 @@ impl Forming {
             if k == 0 {
                 if is_late {
                     // What brought it here was work.
-                    self.model.ledger.external += self.model.energies().drift();
+                    self.model.count_drift_as_work();
                 }
                 // Fields belong to the positions before the step; its motion is far below output
                 // precision.
@@ -508,7 +507,7 @@ impl Forming {
         Outcome {
             history,
             health,
-            cycles: self.model.cycle,
+            cycles: self.model.cycle(),
             smallest_step,
             start_shift,
             peaks,
@@ -520,42 +519,42 @@ impl Forming {
     /// Pressure (Pa) on the face of each of a body's points that looks to the tool.
     pub fn contact_pressure(&self, body: &Body) -> Vec<f64> {
         let m = &self.model;
-        let mut force = vec![0.0; m.x.len()];
+        let mut force = vec![0.0; m.x().len()];
         // The die of a press lies on the other face, and a mirror plane beside the sheet.
         let facing =
             |c: &&RigidContact| !c.name.starts_with("die/") && !c.name.starts_with("symmetry_");
-        for c in m.rigid_contacts.iter().filter(facing) {
+        for c in m.rigid_contacts().iter().filter(facing) {
             for i in &c.items {
                 force[i.node as usize] += f64::from(i.normal_force);
             }
         }
-        for c in &m.sheet_contacts {
+        for c in m.sheet_contacts() {
             for i in c.items.iter().filter(|i| i.active) {
                 if c.side > 0.0 {
                     force[i.node as usize] += i.normal_force;
                 } else {
-                    for (w, n) in i.weights().iter().zip(m.cells[i.cell as usize]) {
+                    for (w, n) in i.weights().iter().zip(m.cells()[i.cell as usize]) {
                         force[n as usize] += w * i.normal_force;
                     }
                 }
             }
         }
-        for i in m.self_contacts.iter().flat_map(|c| &c.items) {
+        for i in m.self_contacts().iter().flat_map(|c| &c.items) {
             let slave = &i.slave;
             if !slave.active {
                 continue;
             }
             // The slave's face that looks to the tool is pressed from there, and so is the master's, or neither.
-            if dot(slave.force, m.normals[slave.node as usize]) > 0.0 {
+            if dot(slave.force, m.normals()[slave.node as usize]) > 0.0 {
                 force[slave.node as usize] += slave.normal_force;
             }
             if i.side < 0.0 {
-                for (w, n) in slave.weights().iter().zip(m.cells[slave.cell as usize]) {
+                for (w, n) in slave.weights().iter().zip(m.cells()[slave.cell as usize]) {
                     force[n as usize] += w * slave.normal_force;
                 }
             }
         }
-        let (nodes, areas) = (&m.sheets[body.sheet].nodes, m.node_areas(body.sheet));
+        let (nodes, areas) = (&m.sheets()[body.sheet].nodes, m.node_areas(body.sheet));
         let pressure = |(n, area): (&u32, &V)| force[*n as usize] / norm(*area).max(1e-12);
         let part: Vec<f64> = nodes.iter().zip(&areas).map(pressure).collect();
         match &body.mirrored {
@@ -566,7 +565,7 @@ impl Forming {
 
     /// What to say when plies have touched themselves and the scene does not tell how they rub.
     pub fn frictionless_folds(&self, scene: &Scene) -> Option<String> {
-        let contacts = self.model.self_contacts.iter().filter(|c| c.touched);
+        let contacts = self.model.self_contacts().iter().filter(|c| c.touched);
         let touched: Vec<&str> = contacts.map(|c| c.name.as_str()).collect();
         (scene.friction.fabric_fabric.is_none() && !touched.is_empty()).then(|| {
             format!(

@@ -30,11 +30,11 @@ pub fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
             }
         } else {
             // A large sheet's points are not copied for this: it is where a run's memory would be largest.
-            let (start, end) = forming.model.sheets[body.sheet].cell_range;
-            for cell in &forming.model.cells[start..end] {
+            let (start, end) = forming.model.sheets()[body.sheet].cell_range;
+            for cell in &forming.model.cells()[start..end] {
                 count(
                     cell.map(|n| forming.reference[n as usize]),
-                    cell.map(|n| forming.model.x[n as usize]),
+                    cell.map(|n| forming.model.x()[n as usize]),
                 );
             }
         }

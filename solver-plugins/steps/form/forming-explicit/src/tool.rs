@@ -56,8 +56,8 @@ impl ToolSurfaces {
 /// The side (m) of a square as large as the median element of a flat sheet over the tool, whose box is given: towards the frame a film's
 /// elements grow, and of a large frame most may be large. Of one that lies nowhere over it, of all its elements.
 fn typical_size(model: &Model, sheet: usize, [low, high]: [V; 2]) -> f64 {
-    let (from, to) = model.sheets[sheet].cell_range;
-    let corners = |cell: &[u32; 4]| cell.map(|n| model.x[n as usize]);
+    let (from, to) = model.sheets()[sheet].cell_range;
+    let corners = |cell: &[u32; 4]| cell.map(|n| model.x()[n as usize]);
     let area = |cell: &&[u32; 4]| {
         let [a, b, c, d] = corners(cell);
         0.5 * norm(cross(sub(c, a), sub(d, b)))
@@ -69,7 +69,7 @@ fn typical_size(model: &Model, sheet: usize, [low, high]: [V; 2]) -> f64 {
             low[k] <= centre && centre <= high[k]
         })
     };
-    let cells = &model.cells[from..to];
+    let cells = &model.cells()[from..to];
     let mut areas: Vec<f64> = cells.iter().filter(is_over).map(|c| area(&c)).collect();
     if areas.is_empty() {
         areas = cells.iter().map(|c| area(&c)).collect();

@@ -34,13 +34,13 @@ impl Writer<'_> {
         let (elapsed, model) = (self.shown.elapsed().as_secs_f64(), &f.model);
         if elapsed > 0.2 {
             self.host.progress(&Progress {
-                fraction: model.time / end,
-                simulated_time: model.time,
-                rate: (model.cycle - self.cycle_shown) as f64 / elapsed,
+                fraction: model.time() / end,
+                simulated_time: model.time(),
+                rate: (model.cycle() - self.cycle_shown) as f64 / elapsed,
                 energy_ratio,
                 phase,
             });
-            (self.shown, self.cycle_shown) = (Instant::now(), model.cycle);
+            (self.shown, self.cycle_shown) = (Instant::now(), model.cycle());
         }
         Ok(())
     }
@@ -83,10 +83,10 @@ impl Observer for Writer<'_> {
     fn resume(&mut self, forming: &mut Forming, course: &mut Course) -> Result<(), StepError> {
         if self.frames.resume(forming, course)? {
             let model = &forming.model;
-            (self.cycle_shown, self.first_cycle) = (model.cycle, model.cycle);
+            (self.cycle_shown, self.first_cycle) = (model.cycle(), model.cycle());
             self.host.progress(&Progress {
-                fraction: model.time / forming.load.duration(),
-                simulated_time: model.time,
+                fraction: model.time() / forming.load.duration(),
+                simulated_time: model.time(),
                 phase: "going on from a checkpoint",
                 ..Progress::default()
             });
@@ -103,7 +103,7 @@ impl Observer for Writer<'_> {
     }
 
     fn tick(&mut self, forming: &Forming, e: &Ledger, end: f64) -> Result<(), StepError> {
-        let (internal, time) = (e.internal(), forming.model.time);
+        let (internal, time) = (e.internal(), forming.model.time());
         let ratio = if internal > 0.0 {
             e.kinetic / internal
         } else {

@@ -72,7 +72,9 @@ fn assert_frugal(what: &str, p: &Parameters, threads: usize, warm: usize) {
         let mut forming = build_global(p, &BuiltIn).unwrap();
         assert!(ASKED.load(Relaxed) > before, "nothing is counted");
         let critical = forming.model.critical_step().unwrap();
-        forming.model.dt = p.time_step.min(p.step_safety * critical);
+        forming
+            .model
+            .set_step(p.time_step.min(p.step_safety * critical));
         let mut quiet = 0;
         for k in 0..warm + 400 {
             let (asked, searched) = (ASKED.load(Relaxed), searches(&forming));

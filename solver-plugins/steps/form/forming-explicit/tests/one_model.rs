@@ -63,7 +63,7 @@ fn press(element: &str, zones: Option<&[[f64; 4]]>) -> Parameters {
 }
 
 fn bits(f: &Forming) -> Vec<u64> {
-    let all = [&f.model.x, &f.model.v];
+    let all = [f.model.x(), f.model.v()];
     all.iter()
         .flat_map(|v| v.as_flattened())
         .map(|x| x.to_bits())

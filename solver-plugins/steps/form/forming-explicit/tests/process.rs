@@ -63,7 +63,9 @@ fn parameters(symmetry: &[&str], change: impl Fn(&mut Value)) -> Parameters {
 /// Steps to `end` (s); `see` gets the model before and after the loads of each step are set.
 fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(&mut Forming)) {
     let critical = forming.model.critical_step().unwrap();
-    forming.model.dt = p.time_step.min(p.step_safety * critical);
+    forming
+        .model
+        .set_step(p.time_step.min(p.step_safety * critical));
     while forming.model.time < end {
         forming.load.apply(&mut forming.model);
         see(forming);
@@ -83,13 +85,13 @@ fn hung(symmetry: &[&str], weight: &str) -> (Forming, [f64; 3]) {
     // Three times the films' own mass: enough to be seen, and light enough for the films to come to rest.
     (p.least_areal_mass, p.damping) = (0.25, 60.0);
     let mut forming = build_global(&p, &BuiltIn).unwrap();
-    let (mut before, mut fall, mut work) = (forming.model.x.clone(), 0.0, 0.0);
+    let (mut before, mut fall, mut work) = (forming.model.x().to_vec(), 0.0, 0.0);
     let mut add_up = |f: &mut Forming| {
         let heights = f.model.x.iter().zip(&before).zip(f.model.own_masses());
         work += heights
             .map(|((x, y), m)| m * fall * (x[2] - y[2]))
             .sum::<f64>();
-        (before, fall) = (f.model.x.clone(), f.model.body_acceleration[2]);
+        (before, fall) = (f.model.x().to_vec(), f.model.body_acceleration[2]);
     };
     run(&mut forming, &p, 0.5, &mut add_up);
     add_up(&mut forming);

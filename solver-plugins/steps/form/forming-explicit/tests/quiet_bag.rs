@@ -90,17 +90,18 @@ fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(f64,
     let mut check = model.time;
     while model.time < end {
         if model.time >= check {
-            model.dt = p
-                .time_step
-                .min(p.step_safety * model.critical_step().unwrap());
+            model.set_step(
+                p.time_step
+                    .min(p.step_safety * model.critical_step().unwrap()),
+            );
             check += 0.01;
         }
         let bag = PRESSURE * smooth_step(model.time, PHASES[0], PHASES[1]);
         // The same air around: nothing is drawn from under the lower film.
-        model.pressures = Pressures {
+        model.set_pressures(Pressures {
             below: bag,
             above: bag,
-        };
+        });
         model.step(false).unwrap();
         see(model.time, model.kinetic());
     }
@@ -110,7 +111,7 @@ fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(f64,
 fn least_distance(forming: &Forming) -> f64 {
     let model = &forming.model;
     let mut least = f64::INFINITY;
-    for contact in &model.sheet_contacts {
+    for contact in model.sheet_contacts() {
         let master = contact.name.split('/').next().unwrap();
         let sheet = model.sheets.iter().find(|s| s.name == master).unwrap();
         let cells = &model.cells[sheet.cell_range.0..sheet.cell_range.1];

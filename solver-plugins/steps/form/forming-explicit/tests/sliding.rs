@@ -131,18 +131,19 @@ fn an_equal_ply_past_the_edge_of_the_one_below_comes_to_rest_on_the_film() {
     let slid = 12e-3;
     let nodes = forming.model.sheets[2].nodes.clone();
     for n in nodes {
-        forming.model.x[n as usize][0] += slid;
+        forming.model.x_mut()[n as usize][0] += slid;
     }
     let model = &mut forming.model;
-    model.dt = p
-        .time_step
-        .min(p.step_safety * model.critical_step().unwrap());
+    model.set_step(
+        p.time_step
+            .min(p.step_safety * model.critical_step().unwrap()),
+    );
     while model.time < 0.08 {
         let bag = 1e5 * smooth_step(model.time, 0.03, 0.04);
-        model.pressures = Pressures {
+        model.set_pressures(Pressures {
             below: bag,
             above: bag,
-        };
+        });
         model.step(false).unwrap();
     }
     // The film bears what presses on the part that is past the other ply's edge, over 80 mm of width (the upper film's share of it at the edge varies).
@@ -171,9 +172,10 @@ fn films_whose_nodes_do_not_lie_on_each_other_hold_each_other_from_both_sides() 
         (0..2).for_each(|k| forming.model.x[*n as usize][k] += 6e-3);
     }
     let model = &mut forming.model;
-    model.dt = p
-        .time_step
-        .min(p.step_safety * model.critical_step().unwrap());
+    model.set_step(
+        p.time_step
+            .min(p.step_safety * model.critical_step().unwrap()),
+    );
     // Beside the ply, and inside of where the films are joined.
     let away = |n: &u32| {
         let x = model.x[*n as usize];
@@ -190,11 +192,11 @@ fn films_whose_nodes_do_not_lie_on_each_other_hold_each_other_from_both_sides() 
     }]);
     while model.time < 0.1 {
         let bag = 1e5 * smooth_step(model.time, 0.0, 0.03);
-        model.load_factor = smooth_step(model.time, 0.03, 0.03);
-        model.pressures = Pressures {
+        model.set_load_factor(smooth_step(model.time, 0.03, 0.03));
+        model.set_pressures(Pressures {
             below: bag,
             above: bag,
-        };
+        });
         model.step(false).unwrap();
     }
     let at = forming.model.x[node as usize];

@@ -46,7 +46,9 @@ fn node(forming: &Forming, sheet: usize, [x, y]: [f64; 2]) -> usize {
 fn a_node_that_is_put_into_the_tool_is_told_by_how_far_and_where() {
     let mut forming = build(&bag(1, |_| {}));
     let n = node(&forming, 0, [0.0, 0.0]);
-    let depths = seen(&mut forming, |f| f.model.x[n] = [0.01, 0.005, 0.02 - 1e-4]);
+    let depths = seen(&mut forming, |f| {
+        f.model.x_mut()[n] = [0.01, 0.005, 0.02 - 1e-4]
+    });
     let found = of(&depths, "tool/lower").end;
     // Half of the film besides; the field's error is let be.
     let expected = 1e-4 + 4e-5 - forming.field_error("tool");
@@ -71,7 +73,7 @@ fn a_node_that_is_put_through_the_sheet_below_it_is_told_and_one_beside_it_is_no
     let mut forming = build(&bag(2, scene));
     let n = node(&forming, 2, [0.01, 0.01]);
     let below = forming.model.x[node(&forming, 1, [0.01, 0.01])][2];
-    let depths = seen(&mut forming, |f| f.model.x[n][2] = below - 1e-4);
+    let depths = seen(&mut forming, |f| f.model.x_mut()[n][2] = below - 1e-4);
     let found = of(&depths, "ply_1/ply_2").end;
     // The sheet that is bent down to the node is let be a part of what its elements cannot follow.
     assert!(
@@ -84,13 +86,13 @@ fn a_node_that_is_put_through_the_sheet_below_it_is_told_and_one_beside_it_is_no
     // Beyond the shorter ply's end a place between the two plies' middles is beside it, and above the film.
     let mut forming = build(&bag(2, scene));
     let n = node(&forming, 2, [0.055, 0.01]);
-    let depths = seen(&mut forming, |f| f.model.x[n][2] = below + 5e-5);
+    let depths = seen(&mut forming, |f| f.model.x_mut()[n][2] = below + 5e-5);
     assert_eq!(of(&depths, "ply_1/ply_2").end.depth, 0.0);
     assert_eq!(of(&depths, "lower/ply_2").end.depth, 0.0);
     // And there the film is the next one below.
     let mut forming = build(&bag(2, scene));
     let film = forming.model.x[0][2];
-    let depths = seen(&mut forming, |f| f.model.x[n][2] = film - 1e-4);
+    let depths = seen(&mut forming, |f| f.model.x_mut()[n][2] = film - 1e-4);
     let found = of(&depths, "lower/ply_2").end;
     assert!(found.depth > 0.6 * (2.4e-4 + 1e-4), "{found:?}");
 }
@@ -108,7 +110,7 @@ fn a_film_in_the_other_one_is_told_and_stops_a_run_near_a_ply_and_far_from_all_o
         }));
         let [low, high] = [0, 2].map(|sheet| node(&forming, sheet, [x, 0.01]));
         let below = forming.model.x[low][2];
-        let depths = seen(&mut forming, |f| f.model.x[high][2] = below - 2e-4);
+        let depths = seen(&mut forming, |f| f.model.x_mut()[high][2] = below - 2e-4);
         let found = pairs.map(|name| depths.iter().find(|d| d.pair.name == name).unwrap());
         assert_eq!(
             found.map(|d| d.end.depth > 1e-4),
@@ -145,7 +147,7 @@ fn through_a_fin(from: f64, length: &str) -> Vec<PairDepth> {
         let nodes = f.model.sheets[0].nodes.clone();
         nodes
             .iter()
-            .for_each(|n| f.model.x[*n as usize][2] = 0.015 + 4e-5);
+            .for_each(|n| f.model.x_mut()[*n as usize][2] = 0.015 + 4e-5);
         f.model.cycle += 5000;
     })
 }
@@ -186,13 +188,13 @@ fn a_press_is_watched_on_both_sides_of_its_plies() {
     let mut forming = build(&press(1, &json!({"gap": "0.0004 m"}), |_| {}));
     let n = node(&forming, 0, [0.05, 0.01]);
     let z = forming.model.x[n][2];
-    let depths = seen(&mut forming, |f| f.model.x[n][2] = z + 1e-4);
+    let depths = seen(&mut forming, |f| f.model.x_mut()[n][2] = z + 1e-4);
     assert!((of(&depths, "die/ply_1").end.depth - 1e-4).abs() < 1e-9);
     assert_eq!(of(&depths, "holder/ply_1").end.depth, 0.0);
     let depths = seen(
         &mut build(&press(1, &json!({"gap": "0.0004 m"}), |_| {})),
         |f| {
-            f.model.x[n][2] = z - 1e-4;
+            f.model.x_mut()[n][2] = z - 1e-4;
         },
     );
     assert!((of(&depths, "holder/ply_1").end.depth - 1e-4).abs() < 1e-9);
@@ -211,12 +213,12 @@ fn a_ply_without_contact_to_the_film_and_the_bed_stops_the_run_with_pair_place_a
     let count = forming.model.sheet_contacts.len();
     forming
         .model
-        .sheet_contacts
+        .sheet_contacts_mut()
         .retain(|c| !c.name.starts_with("lower/ply_2"));
     assert!(forming.model.sheet_contacts.len() < count);
     forming
         .model
-        .rigid_contacts
+        .rigid_contacts_mut()
         .retain(|c| !c.name.ends_with("/ply_2") && !c.name.contains("/ply_2/"));
     let told = format!(
         "{:?}",

@@ -179,9 +179,9 @@ impl Watch {
                 error: 0.0,
             });
         }
-        let sheets: Vec<Watcher> = (model.sheets.iter())
+        let sheets: Vec<Watcher> = (model.sheets().iter())
             .map(|s| {
-                let cells = &model.cells[s.cell_range.0..s.cell_range.1];
+                let cells = &model.cells()[s.cell_range.0..s.cell_range.1];
                 let mesh = SheetMesh::new(cells, model.start(), model.planes());
                 let free = mesh.nodes.iter().map(|n| !model.is_driven(*n)).collect();
                 Watcher {
@@ -230,7 +230,7 @@ impl Watch {
     /// Looks at everything as it is now. `last`: at the end of the run.
     pub fn look(&mut self, forming: &Forming, watched: &mut Watched, last: bool) {
         let model = &forming.model;
-        let due = |at: u64| model.cycle.saturating_sub(at) >= ANEW;
+        let due = |at: u64| model.cycle().saturating_sub(at) >= ANEW;
         let anew = last || watched.anew_at.is_none_or(due);
         let count = self.sheets.len();
         if watched.seats.len() != count {
@@ -240,16 +240,16 @@ impl Watch {
             watched.between = self.sheets.iter().map(of).collect();
         }
         let trees: Option<Vec<Option<SheetTree>>> = anew.then(|| {
-            let of = |s: &Watcher| s.mesh.tree(&model.x);
+            let of = |s: &Watcher| s.mesh.tree(model.x());
             self.sheets.par_iter().map(of).collect()
         });
         let asked: Vec<OnceLock<Option<SheetTree>>> = (0..count).map(|_| OnceLock::new()).collect();
         let first = watched.anew_at.is_none();
         if anew {
-            watched.anew_at = Some(model.cycle);
+            watched.anew_at = Some(model.cycle());
         }
         let boxes: Vec<[V; 2]> = (self.sheets.iter())
-            .map(|s| s.mesh.bounds(&model.x))
+            .map(|s| s.mesh.bounds(model.x()))
             .collect();
         let shifts: Vec<V> = self.parts.iter().map(|p| forming.shift(&p.name)).collect();
         let mut deepest = vec![Deep::default(); self.pairs.len()];
@@ -257,7 +257,7 @@ impl Watch {
         let mut clear = std::mem::take(&mut self.clear);
         self.nearest.fill(f64::INFINITY);
         let scene = Scene {
-            x: &model.x,
+            x: model.x(),
             shifts: &shifts,
             trees: trees.as_deref(),
             asked: &asked,
@@ -308,7 +308,7 @@ impl Watch {
             if now.depth > peak.deep.depth {
                 *peak = Peak {
                     deep: *now,
-                    time: model.time,
+                    time: model.time(),
                 };
             }
         }

@@ -59,7 +59,7 @@ impl Watch {
             share(a).total_cmp(&share(b))
         })?;
         let (one, other) = pair.name.split_once('/').unwrap_or((&pair.name, ""));
-        let (t, end) = (forming.model.time, forming.load.duration());
+        let (t, end) = (forming.model.time(), forming.load.duration());
         let mut text = format!(
             "'{other}' has gone through '{one}' at {}: they are {:.3} mm deep in each other, {:.1} times the thickness of the thinner one ({:.3} mm)",
             in_mm(now.place),
@@ -68,7 +68,7 @@ impl Watch {
             1e3 * pair.thinner
         );
         if let Some(start) = forming.reference.get(now.node as usize) {
-            let sheet = (forming.model.sheets.iter()).find(|s| s.nodes.contains(&now.node));
+            let sheet = (forming.model.sheets().iter()).find(|s| s.nodes.contains(&now.node));
             text += &format!(
                 "; the node is one of '{}', before forming at {}",
                 sheet.map_or("?", |s| s.name.as_str()),
