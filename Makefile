@@ -10,7 +10,13 @@ PLYFLOW := $(TARGET)/release/plyflow
 DEMO ?= workflows/joggle-spar/workflow.yaml
 CARGO := . ./.tools/env && cargo
 
-.PHONY: help build demo test long templates lint bench docs clean
+# The book's builder is a workspace of its own: what it needs weighs on nobody who only runs Plyflow.
+BOOK := . ./.tools/env && CARGO_TARGET_DIR=$(TARGET)/book-builder cargo
+# What needs no HDF5, no plugin and no run: its tests take seconds once built.
+QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p plyflow-study -p plyflow-sdk -p plyflow-geometry -p plyflow-surface \
+  -p plyflow-kernels -p plyflow-blank -p plyflow-conformance
+
+.PHONY: help build demo check test long templates lint bench docs pictures clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -22,6 +28,15 @@ build: ## build the program and the plugins into target/release
 demo: build ## run the joggle spar: coarse run, zones, local runs, report
 	$(PLYFLOW) run $(DEMO)
 	@echo 'report: $(subst /workflow,/report,$(DEMO:.yaml=.html))'
+
+check: ## form, lints and the tests that need no HDF5: under a minute once built
+	@scripts/setup
+	$(CARGO) fmt --all --check
+	scripts/check-docs
+	scripts/check-bits
+	scripts/check-imports
+	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
+	$(CARGO) test $(CARGO_FLAGS) $(QUICK) --lib --tests
 
 test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	@scripts/setup tests
@@ -41,17 +56,24 @@ lint: ## check form, lints and JSON Schemas
 	@scripts/setup
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
+	$(BOOK) fmt --manifest-path docs/builder/Cargo.toml --check
+	$(BOOK) clippy --locked --manifest-path docs/builder/Cargo.toml --all-targets -- -D warnings
 	scripts/check-docs
 	scripts/check-bits
+	scripts/check-imports
 
 bench: build ## measure; rows go to docs/benchmarks
 	$(CARGO) build $(CARGO_FLAGS) -p plyflow-benches
 	$(TARGET)/release/plyflow-benches
 
-docs: ## build the pages of the code and check the links of the book
+docs: ## build the book (target/book) and the pages of the code (target/doc), and check their links
 	@scripts/setup
-	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(SHELL) -c '$(CARGO) doc $(CARGO_FLAGS) --workspace --no-deps'
 	scripts/check-docs
+	$(BOOK) run --locked --manifest-path docs/builder/Cargo.toml
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(SHELL) -c '$(CARGO) doc $(CARGO_FLAGS) --workspace --no-deps'
+
+pictures: build ## make the pictures of the book anew from runs; half an hour
+	scripts/make-pictures
 
 clean: ## remove what was built; stores of workflows and .tools stay
 	cargo clean
