@@ -25,6 +25,8 @@ CRESTS = """\
     for_each: {zone: zones}
     from: {formed: local}
 """
+# The study of the guide has too few points for a map.
+MORE_POINTS = (("by: 45 deg", "by: 15 deg"), ("size: [80 mm, 96 mm]", "size: [64 mm, 72 mm, 80 mm, 88 mm, 96 mm]"))
 
 
 @functools.cache
@@ -39,6 +41,13 @@ def workflows() -> pathlib.Path:
     if text.count("\nexpect:") != 1:
         raise SystemExit(f"make-pictures: {demo} has no `expect:` before which a step can be put")
     (demo.parent / "with-crests.yaml").write_text(text.replace("\nexpect:", f"{CRESTS}\nexpect:"))
+    angles = copy / "kinematic" / "workflow-angles.yaml"
+    text = angles.read_text()
+    for few, more in MORE_POINTS:
+        if text.count(few) != 1:
+            raise SystemExit(f"make-pictures: {angles} has no `{few}`")
+        text = text.replace(few, more)
+    (angles.parent / "angles-with-map.yaml").write_text(text)
     return copy
 
 
@@ -68,7 +77,7 @@ class Artifact:
         about = self.file["plyflow"].attrs
         self.attributes = json.loads(about["attributes"])
         self.bodies = {b["name"]: b for b in json.loads(about["contents"])["bodies"]}
-        self.times = self.file["plyflow/times"][:]
+        self.times = self.file["plyflow/times"][:] if "times" in self.file["plyflow"] else None
 
     def array(self, path: str) -> np.ndarray:
         return self.file["data"][path][:]
@@ -110,8 +119,3 @@ def artifact(place: tuple[str, ...], step: str) -> Artifact:
     """The artifact of a step, or of one of its items such as `local[A]`."""
     file, *store = place
     return Artifact(json.loads(plyflow("inspect", step, "--workflow", file, *store, "--format", "json"))["path"])
-
-
-def results(place: tuple[str, ...]) -> list[dict]:
-    """The named numbers of a run."""
-    return json.loads(plyflow("results", *place, "--format", "json"))

@@ -10,12 +10,14 @@ from matplotlib.colors import Normalize
 import runs
 import scene3d
 import style
-from style import BLUE, GREY, INK, MM, ORANGE, RED
+from style import BLUE, GREEN, GREY, INK, MM, ORANGE, RED
 
 # Plies are drawn this much nearer to the eye: a flat cell over a fillet would else cut into the tool that its corners lie on.
 OVER_TOOL = 0.003
 COARSE_LINE, FINE_LINE = (0.45, 0.42, 0.36), (0.12, 0.12, 0.12)
 TOP = "ply_2"
+# Pale where a ply lies on the tool, dark where it stands off; readable without telling red from green.
+HEIGHTS = "YlGnBu"
 
 
 def demo() -> tuple[str, ...]:
@@ -42,16 +44,18 @@ def spar_zones():
     """The formed upper ply in its coarse mesh, with the fine meshes of the zones laid in, coloured by their height over the tool."""
     formed, compared = coarse(), runs.artifact(demo(), "comparison")
     size = (1400, 830)
-    view = scene3d.View(size, scene3d.Camera(-66, 40, (0.0, -0.004, 0.047), 0.67))
+    # From the side on which all zones are seen.
+    view = scene3d.View(size, scene3d.Camera(118, 42, (0.0, 0.004, 0.047), 0.67))
     show_tool(view, formed)
-    flat = formed.reference(TOP)[formed.cells(TOP)].mean(axis=1)
+    flat = formed.reference(TOP)[formed.cells(TOP)]
     outside = np.ones(len(flat), bool)
     for x0, y0, x1, y1 in (z["box"] for z in zones()):
-        outside &= ~((flat[:, 0] > x0) & (flat[:, 0] < x1) & (flat[:, 1] > y0) & (flat[:, 1] < y1))
+        within = (flat[..., 0] > x0) & (flat[..., 0] < x1) & (flat[..., 1] > y0) & (flat[..., 1] < y1)
+        outside &= ~within.all(axis=1)
     points, cells = formed.points(TOP), formed.cells(TOP)
-    view.surface(points, cells, style.CLOTH, lift=OVER_TOOL)
+    view.surface(points, cells[outside], style.CLOTH, lift=OVER_TOOL)
     view.lines(scene3d.grid_lines(points, cells[outside]), COARSE_LINE, 1.0, lift=OVER_TOOL + 0.002, share=0.55)
-    colours = ScalarMappable(Normalize(0, 5), "viridis")
+    colours = ScalarMappable(Normalize(0, 5), HEIGHTS)
     names = []
     for zone in zones():
         body = f"local_{zone['name']}_{TOP}"
@@ -67,8 +71,8 @@ def spar_zones():
         axes.annotate(f"zone {name}", highest[:2], (highest[0] + 45, highest[1] - 62), ha="left", va="center", fontsize=10,
                       arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.8, "shrinkB": 0})
     style.colour_bar(figure, (60, 735, 420, 22), colours, "height over the tool in the zones (mm)")
-    style.scale_bar(axes, 1080, 770, 0.1, size[0] / view.camera.width)
-    return style.save_png(figure, "spar-zones")
+    style.scale_bar(axes, 1130, 805, 0.1, size[0] / view.camera.width)
+    return style.save_png(figure, "spar-zones", [colours])
 
 
 def shear_angle():
@@ -85,8 +89,8 @@ def shear_angle():
     figure, axes = style.canvas(*size)
     style.put(axes, view.picture())
     style.colour_bar(figure, (60, 705, 420, 22), colours, "shear angle (deg)", ticks=[-20, -10, 0, 10, 20])
-    style.scale_bar(axes, 1080, 740, 0.1, size[0] / view.camera.width)
-    return style.save_png(figure, "shear-angle")
+    style.scale_bar(axes, 1130, 775, 0.1, size[0] / view.camera.width)
+    return style.save_png(figure, "shear-angle", [colours])
 
 
 def forming_stages():
@@ -97,19 +101,19 @@ def forming_stages():
     ends = np.cumsum(spent)
     stages = [
         (ends[0], "the bag is evacuated"), (ends[1], "the frame is lowered"),
-        (ends[1] + 0.45 * spent[2], "air is drawn under the film"), (ends[3], "formed"),
+        (ends[1] + 0.75 * spent[2], "the air under the films is drawn off"), (ends[3], "formed"),
     ]
-    width, height, gap = 700, 430, 46
+    width, height, gap = 700, 420, 46
     figure, axes = style.canvas(2 * width, 2 * (height + gap) + 40)
     for k, (time, what) in enumerate(stages):
         frame = int(np.argmin(np.abs(formed.times - time)))
-        camera = scene3d.Camera(-66, 30, (0.0, -0.01, 0.045), 0.80)
+        camera = scene3d.Camera(-66, 30, (0.01, 0.0, 0.10), 0.84)
         view = scene3d.View((width, height), camera)
         show_tool(view, formed)
         film, film_cells = formed.points("lower_film", frame), formed.cells("lower_film")
         middles = formed.reference("lower_film")[film_cells].mean(axis=1)
-        shown = (middles[:, 1] > 0) & (np.abs(middles[:, 0]) < 0.36) & (middles[:, 1] < 0.36)
-        view.surface(film, film_cells[shown], (0.75, 0.87, 0.95))
+        shown = (middles[:, 1] > 0) & (np.abs(middles[:, 0]) < 0.33) & (middles[:, 1] < 0.30)
+        view.surface(film, film_cells[shown], (0.75, 0.87, 0.95), lift=0.0015)
         points, cells = formed.points(TOP, frame), formed.cells(TOP)
         view.surface(points, cells, style.CLOTH, lift=OVER_TOOL)
         view.lines(scene3d.grid_lines(points, cells), COARSE_LINE, 0.7, lift=OVER_TOOL + 0.002, share=0.45)
@@ -117,8 +121,109 @@ def forming_stages():
         x, y = (k % 2) * width, (k // 2) * (height + gap)
         style.put(axes, view.picture(), x, y + gap)
         axes.text(x + 24, y + 34, f"{formed.times[frame]:.2f} s: {what}", fontsize=10, va="center")
-    style.scale_bar(axes, 1180, 2 * (height + gap) + 20, 0.1, width / 0.80)
+    style.scale_bar(axes, 1180, 2 * (height + gap) + 20, 0.1, width / 0.84)
     return style.save_png(figure, "forming-stages")
+
+
+def crests(zone: str) -> list[np.ndarray]:
+    """Crests of the wrinkles of a zone's upper ply, paths [k][3] in m."""
+    found = runs.artifact(demo(), f"crests[{zone}]").attributes["defects"]
+    return [np.array(d["ridge"]) for d in found if d["on"] == TOP and d["type"] == "wrinkle"]
+
+
+def local_wrinkle():
+    """The fine shells of the zone with the largest wrinkle: upper ply, height over the tool, crests."""
+    compared, name = runs.artifact(demo(), "comparison"), "B"
+    body, size = f"local_{name}_{TOP}", (1400, 800)
+    view = scene3d.View(size, scene3d.Camera(-58, 38, (-0.118, -0.030, 0.092), 0.262))
+    show_tool(view, coarse())
+    points, cells = compared.points(body), compared.cells(body)
+    colours = ScalarMappable(Normalize(0, 5), HEIGHTS)
+    view.surface(points, cells, paint(compared.field(body, "nodal_distance") * MM, colours), lift=0.001)
+    view.lines(scene3d.grid_lines(points, cells), FINE_LINE, 0.8, lift=0.0018, share=0.3)
+    view.lines(points[scene3d.rim(cells)], FINE_LINE, 2.0, lift=0.002)
+    view.lines(crests(name), (0.84, 0.37, 0.0), 5.0, lift=0.004)
+    figure, axes = style.canvas(size[0], size[1] + 115)
+    style.put(axes, view.picture())
+    style.colour_bar(figure, (60, size[1] + 20, 420, 22), colours, "height over the tool (mm)")
+    axes.plot([640, 700], [size[1] + 31] * 2, color=RED, linewidth=2.5)
+    axes.text(715, size[1] + 31, "crest of a wrinkle", va="center")
+    style.scale_bar(axes, 1180, size[1] + 60, 0.02, size[0] / view.camera.width)
+    return style.save_png(figure, "local-wrinkle", [colours])
+
+
+def cross_section():
+    """The section through the largest wrinkle that the demo's workflow asks for: plies of the coarse run and of the zone, over the tool."""
+    measured = runs.artifact(demo(), "shape")
+    cut = next(s for s in measured.attributes["sections"] if "wrinkle" in s["label"])
+    sizes = {m["name"]: m["element_size"] * MM for m in runs.artifact(demo(), "comparison").attributes["models"]}
+    figure, axes = plt.subplots(figsize=(7, 4.6), layout="constrained")
+    for line in cut["lines"]:
+        x, z = measured.array(line["x"]) * MM, measured.array(line["y"]) * MM
+        if line["label"] == "tool":
+            axes.fill_between(x, z, 0, color="#d5d7da", linewidth=0)
+            axes.plot(x, z, color=GREY, linewidth=1.0)
+            continue
+        fine = "zone" in line["label"]
+        axes.plot(x, z, color=BLUE if fine else ORANGE, linewidth=1.7, linestyle="-" if fine else (0, (4, 1.5)), label=(
+            f"zone: shells of {sizes['local.B']:g} mm" if fine else f"coarse run: membranes of {sizes['global']:g} mm"))
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles))
+    axes.legend(once.values(), once.keys(), loc="lower right")
+    axes.set(aspect="equal", xlabel="along the section (mm)", ylabel="height over the bed (mm)", xlim=(0, 30), ylim=(95, 114),
+             xticks=range(0, 31, 5), yticks=range(95, 115, 5))
+    axes.text(25, 105, "tool", ha="center", color="#555555")
+    return style.save_svg(figure, "cross-section")
+
+
+PHASES = (("bagging_time", "bag"), ("lowering_time", "frame lowered"), ("drawing_time", "air drawn"), ("settling_time", ""))
+
+
+def energy_ledger():
+    """Where the work of the coarse run goes."""
+    formed = coarse()
+    process = json.loads(formed.file["plyflow"].attrs["provenance"])["parameters"]["scene"]["process"]["double_diaphragm"]
+    time = formed.array("history/time")
+    energy = {name: formed.array(f"history/{name}") for name in
+              ("external", "membrane", "friction", "damping", "contact", "hourglass", "kinetic", "drift")}
+    figure, (upper, lower) = plt.subplots(2, 1, figsize=(7, 5.2), sharex=True, layout="constrained", height_ratios=(3, 2))
+    large = (("external", "work of the pressures", INK, "-"), ("membrane", "strain of plies and films", BLUE, "-"),
+             ("friction", "friction", ORANGE, "-"), ("damping", "damping", GREEN, "-"))
+    small = (("kinetic", "kinetic", RED, "-"), ("hourglass", "hourglass control", style.PURPLE, "-"),
+             ("contact", "in the contacts", style.SKY, "-"), ("drift", "drift (unaccounted)", INK, (0, (3, 1.5))))
+    for axes, lines in ((upper, large), (lower, small)):
+        for name, label, colour, dashes in lines:
+            axes.plot(time, energy[name], color=colour, linestyle=dashes, label=label, linewidth=1.4)
+        axes.set(ylabel="energy (J)")
+        axes.legend(loc="upper left" if axes is upper else "lower left", frameon=True, facecolor="white", edgecolor="none", framealpha=1)
+        start = 0.0
+        for key, label in PHASES:
+            end = start + float(process[key].split()[0])
+            axes.axvline(end, color=GREY, linewidth=0.6, linestyle=(0, (2, 2)))
+            if axes is upper:
+                axes.text((start + end) / 2, 1.02, label, transform=axes.get_xaxis_transform(), ha="center", va="bottom", fontsize=8)
+            start = end
+    lower.set(xlabel="time (s)", xlim=(0, time[-1]))
+    return style.save_svg(figure, "energy-ledger")
+
+
+def kinematic():
+    """Shear of the upper ply by geometry alone and by the coarse run."""
+    width, height = 700, 400
+    figure, axes = style.canvas(2 * width, height + 180)
+    colours = ScalarMappable(Normalize(-40, 40), "RdBu_r")
+    for k, (step, what) in enumerate((("drape", "kinematic drape"), ("coarse", "explicit run, membranes"))):
+        formed = runs.artifact(demo(), step)
+        view = scene3d.View((width, height), scene3d.Camera(-66, 42, (0.0, -0.004, 0.047), 0.67))
+        show_tool(view, formed)
+        points, cells = formed.points(TOP), formed.cells(TOP)
+        view.surface(points, cells, paint(np.degrees(formed.at_points(TOP, "shear_angle")), colours), lift=OVER_TOOL)
+        view.lines(scene3d.grid_lines(points, cells), (0.2, 0.2, 0.2), 0.6, lift=OVER_TOOL + 0.002, share=0.25)
+        style.put(axes, view.picture(), k * width, 45)
+        axes.text(k * width + 30, 34, what, fontsize=10, va="center")
+    style.colour_bar(figure, (60, height + 75, 420, 22), colours, "shear angle (deg)", ticks=[-40, -20, 0, 20, 40])
+    style.scale_bar(axes, 1220, height + 110, 0.1, width / 0.67)
+    return style.save_png(figure, "kinematic", [colours])
 
 
 def dimension(axes, start, end, text: str, aside=(0, 0), gap: float = 0):
@@ -152,7 +257,7 @@ def tool_spar():
     scale, size = 1.45, (1400, 800)  # pixels for each mm
     figure, axes = style.canvas(*size)
     views = {}
-    for name, elevation, box, middle, y in (("plan", 90, (960, 280), 0.0, 135), ("side", 0, (960, 190), 0.06, 570)):
+    for name, elevation, box, middle, y in (("plan", 90, (960, 280), 0.0, 105), ("side", 0, (960, 190), 0.06, 570)):
         view = scene3d.View(box, scene3d.Camera(-90, elevation, (0, 0, middle), box[0] / scale / MM))
         view.surface(points, cells, style.TOOL)
         style.put(axes, view.picture(), 30, y)
@@ -178,7 +283,7 @@ def tool_spar():
         wall = 0 if outwards[0] else 1
         foot = -84 if wall == 0 else 84
         note(axes, plan(start + slope * foot + long / 2, foot), f"wall steps out by {max(outwards):g}",
-             plan(start + slope * foot + (-95 if wall == 0 else 118), -103 if wall == 0 else 112))
+             plan(start + slope * foot + (-80 if wall == 0 else 118), -103 if wall == 0 else 112))
         crown = max(top, top + rise)
         ends = (side(start - 62 * slope, crown), side(start - 62 * slope + long, crown))
         dimension(axes, *ends, f"{long:g}", (0, -26))

@@ -41,18 +41,25 @@ def save_svg(figure, name: str) -> pathlib.Path:
     return path
 
 
-def save_png(figure, name: str, colours: int = 256) -> pathlib.Path:
-    """Writes a figure with a palette of its own, which takes a third of the room."""
+def save_png(figure, name: str, maps=()) -> pathlib.Path:
+    """Writes a figure of pixels; `maps` are the mappables whose colours must come out smooth."""
     figure.canvas.draw()
     pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
     plt.close(figure)
-    return save_pixels(pixels, name, colours)
+    return save_pixels(pixels, name, maps)
 
 
-def save_pixels(pixels: np.ndarray, name: str, colours: int = 256) -> pathlib.Path:
+def save_pixels(pixels: np.ndarray, name: str, maps=()) -> pathlib.Path:
+    """Writes pixels with a palette of 256 colours, which takes a third of the room: some from the maps, the rest from the picture."""
     path = runs.PICTURES / f"{name}.png"
     image = Image.fromarray(np.ascontiguousarray(pixels))
-    image.quantize(colours, method=Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE).save(path, optimize=True)
+    of_maps = [m.cmap(np.linspace(0, 1, 56 // len(maps)))[:, :3] for m in maps]
+    palette = np.concatenate([np.rint(255 * c).astype(np.uint8) for c in of_maps]) if maps else np.zeros((0, 3), np.uint8)
+    own = image.quantize(256 - len(palette), method=Image.Quantize.MEDIANCUT, kmeans=2)
+    palette = np.concatenate([palette, np.array(own.getpalette(), np.uint8).reshape(-1, 3)])[:256]
+    chosen = Image.new("P", (1, 1))
+    chosen.putpalette(palette.ravel().tolist())
+    image.quantize(palette=chosen, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
     return path
 
 

@@ -14,6 +14,7 @@ mod comparison;
 mod conformance;
 mod coupon;
 mod defects;
+mod export;
 mod forming;
 mod measurement;
 mod mesh_study;
@@ -37,6 +38,7 @@ pub use conformance::{
 };
 pub use coupon::{Coupon, ElementCount, SpecimenBody};
 pub use defects::{Defects, PlyDefects, Thresholds};
+pub use export::Export;
 pub use forming::{
     Depth, DepthPeak, Energy, FieldError, Forming, MeshQuality, Penetration, PenetrationPeak,
     PlainBody, RegionFacts, RigidBody, Sheet, SheetBody,

@@ -123,6 +123,8 @@ struct Artifacts {
     census_comparison: artifact::CensusComparison,
     /// How far a component keeps the contract of its kind.
     conformance: artifact::Conformance,
+    /// Files for other programs.
+    export: artifact::Export,
     /// The table of a study; not a step's artifact.
     study_table: artifact::StudyTable,
 }

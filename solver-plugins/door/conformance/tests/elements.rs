@@ -8,6 +8,7 @@ use plyflow_conformance::failed;
 use plyflow_kernels::fabric::Fabric;
 use plyflow_kernels::isotropic::Isotropic;
 use plyflow_kernels::m4::M4;
+use plyflow_kernels::m4f::M4f;
 use plyflow_kernels::rf4::Rf4;
 use plyflow_kernels::s4::S4;
 use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch};
@@ -45,6 +46,14 @@ fn nothing_is_found_in_the_membrane_element_with_film_and_with_fabric() {
         let checks = with_fabric::<M4>("{}", form);
         sound(&checks, &MEMBRANE);
         sound(&checks, &["work"]);
+    }
+}
+
+#[test]
+fn nothing_is_found_in_the_fully_integrated_membrane_with_film_and_with_fabric() {
+    sound(&with_film::<M4f>("{}"), &MEMBRANE);
+    for form in ["fibre-energy", "hypoelastic"] {
+        sound(&with_fabric::<M4f>("{}", form), &MEMBRANE);
     }
 }
 

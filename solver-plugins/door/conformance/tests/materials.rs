@@ -2,9 +2,10 @@
 
 mod common;
 
-use common::{FILM, ISOTROPIC, KINKED, TABULATED_FILM, WOVEN, ncf, of_material, sound};
+use common::{FILM, ISOTROPIC, KINKED, LINEAR, TABULATED_FILM, WOVEN, ncf, of_material, sound};
 use plyflow_conformance::{Check, failed};
 use plyflow_kernels::fabric::Fabric;
+use plyflow_kernels::fabric_linear::FabricLinear;
 use plyflow_kernels::isotropic::Isotropic;
 use plyflow_kernels::marlow::Marlow;
 use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
@@ -35,6 +36,7 @@ fn nothing_is_found_in_the_repository_s_own_materials() {
     sound(&of_material::<Marlow>(TABULATED_FILM), &membrane);
     let mut sheets = vec![
         of_material::<Isotropic>(ISOTROPIC),
+        of_material::<FabricLinear>(LINEAR),
         of_material::<Fabric>(WOVEN),
         of_material::<Fabric>(KINKED),
     ];

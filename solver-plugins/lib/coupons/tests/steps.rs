@@ -1,45 +1,15 @@
 //! Coupons as steps. They give the same bytes for any number of threads: the pieces that threads share are larger than one
 //! (batches of elements, blocks of nodes), so the meshes of these tests have more than a thousand nodes.
 
-use plyflow_abi::{PF_KIND_ELEMENT, pf_component, pf_str};
 use plyflow_coupons::{
     bias_extension::Plugin as BiasExtension, bias_plane::Plugin as BiasPlane,
     cantilever::Plugin as Cantilever, film::Plugin as Film, inflation::Plugin as Inflation,
     picture_frame::Plugin as PictureFrame, pure_bending::Plugin as PureBending,
 };
-use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4};
-use plyflow_sdk::{Element, Step, element_table, material_table};
+use plyflow_kernels::built_in::component;
+use plyflow_sdk::Step;
 use plyflow_testing::{Machine, MemoryArtifact, MemoryInput, run_on};
 use serde_json::{Value, json};
-
-fn component(kind: u32, name: &str) -> Option<pf_component> {
-    let functions: *const std::ffi::c_void = match (kind, name) {
-        (PF_KIND_ELEMENT, "m4") => {
-            std::ptr::from_ref(Box::leak(Box::new(element_table::<M4>()))).cast()
-        }
-        (PF_KIND_ELEMENT, "rf4") => {
-            std::ptr::from_ref(Box::leak(Box::new(element_table::<Rf4>()))).cast()
-        }
-        (_, "material-fabric") => {
-            std::ptr::from_ref(Box::leak(Box::new(material_table::<Fabric>()))).cast()
-        }
-        (_, "material-marlow") => {
-            std::ptr::from_ref(Box::leak(Box::new(material_table::<Marlow>()))).cast()
-        }
-        _ => return None,
-    };
-    let manifest = match name {
-        "m4" => M4::MANIFEST,
-        "rf4" => Rf4::MANIFEST,
-        _ => "{}",
-    };
-    Some(pf_component {
-        kind,
-        reserved: 0,
-        functions,
-        manifest: pf_str::new(manifest),
-    })
-}
 
 /// One thread, with Plyflow's own components.
 const ALONE: Machine = Machine {

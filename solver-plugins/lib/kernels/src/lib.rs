@@ -1,5 +1,5 @@
-//! What Plyflow's own component plugins are made of: the element formulations [`m4`], [`rf4`] and
-//! [`s4`], the materials [`fabric`], [`isotropic`] and [`marlow`], and the lane arithmetic under them ([`Lanes`],
+//! What Plyflow's own component plugins are made of: the element formulations [`m4`], [`m4f`], [`rf4`] and
+//! [`s4`], the materials [`fabric`], [`fabric_linear`], [`isotropic`] and [`marlow`], and the lane arithmetic under them ([`Lanes`],
 //! [`dispatch!`], [`exp`], [`asin`]).
 //!
 //! The plugin crates `element-*` and `material-*` only export these types: a library may be linked
@@ -9,11 +9,14 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+pub mod built_in;
 pub mod fabric;
+pub mod fabric_linear;
 mod functions;
 pub mod isotropic;
 mod lanes;
 pub mod m4;
+pub mod m4f;
 pub mod marlow;
 pub mod quad;
 pub mod rf4;

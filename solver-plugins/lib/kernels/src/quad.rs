@@ -432,7 +432,7 @@ fn critical_step_of(constants: &[f64], n: usize, areal_mass: f64, s: &View<'_>, 
 }
 
 /// Largest eigenvalue of the symmetric [[a, c], [c, b]].
-fn largest(a: f64, b: f64, c: f64) -> f64 {
+pub(crate) fn largest(a: f64, b: f64, c: f64) -> f64 {
     0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt()
 }
 

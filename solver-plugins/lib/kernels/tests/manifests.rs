@@ -2,19 +2,16 @@
 
 mod common;
 use common::*;
-use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4};
+use plyflow_kernels::{built_in, fabric::Fabric, m4::M4, m4f::M4f, marlow::Marlow, rf4::Rf4};
 use plyflow_model::Manifest;
 use plyflow_sdk::{Element, Material};
 
 #[test]
 fn manifests_obey_the_models_rules() {
-    for (name, text) in [
-        ("m4", M4::MANIFEST),
-        ("rf4", Rf4::MANIFEST),
-        ("material-fabric", Fabric::MANIFEST),
-        ("material-marlow", Marlow::MANIFEST),
-    ] {
-        let manifest = Manifest::parse(text).unwrap_or_else(|e| panic!("{name}: {e}"));
+    for component in built_in::all() {
+        let name = component.name;
+        let manifest =
+            Manifest::parse(component.manifest).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(manifest.name, name);
     }
 }
@@ -24,6 +21,7 @@ fn fields_of_the_manifest_are_the_rows_that_the_elements_write() {
     let m = fabric(&ncf("fibre-energy", "")).unwrap();
     for (text, sizes) in [
         (M4::MANIFEST, El::new::<M4>("{}", &m).unwrap().sizes),
+        (M4f::MANIFEST, El::new::<M4f>("{}", &m).unwrap().sizes),
         (Rf4::MANIFEST, El::new::<Rf4>("{}", &m).unwrap().sizes),
     ] {
         let json: serde_json::Value = serde_json::from_str(text).unwrap();

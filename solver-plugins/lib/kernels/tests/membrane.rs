@@ -3,12 +3,20 @@
 mod common;
 mod fabric_support;
 use common::*;
-use plyflow_kernels::{Level, limit_level, m4::M4, rf4::Rf4};
+use plyflow_kernels::{Level, limit_level, m4::M4, m4f::M4f, rf4::Rf4};
 
 /// Compares the forces of `m4` with differences of its energies in random states.
 fn check_forces(material: &Mat, json: &str, strain: f64, warp: f64, tolerance: f64) {
+    check_forces_of(
+        &El::new::<M4>(json, material).unwrap(),
+        strain,
+        warp,
+        tolerance,
+    );
+}
+
+fn check_forces_of(e: &El, strain: f64, warp: f64, tolerance: f64) {
     let mut r = Random(11);
-    let e = El::new::<M4>(json, material).unwrap();
     for _ in 0..20 {
         let reference: Vec<Quad> = (0..8).map(|_| flat(&mut r, 0.2)).collect();
         let mut batch = e.initialise(&reference, &[AXIS; 8]);
@@ -42,6 +50,13 @@ fn check_forces(material: &Mat, json: &str, strain: f64, warp: f64, tolerance: f
 fn forces_are_the_gradient_of_the_energies_in_random_states_of_m4() {
     check_forces(&ply(), "{}", 0.1, 0.1, 1e-4);
     check_forces(&film(FILM).unwrap(), "{}", 0.3, 0.2, 1e-4);
+}
+
+#[test]
+fn forces_are_the_gradient_of_the_energies_in_random_states_of_m4f() {
+    for material in [ply(), film(FILM).unwrap()] {
+        check_forces_of(&El::new::<M4f>("{}", &material).unwrap(), 0.1, 0.1, 1e-4);
+    }
 }
 
 #[test]

@@ -15,6 +15,10 @@ pub const FILM: &str = r#"{"uniaxial": {"amplitude": 6.364e6, "growth": 0.4451, 
 pub const ISOTROPIC: &str =
     r#"{"youngs_modulus": 7e10, "poisson_ratio": 0.33, "thickness": 2e-4, "areal_mass": 0.54}"#;
 
+/// A ply with constant moduli, SI.
+pub const LINEAR: &str = r#"{"fibre_modulus_1": 3e9, "fibre_modulus_2": 1e9, "shear_modulus": 4e5, "thickness": 4e-4,
+    "areal_mass": 0.4, "bending": {"family_1": 4e-4, "family_2": 2e-4, "twist": 1e-4}}"#;
+
 /// NCF FCIM359 of workflows/materials, SI, in one of the two forms.
 pub fn ncf(form: &str) -> String {
     r#"{"form": "FORM", "fibre_modulus": 3e9,

@@ -11,13 +11,9 @@
 
 use super::forces::View;
 use super::{S4, row};
+use crate::quad::largest;
 use nalgebra::{Matrix3, Vector3};
 use plyflow_geometry::vec3::{Vec3, cross, dot, mix, norm};
-
-/// Largest eigenvalue of the symmetric [[a, c], [c, b]].
-pub(super) fn largest(a: f64, b: f64, c: f64) -> f64 {
-    0.5 * (a + b) + (0.25 * (a - b) * (a - b) + c * c).sqrt()
-}
 
 /// What each kind of strain stores over displacements in the plane, across it, and rotations: roots of
 /// its blocks' bounds (1/s).

@@ -1,0 +1,74 @@
+"""Pictures of the HTML pages that Plyflow writes, taken with headless Chromium as tests/report does."""
+
+import io
+import os
+import pathlib
+import shutil
+
+import numpy as np
+from PIL import Image
+from selenium import webdriver
+from selenium.webdriver.support.ui import WebDriverWait
+
+import runs
+import spar
+import style
+
+# Seconds that software WebGL may take for the first picture.
+PATIENCE = 60
+
+
+def chromium(width: int, height: int):
+    """Chromium with WebGL in software, without a way out."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    arguments = ["--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", f"--window-size={width},{height}",
+                 "--host-resolver-rules=MAP * ~NOTFOUND", "--disable-background-networking", "--no-first-run", "--disable-dev-shm-usage",
+                 "--hide-scrollbars", "--force-device-scale-factor=1.5"]
+    if os.geteuid() == 0:
+        arguments.append("--no-sandbox")
+    for argument in arguments:
+        options.add_argument(argument)
+    return webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=shutil.which("chromedriver")))
+
+
+def photograph(page: pathlib.Path, name: str, width: int, height: int, prepare):
+    """A picture of a page, after `prepare` has been called with the driver and has brought the right place into view."""
+    driver = chromium(width, height)
+    try:
+        driver.get(page.resolve().as_uri())
+        prepare(driver)
+        driver.execute_async_script("const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done));")
+        picture = Image.open(io.BytesIO(driver.get_screenshot_as_png())).convert("RGB")
+    finally:
+        driver.quit()
+    return style.save_pixels(np.asarray(picture), name)
+
+
+def page(place: tuple[str, ...], name: str) -> pathlib.Path:
+    """The report of a run. What differs from run to run (times, hosts) is not in the part that is photographed."""
+    path = runs.STORE / f"{name}.html"
+    runs.plyflow("report", *place, "--output", str(path))
+    return path
+
+
+# Brings the heading with a text to the upper edge.
+TO_HEADING = """
+const heading = [...document.querySelectorAll('h2, h3, h4')].find((h) => h.textContent.trim().startsWith(arguments[0]));
+window.scrollTo(0, heading.getBoundingClientRect().top + window.scrollY - 12);
+"""
+
+
+def report():
+    """The 3D view of the demo's report."""
+    def prepare(driver):
+        WebDriverWait(driver, PATIENCE).until(lambda d: d.find_element("css selector", ".view3d").get_attribute("data-ready"))
+        driver.execute_script(TO_HEADING, "Formed plies in 3D")
+    return photograph(page(spar.demo(), "report"), "report", 900, 880, prepare)
+
+
+def study():
+    """The page of a study: the largest shear over the ply's angle and size, as a map."""
+    def prepare(driver):
+        driver.execute_script(TO_HEADING, "shear (deg) over angle and size")
+    return photograph(page(runs.run("kinematic/angles-with-map"), "study"), "study", 900, 760, prepare)

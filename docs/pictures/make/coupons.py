@@ -1,0 +1,78 @@
+"""Pictures of workflows/coupons and workflows/hemisphere."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+
+import runs
+import scene3d
+import spar
+import style
+from style import BLUE, GREY, INK, MM, ORANGE, RED
+
+
+def bias_extension():
+    """Shear and wrinkle amplitude of both pulled fabrics, in the meshes for every day, and what the thesis states of its tests."""
+    figure, panels = plt.subplots(2, 2, figsize=(7, 5.4), layout="constrained", sharex="col")
+    cases = (("bias-extension-ncf", "rf4_5mm", "NCF, 200 × 100 mm"), ("bias-extension-woven", "rf4_75mm", "woven, 300 × 150 mm"))
+    for (shear, amplitude), (name, step, title) in zip(panels.T, cases):
+        place = runs.run(f"coupons/{name}/workflow")
+        run = runs.artifact(place, step)
+        x = run.array("curves/run/displacement") * MM
+        shear.plot(x, np.degrees(run.array("curves/run/shear_a")), color=BLUE, label="computed, at the centre")
+        shear.plot(x, np.degrees(run.array("curves/theory/shear")), color=GREY, linestyle=(0, (4, 2)), label="pin-jointed net")
+        # The first measured point is the start, the second the onset of wrinkles.
+        shear.plot(run.array("curves/measured/shear_displacement")[1:] * MM, np.degrees(run.array("curves/measured/shear")[1:]), "o",
+                   color=RED, label="thesis: onset of wrinkles")
+        shear.set(title=title, ylabel="shear angle (deg)")
+        amplitude.plot(x, run.array("curves/run/amplitude") * MM, color=BLUE, label="computed")
+        amplitude.plot(run.array("curves/measured/amplitude_displacement") * MM, run.array("curves/measured/amplitude") * MM, "o",
+                       color=RED, label="thesis")
+        amplitude.set(xlabel="displacement (mm)", ylabel="wrinkle amplitude (mm)", xlim=(0, x[-1]))
+        for axes in (shear, amplitude):
+            axes.set_ylim(bottom=0)
+        shear.legend(loc="upper left")
+        amplitude.legend(loc="upper right" if "ncf" in name else "upper left")
+    return style.save_svg(figure, "bias-extension")
+
+
+def cantilever():
+    """Profiles of hanging strips: shells and the heavy elastica with the same law."""
+    place = runs.run("coupons/cantilever/workflow")
+    figure, panels = plt.subplots(1, 3, figsize=(7, 3.5), layout="constrained", sharey=True, width_ratios=(190, 190, 110))
+    laws = (("nonlinear", "nonlinear law", BLUE), ("b415", "constant, B(41.5°)", ORANGE), ("binit", "constant, initial", style.GREEN))
+    for axes, (fabric, title) in zip(panels, (("ncf_positive", "NCF, positive bending"), ("ncf_negative", "NCF, negative bending"), ("woven", "woven"))):
+        for law, label, colour in laws:
+            run = runs.artifact(place, f"{fabric}_{law}_rf4")
+            axes.plot(run.array("curves/reference/x") * MM, run.array("curves/reference/z") * MM, color=colour, linewidth=1.2, label=label)
+            axes.plot(run.array("profile/x")[::2] * MM, run.array("profile/z")[::2] * MM, "o", color=colour, markersize=3.2,
+                      markerfacecolor="white", markeredgewidth=0.9)
+        axes.set(title=title, aspect="equal", xlabel="x (mm)", xlim=(-5, 105 if fabric == "woven" else 185), ylim=(-195, 8))
+    panels[0].set_ylabel("z (mm)")
+    handles = panels[0].get_legend_handles_labels()[0]
+    marks = [plt.Line2D([], [], color=INK, linewidth=1.2, label="elastica"),
+             plt.Line2D([], [], color=INK, marker="o", markersize=3.2, markerfacecolor="white", linestyle="none", label="shells (rf4)")]
+    figure.legend(handles=handles + marks, loc="outside lower center", ncols=5, columnspacing=1.2, handlelength=1.6)
+    return style.save_svg(figure, "cantilever")
+
+
+def hemisphere():
+    """The woven ply of case A in 5 mm shells, pressed: shear from above and the wrinkles from the side."""
+    place = runs.run("hemisphere/workflow-coarse")
+    formed, census = runs.artifact(place, "woven"), runs.artifact(place, "woven_wrinkles")
+    width, height = 700, 470
+    figure, axes = style.canvas(2 * width, height + 160)
+    shear = ScalarMappable(Normalize(-50, 50), "RdBu_r")
+    off = ScalarMappable(Normalize(0, 7), spar.HEIGHTS)
+    points, cells = formed.points("ply_1"), formed.cells("ply_1")
+    values = ((np.degrees(formed.at_points("ply_1", "shear_angle")), shear), (census.field("ply_1", "deviation") * MM, off))
+    for k, (field, colours) in enumerate(values):
+        view = scene3d.View((width, height), scene3d.Camera(-70, 38, (0, 0, -0.011), 0.385))
+        view.surface(points, cells, spar.paint(field, colours))
+        view.lines(scene3d.grid_lines(points, cells), (0.15, 0.15, 0.15), 0.7, lift=0.0008, share=0.3)
+        style.put(axes, view.picture(), k * width, 0)
+    style.colour_bar(figure, (140, height + 55, 420, 22), shear, "shear angle (deg)")
+    style.colour_bar(figure, (width + 140, height + 55, 420, 22), off, "distance from punch and die (mm)")
+    style.scale_bar(axes, 40, height + 30, 0.05, width / 0.385)
+    return style.save_png(figure, "hemisphere", [shear, off])

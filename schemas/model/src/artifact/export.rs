@@ -1,0 +1,16 @@
+//! The kind `export`: files for other programs.
+
+use super::{Attributes, TextFile};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Attributes of the kind `export`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Export {
+    /// What `plyflow extract` writes.
+    pub files: Vec<TextFile>,
+}
+
+impl Attributes for Export {
+    const KIND: &'static str = "export";
+}

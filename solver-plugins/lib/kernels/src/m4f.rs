@@ -1,0 +1,321 @@
+//! `m4f`: a four-node membrane quadrilateral in space with four points and no hourglass control.
+//!
+//! At each Gauss point p of the 2 x 2 rule the columns of the deformation gradient along the material axes are
+//! `g_a = N_i,a x_i`, the metric is `C_ab = g_a . g_b`, and the internal force is the exact gradient of `sum_p A_p W(C_p)`:
+//! `f_i = sum_p A_p (N_i,1 (S11 g1 + S12 g2) + N_i,2 (S12 g1 + S22 g2))` (total Lagrangian, as any textbook has it, such as
+//! Belytschko, Liu, Moran, Nonlinear Finite Elements, 4.9). The reference is projected on the plane of its diagonals.
+//!
+//! Every in-plane mode has its stiffness from the material, so nothing has to be controlled. The price: 4 calls of the material instead of
+//! one, and locking where stiff fibres are not parallel to the sides, because all four points then forbid what the element cannot do
+//! otherwise. [`crate::m4`] is the element for fabrics; this one is for films and for telling hourglass control from material.
+
+use crate::quad::{FIELDS, MAX_LANES, fields_of, largest, material_frame};
+use crate::{Lanes, WIDTH, dispatch};
+use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
+use plyflow_sdk::abi::PF_OK;
+use plyflow_sdk::{Aligned, Element, ElementBatch, ElementSizes, MaterialRef, MembraneBatch};
+
+/// Points of the 2 x 2 Gauss rule.
+const POINTS: usize = 4;
+/// Rows of constants of a point: `N_i,1` and `N_i,2` of four nodes (1/m), area (m2).
+const PER_POINT: usize = 9;
+/// Rows of constants; the last one is the least area that a node has (m2).
+const CONSTANTS: usize = POINTS * PER_POINT + 1;
+/// Corners and Gauss points of the unit square, counter-clockwise.
+const SIGNS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+/// 1 / sqrt(3).
+const GAUSS: f64 = 0.577_350_269_189_625_8;
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parameters {}
+
+/// The formulation; it has no parameters.
+pub struct M4f;
+
+impl Element for M4f {
+    const MANIFEST: &'static str = include_str!("m4f/manifest.json");
+
+    fn create(parameters: &str, _: &MaterialRef) -> Result<Self, String> {
+        let Parameters {} = serde_json::from_str(parameters)
+            .map_err(|e| format!("parameters of element 'm4f': {e}"))?;
+        Ok(Self)
+    }
+
+    fn sizes(&self) -> ElementSizes {
+        ElementSizes {
+            nodes: 4,
+            dofs_per_node: 3,
+            constants: CONSTANTS,
+            material_points: POINTS,
+            fields: FIELDS,
+            ..Default::default()
+        }
+    }
+
+    fn initialise(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) {
+        let n = batch.lanes;
+        let areal_mass = material.sizes().areal_mass;
+        for l in 0..n {
+            let x = |i: usize| core::array::from_fn(|k| batch.position[(3 * i + k) * n + l]);
+            let axis = core::array::from_fn(|k| batch.axis[k * n + l]);
+            let (constants, areas) = reference([0, 1, 2, 3].map(x), axis);
+            for (r, value) in constants.iter().enumerate() {
+                batch.constants[r * n + l] = *value;
+            }
+            for (i, area) in areas.iter().enumerate() {
+                batch.mass[i * n + l] = area * areal_mass;
+            }
+        }
+        if batch.critical_step.is_some() {
+            let history = POINTS * material.sizes().membrane_history * n;
+            let mut history = Aligned::zeros(history);
+            let mut scratch = Scratch::new();
+            let code = scratch.evaluate(
+                &batch.constants,
+                batch.position,
+                &mut history,
+                n,
+                0.0,
+                material,
+                true,
+            );
+            if let Some(step) = batch.critical_step.as_deref_mut() {
+                match code {
+                    PF_OK => scratch.critical_step(&batch.constants, n, areal_mass, step),
+                    _ => step.fill(0.0),
+                }
+            }
+        }
+    }
+
+    fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
+        let n = batch.lanes;
+        let mut s = Scratch::new();
+        let wanted = batch.critical_step.is_some();
+        let code = s.evaluate(
+            &batch.constants,
+            batch.position,
+            batch.material_history,
+            n,
+            batch.dt,
+            material,
+            wanted,
+        );
+        if code != PF_OK {
+            return code;
+        }
+        forces_of(&batch.constants, n, &s, batch.force, batch.energy);
+        if let Some(step) = batch.critical_step.as_deref_mut() {
+            s.critical_step(&batch.constants, n, material.sizes().areal_mass, step);
+        }
+        if let Some(fields) = batch.fields.as_deref_mut() {
+            let [metric, stress] = s.means(&batch.constants, n);
+            fields_of(n, &metric, &stress, fields);
+        }
+        PF_OK
+    }
+}
+
+/// Constants of an element with corners `x` (m) and the fabric's `axis`, and the areas of its nodes (m2).
+fn reference(x: [Vec3; 4], axis: Vec3) -> ([f64; CONSTANTS], [f64; 4]) {
+    let normal = cross(sub(x[0], x[2]), sub(x[1], x[3]));
+    let (e1, e2, _) = material_frame(axis, normal);
+    let flat = x.map(|p| [dot(p, e1), dot(p, e2)]);
+    let mut constants = [0.0; CONSTANTS];
+    let mut areas = [0.0; 4];
+    for (p, at) in SIGNS.iter().enumerate() {
+        let [xi, eta] = at.map(|s| s * GAUSS);
+        let slopes = SIGNS.map(|[s, t]| [0.25 * s * (1.0 + t * eta), 0.25 * t * (1.0 + s * xi)]);
+        let mut jacobian = [[0.0; 2]; 2];
+        for (slope, place) in slopes.iter().zip(&flat) {
+            for a in 0..2 {
+                for b in 0..2 {
+                    jacobian[a][b] += slope[a] * place[b];
+                }
+            }
+        }
+        let [[a, b], [c, d]] = jacobian;
+        let area = (a * d - b * c).max(f64::MIN_POSITIVE);
+        let rows = &mut constants[p * PER_POINT..];
+        for (i, [s, t]) in slopes.iter().enumerate() {
+            rows[i] = (d * s - b * t) / area;
+            rows[4 + i] = (a * t - c * s) / area;
+            let [along, across] = SIGNS[i];
+            areas[i] += area * 0.25 * (1.0 + along * xi) * (1.0 + across * eta);
+        }
+        rows[8] = area;
+    }
+    constants[CONSTANTS - 1] = areas.iter().fold(f64::INFINITY, |m, a| m.min(*a));
+    (constants, areas)
+}
+
+/// Rows of one point, of n lanes each, one after the other from the start of each field.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Point {
+    /// g1, g2: `[2][3][lanes]`.
+    g: [f64; 6 * MAX_LANES],
+    metric: [f64; 3 * MAX_LANES],
+    stress: [f64; 3 * MAX_LANES],
+    energy: [f64; MAX_LANES],
+    stiffness: [f64; 2 * MAX_LANES],
+}
+
+/// What a batch needs between the material's calls and the forces.
+struct Scratch([Point; POINTS]);
+
+impl Scratch {
+    fn new() -> Self {
+        Self(
+            [Point {
+                g: [0.0; 6 * MAX_LANES],
+                metric: [0.0; 3 * MAX_LANES],
+                stress: [0.0; 3 * MAX_LANES],
+                energy: [0.0; MAX_LANES],
+                stiffness: [0.0; 2 * MAX_LANES],
+            }; POINTS],
+        )
+    }
+
+    /// Metric and stress at all points; the material's code.
+    fn evaluate(
+        &mut self,
+        constants: &[f64],
+        position: &[f64],
+        history: &mut [f64],
+        n: usize,
+        dt: f64,
+        material: &MaterialRef,
+        stiffness: bool,
+    ) -> i32 {
+        let rows = material.sizes().membrane_history * n;
+        for (p, point) in self.0.iter_mut().enumerate() {
+            metric_of(position, &constants[p * PER_POINT * n..], n, point);
+            let code = material.membrane(&mut MembraneBatch {
+                lanes: n,
+                dt,
+                metric: &point.metric[..3 * n],
+                history: &mut history[p * rows..(p + 1) * rows],
+                stress: &mut point.stress[..3 * n],
+                energy: &mut point.energy[..n],
+                stiffness: stiffness.then_some(&mut point.stiffness[..2 * n]),
+            });
+            if code != PF_OK {
+                return code;
+            }
+        }
+        PF_OK
+    }
+
+    /// A bound of 2 / omega_max, as that of [`crate::quad`], summed over the points, with the lightest node's mass.
+    fn critical_step(&self, constants: &[f64], n: usize, areal_mass: f64, step: &mut [f64]) {
+        for l in 0..n {
+            let mut sum = 0.0;
+            for (p, point) in self.0.iter().enumerate() {
+                let b = |r: usize| constants[(p * PER_POINT + r) * n + l];
+                let product = |r: usize, s: usize| (0..4).map(|i| b(r + i) * b(s + i)).sum::<f64>();
+                let gradient = largest(product(0, 0), product(4, 4), product(0, 4));
+                let row = |of: &[f64], r: usize| of[r * n + l];
+                let metric = [0, 1, 2].map(|r| row(&point.metric, r));
+                let stress = [0, 1, 2].map(|r| row(&point.stress, r));
+                let [tangent, shear] = [0, 1].map(|r| row(&point.stiffness, r).max(0.0));
+                let stretch = largest(metric[0], metric[1], metric[2]);
+                let pulled = largest(stress[0], stress[1], stress[2]).max(0.0);
+                let along = (tangent * metric[0].max(metric[1])).sqrt();
+                let across = (shear * (metric[0] + metric[1])).sqrt();
+                let material = (tangent * stretch).min((along + across).powi(2));
+                sum += b(8) * (material + pulled) * gradient;
+            }
+            let mass = areal_mass * constants[(CONSTANTS - 1) * n + l];
+            step[l] = 2.0 * (mass / sum).sqrt();
+        }
+    }
+
+    /// Metric and stress, `[3][lanes]` each, in the mean over the area.
+    fn means(&self, constants: &[f64], n: usize) -> [[f64; 3 * MAX_LANES]; 2] {
+        let area = |p: usize, l: usize| constants[(p * PER_POINT + 8) * n + l];
+        let mut means = [[0.0; 3 * MAX_LANES]; 2];
+        for k in 0..3 * n {
+            let all: f64 = (0..POINTS).map(|p| area(p, k % n)).sum();
+            for (p, point) in self.0.iter().enumerate() {
+                let share = area(p, k % n) / all;
+                means[0][k] += share * point.metric[k];
+                means[1][k] += share * point.stress[k];
+            }
+        }
+        means
+    }
+}
+
+dispatch!(fn metric_of(position: &[f64], constants: &[f64], n: usize, s: &mut Point) = metric_kernel, lanes n);
+dispatch!(fn forces_of(
+    constants: &[f64],
+    n: usize,
+    s: &Scratch,
+    force: &mut [f64],
+    energy: &mut [f64],
+) = forces_kernel, lanes n);
+
+#[inline(always)]
+fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut Point) {
+    for c in (0..n).step_by(WIDTH) {
+        let slope = |r: usize| V::load(constants, r * n + c);
+        let (mut c11, mut c22, mut c12) = (V::splat(0.0), V::splat(0.0), V::splat(0.0));
+        for k in 0..3 {
+            let (mut g1, mut g2) = (V::splat(0.0), V::splat(0.0));
+            for i in 0..4 {
+                let x = V::load(position, (3 * i + k) * n + c);
+                g1 = g1 + slope(i) * x;
+                g2 = g2 + slope(4 + i) * x;
+            }
+            g1.store(&mut s.g, k * n + c);
+            g2.store(&mut s.g, (3 + k) * n + c);
+            c11 = c11 + g1 * g1;
+            c22 = c22 + g2 * g2;
+            c12 = c12 + g1 * g2;
+        }
+        c11.store(&mut s.metric, c);
+        c22.store(&mut s.metric, n + c);
+        c12.store(&mut s.metric, 2 * n + c);
+    }
+}
+
+#[inline(always)]
+fn forces_kernel<V: Lanes>(
+    constants: &[f64],
+    n: usize,
+    s: &Scratch,
+    force: &mut [f64],
+    energy: &mut [f64],
+) {
+    for c in (0..n).step_by(WIDTH) {
+        let mut f = [[V::splat(0.0); 3]; 4];
+        let mut stored = V::splat(0.0);
+        for (p, point) in s.0.iter().enumerate() {
+            let row = |r: usize| V::load(constants, (p * PER_POINT + r) * n + c);
+            let area = row(8);
+            let s11 = V::load(&point.stress, c) * area;
+            let s22 = V::load(&point.stress, n + c) * area;
+            let s12 = V::load(&point.stress, 2 * n + c) * area;
+            for k in 0..3 {
+                let g1 = V::load(&point.g, k * n + c);
+                let g2 = V::load(&point.g, (3 + k) * n + c);
+                let t1 = s11 * g1 + s12 * g2;
+                let t2 = s12 * g1 + s22 * g2;
+                for (i, node) in f.iter_mut().enumerate() {
+                    node[k] = node[k] + (row(i) * t1 + row(4 + i) * t2);
+                }
+            }
+            stored = stored + V::load(&point.energy, c) * area;
+        }
+        for (i, node) in f.iter().enumerate() {
+            for (k, component) in node.iter().enumerate() {
+                component.store(force, (3 * i + k) * n + c);
+            }
+        }
+        stored.store(energy, c);
+        V::splat(0.0).store(energy, n + c);
+        V::splat(0.0).store(energy, 2 * n + c);
+    }
+}
