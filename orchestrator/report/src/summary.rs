@@ -1,11 +1,13 @@
 //! The table at the end of a run in the terminal.
 
-use crate::family::{SMALL, base};
+use crate::family::Family;
 use crate::input::{Expectation, Instance, ReportInput, Verdict, label};
-use crate::page::{expected_text, got_text, is_notable};
-use crate::study::{Comparison, Material, Study};
+use crate::page::expectations::{expected_text, got_text, is_notable};
+use crate::page::verdict;
+use crate::read::comparison::Comparison;
+use crate::read::material::Material;
+use crate::read::study::Study;
 use crate::units::{bytes, duration, fixed, number, quantity};
-use crate::verdict;
 use camino::Utf8Path;
 use plyflow_model::text::one_line;
 
@@ -22,8 +24,7 @@ const ITEMS: usize = 3;
 pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
     let material = Material::read(input, false);
     let mut blocks: Vec<String> = Vec::new();
-    let family = input.family.as_ref();
-    let large = family.is_some_and(|f| f.points.len() > SMALL);
+    let large = input.family.as_ref().is_some_and(Family::is_large);
     // The table of a study tells of its points; one line for each run of each would bury it.
     for study in material.studies.iter().filter(|_| !large) {
         let (_, text) = verdict::of_study(study);
@@ -154,7 +155,7 @@ fn result_table(input: &ReportInput) -> String {
 fn cost_table(instances: &[Instance], together: bool) -> String {
     let mut steps: Vec<(&str, Vec<&Instance>)> = Vec::new();
     for i in instances {
-        let step = if together { base(i) } else { &i.step };
+        let step = if together { i.base() } else { &i.step };
         match steps.iter_mut().find(|(name, _)| *name == step) {
             Some((_, items)) => items.push(i),
             None => steps.push((step, vec![i])),

@@ -1,8 +1,9 @@
 //! What the steps cost.
 
-use crate::input::{Instance, ReportInput};
-use crate::plot::bars;
-use crate::study::{Material, Run};
+use crate::draw::plot::bars;
+use crate::input::Instance;
+use crate::page::content::Content;
+use crate::read::study::Run;
 use crate::units::{bytes, count, duration, fixed};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
@@ -13,13 +14,10 @@ const LONGEST: usize = 400;
 const BARS: (usize, f64) = (16, 0.005);
 
 /// Forming runs and coupons by their instance.
-fn runs(material: &Material) -> BTreeMap<usize, &Run> {
-    let studies = material.studies.iter();
-    let all = studies.flat_map(|s| {
-        let local = s.locals.iter().filter_map(|l| l.run.as_ref());
-        (s.global.iter().chain(&s.reference).chain(local)).chain(&s.further)
-    });
-    let coupons = material.shown.iter().filter_map(|s| s.run.as_ref());
+fn runs<'a>(content: &'a Content<'_>) -> BTreeMap<usize, &'a Run> {
+    let studies = content.material.studies.iter();
+    let all = studies.flat_map(|s| s.runs().chain(&s.further));
+    let coupons = content.shown.iter().filter_map(|s| s.run.as_ref());
     all.chain(coupons).map(|r| (r.instance, r)).collect()
 }
 
@@ -35,9 +33,9 @@ fn rate(i: &Instance, run: &Run) -> f64 {
 }
 
 /// Table and bars; forming runs with their elements and rate.
-pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
-    let runs = runs(material);
-    let all = &input.instances;
+pub(super) fn section(content: &Content<'_>) -> Markup {
+    let runs = runs(content);
+    let all = &content.input.instances;
     let sum = |f: fn(&Instance) -> f64| duration(all.iter().map(f).sum());
     let memory = all
         .iter()

@@ -1,7 +1,8 @@
 //! Energies, loads and contact over time.
 
-use crate::plot::{Plot, Series, Style};
-use crate::study::{Material, Run};
+use crate::page::content::Content;
+use crate::plain::chart::{Plot, Series, Style};
+use crate::read::study::Run;
 use crate::units::{fixed, number};
 use maud::{Markup, html};
 use plyflow_model::artifact::PenetrationPeak;
@@ -20,37 +21,23 @@ const ENERGIES: [(&str, &str, usize); 6] = [
 ];
 
 /// Whether any run tells of its energies.
-pub(super) fn has(material: &Material) -> bool {
-    !runs(material).is_empty()
+pub(super) fn has(content: &Content<'_>) -> bool {
+    !runs(content).is_empty()
 }
 
 /// All forming runs and coupons, and whether they are whole: driven by pressure and frame, not by their edges. Last come those that no
 /// study draws.
-fn runs(material: &Material) -> Vec<(bool, &Run)> {
+fn runs<'a>(content: &'a Content<'_>) -> Vec<(bool, &'a Run)> {
+    let studies = &content.material.studies;
     let mut runs: Vec<(bool, &Run)> = Vec::new();
-    for study in &material.studies {
-        runs.extend(
-            study
-                .global
-                .iter()
-                .chain(&study.reference)
-                .map(|r| (true, r)),
-        );
-        runs.extend(
-            study
-                .locals
-                .iter()
-                .filter_map(|l| l.run.as_ref())
-                .map(|r| (false, r)),
-        );
+    for study in studies {
+        let whole = study.global.iter().chain(&study.reference);
+        runs.extend(whole.map(|r| (true, r)));
+        runs.extend(study.locals.iter().map(|l| (false, &l.run)));
     }
-    runs.extend(
-        material
-            .shown
-            .iter()
-            .filter_map(|s| Some((false, s.run.as_ref()?))),
-    );
-    for run in material.studies.iter().flat_map(|s| &s.further) {
+    let coupons = content.shown.iter().filter_map(|s| s.run.as_ref());
+    runs.extend(coupons.map(|r| (false, r)));
+    for run in studies.iter().flat_map(|s| &s.further) {
         if runs.iter().all(|(_, r)| r.instance != run.instance) {
             runs.push((false, run));
         }
@@ -59,8 +46,8 @@ fn runs(material: &Material) -> Vec<(bool, &Run)> {
 }
 
 /// Energies and contact of all runs.
-pub(super) fn section(material: &Material) -> Markup {
-    let runs = runs(material);
+pub(super) fn section(content: &Content<'_>) -> Markup {
+    let runs = runs(content);
     html! {
         @if !runs.is_empty() {
             section id="energy" {
@@ -129,20 +116,14 @@ fn plots(run: &Run, whole: bool) -> Markup {
         energies.insert(at, over(time, "internal", 1, values.clone()));
     }
     let blank = Plot {
-        title: "",
-        x_label: "time (s)",
-        y_label: "",
-        series: Vec::new(),
-        boxes: Vec::new(),
+        x_label: "time (s)".into(),
         from_zero: true,
-        bound: None,
-        ceiling: None,
-        legend_of_one: false,
         size: [560.0, 290.0],
+        ..Plot::default()
     };
     let energy = Plot {
-        title: "Energies",
-        y_label: "energy (J)",
+        title: "Energies".into(),
+        y_label: "energy (J)".into(),
         series: energies,
         ..blank.clone()
     };
@@ -150,9 +131,9 @@ fn plots(run: &Run, whole: bool) -> Markup {
         let values = h.get(name)?.iter().map(|v| v * factor).collect();
         Some(over(time, shown, colour, values))
     };
-    let drawn = |title, y_label, columns: &[Column]| Plot {
-        title,
-        y_label,
+    let drawn = |title: &'static str, y_label: &'static str, columns: &[Column]| Plot {
+        title: title.into(),
+        y_label: y_label.into(),
         series: columns.iter().copied().filter_map(scaled).collect(),
         ..blank.clone()
     };
@@ -207,8 +188,8 @@ fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64], blank: Plot<'
     let bound = run.kinetic_bound.map(|b| (100.0 * b, "bound"));
     let time = run.history.get("time").unwrap_or_default();
     Plot {
-        title: "Kinetic over internal energy",
-        y_label: "ratio (%)",
+        title: "Kinetic over internal energy".into(),
+        y_label: "ratio (%)".into(),
         series: vec![over(time, "ratio", 2, values)],
         ceiling: bound.map(|b| 3.0 * b.0),
         bound,

@@ -1,8 +1,8 @@
 //! Speed against error.
 
-use crate::fidelity::{Measure, Way, Ways, advice, ways};
 use crate::input::ReportInput;
-use crate::plot::{Plot, Series, Style};
+use crate::plain::chart::{Plot, Series, Style};
+use crate::read::fidelity::{Measure, Way, Ways, advice, ways};
 use crate::units::{bytes, duration, fixed};
 use maud::{Markup, html};
 
@@ -114,16 +114,14 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
     );
     let x_label = format!("CPU time over that of the {} (%)", ways.yardstick());
     Plot {
-        title,
-        x_label: &x_label,
-        y_label,
+        title: title.into(),
+        x_label: x_label.into(),
+        y_label: y_label.into(),
         series: all,
-        boxes: Vec::new(),
         from_zero: true,
-        bound: None,
-        ceiling: None,
         legend_of_one: true,
         size: [640.0, 300.0],
+        ..Plot::default()
     }
     .svg()
 }

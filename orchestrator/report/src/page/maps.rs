@@ -1,12 +1,14 @@
 //! Maps of the plies.
 
-use crate::field::{Field, Legend};
-use crate::place::{Place, id_of};
-use crate::read::Ply;
-use crate::study::{Local, Study};
+use crate::draw::error::{DrawError, Drawn};
+use crate::draw::legend::{Field, Legend};
+use crate::draw::sharpness::Sharpness;
+use crate::draw::view::{FormedView, Mark, Overlay, Side, flat, formed};
+use crate::plain::place::{Place, id_of};
+use crate::plain::ply::Ply;
+use crate::read::study::{Local, Study};
 use crate::units::quantity;
-use crate::view::{FormedView, Mark, Overlay, Sharpness, Side, flat, formed};
-use maud::{Markup, html};
+use maud::html;
 use plyflow_model::artifact::ComparedDefect;
 use rayon::prelude::*;
 
@@ -15,17 +17,15 @@ const FLAT: f64 = 430.0;
 const FORMED: f64 = 430.0;
 const LOCAL: f64 = 340.0;
 
-fn legends(study: &Study) -> Vec<Legend> {
-    Field::ALL.iter().filter_map(|f| f.legend(study)).collect()
+/// The scales of all maps of a study.
+pub(super) fn legends(study: &Study) -> Vec<Legend> {
+    let (plies, thresholds) = (study.all_plies(), study.thresholds());
+    let of = |f: &Field| f.legend(&plies, thresholds);
+    Field::ALL.iter().filter_map(of).collect()
 }
 
 /// Maps of the global run: each quantity on each ply, flat and formed.
-pub(super) fn global(
-    study: &Study,
-    n: usize,
-    places: &[Place],
-    sharp: Sharpness,
-) -> Result<Markup, String> {
+pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness) -> Drawn {
     if study.plies.is_empty() {
         return Ok(html! {});
     }
@@ -62,7 +62,7 @@ pub(super) fn global(
     let rows = pairs
         .par_iter()
         .map(draw)
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, DrawError>>()?;
     let of = |field: Option<Field>| rows.iter().filter(move |r| r.0 == field);
     Ok(html! {
         section id={ "maps-" (n) } {
@@ -93,12 +93,7 @@ pub(super) fn global(
 }
 
 /// Maps of the local runs, with their defects named.
-pub(super) fn local(
-    study: &Study,
-    n: usize,
-    places: &[Place],
-    sharp: Sharpness,
-) -> Result<Markup, String> {
+pub(super) fn local(study: &Study, n: usize, places: &[Place], sharp: Sharpness) -> Drawn {
     let legends = legends(study);
     let shown: Vec<&Local> = study
         .locals
@@ -109,7 +104,7 @@ pub(super) fn local(
     let zones = shown
         .par_iter()
         .map(draw)
-        .collect::<Result<Vec<_>, String>>()?;
+        .collect::<Result<Vec<_>, DrawError>>()?;
     if zones.is_empty() {
         return Ok(html! {});
     }
@@ -134,7 +129,7 @@ fn zone(
     legends: &[Legend],
     places: &[Place],
     sharp: Sharpness,
-) -> Result<Markup, String> {
+) -> Drawn {
     let compared = (study.comparison.as_ref()).map(|c| &c.told);
     let compared = compared.filter(|c| c.local_of(&local.zone).is_some());
     let defects: Vec<&ComparedDefect> = compared
@@ -186,10 +181,8 @@ fn zone(
     Ok(html! {
         div class="zone-block" {
             h3 { "Zone " (local.zone) }
-            @if let Some(run) = &local.run {
-                p class="note" { "Step " code { (run.label) } ", elements of "
-                    (quantity(run.facts.element_size, "m", 3)) "." }
-            }
+            p class="note" { "Step " code { (local.run.label) } ", elements of "
+                (quantity(local.run.facts.element_size, "m", 3)) "." }
             @for (name, found, figures) in &rows {
                 h4 { (name) span class="note" { ": "
                     @if compared.is_none() { "not compared" }

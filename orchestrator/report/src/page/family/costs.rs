@@ -1,6 +1,6 @@
 //! What the steps of a study cost, all points together.
 
-use crate::family::{Family, base};
+use crate::family::Family;
 use crate::input::{Instance, ReportInput};
 use crate::units::{bytes, duration};
 use maud::{Markup, html};
@@ -9,7 +9,7 @@ use maud::{Markup, html};
 pub(in crate::page) fn section(input: &ReportInput, family: &Family) -> Markup {
     let mut steps: Vec<(&str, Vec<&Instance>)> = Vec::new();
     for instance in &input.instances {
-        let name = base(instance);
+        let name = instance.base();
         match steps.iter_mut().find(|(n, _)| *n == name) {
             Some((_, all)) => all.push(instance),
             None => steps.push((name, vec![instance])),

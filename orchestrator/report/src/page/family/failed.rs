@@ -1,7 +1,7 @@
 //! Points that failed: where, of what class, and why.
 
-use super::{LISTED, Shown};
 use crate::family::Fate;
+use crate::page::family::shown::{LISTED, Shown};
 use crate::units::plural;
 use maud::{Markup, html};
 use std::collections::BTreeMap;

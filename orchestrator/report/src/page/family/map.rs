@@ -1,14 +1,17 @@
 //! A response over two variables: colours and lines of equal value between the computed points, which are drawn on top.
 
-use super::{LINKED, Shown, range_of};
-use crate::colour::{Palette, Scale as Colours};
+use crate::draw::colour::{Palette, Scale as Colours};
+use crate::draw::colour_bar::bar;
+use crate::draw::error::{DrawError, Drawn};
+use crate::draw::plane::{Corner, LEAST, Plane, contour};
+use crate::draw::plot::CHARACTER;
+use crate::draw::plot::axis::ticks;
+use crate::draw::raster::{Camera, Canvas, Paint, Triangles};
+use crate::draw::svg::px;
 use crate::family::Fate;
-use crate::family::plane::{Corner, LEAST, Plane, contour};
-use crate::field::bar;
-use crate::plot::{CHARACTER, ticks};
-use crate::raster::{Camera, Canvas, Paint, Triangles};
+use crate::page::family::shown::{LINKED, Shown, range_of};
+use crate::plain::ply::Cells;
 use crate::units::{number, plural, shown as unit_of};
-use crate::view::px;
 use maud::{Markup, html};
 use std::fmt::Write;
 
@@ -32,11 +35,7 @@ const CLEAR: [f64; 2] = [13.0, 10.0];
 ///
 /// # Errors
 /// When a picture cannot be encoded.
-pub(super) fn maps(
-    shown: &Shown<'_>,
-    response: usize,
-    values: &[Option<f64>],
-) -> Result<Markup, String> {
+pub(super) fn maps(shown: &Shown<'_>, response: usize, values: &[Option<f64>]) -> Drawn {
     let numeric: Vec<usize> = (shown.varied.iter().copied())
         .filter(|v| shown.levels[*v].numbers().is_some())
         .collect();
@@ -110,7 +109,7 @@ fn of_pair(
     pair: [usize; 2],
     values: &[Option<f64>],
     colours: Colours,
-) -> Result<Result<Markup, String>, String> {
+) -> Result<Result<Markup, String>, DrawError> {
     let others = shown.others(&pair);
     let planes = Plane::all(&shown.levels, pair);
     let kept: Vec<&Plane> = (planes.iter())
@@ -166,7 +165,7 @@ struct Map<'a> {
 }
 
 impl Map<'_> {
-    fn svg(&self, response: usize) -> Result<Markup, String> {
+    fn svg(&self, response: usize) -> Drawn {
         let [w, h] = SIZE;
         let [across, up] = self.pair.map(|v| &self.shown.scales[v]);
         let widest = up
@@ -227,17 +226,20 @@ impl Map<'_> {
         triangles: &[[Corner; 3]],
         left: f64,
         field: [f64; 2],
-    ) -> Result<String, String> {
+    ) -> Result<String, DrawError> {
         // Of the page down, of the canvas up.
         let points: Vec<[f64; 3]> = (triangles.iter().flatten())
             .map(|c| [c[0] - left, TOP + field[1] - c[1], 0.0])
             .collect();
         let values: Vec<f64> = triangles.iter().flatten().map(|c| c[2]).collect();
-        let cells: Vec<u32> = (0..points.len() as u32).collect();
+        let cells = Cells {
+            nodes: (0..points.len() as u32).collect(),
+            each: 3,
+        };
         let around = [[0.0, 0.0, 0.0], [field[0], field[1], 0.0]];
         let (camera, size) = Camera::plan().fit(around.iter(), field, 0.0);
         let mut canvas = Canvas::new(size);
-        let mesh = Triangles::new(points.len(), &cells, 3);
+        let mesh = Triangles::new(points.len(), &cells);
         canvas.surface(
             &camera,
             &points,
@@ -246,7 +248,7 @@ impl Map<'_> {
             false,
             0.0,
         );
-        canvas.data_url().map_err(|e| e.to_string())
+        Ok(canvas.data_url()?)
     }
 
     /// Lines of equal value, with their values where there is room.

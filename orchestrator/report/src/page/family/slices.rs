@@ -1,11 +1,13 @@
 //! A response over one variable: every point, lines through points that differ in it alone, bars where several stand at one value.
 
-use super::{LINKED, Shown};
+use crate::draw::plot::axis::{Axis, Zero, extent};
+use crate::draw::plot::{CHARACTER, MARKERS};
+use crate::draw::scale::Scale;
+use crate::draw::svg::px;
 use crate::family::Fate;
-use crate::family::scale::Scale;
-use crate::plot::{Axis, CHARACTER, COLOURS, MARKERS, Zero, extent};
+use crate::page::family::shown::{LINKED, Shown};
+use crate::plain::chart::COLOURS;
 use crate::units::{number, plural, shown as unit_of};
-use crate::view::px;
 use maud::{Markup, html};
 use std::collections::HashMap;
 use std::fmt::Write;
