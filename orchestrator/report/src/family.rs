@@ -223,8 +223,7 @@ impl Family {
             let mut order: Vec<usize> = (0..values.len()).collect();
             order.sort_by(|a, b| number(a).total_cmp(&number(b)));
             let mut place = vec![0; order.len()];
-            order
-                .iter()
+            (order.iter())
                 .enumerate()
                 .for_each(|(to, from)| place[*from] = to);
             of.iter_mut().for_each(|i| *i = place[*i]);

@@ -165,9 +165,13 @@ fn contents(content: &Content<'_>, large: bool) -> Markup {
     let study = material.studies.first();
     let maps = study.is_some_and(|s| !s.plies.is_empty());
     let local = material.studies.iter().any(|s| !s.locals.is_empty());
+    let compared = study.is_some_and(|s| s.comparison.is_some());
     let family = input.family.as_ref();
     let failed = family.is_some_and(|f| f.count("failed") > 0);
     let responses = family.is_some_and(|f| !f.responses.is_empty());
+    let (plots, steps) = (!content.shown.is_empty(), steps::heading(&content.shown));
+    let ways = !large && fidelity::has(input);
+    let expected = !input.expectations.is_empty();
     let items = [
         (family.is_some(), "#points", "Table of points"),
         (failed, "#failed", "Failed points"),
@@ -176,26 +180,10 @@ fn contents(content: &Content<'_>, large: bool) -> Markup {
         (maps, "#view-0", "3D view"),
         (maps, "#maps-0", "Maps"),
         (local, "#local-0", "Local runs"),
-        (
-            study.is_some_and(|s| s.comparison.is_some()),
-            "#defects-0",
-            "Defects",
-        ),
-        (
-            !content.shown.is_empty(),
-            "#plots",
-            steps::heading(&content.shown),
-        ),
-        (
-            !large && fidelity::has(input),
-            "#fidelity",
-            "Speed against error",
-        ),
-        (
-            !input.expectations.is_empty(),
-            "#expectations",
-            "Expectations",
-        ),
+        (compared, "#defects-0", "Defects"),
+        (plots, "#plots", steps),
+        (ways, "#fidelity", "Speed against error"),
+        (expected, "#expectations", "Expectations"),
         (true, "#costs", "Costs"),
         (energy::has(content), "#energy", "Energy and contact"),
         (!large, "#results", "Results"),

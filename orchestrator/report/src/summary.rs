@@ -64,8 +64,7 @@ fn warning_lines(warnings: &[(String, String)]) -> String {
 fn zone_table(study: &Study) -> String {
     let mm = |v: f64| fixed(v * 1e3, 0);
     let zones = study.zones.as_deref().unwrap_or_default();
-    let rows: Vec<Vec<String>> = zones
-        .iter()
+    let rows: Vec<Vec<String>> = (zones.iter())
         .map(|z| {
             let [x0, y0, x1, y1] = z.bounds;
             let place = format!(
@@ -183,8 +182,7 @@ fn cost_table(instances: &[Instance], together: bool) -> String {
 /// Times are summed over the items; threads, memory and rate are the largest.
 fn cost_row(name: String, items: &[&Instance]) -> Vec<String> {
     let cost = || items.iter().map(|i| i.record.cost);
-    let rates = items
-        .iter()
+    let rates = (items.iter())
         .flat_map(|i| &i.record.results)
         .filter(|r| r.name == "element_cycle_rate");
     let rate = rates.map(|r| r.value).fold(0.0, f64::max);

@@ -49,8 +49,7 @@ impl Palette {
     pub(crate) fn css(self) -> Vec<(f64, String)> {
         let stops = self.stops();
         let last = (stops.len() - 1) as f64;
-        stops
-            .iter()
+        (stops.iter())
             .enumerate()
             .map(|(i, c)| (i as f64 / last, format!("#{c:06x}")))
             .collect()
@@ -73,6 +72,18 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
+    /// From 0 to `high`.
+    pub(crate) fn from_zero(high: f64) -> Self {
+        let (palette, low) = (Palette::Viridis, 0.0);
+        Self { palette, low, high }
+    }
+
+    /// From `-high` to `high`.
+    pub(crate) fn about_zero(palette: Palette, high: f64) -> Self {
+        let low = -high;
+        Self { palette, low, high }
+    }
+
     /// Place of a value in 0..1, not clamped.
     pub(crate) fn place(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
@@ -97,8 +108,7 @@ pub(crate) fn end_of_scale(
     let value = size.max(least).max(1e-12) * per;
     let power = 10f64.powf(value.log10().floor());
     let steps = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-    let step = steps
-        .into_iter()
+    let step = (steps.into_iter())
         .find(|s| s * power >= value * (1.0 - 1e-9))
         .unwrap_or(10.0);
     step * power / per

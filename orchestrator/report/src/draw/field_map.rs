@@ -3,7 +3,7 @@
 use crate::draw::colour::{Palette, Scale, end_of_scale};
 use crate::draw::colour_bar::bar;
 use crate::draw::error::Drawn;
-use crate::draw::raster::{Camera, Canvas, Paint, Triangles};
+use crate::draw::raster::{Camera, Canvas, Paint, Surface, Triangles};
 use crate::draw::sharpness::Sharpness;
 use crate::draw::svg::px;
 use crate::plain::field_map::FieldMap;
@@ -20,17 +20,9 @@ impl FieldMap {
     fn scale(&self, [low, high]: [f64; 2]) -> Scale {
         let end = end_of_scale(self.values(), SHOWN, 0.0, self.factor);
         if low < -0.02 * high.abs() {
-            Scale {
-                palette: Palette::BlueRed,
-                low: -end,
-                high: end,
-            }
+            Scale::about_zero(Palette::BlueRed, end)
         } else {
-            Scale {
-                palette: Palette::Viridis,
-                low: 0.0,
-                high: end,
-            }
+            Scale::from_zero(end)
         }
     }
 
@@ -53,7 +45,7 @@ impl FieldMap {
             let mut canvas = Canvas::new(size);
             let mesh = Triangles::new(panel.points.len(), &panel.cells);
             let paint = Paint::Field(&panel.values, scale);
-            canvas.surface(&camera, &panel.points, &mesh, paint, false, 0.0);
+            canvas.surface(&camera, &Surface::new(&panel.points, &mesh, paint));
             let image = canvas.data_url()?;
             let [w, h] = size.map(|s| px(s as f64 / sharp.0));
             let what = format!("{}, {}", self.title, panel.label);

@@ -24,37 +24,30 @@ impl Field {
     /// Those of a forming run.
     pub(crate) const ALL: [Self; 3] = [Self::Shear, Self::Distance, Self::Curvature];
 
-    fn title(self) -> &'static str {
+    /// Title, SI unit and explanation.
+    fn about(self) -> [&'static str; 3] {
         match self {
-            Self::Shear => "Shear angle",
-            Self::Distance => "Nodal distance",
-            Self::Curvature => "Curvature",
-            Self::Deflection => "Deflection along z",
-        }
-    }
-
-    /// SI unit.
-    fn unit(self) -> &'static str {
-        match self {
-            Self::Shear => "rad",
-            Self::Distance | Self::Deflection => "m",
-            Self::Curvature => "1/m",
-        }
-    }
-
-    fn explanation(self) -> &'static str {
-        match self {
-            Self::Shear => {
+            Self::Shear => [
+                "Shear angle",
+                "rad",
                 "Change of the angle between the fibre families; positive stretches the stitch. \
-                 Element values, averaged at the nodes for drawing."
-            }
-            Self::Distance => {
-                "Distance of the ply from where it would lie on the tool; large where it bridges or wrinkles."
-            }
-            Self::Deflection => "How far the sheet moved out of its plane.",
-            Self::Curvature => {
-                "Principal curvature of largest magnitude of the formed ply; the sign tells to which side it bends."
-            }
+                 Element values, averaged at the nodes for drawing.",
+            ],
+            Self::Distance => [
+                "Nodal distance",
+                "m",
+                "Distance of the ply from where it would lie on the tool; large where it bridges or wrinkles.",
+            ],
+            Self::Curvature => [
+                "Curvature",
+                "1/m",
+                "Principal curvature of largest magnitude of the formed ply; the sign tells to which side it bends.",
+            ],
+            Self::Deflection => [
+                "Deflection along z",
+                "m",
+                "How far the sheet moved out of its plane.",
+            ],
         }
     }
 
@@ -97,40 +90,38 @@ impl Field {
     /// `thresholds`: of the detection.
     pub(crate) fn legend(self, plies: &[&Ply], thresholds: Option<&Thresholds>) -> Option<Legend> {
         let values = || {
-            plies
-                .iter()
+            (plies.iter())
                 .filter_map(|p| self.stored(p))
                 .flatten()
                 .copied()
         };
         let limits = self.limits(thresholds);
-        let (factor, _) = shown(self.unit());
+        let [title, unit, _] = self.about();
+        let (factor, _) = shown(unit);
         let end = |part, least| end_of_scale(values(), part, least, factor);
-        let (palette, low, high) = match self {
-            Self::Shear => both_sides(Palette::BlueRed, end(0.995, 0.02)),
-            Self::Deflection => both_sides(Palette::PurpleOrange, end(1.0, LEAST_DEFLECTION)),
+        let scale = match self {
+            Self::Shear => Scale::about_zero(Palette::BlueRed, end(0.995, 0.02)),
+            Self::Deflection => {
+                Scale::about_zero(Palette::PurpleOrange, end(1.0, LEAST_DEFLECTION))
+            }
             // Crests of the finest mesh are narrow; a scale that shows their peaks leaves the part pale.
-            Self::Curvature => both_sides(Palette::PurpleOrange, end(0.985, 10.0)),
+            Self::Curvature => Scale::about_zero(Palette::PurpleOrange, end(0.985, 10.0)),
             Self::Distance => {
                 // Edges that hang in the air stand centimetres off; a scale that shows them hides all else.
                 let threshold = limits.first().copied().unwrap_or(1e-3);
-                let end = end(0.995, 2.0 * threshold).min(8.0 * threshold);
-                (Palette::Viridis, 0.0, end)
+                let end = end(0.995, 2.0 * threshold);
+                Scale::from_zero(end.min(8.0 * threshold))
             }
         };
         Some(Legend {
             field: Some(self),
-            title: self.title().to_owned(),
-            si: self.unit().to_owned(),
-            scale: Scale { palette, low, high },
+            title: title.to_owned(),
+            si: unit.to_owned(),
+            scale,
             range: range_of(values())?,
             limits,
         })
     }
-}
-
-fn both_sides(palette: Palette, end: f64) -> (Palette, f64, f64) {
-    (palette, -end, end)
 }
 
 /// A colour scale with what it must tell.
@@ -191,16 +182,16 @@ impl Legend {
         let most = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let usual = end(0.995);
         let high = if usual < 1e-3 * most { end(1.0) } else { usual };
-        let (palette, low) = if range[0] < 0.0 {
-            (Palette::PurpleOrange, -high)
+        let scale = if range[0] < 0.0 {
+            Scale::about_zero(Palette::PurpleOrange, high)
         } else {
-            (Palette::Viridis, 0.0)
+            Scale::from_zero(high)
         };
         Self {
             field: None,
             title: other.title.clone(),
             si: other.unit.clone(),
-            scale: Scale { palette, low, high },
+            scale,
             range,
             limits: Vec::new(),
         }
@@ -279,7 +270,7 @@ impl Legend {
             p class="note" {
                 @if unit.is_empty() { "Values" } @else { b { (unit) } "; values" } " from " (value(range[0])) " to " (value(range[1]))
                 @if range[0] < low || range[1] > high { " (colours end where the bar ends)" }
-                ". " @if let Some(field) = self.field { (field.explanation()) } @else { "Plies that do not have it are grey." }
+                ". " @if let Some(field) = self.field { (field.about()[2]) } @else { "Plies that do not have it are grey." }
             }
         }
     }

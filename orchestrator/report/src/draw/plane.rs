@@ -30,8 +30,7 @@ impl Plane {
         let mut planes: Vec<Self> = Vec::new();
         let n = levels.first().map_or(0, |l| l.of.len());
         for p in 0..n {
-            let others = levels
-                .iter()
+            let others = (levels.iter())
                 .enumerate()
                 .filter(|(v, _)| *v != a && *v != b);
             let others: Vec<usize> = others.map(|(_, l)| l.of[p]).collect();
@@ -110,8 +109,7 @@ impl Plane {
         for i in rows[0].windows(2) {
             for j in rows[1].windows(2) {
                 let around = [[i[0], j[0]], [i[1], j[0]], [i[1], j[1]], [i[0], j[1]]];
-                let there: Vec<usize> = around
-                    .iter()
+                let there: Vec<usize> = (around.iter())
                     .filter_map(|a| known.get(a).copied())
                     .collect();
                 let corners: Option<Vec<Corner>> = there.iter().map(|k| corner(*k)).collect();
@@ -155,8 +153,7 @@ impl Plane {
             .map(|f| f.vertices().map(|v| v.data().0))
             .collect();
         cells.sort_unstable();
-        cells
-            .iter()
+        (cells.iter())
             .filter_map(|c| Some([of(&c[0])?, of(&c[1])?, of(&c[2])?]))
             .collect()
     }

@@ -162,12 +162,36 @@ impl Triangles {
     /// Values at the points, with those at the centres of quads appended.
     fn extended<T: Copy>(&self, values: &[T], mean: impl Fn([T; 4]) -> T) -> Vec<T> {
         let mut all = values[..self.points].to_vec();
-        all.extend(
-            self.centres
-                .iter()
-                .map(|c| mean(c.map(|i| values[i as usize]))),
-        );
+        all.extend((self.centres.iter()).map(|c| mean(c.map(|i| values[i as usize]))));
         all
+    }
+}
+
+/// A mesh that is drawn.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surface<'a> {
+    points: &'a [Vec3],
+    mesh: &'a Triangles,
+    paint: Paint<'a>,
+    /// Of a lit one: how far (m) it is moved towards the viewer.
+    lift: Option<f64>,
+}
+
+impl<'a> Surface<'a> {
+    /// In its colours alone, as values are read off.
+    pub(crate) fn new(points: &'a [Vec3], mesh: &'a Triangles, paint: Paint<'a>) -> Self {
+        Self {
+            points,
+            mesh,
+            paint,
+            lift: None,
+        }
+    }
+
+    /// Lit from the upper left, moved by `lift` (m) towards the viewer. Colours that stand for values keep most of their lightness.
+    pub(crate) fn lit(self, lift: f64) -> Self {
+        let lift = Some(lift);
+        Self { lift, ..self }
     }
 }
 
@@ -190,19 +214,17 @@ impl Canvas {
         }
     }
 
-    /// Draws a surface, lit from the upper left when `lit` (colours that stand for values keep most of their lightness), moved by `bias` (m) towards the viewer.
-    pub(crate) fn surface(
-        &mut self,
-        camera: &Camera,
-        points: &[Vec3],
-        mesh: &Triangles,
-        paint: Paint<'_>,
-        lit: bool,
-        bias: f64,
-    ) {
+    /// Draws a surface.
+    pub(crate) fn surface(&mut self, camera: &Camera, surface: &Surface<'_>) {
+        let Surface {
+            points,
+            mesh,
+            paint,
+            lift,
+        } = *surface;
         let mean = |q: [Vec3; 4]| [0, 1, 2].map(|d| (q[0][d] + q[1][d] + q[2][d] + q[3][d]) / 4.0);
         let points = mesh.extended(points, mean);
-        let shade = if lit {
+        let shade = if lift.is_some() {
             let dark = if matches!(paint, Paint::Plain(_)) {
                 0.42
             } else {
@@ -226,7 +248,7 @@ impl Canvas {
                 [
                     (x * s) as f32,
                     (y * s) as f32,
-                    (z + bias) as f32,
+                    (z + lift.unwrap_or(0.0)) as f32,
                     place[i] as f32,
                     shade[i],
                 ]
@@ -362,8 +384,7 @@ fn shades(points: &[Vec3], mesh: &Triangles, light: Vec3, dark: f64) -> Vec<f32>
             (0..3).for_each(|d| normals[*i as usize][d] += n[d]);
         }
     }
-    normals
-        .iter()
+    (normals.iter())
         .map(|n| (dark + (1.04 - dark) * dot(unit(*n), light).abs()).min(1.0) as f32)
         .collect()
 }
@@ -386,7 +407,8 @@ mod tests {
             for z in order {
                 let (points, mesh) = square(z);
                 let grey = if z > 0.5 { 200.0 } else { 50.0 };
-                canvas.surface(&camera, &points, &mesh, Paint::Plain([grey; 3]), false, 0.0);
+                let paint = Paint::Plain([grey; 3]);
+                canvas.surface(&camera, &Surface::new(&points, &mesh, paint));
             }
             let pixels = canvas.pixels();
             assert_eq!(pixels[4 * (10 * 20 + 10)..][..4], [200, 200, 200, 255]);
@@ -401,20 +423,10 @@ mod tests {
         let (points, mesh) = square(0.0);
         let (camera, size) = Camera::plan().fit(points.iter(), [64.0, 64.0], 0.0);
         let mut canvas = Canvas::new(size);
-        let scale = Scale {
-            palette: Palette::Viridis,
-            low: 0.0,
-            high: 1.0,
-        };
+        let scale = Scale::from_zero(1.0);
         let values = [0.0, 0.0, 1.0, 1.0];
-        canvas.surface(
-            &camera,
-            &points,
-            &mesh,
-            Paint::Field(&values, scale),
-            false,
-            0.0,
-        );
+        let paint = Paint::Field(&values, scale);
+        canvas.surface(&camera, &Surface::new(&points, &mesh, paint));
         let pixels = canvas.pixels();
         for y in [4usize, 20, 40, 60] {
             let expected = Palette::Viridis.at(1.0 - (y as f32 + 0.5) / 64.0);

@@ -44,15 +44,13 @@ impl Scale {
         };
         let place = |v: f64| AIR + (1.0 - 2.0 * AIR) * (v - low) / (high - low);
         let ticks: Vec<(f64, String)> = if log {
-            decades(low, high)
-                .into_iter()
+            (decades(low, high).into_iter())
                 .map(|t| (place(t.log10()), number(t, 4)))
                 .collect()
         } else if values.len() == 1 {
             vec![(place(values[0]), number(values[0], 6))]
         } else {
-            ticks(low, high, 6)
-                .into_iter()
+            (ticks(low, high, 6).into_iter())
                 .map(|t| (place(t), number(t, 6)))
                 .collect()
         };

@@ -152,11 +152,12 @@ pub(crate) fn scene(
         return Ok(None);
     }
     let of_page = |all: f64| (all * sharp.share()) as usize / drawn.max(1);
-    let (bodies, most, mut notes) = chosen(bodies(&shown), of_page(POINTS));
+    let all = bodies(&shown);
+    let plies: Vec<&Ply> = all.iter().filter_map(|b| b.ply).collect();
+    let others = Others::of(&plies);
+    let (bodies, most, mut notes) = chosen(all, of_page(POINTS));
     let places = shown.places;
-    let ends = places
-        .iter()
-        .flat_map(|p| p.lines.iter().flat_map(|l| &l.formed));
+    let ends = (places.iter()).flat_map(|p| p.lines.iter().flat_map(|l| &l.formed));
     let all = bodies.iter().flat_map(|b| b.formed).chain(ends);
     let Some(extent) = Extent::of(all) else {
         return Ok(None);
@@ -164,22 +165,16 @@ pub(crate) fn scene(
     let thinned: Vec<Thinned> = (bodies.iter())
         .map(|b| thin::thin(b.at, &b.cells, most))
         .collect();
-    let finer = shown.finer.iter().map(|(_, ply)| *ply);
-    let others = Others::of(&shown.plies.iter().chain(finer).collect::<Vec<_>>());
     let mut legends = shown.legends;
     let room = of_page(ROOM);
     let left_out = choose(&mut legends, others.legends, &bodies, &thinned, room)?;
     let mut stream = Stream::default();
-    let mut told = Vec::new();
-    for (body, found) in bodies.iter().zip(&thinned) {
+    let write = |(body, found): (&Body<'_>, &Thinned)| {
         let inside = refined(body, &bodies, shown.zones);
-        let one = write(&mut stream, &extent, (body, found), &inside, &legends);
-        if one.points < body.formed.len() {
-            let (name, left, whole) = (body.name(), one.points, body.formed.len());
-            notes.push(format!("{name} with {left} of its {whole} points"));
-        }
-        told.push(one);
-    }
+        write(&mut stream, &extent, (body, found), &inside, &legends)
+    };
+    let told: Vec<ToldBody> = bodies.iter().zip(&thinned).map(write).collect();
+    notes.extend(bodies.iter().zip(&told).filter_map(coarser));
     let outlines = outlines(&mut stream, &extent, shown.plies, shown.zones);
     let defects = defects(&mut stream, &extent, places);
     let plies = distinct(told.iter().filter_map(|b| b.ply.clone()));
@@ -205,6 +200,12 @@ pub(crate) fn scene(
         left_out,
         defects: !places.is_empty(),
     }))
+}
+
+/// Says how much of a mesh is shown, if that is not all of it.
+fn coarser((body, told): (&Body<'_>, &ToldBody)) -> Option<String> {
+    let (name, left, whole) = (body.name(), told.points, body.formed.len());
+    (left < whole).then(|| format!("{name} with {left} of its {whole} points"))
 }
 
 /// The zones in which a ply of the global run is there as a finer one, too.

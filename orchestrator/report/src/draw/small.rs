@@ -3,7 +3,7 @@
 use crate::draw::colour::{Palette, Rgb, Scale, end_of_scale};
 use crate::draw::colour_bar::bar;
 use crate::draw::error::DrawError;
-use crate::draw::raster::{Camera, Canvas, Paint, Triangles};
+use crate::draw::raster::{Camera, Canvas, Paint, Surface, Triangles};
 use crate::plain::ply::{Shade, Sheet, Vec3};
 use crate::units::shown;
 use maud::{Markup, html};
@@ -36,12 +36,11 @@ impl Shade {
         let (factor, _) = shown(self.said().1);
         let least = if self == Self::Shear { 0.02 } else { 1e-5 };
         let high = end_of_scale(values.iter().copied(), 0.995, least, factor);
-        let (palette, low) = match self {
-            Self::Distance | Self::Nothing => (Palette::Viridis, 0.0),
-            Self::Shear => (Palette::BlueRed, -high),
-            Self::Deflection => (Palette::PurpleOrange, -high),
-        };
-        Scale { palette, low, high }
+        match self {
+            Self::Distance | Self::Nothing => Scale::from_zero(high),
+            Self::Shear => Scale::about_zero(Palette::BlueRed, high),
+            Self::Deflection => Scale::about_zero(Palette::PurpleOrange, high),
+        }
     }
 }
 
@@ -97,8 +96,7 @@ impl Series {
     /// Of plies; `None` without any.
     pub(crate) fn of(looks: &[Look]) -> Option<Self> {
         let Look { name, shade, .. } = looks.first()?;
-        let values: Vec<f64> = looks
-            .iter()
+        let values: Vec<f64> = (looks.iter())
             .flat_map(|l| l.values.iter().copied())
             .collect();
         Some(Self {
@@ -131,7 +129,8 @@ impl Series {
             _ => Paint::Plain(PLAIN),
         };
         let mesh = Triangles::of_quads(sheet.points.len(), &sheet.cells);
-        canvas.surface(&camera, &sheet.points, &mesh, paint, true, 0.0);
+        let surface = Surface::new(&sheet.points, &mesh, paint);
+        canvas.surface(&camera, &surface.lit(0.0));
         Ok(canvas.data_url()?)
     }
 

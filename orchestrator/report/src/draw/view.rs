@@ -1,10 +1,10 @@
 //! Pictures of plies: the flat map and the formed view, with zones, marks and axes drawn over them.
 
 use crate::draw::colour::Rgb;
-use crate::draw::error::Drawn;
+use crate::draw::error::{DrawError, Drawn};
 use crate::draw::legend::Legend;
 use crate::draw::plot::axis::ticks;
-use crate::draw::raster::{Camera, Canvas, Paint, Triangles};
+use crate::draw::raster::{Camera, Canvas, Paint, Surface, Triangles};
 use crate::draw::sharpness::Sharpness;
 use crate::draw::svg::{px, spot};
 use crate::plain::locate::{Locator, bounds, outline};
@@ -109,7 +109,7 @@ pub(crate) fn flat(
     let (camera, size) = fit(Camera::plan(), &ply.flat, &[], room, sharp);
     let mut canvas = Canvas::new(size);
     let paint = Paint::Field(&values, legend.scale);
-    canvas.surface(&camera, &ply.flat, &triangles(ply), paint, false, 0.0);
+    canvas.surface(&camera, &Surface::new(&ply.flat, &triangles(ply), paint));
     let image = canvas.data_url()?;
     let page = |p: [f64; 2]| {
         let [x, y, _] = camera.project([p[0], p[1], 0.0]);
@@ -194,34 +194,11 @@ pub(crate) fn formed(
     let Some(values) = legend.at_points(ply) else {
         return Ok(html! {});
     };
-    let FormedView { tool, width, .. } = how;
     let front = how.side == Side::Front;
-    let azimuth = if front { -65f64 } else { 65f64 }.to_radians();
-    let around = tool
-        .filter(|_| how.whole_tool)
-        .map_or(&[][..], |t| &t.points);
-    let camera = Camera::oblique(azimuth, 38f64.to_radians());
-    let (camera, size) = fit(camera, &ply.formed, around, [width, 0.72 * width], sharp);
-    let mut canvas = Canvas::new(size);
-    if let Some(t) = tool {
-        let mesh = Triangles::new(t.points.len(), &t.cells);
-        canvas.surface(&camera, &t.points, &mesh, Paint::Plain(TOOL), true, 0.0);
-    }
-    let paint = Paint::Field(&values, legend.scale);
-    let bias = lift(ply);
-    canvas.surface(&camera, &ply.formed, &triangles(ply), paint, true, bias);
-    let image = canvas.data_url()?;
-    let view = View {
-        camera,
-        canvas,
-        sharp,
-        locator: Locator::new(&ply.flat, &ply.cells),
-        ply,
-        bias,
-    };
+    let (view, image) = View::of(ply, Paint::Field(&values, legend.scale), how, sharp)?;
     let all = bounds(&ply.flat).as_flattened().try_into();
     let edge = Zone::new("", all.unwrap_or_default());
-    let (w, h) = (size[0] as f64 / sharp.0, size[1] as f64 / sharp.0);
+    let [w, h] = view.size;
     let what = format!("{}, formed ply {}", legend.title(), ply.name);
     Ok(html! {
         svg viewBox={ "0 0 " (px(w)) " " (px(h)) } role="img" aria-label=(what) {
@@ -238,7 +215,7 @@ pub(crate) fn formed(
                     (label(&mark.text, at, "defect-name", "middle"))
                 }
             }
-            (triad(&camera, [if front { 34.0 } else { w - 34.0 }, h - 26.0]))
+            (triad(&view.camera, [if front { 34.0 } else { w - 34.0 }, h - 26.0]))
             @if front {
                 text class="over" x=(px(w - 4.0)) y="14" text-anchor="end" { "seen from −y" }
             } @else {
@@ -256,9 +233,47 @@ struct View<'a> {
     locator: Locator<'a>,
     ply: &'a Ply,
     bias: f64,
+    /// On the page (px).
+    size: [f64; 2],
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
+    /// Of a ply on its tool, with the picture as an address.
+    fn of(
+        ply: &'a Ply,
+        paint: Paint<'_>,
+        how: FormedView<'_>,
+        sharp: Sharpness,
+    ) -> Result<(Self, String), DrawError> {
+        let FormedView { side, width, .. } = how;
+        let azimuth = if side == Side::Front { -65f64 } else { 65f64 };
+        let camera = Camera::oblique(azimuth.to_radians(), 38f64.to_radians());
+        let whole = how.tool.filter(|_| how.whole_tool);
+        let around = whole.map_or(&[][..], |t| &t.points);
+        let (camera, size) = fit(camera, &ply.formed, around, [width, 0.72 * width], sharp);
+        let mut canvas = Canvas::new(size);
+        if let Some(t) = how.tool {
+            let mesh = Triangles::new(t.points.len(), &t.cells);
+            let surface = Surface::new(&t.points, &mesh, Paint::Plain(TOOL));
+            canvas.surface(&camera, &surface.lit(0.0));
+        }
+        let bias = lift(ply);
+        let mesh = triangles(ply);
+        let surface = Surface::new(&ply.formed, &mesh, paint);
+        canvas.surface(&camera, &surface.lit(bias));
+        let image = canvas.data_url()?;
+        let view = Self {
+            camera,
+            canvas,
+            sharp,
+            locator: Locator::new(&ply.flat, &ply.cells),
+            ply,
+            bias,
+            size: size.map(|s| s as f64 / sharp.0),
+        };
+        Ok((view, image))
+    }
+
     /// Where a place of the flat ply (m) appears on the page (px), and whether it is seen.
     fn place(&self, at: [f64; 2]) -> Option<([f64; 2], bool)> {
         let p = self.locator.carried(at, &self.ply.formed)?;

@@ -16,9 +16,7 @@ pub(super) fn table(
     let numeric = |k: usize| {
         let measured = given.columns.get(k).is_some_and(|c| c.measured.is_some());
         measured
-            || given
-                .rows
-                .iter()
+            || (given.rows.iter())
                 .any(|r| matches!(r.get(k), Some(Cell::Count(_) | Cell::Number(_))))
     };
     let class = |k: usize| if numeric(k) { "n" } else { "" };

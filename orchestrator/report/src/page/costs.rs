@@ -23,11 +23,7 @@ fn runs<'a>(content: &'a Content<'_>) -> BTreeMap<usize, &'a Run> {
 
 /// Element-steps per second, as the step measured them or else over the whole step; 0 when unknown.
 fn rate(i: &Instance, run: &Run) -> f64 {
-    let told = i
-        .record
-        .results
-        .iter()
-        .find(|r| r.name == "element_cycle_rate");
+    let told = (i.record.results.iter()).find(|r| r.name == "element_cycle_rate");
     let wall = i.record.cost.wall_seconds.max(1e-9);
     told.map_or(run.facts.element_cycles.unwrap_or(0.0) / wall, |r| r.value)
 }
@@ -37,8 +33,7 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
     let runs = runs(content);
     let all = &content.input.instances;
     let sum = |f: fn(&Instance) -> f64| duration(all.iter().map(f).sum());
-    let memory = all
-        .iter()
+    let memory = (all.iter())
         .map(|i| i.record.cost.peak_memory)
         .max()
         .unwrap_or(0);

@@ -101,8 +101,7 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
         name: name.to_owned().into(),
         colour,
         style,
-        x: of
-            .iter()
+        x: (of.iter())
             .map(|(w, _)| 100.0 * w.share)
             .collect::<Vec<_>>()
             .into(),

@@ -8,9 +8,10 @@ use crate::plain::place::{Place, id_of};
 use crate::plain::ply::Ply;
 use crate::read::study::{Local, Study};
 use crate::units::quantity;
-use maud::html;
+use maud::{Markup, html};
 use plyflow_model::artifact::ComparedDefect;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Widths on the page (px).
 const FLAT: f64 = 430.0;
@@ -35,9 +36,7 @@ pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness
     };
     let legends = legends(study);
     let has = |(l, p): &(&Legend, &Ply)| l.at_points(p).is_some();
-    let pairs = legends
-        .iter()
-        .flat_map(|l| study.plies.iter().map(move |p| (l, p)));
+    let pairs = (legends.iter()).flat_map(|l| study.plies.iter().map(move |p| (l, p)));
     let pairs: Vec<(&Legend, &Ply)> = pairs.filter(has).collect();
     let draw = |(legend, ply): &(&Legend, &Ply)| {
         let mine: Vec<&Place> = places.iter().filter(|p| p.ply == ply.name).collect();
@@ -45,25 +44,22 @@ pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness
             places: &mine,
             ..overlay.clone()
         };
-        let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
         let view = |side| {
-            let tool = study.tool.as_ref();
             let how = FormedView {
                 side,
-                tool,
+                tool: study.tool.as_ref(),
                 whole_tool: true,
                 width: FORMED,
             };
             formed(ply, legend, &overlay, how, sharp)
         };
-        let figures = [plan, view(Side::Front)?, view(Side::Back)?];
-        Ok((legend.field, ply.name.clone(), figures))
+        let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
+        Ok([plan, view(Side::Front)?, view(Side::Back)?])
     };
-    let rows = pairs
-        .par_iter()
-        .map(draw)
-        .collect::<Result<Vec<_>, DrawError>>()?;
-    let of = |field: Option<Field>| rows.iter().filter(move |r| r.0 == field);
+    let drawn: Result<Vec<_>, DrawError> = pairs.par_iter().map(draw).collect();
+    let drawn = drawn?;
+    let rows = || pairs.iter().zip(&drawn);
+    let of = |field| rows().filter(move |((l, _), _)| l.field == field);
     Ok(html! {
         section id={ "maps-" (n) } {
             h2 { "Maps of the global run" }
@@ -79,10 +75,10 @@ pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness
                     h3 { (legend.title()) }
                     (legend.bar(&format!("scale-{n}-{}", legend.si_unit().replace('/', "-"))))
                     (legend.note_of(&study.plies))
-                    @for (_, name, figures) in of(legend.field) {
+                    @for ((_, ply), figures) in of(legend.field) {
                         div class="triple" {
                             @for (figure, what) in figures.iter().zip(["flat", "formed", "formed"]) {
-                                figure class="map" { (figure) figcaption { (name) ", " (what) } }
+                                figure class="map" { (figure) figcaption { (ply.name) ", " (what) } }
                             }
                         }
                     }
@@ -95,14 +91,11 @@ pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness
 /// Maps of the local runs, with their defects named.
 pub(super) fn local(study: &Study, n: usize, places: &[Place], sharp: Sharpness) -> Drawn {
     let legends = legends(study);
-    let shown: Vec<&Local> = study
-        .locals
-        .iter()
+    let shown: Vec<&Local> = (study.locals.iter())
         .filter(|l| !l.plies.is_empty())
         .collect();
     let draw = |local: &&Local| zone((study, n), local, &legends, places, sharp);
-    let zones = shown
-        .par_iter()
+    let zones = (shown.par_iter())
         .map(draw)
         .collect::<Result<Vec<_>, DrawError>>()?;
     if zones.is_empty() {
@@ -132,15 +125,13 @@ fn zone(
 ) -> Drawn {
     let compared = (study.comparison.as_ref()).map(|c| &c.told);
     let compared = compared.filter(|c| c.local_of(&local.zone).is_some());
-    let defects: Vec<&ComparedDefect> = compared
-        .iter()
+    let defects: Vec<&ComparedDefect> = (compared.iter())
         .flat_map(|c| c.local_defects())
         .filter(|d| d.zone == local.zone)
         .collect();
     let mut rows = Vec::new();
     for ply in &local.plies {
-        let marks: Vec<Mark> = defects
-            .iter()
+        let marks: Vec<Mark> = (defects.iter())
             .filter(|d| d.ply == ply.name)
             .map(|d| Mark {
                 text: d.id.clone(),
@@ -155,27 +146,7 @@ fn zone(
             marks: &marks,
             places: &mine,
         };
-        let mut figures = Vec::new();
-        let known = || legends.iter().filter(|l| l.at_points(ply).is_some());
-        for legend in known() {
-            let title = legend.title();
-            figures.push((title.to_owned(), flat(ply, legend, &overlay, LOCAL, sharp)?));
-        }
-        // The formed view shows the shape; the distance tells most on it.
-        let legend = known()
-            .find(|l| l.field == Some(Field::Distance))
-            .or(known().next());
-        if let Some(legend) = legend {
-            let (side, tool) = (Side::facing(ply), study.tool.as_ref());
-            let how = FormedView {
-                side,
-                tool,
-                whole_tool: false,
-                width: LOCAL,
-            };
-            let view = formed(ply, legend, &overlay, how, sharp)?;
-            figures.push((format!("{}, formed", legend.title()), view));
-        }
+        let figures = figures(study, ply, legends, &overlay, sharp)?;
         rows.push((ply.name.clone(), marks.len(), figures));
     }
     Ok(html! {
@@ -196,4 +167,33 @@ fn zone(
             }
         }
     })
+}
+
+/// The maps of a finer ply, each with its title, and the formed ply.
+fn figures<'a>(
+    study: &Study,
+    ply: &Ply,
+    legends: &'a [Legend],
+    overlay: &Overlay<'_>,
+    sharp: Sharpness,
+) -> Result<Vec<(Cow<'a, str>, Markup)>, DrawError> {
+    let known = || legends.iter().filter(|l| l.at_points(ply).is_some());
+    let mut figures = Vec::new();
+    for legend in known() {
+        let map = flat(ply, legend, overlay, LOCAL, sharp)?;
+        figures.push((legend.title().into(), map));
+    }
+    // The formed view shows the shape; the distance tells most on it.
+    let distance = known().find(|l| l.field == Some(Field::Distance));
+    if let Some(legend) = distance.or(known().next()) {
+        let how = FormedView {
+            side: Side::facing(ply),
+            tool: study.tool.as_ref(),
+            whole_tool: false,
+            width: LOCAL,
+        };
+        let view = formed(ply, legend, overlay, how, sharp)?;
+        figures.push((format!("{}, formed", legend.title()).into(), view));
+    }
+    Ok(figures)
 }

@@ -84,9 +84,7 @@ fn numbers(input: &ReportInput, instance: &Instance) -> Markup {
     let of = |name: &str| -> Vec<&Expectation> {
         mine.iter().copied().filter(|e| e.result == name).collect()
     };
-    let absent = mine
-        .iter()
-        .filter(|e| !results.iter().any(|r| r.name == e.result));
+    let absent = (mine.iter()).filter(|e| !results.iter().any(|r| r.name == e.result));
     html! {
         @if !results.is_empty() || !mine.is_empty() {
             div class="scroll" { table class="numbers" {

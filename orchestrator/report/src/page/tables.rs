@@ -57,8 +57,7 @@ pub(super) fn zones(study: &Study) -> Markup {
 
 fn sides(free: [bool; 4]) -> String {
     let names = ["left", "right", "bottom", "top"];
-    let all: Vec<&str> = names
-        .into_iter()
+    let all: Vec<&str> = (names.into_iter())
         .zip(free)
         .filter(|(_, f)| *f)
         .map(|(n, _)| n)
@@ -194,9 +193,7 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
 
 /// All named numbers, by step.
 pub(super) fn results(input: &ReportInput, open: bool) -> Markup {
-    let with: Vec<_> = input
-        .instances
-        .iter()
+    let with: Vec<_> = (input.instances.iter())
         .filter(|i| !i.record.results.is_empty())
         .collect();
     html! {

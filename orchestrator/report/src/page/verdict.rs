@@ -1,6 +1,7 @@
 //! What the run found, in one line, and what must not be overlooked.
 
 use crate::input::{ReportInput, Verdict};
+use crate::read::comparison::Comparison;
 use crate::read::facts::Facts;
 use crate::read::material::Material;
 use crate::read::study::{Run, Study};
@@ -32,70 +33,85 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
         }
         None => {}
     }
-    if let Some(c) = study.comparison.as_ref().filter(|_| tone == Tone::Found) {
-        let (of_wrinkles, bridging): (Vec<_>, Vec<_>) =
-            (c.told.local_defects()).partition(|d| d.found.is_wrinkle());
-        let wrinkles: Vec<f64> = of_wrinkles.iter().map(|d| d.length).collect();
-        let longest = wrinkles.iter().copied().fold(0.0, f64::max);
-        parts.push(match wrinkles.len() {
-            0 => "no wrinkles".into(),
-            1 => format!("1 wrinkle, {} long", quantity(longest, "m", 3)),
-            n => format!("{n} wrinkles, longest {}", quantity(longest, "m", 3)),
-        });
-        parts.push(match bridging.len() {
-            0 => "no bridging".into(),
-            n => plural(n, "bridging area", "bridging areas"),
-        });
-    }
-    if let Some(missed) = study.comparison.as_ref().and_then(|c| c.missed_text()) {
-        tone = Tone::Found;
-        parts.push(format!("{missed} of the reference missed"));
+    if let Some(c) = &study.comparison {
+        if tone == Tone::Found {
+            parts.extend(defects(c));
+        }
+        if let Some(missed) = c.missed_text() {
+            tone = Tone::Found;
+            parts.push(format!("{missed} of the reference missed"));
+        }
     }
     let runs = runs(study);
-    let kept: Vec<bool> = (runs.iter())
-        .filter_map(|(_, r)| r.facts.energy?.kinetic_bound_kept)
-        .collect();
-    let is_missed =
-        |(_, r): &&(&str, &Run)| r.facts.energy.and_then(|e| e.kinetic_bound_kept) == Some(false);
-    if kept.iter().all(|k| *k) && !kept.is_empty() {
-        parts.push(kinetic_text(&runs));
-    } else if let Some((label, _)) = runs.iter().find(is_missed) {
+    parts.extend(kinetic_text(&runs));
+    let bad = [kinetic_missed(&runs), ledger_open(&runs)];
+    if bad.iter().any(Option::is_some) {
         tone = Tone::Bad;
-        let missed = kept.iter().filter(|k| !**k).count();
-        parts.push(format!(
-            "kinetic bound missed by {} of {} runs (first: {label})",
-            missed,
-            kept.len(),
-        ));
     }
-    let drift = |r: &Run| {
-        r.facts
-            .energy
-            .and_then(|e| e.peak_drift_ratio)
-            .unwrap_or(0.0)
-    };
-    let worst = (runs.iter()).max_by(|a, b| drift(a.1).total_cmp(&drift(b.1)));
-    if let Some((label, run)) = worst.filter(|(_, r)| drift(r) > DRIFT_BOUND) {
-        tone = Tone::Bad;
-        let percent = fixed(100.0 * drift(run), 0);
-        parts.push(format!("energy ledger open by up to {percent} % ({label})"));
-    }
+    parts.extend(bad.into_iter().flatten());
     (tone, parts.join("; "))
 }
 
-/// How far below their bounds the kinetic energies of runs stayed that all kept theirs.
-fn kinetic_text(runs: &[(&str, &Run)]) -> String {
+/// Wrinkles and bridging of the local runs.
+fn defects(c: &Comparison) -> [String; 2] {
+    let (wrinkles, bridging): (Vec<_>, Vec<_>) =
+        (c.told.local_defects()).partition(|d| d.found.is_wrinkle());
+    let longest = wrinkles.iter().map(|d| d.length).fold(0.0, f64::max);
+    let wrinkles = match wrinkles.len() {
+        0 => "no wrinkles".into(),
+        1 => format!("1 wrinkle, {} long", quantity(longest, "m", 3)),
+        n => format!("{n} wrinkles, longest {}", quantity(longest, "m", 3)),
+    };
+    let bridging = match bridging.len() {
+        0 => "no bridging".into(),
+        n => plural(n, "bridging area", "bridging areas"),
+    };
+    [wrinkles, bridging]
+}
+
+/// Whether a run kept its bound on the kinetic energy; `None` when it had none.
+fn kept(run: &Run) -> Option<bool> {
+    run.facts.energy?.kinetic_bound_kept
+}
+
+/// How many runs missed their bounds on the kinetic energy.
+fn kinetic_missed(runs: &[(&str, &Run)]) -> Option<String> {
+    let all = runs.iter().filter(|(_, r)| kept(r).is_some()).count();
+    let mut missed = runs.iter().filter(|(_, r)| kept(r) == Some(false));
+    let (label, _) = missed.next()?;
+    let missed = 1 + missed.count();
+    Some(format!(
+        "kinetic bound missed by {missed} of {all} runs (first: {label})"
+    ))
+}
+
+/// In which run most of the energy is not accounted for, if that is too much.
+fn ledger_open(runs: &[(&str, &Run)]) -> Option<String> {
+    let drift = |r: &Run| r.facts.energy.and_then(|e| e.peak_drift_ratio);
+    let drifts = (runs.iter()).map(|(label, r)| (label, drift(r).unwrap_or(0.0)));
+    let (label, worst) = drifts.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let percent = fixed(100.0 * worst, 0);
+    (worst > DRIFT_BOUND).then(|| format!("energy ledger open by up to {percent} % ({label})"))
+}
+
+/// How far below their bounds the kinetic energies of runs stayed, if all that had one kept theirs.
+fn kinetic_text(runs: &[(&str, &Run)]) -> Option<String> {
+    let mut all = runs.iter().filter_map(|(_, r)| kept(r)).peekable();
+    all.peek()?;
+    if all.any(|kept| !kept) {
+        return None;
+    }
     let of_bound = |r: &Run| Some((r.facts.energy?.peak_kinetic_ratio?, r.kinetic_bound?));
-    let known: Vec<(f64, f64)> = runs.iter().filter_map(|(_, r)| of_bound(r)).collect();
-    let nearest = (known.iter()).max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
-    match nearest {
+    let known = runs.iter().filter_map(|(_, r)| of_bound(r));
+    let nearest = known.max_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+    Some(match nearest {
         Some((ratio, bound)) => format!(
             "kinetic energy at most {} % of internal (bound {} %)",
             fixed(100.0 * ratio, 1),
             number(100.0 * bound, 3)
         ),
         None => "kinetic bound kept".into(),
-    }
+    })
 }
 
 /// All runs of a study, each once, with their names for people: those drawn, those that other comparisons have, and the reference, by
@@ -114,9 +130,7 @@ fn runs(study: &Study) -> Vec<(&str, &Run)> {
 
 /// What a study without zones found.
 pub(crate) fn nothing_found(study: &Study) -> String {
-    let flagged: f64 = study
-        .detection
-        .iter()
+    let flagged: f64 = (study.detection.iter())
         .flat_map(|d| &d.plies)
         .map(|p| p.flagged_area)
         .sum();
@@ -135,9 +149,7 @@ pub(crate) fn of_run(input: &ReportInput) -> (Tone, String) {
     let mut parts = Vec::new();
     let mut tone = Tone::Good;
     let count = |v| {
-        input
-            .expectations
-            .iter()
+        (input.expectations.iter())
             .filter(|e| e.verdict() == v)
             .count()
     };

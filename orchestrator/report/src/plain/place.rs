@@ -111,15 +111,12 @@ fn groups(cells: &[[u32; 4]], points: usize) -> Vec<Vec<[u32; 4]>> {
 /// The place of cells: the rings around them.
 pub(crate) fn of_cells(flat: &[Vec3], formed: &[Vec3], cells: &[[u32; 4]]) -> Place {
     let line = |ring: Vec<u32>| Line {
-        flat: ring
-            .iter()
+        flat: (ring.iter())
             .map(|i| [flat[*i as usize][0], flat[*i as usize][1]])
             .collect(),
         formed: ring.iter().map(|i| formed[*i as usize]).collect(),
     };
-    let corners: Vec<Vec3> = cells
-        .as_flattened()
-        .iter()
+    let corners: Vec<Vec3> = (cells.as_flattened().iter())
         .map(|i| formed[*i as usize])
         .collect();
     Place {

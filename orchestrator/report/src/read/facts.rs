@@ -41,9 +41,7 @@ impl Facts {
             contents.push(format!("{} frames", c.frames));
         }
         contents.extend(
-            c.arrays
-                .iter()
-                .map(|a| format!("array {} {:?} {}", a.path, a.shape, a.unit)),
+            (c.arrays.iter()).map(|a| format!("array {} {:?} {}", a.path, a.shape, a.unit)),
         );
         Ok(Self {
             kind: artifact.kind().to_owned(),

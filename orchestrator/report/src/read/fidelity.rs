@@ -253,6 +253,39 @@ fn value(instance: &Instance, name: &str) -> Option<f64> {
     results.find(|r| r.name == name).map(|r| r.value)
 }
 
+/// A way of a comparison, without its name, by its model there and what the results of its errors end with (none: it is the reference).
+/// `whole`: the CPU time that its own is held against (s).
+fn one(instance: &Instance, model: &str, suffix: Option<&str>, whole: f64) -> Option<Way> {
+    let value = |name: &str| value(instance, name);
+    let cpu_seconds = value(&format!("cost.{model}.cpu_seconds"))?;
+    let measured = |name: &str| value(&format!("{name}{}", suffix?));
+    let counts = COUNTS.map(measured);
+    let errors = match suffix {
+        Some(_) => Measure::ALL.map(|m| measured(m.result())),
+        None => [Some(0.0); 7],
+    };
+    // A reference without defects leaves the other errors to be told.
+    if errors.iter().chain(&counts).all(Option::is_none) {
+        return None;
+    }
+    let all_counts = counts.iter().all(Option::is_some);
+    Some(Way {
+        comparison: instance.label(),
+        model: model.to_owned(),
+        name: String::new(),
+        cpu_seconds,
+        wall_seconds: value(&format!("cost.{model}.wall_seconds"))?,
+        peak_memory: value(&format!("peak_memory.{model}")),
+        share: cpu_seconds / whole,
+        errors,
+        counts: all_counts.then(|| counts.map(Option::unwrap_or_default)),
+        is_reference: suffix.is_none(),
+        measured_by: String::new(),
+        start_time: value(&format!("start_time.{model}")),
+        on_front: [false; 7],
+    })
+}
+
 /// The ways of one comparison, `named` after it or not.
 fn of(instance: &Instance, named: bool, measured_by: &str) -> Vec<Way> {
     let value = |name: &str| value(instance, name);
@@ -267,35 +300,13 @@ fn of(instance: &Instance, named: bool, measured_by: &str) -> Vec<Way> {
             what.to_owned()
         }
     };
-    // No suffix: the reference.
     let way = |name: String, model: &str, suffix: Option<&str>| {
-        let cpu_seconds = value(&format!("cost.{model}.cpu_seconds"))?;
-        let measured = |name: &str| value(&format!("{name}{}", suffix?));
-        let counts = COUNTS.map(measured);
-        let errors = match suffix {
-            Some(_) => Measure::ALL.map(|m| measured(m.result())),
-            None => [Some(0.0); 7],
-        };
-        // A reference without defects leaves the other errors to be told.
-        if errors.iter().chain(&counts).all(Option::is_none) {
-            return None;
-        }
-        Some(Way {
-            comparison: instance.label(),
-            model: model.to_owned(),
+        let way = Way {
             name,
-            cpu_seconds,
-            wall_seconds: value(&format!("cost.{model}.wall_seconds"))?,
-            peak_memory: value(&format!("peak_memory.{model}")),
-            share: cpu_seconds / whole,
-            errors,
-            counts: (counts.iter().all(Option::is_some))
-                .then(|| counts.map(Option::unwrap_or_default)),
-            is_reference: suffix.is_none(),
             measured_by: measured_by.to_owned(),
-            start_time: value(&format!("start_time.{model}")),
-            on_front: [false; 7],
-        })
+            ..one(instance, model, suffix, whole)?
+        };
+        Some(way)
     };
     let coarse = match value("passes") {
         Some(_) => "coarse run of the last pass",

@@ -61,10 +61,7 @@ fn cells_of(artifact: &Artifact, given: &MeasuredDefect) -> Result<Option<Cells>
     let bears = |i: &u32| (number[*i as usize] - given.number as f64).abs() < 0.5;
     let with = |least: usize| -> Vec<[u32; 4]> {
         let mine = |c: &&[u32; 4]| c.iter().filter(|i| bears(i)).count() >= least;
-        cells
-            .as_chunks::<4>()
-            .0
-            .iter()
+        (cells.as_chunks::<4>().0.iter())
             .filter(mine)
             .copied()
             .collect()

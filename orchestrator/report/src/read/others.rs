@@ -28,6 +28,8 @@ pub(crate) fn of_body(
     frame: u64,
     cells: &[[u32; 4]],
 ) -> Vec<Other> {
+    let points = body.points as usize;
+    let is_compared = ComparedBody::deserialize(&body.attributes).is_ok();
     let mut all = Vec::new();
     for field in &body.fields {
         let (name, c) = (field.name.as_str(), field.components as usize);
@@ -37,8 +39,12 @@ pub(crate) fn of_body(
         let Ok(data) = artifact.frame_field(&body.name, frame, field.on, name) else {
             continue;
         };
-        let points = body.points as usize;
-        let mut push = |title: String, values: Vec<f64>| {
+        let scalars = if name == "defect" && is_compared {
+            kinds(&data)
+        } else {
+            scalars(in_words(name), data, c)
+        };
+        for (title, values) in scalars {
             let values = match field.on {
                 On::Points => values,
                 On::Cells => at_points(&values, cells.as_flattened(), 4, points),
@@ -52,38 +58,41 @@ pub(crate) fn of_body(
                     values,
                 });
             }
+        }
+    }
+    all
+}
+
+/// Of a comparison, codes of what was found there, each by itself: as numbers on a scale the rim of the one kind would look like the other.
+fn kinds(codes: &[f64]) -> Vec<(String, Vec<f64>)> {
+    let of = |(code, kind)| {
+        let is = |v: &f64| f64::from(u8::from(*v == code));
+        let values = codes.iter().map(is).collect();
+        (format!("{kind} (1 where one was found)"), values)
+    };
+    [(1.0, "Wrinkle"), (2.0, "Bridging")].map(of).into()
+}
+
+/// A field of `c` components as scalars with their titles.
+fn scalars(title: String, data: Vec<f64>, c: usize) -> Vec<(String, Vec<f64>)> {
+    if c == 1 {
+        return vec![(title, data)];
+    }
+    let of = |k: usize| {
+        let which = match (c, k) {
+            (2 | 3, 0) => "x".to_owned(),
+            (2 | 3, 1) => "y".to_owned(),
+            (3, 2) => "z".to_owned(),
+            _ => (k + 1).to_string(),
         };
-        // Of a comparison: codes of what was found there. As numbers on a scale the rim of the one kind would look like the other.
-        if name == "defect" && ComparedBody::deserialize(&body.attributes).is_ok() {
-            for (code, kind) in [(1.0, "Wrinkle"), (2.0, "Bridging")] {
-                let is = |v: &f64| f64::from(u8::from(*v == code));
-                push(
-                    format!("{kind} (1 where one was found)"),
-                    data.iter().map(is).collect(),
-                );
-            }
-            continue;
-        }
-        let title = in_words(name);
-        if c == 1 {
-            push(title, data);
-            continue;
-        }
-        for k in 0..c {
-            let which = match (c, k) {
-                (2 | 3, 0) => "x".to_owned(),
-                (2 | 3, 1) => "y".to_owned(),
-                (3, 2) => "z".to_owned(),
-                _ => (k + 1).to_string(),
-            };
-            let values = data.iter().skip(k).step_by(c).copied().collect();
-            push(format!("{title}, {which}"), values);
-        }
-        if c <= 3 {
-            let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let values = data.chunks_exact(c).map(size).collect();
-            push(format!("{title}, magnitude"), values);
-        }
+        let values = data.iter().skip(k).step_by(c).copied().collect();
+        (format!("{title}, {which}"), values)
+    };
+    let mut all: Vec<_> = (0..c).map(of).collect();
+    if c <= 3 {
+        let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let values = data.chunks_exact(c).map(size).collect();
+        all.push((format!("{title}, magnitude"), values));
     }
     all
 }

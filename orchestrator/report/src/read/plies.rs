@@ -107,8 +107,7 @@ pub(crate) fn formed_plies(path: &Utf8Path, told: &Forming) -> Result<Vec<Ply>, 
 pub(crate) fn shown_sheet(artifact: &Artifact) -> Option<Ply> {
     let frame = last_frame(artifact).ok()?;
     let bodies = &artifact.contents().bodies;
-    let body = bodies
-        .iter()
+    let body = (bodies.iter())
         .find(|b| b.moving && b.nodes_per_cell == 4 && b.cells > 0 && b.name != "tool")?;
     let (flat, cells) = artifact.mesh(&body.name).ok()?;
     let formed = artifact.frame_points(&body.name, frame).ok()?;

@@ -36,8 +36,7 @@ pub(in crate::page) fn section(input: &ReportInput, family: &Family) -> Markup {
 
 fn cells(all: &[&Instance]) -> Markup {
     let cpu = || all.iter().map(|i| i.record.cost.cpu_seconds);
-    let memory = all
-        .iter()
+    let memory = (all.iter())
         .map(|i| i.record.cost.peak_memory)
         .max()
         .unwrap_or(0);

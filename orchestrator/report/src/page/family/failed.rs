@@ -20,11 +20,8 @@ pub(super) fn section(shown: &Shown<'_>) -> Markup {
         })
         .collect();
     let mut classes: BTreeMap<&str, usize> = BTreeMap::new();
-    failed
-        .iter()
-        .for_each(|(_, [_, class, _])| *classes.entry(class).or_default() += 1);
-    let classes: Vec<String> = classes
-        .iter()
+    (failed.iter()).for_each(|(_, [_, class, _])| *classes.entry(class).or_default() += 1);
+    let classes: Vec<String> = (classes.iter())
         .map(|(class, n)| format!("{n} of class {class}"))
         .collect();
     html! {

@@ -6,8 +6,8 @@ use crate::draw::error::{DrawError, Drawn};
 use crate::draw::plane::{Corner, LEAST, Plane, contour};
 use crate::draw::plot::CHARACTER;
 use crate::draw::plot::axis::ticks;
-use crate::draw::raster::{Camera, Canvas, Paint, Triangles};
-use crate::draw::svg::px;
+use crate::draw::raster::{Camera, Canvas, Paint, Surface, Triangles};
+use crate::draw::svg::{px, spot};
 use crate::family::Fate;
 use crate::page::family::shown::{LINKED, Shown, range_of};
 use crate::plain::ply::Cells;
@@ -88,17 +88,10 @@ fn colours(values: &[Option<f64>]) -> Option<Colours> {
         return None;
     }
     Some(if low < 0.0 && high > 0.0 {
-        Colours {
-            palette: Palette::PurpleOrange,
-            low: -size,
-            high: size,
-        }
+        Colours::about_zero(Palette::PurpleOrange, size)
     } else {
-        Colours {
-            palette: Palette::Viridis,
-            low,
-            high,
-        }
+        let palette = Palette::Viridis;
+        Colours { palette, low, high }
     })
 }
 
@@ -168,9 +161,7 @@ impl Map<'_> {
     fn svg(&self, response: usize) -> Drawn {
         let [w, h] = SIZE;
         let [across, up] = self.pair.map(|v| &self.shown.scales[v]);
-        let widest = up
-            .ticks
-            .iter()
+        let widest = (up.ticks.iter())
             .map(|t| t.1.chars().count())
             .max()
             .unwrap_or(1);
@@ -184,10 +175,7 @@ impl Map<'_> {
         ];
         let triangles = self.plane.triangles(self.values, &place);
         let image = self.image(&triangles, left, field)?;
-        let known = self
-            .plane
-            .points
-            .iter()
+        let known = (self.plane.points.iter())
             .filter(|p| self.values[**p].is_some())
             .count();
         let said = format!(
@@ -240,23 +228,14 @@ impl Map<'_> {
         let (camera, size) = Camera::plan().fit(around.iter(), field, 0.0);
         let mut canvas = Canvas::new(size);
         let mesh = Triangles::new(points.len(), &cells);
-        canvas.surface(
-            &camera,
-            &points,
-            &mesh,
-            Paint::Field(&values, self.colours),
-            false,
-            0.0,
-        );
+        let paint = Paint::Field(&values, self.colours);
+        canvas.surface(&camera, &Surface::new(&points, &mesh, paint));
         Ok(canvas.data_url()?)
     }
 
     /// Lines of equal value, with their values where there is room.
     fn lines(&self, triangles: &[[Corner; 3]], place: &[Vec<f64>; 2]) -> Markup {
-        let points: Vec<[f64; 2]> = self
-            .plane
-            .points
-            .iter()
+        let points: Vec<[f64; 2]> = (self.plane.points.iter())
             .map(|p| self.at(place, *p))
             .collect();
         let known = || self.values.iter().flatten().map(|v| v * self.factor);
@@ -264,20 +243,16 @@ impl Map<'_> {
             known().fold(f64::INFINITY, f64::min),
             known().fold(f64::NEG_INFINITY, f64::max),
         );
-        let levels = ticks(low, high, LEVELS)
-            .into_iter()
-            .filter(|l| *l > low && *l < high);
+        let levels = (ticks(low, high, LEVELS).into_iter()).filter(|l| *l > low && *l < high);
         let mut path = String::new();
         let mut texts: Vec<([f64; 2], String)> = Vec::new();
         for level in levels {
             let pieces = contour(triangles, level / self.factor);
             for [a, b] in &pieces {
-                let _ = write!(path, "M{} {}L{} {}", px(a[0]), px(a[1]), px(b[0]), px(b[1]));
+                let _ = write!(path, "M{}L{}", spot(*a), spot(*b));
             }
             let far = |p: [f64; 2]| {
-                let others = texts
-                    .iter()
-                    .map(|(at, _)| (at[0] - p[0]).hypot(at[1] - p[1]));
+                let others = (texts.iter()).map(|(at, _)| (at[0] - p[0]).hypot(at[1] - p[1]));
                 others.fold(f64::INFINITY, f64::min)
             };
             let inside = |p: [f64; 2]| {

@@ -108,8 +108,7 @@ fn fitting(
                 continue;
             }
         }
-        drawn = paths
-            .par_iter()
+        drawn = (paths.par_iter())
             .map(|p| one(p, width))
             .collect::<Result<Vec<_>, _>>()?;
         let length: usize = drawn.iter().flatten().map(String::len).sum();
@@ -154,9 +153,7 @@ fn source<'a>(
             }
         }
         // What cannot be read of the step that is drawn is told with its points.
-        let lost = unread
-            .iter()
-            .filter(|(step, _)| found.is_none_or(|f| f.0 != *step));
+        let lost = (unread.iter()).filter(|(step, _)| found.is_none_or(|f| f.0 != *step));
         problems.extend(
             lost.map(|(step, why)| format!("no picture of a ply of the step {step}: at {why}")),
         );

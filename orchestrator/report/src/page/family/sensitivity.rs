@@ -253,9 +253,7 @@ fn notes(
     if has(&|r| r.effects.is_some()) {
         notes.push("Effect: between neighbours that differ in the variable alone, how much the response changes, as if it did so over the whole range of the variable; the mean of the sizes with a range of 95 %. A deviation as large as the effect says that it depends on where one is.".into());
     }
-    let texts = rows
-        .iter()
-        .filter(|r| shown.levels[r.variable].numbers().is_none());
+    let texts = (rows.iter()).filter(|r| shown.levels[r.variable].numbers().is_none());
     let texts: Vec<usize> = texts.map(|r| r.variable).collect();
     if !texts.is_empty() {
         notes.push(format!(

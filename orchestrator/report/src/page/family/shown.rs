@@ -49,9 +49,7 @@ impl<'a> Shown<'a> {
     }
 
     pub(super) fn values(&self, response: usize) -> Vec<Option<f64>> {
-        self.family
-            .points
-            .iter()
+        (self.family.points.iter())
             .map(|p| p.responses[response])
             .collect()
     }
@@ -63,8 +61,7 @@ impl<'a> Shown<'a> {
     }
 
     pub(super) fn names(&self, variables: &[usize]) -> String {
-        let names: Vec<&str> = variables
-            .iter()
+        let names: Vec<&str> = (variables.iter())
             .map(|v| self.family.variables[*v].name.as_str())
             .collect();
         match names.as_slice() {

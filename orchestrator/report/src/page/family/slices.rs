@@ -171,9 +171,7 @@ impl<'a> Slice<'a> {
             let differ: Vec<usize> = (self.others.iter().copied())
                 .filter(|o| {
                     let of = &self.shown.levels[*o].of;
-                    self.at
-                        .iter()
-                        .any(|all| all.iter().any(|p| of[*p] != of[all[0]]))
+                    (self.at.iter()).any(|all| all.iter().any(|p| of[*p] != of[all[0]]))
                 })
                 .collect();
             text += &format!(
