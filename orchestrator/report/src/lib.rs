@@ -15,14 +15,14 @@ mod read;
 mod summary;
 mod units;
 
-pub use draw::error::DrawError;
+pub use draw::DrawError;
 pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable};
 pub use input::{Expectation, Instance, ReportInput, Verdict};
-pub use read::fidelity::{COUNTS, Measure, Way, Ways, ways};
+pub use read::{COUNTS, Measure, Way, Ways, ways};
 pub use summary::summary;
 
 use camino::{Utf8Path, Utf8PathBuf};
-use draw::sharpness::Sharpness;
+use draw::Sharpness;
 use page::content::Content;
 use plyflow_artifact::seal;
 

@@ -15,15 +15,13 @@ mod tables;
 pub(crate) mod verdict;
 mod view3d;
 
-use crate::draw::error::{DrawError, Drawn};
-use crate::draw::sharpness::Sharpness;
+use crate::draw::{DrawError, Drawn, Sharpness};
 use crate::family::Family;
 use crate::input::ReportInput;
 use crate::page::content::Content;
 use crate::page::family::shown::Shown;
 use crate::page::verdict::Tone;
-use crate::read::places::places;
-use crate::read::study::Study;
+use crate::read::{Study, places};
 use crate::units::bytes;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

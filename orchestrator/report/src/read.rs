@@ -1,20 +1,32 @@
 //! What records and artifacts say, as structs: nothing here draws.
 
-pub(crate) mod carried;
-pub(crate) mod comparison;
+mod carried;
+mod comparison;
 pub(crate) mod coupon;
-pub(crate) mod error;
-pub(crate) mod facts;
-pub(crate) mod fidelity;
-pub(crate) mod history;
+mod error;
+mod facts;
+mod fidelity;
+mod history;
 mod links;
 pub(crate) mod maps;
-pub(crate) mod material;
-pub(crate) mod measured;
-pub(crate) mod others;
-pub(crate) mod places;
-pub(crate) mod plies;
+mod material;
+mod measured;
+mod others;
+mod places;
+mod plies;
 pub(crate) mod plots;
 pub(crate) mod sheet;
-pub(crate) mod study;
+mod study;
 pub(crate) mod tables;
+
+pub(crate) use carried::{CARRIED, files};
+pub(crate) use comparison::Comparison;
+pub(crate) use facts::{Facts, open};
+pub(crate) use fidelity::advice;
+pub use fidelity::{COUNTS, Measure, Way, Ways, ways};
+pub(crate) use material::Material;
+pub(crate) use places::places;
+pub(crate) use plies::shown_sheet;
+pub(crate) use sheet::Source;
+pub(crate) use study::{Local, Run, Study};
+pub(crate) use tables::ROWS;

@@ -6,7 +6,7 @@ use crate::draw::error::Drawn;
 use crate::draw::raster::{Camera, Canvas, Paint, Surface, Triangles};
 use crate::draw::sharpness::Sharpness;
 use crate::draw::svg::px;
-use crate::plain::field_map::FieldMap;
+use crate::plain::FieldMap;
 use crate::units::number;
 use maud::html;
 

@@ -2,7 +2,7 @@
 
 use crate::draw::colour::{Palette, Scale, end_of_scale};
 use crate::draw::colour_bar::bar;
-use crate::plain::ply::{Other, Ply, at_points, range_of};
+use crate::plain::{Other, Ply, at_points, range_of};
 use crate::units::{number, quantity, shown};
 use maud::{Markup, html};
 use plyflow_model::artifact::Thresholds;

@@ -49,10 +49,9 @@ impl Plane {
 
     /// Whether a map of the points with a value would be honest; otherwise why not.
     pub(crate) fn is_mapped(&self, values: &[Option<f64>]) -> Result<(), String> {
-        let with: Vec<&[usize; 2]> = (self.points.iter().zip(&self.at))
-            .filter(|(p, _)| values[**p].is_some())
-            .map(|(_, at)| at)
-            .collect();
+        let with = self.points.iter().zip(&self.at);
+        let with = with.filter(|(p, _)| values[**p].is_some());
+        let with: Vec<&[usize; 2]> = with.map(|(_, at)| at).collect();
         if with.len() < LEAST {
             return Err(format!(
                 "{} with a value lie on the plane; a map needs {LEAST}",
@@ -109,10 +108,8 @@ impl Plane {
         for i in rows[0].windows(2) {
             for j in rows[1].windows(2) {
                 let around = [[i[0], j[0]], [i[1], j[0]], [i[1], j[1]], [i[0], j[1]]];
-                let there: Vec<usize> = (around.iter())
-                    .filter_map(|a| known.get(a).copied())
-                    .collect();
-                let corners: Option<Vec<Corner>> = there.iter().map(|k| corner(*k)).collect();
+                let there = around.iter().filter_map(|a| known.get(a).copied());
+                let corners: Option<Vec<Corner>> = there.map(corner).collect();
                 match corners.as_deref() {
                     // About the middle, so that no diagonal shows.
                     Some(&[a, b, c, d]) => {
@@ -147,15 +144,11 @@ impl Plane {
         let Ok(mesh) = DelaunayTriangulation::<Site>::bulk_load_stable(sites) else {
             return Vec::new();
         };
-        let of = |k: &usize| corner(*k);
-        let mut cells: Vec<[usize; 3]> = mesh
-            .inner_faces()
-            .map(|f| f.vertices().map(|v| v.data().0))
-            .collect();
+        let cells = mesh.inner_faces();
+        let mut cells: Vec<[usize; 3]> = cells.map(|f| f.vertices().map(|v| v.data().0)).collect();
         cells.sort_unstable();
-        (cells.iter())
-            .filter_map(|c| Some([of(&c[0])?, of(&c[1])?, of(&c[2])?]))
-            .collect()
+        let corners = |[a, b, c]: &[usize; 3]| Some([corner(*a)?, corner(*b)?, corner(*c)?]);
+        cells.iter().filter_map(corners).collect()
     }
 }
 

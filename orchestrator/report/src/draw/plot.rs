@@ -6,7 +6,7 @@ mod thin;
 
 use crate::draw::plot::axis::{Axis, Frame, Zero, extent};
 use crate::draw::svg::{px, spot};
-use crate::plain::chart::{Boxes, COLOURS, LARGEST, Plot, Series, Style};
+use crate::plain::{Boxes, COLOURS, LARGEST, Plot, Series, Style};
 use crate::units::number;
 use maud::{Markup, html};
 

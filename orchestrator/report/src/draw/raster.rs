@@ -1,7 +1,7 @@
 //! A small orthographic rasteriser: triangles with a depth buffer, smooth colours and light, to PNG.
 
 use crate::draw::colour::{Rgb, Scale};
-use crate::plain::ply::{Cells, Vec3};
+use crate::plain::{Cells, Vec3};
 use base64::Engine;
 
 /// Samples per pixel and direction.
@@ -384,9 +384,8 @@ fn shades(points: &[Vec3], mesh: &Triangles, light: Vec3, dark: f64) -> Vec<f32>
             (0..3).for_each(|d| normals[*i as usize][d] += n[d]);
         }
     }
-    (normals.iter())
-        .map(|n| (dark + (1.04 - dark) * dot(unit(*n), light).abs()).min(1.0) as f32)
-        .collect()
+    let shade = |n: &Vec3| (dark + (1.04 - dark) * dot(unit(*n), light).abs()).min(1.0) as f32;
+    normals.iter().map(shade).collect()
 }
 
 #[cfg(test)]

@@ -7,9 +7,7 @@ use crate::draw::error::DrawError;
 use crate::draw::legend::{Legend, Others};
 use crate::draw::sharpness::Sharpness;
 use crate::draw::view::lift;
-use crate::plain::locate::{Locator, outline};
-use crate::plain::place::{Place, normal};
-use crate::plain::ply::{Ply, Tool, Vec3};
+use crate::plain::{Locator, Place, Ply, Tool, Vec3, normal, outline};
 use pack::{Extent, Stream, script_json};
 use plyflow_model::artifact::Zone;
 use serde::Serialize;
@@ -351,15 +349,10 @@ fn write(
 }
 
 fn field(legend: &Legend) -> ToldField {
+    let stops = legend.scale.palette.css().into_iter();
     ToldField {
         name: legend.title().to_owned(),
-        stops: legend
-            .scale
-            .palette
-            .css()
-            .into_iter()
-            .map(|s| s.1)
-            .collect(),
+        stops: stops.map(|s| s.1).collect(),
     }
 }
 

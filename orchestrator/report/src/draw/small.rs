@@ -4,7 +4,7 @@ use crate::draw::colour::{Palette, Rgb, Scale, end_of_scale};
 use crate::draw::colour_bar::bar;
 use crate::draw::error::DrawError;
 use crate::draw::raster::{Camera, Canvas, Paint, Surface, Triangles};
-use crate::plain::ply::{Shade, Sheet, Vec3};
+use crate::plain::{Shade, Sheet, Vec3};
 use crate::units::shown;
 use maud::{Markup, html};
 
@@ -96,9 +96,8 @@ impl Series {
     /// Of plies; `None` without any.
     pub(crate) fn of(looks: &[Look]) -> Option<Self> {
         let Look { name, shade, .. } = looks.first()?;
-        let values: Vec<f64> = (looks.iter())
-            .flat_map(|l| l.values.iter().copied())
-            .collect();
+        let values = looks.iter().flat_map(|l| l.values.iter().copied());
+        let values: Vec<f64> = values.collect();
         Some(Self {
             corners: looks.iter().flat_map(|l| l.corners).collect(),
             name: name.clone(),

@@ -2,14 +2,8 @@
 
 use crate::input::{Instance, ReportInput};
 use crate::page::carried_tables::table;
-use crate::plain::field_map::FieldMap;
-use crate::plain::place::id_of_row;
-use crate::plain::ply::Ply;
-use crate::read::carried::{CARRIED, files};
-use crate::read::facts::{Facts, open};
-use crate::read::plies::shown_sheet;
-use crate::read::study::Run;
-use crate::read::{coupon, maps, plots, tables};
+use crate::plain::{FieldMap, Ply, id_of_row};
+use crate::read::{CARRIED, Facts, Run, coupon, files, maps, open, plots, shown_sheet, tables};
 use maud::{Markup, html};
 use plyflow_model::artifact::TextFile;
 

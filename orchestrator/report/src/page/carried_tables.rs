@@ -1,6 +1,6 @@
 //! Tables that steps carry.
 
-use crate::read::tables::ROWS;
+use crate::read::ROWS;
 use crate::units::{duration, number, shown};
 use maud::{Markup, html};
 use plyflow_model::artifact::{Cell, Column, Table};

@@ -1,10 +1,10 @@
 //! Everything that is on a page, read and ready to be written.
 
-use crate::draw::error::DrawError;
+use crate::draw::DrawError;
 use crate::input::ReportInput;
 use crate::page::carried::{self, Shown};
 use crate::page::family::gathered::Gathered;
-use crate::read::material::Material;
+use crate::read::Material;
 
 /// Everything that is on a page.
 #[derive(Debug)]

@@ -1,9 +1,9 @@
 //! What the steps cost.
 
-use crate::draw::plot::bars;
+use crate::draw::bars;
 use crate::input::Instance;
 use crate::page::content::Content;
-use crate::read::study::Run;
+use crate::read::Run;
 use crate::units::{bytes, count, duration, fixed};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
@@ -33,10 +33,7 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
     let runs = runs(content);
     let all = &content.input.instances;
     let sum = |f: fn(&Instance) -> f64| duration(all.iter().map(f).sum());
-    let memory = (all.iter())
-        .map(|i| i.record.cost.peak_memory)
-        .max()
-        .unwrap_or(0);
+    let memory = all.iter().map(|i| i.record.cost.peak_memory).max();
     html! {
         section id="costs" {
             h2 { "Costs" }
@@ -52,7 +49,7 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
                     th { "all steps, times added up" }
                     td colspan="4" { @if all.len() > LONGEST { "the first " (LONGEST) " of " (all.len()) " are listed" } }
                     td class="n" { (sum(|i| i.record.cost.wall_seconds)) } td class="n" { (sum(|i| i.record.cost.cpu_seconds)) }
-                    td {} td class="n" { (bytes(memory)) } td {} td {}
+                    td {} td class="n" { (bytes(memory.unwrap_or(0))) } td {} td {}
                 } }
             } }
             (longest(all))

@@ -1,8 +1,8 @@
 //! Energies, loads and contact over time.
 
 use crate::page::content::Content;
-use crate::plain::chart::{Plot, Series, Style};
-use crate::read::study::Run;
+use crate::plain::{Plot, Series, Style};
+use crate::read::Run;
 use crate::units::{fixed, number};
 use maud::{Markup, html};
 use plyflow_model::artifact::PenetrationPeak;

@@ -12,7 +12,7 @@ mod slices;
 mod statistics;
 mod table;
 
-use crate::draw::error::Drawn;
+use crate::draw::Drawn;
 use crate::family::{Origin, Response};
 use crate::page::family::shown::{Shown, is_same, range_of};
 use crate::units::{plural, quantity};

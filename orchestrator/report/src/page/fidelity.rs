@@ -1,8 +1,8 @@
 //! Speed against error.
 
 use crate::input::ReportInput;
-use crate::plain::chart::{Plot, Series, Style};
-use crate::read::fidelity::{Measure, Way, Ways, advice, ways};
+use crate::plain::{Plot, Series, Style};
+use crate::read::{Measure, Way, Ways, advice, ways};
 use crate::units::{bytes, duration, fixed};
 use maud::{Markup, html};
 
@@ -101,11 +101,8 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
         name: name.to_owned().into(),
         colour,
         style,
-        x: (of.iter())
-            .map(|(w, _)| 100.0 * w.share)
-            .collect::<Vec<_>>()
-            .into(),
-        y: of.iter().map(|(_, e)| *e).collect::<Vec<_>>().into(),
+        x: of.iter().map(|(w, _)| 100.0 * w.share).collect(),
+        y: of.iter().map(|(_, e)| *e).collect(),
     };
     let mut all = vec![series("front", 0, Style::Dashed, &front)];
     all.extend(

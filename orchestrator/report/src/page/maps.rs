@@ -1,12 +1,10 @@
 //! Maps of the plies.
 
-use crate::draw::error::{DrawError, Drawn};
-use crate::draw::legend::{Field, Legend};
-use crate::draw::sharpness::Sharpness;
-use crate::draw::view::{FormedView, Mark, Overlay, Side, flat, formed};
-use crate::plain::place::{Place, id_of};
-use crate::plain::ply::Ply;
-use crate::read::study::{Local, Study};
+use crate::draw::{
+    DrawError, Drawn, Field, FormedView, Legend, Mark, Overlay, Sharpness, Side, flat, formed,
+};
+use crate::plain::{Place, Ply, id_of};
+use crate::read::{Local, Study};
 use crate::units::quantity;
 use maud::{Markup, html};
 use plyflow_model::artifact::ComparedDefect;
@@ -91,13 +89,9 @@ pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness
 /// Maps of the local runs, with their defects named.
 pub(super) fn local(study: &Study, n: usize, places: &[Place], sharp: Sharpness) -> Drawn {
     let legends = legends(study);
-    let shown: Vec<&Local> = (study.locals.iter())
-        .filter(|l| !l.plies.is_empty())
-        .collect();
-    let draw = |local: &&Local| zone((study, n), local, &legends, places, sharp);
-    let zones = (shown.par_iter())
-        .map(draw)
-        .collect::<Result<Vec<_>, DrawError>>()?;
+    let shown = study.locals.par_iter().filter(|l| !l.plies.is_empty());
+    let draw = |local: &Local| zone((study, n), local, &legends, places, sharp);
+    let zones: Vec<Markup> = shown.map(draw).collect::<Result<_, DrawError>>()?;
     if zones.is_empty() {
         return Ok(html! {});
     }

@@ -1,8 +1,7 @@
 //! Where everything comes from and how to make it again.
 
 use crate::input::{Instance, ReportInput};
-use crate::read::facts::Facts;
-use crate::read::material::Material;
+use crate::read::{Facts, Material};
 use crate::units::moment;
 use maud::{Markup, html};
 use serde_json::Value;

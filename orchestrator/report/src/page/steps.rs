@@ -1,14 +1,11 @@
 //! Steps with plots, maps and tables: coupons, characterisations and whatever else carries some.
 
-use crate::draw::error::Drawn;
-use crate::draw::legend::Field;
-use crate::draw::sharpness::Sharpness;
-use crate::draw::view::{FormedView, Overlay, Side, flat, formed};
+use crate::draw::{Drawn, Field, FormedView, Overlay, Sharpness, Side, flat, formed};
 use crate::input::{Expectation, Instance, ReportInput};
 use crate::page::carried::Shown;
 use crate::page::content::Content;
 use crate::page::expectations::{expected_text, got_text, verdict_and_source};
-use crate::plain::ply::Ply;
+use crate::plain::Ply;
 use crate::units::{bytes, quantity};
 use maud::{Markup, html};
 use plyflow_model::artifact::TextFile;

@@ -2,8 +2,8 @@
 
 use crate::input::ReportInput;
 use crate::page::verdict;
-use crate::plain::place::{Place, id_of};
-use crate::read::study::Study;
+use crate::plain::{Place, id_of};
+use crate::read::Study;
 use crate::units::{fixed, number, quantity};
 use maud::{Markup, html};
 use plyflow_model::artifact::{Cause, ComparedDefect, Comparison, Role};
@@ -57,15 +57,11 @@ pub(super) fn zones(study: &Study) -> Markup {
 
 fn sides(free: [bool; 4]) -> String {
     let names = ["left", "right", "bottom", "top"];
-    let all: Vec<&str> = (names.into_iter())
-        .zip(free)
-        .filter(|(_, f)| *f)
-        .map(|(n, _)| n)
-        .collect();
-    if all.is_empty() {
-        "none".into()
-    } else {
-        all.join(", ")
+    let all = names.into_iter().zip(free).filter(|(_, f)| *f);
+    let all: Vec<&str> = all.map(|(n, _)| n).collect();
+    match all.as_slice() {
+        [] => "none".into(),
+        all => all.join(", "),
     }
 }
 
@@ -193,9 +189,8 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
 
 /// All named numbers, by step.
 pub(super) fn results(input: &ReportInput, open: bool) -> Markup {
-    let with: Vec<_> = (input.instances.iter())
-        .filter(|i| !i.record.results.is_empty())
-        .collect();
+    let with = input.instances.iter();
+    let with: Vec<_> = with.filter(|i| !i.record.results.is_empty()).collect();
     html! {
         section id="results" {
             h2 { "All results" }

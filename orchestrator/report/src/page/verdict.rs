@@ -1,10 +1,7 @@
 //! What the run found, in one line, and what must not be overlooked.
 
-use crate::input::{ReportInput, Verdict};
-use crate::read::comparison::Comparison;
-use crate::read::facts::Facts;
-use crate::read::material::Material;
-use crate::read::study::{Run, Study};
+use crate::input::{Expectation, ReportInput, Verdict};
+use crate::read::{Comparison, Facts, Material, Run, Study};
 use crate::units::{fixed, number, plural, quantity};
 
 /// Energy that is not accounted for, over the external work, above which a run is not to be trusted.
@@ -130,10 +127,8 @@ fn runs(study: &Study) -> Vec<(&str, &Run)> {
 
 /// What a study without zones found.
 pub(crate) fn nothing_found(study: &Study) -> String {
-    let flagged: f64 = (study.detection.iter())
-        .flat_map(|d| &d.plies)
-        .map(|p| p.flagged_area)
-        .sum();
+    let looked_at = study.detection.iter().flat_map(|d| &d.plies);
+    let flagged: f64 = looked_at.map(|p| p.flagged_area).sum();
     if flagged > 0.0 {
         let area = quantity(flagged, "m2", 3);
         return format!("no zones, no local runs: {area} are flagged, too little for a zone");
@@ -148,11 +143,8 @@ pub(crate) fn nothing_found(study: &Study) -> String {
 pub(crate) fn of_run(input: &ReportInput) -> (Tone, String) {
     let mut parts = Vec::new();
     let mut tone = Tone::Good;
-    let count = |v| {
-        (input.expectations.iter())
-            .filter(|e| e.verdict() == v)
-            .count()
-    };
+    let is = |v| move |e: &&Expectation| e.verdict() == v;
+    let count = |v| input.expectations.iter().filter(is(v)).count();
     let (missed, open) = (count(Verdict::Missed), count(Verdict::NotJudged));
     let all = plural(input.expectations.len(), "expectation", "expectations");
     if missed + open > 0 {

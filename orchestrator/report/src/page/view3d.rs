@@ -1,11 +1,9 @@
 //! The rotatable view of the formed plies: its place on the page and its scripts.
 
-use crate::draw::error::Drawn;
-use crate::draw::scene::{Scene, Shown, scene};
-use crate::draw::sharpness::Sharpness;
+use crate::draw::{Drawn, Scene, Sharpness, Shown, scene};
 use crate::page::maps::legends;
-use crate::plain::place::Place;
-use crate::read::study::Study;
+use crate::plain::Place;
+use crate::read::Study;
 use maud::{Markup, PreEscaped, html};
 
 /// regl 2.1.1 (MIT), see `vendor/README.md`.

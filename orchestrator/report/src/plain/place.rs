@@ -55,10 +55,8 @@ pub(crate) fn cells_of(ply: &Ply, d: &Defect, rivals: &[[f64; 2]]) -> Vec<[u32; 
         DefectKind::Bridging => Marked::Other,
     };
     let marked = ply.cells.iter().zip(&ply.marked);
-    let marked: Vec<[u32; 4]> = marked
-        .filter(|(_, m)| **m == kind)
-        .map(|(c, _)| *c)
-        .collect();
+    let marked = marked.filter(|(_, m)| **m == kind);
+    let marked: Vec<[u32; 4]> = marked.map(|(c, _)| *c).collect();
     let groups = groups(&marked, ply.flat.len());
     let middle = |cells: &[[u32; 4]]| {
         let at = |c: &[u32; 4]| c.map(|i| ply.flat[i as usize]);
@@ -116,9 +114,8 @@ pub(crate) fn of_cells(flat: &[Vec3], formed: &[Vec3], cells: &[[u32; 4]]) -> Pl
             .collect(),
         formed: ring.iter().map(|i| formed[*i as usize]).collect(),
     };
-    let corners: Vec<Vec3> = (cells.as_flattened().iter())
-        .map(|i| formed[*i as usize])
-        .collect();
+    let corners = cells.as_flattened().iter();
+    let corners: Vec<Vec3> = corners.map(|i| formed[*i as usize]).collect();
     Place {
         lines: rings(cells).into_iter().map(line).collect(),
         at: mean(&corners),

@@ -23,14 +23,11 @@ pub(crate) struct Cells {
 impl Cells {
     /// Those that have a surface: triangles and quads.
     pub(crate) fn surface(&self) -> Vec<Vec<u32>> {
-        match self.each {
-            3 | 4 => self
-                .nodes
-                .chunks_exact(self.each)
-                .map(<[u32]>::to_vec)
-                .collect(),
-            _ => Vec::new(),
+        if !matches!(self.each, 3 | 4) {
+            return Vec::new();
         }
+        let all = self.nodes.chunks_exact(self.each);
+        all.map(<[u32]>::to_vec).collect()
     }
 }
 

@@ -1,8 +1,7 @@
 //! Maps of fields that an artifact carries in its attributes, for every kind of artifact (`maps` in the data model): bodies
 //! seen from above, side by side in the colours of one scale.
 
-use crate::plain::field_map::{FieldMap, Panel};
-use crate::plain::ply::{Cells, at_points};
+use crate::plain::{Cells, FieldMap, Panel, at_points};
 use crate::read::carried::{list, pretty, to_si, unreadable, without_list};
 use plyflow_artifact::{Artifact, On};
 use plyflow_model::artifact;

@@ -1,7 +1,7 @@
 //! Everything that is read for a report: the runs of a workflow as studies, each of a global run with what it led to.
 
 use crate::input::ReportInput;
-use crate::plain::ply::Ply;
+use crate::plain::Ply;
 use crate::read::comparison::Comparison;
 use crate::read::error::{ReadError, form};
 use crate::read::facts::Facts;
@@ -59,6 +59,7 @@ impl Material {
 }
 
 /// The instances of which a study is made.
+#[derive(Default)]
 struct Plan {
     global: usize,
     detection: Option<usize>,
@@ -81,9 +82,7 @@ fn plans(links: Links<'_>) -> Vec<Plan> {
         if detections.is_empty() && !references.contains(links.key(global)) {
             only_run.push(Plan {
                 global,
-                detection: None,
-                list: None,
-                zones: Vec::new(),
+                ..Plan::default()
             });
         }
         for detection in detections {

@@ -1,7 +1,6 @@
 //! Defects that were measured on the plies of a run (`defect-measurement`).
 
-use crate::plain::place::{Line, Place, id_of_row, of_cells};
-use crate::plain::ply::Vec3;
+use crate::plain::{Line, Place, Vec3, id_of_row, of_cells};
 use crate::read::error::{ReadError, form};
 use crate::read::facts::{Facts, open};
 use camino::Utf8Path;
@@ -61,10 +60,8 @@ fn cells_of(artifact: &Artifact, given: &MeasuredDefect) -> Result<Option<Cells>
     let bears = |i: &u32| (number[*i as usize] - given.number as f64).abs() < 0.5;
     let with = |least: usize| -> Vec<[u32; 4]> {
         let mine = |c: &&[u32; 4]| c.iter().filter(|i| bears(i)).count() >= least;
-        (cells.as_chunks::<4>().0.iter())
-            .filter(mine)
-            .copied()
-            .collect()
+        let all = cells.as_chunks::<4>().0.iter();
+        all.filter(mine).copied().collect()
     };
     let mut found = with(2);
     if found.is_empty() {

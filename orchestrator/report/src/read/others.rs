@@ -1,6 +1,6 @@
 //! Fields of the plies besides those that are mapped: whatever an artifact has on their points or cells.
 
-use crate::plain::ply::{Other, Ply, at_points};
+use crate::plain::{Other, Ply, at_points};
 use crate::read::error::ReadError;
 use crate::read::facts::{last_frame, open};
 use camino::Utf8Path;

@@ -1,6 +1,6 @@
 //! Where the defects of a study's tables lie on its plies.
 
-use crate::plain::place::{Place, cells_of, id_of, of_cells, ring};
+use crate::plain::{Place, cells_of, id_of, of_cells, ring};
 use crate::read::study::Study;
 use plyflow_model::artifact::{ComparedDefect, Role};
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! Plies and tool of an artifact, in its last frame.
 
-use crate::plain::ply::{Cells, Marked, Ply, Tool};
+use crate::plain::{Cells, Marked, Ply, Tool};
 use crate::read::error::ReadError;
 use crate::read::facts::{last_frame, open, quads};
 use crate::read::others;

@@ -1,6 +1,6 @@
 //! Plots that an artifact carries in its attributes, for every kind of artifact (`plots` in the data model).
 
-use crate::plain::chart::{self, Boxes};
+use crate::plain::{Boxes, chart};
 use crate::read::carried::{list, pretty, to_si, unreadable, without_list};
 use plyflow_artifact::Artifact;
 use plyflow_model::artifact::{Axis, Paths, Plot, Series, Style};

@@ -1,6 +1,6 @@
 //! The ply of a point of a study that stands for it.
 
-use crate::plain::ply::{Shade, Sheet, at_points};
+use crate::plain::{Shade, Sheet, at_points};
 use crate::read::error::{ReadError, form};
 use crate::read::facts::{last_frame, open, quads};
 use camino::Utf8Path;

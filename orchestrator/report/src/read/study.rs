@@ -1,7 +1,6 @@
 //! A global run with what it led to: its defects and zones, its local runs, their comparison.
 
-use crate::plain::place::Place;
-use crate::plain::ply::{Ply, Tool};
+use crate::plain::{Place, Ply, Tool};
 use crate::read::comparison::Comparison;
 use crate::read::history::History;
 use plyflow_model::artifact::{Defects, Forming, Thresholds, Zone};

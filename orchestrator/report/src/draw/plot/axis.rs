@@ -1,6 +1,6 @@
 //! Axes: ranges, round ticks and their texts.
 
-use crate::plain::chart::LARGEST;
+use crate::plain::LARGEST;
 use crate::units::{fixed, trim};
 
 /// Round numbers between `low` and `high`, about `count` of them.

@@ -2,7 +2,7 @@
 
 use crate::draw::plot::axis::Frame;
 use crate::draw::svg::px;
-use crate::plain::chart::{Boxes, COLOURS, LARGEST, Spread};
+use crate::plain::{Boxes, COLOURS, LARGEST, Spread};
 use maud::{Markup, html};
 
 /// Boxes are so wide, over the least distance of two places.

@@ -3,7 +3,7 @@
 //! The script of the page reads them in the order in which they were written (`script/scene3d.js`).
 
 use crate::draw::error::DrawError;
-use crate::plain::ply::Vec3;
+use crate::plain::Vec3;
 use base64::Engine;
 use flate2::{Compression, write::ZlibEncoder};
 use serde::Serialize;

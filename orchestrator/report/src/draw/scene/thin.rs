@@ -1,6 +1,6 @@
 //! Coarser meshes for pages that would be too large.
 
-use crate::plain::ply::Vec3;
+use crate::plain::Vec3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Coarsening stops here: a mesh that has still more points stays so.

@@ -36,15 +36,12 @@ pub(in crate::page) fn section(input: &ReportInput, family: &Family) -> Markup {
 
 fn cells(all: &[&Instance]) -> Markup {
     let cpu = || all.iter().map(|i| i.record.cost.cpu_seconds);
-    let memory = (all.iter())
-        .map(|i| i.record.cost.peak_memory)
-        .max()
-        .unwrap_or(0);
+    let memory = all.iter().map(|i| i.record.cost.peak_memory).max();
     html! {
         td class="n" { (all.len()) }
         td class="n" { (duration(cpu().sum::<f64>() / all.len().max(1) as f64)) }
         td class="n" { (duration(cpu().fold(0.0, f64::max))) } td class="n" { (duration(cpu().sum())) }
         td class="n" { (duration(all.iter().map(|i| i.record.cost.wall_seconds).sum())) }
-        td class="n" { (bytes(memory)) } td class="n" { (bytes(all.iter().map(|i| i.record.bytes).sum())) }
+        td class="n" { (bytes(memory.unwrap_or(0))) } td class="n" { (bytes(all.iter().map(|i| i.record.bytes).sum())) }
     }
 }

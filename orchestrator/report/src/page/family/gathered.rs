@@ -1,10 +1,10 @@
 //! What is read and drawn of a study before its page is written.
 
-use crate::draw::error::DrawError;
+use crate::draw::DrawError;
 use crate::family::{Family, Point};
 use crate::input::{Instance, ReportInput};
 use crate::page::family::pictures::{self, Pictures};
-use crate::read::facts::Facts;
+use crate::read::Facts;
 
 /// What is read of a study for its page.
 #[derive(Debug, Default)]

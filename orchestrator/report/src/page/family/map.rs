@@ -1,16 +1,12 @@
 //! A response over two variables: colours and lines of equal value between the computed points, which are drawn on top.
 
-use crate::draw::colour::{Palette, Scale as Colours};
-use crate::draw::colour_bar::bar;
-use crate::draw::error::{DrawError, Drawn};
-use crate::draw::plane::{Corner, LEAST, Plane, contour};
-use crate::draw::plot::CHARACTER;
-use crate::draw::plot::axis::ticks;
-use crate::draw::raster::{Camera, Canvas, Paint, Surface, Triangles};
-use crate::draw::svg::{px, spot};
+use crate::draw::{
+    CHARACTER, Camera, Canvas, Corner, DrawError, Drawn, LEAST, Paint, Palette, Plane,
+    Scale as Colours, Surface, Triangles, bar, contour, px, spot, ticks,
+};
 use crate::family::Fate;
 use crate::page::family::shown::{LINKED, Shown, range_of};
-use crate::plain::ply::Cells;
+use crate::plain::Cells;
 use crate::units::{number, plural, shown as unit_of};
 use maud::{Markup, html};
 use std::fmt::Write;
@@ -54,12 +50,8 @@ pub(super) fn maps(shown: &Shown<'_>, response: usize, values: &[Option<f64>]) -
     }
     let response = &shown.family.responses[response];
     let (factor, _) = unit_of(&response.unit);
-    let id = format!(
-        "map-scale-{}",
-        plyflow_artifact::seal::hash(response.name.as_bytes())
-            .split_at(10)
-            .0
-    );
+    let hash = plyflow_artifact::seal::hash(response.name.as_bytes());
+    let id = format!("map-scale-{}", hash.split_at(10).0);
     // Of many pairs that have no map for one reason it is told once.
     let mut whys: Vec<(String, Vec<String>)> = Vec::new();
     for (pair, why) in not {
@@ -161,11 +153,8 @@ impl Map<'_> {
     fn svg(&self, response: usize) -> Drawn {
         let [w, h] = SIZE;
         let [across, up] = self.pair.map(|v| &self.shown.scales[v]);
-        let widest = (up.ticks.iter())
-            .map(|t| t.1.chars().count())
-            .max()
-            .unwrap_or(1);
-        let left = 34.0 + CHARACTER * widest as f64;
+        let widest = up.ticks.iter().map(|t| t.1.chars().count()).max();
+        let left = 34.0 + CHARACTER * widest.unwrap_or(1) as f64;
         let field = [w - RIGHT - left, h - BOTTOM - TOP];
         let x = |place: f64| left + place * field[0];
         let y = |place: f64| TOP + (1.0 - place) * field[1];
@@ -175,9 +164,8 @@ impl Map<'_> {
         ];
         let triangles = self.plane.triangles(self.values, &place);
         let image = self.image(&triangles, left, field)?;
-        let known = (self.plane.points.iter())
-            .filter(|p| self.values[**p].is_some())
-            .count();
+        let points = self.plane.points.iter();
+        let known = points.filter(|p| self.values[**p].is_some()).count();
         let said = format!(
             "Map of {} over {} and {}: {} on it. The numbers are in the table of points.",
             self.shown.family.responses[response].name,
@@ -235,9 +223,8 @@ impl Map<'_> {
 
     /// Lines of equal value, with their values where there is room.
     fn lines(&self, triangles: &[[Corner; 3]], place: &[Vec<f64>; 2]) -> Markup {
-        let points: Vec<[f64; 2]> = (self.plane.points.iter())
-            .map(|p| self.at(place, *p))
-            .collect();
+        let points = self.plane.points.iter();
+        let points: Vec<[f64; 2]> = points.map(|p| self.at(place, *p)).collect();
         let known = || self.values.iter().flatten().map(|v| v * self.factor);
         let (low, high) = (
             known().fold(f64::INFINITY, f64::min),
@@ -331,11 +318,8 @@ impl Map<'_> {
     }
 
     fn colour(&self, value: f64) -> String {
-        let [r, g, b] = self
-            .colours
-            .palette
-            .at(self.colours.place(value) as f32)
-            .map(|c| c.round() as u8);
+        let at = self.colours.place(value) as f32;
+        let [r, g, b] = self.colours.palette.at(at).map(|c| c.round() as u8);
         format!("#{r:02x}{g:02x}{b:02x}")
     }
 }

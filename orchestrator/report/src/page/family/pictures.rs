@@ -1,10 +1,9 @@
 //! Small pictures of the formed ply, one for each point: the same step and ply.
 
-use crate::draw::error::DrawError;
-use crate::draw::small::{Look, Series};
+use crate::draw::{DrawError, Look, Series};
 use crate::family::Family;
 use crate::input::ReportInput;
-use crate::read::sheet::{self, Source};
+use crate::read::{Source, sheet};
 use camino::Utf8Path;
 use maud::Markup;
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! What all sections of a study's page need of it.
 
-use crate::draw::scale::Scale;
+use crate::draw::VariableAxis;
 use crate::family::{Family, Levels};
 use crate::input::ReportInput;
 use crate::page::family::gathered::Gathered;
@@ -19,7 +19,7 @@ pub(in crate::page) struct Shown<'a> {
     pub(super) input: &'a ReportInput,
     pub(in crate::page) family: &'a Family,
     pub(super) levels: Vec<Levels>,
-    pub(super) scales: Vec<Scale>,
+    pub(super) scales: Vec<VariableAxis>,
     /// Variables with more than one value.
     pub(super) varied: Vec<usize>,
     /// For each point what its steps warn of.
@@ -35,7 +35,7 @@ impl<'a> Shown<'a> {
     ) -> Self {
         let levels = family.levels();
         let scales = family.variables.iter().zip(&levels);
-        let scales = scales.map(|(v, l)| Scale::new(v, l)).collect();
+        let scales = scales.map(|(v, l)| VariableAxis::new(v, l)).collect();
         let varied = (0..levels.len()).filter(|v| levels[*v].values.len() > 1);
         Self {
             input,
@@ -49,9 +49,8 @@ impl<'a> Shown<'a> {
     }
 
     pub(super) fn values(&self, response: usize) -> Vec<Option<f64>> {
-        (self.family.points.iter())
-            .map(|p| p.responses[response])
-            .collect()
+        let points = self.family.points.iter();
+        points.map(|p| p.responses[response]).collect()
     }
 
     /// Variables that differ among the points besides some.

@@ -1,12 +1,9 @@
 //! A response over one variable: every point, lines through points that differ in it alone, bars where several stand at one value.
 
-use crate::draw::plot::axis::{Axis, Zero, extent};
-use crate::draw::plot::{CHARACTER, MARKERS};
-use crate::draw::scale::Scale;
-use crate::draw::svg::px;
+use crate::draw::{Axis, CHARACTER, MARKERS, VariableAxis, Zero, extent, px};
 use crate::family::Fate;
 use crate::page::family::shown::{LINKED, Shown};
-use crate::plain::chart::COLOURS;
+use crate::plain::COLOURS;
 use crate::units::{number, plural, shown as unit_of};
 use maud::{Markup, html};
 use std::collections::HashMap;
@@ -43,7 +40,7 @@ pub(super) fn slices(shown: &Shown<'_>, response: usize, values: &[Option<f64>])
 struct Slice<'a> {
     shown: &'a Shown<'a>,
     variable: usize,
-    scale: &'a Scale,
+    scale: &'a VariableAxis,
     /// In the unit of the axis; by point.
     values: Vec<Option<f64>>,
     /// Variables that differ besides this one.

@@ -13,7 +13,7 @@ const LONGEST: usize = 14;
 
 /// An axis for a variable.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Scale {
+pub(crate) struct VariableAxis {
     /// Name and unit.
     pub(crate) title: String,
     /// For each level its place, 0 to 1.
@@ -24,7 +24,7 @@ pub(crate) struct Scale {
     pub(crate) ordered: bool,
 }
 
-impl Scale {
+impl VariableAxis {
     pub(crate) fn new(variable: &Variable, levels: &Levels) -> Self {
         match levels.numbers() {
             Some(values) => Self::of_numbers(variable.titled(), &values),
@@ -117,8 +117,8 @@ fn decades(low: f64, high: f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn scale(values: &[f64]) -> Scale {
-        Scale::of_numbers("x".into(), values)
+    fn scale(values: &[f64]) -> VariableAxis {
+        VariableAxis::of_numbers("x".into(), values)
     }
 
     #[test]
