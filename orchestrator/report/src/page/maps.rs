@@ -54,8 +54,10 @@ pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness
         let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
         Ok([plan, view(Side::Front)?, view(Side::Back)?])
     };
-    let drawn: Result<Vec<_>, DrawError> = pairs.par_iter().map(draw).collect();
-    let drawn = drawn?;
+    let drawn: Vec<_> = pairs
+        .par_iter()
+        .map(draw)
+        .collect::<Result<_, DrawError>>()?;
     let rows = || pairs.iter().zip(&drawn);
     let of = |field| rows().filter(move |((l, _), _)| l.field == field);
     Ok(html! {
