@@ -1,17 +1,10 @@
 //! A study as its page shows it: what was varied, and what came out at every point.
 
-pub(crate) mod pictures;
-pub(crate) mod plane;
-pub(crate) mod scale;
-pub(crate) mod statistics;
-
-use crate::input::{Instance, ReportInput};
-use crate::read::Facts;
-use pictures::Pictures;
+use crate::units::{join, plural, shown};
 use plyflow_model::units::si_number;
 
 /// Studies with more points show what is of one point on that point's own page alone.
-pub(crate) const SMALL: usize = 6;
+const SMALL: usize = 6;
 
 /// The points of a study with what came out.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,7 +19,7 @@ pub struct Family {
     pub samples: Vec<Sampled>,
     /// Name of the file that has the table whole.
     pub table: String,
-    /// Positions among [`ReportInput::instances`] of those that are the same at every point.
+    /// Positions among [`ReportInput::instances`](crate::ReportInput::instances) of those that are the same at every point.
     pub shared: Vec<usize>,
 }
 
@@ -99,7 +92,7 @@ pub struct Point {
     pub responses: Vec<Option<f64>>,
     /// What became of it.
     pub fate: Fate,
-    /// Positions of its steps among [`ReportInput::instances`].
+    /// Positions of its steps among [`ReportInput::instances`](crate::ReportInput::instances).
     pub instances: Vec<usize>,
     /// Where its own page lies, as an address from the study's page, if it has been written.
     pub report: Option<String>,
@@ -166,7 +159,7 @@ impl Variable {
 impl Response {
     /// With the unit in which it is shown.
     pub(crate) fn titled(&self) -> String {
-        titled(&self.name, crate::units::shown(&self.unit).1)
+        titled(&self.name, shown(&self.unit).1)
     }
 }
 
@@ -202,6 +195,11 @@ impl Levels {
 }
 
 impl Family {
+    /// Whether what is of one point is on that point's own page alone.
+    pub(crate) fn is_large(&self) -> bool {
+        self.points.len() > SMALL
+    }
+
     /// The different values of each variable.
     pub(crate) fn levels(&self) -> Vec<Levels> {
         (0..self.variables.len())
@@ -225,8 +223,7 @@ impl Family {
             let mut order: Vec<usize> = (0..values.len()).collect();
             order.sort_by(|a, b| number(a).total_cmp(&number(b)));
             let mut place = vec![0; order.len()];
-            order
-                .iter()
+            (order.iter())
                 .enumerate()
                 .for_each(|(to, from)| place[*from] = to);
             of.iter_mut().for_each(|i| *i = place[*i]);
@@ -237,7 +234,7 @@ impl Family {
 
     /// How many points there are of each kind, in words: `6 points, 5 done, 1 failed`.
     pub(crate) fn counts(&self) -> String {
-        let mut parts = vec![crate::units::plural(self.points.len(), "point", "points")];
+        let mut parts = vec![plural(self.points.len(), "point", "points")];
         for word in ["done", "failed", "not run"] {
             match self.count(word) {
                 0 => {}
@@ -257,91 +254,11 @@ impl Family {
         let one = |v: &usize| {
             let variable = &self.variables[*v];
             let value = self.points[point].values[*v].text();
-            let value = crate::units::join(value, &variable.unit);
+            let value = join(value, &variable.unit);
             format!("{} = {value}", variable.name)
         };
         variables.iter().map(one).collect::<Vec<_>>().join(", ")
     }
-}
-
-/// What is read of a study for its page.
-#[derive(Debug, Default)]
-pub(crate) struct Read {
-    /// For each point what its steps warn of: label and text.
-    pub(crate) warnings: Vec<Vec<(String, String)>>,
-    /// Small pictures of the formed plies, if there are plies.
-    pub(crate) pictures: Option<Pictures>,
-    /// What could not be read.
-    pub(crate) problems: Vec<String>,
-    /// What is the same at every point, where what is of one point finds no room.
-    rest: Option<ReportInput>,
-}
-
-impl Read {
-    /// # Errors
-    /// When a picture cannot be encoded.
-    pub(crate) fn of(input: &ReportInput, family: &Family) -> Result<Self, String> {
-        let all: Vec<Vec<String>> = input.instances.iter().map(warnings).collect();
-        let of_point = |p: &Point| {
-            let one = |i: &usize| {
-                let label = input.instances[*i].label();
-                all[*i]
-                    .iter()
-                    .map(move |text| (label.clone(), text.clone()))
-            };
-            p.instances.iter().flat_map(one).collect()
-        };
-        let mut problems = Vec::new();
-        Ok(Self {
-            warnings: family.points.iter().map(of_point).collect(),
-            pictures: pictures::draw(input, family, &mut problems)?,
-            problems,
-            rest: (family.points.len() > SMALL).then(|| shared(input, family)),
-        })
-    }
-
-    /// What is shown of steps besides the study.
-    pub(crate) fn rest<'a>(&'a self, input: &'a ReportInput) -> &'a ReportInput {
-        self.rest.as_ref().unwrap_or(input)
-    }
-
-    /// Whether what is of one point is on that point's own page alone.
-    pub(crate) fn is_large(&self) -> bool {
-        self.rest.is_some()
-    }
-}
-
-/// What a step warns of, in its record and in its artifact, each once. What cannot be read is told by whoever reads more of it.
-fn warnings(instance: &Instance) -> Vec<String> {
-    let mut all = instance.record.warnings.clone();
-    if let Ok(facts) = Facts::read(&instance.artifact) {
-        let told = facts.attributes["warnings"].as_array();
-        let told = told.into_iter().flatten().filter_map(|t| t.as_str());
-        for text in told.map(str::to_owned) {
-            if !all.contains(&text) {
-                all.push(text);
-            }
-        }
-    }
-    all
-}
-
-/// The part of a report that is the same at every point: what is of one point is left out.
-pub(crate) fn shared(input: &ReportInput, family: &Family) -> ReportInput {
-    let one = |i: &usize| input.instances[*i].clone();
-    ReportInput {
-        instances: family.shared.iter().map(one).collect(),
-        family: None,
-        ..input.clone()
-    }
-}
-
-/// The name in the file of the step of an instance.
-pub(crate) fn base(instance: &Instance) -> &str {
-    instance
-        .step
-        .split_once('@')
-        .map_or(&instance.step, |s| s.0)
 }
 
 #[cfg(test)]

@@ -35,6 +35,16 @@ pub struct ReportInput {
 }
 
 impl ReportInput {
+    /// The part that is the same at every point of a study: what is of one point is left out.
+    pub(crate) fn shared(&self, family: &Family) -> Self {
+        let one = |i: &usize| self.instances[*i].clone();
+        Self {
+            instances: family.shared.iter().map(one).collect(),
+            family: None,
+            ..self.clone()
+        }
+    }
+
     /// A command on this workflow as one types it: `plyflow run workflow.yaml --set ..`.
     pub(crate) fn command(&self, name: &str) -> String {
         let mut command = format!("plyflow {name} {}", self.given);
@@ -65,6 +75,11 @@ impl Instance {
     #[must_use]
     pub fn label(&self) -> String {
         label(&self.step, &self.item)
+    }
+
+    /// The name of its step in the file, without the point of a study.
+    pub(crate) fn base(&self) -> &str {
+        self.step.split_once('@').map_or(&self.step, |s| s.0)
     }
 }
 

@@ -6,49 +6,28 @@
 //! and join tables with maps; without them everything else is there. Workflows with artifacts of
 //! unknown kinds get a page with their steps, results and costs.
 
-mod colour;
-mod comparison;
+mod draw;
 mod family;
-mod fidelity;
-mod field;
 mod input;
-mod locate;
-mod maps;
-mod measured;
-mod others;
 mod page;
-mod place;
-mod plot;
-mod plots;
-mod raster;
+mod plain;
 mod read;
-mod scene;
-mod steps;
-mod study;
 mod summary;
-mod tables;
 mod units;
-mod verdict;
-mod view;
 
+pub use draw::DrawError;
 pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable};
-pub use fidelity::{COUNTS, Measure, Way, Ways, ways};
 pub use input::{Expectation, Instance, ReportInput, Verdict};
+pub use read::{COUNTS, Measure, Way, Ways, ways};
 pub use summary::summary;
 
 use camino::{Utf8Path, Utf8PathBuf};
+use draw::Sharpness;
+use page::content::Content;
 use plyflow_artifact::seal;
-use study::Material;
-use view::Sharpness;
 
 /// A page larger than this is drawn again with coarser pictures (bytes).
 const LARGEST: usize = 4_500_000;
-
-/// Resolutions of the pictures that are tried, the finest first.
-const SHARPNESS: [f64; 6] = [1.6, 1.2, 0.8, 0.5, 0.35, 0.25];
-
-/// Below this the page says that it shows less than the artifacts have.
-const COARSE: f64 = 0.8;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -63,7 +42,7 @@ pub enum ReportError {
     },
     /// A picture cannot be made.
     #[error("a picture of the report cannot be drawn: {0}")]
-    Picture(String),
+    Picture(#[from] DrawError),
 }
 
 /// Writes the report to `out` (under a temporary name first, so that a whole one is there at any moment) and returns
@@ -72,15 +51,7 @@ pub enum ReportError {
 /// # Errors
 /// When the file cannot be written or a picture not be encoded.
 pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportError> {
-    let study = input.family.as_ref();
-    let study = study.map(|f| family::Read::of(input, f)).transpose();
-    let study = study.map_err(ReportError::Picture)?;
-    let rest = study.as_ref().map_or(input, |s| s.rest(input));
-    let mut material = Material::read(rest, true);
-    if let Some(study) = &study {
-        material.problems.extend(study.problems.iter().cloned());
-    }
-    let mut page = drawn(input, &mut material, study.as_ref()).map_err(ReportError::Picture)?;
+    let mut page = drawn(Content::read(input)?)?;
     page += &sealed_by(&page);
     let wrong = |source| ReportError::Write {
         path: out.to_owned(),
@@ -100,16 +71,10 @@ pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportEr
 }
 
 /// The page with the finest pictures for which there is room.
-fn drawn(
-    input: &ReportInput,
-    material: &mut Material,
-    study: Option<&family::Read>,
-) -> Result<String, String> {
-    let (mut sharp, mut size) = (Sharpness(SHARPNESS[0]), 0);
-    let mut in_full = 0;
-    for tried in SHARPNESS {
-        sharp = Sharpness(tried);
-        let page = page::page(input, material, study, (sharp, in_full))?;
+fn drawn(mut content: Content<'_>) -> Result<String, DrawError> {
+    let (mut size, mut in_full) = (0, 0);
+    for sharp in Sharpness::ALL {
+        let page = page::page(&content, sharp, in_full)?;
         size = page.len();
         if size <= LARGEST {
             return Ok(page);
@@ -117,10 +82,10 @@ fn drawn(
         in_full = in_full.max(size);
     }
     let [size, bound] = [size, LARGEST].map(|n| units::bytes(n as u64));
-    material.problems.push(format!(
+    content.warn(format!(
         "this page of {size} is larger than {bound} even with its coarsest pictures"
     ));
-    page::page(input, material, study, (sharp, in_full))
+    page::page(&content, Sharpness::ALL[Sharpness::ALL.len() - 1], in_full)
 }
 
 /// The last line of a page: the hash of all that is before it.

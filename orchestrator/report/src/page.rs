@@ -1,24 +1,28 @@
 //! The page.
 
+mod carried;
+mod carried_tables;
+pub(crate) mod content;
 mod costs;
 mod energy;
+pub(crate) mod expectations;
 mod family;
 mod fidelity;
 mod maps;
 mod provenance;
-mod scene;
 mod steps;
 mod tables;
+pub(crate) mod verdict;
+mod view3d;
 
-pub(crate) use tables::{expected_text, got_text, is_notable};
-
-use crate::family::Read;
+use crate::draw::{DrawError, Drawn, Sharpness};
+use crate::family::Family;
 use crate::input::ReportInput;
-use crate::place;
-use crate::study::{Material, Study};
+use crate::page::content::Content;
+use crate::page::family::shown::Shown;
+use crate::page::verdict::Tone;
+use crate::read::{Study, places};
 use crate::units::bytes;
-use crate::verdict::{self, Tone};
-use crate::view::Sharpness;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("style.css");
@@ -28,72 +32,73 @@ pub(crate) fn fingerprint_mark(fingerprint: &str) -> String {
     html! { meta name="plyflow-report" content=(fingerprint); }.into_string()
 }
 
-/// The whole page. `study`: what was read of a study; `material` is then of what is shown besides it. `in_full`: the page's size with the
-/// finest pictures (bytes), when these found no room.
+/// The whole page. `in_full`: its size with the finest pictures (bytes), when these found no room.
+///
+/// # Errors
+/// When a picture cannot be encoded.
 pub(crate) fn page(
-    input: &ReportInput,
-    material: &Material,
-    study: Option<&Read>,
-    (sharp, in_full): (Sharpness, usize),
-) -> Result<String, String> {
-    let rest = study.map_or(input, |s| s.rest(input));
-    let shown = input.family.as_ref().zip(study);
-    let shown = shown.map(|(f, s)| family::Shown::new(input, f, &s.warnings, s.pictures.as_ref()));
-    let large = study.is_some_and(Read::is_large);
-    let points = shown.as_ref().map(family::sections).transpose()?;
+    content: &Content<'_>,
+    sharp: Sharpness,
+    in_full: usize,
+) -> Result<String, DrawError> {
+    let (input, material, rest) = (content.input, &content.material, content.rest());
+    let study = input.family.as_ref().zip(content.study.as_ref());
+    let study = study.map(|(family, gathered)| Shown::new(input, family, gathered));
+    let large = input.family.as_ref().is_some_and(Family::is_large);
+    let points = study.as_ref().map(family::sections).transpose()?;
     let mut studies = Vec::new();
-    let drawn = material
-        .studies
-        .iter()
+    let drawn = (material.studies.iter())
         .filter(|s| !s.plies.is_empty())
         .count();
     for (n, study) in material.studies.iter().enumerate() {
         studies.push(study_sections(study, n, drawn, sharp)?);
     }
-    let steps = steps::section(rest, material, sharp)?;
+    let steps = steps::section(content, sharp)?;
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                (PreEscaped(fingerprint_mark(&input.fingerprint)))
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (input.workflow) @if shown.is_some() { " – study" } @else { " – forming report" } }
-                style { (PreEscaped(STYLE)) }
-            }
+            (html_head(input, study.is_some()))
             body {
-                (head(input, material, shown.as_ref(), large))
-                @if sharp.0 < crate::COARSE { (coarser(in_full)) }
+                (header(content, study.as_ref(), large))
+                @if sharp.is_coarse() { (coarser(in_full)) }
                 main {
                     @if let Some(points) = &points { (points) }
                     @for study in &studies { (study) }
                     (steps)
                     (fidelity::section(rest))
-                    (tables::expectations(input))
-                    @match shown.as_ref().filter(|_| large) {
-                        Some(s) => (family::costs(input, s.family)),
-                        None => (costs::section(input, material)),
+                    (expectations::section(input))
+                    @match study.as_ref().filter(|_| large) {
+                        Some(s) => (family::costs::section(input, s.family)),
+                        None => (costs::section(content)),
                     }
-                    (energy::section(material))
+                    (energy::section(content))
                     @if !large || !rest.instances.is_empty() { (tables::results(rest, material.studies.is_empty())) }
                     (provenance::section(input, rest, material))
                 }
                 footer { "Made by " (input.program) ". This page is complete in itself: it loads nothing." }
-                (scene::scripts(drawn > 0, shown.is_some()))
+                (view3d::scripts(drawn > 0, study.is_some()))
             }
         }
     };
     Ok(page.into_string())
 }
 
+fn html_head(input: &ReportInput, is_study: bool) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            (PreEscaped(fingerprint_mark(&input.fingerprint)))
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="color-scheme" content="light dark";
+            title { (input.workflow) @if is_study { " – study" } @else { " – forming report" } }
+            style { (PreEscaped(STYLE)) }
+        }
+    }
+}
+
 /// `study`: of a study; `large`: what is of one of its points is not told here.
-fn head(
-    input: &ReportInput,
-    material: &Material,
-    study: Option<&family::Shown<'_>>,
-    large: bool,
-) -> Markup {
+fn header(content: &Content<'_>, study: Option<&Shown<'_>>, large: bool) -> Markup {
+    let (input, material) = (content.input, &content.material);
     // What is of single points stands in their places: before the table it would bury what all of them say.
     let apart = study.is_some();
     let warnings = verdict::warnings(input, material, apart);
@@ -133,7 +138,7 @@ fn head(
                 }
             }
             @if let Some(s) = study { (family::warned(s)) }
-            (contents(material, input, large))
+            (contents(content, large))
         }
     }
 }
@@ -153,13 +158,18 @@ fn class(tone: Tone) -> &'static str {
     }
 }
 
-fn contents(material: &Material, input: &ReportInput, large: bool) -> Markup {
+fn contents(content: &Content<'_>, large: bool) -> Markup {
+    let (input, material) = (content.input, &content.material);
     let study = material.studies.first();
     let maps = study.is_some_and(|s| !s.plies.is_empty());
     let local = material.studies.iter().any(|s| !s.locals.is_empty());
+    let compared = study.is_some_and(|s| s.comparison.is_some());
     let family = input.family.as_ref();
     let failed = family.is_some_and(|f| f.count("failed") > 0);
     let responses = family.is_some_and(|f| !f.responses.is_empty());
+    let (plots, steps) = (!content.shown.is_empty(), steps::heading(&content.shown));
+    let ways = !large && fidelity::has(input);
+    let expected = !input.expectations.is_empty();
     let items = [
         (family.is_some(), "#points", "Table of points"),
         (failed, "#failed", "Failed points"),
@@ -168,28 +178,12 @@ fn contents(material: &Material, input: &ReportInput, large: bool) -> Markup {
         (maps, "#view-0", "3D view"),
         (maps, "#maps-0", "Maps"),
         (local, "#local-0", "Local runs"),
-        (
-            study.is_some_and(|s| s.comparison.is_some()),
-            "#defects-0",
-            "Defects",
-        ),
-        (
-            !material.shown.is_empty(),
-            "#plots",
-            steps::heading(material),
-        ),
-        (
-            !large && fidelity::has(input),
-            "#fidelity",
-            "Speed against error",
-        ),
-        (
-            !input.expectations.is_empty(),
-            "#expectations",
-            "Expectations",
-        ),
+        (compared, "#defects-0", "Defects"),
+        (plots, "#plots", steps),
+        (ways, "#fidelity", "Speed against error"),
+        (expected, "#expectations", "Expectations"),
         (true, "#costs", "Costs"),
-        (energy::has(material), "#energy", "Energy and contact"),
+        (energy::has(content), "#energy", "Energy and contact"),
         (!large, "#results", "Results"),
         (true, "#provenance", "Provenance"),
     ];
@@ -198,14 +192,9 @@ fn contents(material: &Material, input: &ReportInput, large: bool) -> Markup {
     }
 }
 
-fn study_sections(
-    study: &Study,
-    n: usize,
-    drawn: usize,
-    sharp: Sharpness,
-) -> Result<Markup, String> {
-    let places = place::places(study, n);
-    let view = scene::section(study, n, &places, drawn, sharp)?;
+fn study_sections(study: &Study, n: usize, drawn: usize, sharp: Sharpness) -> Drawn {
+    let places = places(study, n);
+    let view = view3d::section(study, n, &places, drawn, sharp)?;
     let maps = maps::global(study, n, &places, sharp)?;
     let local = maps::local(study, n, &places, sharp)?;
     Ok(html! {

@@ -1,11 +1,11 @@
 //! The table at the end of a run in the terminal.
 
-use crate::family::{SMALL, base};
+use crate::family::Family;
 use crate::input::{Expectation, Instance, ReportInput, Verdict, label};
-use crate::page::{expected_text, got_text, is_notable};
-use crate::study::{Comparison, Material, Study};
+use crate::page::expectations::{expected_text, got_text, is_notable};
+use crate::page::verdict;
+use crate::read::{Comparison, Material, Study};
 use crate::units::{bytes, duration, fixed, number, quantity};
-use crate::verdict;
 use camino::Utf8Path;
 use plyflow_model::text::one_line;
 
@@ -22,8 +22,7 @@ const ITEMS: usize = 3;
 pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
     let material = Material::read(input, false);
     let mut blocks: Vec<String> = Vec::new();
-    let family = input.family.as_ref();
-    let large = family.is_some_and(|f| f.points.len() > SMALL);
+    let large = input.family.as_ref().is_some_and(Family::is_large);
     // The table of a study tells of its points; one line for each run of each would bury it.
     for study in material.studies.iter().filter(|_| !large) {
         let (_, text) = verdict::of_study(study);
@@ -63,8 +62,7 @@ fn warning_lines(warnings: &[(String, String)]) -> String {
 fn zone_table(study: &Study) -> String {
     let mm = |v: f64| fixed(v * 1e3, 0);
     let zones = study.zones.as_deref().unwrap_or_default();
-    let rows: Vec<Vec<String>> = zones
-        .iter()
+    let rows: Vec<Vec<String>> = (zones.iter())
         .map(|z| {
             let [x0, y0, x1, y1] = z.bounds;
             let place = format!(
@@ -154,7 +152,7 @@ fn result_table(input: &ReportInput) -> String {
 fn cost_table(instances: &[Instance], together: bool) -> String {
     let mut steps: Vec<(&str, Vec<&Instance>)> = Vec::new();
     for i in instances {
-        let step = if together { base(i) } else { &i.step };
+        let step = if together { i.base() } else { &i.step };
         match steps.iter_mut().find(|(name, _)| *name == step) {
             Some((_, items)) => items.push(i),
             None => steps.push((step, vec![i])),
@@ -182,8 +180,7 @@ fn cost_table(instances: &[Instance], together: bool) -> String {
 /// Times are summed over the items; threads, memory and rate are the largest.
 fn cost_row(name: String, items: &[&Instance]) -> Vec<String> {
     let cost = || items.iter().map(|i| i.record.cost);
-    let rates = items
-        .iter()
+    let rates = (items.iter())
         .flat_map(|i| &i.record.results)
         .filter(|r| r.name == "element_cycle_rate");
     let rate = rates.map(|r| r.value).fold(0.0, f64::max);

@@ -292,6 +292,34 @@ fn a_zone_that_the_comparison_lacks_is_not_called_free_of_wrinkles() {
 }
 
 #[test]
+fn a_local_run_whose_zone_cannot_be_read_is_told_and_the_others_are_shown() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.008);
+    study.defects(false);
+    study.zones(&common::ZONES);
+    for (zone, bounds) in common::ZONES {
+        study.boundary(zone);
+        study.forming(&format!("local[{zone}]"), Some((zone, bounds)), 0.004);
+    }
+    let mut torn = study.create("local[B]", "forming");
+    torn.attributes(r#"{"sheets": [], "zone": {"name": "B"}}"#)
+        .unwrap();
+    let local = study.instances.pop().unwrap();
+    study.finish(
+        torn,
+        ("local", &["B"]),
+        "forming",
+        &[("boundary", "boundary[B]")],
+        vec![],
+    );
+    assert_eq!(study.instances.last().unwrap().label(), local.label());
+    let text = page(&study.input(), &folder);
+    assert!(text.contains("local[B]: its attribute 'zone': missing field `box`"));
+    assert!(text.contains("Zone A") && !text.contains("Zone B"));
+}
+
+#[test]
 fn a_press_shows_the_force_of_its_punch_and_no_pressures() {
     let (_keep, folder) = folder();
     let mut study = Study::new(&folder);

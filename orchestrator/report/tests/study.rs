@@ -218,6 +218,44 @@ fn all_pictures_have_one_view_one_size_and_the_order_of_the_table() {
     assert_ne!(data[0], data[9]);
 }
 
+/// Writes the artifact of a forming run anew, with attributes that are not of their form.
+fn spoil(input: &ReportInput, instance: usize) {
+    let instance = &input.instances[instance];
+    assert_eq!(instance.record.kind, "forming");
+    let path = instance.artifact.as_std_path();
+    let mut w = plyflow_artifact::ArtifactWriter::create(path, "forming").unwrap();
+    w.attributes(r#"{"sheets": [{"name": 3}]}"#).unwrap();
+    w.finish(&serde_json::json!({})).unwrap();
+}
+
+#[test]
+fn a_point_whose_sheet_cannot_be_read_is_named_and_the_others_have_their_pictures() {
+    let (_dir, folder) = folder();
+    let input = sweep(&folder, 15);
+    let pictures = |text: &str| section(text, "places").matches("<img ").count();
+    let all = pictures(&page(&input, &folder));
+    // The one that is looked at first for what can be drawn.
+    spoil(&input, 1);
+    let text = page(&input, &folder);
+    assert_eq!((all, pictures(&text)), (6, 5));
+    assert!(
+        text.contains("picture of angle=0deg: its attributes: invalid type"),
+        "{text:.3000}"
+    );
+}
+
+#[test]
+fn a_study_none_of_whose_sheets_can_be_read_says_why_it_has_no_pictures() {
+    let (_dir, folder) = folder();
+    let input = sweep(&folder, 15);
+    (1..input.instances.len()).for_each(|i| spoil(&input, i));
+    let text = page(&input, &folder);
+    assert!(!section(&text, "places").contains("<img "));
+    let told =
+        "no picture of a ply of the step formed: at angle=0deg: its attributes: invalid type";
+    assert_eq!(text.matches(told).count(), 1, "{text:.3000}");
+}
+
 #[test]
 fn points_that_repeat_have_bars_and_it_is_told_what_differs_among_them() {
     let (_dir, folder) = folder();

@@ -1,8 +1,9 @@
 //! What the steps cost.
 
-use crate::input::{Instance, ReportInput};
-use crate::plot::bars;
-use crate::study::{Material, Run};
+use crate::draw::bars;
+use crate::input::Instance;
+use crate::page::content::Content;
+use crate::read::Run;
 use crate::units::{bytes, count, duration, fixed};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
@@ -13,37 +14,26 @@ const LONGEST: usize = 400;
 const BARS: (usize, f64) = (16, 0.005);
 
 /// Forming runs and coupons by their instance.
-fn runs(material: &Material) -> BTreeMap<usize, &Run> {
-    let studies = material.studies.iter();
-    let all = studies.flat_map(|s| {
-        let local = s.locals.iter().filter_map(|l| l.run.as_ref());
-        (s.global.iter().chain(&s.reference).chain(local)).chain(&s.further)
-    });
-    let coupons = material.shown.iter().filter_map(|s| s.run.as_ref());
+fn runs<'a>(content: &'a Content<'_>) -> BTreeMap<usize, &'a Run> {
+    let studies = content.material.studies.iter();
+    let all = studies.flat_map(|s| s.runs().chain(&s.further));
+    let coupons = content.shown.iter().filter_map(|s| s.run.as_ref());
     all.chain(coupons).map(|r| (r.instance, r)).collect()
 }
 
 /// Element-steps per second, as the step measured them or else over the whole step; 0 when unknown.
 fn rate(i: &Instance, run: &Run) -> f64 {
-    let told = i
-        .record
-        .results
-        .iter()
-        .find(|r| r.name == "element_cycle_rate");
+    let told = (i.record.results.iter()).find(|r| r.name == "element_cycle_rate");
     let wall = i.record.cost.wall_seconds.max(1e-9);
     told.map_or(run.facts.element_cycles.unwrap_or(0.0) / wall, |r| r.value)
 }
 
 /// Table and bars; forming runs with their elements and rate.
-pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
-    let runs = runs(material);
-    let all = &input.instances;
+pub(super) fn section(content: &Content<'_>) -> Markup {
+    let runs = runs(content);
+    let all = &content.input.instances;
     let sum = |f: fn(&Instance) -> f64| duration(all.iter().map(f).sum());
-    let memory = all
-        .iter()
-        .map(|i| i.record.cost.peak_memory)
-        .max()
-        .unwrap_or(0);
+    let memory = all.iter().map(|i| i.record.cost.peak_memory).max();
     html! {
         section id="costs" {
             h2 { "Costs" }
@@ -59,7 +49,7 @@ pub(super) fn section(input: &ReportInput, material: &Material) -> Markup {
                     th { "all steps, times added up" }
                     td colspan="4" { @if all.len() > LONGEST { "the first " (LONGEST) " of " (all.len()) " are listed" } }
                     td class="n" { (sum(|i| i.record.cost.wall_seconds)) } td class="n" { (sum(|i| i.record.cost.cpu_seconds)) }
-                    td {} td class="n" { (bytes(memory)) } td {} td {}
+                    td {} td class="n" { (bytes(memory.unwrap_or(0))) } td {} td {}
                 } }
             } }
             (longest(all))

@@ -1,7 +1,8 @@
 //! Energies, loads and contact over time.
 
-use crate::plot::{Plot, Series, Style};
-use crate::study::{Material, Run};
+use crate::page::content::Content;
+use crate::plain::{Plot, Series, Style};
+use crate::read::Run;
 use crate::units::{fixed, number};
 use maud::{Markup, html};
 use plyflow_model::artifact::PenetrationPeak;
@@ -10,47 +11,70 @@ use plyflow_model::artifact::PenetrationPeak;
 type Column = (&'static str, &'static str, usize, f64);
 
 /// Energies of a run's history; the internal one is summed.
-const ENERGIES: [(&str, &str, usize); 6] = [
-    ("external", "external work", 0),
-    ("kinetic", "kinetic", 2),
-    ("contact", "contact", 3),
-    ("friction", "friction loss", 4),
-    ("damping", "damping loss", 5),
-    ("drift", "drift", 6),
+const ENERGIES: [Column; 6] = [
+    ("external", "external work", 0, 1.0),
+    ("kinetic", "kinetic", 2, 1.0),
+    ("contact", "contact", 3, 1.0),
+    ("friction", "friction loss", 4, 1.0),
+    ("damping", "damping loss", 5, 1.0),
+    ("drift", "drift", 6, 1.0),
+];
+
+/// A plot of loads: title, label of its values, and what is drawn.
+type Loads = (&'static str, &'static str, &'static [Column]);
+
+/// Loads of a press.
+const PRESS: [Loads; 2] = [
+    (
+        "Force of the punch",
+        "force (N)",
+        &[("punch_force", "punch", 0, 1.0)],
+    ),
+    (
+        "Travel of punch and holder",
+        "travel (mm)",
+        &[
+            ("frame_height", "punch, from its end", 0, 1e3),
+            ("holder_travel", "holder", 1, 1e3),
+        ],
+    ),
+];
+
+/// Loads of a forming by membranes.
+const MEMBRANE: [Loads; 2] = [
+    (
+        "Pressures",
+        "pressure (kPa)",
+        &[
+            ("cavity_pressure", "cavity", 0, 1e-3),
+            ("bag_pressure", "bag", 1, 1e-3),
+        ],
+    ),
+    (
+        "Frame height",
+        "height (mm)",
+        &[("frame_height", "frame", 0, 1e3)],
+    ),
 ];
 
 /// Whether any run tells of its energies.
-pub(super) fn has(material: &Material) -> bool {
-    !runs(material).is_empty()
+pub(super) fn has(content: &Content<'_>) -> bool {
+    !runs(content).is_empty()
 }
 
 /// All forming runs and coupons, and whether they are whole: driven by pressure and frame, not by their edges. Last come those that no
 /// study draws.
-fn runs(material: &Material) -> Vec<(bool, &Run)> {
+fn runs<'a>(content: &'a Content<'_>) -> Vec<(bool, &'a Run)> {
+    let studies = &content.material.studies;
     let mut runs: Vec<(bool, &Run)> = Vec::new();
-    for study in &material.studies {
-        runs.extend(
-            study
-                .global
-                .iter()
-                .chain(&study.reference)
-                .map(|r| (true, r)),
-        );
-        runs.extend(
-            study
-                .locals
-                .iter()
-                .filter_map(|l| l.run.as_ref())
-                .map(|r| (false, r)),
-        );
+    for study in studies {
+        let whole = study.global.iter().chain(&study.reference);
+        runs.extend(whole.map(|r| (true, r)));
+        runs.extend(study.locals.iter().map(|l| (false, &l.run)));
     }
-    runs.extend(
-        material
-            .shown
-            .iter()
-            .filter_map(|s| Some((false, s.run.as_ref()?))),
-    );
-    for run in material.studies.iter().flat_map(|s| &s.further) {
+    let coupons = content.shown.iter().filter_map(|s| s.run.as_ref());
+    runs.extend(coupons.map(|r| (false, r)));
+    for run in studies.iter().flat_map(|s| &s.further) {
         if runs.iter().all(|(_, r)| r.instance != run.instance) {
             runs.push((false, run));
         }
@@ -59,8 +83,8 @@ fn runs(material: &Material) -> Vec<(bool, &Run)> {
 }
 
 /// Energies and contact of all runs.
-pub(super) fn section(material: &Material) -> Markup {
-    let runs = runs(material);
+pub(super) fn section(content: &Content<'_>) -> Markup {
+    let runs = runs(content);
     html! {
         @if !runs.is_empty() {
             section id="energy" {
@@ -114,87 +138,44 @@ fn over<'a>(time: &'a [f64], name: &'a str, colour: usize, values: Vec<f64>) -> 
     }
 }
 
+/// A plot over the time of a run.
+fn plot<'a>(title: &'a str, y_label: &'a str, series: Vec<Series<'a>>) -> Plot<'a> {
+    Plot {
+        title: title.into(),
+        x_label: "time (s)".into(),
+        y_label: y_label.into(),
+        series,
+        from_zero: true,
+        size: [560.0, 290.0],
+        ..Plot::default()
+    }
+}
+
 fn plots(run: &Run, whole: bool) -> Markup {
     let h = &run.history;
     let time = h.get("time").unwrap_or_default();
+    let scaled = |(name, shown, colour, factor): &Column| {
+        let values = h.get(name)?.iter().map(|v| v * factor).collect();
+        Some(over(time, shown, *colour, values))
+    };
+    let mut energies: Vec<Series<'_>> = ENERGIES.iter().filter_map(scaled).collect();
     let internal = h.internal();
-    let mut energies: Vec<Series<'_>> = Vec::new();
-    for (name, shown, colour) in ENERGIES {
-        if let Some(values) = h.get(name) {
-            energies.push(over(time, shown, colour, values.to_vec()));
-        }
-    }
     if let Some(values) = &internal {
         let at = 1.min(energies.len());
         energies.insert(at, over(time, "internal", 1, values.clone()));
     }
-    let blank = Plot {
-        title: "",
-        x_label: "time (s)",
-        y_label: "",
-        series: Vec::new(),
-        boxes: Vec::new(),
-        from_zero: true,
-        bound: None,
-        ceiling: None,
-        legend_of_one: false,
-        size: [560.0, 290.0],
-    };
-    let energy = Plot {
-        title: "Energies",
-        y_label: "energy (J)",
-        series: energies,
-        ..blank.clone()
-    };
-    let scaled = |(name, shown, colour, factor): Column| {
-        let values = h.get(name)?.iter().map(|v| v * factor).collect();
-        Some(over(time, shown, colour, values))
-    };
-    let drawn = |title, y_label, columns: &[Column]| Plot {
-        title,
-        y_label,
-        series: columns.iter().copied().filter_map(scaled).collect(),
-        ..blank.clone()
-    };
-    let loads: [Plot<'_>; 2] = if h.get("punch_force").is_some() {
-        let travel = [
-            ("frame_height", "punch, from its end", 0, 1e3),
-            ("holder_travel", "holder", 1, 1e3),
-        ];
-        [
-            drawn(
-                "Force of the punch",
-                "force (N)",
-                &[("punch_force", "punch", 0, 1.0)],
-            ),
-            drawn("Travel of punch and holder", "travel (mm)", &travel),
-        ]
-    } else {
-        let pressures = [
-            ("cavity_pressure", "cavity", 0, 1e-3),
-            ("bag_pressure", "bag", 1, 1e-3),
-        ];
-        [
-            drawn("Pressures", "pressure (kPa)", &pressures),
-            drawn(
-                "Frame height",
-                "height (mm)",
-                &[("frame_height", "frame", 0, 1e3)],
-            ),
-        ]
-    };
+    let is_press = h.get("punch_force").is_some();
+    let loads = if is_press { &PRESS } else { &MEMBRANE };
     html! {
-        (energy.svg())
-        @if let (Some(kinetic), Some(internal)) = (h.get("kinetic"), &internal) {
-            (ratio_plot(run, kinetic, internal, blank.clone()).svg())
-        }
-        @if whole { @for load in &loads { (load.svg()) } }
+        (plot("Energies", "energy (J)", energies).svg())
+        @if let (Some(kinetic), Some(internal)) = (h.get("kinetic"), &internal) { (ratio_plot(run, kinetic, internal).svg()) }
+        @if whole { @for (title, y_label, columns) in loads { (plot(title, y_label, columns.iter().filter_map(scaled).collect()).svg()) } }
     }
 }
 
 /// Kinetic over internal energy in per cent; left out while the internal energy is below 5 % of its peak, where
 /// the ratio says nothing.
-fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64], blank: Plot<'a>) -> Plot<'a> {
+fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64]) -> Plot<'a> {
     let peak = internal.iter().copied().fold(0.0, f64::max);
     let ratio = |(k, i): (&f64, &f64)| {
         if *i > 0.05 * peak {
@@ -206,20 +187,17 @@ fn ratio_plot<'a>(run: &'a Run, kinetic: &[f64], internal: &[f64], blank: Plot<'
     let values = kinetic.iter().zip(internal).map(ratio).collect();
     let bound = run.kinetic_bound.map(|b| (100.0 * b, "bound"));
     let time = run.history.get("time").unwrap_or_default();
+    let series = vec![over(time, "ratio", 2, values)];
     Plot {
-        title: "Kinetic over internal energy",
-        y_label: "ratio (%)",
-        series: vec![over(time, "ratio", 2, values)],
         ceiling: bound.map(|b| 3.0 * b.0),
         bound,
-        ..blank
+        ..plot("Kinetic over internal energy", "ratio (%)", series)
     }
 }
 
 fn penetrations(runs: &[(bool, &Run)]) -> Markup {
-    let any = runs
-        .iter()
-        .any(|(_, r)| r.facts.penetration.as_ref().is_some_and(|p| !p.is_empty()));
+    let any =
+        (runs.iter()).any(|(_, r)| r.facts.penetration.as_ref().is_some_and(|p| !p.is_empty()));
     let bound = runs.iter().find_map(|(_, r)| r.facts.overlap_bound);
     let on_the_way = |r: &Run| r.facts.overlap_peak_bound.or(r.facts.overlap_bound);
     let later = runs.iter().find_map(|(_, r)| r.facts.overlap_peak_bound);
@@ -245,9 +223,7 @@ fn penetrations(runs: &[(bool, &Run)]) -> Markup {
 
 /// What the watch found, by pair.
 fn watched(runs: &[(bool, &Run)]) -> Markup {
-    let any = runs
-        .iter()
-        .any(|(_, r)| r.facts.depth.as_ref().is_some_and(|d| !d.is_empty()));
+    let any = (runs.iter()).any(|(_, r)| r.facts.depth.as_ref().is_some_and(|d| !d.is_empty()));
     let place = |at: Option<[f64; 3]>| {
         at.map_or("–".into(), |at| at.map(|c| fixed(1e3 * c, 1)).join(", "))
     };

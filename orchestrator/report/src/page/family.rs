@@ -1,115 +1,31 @@
 //! The page of a study: its table, its responses over what was varied, and every point in its place.
 
-mod costs;
+pub(super) mod costs;
 mod failed;
+pub(crate) mod gathered;
 mod map;
+mod pictures;
 mod places;
 mod sensitivity;
+pub(super) mod shown;
 mod slices;
+mod statistics;
 mod table;
 
-pub(super) use costs::section as costs;
-
-use crate::family::pictures::{MOST, Pictures};
-use crate::family::scale::Scale;
-use crate::family::{Family, Levels, Origin, Response};
-use crate::input::ReportInput;
-use crate::units::{number, plural, quantity, shown};
+use crate::draw::Drawn;
+use crate::family::{Origin, Response};
+use crate::page::family::shown::{Shown, is_same, range_of};
+use crate::units::{plural, quantity};
 use maud::{Markup, html};
 
-/// Rows of the table, and places of points.
-const LISTED: usize = 1000;
-/// Of more points the marks in a plot are not links, each of which has its length.
-const LINKED: usize = 600;
-/// Values that differ by no more than this part of them are the same.
-const ROUNDING: f64 = 1e-9;
 /// Responses that are drawn.
 const RESPONSES: usize = 12;
-
-/// A study with what is worked out of it once.
-pub(super) struct Shown<'a> {
-    pub(super) input: &'a ReportInput,
-    pub(super) family: &'a Family,
-    levels: Vec<Levels>,
-    scales: Vec<Scale>,
-    /// Variables with more than one value.
-    varied: Vec<usize>,
-    /// For each point what its steps warn of.
-    pub(super) warnings: &'a [Vec<(String, String)>],
-    pub(super) pictures: Option<&'a Pictures>,
-}
-
-impl<'a> Shown<'a> {
-    pub(super) fn new(
-        input: &'a ReportInput,
-        family: &'a Family,
-        warnings: &'a [Vec<(String, String)>],
-        pictures: Option<&'a Pictures>,
-    ) -> Self {
-        let levels = family.levels();
-        let scales = family.variables.iter().zip(&levels);
-        let scales = scales.map(|(v, l)| Scale::new(v, l)).collect();
-        let varied = (0..levels.len()).filter(|v| levels[*v].values.len() > 1);
-        Self {
-            input,
-            family,
-            varied: varied.collect(),
-            scales,
-            levels,
-            warnings,
-            pictures,
-        }
-    }
-
-    fn values(&self, response: usize) -> Vec<Option<f64>> {
-        self.family
-            .points
-            .iter()
-            .map(|p| p.responses[response])
-            .collect()
-    }
-
-    /// Variables that differ among the points besides some.
-    fn others(&self, than: &[usize]) -> Vec<usize> {
-        let others = self.varied.iter().filter(|v| !than.contains(v));
-        others.copied().collect()
-    }
-
-    fn names(&self, variables: &[usize]) -> String {
-        let names: Vec<&str> = variables
-            .iter()
-            .map(|v| self.family.variables[*v].name.as_str())
-            .collect();
-        match names.as_slice() {
-            [] => String::new(),
-            [one] => (*one).to_owned(),
-            [first @ .., last] => format!("{} and {last}", first.join(", ")),
-        }
-    }
-
-    /// The address of a point's place on the page; none where there is no room for it.
-    fn address(&self, point: usize) -> Option<String> {
-        let place = || format!("#{}", self.family.points[point].place());
-        (point < LISTED).then(place)
-    }
-
-    /// A link to the place of a point.
-    fn link(&self, point: usize) -> Markup {
-        let name = parted(&self.family.points[point].name);
-        html! { a href=[self.address(point)] { (name) } }
-    }
-}
-
-/// A name that may go on in the next line behind each of its values.
-fn parted(name: &str) -> Markup {
-    html! { @for part in name.split_inclusive(',') { (part) wbr; } }
-}
 
 /// The whole of what is told of the study.
 ///
 /// # Errors
 /// When a picture cannot be encoded.
-pub(super) fn sections(shown: &Shown<'_>) -> Result<Markup, String> {
+pub(super) fn sections(shown: &Shown<'_>) -> Drawn {
     let family = shown.family;
     let mut responses = Vec::new();
     for r in 0..family.responses.len().min(RESPONSES) {
@@ -160,7 +76,7 @@ fn legend(shown: &Shown<'_>) -> Markup {
     }
 }
 
-fn response(shown: &Shown<'_>, r: usize) -> Result<Markup, String> {
+fn response(shown: &Shown<'_>, r: usize) -> Drawn {
     let response = &shown.family.responses[r];
     let values = shown.values(r);
     let maps = map::maps(shown, r, &values)?;
@@ -183,21 +99,6 @@ fn response(shown: &Shown<'_>, r: usize) -> Result<Markup, String> {
             }
         }
     })
-}
-
-/// Smallest and largest of a response; the same where they differ by no more than rounding.
-fn range_of(values: &[Option<f64>]) -> [f64; 2] {
-    let known = || values.iter().flatten().copied();
-    let low = known().fold(f64::INFINITY, f64::min);
-    let high = known().fold(f64::NEG_INFINITY, f64::max);
-    match is_same(low, high) {
-        true => [low, low],
-        false => [low, high],
-    }
-}
-
-fn is_same(a: f64, b: f64) -> bool {
-    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 /// Where a response is smallest and largest.
@@ -223,17 +124,6 @@ fn extremes(shown: &Shown<'_>, response: &Response, values: &[Option<f64>]) -> M
             @if missing > 0 { " " (plural(missing, "point has", "points have")) " no value; nothing is put in their place." }
         }
     }
-}
-
-/// A response as the page shows it, without its unit.
-fn cell(value: f64, unit: &str) -> String {
-    number(value * shown(unit).0, 5)
-}
-
-/// How many pictures of points there are, where not all have one.
-fn pictures_note(shown: &Shown<'_>) -> Option<String> {
-    let n = shown.family.points.len();
-    (n > MOST).then(|| format!("Pictures are drawn of the first {MOST} of {n} points."))
 }
 
 /// At how many points something is warned of.

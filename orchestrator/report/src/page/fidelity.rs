@@ -1,8 +1,8 @@
 //! Speed against error.
 
-use crate::fidelity::{Measure, Way, Ways, advice, ways};
 use crate::input::ReportInput;
-use crate::plot::{Plot, Series, Style};
+use crate::plain::{Plot, Series, Style};
+use crate::read::{Measure, Way, Ways, advice, ways};
 use crate::units::{bytes, duration, fixed};
 use maud::{Markup, html};
 
@@ -101,12 +101,8 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
         name: name.to_owned().into(),
         colour,
         style,
-        x: of
-            .iter()
-            .map(|(w, _)| 100.0 * w.share)
-            .collect::<Vec<_>>()
-            .into(),
-        y: of.iter().map(|(_, e)| *e).collect::<Vec<_>>().into(),
+        x: of.iter().map(|(w, _)| 100.0 * w.share).collect(),
+        y: of.iter().map(|(_, e)| *e).collect(),
     };
     let mut all = vec![series("front", 0, Style::Dashed, &front)];
     all.extend(
@@ -114,16 +110,14 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
     );
     let x_label = format!("CPU time over that of the {} (%)", ways.yardstick());
     Plot {
-        title,
-        x_label: &x_label,
-        y_label,
+        title: title.into(),
+        x_label: x_label.into(),
+        y_label: y_label.into(),
         series: all,
-        boxes: Vec::new(),
         from_zero: true,
-        bound: None,
-        ceiling: None,
         legend_of_one: true,
         size: [640.0, 300.0],
+        ..Plot::default()
     }
     .svg()
 }

@@ -1,31 +1,30 @@
 //! Maps of the plies.
 
-use crate::field::{Field, Legend};
-use crate::place::{Place, id_of};
-use crate::read::Ply;
-use crate::study::{Local, Study};
+use crate::draw::{
+    DrawError, Drawn, Field, FormedView, Legend, Mark, Overlay, Sharpness, Side, flat, formed,
+};
+use crate::plain::{Place, Ply, id_of};
+use crate::read::{Local, Study};
 use crate::units::quantity;
-use crate::view::{FormedView, Mark, Overlay, Sharpness, Side, flat, formed};
 use maud::{Markup, html};
 use plyflow_model::artifact::ComparedDefect;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Widths on the page (px).
 const FLAT: f64 = 430.0;
 const FORMED: f64 = 430.0;
 const LOCAL: f64 = 340.0;
 
-fn legends(study: &Study) -> Vec<Legend> {
-    Field::ALL.iter().filter_map(|f| f.legend(study)).collect()
+/// The scales of all maps of a study.
+pub(super) fn legends(study: &Study) -> Vec<Legend> {
+    let (plies, thresholds) = (study.all_plies(), study.thresholds());
+    let of = |f: &Field| f.legend(&plies, thresholds);
+    Field::ALL.iter().filter_map(of).collect()
 }
 
 /// Maps of the global run: each quantity on each ply, flat and formed.
-pub(super) fn global(
-    study: &Study,
-    n: usize,
-    places: &[Place],
-    sharp: Sharpness,
-) -> Result<Markup, String> {
+pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness) -> Drawn {
     if study.plies.is_empty() {
         return Ok(html! {});
     }
@@ -35,9 +34,7 @@ pub(super) fn global(
     };
     let legends = legends(study);
     let has = |(l, p): &(&Legend, &Ply)| l.at_points(p).is_some();
-    let pairs = legends
-        .iter()
-        .flat_map(|l| study.plies.iter().map(move |p| (l, p)));
+    let pairs = (legends.iter()).flat_map(|l| study.plies.iter().map(move |p| (l, p)));
     let pairs: Vec<(&Legend, &Ply)> = pairs.filter(has).collect();
     let draw = |(legend, ply): &(&Legend, &Ply)| {
         let mine: Vec<&Place> = places.iter().filter(|p| p.ply == ply.name).collect();
@@ -45,25 +42,24 @@ pub(super) fn global(
             places: &mine,
             ..overlay.clone()
         };
-        let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
         let view = |side| {
-            let tool = study.tool.as_ref();
             let how = FormedView {
                 side,
-                tool,
+                tool: study.tool.as_ref(),
                 whole_tool: true,
                 width: FORMED,
             };
             formed(ply, legend, &overlay, how, sharp)
         };
-        let figures = [plan, view(Side::Front)?, view(Side::Back)?];
-        Ok((legend.field, ply.name.clone(), figures))
+        let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
+        Ok([plan, view(Side::Front)?, view(Side::Back)?])
     };
-    let rows = pairs
+    let drawn: Vec<_> = pairs
         .par_iter()
         .map(draw)
-        .collect::<Result<Vec<_>, String>>()?;
-    let of = |field: Option<Field>| rows.iter().filter(move |r| r.0 == field);
+        .collect::<Result<_, DrawError>>()?;
+    let rows = || pairs.iter().zip(&drawn);
+    let of = |field| rows().filter(move |((l, _), _)| l.field == field);
     Ok(html! {
         section id={ "maps-" (n) } {
             h2 { "Maps of the global run" }
@@ -79,10 +75,10 @@ pub(super) fn global(
                     h3 { (legend.title()) }
                     (legend.bar(&format!("scale-{n}-{}", legend.si_unit().replace('/', "-"))))
                     (legend.note_of(&study.plies))
-                    @for (_, name, figures) in of(legend.field) {
+                    @for ((_, ply), figures) in of(legend.field) {
                         div class="triple" {
                             @for (figure, what) in figures.iter().zip(["flat", "formed", "formed"]) {
-                                figure class="map" { (figure) figcaption { (name) ", " (what) } }
+                                figure class="map" { (figure) figcaption { (ply.name) ", " (what) } }
                             }
                         }
                     }
@@ -93,23 +89,11 @@ pub(super) fn global(
 }
 
 /// Maps of the local runs, with their defects named.
-pub(super) fn local(
-    study: &Study,
-    n: usize,
-    places: &[Place],
-    sharp: Sharpness,
-) -> Result<Markup, String> {
+pub(super) fn local(study: &Study, n: usize, places: &[Place], sharp: Sharpness) -> Drawn {
     let legends = legends(study);
-    let shown: Vec<&Local> = study
-        .locals
-        .iter()
-        .filter(|l| !l.plies.is_empty())
-        .collect();
-    let draw = |local: &&Local| zone((study, n), local, &legends, places, sharp);
-    let zones = shown
-        .par_iter()
-        .map(draw)
-        .collect::<Result<Vec<_>, String>>()?;
+    let shown = study.locals.par_iter().filter(|l| !l.plies.is_empty());
+    let draw = |local: &Local| zone((study, n), local, &legends, places, sharp);
+    let zones: Vec<Markup> = shown.map(draw).collect::<Result<_, DrawError>>()?;
     if zones.is_empty() {
         return Ok(html! {});
     }
@@ -134,18 +118,16 @@ fn zone(
     legends: &[Legend],
     places: &[Place],
     sharp: Sharpness,
-) -> Result<Markup, String> {
+) -> Drawn {
     let compared = (study.comparison.as_ref()).map(|c| &c.told);
     let compared = compared.filter(|c| c.local_of(&local.zone).is_some());
-    let defects: Vec<&ComparedDefect> = compared
-        .iter()
+    let defects: Vec<&ComparedDefect> = (compared.iter())
         .flat_map(|c| c.local_defects())
         .filter(|d| d.zone == local.zone)
         .collect();
     let mut rows = Vec::new();
     for ply in &local.plies {
-        let marks: Vec<Mark> = defects
-            .iter()
+        let marks: Vec<Mark> = (defects.iter())
             .filter(|d| d.ply == ply.name)
             .map(|d| Mark {
                 text: d.id.clone(),
@@ -160,36 +142,14 @@ fn zone(
             marks: &marks,
             places: &mine,
         };
-        let mut figures = Vec::new();
-        let known = || legends.iter().filter(|l| l.at_points(ply).is_some());
-        for legend in known() {
-            let title = legend.title();
-            figures.push((title.to_owned(), flat(ply, legend, &overlay, LOCAL, sharp)?));
-        }
-        // The formed view shows the shape; the distance tells most on it.
-        let legend = known()
-            .find(|l| l.field == Some(Field::Distance))
-            .or(known().next());
-        if let Some(legend) = legend {
-            let (side, tool) = (Side::facing(ply), study.tool.as_ref());
-            let how = FormedView {
-                side,
-                tool,
-                whole_tool: false,
-                width: LOCAL,
-            };
-            let view = formed(ply, legend, &overlay, how, sharp)?;
-            figures.push((format!("{}, formed", legend.title()), view));
-        }
+        let figures = figures(study, ply, legends, &overlay, sharp)?;
         rows.push((ply.name.clone(), marks.len(), figures));
     }
     Ok(html! {
         div class="zone-block" {
             h3 { "Zone " (local.zone) }
-            @if let Some(run) = &local.run {
-                p class="note" { "Step " code { (run.label) } ", elements of "
-                    (quantity(run.facts.element_size, "m", 3)) "." }
-            }
+            p class="note" { "Step " code { (local.run.label) } ", elements of "
+                (quantity(local.run.facts.element_size, "m", 3)) "." }
             @for (name, found, figures) in &rows {
                 h4 { (name) span class="note" { ": "
                     @if compared.is_none() { "not compared" }
@@ -203,4 +163,33 @@ fn zone(
             }
         }
     })
+}
+
+/// The maps of a finer ply, each with its title, and the formed ply.
+fn figures<'a>(
+    study: &Study,
+    ply: &Ply,
+    legends: &'a [Legend],
+    overlay: &Overlay<'_>,
+    sharp: Sharpness,
+) -> Result<Vec<(Cow<'a, str>, Markup)>, DrawError> {
+    let known = || legends.iter().filter(|l| l.at_points(ply).is_some());
+    let mut figures = Vec::new();
+    for legend in known() {
+        let map = flat(ply, legend, overlay, LOCAL, sharp)?;
+        figures.push((legend.title().into(), map));
+    }
+    // The formed view shows the shape; the distance tells most on it.
+    let distance = known().find(|l| l.field == Some(Field::Distance));
+    if let Some(legend) = distance.or(known().next()) {
+        let how = FormedView {
+            side: Side::facing(ply),
+            tool: study.tool.as_ref(),
+            whole_tool: false,
+            width: LOCAL,
+        };
+        let view = formed(ply, legend, overlay, how, sharp)?;
+        figures.push((format!("{}, formed", legend.title()).into(), view));
+    }
+    Ok(figures)
 }

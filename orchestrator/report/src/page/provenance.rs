@@ -1,8 +1,7 @@
 //! Where everything comes from and how to make it again.
 
 use crate::input::{Instance, ReportInput};
-use crate::read::Facts;
-use crate::study::Material;
+use crate::read::{Facts, Material};
 use crate::units::moment;
 use maud::{Markup, html};
 use serde_json::Value;
@@ -88,6 +87,7 @@ fn binary(value: &Value) -> String {
         .to_owned()
 }
 
-fn short(key: &str) -> &str {
+/// The beginning of a key, which is enough to tell it from others.
+pub(super) fn short(key: &str) -> &str {
     key.get(..12).unwrap_or(key)
 }

@@ -1,13 +1,12 @@
 //! Steps with plots, maps and tables: coupons, characterisations and whatever else carries some.
 
-use super::tables::{expected_text, got_text, verdict_and_source};
-use crate::field::Field;
+use crate::draw::{Drawn, Field, FormedView, Overlay, Sharpness, Side, flat, formed};
 use crate::input::{Expectation, Instance, ReportInput};
-use crate::read::Ply;
-use crate::steps::Shown;
-use crate::study::{Material, Study};
+use crate::page::carried::Shown;
+use crate::page::content::Content;
+use crate::page::expectations::{expected_text, got_text, verdict_and_source};
+use crate::plain::Ply;
 use crate::units::{bytes, quantity};
-use crate::view::{FormedView, Overlay, Sharpness, Side, flat, formed};
 use maud::{Markup, html};
 use plyflow_model::artifact::TextFile;
 
@@ -17,36 +16,32 @@ const PICTURE: f64 = 430.0;
 const LONGEST: usize = 20_000;
 
 /// One block per step, in the order of the workflow.
-pub(super) fn section(
-    input: &ReportInput,
-    material: &Material,
-    sharp: Sharpness,
-) -> Result<Markup, String> {
-    if material.shown.is_empty() {
+pub(super) fn section(content: &Content<'_>, sharp: Sharpness) -> Drawn {
+    if content.shown.is_empty() {
         return Ok(html! {});
     }
     let mut blocks = Vec::new();
-    for shown in &material.shown {
-        blocks.push(block(input, shown, sharp)?);
+    for shown in &content.shown {
+        blocks.push(block(content.rest(), shown, sharp)?);
     }
     Ok(html! {
         section id="plots" {
-            h2 { (heading(material)) }
+            h2 { (heading(&content.shown)) }
             @for block in &blocks { (block) }
         }
     })
 }
 
 /// What the section is called.
-pub(super) fn heading(material: &Material) -> &'static str {
-    if material.shown.iter().any(|s| s.numbers) {
+pub(super) fn heading(shown: &[Shown]) -> &'static str {
+    if shown.iter().any(|s| s.numbers) {
         "Tests and plots"
     } else {
         "Plots"
     }
 }
 
-fn block(input: &ReportInput, shown: &Shown, sharp: Sharpness) -> Result<Markup, String> {
+fn block(input: &ReportInput, shown: &Shown, sharp: Sharpness) -> Drawn {
     let instance = &input.instances[shown.instance];
     let pictures = match &shown.sheet {
         Some(sheet) => pictures(sheet, shown.instance, sharp)?,
@@ -86,9 +81,7 @@ fn numbers(input: &ReportInput, instance: &Instance) -> Markup {
     let of = |name: &str| -> Vec<&Expectation> {
         mine.iter().copied().filter(|e| e.result == name).collect()
     };
-    let absent = mine
-        .iter()
-        .filter(|e| !results.iter().any(|r| r.name == e.result));
+    let absent = (mine.iter()).filter(|e| !results.iter().any(|r| r.name == e.result));
     html! {
         @if !results.is_empty() || !mine.is_empty() {
             div class="scroll" { table class="numbers" {
@@ -123,15 +116,11 @@ fn judged(e: &Expectation) -> Markup {
 }
 
 /// The sheet in its last state: shear on the flat sheet, deflection on the flat and on the deformed one.
-fn pictures(sheet: &Ply, n: usize, sharp: Sharpness) -> Result<Markup, String> {
-    let study = Study {
-        plies: vec![sheet.clone()],
-        ..Study::default()
-    };
+fn pictures(sheet: &Ply, n: usize, sharp: Sharpness) -> Drawn {
     let overlay = Overlay::default();
     let mut rows = Vec::new();
     for field in [Field::Shear, Field::Deflection] {
-        let Some(legend) = field.legend(&study).filter(|l| !l.is_flat()) else {
+        let Some(legend) = field.legend(&[sheet], None).filter(|l| !l.is_flat()) else {
             continue;
         };
         let mut figures = vec![(

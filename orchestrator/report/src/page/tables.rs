@@ -1,18 +1,16 @@
-//! Tables: zones, defects, expectations, results.
+//! Tables: zones, defects, results.
 
-use crate::input::{Expectation, ReportInput, Verdict, label};
-use crate::place::{Place, id_of};
-use crate::study::Study;
-use crate::units::{fixed, number, quantity, shown};
-use crate::verdict;
+use crate::input::ReportInput;
+use crate::page::verdict;
+use crate::plain::{Place, id_of};
+use crate::read::Study;
+use crate::units::{fixed, number, quantity};
 use maud::{Markup, html};
 use plyflow_model::artifact::{Cause, ComparedDefect, Comparison, Role};
 use std::collections::BTreeMap;
 
 /// Tables of steps are shown up to this many rows.
 const LONGEST: usize = 400;
-/// More expectations of a study than this are told apart by whether they are met.
-const MANY: usize = 40;
 
 /// Zones and what was flagged on each ply.
 pub(super) fn zones(study: &Study) -> Markup {
@@ -59,16 +57,11 @@ pub(super) fn zones(study: &Study) -> Markup {
 
 fn sides(free: [bool; 4]) -> String {
     let names = ["left", "right", "bottom", "top"];
-    let all: Vec<&str> = names
-        .into_iter()
-        .zip(free)
-        .filter(|(_, f)| *f)
-        .map(|(n, _)| n)
-        .collect();
-    if all.is_empty() {
-        "none".into()
-    } else {
-        all.join(", ")
+    let all = names.into_iter().zip(free).filter(|(_, f)| *f);
+    let all: Vec<&str> = all.map(|(n, _)| n).collect();
+    match all.as_slice() {
+        [] => "none".into(),
+        all => all.join(", "),
     }
 }
 
@@ -194,84 +187,10 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
     }
 }
 
-/// What was expected, in words.
-pub(crate) fn expected_text(e: &Expectation) -> String {
-    let (factor, unit) = shown(&e.unit);
-    let value = |v: f64| number(v * factor, 5);
-    let mut parts = Vec::new();
-    if let Some(v) = e.value {
-        match e.tolerance {
-            Some(t) => parts.push(format!("{} ± {}", value(v), value(t))),
-            None => parts.push(value(v)),
-        }
-    }
-    parts.extend(e.minimum.map(|m| format!("≥ {}", value(m))));
-    parts.extend(e.maximum.map(|m| format!("≤ {}", value(m))));
-    crate::units::join(parts.join(", "), unit)
-}
-
-/// What was found, in words.
-pub(crate) fn got_text(e: &Expectation) -> String {
-    e.got
-        .map_or("not reported".into(), |v| quantity(v, &e.unit, 5))
-}
-
-/// Cells of the verdict on an expectation and of where it comes from.
-pub(super) fn verdict_and_source(e: &Expectation) -> Markup {
-    let (class, text) = match e.verdict() {
-        Verdict::Met => ("met", "✓ met"),
-        Verdict::Missed => ("missed", "✗ missed"),
-        Verdict::NotJudged => ("open", "– not judged"),
-    };
-    html! { td class=(class) { (text) } td { (e.source.as_deref().unwrap_or_default()) } }
-}
-
-/// Expectations with what was found. Of a study with many, those that are met at single points stand apart.
-pub(super) fn expectations(input: &ReportInput) -> Markup {
-    let all = &input.expectations;
-    let many = input.family.is_some() && all.len() > MANY;
-    let is_first = |e: &&Expectation| !many || is_notable(e);
-    let first: Vec<&Expectation> = all.iter().filter(is_first).collect();
-    let met: Vec<&Expectation> = all.iter().filter(|e| !is_first(e)).collect();
-    html! {
-        @if !all.is_empty() {
-            section id="expectations" {
-                h2 { "Expectations" }
-                @if !first.is_empty() { (expectation_table(&first)) }
-                @if !met.is_empty() {
-                    details { summary { (met.len()) " more are met, at single points" } (expectation_table(&met)) }
-                }
-            }
-        }
-    }
-}
-
-/// Whether an expectation of a study is told before all others: it is about the points together, or is not met.
-pub(crate) fn is_notable(e: &Expectation) -> bool {
-    e.step == "study" || e.verdict() != Verdict::Met
-}
-
-fn expectation_table(all: &[&Expectation]) -> Markup {
-    html! {
-        @if all.len() > LONGEST { p class="note" { "The first " (LONGEST) " of " (all.len()) "." } }
-        div class="scroll" { table {
-            thead { tr { th { "step" } th { "result" } th class="n" { "expected" } th class="n" { "got" } th { "verdict" } th { "source" } } }
-            tbody { @for e in all.iter().take(LONGEST) { tr {
-                td { (label(&e.step, &e.item)) } td { (e.result) }
-                td class="n" { (expected_text(e)) } td class="n" { (got_text(e)) }
-                (verdict_and_source(e))
-            } } }
-        } }
-    }
-}
-
 /// All named numbers, by step.
 pub(super) fn results(input: &ReportInput, open: bool) -> Markup {
-    let with: Vec<_> = input
-        .instances
-        .iter()
-        .filter(|i| !i.record.results.is_empty())
-        .collect();
+    let with = input.instances.iter();
+    let with: Vec<_> = with.filter(|i| !i.record.results.is_empty()).collect();
     html! {
         section id="results" {
             h2 { "All results" }

@@ -1,6 +1,6 @@
 //! What the steps of a study cost, all points together.
 
-use crate::family::{Family, base};
+use crate::family::Family;
 use crate::input::{Instance, ReportInput};
 use crate::units::{bytes, duration};
 use maud::{Markup, html};
@@ -9,7 +9,7 @@ use maud::{Markup, html};
 pub(in crate::page) fn section(input: &ReportInput, family: &Family) -> Markup {
     let mut steps: Vec<(&str, Vec<&Instance>)> = Vec::new();
     for instance in &input.instances {
-        let name = base(instance);
+        let name = instance.base();
         match steps.iter_mut().find(|(n, _)| *n == name) {
             Some((_, all)) => all.push(instance),
             None => steps.push((name, vec![instance])),
@@ -36,16 +36,12 @@ pub(in crate::page) fn section(input: &ReportInput, family: &Family) -> Markup {
 
 fn cells(all: &[&Instance]) -> Markup {
     let cpu = || all.iter().map(|i| i.record.cost.cpu_seconds);
-    let memory = all
-        .iter()
-        .map(|i| i.record.cost.peak_memory)
-        .max()
-        .unwrap_or(0);
+    let memory = all.iter().map(|i| i.record.cost.peak_memory).max();
     html! {
         td class="n" { (all.len()) }
         td class="n" { (duration(cpu().sum::<f64>() / all.len().max(1) as f64)) }
         td class="n" { (duration(cpu().fold(0.0, f64::max))) } td class="n" { (duration(cpu().sum())) }
         td class="n" { (duration(all.iter().map(|i| i.record.cost.wall_seconds).sum())) }
-        td class="n" { (bytes(memory)) } td class="n" { (bytes(all.iter().map(|i| i.record.bytes).sum())) }
+        td class="n" { (bytes(memory.unwrap_or(0))) } td class="n" { (bytes(all.iter().map(|i| i.record.bytes).sum())) }
     }
 }

@@ -1,7 +1,7 @@
 //! Points that failed: where, of what class, and why.
 
-use super::{LISTED, Shown};
 use crate::family::Fate;
+use crate::page::family::shown::{LISTED, Shown};
 use crate::units::plural;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
@@ -20,11 +20,8 @@ pub(super) fn section(shown: &Shown<'_>) -> Markup {
         })
         .collect();
     let mut classes: BTreeMap<&str, usize> = BTreeMap::new();
-    failed
-        .iter()
-        .for_each(|(_, [_, class, _])| *classes.entry(class).or_default() += 1);
-    let classes: Vec<String> = classes
-        .iter()
+    (failed.iter()).for_each(|(_, [_, class, _])| *classes.entry(class).or_default() += 1);
+    let classes: Vec<String> = (classes.iter())
         .map(|(class, n)| format!("{n} of class {class}"))
         .collect();
     html! {

@@ -1,14 +1,13 @@
 //! A response over two variables: colours and lines of equal value between the computed points, which are drawn on top.
 
-use super::{LINKED, Shown, range_of};
-use crate::colour::{Palette, Scale as Colours};
+use crate::draw::{
+    CHARACTER, Camera, Canvas, Corner, DrawError, Drawn, LEAST, Paint, Palette, Plane,
+    Scale as Colours, Surface, Triangles, bar, contour, px, spot, ticks,
+};
 use crate::family::Fate;
-use crate::family::plane::{Corner, LEAST, Plane, contour};
-use crate::field::bar;
-use crate::plot::{CHARACTER, ticks};
-use crate::raster::{Camera, Canvas, Paint, Triangles};
+use crate::page::family::shown::{LINKED, Shown, range_of};
+use crate::plain::Cells;
 use crate::units::{number, plural, shown as unit_of};
-use crate::view::px;
 use maud::{Markup, html};
 use std::fmt::Write;
 
@@ -32,11 +31,7 @@ const CLEAR: [f64; 2] = [13.0, 10.0];
 ///
 /// # Errors
 /// When a picture cannot be encoded.
-pub(super) fn maps(
-    shown: &Shown<'_>,
-    response: usize,
-    values: &[Option<f64>],
-) -> Result<Markup, String> {
+pub(super) fn maps(shown: &Shown<'_>, response: usize, values: &[Option<f64>]) -> Drawn {
     let numeric: Vec<usize> = (shown.varied.iter().copied())
         .filter(|v| shown.levels[*v].numbers().is_some())
         .collect();
@@ -55,12 +50,8 @@ pub(super) fn maps(
     }
     let response = &shown.family.responses[response];
     let (factor, _) = unit_of(&response.unit);
-    let id = format!(
-        "map-scale-{}",
-        plyflow_artifact::seal::hash(response.name.as_bytes())
-            .split_at(10)
-            .0
-    );
+    let hash = plyflow_artifact::seal::hash(response.name.as_bytes());
+    let id = format!("map-scale-{}", hash.split_at(10).0);
     // Of many pairs that have no map for one reason it is told once.
     let mut whys: Vec<(String, Vec<String>)> = Vec::new();
     for (pair, why) in not {
@@ -89,17 +80,10 @@ fn colours(values: &[Option<f64>]) -> Option<Colours> {
         return None;
     }
     Some(if low < 0.0 && high > 0.0 {
-        Colours {
-            palette: Palette::PurpleOrange,
-            low: -size,
-            high: size,
-        }
+        Colours::about_zero(Palette::PurpleOrange, size)
     } else {
-        Colours {
-            palette: Palette::Viridis,
-            low,
-            high,
-        }
+        let palette = Palette::Viridis;
+        Colours { palette, low, high }
     })
 }
 
@@ -110,7 +94,7 @@ fn of_pair(
     pair: [usize; 2],
     values: &[Option<f64>],
     colours: Colours,
-) -> Result<Result<Markup, String>, String> {
+) -> Result<Result<Markup, String>, DrawError> {
     let others = shown.others(&pair);
     let planes = Plane::all(&shown.levels, pair);
     let kept: Vec<&Plane> = (planes.iter())
@@ -166,16 +150,11 @@ struct Map<'a> {
 }
 
 impl Map<'_> {
-    fn svg(&self, response: usize) -> Result<Markup, String> {
+    fn svg(&self, response: usize) -> Drawn {
         let [w, h] = SIZE;
         let [across, up] = self.pair.map(|v| &self.shown.scales[v]);
-        let widest = up
-            .ticks
-            .iter()
-            .map(|t| t.1.chars().count())
-            .max()
-            .unwrap_or(1);
-        let left = 34.0 + CHARACTER * widest as f64;
+        let widest = up.ticks.iter().map(|t| t.1.chars().count()).max();
+        let left = 34.0 + CHARACTER * widest.unwrap_or(1) as f64;
         let field = [w - RIGHT - left, h - BOTTOM - TOP];
         let x = |place: f64| left + place * field[0];
         let y = |place: f64| TOP + (1.0 - place) * field[1];
@@ -185,12 +164,8 @@ impl Map<'_> {
         ];
         let triangles = self.plane.triangles(self.values, &place);
         let image = self.image(&triangles, left, field)?;
-        let known = self
-            .plane
-            .points
-            .iter()
-            .filter(|p| self.values[**p].is_some())
-            .count();
+        let points = self.plane.points.iter();
+        let known = points.filter(|p| self.values[**p].is_some()).count();
         let said = format!(
             "Map of {} over {} and {}: {} on it. The numbers are in the table of points.",
             self.shown.family.responses[response].name,
@@ -227,55 +202,44 @@ impl Map<'_> {
         triangles: &[[Corner; 3]],
         left: f64,
         field: [f64; 2],
-    ) -> Result<String, String> {
+    ) -> Result<String, DrawError> {
         // Of the page down, of the canvas up.
         let points: Vec<[f64; 3]> = (triangles.iter().flatten())
             .map(|c| [c[0] - left, TOP + field[1] - c[1], 0.0])
             .collect();
         let values: Vec<f64> = triangles.iter().flatten().map(|c| c[2]).collect();
-        let cells: Vec<u32> = (0..points.len() as u32).collect();
+        let cells = Cells {
+            nodes: (0..points.len() as u32).collect(),
+            each: 3,
+        };
         let around = [[0.0, 0.0, 0.0], [field[0], field[1], 0.0]];
         let (camera, size) = Camera::plan().fit(around.iter(), field, 0.0);
         let mut canvas = Canvas::new(size);
-        let mesh = Triangles::new(points.len(), &cells, 3);
-        canvas.surface(
-            &camera,
-            &points,
-            &mesh,
-            Paint::Field(&values, self.colours),
-            false,
-            0.0,
-        );
-        canvas.data_url().map_err(|e| e.to_string())
+        let mesh = Triangles::new(points.len(), &cells);
+        let paint = Paint::Field(&values, self.colours);
+        canvas.surface(&camera, &Surface::new(&points, &mesh, paint));
+        Ok(canvas.data_url()?)
     }
 
     /// Lines of equal value, with their values where there is room.
     fn lines(&self, triangles: &[[Corner; 3]], place: &[Vec<f64>; 2]) -> Markup {
-        let points: Vec<[f64; 2]> = self
-            .plane
-            .points
-            .iter()
-            .map(|p| self.at(place, *p))
-            .collect();
+        let points = self.plane.points.iter();
+        let points: Vec<[f64; 2]> = points.map(|p| self.at(place, *p)).collect();
         let known = || self.values.iter().flatten().map(|v| v * self.factor);
         let (low, high) = (
             known().fold(f64::INFINITY, f64::min),
             known().fold(f64::NEG_INFINITY, f64::max),
         );
-        let levels = ticks(low, high, LEVELS)
-            .into_iter()
-            .filter(|l| *l > low && *l < high);
+        let levels = (ticks(low, high, LEVELS).into_iter()).filter(|l| *l > low && *l < high);
         let mut path = String::new();
         let mut texts: Vec<([f64; 2], String)> = Vec::new();
         for level in levels {
             let pieces = contour(triangles, level / self.factor);
             for [a, b] in &pieces {
-                let _ = write!(path, "M{} {}L{} {}", px(a[0]), px(a[1]), px(b[0]), px(b[1]));
+                let _ = write!(path, "M{}L{}", spot(*a), spot(*b));
             }
             let far = |p: [f64; 2]| {
-                let others = texts
-                    .iter()
-                    .map(|(at, _)| (at[0] - p[0]).hypot(at[1] - p[1]));
+                let others = (texts.iter()).map(|(at, _)| (at[0] - p[0]).hypot(at[1] - p[1]));
                 others.fold(f64::INFINITY, f64::min)
             };
             let inside = |p: [f64; 2]| {
@@ -354,11 +318,8 @@ impl Map<'_> {
     }
 
     fn colour(&self, value: f64) -> String {
-        let [r, g, b] = self
-            .colours
-            .palette
-            .at(self.colours.place(value) as f32)
-            .map(|c| c.round() as u8);
+        let at = self.colours.place(value) as f32;
+        let [r, g, b] = self.colours.palette.at(at).map(|c| c.round() as u8);
         format!("#{r:02x}{g:02x}{b:02x}")
     }
 }

@@ -1,7 +1,8 @@
 //! Every point in its place: its picture, its numbers, what is to be known of it, and the way to its own page.
 
-use super::{LISTED, Shown, parted, pictures_note};
-use crate::family::{Fate, base};
+use crate::family::Fate;
+use crate::page::family::shown::{LISTED, Shown, parted, pictures_note};
+use crate::page::provenance::short;
 use crate::units::{plural, quantity};
 use maud::{Markup, html};
 
@@ -61,14 +62,10 @@ fn place(shown: &Shown<'_>, i: usize) -> Markup {
             details { summary { "steps" }
                 ul class="keys-of" { @for k in &point.instances {
                     @let instance = &shown.input.instances[*k];
-                    li { (base(instance)) @if !instance.item.is_empty() { "[" (instance.item.join(",")) "]" } " " code { (short(&instance.record.key)) } }
+                    li { (instance.base()) @if !instance.item.is_empty() { "[" (instance.item.join(",")) "]" } " " code { (short(&instance.record.key)) } }
                 } }
             }
             @if let Some(address) = &point.report { p { a href=(address) { "Its own page" } } }
         }
     }
-}
-
-fn short(key: &str) -> &str {
-    key.get(..12).unwrap_or(key)
 }

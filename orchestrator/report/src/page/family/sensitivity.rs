@@ -1,7 +1,8 @@
 //! Which variables a response depends on, by what the points allow to say.
 
-use super::Shown;
-use crate::family::statistics::{
+use crate::family::Sampled;
+use crate::page::family::shown::Shown;
+use crate::page::family::statistics::{
     Effects, Estimate, LEAST, LEAST_SAMPLE, effects, first_order, grid_indices, rank_correlation,
 };
 use crate::units::{fixed, plural, quantity};
@@ -124,7 +125,7 @@ fn indices(shown: &Shown<'_>, with: &[usize]) -> Indices {
             )),
         };
     }
-    let is_sample = |s: &crate::family::Sampled| s.method != "grid" && s.count as usize == n;
+    let is_sample = |s: &Sampled| s.method != "grid" && s.count as usize == n;
     // A variable that takes few values was set; and what a condition left out is no sample of independent variables.
     let drawn = |v: &usize| {
         shown.levels[*v].numbers().is_some()
@@ -252,9 +253,7 @@ fn notes(
     if has(&|r| r.effects.is_some()) {
         notes.push("Effect: between neighbours that differ in the variable alone, how much the response changes, as if it did so over the whole range of the variable; the mean of the sizes with a range of 95 %. A deviation as large as the effect says that it depends on where one is.".into());
     }
-    let texts = rows
-        .iter()
-        .filter(|r| shown.levels[r.variable].numbers().is_none());
+    let texts = (rows.iter()).filter(|r| shown.levels[r.variable].numbers().is_none());
     let texts: Vec<usize> = texts.map(|r| r.variable).collect();
     if !texts.is_empty() {
         notes.push(format!(

@@ -1,11 +1,10 @@
 //! A response over one variable: every point, lines through points that differ in it alone, bars where several stand at one value.
 
-use super::{LINKED, Shown};
+use crate::draw::{Axis, CHARACTER, MARKERS, VariableAxis, Zero, extent, px};
 use crate::family::Fate;
-use crate::family::scale::Scale;
-use crate::plot::{Axis, CHARACTER, COLOURS, MARKERS, Zero, extent};
+use crate::page::family::shown::{LINKED, Shown};
+use crate::plain::COLOURS;
 use crate::units::{number, plural, shown as unit_of};
-use crate::view::px;
 use maud::{Markup, html};
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -41,7 +40,7 @@ pub(super) fn slices(shown: &Shown<'_>, response: usize, values: &[Option<f64>])
 struct Slice<'a> {
     shown: &'a Shown<'a>,
     variable: usize,
-    scale: &'a Scale,
+    scale: &'a VariableAxis,
     /// In the unit of the axis; by point.
     values: Vec<Option<f64>>,
     /// Variables that differ besides this one.
@@ -169,9 +168,7 @@ impl<'a> Slice<'a> {
             let differ: Vec<usize> = (self.others.iter().copied())
                 .filter(|o| {
                     let of = &self.shown.levels[*o].of;
-                    self.at
-                        .iter()
-                        .any(|all| all.iter().any(|p| of[*p] != of[all[0]]))
+                    (self.at.iter()).any(|all| all.iter().any(|p| of[*p] != of[all[0]]))
                 })
                 .collect();
             text += &format!(

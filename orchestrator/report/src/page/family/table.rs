@@ -1,7 +1,7 @@
 //! A row for every point.
 
-use super::{LISTED, Shown, cell, parted};
 use crate::family::{Fate, Point};
+use crate::page::family::shown::{LISTED, Shown, cell, parted};
 use maud::{Markup, html};
 use plyflow_model::units::si_number;
 

@@ -1,0 +1,78 @@
+//! A global run with what it led to: its defects and zones, its local runs, their comparison.
+
+use crate::plain::{Place, Ply, Tool};
+use crate::read::comparison::Comparison;
+use crate::read::history::History;
+use plyflow_model::artifact::{Defects, Forming, Thresholds, Zone};
+
+/// What one global run led to.
+#[derive(Debug, Default)]
+pub(crate) struct Study {
+    /// Items of the global run, when there are several.
+    pub(crate) title: String,
+    /// The global run.
+    pub(crate) global: Option<Run>,
+    /// Its tool.
+    pub(crate) tool: Option<Tool>,
+    /// Its plies, formed, with what the detection found.
+    pub(crate) plies: Vec<Ply>,
+    /// What the detection tells of itself; absent without one.
+    pub(crate) detection: Option<Defects>,
+    /// Zones; absent when no step looked for them.
+    pub(crate) zones: Option<Vec<Zone>>,
+    /// One entry per zone with something to show.
+    pub(crate) locals: Vec<Local>,
+    /// What the comparison found; of several of the same zones, the first.
+    pub(crate) comparison: Option<Comparison>,
+    /// Local runs that only the other comparisons of these zones have, without plies and histories.
+    pub(crate) further: Vec<Run>,
+    /// A fine run of the whole scene.
+    pub(crate) reference: Option<Run>,
+    /// Where the defects lie that were measured on the plies of the global run.
+    pub(crate) measured: Vec<Place>,
+}
+
+/// A forming run without its meshes.
+#[derive(Debug)]
+pub(crate) struct Run {
+    /// Name for people.
+    pub(crate) label: String,
+    /// Index of its instance.
+    pub(crate) instance: usize,
+    /// Its attributes.
+    pub(crate) facts: Forming,
+    /// Bound on kinetic over internal energy that it was given.
+    pub(crate) kinetic_bound: Option<f64>,
+    /// Its history.
+    pub(crate) history: History,
+}
+
+/// A local run.
+#[derive(Debug)]
+pub(crate) struct Local {
+    /// Name of its zone.
+    pub(crate) zone: String,
+    /// The run.
+    pub(crate) run: Run,
+    /// Its plies, formed.
+    pub(crate) plies: Vec<Ply>,
+}
+
+impl Study {
+    /// Its plies and those of its local runs.
+    pub(crate) fn all_plies(&self) -> Vec<&Ply> {
+        let locals = self.locals.iter().flat_map(|l| &l.plies);
+        self.plies.iter().chain(locals).collect()
+    }
+
+    /// Its runs: the global one, the local ones, and the reference, which may be one of them.
+    pub(crate) fn runs(&self) -> impl Iterator<Item = &Run> {
+        let locals = self.locals.iter().map(|l| &l.run);
+        self.global.iter().chain(locals).chain(&self.reference)
+    }
+
+    /// From where on the detection flags something.
+    pub(crate) fn thresholds(&self) -> Option<&Thresholds> {
+        self.detection.as_ref().map(|d| &d.thresholds)
+    }
+}
