@@ -3,10 +3,10 @@
 use super::args::CleanArgs;
 use super::open::store_root;
 use super::table::bytes;
-use super::{Done, Stop, print};
 use crate::exit;
 use crate::plan::Key;
 use crate::store::{Journal, Lock, LockError, Store};
+use crate::said::{Done, Stop, print};
 use camino::Utf8Path;
 use std::collections::BTreeSet;
 

@@ -2,12 +2,13 @@
 
 use super::plan::{Difference, difference};
 use super::report::command;
-use super::{Done, Stop, args::Workflow, warn};
+use super::args::Workflow;
 use crate::engine::core::{Id, State};
 use crate::engine::{Depth, Session};
 use crate::exit;
 use crate::progress::Quiet;
 use crate::store::Flaw;
+use crate::said::{Done, Stop, warn};
 
 /// Reads what is about to be printed of the instances `of`; what is not as it was written is set aside and told. Gives all that was found
 /// damaged.

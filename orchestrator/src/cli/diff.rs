@@ -3,10 +3,10 @@
 use super::args::{DiffArgs, Places, TextOrJson, Workflow};
 use super::open::open;
 use super::table::number;
-use super::{Done, Stop, print};
 use crate::exit;
 use crate::plan::Key;
 use crate::store::{Flaw, Journal, check_artifact, record_beside};
+use crate::said::{Done, Stop, print, warn};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::{Artifact, Difference, How, differences};
 use plyflow_model::text::one_line;
@@ -155,7 +155,7 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
     let is_left = |key: &&Key| !named.contains(*key) && store.artifact(key).is_file();
     let left = keys.iter().filter(is_left).count();
     if only.is_empty() && left > 0 {
-        super::warn(&format!(
+        warn(&format!(
             "plyflow: {file}: {left} artifacts are of steps that this file no longer has; they are not compared\n"
         ));
     }

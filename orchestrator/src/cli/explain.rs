@@ -3,11 +3,11 @@
 use super::args::{ExplainArgs, TextOrJson};
 use super::open::{Opened, open};
 use super::plan::{Difference, difference, or_none};
-use super::{Done, Stop, print};
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
 use crate::store::Flaw;
+use crate::said::{Done, Stop, print};
 use serde_json::json;
 
 /// The instances that a word means: all of a step, or one by its label.

@@ -2,13 +2,14 @@
 
 use super::args::{Places, Workflow};
 use super::clean::locked;
-use super::{Stop, trust};
+use super::trust;
 use crate::engine::core::{Limits, State};
 use crate::engine::{Options, Session};
 use crate::exit;
 use crate::plan::{Graph, recipes};
 use crate::progress::Quiet;
 use crate::store::{Lock, Store, resolved};
+use crate::said::{Stop, show_findings, warn};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::text::one_line;
 use plyflow_plugin_host::{Describer, PluginCatalog};
@@ -146,7 +147,7 @@ pub fn catalog(folders: Folders, places: &Places, store: &Utf8Path) -> Result<Pl
         .then(|| store.set_damaged_plugins_aside())
         .flatten()
     {
-        super::warn(&format!("plyflow: {text}\n"));
+        warn(&format!("plyflow: {text}\n"));
     }
     let trust = trust::trust(places, &folders.installation, folders.own)?;
     Ok(PluginCatalog::new(folders.search, cache, describer).gated(trust))
@@ -160,7 +161,7 @@ pub fn open(args: &Workflow) -> Result<Opened, Stop> {
     match load(args)? {
         Ok(opened) => Ok(opened),
         Err(findings) => {
-            super::show_findings(&findings);
+            show_findings(&findings);
             Err(Stop::silent(exit::INVALID))
         }
     }
@@ -174,7 +175,7 @@ pub fn open_at(args: &Workflow, points: &[Vec<plyflow_study::Value>]) -> Result<
     match load_at(args, Some(points))? {
         Ok(opened) => Ok(opened),
         Err(findings) => {
-            super::show_findings(&findings);
+            show_findings(&findings);
             Err(Stop::silent(exit::INVALID))
         }
     }

@@ -6,12 +6,12 @@ use super::report::command;
 use super::run::first_line;
 use super::study_plan::Prospects;
 use super::table::table;
-use super::{Done, Stop, print};
 use crate::engine::core::{Id, State};
 use crate::engine::{Session, input_keys};
 use crate::exit;
 use crate::plan::{Change, Ingredients, Key, changes};
 use crate::progress::duration_text;
+use crate::said::{Done, Stop, print, show_findings, warn};
 use plyflow_model::job::Cost;
 use plyflow_plugin_host::cost_so_far;
 use plyflow_workflow::Part;
@@ -38,7 +38,7 @@ pub fn plan(args: &PlanArgs) -> Done {
     opened.restrict(&args.until)?;
     let session = opened.look()?;
     for text in session.told() {
-        super::warn(&format!("plyflow: {text}\n"));
+        warn(&format!("plyflow: {text}\n"));
     }
     let study = Prospects::of(&session);
     if let (Some(study), TextOrJson::Text) = (&study, args.format) {
@@ -358,7 +358,7 @@ pub fn validate(args: &ValidateArgs) -> Done {
                 // A reader that has gone away must not make findings a success.
                 let _ = print(&format!("{:#}\n", findings.to_json()));
             } else {
-                super::show_findings(&findings);
+                show_findings(&findings);
             }
             Err(Stop::silent(exit::INVALID))
         }

@@ -2,8 +2,9 @@
 
 use super::args::{PluginsArgs, SchemaArgs, SchemaKind, TextOrJson};
 use super::open::{catalog, folders, store_root};
-use super::{Done, Stop, keys, print};
+use super::keys;
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use camino::Utf8Path;
 use plyflow_model::schema;
 use plyflow_plugin_host::{PluginCatalog, manifest_file};

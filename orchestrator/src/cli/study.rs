@@ -3,11 +3,11 @@
 use super::args::{Format, ResultsArgs};
 use super::results::csv_text;
 use super::table::{number, table};
-use super::{Done, Stop, print};
 use crate::engine::Session;
 use crate::engine::class_of;
 use crate::engine::core::{Id, State};
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use plyflow_model::job::Record;
 use plyflow_model::units::si_number;
 use plyflow_model::workflow::ResponseOf;

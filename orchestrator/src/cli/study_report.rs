@@ -4,10 +4,10 @@ use super::args::ReportArgs;
 use super::report::quoted;
 use super::study::{Status, Table};
 use super::study_file;
-use super::{Done, Stop, print};
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
 use plyflow_report::{

@@ -5,7 +5,6 @@ use super::clean::locked;
 use super::machine::default_memory;
 use super::open::{cores, open, store_root};
 use super::table::bytes;
-use super::{Done, Stop, print, warn};
 use crate::engine::core::Limits;
 use crate::engine::{Compared, Local, Options, Session};
 use crate::exit;
@@ -14,6 +13,7 @@ use crate::progress::Lines;
 use crate::store::{
     Flaw, Journal, Lock, LockError, Store, damage_of_plugins, read_unplaced, resolved,
 };
+use crate::said::{Done, Stop, print, warn};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_plugin_host::damaged_cost;
 use plyflow_workflow::resolved::FailurePolicy;

@@ -18,7 +18,7 @@ pub struct Lines {
 
 fn say(text: &str) {
     // A closed standard error must not stop a run.
-    crate::cli::warn(&format!("{text}\n"));
+    crate::said::warn(&format!("{text}\n"));
 }
 
 impl Observer for Lines {

@@ -31,7 +31,7 @@ fn describe(inside: impl FnOnce(), library: &str, hash: Option<&str>) -> ! {
 }
 
 fn refuse(text: &str) -> ! {
-    crate::cli::warn(&format!("plyflow step-worker: {text}\n"));
+    crate::said::warn(&format!("plyflow step-worker: {text}\n"));
     unsafe { libc::_exit(2) }
 }
 
