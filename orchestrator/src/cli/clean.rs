@@ -1,22 +1,14 @@
 //! `clean`: makes room in a store.
 
 use super::args::CleanArgs;
-use super::open::store_root;
+use super::open::{locked, store_root};
 use super::table::bytes;
 use crate::exit;
 use crate::plan::Key;
-use crate::store::{Journal, Lock, LockError, Store};
 use crate::said::{Done, Stop, print};
+use crate::store::{Journal, Lock, Store};
 use camino::Utf8Path;
 use std::collections::BTreeSet;
-
-/// Turns a lock that is not to be had into an exit code.
-pub fn locked(e: LockError) -> Stop {
-    match e {
-        LockError::Held { .. } => Stop::new(exit::LOCKED, e),
-        LockError::Io { .. } => Stop::new(exit::INTERNAL, e),
-    }
-}
 
 /// `plyflow clean`.
 ///

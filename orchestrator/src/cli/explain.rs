@@ -1,13 +1,14 @@
 //! `explain`: why a step would run.
 
 use super::args::{ExplainArgs, TextOrJson};
+use super::found::change::{Difference, Fate, difference};
 use super::open::{Opened, open};
-use super::plan::{Difference, difference, or_none};
+use super::table::or_none;
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
-use crate::store::Flaw;
 use crate::said::{Done, Stop, print};
+use crate::store::Flaw;
 use serde_json::json;
 
 /// The instances that a word means: all of a step, or one by its label.
@@ -87,12 +88,8 @@ pub fn explain(args: &ExplainArgs) -> Done {
 
 fn as_json(session: &Session<'_>, id: Id) -> serde_json::Value {
     let instance = &session.core.instances()[id];
-    let state = match instance.state {
-        State::Done { .. } => "cached",
-        State::Unkeyed => "unknown",
-        _ => "run",
-    };
-    let flaw = session.flaw(id).filter(|_| state == "run");
+    let fate = Fate::of(instance.state);
+    let flaw = session.flaw(id).filter(|_| fate == Fate::Run);
     let (last, changed) = match (instance.state, difference(session, id)) {
         (State::Done { .. } | State::Unkeyed, _) => ("", vec![]),
         _ if flaw.is_some() => ("damaged", vec![]),
@@ -102,7 +99,7 @@ fn as_json(session: &Session<'_>, id: Id) -> serde_json::Value {
     };
     json!({
         "step": session.core.label(id),
-        "state": state,
+        "state": fate.word(),
         "key": instance.key.map(|k| k.hex()),
         "because": last,
         "changes": changed,

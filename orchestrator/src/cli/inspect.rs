@@ -1,16 +1,16 @@
 //! `inspect`: what an artifact holds.
 
 use super::args::{InspectArgs, Places, TextOrJson, Workflow};
-use super::damage::{damaged, recheck};
 use super::explain::instances_named;
+use super::found::damage::{damaged, recheck};
 use super::open::{Opened, open};
 use super::table::{bytes, number, table};
 use crate::engine::Depth;
 use crate::engine::core::State;
 use crate::exit;
 use crate::progress::duration_text;
-use crate::store::{check_artifact, record_beside};
 use crate::said::{Done, Stop, print};
+use crate::store::{check_artifact, record_beside};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::Artifact;
 use plyflow_model::job::Record;

@@ -3,31 +3,31 @@
 mod args;
 mod check_plugin;
 mod clean;
-mod damage;
 mod diff;
 mod explain;
 mod extract;
+mod found;
 mod front;
 mod inspect;
 mod keys;
 mod machine;
 mod open;
-mod optimise;
 mod plan;
 mod plugins;
 mod report;
 mod results;
 mod run;
 mod study;
-mod study_expect;
 mod study_file;
 mod study_plan;
 mod study_report;
 mod table;
 mod trust;
+mod typed;
 mod verify;
 
 pub use args::Cli;
+
 use crate::exit;
 use crate::said::{Done, warn};
 use args::Command;

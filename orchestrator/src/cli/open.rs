@@ -1,15 +1,15 @@
 //! Opens what most commands need: the plugins, the workflow, the store.
 
 use super::args::{Places, Workflow};
-use super::clean::locked;
+use super::found::asked::asked_before;
 use super::trust;
 use crate::engine::core::{Limits, State};
 use crate::engine::{Options, Session};
 use crate::exit;
 use crate::plan::{Graph, recipes};
 use crate::progress::Quiet;
-use crate::store::{Lock, Store, resolved};
 use crate::said::{Stop, show_findings, warn};
+use crate::store::{Lock, LockError, Store, resolved};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::text::one_line;
 use plyflow_plugin_host::{Describer, PluginCatalog};
@@ -217,7 +217,7 @@ fn load_at(
             &overrides,
             &|name, digest, search| match points {
                 Some(points) => Some(points.to_vec()),
-                None => super::optimise::asked_before(&root, name, digest, search),
+                None => asked_before(&root, name, digest, search),
             },
         ) {
             Ok(resolution) => {
@@ -371,6 +371,14 @@ impl Opened {
             found.extend(named);
         }
         Ok(found)
+    }
+}
+
+/// Turns a lock that is not to be had into an exit code.
+pub fn locked(e: LockError) -> Stop {
+    match e {
+        LockError::Held { .. } => Stop::new(exit::LOCKED, e),
+        LockError::Io { .. } => Stop::new(exit::INTERNAL, e),
     }
 }
 

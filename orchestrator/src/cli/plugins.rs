@@ -1,8 +1,8 @@
 //! `plugins` and `schema`: what can be written into files.
 
 use super::args::{PluginsArgs, SchemaArgs, SchemaKind, TextOrJson};
-use super::open::{catalog, folders, store_root};
 use super::keys;
+use super::open::{catalog, folders, store_root};
 use crate::exit;
 use crate::said::{Done, Stop, print};
 use camino::Utf8Path;

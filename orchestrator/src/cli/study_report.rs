@@ -1,9 +1,10 @@
 //! The page of a study, and those of its points.
 
 use super::args::ReportArgs;
-use super::report::quoted;
-use super::study::{Status, Table};
+use super::found::answer::Status;
+use super::found::points::Table;
 use super::study_file;
+use super::typed::quoted;
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
@@ -85,7 +86,7 @@ pub fn family(
                 Status::NotRun => Fate::NotRun,
                 Status::Failed { step, class, cause } => Fate::Failed {
                     step: step.clone(),
-                    class: (*class).to_owned(),
+                    class: class.to_string(),
                     cause: cause.clone(),
                 },
             },

@@ -8,6 +8,6 @@ mod shown;
 mod unchanged;
 
 pub use drive::{Compared, Depth, Options, Session, input_keys};
-pub use executor::{Executor, Outcome, Report, Task, class_of};
+pub use executor::{Executor, FailureClass, Outcome, Report, Task};
 pub use local::Local;
 pub use shown::{Failure, Observer, Summary, Update};

@@ -1,7 +1,8 @@
 //! What is expected over the points of a study, held against its table.
 
-use super::results::Row;
-use super::study::{STEP, Table};
+use super::points::Table;
+use super::row::{Row, STEP, Verdict};
+use super::trace;
 use crate::engine::Session;
 use crate::engine::core::Id;
 use plyflow_model::job::Record;
@@ -97,7 +98,7 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
         expected: Some(expected),
     };
     // Points without a result could change what is found, unless it is out of its bounds already and they could only add to it.
-    if found.missing > 0 && !(found.stands && row.verdict() == Some(super::results::MISSED)) {
+    if found.missing > 0 && !(found.stands && row.verdict() == Some(Verdict::Missed)) {
         row.value = None;
     }
     // One part of the study stands for the whole where its largest is not known.
@@ -121,7 +122,7 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
         row.name += &format!(" (at {})", names.join(" and "));
     }
     if e.of == FamilyOf::Best {
-        row.name += super::optimise::why_not(table);
+        row.name += trace::why_not(table.trace.as_ref());
     }
     if found.alone > 0 {
         let what = match e.of {
@@ -135,7 +136,7 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
 
 fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
     if e.of == FamilyOf::Best {
-        return super::optimise::found(table, e);
+        return trace::found(table.trace.as_ref(), table.study, &table.lines, e);
     }
     let mark = |i: &u32| {
         let point = &table.study.points[*i as usize];
