@@ -7,9 +7,7 @@
 
 use super::args::{CheckPluginArgs, Places, TextOrJson};
 use super::open::{catalog, folders, program};
-use crate::engine::drive::library;
-use crate::engine::executor::{Executor, Outcome, Report, Task};
-use crate::engine::local::Local;
+use crate::engine::{Executor, Local, Outcome, Report, Task, library};
 use crate::exit;
 use crate::said::{Done, Stop, print, show_findings};
 use camino::{Utf8Path, Utf8PathBuf};

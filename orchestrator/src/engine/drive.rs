@@ -1,170 +1,22 @@
-//! Acts on what the core decides: looks into the store, hands jobs to an executor, commits artifacts,
-//! keeps the journal.
+//! Acts on what the core decides: hands jobs to an executor, commits artifacts, keeps the journal.
 
-#[path = "compare.rs"]
-mod compare;
-#[path = "opening.rs"]
-mod opening;
-#[path = "sound.rs"]
-mod sound;
-#[path = "task.rs"]
-mod task;
-
-pub use compare::Compared;
-pub use sound::Depth;
-pub use task::input_keys;
-pub(crate) use task::library;
-
-use super::core::{Core, Effect, Event, Id, Limits, Output, State};
+use super::core::{Effect, Event, Id, Output, State};
 use super::executor::{Executor, Outcome, Report};
-use super::shown::{Failure, Observer, Summary, Update};
-use super::unchanged::Unchanged;
-use crate::plan::{ByKey, Graph, Ingredients, Key};
-use crate::store::{ENDING, Early, Flaw, Journal, Known, RunFolder, Seen, Store};
-use camino::Utf8PathBuf;
-use opening::{look_at_journal, open_for_writing};
-use plyflow_model::job::{Cost, Message, Record};
-use plyflow_workflow::resolved::ResolvedWorkflow;
-use std::collections::{HashMap, VecDeque};
+use super::session::Session;
+use super::shown::{Observer, Summary, Update};
+use crate::plan::Key;
+use crate::store::Known;
+use plyflow_model::job::{Message, Record};
 use std::io;
 use std::time::Duration;
+
+/// How often an artifact is made again within one run: a disk that damages it each time is beyond help.
+const AGAIN: u32 = 2;
 
 /// How long to wait for reports before looking at the journal and the display again.
 const BEAT: Duration = Duration::from_millis(200);
 
-/// What a session works with.
-pub struct Options {
-    /// Cores, memory, policy.
-    pub limits: Limits,
-    /// Folders searched for components, without links: those whose libraries are trusted whatever their bytes.
-    pub search_path: Vec<Utf8PathBuf>,
-    /// Run again even what the store has (for steps named here).
-    pub force: Vec<usize>,
-    /// Run these again too, but only to compare what they make with what the store has.
-    pub compare: Vec<usize>,
-    /// Time between checkpoints of a running step (s).
-    pub checkpoint_interval: f64,
-}
-
-/// A workflow, its store and where its instances stand.
-pub struct Session<'a> {
-    /// The workflow.
-    pub workflow: &'a ResolvedWorkflow,
-    /// The store.
-    pub store: &'a Store,
-    /// The decisions.
-    pub core: Core<'a>,
-    /// The journal.
-    pub journal: Journal,
-    folder: RunFolder,
-    options: Options,
-    writing: bool,
-    costs: HashMap<Id, Cost>,
-    pending: VecDeque<Effect>,
-    jobs: HashMap<Id, (Utf8PathBuf, Utf8PathBuf)>,
-    serial: u64,
-    unchanged: Unchanged,
-    /// Running instances that have been heard of since they started, with what of theirs turned out to have changed.
-    heard: HashMap<Id, Option<String>>,
-    summary: Summary,
-    sound: sound::Sound,
-    /// What was found when the files of the run were opened, for the user.
-    told: Vec<String>,
-    /// What was seen of files before anybody asked.
-    ahead: HashMap<Key, Seen, ByKey>,
-    compared: Vec<(String, Compared)>,
-}
-
-impl<'a> Session<'a> {
-    /// A session that looks (`writing` false: another may hold the lock) or runs (`writing`: the caller
-    /// holds the run's lock).
-    ///
-    /// # Errors
-    /// When the journal cannot be read or written.
-    pub fn new(
-        workflow: &'a ResolvedWorkflow,
-        graph: &'a Graph,
-        store: &'a Store,
-        options: Options,
-        writing: bool,
-    ) -> io::Result<Self> {
-        Self::new_after(workflow, graph, store, options, writing, None)
-    }
-
-    /// As [`Session::new`], with what was read ahead for a session that writes.
-    ///
-    /// # Errors
-    /// As [`Session::new`].
-    pub fn new_after(
-        workflow: &'a ResolvedWorkflow,
-        graph: &'a Graph,
-        store: &'a Store,
-        options: Options,
-        writing: bool,
-        early: Option<Early>,
-    ) -> io::Result<Self> {
-        let folder = store.run(&workflow.name);
-        let early = early.and_then(|early| early.finish(&folder.journal()));
-        let (scanned, ahead) = match early {
-            Some((scanned, ahead)) => (Some(scanned), ahead),
-            None => (None, HashMap::default()),
-        };
-        let (journal, told) = match writing {
-            true => open_for_writing(store, &folder, scanned)?,
-            false => look_at_journal(&folder)?,
-        };
-        Ok(Self {
-            workflow,
-            store,
-            core: Core::new(graph, options.limits),
-            journal,
-            folder,
-            options,
-            writing,
-            costs: HashMap::new(),
-            pending: VecDeque::new(),
-            jobs: HashMap::new(),
-            serial: 0,
-            unchanged: Unchanged::default(),
-            heard: HashMap::new(),
-            summary: Summary::default(),
-            sound: sound::Sound::default(),
-            told,
-            ahead,
-            compared: Vec::new(),
-        })
-    }
-
-    /// Labels of what was made again to be compared, and how it compares.
-    pub fn compared(&self) -> &[(String, Compared)] {
-        &self.compared
-    }
-
-    /// What was found damaged when the files of the run were opened, in words.
-    pub fn told(&self) -> &[String] {
-        &self.told
-    }
-
-    /// Looks up all that can be keyed without running anything.
-    pub fn look(&mut self, observer: &mut dyn Observer) {
-        let effects = if self.ahead.is_empty() {
-            let keys = self.journal.last_keys();
-            let (core, store) = (&mut self.core, self.store);
-            let (ahead, effects) = store.look_ahead(&keys, || core.start());
-            self.ahead = ahead;
-            effects
-        } else {
-            self.core.start()
-        };
-        self.take(effects, observer);
-        self.ahead = HashMap::default();
-    }
-
-    /// The folder of this run.
-    pub fn folder(&self) -> &RunFolder {
-        &self.folder
-    }
-
+impl Session<'_> {
     /// Runs what [`Session::look`] found missing, and all that follows. `interrupts` counts the user's
     /// wishes to stop: one asks the workers, two kill them.
     ///
@@ -254,101 +106,6 @@ impl<'a> Session<'a> {
                 executor.cancel(id, true);
             }
         }
-    }
-
-    /// Answers lookups at once; leaves the other effects for [`Session::execute`].
-    fn take(&mut self, effects: Vec<Effect>, observer: &mut dyn Observer) {
-        let mut queue = VecDeque::from(effects);
-        while let Some(effect) = queue.pop_front() {
-            match effect {
-                Effect::Look(id) => {
-                    let found = self.find(id, observer);
-                    let cached = found.is_some();
-                    queue.extend(self.core.handle(Event::Looked { id, found }));
-                    if cached {
-                        self.summary.cached += 1;
-                        observer.update(&self.core, id, &Update::Cached);
-                    }
-                }
-                Effect::Skip { id, cause } => {
-                    observer.update(&self.core, id, &Update::Skipped { cause });
-                }
-                other => self.pending.push_back(other),
-            }
-        }
-    }
-
-    /// Whether the store has the artifact of an instance, whole: as long as nothing has written to its files since they were known to be
-    /// so, they are taken for it; else they are read.
-    fn find(&mut self, id: Id, observer: &mut dyn Observer) -> Option<Output> {
-        let instance = &self.core.instances()[id];
-        let (key, step) = (instance.key?, instance.step);
-        if self.options.force.contains(&step) || self.options.compare.contains(&step) {
-            return None;
-        }
-        let seen = match self.ahead.remove(&key) {
-            Some(seen) => Ok(seen),
-            None => self.store.look(&key),
-        };
-        let known = self.journal.known(&key);
-        let known = match (&seen, known) {
-            (Ok(seen), Some(k)) if k.stamp == Some(seen.stamp) && k.bytes == seen.bytes => {
-                Ok(k.clone())
-            }
-            (Err(flaw), _) => Err(flaw.clone()),
-            (Ok(seen), _) => self.read_whole(id).map(|record| Known {
-                bytes: record.bytes,
-                labels: record.collection,
-                stamp: Some(seen.stamp),
-            }),
-        };
-        let known = match known {
-            Ok(known) => known,
-            Err(Flaw::Gone) if self.store.has_earlier(&key) => {
-                self.lose(id, Flaw::Unsealed, false, observer);
-                return None;
-            }
-            Err(Flaw::Gone) => return None,
-            Err(flaw) => {
-                self.lose(id, flaw, self.writing, observer);
-                return None;
-            }
-        };
-        if self.core.graph().steps[step].collection && known.labels.is_none() {
-            return None;
-        }
-        let labels = known.labels.clone();
-        self.note(id, known);
-        Some(Output { labels })
-    }
-
-    fn note(&mut self, id: Id, artifact: Known) {
-        if !self.writing {
-            return;
-        }
-        let instance = &self.core.instances()[id];
-        let step = &self.core.graph().steps[instance.step];
-        if let Some(key) = instance.key {
-            let who = (step.name.as_str(), instance.item.as_slice());
-            let made_by = || Ingredients::of(&self.workflow.steps[instance.step]);
-            let inputs = || input_keys(&self.core, id);
-            self.journal
-                .used(who, key, (step.recipe, made_by), artifact, inputs);
-        }
-    }
-
-    /// What an instance cost, when it is done.
-    pub fn cost(&mut self, id: Id) -> Cost {
-        if let Some(cost) = self.costs.get(&id) {
-            return *cost;
-        }
-        let key = self.core.instances()[id].key;
-        let cost = key
-            .and_then(|k| self.store.read_record(&k).ok())
-            .map(|r| r.cost)
-            .unwrap_or_default();
-        self.costs.insert(id, cost);
-        cost
     }
 
     /// What of an instance is no longer as it was when the run began.
@@ -510,26 +267,38 @@ impl<'a> Session<'a> {
         self.take(effects, observer);
     }
 
-    fn failure(&self, id: Id, reason: &str) -> Failure {
-        let label = self.core.label(id);
-        let log = Some(self.folder.log(&label)).filter(|l| l.exists());
-        Failure {
-            label,
-            reason: reason.to_owned(),
-            log,
+    /// Reads the inputs of an instance that is to start. When one is not what was written it is made again, and this instance waits.
+    /// True: it may start.
+    fn inputs_are_whole(&mut self, id: Id, observer: &mut dyn Observer) -> bool {
+        let mut givers: Vec<Id> = (self.core.instances()[id].inputs.iter())
+            .map(|(_, giver)| *giver)
+            .collect();
+        givers.sort_unstable();
+        givers.dedup();
+        let mut lost = Vec::new();
+        for giver in givers {
+            if let Err(flaw) = self.read_whole(giver) {
+                self.forget(giver);
+                let text = flaw.text().to_owned();
+                self.lose(giver, flaw, true, observer);
+                if self.sound.again.get(&giver).is_some_and(|n| *n > AGAIN) {
+                    let reason = format!(
+                        "its input cannot be kept: made again {AGAIN} times in this run, and each time {text}; look after the disk and the memory of this machine"
+                    );
+                    self.fail(id, &reason, observer);
+                    return false;
+                }
+                lost.push(giver);
+            }
         }
-    }
-
-    /// Why an instance that is not done failed when it ran last as it is now.
-    pub fn failed_before(&self, id: Id) -> Option<Failure> {
-        let instance = &self.core.instances()[id];
-        if matches!(instance.state, State::Done { .. }) {
-            return None;
+        if lost.is_empty() {
+            return true;
         }
-        let step = &self.core.graph().steps[instance.step].name;
-        let reason = self
-            .journal
-            .failure(step, &instance.item, instance.key.as_ref()?)?;
-        Some(self.failure(id, reason))
+        let effects = self.core.handle(Event::Lost {
+            reader: Some(id),
+            ids: lost,
+        });
+        self.take(effects, observer);
+        false
     }
 }

@@ -1,8 +1,10 @@
 //! What a worker is told of an instance: its job.
 
-use super::super::executor::Task;
-use super::{Core, ENDING, Id, Session};
+use super::core::{Core, Id};
+use super::executor::Task;
+use super::session::Session;
 use crate::plan::{Ingredients, InputKey};
+use crate::store::ENDING;
 use camino::Utf8PathBuf;
 use plyflow_model::job::{Checkpoints, DATA_MODEL_VERSION, JOB_VERSION, Job, JobInput, LibraryRef};
 use plyflow_workflow::resolved::PluginId;

@@ -1,6 +1,6 @@
 //! Fan-out: the index paths of a step's instances, as far as the collections they range over are known.
 
-use super::Graph;
+use super::graph::Graph;
 
 /// How many items the artifact of one instance has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
