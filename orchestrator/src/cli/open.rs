@@ -4,7 +4,7 @@ use super::args::{Places, Workflow};
 use super::found::asked::asked_before;
 use super::trust;
 use crate::engine::core::{Limits, State};
-use crate::engine::{Options, Session};
+use crate::engine::{Of, Options, Purpose, Session};
 use crate::exit;
 use crate::plan::{Graph, recipes};
 use crate::progress::Quiet;
@@ -282,6 +282,24 @@ impl Opened {
         ])
     }
 
+    /// A session that has not looked at anything yet.
+    ///
+    /// # Errors
+    /// When the journal cannot be read or written.
+    pub fn session(&self, options: Options, purpose: Purpose) -> Result<Session<'_>, Stop> {
+        let root = self.store.root();
+        let what = match purpose {
+            Purpose::Look => format!("reading the store {root}"),
+            Purpose::Run(_) => format!("running with the store {root}"),
+        };
+        let of = Of {
+            workflow: &self.workflow,
+            graph: &self.graph,
+            store: &self.store,
+        };
+        Session::new(of, options, purpose).map_err(Stop::machine(what))
+    }
+
     /// A session that has looked at the store and will not run anything.
     ///
     /// # Errors
@@ -299,10 +317,7 @@ impl Opened {
             compare: Vec::new(),
             checkpoint_interval: f64::INFINITY,
         };
-        let mut session =
-            Session::new(&self.workflow, &self.graph, &self.store, options, false).map_err(
-                Stop::machine(format!("reading the store {}", self.store.root())),
-            )?;
+        let mut session = self.session(options, Purpose::Look)?;
         session.look(&mut Quiet);
         Ok(session)
     }

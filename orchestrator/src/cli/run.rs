@@ -7,7 +7,7 @@ mod settings;
 
 use super::args::{LogFormat, RunArgs};
 use super::open::{open, store_root};
-use crate::engine::{Local, Session, Summary};
+use crate::engine::{Local, Purpose, Summary};
 use crate::exit;
 use crate::said::{Done, Stop, warn};
 use crate::store::{Early, Store};
@@ -38,15 +38,7 @@ pub fn run(args: &RunArgs) -> Done {
     let options = options(args, &opened)?;
     let _locks = opened.lock()?;
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
-    let mut session = Session::new_after(
-        &opened.workflow,
-        &opened.graph,
-        &opened.store,
-        options,
-        true,
-        early,
-    )
-    .map_err(machine())?;
+    let mut session = opened.session(options, Purpose::Run(early))?;
     let mut observer = observer(args);
     session.look(observer.as_mut());
     if let Err(stop) = opened.admit(&session) {

@@ -5,7 +5,7 @@ use super::machine::default_memory;
 use super::open::{cores, locked, open, store_root};
 use super::table::bytes;
 use crate::engine::core::Limits;
-use crate::engine::{Compared, Local, Options, Session};
+use crate::engine::{Compared, Local, Options, Purpose, Session};
 use crate::exit;
 use crate::plan::Key;
 use crate::progress::Lines;
@@ -228,14 +228,7 @@ fn again(args: &VerifyArgs) -> Done {
         checkpoint_interval: f64::INFINITY,
     };
     let failed = || Stop::machine(format!("running with the store {}", opened.store.root()));
-    let mut session = Session::new(
-        &opened.workflow,
-        &opened.graph,
-        &opened.store,
-        options,
-        true,
-    )
-    .map_err(failed())?;
+    let mut session = opened.session(options, Purpose::Run(None))?;
     let mut observer = Lines::default();
     session.look(&mut observer);
     opened.admit(&session)?;

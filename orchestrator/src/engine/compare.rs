@@ -41,6 +41,15 @@ impl Compared {
     }
 }
 
+/// Two artifacts that cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[error("{new} cannot be compared with {stored}: {source}")]
+pub(super) struct NotCompared {
+    pub(super) new: Utf8PathBuf,
+    pub(super) stored: Utf8PathBuf,
+    pub(super) source: io::Error,
+}
+
 /// Where two files first differ (bytes from the beginning); `None` when they are equal.
 ///
 /// # Errors

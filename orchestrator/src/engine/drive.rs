@@ -1,11 +1,13 @@
 //! Acts on what the core decides: hands jobs to an executor, commits artifacts, keeps the journal.
 
+use super::compare::NotCompared;
 use super::core::{Effect, Event, Id, Output, State};
 use super::executor::{Executor, Outcome, Report};
 use super::session::Session;
 use super::shown::{Observer, Summary, Update};
 use crate::plan::Key;
 use crate::store::Known;
+use camino::Utf8PathBuf;
 use plyflow_model::job::{Message, Record};
 use std::io;
 use std::time::Duration;
@@ -15,6 +17,40 @@ const AGAIN: u32 = 2;
 
 /// How long to wait for reports before looking at the journal and the display again.
 const BEAT: Duration = Duration::from_millis(200);
+
+/// Why what a worker left does not become visible.
+#[derive(Debug, thiserror::Error)]
+enum Refused {
+    #[error("the instance has no key")]
+    NoKey,
+    #[error("the instance was not started")]
+    NotStarted,
+    #[error(
+        "malformed artifact: plugin '{plugin}' did not declare its collection, though its manifest promises one"
+    )]
+    NoCollection { plugin: String },
+    #[error("no artifact: {0}")]
+    NoArtifact(io::Error),
+    #[error("malformed artifact: it has {size} bytes and its record says {told}")]
+    Size { size: u64, told: u64 },
+    #[error(transparent)]
+    NotCompared(#[from] NotCompared),
+    #[error("the artifact cannot be put into the store {root}: {source}; {and}")]
+    NotPlaced {
+        root: Utf8PathBuf,
+        source: io::Error,
+        and: Aside,
+    },
+}
+
+/// What became of an artifact that the store does not take.
+#[derive(Debug, thiserror::Error)]
+enum Aside {
+    #[error("it is whole, lies in {0} and is taken from there by the next run")]
+    Kept(Utf8PathBuf),
+    #[error("nor can it be put aside: {0}")]
+    Lost(io::Error),
+}
 
 impl Session<'_> {
     /// Runs what [`Session::look`] found missing, and all that follows. `interrupts` counts the user's
@@ -160,7 +196,7 @@ impl Session<'_> {
                 outcome: Outcome::Done(record),
             } => match self.accept(id, &record) {
                 Ok(known) => self.succeed(id, &record, known, observer),
-                Err(reason) => self.fail(id, &reason, observer),
+                Err(refused) => self.fail(id, &refused.to_string(), observer),
             },
             Report::Ended {
                 id,
@@ -175,28 +211,21 @@ impl Session<'_> {
     }
 
     /// Checks what the worker left and makes it visible.
-    fn accept(&mut self, id: Id, record: &Record) -> Result<Known, String> {
+    fn accept(&mut self, id: Id, record: &Record) -> Result<Known, Refused> {
         let instance = &self.core.instances()[id];
-        let key: Key = instance.key.ok_or("the instance has no key")?;
-        let (artifact, beside) = self
-            .jobs
-            .remove(&id)
-            .ok_or("the instance was not started")?;
+        let key: Key = instance.key.ok_or(Refused::NoKey)?;
+        let (artifact, beside) = self.jobs.remove(&id).ok_or(Refused::NotStarted)?;
         let step = &self.core.graph().steps[instance.step];
         if step.collection && record.collection.is_none() {
-            return Err(format!(
-                "malformed artifact: plugin '{}' did not declare its collection, though its manifest promises one",
-                self.workflow.steps[instance.step].plugin.name
-            ));
+            let plugin = self.workflow.steps[instance.step].plugin.name.clone();
+            return Err(Refused::NoCollection { plugin });
         }
         let size = std::fs::metadata(&artifact)
-            .map_err(|e| format!("no artifact: {e}"))?
+            .map_err(Refused::NoArtifact)?
             .len();
         if size != record.bytes {
-            return Err(format!(
-                "malformed artifact: it has {size} bytes and its record says {}",
-                record.bytes
-            ));
+            let told = record.bytes;
+            return Err(Refused::Size { size, told });
         }
         if self.options.compare.contains(&instance.step)
             && let Some(known) = self.compare(id, &artifact, &beside)?
@@ -204,21 +233,18 @@ impl Session<'_> {
             return Ok(known);
         }
         let lasting = record.is_lasting();
-        if let Err(e) = self.store.commit(&key, &artifact, &beside, lasting) {
-            let root = self.store.root();
+        if let Err(source) = self.store.commit(&key, &artifact, &beside, lasting) {
             let kept = self
                 .store
                 .keep_unplaced(&self.folder, &key, &artifact, &beside);
-            let and = match kept {
-                Ok(()) => format!(
-                    "it is whole, lies in {} and is taken from there by the next run",
-                    self.folder.unplaced()
-                ),
-                Err(e) => format!("nor can it be put aside: {e}"),
-            };
-            return Err(format!(
-                "the artifact cannot be put into the store {root}: {e}; {and}"
-            ));
+            return Err(Refused::NotPlaced {
+                root: self.store.root().to_owned(),
+                source,
+                and: match kept {
+                    Ok(()) => Aside::Kept(self.folder.unplaced()),
+                    Err(e) => Aside::Lost(e),
+                },
+            });
         }
         // Only now: until here they were all that a killed engine, or a power cut, would have left of the work.
         let label = self.core.label(id);

@@ -18,7 +18,7 @@ mod whole;
 pub use compare::Compared;
 pub use executor::{Executor, FailureClass, Outcome, Report, Task};
 pub use local::Local;
-pub use session::{Options, Session};
+pub use session::{Of, Options, Purpose, Session};
 pub use shown::{Failure, Observer, Summary, Update};
 pub use sound::Depth;
 pub use task::input_keys;

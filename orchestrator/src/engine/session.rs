@@ -28,6 +28,25 @@ pub struct Options {
     pub checkpoint_interval: f64,
 }
 
+/// What a session is of.
+#[derive(Clone, Copy)]
+pub struct Of<'a> {
+    /// The workflow.
+    pub workflow: &'a ResolvedWorkflow,
+    /// Its steps as a graph.
+    pub graph: &'a Graph,
+    /// Its store.
+    pub store: &'a Store,
+}
+
+/// What a session is for.
+pub enum Purpose {
+    /// It only looks: another may hold the lock.
+    Look,
+    /// It runs, and the caller holds the run's lock; with what was read ahead, if something was.
+    Run(Option<Early>),
+}
+
 /// A workflow, its store and where its instances stand.
 pub struct Session<'a> {
     /// The workflow.
@@ -58,33 +77,20 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// A session that looks (`writing` false: another may hold the lock) or runs (`writing`: the caller
-    /// holds the run's lock).
+    /// A session of a workflow.
     ///
     /// # Errors
     /// When the journal cannot be read or written.
-    pub fn new(
-        workflow: &'a ResolvedWorkflow,
-        graph: &'a Graph,
-        store: &'a Store,
-        options: Options,
-        writing: bool,
-    ) -> io::Result<Self> {
-        Self::new_after(workflow, graph, store, options, writing, None)
-    }
-
-    /// As [`Session::new`], with what was read ahead for a session that writes.
-    ///
-    /// # Errors
-    /// As [`Session::new`].
-    pub fn new_after(
-        workflow: &'a ResolvedWorkflow,
-        graph: &'a Graph,
-        store: &'a Store,
-        options: Options,
-        writing: bool,
-        early: Option<Early>,
-    ) -> io::Result<Self> {
+    pub fn new(of: Of<'a>, options: Options, purpose: Purpose) -> io::Result<Self> {
+        let Of {
+            workflow,
+            graph,
+            store,
+        } = of;
+        let (writing, early) = match purpose {
+            Purpose::Look => (false, None),
+            Purpose::Run(early) => (true, early),
+        };
         let folder = store.run(&workflow.name);
         let early = early.and_then(|early| early.finish(&folder.journal()));
         let (scanned, ahead) = match early {

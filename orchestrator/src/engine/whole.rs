@@ -1,6 +1,6 @@
 //! Whether the files of a session's instances are what was written: read once for each state of them, and noted when they are not.
 
-use super::compare::{Compared, first_difference};
+use super::compare::{Compared, NotCompared, first_difference};
 use super::core::{Id, State};
 use super::session::Session;
 use super::shown::{Observer, Update};
@@ -64,7 +64,7 @@ impl Session<'_> {
         id: Id,
         artifact: &Utf8Path,
         record: &Utf8Path,
-    ) -> Result<Option<Known>, String> {
+    ) -> Result<Option<Known>, NotCompared> {
         let label = self.core.label(id);
         let Some(key) = self.core.instances()[id].key else {
             return Ok(None);
@@ -82,7 +82,11 @@ impl Session<'_> {
             }
         };
         let there = self.store.artifact(&key);
-        let cannot = |e: io::Error| format!("{artifact} cannot be compared with {there}: {e}");
+        let cannot = |source: io::Error| NotCompared {
+            new: artifact.to_owned(),
+            stored: there.clone(),
+            source,
+        };
         let how = match first_difference(&there, artifact).map_err(cannot)? {
             None => Compared::Same {
                 bytes: stored.bytes,

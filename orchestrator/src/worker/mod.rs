@@ -18,7 +18,7 @@ pub fn main(arguments: &[String], inside: impl FnOnce()) -> ! {
         [source] => supervise(inside, || plyflow_plugin_host::worker_main(source)),
         [source, "--parent", parent] => match follow(parent) {
             Ok(()) => supervise(inside, || plyflow_plugin_host::worker_main(source)),
-            Err(text) => refuse(&text),
+            Err(alone) => refuse(&alone.to_string()),
         },
         _ => refuse("wants the file of a job, or - for standard input"),
     }
@@ -36,15 +36,23 @@ fn refuse(text: &str) -> ! {
 }
 
 /// Dies when the engine dies, however it dies.
-fn follow(parent: &str) -> Result<(), String> {
-    let parent: i32 = parent
-        .parse()
-        .map_err(|_| "--parent wants a process number")?;
-    rustix::process::set_parent_process_death_signal(Some(Signal::KILL))
-        .map_err(|e| format!("cannot follow the engine's death: {e}"))?;
+fn follow(parent: &str) -> Result<(), Alone> {
+    let parent: i32 = parent.parse().map_err(|_| Alone::NoNumber)?;
+    rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
     // It may have died before the line above.
-    if rustix::process::getppid() != Pid::from_raw(parent) {
-        return Err("the engine is gone already".into());
+    match rustix::process::getppid() == Pid::from_raw(parent) {
+        true => Ok(()),
+        false => Err(Alone::Gone),
     }
-    Ok(())
+}
+
+/// Why a worker does not follow its engine.
+#[derive(Debug, thiserror::Error)]
+enum Alone {
+    #[error("--parent wants a process number")]
+    NoNumber,
+    #[error("cannot follow the engine's death: {0}")]
+    Refused(#[from] rustix::io::Errno),
+    #[error("the engine is gone already")]
+    Gone,
 }

@@ -14,7 +14,7 @@ use crate::cli::found::points::Table;
 use crate::cli::found::rows::records;
 use crate::cli::open::{Opened, open_at};
 use crate::engine::core::State;
-use crate::engine::{Depth, Local, Session, Summary};
+use crate::engine::{Depth, Local, Purpose, Session, Summary};
 use crate::exit;
 use crate::plan::Key;
 use crate::said::{Done, Stop};
@@ -204,14 +204,7 @@ fn execute<'o>(
 ) -> Result<Session<'o>, Stop> {
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
     let options = options(args, opened)?;
-    let mut session = Session::new(
-        &opened.workflow,
-        &opened.graph,
-        &opened.store,
-        options,
-        true,
-    )
-    .map_err(machine())?;
+    let mut session = opened.session(options, Purpose::Run(None))?;
     let mut observer = observer(args);
     session.look(observer.as_mut());
     if let Err(stop) = opened.admit(&session) {
