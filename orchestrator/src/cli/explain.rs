@@ -7,6 +7,7 @@ use super::table::or_none;
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
+use crate::plan::KeyPart;
 use crate::said::{Done, Stop, print};
 use crate::store::Flaw;
 use serde_json::json;
@@ -145,7 +146,7 @@ fn as_text(session: &Session<'_>, id: Id) -> String {
                     or_none(&c.old),
                     or_none(&c.new)
                 );
-                if let Some((_, from)) = c.part.split_once(" from ") {
+                if let KeyPart::Input { from, .. } = &c.part {
                     out += &format!(
                         "    why: plyflow explain {} '{from}'\n",
                         session.workflow.file

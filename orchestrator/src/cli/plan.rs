@@ -8,6 +8,7 @@ use super::table::{first_line, or_none, table};
 use crate::engine::Session;
 use crate::engine::core::Id;
 use crate::exit;
+use crate::plan::{Change, KeyPart};
 use crate::progress::duration_text;
 use crate::said::{Done, Stop, print, show_findings, warn};
 use plyflow_model::job::Cost;
@@ -228,19 +229,15 @@ fn why(session: &Session<'_>, id: Id) -> String {
         Difference::Never => "has not run before".into(),
         Difference::Gone => "its artifact is not in the store any more".into(),
         Difference::Changed(list) => {
-            let mut own: Vec<String> = list
-                .iter()
-                .filter(|c| !c.part.starts_with("input "))
+            let is_input = |c: &&Change| matches!(c.part, KeyPart::Input { .. });
+            let (inputs, rest): (Vec<&Change>, Vec<&Change>) = list.iter().partition(is_input);
+            let mut own: Vec<String> = (rest.iter())
                 .map(|c| format!("{}: {} -> {}", c.part, or_none(&c.old), or_none(&c.new)))
                 .collect();
-            let inputs: Vec<&str> = list
-                .iter()
-                .filter_map(|c| c.part.strip_prefix("input "))
-                .collect();
-            match inputs.len() {
-                0 => {}
-                1 => own.push(format!("input {} changed", inputs[0])),
-                n => own.push(format!("{n} inputs changed")),
+            match inputs[..] {
+                [] => {}
+                [one] => own.push(format!("{} changed", one.part)),
+                _ => own.push(format!("{} inputs changed", inputs.len())),
             }
             own.join("; ")
         }

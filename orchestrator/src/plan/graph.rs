@@ -3,7 +3,7 @@
 use super::keys::{Ingredients, Key};
 use petgraph::Direction;
 use petgraph::graph::{DiGraph, NodeIndex};
-use plyflow_workflow::resolved::ResolvedWorkflow;
+use plyflow_workflow::resolved::{ResolvedInput, ResolvedStep, ResolvedWorkflow};
 use std::collections::{BTreeSet, HashMap};
 
 /// One dimension of a step's fan-out.
@@ -52,6 +52,60 @@ pub struct StepPlan {
     pub retries: u32,
     /// Whether this run wants it (`--until`).
     pub wanted: bool,
+}
+
+impl StepPlan {
+    /// The plan of a step behind these, which `index` has by their names.
+    fn of(
+        step: &ResolvedStep,
+        recipe: Key,
+        before: &[Self],
+        index: &HashMap<&str, usize>,
+    ) -> Result<Self, PlanError> {
+        let find = |name: &str| {
+            index.get(name).copied().ok_or_else(|| PlanError::Order {
+                step: step.name.clone(),
+                other: name.to_owned(),
+            })
+        };
+        let own = step.dimensions.iter().map(|d| find(&d.over));
+        let own: Vec<usize> = own.collect::<Result<_, _>>()?;
+        let position = |d: &DimensionPlan| own.iter().position(|o| *o == d.over);
+        let dimension = |over: &usize| {
+            let prefix = before[*over].dimensions.iter().map(position);
+            let nesting = || PlanError::Nesting {
+                step: step.name.clone(),
+                over: before[*over].name.clone(),
+            };
+            Ok(DimensionPlan {
+                over: *over,
+                prefix: prefix.collect::<Option<_>>().ok_or_else(nesting)?,
+            })
+        };
+        let dimensions = own.iter().map(dimension).collect::<Result<_, _>>()?;
+        let wire = |input: &ResolvedInput| {
+            let from = find(&input.from)?;
+            Ok(WirePlan {
+                port: input.port.clone(),
+                from,
+                matched: before[from].dimensions.iter().map(position).collect(),
+            })
+        };
+        let wires = step.inputs.iter().map(wire).collect::<Result<_, _>>()?;
+        Ok(Self {
+            name: step.name.clone(),
+            base: step.in_file().to_owned(),
+            recipe,
+            dimensions,
+            wires,
+            fanned_by: Vec::new(),
+            collection: step.collection,
+            cores: step.resources.cores,
+            memory: step.resources.memory,
+            retries: step.retries,
+            wanted: true,
+        })
+    }
 }
 
 /// The graph of a workflow.
@@ -140,66 +194,16 @@ impl Graph {
         let mut steps: Vec<StepPlan> = Vec::with_capacity(workflow.steps.len());
         for (at, (step, recipe)) in workflow.steps.iter().zip(recipes).enumerate() {
             edges.add_node(());
-            let find = |name: &str| {
-                index.get(name).copied().ok_or_else(|| PlanError::Order {
-                    step: step.name.clone(),
-                    other: name.to_owned(),
-                })
-            };
-            let own: Vec<usize> = step
-                .dimensions
-                .iter()
-                .map(|d| find(&d.over))
-                .collect::<Result<_, _>>()?;
-            let position = |over: usize| own.iter().position(|o| *o == over);
-            let mut dimensions = Vec::with_capacity(own.len());
-            for over in &own {
-                let prefix = steps[*over].dimensions.iter().map(|d| position(d.over));
-                let prefix =
-                    prefix
-                        .collect::<Option<Vec<_>>>()
-                        .ok_or_else(|| PlanError::Nesting {
-                            step: step.name.clone(),
-                            over: steps[*over].name.clone(),
-                        })?;
-                dimensions.push(DimensionPlan {
-                    over: *over,
-                    prefix,
-                });
-                edges.update_edge(NodeIndex::new(*over), NodeIndex::new(at), ());
+            let plan = StepPlan::of(step, recipe, &steps, &index)?;
+            let overs = plan.dimensions.iter().map(|d| d.over);
+            for giver in overs.clone().chain(plan.wires.iter().map(|w| w.from)) {
+                edges.update_edge(NodeIndex::new(giver), NodeIndex::new(at), ());
             }
-            let mut wires = Vec::with_capacity(step.inputs.len());
-            for input in &step.inputs {
-                let from = find(&input.from)?;
-                let matched = steps[from]
-                    .dimensions
-                    .iter()
-                    .map(|d| position(d.over))
-                    .collect();
-                wires.push(WirePlan {
-                    port: input.port.clone(),
-                    from,
-                    matched,
-                });
-                edges.update_edge(NodeIndex::new(from), NodeIndex::new(at), ());
-            }
-            for over in own {
+            for over in overs {
                 steps[over].fanned_by.push(at);
             }
             index.insert(&step.name, at);
-            steps.push(StepPlan {
-                name: step.name.clone(),
-                base: step.in_file().to_owned(),
-                recipe,
-                dimensions,
-                wires,
-                fanned_by: Vec::new(),
-                collection: step.collection,
-                cores: step.resources.cores,
-                memory: step.resources.memory,
-                retries: step.retries,
-                wanted: true,
-            });
+            steps.push(plan);
         }
         let bears = Bears::of(workflow);
         Ok(Self {

@@ -9,7 +9,7 @@ mod reason;
 pub use fanout::{Extent, Walk, walk};
 pub use graph::{Bears, DimensionPlan, Graph, PlanError, StepPlan, WirePlan, recipes};
 pub use keys::{ByKey, Ingredients, InputKey, Key, canonical_json, instance_key};
-pub use reason::{Change, changes};
+pub use reason::{Change, KeyPart, changes};
 
 #[cfg(test)]
 pub(crate) use graph::tests;
