@@ -6,5 +6,6 @@ pub mod engine;
 pub mod exit;
 pub mod plan;
 pub mod progress;
+pub mod said;
 pub mod store;
 pub mod worker;

@@ -4,32 +4,29 @@
 //! No object times are tracked and every group keeps the order of creation (VTK iterates in it), so the
 //! bytes of a file depend only on the calls that made it.
 
+mod handle;
 mod rows;
 mod shape;
 
 use crate::error::{ArtifactError, ErrorKind, Result};
-use hdf5_sys::h5::{H5dont_atexit, H5open, hsize_t};
-use hdf5_sys::h5a::{H5Aclose, H5Acreate2, H5Aget_type, H5Aopen, H5Aread, H5Awrite};
-use hdf5_sys::h5d::{H5D_fill_time_t, H5Dclose, H5Dcreate2, H5Dopen2, H5Dwrite};
-use hdf5_sys::h5e::{H5E_DEFAULT, H5E_direction_t, H5E_error2_t, H5Eset_auto2, H5Ewalk2};
+use handle::{
+    CLOSE_FAILED, DEFAULT, Handle, c_name, checked, close_attribute, close_dataset, close_file,
+    close_group, close_type, id, locked, plist, space, text_type,
+};
+use hdf5_sys::h5a::{H5Acreate2, H5Aget_type, H5Aopen, H5Aread, H5Awrite};
+use hdf5_sys::h5d::{H5D_fill_time_t, H5Dcreate2, H5Dopen2, H5Dwrite};
 use hdf5_sys::h5f::{H5F_ACC_RDONLY, H5F_ACC_TRUNC, H5F_libver_t, H5Fclose, H5Fcreate, H5Fopen};
-use hdf5_sys::h5g::{H5Gclose, H5Gcreate2, H5Gopen2};
+use hdf5_sys::h5g::{H5Gcreate2, H5Gopen2};
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5l::{H5Lcreate_soft, H5Lexists};
 use hdf5_sys::h5p::*;
-use hdf5_sys::h5s::{H5S_class_t, H5Sclose, H5Screate, H5Screate_simple};
 use hdf5_sys::h5t::{
-    H5T_C_S1, H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT,
-    H5T_NATIVE_INT64, H5T_NATIVE_UINT8, H5T_NATIVE_UINT32, H5T_STD_I64LE, H5T_STD_U8LE,
-    H5T_STD_U32LE, H5T_cset_t, H5T_str_t, H5Tclose, H5Tcopy, H5Tget_size, H5Tset_cset, H5Tset_size,
-    H5Tset_strpad,
+    H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_FLOAT, H5T_NATIVE_INT64,
+    H5T_NATIVE_UINT8, H5T_NATIVE_UINT32, H5T_STD_I64LE, H5T_STD_U8LE, H5T_STD_U32LE, H5Tget_size,
 };
-use std::ffi::{CStr, CString, c_uint, c_void};
+use std::ffi::{CString, c_void};
 use std::path::Path;
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-const DEFAULT: hid_t = 0;
+use std::sync::atomic::Ordering;
 
 /// Type of an element, in the file (little-endian) and in memory (native).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -77,144 +74,6 @@ impl DType {
             Self::U8 => id(H5T_STD_U8LE),
         }
     }
-}
-
-/// The number behind one of the library's names. The library writes them when it starts, but the bindings
-/// call them immutable: a plain read may be moved by the compiler to before the start, and is in release
-/// builds.
-fn id(name: &'static hid_t) -> hid_t {
-    unsafe { std::ptr::read_volatile(name) }
-}
-
-static INIT: Once = Once::new();
-
-/// Runs `f` alone in the library, which is started on first use.
-fn locked<T>(f: impl FnOnce() -> T) -> T {
-    let _guard = hdf5_sys::LOCK.lock();
-    INIT.call_once(|| unsafe {
-        // Handles may outlive `main`; the library must not close them behind our back.
-        H5dont_atexit();
-        H5open();
-        H5Eset_auto2(H5E_DEFAULT, None, std::ptr::null_mut());
-    });
-    f()
-}
-
-/// The innermost description on the library's error stack.
-fn last_error() -> String {
-    unsafe extern "C" fn visit(_: c_uint, e: *const H5E_error2_t, out: *mut c_void) -> i32 {
-        let out = unsafe { &mut *out.cast::<String>() };
-        let text = unsafe { (*e).desc };
-        if out.is_empty() && !text.is_null() {
-            *out = unsafe { CStr::from_ptr(text) }
-                .to_string_lossy()
-                .into_owned();
-        }
-        0
-    }
-    let mut text = String::new();
-    unsafe {
-        H5Ewalk2(
-            H5E_DEFAULT,
-            H5E_direction_t::H5E_WALK_UPWARD,
-            Some(visit),
-            (&raw mut text).cast(),
-        );
-    }
-    text
-}
-
-fn checked(code: impl Into<i64>, what: impl FnOnce() -> String) -> Result<i64> {
-    let code = code.into();
-    if code >= 0 {
-        return Ok(code);
-    }
-    let message = format!("{} (HDF5: {})", what(), last_error());
-    Err(ArtifactError::new(ErrorKind::Io, message))
-}
-
-fn c_name(name: &str) -> Result<CString> {
-    CString::new(name).map_err(|_| {
-        ArtifactError::new(
-            ErrorKind::BadValue,
-            format!("the name {name:?} holds a zero byte"),
-        )
-    })
-}
-
-/// Closes a handle of one class when dropped.
-#[derive(Debug)]
-struct Handle(hid_t, unsafe fn(hid_t) -> i32);
-
-impl Drop for Handle {
-    fn drop(&mut self) {
-        if locked(|| unsafe { (self.1)(self.0) }) < 0 {
-            CLOSE_FAILED.store(true, Ordering::Relaxed);
-        }
-    }
-}
-
-/// Whether closing a handle has failed. The library keeps small parts back until then, and lets them go even when the disk does not take
-/// them; the file could be closed afterwards as if nothing had happened.
-static CLOSE_FAILED: AtomicBool = AtomicBool::new(false);
-
-macro_rules! closer {
-    ($name:ident, $f:ident) => {
-        unsafe fn $name(id: hid_t) -> i32 {
-            unsafe { $f(id) }
-        }
-    };
-}
-closer!(close_file, H5Fclose);
-closer!(close_group, H5Gclose);
-closer!(close_dataset, H5Dclose);
-closer!(close_space, H5Sclose);
-closer!(close_type, H5Tclose);
-closer!(close_attribute, H5Aclose);
-closer!(close_plist, H5Pclose);
-
-fn plist(class: &'static hid_t) -> Result<Handle> {
-    // The class has its number only once the library has started.
-    let id = locked(|| unsafe { H5Pcreate(id(class)) });
-    checked(id, || "making a property list".into())?;
-    Ok(Handle(id, close_plist))
-}
-
-fn space(shape: &[u64], growing: bool) -> Result<Handle> {
-    let id = locked(|| unsafe {
-        if shape.is_empty() {
-            H5Screate(H5S_class_t::H5S_SCALAR)
-        } else if growing {
-            let mut most = shape.to_vec();
-            most[0] = hsize_t::MAX; // H5S_UNLIMITED
-            H5Screate_simple(shape.len() as i32, shape.as_ptr(), most.as_ptr())
-        } else {
-            H5Screate_simple(shape.len() as i32, shape.as_ptr(), std::ptr::null())
-        }
-    });
-    checked(id, || format!("making a space of shape {shape:?}"))?;
-    Ok(Handle(id, close_space))
-}
-
-fn text_type(bytes: usize, ascii: bool) -> Result<Handle> {
-    locked(|| unsafe {
-        let id = checked(H5Tcopy(id(H5T_C_S1)), || "making a text type".into())?;
-        let t = Handle(id, close_type);
-        let set = if ascii {
-            H5T_cset_t::H5T_CSET_ASCII
-        } else {
-            H5T_cset_t::H5T_CSET_UTF8
-        };
-        // HDF5 has no text of no bytes; one padding byte stands for it.
-        checked(H5Tset_size(t.0, bytes.max(1)), || {
-            format!("a text of {bytes} bytes")
-        })?;
-        checked(H5Tset_strpad(t.0, H5T_str_t::H5T_STR_NULLPAD), || {
-            "text padding".into()
-        })?;
-        checked(H5Tset_cset(t.0, set), || "text encoding".into())?;
-        Ok(t)
-    })
 }
 
 /// An open file.
@@ -330,11 +189,13 @@ impl Location for File {
         self.0.0
     }
 }
+
 impl Location for Group {
     fn id(&self) -> hid_t {
         self.0.0
     }
 }
+
 impl Location for Dataset {
     fn id(&self) -> hid_t {
         self.handle.0
@@ -556,8 +417,13 @@ pub(crate) fn bytes_mut<T: Plain>(values: &mut [T]) -> &mut [u8] {
 
 /// Numbers that are just bytes.
 pub(crate) trait Plain: Copy {}
+
 impl Plain for f64 {}
+
 impl Plain for f32 {}
+
 impl Plain for i64 {}
+
 impl Plain for u32 {}
+
 impl Plain for u8 {}

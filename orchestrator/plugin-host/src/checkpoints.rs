@@ -3,7 +3,7 @@
 use crate::emitter::Emitter;
 use crate::process;
 use camino::Utf8Path;
-use plyflow_artifact::seal::{read_document, seal, sealed};
+use plyflow_artifact::seal::{BrokenSeal, read_document, seal, sealed};
 use plyflow_model::job::{self, Cost, LogLevel};
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -23,13 +23,25 @@ fn name(folder: &Utf8Path) -> &str {
     folder.file_name().unwrap_or_default()
 }
 
-fn read_cost(folder: &Utf8Path) -> Result<Cost, String> {
-    let bytes = read_document(folder.join(COST).as_std_path()).map_err(|e| e.to_string())?;
-    let text = sealed(&bytes).map_err(|e| e.to_string())?;
-    let noted: Noted = serde_json::from_str(text).map_err(|e| e.to_string())?;
+/// Why a noted cost is not one.
+#[derive(Debug, thiserror::Error)]
+enum CostError {
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error(transparent)]
+    Seal(#[from] BrokenSeal),
+    #[error(transparent)]
+    Form(#[from] serde_json::Error),
+    #[error("it is of another step or key")]
+    Other,
+}
+
+fn read_cost(folder: &Utf8Path) -> Result<Cost, CostError> {
+    let bytes = read_document(folder.join(COST).as_std_path())?;
+    let noted: Noted = serde_json::from_str(sealed(&bytes)?)?;
     match noted.of == name(folder) {
         true => Ok(noted.cost),
-        false => Err("it is of another step or key".into()),
+        false => Err(CostError::Other),
     }
 }
 

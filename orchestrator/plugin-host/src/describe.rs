@@ -1,5 +1,6 @@
 //! Reading the manifest of a library, in a process that the library may take down with it.
 
+use crate::breach::Breach;
 use crate::load::Plugin;
 use camino::Utf8Path;
 use serde::{Deserialize, Serialize};
@@ -22,8 +23,8 @@ pub enum Description {
 pub fn describe(path: &Utf8Path, bytes: Option<&str>) -> Description {
     match Plugin::load_bytes(path, bytes) {
         Ok(plugin) => Description::Plugin(plugin.manifest_text.to_owned()),
-        Err(e) if e.foreign => Description::Foreign(e.reason),
-        Err(e) => Description::Broken(e.reason),
+        Err(e) if e.breach == Breach::Foreign => Description::Foreign(e.breach.to_string()),
+        Err(e) => Description::Broken(e.breach.to_string()),
     }
 }
 

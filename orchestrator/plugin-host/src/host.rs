@@ -1,5 +1,6 @@
 //! The state behind the services of one running step.
 
+use crate::breach::ComponentError;
 use crate::catalog::find_component_library;
 use crate::checkpoints::Checkpoints;
 use crate::emitter::Emitter;
@@ -149,7 +150,7 @@ impl<'a, 'w> HostState<'a, 'w> {
     }
 
     /// A component by name or path: what the job lists, then the search path.
-    pub(crate) fn component(&self, kind: PluginKind, name: &str) -> Result<Plugin, String> {
+    pub(crate) fn component(&self, kind: PluginKind, name: &str) -> Result<Plugin, ComponentError> {
         let mut output = self.output();
         let known = |(n, p): &&(String, Plugin)| n == name && p.manifest.kind == kind;
         if let Some((_, plugin)) = output.components.iter().find(known) {
@@ -161,7 +162,7 @@ impl<'a, 'w> HostState<'a, 'w> {
                 continue;
             }
             let hash = library.hash.as_deref();
-            let plugin = Plugin::load_bytes(&library.path, hash).map_err(|e| e.to_string())?;
+            let plugin = Plugin::load_bytes(&library.path, hash)?;
             if plugin.manifest.kind == kind {
                 let _ = listed.set(plugin);
                 break;

@@ -9,6 +9,7 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod breach;
 mod catalog;
 mod checkpoints;
 mod describe;
@@ -21,10 +22,11 @@ mod supervise;
 mod trust;
 mod worker;
 
+pub use breach::{Breach, LoadError};
 pub use catalog::{Describer, PluginCatalog};
 pub use checkpoints::{cost_so_far, damaged_cost};
 pub use describe::{Description, describe, describe_main};
-pub use load::{LoadError, Plugin};
+pub use load::Plugin;
 pub use process::children_seconds;
 pub use supervise::{Orphans, rename_argument, supervise};
 pub use trust::{Ask, Consent, Place, Stranger, Trust, manifest_file};

@@ -571,7 +571,7 @@ unsafe extern "C" fn find_component(
         };
         let found = unsafe { text(name) }
             .map_err(|e| e.message)
-            .and_then(|name| s.component(wanted, name));
+            .and_then(|name| s.component(wanted, name).map_err(|e| e.to_string()));
         match found {
             Ok(plugin) if !component.is_null() => {
                 let manifest = pf_str::new(plugin.manifest_text);

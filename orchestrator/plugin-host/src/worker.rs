@@ -137,27 +137,27 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
         host: process::host_name(),
         started,
     };
-    let lasting = record.is_lasting();
-    write_record(&job.record, &record, lasting).map_err(|e| {
-        (
-            FailureKind::Error,
-            format!("the record {} cannot be written: {e}", job.record),
-        )
-    })?;
-    if lasting {
-        std::fs::File::open(&job.artifact)
-            .and_then(|file| file.sync_all())
-            .map_err(|e| {
-                (
-                    FailureKind::Error,
-                    format!(
-                        "the artifact {} cannot be put on the disk: {e}",
-                        job.artifact
-                    ),
-                )
-            })?;
-    }
+    put_on_disk(job, &record)?;
     Ok(record)
+}
+
+/// Writes the record; what was long in the making outlasts a power cut, with its artifact.
+fn put_on_disk(job: &Job, record: &Record) -> Result<(), Failure> {
+    let lasting = record.is_lasting();
+    let failed = |what: String| (FailureKind::Error, what);
+    write_record(&job.record, record, lasting)
+        .map_err(|e| failed(format!("the record {} cannot be written: {e}", job.record)))?;
+    if !lasting {
+        return Ok(());
+    }
+    let artifact = &job.artifact;
+    std::fs::File::open(artifact)
+        .and_then(|file| file.sync_all())
+        .map_err(|e| {
+            failed(format!(
+                "the artifact {artifact} cannot be put on the disk: {e}"
+            ))
+        })
 }
 
 /// The hash of the artifact as the disk has it, `bytes` long.

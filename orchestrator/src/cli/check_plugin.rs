@@ -7,11 +7,9 @@
 
 use super::args::{CheckPluginArgs, Places, TextOrJson};
 use super::open::{catalog, folders, program};
-use super::{Done, Stop, print};
-use crate::engine::drive::library;
-use crate::engine::executor::{Executor, Outcome, Report, Task};
-use crate::engine::local::Local;
+use crate::engine::{Executor, Local, Outcome, Report, Task, library};
 use crate::exit;
+use crate::said::{Done, Stop, print, show_findings};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::artifact::{
     CONFORMANCE_MARK, CheckOutcome, ConformanceCheck, ConformanceLine, ConformanceRule,
@@ -115,7 +113,7 @@ fn judge(
     std::fs::write(&file, workflow(args, entry, &folder.0)?)
         .map_err(Stop::machine(format!("writing {file}")))?;
     let resolved = plyflow_workflow::resolve(&file, catalog, &[]).map_err(|findings| {
-        super::show_findings(&findings);
+        show_findings(&findings);
         Stop::silent(exit::INVALID)
     })?;
     let step = resolved.workflow.steps.into_iter().next();

@@ -1,22 +1,15 @@
 //! `clean`: makes room in a store.
 
 use super::args::CleanArgs;
-use super::open::store_root;
+use super::open::{locked, store_root};
 use super::table::bytes;
-use super::{Done, Stop, print};
 use crate::exit;
 use crate::plan::Key;
-use crate::store::{Journal, Lock, LockError, Store};
+use crate::said::{Done, Stop, print};
+use crate::store::{Journal, Lock, Store};
 use camino::Utf8Path;
 use std::collections::BTreeSet;
-
-/// Turns a lock that is not to be had into an exit code.
-pub fn locked(e: LockError) -> Stop {
-    match e {
-        LockError::Held { .. } => Stop::new(exit::LOCKED, e),
-        LockError::Io { .. } => Stop::new(exit::INTERNAL, e),
-    }
-}
+use std::io;
 
 /// `plyflow clean`.
 ///
@@ -45,9 +38,27 @@ pub fn clean(args: &CleanArgs) -> Done {
     let _lock =
         Lock::exclusive(&store.lock(), &format!("the store {}", store.root())).map_err(locked)?;
     let failed = || Stop::machine(format!("cleaning {}", store.root()));
+    let mut removed = Removed {
+        dry_run: args.dry_run,
+        ..Removed::default()
+    };
+    let unused = unused(&store, args.all)?;
+    removed.artifacts(&store, &unused).map_err(failed())?;
+    removed.set_aside(&store).map_err(failed())?;
+    removed.checkpoints(&store).map_err(failed())?;
+    if args.all && !args.dry_run {
+        // `--store` may name a folder that holds other things too.
+        store.clear().map_err(failed())?;
+    }
+    print(&removed.text(&store))
+}
+
+/// Keys of artifacts that no workflow's last run uses; `all`: of all artifacts.
+fn unused(store: &Store, all: bool) -> Result<Vec<Key>, Stop> {
+    let failed = || Stop::machine(format!("cleaning {}", store.root()));
     let mut used = BTreeSet::new();
     let mut noted = None;
-    if !args.all {
+    if !all {
         for run in store.runs().map_err(failed())? {
             let journal = whole(&run.journal())?;
             used.extend(journal.last_keys());
@@ -57,72 +68,92 @@ pub fn clean(args: &CleanArgs) -> Done {
     // What has come since any journal was last written to is the work of a run that could not note it: the disk was full, or it was
     // killed between the two. The next run finds it by its file.
     let unnoted = |key: &Key| noted.is_some() && modified(&store.artifact(key)) > noted;
-    let (mut count, mut size, mut damaged) = (0u64, 0u64, 0u64);
-    for key in store
-        .keys()
-        .map_err(failed())?
-        .into_iter()
-        .filter(|k| !used.contains(k) && !unnoted(k))
-    {
-        count += 1;
-        size += store.size(&key).unwrap_or(0);
-        if !args.dry_run {
-            store.remove(&key).map_err(failed())?;
-        }
-    }
-    // Of an earlier version: without a hash, so nothing uses them any more.
-    for key in store.earlier_keys().map_err(failed())? {
-        count += 1;
-        size += size_of(&store.earlier_artifact(&key));
-        if !args.dry_run {
-            store.remove_earlier(&key).map_err(failed())?;
-        }
-    }
-    for path in store.set_aside_before().map_err(failed())? {
-        damaged += 1;
-        size += match path.is_dir() {
-            true => folder_size(&path),
-            false => size_of(&path),
-        };
-    }
-    if !args.dry_run {
-        store.remove_set_aside().map_err(failed())?;
-    }
-    let mut old = 0u64;
-    for run in store.runs().map_err(failed())? {
-        for folder in run.old_checkpoints().map_err(failed())? {
-            old += 1;
-            size += folder_size(&folder);
-            if !args.dry_run {
-                std::fs::remove_dir_all(&folder).map_err(failed())?;
+    let mut keys = store.keys().map_err(failed())?;
+    keys.retain(|k| !used.contains(k) && !unnoted(k));
+    Ok(keys)
+}
+
+/// What has been removed, or would be.
+#[derive(Default)]
+struct Removed {
+    dry_run: bool,
+    artifacts: u64,
+    set_aside: u64,
+    checkpoints: u64,
+    size: u64,
+}
+
+impl Removed {
+    fn artifacts(&mut self, store: &Store, unused: &[Key]) -> io::Result<()> {
+        for key in unused {
+            self.artifacts += 1;
+            self.size += store.size(key).unwrap_or(0);
+            if !self.dry_run {
+                store.remove(key)?;
             }
         }
+        // Of an earlier version: without a hash, so nothing uses them any more.
+        for key in store.earlier_keys()? {
+            self.artifacts += 1;
+            self.size += size_of(&store.earlier_artifact(&key));
+            if !self.dry_run {
+                store.remove_earlier(&key)?;
+            }
+        }
+        Ok(())
     }
-    let verb = if args.dry_run {
-        "would remove"
-    } else {
-        "removed"
-    };
-    if args.all && !args.dry_run {
-        // `--store` may name a folder that holds other things too.
-        store.clear().map_err(failed())?;
+
+    fn set_aside(&mut self, store: &Store) -> io::Result<()> {
+        for path in store.set_aside_before()? {
+            self.set_aside += 1;
+            self.size += match path.is_dir() {
+                true => folder_size(&path),
+                false => size_of(&path),
+            };
+        }
+        match self.dry_run {
+            true => Ok(()),
+            false => store.remove_set_aside(),
+        }
     }
-    let s = if count == 1 { "" } else { "s" };
-    let checkpoints = match old {
-        0 => String::new(),
-        1 => " and 1 old checkpoint".into(),
-        n => format!(" and {n} old checkpoints"),
-    };
-    let aside = match damaged {
-        0 => String::new(),
-        1 => " and 1 damaged file that was set aside".into(),
-        n => format!(" and {n} damaged files that were set aside"),
-    };
-    print(&format!(
-        "{verb} {count} artifact{s}{checkpoints}{aside}, {}, in the store {}\n",
-        bytes(size),
-        store.root()
-    ))
+
+    fn checkpoints(&mut self, store: &Store) -> io::Result<()> {
+        for run in store.runs()? {
+            for folder in run.old_checkpoints()? {
+                self.checkpoints += 1;
+                self.size += folder_size(&folder);
+                if !self.dry_run {
+                    std::fs::remove_dir_all(&folder)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn text(&self, store: &Store) -> String {
+        let verb = if self.dry_run {
+            "would remove"
+        } else {
+            "removed"
+        };
+        let s = if self.artifacts == 1 { "" } else { "s" };
+        let checkpoints = match self.checkpoints {
+            0 => String::new(),
+            1 => " and 1 old checkpoint".into(),
+            n => format!(" and {n} old checkpoints"),
+        };
+        let aside = match self.set_aside {
+            0 => String::new(),
+            1 => " and 1 damaged file that was set aside".into(),
+            n => format!(" and {n} damaged files that were set aside"),
+        };
+        format!(
+            "{verb} {} artifact{s}{checkpoints}{aside}, {}, in the store {}\n",
+            self.artifacts,
+            bytes(self.size),
+            store.root()
+        )
+    }
 }
 
 /// A journal from which it can be told what is in use.

@@ -3,9 +3,9 @@
 use super::args::{DiffArgs, Places, TextOrJson, Workflow};
 use super::open::open;
 use super::table::number;
-use super::{Done, Stop, print};
 use crate::exit;
 use crate::plan::Key;
+use crate::said::{Done, Stop, print, warn};
 use crate::store::{Flaw, Journal, check_artifact, record_beside};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::{Artifact, Difference, How, differences};
@@ -155,7 +155,7 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
     let is_left = |key: &&Key| !named.contains(*key) && store.artifact(key).is_file();
     let left = keys.iter().filter(is_left).count();
     if only.is_empty() && left > 0 {
-        super::warn(&format!(
+        warn(&format!(
             "plyflow: {file}: {left} artifacts are of steps that this file no longer has; they are not compared\n"
         ));
     }
@@ -193,6 +193,22 @@ fn label(step: &str, item: &[u64]) -> String {
     format!("{step}[{}]", item.join(","))
 }
 
+/// One of the two that are compared.
+#[derive(Clone, Copy)]
+enum Side {
+    First,
+    Second,
+}
+
+impl Side {
+    fn text(self) -> &'static str {
+        match self {
+            Self::First => "only in the first",
+            Self::Second => "only in the second",
+        }
+    }
+}
+
 /// What came of comparing two artifacts.
 enum Outcome {
     /// The files are the same byte by byte.
@@ -202,7 +218,7 @@ enum Outcome {
     /// Not the same.
     Differs(Vec<Difference>),
     /// One alone is there.
-    OnlyIn(&'static str),
+    OnlyIn(Side),
     /// None is: the step failed, or has not run.
     Neither,
 }
@@ -221,8 +237,8 @@ struct Compared {
 fn compare(pair: &Pair) -> Result<Compared, Stop> {
     let outcome = match &pair.paths {
         [Some(a), Some(b)] => outcome(a, b)?,
-        [Some(_), None] => Outcome::OnlyIn("first"),
-        [None, Some(_)] => Outcome::OnlyIn("second"),
+        [Some(_), None] => Outcome::OnlyIn(Side::First),
+        [None, Some(_)] => Outcome::OnlyIn(Side::Second),
         [None, None] => Outcome::Neither,
     };
     let label = pair.label.clone();
@@ -270,8 +286,8 @@ impl Compared {
             Outcome::SameBytes => ("same-bytes", &[][..]),
             Outcome::Same => ("same", &[][..]),
             Outcome::Differs(list) => ("differs", &list[..]),
-            Outcome::OnlyIn("first") => ("only-in-first", &[][..]),
-            Outcome::OnlyIn(_) => ("only-in-second", &[][..]),
+            Outcome::OnlyIn(Side::First) => ("only-in-first", &[][..]),
+            Outcome::OnlyIn(Side::Second) => ("only-in-second", &[][..]),
             Outcome::Neither => ("in-neither", &[][..]),
         };
         json!({"step": self.label, "status": status, "differences": list})
@@ -288,7 +304,7 @@ fn text(compared: &[Compared], all: bool) -> String {
         out += &match &one.outcome {
             Outcome::SameBytes => format!("{head}the same bytes\n"),
             Outcome::Same => format!("{head}the same numbers, made by something else\n"),
-            Outcome::OnlyIn(which) => format!("{head}only in the {which}\n"),
+            Outcome::OnlyIn(side) => format!("{head}{}\n", side.text()),
             Outcome::Neither => format!("{head}in neither: it failed there, or has not run\n"),
             Outcome::Differs(list) => {
                 let shown = if all { list.len() } else { SHOWN };
@@ -319,8 +335,8 @@ fn text(compared: &[Compared], all: bool) -> String {
 
 fn how(how: &How) -> String {
     match how {
-        How::OnlyInFirst => "only in the first".into(),
-        How::OnlyInSecond => "only in the second".into(),
+        How::OnlyInFirst => Side::First.text().into(),
+        How::OnlyInSecond => Side::Second.text().into(),
         How::Other { first, second } => format!("{} | {}", brief(first), brief(second)),
         How::Number {
             first,

@@ -1,12 +1,14 @@
 //! `explain`: why a step would run.
 
 use super::args::{ExplainArgs, TextOrJson};
+use super::found::change::{Difference, Fate, difference};
 use super::open::{Opened, open};
-use super::plan::{Difference, difference, or_none};
-use super::{Done, Stop, print};
+use super::table::or_none;
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
+use crate::plan::KeyPart;
+use crate::said::{Done, Stop, print};
 use crate::store::Flaw;
 use serde_json::json;
 
@@ -87,12 +89,8 @@ pub fn explain(args: &ExplainArgs) -> Done {
 
 fn as_json(session: &Session<'_>, id: Id) -> serde_json::Value {
     let instance = &session.core.instances()[id];
-    let state = match instance.state {
-        State::Done { .. } => "cached",
-        State::Unkeyed => "unknown",
-        _ => "run",
-    };
-    let flaw = session.flaw(id).filter(|_| state == "run");
+    let fate = Fate::of(instance.state);
+    let flaw = session.flaw(id).filter(|_| fate == Fate::Run);
     let (last, changed) = match (instance.state, difference(session, id)) {
         (State::Done { .. } | State::Unkeyed, _) => ("", vec![]),
         _ if flaw.is_some() => ("damaged", vec![]),
@@ -102,7 +100,7 @@ fn as_json(session: &Session<'_>, id: Id) -> serde_json::Value {
     };
     json!({
         "step": session.core.label(id),
-        "state": state,
+        "state": fate.word(),
         "key": instance.key.map(|k| k.hex()),
         "because": last,
         "changes": changed,
@@ -148,7 +146,7 @@ fn as_text(session: &Session<'_>, id: Id) -> String {
                     or_none(&c.old),
                     or_none(&c.new)
                 );
-                if let Some((_, from)) = c.part.split_once(" from ") {
+                if let KeyPart::Input { from, .. } = &c.part {
                     out += &format!(
                         "    why: plyflow explain {} '{from}'\n",
                         session.workflow.file

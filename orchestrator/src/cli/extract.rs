@@ -4,8 +4,8 @@ use super::args::ExtractArgs;
 use super::inspect::artifact_of;
 use super::open::open;
 use super::table::{bytes, table};
-use super::{Done, Stop, print};
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::Artifact;
 use plyflow_model::artifact::TextFile;
@@ -41,26 +41,34 @@ pub fn extract(args: &ExtractArgs) -> Done {
     print(&write_all(&files, folder, args.force)?)
 }
 
+/// Why the files of an artifact cannot be used.
+#[derive(Debug, thiserror::Error)]
+enum NoFiles {
+    #[error("its attributes: {0}")]
+    Attributes(serde_json::Error),
+    #[error("its attribute 'files' is no list of name and text: {0}")]
+    List(serde_json::Error),
+    #[error("it carries a file with the name {name:?}, which {why}; nothing is written")]
+    Unfit { name: String, why: &'static str },
+    #[error("it carries two files with the name {0:?}; nothing is written")]
+    Twice(String),
+}
+
 /// The files in the attributes of an artifact, each with a name that stays in its folder.
-fn files(attributes: &str) -> Result<Vec<TextFile>, String> {
-    let attributes: Value =
-        serde_json::from_str(attributes).map_err(|e| format!("its attributes: {e}"))?;
+fn files(attributes: &str) -> Result<Vec<TextFile>, NoFiles> {
+    let attributes: Value = serde_json::from_str(attributes).map_err(NoFiles::Attributes)?;
     if attributes["files"].is_null() {
         return Ok(Vec::new());
     }
-    let files = Vec::<TextFile>::deserialize(&attributes["files"])
-        .map_err(|e| format!("its attribute 'files' is no list of name and text: {e}"))?;
+    let files = Vec::<TextFile>::deserialize(&attributes["files"]).map_err(NoFiles::List)?;
     for (i, file) in files.iter().enumerate() {
         let name = &file.name;
         if let Some(why) = unfit(name) {
-            return Err(format!(
-                "it carries a file with the name {name:?}, which {why}; nothing is written"
-            ));
+            let name = name.clone();
+            return Err(NoFiles::Unfit { name, why });
         }
         if files[..i].iter().any(|f| f.name == *name) {
-            return Err(format!(
-                "it carries two files with the name {name:?}; nothing is written"
-            ));
+            return Err(NoFiles::Twice(name.clone()));
         }
     }
     Ok(files)
@@ -156,7 +164,7 @@ mod tests {
         for name in [
             "", ".", "..", "../a", "a/b", "/etc/a", "a\\b", "a..b", "a\nb", "a\0",
         ] {
-            let error = files(&attributes(name)).unwrap_err();
+            let error = files(&attributes(name)).unwrap_err().to_string();
             assert!(error.contains("nothing is written"), "{name:?}: {error}");
         }
         assert!(files(&attributes(&"a".repeat(300))).is_err());
@@ -173,7 +181,7 @@ mod tests {
             assert!(files(odd).is_err(), "{odd}");
         }
         let twice = r#"{"files": [{"name": "a", "text": "1"}, {"name": "a", "text": "2"}]}"#;
-        assert!(files(twice).unwrap_err().contains("two files"));
+        assert!(matches!(files(twice), Err(NoFiles::Twice(_))));
     }
 
     fn folder() -> (tempfile::TempDir, Utf8PathBuf) {

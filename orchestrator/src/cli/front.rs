@@ -3,8 +3,7 @@
 //! Errors come from the artifacts' results, costs from the records beside them: so the front is put together here and is in no
 //! artifact ([decision 1](../../../docs/decisions/0001-artifacts-hold-what-is-reproducible.md)).
 
-use super::results::csv_text;
-use super::table::{bytes, number, table};
+use super::table::{bytes, csv_text, number, table};
 use crate::progress::duration_text;
 use plyflow_report::{COUNTS, Measure, Way, Ways};
 use serde_json::{Value, json};

@@ -1,15 +1,15 @@
 //! `inspect`: what an artifact holds.
 
 use super::args::{InspectArgs, Places, TextOrJson, Workflow};
-use super::damage::{damaged, recheck};
 use super::explain::instances_named;
+use super::found::damage::{damaged, recheck};
 use super::open::{Opened, open};
 use super::table::{bytes, number, table};
-use super::{Done, Stop, print};
 use crate::engine::Depth;
 use crate::engine::core::State;
 use crate::exit;
 use crate::progress::duration_text;
+use crate::said::{Done, Stop, print};
 use crate::store::{check_artifact, record_beside};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::Artifact;
@@ -136,28 +136,7 @@ fn text(path: &Utf8Path, artifact: &Artifact, record: Option<&Record>, made: &Va
         word(&plugin["name"]),
         word(&plugin["version"])
     );
-    if let Some(r) = record {
-        let c = &r.cost;
-        out += &format!(
-            "cost      {} wall, {} cpu, {} threads, {} memory on {}\n",
-            duration_text(c.wall_seconds),
-            duration_text(c.cpu_seconds),
-            c.threads,
-            bytes(c.peak_memory),
-            r.host
-        );
-        out += &format!("size      {}\n", bytes(r.bytes));
-        out += &format!(
-            "verified  its bytes are those that were written (BLAKE3 {})\n",
-            r.hash
-        );
-        for warning in &r.warnings {
-            out += &format!("warning   {warning}\n");
-        }
-    }
-    if record.is_none() {
-        out += "verified  no: no record lies beside it, so it cannot be told whether it is as it was written\n";
-    }
+    out += &verified(record);
     if let Some(labels) = artifact.collection() {
         out += &format!("items     {}: {}\n", labels.len(), labels.join(", "));
     }
@@ -198,6 +177,31 @@ fn text(path: &Utf8Path, artifact: &Artifact, record: Option<&Record>, made: &Va
             .map(|r| vec![r.name.clone(), number(r.value), r.unit.clone()])
             .collect();
         out += &format!("\n{}", table(&["result", "value", "unit"], &rows, &[1]));
+    }
+    out
+}
+
+/// What the record beside an artifact tells: what it cost, and that it is whole.
+fn verified(record: Option<&Record>) -> String {
+    let Some(r) = record else {
+        return "verified  no: no record lies beside it, so it cannot be told whether it is as it was written\n".into();
+    };
+    let c = &r.cost;
+    let mut out = format!(
+        "cost      {} wall, {} cpu, {} threads, {} memory on {}\n",
+        duration_text(c.wall_seconds),
+        duration_text(c.cpu_seconds),
+        c.threads,
+        bytes(c.peak_memory),
+        r.host
+    );
+    out += &format!("size      {}\n", bytes(r.bytes));
+    out += &format!(
+        "verified  its bytes are those that were written (BLAKE3 {})\n",
+        r.hash
+    );
+    for warning in &r.warnings {
+        out += &format!("warning   {warning}\n");
     }
     out
 }

@@ -3,84 +3,36 @@
 mod args;
 mod check_plugin;
 mod clean;
-mod damage;
 mod diff;
 mod explain;
 mod extract;
+mod found;
 mod front;
 mod inspect;
 mod keys;
 mod machine;
 mod open;
-mod optimise;
 mod plan;
 mod plugins;
 mod report;
 mod results;
 mod run;
 mod study;
-mod study_expect;
 mod study_file;
 mod study_plan;
 mod study_report;
 mod table;
 mod trust;
+mod typed;
 mod verify;
 
 pub use args::Cli;
 
 use crate::exit;
+use crate::said::{Done, warn};
 use args::Command;
 use clap::{CommandFactory, Parser};
-use plyflow_model::text::{safe, steers};
-use std::fmt::Display;
-use std::io::{IsTerminal, Write as _};
-
-/// An end of a command that is not success: what to say and the exit code.
-#[derive(Debug)]
-pub struct Stop {
-    /// One of [`exit`].
-    pub code: u8,
-    /// For the user; empty when all has been said.
-    pub text: String,
-}
-
-impl Stop {
-    /// A stop with a text.
-    pub fn new(code: u8, text: impl Display) -> Self {
-        Self {
-            code,
-            text: text.to_string(),
-        }
-    }
-
-    /// A stop after everything has been said.
-    pub fn silent(code: u8) -> Self {
-        Self {
-            code,
-            text: String::new(),
-        }
-    }
-
-    /// Wraps an error of the machine with what was being done.
-    pub fn machine<E: Display>(what: impl Display) -> impl FnOnce(E) -> Self {
-        move |e| Self::new(exit::INTERNAL, format!("{what}: {e}"))
-    }
-}
-
-/// What a command ends with.
-pub type Done = Result<(), Stop>;
-
-/// Writes to standard error, with what could steer a terminal made visible. Whoever reads may have gone, the disk may be full: what happened is told by the exit code all the same.
-pub(crate) fn warn(text: &str) {
-    let _ = std::io::stderr().lock().write_all(safe(text).as_bytes());
-}
-
-/// Shows findings in colours on a terminal. Their own text has been made safe, the colours have not.
-pub(crate) fn show_findings(findings: &plyflow_workflow::Diagnostics) {
-    let text = findings.render(std::io::stderr().is_terminal());
-    let _ = std::io::stderr().lock().write_all(text.as_bytes());
-}
+use plyflow_model::text::steers;
 
 /// Tells help, or what is wrong with the command line: in colours, unless a word of it (the name of a stranger's file, say) could steer the
 /// terminal.
@@ -141,19 +93,5 @@ fn dispatch(command: Command) -> Done {
             clap_complete::generate(shell, &mut command, "plyflow", &mut std::io::stdout());
             Ok(())
         }
-    }
-}
-
-/// Prints to standard output, with what could steer a terminal made visible; a reader that has gone away (`| head`) ends the command quietly.
-pub fn print(text: &str) -> Done {
-    use std::io::Write;
-    let mut out = std::io::stdout().lock();
-    match out
-        .write_all(safe(text).as_bytes())
-        .and_then(|()| out.flush())
-    {
-        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Err(Stop::silent(exit::OK)),
-        Err(e) => Err(Stop::machine("standard output")(e)),
-        Ok(()) => Ok(()),
     }
 }

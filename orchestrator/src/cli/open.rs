@@ -1,14 +1,15 @@
 //! Opens what most commands need: the plugins, the workflow, the store.
 
 use super::args::{Places, Workflow};
-use super::clean::locked;
-use super::{Stop, trust};
+use super::found::asked::asked_before;
+use super::trust;
 use crate::engine::core::{Limits, State};
-use crate::engine::{Options, Session};
+use crate::engine::{Of, Options, Purpose, Session};
 use crate::exit;
 use crate::plan::{Graph, recipes};
 use crate::progress::Quiet;
-use crate::store::{Lock, Store, resolved};
+use crate::said::{Stop, show_findings, warn};
+use crate::store::{Lock, LockError, Store, resolved};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::text::one_line;
 use plyflow_plugin_host::{Describer, PluginCatalog};
@@ -146,7 +147,7 @@ pub fn catalog(folders: Folders, places: &Places, store: &Utf8Path) -> Result<Pl
         .then(|| store.set_damaged_plugins_aside())
         .flatten()
     {
-        super::warn(&format!("plyflow: {text}\n"));
+        warn(&format!("plyflow: {text}\n"));
     }
     let trust = trust::trust(places, &folders.installation, folders.own)?;
     Ok(PluginCatalog::new(folders.search, cache, describer).gated(trust))
@@ -160,7 +161,7 @@ pub fn open(args: &Workflow) -> Result<Opened, Stop> {
     match load(args)? {
         Ok(opened) => Ok(opened),
         Err(findings) => {
-            super::show_findings(&findings);
+            show_findings(&findings);
             Err(Stop::silent(exit::INVALID))
         }
     }
@@ -174,7 +175,7 @@ pub fn open_at(args: &Workflow, points: &[Vec<plyflow_study::Value>]) -> Result<
     match load_at(args, Some(points))? {
         Ok(opened) => Ok(opened),
         Err(findings) => {
-            super::show_findings(&findings);
+            show_findings(&findings);
             Err(Stop::silent(exit::INVALID))
         }
     }
@@ -216,7 +217,7 @@ fn load_at(
             &overrides,
             &|name, digest, search| match points {
                 Some(points) => Some(points.to_vec()),
-                None => super::optimise::asked_before(&root, name, digest, search),
+                None => asked_before(&root, name, digest, search),
             },
         ) {
             Ok(resolution) => {
@@ -281,6 +282,24 @@ impl Opened {
         ])
     }
 
+    /// A session that has not looked at anything yet.
+    ///
+    /// # Errors
+    /// When the journal cannot be read or written.
+    pub fn session(&self, options: Options, purpose: Purpose) -> Result<Session<'_>, Stop> {
+        let root = self.store.root();
+        let what = match purpose {
+            Purpose::Look => format!("reading the store {root}"),
+            Purpose::Run(_) => format!("running with the store {root}"),
+        };
+        let of = Of {
+            workflow: &self.workflow,
+            graph: &self.graph,
+            store: &self.store,
+        };
+        Session::new(of, options, purpose).map_err(Stop::machine(what))
+    }
+
     /// A session that has looked at the store and will not run anything.
     ///
     /// # Errors
@@ -298,10 +317,7 @@ impl Opened {
             compare: Vec::new(),
             checkpoint_interval: f64::INFINITY,
         };
-        let mut session =
-            Session::new(&self.workflow, &self.graph, &self.store, options, false).map_err(
-                Stop::machine(format!("reading the store {}", self.store.root())),
-            )?;
+        let mut session = self.session(options, Purpose::Look)?;
         session.look(&mut Quiet);
         Ok(session)
     }
@@ -370,6 +386,14 @@ impl Opened {
             found.extend(named);
         }
         Ok(found)
+    }
+}
+
+/// Turns a lock that is not to be had into an exit code.
+pub fn locked(e: LockError) -> Stop {
+    match e {
+        LockError::Held { .. } => Stop::new(exit::LOCKED, e),
+        LockError::Io { .. } => Stop::new(exit::INTERNAL, e),
     }
 }
 

@@ -1,17 +1,16 @@
 //! `plan`, `validate`, `graph`: what would be done.
 
-use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs, Workflow};
+use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs};
+use super::found::change::{Difference, Fate, cost_of, difference};
 use super::open::{self, open};
-use super::report::command;
-use super::run::first_line;
 use super::study_plan::Prospects;
-use super::table::table;
-use super::{Done, Stop, print};
-use crate::engine::core::{Id, State};
-use crate::engine::{Session, input_keys};
+use super::table::{first_line, or_none, table};
+use crate::engine::Session;
+use crate::engine::core::Id;
 use crate::exit;
-use crate::plan::{Change, Ingredients, Key, changes};
+use crate::plan::{Change, KeyPart};
 use crate::progress::duration_text;
+use crate::said::{Done, Stop, print, show_findings, warn};
 use plyflow_model::job::Cost;
 use plyflow_plugin_host::cost_so_far;
 use plyflow_workflow::Part;
@@ -21,8 +20,8 @@ use serde_json::json;
 pub struct Prospect {
     /// Label: `coarse`, `local[A]`, or `local x N (from zones)`.
     pub label: String,
-    /// `cached`, `run` or `unknown`.
-    pub fate: &'static str,
+    /// What a run does with it.
+    pub fate: Fate,
     /// Why.
     pub reason: String,
     /// What it cost when it ran last, if that is known: of what is unknown, all items together.
@@ -38,7 +37,7 @@ pub fn plan(args: &PlanArgs) -> Done {
     opened.restrict(&args.until)?;
     let session = opened.look()?;
     for text in session.told() {
-        super::warn(&format!("plyflow: {text}\n"));
+        warn(&format!("plyflow: {text}\n"));
     }
     let study = Prospects::of(&session);
     if let (Some(study), TextOrJson::Text) = (&study, args.format) {
@@ -49,7 +48,7 @@ pub fn plan(args: &PlanArgs) -> Done {
         let list: Vec<_> = found
             .iter()
             .map(|p| {
-                json!({"step": p.label, "state": p.fate, "reason": p.reason,
+                json!({"step": p.label, "state": p.fate.word(), "reason": p.reason,
                     "last_wall_seconds": p.last.map(|c| c.wall_seconds),
                     "last_cpu_seconds": p.last.map(|c| c.cpu_seconds)})
             })
@@ -64,7 +63,7 @@ pub fn plan(args: &PlanArgs) -> Done {
         .iter()
         .map(|p| {
             let wall = p.last.map(|c| duration_text(c.wall_seconds));
-            let (label, fate) = (p.label.clone(), p.fate.to_owned());
+            let (label, fate) = (p.label.clone(), p.fate.word().to_owned());
             vec![label, fate, wall.unwrap_or_default(), p.reason.clone()]
         })
         .collect();
@@ -77,11 +76,11 @@ fn sum(found: &[Prospect]) -> String {
     let count = |fate| found.iter().filter(|p| p.fate == fate).count();
     let mut text = format!(
         "{} to run, {} cached, {} unknown",
-        count("run"),
-        count("cached"),
-        count("unknown")
+        count(Fate::Run),
+        count(Fate::Cached),
+        count(Fate::Unknown)
     );
-    let open = || found.iter().filter(|p| p.fate != "cached");
+    let open = || found.iter().filter(|p| p.fate != Fate::Cached);
     let cpu: f64 = open().filter_map(|p| p.last).map(|c| c.cpu_seconds).sum();
     let new = open().filter(|p| p.last.is_none()).count();
     if new < open().count() {
@@ -114,14 +113,14 @@ pub fn prospects(session: &Session<'_>) -> Vec<Prospect> {
             let from: Vec<String> = hidden.iter().map(|id| core.label(*id)).collect();
             found.push(Prospect {
                 label: format!("{} x N (from {})", plan.name, from.join(", ")),
-                fate: "unknown",
+                fate: Fate::Unknown,
                 reason: format!("how many is known when {} is done", from.join(", ")),
                 last: cost_of_items(session, &plan.name, &hidden),
             });
         } else if by_step[step].is_empty() {
             found.push(Prospect {
                 label: format!("{} x 0", plan.name),
-                fate: "cached",
+                fate: Fate::Cached,
                 reason: "the collection it fans out over is empty".into(),
                 last: None,
             });
@@ -133,22 +132,18 @@ pub fn prospects(session: &Session<'_>) -> Vec<Prospect> {
 fn prospect(session: &Session<'_>, id: Id) -> Prospect {
     let core = &session.core;
     let instance = &core.instances()[id];
-    let (fate, reason) = match instance.state {
-        State::Done { .. } => (
-            "cached",
-            instance
-                .key
-                .map(|k| format!("key {}", k.short()))
-                .unwrap_or_default(),
-        ),
-        State::Unkeyed => ("unknown", waits_for(session, id)),
-        _ => (
-            "run",
-            match session.failed_before(id) {
-                Some(f) => format!("failed last time: {}", first_line(&f.reason)),
-                None => why(session, id),
-            } + &goes_on(session, id),
-        ),
+    let fate = Fate::of(instance.state);
+    let reason = match (fate, session.failed_before(id)) {
+        (Fate::Cached, _) => {
+            let key = instance.key.map(|k| format!("key {}", k.short()));
+            key.unwrap_or_default()
+        }
+        (Fate::Unknown, _) => waits_for(session, id),
+        (Fate::Run, Some(f)) => {
+            let first = first_line(&f.reason);
+            format!("failed last time: {first}{}", goes_on(session, id))
+        }
+        (Fate::Run, None) => why(session, id) + &goes_on(session, id),
     };
     let name = &core.graph().steps[instance.step].name;
     let last = session.journal.last(name, &instance.item);
@@ -157,7 +152,7 @@ fn prospect(session: &Session<'_>, id: Id) -> Prospect {
         fate,
         reason,
         last: last
-            .filter(|_| fate != "cached")
+            .filter(|_| fate != Fate::Cached)
             .and_then(|key| cost_of(session, &key)),
     }
 }
@@ -174,10 +169,6 @@ fn goes_on(session: &Session<'_>, id: Id) -> String {
         ),
         None => String::new(),
     }
-}
-
-pub(super) fn cost_of(session: &Session<'_>, key: &Key) -> Option<Cost> {
-    session.store.read_record(key).ok().map(|r| r.cost)
 }
 
 /// What the items of a step that fans out over the collections of `givers` cost when they ran last, added up.
@@ -238,96 +229,19 @@ fn why(session: &Session<'_>, id: Id) -> String {
         Difference::Never => "has not run before".into(),
         Difference::Gone => "its artifact is not in the store any more".into(),
         Difference::Changed(list) => {
-            let mut own: Vec<String> = list
-                .iter()
-                .filter(|c| !c.part.starts_with("input "))
+            let is_input = |c: &&Change| matches!(c.part, KeyPart::Input { .. });
+            let (inputs, rest): (Vec<&Change>, Vec<&Change>) = list.iter().partition(is_input);
+            let mut own: Vec<String> = (rest.iter())
                 .map(|c| format!("{}: {} -> {}", c.part, or_none(&c.old), or_none(&c.new)))
                 .collect();
-            let inputs: Vec<&str> = list
-                .iter()
-                .filter_map(|c| c.part.strip_prefix("input "))
-                .collect();
-            match inputs.len() {
-                0 => {}
-                1 => own.push(format!("input {} changed", inputs[0])),
-                n => own.push(format!("{n} inputs changed")),
+            match inputs[..] {
+                [] => {}
+                [one] => own.push(format!("{} changed", one.part)),
+                _ => own.push(format!("{} inputs changed", inputs.len())),
             }
             own.join("; ")
         }
     }
-}
-
-pub(super) fn or_none(text: &str) -> &str {
-    if text.is_empty() { "(none)" } else { text }
-}
-
-/// What to say when the store has nothing of a workflow as it is now, `given` by the user, or nothing of some of its `steps` (of all if there are none).
-pub(super) fn nothing_yet(session: &Session<'_>, steps: &[String], given: &Workflow) -> String {
-    let core = &session.core;
-    let again = command(given);
-    let named: Vec<usize> = steps.iter().flat_map(|s| core.graph().named(s)).collect();
-    let wanted = |id: &Id| steps.is_empty() || named.contains(&core.instances()[*id].step);
-    let of_these = || (0..core.instances().len()).filter(wanted);
-    if let Some(f) = of_these().find_map(|id| session.failed_before(id)) {
-        let (label, reason) = (f.label, f.reason.replace('\n', "\n  "));
-        return format!(
-            "nothing of it is in the store: {label} failed last time:\n  {reason}\nrun it again with: {again}"
-        );
-    }
-    if let Some((id, flaw)) = of_these().find_map(|id| Some((id, session.flaw(id)?))) {
-        return format!(
-            "nothing of it can be shown: {}: {}; make it again with: {again}",
-            core.label(id),
-            flaw.text()
-        );
-    }
-    if of_these().all(|id| matches!(difference(session, id), Difference::Never)) {
-        let what = if steps.is_empty() {
-            "nothing has been run yet; start with"
-        } else {
-            "nothing of these steps is in the store; run them with"
-        };
-        return format!("{what}: {again}");
-    }
-    format!(
-        "nothing of what was run is of this workflow as it is now: parameters, files or plugins have changed since, or artifacts are gone. \
-         What changed: {}; run it again: {again}",
-        again.replacen("plyflow run", "plyflow plan", 1)
-    )
-}
-
-/// How an instance differs from the last run.
-pub enum Difference {
-    /// The journal knows no earlier key.
-    Never,
-    /// The key is the same; only the artifact is missing.
-    Gone,
-    /// These parts of the key.
-    Changed(Vec<Change>),
-}
-
-/// Compares an instance with what the last run knew of it.
-pub fn difference(session: &Session<'_>, id: Id) -> Difference {
-    let core = &session.core;
-    let instance = &core.instances()[id];
-    let step = &core.graph().steps[instance.step];
-    let Some(last) = session.journal.last(&step.name, &instance.item) else {
-        return Difference::Never;
-    };
-    if Some(last) == instance.key {
-        return Difference::Gone;
-    }
-    let Some((ingredients, inputs)) = session.journal.detail(&last) else {
-        return Difference::Never;
-    };
-    let now = input_keys(core, id);
-    Difference::Changed(changes(
-        (&ingredients, &inputs),
-        (
-            &Ingredients::of(&session.workflow.steps[instance.step]),
-            &now,
-        ),
-    ))
 }
 
 /// `plyflow validate`.
@@ -358,7 +272,7 @@ pub fn validate(args: &ValidateArgs) -> Done {
                 // A reader that has gone away must not make findings a success.
                 let _ = print(&format!("{:#}\n", findings.to_json()));
             } else {
-                super::show_findings(&findings);
+                show_findings(&findings);
             }
             Err(Stop::silent(exit::INVALID))
         }

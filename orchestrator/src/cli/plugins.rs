@@ -1,9 +1,10 @@
 //! `plugins` and `schema`: what can be written into files.
 
 use super::args::{PluginsArgs, SchemaArgs, SchemaKind, TextOrJson};
+use super::keys;
 use super::open::{catalog, folders, store_root};
-use super::{Done, Stop, keys, print};
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use camino::Utf8Path;
 use plyflow_model::schema;
 use plyflow_plugin_host::{PluginCatalog, manifest_file};

@@ -1,14 +1,16 @@
 //! `report`, and the report and summary at the end of a run.
 
 use super::args::{ReportArgs, Workflow};
-use super::damage::{concluded, recheck, tell_gone};
+use super::found::change::nothing_yet;
+use super::found::damage::{concluded, recheck, tell_gone};
+use super::found::row::{Row, Verdict};
+use super::found::rows::Found;
 use super::open::{Opened, open};
-use super::plan::nothing_yet;
-use super::results::{OK, Row, records, rows};
-use super::{Done, Stop, print};
+use super::typed::arguments;
 use crate::engine::core::{Id, State};
 use crate::engine::{Depth, Failure, Session};
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
 use plyflow_report::{Expectation, Instance, ReportInput, is_current, write_report};
@@ -50,23 +52,6 @@ pub fn report(args: &ReportArgs) -> Done {
     }
     let bytes = write_report(&input, &path).map_err(|e| Stop::new(exit::INTERNAL, e))?;
     print(&format!("{path}: {}\n", super::table::bytes(bytes)))
-}
-
-/// What the store has of a workflow.
-pub struct Found {
-    /// Instances and their records, in the order of the workflow.
-    pub records: Vec<(Id, Record)>,
-    /// Their numbers.
-    pub rows: Vec<Row>,
-}
-
-impl Found {
-    /// Reads all records.
-    pub fn read(session: &Session<'_>) -> Self {
-        let records = records(session);
-        let rows = rows(session, &records);
-        Self { records, rows }
-    }
 }
 
 /// The report of a workflow file: `report.html` for `workflow.yaml`, `report-coarse.html` for
@@ -132,44 +117,6 @@ pub fn is_written(path: &Utf8Path, fingerprint: &str) -> bool {
     is_current(path, fingerprint)
 }
 
-/// The command that makes the results of a workflow again, as one types it.
-pub(super) fn command(given: &Workflow) -> String {
-    format!("plyflow run {}", arguments(given))
-}
-
-/// The workflow file with its options, as one types them behind a command.
-fn arguments(given: &Workflow) -> String {
-    let mut words = vec![given.workflow.to_string()];
-    let places = &given.places;
-    let folders = places.plugins.iter().map(|p| ("--plugins", p.as_str()));
-    let store = places.store.iter().map(|p| ("--store", p.as_str()));
-    let set = given.set.iter().map(|s| ("--set", s.as_str()));
-    for (option, value) in set.chain(store).chain(folders) {
-        words.extend([option.to_owned(), value.to_owned()]);
-    }
-    // As it was typed: `--trust` alone, or with what it names.
-    let trust = places.trust.iter().map(|t| match t.as_str() {
-        "" => "--trust".to_owned(),
-        named => format!("--trust={named}"),
-    });
-    words.extend(trust);
-    words
-        .iter()
-        .map(|w| quoted(w))
-        .collect::<Vec<_>>()
-        .join(" ")
-}
-
-/// A word as one types it for a shell.
-pub(super) fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
-}
-
 /// All that a report or a summary is made of. `given`, `until`: the workflow as the user asked for it; `page`: where the report lies.
 pub fn input(
     opened: &Opened,
@@ -204,7 +151,7 @@ pub fn input(
             minimum: e.minimum,
             maximum: e.maximum,
             source: e.source.clone(),
-            met: r.verdict() == Some(OK),
+            met: r.verdict() == Some(Verdict::Ok),
         })
     };
     let failed = |label: &str| failures.iter().any(|f| f.label == label);
@@ -236,17 +183,6 @@ pub fn input(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_command_of_a_report_repeats_overrides_so_that_a_shell_takes_them() {
-        let given = Workflow {
-            workflow: "a/workflow.yaml".into(),
-            places: super::super::args::Places::default(),
-            set: vec!["detect.over_shear_positive=9 deg".into(), "a.b=it's".into()],
-        };
-        let expected = "plyflow run a/workflow.yaml --set 'detect.over_shear_positive=9 deg' --set 'a.b=it'\\''s'";
-        assert_eq!(command(&given), expected);
-    }
 
     #[test]
     fn workflows_of_one_folder_have_reports_of_their_own() {

@@ -1,76 +1,21 @@
 //! `results`: the named numbers of what the store has, beside what the workflow expects.
 
 use super::args::{Format, ResultsArgs};
-use super::damage::{concluded, recheck, tell_gone};
+use super::found::change::nothing_yet;
+use super::found::damage::{concluded, recheck, tell_gone};
+use super::found::row::{Row, Verdict};
+use super::found::rows::{Found, records, rows};
 use super::open::{Opened, open};
-use super::plan::nothing_yet;
-use super::report::{Found, input};
-use super::table::{bytes, number, table};
-use super::{Done, Stop, print};
-use crate::engine::core::{Id, State};
+use super::report::{beside, input};
+use super::table::{bytes, csv_text, number, table};
+use crate::engine::core::Id;
 use crate::engine::{Depth, Session};
 use crate::exit;
 use crate::progress::duration_text;
+use crate::said::{Done, Stop, print};
 use plyflow_model::job::Record;
 use plyflow_workflow::resolved::Expectation;
 use serde_json::json;
-
-/// Verdicts on what is expected.
-pub const OK: &str = "ok";
-pub const MISSED: &str = "missed";
-const NOT_JUDGED: &str = "not judged";
-
-/// One number, or one expectation without a number.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// Step.
-    pub step: String,
-    /// Labels of its item.
-    pub item: Vec<String>,
-    /// Name of the number.
-    pub name: String,
-    /// Value (SI); absent when the step did not report it.
-    pub value: Option<f64>,
-    /// Unit.
-    pub unit: String,
-    /// Whether it depends on the machine.
-    pub measured: bool,
-    /// What is expected of it.
-    pub expected: Option<Expectation>,
-}
-
-impl Row {
-    /// What it is about, in a list.
-    fn title(&self) -> String {
-        let e = self.expected.as_ref();
-        if self.step == super::study::STEP {
-            return self.name.clone();
-        }
-        if e.is_some_and(|e| !e.mean_over.is_empty()) {
-            format!("{} ({})", self.name, self.step)
-        } else {
-            let item = match self.item.is_empty() {
-                true => String::new(),
-                false => format!("[{}]", self.item.join(",")),
-            };
-            format!("{}{item}.{}", self.step, self.name)
-        }
-    }
-
-    /// `ok`, `missed`, or `not judged` without a value; only when something is expected.
-    pub fn verdict(&self) -> Option<&'static str> {
-        let e = self.expected.as_ref()?;
-        let Some(value) = self.value else {
-            return Some(NOT_JUDGED);
-        };
-        let near = e.value.is_none_or(|x| {
-            // Without a tolerance the same number is meant, up to rounding in its text.
-            (value - x).abs() <= e.tolerance.unwrap_or(1e-9 * x.abs())
-        });
-        let inside = e.minimum.is_none_or(|m| value >= m) && e.maximum.is_none_or(|m| value <= m);
-        Some(if near && inside { OK } else { MISSED })
-    }
-}
 
 /// What the expectation says, in words.
 fn expectation_text(e: &Expectation) -> String {
@@ -88,169 +33,6 @@ fn expectation_text(e: &Expectation) -> String {
         parts.push(format!("<= {}", number(m)));
     }
     parts.join(", ")
-}
-
-/// Records of all instances that the store has, in the order of the workflow.
-pub fn records(session: &Session<'_>) -> Vec<(Id, Record)> {
-    let core = &session.core;
-    let mut ids: Vec<Id> = (0..core.instances().len())
-        .filter(|id| matches!(core.instances()[*id].state, State::Done { .. }))
-        .collect();
-    ids.sort_by_key(|id| {
-        (
-            core.instances()[*id].step,
-            core.instances()[*id].item.clone(),
-        )
-    });
-    let read = |id: Id| {
-        let key = core.instances()[id].key?;
-        Some((id, session.store.read_record(&key).ok()?))
-    };
-    ids.into_iter().filter_map(read).collect()
-}
-
-/// All numbers and expectations.
-pub fn rows(session: &Session<'_>, records: &[(Id, Record)]) -> Vec<Row> {
-    let core = &session.core;
-    let expectations = &session.workflow.expectations;
-    let mut met = vec![false; expectations.len()];
-    let mut rows = Vec::new();
-    for (id, record) in records {
-        let step = &core.graph().steps[core.instances()[*id].step].name;
-        for result in &record.results {
-            let row = Row {
-                step: step.clone(),
-                item: core.item_labels(*id),
-                name: result.name.clone(),
-                value: Some(result.value),
-                unit: result.unit.clone(),
-                measured: result.measured,
-                expected: None,
-            };
-            let before = rows.len();
-            // A number may be held against several sources: one row each.
-            for (at, e) in expectations.iter().enumerate() {
-                let each = e.mean_over.is_empty();
-                if each && e.step == *step && e.result == result.name {
-                    met[at] = true;
-                    rows.push(Row {
-                        expected: Some(e.clone()),
-                        ..row.clone()
-                    });
-                }
-            }
-            if rows.len() == before {
-                rows.push(row);
-            }
-        }
-    }
-    // What `--until` leaves out is not expected either.
-    let left_out =
-        |name: &String| (core.graph().steps.iter()).any(|s| s.name == *name && !s.wanted);
-    for (e, met) in expectations.iter().zip(met) {
-        if left_out(&e.step) || e.mean_over.iter().any(left_out) {
-            continue;
-        }
-        if !e.mean_over.is_empty() {
-            let progress = e.mean_over.iter().map(|s| Progress::of(session, s));
-            rows.extend(mean(e, &rows, &progress.collect::<Vec<_>>()));
-            continue;
-        }
-        let progress = Progress::of(session, &e.step);
-        let unfinished = progress.unfinished.iter().map(|item| Row {
-            item: item.clone(),
-            ..absent(e)
-        });
-        rows.extend(unfinished);
-        let told = met || !progress.unfinished.is_empty();
-        if progress.hidden || (!told && !progress.is_nothing()) {
-            rows.push(absent(e));
-        }
-    }
-    rows.extend(super::study_expect::rows(session, records));
-    rows
-}
-
-/// How far the instances of a step are.
-struct Progress {
-    /// Number of its instances that are known.
-    count: usize,
-    /// Labels of the items that have no artifact.
-    unfinished: Vec<Vec<String>>,
-    /// Whether a collection that is not there yet may bring more.
-    hidden: bool,
-}
-
-impl Progress {
-    fn of(session: &Session<'_>, name: &str) -> Self {
-        let core = &session.core;
-        let is_of = |id: &Id| core.graph().steps[core.instances()[*id].step].name == name;
-        let ids: Vec<Id> = (0..core.instances().len()).filter(is_of).collect();
-        let done = |id: &Id| matches!(core.instances()[*id].state, State::Done { .. });
-        let at = core.graph().steps.iter().position(|s| s.name == name);
-        Self {
-            count: ids.len(),
-            unfinished: (ids.iter().filter(|id| !done(id)))
-                .map(|id| core.item_labels(*id))
-                .collect(),
-            hidden: at.is_some_and(|at| !core.hidden_by(at).is_empty()),
-        }
-    }
-
-    /// Whether its collection is there and empty: no zone, or passes that have come to rest. Then there is nothing to expect.
-    fn is_nothing(&self) -> bool {
-        self.count == 0 && !self.hidden
-    }
-
-    fn is_finished(&self) -> bool {
-        self.unfinished.is_empty() && !self.hidden
-    }
-}
-
-/// An expectation whose number is not there.
-fn absent(e: &Expectation) -> Row {
-    Row {
-        step: e.step.clone(),
-        item: vec![],
-        name: e.result.clone(),
-        value: None,
-        unit: e.unit.clone(),
-        measured: false,
-        expected: Some(e.clone()),
-    }
-}
-
-/// The mean over steps and their items of what `e` is about; without a value unless every item of every step is finished and every step
-/// that has any has reported. `None`: none of the steps has an item. `progress`: of the steps, in their order.
-fn mean(e: &Expectation, rows: &[Row], progress: &[Progress]) -> Option<Row> {
-    if progress.iter().all(Progress::is_nothing) {
-        return None;
-    }
-    let mut seen: Vec<(&str, &[String])> = Vec::new();
-    let mut row = Row {
-        step: e.mean_over.join(", "),
-        name: format!("mean of {}", e.result),
-        ..absent(e)
-    };
-    let mut sum = 0.0;
-    for r in rows.iter().filter(|r| r.name == e.result) {
-        let Some(value) = r.value.filter(|_| e.mean_over.contains(&r.step)) else {
-            continue;
-        };
-        // A number that is held against several sources has several rows.
-        if !seen.contains(&(&r.step, &r.item)) {
-            seen.push((&r.step, &r.item));
-            sum += value;
-            (row.unit, row.measured) = (r.unit.clone(), row.measured || r.measured);
-        }
-    }
-    let is_whole = |(step, progress): (&String, &Progress)| {
-        progress.is_nothing() || (progress.is_finished() && seen.iter().any(|(s, _)| s == step))
-    };
-    if e.mean_over.iter().zip(progress).all(is_whole) {
-        row.value = Some(sum / seen.len() as f64);
-    }
-    Some(row)
 }
 
 /// A table of numbers.
@@ -279,7 +61,7 @@ pub fn results_table(rows: &[Row]) -> String {
                 .as_ref()
                 .map(expectation_text)
                 .unwrap_or_default(),
-            r.verdict().unwrap_or_default().to_owned(),
+            r.verdict().map_or("", Verdict::word).to_owned(),
         ]
     };
     let lines: Vec<Vec<String>> = rows.iter().map(line).collect();
@@ -317,7 +99,7 @@ fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> ser
             let e = r.expected.as_ref();
             json!({
                 "step": r.step, "item": r.item, "result": r.name, "value": r.value, "unit": r.unit,
-                "measured": r.measured, "verdict": r.verdict(),
+                "measured": r.measured, "verdict": r.verdict().map(Verdict::word),
                 "expected": e.map(|e| json!({"value": e.value, "tolerance": e.tolerance,
                     "minimum": e.minimum, "maximum": e.maximum, "source": e.source})),
             })
@@ -351,15 +133,6 @@ pub fn is_named(session: &Session<'_>, step: &str, wanted: &[String]) -> bool {
     is(step) || of(step).is_some_and(|base| is(&base))
 }
 
-/// A text as a cell of CSV.
-pub fn csv_text(t: &str) -> String {
-    if t.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", t.replace('"', "\"\""))
-    } else {
-        t.to_owned()
-    }
-}
-
 fn as_csv(rows: &[Row]) -> String {
     let mut out = String::from(
         "step,item,result,value,unit,measured,expected,tolerance,minimum,maximum,verdict,source\n",
@@ -378,7 +151,7 @@ fn as_csv(rows: &[Row]) -> String {
             value(e.and_then(|e| e.tolerance)),
             value(e.and_then(|e| e.minimum)),
             value(e.and_then(|e| e.maximum)),
-            r.verdict().unwrap_or_default().to_owned(),
+            r.verdict().map_or("", Verdict::word).to_owned(),
             csv_text(e.and_then(|e| e.source.as_deref()).unwrap_or_default()),
         ];
         out += &(cells.join(",") + "\n");
@@ -450,7 +223,7 @@ fn front(
         records,
         rows: Vec::new(),
     };
-    let page = super::report::beside(&opened.workflow.file, &[]);
+    let page = beside(&opened.workflow.file, &[]);
     let asked = (&args.workflow, &[][..], page.as_path());
     let ways = plyflow_report::ways(&input(opened, session, &found, &[], asked));
     match args.format {
@@ -472,13 +245,16 @@ pub fn checked(told: Done, asked: bool, rows: &[Row]) -> Done {
 /// Ends with the code for missed expectations if there are any, or any that could not be judged.
 fn check(rows: &[Row]) -> Done {
     let mut parts = Vec::new();
-    for (verdict, why) in [(MISSED, ""), (NOT_JUDGED, " (no value)")] {
+    for (verdict, why) in [(Verdict::Missed, ""), (Verdict::NotJudged, " (no value)")] {
         let found = rows.iter().filter(|r| r.verdict() == Some(verdict));
         let titles: Vec<String> = found.map(Row::title).collect();
         if let n @ 1.. = titles.len() {
             let s = if n == 1 { "" } else { "s" };
             let titles = titles.join(", ");
-            parts.push(format!("{n} expectation{s} {verdict}{why}: {titles}"));
+            parts.push(format!(
+                "{n} expectation{s} {}{why}: {titles}",
+                verdict.word()
+            ));
         }
     }
     if parts.is_empty() {

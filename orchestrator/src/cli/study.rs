@@ -1,267 +1,20 @@
 //! The table of a study: a row for each of its points, whatever became of it.
 
 use super::args::{Format, ResultsArgs};
-use super::results::csv_text;
-use super::table::{number, table};
-use super::{Done, Stop, print};
+use super::found::answer::{Line, Status};
+use super::found::points::Table;
+use super::table::{csv_text, head, number, shortened, table};
 use crate::engine::Session;
-use crate::engine::class_of;
-use crate::engine::core::{Id, State};
+use crate::engine::core::Id;
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use plyflow_model::job::Record;
 use plyflow_model::units::si_number;
-use plyflow_model::workflow::ResponseOf;
-use plyflow_workflow::resolved::{ResponseFrom, Study, StudyPoint, StudyResponse, StudyValue};
+use plyflow_workflow::resolved::{StudyPoint, StudyValue};
 use serde_json::{Value, json};
-use std::collections::{BTreeSet, HashMap};
-
-/// Where the expectations over a study stand in lists of results.
-pub const STEP: &str = "study";
 
 /// Points that a summary shows.
 const SHOWN: usize = 20;
-
-/// Characters of a cause that a table shows.
-const CAUSE: usize = 80;
-
-/// What became of a point.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Status {
-    /// All its steps are there.
-    Done,
-    /// A step of it has failed.
-    Failed {
-        /// The step.
-        step: String,
-        /// The class of the failure.
-        class: &'static str,
-        /// Why, in one line.
-        cause: String,
-    },
-    /// Something of it has not been run yet.
-    NotRun,
-}
-
-impl Status {
-    /// In a word.
-    pub fn word(&self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::Failed { .. } => "failed",
-            Self::NotRun => "not run",
-        }
-    }
-}
-
-/// A row of the table.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Line {
-    /// What became of the point.
-    pub status: Status,
-    /// For each response: its value (SI); `None`: there is none.
-    pub responses: Vec<Option<f64>>,
-    /// For each step that a response is of: the keys of its artifacts, hex, of several items one behind the other.
-    pub keys: Vec<String>,
-}
-
-/// The table.
-pub struct Table<'s> {
-    /// The study.
-    pub study: &'s Study,
-    /// Steps that responses are of, each once, as positions among the steps of the file.
-    pub steps: Vec<usize>,
-    /// A row for each point.
-    pub lines: Vec<Line>,
-    /// Of an optimisation: how far it has come with each point.
-    pub trace: Option<super::optimise::Trace>,
-}
-
-impl<'s> Table<'s> {
-    /// Reads what the store has of every point. `records`: of all instances that are done.
-    ///
-    /// # Panics
-    /// When the workflow is no study; the caller has asked.
-    pub fn read(session: &Session<'s>, records: &[(Id, Record)]) -> Self {
-        let study = session.workflow.study.as_ref().expect("a study");
-        let mut steps: Vec<usize> = Vec::new();
-        for response in &study.responses {
-            if let Some(step) = response.step().filter(|s| !steps.contains(s)) {
-                steps.push(step);
-            }
-        }
-        let records: HashMap<Id, &Record> = records.iter().map(|(id, r)| (*id, r)).collect();
-        let mut by_step: Vec<Vec<Id>> = vec![Vec::new(); session.core.graph().steps.len()];
-        for (id, instance) in session.core.instances().iter().enumerate() {
-            by_step[instance.step].push(id);
-        }
-        for ids in &mut by_step {
-            ids.sort_by(|a, b| {
-                session.core.instances()[*a]
-                    .item
-                    .cmp(&session.core.instances()[*b].item)
-            });
-        }
-        let mut known: HashMap<usize, Fate> = HashMap::new();
-        let lines = study.points.iter().enumerate().map(|(at, point)| {
-            let fates: Vec<usize> = point.steps.clone();
-            for step in &fates {
-                known
-                    .entry(*step)
-                    .or_insert_with(|| Fate::of(session, *step, &by_step[*step]));
-            }
-            let status = status(fates.iter().map(|s| &known[s]));
-            let is_done = matches!(status, Status::Done);
-            let value = |r: &StudyResponse| match &r.from {
-                ResponseFrom::Step { step, result, of } => {
-                    let step = point.steps[*step];
-                    let whole = known[&step] == Fate::Done;
-                    whole
-                        .then(|| response(result, *of, &by_step[step], &records))
-                        .flatten()
-                }
-                // A point that has not run, or has failed, has no row of numbers: nobody is to think that it has.
-                ResponseFrom::Variables { values, .. } => is_done.then(|| values[at]),
-            };
-            // What other steps of a failed point had come to when it failed is chance, and a search does not go on with them.
-            let told = study.optimisation.is_none() || !matches!(status, Status::Failed { .. });
-            let value = |r: &StudyResponse| told.then(|| value(r)).flatten();
-            let keys = |step: &usize| {
-                let ids = by_step[point.steps[*step]].iter();
-                let keys = ids.filter_map(|id| session.core.instances()[*id].key);
-                keys.map(|k| k.hex()).collect::<Vec<_>>().join(" ")
-            };
-            Line {
-                status,
-                responses: study.responses.iter().map(value).collect(),
-                keys: steps.iter().map(keys).collect(),
-            }
-        });
-        let lines: Vec<Line> = lines.collect();
-        Self {
-            study,
-            steps,
-            trace: super::optimise::Trace::of(session, study, &lines),
-            lines,
-        }
-    }
-
-    /// How many points have this status.
-    pub fn count(&self, word: &str) -> usize {
-        self.lines
-            .iter()
-            .filter(|l| l.status.word() == word)
-            .count()
-    }
-
-    /// Seeds of the samples, in words.
-    pub fn seeds(&self) -> String {
-        let seeds = self.study.samples.iter().map(|s| s.2.to_string());
-        seeds.collect::<Vec<_>>().join(" ")
-    }
-}
-
-/// What became of a step at a point.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Fate {
-    Done,
-    Failed(String, String),
-    NotRun,
-}
-
-impl Fate {
-    fn of(session: &Session<'_>, step: usize, ids: &[Id]) -> Self {
-        let core = &session.core;
-        // `--until` may have left it out.
-        if !core.graph().steps[step].wanted {
-            return Self::NotRun;
-        }
-        if let Some(failure) = ids.iter().find_map(|id| session.failed_before(*id)) {
-            return Self::Failed(failure.label, failure.reason);
-        }
-        let done = |id: &Id| matches!(core.instances()[*id].state, State::Done { .. });
-        match ids.iter().all(done) && core.hidden_by(step).is_empty() {
-            true => Self::Done,
-            false => Self::NotRun,
-        }
-    }
-}
-
-fn status<'f>(fates: impl Iterator<Item = &'f Fate>) -> Status {
-    let mut all = Status::Done;
-    for fate in fates {
-        match fate {
-            Fate::Failed(step, reason) => {
-                return Status::Failed {
-                    step: step.clone(),
-                    class: class_of(reason),
-                    cause: super::run::first_line(reason).to_owned(),
-                };
-            }
-            Fate::NotRun => all = Status::NotRun,
-            Fate::Done => {}
-        }
-    }
-    all
-}
-
-/// `result` of the items of a step, and what is taken `of` them.
-fn response(
-    result: &str,
-    of: Option<ResponseOf>,
-    ids: &[Id],
-    records: &HashMap<Id, &Record>,
-) -> Option<f64> {
-    let mut values = Vec::with_capacity(ids.len());
-    for id in ids {
-        let results = &records.get(id)?.results;
-        // What depends on the machine has no place in a table that is the same on every one.
-        let found = results.iter().find(|n| n.name == result && !n.measured)?;
-        values.push(found.value);
-    }
-    let sum = || values.iter().sum::<f64>();
-    match of {
-        None => values.first().copied().filter(|_| values.len() == 1),
-        Some(ResponseOf::Sum) => Some(sum()),
-        _ if values.is_empty() => None,
-        Some(ResponseOf::Mean) => Some(sum() / values.len() as f64),
-        Some(ResponseOf::Max) => values.iter().copied().reduce(f64::max),
-        Some(ResponseOf::Min) => values.iter().copied().reduce(f64::min),
-    }
-}
-
-/// What a study bears of the failures of a run, in words; `None`: it does not.
-pub fn borne(session: &Session<'_>) -> Option<String> {
-    let study = session.workflow.study.as_ref()?;
-    if study.optimisation.is_some() {
-        return Some("what fails at a point is an answer to an optimisation\n".into());
-    }
-    let most = study.at_most_failures? as usize;
-    let core = &session.core;
-    let failed: BTreeSet<usize> = (0..core.instances().len())
-        .filter(|id| core.instances()[*id].state == State::Failed)
-        .map(|id| core.instances()[id].step)
-        .collect();
-    let is_failed = |p: &&StudyPoint| p.steps.iter().any(|s| failed.contains(s));
-    let n = study.points.iter().filter(is_failed).count();
-    let points = study.points.len();
-    (n <= most).then(|| {
-        format!(
-            "{n} of {points} points failed; the study bears {most} (`at_most_failures`), so that this run ends well\n"
-        )
-    })
-}
-
-// Expectations over the points.
-
-// How the table is shown.
-
-/// A name with its unit, as in the head of a table: `angle [deg]`.
-pub fn head(name: &str, unit: &str) -> String {
-    match unit {
-        "" | "1" => name.to_owned(),
-        unit => format!("{name} [{unit}]"),
-    }
-}
 
 /// A value of a variable, in the unit of its column.
 pub fn shown(value: &StudyValue) -> String {
@@ -306,10 +59,13 @@ pub fn in_short(session: &Session<'_>, found: &Table<'_>) -> String {
 /// How many points there are of each kind.
 fn sum(table: &Table<'_>) -> String {
     let mut parts = vec![format!("{} points", table.lines.len())];
-    for word in ["done", "failed", "not run"] {
-        match table.count(word) {
-            0 => {}
-            n => parts.push(format!("{n} {word}")),
+    for (n, word) in [
+        (table.count(|s| *s == Status::Done), "done"),
+        (table.count(Status::is_failed), "failed"),
+        (table.count(|s| *s == Status::NotRun), "not run"),
+    ] {
+        if n > 0 {
+            parts.push(format!("{n} {word}"));
         }
     }
     parts.join(", ") + "\n"
@@ -318,15 +74,7 @@ fn sum(table: &Table<'_>) -> String {
 /// What an optimisation has led to; empty for a study.
 fn best(table: &Table<'_>) -> String {
     let trace = table.trace.as_ref();
-    trace.map_or_else(String::new, |t| t.in_words(table))
-}
-
-/// The begin of a text.
-pub fn shortened(text: &str) -> String {
-    match text.char_indices().nth(CAUSE) {
-        Some((end, _)) => format!("{}…", text[..end].trim_end()),
-        None => text.to_owned(),
-    }
+    trace.map_or_else(String::new, |t| t.in_words(table.study))
 }
 
 fn as_table(found: &Table<'_>, most: usize) -> String {
@@ -338,7 +86,7 @@ fn as_table(found: &Table<'_>, most: usize) -> String {
         .collect();
     heads.extend(study.responses.iter().map(|r| head(&r.name, &r.unit)));
     let numbers: Vec<usize> = (0..heads.len()).collect();
-    let failed = found.count("failed") > 0;
+    let failed = found.count(Status::is_failed) > 0;
     heads.extend(found.trace.iter().flat_map(|t| t.heads(study)));
     heads.push("status".into());
     if failed {
@@ -399,7 +147,7 @@ pub fn as_csv(found: &Table<'_>) -> String {
         cells.push(line.status.word().into());
         match &line.status {
             Status::Failed { step, class, cause } => {
-                cells.extend([step.clone(), (*class).to_owned(), cause.clone()]);
+                cells.extend([step.clone(), class.to_string(), cause.clone()]);
             }
             _ => cells.extend([const { String::new() }; 3]),
         }
@@ -432,7 +180,7 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
             names.zip(line.keys.iter().map(|k| json!(k))).collect();
         let failure = match &line.status {
             Status::Failed { step, class, cause } => {
-                json!({"step": step, "class": class, "cause": cause})
+                json!({"step": step, "class": class.to_string(), "cause": cause})
             }
             _ => Value::Null,
         };
@@ -453,6 +201,6 @@ fn as_json(session: &Session<'_>, found: &Table<'_>) -> Value {
         "workflow": session.workflow.name,
         "variables": variables.collect::<Vec<_>>(), "responses": responses.collect::<Vec<_>>(),
         "samples": samples.collect::<Vec<_>>(), "points": points,
-        "optimisation": found.trace.as_ref().and_then(|t| t.told(found)),
+        "optimisation": found.trace.as_ref().and_then(|t| t.told(found.study)),
     })
 }

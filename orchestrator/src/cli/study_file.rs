@@ -2,7 +2,9 @@
 //!
 //! What is in them depends on the workflow, on the plugins and on what came out, not on the order in which it did.
 
-use super::study::{Line, Status, Table, as_csv};
+use super::found::answer::{Line, Status};
+use super::found::points::Table;
+use super::study::as_csv;
 use crate::engine::Session;
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::{ArtifactError, ArtifactWriter, DType};
@@ -145,7 +147,7 @@ fn attributes(table: &Table<'_>, session: &Session<'_>) -> StudyTable {
         Status::Failed { step, class, cause } => Some(StudyFailure {
             point,
             step: step.clone(),
-            class: (*class).into(),
+            class: class.to_string(),
             cause: cause.clone(),
         }),
         _ => None,
@@ -172,7 +174,7 @@ fn attributes(table: &Table<'_>, session: &Session<'_>) -> StudyTable {
         failures: failures.collect(),
         keys: keys.collect(),
         samples: samples.collect(),
-        optimisation: table.trace.as_ref().and_then(|t| t.told(table)),
+        optimisation: table.trace.as_ref().and_then(|t| t.told(table.study)),
     }
 }
 

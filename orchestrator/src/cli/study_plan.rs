@@ -1,13 +1,12 @@
 //! `plan` of a study: its points, what they share, and what is left to do costs.
 
-use super::plan::cost_of;
-use super::run::first_line;
-use super::study::{head, shortened};
-use super::table::table;
+use super::found::answer::is_answer_of;
+use super::found::change::cost_of;
+use super::table::{first_line, head, shortened, table};
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::progress::duration_text;
-use plyflow_workflow::resolved::Study;
+use plyflow_workflow::resolved::{Budget, Study};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
@@ -170,7 +169,7 @@ impl<'s> Prospects<'s> {
                 out += &format!("  and {} more\n", open - SHOWN);
             }
         }
-        out + "\n" + &self.cost() + &super::optimise::ahead(self.study, self.of_a_point())
+        out + "\n" + &self.cost() + &ahead(self.study, self.of_a_point())
     }
 
     /// What a further point would take (CPU, s): the steps that are not the same for all. `None`: not known.
@@ -214,7 +213,7 @@ impl<'s> Prospects<'s> {
             "steps": steps.collect::<Vec<_>>(),
             "estimated_cpu_seconds": self.estimate(),
             "steps_without_estimate": self.without(),
-            "optimisation": super::optimise::ahead_json(self.study, self.of_a_point()),
+            "optimisation": ahead_json(self.study, self.of_a_point()),
         })
     }
 }
@@ -223,7 +222,7 @@ impl<'s> Prospects<'s> {
 fn answered(session: &Session<'_>, study: &Study, by_step: &[Vec<Id>]) -> Vec<bool> {
     let is_answer = |id: &Id| {
         let failure = session.failed_before(*id);
-        failure.is_some_and(|f| super::optimise::is_answer_of(&f.label, &f.reason))
+        failure.is_some_and(|f| is_answer_of(&f.label, &f.reason))
     };
     let point = |steps: &[usize]| {
         let mut all = steps.iter().flat_map(|s| &by_step[*s]);
@@ -340,4 +339,55 @@ impl Step {
         }
         step
     }
+}
+
+/// How much of the budget is left, for `plan`; empty for a study.
+fn ahead(study: &Study, of_a_point: Option<f64>) -> String {
+    let Some(o) = &study.optimisation else {
+        return String::new();
+    };
+    let (asked, word) = (
+        study.points.len(),
+        if o.maximise { "maximise" } else { "minimise" },
+    );
+    let name = &study.responses[o.objective].name;
+    let mut out = format!("optimisation: {word} {name}, method {}, ", o.method);
+    let took = of_a_point.map(duration_text);
+    match o.budget {
+        Budget::Runs(most) => {
+            let left = (most as usize).saturating_sub(asked);
+            out += &format!("budget {most} points: {asked} asked for, at most {left} more");
+            if let (Some(one), true) = (of_a_point, left > 0) {
+                out += &format!(", about {} of CPU time", duration_text(one * left as f64));
+            }
+        }
+        Budget::CpuSeconds(most) => {
+            out += &format!(
+                "budget {} of CPU time: {asked} points asked for",
+                duration_text(most)
+            );
+            if let Some(one) = took {
+                out += &format!(", one takes about {one}");
+            }
+        }
+    }
+    out + "\n"
+}
+
+/// As [`ahead`], for programs.
+fn ahead_json(study: &Study, of_a_point: Option<f64>) -> serde_json::Value {
+    let Some(o) = &study.optimisation else {
+        return serde_json::Value::Null;
+    };
+    let (runs, cpu) = match o.budget {
+        Budget::Runs(most) => (Some(most), None),
+        Budget::CpuSeconds(most) => (None, Some(most)),
+    };
+    let left = runs.map(|most| (most as usize).saturating_sub(study.points.len()));
+    let more = left.zip(of_a_point).map(|(n, one)| n as f64 * one);
+    json!({
+        "objective": study.responses[o.objective].name, "maximise": o.maximise, "method": o.method,
+        "budget_runs": runs, "budget_cpu_seconds": cpu, "asked": study.points.len(), "at_most_more": left,
+        "estimated_cpu_seconds_more": more,
+    })
 }

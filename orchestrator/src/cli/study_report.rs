@@ -1,19 +1,20 @@
 //! The page of a study, and those of its points.
 
 use super::args::ReportArgs;
-use super::report::quoted;
-use super::study::{Status, Table};
+use super::found::answer::Status;
+use super::found::points::Table;
 use super::study_file;
-use super::{Done, Stop, print};
+use super::typed::quoted;
 use crate::engine::Session;
 use crate::engine::core::{Id, State};
 use crate::exit;
+use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
 use plyflow_report::{
     Family, Fate, Origin, Point, ReportInput, Response, Sampled, Value, Variable, write_report,
 };
-use plyflow_workflow::resolved::{ResponseFrom, StudyValue};
+use plyflow_workflow::resolved::{ResponseFrom, Study, StudyResponse, StudyValue};
 
 /// Names of files keep this many characters of a point's name.
 const LONGEST: usize = 120;
@@ -80,15 +81,7 @@ pub fn family(
             word: quoted(&p.name),
             values: p.values.iter().map(value).collect(),
             responses: line.responses.clone(),
-            fate: match &line.status {
-                Status::Done => Fate::Done,
-                Status::NotRun => Fate::NotRun,
-                Status::Failed { step, class, cause } => Fate::Failed {
-                    step: step.clone(),
-                    class: (*class).to_owned(),
-                    cause: cause.clone(),
-                },
-            },
+            fate: fate(&line.status),
             instances: p.steps.iter().flat_map(|s| by_step[*s].clone()).collect(),
             report: address(page, &p.name),
         });
@@ -103,21 +96,7 @@ pub fn family(
                 unit: v.unit.clone(),
             })
             .collect(),
-        responses: (study.responses.iter())
-            .map(|r| Response {
-                name: r.name.clone(),
-                unit: r.unit.clone(),
-                from: match &r.from {
-                    ResponseFrom::Step { step, result, .. } => Origin::Step {
-                        step: study.steps[*step].clone(),
-                        result: result.clone(),
-                    },
-                    ResponseFrom::Variables { expression, .. } => {
-                        Origin::Variables(expression.clone())
-                    }
-                },
-            })
-            .collect(),
+        responses: study.responses.iter().map(|r| response(study, r)).collect(),
         points: points.collect(),
         samples: (study.samples.iter())
             .map(|(method, count, seed)| Sampled {
@@ -133,6 +112,32 @@ pub fn family(
             .to_owned(),
         shared: (0..records.len()).filter(is_shared).collect(),
     })
+}
+
+fn response(study: &Study, r: &StudyResponse) -> Response {
+    Response {
+        name: r.name.clone(),
+        unit: r.unit.clone(),
+        from: match &r.from {
+            ResponseFrom::Step { step, result, .. } => Origin::Step {
+                step: study.steps[*step].clone(),
+                result: result.clone(),
+            },
+            ResponseFrom::Variables { expression, .. } => Origin::Variables(expression.clone()),
+        },
+    }
+}
+
+fn fate(status: &Status) -> Fate {
+    match status {
+        Status::Done => Fate::Done,
+        Status::NotRun => Fate::NotRun,
+        Status::Failed { step, class, cause } => Fate::Failed {
+            step: step.clone(),
+            class: class.to_string(),
+            cause: cause.clone(),
+        },
+    }
 }
 
 /// `plyflow report --point`: writes the pages of points. `whole`: the report of the study; `page`: where it lies.
@@ -170,7 +175,7 @@ pub fn points(
     print(&told)
 }
 
-fn unknown(name: &str, study: &plyflow_workflow::resolved::Study) -> String {
+fn unknown(name: &str, study: &Study) -> String {
     let some: Vec<&str> = study
         .points
         .iter()

@@ -1,4 +1,4 @@
-//! Plain tables.
+//! Plain tables, and how what stands in them is written.
 
 use plyflow_model::text::one_line;
 
@@ -65,6 +65,44 @@ pub fn bytes(n: u64) -> String {
     } else {
         format!("{value:.1} {}", units[unit])
     }
+}
+
+/// A name with its unit, as in the head of a table: `angle [deg]`.
+pub fn head(name: &str, unit: &str) -> String {
+    match unit {
+        "" | "1" => name.to_owned(),
+        unit => format!("{name} [{unit}]"),
+    }
+}
+
+/// Characters of a cause that a table shows.
+const CAUSE: usize = 80;
+
+/// The begin of a text.
+pub fn shortened(text: &str) -> String {
+    match text.char_indices().nth(CAUSE) {
+        Some((end, _)) => format!("{}…", text[..end].trim_end()),
+        None => text.to_owned(),
+    }
+}
+
+/// A text as a cell of CSV.
+pub fn csv_text(t: &str) -> String {
+    if t.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", t.replace('"', "\"\""))
+    } else {
+        t.to_owned()
+    }
+}
+
+/// The first line of a text.
+pub fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
+/// A text, or that there is none.
+pub fn or_none(text: &str) -> &str {
+    if text.is_empty() { "(none)" } else { text }
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@
 //! their bytes; what follows `#` is for people.
 
 use super::args::{Places, TrustArgs};
-use super::{Done, Stop, print, warn};
 use crate::exit;
+use crate::said::{Done, Stop, print, warn};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open;
 use plyflow_model::text::one_line;

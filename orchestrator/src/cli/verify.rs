@@ -1,16 +1,15 @@
 //! `verify`: reads a whole store and says what is not as it was written; or makes a step again and compares its bytes.
 
 use super::args::{TextOrJson, VerifyArgs, Workflow};
-use super::clean::locked;
 use super::machine::default_memory;
-use super::open::{cores, open, store_root};
+use super::open::{cores, locked, open, store_root};
 use super::table::bytes;
-use super::{Done, Stop, print, warn};
 use crate::engine::core::Limits;
-use crate::engine::{Compared, Local, Options, Session};
+use crate::engine::{Compared, Local, Options, Purpose, Session};
 use crate::exit;
 use crate::plan::Key;
 use crate::progress::Lines;
+use crate::said::{Done, Stop, print, warn};
 use crate::store::{
     Flaw, Journal, Lock, LockError, Store, damage_of_plugins, read_unplaced, resolved,
 };
@@ -216,11 +215,7 @@ fn again(args: &VerifyArgs) -> Done {
     })?;
     opened.restrict(&args.again)?;
     let steps = opened.step_indices(&args.again)?;
-    let folder = opened.store.run(&opened.workflow.name);
-    let what = format!("the store {}", opened.store.root());
-    let _store = Lock::shared(&opened.store.lock(), &what).map_err(locked)?;
-    let what = format!("the workflow '{}'", opened.workflow.name);
-    let _run = Lock::exclusive(&folder.lock(), &what).map_err(locked)?;
+    let _locks = opened.lock()?;
     let options = Options {
         limits: Limits {
             cores: args.jobs.unwrap_or_else(cores),
@@ -233,14 +228,7 @@ fn again(args: &VerifyArgs) -> Done {
         checkpoint_interval: f64::INFINITY,
     };
     let failed = || Stop::machine(format!("running with the store {}", opened.store.root()));
-    let mut session = Session::new(
-        &opened.workflow,
-        &opened.graph,
-        &opened.store,
-        options,
-        true,
-    )
-    .map_err(failed())?;
+    let mut session = opened.session(options, Purpose::Run(None))?;
     let mut observer = Lines::default();
     session.look(&mut observer);
     opened.admit(&session)?;

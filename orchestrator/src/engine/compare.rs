@@ -1,6 +1,5 @@
-//! A step that is made again to be compared with what the store has of it.
+//! How a step that was made again compares with what the store has of it.
 
-use super::{ENDING, Flaw, Id, Known, Session};
 use camino::{Utf8Path, Utf8PathBuf};
 use std::fs::File;
 use std::io::{self, Read};
@@ -42,11 +41,20 @@ impl Compared {
     }
 }
 
+/// Two artifacts that cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[error("{new} cannot be compared with {stored}: {source}")]
+pub(super) struct NotCompared {
+    pub(super) new: Utf8PathBuf,
+    pub(super) stored: Utf8PathBuf,
+    pub(super) source: io::Error,
+}
+
 /// Where two files first differ (bytes from the beginning); `None` when they are equal.
 ///
 /// # Errors
 /// When one cannot be read.
-fn first_difference(a: &Utf8Path, b: &Utf8Path) -> io::Result<Option<u64>> {
+pub(super) fn first_difference(a: &Utf8Path, b: &Utf8Path) -> io::Result<Option<u64>> {
     let (mut a, mut b) = (File::open(a)?, File::open(b)?);
     let (mut x, mut y) = (Vec::new(), Vec::new());
     let mut before = 0;
@@ -63,59 +71,6 @@ fn first_difference(a: &Utf8Path, b: &Utf8Path) -> io::Result<Option<u64>> {
             return Ok(None);
         }
         before += x.len() as u64;
-    }
-}
-
-impl Session<'_> {
-    /// Compares what was made again with what the store has; `None` when that is nothing whole, and the new one is to take its place.
-    pub(super) fn compare(
-        &mut self,
-        id: Id,
-        artifact: &Utf8Path,
-        record: &Utf8Path,
-    ) -> Result<Option<Known>, String> {
-        let label = self.core.label(id);
-        let Some(key) = self.core.instances()[id].key else {
-            return Ok(None);
-        };
-        let stored = match self.read_whole(id) {
-            Ok(stored) => stored,
-            Err(flaw) => {
-                if let Flaw::Damaged(text) = flaw {
-                    let place = self.store.set_key_aside(&key);
-                    self.told.push(format!("{label}: {text}; {place}"));
-                    self.summary.damaged += 1;
-                }
-                self.compared.push((label, Compared::New));
-                return Ok(None);
-            }
-        };
-        let there = self.store.artifact(&key);
-        let cannot = |e: io::Error| format!("{artifact} cannot be compared with {there}: {e}");
-        let how = match first_difference(&there, artifact).map_err(cannot)? {
-            None => Compared::Same {
-                bytes: stored.bytes,
-            },
-            Some(at) => {
-                let size = std::fs::metadata(artifact).map_err(cannot)?.len();
-                let named = artifact.with_file_name(format!("{}-again{ENDING}", key.hex()));
-                std::fs::rename(artifact, &named).map_err(cannot)?;
-                let kept = self.store.set_aside(&named).map_err(cannot)?;
-                let kept = kept.unwrap_or(named);
-                Compared::Other {
-                    at,
-                    sizes: [stored.bytes, size],
-                    kept,
-                }
-            }
-        };
-        self.compared.push((label, how));
-        let _ = (std::fs::remove_file(artifact), std::fs::remove_file(record));
-        Ok(Some(Known {
-            bytes: stored.bytes,
-            labels: stored.collection,
-            stamp: self.store.look(&key).ok().map(|seen| seen.stamp),
-        }))
     }
 }
 

@@ -1,170 +1,58 @@
-//! Acts on what the core decides: looks into the store, hands jobs to an executor, commits artifacts,
-//! keeps the journal.
+//! Acts on what the core decides: hands jobs to an executor, commits artifacts, keeps the journal.
 
-#[path = "compare.rs"]
-mod compare;
-#[path = "opening.rs"]
-mod opening;
-#[path = "sound.rs"]
-mod sound;
-#[path = "task.rs"]
-mod task;
-
-pub use compare::Compared;
-pub use sound::Depth;
-pub use task::input_keys;
-pub(crate) use task::library;
-
-use super::core::{Core, Effect, Event, Id, Limits, Output, State};
+use super::compare::NotCompared;
+use super::core::{Effect, Event, Id, Output, State};
 use super::executor::{Executor, Outcome, Report};
-use super::shown::{Failure, Observer, Summary, Update};
-use super::unchanged::Unchanged;
-use crate::plan::{ByKey, Graph, Ingredients, Key};
-use crate::store::{ENDING, Early, Flaw, Journal, Known, RunFolder, Seen, Store};
+use super::session::Session;
+use super::shown::{Observer, Summary, Update};
+use crate::plan::Key;
+use crate::store::Known;
 use camino::Utf8PathBuf;
-use opening::{look_at_journal, open_for_writing};
-use plyflow_model::job::{Cost, Message, Record};
-use plyflow_workflow::resolved::ResolvedWorkflow;
-use std::collections::{HashMap, VecDeque};
+use plyflow_model::job::{Message, Record};
 use std::io;
 use std::time::Duration;
+
+/// How often an artifact is made again within one run: a disk that damages it each time is beyond help.
+const AGAIN: u32 = 2;
 
 /// How long to wait for reports before looking at the journal and the display again.
 const BEAT: Duration = Duration::from_millis(200);
 
-/// What a session works with.
-pub struct Options {
-    /// Cores, memory, policy.
-    pub limits: Limits,
-    /// Folders searched for components, without links: those whose libraries are trusted whatever their bytes.
-    pub search_path: Vec<Utf8PathBuf>,
-    /// Run again even what the store has (for steps named here).
-    pub force: Vec<usize>,
-    /// Run these again too, but only to compare what they make with what the store has.
-    pub compare: Vec<usize>,
-    /// Time between checkpoints of a running step (s).
-    pub checkpoint_interval: f64,
+/// Why what a worker left does not become visible.
+#[derive(Debug, thiserror::Error)]
+enum Refused {
+    #[error("the instance has no key")]
+    NoKey,
+    #[error("the instance was not started")]
+    NotStarted,
+    #[error(
+        "malformed artifact: plugin '{plugin}' did not declare its collection, though its manifest promises one"
+    )]
+    NoCollection { plugin: String },
+    #[error("no artifact: {0}")]
+    NoArtifact(io::Error),
+    #[error("malformed artifact: it has {size} bytes and its record says {told}")]
+    Size { size: u64, told: u64 },
+    #[error(transparent)]
+    NotCompared(#[from] NotCompared),
+    #[error("the artifact cannot be put into the store {root}: {source}; {and}")]
+    NotPlaced {
+        root: Utf8PathBuf,
+        source: io::Error,
+        and: Aside,
+    },
 }
 
-/// A workflow, its store and where its instances stand.
-pub struct Session<'a> {
-    /// The workflow.
-    pub workflow: &'a ResolvedWorkflow,
-    /// The store.
-    pub store: &'a Store,
-    /// The decisions.
-    pub core: Core<'a>,
-    /// The journal.
-    pub journal: Journal,
-    folder: RunFolder,
-    options: Options,
-    writing: bool,
-    costs: HashMap<Id, Cost>,
-    pending: VecDeque<Effect>,
-    jobs: HashMap<Id, (Utf8PathBuf, Utf8PathBuf)>,
-    serial: u64,
-    unchanged: Unchanged,
-    /// Running instances that have been heard of since they started, with what of theirs turned out to have changed.
-    heard: HashMap<Id, Option<String>>,
-    summary: Summary,
-    sound: sound::Sound,
-    /// What was found when the files of the run were opened, for the user.
-    told: Vec<String>,
-    /// What was seen of files before anybody asked.
-    ahead: HashMap<Key, Seen, ByKey>,
-    compared: Vec<(String, Compared)>,
+/// What became of an artifact that the store does not take.
+#[derive(Debug, thiserror::Error)]
+enum Aside {
+    #[error("it is whole, lies in {0} and is taken from there by the next run")]
+    Kept(Utf8PathBuf),
+    #[error("nor can it be put aside: {0}")]
+    Lost(io::Error),
 }
 
-impl<'a> Session<'a> {
-    /// A session that looks (`writing` false: another may hold the lock) or runs (`writing`: the caller
-    /// holds the run's lock).
-    ///
-    /// # Errors
-    /// When the journal cannot be read or written.
-    pub fn new(
-        workflow: &'a ResolvedWorkflow,
-        graph: &'a Graph,
-        store: &'a Store,
-        options: Options,
-        writing: bool,
-    ) -> io::Result<Self> {
-        Self::new_after(workflow, graph, store, options, writing, None)
-    }
-
-    /// As [`Session::new`], with what was read ahead for a session that writes.
-    ///
-    /// # Errors
-    /// As [`Session::new`].
-    pub fn new_after(
-        workflow: &'a ResolvedWorkflow,
-        graph: &'a Graph,
-        store: &'a Store,
-        options: Options,
-        writing: bool,
-        early: Option<Early>,
-    ) -> io::Result<Self> {
-        let folder = store.run(&workflow.name);
-        let early = early.and_then(|early| early.finish(&folder.journal()));
-        let (scanned, ahead) = match early {
-            Some((scanned, ahead)) => (Some(scanned), ahead),
-            None => (None, HashMap::default()),
-        };
-        let (journal, told) = match writing {
-            true => open_for_writing(store, &folder, scanned)?,
-            false => look_at_journal(&folder)?,
-        };
-        Ok(Self {
-            workflow,
-            store,
-            core: Core::new(graph, options.limits),
-            journal,
-            folder,
-            options,
-            writing,
-            costs: HashMap::new(),
-            pending: VecDeque::new(),
-            jobs: HashMap::new(),
-            serial: 0,
-            unchanged: Unchanged::default(),
-            heard: HashMap::new(),
-            summary: Summary::default(),
-            sound: sound::Sound::default(),
-            told,
-            ahead,
-            compared: Vec::new(),
-        })
-    }
-
-    /// Labels of what was made again to be compared, and how it compares.
-    pub fn compared(&self) -> &[(String, Compared)] {
-        &self.compared
-    }
-
-    /// What was found damaged when the files of the run were opened, in words.
-    pub fn told(&self) -> &[String] {
-        &self.told
-    }
-
-    /// Looks up all that can be keyed without running anything.
-    pub fn look(&mut self, observer: &mut dyn Observer) {
-        let effects = if self.ahead.is_empty() {
-            let keys = self.journal.last_keys();
-            let (core, store) = (&mut self.core, self.store);
-            let (ahead, effects) = store.look_ahead(&keys, || core.start());
-            self.ahead = ahead;
-            effects
-        } else {
-            self.core.start()
-        };
-        self.take(effects, observer);
-        self.ahead = HashMap::default();
-    }
-
-    /// The folder of this run.
-    pub fn folder(&self) -> &RunFolder {
-        &self.folder
-    }
-
+impl Session<'_> {
     /// Runs what [`Session::look`] found missing, and all that follows. `interrupts` counts the user's
     /// wishes to stop: one asks the workers, two kill them.
     ///
@@ -256,101 +144,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Answers lookups at once; leaves the other effects for [`Session::execute`].
-    fn take(&mut self, effects: Vec<Effect>, observer: &mut dyn Observer) {
-        let mut queue = VecDeque::from(effects);
-        while let Some(effect) = queue.pop_front() {
-            match effect {
-                Effect::Look(id) => {
-                    let found = self.find(id, observer);
-                    let cached = found.is_some();
-                    queue.extend(self.core.handle(Event::Looked { id, found }));
-                    if cached {
-                        self.summary.cached += 1;
-                        observer.update(&self.core, id, &Update::Cached);
-                    }
-                }
-                Effect::Skip { id, cause } => {
-                    observer.update(&self.core, id, &Update::Skipped { cause });
-                }
-                other => self.pending.push_back(other),
-            }
-        }
-    }
-
-    /// Whether the store has the artifact of an instance, whole: as long as nothing has written to its files since they were known to be
-    /// so, they are taken for it; else they are read.
-    fn find(&mut self, id: Id, observer: &mut dyn Observer) -> Option<Output> {
-        let instance = &self.core.instances()[id];
-        let (key, step) = (instance.key?, instance.step);
-        if self.options.force.contains(&step) || self.options.compare.contains(&step) {
-            return None;
-        }
-        let seen = match self.ahead.remove(&key) {
-            Some(seen) => Ok(seen),
-            None => self.store.look(&key),
-        };
-        let known = self.journal.known(&key);
-        let known = match (&seen, known) {
-            (Ok(seen), Some(k)) if k.stamp == Some(seen.stamp) && k.bytes == seen.bytes => {
-                Ok(k.clone())
-            }
-            (Err(flaw), _) => Err(flaw.clone()),
-            (Ok(seen), _) => self.read_whole(id).map(|record| Known {
-                bytes: record.bytes,
-                labels: record.collection,
-                stamp: Some(seen.stamp),
-            }),
-        };
-        let known = match known {
-            Ok(known) => known,
-            Err(Flaw::Gone) if self.store.has_earlier(&key) => {
-                self.lose(id, Flaw::Unsealed, false, observer);
-                return None;
-            }
-            Err(Flaw::Gone) => return None,
-            Err(flaw) => {
-                self.lose(id, flaw, self.writing, observer);
-                return None;
-            }
-        };
-        if self.core.graph().steps[step].collection && known.labels.is_none() {
-            return None;
-        }
-        let labels = known.labels.clone();
-        self.note(id, known);
-        Some(Output { labels })
-    }
-
-    fn note(&mut self, id: Id, artifact: Known) {
-        if !self.writing {
-            return;
-        }
-        let instance = &self.core.instances()[id];
-        let step = &self.core.graph().steps[instance.step];
-        if let Some(key) = instance.key {
-            let who = (step.name.as_str(), instance.item.as_slice());
-            let made_by = || Ingredients::of(&self.workflow.steps[instance.step]);
-            let inputs = || input_keys(&self.core, id);
-            self.journal
-                .used(who, key, (step.recipe, made_by), artifact, inputs);
-        }
-    }
-
-    /// What an instance cost, when it is done.
-    pub fn cost(&mut self, id: Id) -> Cost {
-        if let Some(cost) = self.costs.get(&id) {
-            return *cost;
-        }
-        let key = self.core.instances()[id].key;
-        let cost = key
-            .and_then(|k| self.store.read_record(&k).ok())
-            .map(|r| r.cost)
-            .unwrap_or_default();
-        self.costs.insert(id, cost);
-        cost
-    }
-
     /// What of an instance is no longer as it was when the run began.
     fn changed(&mut self, id: Id) -> Option<String> {
         let step = self.core.instances()[id].step;
@@ -403,7 +196,7 @@ impl<'a> Session<'a> {
                 outcome: Outcome::Done(record),
             } => match self.accept(id, &record) {
                 Ok(known) => self.succeed(id, &record, known, observer),
-                Err(reason) => self.fail(id, &reason, observer),
+                Err(refused) => self.fail(id, &refused.to_string(), observer),
             },
             Report::Ended {
                 id,
@@ -418,28 +211,21 @@ impl<'a> Session<'a> {
     }
 
     /// Checks what the worker left and makes it visible.
-    fn accept(&mut self, id: Id, record: &Record) -> Result<Known, String> {
+    fn accept(&mut self, id: Id, record: &Record) -> Result<Known, Refused> {
         let instance = &self.core.instances()[id];
-        let key: Key = instance.key.ok_or("the instance has no key")?;
-        let (artifact, beside) = self
-            .jobs
-            .remove(&id)
-            .ok_or("the instance was not started")?;
+        let key: Key = instance.key.ok_or(Refused::NoKey)?;
+        let (artifact, beside) = self.jobs.remove(&id).ok_or(Refused::NotStarted)?;
         let step = &self.core.graph().steps[instance.step];
         if step.collection && record.collection.is_none() {
-            return Err(format!(
-                "malformed artifact: plugin '{}' did not declare its collection, though its manifest promises one",
-                self.workflow.steps[instance.step].plugin.name
-            ));
+            let plugin = self.workflow.steps[instance.step].plugin.name.clone();
+            return Err(Refused::NoCollection { plugin });
         }
         let size = std::fs::metadata(&artifact)
-            .map_err(|e| format!("no artifact: {e}"))?
+            .map_err(Refused::NoArtifact)?
             .len();
         if size != record.bytes {
-            return Err(format!(
-                "malformed artifact: it has {size} bytes and its record says {}",
-                record.bytes
-            ));
+            let told = record.bytes;
+            return Err(Refused::Size { size, told });
         }
         if self.options.compare.contains(&instance.step)
             && let Some(known) = self.compare(id, &artifact, &beside)?
@@ -447,21 +233,18 @@ impl<'a> Session<'a> {
             return Ok(known);
         }
         let lasting = record.is_lasting();
-        if let Err(e) = self.store.commit(&key, &artifact, &beside, lasting) {
-            let root = self.store.root();
+        if let Err(source) = self.store.commit(&key, &artifact, &beside, lasting) {
             let kept = self
                 .store
                 .keep_unplaced(&self.folder, &key, &artifact, &beside);
-            let and = match kept {
-                Ok(()) => format!(
-                    "it is whole, lies in {} and is taken from there by the next run",
-                    self.folder.unplaced()
-                ),
-                Err(e) => format!("nor can it be put aside: {e}"),
-            };
-            return Err(format!(
-                "the artifact cannot be put into the store {root}: {e}; {and}"
-            ));
+            return Err(Refused::NotPlaced {
+                root: self.store.root().to_owned(),
+                source,
+                and: match kept {
+                    Ok(()) => Aside::Kept(self.folder.unplaced()),
+                    Err(e) => Aside::Lost(e),
+                },
+            });
         }
         // Only now: until here they were all that a killed engine, or a power cut, would have left of the work.
         let label = self.core.label(id);
@@ -510,26 +293,38 @@ impl<'a> Session<'a> {
         self.take(effects, observer);
     }
 
-    fn failure(&self, id: Id, reason: &str) -> Failure {
-        let label = self.core.label(id);
-        let log = Some(self.folder.log(&label)).filter(|l| l.exists());
-        Failure {
-            label,
-            reason: reason.to_owned(),
-            log,
+    /// Reads the inputs of an instance that is to start. When one is not what was written it is made again, and this instance waits.
+    /// True: it may start.
+    fn inputs_are_whole(&mut self, id: Id, observer: &mut dyn Observer) -> bool {
+        let mut givers: Vec<Id> = (self.core.instances()[id].inputs.iter())
+            .map(|(_, giver)| *giver)
+            .collect();
+        givers.sort_unstable();
+        givers.dedup();
+        let mut lost = Vec::new();
+        for giver in givers {
+            if let Err(flaw) = self.read_whole(giver) {
+                self.forget(giver);
+                let text = flaw.text().to_owned();
+                self.lose(giver, flaw, true, observer);
+                if self.sound.again.get(&giver).is_some_and(|n| *n > AGAIN) {
+                    let reason = format!(
+                        "its input cannot be kept: made again {AGAIN} times in this run, and each time {text}; look after the disk and the memory of this machine"
+                    );
+                    self.fail(id, &reason, observer);
+                    return false;
+                }
+                lost.push(giver);
+            }
         }
-    }
-
-    /// Why an instance that is not done failed when it ran last as it is now.
-    pub fn failed_before(&self, id: Id) -> Option<Failure> {
-        let instance = &self.core.instances()[id];
-        if matches!(instance.state, State::Done { .. }) {
-            return None;
+        if lost.is_empty() {
+            return true;
         }
-        let step = &self.core.graph().steps[instance.step].name;
-        let reason = self
-            .journal
-            .failure(step, &instance.item, instance.key.as_ref()?)?;
-        Some(self.failure(id, reason))
+        let effects = self.core.handle(Event::Lost {
+            reader: Some(id),
+            ids: lost,
+        });
+        self.take(effects, observer);
+        false
     }
 }

@@ -80,19 +80,52 @@ impl Outcome {
     }
 }
 
-/// The class of a failure, from the reason that the user reads ([`Outcome::reason`]), which is what a journal keeps of it.
-pub fn class_of(reason: &str) -> &'static str {
-    let classes = [
-        ("the plugin panicked", "panic"),
-        ("malformed artifact", "malformed"),
-        ("the worker crashed", "crash"),
-        ("the worker ended", "crash"),
-        ("the worker could not be started", "machine"),
-        ("the artifact cannot be put into the store", "machine"),
-        ("stopped at its time limit", "time-limit"),
-    ];
-    let found = classes.iter().find(|(begin, _)| reason.starts_with(begin));
-    found.map_or("error", |(_, class)| class)
+/// The class of a failure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FailureClass {
+    /// The step said what failed.
+    Error,
+    /// The plugin panicked.
+    Panic,
+    /// What the plugin wrote is no artifact of its kind.
+    Malformed,
+    /// The worker died.
+    Crash,
+    /// It was stopped at its time limit.
+    TimeLimit,
+    /// The machine failed: nothing is told of the step.
+    Machine,
+}
+
+impl FailureClass {
+    /// The class by the reason that the user reads ([`Outcome::reason`]), which is what a journal keeps of it.
+    pub fn of(reason: &str) -> Self {
+        let classes = [
+            ("the plugin panicked", Self::Panic),
+            ("malformed artifact", Self::Malformed),
+            ("the worker crashed", Self::Crash),
+            ("the worker ended", Self::Crash),
+            ("the worker could not be started", Self::Machine),
+            ("the artifact cannot be put into the store", Self::Machine),
+            ("stopped at its time limit", Self::TimeLimit),
+        ];
+        let found = classes.iter().find(|(begin, _)| reason.starts_with(begin));
+        found.map_or(Self::Error, |(_, class)| *class)
+    }
+}
+
+/// In a word, as in the table of a study.
+impl std::fmt::Display for FailureClass {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Panic => "panic",
+            Self::Malformed => "malformed",
+            Self::Crash => "crash",
+            Self::TimeLimit => "time-limit",
+            Self::Machine => "machine",
+        })
+    }
 }
 
 /// What an executor reports.
@@ -148,7 +181,8 @@ mod tests {
             (Outcome::TimedOut(2.0), "time-limit"),
             (Outcome::NotStarted("m".into()), "machine"),
         ] {
-            assert_eq!(class_of(&outcome.reason()), class, "{outcome:?}");
+            let found = FailureClass::of(&outcome.reason()).to_string();
+            assert_eq!(found, class, "{outcome:?}");
         }
     }
 }

@@ -1,7 +1,6 @@
 //! Opens the journal of a run, and says what of its files was found damaged.
 
-use super::{Journal, RunFolder, Store};
-use crate::store::Scanned;
+use crate::store::{Journal, RunFolder, Scanned, Store};
 use camino::Utf8PathBuf;
 use std::io;
 

@@ -1,8 +1,10 @@
 //! What a worker is told of an instance: its job.
 
-use super::super::executor::Task;
-use super::{Core, ENDING, Id, Session};
-use crate::plan::{Ingredients, InputKey};
+use super::core::{Core, Id};
+use super::executor::Task;
+use super::session::Session;
+use crate::plan::{Ingredients, InputKey, Key};
+use crate::store::ENDING;
 use camino::Utf8PathBuf;
 use plyflow_model::job::{Checkpoints, DATA_MODEL_VERSION, JOB_VERSION, Job, JobInput, LibraryRef};
 use plyflow_workflow::resolved::PluginId;
@@ -10,25 +12,8 @@ use plyflow_workflow::resolved::PluginId;
 impl Session<'_> {
     /// What a worker is told of an instance that is to start.
     pub(super) fn task(&mut self, id: Id, threads: u32) -> Task {
-        let givers = self.core.instances()[id].inputs.clone();
+        let inputs = self.inputs(id);
         let step = &self.workflow.steps[self.core.instances()[id].step];
-        let mut inputs = Vec::with_capacity(givers.len());
-        for (wire, giver) in givers {
-            let cost = self.cost(giver);
-            let given = &self.core.instances()[giver];
-            let from = &self.workflow.steps[given.step];
-            inputs.push(JobInput {
-                port: step.inputs[wire].port.clone(),
-                step: from.in_file().to_owned(),
-                kind: from.output_kind.clone(),
-                item: given.item.clone(),
-                artifact: given
-                    .key
-                    .map(|k| self.store.artifact(&k))
-                    .unwrap_or_default(),
-                cost,
-            });
-        }
         self.serial += 1;
         let tmp = self
             .folder
@@ -43,16 +28,7 @@ impl Session<'_> {
         if let Some(key) = instance.key
             && self.options.force.contains(&instance.step)
         {
-            // To run again means from the start: but a forced run that was stopped goes on where it was.
-            let forced = self.folder.forced(&label, &key);
-            if !forced.exists() {
-                let checkpoints = self.folder.checkpoints(&label, &key);
-                let _ = std::fs::remove_dir_all(&checkpoints);
-                let _ = (
-                    forced.parent().map(std::fs::create_dir_all),
-                    std::fs::write(&forced, ""),
-                );
-            }
+            self.begin_anew(&label, &key);
         }
         let library = |p: &PluginId| library(p, &self.options.search_path);
         let job = Job {
@@ -90,6 +66,43 @@ impl Session<'_> {
             job,
             time_limit: step.resources.time_limit,
             log,
+        }
+    }
+
+    /// What arrives at an instance, with what it cost.
+    fn inputs(&mut self, id: Id) -> Vec<JobInput> {
+        let givers = self.core.instances()[id].inputs.clone();
+        let step = &self.workflow.steps[self.core.instances()[id].step];
+        let mut inputs = Vec::with_capacity(givers.len());
+        for (wire, giver) in givers {
+            let cost = self.cost(giver);
+            let given = &self.core.instances()[giver];
+            let from = &self.workflow.steps[given.step];
+            inputs.push(JobInput {
+                port: step.inputs[wire].port.clone(),
+                step: from.in_file().to_owned(),
+                kind: from.output_kind.clone(),
+                item: given.item.clone(),
+                artifact: given
+                    .key
+                    .map(|k| self.store.artifact(&k))
+                    .unwrap_or_default(),
+                cost,
+            });
+        }
+        inputs
+    }
+
+    /// To run again means from the start: but a forced run that was stopped goes on where it was.
+    fn begin_anew(&self, label: &str, key: &Key) {
+        let forced = self.folder.forced(label, key);
+        if !forced.exists() {
+            let checkpoints = self.folder.checkpoints(label, key);
+            let _ = std::fs::remove_dir_all(&checkpoints);
+            let _ = (
+                forced.parent().map(std::fs::create_dir_all),
+                std::fs::write(&forced, ""),
+            );
         }
     }
 

@@ -1,6 +1,6 @@
 //! Fan-out: the index paths of a step's instances, as far as the collections they range over are known.
 
-use super::Graph;
+use super::graph::Graph;
 
 /// How many items the artifact of one instance has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,41 +29,51 @@ pub fn walk(
     fixed: &[Option<u64>],
     mut extent: impl FnMut(usize, &[u64]) -> Extent,
 ) -> Walk {
-    let mut found = Walk::default();
-    let mut path = Vec::with_capacity(fixed.len());
-    descend(graph, step, fixed, &mut extent, &mut path, &mut found);
-    found
+    let mut walker = Walker {
+        graph,
+        step,
+        fixed,
+        path: Vec::with_capacity(fixed.len()),
+        found: Walk::default(),
+    };
+    walker.descend(&mut extent);
+    walker.found
 }
 
-fn descend(
-    graph: &Graph,
+/// A walk under way.
+struct Walker<'w> {
+    graph: &'w Graph,
     step: usize,
-    fixed: &[Option<u64>],
-    extent: &mut impl FnMut(usize, &[u64]) -> Extent,
-    path: &mut Vec<u64>,
-    found: &mut Walk,
-) {
-    let Some(dimension) = graph.steps[step].dimensions.get(path.len()) else {
-        found.known.push(path.clone());
-        return;
-    };
-    let owner: Vec<u64> = dimension.prefix.iter().map(|at| path[*at]).collect();
-    match extent(dimension.over, &owner) {
-        Extent::Unknown(instance) => {
-            if !found.unknown.contains(&instance) {
-                found.unknown.push(instance);
+    fixed: &'w [Option<u64>],
+    path: Vec<u64>,
+    found: Walk,
+}
+
+impl Walker<'_> {
+    fn descend(&mut self, extent: &mut impl FnMut(usize, &[u64]) -> Extent) {
+        let at = self.path.len();
+        let Some(dimension) = self.graph.steps[self.step].dimensions.get(at) else {
+            self.found.known.push(self.path.clone());
+            return;
+        };
+        let owner: Vec<u64> = dimension.prefix.iter().map(|at| self.path[*at]).collect();
+        match extent(dimension.over, &owner) {
+            Extent::Unknown(instance) => {
+                if !self.found.unknown.contains(&instance) {
+                    self.found.unknown.push(instance);
+                }
             }
-        }
-        Extent::Items(n) => {
-            let range = match fixed[path.len()] {
-                Some(i) if i < n => i..i + 1,
-                Some(_) => 0..0,
-                None => 0..n,
-            };
-            for i in range {
-                path.push(i);
-                descend(graph, step, fixed, extent, path, found);
-                path.pop();
+            Extent::Items(n) => {
+                let range = match self.fixed[at] {
+                    Some(i) if i < n => i..i + 1,
+                    Some(_) => 0..0,
+                    None => 0..n,
+                };
+                for i in range {
+                    self.path.push(i);
+                    self.descend(extent);
+                    self.path.pop();
+                }
             }
         }
     }

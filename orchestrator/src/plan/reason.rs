@@ -3,11 +3,52 @@
 use super::keys::{Binary, Ingredients, InputKey, canonical_json};
 use serde_json::Value;
 
+/// A part of a key.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum KeyPart {
+    /// The name of the step.
+    #[error("step name")]
+    StepName,
+    /// The plugin.
+    #[error("plugin")]
+    Plugin,
+    /// A component, by its name.
+    #[error("component {0}")]
+    Component(String),
+    /// A parameter, by its JSON pointer.
+    #[error("parameter {0}")]
+    Parameter(String),
+    /// What is in a file, by the pointer of the parameter that names it.
+    #[error("content of the file at {0}")]
+    File(String),
+    /// The version of the data model.
+    #[error("data model")]
+    DataModel,
+    /// An input.
+    #[error("input {port} from {from}")]
+    Input {
+        /// The port at which it arrives.
+        port: String,
+        /// The instance that gives it: `local[2]`.
+        from: String,
+    },
+    /// The order of the inputs.
+    #[error("order of the inputs")]
+    Order,
+}
+
+/// As its text.
+impl serde::Serialize for KeyPart {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(self)
+    }
+}
+
 /// One part of a key that differs.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Change {
-    /// What: `parameter /speed`, `plugin`, `component m4`, `input formed`.
-    pub part: String,
+    /// What.
+    pub part: KeyPart,
     /// Before; empty when it was not there.
     pub old: String,
     /// Now; empty when it is gone.
@@ -18,10 +59,10 @@ pub struct Change {
 pub fn changes(old: (&Ingredients, &[InputKey]), new: (&Ingredients, &[InputKey])) -> Vec<Change> {
     let mut found = Vec::new();
     let (o, n) = (old.0, new.0);
-    push(&mut found, "step name", &o.step, &n.step);
+    push(&mut found, KeyPart::StepName, &o.step, &n.step);
     push(
         &mut found,
-        "plugin",
+        KeyPart::Plugin,
         &binary_text(&o.plugin),
         &binary_text(&n.plugin),
     );
@@ -29,13 +70,14 @@ pub fn changes(old: (&Ingredients, &[InputKey]), new: (&Ingredients, &[InputKey]
         let (a, b) = (o.components.get(at), n.components.get(at));
         let name = b.or(a).map_or("", |c| c.name.as_str());
         let text = |c: Option<&Binary>| c.map(binary_text).unwrap_or_default();
-        push(&mut found, &format!("component {name}"), &text(a), &text(b));
+        let part = KeyPart::Component(name.to_owned());
+        push(&mut found, part, &text(a), &text(b));
     }
     compare_values(&mut found, "", Some(&o.parameters), Some(&n.parameters));
     compare_files(&mut found, &o.files, &n.files);
     push(
         &mut found,
-        "data model",
+        KeyPart::DataModel,
         &o.data_model.to_string(),
         &n.data_model.to_string(),
     );
@@ -43,10 +85,10 @@ pub fn changes(old: (&Ingredients, &[InputKey]), new: (&Ingredients, &[InputKey]
     found
 }
 
-fn push(found: &mut Vec<Change>, part: &str, old: &str, new: &str) {
+fn push(found: &mut Vec<Change>, part: KeyPart, old: &str, new: &str) {
     if old != new {
         found.push(Change {
-            part: part.into(),
+            part,
             old: old.into(),
             new: new.into(),
         });
@@ -79,7 +121,7 @@ fn compare_values(found: &mut Vec<Change>, at: &str, old: Option<&Value>, new: O
         }
         (a, b) => {
             let text = |v: Option<&Value>| v.map(canonical_json).unwrap_or_default();
-            push(found, &format!("parameter {at}"), &text(a), &text(b));
+            push(found, KeyPart::Parameter(at.to_owned()), &text(a), &text(b));
         }
     }
 }
@@ -97,7 +139,7 @@ fn compare_files(found: &mut Vec<Change>, old: &[(String, String)], new: &[(Stri
     for p in pointers {
         push(
             found,
-            &format!("content of the file at {p}"),
+            KeyPart::File(p.clone()),
             &hash(old, p),
             &hash(new, p),
         );
@@ -105,22 +147,25 @@ fn compare_files(found: &mut Vec<Change>, old: &[(String, String)], new: &[(Stri
 }
 
 fn compare_inputs(found: &mut Vec<Change>, old: &[InputKey], new: &[InputKey]) {
-    let name = |i: &InputKey| format!("input {} from {}", i.port, place(&i.step, &i.item));
+    let part = |i: &InputKey| KeyPart::Input {
+        port: i.port.clone(),
+        from: place(&i.step, &i.item),
+    };
     for o in old {
         let same = |i: &&InputKey| (&i.port, &i.step, &i.item) == (&o.port, &o.step, &o.item);
         match new.iter().find(same) {
-            Some(n) => push(found, &name(o), &o.key.short(), &n.key.short()),
-            None => push(found, &name(o), &o.key.short(), ""),
+            Some(n) => push(found, part(o), &o.key.short(), &n.key.short()),
+            None => push(found, part(o), &o.key.short(), ""),
         }
     }
     for n in new {
         let same = |i: &InputKey| (&i.port, &i.step, &i.item) == (&n.port, &n.step, &n.item);
         if !old.iter().any(same) {
-            push(found, &name(n), "", &n.key.short());
+            push(found, part(n), "", &n.key.short());
         }
     }
     if found.is_empty() && old != new {
-        push(found, "order of the inputs", "differs", "");
+        push(found, KeyPart::Order, "differs", "");
     }
 }
 
@@ -157,7 +202,7 @@ mod tests {
             (&old, &[input(Key([1; 32]))]),
             (&new, &[input(Key([2; 32]))]),
         );
-        let parts: Vec<&str> = found.iter().map(|c| c.part.as_str()).collect();
+        let parts: Vec<String> = found.iter().map(|c| c.part.to_string()).collect();
         assert_eq!(
             parts,
             [

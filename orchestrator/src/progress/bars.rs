@@ -1,6 +1,6 @@
 //! Bars on a terminal: one per running step, one for the run.
 
-use super::{Pace, duration_text, progress_text};
+use super::pace::{Pace, duration_text, progress_text};
 use crate::engine::core::{Core, Id, State};
 use crate::engine::{Observer, Update};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};

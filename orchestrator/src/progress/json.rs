@@ -34,6 +34,6 @@ impl Observer for JsonLines {
         if let (Value::Object(line), Value::Object(more)) = (&mut line, more) {
             line.extend(more);
         }
-        crate::cli::warn(&format!("{line}\n"));
+        crate::said::warn(&format!("{line}\n"));
     }
 }

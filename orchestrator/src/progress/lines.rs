@@ -1,6 +1,6 @@
 //! One line per event, for files and pipes.
 
-use super::{Pace, duration_text, progress_text};
+use super::pace::{Pace, duration_text, progress_text};
 use crate::engine::core::{Core, Id};
 use crate::engine::{Observer, Update};
 use plyflow_model::job::LogLevel;
@@ -18,7 +18,7 @@ pub struct Lines {
 
 fn say(text: &str) {
     // A closed standard error must not stop a run.
-    crate::cli::warn(&format!("{text}\n"));
+    crate::said::warn(&format!("{text}\n"));
 }
 
 impl Observer for Lines {

@@ -1,6 +1,7 @@
 //! Where damaged files go: kept under another name, so that somebody can look at them and nothing takes them for whole.
 
-use super::{Store, list};
+use super::folder::Store;
+use super::names::{free_name, list};
 use crate::plan::Key;
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::seal::{read_document, sealed};
@@ -107,14 +108,6 @@ impl Store {
             _ => Ok(()),
         }
     }
-}
-
-/// This path, or the first of `PATH.2`, `PATH.3` .. at which nothing lies: whatever lies there stays.
-pub(super) fn free_name(path: &Utf8Path) -> Utf8PathBuf {
-    let numbered = (2..).map(|n| Utf8PathBuf::from(format!("{path}.{n}")));
-    let mut all = std::iter::once(path.to_owned()).chain(numbered);
-    all.find(|p| fs::symlink_metadata(p).is_err())
-        .unwrap_or_else(|| path.to_owned())
 }
 
 /// Why the note of plugin libraries is not what was written, when it is there and is not.

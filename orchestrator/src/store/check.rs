@@ -3,7 +3,9 @@
 //! An artifact is sealed by the hash in its record, the record by its own. Hashing is for when bytes are consumed or printed; a run
 //! that does nothing looks only at what the file system tells of the files ([`Seen`]), as it was when they were last known to be whole.
 
-use super::{ENDING, RECORD_ENDING, RunFolder, Store, key_of, list};
+use super::folder::Store;
+use super::names::{ENDING, RECORD_ENDING, key_of, list};
+use super::run::RunFolder;
 use crate::plan::{ByKey, Key};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::seal::{BrokenSeal, hash_file, read_document, sealed};

@@ -1,4 +1,4 @@
-use super::super::tests::write_pair;
+use super::super::place::tests::write_pair;
 use super::*;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

@@ -1,9 +1,9 @@
 //! Reads what a run will need while its workflow is still being read: the journal of the last run, and what the file system tells of the
 //! artifacts that it used. What has changed until the run holds its lock is read again.
 
-use super::check::look_at_many;
+use super::check::{Seen, look_at_many};
+use super::folder::Store;
 use super::journal::Scanned;
-use super::{Seen, Store};
 use crate::plan::{ByKey, Key};
 use camino::{Utf8Path, Utf8PathBuf};
 use std::collections::HashMap;

@@ -1,6 +1,6 @@
 //! Kernel locks: they end with the process that holds them, so nothing is ever left to unlock.
 
-use super::aside::free_name;
+use super::names::free_name;
 use camino::{Utf8Path, Utf8PathBuf};
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;

@@ -1,6 +1,6 @@
 //! Where the files of one workflow's runs lie.
 
-use super::{list, safe_name};
+use super::names::{list, safe_name};
 use crate::plan::Key;
 use camino::Utf8PathBuf;
 use std::{fs, io};

@@ -1,4 +1,6 @@
+use super::super::names::safe_name;
 use super::*;
+use camino::Utf8PathBuf;
 
 #[test]
 fn names_that_are_not_file_names_stay_apart() {
@@ -69,7 +71,7 @@ fn what_is_damaged_while_it_could_not_be_committed_never_gets_into_the_store() {
 }
 
 /// An artifact and its record, as a worker leaves them.
-pub(super) fn write_pair(key: &Key, artifact: &Utf8Path, record: &Utf8Path) {
+pub(crate) fn write_pair(key: &Key, artifact: &Utf8Path, record: &Utf8Path) {
     fs::write(artifact, "artifact").unwrap();
     let whole = plyflow_model::job::Record {
         version: plyflow_model::job::JOB_VERSION,

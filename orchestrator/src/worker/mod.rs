@@ -18,7 +18,7 @@ pub fn main(arguments: &[String], inside: impl FnOnce()) -> ! {
         [source] => supervise(inside, || plyflow_plugin_host::worker_main(source)),
         [source, "--parent", parent] => match follow(parent) {
             Ok(()) => supervise(inside, || plyflow_plugin_host::worker_main(source)),
-            Err(text) => refuse(&text),
+            Err(alone) => refuse(&alone.to_string()),
         },
         _ => refuse("wants the file of a job, or - for standard input"),
     }
@@ -31,20 +31,28 @@ fn describe(inside: impl FnOnce(), library: &str, hash: Option<&str>) -> ! {
 }
 
 fn refuse(text: &str) -> ! {
-    crate::cli::warn(&format!("plyflow step-worker: {text}\n"));
+    crate::said::warn(&format!("plyflow step-worker: {text}\n"));
     unsafe { libc::_exit(2) }
 }
 
 /// Dies when the engine dies, however it dies.
-fn follow(parent: &str) -> Result<(), String> {
-    let parent: i32 = parent
-        .parse()
-        .map_err(|_| "--parent wants a process number")?;
-    rustix::process::set_parent_process_death_signal(Some(Signal::KILL))
-        .map_err(|e| format!("cannot follow the engine's death: {e}"))?;
+fn follow(parent: &str) -> Result<(), Alone> {
+    let parent: i32 = parent.parse().map_err(|_| Alone::NoNumber)?;
+    rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
     // It may have died before the line above.
-    if rustix::process::getppid() != Pid::from_raw(parent) {
-        return Err("the engine is gone already".into());
+    match rustix::process::getppid() == Pid::from_raw(parent) {
+        true => Ok(()),
+        false => Err(Alone::Gone),
     }
-    Ok(())
+}
+
+/// Why a worker does not follow its engine.
+#[derive(Debug, thiserror::Error)]
+enum Alone {
+    #[error("--parent wants a process number")]
+    NoNumber,
+    #[error("cannot follow the engine's death: {0}")]
+    Refused(#[from] rustix::io::Errno),
+    #[error("the engine is gone already")]
+    Gone,
 }

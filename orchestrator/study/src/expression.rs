@@ -14,83 +14,21 @@
 
 mod evaluate;
 mod read;
+mod tree;
 mod unit;
 
-use crate::{Problem, Value};
+use crate::value::Value;
 use evaluate::{value, yes};
 use read::Reader;
-use std::ops::Range;
+use tree::{Node, variables};
 
-/// Why an expression cannot be read or computed, and where in its text.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{problem}")]
-pub struct ExpressionError {
-    /// Bytes of the expression.
-    pub at: Range<usize>,
-    /// What is wrong.
-    pub problem: Problem,
-}
-
-/// The variables that an expression may name.
-#[derive(Debug, Clone, Copy)]
-pub struct Names<'a> {
-    /// Their names; an expression holds their positions.
-    pub all: &'a [String],
-    /// Whether a name alone means a variable (`angle`), or only `${angle}` does.
-    pub bare: bool,
-}
+pub use tree::{ExpressionError, Names};
 
 /// An expression that has been read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expression {
     root: Node,
 }
-
-#[derive(Debug, Clone, PartialEq)]
-struct Node {
-    at: Range<usize>,
-    kind: Kind,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-enum Kind {
-    Literal(Value),
-    Variable(usize),
-    Negative(Box<Node>),
-    Sum(char, Box<Node>, Box<Node>),
-    Compared(Vec<(Compare, Node)>, Box<Node>),
-    Not(Box<Node>),
-    And(Vec<Node>),
-    Or(Vec<Node>),
-    Call(Function, Vec<Node>),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Compare {
-    Less,
-    AtMost,
-    More,
-    AtLeast,
-    Equal,
-    Other,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Function {
-    Abs,
-    Min,
-    Max,
-    Round,
-}
-
-const FUNCTIONS: [(&str, Function); 4] = [
-    ("abs", Function::Abs),
-    ("min", Function::Min),
-    ("max", Function::Max),
-    ("round", Function::Round),
-];
-
-const WORDS: [&str; 5] = ["and", "or", "not", "true", "false"];
 
 impl Expression {
     /// Reads an expression.
@@ -137,25 +75,6 @@ impl Expression {
         found.sort_unstable();
         found.dedup();
         found
-    }
-}
-
-fn variables(node: &Node, found: &mut Vec<usize>) {
-    match &node.kind {
-        Kind::Literal(_) => {}
-        Kind::Variable(i) => found.push(*i),
-        Kind::Negative(a) | Kind::Not(a) => variables(a, found),
-        Kind::Sum(_, a, b) => {
-            variables(a, found);
-            variables(b, found);
-        }
-        Kind::Compared(all, last) => {
-            all.iter().for_each(|(_, n)| variables(n, found));
-            variables(last, found);
-        }
-        Kind::And(all) | Kind::Or(all) | Kind::Call(_, all) => {
-            all.iter().for_each(|n| variables(n, found));
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Numbers as they are written, with their units.
 
-use crate::Problem;
+use crate::problem::Problem;
 use num_rational::Ratio;
 use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, Signed, Zero};
 use plyflow_model::units::{

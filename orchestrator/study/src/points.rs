@@ -1,8 +1,9 @@
 //! Tables of values, and the points of a study.
 
+use crate::expression::{Expression, ExpressionError, Names};
 use crate::number::Quantity;
-use crate::value::Kind;
-use crate::{Expression, ExpressionError, Names, Problem, Value};
+use crate::problem::Problem;
+use crate::value::{Kind, Value};
 use std::collections::HashMap;
 
 /// Most points of a study.

@@ -1,7 +1,8 @@
 //! Ranges: values from one end to the other, both included.
 
-use crate::number::{double, of_double, power_of_ten, rounded};
-use crate::{Exact, Problem, Quantity, Value};
+use crate::number::{Exact, Quantity, double, of_double, power_of_ten, rounded};
+use crate::problem::Problem;
+use crate::value::Value;
 use num_traits::{CheckedAdd, CheckedDiv, CheckedMul, CheckedSub, Signed, Zero};
 use plyflow_fixed::FixedBits;
 

@@ -5,8 +5,10 @@
 //! not. Streams are ChaCha8 of the crate `chacha20`, Sobol numbers with Owen's scrambling those of `sobol_burley`: whole numbers,
 //! the same on every machine.
 
+use crate::points::Table;
+use crate::problem::Problem;
 use crate::range::{Range, Step, range};
-use crate::{Problem, Table, Value};
+use crate::value::Value;
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 

@@ -1,7 +1,7 @@
 //! Values of a file with `${name}` in them.
 
-use crate::Problem;
 use crate::expression::{Expression, ExpressionError, Names};
+use crate::problem::Problem;
 use crate::value::{Kind, Value, Written};
 
 /// A value with variables in it.

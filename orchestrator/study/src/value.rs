@@ -1,7 +1,7 @@
 //! Values of variables.
 
-use crate::Problem;
 use crate::number::{Quantity, double, si_unit, text, words};
+use crate::problem::Problem;
 use plyflow_model::units::Exponents;
 
 /// A value of a variable or of an expression.

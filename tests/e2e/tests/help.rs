@@ -73,22 +73,6 @@ fn the_exit_codes_of_help_and_of_the_book_are_the_same() {
 }
 
 #[test]
-fn a_wrong_command_line_is_code_2_and_says_what_is_right() {
-    for words in [
-        &[][..],
-        &["runn"],
-        &["run"],
-        &["run", "w.yaml", "--jobs", "0"],
-        &["run", "--jbos"],
-    ] {
-        let output = plyflow(words);
-        assert_eq!(output.status.code(), Some(2), "{words:?}");
-        assert!(!output.stderr.is_empty(), "{words:?}");
-    }
-    assert!(text(&plyflow(&["runn"]).stderr).contains("'run'"));
-}
-
-#[test]
 fn schemas_and_completions_are_printed_without_a_workflow() {
     for which in [
         "workflow",

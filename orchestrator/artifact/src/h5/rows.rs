@@ -1,6 +1,7 @@
 //! Rows of a dataset: appended whole, read whole or in part.
 
-use super::{DEFAULT, DType, Dataset, Location, checked, locked, space};
+use super::handle::{DEFAULT, checked, locked, space};
+use super::{DType, Dataset, Location};
 use crate::error::Result;
 use hdf5_sys::h5d::{H5Dread, H5Dset_extent, H5Dwrite};
 use hdf5_sys::h5i::hid_t;

@@ -1,6 +1,6 @@
 //! What a file really holds, before buffers of the size that it should have are filled: files may be damaged, or written by others.
 
-use super::{Handle, checked, close_space};
+use super::handle::{Handle, checked, close_space};
 use crate::error::{ArtifactError, ErrorKind, Result};
 use hdf5_sys::h5a::H5Aget_space;
 use hdf5_sys::h5d::H5Dget_space;

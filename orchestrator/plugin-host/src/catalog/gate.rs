@@ -1,15 +1,35 @@
 //! The gate before libraries that are not trusted: what is known of them without loading them, and what they may not take.
 
-use super::{Found, Looked, PluginCatalog, is_readable, named_like};
+use super::known::{Looked, PluginCatalog, is_readable, looked, read_stranger};
+use crate::breach::Breach;
 use crate::describe::Description;
-use crate::load::{hash_of, read_manifest};
+use crate::load::read_manifest;
 use crate::trust::{Place, Stranger, Trust, manifest_file};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_workflow::CatalogError;
 use plyflow_workflow::resolved::PluginId;
-use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
+use std::io;
 
 /// Longest manifest that is read from beside a library (bytes).
 const LONGEST_MANIFEST: u64 = 4 << 20;
+
+/// Why the manifest beside a library is of no use.
+#[derive(Debug, thiserror::Error)]
+#[error("its manifest {file} cannot be used: {why}")]
+struct BesideError {
+    file: Utf8PathBuf,
+    why: Unusable,
+}
+
+#[derive(Debug, thiserror::Error)]
+enum Unusable {
+    #[error("expected a plain file of at most {} KiB", LONGEST_MANIFEST / 1024)]
+    NoFile,
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    #[error(transparent)]
+    Breach(#[from] Breach),
+}
 
 impl PluginCatalog {
     /// Loads only what this trust allows (without it: every library). Of the others only what stands beside them is
@@ -39,9 +59,9 @@ impl PluginCatalog {
         if self.trust.place(&id.path) != Place::Elsewhere {
             return Ok(());
         }
-        let library = read_stranger(&id.path).map_err(|reason| CatalogError::Broken {
+        let library = read_stranger(&id.path).map_err(|breach| CatalogError::Broken {
             path: id.path.clone(),
-            reason,
+            reason: breach.to_string(),
         })?;
         if !self.trust.allows_when_asked(&library) {
             return Err(needs_consent(&id.name, [&library]));
@@ -58,39 +78,26 @@ impl PluginCatalog {
         }
     }
 
-    /// A plugin that has the name of one that is trusted more, with other bytes: which of them is meant nobody can know.
-    pub(super) fn taken(&self, entry: &CatalogEntry, place: Place) -> Option<CatalogError> {
-        let owner = self.owner(&entry.id.name, place)?;
-        (owner.id.hash != entry.id.hash).then(|| CatalogError::Taken {
-            name: entry.id.name.clone(),
-            owner: owner.id.path.clone(),
-            other: entry.id.path.clone(),
-        })
+    /// What a library is. One that may not be loaded is described by what lies beside it; `ask`: the user may be asked
+    /// when nothing does.
+    pub(super) fn look(&self, path: &Utf8Path, place: Place, ask: bool) -> Looked {
+        match place {
+            Place::Elsewhere => self.look_at_stranger(path, ask),
+            Place::Installation | Place::Own => match self.known(path, None) {
+                Ok(known) => looked(path, known),
+                Err(breach) => Looked::Broken(breach.to_string()),
+            },
+        }
     }
 
-    /// The plugin of a name that is trusted more than those of a place.
-    fn owner(&self, name: &str, than: Place) -> Option<&CatalogEntry> {
-        let places = match than {
-            Place::Installation => &[][..],
-            Place::Own => &[Place::Installation][..],
-            Place::Elsewhere => &[Place::Installation, Place::Own][..],
-        };
-        places.iter().find_map(|wanted| {
-            self.scan().iter().find_map(|found| match found {
-                Found::Plugin(e, place) if place == wanted && e.id.name == name => Some(&**e),
-                _ => None,
-            })
-        })
-    }
-
-    pub(super) fn look_at_stranger(&self, path: &Utf8Path, ask: bool) -> Looked {
+    fn look_at_stranger(&self, path: &Utf8Path, ask: bool) -> Looked {
         let library = match read_stranger(path) {
             Ok(library) => library,
-            Err(reason) => return Looked::Broken(reason),
+            Err(e) => return Looked::Broken(e.to_string()),
         };
         let beside = match manifest_beside(path) {
             Ok(text) => text,
-            Err(reason) => return Looked::Broken(reason),
+            Err(e) => return Looked::Broken(e.to_string()),
         };
         let hash = library.hash.clone();
         if !self.trust.allows(&library) {
@@ -111,7 +118,7 @@ impl PluginCatalog {
         }
         let known = match self.known(path, Some(hash)) {
             Ok(known) => known,
-            Err(reason) => return Looked::Broken(reason),
+            Err(e) => return Looked::Broken(e.to_string()),
         };
         if let (Some(beside), Description::Plugin(own)) = (beside, &known.1)
             && read_manifest(&beside) != read_manifest(own)
@@ -124,78 +131,24 @@ impl PluginCatalog {
         }
         looked(path, known)
     }
-
-    pub(super) fn find_by_name(&self, name: &str) -> Result<CatalogEntry, CatalogError> {
-        let mut strangers = Vec::new();
-        for found in self.scan() {
-            match found {
-                Found::Plugin(entry, place) if entry.id.name == name => {
-                    return match self.taken(entry, *place) {
-                        Some(taken) => Err(taken),
-                        None => Ok((**entry).clone()),
-                    };
-                }
-                Found::Broken { path, reason } if named_like(path, name) => {
-                    return Err(CatalogError::Broken {
-                        path: path.clone(),
-                        reason: reason.clone(),
-                    });
-                }
-                Found::Stranger(library) if named_like(&library.path, name) => {
-                    // It comes before a plugin of that name: to take either without a word would be wrong.
-                    if let Some(owner) = self.owner(name, Place::Elsewhere) {
-                        return Err(CatalogError::Taken {
-                            name: name.into(),
-                            owner: owner.id.path.clone(),
-                            other: library.path.clone(),
-                        });
-                    }
-                    match self.find(library.path.as_str(), Utf8Path::new("/")) {
-                        Ok(entry) if entry.id.name != name => {}
-                        answer => return answer,
-                    }
-                }
-                Found::Stranger(library) => strangers.push(library),
-                _ => {}
-            }
-        }
-        if strangers.is_empty() {
-            return Err(CatalogError::NotFound {
-                name: name.into(),
-                searched: self.folders.clone(),
-            });
-        }
-        Err(needs_consent(name, strangers))
-    }
-}
-
-/// The path and the hash of a library's bytes.
-pub(super) fn read_stranger(path: &Utf8Path) -> Result<Stranger, String> {
-    if !path.is_file() {
-        return Err("there is no such file".into());
-    }
-    Ok(Stranger {
-        path: path.to_owned(),
-        hash: hash_of(path).map_err(|e| e.to_string())?,
-    })
 }
 
 /// The manifest that lies beside a library, if one does.
-fn manifest_beside(library: &Utf8Path) -> Result<Option<String>, String> {
+fn manifest_beside(library: &Utf8Path) -> Result<Option<String>, BesideError> {
     let file = manifest_file(library);
-    let wrong = |why: String| format!("its manifest {file} cannot be used: {why}");
+    let wrong = |why: Unusable| BesideError {
+        file: file.clone(),
+        why,
+    };
     match std::fs::metadata(&file) {
         Err(_) => return Ok(None),
         Ok(m) if !m.is_file() || m.len() > LONGEST_MANIFEST => {
-            return Err(wrong(format!(
-                "expected a plain file of at most {} KiB",
-                LONGEST_MANIFEST / 1024
-            )));
+            return Err(wrong(Unusable::NoFile));
         }
         Ok(_) => {}
     }
-    let text = std::fs::read_to_string(&file).map_err(|e| wrong(e.to_string()))?;
-    read_manifest(&text).map_err(wrong)?;
+    let text = std::fs::read_to_string(&file).map_err(|e| wrong(e.into()))?;
+    read_manifest(&text).map_err(|e| wrong(e.into()))?;
     Ok(Some(text))
 }
 
@@ -210,23 +163,4 @@ pub(super) fn needs_consent<'a>(
             .map(|l| (l.path.clone(), l.hash.clone()))
             .collect(),
     }
-}
-
-pub(super) fn looked(path: &Utf8Path, (hash, description): (String, Description)) -> Looked {
-    let text = match description {
-        Description::Foreign(_) => return Looked::Foreign,
-        Description::Broken(reason) => return Looked::Broken(reason),
-        Description::Plugin(text) => text,
-    };
-    let manifest = match read_manifest(&text) {
-        Ok(manifest) => manifest,
-        Err(reason) => return Looked::Broken(reason),
-    };
-    let id = PluginId {
-        name: manifest.name.clone(),
-        version: manifest.version.clone(),
-        path: path.to_owned(),
-        hash,
-    };
-    Looked::Plugin(Box::new(CatalogEntry { id, manifest }))
 }

@@ -1,8 +1,9 @@
 //! The value of an expression that has been read.
 
-use super::{Compare, ExpressionError, Function, Kind, Node};
+use super::tree::{Compare, ExpressionError, Function, Kind, Node, Sign};
 use crate::number::Quantity;
-use crate::{Problem, Value};
+use crate::problem::Problem;
+use crate::value::Value;
 use num_traits::Signed;
 use std::cmp::Ordering;
 
@@ -22,10 +23,10 @@ pub(super) fn value(node: &Node, of: &[Value]) -> Result<Value, ExpressionError>
         Kind::Sum(sign, a, b) => {
             let (a, b) = (number(a, of)?, number(b, of)?);
             let found = match sign {
-                '+' => a.plus(&b),
-                '-' => a.minus(&b),
-                '*' => a.times(&b),
-                _ => a.over(&b),
+                Sign::Plus => a.plus(&b),
+                Sign::Minus => a.minus(&b),
+                Sign::Times => a.times(&b),
+                Sign::Over => a.over(&b),
             };
             Value::Quantity(found.map_err(at)?)
         }

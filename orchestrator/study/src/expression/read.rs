@@ -1,9 +1,10 @@
 //! The grammar: text -> nodes.
 
+use super::tree::{Compare, ExpressionError, FUNCTIONS, Function, Kind, Names, Node, Sign, WORDS};
 use super::unit::{unit, variable_in};
-use super::{Compare, ExpressionError, FUNCTIONS, Function, Kind, Names, Node, WORDS};
 use crate::number::{Quantity, leading};
-use crate::{Problem, Value};
+use crate::problem::Problem;
+use crate::value::Value;
 
 /// Deepest nesting that is read: nobody writes more, and it keeps a hostile file from using up the stack.
 const DEEPEST: usize = 64;
@@ -183,8 +184,8 @@ impl<'t> Reader<'t> {
         let mut left = self.product()?;
         loop {
             let sign = match (self.takes("+"), self.takes("-")) {
-                (true, _) => '+',
-                (false, true) => '-',
+                (true, _) => Sign::Plus,
+                (false, true) => Sign::Minus,
                 _ => return Ok(left),
             };
             self.count()?;
@@ -197,8 +198,8 @@ impl<'t> Reader<'t> {
         let mut left = self.factor()?;
         loop {
             let sign = match (self.takes("*"), self.takes("/")) {
-                (true, _) => '*',
-                (false, true) => '/',
+                (true, _) => Sign::Times,
+                (false, true) => Sign::Over,
                 _ => return Ok(left),
             };
             self.count()?;
@@ -396,7 +397,7 @@ impl<'t> Reader<'t> {
     }
 }
 
-fn pair(sign: char, left: Node, right: Node) -> Node {
+fn pair(sign: Sign, left: Node, right: Node) -> Node {
     Node {
         at: left.at.start..right.at.end,
         kind: Kind::Sum(sign, Box::new(left), Box::new(right)),

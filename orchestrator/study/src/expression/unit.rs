@@ -1,6 +1,6 @@
 //! Where the unit of a number ends.
 
-use super::{FUNCTIONS, Names, WORDS};
+use super::tree::{FUNCTIONS, Names, WORDS};
 use plyflow_model::units::parse_unit;
 
 fn is_letter(c: char) -> bool {

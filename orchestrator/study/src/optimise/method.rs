@@ -2,8 +2,10 @@
 //!
 //! Only methods are here that compare and add, multiply and divide: their points have the same bits on every machine (decision 37).
 
-use super::{Along, Asked, Search, key};
-use crate::{Problem, Value};
+use super::rank::{Told, ranks};
+use super::search::{Search, Way, distinct, key};
+use crate::problem::Problem;
+use crate::value::Value;
 use basin::{
     BoxBounds, ConstraintDescription, ConstraintSet, Constraints, CostFunction, De, DeMutation,
     NelderMead, PopulationProgress, SimplexProgress, Solver,
@@ -11,66 +13,42 @@ use basin::{
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 
-/// Members of a population for each variable, where the number is not given.
-pub const DEFAULT_POPULATION: usize = 4;
+/// What a method wants next.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Asked {
+    /// These points, which may run at once.
+    Points(Vec<Vec<Value>>),
+    /// Nothing: it asks only for points that it has had.
+    Settled,
+}
 
-/// How far the corners of the first simplex lie from its start, as a part of each range.
-const FIRST_STEP: f64 = 0.25;
+impl Search {
+    /// The first points that the method asks for.
+    ///
+    /// # Errors
+    /// When a value has too many digits.
+    pub fn first(&self) -> Result<Vec<Vec<Value>>, Problem> {
+        Ok(match self.ask(&[])? {
+            Asked::Points(points) => points,
+            Asked::Settled => Vec::new(),
+        })
+    }
 
-/// A method.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
-    /// The simplex of Nelder and Mead, kept within the ranges: local, one point after the other.
-    Simplex,
-    /// Differential evolution of a population: global, a generation at once.
-    Evolution {
-        /// Members of the population, at least 4.
-        population: usize,
-    },
+    /// What the method asks for, where it has been told this, in the order in which it asked.
+    ///
+    /// # Errors
+    /// When a value has too many digits.
+    pub fn ask(&self, told: &[Told]) -> Result<Asked, Problem> {
+        let begin = self.begin();
+        let first = distinct(self, &begin)?;
+        let ranks = ranks(told, first);
+        let known = told.iter().zip(ranks);
+        let known: HashMap<String, f64> = known.map(|(t, rank)| (key(&t.point), rank)).collect();
+        next(self, begin, known)
+    }
 }
 
 impl Way {
-    /// The points that it begins with, of the unit cube.
-    pub(super) fn begin(self, search: &Search) -> Result<Vec<Vec<f64>>, Problem> {
-        let n = search.over.len();
-        let start: Vec<f64> = match &search.start {
-            Some(values) => {
-                let all = search.over.iter().zip(values);
-                let found = all.map(|((_, along), v)| along.fraction(v).unwrap_or(0.5));
-                found.collect()
-            }
-            None => vec![0.5; n],
-        };
-        match self {
-            Self::Simplex => {
-                let mut all = vec![start.clone()];
-                for i in 0..n {
-                    let mut corner = start.clone();
-                    // A step must lead to another value.
-                    let step = match &search.over[i].1 {
-                        Along::Range(_) => FIRST_STEP,
-                        Along::Steps(v) | Along::Choice(v) => {
-                            FIRST_STEP.max(1.0 / v.len() as f64).min(0.5)
-                        }
-                    };
-                    corner[i] += if start[i] <= 0.5 { step } else { -step };
-                    all.push(corner);
-                }
-                Ok(all)
-            }
-            Self::Evolution { population } => {
-                let seed = search.stream("begin") as u32;
-                let coordinate = |i: u32, d: u32| f64::from(sobol_burley::sample(i, d, seed));
-                let member = |i: u32| (0..n as u32).map(|d| coordinate(i, d)).collect();
-                let mut all: Vec<Vec<f64>> = (0..population as u32).map(member).collect();
-                if search.start.is_some() {
-                    all[0] = start;
-                }
-                Ok(all)
-            }
-        }
-    }
-
     /// How many points it asks for at once behind its first ones.
     fn at_once(self) -> usize {
         match self {
@@ -170,7 +148,7 @@ impl CostFunction for Oracle<'_> {
 }
 
 /// Lets a method run on what is known until it asks for more.
-pub(super) fn next(
+fn next(
     search: &Search,
     begin: Vec<Vec<f64>>,
     known: HashMap<String, f64>,

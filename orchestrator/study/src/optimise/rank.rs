@@ -1,6 +1,6 @@
 //! The order of points: what is better than what.
 
-use crate::Value;
+use crate::value::Value;
 
 /// What became of a point.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,5 +1,6 @@
+use super::search::key;
 use super::*;
-use crate::Quantity;
+use crate::{Quantity, Range, Value};
 
 const SIMPLEX: Way = Way::Simplex;
 

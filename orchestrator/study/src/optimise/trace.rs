@@ -1,8 +1,8 @@
 //! What a search has led to, point by point.
 
-use super::rank::{Outcome, scales, unmet};
-use super::{Search, Told, distinct};
-use crate::Problem;
+use super::rank::{Outcome, Told, scales, unmet};
+use super::search::{Search, distinct};
+use crate::problem::Problem;
 
 /// What is said of a point of a search.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Entry {
 /// # Errors
 /// When a value of the search has too many digits.
 pub fn trace(search: &Search, told: &[Told]) -> Result<Vec<Entry>, Problem> {
-    let first = distinct(search, &search.way.begin(search)?)?;
+    let first = distinct(search, &search.begin())?;
     let scales = scales(told, first);
     let place = |t: &Told| match &t.outcome {
         Outcome::Done { objective, .. } if t.outcome.is_feasible() => Some((false, *objective)),

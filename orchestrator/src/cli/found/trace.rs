@@ -1,15 +1,13 @@
-//! What has come of an optimisation, and what lies ahead.
+//! What has come of an optimisation.
 
-use super::super::study::{Line, Table, head};
-use super::super::table::number;
-use super::{Kept, is_answer, outcome};
+use super::answer::{Line, is_answer, outcome};
+use super::asked::Kept;
+use crate::cli::table::{head, number};
 use crate::engine::Session;
-use crate::progress::duration_text;
 use plyflow_model::artifact::{StudyBest, StudyOptimisation};
 use plyflow_study::Found;
 use plyflow_study::optimise::{Entry, Outcome, Told, best, trace};
 use plyflow_workflow::resolved::{Budget, FamilyExpectation, Study, StudyPoint, StudyValue};
-use serde_json::json;
 
 /// A column of numbers: its name, its unit, and the positions of the points that have a value, with it.
 pub type Column = (String, String, Vec<(u32, f64)>);
@@ -143,9 +141,9 @@ impl Trace {
     }
 
     /// In one sentence.
-    pub fn in_words(&self, table: &Table<'_>) -> String {
-        let name = &table.study.responses[self.objective].name;
-        let unit = &table.study.responses[self.objective].unit;
+    pub fn in_words(&self, study: &Study) -> String {
+        let name = &study.responses[self.objective].name;
+        let unit = &study.responses[self.objective].unit;
         let ended = match (self.ended, self.settled) {
             (true, true) => "its method has nothing more to ask",
             (true, false) => "its budget is used up",
@@ -165,7 +163,7 @@ impl Trace {
                 let value = value.trim_end();
                 format!(
                     "best of {told} ({failed} failed): {name} = {value} at {}; {ended}\n",
-                    table.study.points[at].name
+                    study.points[at].name
                 )
             }
             None => {
@@ -175,8 +173,7 @@ impl Trace {
     }
 
     /// For programs; `None` for a study.
-    pub fn told(&self, table: &Table<'_>) -> Option<StudyOptimisation> {
-        let study = table.study;
+    pub fn told(&self, study: &Study) -> Option<StudyOptimisation> {
         let o = study.optimisation.as_ref()?;
         let response = &study.responses[self.objective];
         let best = best(&self.told).map(|at| StudyBest {
@@ -201,8 +198,8 @@ impl Trace {
 }
 
 /// Why there is no best point to be judged; empty where there is one.
-pub fn why_not(table: &Table<'_>) -> &'static str {
-    match table.trace.as_ref() {
+pub fn why_not(trace: Option<&Trace>) -> &'static str {
+    match trace {
         Some(t) if t.ended && best(&t.told).is_some() => "",
         Some(t) if t.ended => " (no point meets what must hold)",
         _ => " (the optimisation is not at its end)",
@@ -210,8 +207,8 @@ pub fn why_not(table: &Table<'_>) -> &'static str {
 }
 
 /// The number of an expectation on the best point, once the optimisation is at its end.
-pub fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
-    let Some(trace) = table.trace.as_ref().filter(|t| t.ended) else {
+pub fn found(trace: Option<&Trace>, study: &Study, lines: &[Line], e: &FamilyExpectation) -> Found {
+    let Some(trace) = trace.filter(|t| t.ended) else {
         return Found::default();
     };
     let at = best(&trace.told);
@@ -219,69 +216,16 @@ pub fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
     let Some((at, place)) = at.zip(place) else {
         return Found::default();
     };
-    let point: &StudyPoint = &table.study.points[at];
+    let point: &StudyPoint = &study.points[at];
     let value = match e.over.map(|v| &point.values[v]) {
         Some(StudyValue::Number { si, .. }) => Some(*si),
         // Only a number is looked at.
         Some(_) => None,
-        None => table.lines[at].responses[e.response],
+        None => lines[at].responses[e.response],
     };
     Found {
         value,
         at: vec![place],
         ..Found::default()
     }
-}
-
-// What lies ahead.
-
-/// How much of the budget is left, for `plan`; empty for a study.
-pub fn ahead(study: &Study, of_a_point: Option<f64>) -> String {
-    let Some(o) = &study.optimisation else {
-        return String::new();
-    };
-    let (asked, word) = (
-        study.points.len(),
-        if o.maximise { "maximise" } else { "minimise" },
-    );
-    let name = &study.responses[o.objective].name;
-    let mut out = format!("optimisation: {word} {name}, method {}, ", o.method);
-    let took = of_a_point.map(duration_text);
-    match o.budget {
-        Budget::Runs(most) => {
-            let left = (most as usize).saturating_sub(asked);
-            out += &format!("budget {most} points: {asked} asked for, at most {left} more");
-            if let (Some(one), true) = (of_a_point, left > 0) {
-                out += &format!(", about {} of CPU time", duration_text(one * left as f64));
-            }
-        }
-        Budget::CpuSeconds(most) => {
-            out += &format!(
-                "budget {} of CPU time: {asked} points asked for",
-                duration_text(most)
-            );
-            if let Some(one) = took {
-                out += &format!(", one takes about {one}");
-            }
-        }
-    }
-    out + "\n"
-}
-
-/// As [`ahead`], for programs.
-pub fn ahead_json(study: &Study, of_a_point: Option<f64>) -> serde_json::Value {
-    let Some(o) = &study.optimisation else {
-        return serde_json::Value::Null;
-    };
-    let (runs, cpu) = match o.budget {
-        Budget::Runs(most) => (Some(most), None),
-        Budget::CpuSeconds(most) => (None, Some(most)),
-    };
-    let left = runs.map(|most| (most as usize).saturating_sub(study.points.len()));
-    let more = left.zip(of_a_point).map(|(n, one)| n as f64 * one);
-    json!({
-        "objective": study.responses[o.objective].name, "maximise": o.maximise, "method": o.method,
-        "budget_runs": runs, "budget_cpu_seconds": cpu, "asked": study.points.len(), "at_most_more": left,
-        "estimated_cpu_seconds_more": more,
-    })
 }

@@ -1,12 +1,13 @@
 //! What commands say and end with when something in the store is not what was written.
 
-use super::plan::{Difference, difference};
-use super::report::command;
-use super::{Done, Stop, args::Workflow, warn};
+use super::change::{Difference, difference};
+use crate::cli::args::Workflow;
+use crate::cli::typed::command;
 use crate::engine::core::{Id, State};
 use crate::engine::{Depth, Session};
 use crate::exit;
 use crate::progress::Quiet;
+use crate::said::{Done, Stop, warn};
 use crate::store::Flaw;
 
 /// Reads what is about to be printed of the instances `of`; what is not as it was written is set aside and told. Gives all that was found

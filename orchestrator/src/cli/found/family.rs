@@ -1,7 +1,8 @@
 //! What is expected over the points of a study, held against its table.
 
-use super::results::Row;
-use super::study::{STEP, Table};
+use super::points::Table;
+use super::row::{Row, STEP, Verdict};
+use super::trace;
 use crate::engine::Session;
 use crate::engine::core::Id;
 use plyflow_model::job::Record;
@@ -67,10 +68,7 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
         let all = table.lines.iter().filter_map(|l| l.responses[e.response]);
         t * all.fold(0.0, |a: f64, v| a.max(v.abs()))
     });
-    let along = matches!(
-        e.of,
-        FamilyOf::Monotone | FamilyOf::ZeroWhere | FamilyOf::SymmetricAbout
-    );
+    let along = is_size(e.of);
     let expected = Expectation {
         step: STEP.into(),
         mean_over: Vec::new(),
@@ -97,7 +95,7 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
         expected: Some(expected),
     };
     // Points without a result could change what is found, unless it is out of its bounds already and they could only add to it.
-    if found.missing > 0 && !(found.stands && row.verdict() == Some(super::results::MISSED)) {
+    if found.missing > 0 && !(found.stands && row.verdict() == Some(Verdict::Missed)) {
         row.value = None;
     }
     // One part of the study stands for the whole where its largest is not known.
@@ -109,33 +107,46 @@ fn row(table: &Table<'_>, e: &FamilyExpectation) -> Row {
     {
         row.value = None;
     }
+    row.name += &remarks(table, e, &found);
+    row
+}
+
+/// Whether what is found is the size of what should not be.
+fn is_size(of: FamilyOf) -> bool {
+    use FamilyOf::{Monotone, SymmetricAbout, ZeroWhere};
+    matches!(of, Monotone | ZeroWhere | SymmetricAbout)
+}
+
+/// Where the number comes from, and what it leaves out.
+fn remarks(table: &Table<'_>, e: &FamilyExpectation, found: &Found) -> String {
+    let mut out = String::new();
     if found.missing > 0 {
-        row.name += &format!(
+        out += &format!(
             " ({} of {} points have no value)",
             found.missing,
             e.points.len()
         );
-    } else if !(found.at.is_empty() || along && found.value == Some(0.0)) {
+    } else if !(found.at.is_empty() || is_size(e.of) && found.value == Some(0.0)) {
         let name = |i: &usize| table.study.points[e.points[*i] as usize].name.as_str();
         let names: Vec<&str> = found.at.iter().map(name).collect();
-        row.name += &format!(" (at {})", names.join(" and "));
+        out += &format!(" (at {})", names.join(" and "));
     }
     if e.of == FamilyOf::Best {
-        row.name += super::optimise::why_not(table);
+        out += trace::why_not(table.trace.as_ref());
     }
     if found.alone > 0 {
         let what = match e.of {
             FamilyOf::SymmetricAbout => "without a mirror point",
             _ => "without another one beside it",
         };
-        row.name += &format!(" ({} of {} points {what})", found.alone, e.points.len());
+        out += &format!(" ({} of {} points {what})", found.alone, e.points.len());
     }
-    row
+    out
 }
 
 fn found(table: &Table<'_>, e: &FamilyExpectation) -> Found {
     if e.of == FamilyOf::Best {
-        return super::optimise::found(table, e);
+        return trace::found(table.trace.as_ref(), table.study, &table.lines, e);
     }
     let mark = |i: &u32| {
         let point = &table.study.points[*i as usize];

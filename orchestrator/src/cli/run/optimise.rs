@@ -3,83 +3,27 @@
 //! Every round is a run of the workflow at the points that are new. What a method asks for depends on what it was told alone, and what it is told
 //! is in the store: so the same command goes on after a kill, and asks for the same points.
 
-mod trace;
-
-pub use trace::{Trace, ahead, ahead_json, found, why_not};
-
-use super::args::RunArgs;
-use super::open::{Opened, open_at};
-use super::plan::cost_of;
-use super::run::{Interrupts, ROUNDS, conclude, observer, options};
-use super::study::{Line, Status, Table};
-use super::{Done, Stop};
+use super::conclude::conclude;
+use super::interrupts::Interrupts;
+use super::settings::{ROUNDS, observer, options};
+use crate::cli::args::RunArgs;
+use crate::cli::found::answer::{Line, is_answer, no_answer, outcome};
+use crate::cli::found::asked::Kept;
+use crate::cli::found::change::cost_of;
+use crate::cli::found::points::Table;
+use crate::cli::found::rows::records;
+use crate::cli::open::{Opened, open_at};
 use crate::engine::core::State;
-use crate::engine::{Depth, Local, Session, Summary, class_of};
+use crate::engine::{Depth, Local, Purpose, Session, Summary};
 use crate::exit;
 use crate::plan::Key;
-use crate::store::{RunFolder, Store};
-use camino::Utf8Path;
+use crate::said::{Done, Stop};
 use plyflow_plugin_host::children_seconds;
 use plyflow_study::Value;
-use plyflow_study::optimise::{Asked, Outcome, Search, Told};
+use plyflow_study::optimise::{Asked, Told};
 use plyflow_workflow::resolved::{Budget, Optimisation, Study};
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
 use std::time::Instant;
-
-/// The class of failures that tell nothing of a point.
-const MACHINE: &str = "machine";
-
-// What has been asked for, kept for other commands.
-
-/// The points that an optimisation has asked for, as they are kept beside the journal of a workflow. A run needs none of it: it asks anew.
-#[derive(Debug, Default, Serialize, Deserialize)]
-struct Kept {
-    /// Names the search.
-    digest: String,
-    /// Whether the method has nothing more to ask.
-    settled: bool,
-    /// What the points took (CPU, s).
-    cpu_seconds: f64,
-    /// What steps took that failed (CPU, s), by their keys: the store has no record of them.
-    #[serde(default)]
-    failed: BTreeMap<String, f64>,
-    /// Texts of the values.
-    points: Vec<Vec<String>>,
-}
-
-impl Kept {
-    fn read(folder: &RunFolder, digest: &str) -> Option<Self> {
-        let path = folder.root.join("asked.json");
-        let bytes = plyflow_files::open::read(path.as_std_path(), plyflow_files::open::MOST_NOTED);
-        let kept: Self = serde_json::from_slice(&bytes.ok()?).ok()?;
-        (kept.digest == digest).then_some(kept)
-    }
-
-    fn write(&self, folder: &RunFolder) -> std::io::Result<()> {
-        let (path, new) = (
-            folder.root.join("asked.json"),
-            folder.root.join("asked.new"),
-        );
-        std::fs::create_dir_all(&folder.root)?;
-        std::fs::write(&new, serde_json::to_vec(self)?)?;
-        std::fs::rename(new, path)
-    }
-}
-
-/// The points that an optimisation asked for when it ran last.
-pub fn asked_before(
-    root: &Utf8Path,
-    workflow: &str,
-    digest: &str,
-    search: &Search,
-) -> Option<Vec<Vec<Value>>> {
-    let folder = Store::new(root.to_owned()).run(workflow);
-    let kept = Kept::read(&folder, digest)?;
-    kept.points.iter().map(|p| search.read(p)).collect()
-}
-
-// The run.
 
 /// What an opened workflow optimises, if it does.
 pub fn of(opened: &Opened) -> Option<Optimisation> {
@@ -233,7 +177,7 @@ fn round(
         if !is_answer(line) {
             break;
         }
-        let outcome = outcome(o, study, &point, line)?;
+        let outcome = outcome(o, study, &point, line).map_err(wrong)?;
         way.told.push(Told { point, outcome });
     }
     Ok(())
@@ -248,44 +192,7 @@ fn study_of(opened: &Opened) -> &Study {
 }
 
 fn read(session: &Session<'_>) -> Vec<Line> {
-    Table::read(session, &super::results::records(session)).lines
-}
-
-/// Whether a method can be told what became of a point.
-fn is_answer(line: &Line) -> bool {
-    match &line.status {
-        Status::Done => true,
-        Status::Failed { .. } => no_answer(line).is_none(),
-        Status::NotRun => false,
-    }
-}
-
-/// Whether what happened to a step when it ran last is an answer, so that it is not run again.
-pub fn is_answer_of(label: &str, reason: &str) -> bool {
-    class_of(reason) != MACHINE && label.contains('@')
-}
-
-/// Why a failure tells nothing of a point, if it does not.
-fn no_answer(line: &Line) -> Option<String> {
-    match &line.status {
-        Status::Failed { step, class, cause } if *class == MACHINE => Some(format!(
-            "{step}: {cause}\na failure of the machine tells nothing of a point, so that the optimisation stopped"
-        )),
-        // Its name has no values in it: it is the same at every point.
-        Status::Failed { step, cause, .. } if !step.contains('@') => Some(format!(
-            "{step}: {cause}\nthis step is the same at every point, so that the optimisation stopped"
-        )),
-        _ => None,
-    }
-}
-
-fn outcome(o: &Optimisation, study: &Study, point: &[Value], line: &Line) -> Result<Outcome, Stop> {
-    match line.status {
-        Status::Done => o
-            .outcome(study, point, &line.responses)
-            .map_err(|e| wrong(e.problem)),
-        _ => Ok(Outcome::Failed),
-    }
+    Table::read(session, &records(session)).lines
 }
 
 /// Runs the wanted steps of an opened workflow.
@@ -297,14 +204,7 @@ fn execute<'o>(
 ) -> Result<Session<'o>, Stop> {
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
     let options = options(args, opened)?;
-    let mut session = Session::new(
-        &opened.workflow,
-        &opened.graph,
-        &opened.store,
-        options,
-        true,
-    )
-    .map_err(machine())?;
+    let mut session = opened.session(options, Purpose::Run(None))?;
     let mut observer = observer(args);
     session.look(observer.as_mut());
     if let Err(stop) = opened.admit(&session) {
