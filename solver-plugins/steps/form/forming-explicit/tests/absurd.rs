@@ -5,8 +5,8 @@ mod common;
 use common::BuiltIn;
 use common::scenes::{bag, gentle_press, press};
 use plyflow_forming_explicit::absurd::{check, off_the_tool};
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::watch::{Watch, Watched};
+use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::{Watch, Watched};
 use plyflow_forming_explicit::{Feedback, LocalSheet, build_global, feed_back};
 use serde_json::{Value, json};
 

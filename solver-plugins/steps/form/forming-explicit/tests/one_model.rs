@@ -4,8 +4,8 @@ mod common;
 
 use common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
+use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::{Forming, Observer, Outcome};
 use plyflow_kernels::rf4::Rf4;
 use plyflow_mechanics::component::element_fields;
 use plyflow_mechanics::energy::Ledger;

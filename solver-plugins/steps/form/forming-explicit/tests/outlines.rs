@@ -4,7 +4,7 @@ mod common;
 
 use common::form;
 use common::scenes::{bag, press};
-use plyflow_forming_explicit::run::Forming;
+use plyflow_forming_explicit::Forming;
 use plyflow_mechanics::contact::SheetContact;
 use serde_json::json;
 

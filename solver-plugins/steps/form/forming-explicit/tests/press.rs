@@ -5,8 +5,8 @@ mod common;
 use common::scenes::press;
 use common::{BuiltIn, form};
 use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Outcome};
+use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::{Forming, Outcome};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 

@@ -16,10 +16,10 @@ mod common;
 
 use common::scenes::{self, ply};
 use common::{BuiltIn, fabric};
-use plyflow_forming_explicit::assembly::inverse_bilinear;
+use plyflow_forming_explicit::inverse_bilinear;
 use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::Forming;
+use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::Forming;
 use plyflow_mechanics::contact::shape;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::QuadMesh;

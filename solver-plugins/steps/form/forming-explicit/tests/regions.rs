@@ -5,7 +5,7 @@ mod common;
 use common::scenes::{bag, hourglass, ply, press};
 use common::{BuiltIn, fabric, form, woven};
 use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::Parameters;
 use plyflow_mechanics::contact::{FrictionLaw, Partner, RegionalFriction};
 use plyflow_mechanics::model::Model;
 use serde_json::{Value, json};

@@ -8,9 +8,9 @@ mod common;
 
 use common::scenes::bag;
 use common::{BuiltIn, Silent, form};
-use plyflow_forming_explicit::assembly::inverse_bilinear;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer, Outcome};
+use plyflow_forming_explicit::inverse_bilinear;
+use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome};
 use plyflow_forming_explicit::{
     Feedback, LocalInput, LocalSheet, Start, build_global, build_local, feed_back,
 };

@@ -5,9 +5,9 @@ mod common;
 use common::scenes::{bag, ply, press};
 use common::{BuiltIn, Silent, fabric, form};
 use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::Forming;
-use plyflow_forming_explicit::watch::{PairDepth, Watch, Watched, depth_warnings};
+use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::Forming;
+use plyflow_forming_explicit::{PairDepth, Watch, Watched, depth_warnings};
 use serde_json::json;
 
 fn build(p: &Parameters) -> Forming {
@@ -49,7 +49,7 @@ fn a_node_that_is_put_into_the_tool_is_told_by_how_far_and_where() {
     let depths = seen(&mut forming, |f| f.model.x[n] = [0.01, 0.005, 0.02 - 1e-4]);
     let found = of(&depths, "tool/lower").end;
     // Half of the film besides; the field's error is let be.
-    let expected = 1e-4 + 4e-5 - forming.field_error("tool");
+    let expected = 1e-4 + 4e-5 - forming.field_error(RigidName::Tool);
     assert!(
         (found.depth - expected).abs() < 1e-9,
         "{found:?}, not {expected}"

@@ -5,10 +5,10 @@ pub mod depth;
 pub mod scenes;
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
-use plyflow_forming_explicit::assembly::Components;
+use plyflow_forming_explicit::Components;
 use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
+use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::{Forming, Observer, Outcome};
 use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4, s4::S4};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::vec3::{V, norm, sub};

@@ -1,0 +1,5 @@
+//! What drives nodes.
+
+pub mod beginning;
+pub mod cut;
+pub mod frame;

@@ -1,0 +1,81 @@
+//! A whole scene of which fine runs drive parts.
+
+use crate::boundary::cut::CutDrive;
+use crate::error::FormingError;
+use crate::forming::Forming;
+use crate::request::cut::Feedback;
+use crate::stack::body::Body;
+use plyflow_mechanics::mirror::Planes;
+use plyflow_mechanics::vec3::{V, norm, sub};
+
+/// Drives nodes of the plies of a whole scene as fine runs have moved them.
+///
+/// # Errors
+/// A text for the user: what was fed back is of other meshes, or has too few frames.
+pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), FormingError> {
+    if input.time.len() < 2 {
+        let text = "the feedback has fewer than two frames";
+        return Err(FormingError::Input(text.into()));
+    }
+    if forming.model.planes() != Planes::default() {
+        let text = "what is fed back is of the whole scene, and this scene is computed beside mirror planes: leave out its `symmetry`";
+        return Err(FormingError::Input(text.into()));
+    }
+    let mut nodes = Vec::new();
+    let mut drive = CutDrive::new(input.time);
+    for sheet in &input.sheets {
+        let body = forming.plies().find(|(body, _)| body.name == sheet.name);
+        let (body, _) = body.ok_or_else(|| {
+            FormingError::Input(format!(
+                "what is fed back moves '{}', which is no ply of this scene",
+                sheet.name
+            ))
+        })?;
+        let own = forming.reference_points(body);
+        let near = |(a, b): (&V, &V)| norm(sub(*a, *b)) < SAME_PLACE;
+        if own.len() != sheet.points.len() || !own.iter().zip(&sheet.points).all(near) {
+            return Err(FormingError::Input(format!(
+                "what is fed back was made for another mesh of ply '{}' ({} nodes; this run has {}): give this run the scene and \
+                 the `element_size` of the coarse run that it came from",
+                sheet.name,
+                sheet.points.len(),
+                own.len()
+            )));
+        }
+        let all = body.sheet.nodes(&forming.model);
+        nodes.extend(sheet.driven.iter().map(|n| all[*n as usize]));
+        drive.add(sheet);
+    }
+    forming.model.drive_also(nodes, Box::new(drive));
+    let_drive_decide(forming);
+    Ok(())
+}
+
+/// Takes nodes that are driven out of contacts with what does not give way to them: rigid parts, other plies, whose nodes there are driven too, and
+/// folds of their own ply, which are mostly driven as a whole. Where they are has been decided, by runs with finer elements; coarse ones stand
+/// elsewhere off tool and plies, and a multiplier that cannot move its node grows for ever. The films give way.
+fn let_drive_decide(forming: &mut Forming) {
+    let ply = |(body, _): (&Body, _)| body.sheet.cell_range(&forming.model);
+    let plies: Vec<_> = forming.plies().map(ply).collect();
+    let mut all = std::mem::take(&mut forming.model.sheet_contacts);
+    for contact in &mut all {
+        let mut cells = contact.items.iter().map(|i| i.cell as usize);
+        if cells.any(|c| plies.iter().any(|cells| cells.contains(&c))) {
+            (contact.items).retain(|i| !forming.model.is_driven(i.node));
+        }
+    }
+    forming.model.sheet_contacts = all;
+    let mut all = std::mem::take(&mut forming.model.rigid_contacts);
+    for contact in &mut all {
+        (contact.items).retain(|i| !forming.model.is_driven(i.node));
+    }
+    forming.model.rigid_contacts = all;
+    let mut all = std::mem::take(&mut forming.model.self_contacts);
+    for contact in &mut all {
+        contact.retain(|n| !forming.model.is_driven(n));
+    }
+    forming.model.self_contacts = all;
+}
+
+/// Places nearer than this are the same (m).
+const SAME_PLACE: f64 = 1e-9;

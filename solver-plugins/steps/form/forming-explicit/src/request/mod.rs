@@ -1,0 +1,5 @@
+//! What is asked for.
+
+pub mod cut;
+pub mod inputs;
+pub mod parameters;
