@@ -7,9 +7,7 @@ mod common;
 
 use common::scenes::{bag, press};
 use common::{BuiltIn, woven};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::Forming;
+use plyflow_forming_explicit::{Forming, Parameters, build_global};
 use plyflow_mechanics::model::ASK_INTERVAL;
 use serde_json::json;
 use std::alloc::{GlobalAlloc, Layout, System};

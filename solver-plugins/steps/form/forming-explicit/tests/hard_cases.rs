@@ -4,9 +4,7 @@
 mod common;
 
 use common::{form, scenes};
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::{Forming, Outcome};
-use plyflow_forming_explicit::PairDepth;
+use plyflow_forming_explicit::{Forming, Outcome, PairDepth, Parameters};
 use serde_json::{Value, json};
 
 /// A ply over a hemisphere, 12 mm deep; `change` has the last word.

@@ -8,8 +8,7 @@ mod common;
 
 use common::form;
 use common::scenes::bag;
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::Forming;
+use plyflow_forming_explicit::{Forming, Parameters};
 use serde_json::json;
 
 /// Pressure (Pa) on both sides of the stack at the end.

@@ -4,9 +4,7 @@ mod common;
 
 use common::scenes::press;
 use common::{BuiltIn, form};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::{Forming, Outcome};
+use plyflow_forming_explicit::{Forming, Outcome, Parameters, build_global};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -159,7 +157,10 @@ fn an_outline_that_the_elements_cannot_follow_is_refused_with_the_size_that_can(
     let outline = json!({"circle": {"radius": "0.06 m"}});
     let holes = json!([{"circle": {"centre": ["0.05 m", "0 m"], "radius": "0.008 m"}}]);
     let p = outlined(outline, holes, &Value::Null);
-    let text = build_global(&p, &BuiltIn).err().expect("refused");
+    let text = build_global(&p, &BuiltIn)
+        .err()
+        .expect("refused")
+        .to_string();
     assert!(
         text.contains("ply 'ply_1'") && text.contains("measures 2.0"),
         "{text}"
@@ -287,7 +288,12 @@ fn contact_with_itself_changes_nothing_where_no_ply_folds() {
 
 #[test]
 fn what_makes_no_press_is_refused_with_what_to_do() {
-    let refused = |p: &Parameters| build_global(p, &BuiltIn).err().expect("refused");
+    let refused = |p: &Parameters| {
+        build_global(p, &BuiltIn)
+            .err()
+            .expect("refused")
+            .to_string()
+    };
     let tight = refused(&parameters(2, &json!({"gap": "0.0005 m"})));
     assert!(
         tight.contains("gap") && tight.contains("0.800 mm"),
@@ -374,7 +380,7 @@ fn an_open_ledger_stops_the_run_and_says_where() {
     p.drift_bound = 1e-7;
     let mut forming = build_global(&p, &BuiltIn).unwrap();
     let error = forming.run(&p.control(), &mut common::Silent).unwrap_err();
-    let text = format!("{error:?}");
+    let text = error.to_string();
     for part in [
         "is unaccounted for (drift_bound",
         "The step is set by an element of 'ply_1' at (",

@@ -3,10 +3,10 @@
 mod common;
 
 use common::{BuiltIn, fabric, form};
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::{MANY, Penetration};
-use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome};
-use plyflow_forming_explicit::{LocalInput, LocalSheet, Start, build_global, build_local};
+use plyflow_forming_explicit::{
+    Forming, HistoryRow, LocalInput, LocalSheet, MANY, Observer, Outcome, Parameters, Penetration,
+    Start, build_global, build_local,
+};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::linear;
 use plyflow_mechanics::mesh::QuadMesh;

@@ -16,10 +16,7 @@ mod common;
 
 use common::scenes::{self, ply};
 use common::{BuiltIn, fabric};
-use plyflow_forming_explicit::inverse_bilinear;
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::Forming;
+use plyflow_forming_explicit::{Forming, Parameters, build_global, inverse_bilinear};
 use plyflow_mechanics::contact::shape;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::QuadMesh;

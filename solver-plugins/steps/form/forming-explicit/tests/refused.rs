@@ -4,8 +4,7 @@ mod common;
 
 use common::scenes::{bag, press};
 use common::{BuiltIn, woven};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::{Parameters, RigidName, build_global};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -13,7 +12,10 @@ use std::fmt::Write;
 const PLY_THICKNESS: f64 = 4e-4;
 
 fn refused(p: &Parameters) -> String {
-    build_global(p, &BuiltIn).err().expect("refused")
+    build_global(p, &BuiltIn)
+        .err()
+        .expect("refused")
+        .to_string()
 }
 
 fn assert_told(text: &str, parts: &[&str]) {
@@ -247,9 +249,9 @@ fn a_body_that_floats_is_named() {
 fn what_contacts_see_of_every_rigid_part_is_held_against_what_is_drawn_of_it() {
     let p = press(1, &json!({"gap": "0.003 m"}), |_| {});
     let built = build_global(&p, &BuiltIn).unwrap_or_else(|e| panic!("{e}"));
-    for part in ["tool", "die", "holder"] {
+    for part in [RigidName::Tool, RigidName::Die, RigidName::Holder] {
         let error = built.field_error(part);
-        assert!(error > 0.0 && error < 2e-5, "{part}: {error}");
+        assert!(error > 0.0 && error < 2e-5, "{part:?}: {error}");
     }
     assert_eq!(built.field_error(RigidName::Bed), 0.0);
 }

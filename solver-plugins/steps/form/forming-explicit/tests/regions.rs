@@ -4,8 +4,7 @@ mod common;
 
 use common::scenes::{bag, hourglass, ply, press};
 use common::{BuiltIn, fabric, form, woven};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::Parameters;
+use plyflow_forming_explicit::{Parameters, build_global};
 use plyflow_mechanics::contact::{FrictionLaw, Partner, RegionalFriction};
 use plyflow_mechanics::model::Model;
 use serde_json::{Value, json};
@@ -226,7 +225,7 @@ fn regions_that_would_do_nothing_or_break_a_mirror_plane_are_refused() {
                 sheet["material"] = woven();
             }
         });
-        build_global(&p, &BuiltIn).err()
+        build_global(&p, &BuiltIn).err().map(|e| e.to_string())
     };
     let at = |x: &str, size: &str, does: Value| {
         let mut region = rectangle("a", [size, size], does);

@@ -8,11 +8,9 @@ mod common;
 
 use common::scenes::bag;
 use common::{BuiltIn, Silent, form};
-use plyflow_forming_explicit::inverse_bilinear;
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome};
 use plyflow_forming_explicit::{
-    Feedback, LocalInput, LocalSheet, Start, build_global, build_local, feed_back,
+    Feedback, Forming, HistoryRow, LocalInput, LocalSheet, Observer, Outcome, Parameters, Start,
+    build_global, build_local, feed_back, inverse_bilinear,
 };
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::{linear, spline_slopes};
@@ -267,6 +265,7 @@ fn a_run_that_is_fed_its_own_motion_repeats_itself_and_one_that_is_fed_more_foll
             },
         )
         .unwrap_err()
+        .to_string()
     };
     let mut other = fed(&first, &film, 1, deep, [0.0; 3]);
     other.points.pop();

@@ -4,9 +4,7 @@ mod common;
 
 use common::scenes::{diaphragm, gentle_press as press, ply};
 use common::{BuiltIn, apart, fabric, form, twins, woven};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome};
+use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome, Parameters, build_global};
 use plyflow_kernels::{m4::M4, rf4::Rf4, s4::S4};
 use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_mechanics::energy::Ledger;
@@ -270,7 +268,10 @@ fn refused(p: &Parameters, change: impl Fn(&mut Value)) -> String {
     let mut scene = serde_json::to_value(&p.scene).unwrap();
     change(&mut scene);
     p.scene = serde_json::from_value(scene).unwrap();
-    build_global(&p, &BuiltIn).err().expect("refused")
+    build_global(&p, &BuiltIn)
+        .err()
+        .expect("refused")
+        .to_string()
 }
 
 #[test]
@@ -350,7 +351,11 @@ fn materials_that_a_plane_turns_into_others_are_refused() {
     scene["sheets"][0]["material"] = bending("opposite");
     membrane.scene = serde_json::from_value(scene).unwrap();
     let made = build_global(&membrane, &BuiltIn);
-    assert!(made.is_ok(), "{}", made.err().unwrap_or_default());
+    assert!(
+        made.is_ok(),
+        "{}",
+        made.err().map_or_else(String::new, |e| e.to_string())
+    );
 }
 
 #[test]

@@ -9,8 +9,7 @@ mod common;
 
 use common::scenes::{bag, gentle_press, ply};
 use common::{apart, form, woven};
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::{Forming, Outcome};
+use plyflow_forming_explicit::{Forming, Outcome, Parameters};
 use plyflow_kernels::m4::M4;
 use plyflow_mechanics::component::element_fields;
 use plyflow_mechanics::vec3::V;

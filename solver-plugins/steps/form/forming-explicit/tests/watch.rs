@@ -4,10 +4,9 @@ mod common;
 
 use common::scenes::{bag, ply, press};
 use common::{BuiltIn, Silent, fabric, form};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::Parameters;
-use plyflow_forming_explicit::Forming;
-use plyflow_forming_explicit::{PairDepth, Watch, Watched, depth_warnings};
+use plyflow_forming_explicit::{
+    Forming, PairDepth, Parameters, RigidName, Watch, Watched, build_global, depth_warnings,
+};
 use serde_json::json;
 
 fn build(p: &Parameters) -> Forming {

@@ -121,7 +121,8 @@ pub fn add_top(
 /// have to close would close with a bang.
 fn lay_top(parts: &mut Parts, at: &Layout, bottom: &StackSheet, top: &StackSheet) -> Upper {
     let mesh = &at.film;
-    let (joined, free): (Vec<&[u32; 4]>, Vec<&[u32; 4]>) = mesh.cells.iter().partition(|c| at.is_joined(c));
+    let (joined, free): (Vec<&[u32; 4]>, Vec<&[u32; 4]>) =
+        mesh.cells.iter().partition(|c| at.is_joined(c));
     let mut shared = vec![false; mesh.points.len()];
     for n in joined.into_iter().flatten() {
         shared[*n as usize] = true;

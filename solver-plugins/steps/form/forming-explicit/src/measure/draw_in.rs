@@ -51,7 +51,6 @@ impl Forming {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use plyflow_fixed::FixedBits;
     use plyflow_mechanics::mesh::QuadMesh;
     use plyflow_mechanics::mirror::MIRRORED;
 

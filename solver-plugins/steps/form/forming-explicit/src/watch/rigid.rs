@@ -178,7 +178,6 @@ pub fn from_plate(plate: &OpenPlate, p: V) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stack::rigid::RigidName;
     use plyflow_mechanics::contact::RigidSurface;
 
     /// A box with these corners (m).
