@@ -1,10 +1,8 @@
 //! A forming run, ready to go: what all that follows looks at.
 
-use crate::boundary::beginning::Beginning;
-use crate::load::process::Load;
-use crate::stack::body::Body;
-use crate::stack::rigid::{RigidBody, RigidName};
-use crate::stack::sheet::StackSheet;
+use crate::boundary::Beginning;
+use crate::load::Load;
+use crate::stack::{Body, RigidBody, RigidName, StackSheet};
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::contact::RigidContact;

@@ -40,25 +40,15 @@ mod step;
 mod watch;
 mod words;
 
-pub use build::feedback::feed_back;
-pub use build::whole::build_global;
-pub use build::zone::build_local;
-pub use course::history::HistoryRow;
-pub use course::observer::Observer;
-pub use course::outcome::Outcome;
-pub use course::progress::Course;
+pub use build::{build_global, build_local, feed_back};
+pub use course::{Course, HistoryRow, Observer, Outcome};
 pub use error::FormingError;
 pub use forming::Forming;
 pub use judge::absurd;
-pub use measure::penetration::{MANY, Penetration};
-pub use request::cut::{Feedback, LocalInput, LocalSheet, Start};
-pub use request::parameters::Parameters;
-pub use stack::elements::Components;
-pub use stack::locate::inverse_bilinear;
-pub use stack::rigid::RigidName;
-pub use watch::deep::Watched;
-pub use watch::look::Watch;
-pub use watch::told::{PairDepth, depth_attributes, depth_warnings};
+pub use measure::{MANY, Penetration};
+pub use request::{Feedback, LocalInput, LocalSheet, Parameters, Start};
+pub use stack::{Components, RigidName, inverse_bilinear};
+pub use watch::{PairDepth, Watch, Watched, depth_attributes, depth_warnings};
 
 use plyflow_sdk::{Host, Step, StepError};
 

@@ -1,22 +1,17 @@
 //! The step behind the host: from its inputs to its artifact.
 
-use crate::build::feedback::feed_back;
-use crate::build::whole::build_global;
-use crate::build::zone::build_local;
+use crate::build::{build_global, build_local, feed_back};
 use crate::error::FormingError;
 use crate::forming::Forming;
 use crate::judge::absurd;
-use crate::output::fields::fields_of;
-use crate::output::history::{write_energies, write_history};
-use crate::output::meshes::{define, define_rigid};
-use crate::output::summary::write_summary;
-use crate::output::warnings::{at_the_start, slower_multipliers};
-use crate::output::writer::Writer;
-use crate::request::cut::Feedback;
-use crate::request::inputs::{advised_size, bending_zones, read_boundary, read_motion};
-use crate::request::parameters::Parameters;
-use crate::stack::body::Body;
-use crate::stack::elements::Components;
+use crate::output::{
+    Writer, at_the_start, define, define_rigid, fields_of, slower_multipliers, write_energies,
+    write_history, write_summary,
+};
+use crate::request::{
+    Feedback, Parameters, advised_size, bending_zones, read_boundary, read_motion,
+};
+use crate::stack::{Body, Components};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::team;
 use plyflow_sdk::{Host, Log, Progress};

@@ -1,10 +1,10 @@
 //! A local run that begins late: at a state that the coarse run had on its way. Until something stands off or folds a zone of
 //! fine shells does what coarse membranes do, and need not be computed again.
 
-use crate::course::observer::Observer;
+use crate::course::Observer;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::request::parameters::Control;
+use crate::request::Control;
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 

@@ -1,16 +1,13 @@
 //! The time loop.
 
 use crate::advance::late;
-use crate::course::history::HistoryRow;
-use crate::course::observer::Observer;
-use crate::course::outcome::Outcome;
-use crate::course::progress::Course;
+use crate::course::{Course, HistoryRow, Observer, Outcome};
 use crate::error::FormingError;
 use crate::forming::Forming;
 use crate::judge::{absurd, diagnosis};
-use crate::measure::penetration::keep_largest;
-use crate::request::parameters::Control;
-use crate::watch::look::Watch;
+use crate::measure::keep_largest;
+use crate::request::Control;
+use crate::watch::Watch;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::energy::Ledger;
 

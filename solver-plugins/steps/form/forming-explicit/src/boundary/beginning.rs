@@ -1,8 +1,8 @@
 //! Where a local run that begins late begins: at a state that the coarse run had on its way.
 
 use crate::error::FormingError;
-use crate::request::cut::LocalSheet;
-use crate::stack::sheet::StackSheet;
+use crate::request::LocalSheet;
+use crate::stack::StackSheet;
 use plyflow_mechanics::vec3::V;
 
 /// Where all sheets of a zone are when it begins late, and how they came there.

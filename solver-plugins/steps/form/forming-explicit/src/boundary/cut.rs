@@ -1,6 +1,6 @@
 //! How other runs drive nodes: those of the cut of a zone, or of the plies of a whole scene.
 
-use crate::request::cut::LocalSheet;
+use crate::request::LocalSheet;
 use plyflow_mechanics::history::{hermite, hermite_rate, locate};
 use plyflow_mechanics::model::{Drive, Hold};
 use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};

@@ -1,6 +1,6 @@
 //! How the frame of a bag drives the edges of its films.
 
-use crate::load::cycle::Cycle;
+use crate::load::Cycle;
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::vec3::V;
 

@@ -1,19 +1,15 @@
 //! The model of a whole scene in a bag: films, plies between them, the tool below.
 
-use crate::boundary::frame::FrameDrive;
+use crate::boundary::FrameDrive;
 use crate::build::bag_contacts::add_contacts;
 use crate::build::films;
 use crate::build::layout::Layout;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::load::cycle::Cycle;
-use crate::load::process::Load;
-use crate::request::parameters::Parameters;
-use crate::stack::elements::Components;
-use crate::stack::parts::Parts;
-use crate::stack::rigid::RigidName;
-use crate::stack::tool::{self, ToolSurfaces};
-use crate::stack::{sheet, symmetry};
+use crate::load::{Cycle, Load};
+use crate::request::Parameters;
+use crate::stack::tool;
+use crate::stack::{Components, Parts, RigidName, ToolSurfaces, sheet, symmetry};
 use plyflow_mechanics::model::Model;
 use plyflow_model::scene::DoubleDiaphragm;
 use plyflow_tooling::RigidTool;

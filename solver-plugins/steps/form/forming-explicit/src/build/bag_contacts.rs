@@ -1,14 +1,11 @@
 //! The contacts of a stack between two films.
 
 use crate::error::FormingError;
-use crate::request::parameters::Parameters;
-use crate::stack::contact::StackContacts;
-use crate::stack::cover::RigidPart;
-use crate::stack::friction::table::Touching;
-use crate::stack::place::{Placed, StackPlace, layers};
-use crate::stack::rigid::RigidName;
-use crate::stack::sheet::StackSheet;
-use crate::stack::tool::ToolSurfaces;
+use crate::request::Parameters;
+use crate::stack::friction::Touching;
+use crate::stack::{
+    Placed, RigidName, RigidPart, StackContacts, StackPlace, StackSheet, ToolSurfaces, layers,
+};
 use plyflow_mechanics::contact::{Plane, RigidContact, RigidItem, RigidSurface};
 use plyflow_mechanics::model::Model;
 use std::sync::Arc;

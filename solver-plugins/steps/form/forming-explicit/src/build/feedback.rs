@@ -1,10 +1,10 @@
 //! A whole scene of which fine runs drive parts.
 
-use crate::boundary::cut::CutDrive;
+use crate::boundary::CutDrive;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::request::cut::Feedback;
-use crate::stack::body::Body;
+use crate::request::Feedback;
+use crate::stack::Body;
 use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::vec3::{V, norm, sub};
 

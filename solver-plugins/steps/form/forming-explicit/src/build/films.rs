@@ -2,13 +2,11 @@
 
 use crate::build::layout::Layout;
 use crate::error::FormingError;
-use crate::request::parameters::Parameters;
-use crate::stack::body::Body;
-use crate::stack::contact::LEAST_FILM_DISTANCE;
-use crate::stack::elements::{self, Components};
-use crate::stack::parts::{Meshed, Parts, plain};
-use crate::stack::sheet::StackSheet;
-use crate::stack::symmetry;
+use crate::request::Parameters;
+use crate::stack::elements;
+use crate::stack::{
+    Body, Components, LEAST_FILM_DISTANCE, Meshed, Parts, StackSheet, plain, symmetry,
+};
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::mirror::on_outer_boundary;

@@ -1,8 +1,9 @@
 //! Where everything of a bag lies before it is meshed.
 
 use crate::error::FormingError;
-use crate::request::parameters::Parameters;
-use crate::stack::sheet::{self, StackSheet};
+use crate::request::Parameters;
+use crate::stack::StackSheet;
+use crate::stack::sheet;
 use plyflow_blank::Blank;
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::mirror::Planes;

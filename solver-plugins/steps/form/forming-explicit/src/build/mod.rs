@@ -9,3 +9,7 @@ pub mod plates;
 pub mod press;
 pub mod whole;
 pub mod zone;
+
+pub use feedback::feed_back;
+pub use whole::build_global;
+pub use zone::build_local;

@@ -1,8 +1,7 @@
 //! Die and blank holder of a press: where they are, and whether the punch goes through.
 
 use crate::error::FormingError;
-use crate::stack::rigid::RigidName;
-use crate::stack::sheet::StackSheet;
+use crate::stack::{RigidName, StackSheet};
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::{OpenPlate, RigidSurface};
 use plyflow_model::scene::{Hold, Press};

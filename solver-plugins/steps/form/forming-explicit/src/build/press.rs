@@ -6,18 +6,14 @@
 use crate::build::plates::Plates;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::load::press::{HeldByForce, PressLoad, Stroke};
-use crate::load::process::Load;
-use crate::request::parameters::Parameters;
-use crate::stack::contact::StackContacts;
-use crate::stack::cover::RigidPart;
-use crate::stack::elements::Components;
-use crate::stack::parts::Parts;
-use crate::stack::place::{Placed, StackPlace, layers};
-use crate::stack::rigid::{RigidBody, RigidName};
-use crate::stack::sheet::{self, StackSheet};
-use crate::stack::symmetry;
-use crate::stack::tool::{self, ToolSurface};
+use crate::load::{HeldByForce, Load, PressLoad, Stroke};
+use crate::request::Parameters;
+use crate::stack::sheet;
+use crate::stack::tool;
+use crate::stack::{
+    Components, Parts, Placed, RigidBody, RigidName, RigidPart, StackContacts, StackPlace,
+    StackSheet, ToolSurface, layers, symmetry,
+};
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;

@@ -4,8 +4,8 @@ use crate::build::bag::build_bag;
 use crate::build::press::build_press;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::request::parameters::Parameters;
-use crate::stack::elements::Components;
+use crate::request::Parameters;
+use crate::stack::Components;
 use plyflow_model::scene::Process;
 
 /// Builds the model of a whole scene.

@@ -1,20 +1,15 @@
 //! The model of one zone, driven at its cut by a coarse run.
 
-use crate::boundary::beginning::Beginning;
-use crate::boundary::cut::CutDrive;
+use crate::boundary::{Beginning, CutDrive};
 use crate::build::bag_contacts::add_contacts;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::load::cycle::Cycle;
-use crate::load::process::Load;
-use crate::request::cut::{LocalInput, LocalSheet};
-use crate::request::parameters::Parameters;
-use crate::stack::body::Body;
-use crate::stack::elements::{self, Components};
-use crate::stack::parts::{Meshed, Parts, plain};
-use crate::stack::rigid::RigidName;
-use crate::stack::sheet::{self, StackSheet};
-use crate::stack::tool::{self, ToolSurfaces};
+use crate::load::{Cycle, Load};
+use crate::request::{LocalInput, LocalSheet, Parameters};
+use crate::stack::elements;
+use crate::stack::sheet;
+use crate::stack::tool;
+use crate::stack::{Body, Components, Meshed, Parts, RigidName, StackSheet, ToolSurfaces, plain};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};

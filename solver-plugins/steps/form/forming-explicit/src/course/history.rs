@@ -1,8 +1,8 @@
 //! The history of a run: one row at each look at its energies.
 
 use crate::forming::Forming;
-use crate::load::press::PressLoad;
-use crate::watch::deep::Watched;
+use crate::load::PressLoad;
+use crate::watch::Watched;
 use plyflow_mechanics::contact::ContactEnergy;
 use plyflow_mechanics::energy::{Ledger, SheetEnergy};
 use serde::{Deserialize, Serialize};

@@ -2,8 +2,8 @@
 
 use crate::course::history::HistoryRow;
 use crate::course::progress::Course;
-use crate::measure::penetration::PenetrationPeak;
-use crate::watch::told::PairDepth;
+use crate::measure::PenetrationPeak;
+use crate::watch::PairDepth;
 use plyflow_mechanics::energy::{EnergyHealth, Ledger, judge};
 
 /// What came of a run.

@@ -1,8 +1,8 @@
 //! How far a run has come: what a checkpoint keeps besides the model.
 
 use crate::course::history::HistoryRow;
-use crate::measure::penetration::PenetrationPeak;
-use crate::watch::deep::Watched;
+use crate::measure::PenetrationPeak;
+use crate::watch::Watched;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 
 /// How far a run has come, between two frames.

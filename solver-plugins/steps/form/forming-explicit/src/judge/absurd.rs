@@ -1,13 +1,12 @@
 //! Runs that would end well and mean nothing: refused before the first step where that can be known, stopped where it shows.
 
-use crate::course::history::HistoryRow;
+use crate::course::HistoryRow;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::load::process::Load;
-use crate::request::parameters::Parameters;
-use crate::stack::body::Body;
-use crate::stack::rigid::RigidName;
-use crate::watch::look::Watch;
+use crate::load::Load;
+use crate::request::Parameters;
+use crate::stack::{Body, RigidName};
+use crate::watch::Watch;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::scene::Process;
 

@@ -1,9 +1,8 @@
 //! Where and why a run went wrong, for the one who has to change it.
 
-use crate::course::history::HistoryRow;
+use crate::course::HistoryRow;
 use crate::forming::Forming;
-use crate::measure::penetration::Penetration;
-use crate::measure::strain::cell_strain;
+use crate::measure::{Penetration, cell_strain};
 use crate::stack::sheet;
 use crate::words::in_mm;
 use plyflow_mechanics::vec3::{V, norm};

@@ -3,3 +3,7 @@
 pub mod cycle;
 pub mod press;
 pub mod process;
+
+pub use cycle::Cycle;
+pub use press::{HeldByForce, PressLoad, Stroke};
+pub use process::Load;

@@ -4,3 +4,9 @@ pub mod draw_in;
 pub mod penetration;
 pub mod pressure;
 pub mod strain;
+
+pub use penetration::{
+    MANY, OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, keep_largest,
+    too_deep_on_the_way,
+};
+pub use strain::{cell_strain, ply_extremes};

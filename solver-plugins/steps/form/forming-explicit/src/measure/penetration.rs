@@ -1,7 +1,7 @@
 //! How deep sheets lie in each other and in rigid surfaces.
 
 use crate::forming::Forming;
-use crate::stack::cover::SHARE_SQUEEZED;
+use crate::stack::SHARE_SQUEEZED;
 use crate::words::in_mm;
 use plyflow_mechanics::contact::{RigidItem, SlaveItem};
 use plyflow_mechanics::vec3::V;

@@ -1,8 +1,7 @@
 //! What presses on sheets from the tool, and whether plies have touched themselves.
 
 use crate::forming::Forming;
-use crate::stack::body::Body;
-use crate::stack::rigid::RigidName;
+use crate::stack::{Body, RigidName};
 use plyflow_mechanics::contact::RigidContact;
 use plyflow_mechanics::vec3::{V, dot, norm};
 use plyflow_model::scene::Scene;

@@ -3,7 +3,7 @@
 //! The artifact of a run that is killed is lost, so its frames are kept here and written again. Every file ends with the
 //! hash of its name, that of its folder (the key of the step), and what is before it: a torn one, or one of another step, is as good as none.
 
-use crate::course::progress::Course;
+use crate::course::Course;
 use crate::forming::Forming;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::vec3::V;

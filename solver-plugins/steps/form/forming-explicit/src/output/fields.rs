@@ -1,7 +1,7 @@
 //! Which fields of elements are written.
 
 use crate::error::FormingError;
-use crate::request::parameters::Parameters;
+use crate::request::Parameters;
 use plyflow_abi::PF_KIND_ELEMENT;
 use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_model::scene::SheetKind;

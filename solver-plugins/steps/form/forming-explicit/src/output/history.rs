@@ -1,7 +1,6 @@
 //! The history of a run for the host.
 
-use crate::course::history::HistoryRow;
-use crate::course::outcome::Outcome;
+use crate::course::{HistoryRow, Outcome};
 use crate::error::FormingError;
 use crate::forming::Forming;
 use plyflow_mechanics::contact::ContactEnergy;

@@ -2,9 +2,7 @@
 
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::stack::body::Body;
-use crate::stack::rigid::RigidName;
-use crate::stack::sheet::StackSheet;
+use crate::stack::{Body, RigidName, StackSheet};
 use plyflow_model::artifact::{RigidBody, SheetBody};
 use plyflow_sdk::Host;
 

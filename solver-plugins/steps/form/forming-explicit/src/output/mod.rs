@@ -7,3 +7,10 @@ pub mod meshes;
 pub mod summary;
 pub mod warnings;
 pub mod writer;
+
+pub use fields::fields_of;
+pub use history::{write_energies, write_history};
+pub use meshes::{define, define_rigid};
+pub use summary::write_summary;
+pub use warnings::{at_the_start, slower_multipliers};
+pub use writer::Writer;

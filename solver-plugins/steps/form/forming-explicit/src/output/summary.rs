@@ -1,18 +1,15 @@
 //! Attributes and results of a run.
 
-use crate::course::outcome::Outcome;
+use crate::course::Outcome;
 use crate::error::FormingError;
 use crate::forming::Forming;
-use crate::measure::penetration::{
-    OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak,
+use crate::measure::{
+    OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, ply_extremes,
 };
-use crate::measure::strain::ply_extremes;
 use crate::output::warnings::warnings;
-use crate::request::parameters::Parameters;
-use crate::stack::rigid::RigidName;
-use crate::stack::{regions, sheet, symmetry};
-use crate::watch::pairs::{DEPTH_BOUND, Kind};
-use crate::watch::told::{PairDepth, depth_attributes};
+use crate::request::Parameters;
+use crate::stack::{RigidName, regions, sheet, symmetry};
+use crate::watch::{DEPTH_BOUND, Kind, PairDepth, depth_attributes};
 use plyflow_model::artifact::{self, MeshQuality};
 use plyflow_model::scene::SheetKind;
 use plyflow_sdk::{Host, Log};

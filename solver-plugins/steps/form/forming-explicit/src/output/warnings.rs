@@ -1,14 +1,12 @@
 //! What a user should know of a run.
 
-use crate::course::outcome::Outcome;
+use crate::course::Outcome;
 use crate::forming::Forming;
-use crate::load::press::PressLoad;
-use crate::measure::penetration::{Penetration, too_deep_on_the_way};
-use crate::measure::strain::ply_extremes;
-use crate::request::parameters::Parameters;
-use crate::stack::body::Body;
-use crate::stack::sheet::StackSheet;
-use crate::watch::told::depth_warnings;
+use crate::load::PressLoad;
+use crate::measure::{Penetration, ply_extremes, too_deep_on_the_way};
+use crate::request::Parameters;
+use crate::stack::{Body, StackSheet};
+use crate::watch::depth_warnings;
 
 /// What to say before the first step.
 pub fn at_the_start(forming: &Forming) -> impl Iterator<Item = String> {

@@ -1,10 +1,9 @@
 //! The observer of a run that writes for the host.
 
-use crate::course::observer::Observer;
-use crate::course::progress::Course;
+use crate::course::{Course, Observer};
 use crate::forming::Forming;
 use crate::output::checkpoint::{Part, Recorder};
-use crate::stack::rigid::RigidName;
+use crate::stack::RigidName;
 use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::vec3::{V, add};

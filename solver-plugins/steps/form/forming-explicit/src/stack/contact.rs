@@ -1,8 +1,8 @@
 //! Contacts of the sheets of a stack: of two that lie on each other, and of a ply with itself.
 
 use crate::error::FormingError;
-use crate::request::parameters::Parameters;
-use crate::stack::friction::table::{FrictionTable, Touching};
+use crate::request::Parameters;
+use crate::stack::friction::{FrictionTable, Touching};
 use crate::stack::locate::locate;
 use crate::stack::place::{Layer, StackPlace};
 use crate::stack::rim::crooked_rim;

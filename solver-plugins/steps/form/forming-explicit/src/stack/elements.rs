@@ -1,7 +1,7 @@
 //! Which element a cell has: those of sheets, their node patches, and membranes beside the zones in which plies bend.
 
 use crate::error::FormingError;
-use crate::request::parameters::{ComponentChoice, Parameters};
+use crate::request::{ComponentChoice, Parameters};
 use crate::stack::sheet::StackSheet;
 use crate::stack::{regions, symmetry};
 use plyflow_abi::pf_component;

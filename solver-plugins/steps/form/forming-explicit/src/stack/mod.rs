@@ -14,3 +14,14 @@ pub mod rim;
 pub mod sheet;
 pub mod symmetry;
 pub mod tool;
+
+pub use body::Body;
+pub use contact::{LEAST_FILM_DISTANCE, StackContacts};
+pub use cover::{RigidPart, SHARE_SQUEEZED};
+pub use elements::Components;
+pub use locate::inverse_bilinear;
+pub use parts::{Meshed, Parts, plain};
+pub use place::{Placed, SheetIndex, StackPlace, layers};
+pub use rigid::{RigidBody, RigidName};
+pub use sheet::StackSheet;
+pub use tool::{ToolSurface, ToolSurfaces};

@@ -1,7 +1,7 @@
 //! What a model is made of, as it grows sheet by sheet.
 
 use crate::error::FormingError;
-use crate::request::parameters::Parameters;
+use crate::request::Parameters;
 use crate::stack::body::Body;
 use crate::stack::elements::{self, Components};
 use crate::stack::place::{Placed, SheetIndex};

@@ -1,7 +1,7 @@
 //! The tool as the sheets of a model see it.
 
 use crate::error::FormingError;
-use crate::request::parameters::Parameters;
+use crate::request::Parameters;
 use crate::stack::place::SheetIndex;
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;

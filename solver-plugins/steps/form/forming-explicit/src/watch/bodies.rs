@@ -1,8 +1,7 @@
 //! What is watched: rigid parts, sheets, and the pairs of them.
 
 use crate::forming::Forming;
-use crate::stack::place::SheetIndex;
-use crate::stack::rigid::RigidName;
+use crate::stack::{RigidName, SheetIndex};
 use crate::watch::pairs::{Numbers, Pair, pairs};
 use crate::watch::rigid::{Part, Shape, Triangles};
 use crate::watch::sheet::SheetMesh;

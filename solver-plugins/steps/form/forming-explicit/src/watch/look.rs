@@ -1,8 +1,7 @@
 //! The watch over a run.
 
 use crate::forming::Forming;
-use crate::stack::place::SheetIndex;
-use crate::stack::rigid::RigidName;
+use crate::stack::{RigidName, SheetIndex};
 use crate::watch::against::{Clear, Found, View};
 use crate::watch::bodies::Bodies;
 use crate::watch::deep::{CHUNK, Deep, Peak, Watched};

@@ -15,3 +15,8 @@ pub mod rigid;
 pub mod sheet;
 pub mod told;
 pub mod watcher;
+
+pub use deep::Watched;
+pub use look::Watch;
+pub use pairs::{DEPTH_BOUND, Kind};
+pub use told::{PairDepth, depth_attributes, depth_warnings};

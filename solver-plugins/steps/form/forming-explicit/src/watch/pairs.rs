@@ -1,6 +1,6 @@
 //! What is held against what.
 
-use crate::stack::sheet::StackSheet;
+use crate::stack::StackSheet;
 use crate::watch::rigid::Part;
 
 /// Share of the thinner sheet beyond which a depth at the end is told.

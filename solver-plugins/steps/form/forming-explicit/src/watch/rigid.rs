@@ -1,6 +1,6 @@
 //! Rigid parts as the watch sees them: the tool's triangles, the bed, the plates of a press.
 
-use crate::stack::rigid::RigidName;
+use crate::stack::RigidName;
 use plyflow_mechanics::contact::OpenPlate;
 use plyflow_mechanics::vec3::{V, add, cross, norm, scale};
 use plyflow_surface::Surface;

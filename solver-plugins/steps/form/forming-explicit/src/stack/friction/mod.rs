@@ -4,3 +4,5 @@ pub mod check;
 pub mod pairs;
 pub mod table;
 pub mod through;
+
+pub use table::{FrictionTable, Touching};
