@@ -4,6 +4,9 @@ use plyflow_blank::MeshError;
 use plyflow_mechanics::MechanicsError;
 use plyflow_sdk::StepError;
 
+/// What a function gives, or why not.
+pub type Result<T> = std::result::Result<T, FormingError>;
+
 /// What stops the step. Every text is for the user: what is given, where, what was expected and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FormingError {

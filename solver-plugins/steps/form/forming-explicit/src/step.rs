@@ -1,7 +1,7 @@
 //! The step behind the host: from its inputs to its artifact.
 
 use crate::build::{build_global, build_local, feed_back};
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::judge::absurd;
 use crate::output::{
@@ -19,19 +19,16 @@ use plyflow_sdk::{Host, Log, Progress};
 struct HostComponents<'a>(&'a Host);
 
 impl Components for HostComponents<'_> {
-    fn element(&self, name: &str) -> Result<pf_component, FormingError> {
+    fn element(&self, name: &str) -> Result<pf_component> {
         Ok(self.0.component(PF_KIND_ELEMENT, name)?)
     }
-    fn material(&self, name: &str) -> Result<pf_component, FormingError> {
+    fn material(&self, name: &str) -> Result<pf_component> {
         Ok(self.0.component(PF_KIND_MATERIAL, name)?)
     }
 }
 
 /// Runs the step.
-///
-/// # Errors
-/// Whatever stops it.
-pub fn run(host: &Host) -> Result<(), FormingError> {
+pub fn run(host: &Host) -> Result<()> {
     let mut p: Parameters = host.parameters()?;
     if let Some(size) = advised_size(host)? {
         let text = format!("element_size {:.3} mm, as advised", 1e3 * size);
@@ -50,7 +47,7 @@ pub fn run(host: &Host) -> Result<(), FormingError> {
 }
 
 /// The model that is asked for: of the whole scene, driven in parts by what finer runs fed back or not, or of a zone.
-fn build(host: &Host, p: &Parameters) -> Result<Forming, FormingError> {
+fn build(host: &Host, p: &Parameters) -> Result<Forming> {
     host.progress(&Progress {
         phase: "building the model",
         ..Progress::default()
@@ -82,10 +79,7 @@ fn build(host: &Host, p: &Parameters) -> Result<Forming, FormingError> {
 }
 
 /// Tells how much of the plies bends, where that is not everything.
-///
-/// # Errors
-/// When there are zones and no element lies in any.
-fn tell_bending(host: &Host, forming: &Forming, p: &Parameters) -> Result<(), FormingError> {
+fn tell_bending(host: &Host, forming: &Forming, p: &Parameters) -> Result<()> {
     let bending = |b: &Body| forming.model.bending_cells(b.sheet.0);
     let mixed = || forming.bodies.iter().filter_map(|b| Some((b, bending(b)?)));
     for (body, [cells, all]) in mixed() {
@@ -102,7 +96,7 @@ fn tell_bending(host: &Host, forming: &Forming, p: &Parameters) -> Result<(), Fo
 }
 
 /// Runs the model and writes what comes of it.
-fn form(host: &Host, p: &Parameters, forming: &mut Forming) -> Result<(), FormingError> {
+fn form(host: &Host, p: &Parameters, forming: &mut Forming) -> Result<()> {
     let mut fields = Vec::new();
     for (body, sheet) in forming.bodies.iter().zip(&forming.stack) {
         fields.push(fields_of(host, sheet.scene.kind, p)?);

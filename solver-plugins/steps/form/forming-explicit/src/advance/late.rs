@@ -2,7 +2,7 @@
 //! fine shells does what coarse membranes do, and need not be computed again.
 
 use crate::course::Observer;
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::forming::Forming;
 use crate::request::Control;
 use plyflow_mechanics::model::Model;
@@ -42,12 +42,12 @@ pub fn too_late(shift: f64) -> Option<String> {
 /// quantile: what fine shells do that coarse membranes did not until then. `None` for a run that begins with the process.
 ///
 /// # Errors
-/// A text for the user: a component failed, or the start is unstable; or the observer stops it.
+/// When a component failed, or the start is unstable; or the observer stops it.
 pub fn begin(
     forming: &mut Forming,
     control: &Control,
     observer: &mut dyn Observer,
-) -> Result<Option<f64>, FormingError> {
+) -> Result<Option<f64>> {
     let Some(start) = forming.start.take() else {
         return Ok(None);
     };
@@ -105,11 +105,7 @@ fn clear_tool(forming: &mut Forming) {
 /// Steps at the time of the start, the nodes of the cut at rest. Contacts that get their whole load at once must not swing through
 /// each other: first nothing swings at all, for as long as multipliers take to follow; then all nodes are stopped whenever the
 /// kinetic energy has passed a peak.
-fn settle(
-    forming: &mut Forming,
-    control: &Control,
-    observer: &mut dyn Observer,
-) -> Result<(), FormingError> {
+fn settle(forming: &mut Forming, control: &Control, observer: &mut dyn Observer) -> Result<()> {
     let model = &mut forming.model;
     let damping = model.damping();
     model.dt = control
@@ -156,7 +152,7 @@ fn settle(
 }
 
 /// A step with the loads of the start, to the time of the start: before it nothing moves, so neither do held nodes go with the cut.
-fn stand(forming: &mut Forming) -> Result<(), FormingError> {
+fn stand(forming: &mut Forming) -> Result<()> {
     let start = forming.load.start();
     forming.load_at(start);
     forming.model.time = start - forming.model.dt;

@@ -2,7 +2,7 @@
 
 use crate::advance::late;
 use crate::course::{Course, HistoryRow, Observer, Outcome};
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::judge::{absurd, diagnosis};
 use crate::measure::keep_largest;
@@ -20,11 +20,7 @@ impl Forming {
     ///
     /// # Errors
     /// When the run becomes unstable, its ledger opens beyond a bound, a component fails, or the observer stops it.
-    pub fn run(
-        &mut self,
-        control: &Control,
-        observer: &mut dyn Observer,
-    ) -> Result<Outcome, FormingError> {
+    pub fn run(&mut self, control: &Control, observer: &mut dyn Observer) -> Result<Outcome> {
         let mut run = Run::start(self, control, observer)?;
         for frame in run.course.frame..control.frames {
             run.between_frames(frame);
@@ -63,7 +59,7 @@ impl<'a> Run<'a> {
         forming: &'a mut Forming,
         control: &'a Control,
         observer: &'a mut dyn Observer,
-    ) -> Result<Self, FormingError> {
+    ) -> Result<Self> {
         let span = [forming.load.start(), forming.load.duration()];
         let mut course = Course::default();
         observer.resume(forming, &mut course)?;
@@ -102,7 +98,7 @@ impl<'a> Run<'a> {
     }
 
     /// Sets the step for the next frame, a whole fraction of the interval, and gives their number.
-    fn choose_step(&mut self) -> Result<u64, FormingError> {
+    fn choose_step(&mut self) -> Result<u64> {
         let critical = self.forming.model.critical_step()?;
         let wanted = (self.control.target_step).min(self.control.safety * critical);
         if wanted < 0.02 * self.control.target_step {
@@ -123,7 +119,7 @@ impl<'a> Run<'a> {
     }
 
     /// Step number `k` after a frame.
-    fn step(&mut self, frame: usize, k: u64) -> Result<(), FormingError> {
+    fn step(&mut self, frame: usize, k: u64) -> Result<()> {
         // Times from the count, not from a sum: frames fall on the same instants in every run.
         let time = self.time_of(frame) + self.forming.model.dt * k as f64;
         self.forming.load_at(time);
@@ -144,14 +140,14 @@ impl<'a> Run<'a> {
     }
 
     /// Shows a frame. Fields belong to the positions before the step; its motion is far below output precision.
-    fn write_frame(&mut self, time: f64) -> Result<(), FormingError> {
+    fn write_frame(&mut self, time: f64) -> Result<()> {
         self.observer.frame(self.forming, time)?;
         keep_largest(&mut self.course.peaks, &self.forming.penetrations(), time);
         Ok(())
     }
 
     /// Looks at what is in what. `last`: at the end of the run.
-    fn look(&mut self, last: bool) -> Result<(), FormingError> {
+    fn look(&mut self, last: bool) -> Result<()> {
         let watched = &mut self.course.watched;
         self.watch.look(self.forming, watched, last);
         match self.watch.gone_through(watched, self.forming) {
@@ -161,7 +157,7 @@ impl<'a> Run<'a> {
     }
 
     /// A row of the history, if the run may go on after it.
-    fn write_row(&mut self) -> Result<(), FormingError> {
+    fn write_row(&mut self) -> Result<()> {
         let energies = self.add_row();
         let (history, end) = (&self.course.history, self.span[1]);
         let open = diagnosis::open_ledger(history, end, self.control.drift_bound);
@@ -186,7 +182,7 @@ impl<'a> Run<'a> {
     }
 
     /// The last frame and the last row.
-    fn end(mut self) -> Result<Outcome, FormingError> {
+    fn end(mut self) -> Result<Outcome> {
         let end = self.span[1];
         self.forming.load_at(end);
         self.forming.model.step(true)?;

@@ -1,6 +1,6 @@
 //! Where a local run that begins late begins: at a state that the coarse run had on its way.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::request::LocalSheet;
 use crate::stack::StackSheet;
 use plyflow_mechanics::vec3::V;
@@ -23,12 +23,8 @@ impl Beginning {
     /// The start of a whole zone whose sheets begin at `time` (s): none at 0.
     ///
     /// # Errors
-    /// A text for the user: sheets that do not tell their start.
-    pub fn of_zone(
-        stack: &[StackSheet],
-        sheets: &[LocalSheet],
-        time: f64,
-    ) -> Result<Option<Self>, FormingError> {
+    /// Sheets that do not tell their start.
+    pub fn of_zone(stack: &[StackSheet], sheets: &[LocalSheet], time: f64) -> Result<Option<Self>> {
         if time == 0.0 {
             return Ok(None);
         }

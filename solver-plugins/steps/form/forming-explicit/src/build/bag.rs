@@ -4,15 +4,13 @@ use crate::boundary::FrameDrive;
 use crate::build::bag_contacts::add_contacts;
 use crate::build::films;
 use crate::build::layout::Layout;
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::forming::Forming;
 use crate::load::{Cycle, Load};
 use crate::request::Parameters;
-use crate::stack::tool;
-use crate::stack::{Components, Parts, RigidName, ToolSurfaces, sheet, symmetry};
+use crate::stack::{Components, Elements, Parts, RigidName, ToolSurfaces, sheet, symmetry, tool};
 use plyflow_mechanics::model::Model;
 use plyflow_model::scene::DoubleDiaphragm;
-use plyflow_tooling::RigidTool;
 
 /// What to say of a distance field with points further apart than the nodes that it holds off.
 fn coarse_grid(p: &Parameters) -> Option<String> {
@@ -34,27 +32,23 @@ pub fn build_bag(
     p: &Parameters,
     process: &DoubleDiaphragm,
     components: &dyn Components,
-) -> Result<Forming, FormingError> {
+) -> Result<Forming> {
     let scene = &p.scene;
     let stack = sheet::stack(scene)?;
-    let RigidTool {
-        mesh: tool,
-        field,
-        error,
-        warnings: mut tool_warnings,
-    } = tool::rigid(p)?;
-    tool_warnings.extend(coarse_grid(p));
+    let mut tool = tool::rigid(p)?;
+    tool.warnings.extend(coarse_grid(p));
     let planes = symmetry::planes(scene);
-    symmetry::check(scene, planes, &stack, &tool)?;
-    let at = Layout::new(&stack, process, p, &tool, planes)?;
+    symmetry::check(scene, planes, &stack, &tool.mesh)?;
+    let at = Layout::new(&stack, process, p, &tool.mesh, planes)?;
+    let elements = Elements { p, components };
     let mut parts = Parts::default();
     parts.mirrors.planes = planes;
-    let frame = films::add_bottom(&mut parts, &at, &stack[0], p, components)?;
+    let frame = films::add_bottom(&mut parts, &at, &stack[0], &elements)?;
     for (sheet, blank) in stack[1..].iter().zip(&at.plies) {
         let z = at.bottom_z + sheet.offset - stack[0].offset;
-        parts.add_ply(sheet, blank, z, p, components)?;
+        parts.add_ply(sheet, blank, z, &elements)?;
     }
-    films::add_top(&mut parts, &at, &stack, p, components)?;
+    films::add_top(&mut parts, &at, &stack, &elements)?;
     let cycle = Cycle::new(process, [at.bottom_z, stack[0].offset])?;
     let in_plan = |n: &u32| [0, 1].map(|k| parts.points[*n as usize][k]);
     let drive = FrameDrive {
@@ -63,7 +57,7 @@ pub fn build_bag(
     };
     let settings = p.step_settings();
     let mut model = Model::mirrored(parts.points, parts.specs, settings, parts.mirrors)?;
-    let mut surfaces = ToolSurfaces::new(field);
+    let mut surfaces = ToolSurfaces::new(tool.field);
     add_contacts(&mut model, &stack, &parts.placed, p, &mut surfaces)?;
     model.add_plane_contacts(&p.contact_settings());
     model.set_driven(frame, Box::new(drive));
@@ -72,17 +66,17 @@ pub fn build_bag(
         model,
         load: Load::Process {
             cycle,
-            tool_volume: tool.volume() / planes.copies() as f64,
+            tool_volume: tool.mesh.volume() / planes.copies() as f64,
             sealed_volume: None,
             pumped_volume: None,
         },
         stack,
         bodies: parts.bodies,
         reference,
-        tool,
+        tool: tool.mesh,
         rigid: Vec::new(),
-        field_errors: vec![(RigidName::Tool, error)],
-        tool_warnings,
+        field_errors: vec![(RigidName::Tool, tool.error)],
+        tool_warnings: tool.warnings,
         zone: None,
         start: None,
         element_size: p.element_size,

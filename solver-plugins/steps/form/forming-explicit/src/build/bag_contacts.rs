@@ -1,6 +1,6 @@
 //! The contacts of a stack between two films.
 
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::request::Parameters;
 use crate::stack::friction::Touching;
 use crate::stack::{
@@ -24,7 +24,7 @@ pub fn add_contacts(
     placed: &[Placed],
     p: &Parameters,
     tool: &mut ToolSurfaces,
-) -> Result<(), FormingError> {
+) -> Result<()> {
     let contacts = StackContacts::new(stack, p)?;
     let layers = layers(placed);
     let (bottom, top) = (layers[0], layers[layers.len() - 1]);
@@ -72,7 +72,7 @@ fn add_bottom(
     contacts: &StackContacts<'_>,
     placed: &[Placed],
     tool: &mut ToolSurfaces,
-) -> Result<(), FormingError> {
+) -> Result<()> {
     let (own, film) = (contacts.name(BOTTOM), &placed[BOTTOM.0]);
     let bed: Arc<dyn RigidSurface> = Arc::new(Plane { height: 0.0 });
     let tool = tool.of(model, film.sheet);

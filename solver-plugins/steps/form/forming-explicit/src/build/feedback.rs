@@ -1,7 +1,7 @@
 //! A whole scene of which fine runs drive parts.
 
 use crate::boundary::CutDrive;
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::request::Feedback;
 use crate::stack::Body;
@@ -11,8 +11,8 @@ use plyflow_mechanics::vec3::{V, norm, sub};
 /// Drives nodes of the plies of a whole scene as fine runs have moved them.
 ///
 /// # Errors
-/// A text for the user: what was fed back is of other meshes, or has too few frames.
-pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<(), FormingError> {
+/// What was fed back is of other meshes, or has too few frames.
+pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<()> {
     if input.time.len() < 2 {
         let text = "the feedback has fewer than two frames";
         return Err(FormingError::Input(text.into()));

@@ -1,11 +1,9 @@
 //! The films of a bag: two surfaces that are one where they are joined.
 
 use crate::build::layout::Layout;
-use crate::error::FormingError;
-use crate::request::Parameters;
-use crate::stack::elements;
+use crate::error::Result;
 use crate::stack::{
-    Body, Components, LEAST_FILM_DISTANCE, Meshed, Parts, StackSheet, plain, symmetry,
+    Body, Elements, LEAST_FILM_DISTANCE, Meshed, Parts, StackSheet, plain, symmetry,
 };
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::mesh::QuadMesh;
@@ -16,10 +14,9 @@ use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 fn film_element(
     film: &StackSheet,
     at: &Layout,
-    p: &Parameters,
-    components: &dyn Components,
-) -> Result<ElementInstance, FormingError> {
-    let element = elements::element(components, film, &p.diaphragm_element)?;
+    elements: &Elements<'_>,
+) -> Result<ElementInstance> {
+    let element = elements.of_film(film)?;
     symmetry::check_material(&element, film, at.planes)?;
     Ok(element)
 }
@@ -32,16 +29,15 @@ pub fn add_bottom(
     parts: &mut Parts,
     at: &Layout,
     film: &StackSheet,
-    p: &Parameters,
-    components: &dyn Components,
-) -> Result<Vec<u32>, FormingError> {
+    elements: &Elements<'_>,
+) -> Result<Vec<u32>> {
     let mesh = &at.film;
     let plan = mesh.points.iter();
     parts.points.extend(plan.map(|q| [q[0], q[1], at.bottom_z]));
     let boundary = on_outer_boundary(mesh, at.planes);
     let mut nodes: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let (frame, slaves) = (nodes.iter()).partition::<Vec<u32>, _>(|n| boundary[**n as usize]);
-    let element = film_element(film, at, p, components)?;
+    let element = film_element(film, at, elements)?;
     let patches = parts.patches(&mut nodes, mesh, &element);
     let joined = || mesh.cells.iter().map(|c| at.is_joined(c));
     let meshed = Meshed {
@@ -51,7 +47,7 @@ pub fn add_bottom(
     };
     let least = |c| {
         if at.is_fine(c) {
-            p.least_areal_mass
+            elements.p.least_areal_mass
         } else {
             0.0
         }
@@ -63,7 +59,7 @@ pub fn add_bottom(
             .collect(),
         // Away from plies and tool nothing presses on the film: there it keeps its own mass.
         least_areal_mass: mesh.cells.iter().map(least).collect(),
-        ..plain(film, meshed, element, p)
+        ..plain(film, meshed, element, elements.p)
     };
     let body = Body::mirrored(film, parts.next(), &mesh.points, &mesh.cells, at.planes)?;
     parts.add(spec, body, slaves);
@@ -88,9 +84,8 @@ pub fn add_top(
     parts: &mut Parts,
     at: &Layout,
     stack: &[StackSheet],
-    p: &Parameters,
-    components: &dyn Components,
-) -> Result<(), FormingError> {
+    elements: &Elements<'_>,
+) -> Result<()> {
     let film = &stack[stack.len() - 1];
     let upper = lay_top(parts, at, &stack[0], film);
     let mut nodes = upper.nodes;
@@ -99,7 +94,7 @@ pub fn add_top(
         cells: upper.cells,
     };
     let body = Body::mirrored(film, parts.next(), &plan.points, &plan.cells, at.planes)?;
-    let element = film_element(film, at, p, components)?;
+    let element = film_element(film, at, elements)?;
     let patches = parts.patches(&mut nodes, &plan, &element);
     let count = plan.cells.len();
     let meshed = Meshed {
@@ -109,7 +104,7 @@ pub fn add_top(
     };
     let spec = SheetSpec {
         pressed: vec![Pressed::Above; count],
-        ..plain(film, meshed, element, p)
+        ..plain(film, meshed, element, elements.p)
     };
     parts.add(spec, body, upper.slaves);
     Ok(())

@@ -1,9 +1,8 @@
 //! Where everything of a bag lies before it is meshed.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::request::Parameters;
-use crate::stack::StackSheet;
-use crate::stack::sheet;
+use crate::stack::{StackSheet, sheet};
 use plyflow_blank::Blank;
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::mirror::Planes;
@@ -60,12 +59,12 @@ impl Layout {
         p: &Parameters,
         tool: &ToolMesh,
         planes: Planes,
-    ) -> Result<Self, FormingError> {
+    ) -> Result<Self> {
         let [lo, hi] = tool.bounds();
         let plies: Vec<Blank> = stack[1..stack.len() - 1]
             .iter()
             .map(|sheet| sheet::blank_part(sheet, planes))
-            .collect::<Result<_, _>>()?;
+            .collect::<Result<_>>()?;
         let all_plies = plies
             .iter()
             .map(Blank::bounds)
@@ -139,12 +138,7 @@ impl Layout {
 }
 
 /// Whether the frame, of these half sizes (m), holds what is to be fine; `margin`: free film around the plies (m).
-fn check_frame(
-    half: [f64; 2],
-    fine: Box2,
-    margin: f64,
-    film_size: f64,
-) -> Result<(), FormingError> {
+fn check_frame(half: [f64; 2], fine: Box2, margin: f64, film_size: f64) -> Result<()> {
     if (0..2).all(|k| fine[k] >= -half[k] && fine[k + 2] <= half[k]) {
         return Ok(());
     }
@@ -162,7 +156,7 @@ fn check_frame(
 }
 
 /// Whether the films' elements are not too many to be made; `fine`: the area of the even ones (m2), which are most.
-fn allow_film(fine: f64, p: &Parameters) -> Result<(), FormingError> {
+fn allow_film(fine: f64, p: &Parameters) -> Result<()> {
     let size = p.film_size();
     budget::allow(Wanted {
         what: "the mesh of a diaphragm",

@@ -1,6 +1,6 @@
 //! Die and blank holder of a press: where they are, and whether the punch goes through.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::stack::{RigidName, StackSheet};
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::{OpenPlate, RigidSurface};
@@ -41,7 +41,7 @@ impl Plates {
     ///
     /// # Errors
     /// When the plies do not fit into the holder's gap.
-    pub fn new(press: &Press, stack: &[StackSheet], tool_top: f64) -> Result<Self, FormingError> {
+    pub fn new(press: &Press, stack: &[StackSheet], tool_top: f64) -> Result<Self> {
         let thickness: f64 = stack.iter().map(|s| s.thickness).sum();
         let blank = tool_top - press.stroke.si();
         let die = OpenPlate {
@@ -86,7 +86,7 @@ impl Plates {
     }
 
     /// Whether the punch ends inside its own height and goes through the openings, with the plies over it.
-    pub fn check_passage(&self, press: &Press, tool: &ToolMesh) -> Result<(), FormingError> {
+    pub fn check_passage(&self, press: &Press, tool: &ToolMesh) -> Result<()> {
         let [low, high] = tool.bounds().map(|b| b[2]);
         let mm = |x: f64| 1e3 * x;
         if press.stroke.si() > high - low + 1e-9 {

@@ -4,15 +4,13 @@
 //! lowest ply, and pushes the plies through the opening of the die.
 
 use crate::build::plates::Plates;
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::forming::Forming;
 use crate::load::{HeldByForce, Load, PressLoad, Stroke};
 use crate::request::Parameters;
-use crate::stack::sheet;
-use crate::stack::tool;
 use crate::stack::{
-    Components, Parts, Placed, RigidBody, RigidName, RigidPart, StackContacts, StackPlace,
-    StackSheet, ToolSurface, layers, symmetry,
+    Components, Elements, Parts, Placed, RigidBody, RigidName, RigidPart, StackContacts,
+    StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
 };
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::RigidSurface;
@@ -20,7 +18,7 @@ use plyflow_mechanics::model::Model;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{Hold, Press, Towards};
-use plyflow_tooling::{RigidTool, SignedDistanceGrid};
+use plyflow_tooling::SignedDistanceGrid;
 use std::sync::Arc;
 
 /// Mass of a holder that a force presses, over that of the plies: heavy enough to follow their contacts stably in
@@ -31,28 +29,20 @@ const HOLDER_MASS: f64 = 20.0;
 ///
 /// # Errors
 /// What of the scene or the parameters makes no model.
-pub fn build_press(
-    p: &Parameters,
-    press: &Press,
-    components: &dyn Components,
-) -> Result<Forming, FormingError> {
+pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -> Result<Forming> {
     let scene = &p.scene;
     let stack = sheet::stack(scene)?;
-    let RigidTool {
-        mesh: tool,
-        field,
-        error,
-        warnings: tool_warnings,
-    } = tool::rigid(p)?;
+    let tool = tool::rigid(p)?;
     let planes = symmetry::planes(scene);
-    symmetry::check(scene, planes, &stack, &tool)?;
-    let plates = Plates::new(press, &stack, tool.bounds()[1][2])?;
-    plates.check_passage(press, &tool)?;
+    symmetry::check(scene, planes, &stack, &tool.mesh)?;
+    let plates = Plates::new(press, &stack, tool.mesh.bounds()[1][2])?;
+    plates.check_passage(press, &tool.mesh)?;
+    let elements = Elements { p, components };
     let mut parts = Parts::default();
     parts.mirrors.planes = planes;
     for sheet in &stack {
         let blank = sheet::blank_part(sheet, planes)?;
-        parts.add_ply(sheet, &blank, plates.blank + sheet.offset, p, components)?;
+        parts.add_ply(sheet, &blank, plates.blank + sheet.offset, &elements)?;
     }
     let settings = p.step_settings();
     let mut model = Model::mirrored(parts.points, parts.specs, settings, parts.mirrors)?;
@@ -61,7 +51,7 @@ pub fn build_press(
         Some(Towards::Die) => STANDARD_GRAVITY,
         Some(Towards::Holder) => -STANDARD_GRAVITY,
     };
-    add_contacts(&mut model, &stack, parts.placed, &plates, field, p)?;
+    add_contacts(&mut model, &stack, parts.placed, &plates, tool.field, p)?;
     model.add_plane_contacts(&p.contact_settings());
     let mut load = press_load(press, &plates, &model);
     load.apply(&mut model);
@@ -69,7 +59,7 @@ pub fn build_press(
     // Largest distance of a point from the axis (m).
     let from_axis = |q: &V| q[0].fixed_hypot(q[1]);
     let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
-    let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, error)]);
+    let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, tool.error)]);
     for (name, plate) in plates.named() {
         let body = RigidBody::plate(name, &plate, reach);
         field_errors.push((name, body.error_against(&plate)));
@@ -81,10 +71,10 @@ pub fn build_press(
         stack,
         bodies: parts.bodies,
         reference,
-        tool,
+        tool: tool.mesh,
         rigid,
         field_errors,
-        tool_warnings,
+        tool_warnings: tool.warnings,
         zone: None,
         start: None,
         element_size: p.element_size,
@@ -131,7 +121,7 @@ fn add_contacts(
     plates: &Plates,
     punch: SignedDistanceGrid,
     p: &Parameters,
-) -> Result<(), FormingError> {
+) -> Result<()> {
     for ply in &mut placed {
         ply.slaves = ply.sheet.nodes(model).to_vec();
     }

@@ -2,19 +2,18 @@
 
 use crate::boundary::{Beginning, CutDrive};
 use crate::build::bag_contacts::add_contacts;
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::load::{Cycle, Load};
 use crate::request::{LocalInput, LocalSheet, Parameters};
-use crate::stack::elements;
-use crate::stack::sheet;
-use crate::stack::tool;
-use crate::stack::{Body, Components, Meshed, Parts, RigidName, StackSheet, ToolSurfaces, plain};
+use crate::stack::{
+    Body, Components, Elements, Meshed, Parts, RigidName, StackSheet, ToolSurfaces, plain, sheet,
+    tool,
+};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_model::scene::{DoubleDiaphragm, Process, Scene, SheetKind};
-use plyflow_tooling::RigidTool;
 
 /// Builds the model of a zone.
 ///
@@ -24,7 +23,7 @@ pub fn build_local(
     p: &Parameters,
     input: LocalInput,
     components: &dyn Components,
-) -> Result<Forming, FormingError> {
+) -> Result<Forming> {
     let process = process_of(&p.scene)?;
     let stack = stack_of(&p.scene, &input)?;
     if input.time.len() < 2 {
@@ -32,17 +31,12 @@ pub fn build_local(
         return Err(FormingError::Input(text.into()));
     }
     let last = input.time.len() - 1;
-    let (parts, cut) = sheets_of(p, &input, &stack, components)?;
+    let (parts, cut) = sheets_of(&input, &stack, &Elements { p, components })?;
     let start = Beginning::of_zone(&stack, &input.sheets, input.time[0])?;
-    let RigidTool {
-        mesh: tool,
-        field,
-        error,
-        warnings: tool_warnings,
-    } = tool::rigid(p)?;
+    let tool = tool::rigid(p)?;
     let cycle = Cycle::new(process, [input.frame[0], input.frame[last]])?;
     let mut model = Model::new(parts.points, parts.specs, p.step_settings())?;
-    let mut surfaces = ToolSurfaces::new(field);
+    let mut surfaces = ToolSurfaces::new(tool.field);
     add_contacts(&mut model, &stack, &parts.placed, p, &mut surfaces)?;
     model.set_driven(cut.nodes, Box::new(cut.drive));
     let reference = model.start().clone();
@@ -58,10 +52,10 @@ pub fn build_local(
         stack,
         bodies: parts.bodies,
         reference,
-        tool,
+        tool: tool.mesh,
         rigid: Vec::new(),
-        field_errors: vec![(RigidName::Tool, error)],
-        tool_warnings,
+        field_errors: vec![(RigidName::Tool, tool.error)],
+        tool_warnings: tool.warnings,
         zone: Some(input.zone),
         start,
         element_size: input.element_size,
@@ -69,7 +63,7 @@ pub fn build_local(
 }
 
 /// The process of a scene of which a zone can be run by itself.
-fn process_of(scene: &Scene) -> Result<&DoubleDiaphragm, FormingError> {
+fn process_of(scene: &Scene) -> Result<&DoubleDiaphragm> {
     match &scene.process {
         Process::DoubleDiaphragm(process) => Ok(process),
         Process::Press(_) => Err(FormingError::Scene(format!(
@@ -82,7 +76,7 @@ fn process_of(scene: &Scene) -> Result<&DoubleDiaphragm, FormingError> {
 }
 
 /// Those sheets of the scene that the zone has, bottom to top, one on the other.
-fn stack_of(scene: &Scene, input: &LocalInput) -> Result<Vec<StackSheet>, FormingError> {
+fn stack_of(scene: &Scene, input: &LocalInput) -> Result<Vec<StackSheet>> {
     let whole = sheet::stack(scene)?;
     let has = |name: &str| input.sheets.iter().any(|s| s.name == name);
     let mut stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
@@ -108,11 +102,10 @@ struct Cut {
 
 /// The sheets of a zone, from the tool upwards, and what drives them.
 fn sheets_of(
-    p: &Parameters,
     input: &LocalInput,
     stack: &[StackSheet],
-    components: &dyn Components,
-) -> Result<(Parts, Cut), FormingError> {
+    elements: &Elements<'_>,
+) -> Result<(Parts, Cut)> {
     let mut parts = Parts::default();
     let mut cut = Cut {
         nodes: Vec::new(),
@@ -129,14 +122,14 @@ fn sheets_of(
             (SheetKind::Ply, _) => Pressed::No,
         };
         let element = match sheet.scene.kind {
-            SheetKind::Diaphragm => elements::element(components, sheet, &p.diaphragm_element)?,
-            SheetKind::Ply => elements::of_ply(components, sheet, &p.element)?,
+            SheetKind::Diaphragm => elements.of_film(sheet)?,
+            SheetKind::Ply => elements.of_ply(sheet)?,
         };
         let mesh = QuadMesh {
             points: local.points.clone(),
             cells: local.cells.clone(),
         };
-        let other_material = elements::unstitched(components, sheet, &mesh, &element, p)?;
+        let other_material = elements.unstitched(sheet, &mesh, &element)?;
         let nodes: Vec<u32> = (first..parts.points.len() as u32).collect();
         let mut free = vec![true; local.points.len()];
         for n in &local.driven {
@@ -156,7 +149,7 @@ fn sheets_of(
         let spec = SheetSpec {
             pressed: vec![pressed; local.cells.len()],
             other_material,
-            ..plain(sheet, meshed, element, p)
+            ..plain(sheet, meshed, element, elements.p)
         };
         parts.add(spec, body, slaves);
     }

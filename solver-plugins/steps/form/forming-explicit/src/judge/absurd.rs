@@ -1,7 +1,7 @@
 //! Runs that would end well and mean nothing: refused before the first step where that can be known, stopped where it shows.
 
 use crate::course::HistoryRow;
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::load::Load;
 use crate::request::Parameters;
@@ -33,8 +33,8 @@ const OFF_THICKNESSES: f64 = 5.0;
 /// Whether parameters and scene of a run make sense together.
 ///
 /// # Errors
-/// A text for the user: what is given, what would do.
-pub fn check(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
+/// What is given, what would do.
+pub fn check(p: &Parameters, forming: &Forming) -> Result<()> {
     check_elements(p, forming)?;
     check_phases(p, forming)?;
     check_masses(p, forming)?;
@@ -56,7 +56,7 @@ fn plan(forming: &Forming, body: &Body) -> [[f64; 2]; 2] {
 }
 
 /// Whether plies have elements to speak of.
-fn check_elements(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
+fn check_elements(p: &Parameters, forming: &Forming) -> Result<()> {
     if forming.zone.is_some() {
         return Ok(());
     }
@@ -91,7 +91,7 @@ fn phases(forming: &Forming) -> Vec<(&'static str, f64)> {
 
 /// Whether phases take as long as a wave needs to cross the plies: what is pulled at one end is not felt at the other before, and elements pass it on by
 /// one in a step at most.
-fn check_phases(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
+fn check_phases(p: &Parameters, forming: &Forming) -> Result<()> {
     let across = (forming.plies())
         .map(|(body, _)| {
             let [low, high] = plan(forming, body);
@@ -116,7 +116,7 @@ fn check_phases(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
 }
 
 /// Whether sheets keep something of their own mass.
-fn check_masses(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
+fn check_masses(p: &Parameters, forming: &Forming) -> Result<()> {
     let m = &forming.model;
     let own: f64 = m.own_masses().iter().sum();
     let added: f64 = m.sheets.iter().map(|s| s.added_mass).sum();
@@ -133,7 +133,7 @@ fn check_masses(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
 }
 
 /// Whether anything forms.
-fn check_loads(p: &Parameters) -> Result<(), FormingError> {
+fn check_loads(p: &Parameters) -> Result<()> {
     match &p.scene.process {
         Process::DoubleDiaphragm(process) => {
             for (name, pressure) in [
@@ -163,7 +163,7 @@ fn check_loads(p: &Parameters) -> Result<(), FormingError> {
 }
 
 /// Whether damping leaves the motion to what forms.
-fn check_drag(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
+fn check_drag(p: &Parameters, forming: &Forming) -> Result<()> {
     let m = &forming.model;
     let (speed, pressure) = match (&forming.load, &p.scene.process) {
         (Load::Process { cycle, .. }, Process::DoubleDiaphragm(_)) => {
@@ -196,7 +196,7 @@ fn check_drag(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
 }
 
 /// Whether plies lie over the tool, and in a press reach the die.
-fn check_places(p: &Parameters, forming: &Forming) -> Result<(), FormingError> {
+fn check_places(p: &Parameters, forming: &Forming) -> Result<()> {
     if forming.zone.is_some() {
         return Ok(());
     }

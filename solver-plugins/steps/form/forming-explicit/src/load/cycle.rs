@@ -1,6 +1,6 @@
 //! The process of double-diaphragm forming in time: bagging, lowering, drawing, settling.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use plyflow_mechanics::history::{MonotoneCubic, smooth_step};
 use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{DoubleDiaphragm, PressureCourse, WeightDirection};
@@ -28,10 +28,7 @@ pub struct Cycle {
 
 impl Cycle {
     /// From the scene; `frame` as in [`Cycle::frame`].
-    ///
-    /// # Errors
-    /// A text for the user: a course of a pressure that is none.
-    pub fn new(p: &DoubleDiaphragm, frame: [f64; 2]) -> Result<Self, FormingError> {
+    pub fn new(p: &DoubleDiaphragm, frame: [f64; 2]) -> Result<Self> {
         let bag = p.bag_pressure.last();
         let bag_course = course(&p.bag_pressure, "bag_pressure", "bagging", f64::MAX)?;
         let drawn_course = course(&p.forming_pressure, "forming_pressure", "drawing", bag)?;
@@ -155,7 +152,7 @@ fn course(
     name: &str,
     phase: &str,
     most: f64,
-) -> Result<Option<MonotoneCubic>, FormingError> {
+) -> Result<Option<MonotoneCubic>> {
     let PressureCourse::Course(course) = given else {
         return Ok(None);
     };
@@ -209,7 +206,7 @@ mod tests {
     use super::*;
     use serde_json::{Value, json};
 
-    fn cycle(bag: Value, forming: Value) -> Result<Cycle, FormingError> {
+    fn cycle(bag: Value, forming: Value) -> Result<Cycle> {
         let process = json!({
             "frame_length": "1 m", "frame_width": "1 m", "clearance": "0.01 m", "bag_pressure": bag, "forming_pressure": forming,
             "bagging_time": "0.2 s", "lowering_time": "0.3 s", "drawing_time": "0.4 s", "settling_time": "0.1 s",

@@ -1,21 +1,14 @@
 //! The history of a run for the host.
 
 use crate::course::{HistoryRow, Outcome};
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::forming::Forming;
 use plyflow_mechanics::contact::ContactEnergy;
 use plyflow_mechanics::energy::SheetEnergy;
 use plyflow_sdk::Host;
 
 /// The columns of the history.
-///
-/// # Errors
-/// The host's.
-pub fn write_history(
-    host: &Host,
-    forming: &Forming,
-    outcome: &Outcome,
-) -> Result<(), FormingError> {
+pub fn write_history(host: &Host, forming: &Forming, outcome: &Outcome) -> Result<()> {
     let of_press = forming.load.press().map(|_| HistoryRow::OF_PRESS);
     let columns = HistoryRow::COLUMNS.into_iter();
     for (name, unit, value) in columns.chain(of_press.into_iter().flatten()) {
@@ -26,14 +19,7 @@ pub fn write_history(
 }
 
 /// Energies by sheet and by interface over the times of the history, and depths by pair.
-///
-/// # Errors
-/// The host's.
-pub fn write_energies(
-    host: &Host,
-    forming: &Forming,
-    outcome: &Outcome,
-) -> Result<(), FormingError> {
+pub fn write_energies(host: &Host, forming: &Forming, outcome: &Outcome) -> Result<()> {
     type Of<T> = (&'static str, fn(&T) -> f64);
     let sheet: [Of<SheetEnergy>; 4] = [
         ("kinetic", |e| e.kinetic),

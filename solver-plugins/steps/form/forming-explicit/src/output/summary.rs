@@ -1,7 +1,7 @@
 //! Attributes and results of a run.
 
 use crate::course::Outcome;
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::forming::Forming;
 use crate::measure::{
     OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, ply_extremes,
@@ -138,16 +138,13 @@ fn attributes(
 }
 
 /// Tells attributes and results of a run that came to its end; `rate`: steps per second.
-///
-/// # Errors
-/// The host's.
 pub fn write_summary(
     host: &Host,
     p: &Parameters,
     forming: &Forming,
     outcome: &Outcome,
     rate: f64,
-) -> Result<(), FormingError> {
+) -> Result<()> {
     let penetrations = forming.penetrations();
     let attributes = attributes(p, forming, outcome, &penetrations);
     for w in &attributes.warnings {
@@ -162,12 +159,7 @@ pub fn write_summary(
 }
 
 /// What the run took.
-fn write_cost(
-    host: &Host,
-    forming: &Forming,
-    outcome: &Outcome,
-    rate: f64,
-) -> Result<(), FormingError> {
+fn write_cost(host: &Host, forming: &Forming, outcome: &Outcome, rate: f64) -> Result<()> {
     let m = &forming.model;
     let elements = m.element_count() as f64;
     host.result("elements", elements, "1")?;
@@ -192,7 +184,7 @@ fn write_cost(
 }
 
 /// How far to trust the run: energies and penetrations.
-fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<(), FormingError> {
+fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<()> {
     let h = &outcome.health;
     let worst = |f: fn(&Penetration) -> f64| now.iter().map(f).fold(0.0, f64::max);
     let peak = |f: fn(&Penetration, &PenetrationPeak) -> f64| {
@@ -237,7 +229,7 @@ fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<(
 }
 
 /// What the plies came to, and the quality of what they are meshed with.
-fn write_shape(host: &Host, forming: &Forming) -> Result<(), FormingError> {
+fn write_shape(host: &Host, forming: &Forming) -> Result<()> {
     let outlined = || forming.bodies.iter().filter_map(|b| b.quality);
     if outlined().next().is_some() {
         let least =

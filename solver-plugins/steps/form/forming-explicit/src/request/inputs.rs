@@ -1,6 +1,6 @@
 //! What the step is given by others: an element size, zones, the boundary of a zone.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::request::cut::{LocalInput, LocalSheet, Start};
 use crate::request::parameters::Parameters;
 use plyflow_mechanics::vec3::V;
@@ -10,7 +10,7 @@ use plyflow_model::scene::{Scene, SheetKind};
 use plyflow_sdk::{Host, Input, Log};
 
 /// The element size (m) that a mesh study advises, if there is one.
-pub fn advised_size(host: &Host) -> Result<Option<f64>, FormingError> {
+pub fn advised_size(host: &Host) -> Result<Option<f64>> {
     let studies = host.inputs_of("meshes")?;
     let Some(study) = studies.first() else {
         return Ok(None);
@@ -35,7 +35,7 @@ pub fn advised_size(host: &Host) -> Result<Option<f64>, FormingError> {
 }
 
 /// Boxes of the zones in which alone plies have `element`; none without the input `zones`.
-pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, FormingError> {
+pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>> {
     let inputs = host.inputs_of("zones")?;
     let steps: Vec<&str> = inputs.iter().map(|i| i.step.as_str()).collect();
     match (&p.element_elsewhere, inputs.is_empty()) {
@@ -76,11 +76,7 @@ pub fn bending_zones(host: &Host, p: &Parameters) -> Result<Vec<Rectangle>, Form
 ///
 /// # Errors
 /// When it is of another scene, or not as boundaries are.
-pub fn read_boundary(
-    host: &Host,
-    input: &Input,
-    scene: &Scene,
-) -> Result<LocalInput, FormingError> {
+pub fn read_boundary(host: &Host, input: &Input, scene: &Scene) -> Result<LocalInput> {
     let boundary: Boundary = host.attributes(input)?;
     fits(scene, &boundary, &input.step)?;
     let series = |name: &str| host.array_f64(input, name).map(|(v, _)| v);
@@ -97,7 +93,7 @@ pub fn read_boundary(
 }
 
 /// Whether a boundary is of this scene: its name, and what the run that it was made of told of its sheets.
-fn fits(scene: &Scene, boundary: &Boundary, step: &str) -> Result<(), FormingError> {
+fn fits(scene: &Scene, boundary: &Boundary, step: &str) -> Result<()> {
     let differs = |what: &str, there: &str, here: &str| {
         Err(FormingError::Input(format!(
             "scene: {what} is {here}, and {there} in the run that '{step}' was made of; expected the same scene for a zone as for the whole"
@@ -145,10 +141,7 @@ fn fits(scene: &Scene, boundary: &Boundary, step: &str) -> Result<(), FormingErr
 }
 
 /// Times and driven sheets of a boundary artifact.
-pub fn read_motion(
-    host: &Host,
-    input: &Input,
-) -> Result<(Vec<f64>, Vec<LocalSheet>), FormingError> {
+pub fn read_motion(host: &Host, input: &Input) -> Result<(Vec<f64>, Vec<LocalSheet>)> {
     let meshes = host.meshes(input)?;
     let (time, _) = host.array_f64(input, "time")?;
     let mut sheets = Vec::new();
@@ -198,7 +191,7 @@ fn read_vectors(
     input: &Input,
     path: &str,
     expected: [usize; 3],
-) -> Result<Vec<Vec<V>>, FormingError> {
+) -> Result<Vec<Vec<V>>> {
     let (v, shape) = host.array_f64(input, path)?;
     if shape != expected {
         return Err(FormingError::Input(format!(
@@ -212,7 +205,7 @@ fn read_vectors(
 }
 
 /// Where a sheet of a boundary artifact begins, if not with the process.
-fn read_start(host: &Host, input: &Input, name: &str) -> Result<Option<Start>, FormingError> {
+fn read_start(host: &Host, input: &Input, name: &str) -> Result<Option<Start>> {
     let [path, velocity] = ["path", "start_velocity"].map(|what| format!("{name}/{what}"));
     if host.array_info(input, &path).is_none() {
         return Ok(None);

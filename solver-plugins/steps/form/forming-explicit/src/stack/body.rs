@@ -1,6 +1,6 @@
 //! Bodies of the artifact: sheets, with their mirror images.
 
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::stack::place::SheetIndex;
 use crate::stack::sheet::StackSheet;
 use crate::stack::symmetry::Families;
@@ -45,7 +45,7 @@ impl Body {
         points: &[V],
         cells: &[[u32; 4]],
         planes: Planes,
-    ) -> Result<Self, FormingError> {
+    ) -> Result<Self> {
         let mut body = Self::new(sheet, index, cells.to_vec());
         if planes.any() {
             let whole = Whole::new(points, cells, planes);

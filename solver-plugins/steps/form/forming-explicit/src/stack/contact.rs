@@ -1,6 +1,6 @@
 //! Contacts of the sheets of a stack: of two that lie on each other, and of a ply with itself.
 
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::request::Parameters;
 use crate::stack::friction::{FrictionTable, Touching};
 use crate::stack::locate::locate;
@@ -32,7 +32,7 @@ impl<'a> StackContacts<'a> {
     ///
     /// # Errors
     /// When the scene's friction makes no sense.
-    pub fn new(stack: &'a [StackSheet], p: &'a Parameters) -> Result<Self, FormingError> {
+    pub fn new(stack: &'a [StackSheet], p: &'a Parameters) -> Result<Self> {
         let friction = FrictionTable::new(&p.scene)?;
         Ok(Self { stack, friction, p })
     }
@@ -87,7 +87,7 @@ impl<'a> StackContacts<'a> {
         slave: Layer<'_>,
         master: Layer<'_>,
         side: f64,
-    ) -> Result<(), FormingError> {
+    ) -> Result<()> {
         let touching = Touching {
             parts: [slave.place.min(master.place), slave.place.max(master.place)]
                 .map(|k| self.name(k)),
@@ -104,7 +104,7 @@ impl<'a> StackContacts<'a> {
     ///
     /// # Errors
     /// When the law of friction makes no sense.
-    pub fn add_folds(&self, model: &mut Model, ply: Layer<'_>) -> Result<(), FormingError> {
+    pub fn add_folds(&self, model: &mut Model, ply: Layer<'_>) -> Result<()> {
         let cells = ply.sheet.cell_range(model);
         if !self.p.self_contact || cells.is_empty() {
             return Ok(());

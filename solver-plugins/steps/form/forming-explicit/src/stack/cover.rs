@@ -5,7 +5,7 @@
 //! nobody knows before. So any two sheets of a stack have a contact, with all of their nodes; where something lies between they are too
 //! far apart to touch, and nodes that are far from touching sleep.
 
-use crate::error::FormingError;
+use crate::error::Result;
 use crate::stack::contact::StackContacts;
 use crate::stack::place::{Layer, StackPlace};
 use crate::stack::rigid::RigidName;
@@ -77,7 +77,7 @@ impl StackContacts<'_> {
     ///
     /// # Errors
     /// When a friction coefficient is missing or makes no sense.
-    pub fn add_past(&self, model: &mut Model, layers: &[Layer<'_>]) -> Result<(), FormingError> {
+    pub fn add_past(&self, model: &mut Model, layers: &[Layer<'_>]) -> Result<()> {
         let pairs = || {
             let below = |upper: usize| layers[..upper].iter().map(move |low| (low, &layers[upper]));
             (0..layers.len()).flat_map(below)
@@ -118,7 +118,7 @@ impl StackContacts<'_> {
         slave: Layer<'_>,
         master: Layer<'_>,
         side: f64,
-    ) -> Result<SheetContact, FormingError> {
+    ) -> Result<SheetContact> {
         let (from, to) = (slave.place.min(master.place), slave.place.max(master.place));
         let chain: Vec<&str> = (from.0..=to.0).map(|k| self.name(StackPlace(k))).collect();
         let friction = self.friction.past(model, &chain, self.name(slave.place))?;
@@ -139,7 +139,7 @@ impl StackContacts<'_> {
         slave: Layer<'_>,
         between: &[StackPlace],
         name: String,
-    ) -> Result<RigidContact, FormingError> {
+    ) -> Result<RigidContact> {
         let own = self.name(slave.place);
         let mut chain: Vec<&str> = std::iter::once(part.name.word())
             .chain(between.iter().map(|k| self.name(*k)))
@@ -175,7 +175,7 @@ impl StackContacts<'_> {
         part: &RigidPart,
         ply: Layer<'_>,
         among: &[StackPlace],
-    ) -> Result<(), FormingError> {
+    ) -> Result<()> {
         let own = self.name(ply.place);
         let film: Vec<StackPlace> = part.film.into_iter().collect();
         let mut all = [&film[..], among].concat();

@@ -1,6 +1,6 @@
 //! Which element a cell has: those of sheets, their node patches, and membranes beside the zones in which plies bend.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::request::{ComponentChoice, Parameters};
 use crate::stack::sheet::StackSheet;
 use crate::stack::{regions, symmetry};
@@ -19,83 +19,147 @@ pub trait Components {
     ///
     /// # Errors
     /// When there is none.
-    fn element(&self, name: &str) -> Result<pf_component, FormingError>;
+    fn element(&self, name: &str) -> Result<pf_component>;
     /// The material of that name.
     ///
     /// # Errors
     /// When there is none.
-    fn material(&self, name: &str) -> Result<pf_component, FormingError>;
+    fn material(&self, name: &str) -> Result<pf_component>;
 }
 
-/// Makes the element of a sheet with its material.
-///
-/// # Errors
-/// The component's own text.
-pub fn element(
-    components: &dyn Components,
-    sheet: &StackSheet,
-    choice: &ComponentChoice,
-) -> Result<ElementInstance, FormingError> {
-    of_material(components, sheet, choice, material(components, sheet)?)
+/// Makes the elements of sheets.
+pub struct Elements<'a> {
+    /// Which are asked for.
+    pub p: &'a Parameters,
+    /// Where they are found.
+    pub components: &'a dyn Components,
 }
 
-/// The element of a ply.
-///
-/// # Errors
-/// The component's own text; when the element has patches for bending and the material nothing that bends: it would be a membrane
-/// without a word.
-pub fn of_ply(
-    components: &dyn Components,
-    sheet: &StackSheet,
-    choice: &ComponentChoice,
-) -> Result<ElementInstance, FormingError> {
-    let element = element(components, sheet, choice)?;
-    let bends = element.material.reference().sizes().has_bending;
-    if element.sizes.patch_nodes > 0 && !bends {
-        return Err(FormingError::Element(format!(
-            "element: given '{}', which bends, for ply '{}', whose material '{}' has no bending; expected a material with `bending` \
-             (`plyflow plugins {}`), or a membrane such as m4",
-            choice.plugin, sheet.scene.name, sheet.material.name, sheet.material.plugin
-        )));
+impl Elements<'_> {
+    /// Makes the element of a sheet with its material.
+    fn element(&self, sheet: &StackSheet, choice: &ComponentChoice) -> Result<ElementInstance> {
+        self.of_material(sheet, choice, self.material(sheet)?)
     }
-    symmetry::check_order(&element, sheet)?;
-    Ok(element)
-}
 
-/// Makes the material of a sheet.
-fn material(
-    components: &dyn Components,
-    sheet: &StackSheet,
-) -> Result<Arc<MaterialInstance>, FormingError> {
-    let mut with = serde_json::Value::Object(sheet.material.with.clone());
-    with["thickness"] = sheet.thickness.into();
-    with["areal_mass"] = sheet.material.areal_mass.si().into();
-    let what = format!(
-        "material '{}' of sheet '{}'",
-        sheet.material.name, sheet.scene.name
-    );
-    let found = components.material(&sheet.material.plugin)?;
-    Ok(unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }?)
-}
+    /// The element of a film.
+    pub fn of_film(&self, film: &StackSheet) -> Result<ElementInstance> {
+        self.element(film, &self.p.diaphragm_element)
+    }
 
-/// Makes the element of a sheet for its material.
-fn of_material(
-    components: &dyn Components,
-    sheet: &StackSheet,
-    choice: &ComponentChoice,
-    material: Arc<MaterialInstance>,
-) -> Result<ElementInstance, FormingError> {
-    let what = format!(
-        "element '{}' of sheet '{}'",
-        choice.plugin, sheet.scene.name
-    );
-    let found = components.element(&choice.plugin)?;
-    let parameters = if choice.with.is_null() {
-        "{}".into()
-    } else {
-        choice.with.to_string()
-    };
-    Ok(unsafe { ElementInstance::create(&found, &parameters, material, &what) }?)
+    /// The element of a ply.
+    ///
+    /// # Errors
+    /// The component's own text; when the element has patches for bending and the material nothing that bends: it would be a membrane
+    /// without a word.
+    pub fn of_ply(&self, sheet: &StackSheet) -> Result<ElementInstance> {
+        let element = self.element(sheet, &self.p.element)?;
+        let bends = element.material.reference().sizes().has_bending;
+        if element.sizes.patch_nodes > 0 && !bends {
+            return Err(FormingError::Element(format!(
+                "element: given '{}', which bends, for ply '{}', whose material '{}' has no bending; expected a material with `bending` \
+                 (`plyflow plugins {}`), or a membrane such as m4",
+                self.p.element.plugin, sheet.scene.name, sheet.material.name, sheet.material.plugin
+            )));
+        }
+        symmetry::check_order(&element, sheet)?;
+        Ok(element)
+    }
+
+    /// Makes the material of a sheet.
+    fn material(&self, sheet: &StackSheet) -> Result<Arc<MaterialInstance>> {
+        let mut with = serde_json::Value::Object(sheet.material.with.clone());
+        with["thickness"] = sheet.thickness.into();
+        with["areal_mass"] = sheet.material.areal_mass.si().into();
+        let what = format!(
+            "material '{}' of sheet '{}'",
+            sheet.material.name, sheet.scene.name
+        );
+        let found = self.components.material(&sheet.material.plugin)?;
+        Ok(unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }?)
+    }
+
+    /// Makes the element of a sheet for its material.
+    fn of_material(
+        &self,
+        sheet: &StackSheet,
+        choice: &ComponentChoice,
+        material: Arc<MaterialInstance>,
+    ) -> Result<ElementInstance> {
+        let what = format!(
+            "element '{}' of sheet '{}'",
+            choice.plugin, sheet.scene.name
+        );
+        let found = self.components.element(&choice.plugin)?;
+        let parameters = if choice.with.is_null() {
+            "{}".into()
+        } else {
+            choice.with.to_string()
+        };
+        Ok(unsafe { ElementInstance::create(&found, &parameters, material, &what) }?)
+    }
+
+    /// The membranes of a ply whose `element` is for the zones alone: where the centres of its cells lie in none. `None` for a
+    /// run whose plies have one element.
+    ///
+    /// # Errors
+    /// An element in the zones that does not bend, or one elsewhere that does.
+    pub fn elsewhere(
+        &self,
+        sheet: &StackSheet,
+        element: &ElementInstance,
+        mesh: &QuadMesh,
+        planes: Planes,
+    ) -> Result<Option<Elsewhere>> {
+        let Some(choice) = &self.p.element_elsewhere else {
+            return Ok(None);
+        };
+        let bends = |e: &ElementInstance| e.sizes.patch_nodes > 0 || e.rotates();
+        if !bends(element) {
+            return Err(FormingError::Element(format!(
+                "element: given '{}', a membrane, for the plies in the zones; expected an element that bends, such as rf4, beside \
+                 `element_elsewhere`",
+                self.p.element.plugin
+            )));
+        }
+        let other = self.of_material(sheet, choice, element.material.clone())?;
+        if bends(&other) {
+            return Err(FormingError::Element(format!(
+                "element_elsewhere: given '{}', which bends; expected a membrane, such as m4. For plies that bend everywhere \
+                 leave out `element_elsewhere` and `zones`",
+                choice.plugin
+            )));
+        }
+        let cells = mesh.cells.iter();
+        let centre = |c| regions::centre(&mesh.points, c);
+        let is_elsewhere = cells.map(|c| !is_in(&self.p.bending_zones, centre(c), planes));
+        Ok(Some(Elsewhere {
+            element: other,
+            cells: is_elsewhere.collect(),
+        }))
+    }
+
+    /// The material without stitches of a ply in `element`, with the cells of its flat mesh that have it. `None` of a ply without such cells.
+    pub fn unstitched(
+        &self,
+        sheet: &StackSheet,
+        mesh: &QuadMesh,
+        element: &ElementInstance,
+    ) -> Result<Option<OtherMaterial>> {
+        let cells = regions::without_stitches(&sheet.scene, &mesh.points, &mesh.cells)?;
+        if !cells.iter().any(|c| *c) {
+            return Ok(None);
+        }
+        let mut bare = sheet.clone();
+        bare.material.with.remove("stitch");
+        let make = |choice: &ComponentChoice| self.element(&bare, choice);
+        let other = make(&self.p.element)?;
+        debug_assert_eq!(other.sizes.fields, element.sizes.fields);
+        Ok(Some(OtherMaterial {
+            element: other,
+            elsewhere: self.p.element_elsewhere.as_ref().map(make).transpose()?,
+            cells,
+        }))
+    }
 }
 
 /// A box holds what is nearer to it than this (m): whether a centre that lies on its side counts must not hang on rounding.
@@ -110,47 +174,6 @@ fn is_in(zones: &[Rectangle], at: V, planes: Planes) -> bool {
         let holds = |b: &Rectangle| within(x, b[0], b[2]) && within(y, b[1], b[3]);
         zones.iter().any(holds)
     })
-}
-
-/// The membranes of a ply whose `element` is for the zones alone: where the centres of its cells lie in none. `None` for a
-/// run whose plies have one element.
-///
-/// # Errors
-/// A text for the user: an element in the zones that does not bend, or one elsewhere that does.
-pub fn elsewhere(
-    components: &dyn Components,
-    sheet: &StackSheet,
-    element: &ElementInstance,
-    mesh: &QuadMesh,
-    planes: Planes,
-    p: &Parameters,
-) -> Result<Option<Elsewhere>, FormingError> {
-    let Some(choice) = &p.element_elsewhere else {
-        return Ok(None);
-    };
-    let bends = |e: &ElementInstance| e.sizes.patch_nodes > 0 || e.rotates();
-    if !bends(element) {
-        return Err(FormingError::Element(format!(
-            "element: given '{}', a membrane, for the plies in the zones; expected an element that bends, such as rf4, beside \
-             `element_elsewhere`",
-            p.element.plugin
-        )));
-    }
-    let other = of_material(components, sheet, choice, element.material.clone())?;
-    if bends(&other) {
-        return Err(FormingError::Element(format!(
-            "element_elsewhere: given '{}', which bends; expected a membrane, such as m4. For plies that bend everywhere \
-             leave out `element_elsewhere` and `zones`",
-            choice.plugin
-        )));
-    }
-    let cells = mesh.cells.iter();
-    let centre = |c| regions::centre(&mesh.points, c);
-    let is_elsewhere = cells.map(|c| !is_in(&p.bending_zones, centre(c), planes));
-    Ok(Some(Elsewhere {
-        element: other,
-        cells: is_elsewhere.collect(),
-    }))
 }
 
 /// The part of a mesh, with all of its points, whose cells have the sheet's own element. Patches that are made of it end at
@@ -187,33 +210,6 @@ pub fn patches(
         mirrors.ghosts.push(Ghost { node, of, ..ghost });
     }
     patches
-}
-
-/// The material without stitches of a ply in `element`, with the cells of its flat mesh that have it. `None` of a ply without such cells.
-///
-/// # Errors
-/// The component's own text.
-pub fn unstitched(
-    components: &dyn Components,
-    sheet: &StackSheet,
-    mesh: &QuadMesh,
-    element: &ElementInstance,
-    p: &Parameters,
-) -> Result<Option<OtherMaterial>, FormingError> {
-    let cells = regions::without_stitches(&sheet.scene, &mesh.points, &mesh.cells)?;
-    if !cells.iter().any(|c| *c) {
-        return Ok(None);
-    }
-    let mut bare = sheet.clone();
-    bare.material.with.remove("stitch");
-    let make = |choice: &ComponentChoice| self::element(components, &bare, choice);
-    let other = make(&p.element)?;
-    debug_assert_eq!(other.sizes.fields, element.sizes.fields);
-    Ok(Some(OtherMaterial {
-        element: other,
-        elsewhere: p.element_elsewhere.as_ref().map(make).transpose()?,
-        cells,
-    }))
 }
 
 #[cfg(test)]

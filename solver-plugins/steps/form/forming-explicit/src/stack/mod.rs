@@ -18,7 +18,7 @@ pub mod tool;
 pub use body::Body;
 pub use contact::{LEAST_FILM_DISTANCE, StackContacts};
 pub use cover::{RigidPart, SHARE_SQUEEZED};
-pub use elements::Components;
+pub use elements::{Components, Elements};
 pub use locate::inverse_bilinear;
 pub use parts::{Meshed, Parts, plain};
 pub use place::{Placed, SheetIndex, StackPlace, layers};

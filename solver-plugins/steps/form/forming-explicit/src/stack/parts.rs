@@ -1,9 +1,9 @@
 //! What a model is made of, as it grows sheet by sheet.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::request::Parameters;
 use crate::stack::body::Body;
-use crate::stack::elements::{self, Components};
+use crate::stack::elements::{Elements, bending_part, patches};
 use crate::stack::place::{Placed, SheetIndex};
 use crate::stack::sheet::{self, StackSheet};
 use crate::stack::{regions, symmetry};
@@ -85,10 +85,9 @@ impl Parts {
         sheet: &StackSheet,
         blank: &Blank,
         z: f64,
-        p: &Parameters,
-        components: &dyn Components,
-    ) -> Result<(), FormingError> {
-        let planes = self.mirrors.planes;
+        elements: &Elements<'_>,
+    ) -> Result<()> {
+        let (p, planes) = (elements.p, self.mirrors.planes);
         let name = &sheet.scene.name;
         let (mut mesh, quality) = (blank.mesh(p.element_size)).map_err(|source| {
             let ply = name.clone();
@@ -105,16 +104,16 @@ impl Parts {
             .extend(mesh.points.iter().map(|q| [q[0], q[1], z]));
         let slaves: Vec<u32> = (first..self.points.len() as u32).collect();
         regions::check(&sheet.scene, &mesh.points, &mesh.cells, planes)?;
-        let element = elements::of_ply(components, sheet, &p.element)?;
-        let other_material = elements::unstitched(components, sheet, &mesh, &element, p)?;
+        let element = elements.of_ply(sheet)?;
+        let other_material = elements.unstitched(sheet, &mesh, &element)?;
         symmetry::check_material(&element, sheet, planes)?;
-        let elsewhere = elements::elsewhere(components, sheet, &element, &mesh, planes, p)?;
+        let elsewhere = elements.elsewhere(sheet, &element, &mesh, planes)?;
         let body = Body {
             quality,
             ..Body::mirrored(sheet, self.next(), &mesh.points, &mesh.cells, planes)?
         };
         let mut nodes = slaves.clone();
-        let bending = elements::bending_part(&mesh, elsewhere.as_ref());
+        let bending = bending_part(&mesh, elsewhere.as_ref());
         let patches = self.patches(&mut nodes, &bending, &element);
         if elsewhere.is_none() && element.sizes.patch_nodes > 0 && patches.is_empty() {
             return Err(too_few_elements(name, blank, p));
@@ -141,7 +140,7 @@ impl Parts {
         mesh: &QuadMesh,
         element: &ElementInstance,
     ) -> Vec<Patch> {
-        elements::patches(&mut self.points, nodes, mesh, element, &mut self.mirrors)
+        patches(&mut self.points, nodes, mesh, element, &mut self.mirrors)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Regions of plies: which nodes rub otherwise, and which elements have no stitches.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::stack::place::SheetIndex;
 use plyflow_mechanics::contact::NodeLaws;
 use plyflow_mechanics::mirror::{Planes, reflect};
@@ -29,7 +29,7 @@ impl PlacedRegion<'_> {
 ///
 /// # Errors
 /// When one has no shape ([`plyflow_model::regions::faults`] tells more).
-pub fn of_sheet(sheet: &Sheet) -> Result<Vec<PlacedRegion<'_>>, FormingError> {
+pub fn of_sheet(sheet: &Sheet) -> Result<Vec<PlacedRegion<'_>>> {
     let centre = sheet.centre.map(|c| c.si());
     let place = |region: &'_ PlyRegion| region.corners(centre);
     let each = sheet.regions.iter().map(|region| {
@@ -66,11 +66,7 @@ pub fn centre(points: &[V], cell: &[u32; 4]) -> V {
 ///
 /// # Errors
 /// As [`of_sheet`].
-pub fn without_stitches(
-    sheet: &Sheet,
-    points: &[V],
-    cells: &[[u32; 4]],
-) -> Result<Vec<bool>, FormingError> {
+pub fn without_stitches(sheet: &Sheet, points: &[V], cells: &[[u32; 4]]) -> Result<Vec<bool>> {
     let mut all = of_sheet(sheet)?;
     all.retain(|r| r.region.stitches == Some(Stitches::Removed));
     let removed = |at: V| all.iter().any(|r| r.holds(at));
@@ -79,15 +75,7 @@ pub fn without_stitches(
 
 /// Whether the regions of a ply lie on what is computed of it as the scene means them: each holds a node (or the middle of an element, where it removes
 /// stitches), and they are their own images in mirror planes.
-///
-/// # Errors
-/// A text for the user.
-pub fn check(
-    sheet: &Sheet,
-    points: &[V],
-    cells: &[[u32; 4]],
-    planes: Planes,
-) -> Result<(), FormingError> {
+pub fn check(sheet: &Sheet, points: &[V], cells: &[[u32; 4]], planes: Planes) -> Result<()> {
     for axis in (0..2).filter(|a| planes.0[*a]) {
         if let Some(text) = asymmetry(sheet, axis) {
             return Err(FormingError::Symmetry(text));

@@ -1,6 +1,6 @@
 //! The sheets of a scene as they lie one on the other.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use plyflow_blank::Blank;
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::mirror::Planes;
@@ -33,7 +33,7 @@ impl StackSheet {
 ///
 /// # Errors
 /// When it does not fit the process: film, plies, film for double-diaphragm forming, plies alone for a press.
-pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, FormingError> {
+pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>> {
     let n = scene.sheets.len();
     let kinds: Vec<SheetKind> = scene.sheets.iter().map(|s| s.kind).collect();
     let plies =
@@ -76,7 +76,7 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, FormingError> {
                 offset: 0.0,
             })
         })
-        .collect::<Result<Vec<_>, FormingError>>()?;
+        .collect::<Result<Vec<_>>>()?;
     lay(&mut stack);
     Ok(stack)
 }
@@ -94,7 +94,7 @@ pub fn lay(stack: &mut [StackSheet]) {
 const SQUARE: f64 = 1e-6;
 
 /// Whether the solver can compute a sheet as the scene has it.
-fn check_sheet(sheet: &Sheet) -> Result<(), FormingError> {
+fn check_sheet(sheet: &Sheet) -> Result<()> {
     if ["bed", "die", "holder"].contains(&sheet.name.as_str()) {
         return Err(FormingError::Scene(format!(
             "sheet '{}' has the name of a rigid part; give it another name",
@@ -129,7 +129,7 @@ pub fn axis(sheet: &Sheet) -> V {
 ///
 /// # Errors
 /// When the scene gives no size, or an outline that is none.
-pub fn blank(sheet: &StackSheet) -> Result<Blank, FormingError> {
+pub fn blank(sheet: &StackSheet) -> Result<Blank> {
     Ok(Blank::new(&sheet.scene)?)
 }
 
@@ -137,7 +137,7 @@ pub fn blank(sheet: &StackSheet) -> Result<Blank, FormingError> {
 ///
 /// # Errors
 /// As [`blank`]; when it is not its own mirror image.
-pub fn blank_part(sheet: &StackSheet, planes: Planes) -> Result<Blank, FormingError> {
+pub fn blank_part(sheet: &StackSheet, planes: Planes) -> Result<Blank> {
     let part = blank(sheet)?.part(planes);
     part.map_err(|source| FormingError::Mesh {
         ply: sheet.scene.name.clone(),

@@ -3,7 +3,7 @@
 //! In a plane that is square to one fibre family, both families are their own mirror images and shear changes its sign; at
 //! 45 degrees to them the plane exchanges the families and shear keeps its sign.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::stack::sheet::{self, StackSheet};
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::LANES;
@@ -57,7 +57,7 @@ impl Families {
     ///
     /// # Errors
     /// When its fibres lie in neither way to the planes.
-    pub fn of(sheet: &StackSheet, planes: Planes) -> Result<Self, FormingError> {
+    pub fn of(sheet: &StackSheet, planes: Planes) -> Result<Self> {
         let [x, y, _] = sheet::axis(&sheet.scene).map(f64::abs);
         if x.min(y) < FIBRES_APART {
             Ok(Self::Kept)
@@ -85,15 +85,7 @@ impl Families {
 
 /// Whether tool and friction are their own mirror images. Frame, bed, die and holder always are; blanks, fibres and
 /// materials are looked at where they are made.
-///
-/// # Errors
-/// What is not, and where.
-pub fn check(
-    scene: &Scene,
-    planes: Planes,
-    stack: &[StackSheet],
-    tool: &ToolMesh,
-) -> Result<(), FormingError> {
+pub fn check(scene: &Scene, planes: Planes, stack: &[StackSheet], tool: &ToolMesh) -> Result<()> {
     if !planes.any() {
         return Ok(());
     }
@@ -124,7 +116,7 @@ pub fn check(
     Ok(())
 }
 
-fn check_tool(planes: Planes, tool: &ToolMesh) -> Result<(), FormingError> {
+fn check_tool(planes: Planes, tool: &ToolMesh) -> Result<()> {
     let [low, high] = tool.bounds();
     let most = TOOL_APART * norm(sub(high, low));
     let tree = SurfaceTree::new(tool);
@@ -160,11 +152,7 @@ fn check_tool(planes: Planes, tool: &ToolMesh) -> Result<(), FormingError> {
 ///
 /// # Errors
 /// Which answer differs, by how much, and what to do.
-pub fn check_material(
-    element: &ElementInstance,
-    sheet: &StackSheet,
-    planes: Planes,
-) -> Result<(), FormingError> {
+pub fn check_material(element: &ElementInstance, sheet: &StackSheet, planes: Planes) -> Result<()> {
     if !planes.any() {
         return Ok(());
     }
@@ -206,7 +194,7 @@ pub fn check_material(
 ///
 /// # Errors
 /// When it does not, and what to write instead.
-pub fn check_order(element: &ElementInstance, sheet: &StackSheet) -> Result<(), FormingError> {
+pub fn check_order(element: &ElementInstance, sheet: &StackSheet) -> Result<()> {
     let (first, second) = (&sheet.scene.fibre_1, &sheet.scene.fibre_2);
     let Some(second) = second
         .as_ref()
@@ -286,7 +274,7 @@ fn difference(families: Families, answers: &[f64], energy: &[f64]) -> f64 {
     (0..4).map(of).fold(0.0, f64::max)
 }
 
-fn failed(code: i32) -> Result<(), FormingError> {
+fn failed(code: i32) -> Result<()> {
     match code {
         plyflow_abi::PF_OK => Ok(()),
         _ => Err(FormingError::Symmetry(format!(
@@ -295,7 +283,7 @@ fn failed(code: i32) -> Result<(), FormingError> {
     }
 }
 
-fn membrane_apart(material: &MaterialInstance, families: Families) -> Result<f64, FormingError> {
+fn membrane_apart(material: &MaterialInstance, families: Families) -> Result<f64> {
     let sizes = material.reference().sizes();
     let mut history = Aligned::zeros(sizes.membrane_history * LANES);
     let (mut stress, mut energy) = (Aligned::zeros(3 * LANES), Aligned::zeros(LANES));
@@ -328,7 +316,7 @@ fn membrane_apart(material: &MaterialInstance, families: Families) -> Result<f64
     Ok(apart)
 }
 
-fn bending_apart(material: &MaterialInstance, families: Families) -> Result<f64, FormingError> {
+fn bending_apart(material: &MaterialInstance, families: Families) -> Result<f64> {
     let sizes = material.reference().sizes();
     let mut history = Aligned::zeros(sizes.bending_history * LANES);
     let (mut moment, mut energy) = (Aligned::zeros(3 * LANES), Aligned::zeros(LANES));

@@ -1,6 +1,6 @@
 //! The tool as the sheets of a model see it.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::request::Parameters;
 use crate::stack::place::SheetIndex;
 use plyflow_mechanics::contact::RigidSurface;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// When it has no surface, or the field cannot follow it.
-pub fn rigid(p: &Parameters) -> Result<RigidTool, FormingError> {
+pub fn rigid(p: &Parameters) -> Result<RigidTool> {
     given::rigid(&p.scene, p.tool_grid).map_err(FormingError::Tool)
 }
 

@@ -97,6 +97,27 @@ impl Stack<'_> {
         }
     }
 
+    /// What of a film hangs through between the nodes of a ply.
+    fn hanging(&self, film: usize, ply: usize) -> Pair {
+        let both = self.of_sheets(film.min(ply), film.max(ply));
+        Pair {
+            name: format!("between_nodes/{}", both.name),
+            kind: Kind::Hangs,
+            bound: f64::INFINITY,
+            most: f64::INFINITY,
+            ..both
+        }
+    }
+
+    /// Edges of the tool with a film, an element away from all plies.
+    fn off_plies(&self, film: usize) -> Pair {
+        Pair {
+            name: format!("tool_edges_off_plies/{}", self.name(film)),
+            bound: f64::INFINITY,
+            ..self.with_edges(film)
+        }
+    }
+
     /// No ply feels what films do to each other beside the plies; they fold there. `share`: of an element, which they may be in each other.
     fn of_films(&self, low: usize, high: usize, share: f64) -> Pair {
         let size = self.sizes[low].min(self.sizes[high]);
@@ -140,23 +161,12 @@ pub fn pairs(sheets: &[StackSheet], parts: &[Part], sizes: &[f64]) -> (Vec<Pair>
     let mut hangs = vec![None; count * count];
     for (film, ply) in films().flat_map(|film| plies().map(move |ply| (film, ply))) {
         hangs[film * count + ply] = Some(all.len());
-        let both = stack.of_sheets(film.min(ply), film.max(ply));
-        all.push(Pair {
-            name: format!("between_nodes/{}", both.name),
-            kind: Kind::Hangs,
-            bound: f64::INFINITY,
-            most: f64::INFINITY,
-            ..both
-        });
+        all.push(stack.hanging(film, ply));
     }
     let mut beyond = vec![None; count];
     for film in films() {
         beyond[film] = Some(all.len());
-        all.push(Pair {
-            name: format!("tool_edges_off_plies/{}", stack.name(film)),
-            bound: f64::INFINITY,
-            ..stack.with_edges(film)
-        });
+        all.push(stack.off_plies(film));
     }
     let films = both_films.map(|(near, both)| {
         all.push(Pair {

@@ -122,6 +122,26 @@ const CROSSED: usize = 200;
 /// A cell is nearer only when it is by this share of the squared distance: on a common edge both are equally near but for rounding.
 const NEARER: f64 = 1.0 - 1e-9;
 
+/// By node, of so many: where its cells begin in what comes second; one more at the end.
+fn cells_around(cells: &[[u32; 4]], nodes: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut first = vec![0u32; nodes + 1];
+    for n in cells.iter().flatten() {
+        first[*n as usize + 1] += 1;
+    }
+    for n in 0..nodes {
+        first[n + 1] += first[n];
+    }
+    let mut place = first.clone();
+    let mut around = vec![0; 4 * cells.len()];
+    for (i, cell) in cells.iter().enumerate() {
+        for n in cell {
+            around[place[*n as usize] as usize] = i as u32;
+            place[*n as usize] += 1;
+        }
+    }
+    (first, around)
+}
+
 impl SheetMesh {
     /// Of cells in the numbers of a model with points that started at `start` (m).
     pub fn new(cells: &[[u32; 4]], start: &[V], planes: Planes) -> Self {
@@ -161,21 +181,7 @@ impl SheetMesh {
             })
         };
         let across = cells.iter().enumerate().map(across).collect();
-        let mut first = vec![0u32; start.len() + 1];
-        for n in cells.iter().flatten() {
-            first[*n as usize + 1] += 1;
-        }
-        for n in 0..start.len() {
-            first[n + 1] += first[n];
-        }
-        let mut place = first.clone();
-        let mut around = vec![0; 4 * cells.len()];
-        for (i, cell) in cells.iter().enumerate() {
-            for n in cell {
-                around[place[*n as usize] as usize] = i as u32;
-                place[*n as usize] += 1;
-            }
-        }
+        let (first, around) = cells_around(cells, start.len());
         let index = |n: u32| nodes.binary_search(&n).map_or(0, |k| k as u32);
         Self {
             local: cells.iter().map(|c| c.map(index)).collect(),

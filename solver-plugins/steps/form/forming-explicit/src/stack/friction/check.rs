@@ -1,21 +1,18 @@
 //! Whether a law of friction is one.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use plyflow_mechanics::contact::LARGEST_COEFFICIENT;
 use plyflow_model::friction::{AngleLaw, Coefficient, FrictionLaw, PowerLaw, PressureLaw};
 
 /// Whether what a scene gives at a place is a coefficient or a law.
-///
-/// # Errors
-/// What is not, and where.
-pub fn check(given: &Coefficient, place: &str) -> Result<(), FormingError> {
+pub fn check(given: &Coefficient, place: &str) -> Result<()> {
     match given {
         Coefficient::Law(law) => check_law(law, place),
         Coefficient::Constant(n) => check_coefficient(n.0, place),
     }
 }
 
-fn check_coefficient(value: f64, place: &str) -> Result<(), FormingError> {
+fn check_coefficient(value: f64, place: &str) -> Result<()> {
     if (0.0..=LARGEST_COEFFICIENT).contains(&value) {
         return Ok(());
     }
@@ -24,7 +21,7 @@ fn check_coefficient(value: f64, place: &str) -> Result<(), FormingError> {
 }
 
 /// Whether the first numbers of the rows grow, from at least 0.
-fn check_rows(rows: &[f64], place: &str, what: &str) -> Result<(), FormingError> {
+fn check_rows(rows: &[f64], place: &str, what: &str) -> Result<()> {
     if rows.len() < 2 {
         return Err(FormingError::Scene(format!(
             "{place}: {} given; expected two or more rows with growing {what}",
@@ -45,7 +42,7 @@ fn check_rows(rows: &[f64], place: &str, what: &str) -> Result<(), FormingError>
 }
 
 /// Whether a law is one: coefficients from 0 to the largest, tables in order.
-pub fn check_law(law: &FrictionLaw, place: &str) -> Result<(), FormingError> {
+pub fn check_law(law: &FrictionLaw, place: &str) -> Result<()> {
     let mut largest = 0.0f64;
     match (&law.pressure, law.coefficient) {
         (Some(PressureLaw::Table(rows)), None) => {
@@ -86,7 +83,7 @@ pub fn check_law(law: &FrictionLaw, place: &str) -> Result<(), FormingError> {
 }
 
 /// Whether a power of pressure is one.
-fn check_power(law: &PowerLaw, place: &str) -> Result<(), FormingError> {
+fn check_power(law: &PowerLaw, place: &str) -> Result<()> {
     let (reference, exponent) = (law.reference.si(), law.exponent.0);
     let wrong = |what: &str, given: String, expected: &str| {
         Err(FormingError::value(
@@ -110,7 +107,7 @@ fn check_power(law: &PowerLaw, place: &str) -> Result<(), FormingError> {
 }
 
 /// Whether factors by angle are such; `largest`: the largest coefficient that they multiply.
-fn check_angle(law: &AngleLaw, largest: f64, place: &str) -> Result<(), FormingError> {
+fn check_angle(law: &AngleLaw, largest: f64, place: &str) -> Result<()> {
     let angles: Vec<f64> = law.factors.iter().map(|r| r.angle.si()).collect();
     check_rows(&angles, &format!("{place}.factors"), "angles (rad)")?;
     if angles[angles.len() - 1] > std::f64::consts::FRAC_PI_2 + 1e-9 {

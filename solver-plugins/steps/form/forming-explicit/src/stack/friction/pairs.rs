@@ -29,35 +29,27 @@ impl FrictionClass {
         Self::DiaphragmDiaphragm,
     ];
 
-    /// Of two sheets.
-    pub fn of(a: &Sheet, b: &Sheet) -> Self {
-        match (a.kind, b.kind) {
-            (SheetKind::Ply, SheetKind::Ply) => Self::FabricFabric,
-            (SheetKind::Diaphragm, SheetKind::Diaphragm) => Self::DiaphragmDiaphragm,
+    /// Of two sheets, or of one and a rigid part.
+    pub fn of(a: SheetKind, b: Option<SheetKind>) -> Self {
+        match (a, b) {
+            (SheetKind::Ply, None) => Self::ToolFabric,
+            (SheetKind::Diaphragm, None) => Self::ToolDiaphragm,
+            (SheetKind::Ply, Some(SheetKind::Ply)) => Self::FabricFabric,
+            (SheetKind::Diaphragm, Some(SheetKind::Diaphragm)) => Self::DiaphragmDiaphragm,
             _ => Self::FabricDiaphragm,
         }
     }
 
-    /// Its name in a scene.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::ToolDiaphragm => "tool_diaphragm",
-            Self::ToolFabric => "tool_fabric",
-            Self::FabricDiaphragm => "fabric_diaphragm",
-            Self::FabricFabric => "fabric_fabric",
-            Self::DiaphragmDiaphragm => "diaphragm_diaphragm",
-        }
-    }
-
-    /// What a scene gives for it.
-    pub fn given(self, friction: &Friction) -> Option<&Coefficient> {
-        match self {
-            Self::ToolDiaphragm => friction.tool_diaphragm.as_ref(),
-            Self::ToolFabric => friction.tool_fabric.as_ref(),
-            Self::FabricDiaphragm => friction.fabric_diaphragm.as_ref(),
-            Self::FabricFabric => friction.fabric_fabric.as_ref(),
-            Self::DiaphragmDiaphragm => friction.diaphragm_diaphragm.as_ref(),
-        }
+    /// Its name in a scene, and what the scene gives for it.
+    pub fn given(self, f: &Friction) -> (&'static str, Option<&Coefficient>) {
+        let (name, given) = match self {
+            Self::ToolDiaphragm => ("tool_diaphragm", &f.tool_diaphragm),
+            Self::ToolFabric => ("tool_fabric", &f.tool_fabric),
+            Self::FabricDiaphragm => ("fabric_diaphragm", &f.fabric_diaphragm),
+            Self::FabricFabric => ("fabric_fabric", &f.fabric_fabric),
+            Self::DiaphragmDiaphragm => ("diaphragm_diaphragm", &f.diaphragm_diaphragm),
+        };
+        (name, given.as_ref())
     }
 }
 
@@ -79,84 +71,59 @@ impl Pair {
 /// Pairs of a scene in which friction acts.
 pub fn pairs(scene: &Scene) -> Vec<Pair> {
     let sheets = &scene.sheets;
-    let pair = |lower: &str, upper: &str, class| Pair {
-        parts: [lower.into(), upper.into()],
-        class,
-    };
     let (Some(first), Some(last)) = (sheets.first(), sheets.last()) else {
         return Vec::new();
     };
-    let mut found = Vec::new();
-    match &scene.process {
-        Process::DoubleDiaphragm(_) => {
-            found.push(pair(
-                RigidName::Tool.word(),
-                &first.name,
-                FrictionClass::ToolDiaphragm,
-            ));
-            found.push(pair(
-                RigidName::Bed.word(),
-                &first.name,
-                FrictionClass::ToolDiaphragm,
-            ));
+    let two = |lower: &Sheet, upper: &Sheet| Pair {
+        parts: [lower.name.clone(), upper.name.clone()],
+        class: FrictionClass::of(lower.kind, Some(upper.kind)),
+    };
+    let on = |part: RigidName, sheet: &Sheet| Pair {
+        parts: [part.word().into(), sheet.name.clone()],
+        class: FrictionClass::of(sheet.kind, None),
+    };
+    let under = |sheet: &Sheet, part: RigidName| {
+        let Pair { parts, class } = on(part, sheet);
+        let [part, sheet] = parts;
+        Pair {
+            parts: [sheet, part],
+            class,
         }
+    };
+    let mut found = vec![on(RigidName::Tool, first)];
+    let mut rigid = vec![RigidName::Tool];
+    match &scene.process {
+        Process::DoubleDiaphragm(_) => found.push(on(RigidName::Bed, first)),
         Process::Press(press) => {
-            found.push(pair(
-                RigidName::Tool.word(),
-                &first.name,
-                FrictionClass::ToolFabric,
-            ));
-            found.push(pair(
-                &last.name,
-                RigidName::Die.word(),
-                FrictionClass::ToolFabric,
-            ));
+            found.push(under(last, RigidName::Die));
+            rigid.push(RigidName::Die);
             if press.holder.is_some() {
-                found.push(pair(
-                    RigidName::Holder.word(),
-                    &first.name,
-                    FrictionClass::ToolFabric,
-                ));
+                found.push(on(RigidName::Holder, first));
+                rigid.push(RigidName::Holder);
             }
         }
     }
-    for two in sheets.windows(2) {
-        found.push(pair(
-            &two[0].name,
-            &two[1].name,
-            FrictionClass::of(&two[0], &two[1]),
-        ));
-    }
+    found.extend(sheets.windows(2).map(|w| two(&w[0], &w[1])));
     // Past the edges of what lies between them any two sheets may touch: plies slide on each other.
     for (i, lower) in sheets.iter().enumerate() {
-        for upper in sheets.iter().skip(i + 2) {
-            if FrictionClass::of(lower, upper) != FrictionClass::DiaphragmDiaphragm {
-                found.push(pair(
-                    &lower.name,
-                    &upper.name,
-                    FrictionClass::of(lower, upper),
-                ));
+        let past = sheets.iter().skip(i + 2).map(|upper| two(lower, upper));
+        found.extend(past.filter(|p| p.class != FrictionClass::DiaphragmDiaphragm));
+    }
+    match scene.process {
+        Process::Press(_) => {
+            let plies = || sheets.iter().filter(|s| s.kind == SheetKind::Ply);
+            for pair in rigid
+                .iter()
+                .flat_map(|part| plies().map(|ply| on(*part, ply)))
+            {
+                if !found.iter().any(|f| same(&f.parts, pair.names())) {
+                    found.push(pair);
+                }
             }
         }
-    }
-    if let Process::Press(press) = &scene.process {
-        let holder = press.holder.as_ref().map(|_| RigidName::Holder);
-        for part in [RigidName::Tool, RigidName::Die].into_iter().chain(holder) {
-            let plies = sheets.iter().filter(|s| s.kind == SheetKind::Ply);
-            let new: Vec<Pair> = (plies
-                .map(|ply| pair(part.word(), &ply.name, FrictionClass::ToolFabric)))
-            .filter(|p| !found.iter().any(|f| same(&f.parts, p.names())))
-            .collect();
-            found.extend(new);
-        }
-    }
-    // Beyond the plies the two films meet.
-    if sheets.len() > 2 && matches!(scene.process, Process::DoubleDiaphragm(_)) {
-        found.push(pair(
-            &first.name,
-            &last.name,
-            FrictionClass::of(first, last),
-        ));
+        // Beyond the plies the two films meet.
+        Process::DoubleDiaphragm(_) if sheets.len() > 2 => found.push(two(first, last)),
+        Process::DoubleDiaphragm(_) => {}
     }
     found
 }

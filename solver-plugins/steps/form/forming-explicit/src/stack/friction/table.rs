@@ -1,6 +1,6 @@
 //! By which law two surfaces of a scene rub on each other.
 
-use crate::error::FormingError;
+use crate::error::{FormingError, Result};
 use crate::stack::friction::check::{check, check_law};
 use crate::stack::friction::pairs::{FrictionClass, Pair, pairs, same};
 use crate::stack::friction::through::{at_one_bar, least, without_fibres_of_others};
@@ -38,15 +38,15 @@ impl<'a> FrictionTable<'a> {
     /// # Errors
     /// When a pair names surfaces that the scene does not have or that do not touch, or one that another pair names too; when
     /// a law makes no sense.
-    pub fn new(scene: &'a Scene) -> Result<Self, FormingError> {
+    pub fn new(scene: &'a Scene) -> Result<Self> {
         let pairs = pairs(scene);
         let table = Self { scene, pairs };
         for k in 0..scene.friction.pairs.len() {
             table.check_pair(k)?;
         }
         for class in FrictionClass::ALL {
-            if let Some(given) = class.given(&scene.friction) {
-                check(given, &format!("friction.{}", class.word()))?;
+            if let (name, Some(given)) = class.given(&scene.friction) {
+                check(given, &format!("friction.{name}"))?;
             }
         }
         for sheet in &scene.sheets {
@@ -59,7 +59,7 @@ impl<'a> FrictionTable<'a> {
         Ok(table)
     }
 
-    fn check_pair(&self, k: usize) -> Result<(), FormingError> {
+    fn check_pair(&self, k: usize) -> Result<()> {
         let given = &self.scene.friction.pairs[k];
         let place = format!("friction.pairs[{k}]");
         let mut names: Vec<&str> = Vec::new();
@@ -114,7 +114,7 @@ impl<'a> FrictionTable<'a> {
     ///
     /// # Errors
     /// When the scene does not give it, or when whose fibres count is not clear.
-    pub fn law(&self, model: &Model, touching: &Touching<'_>) -> Result<FrictionLaw, FormingError> {
+    pub fn law(&self, model: &Model, touching: &Touching<'_>) -> Result<FrictionLaw> {
         self.by_region(model, touching, true)
     }
 
@@ -124,7 +124,7 @@ impl<'a> FrictionTable<'a> {
         model: &Model,
         touching: &Touching<'_>,
         cells: bool,
-    ) -> Result<FrictionLaw, FormingError> {
+    ) -> Result<FrictionLaw> {
         let mut laws = vec![self.everywhere(model, touching)?];
         let [lower, upper] = touching.parts;
         // The surface whose nodes touch comes first; of two between which they do not, the lower one.
@@ -132,24 +132,23 @@ impl<'a> FrictionTable<'a> {
             true => (upper, lower),
             false => (lower, upper),
         };
-        let mut of =
-            |name: &str, partner: &str| -> Result<Vec<(PlacedRegion<'a>, u16)>, FormingError> {
-                let Some(sheet) = self.scene.sheets.iter().find(|s| s.name == name) else {
-                    return Ok(Vec::new());
-                };
-                let class = self.class(touching.parts);
-                let mut found = Vec::new();
-                for placed in regions::of_sheet(sheet)? {
-                    let Some(given) = placed.region.coefficient(partner, class.word()) else {
-                        continue;
-                    };
-                    let at = place(sheet, &placed.region.name, partner);
-                    let law = self.given(given, &at, model, touching)?;
-                    found.push((placed, laws.len() as u16));
-                    laws.push(law);
-                }
-                Ok(found)
+        let mut of = |name: &str, partner: &str| -> Result<Vec<(PlacedRegion<'a>, u16)>> {
+            let Some(sheet) = self.scene.sheets.iter().find(|s| s.name == name) else {
+                return Ok(Vec::new());
             };
+            let (class, _) = self.class(touching.parts).given(&self.scene.friction);
+            let mut found = Vec::new();
+            for placed in regions::of_sheet(sheet)? {
+                let Some(given) = placed.region.coefficient(partner, class) else {
+                    continue;
+                };
+                let at = place(sheet, &placed.region.name, partner);
+                let law = self.given(given, &at, model, touching)?;
+                found.push((placed, laws.len() as u16));
+                laws.push(law);
+            }
+            Ok(found)
+        };
         let (near, far) = (of(own, other)?, of(other, own)?);
         if laws.len() == 1 {
             return Ok(laws.swap_remove(0));
@@ -175,20 +174,16 @@ impl<'a> FrictionTable<'a> {
     }
 
     /// The law of a contact outside of all regions.
-    fn everywhere(
-        &self,
-        model: &Model,
-        touching: &Touching<'_>,
-    ) -> Result<FrictionLaw, FormingError> {
+    fn everywhere(&self, model: &Model, touching: &Touching<'_>) -> Result<FrictionLaw> {
         let f = &self.scene.friction;
         let mut own = f.pairs.iter().enumerate();
         if let Some((k, given)) = own.find(|(_, p)| same(&p.between, touching.parts)) {
             let at = format!("friction.pairs[{k}]");
             return self.make(&given.law(), &at, model, touching);
         }
-        let class = self.class(touching.parts);
-        let at = format!("friction.{}", class.word());
-        match class.given(f) {
+        let (class, given) = self.class(touching.parts).given(f);
+        let at = format!("friction.{class}");
+        match given {
             Some(given) => self.given(given, &at, model, touching),
             None => Err(FormingError::Scene(format!(
                 "{at}: not given, but in this scene {} and {} touch; expected a coefficient",
@@ -202,16 +197,11 @@ impl<'a> FrictionTable<'a> {
     ///
     /// # Errors
     /// When the scene does not give one of them.
-    pub fn past(
-        &self,
-        model: &Model,
-        chain: &[&str],
-        slave: &str,
-    ) -> Result<FrictionLaw, FormingError> {
+    pub fn past(&self, model: &Model, chain: &[&str], slave: &str) -> Result<FrictionLaw> {
         let parts = [chain[0], chain[chain.len() - 1]];
         let f = &self.scene.friction;
         let named = f.pairs.iter().any(|p| same(&p.between, parts));
-        if named || self.class(parts).given(f).is_some() {
+        if named || self.class(parts).given(f).1.is_some() {
             self.law(model, &Touching { parts, slave })
         } else {
             self.through(model, chain, slave)
@@ -224,12 +214,7 @@ impl<'a> FrictionTable<'a> {
     ///
     /// # Errors
     /// When the scene does not give one of them.
-    pub fn through(
-        &self,
-        model: &Model,
-        parts: &[&str],
-        sheet: &str,
-    ) -> Result<FrictionLaw, FormingError> {
+    pub fn through(&self, model: &Model, parts: &[&str], sheet: &str) -> Result<FrictionLaw> {
         let mut laws: Vec<FrictionLaw> = Vec::new();
         for two in parts.windows(2) {
             let touching = Touching {
@@ -261,12 +246,9 @@ impl<'a> FrictionTable<'a> {
             return pair.class;
         }
         let sheet = |name: &str| self.scene.sheets.iter().find(|s| s.name == name);
-        match parts.map(sheet) {
-            [Some(a), Some(b)] => FrictionClass::of(a, b),
-            [Some(s), None] | [None, Some(s)] if s.kind == SheetKind::Ply => {
-                FrictionClass::ToolFabric
-            }
-            _ => FrictionClass::ToolDiaphragm,
+        match parts.map(|name| sheet(name).map(|s| s.kind)) {
+            [Some(sheet), other] | [other, Some(sheet)] => FrictionClass::of(sheet, other),
+            [None, None] => FrictionClass::ToolDiaphragm,
         }
     }
 
@@ -277,7 +259,7 @@ impl<'a> FrictionTable<'a> {
         place: &str,
         model: &Model,
         touching: &Touching<'_>,
-    ) -> Result<FrictionLaw, FormingError> {
+    ) -> Result<FrictionLaw> {
         match given {
             Coefficient::Constant(n) => Ok(n.0.into()),
             Coefficient::Law(law) => self.make(law, place, model, touching),
@@ -290,7 +272,7 @@ impl<'a> FrictionTable<'a> {
         place: &str,
         model: &Model,
         touching: &Touching<'_>,
-    ) -> Result<FrictionLaw, FormingError> {
+    ) -> Result<FrictionLaw> {
         let pressure = match (&law.pressure, law.coefficient) {
             (None, Some(c)) if law.angle.is_none() => return Ok(c.0.into()),
             (None, c) => PressureDependence::Constant(c.map_or(0.0, |c| c.0)),
@@ -322,7 +304,7 @@ impl<'a> FrictionTable<'a> {
         place: &str,
         model: &Model,
         touching: &Touching<'_>,
-    ) -> Result<AngleDependence, FormingError> {
+    ) -> Result<AngleDependence> {
         let sheet = |name: &str| self.scene.sheets.iter().find(|s| s.name == name);
         let ply = |name: &str| sheet(name).filter(|s| s.kind == SheetKind::Ply);
         let [lower, upper] = touching.parts;
