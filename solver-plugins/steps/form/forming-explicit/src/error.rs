@@ -89,3 +89,17 @@ impl From<StepError> for FormingError {
         Self::Host(stopped)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cancelled_step_is_told_as_cancelled_and_all_else_as_its_text() {
+        let cancelled = FormingError::from(StepError::Cancelled);
+        assert_eq!(cancelled.at_the_door(), StepError::Cancelled);
+        let wrong = FormingError::value("tool_grid", "-1 m", "more than 0 m");
+        let text = "tool_grid: given -1 m; expected more than 0 m";
+        assert_eq!(wrong.at_the_door(), StepError::Failed(text.into()));
+    }
+}

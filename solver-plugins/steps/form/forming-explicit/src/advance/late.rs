@@ -10,19 +10,14 @@ use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 
 /// Steps in which elements are led from one state of the path to the next.
 const STEPS: u32 = 5;
-
 /// Steps in which nothing swings, at least, and at most.
 const CREEPING: [f64; 2] = [1000.0, 10000.0];
-
 /// The same in the steps that the contacts' multipliers take to follow to within 1 / e.
 const FOLLOWING: f64 = 3.0;
-
 /// Most steps (with all loads, at the time of the start) to find the balance of fine shells there.
 const SETTLING: u32 = 3000;
-
 /// Kinetic over internal energy at a peak below which they have found it.
 const SETTLED: f64 = 1e-5;
-
 /// Way (m) that fine plies may go by themselves at a late start: half of what counts as a wrinkle.
 const LARGEST_SHIFT: f64 = 5e-4;
 

@@ -12,22 +12,16 @@ use plyflow_model::scene::Process;
 
 /// Mass that is added over the sheets' own, beyond which a run is none of these sheets. Shipped studies have up to 75 in films.
 const MOST_ADDED: f64 = 1000.0;
-
 /// Share of the pressure that forms beyond which the drag of mass-proportional damping holds the sheets up.
 const MOST_DRAG: f64 = 0.1;
-
 /// Kinetic over internal energy beyond which sheets fly, and the share of the whole process for which they must do so. Sheets that a punch or a
 /// frame carries along have some kinetic energy before anything is stored in them: a soft fabric in a quick press several times as much.
 const FLIES: f64 = 10.0;
-
 const MOST_OF_IT: f64 = 0.5;
-
 /// Rows before which nothing is said of them.
 const FEW_ROWS: usize = 40;
-
 /// A ply this far (m) from the tool, or so many times its thickness, does not touch it.
 const OFF: f64 = 2e-3;
-
 const OFF_THICKNESSES: f64 = 5.0;
 
 /// Whether parameters and scene of a run make sense together.

@@ -10,10 +10,8 @@ use std::fmt::Write;
 
 /// Share of [`open_shares`] from which on a ledger counts as opening.
 const OPENING: f64 = 0.02;
-
 /// Rows of the history for which it must stay open: a single one may be a knock that closes again.
 const ROWS: usize = 3;
-
 /// Rows at the start that are not judged.
 const FIRST_ROWS: usize = 20;
 

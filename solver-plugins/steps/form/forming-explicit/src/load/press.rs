@@ -7,7 +7,6 @@ use plyflow_mechanics::model::Model;
 
 /// Rate (1/s) at which the motion of a holder that a force presses dies out.
 const HOLDER_DAMPING: f64 = 300.0;
-
 /// Share of the stroke's duration over which the holder's force grows.
 const HOLD_RISE: f64 = 0.05;
 

@@ -9,4 +9,4 @@ pub use penetration::{
     MANY, OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, keep_largest,
     too_deep_on_the_way,
 };
-pub use strain::{cell_strain, ply_extremes};
+pub use strain::{cell_strain, ply_strains};

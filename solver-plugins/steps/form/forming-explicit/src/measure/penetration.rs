@@ -9,10 +9,8 @@ use serde::{Deserialize, Serialize};
 
 /// Share of the thinner body beyond which what bodies share is told.
 pub const OVERLAP_BOUND: f64 = 0.1;
-
 /// The same on the way, where loads grow and contacts take them over a little late.
 pub const OVERLAP_PEAK_BOUND: f64 = 0.25;
-
 /// Nodes in touch from which on a quantile says something of a pair: with fewer, one node at a corner is the 99.9 % quantile.
 pub const MANY: usize = 100;
 

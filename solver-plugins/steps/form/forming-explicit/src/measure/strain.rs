@@ -5,19 +5,26 @@ use crate::stack::sheet;
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::vec3::{V, add, dot, norm, scale, sub};
 
-/// Smallest and largest shear angle (rad) and largest fibre strain by size, over the plies' elements, from
-/// the stretch of each cell's sides and diagonals in its material axes.
-pub fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
-    let (mut lo, mut hi, mut strain) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
+/// Strains of the plies' elements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlyStrains {
+    /// Smallest and largest shear angle (rad).
+    pub shear: [f64; 2],
+    /// Largest strain of a fibre by size (1).
+    pub fibre: f64,
+}
+
+/// Strains of all plies, from the stretch of each cell's sides and diagonals in its material axes; 0 without a cell.
+pub fn ply_strains(forming: &Forming) -> PlyStrains {
+    let (mut low, mut high, mut fibre) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
     for (body, sheet) in forming.plies() {
         let axis = sheet::axis(&sheet.scene);
         let mut count = |cells: &[[u32; 4]], then: &[V], now: &[V]| {
             for cell in cells {
                 let of = |points: &[V]| cell.map(|n| points[n as usize]);
                 let (g, e) = cell_strain(of(then), of(now), axis);
-                lo = lo.min(g);
-                hi = hi.max(g);
-                strain = strain.max(e);
+                (low, high) = (low.min(g), high.max(g));
+                fibre = fibre.max(e);
             }
         };
         if body.mirrored.is_some() {
@@ -29,11 +36,8 @@ pub fn ply_extremes(forming: &Forming) -> (f64, f64, f64) {
             count(body.sheet.cells(m), &forming.reference, &m.x);
         }
     }
-    if lo > hi {
-        (0.0, 0.0, 0.0)
-    } else {
-        (lo, hi, strain)
-    }
+    let shear = if low > high { [0.0; 2] } else { [low, high] };
+    PlyStrains { shear, fibre }
 }
 
 /// Shear angle (rad) and largest fibre strain by size at the centre of a cell.

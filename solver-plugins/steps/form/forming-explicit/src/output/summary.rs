@@ -4,7 +4,7 @@ use crate::course::Outcome;
 use crate::error::Result;
 use crate::forming::Forming;
 use crate::measure::{
-    OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, ply_extremes,
+    OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, ply_strains,
 };
 use crate::output::warnings::warnings;
 use crate::request::Parameters;
@@ -241,10 +241,10 @@ fn write_shape(host: &Host, forming: &Forming) -> Result<()> {
         )?;
         host.result("mesh_least_edge", least(|q| q.least_edge), "1")?;
     }
-    let (lo, hi, strain) = ply_extremes(forming);
-    host.result("shear_max", hi, "rad")?;
-    host.result("shear_min", lo, "rad")?;
-    host.result("fibre_strain_max", strain, "1")?;
+    let strains = ply_strains(forming);
+    host.result("shear_max", strains.shear[1], "rad")?;
+    host.result("shear_min", strains.shear[0], "rad")?;
+    host.result("fibre_strain_max", strains.fibre, "1")?;
     if forming.zone.is_none() {
         let ways = forming.draw_in();
         host.result("draw_in_max", ways.rim, "m")?;

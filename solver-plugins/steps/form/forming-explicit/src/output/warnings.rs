@@ -3,7 +3,7 @@
 use crate::course::Outcome;
 use crate::forming::Forming;
 use crate::load::PressLoad;
-use crate::measure::{Penetration, ply_extremes, too_deep_on_the_way};
+use crate::measure::{Penetration, ply_strains, too_deep_on_the_way};
 use crate::request::Parameters;
 use crate::stack::{Body, StackSheet};
 use crate::watch::depth_warnings;
@@ -65,7 +65,7 @@ pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Ve
     warnings.extend(depth_warnings(&outcome.depths));
     warnings.extend(now.iter().filter_map(Penetration::too_deep));
     warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
-    let (_, _, strain) = ply_extremes(forming);
+    let strain = ply_strains(forming).fibre;
     if strain > LARGEST_FIBRE_STRAIN {
         warnings.push(format!(
             "a fibre is strained by {:.1} %, more than {:.0} %: fibres of plies hardly stretch. Where it is (fibre_strain_1, fibre_strain_2) look for cells \

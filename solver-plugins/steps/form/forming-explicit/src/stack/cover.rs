@@ -29,11 +29,9 @@ fn place(item: &SlaveItem, cells: &[[u32; 4]], x: &[V]) -> V {
 /// The nodes of the upper one, which lie on the lower one, carry what presses the two together. Held at the same distance the nodes of the lower
 /// one would share in it, in shares that no physics gives, and where nodes lie on nodes a bag at rest trembles.
 const LET_IN: f64 = 0.05;
-
 /// The same share for films: these are only to be kept from crossing. How deep one is in the other beside the plies matters to nobody, and what catches
 /// there puts work in (`docs/decisions/0050-what-slides-off-an-edge.md`).
 const FILMS_LET_IN: f64 = 0.25;
-
 /// A sheet that others keep away from a rigid part is held by the part itself once those are squeezed by this share of their
 /// thickness. Held at their full thickness it would share their load with them, in shares that no physics gives, and past the
 /// surfaces on which they slide (`docs/decisions/0025-loads-go-through-the-stack.md`).

@@ -19,10 +19,8 @@ use plyflow_tooling::{SurfaceTree, ToolMesh};
 /// How far (share of the box's diagonal) a tool's corners may lie from its mirror image: facets follow the same surface
 /// with other chords on either side.
 const TOOL_APART: f64 = 1e-4;
-
 /// How far fibres may be from the directions that are possible (rad).
 const FIBRES_APART: f64 = 1e-6;
-
 /// Largest difference of mirrored responses of a material, over its largest response.
 const RESPONSE_APART: f64 = 1e-9;
 
@@ -226,7 +224,6 @@ pub fn check_order(element: &ElementInstance, sheet: &StackSheet) -> Result<()> 
 
 /// Samples; as many lanes hold their mirror images.
 const SAMPLES: usize = LANES / 2;
-
 /// States on the way to each sample, for materials that remember.
 const STATES: usize = 4;
 

@@ -4,10 +4,8 @@ use plyflow_mechanics::vec3::{V, dot, norm, scale, sub};
 
 /// Steps to the closest point of a cell at most.
 const STEPS: usize = 12;
-
 /// Last step (of half an element) to it: of 4 um in an element of 8 mm, which is 0.03 um of a distance of 0.24 mm.
 const SETTLED: f64 = 1e-3;
-
 const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
 /// The closest point of one cell.

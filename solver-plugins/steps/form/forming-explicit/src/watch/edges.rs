@@ -10,7 +10,6 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Sine of the angle between neighbouring facets from which on an edge is looked at.
 const TURNS: f64 = 0.05;
-
 /// Places on edges, by the finest sheet's elements.
 const PER_ELEMENT: f64 = 4.0;
 

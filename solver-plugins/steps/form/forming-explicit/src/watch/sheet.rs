@@ -10,10 +10,8 @@ use std::sync::OnceLock;
 
 /// A node nearer than this share of an element to the edge of a sheet is beside it.
 const BESIDE: f64 = 0.1;
-
 /// No cell: what lies across an edge where the sheet ends.
 const RIM: u32 = u32::MAX;
-
 /// Across this edge lies the cell's own mirror image.
 const MIRROR: u32 = u32::MAX - 1;
 
@@ -118,7 +116,6 @@ impl Bent {
 
 /// Cells that are crossed at most on the way to the closest one.
 const CROSSED: usize = 200;
-
 /// A cell is nearer only when it is by this share of the squared distance: on a common edge both are equally near but for rounding.
 const NEARER: f64 = 1.0 - 1e-9;
 
