@@ -54,12 +54,18 @@ def save_pixels(pixels: np.ndarray, name: str, maps=()) -> pathlib.Path:
     path = runs.PICTURES / f"{name}.png"
     image = Image.fromarray(np.ascontiguousarray(pixels))
     of_maps = [m.cmap(np.linspace(0, 1, 56 // len(maps)))[:, :3] for m in maps]
-    palette = np.concatenate([np.rint(255 * c).astype(np.uint8) for c in of_maps]) if maps else np.zeros((0, 3), np.uint8)
+    # White first, and put where it was: Pillow finds a neighbour of it instead.
+    palette = np.concatenate([np.full((1, 3), 255, np.uint8), *(np.rint(255 * c).astype(np.uint8) for c in of_maps)])
     own = image.quantize(256 - len(palette), method=Image.Quantize.MEDIANCUT, kmeans=2)
     palette = np.concatenate([palette, np.array(own.getpalette(), np.uint8).reshape(-1, 3)])[:256]
     chosen = Image.new("P", (1, 1))
     chosen.putpalette(palette.ravel().tolist())
-    image.quantize(palette=chosen, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
+    chosen = image.quantize(palette=chosen, dither=Image.Dither.FLOYDSTEINBERG)
+    at = np.array(chosen)
+    at[(pixels == 255).all(axis=2)] = 0
+    drawn = Image.frombytes("P", image.size, at.tobytes())
+    drawn.putpalette(palette.ravel().tolist())
+    drawn.save(path, optimize=True)
     return path
 
 

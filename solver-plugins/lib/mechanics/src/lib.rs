@@ -92,4 +92,4 @@ pub enum MechanicsError {
     },
 }
 
-pub use plyflow_geometry::vec3;
+pub(crate) use plyflow_geometry::vec3;

@@ -2,6 +2,7 @@
 
 mod common;
 
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::contact::{
     ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem,
@@ -9,7 +10,6 @@ use plyflow_mechanics::contact::{
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Model, Pressures, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::V;
 use std::sync::Arc;
 
 /// Shears the upper sheet along y at its left edge, and lifts that.

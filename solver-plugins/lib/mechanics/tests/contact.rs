@@ -3,10 +3,10 @@
 mod common;
 
 use common::slave::{OFFSET, contact, evaluate, gradient_error, gradient_error_of, pace, scene};
+use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub};
 use plyflow_mechanics::contact::{ContactSettings, SheetContact, SlaveItem, Surface};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Model, StepSettings};
-use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
 
 /// The same cells as a bowl: four planes that meet at the slave's corner, with folds of `folds` (rad).
 fn bowl(folds: [f64; 2], place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {

@@ -3,13 +3,13 @@
 
 mod common;
 
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Model, StepSettings};
 use plyflow_mechanics::sheet::SheetSpec;
-use plyflow_mechanics::vec3::V;
 
 /// Length (m) and bending stiffness (N m) of the strip.
 const LENGTH: f64 = 0.1;

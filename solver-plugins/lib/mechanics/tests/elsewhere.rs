@@ -2,6 +2,7 @@
 
 mod common;
 
+use plyflow_geometry::vec3::{V, norm, sub};
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::component::ElementInstance;
@@ -9,7 +10,6 @@ use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::relax::{Tolerance, relax};
 use plyflow_mechanics::sheet::{Elsewhere, SheetSpec};
-use plyflow_mechanics::vec3::{V, norm, sub};
 
 /// Elements of 10 mm.
 const SIZE: f64 = 0.01;

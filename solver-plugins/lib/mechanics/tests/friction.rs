@@ -3,6 +3,7 @@
 
 mod common;
 
+use plyflow_geometry::vec3::{V, add, dot, scale};
 use plyflow_mechanics::contact::{
     AngleDependence, ContactSettings, FibreField, FrictionLaw, Plane, PressureDependence,
     RigidContact, RigidItem, RigidSurface, SheetCells, SheetContact, SlaveItem, VaryingFriction,
@@ -12,7 +13,6 @@ use plyflow_mechanics::history::{constant_speed_way, smooth_step};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad, Pressures, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::{V, add, dot, scale};
 use std::sync::Arc;
 
 /// A sheet of the fabric; its nodes follow `first` of the model.

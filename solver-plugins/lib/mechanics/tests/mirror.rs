@@ -2,6 +2,7 @@
 
 mod common;
 
+use plyflow_geometry::vec3::{V, norm, sub};
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::contact::{ContactSettings, SheetContact, SlaveItem};
@@ -9,7 +10,6 @@ use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::mirror::{Mirrors, Planes, Whole, part_patches, reflect};
 use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::SheetSpec;
-use plyflow_mechanics::vec3::{V, norm, sub};
 
 const STEP: f64 = 1e-7;
 

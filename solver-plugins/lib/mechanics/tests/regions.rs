@@ -3,6 +3,7 @@
 
 mod common;
 
+use plyflow_geometry::vec3::V;
 use plyflow_kernels::m4::M4;
 use plyflow_mechanics::contact::{
     ContactSettings, FrictionLaw, NodeLaws, Partner, Plane, RegionalFriction, RigidContact,
@@ -12,7 +13,6 @@ use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Model, StepSettings};
 use plyflow_mechanics::sheet::OtherMaterial;
-use plyflow_mechanics::vec3::V;
 use std::sync::Arc;
 
 const DRY: f64 = 0.4;

@@ -1,10 +1,10 @@
 //! Rigid surfaces: distances of the open plate, and surfaces that move.
 
+use plyflow_geometry::vec3::{V, add, dot, norm, scale, sub};
 use plyflow_mechanics::contact::{
     ContactSettings, OpenPlate, Pace, Plane, RigidContact, RigidItem, RigidMotion, RigidSurface,
 };
 use plyflow_mechanics::history::constant_speed_way;
-use plyflow_mechanics::vec3::{V, add, dot, norm, scale, sub};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -3,13 +3,13 @@
 mod common;
 
 use common::slave::{OFFSET, contact, evaluate, gradient_errors, pace, scene, scene_of};
+use plyflow_geometry::vec3::{V, add, dot, norm, scale, sub};
 use plyflow_mechanics::contact::{
     ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem, Surface, ledge,
     rim_height,
 };
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Model, StepSettings};
-use plyflow_mechanics::vec3::{V, add, dot, norm, scale, sub};
 use std::sync::Arc;
 
 /// What a cell goes on by past its rim, over its length.

@@ -2,6 +2,7 @@
 
 mod common;
 
+use plyflow_geometry::vec3::{V, add, cross, norm, scale, sub};
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::contact::{ContactSettings, FoldSpec, Plane, RigidContact, RigidItem};
@@ -9,7 +10,6 @@ use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Model, Pressures, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_mechanics::vec3::{V, add, cross, norm, scale, sub};
 use std::sync::Arc;
 
 const THICKNESS: f64 = 1e-3;

@@ -2,13 +2,13 @@
 
 mod common;
 
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Hold, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::relax::{Tolerance, relax};
-use plyflow_mechanics::vec3::V;
 
 struct Clamp(Vec<V>);
 

@@ -1,10 +1,10 @@
 //! One slave on a sheet, and what it must be held by: the gradient of its own energy.
 
+use plyflow_geometry::vec3::{V, norm};
 use plyflow_mechanics::contact::{
     ContactSettings, Pace, SheetContact, SlaveItem, Surface, ledge, rim_height,
 };
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_mechanics::vec3::{V, norm};
 
 /// Distance (m) at which it touches.
 pub const OFFSET: f64 = 4e-4;

@@ -4,13 +4,14 @@ mod common;
 
 use common::BuiltIn;
 use common::scenes::{bag, gentle_press, press};
-use plyflow_forming_explicit::absurd::{check, off_the_tool};
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::watch::{Watch, Watched};
-use plyflow_forming_explicit::{Feedback, LocalSheet, build_global, feed_back};
+use plyflow_forming_explicit::{
+    Feedback, FormingError, LocalSheet, Parameters, Watch, Watched,
+    absurd::{check, off_the_tool},
+    build_global, feed_back,
+};
 use serde_json::{Value, json};
 
-fn judged(p: &Parameters) -> Result<(), String> {
+fn judged(p: &Parameters) -> Result<(), FormingError> {
     check(p, &build_global(p, &BuiltIn)?)
 }
 
@@ -21,7 +22,7 @@ fn in_bag(name: &str, value: Value) -> Parameters {
 }
 
 fn assert_told(p: &Parameters, parts: &[&str]) {
-    let text = judged(p).expect_err("refused");
+    let text = judged(p).expect_err("refused").to_string();
     for part in parts {
         assert!(text.contains(part), "'{part}' in: {text}");
     }

@@ -7,9 +7,7 @@ mod common;
 
 use common::scenes::{bag, press};
 use common::{BuiltIn, woven};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::Forming;
+use plyflow_forming_explicit::{Forming, Parameters, build_global};
 use plyflow_mechanics::model::ASK_INTERVAL;
 use serde_json::json;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -56,7 +54,7 @@ static ALLOCATOR: Counting = Counting;
 
 /// Searches of all plies for pairs of their own.
 fn searches(forming: &Forming) -> u64 {
-    let contacts = forming.model.self_contacts.iter();
+    let contacts = forming.model.self_contacts().iter();
     contacts.map(|c| c.searches).sum()
 }
 
@@ -78,10 +76,10 @@ fn assert_frugal(what: &str, p: &Parameters, threads: usize, warm: usize) {
         let mut quiet = 0;
         for k in 0..warm + 400 {
             let (asked, searched) = (ASKED.load(Relaxed), searches(&forming));
-            forming.load.apply(&mut forming.model);
+            forming.load_at(forming.model.time());
             forming.model.step(false).unwrap();
             let asked = ASKED.load(Relaxed) - asked;
-            let asks = forming.model.cycle.is_multiple_of(ASK_INTERVAL);
+            let asks = forming.model.cycle().is_multiple_of(ASK_INTERVAL);
             if k >= warm && searches(&forming) == searched && !asks {
                 quiet += 1;
                 assert_eq!(asked, 0, "{what}, {threads} threads: step {k}");
@@ -89,14 +87,14 @@ fn assert_frugal(what: &str, p: &Parameters, threads: usize, warm: usize) {
         }
         assert!(quiet >= 350, "{what}: {quiet} steps without a search");
         // Sheets, tool and plates touch, and so there is something to compute.
-        let rigid = forming.model.rigid_contacts.iter();
+        let rigid = forming.model.rigid_contacts().iter();
         let touching = |f: f64| f > 0.0;
         let on_rigid = rigid
             .flat_map(|c| &c.items)
             .filter(|i| touching(i.normal_force.into()));
-        let between = forming.model.sheet_contacts.iter().flat_map(|c| &c.items);
+        let between = forming.model.sheet_contacts().iter().flat_map(|c| &c.items);
         let between = between.filter(|i| i.active).count();
-        let sheets = forming.model.sheets.len();
+        let sheets = forming.model.sheets().len();
         assert!(
             on_rigid.count() > 10 && (sheets == 1 || between > 10),
             "{what}"

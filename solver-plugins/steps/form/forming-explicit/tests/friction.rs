@@ -4,8 +4,7 @@ mod common;
 
 use common::scenes::{ply, press};
 use common::{BuiltIn, fabric};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::{Parameters, build_global};
 use plyflow_mechanics::contact::{FrictionLaw, PressureDependence, Whose};
 use plyflow_mechanics::model::Model;
 use serde_json::{Value, json};
@@ -31,8 +30,14 @@ fn model(friction: &Value) -> Model {
 
 /// The law of a contact by its name.
 fn law<'a>(model: &'a Model, name: &str) -> &'a FrictionLaw {
-    let rigid = model.rigid_contacts.iter().map(|c| (&c.name, &c.friction));
-    let sheets = model.sheet_contacts.iter().map(|c| (&c.name, &c.friction));
+    let rigid = model
+        .rigid_contacts()
+        .iter()
+        .map(|c| (&c.name, &c.friction));
+    let sheets = model
+        .sheet_contacts()
+        .iter()
+        .map(|c| (&c.name, &c.friction));
     let found = rigid.chain(sheets).find(|(n, _)| n.as_str() == name);
     found.unwrap_or_else(|| panic!("no contact {name}")).1
 }
@@ -180,7 +185,10 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
         ),
     ] {
         let p = parameters(&friction);
-        let text = build_global(&p, &BuiltIn).err().expect("refused");
+        let text = build_global(&p, &BuiltIn)
+            .err()
+            .expect("refused")
+            .to_string();
         for word in words {
             assert!(text.contains(word), "{friction}: '{text}' lacks '{word}'");
         }

@@ -4,9 +4,7 @@
 mod common;
 
 use common::{form, scenes};
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Outcome};
-use plyflow_forming_explicit::watch::PairDepth;
+use plyflow_forming_explicit::{Forming, Outcome, PairDepth, Parameters};
 use serde_json::{Value, json};
 
 /// A ply over a hemisphere, 12 mm deep; `change` has the last word.
@@ -30,7 +28,12 @@ fn bag(plies: usize, fillet: f64) -> Parameters {
 
 /// All places are numbers; at most so much of the work is unaccounted for, and from 1 % on the run says so.
 fn assert_sound(what: &str, (forming, outcome): &(Forming, Outcome), drift: f64) {
-    let finite = forming.model.x.as_flattened().iter().all(|x| x.is_finite());
+    let finite = forming
+        .model
+        .x()
+        .as_flattened()
+        .iter()
+        .all(|x| x.is_finite());
     assert!(finite, "{what}");
     let health = &outcome.health;
     assert!(health.peak_drift_ratio < drift, "{what}: {health:?}");
@@ -118,8 +121,9 @@ fn steps_up_to_the_last_fiftieth_of_what_is_stable_give_the_same_ply() {
     let (small, large) = (with(0.5), with(0.98));
     assert_sound("half of the critical step", &small, 0.01);
     assert_sound("0.98 of the critical step", &large, 0.01);
-    let apart = small.0.model.x.iter().zip(large.0.model.x());
-    let mean = apart.map(|(a, b)| (a[2] - b[2]).abs()).sum::<f64>() / small.0.model.x.len() as f64;
+    let apart = small.0.model.x().iter().zip(large.0.model.x());
+    let mean =
+        apart.map(|(a, b)| (a[2] - b[2]).abs()).sum::<f64>() / small.0.model.x().len() as f64;
     assert!(mean < 2e-4, "{mean}");
 }
 

@@ -8,8 +8,7 @@ mod common;
 
 use common::form;
 use common::scenes::bag;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::Forming;
+use plyflow_forming_explicit::{Forming, Parameters};
 use serde_json::json;
 
 /// Pressure (Pa) on both sides of the stack at the end.
@@ -35,9 +34,9 @@ fn parameters() -> Parameters {
 fn held_in_the_middle(forming: &Forming, sheet: &str) -> f64 {
     let model = &forming.model;
     let name = format!("tool/{sheet}");
-    let contact = model.rigid_contacts.iter().find(|c| c.name == name);
+    let contact = model.rigid_contacts().iter().find(|c| c.name == name);
     let middle = |n: u32| {
-        let x = model.x[n as usize];
+        let x = model.x()[n as usize];
         x[0].abs() < 0.05 && x[1].abs() < 0.03
     };
     let items = contact.unwrap_or_else(|| panic!("no {name}")).items.iter();

@@ -3,13 +3,11 @@
 mod common;
 
 use common::{BuiltIn, fabric, form};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
+use plyflow_forming_explicit::{Forming, Observer, Outcome, Parameters, build_global};
+use plyflow_geometry::vec3::V;
 use plyflow_kernels::rf4::Rf4;
 use plyflow_mechanics::component::element_fields;
 use plyflow_mechanics::energy::Ledger;
-use plyflow_mechanics::vec3::V;
 use plyflow_sdk::{Element, StepError};
 use serde_json::{Value, json};
 
@@ -195,7 +193,12 @@ fn shells_with_rotations_bend_in_a_zone_beside_membranes_whose_nodes_do_not_turn
 
 #[test]
 fn elements_that_cannot_share_a_ply_are_refused_with_what_to_do() {
-    let refused = |p: &Parameters| build_global(p, &BuiltIn).err().expect("an error");
+    let refused = |p: &Parameters| {
+        build_global(p, &BuiltIn)
+            .err()
+            .expect("an error")
+            .to_string()
+    };
     let text = refused(&press("m4", Some(&[LEFT])));
     assert!(
         text.contains("element: given 'm4'") && text.contains("such as rf4"),

@@ -4,8 +4,8 @@ mod common;
 
 use common::form;
 use common::scenes::{bag, press};
-use plyflow_forming_explicit::run::Forming;
-use plyflow_mechanics::contact::SheetContact;
+use plyflow_forming_explicit::Forming;
+use plyflow_mechanics::model::Model;
 use serde_json::json;
 
 /// Mean height (m) of a body's nodes within a strip across x (m), near the middle of the width.
@@ -73,9 +73,9 @@ fn any_two_sheets_of_a_stack_have_a_contact_whatever_their_outlines() {
         let model = plyflow_forming_explicit::build_global(&p, &common::BuiltIn)
             .unwrap()
             .model;
-        let rigid = model.rigid_contacts.iter().map(|c| c.name.clone());
+        let rigid = model.rigid_contacts().iter().map(|c| c.name.clone());
         rigid
-            .chain(model.sheet_contacts.iter().map(|c| c.name.clone()))
+            .chain(model.sheet_contacts().iter().map(|c| c.name.clone()))
             .collect()
     };
     let gap = json!({"gap": "0.003 m"});
@@ -131,10 +131,13 @@ fn friction_of_what_meets_past_a_ply_can_be_named_and_else_is_that_of_its_neighb
             .map_err(|e| panic!("{e}"))
             .unwrap()
             .model
-            .sheet_contacts
     };
-    let law = |contacts: &[SheetContact], name: &str| {
-        let found = contacts.iter().find(|c| c.name == name).unwrap();
+    let law = |model: &Model, name: &str| {
+        let found = model
+            .sheet_contacts()
+            .iter()
+            .find(|c| c.name == name)
+            .unwrap();
         format!("{:?}", found.friction)
     };
     let pair = json!([{"between": ["lower", "ply_2"], "coefficient": 0.1}]);

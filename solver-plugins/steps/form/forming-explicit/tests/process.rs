@@ -3,10 +3,10 @@
 mod common;
 
 use common::{BuiltIn, fabric, form};
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::penetration::{MANY, Penetration};
-use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer, Outcome};
-use plyflow_forming_explicit::{LocalInput, LocalSheet, Start, build_global, build_local};
+use plyflow_forming_explicit::{
+    Forming, HistoryRow, LocalInput, LocalSheet, MANY, Observer, Outcome, Parameters, Penetration,
+    Start, build_global, build_local,
+};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::linear;
 use plyflow_mechanics::mesh::QuadMesh;
@@ -66,8 +66,8 @@ fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(&mut
     forming
         .model
         .set_step(p.time_step.min(p.step_safety * critical));
-    while forming.model.time < end {
-        forming.load.apply(&mut forming.model);
+    while forming.model.time() < end {
+        forming.load_at(forming.model.time());
         see(forming);
         forming.model.step(false).unwrap();
     }
@@ -87,16 +87,16 @@ fn hung(symmetry: &[&str], weight: &str) -> (Forming, [f64; 3]) {
     let mut forming = build_global(&p, &BuiltIn).unwrap();
     let (mut before, mut fall, mut work) = (forming.model.x().to_vec(), 0.0, 0.0);
     let mut add_up = |f: &mut Forming| {
-        let heights = f.model.x.iter().zip(&before).zip(f.model.own_masses());
+        let heights = f.model.x().iter().zip(&before).zip(f.model.own_masses());
         work += heights
             .map(|((x, y), m)| m * fall * (x[2] - y[2]))
             .sum::<f64>();
-        (before, fall) = (f.model.x().to_vec(), f.model.body_acceleration[2]);
+        (before, fall) = (f.model.x().to_vec(), f.model.body_acceleration()[2]);
     };
     run(&mut forming, &p, 0.5, &mut add_up);
     add_up(&mut forming);
     let held: f64 = forming.model.reactions().iter().map(|r| r[2]).sum();
-    let external = forming.model.ledger.external;
+    let external = forming.model.energies().external;
     let all = [held, work, external].map(|x| forming.copies() * x);
     (forming, all)
 }
@@ -113,7 +113,7 @@ fn the_frame_bears_the_weight_of_the_bodies_own_masses_and_its_work_is_in_the_le
         let (forming, [held, work, external]) = hung(symmetry, weight);
         let case = format!("{symmetry:?} {weight}");
         let own: f64 = forming.model.own_masses().iter().sum();
-        let all: f64 = forming.model.mass.iter().sum();
+        let all: f64 = forming.model.mass().iter().sum();
         assert!(all > 2.0 * own, "{case}: mass is added, {own} {all} kg");
         let ratio = sign * held / expected;
         println!("{case}: {ratio} of the weight, work {work} J, in the ledger {external} J");
@@ -131,9 +131,8 @@ fn the_frame_bears_the_weight_of_the_bodies_own_masses_and_its_work_is_in_the_le
 #[test]
 fn without_the_option_nothing_has_weight() {
     let mut forming = build_global(&parameters(&[], |_| {}), &BuiltIn).unwrap();
-    forming.model.time = 0.05;
-    forming.load.apply(&mut forming.model);
-    assert_eq!(forming.model.body_acceleration, [0.0; 3]);
+    forming.load_at(0.05);
+    assert_eq!(forming.model.body_acceleration(), [0.0; 3]);
 }
 
 /// A zone of 60 mm in the middle of the films, held at its rim, that begins at `begin` (s).
@@ -186,9 +185,8 @@ fn a_zone_has_the_weight_that_the_whole_has_then_however_late_it_begins() {
         let mut whole = build_global(&p, &BuiltIn).unwrap();
         let mut part = zone(&p, begin);
         for forming in [&mut whole, &mut part] {
-            forming.model.time = at;
-            forming.load.apply(&mut forming.model);
-            let fall = forming.model.body_acceleration;
+            forming.load_at(at);
+            let fall = forming.model.body_acceleration();
             assert!(
                 fall[2] + GRAVITY * share < 1e-12 && fall[2] + GRAVITY * share > -1e-12,
                 "{at} s: {fall:?}"
@@ -367,7 +365,7 @@ fn pressures_of_a_run_follow_their_tables_and_its_ledger_closes() {
     let (again, same) = form(&p, 2);
     assert_eq!(outcome.peaks, same.peaks);
     assert!(
-        forming.model.x == again.model.x,
+        forming.model.x() == again.model.x(),
         "two threads give other positions"
     );
 }

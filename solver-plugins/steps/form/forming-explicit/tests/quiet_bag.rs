@@ -16,15 +16,12 @@ mod common;
 
 use common::scenes::{self, ply};
 use common::{BuiltIn, fabric};
-use plyflow_forming_explicit::assembly::inverse_bilinear;
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::Forming;
+use plyflow_forming_explicit::{Forming, Parameters, build_global, inverse_bilinear};
+use plyflow_geometry::vec3::V;
 use plyflow_mechanics::contact::shape;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Drive, Pressures};
-use plyflow_mechanics::vec3::V;
 use serde_json::json;
 
 /// Vacuum in the bag (Pa).
@@ -87,23 +84,23 @@ impl Drive for Frame {
 /// Steps to `end` (s); `see` gets the time and the kinetic energy after every step.
 fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(f64, f64)) {
     let model = &mut forming.model;
-    let mut check = model.time;
-    while model.time < end {
-        if model.time >= check {
+    let mut check = model.time();
+    while model.time() < end {
+        if model.time() >= check {
             model.set_step(
                 p.time_step
                     .min(p.step_safety * model.critical_step().unwrap()),
             );
             check += 0.01;
         }
-        let bag = PRESSURE * smooth_step(model.time, PHASES[0], PHASES[1]);
+        let bag = PRESSURE * smooth_step(model.time(), PHASES[0], PHASES[1]);
         // The same air around: nothing is drawn from under the lower film.
         model.set_pressures(Pressures {
             below: bag,
             above: bag,
         });
         model.step(false).unwrap();
-        see(model.time, model.kinetic());
+        see(model.time(), model.kinetic());
     }
 }
 
@@ -113,12 +110,12 @@ fn least_distance(forming: &Forming) -> f64 {
     let mut least = f64::INFINITY;
     for contact in model.sheet_contacts() {
         let master = contact.name.split('/').next().unwrap();
-        let sheet = model.sheets.iter().find(|s| s.name == master).unwrap();
-        let cells = &model.cells[sheet.cell_range.0..sheet.cell_range.1];
+        let sheet = model.sheets().iter().find(|s| s.name == master).unwrap();
+        let cells = &model.cells()[sheet.cell_range.0..sheet.cell_range.1];
         for item in &contact.items {
-            let p = model.x[item.node as usize];
+            let p = model.x()[item.node as usize];
             for cell in cells {
-                let q = cell.map(|n| model.x[n as usize]);
+                let q = cell.map(|n| model.x()[n as usize]);
                 let out = |k: usize| {
                     let (lo, hi) = q
                         .iter()
@@ -135,7 +132,7 @@ fn least_distance(forming: &Forming) -> f64 {
                 };
                 let z: f64 = shape(xi).iter().zip(&q).map(|(w, c)| w * c[2]).sum();
                 let area = plyflow_mechanics::mesh::area_vector(q);
-                let slope = area[2] / plyflow_mechanics::vec3::norm(area);
+                let slope = area[2] / plyflow_geometry::vec3::norm(area);
                 least = least.min(contact.side * (p[2] - z) * slope / contact.offset);
             }
         }
@@ -161,9 +158,9 @@ fn watch(bag: &Bag) -> Seen {
     };
     forming.model.set_driven(frame, Box::new(drive));
     run(&mut forming, &p, PHASES[0], |_, _| {});
-    let before = forming.model.ledger.external;
+    let before = forming.model.energies().external;
     run(&mut forming, &p, PHASES[0] + PHASES[1], |_, _| {});
-    let work = (forming.model.ledger.external - before).abs();
+    let work = (forming.model.energies().external - before).abs();
     let lowering = if bag.way > 0.0 { PHASES[2] } else { 0.0 };
     let begin = PHASES[0] + PHASES[1] + lowering + REST;
     run(&mut forming, &p, begin, |_, _| {});

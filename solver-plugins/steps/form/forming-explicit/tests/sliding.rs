@@ -5,10 +5,7 @@ mod common;
 use common::BuiltIn;
 use common::depth::{Depth, depths};
 use common::scenes::{bag, ply};
-use plyflow_forming_explicit::assembly::inverse_bilinear;
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Observer};
+use plyflow_forming_explicit::{Forming, Observer, Parameters, build_global, inverse_bilinear};
 use plyflow_mechanics::contact::shape;
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::smooth_step;
@@ -129,7 +126,7 @@ fn an_equal_ply_past_the_edge_of_the_one_below_comes_to_rest_on_the_film() {
     let mut forming = build_global(&p, &BuiltIn).unwrap();
     // Further than a cell goes on past its rim, and no further than the upper film is laid over.
     let slid = 12e-3;
-    let nodes = forming.model.sheets[2].nodes.clone();
+    let nodes = forming.model.sheets()[2].nodes.clone();
     for n in nodes {
         forming.model.x_mut()[n as usize][0] += slid;
     }
@@ -138,8 +135,8 @@ fn an_equal_ply_past_the_edge_of_the_one_below_comes_to_rest_on_the_film() {
         p.time_step
             .min(p.step_safety * model.critical_step().unwrap()),
     );
-    while model.time < 0.08 {
-        let bag = 1e5 * smooth_step(model.time, 0.03, 0.04);
+    while model.time() < 0.08 {
+        let bag = 1e5 * smooth_step(model.time(), 0.03, 0.04);
         model.set_pressures(Pressures {
             below: bag,
             above: bag,
@@ -147,7 +144,7 @@ fn an_equal_ply_past_the_edge_of_the_one_below_comes_to_rest_on_the_film() {
         model.step(false).unwrap();
     }
     // The film bears what presses on the part that is past the other ply's edge, over 80 mm of width (the upper film's share of it at the edge varies).
-    let contacts = forming.model.sheet_contacts.iter();
+    let contacts = forming.model.sheet_contacts().iter();
     let on_film = contacts
         .filter(|c| c.name == "lower/ply_2")
         .flat_map(|c| &c.items);
@@ -166,10 +163,10 @@ fn an_equal_ply_past_the_edge_of_the_one_below_comes_to_rest_on_the_film() {
 fn films_whose_nodes_do_not_lie_on_each_other_hold_each_other_from_both_sides() {
     let p = stack(&[([0.12, 0.08], 0.0)], |_| {});
     let mut forming = build_global(&p, &BuiltIn).unwrap();
-    let [lower, upper] = [0, 2].map(|sheet| forming.model.sheets[sheet].nodes.clone());
+    let [lower, upper] = [0, 2].map(|sheet| forming.model.sheets()[sheet].nodes.clone());
     // The films have one mesh: by half an element, nodes of the lower one lie in the middle of cells of the upper one.
     for n in upper.iter().filter(|n| !lower.contains(n)) {
-        (0..2).for_each(|k| forming.model.x[*n as usize][k] += 6e-3);
+        (0..2).for_each(|k| forming.model.x_mut()[*n as usize][k] += 6e-3);
     }
     let model = &mut forming.model;
     model.set_step(
@@ -178,7 +175,7 @@ fn films_whose_nodes_do_not_lie_on_each_other_hold_each_other_from_both_sides() 
     );
     // Beside the ply, and inside of where the films are joined.
     let away = |n: &u32| {
-        let x = model.x[*n as usize];
+        let x = model.x()[*n as usize];
         (x[0] - 0.076).hypot(x[1])
     };
     let node = *(lower.iter())
@@ -190,19 +187,19 @@ fn films_whose_nodes_do_not_lie_on_each_other_hold_each_other_from_both_sides() 
         force,
         moment: [0.0; 3],
     }]);
-    while model.time < 0.1 {
-        let bag = 1e5 * smooth_step(model.time, 0.0, 0.03);
-        model.set_load_factor(smooth_step(model.time, 0.03, 0.03));
+    while model.time() < 0.1 {
+        let bag = 1e5 * smooth_step(model.time(), 0.0, 0.03);
+        model.set_load_factor(smooth_step(model.time(), 0.03, 0.03));
         model.set_pressures(Pressures {
             below: bag,
             above: bag,
         });
         model.step(false).unwrap();
     }
-    let at = forming.model.x[node as usize];
-    let (from, to) = forming.model.sheets[2].cell_range;
-    let heights = forming.model.cells[from..to].iter().filter_map(|c| {
-        let q = c.map(|n| forming.model.x[n as usize]);
+    let at = forming.model.x()[node as usize];
+    let (from, to) = forming.model.sheets()[2].cell_range;
+    let heights = forming.model.cells()[from..to].iter().filter_map(|c| {
+        let q = c.map(|n| forming.model.x()[n as usize]);
         let xi = inverse_bilinear(q, at)?;
         let inside = xi.iter().all(|x| x.abs() <= 1.0);
         let height = |w: [f64; 4]| (0..4).map(|k| w[k] * q[k][2]).sum::<f64>();

@@ -8,16 +8,14 @@ mod common;
 
 use common::scenes::bag;
 use common::{BuiltIn, Silent, form};
-use plyflow_forming_explicit::assembly::inverse_bilinear;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, HistoryRow, Observer, Outcome};
 use plyflow_forming_explicit::{
-    Feedback, LocalInput, LocalSheet, Start, build_global, build_local, feed_back,
+    Feedback, Forming, HistoryRow, LocalInput, LocalSheet, Observer, Outcome, Parameters, Start,
+    build_global, build_local, feed_back, inverse_bilinear,
 };
+use plyflow_geometry::vec3::{V, add, norm, scale, sub};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_mechanics::mesh::area_vector;
-use plyflow_mechanics::vec3::{V, add, norm, scale, sub};
 use plyflow_sdk::StepError;
 use serde_json::json;
 
@@ -73,7 +71,7 @@ fn small_part_is_formed_quietly_with_a_closed_ledger_and_the_same_bits_on_two_th
 
     let (again, _) = form(&parameters(), 2);
     assert!(
-        forming.model.x == again.model.x,
+        forming.model.x() == again.model.x(),
         "two threads give other positions"
     );
 }
@@ -267,6 +265,7 @@ fn a_run_that_is_fed_its_own_motion_repeats_itself_and_one_that_is_fed_more_foll
             },
         )
         .unwrap_err()
+        .to_string()
     };
     let mut other = fed(&first, &film, 1, deep, [0.0; 3]);
     other.points.pop();
@@ -493,7 +492,7 @@ fn begun_late(whole: &Whole, near: f64) -> Zone {
     let shift = outcome.start_shift.unwrap();
     assert!(shift < 5e-4, "{shift} m");
     assert!(
-        outcome.cycles < 10_000 + from_the_start.forming.model.cycle / 2,
+        outcome.cycles < 10_000 + from_the_start.forming.model.cycle() / 2,
         "{}",
         outcome.cycles
     );
@@ -575,7 +574,7 @@ fn a_zone_that_begins_late_ends_as_one_that_begins_with_the_process() {
         "held nodes went {loose} m to their balance, {gone} m with the drive before the start, and are {largest} m off at the end"
     );
     // The first frame is seen after a step.
-    let way = drift * held.forming.model.dt;
+    let way = drift * held.forming.model.dt();
     assert!(gone < 2.0 * way, "{gone} m");
     assert!(loose > 1e-5 && loose < 2e-4, "{loose} m");
     assert!(largest > 1e-5 && largest < 2e-4, "{largest} m");

@@ -4,10 +4,10 @@ mod common;
 
 use common::BuiltIn;
 use common::scenes::bag;
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Course, Forming, Observer, Outcome};
-use plyflow_forming_explicit::watch::{Watched, depth_attributes, depth_warnings};
+use plyflow_forming_explicit::{
+    Course, Forming, FormingError, Observer, Outcome, Parameters, Watched, build_global,
+    depth_attributes, depth_warnings,
+};
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::energy::Ledger;
 use plyflow_sdk::StepError;
@@ -65,7 +65,7 @@ impl Observer for GoOn {
 }
 
 /// Runs a model that is made anew, as after a kill.
-fn run(p: &Parameters, observer: &mut (dyn Observer + Send)) -> Result<Outcome, StepError> {
+fn run(p: &Parameters, observer: &mut (dyn Observer + Send)) -> Result<Outcome, FormingError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
     pool.unwrap().install(|| {
         let mut forming = build_global(p, &BuiltIn).unwrap();

@@ -9,11 +9,10 @@ mod common;
 
 use common::scenes::{bag, gentle_press, ply};
 use common::{apart, form, woven};
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Outcome};
+use plyflow_forming_explicit::{Forming, Outcome, Parameters};
+use plyflow_geometry::vec3::V;
 use plyflow_kernels::m4::M4;
 use plyflow_mechanics::component::element_fields;
-use plyflow_mechanics::vec3::V;
 use plyflow_sdk::Element as _;
 use plyflow_tooling::ToolMesh;
 use serde_json::{Value, json};
@@ -333,7 +332,7 @@ mod stl {
         let far = apart(&parametric, &one);
         assert!(far < 2e-7, "{far} m");
         assert!(
-            one.model.x == other.model.x && one.model.v == other.model.v,
+            one.model.x() == other.model.x() && one.model.v() == other.model.v(),
             "the two kinds of files differ"
         );
     }

@@ -4,10 +4,9 @@ mod common;
 
 use common::scenes::{bag, ply, press};
 use common::{BuiltIn, Silent, fabric, form};
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::Forming;
-use plyflow_forming_explicit::watch::{PairDepth, Watch, Watched, depth_warnings};
+use plyflow_forming_explicit::{
+    Forming, PairDepth, Parameters, RigidName, Watch, Watched, build_global, depth_warnings,
+};
 use serde_json::json;
 
 fn build(p: &Parameters) -> Forming {
@@ -16,6 +15,11 @@ fn build(p: &Parameters) -> Forming {
 
 /// What is seen of a model whose nodes have been put elsewhere since it was looked at first.
 fn seen(forming: &mut Forming, put: impl FnOnce(&mut Forming)) -> Vec<PairDepth> {
+    seen_at(forming, false, put)
+}
+
+/// The same; `last`: at the end of a run, when everything is looked at anew.
+fn seen_at(forming: &mut Forming, last: bool, put: impl FnOnce(&mut Forming)) -> Vec<PairDepth> {
     let (mut watch, mut watched) = (Watch::new(forming), Watched::default());
     watch.look(forming, &mut watched, false);
     assert!(
@@ -23,8 +27,7 @@ fn seen(forming: &mut Forming, put: impl FnOnce(&mut Forming)) -> Vec<PairDepth>
         "nothing is in anything at the start"
     );
     put(forming);
-    forming.model.cycle += 10;
-    watch.look(forming, &mut watched, false);
+    watch.look(forming, &mut watched, last);
     watch.depths(&watched)
 }
 
@@ -35,10 +38,10 @@ fn of<'a>(depths: &'a [PairDepth], pair: &str) -> &'a PairDepth {
 /// The node of a sheet nearest to a place in plan (m).
 fn node(forming: &Forming, sheet: usize, [x, y]: [f64; 2]) -> usize {
     let away = |n: &u32| {
-        let p = forming.model.x[*n as usize];
+        let p = forming.model.x()[*n as usize];
         (p[0] - x).powi(2) + (p[1] - y).powi(2)
     };
-    let nodes = forming.model.sheets[sheet].nodes.iter();
+    let nodes = forming.model.sheets()[sheet].nodes.iter();
     *nodes.min_by(|a, b| away(a).total_cmp(&away(b))).unwrap() as usize
 }
 
@@ -51,7 +54,7 @@ fn a_node_that_is_put_into_the_tool_is_told_by_how_far_and_where() {
     });
     let found = of(&depths, "tool/lower").end;
     // Half of the film besides; the field's error is let be.
-    let expected = 1e-4 + 4e-5 - forming.field_error("tool");
+    let expected = 1e-4 + 4e-5 - forming.field_error(RigidName::Tool);
     assert!(
         (found.depth - expected).abs() < 1e-9,
         "{found:?}, not {expected}"
@@ -72,7 +75,7 @@ fn a_node_that_is_put_through_the_sheet_below_it_is_told_and_one_beside_it_is_no
     };
     let mut forming = build(&bag(2, scene));
     let n = node(&forming, 2, [0.01, 0.01]);
-    let below = forming.model.x[node(&forming, 1, [0.01, 0.01])][2];
+    let below = forming.model.x()[node(&forming, 1, [0.01, 0.01])][2];
     let depths = seen(&mut forming, |f| f.model.x_mut()[n][2] = below - 1e-4);
     let found = of(&depths, "ply_1/ply_2").end;
     // The sheet that is bent down to the node is let be a part of what its elements cannot follow.
@@ -91,7 +94,7 @@ fn a_node_that_is_put_through_the_sheet_below_it_is_told_and_one_beside_it_is_no
     assert_eq!(of(&depths, "lower/ply_2").end.depth, 0.0);
     // And there the film is the next one below.
     let mut forming = build(&bag(2, scene));
-    let film = forming.model.x[0][2];
+    let film = forming.model.x()[0][2];
     let depths = seen(&mut forming, |f| f.model.x_mut()[n][2] = film - 1e-4);
     let found = of(&depths, "lower/ply_2").end;
     assert!(found.depth > 0.6 * (2.4e-4 + 1e-4), "{found:?}");
@@ -109,7 +112,7 @@ fn a_film_in_the_other_one_is_told_and_stops_a_run_near_a_ply_and_far_from_all_o
             p["diaphragm_element_size"] = json!(0.006);
         }));
         let [low, high] = [0, 2].map(|sheet| node(&forming, sheet, [x, 0.01]));
-        let below = forming.model.x[low][2];
+        let below = forming.model.x()[low][2];
         let depths = seen(&mut forming, |f| f.model.x_mut()[high][2] = below - 2e-4);
         let found = pairs.map(|name| depths.iter().find(|d| d.pair.name == name).unwrap());
         assert_eq!(
@@ -143,12 +146,11 @@ fn through_a_fin(from: f64, length: &str) -> Vec<PairDepth> {
         p["scene"]["sheets"][1]["length"] = json!(length);
         p["tool_grid"] = json!(0.001);
     }));
-    seen(&mut forming, |f| {
-        let nodes = f.model.sheets[0].nodes.clone();
+    seen_at(&mut forming, true, |f| {
+        let nodes = f.model.sheets()[0].nodes.clone();
         nodes
             .iter()
             .for_each(|n| f.model.x_mut()[*n as usize][2] = 0.015 + 4e-5);
-        f.model.cycle += 5000;
     })
 }
 
@@ -187,7 +189,7 @@ fn an_edge_of_the_tool_that_goes_through_a_film_between_its_nodes_is_told_where_
 fn a_press_is_watched_on_both_sides_of_its_plies() {
     let mut forming = build(&press(1, &json!({"gap": "0.0004 m"}), |_| {}));
     let n = node(&forming, 0, [0.05, 0.01]);
-    let z = forming.model.x[n][2];
+    let z = forming.model.x()[n][2];
     let depths = seen(&mut forming, |f| f.model.x_mut()[n][2] = z + 1e-4);
     assert!((of(&depths, "die/ply_1").end.depth - 1e-4).abs() < 1e-9);
     assert_eq!(of(&depths, "holder/ply_1").end.depth, 0.0);
@@ -210,12 +212,12 @@ fn a_ply_without_contact_to_the_film_and_the_bed_stops_the_run_with_pair_place_a
         }
     });
     let mut forming = build(&p);
-    let count = forming.model.sheet_contacts.len();
+    let count = forming.model.sheet_contacts().len();
     forming
         .model
         .sheet_contacts_mut()
         .retain(|c| !c.name.starts_with("lower/ply_2"));
-    assert!(forming.model.sheet_contacts.len() < count);
+    assert!(forming.model.sheet_contacts().len() < count);
     forming
         .model
         .rigid_contacts_mut()

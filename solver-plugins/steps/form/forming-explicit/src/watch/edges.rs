@@ -1,9 +1,9 @@
 //! Edges of the tool against the cells of sheets: between its nodes a sheet may lie on what goes through it.
 
-use super::Deep;
-use super::rigid::Triangles;
-use super::sheet::{SheetMesh, SheetTree};
-use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
+use crate::watch::deep::{CHUNK, Deep};
+use crate::watch::rigid::Triangles;
+use crate::watch::sheet::{SheetMesh, SheetTree};
+use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub};
 use plyflow_tooling::ToolMesh;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -26,17 +26,17 @@ struct Place {
 }
 
 /// Convex edges of a tool.
-pub(super) struct Edges {
+pub struct Edges {
     places: Vec<Place>,
     /// By sheet and place: the sheet's triangle that was found last, near which the next search begins; [`UNKNOWN`] before.
     last: Vec<Vec<u32>>,
 }
 
 /// No triangle.
-pub(super) const UNKNOWN: u32 = u32::MAX;
+pub const UNKNOWN: u32 = u32::MAX;
 
 /// A sheet at which they are held.
-pub(super) struct Look<'a> {
+pub struct Look<'a> {
     pub x: &'a [V],
     pub mesh: &'a SheetMesh,
     pub tree: &'a SheetTree,
@@ -96,7 +96,7 @@ impl Edges {
     ) -> [Deep; 2] {
         let depths: Vec<f64> = (self.places.par_iter())
             .zip(&mut self.last[sheet])
-            .with_min_len(super::CHUNK)
+            .with_min_len(CHUNK)
             .map(|(place, last)| depth(place, triangles, look, last))
             .collect();
         let mut deepest = [Deep::default(); 2];
@@ -131,8 +131,7 @@ fn depth(place: &Place, triangles: &Triangles, look: &Look<'_>, last: &mut u32) 
     };
     let near = look.mesh.closest(look.x, p, (cell, [0.0; 2]));
     let depth = look.half + near.height;
-    let beside = near.to_rim <= super::BESIDE * look.size;
-    if beside || depth <= look.floor || near.height > look.size {
+    if near.is_beside(look.size) || depth <= look.floor || near.height > look.size {
         return 0.0;
     }
     // A sheet over this edge looks the same way.

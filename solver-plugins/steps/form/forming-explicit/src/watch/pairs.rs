@@ -1,8 +1,10 @@
 //! What is held against what.
 
-use super::{DEPTH_BOUND, Part};
-use crate::run::Forming;
-use plyflow_model::scene::SheetKind;
+use crate::stack::StackSheet;
+use crate::watch::rigid::Part;
+
+/// Share of the thinner sheet beyond which a depth at the end is told.
+pub const DEPTH_BOUND: f64 = 0.1;
 
 /// What is held against what in a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,52 +35,59 @@ pub struct Pair {
 }
 
 /// Numbers of pairs that are not found by those of their bodies.
-pub(super) struct Numbers {
+pub struct Numbers {
     /// By film and ply: of what hangs through.
-    pub(super) hangs: Vec<Option<usize>>,
+    pub hangs: Vec<Option<usize>>,
     /// By film: of edges of the tool that are an element away from all plies.
-    pub(super) beyond: Vec<Option<usize>>,
+    pub beyond: Vec<Option<usize>>,
     /// Of the two films, and of the two where they are an element away from all plies.
-    pub(super) films: Option<[usize; 2]>,
+    pub films: Option<[usize; 2]>,
 }
 
-/// The pairs: parts with sheets, edges of the tool with sheets, sheets with each other, and those of [`Numbers`].
-pub(super) fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Numbers) {
-    let stack = &forming.stack;
-    let is_ply = |k: usize| stack[k].scene.kind == SheetKind::Ply;
-    let plies = (0..stack.len()).filter(|k| is_ply(*k));
-    let thinnest = plies
-        .map(|k| stack[k].thickness)
-        .fold(f64::INFINITY, f64::min);
-    let name = |k: usize| stack[k].scene.name.as_str();
-    let mut all = Vec::new();
-    for part in parts {
-        for (k, s) in stack.iter().enumerate() {
-            let thinner = s.thickness;
-            all.push(Pair {
-                name: format!("{}/{}", part.name, name(k)),
-                kind: Kind::Nodes,
-                thinner,
-                bound: DEPTH_BOUND * thinner,
-                // A film may land on the bed harder than it is thick.
-                most: thinner.max(if is_ply(k) { 0.0 } else { thinnest }),
-                of_ply: is_ply(k),
-            });
+/// What all pairs of a stack are made from.
+struct Stack<'a> {
+    sheets: &'a [StackSheet],
+    /// Of their elements (m).
+    sizes: &'a [f64],
+    /// Thickness of the thinnest ply (m).
+    thinnest: f64,
+}
+
+impl Stack<'_> {
+    fn name(&self, k: usize) -> &str {
+        &self.sheets[k].scene.name
+    }
+
+    fn with_part(&self, part: &Part, k: usize) -> Pair {
+        let thinner = self.sheets[k].thickness;
+        let of_ply = self.sheets[k].is_ply();
+        Pair {
+            name: format!("{}/{}", part.name.word(), self.name(k)),
+            kind: Kind::Nodes,
+            thinner,
+            bound: DEPTH_BOUND * thinner,
+            // A film may land on the bed harder than it is thick.
+            most: thinner.max(if of_ply { 0.0 } else { self.thinnest }),
+            of_ply,
         }
     }
-    let edges = |k: usize| Pair {
-        name: format!("tool_edges/{}", name(k)),
-        kind: Kind::Edges,
-        thinner: stack[k].thickness,
-        bound: stack[k].thickness.max(thinnest),
-        most: 0.5 * sizes[k],
-        of_ply: is_ply(k),
-    };
-    all.extend((0..stack.len()).map(edges));
-    let pair = |low: usize, high: usize| {
-        let [a, b] = [low, high].map(|k| stack[k].thickness);
+
+    fn with_edges(&self, k: usize) -> Pair {
+        let thinner = self.sheets[k].thickness;
         Pair {
-            name: format!("{}/{}", name(low), name(high)),
+            name: format!("tool_edges/{}", self.name(k)),
+            kind: Kind::Edges,
+            thinner,
+            bound: thinner.max(self.thinnest),
+            most: 0.5 * self.sizes[k],
+            of_ply: self.sheets[k].is_ply(),
+        }
+    }
+
+    fn of_sheets(&self, low: usize, high: usize) -> Pair {
+        let [a, b] = [low, high].map(|k| self.sheets[k].thickness);
+        Pair {
+            name: format!("{}/{}", self.name(low), self.name(high)),
             kind: Kind::Nodes,
             thinner: a.min(b),
             bound: DEPTH_BOUND * a.min(b),
@@ -86,47 +95,78 @@ pub(super) fn pairs(forming: &Forming, parts: &[Part], sizes: &[f64]) -> (Vec<Pa
             most: 0.5 * (a + b),
             of_ply: true,
         }
+    }
+
+    /// What of a film hangs through between the nodes of a ply.
+    fn hanging(&self, film: usize, ply: usize) -> Pair {
+        let both = self.of_sheets(film.min(ply), film.max(ply));
+        Pair {
+            name: format!("between_nodes/{}", both.name),
+            kind: Kind::Hangs,
+            bound: f64::INFINITY,
+            most: f64::INFINITY,
+            ..both
+        }
+    }
+
+    /// Edges of the tool with a film, an element away from all plies.
+    fn off_plies(&self, film: usize) -> Pair {
+        Pair {
+            name: format!("tool_edges_off_plies/{}", self.name(film)),
+            bound: f64::INFINITY,
+            ..self.with_edges(film)
+        }
+    }
+
+    /// No ply feels what films do to each other beside the plies; they fold there. `share`: of an element, which they may be in each other.
+    fn of_films(&self, low: usize, high: usize, share: f64) -> Pair {
+        let size = self.sizes[low].min(self.sizes[high]);
+        Pair {
+            bound: DEPTH_BOUND * self.thinnest,
+            most: self.thinnest.max(share * size),
+            of_ply: false,
+            ..self.of_sheets(low, high)
+        }
+    }
+}
+
+/// The pairs: parts with sheets, edges of the tool with sheets, sheets with each other, and those of [`Numbers`]. `sizes`: of the
+/// sheets' elements (m).
+pub fn pairs(sheets: &[StackSheet], parts: &[Part], sizes: &[f64]) -> (Vec<Pair>, Numbers) {
+    let count = sheets.len();
+    let plies = || (0..count).filter(|k| sheets[*k].is_ply());
+    let films = || (0..count).filter(|k| !sheets[*k].is_ply());
+    let thinnest = plies().map(|k| sheets[k].thickness);
+    let stack = Stack {
+        sheets,
+        sizes,
+        thinnest: thinnest.fold(f64::INFINITY, f64::min),
     };
-    // No ply feels what films do to each other beside the plies; they fold there.
-    let films = |low: usize, high: usize, element: f64| Pair {
-        bound: DEPTH_BOUND * thinnest,
-        most: thinnest.max(element * sizes[low].min(sizes[high])),
-        of_ply: false,
-        ..pair(low, high)
-    };
+    let with_part = |part| (0..count).map(move |k| (part, k));
+    let mut all: Vec<Pair> = (parts.iter().flat_map(with_part))
+        .map(|(part, k)| stack.with_part(part, k))
+        .collect();
+    all.extend((0..count).map(|k| stack.with_edges(k)));
     let mut both_films = None;
-    for high in 1..stack.len() {
+    for high in 1..count {
         for low in 0..high {
-            if is_ply(low) || is_ply(high) {
-                all.push(pair(low, high));
+            if sheets[low].is_ply() || sheets[high].is_ply() {
+                all.push(stack.of_sheets(low, high));
             } else {
-                both_films = Some((all.len(), films(low, high, 0.5)));
-                all.push(films(low, high, 0.25));
+                both_films = Some((all.len(), stack.of_films(low, high, 0.5)));
+                all.push(stack.of_films(low, high, 0.25));
             }
         }
     }
-    let mut hangs = vec![None; stack.len() * stack.len()];
-    for film in (0..stack.len()).filter(|k| !is_ply(*k)) {
-        for ply in (0..stack.len()).filter(|k| is_ply(*k)) {
-            hangs[film * stack.len() + ply] = Some(all.len());
-            let both = pair(film.min(ply), film.max(ply));
-            all.push(Pair {
-                name: format!("between_nodes/{}", both.name),
-                kind: Kind::Hangs,
-                bound: f64::INFINITY,
-                most: f64::INFINITY,
-                ..both
-            });
-        }
+    let mut hangs = vec![None; count * count];
+    for (film, ply) in films().flat_map(|film| plies().map(move |ply| (film, ply))) {
+        hangs[film * count + ply] = Some(all.len());
+        all.push(stack.hanging(film, ply));
     }
-    let mut beyond = vec![None; stack.len()];
-    for film in (0..stack.len()).filter(|k| !is_ply(*k)) {
+    let mut beyond = vec![None; count];
+    for film in films() {
         beyond[film] = Some(all.len());
-        all.push(Pair {
-            name: format!("tool_edges_off_plies/{}", name(film)),
-            bound: f64::INFINITY,
-            ..edges(film)
-        });
+        all.push(stack.off_plies(film));
     }
     let films = both_films.map(|(near, both)| {
         all.push(Pair {

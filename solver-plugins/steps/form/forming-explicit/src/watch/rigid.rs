@@ -1,21 +1,44 @@
 //! Rigid parts as the watch sees them: the tool's triangles, the bed, the plates of a press.
 
+use crate::stack::RigidName;
+use plyflow_geometry::vec3::{V, add, cross, norm, scale};
 use plyflow_mechanics::contact::OpenPlate;
-use plyflow_mechanics::vec3::{V, add, cross, norm, scale};
 use plyflow_surface::Surface;
 use plyflow_tooling::ToolMesh;
 
+/// What a rigid part is made of.
+pub enum Shape {
+    /// Its triangles.
+    Tool(Triangles),
+    /// The plane z = 0.
+    Bed,
+    /// Of a press.
+    Plate(OpenPlate),
+}
+
+/// A rigid part that is watched.
+pub struct Part {
+    /// Which it is.
+    pub name: RigidName,
+    /// What it is made of.
+    pub shape: Shape,
+    /// Whether it lies above the sheets.
+    pub above: bool,
+    /// Error (m) of its distance field.
+    pub error: f64,
+}
+
 /// The triangles of a tool, body by body.
-pub(super) struct Triangles {
+pub struct Triangles {
     bodies: Vec<Surface>,
 }
 
 /// A triangle of a tool near which a search begins: its body and its number there.
-pub(super) type Hint = (u32, u32);
+pub type Hint = (u32, u32);
 
 /// The closest point of a tool.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OnTool {
+pub struct OnTool {
     /// Distance (m), positive outside.
     pub distance: f64,
     /// The point (m).
@@ -133,7 +156,7 @@ fn parts(tool: &ToolMesh) -> Vec<Vec<[u32; 3]>> {
 
 /// Distance (m, positive outside) from a plate with a rounded opening: in the half plane of the axis, the nearest point of its outline, which is a
 /// straight face, a quarter of a circle and a straight wall.
-pub(super) fn from_plate(plate: &OpenPlate, p: V) -> f64 {
+pub fn from_plate(plate: &OpenPlate, p: V) -> f64 {
     let r = (p[0] * p[0] + p[1] * p[1]).sqrt();
     // Into the plate from its face.
     let y = plate.side * (p[2] - plate.height);

@@ -1,12 +1,15 @@
 //! A sheet as the watch sees it: bilinear cells, their neighbours, the closest point of them.
 
+use crate::watch::cell::{Foot, corner, direction, edge, foot, mix, tangents, weights};
+use plyflow_geometry::TriangleTree;
+use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub};
 use plyflow_mechanics::mirror::Planes;
-use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub};
-use plyflow_surface::TriangleTree;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
+/// A node nearer than this share of an element to the edge of a sheet is beside it.
+const BESIDE: f64 = 0.1;
 /// No cell: what lies across an edge where the sheet ends.
 const RIM: u32 = u32::MAX;
 /// Across this edge lies the cell's own mirror image.
@@ -14,7 +17,7 @@ const MIRROR: u32 = u32::MAX - 1;
 
 /// Where on a sheet the closest point of a node was.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Seat {
+pub struct Seat {
     /// Cell, in the sheet's numbers; [`Seat::NOWHERE`]'s when none is known.
     pub cell: u32,
     /// Place in it, -1 to 1.
@@ -35,7 +38,7 @@ impl Seat {
 
 /// The closest point of a sheet.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Near {
+pub struct Near {
     /// Cell.
     pub cell: u32,
     /// Place in it.
@@ -46,18 +49,15 @@ pub(super) struct Near {
     pub to_rim: f64,
 }
 
-/// The closest point of one cell.
-struct Foot {
-    xi: [f64; 2],
-    square: f64,
-    /// From it to the point (m).
-    away: V,
-    /// By coordinate: whether the closest point of the whole surface may lie across the side where it ends, and on which.
-    out: [i8; 2],
+impl Near {
+    /// Whether it is past the edge of the sheet, whose elements have that size (m), or hardly on it.
+    pub fn is_beside(&self, size: f64) -> bool {
+        self.to_rim <= BESIDE * size
+    }
 }
 
 /// Topology of a sheet.
-pub(super) struct SheetMesh {
+pub struct SheetMesh {
     /// Nodes of its cells, in the model's numbers, ascending.
     pub nodes: Vec<u32>,
     cells: Vec<[u32; 4]>,
@@ -73,7 +73,7 @@ pub(super) struct SheetMesh {
 }
 
 /// Where a cell is looked for among all.
-pub(super) struct SheetTree {
+pub struct SheetTree {
     tree: TriangleTree,
     /// By triangle.
     cells: Vec<u32>,
@@ -97,7 +97,7 @@ impl SheetTree {
 }
 
 /// How a sheet is bent at one time, found out where it is asked for: a normal counts for up to four cells, and a cell for four nodes.
-pub(super) struct Bent {
+pub struct Bent {
     /// By node, in the sheet's numbers: [`SheetMesh::normal_at_node`].
     normals: Vec<OnceLock<V>>,
     /// By cell: [`SheetMesh::bulge`] in its middle (m).
@@ -114,90 +114,29 @@ impl Bent {
     }
 }
 
-/// Steps to the closest point of a cell at most.
-const STEPS: usize = 12;
-/// Last step (of half an element) to it: of 4 um in an element of 8 mm, which is 0.03 um of a distance of 0.24 mm.
-const SETTLED: f64 = 1e-3;
 /// Cells that are crossed at most on the way to the closest one.
 const CROSSED: usize = 200;
 /// A cell is nearer only when it is by this share of the squared distance: on a common edge both are equally near but for rounding.
 const NEARER: f64 = 1.0 - 1e-9;
 
-const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-
-/// Weights of a cell's corners at a place in it.
-pub(super) fn weights(xi: [f64; 2]) -> [f64; 4] {
-    CORNERS.map(|c| 0.25 * (1.0 + c[0] * xi[0]) * (1.0 + c[1] * xi[1]))
-}
-
-fn mix(w: [f64; 4], q: &[V; 4]) -> V {
-    [0, 1, 2].map(|k| w[0] * q[0][k] + w[1] * q[1][k] + w[2] * q[2][k] + w[3] * q[3][k])
-}
-
-/// Derivatives of the place by the two coordinates.
-fn tangents(q: &[V; 4], xi: [f64; 2]) -> [V; 2] {
-    let along = CORNERS.map(|c| 0.25 * c[0] * (1.0 + c[1] * xi[1]));
-    let across = CORNERS.map(|c| 0.25 * c[1] * (1.0 + c[0] * xi[0]));
-    [mix(along, q), mix(across, q)]
-}
-
-/// Closest point of a bilinear cell: Gauss and Newton's steps within its bounds.
-fn foot(q: &[V; 4], p: V, start: [f64; 2]) -> Foot {
-    let mut xi = start.map(|c| c.clamp(-1.0, 1.0));
-    for step in 0..=STEPS {
-        let away = sub(p, mix(weights(xi), q));
-        let [a, b] = tangents(q, xi);
-        let g = [dot(a, away), dot(b, away)];
-        let side = |k: usize| match xi[k] {
-            c if c >= 1.0 && g[k] > 0.0 => 1,
-            c if c <= -1.0 && g[k] < 0.0 => -1,
-            _ => 0,
-        };
-        let out = [side(0), side(1)];
-        let (aa, ab, bb) = (dot(a, a), dot(a, b), dot(b, b));
-        let det = aa * bb - ab * ab;
-        let mut move_by = [0.0; 2];
-        match out {
-            [0, 0] if det > 1e-12 * aa * bb => {
-                move_by = [(bb * g[0] - ab * g[1]) / det, (aa * g[1] - ab * g[0]) / det];
-            }
-            [0, _] if aa > 0.0 => move_by[0] = g[0] / aa,
-            [_, 0] if bb > 0.0 => move_by[1] = g[1] / bb,
-            _ => {}
+/// By node, of so many: where its cells begin in what comes second; one more at the end.
+fn cells_around(cells: &[[u32; 4]], nodes: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut first = vec![0u32; nodes + 1];
+    for n in cells.iter().flatten() {
+        first[*n as usize + 1] += 1;
+    }
+    for n in 0..nodes {
+        first[n + 1] += first[n];
+    }
+    let mut place = first.clone();
+    let mut around = vec![0; 4 * cells.len()];
+    for (i, cell) in cells.iter().enumerate() {
+        for n in cell {
+            around[place[*n as usize] as usize] = i as u32;
+            place[*n as usize] += 1;
         }
-        let next = [0, 1].map(|k| (xi[k] + move_by[k]).clamp(-1.0, 1.0));
-        let moved = (next[0] - xi[0]).abs().max((next[1] - xi[1]).abs());
-        if moved < SETTLED || step == STEPS {
-            return Foot {
-                xi,
-                square: dot(away, away),
-                away,
-                out,
-            };
-        }
-        xi = next;
     }
-    unreachable!("the last step returns")
-}
-
-/// The edge on which a coordinate ends.
-fn edge(coordinate: usize, side: i8) -> usize {
-    match (coordinate, side > 0) {
-        (0, true) => 1,
-        (0, false) => 3,
-        (_, true) => 2,
-        (_, false) => 0,
-    }
-}
-
-/// The corner at which both coordinates end.
-fn corner(out: [i8; 2]) -> usize {
-    match (out[0] > 0, out[1] > 0) {
-        (false, false) => 0,
-        (true, false) => 1,
-        (true, true) => 2,
-        (false, true) => 3,
-    }
+    (first, around)
 }
 
 impl SheetMesh {
@@ -239,21 +178,7 @@ impl SheetMesh {
             })
         };
         let across = cells.iter().enumerate().map(across).collect();
-        let mut first = vec![0u32; start.len() + 1];
-        for n in cells.iter().flatten() {
-            first[*n as usize + 1] += 1;
-        }
-        for n in 0..start.len() {
-            first[n + 1] += first[n];
-        }
-        let mut place = first.clone();
-        let mut around = vec![0; 4 * cells.len()];
-        for (i, cell) in cells.iter().enumerate() {
-            for n in cell {
-                around[place[*n as usize] as usize] = i as u32;
-                place[*n as usize] += 1;
-            }
-        }
+        let (first, around) = cells_around(cells, start.len());
         let index = |n: u32| nodes.binary_search(&n).map_or(0, |k| k as u32);
         Self {
             local: cells.iter().map(|c| c.map(index)).collect(),
@@ -510,11 +435,6 @@ impl SheetMesh {
         let around = self.around(node).iter();
         around.map(|c| of(*c)).fold(0.0, f64::max)
     }
-}
-
-fn direction(v: V) -> V {
-    let n = norm(v);
-    if n > 0.0 { scale(v, 1.0 / n) } else { v }
 }
 
 #[cfg(test)]

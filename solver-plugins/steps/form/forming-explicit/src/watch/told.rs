@@ -1,13 +1,12 @@
 //! What the watch tells.
 
-use super::{Deep, Kind, Pair, Peak, Watch, Watched};
-use crate::run::Forming;
-use plyflow_mechanics::vec3::V;
+use crate::forming::Forming;
+use crate::watch::deep::{Deep, Peak, Watched};
+use crate::watch::look::Watch;
+use crate::watch::pairs::{Kind, Pair};
+use crate::words::in_mm;
 use plyflow_model::artifact::{Depth, DepthPeak};
 use std::collections::BTreeMap;
-
-/// Share of the thinner sheet beyond which a depth at the end is told.
-pub const DEPTH_BOUND: f64 = 0.1;
 
 /// What the watch found of one pair.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,16 +31,10 @@ impl PairDepth {
     }
 }
 
-/// A place (m) for a reader.
-fn in_mm(place: V) -> String {
-    let [x, y, z] = place.map(|c| 1e3 * c);
-    format!("({x:.1}, {y:.1}, {z:.1}) mm")
-}
-
 impl Watch {
     /// What has been found so far, by pair.
     pub fn depths(&self, watched: &Watched) -> Vec<PairDepth> {
-        (self.pairs.iter().zip(&watched.now).zip(&watched.peaks))
+        (self.pairs().iter().zip(&watched.now).zip(&watched.peaks))
             .map(|((pair, end), peak)| PairDepth {
                 pair: pair.clone(),
                 end: *end,
@@ -52,7 +45,7 @@ impl Watch {
 
     /// What to say when a pair is in each other by more than it may: the run is to stop.
     pub fn gone_through(&self, watched: &Watched, forming: &Forming) -> Option<String> {
-        let pairs = self.pairs.iter().zip(&watched.now);
+        let pairs = self.pairs().iter().zip(&watched.now);
         let over = pairs.filter(|(p, now)| now.depth > p.most);
         let (pair, now) = over.max_by(|a, b| {
             let share = |(p, d): &(&Pair, &Deep)| d.depth / p.most;

@@ -1,75 +1,75 @@
 //! A sheet that is watched, and where on it a node's closest point is.
 
-use super::sheet::{Bent, Near, Seat, SheetMesh, SheetTree};
-use plyflow_mechanics::vec3::V;
+use crate::watch::sheet::{Bent, Near, Seat, SheetMesh, SheetTree};
+use plyflow_geometry::vec3::V;
 use std::sync::OnceLock;
 
 /// Distance (m) from a sheet's middle surface over which a node may have come through it since the row before.
 const LEAP: f64 = 0.01;
 
 /// A sheet that is watched.
-pub(super) struct Watcher {
-    pub(super) mesh: SheetMesh,
-    pub(super) thickness: f64,
+pub struct Watcher {
+    pub mesh: SheetMesh,
+    pub thickness: f64,
     /// By node of the mesh: whether it is moved by the run itself.
-    pub(super) free: Vec<bool>,
+    pub free: Vec<bool>,
     /// Size (m) of its elements over the tool.
-    pub(super) size: f64,
+    pub size: f64,
 }
 
 /// Everything at one time.
-pub(super) struct Scene<'a> {
-    pub(super) x: &'a [V],
+pub struct Moment<'a> {
+    pub x: &'a [V],
     /// By part (m).
-    pub(super) shifts: &'a [V],
+    pub shifts: &'a [V],
     /// By sheet, where everything is looked at anew.
-    pub(super) trees: Option<&'a [Option<SheetTree>]>,
+    pub trees: Option<&'a [Option<SheetTree>]>,
     /// By sheet, where something seems to have come through it and nothing else is looked at anew.
-    pub(super) asked: &'a [OnceLock<Option<SheetTree>>],
+    pub asked: &'a [OnceLock<Option<SheetTree>>],
     /// By sheet (m).
-    pub(super) boxes: &'a [[V; 2]],
+    pub boxes: &'a [[V; 2]],
     /// By sheet.
-    pub(super) bent: &'a [Bent],
-    pub(super) first: bool,
-    pub(super) last: bool,
+    pub bent: &'a [Bent],
+    pub first: bool,
+    pub last: bool,
 }
 
 impl Watcher {
     /// The closest point of this sheet, number `own` of the stack, to a node; `None`, and nothing known of it any more, where there is none or
     /// where it is one of its own nodes.
-    pub(super) fn near(
+    pub fn near(
         &self,
-        scene: &Scene<'_>,
+        moment: &Moment<'_>,
         own: usize,
         node: u32,
         seat: &mut Seat,
     ) -> Option<Near> {
-        let p = scene.x[node as usize];
-        if self.mesh.has(node) || is_off(scene.boxes[own], p) {
+        let p = moment.x[node as usize];
+        if self.mesh.has(node) || is_off(moment.boxes[own], p) {
             *seat = Seat::NOWHERE;
             return None;
         }
-        let from = match scene.trees {
+        let from = match moment.trees {
             Some(trees) => (trees[own].as_ref()?.cell(p, seat.cell), [0.0; 2]),
-            None if seat.cell == u32::MAX => (self.mesh.nearest_middle(scene.x, p), [0.0; 2]),
+            None if seat.cell == u32::MAX => (self.mesh.nearest_middle(moment.x, p), [0.0; 2]),
             None => (seat.cell, seat.xi.map(f64::from)),
         };
-        Some(self.mesh.closest(scene.x, p, from))
+        Some(self.mesh.closest(moment.x, p, from))
     }
 
     /// The same wherever on this sheet it is: a walk from where it was may have ended in a fold, at a place that is nearest only of those around.
-    pub(super) fn nearest(&self, scene: &Scene<'_>, own: usize, node: u32, found: Near) -> Near {
-        let p = scene.x[node as usize];
-        let tree = scene.asked[own].get_or_init(|| self.mesh.tree(scene.x));
+    pub fn nearest(&self, moment: &Moment<'_>, own: usize, node: u32, found: Near) -> Near {
+        let p = moment.x[node as usize];
+        let tree = moment.asked[own].get_or_init(|| self.mesh.tree(moment.x));
         let Some(tree) = tree else { return found };
         let from = (tree.cell(p, found.cell), [0.0; 2]);
-        self.mesh.closest(scene.x, p, from)
+        self.mesh.closest(moment.x, p, from)
     }
 }
 
 /// Whether a node that is behind a sheet now, by `over` (m, negative), has come through it: it was on the right side shortly before, or has been
 /// behind it. Infinite `before`: it was beside, from where it may well have come around the edge.
-pub(super) fn has_come_through(before: f64, over: f64) -> bool {
+pub fn has_come_through(before: f64, over: f64) -> bool {
     before.is_finite() && before.max(0.0) - over < LEAP || before < 0.0
 }
 
@@ -104,7 +104,7 @@ mod tests {
         let bent = [Bent::new(&sheet.mesh)];
         let boxes = [sheet.mesh.bounds(&x)];
         let asked = [OnceLock::new()];
-        let scene = Scene {
+        let moment = Moment {
             x: &x,
             shifts: &[],
             trees: None,
@@ -125,9 +125,9 @@ mod tests {
             cell: far as u32,
             ..Seat::NOWHERE
         };
-        let walked = sheet.near(&scene, 0, node, &mut seat).unwrap();
+        let walked = sheet.near(&moment, 0, node, &mut seat).unwrap();
         assert!((walked.height + 0.007).abs() < 1e-9, "{walked:?}");
-        let found = sheet.nearest(&scene, 0, node, walked);
+        let found = sheet.nearest(&moment, 0, node, walked);
         assert!((found.height - 0.001).abs() < 1e-9, "{found:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! How deep the nodes of sheets lie in other sheets, from their places alone: nothing here is shared with contact.
 
-use plyflow_forming_explicit::run::Forming;
-use plyflow_mechanics::vec3::{V, add, cross, dot, norm, scale, sub, unit};
+use plyflow_forming_explicit::Forming;
+use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub, unit};
 use plyflow_model::scene::SheetKind;
 
 /// The deepest node of one sheet in another.

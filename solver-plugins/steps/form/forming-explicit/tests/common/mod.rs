@@ -5,13 +5,12 @@ pub mod depth;
 pub mod scenes;
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
-use plyflow_forming_explicit::assembly::Components;
-use plyflow_forming_explicit::build_global;
-use plyflow_forming_explicit::parameters::Parameters;
-use plyflow_forming_explicit::run::{Forming, Observer, Outcome};
+use plyflow_forming_explicit::{
+    Components, Forming, FormingError, Observer, Outcome, Parameters, build_global,
+};
+use plyflow_geometry::vec3::{V, norm, sub};
 use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4, s4::S4};
 use plyflow_mechanics::energy::Ledger;
-use plyflow_mechanics::vec3::{V, norm, sub};
 use plyflow_sdk::{StepError, element_table, material_table};
 use serde_json::{Value, json};
 
@@ -28,7 +27,7 @@ fn component(kind: u32, functions: *const std::ffi::c_void) -> pf_component {
 }
 
 impl Components for BuiltIn {
-    fn element(&self, name: &str) -> Result<pf_component, String> {
+    fn element(&self, name: &str) -> Result<pf_component, FormingError> {
         let table = match name {
             "rf4" => element_table::<Rf4>(),
             "s4" => element_table::<S4>(),
@@ -37,7 +36,7 @@ impl Components for BuiltIn {
         let table = Box::leak(Box::new(table));
         Ok(component(PF_KIND_ELEMENT, std::ptr::from_ref(table).cast()))
     }
-    fn material(&self, name: &str) -> Result<pf_component, String> {
+    fn material(&self, name: &str) -> Result<pf_component, FormingError> {
         let table = match name {
             "material-fabric" => material_table::<Fabric>(),
             _ => material_table::<Marlow>(),
@@ -113,8 +112,7 @@ pub fn stopped(p: &Parameters, threads: usize) -> String {
     pool.install(|| {
         let mut forming = build_global(p, &BuiltIn).unwrap();
         match forming.run(&p.control(), &mut Silent) {
-            Err(StepError::Failed(text)) => text,
-            Err(other) => panic!("{other:?}"),
+            Err(error) => error.to_string(),
             Ok(_) => panic!("it got to its end"),
         }
     })

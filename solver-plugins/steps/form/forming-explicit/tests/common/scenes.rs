@@ -1,7 +1,7 @@
 //! The scenes of the tests: a small press and a small bag, each of which a test changes to what it is about.
 
 use super::{fabric, woven};
-use plyflow_forming_explicit::parameters::Parameters;
+use plyflow_forming_explicit::Parameters;
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 

@@ -1,0 +1,4 @@
+//! The time loop, and what comes before it.
+
+pub mod late;
+pub mod run;

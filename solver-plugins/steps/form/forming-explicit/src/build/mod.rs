@@ -1,0 +1,32 @@
+//! Makes a run of a scene.
+
+pub mod bag;
+pub mod bag_contacts;
+pub mod feedback;
+pub mod films;
+pub mod layout;
+pub mod plates;
+pub mod press;
+pub mod zone;
+
+pub use feedback::feed_back;
+pub use zone::build_local;
+
+use crate::error::Result;
+use crate::forming::Forming;
+use crate::request::Parameters;
+use crate::stack::Components;
+use bag::build_bag;
+use plyflow_model::scene::Process;
+use press::build_press;
+
+/// Builds the model of a whole scene.
+///
+/// # Errors
+/// What of the scene or the parameters makes no model.
+pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Forming> {
+    match &p.scene.process {
+        Process::DoubleDiaphragm(process) => build_bag(p, process, components),
+        Process::Press(press) => build_press(p, press, components),
+    }
+}

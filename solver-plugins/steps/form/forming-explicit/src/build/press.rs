@@ -1,0 +1,169 @@
+//! Press forming: a rising punch, a die above the plies, a blank holder below them.
+//!
+//! The tool of the scene is the punch, described where it ends. It starts one stroke below, where it touches the
+//! lowest ply, and pushes the plies through the opening of the die.
+
+use crate::build::plates::Plates;
+use crate::error::Result;
+use crate::forming::Forming;
+use crate::load::{HeldByForce, Load, PressLoad, Stroke};
+use crate::request::Parameters;
+use crate::stack::{
+    Components, Elements, Parts, Placed, RigidBody, RigidName, RigidPart, StackContacts,
+    StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
+};
+use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::V;
+use plyflow_mechanics::contact::RigidSurface;
+use plyflow_mechanics::model::Model;
+use plyflow_model::STANDARD_GRAVITY;
+use plyflow_model::scene::{Hold, Press, Towards};
+use plyflow_tooling::SignedDistanceGrid;
+use std::sync::Arc;
+
+/// Mass of a holder that a force presses, over that of the plies: heavy enough to follow their contacts stably in
+/// explicit steps, light enough to follow the blank as it thickens.
+const HOLDER_MASS: f64 = 20.0;
+
+/// Builds the model of a press.
+///
+/// # Errors
+/// What of the scene or the parameters makes no model.
+pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -> Result<Forming> {
+    let scene = &p.scene;
+    let stack = sheet::stack(scene)?;
+    let tool = tool::rigid(p)?;
+    let planes = symmetry::planes(scene);
+    symmetry::check(scene, planes, &stack, &tool.mesh)?;
+    let plates = Plates::new(press, &stack, tool.mesh.bounds()[1][2])?;
+    plates.check_passage(press, &tool.mesh)?;
+    let elements = Elements { p, components };
+    let mut parts = Parts::default();
+    parts.mirrors.planes = planes;
+    for sheet in &stack {
+        let blank = sheet::blank_part(sheet, planes)?;
+        parts.add_ply(sheet, &blank, plates.blank + sheet.offset, &elements)?;
+    }
+    let settings = p.step_settings();
+    let mut model = Model::mirrored(parts.points, parts.specs, settings, parts.mirrors)?;
+    model.set_body_acceleration([
+        0.0,
+        0.0,
+        match press.weight {
+            None => 0.0,
+            Some(Towards::Die) => STANDARD_GRAVITY,
+            Some(Towards::Holder) => -STANDARD_GRAVITY,
+        },
+    ]);
+    add_contacts(&mut model, &stack, parts.placed, &plates, tool.field, p)?;
+    model.add_plane_contacts(&p.contact_settings());
+    let mut load = press_load(press, &plates, &model);
+    load.apply(&mut model, 0.0);
+    let reference = model.start().clone();
+    // Largest distance of a point from the axis (m).
+    let from_axis = |q: &V| q[0].fixed_hypot(q[1]);
+    let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
+    let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, tool.error)]);
+    for (name, plate) in plates.named() {
+        let body = RigidBody::plate(name, &plate, reach);
+        field_errors.push((name, body.error_against(&plate)));
+        rigid.push(body);
+    }
+    Ok(Forming {
+        model,
+        load: Load::Press(load),
+        stack,
+        bodies: parts.bodies,
+        reference,
+        tool: tool.mesh,
+        rigid,
+        field_errors,
+        tool_warnings: tool.warnings,
+        zone: None,
+        start: None,
+        element_size: p.element_size,
+    })
+}
+
+/// What moves in the press, as it starts.
+fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
+    let contacts_of = |part: RigidName| -> Vec<usize> {
+        let all = model.rigid_contacts().iter().enumerate();
+        all.filter(|(_, c)| part.is_of(&c.name))
+            .map(|(k, _)| k)
+            .collect()
+    };
+    let held = match press.holder.as_ref().map(|h| &h.hold) {
+        Some(Hold::Force(force)) => Some(HeldByForce {
+            // What is given holds the whole.
+            force: force.si() / model.planes().copies() as f64,
+            mass: HOLDER_MASS * model.mass().iter().sum::<f64>(),
+            most: plates.thickness(),
+            height: 0.0,
+            velocity: 0.0,
+        }),
+        _ => None,
+    };
+    PressLoad {
+        stroke: Stroke {
+            way: press.stroke.si(),
+            forming: press.forming_time.si(),
+            ramp: press.ramp_share.0 * press.forming_time.si(),
+            settling: press.settling_time.si(),
+        },
+        punch: contacts_of(RigidName::Tool),
+        holder: contacts_of(RigidName::Holder),
+        held,
+    }
+}
+
+/// Plies on each other, and on rigid parts.
+fn add_contacts(
+    model: &mut Model,
+    stack: &[StackSheet],
+    mut placed: Vec<Placed>,
+    plates: &Plates,
+    punch: SignedDistanceGrid,
+    p: &Parameters,
+) -> Result<()> {
+    for ply in &mut placed {
+        ply.slaves = ply.sheet.nodes(model).to_vec();
+    }
+    let contacts = StackContacts::new(stack, p)?;
+    let plies = layers(&placed);
+    for pair in plies.windows(2) {
+        contacts.add_pair(model, pair[1], pair[0], 1.0)?;
+    }
+    contacts.add_past(model, &plies)?;
+    for part in rigid_parts(plates, punch) {
+        for ply in &plies {
+            let k = ply.place.0;
+            let among = if part.above { k + 1..plies.len() } else { 0..k };
+            let among: Vec<StackPlace> = among.map(StackPlace).collect();
+            contacts.add_rigid(model, &part, *ply, &among)?;
+        }
+    }
+    for ply in &plies {
+        contacts.add_folds(model, *ply)?;
+    }
+    model.set_contact_stiffness(&p.contact_settings());
+    Ok(())
+}
+
+/// Punch, die, and holder if there is one.
+fn rigid_parts(plates: &Plates, punch: SignedDistanceGrid) -> Vec<RigidPart> {
+    let part = |name: RigidName, surface: Arc<dyn RigidSurface>| RigidPart {
+        name,
+        surface,
+        above: name == RigidName::Die,
+        film: None,
+        moves: name != RigidName::Die,
+    };
+    let mut parts = vec![part(RigidName::Tool, Arc::new(ToolSurface(punch)))];
+    parts.extend(
+        plates
+            .named()
+            .map(|(name, plate)| part(name, Arc::new(plate))),
+    );
+    parts
+}

@@ -1,0 +1,4 @@
+//! What went wrong with a run, or means nothing.
+
+pub mod absurd;
+pub mod diagnosis;

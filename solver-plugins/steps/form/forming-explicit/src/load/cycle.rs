@@ -1,0 +1,355 @@
+//! The process of double-diaphragm forming in time: bagging, lowering, drawing, settling.
+
+use crate::error::{FormingError, Result};
+use plyflow_mechanics::history::{MonotoneCubic, smooth_step};
+use plyflow_model::STANDARD_GRAVITY;
+use plyflow_model::scene::{DoubleDiaphragm, PressureCourse, WeightDirection};
+
+/// Pressures and frame height of the process.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cycle {
+    /// Pressure of the surroundings over the bag's vacuum at the end (Pa).
+    pub bag: f64,
+    /// Its course (Pa) over the share of bagging; none: it rises smoothly in the second half.
+    pub bag_course: Option<MonotoneCubic>,
+    /// Pressure left in the cavity at the end (Pa).
+    pub cavity_end: f64,
+    /// Course of the pressure drawn (Pa) over the share of drawing; none: it comes smoothly.
+    pub drawn_course: Option<MonotoneCubic>,
+    /// Durations of the four phases (s).
+    pub durations: [f64; 4],
+    /// Frame height at start and end (m), of the lower film's mid-plane.
+    pub frame: [f64; 2],
+    /// Strain by which the frame stretches the films before the bag is evacuated.
+    pub pre_stretch: f64,
+    /// Acceleration of free fall along z once the weight is there (m/s2); 0: bodies have no weight.
+    pub weight: f64,
+}
+
+impl Cycle {
+    /// From the scene; `frame` as in [`Cycle::frame`].
+    pub fn new(p: &DoubleDiaphragm, frame: [f64; 2]) -> Result<Self> {
+        let bag = p.bag_pressure.last();
+        let bag_course = course(&p.bag_pressure, "bag_pressure", "bagging", f64::MAX)?;
+        let drawn_course = course(&p.forming_pressure, "forming_pressure", "drawing", bag)?;
+        let drawn = p.forming_pressure.last();
+        if drawn > bag * (1.0 + 1e-9) {
+            return Err(FormingError::Scene(format!(
+                "process.double_diaphragm.forming_pressure: given {:.4} bar, the vacuum in the bag is {:.4} bar (bag_pressure); expected at most \
+                 that: no more air can be drawn from under the film than there is in the bag's surroundings",
+                1e-5 * drawn,
+                1e-5 * bag
+            )));
+        }
+        Ok(Self {
+            bag,
+            bag_course,
+            cavity_end: (bag - drawn).max(0.0),
+            drawn_course,
+            durations: [
+                p.bagging_time.si(),
+                p.lowering_time.si(),
+                p.drawing_time.si(),
+                p.settling_time.si(),
+            ],
+            frame,
+            pre_stretch: p.film_pre_stretch.0,
+            weight: match p.weight {
+                None => 0.0,
+                Some(WeightDirection::Tool) => -STANDARD_GRAVITY,
+                Some(WeightDirection::Away) => STANDARD_GRAVITY,
+            },
+        })
+    }
+
+    /// Whole duration (s).
+    pub fn duration(&self) -> f64 {
+        self.durations.iter().sum()
+    }
+
+    /// When the cavity closes and drawing starts (s).
+    pub fn sealed_at(&self) -> f64 {
+        self.durations[0] + self.durations[1]
+    }
+
+    /// Name of the phase at `t`.
+    pub fn phase(&self, t: f64) -> &'static str {
+        let mut end = 0.0;
+        for (d, name) in self
+            .durations
+            .iter()
+            .zip(["bagging", "lowering", "drawing"])
+        {
+            end += d;
+            if t < end {
+                return name;
+            }
+        }
+        "settling"
+    }
+
+    /// Pressure of the surroundings over the bag at `t` (Pa).
+    pub fn bag_pressure(&self, t: f64) -> f64 {
+        match &self.bag_course {
+            Some(course) => course.at(share(t, 0.0, self.durations[0])),
+            None => self.bag * smooth_step(t, 0.5 * self.durations[0], 0.5 * self.durations[0]),
+        }
+    }
+
+    /// Strain of the frame at `t`: it grows in the first half of bagging, before friction ties the films to
+    /// the plies.
+    pub fn stretch(&self, t: f64) -> f64 {
+        self.pre_stretch * smooth_step(t, 0.0, 0.5 * self.durations[0])
+    }
+
+    /// Acceleration of free fall along z at `t` (m/s2). It grows while the frame stretches the films: under a weight that is there at
+    /// once films that are still slack would fall, and swing when they are stretched.
+    pub fn fall(&self, t: f64) -> f64 {
+        self.weight * smooth_step(t, 0.0, 0.5 * self.durations[0])
+    }
+
+    /// Height of the frame at `t` (m).
+    pub fn frame_height(&self, t: f64) -> f64 {
+        let s = smooth_step(t, self.durations[0], self.durations[1]);
+        self.frame[0] + (self.frame[1] - self.frame[0]) * s
+    }
+
+    /// Gas left in the cavity over that at sealing.
+    pub fn gas_left(&self, t: f64) -> f64 {
+        let drawn = smooth_step(t, self.sealed_at(), self.durations[2]);
+        1.0 - (1.0 - self.cavity_end / self.bag.max(1e-300)) * drawn
+    }
+
+    /// Pressure (Pa) that a pump is to give the cavity at `t`: after a table, or towards a pressure that stays in it. `None` where all of the gas
+    /// is drawn, or none of it: then what matters is the gas that is left, wherever its volume goes.
+    pub fn wanted_in_cavity(&self, t: f64) -> Option<f64> {
+        let drawn = match &self.drawn_course {
+            Some(course) => course.at(share(t, self.sealed_at(), self.durations[2])),
+            // A share of the gas in a cavity that shrinks to a few hundredths of itself would have far more than this pressure.
+            None if self.cavity_end > 0.0 && self.cavity_end < self.bag => {
+                (self.bag - self.cavity_end) * smooth_step(t, self.sealed_at(), self.durations[2])
+            }
+            None => return None,
+        };
+        Some((self.bag - drawn).max(0.0))
+    }
+}
+
+/// Share of a phase that is over at `t`.
+fn share(t: f64, start: f64, duration: f64) -> f64 {
+    if duration > 0.0 {
+        ((t - start) / duration).clamp(0.0, 1.0)
+    } else if t >= start {
+        1.0
+    } else {
+        0.0
+    }
+}
+
+/// The course of a pressure over the share of a phase, if a table gives it: no pressure first, at most `most` (Pa).
+fn course(
+    given: &PressureCourse,
+    name: &str,
+    phase: &str,
+    most: f64,
+) -> Result<Option<MonotoneCubic>> {
+    let PressureCourse::Course(course) = given else {
+        return Ok(None);
+    };
+    let place = format!("process.double_diaphragm.{name}.table");
+    let rows: Vec<[f64; 2]> = (course.table.iter())
+        .map(|row| [row.share.0, row.pressure.si()])
+        .collect();
+    let last = rows.len().saturating_sub(1);
+    if last == 0 {
+        return Err(FormingError::Scene(format!(
+            "{place}: {} given; expected two or more rows, from {{share: 0, pressure: 0 kPa}} to share 1",
+            if rows.is_empty() { "no row" } else { "one row" }
+        )));
+    }
+    for (k, [at, pressure]) in rows.iter().enumerate() {
+        let wrong = |what: &str, given: String, expected: String| {
+            let at = format!("{place}[{k}].{what}");
+            Err(FormingError::value(at, given, expected))
+        };
+        if k == 0 && *at != 0.0 {
+            return wrong("share", at.to_string(), format!("0, where {phase} begins"));
+        }
+        if k > 0 && *at <= rows[k - 1][0] {
+            let expected = format!("more than the {} of the row before", rows[k - 1][0]);
+            return wrong("share", at.to_string(), expected);
+        }
+        if k == last && *at != 1.0 {
+            let expected = format!("1 in the last row, where {phase} ends");
+            return wrong("share", at.to_string(), expected);
+        }
+        if !(*pressure >= 0.0 && pressure.is_finite()) {
+            return wrong("pressure", format!("{pressure} Pa"), "0 Pa or more".into());
+        }
+        if k == 0 && *pressure != 0.0 {
+            let expected = format!("0 Pa, so that nothing jumps when {phase} begins");
+            return wrong("pressure", format!("{pressure} Pa"), expected);
+        }
+        if *pressure > most {
+            let expected = format!(
+                "at most {most} Pa, the bag_pressure: more than that there is not to be drawn"
+            );
+            return wrong("pressure", format!("{pressure} Pa"), expected);
+        }
+    }
+    let (times, values) = rows.iter().map(|[at, pressure]| (*at, *pressure)).unzip();
+    Ok(Some(MonotoneCubic::new(times, values)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn cycle(bag: Value, forming: Value) -> Result<Cycle> {
+        let process = json!({
+            "frame_length": "1 m", "frame_width": "1 m", "clearance": "0.01 m", "bag_pressure": bag, "forming_pressure": forming,
+            "bagging_time": "0.2 s", "lowering_time": "0.3 s", "drawing_time": "0.4 s", "settling_time": "0.1 s",
+            "film_joint_margin": "0.03 m"});
+        Cycle::new(&serde_json::from_value(process).unwrap(), [0.1, 0.0])
+    }
+
+    fn table(rows: &[(f64, f64)]) -> Value {
+        let rows = rows
+            .iter()
+            .map(|(share, kpa)| json!({"share": share, "pressure": format!("{} Pa", 1e3 * kpa)}));
+        json!({"table": rows.collect::<Vec<_>>()})
+    }
+
+    #[test]
+    fn pressures_follow_their_tables_over_their_phases() {
+        let bag = table(&[(0.0, 0.0), (0.25, 10.0), (0.5, 70.0), (1.0, 80.0)]);
+        let forming = table(&[(0.0, 0.0), (0.2, 40.0), (0.6, 40.0), (1.0, 75.0)]);
+        let cycle = cycle(bag, forming).unwrap();
+        for (t, kpa) in [
+            (0.0, 0.0),
+            (0.05, 10.0),
+            (0.1, 70.0),
+            (0.2, 80.0),
+            (0.45, 80.0),
+            (1.0, 80.0),
+        ] {
+            assert!((cycle.bag_pressure(t) - 1e3 * kpa).abs() < 1e-6, "{t}");
+        }
+        for (t, kpa) in [
+            (0.5, 80.0),
+            (0.58, 40.0),
+            (0.66, 40.0),
+            (0.74, 40.0),
+            (0.9, 5.0),
+            (1.0, 5.0),
+        ] {
+            let wanted = cycle.wanted_in_cavity(t).unwrap();
+            assert!((wanted - 1e3 * kpa).abs() < 1e-6, "{t}: {wanted}");
+        }
+        assert_eq!((cycle.bag, cycle.cavity_end), (8e4, 5e3));
+    }
+
+    #[test]
+    fn single_values_come_as_smooth_steps() {
+        for (forming, left) in [("80000 Pa", [0.5, 0.0]), ("0 Pa", [1.0, 1.0])] {
+            let cycle = cycle(json!("80000 Pa"), json!(forming)).unwrap();
+            for (t, bag, gas) in [
+                (0.1, 0.0, 1.0),
+                (0.15, 4e4, 1.0),
+                (0.3, 8e4, 1.0),
+                (0.7, 8e4, left[0]),
+                (1.0, 8e4, left[1]),
+            ] {
+                let (b, g) = (cycle.bag_pressure(t), cycle.gas_left(t));
+                assert!(
+                    (b - bag).abs() < 1e-9 && (g - gas).abs() < 1e-12,
+                    "{t} s: {b} Pa, {g}"
+                );
+                assert_eq!(cycle.wanted_in_cavity(t), None);
+            }
+        }
+        // Some of the air stays: a pump sees to its pressure, however small the cavity becomes.
+        let cycle = cycle(json!("80000 Pa"), json!("60000 Pa")).unwrap();
+        for (t, wanted) in [(0.5, 8e4), (0.7, 5e4), (0.9, 2e4), (1.0, 2e4)] {
+            let w = cycle.wanted_in_cavity(t).unwrap();
+            assert!((w - wanted).abs() < 1e-9, "{t} s: {w} Pa");
+        }
+    }
+
+    #[test]
+    fn a_table_that_is_none_is_refused_with_its_row_and_what_is_expected() {
+        let good = || table(&[(0.0, 0.0), (1.0, 100.0)]);
+        for (bag, forming, parts) in [
+            (
+                table(&[(0.0, 0.0)]),
+                good(),
+                ["bag_pressure.table: one row", "two or more rows"],
+            ),
+            (
+                table(&[(0.1, 0.0), (1.0, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[0].share: given 0.1",
+                    "where bagging begins",
+                ],
+            ),
+            (
+                table(&[(0.0, 5.0), (1.0, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[0].pressure: given 5000 Pa",
+                    "0 Pa, so that",
+                ],
+            ),
+            (
+                table(&[(0.0, 0.0), (0.5, 9.0), (0.5, 9.0), (1.0, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[2].share: given 0.5",
+                    "more than the 0.5",
+                ],
+            ),
+            (
+                table(&[(0.0, 0.0), (0.9, 9.0)]),
+                good(),
+                [
+                    "bag_pressure.table[1].share: given 0.9",
+                    "where bagging ends",
+                ],
+            ),
+            (
+                good(),
+                table(&[(0.0, 0.0), (0.3, -1.0), (1.0, 9.0)]),
+                [
+                    "forming_pressure.table[1].pressure: given -1000 Pa",
+                    "0 Pa or more",
+                ],
+            ),
+            (
+                good(),
+                table(&[(0.0, 0.0), (0.5, 120.0), (1.0, 9.0)]),
+                [
+                    "forming_pressure.table[1].pressure: given 120000 Pa",
+                    "at most 100000 Pa",
+                ],
+            ),
+            (
+                good(),
+                table(&[(0.0, 0.0), (0.8, 9.0)]),
+                [
+                    "forming_pressure.table[1].share: given 0.8",
+                    "where drawing ends",
+                ],
+            ),
+        ] {
+            let text = cycle(bag, forming).unwrap_err().to_string();
+            for part in parts {
+                assert!(
+                    text.contains(part) && text.contains("process.double_diaphragm"),
+                    "{part}: {text}"
+                );
+            }
+        }
+    }
+}

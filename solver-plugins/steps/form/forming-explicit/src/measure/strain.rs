@@ -1,0 +1,57 @@
+//! Shear angles and fibre strains of the plies, from their cells alone.
+
+use crate::forming::Forming;
+use crate::stack::sheet;
+use plyflow_fixed::FixedBits;
+use plyflow_geometry::vec3::{V, add, dot, norm, scale, sub};
+
+/// Strains of the plies' elements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlyStrains {
+    /// Smallest and largest shear angle (rad).
+    pub shear: [f64; 2],
+    /// Largest strain of a fibre by size (1).
+    pub fibre: f64,
+}
+
+/// Strains of all plies, from the stretch of each cell's sides and diagonals in its material axes; 0 without a cell.
+pub fn ply_strains(forming: &Forming) -> PlyStrains {
+    let (mut low, mut high, mut fibre) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
+    for (body, sheet) in forming.plies() {
+        let axis = sheet::axis(&sheet.scene);
+        let mut count = |cells: &[[u32; 4]], then: &[V], now: &[V]| {
+            for cell in cells {
+                let of = |points: &[V]| cell.map(|n| points[n as usize]);
+                let (g, e) = cell_strain(of(then), of(now), axis);
+                (low, high) = (low.min(g), high.max(g));
+                fibre = fibre.max(e);
+            }
+        };
+        if body.mirrored.is_some() {
+            let (now, then) = (forming.points(body), forming.reference_points(body));
+            count(&body.cells, &then, &now);
+        } else {
+            // A large sheet's points are not copied for this: it is where a run's memory would be largest.
+            let m = &forming.model;
+            count(body.sheet.cells(m), &forming.reference, m.x());
+        }
+    }
+    let shear = if low > high { [0.0; 2] } else { [low, high] };
+    PlyStrains { shear, fibre }
+}
+
+/// Shear angle (rad) and largest fibre strain by size at the centre of a cell.
+pub fn cell_strain(then: [V; 4], now: [V; 4], axis: V) -> (f64, f64) {
+    let mid = |p: &[V; 4]| (sub(p[2], p[0]), sub(p[3], p[1]));
+    let ((a, b), (d, e)) = (mid(&then), mid(&now));
+    let det = a[0] * b[1] - a[1] * b[0];
+    let map = |u: V| {
+        let s = (u[0] * b[1] - u[1] * b[0]) / det;
+        let t = (a[0] * u[1] - a[1] * u[0]) / det;
+        add(scale(d, s), scale(e, t))
+    };
+    let (f1, f2) = (map(axis), map([-axis[1], axis[0], 0.0]));
+    let (l1, l2) = (norm(f1), norm(f2));
+    let g = (dot(f1, f2) / (l1 * l2)).clamp(-1.0, 1.0).fixed_asin();
+    (g, (l1 - 1.0).abs().max((l2 - 1.0).abs()))
+}

@@ -1,0 +1,103 @@
+//! What a user should know of a run.
+
+use crate::course::Outcome;
+use crate::forming::Forming;
+use crate::load::PressLoad;
+use crate::measure::{Penetration, ply_strains, too_deep_on_the_way};
+use crate::request::Parameters;
+use crate::stack::{Body, StackSheet};
+use crate::watch::depth_warnings;
+
+/// What to say before the first step.
+pub fn at_the_start(forming: &Forming) -> impl Iterator<Item = String> {
+    long_process(forming)
+        .into_iter()
+        .chain(unlike_films(forming))
+}
+
+/// What is poor about the meshes of outlined plies.
+fn mesh_warnings(forming: &Forming) -> Vec<String> {
+    let poor = |b: &Body| {
+        let text = b.quality.and_then(|q| q.warning())?;
+        Some(format!("ply '{}': {text}", b.name))
+    };
+    forming.bodies.iter().filter_map(poor).collect()
+}
+
+/// Simulated time (s) beyond which a process is likely to have been given in the workshop's times.
+const LONG: f64 = 20.0;
+
+/// What to say of a process that takes very long.
+fn long_process(forming: &Forming) -> Option<String> {
+    let (duration, step) = (forming.load.duration(), forming.model.dt());
+    (duration > LONG && forming.zone.is_none()).then(|| {
+        format!(
+            "the process takes {duration:.0} s of simulated time, {:.1e} steps of {:.2} us: the times of a scene are those in which inertia \
+             matters no more (tenths of a second for most parts), not the workshop's; see the kinetic ratio of a run with shorter ones",
+            duration / step,
+            1e6 * step
+        )
+    })
+}
+
+/// Whether two films that are one sheet where they are joined are of one material.
+fn unlike_films(forming: &Forming) -> Option<String> {
+    let film = |s: &&StackSheet| !s.is_ply();
+    let lower = forming.stack.first().filter(film)?;
+    let upper = forming.stack.last().filter(film)?;
+    (lower.material != upper.material).then(|| {
+        format!(
+            "the films are of unlike materials, '{}' below and '{}' above; beyond the plies, where they are joined (`film_joint_margin`), both \
+             are taken for the lower one: its stiffness and mass carry the span to the frame",
+            lower.material.name, upper.material.name
+        )
+    })
+}
+
+/// Strain of the fibres of plies beyond which the run warns (thesis 3.4.1).
+const LARGEST_FIBRE_STRAIN: f64 = 0.01;
+
+/// All that a user should know of a run that came to its end.
+pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<String> {
+    let mut warnings = mesh_warnings(forming);
+    warnings.extend(forming.tool_warnings.iter().cloned());
+    warnings.extend(outcome.warnings.iter().cloned());
+    warnings.extend(depth_warnings(&outcome.depths));
+    warnings.extend(now.iter().filter_map(Penetration::too_deep));
+    warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
+    let strain = ply_strains(forming).fibre;
+    if strain > LARGEST_FIBRE_STRAIN {
+        warnings.push(format!(
+            "a fibre is strained by {:.1} %, more than {:.0} %: fibres of plies hardly stretch. Where it is (fibre_strain_1, fibre_strain_2) look for cells \
+             that have gathered; where it is widespread raise the material's fibre_modulus, which asks for smaller steps",
+            100.0 * strain,
+            100.0 * LARGEST_FIBRE_STRAIN
+        ));
+    }
+    if forming.load.press().is_some_and(PressLoad::holder_is_bare) {
+        warnings.push(
+            "the plies have left the holder, which its force has pressed against the die: make the blank larger or the stroke shorter, or give the holder a gap"
+                .into(),
+        );
+    }
+    warnings
+}
+
+/// What to tell where contacts' multipliers grow more slowly than asked for.
+pub fn slower_multipliers(forming: &Forming, p: &Parameters) -> Option<String> {
+    let asked = p.contact_augmentation;
+    let taken = forming.model.contact_augmentation();
+    if taken <= 0.0 && asked > 0.0 {
+        return Some(format!(
+            "contact_augmentation is 0 instead of {asked:.2e}: without damping of contacts (contact_damping: {}) multipliers would feed every \
+             motion, so pressure is borne by the penalty alone, at larger penetrations",
+            p.contact_damping
+        ));
+    }
+    (taken > 0.0 && taken < asked).then(|| {
+        format!(
+            "contact_augmentation is {taken:.2e} instead of {asked:.2e}: some sheets have far more mass in a node than those they touch, \
+             and would tremble"
+        )
+    })
+}

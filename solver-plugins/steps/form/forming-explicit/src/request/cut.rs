@@ -1,0 +1,67 @@
+//! What other runs give: how the cut of a zone moves, and where nodes of a whole scene go.
+
+use plyflow_geometry::vec3::V;
+use plyflow_model::artifact::Zone;
+
+/// Where a sheet is when its zone begins late, and how it came there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// `[states][n]` positions (m) on the way from the undeformed state, in time; the last is the one to begin at.
+    pub path: Vec<Vec<V>>,
+    /// `[n]` velocities (m/s) there.
+    pub velocity: Vec<V>,
+}
+
+/// A sheet of the zone as the boundary artifact holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LocalSheet {
+    /// Name, as in the scene.
+    pub name: String,
+    /// `[n]` undeformed points (m).
+    pub points: Vec<V>,
+    /// `[m]` cells.
+    pub cells: Vec<[u32; 4]>,
+    /// `[k]` driven nodes.
+    pub driven: Vec<u32>,
+    /// `[frames][k]` positions (m).
+    pub position: Vec<Vec<V>>,
+    /// `[frames][k]` velocities (m/s).
+    pub velocity: Vec<Vec<V>>,
+    /// `[frames][k]` normals of the coarse surface; empty when the artifact has none, and then rotations are free.
+    pub normal: Vec<Vec<V>>,
+    /// `[frames][k]` their rates (1/s); as `normal`.
+    pub normal_rate: Vec<Vec<V>>,
+    /// `[frames][k]` forces of the surroundings on them (N); empty when the cut gives no way.
+    pub pull: Vec<Vec<V>>,
+    /// `[k]` how stiffly they hold (N/m); as `pull`.
+    pub stiffness: Vec<f64>,
+    /// Where a run that begins late begins; `None` for one that begins with the process.
+    pub start: Option<Start>,
+}
+
+/// What a boundary artifact gives.
+#[derive(Debug, Clone)]
+pub struct LocalInput {
+    /// Times of the frames (s).
+    pub time: Vec<f64>,
+    /// Sheets, any order.
+    pub sheets: Vec<LocalSheet>,
+    /// Cavity pressure (Pa) at the times.
+    pub cavity: Vec<f64>,
+    /// Bag pressure (Pa).
+    pub bag: Vec<f64>,
+    /// Frame height (m).
+    pub frame: Vec<f64>,
+    /// The zone, as its artifact describes it.
+    pub zone: Zone,
+    /// Element size (m).
+    pub element_size: f64,
+}
+
+/// What an artifact feeds back: where nodes of the coarse plies go.
+pub struct Feedback {
+    /// Times of the frames (s).
+    pub time: Vec<f64>,
+    /// Plies, any order, with the meshes of the coarse run.
+    pub sheets: Vec<LocalSheet>,
+}
