@@ -2,12 +2,12 @@
 
 use crate::breaches::{Ask, Breaches};
 use crate::element::{STRAIN, once};
+use crate::linear::{Vec3, cross};
 use crate::linear::{largest_eigenvalue, rotation};
 use crate::shapes::{Elements, moved};
 use crate::subject::{Answer, Masses, Motion, State, Subject};
 use crate::{Run, Seen, Sequence, rules, worse};
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::{Vec3, cross};
 
 pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, lanes: usize) {
     let elements = Elements::new(subject.nodes(), lanes, 31);

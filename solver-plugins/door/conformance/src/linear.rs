@@ -1,7 +1,18 @@
 //! Small dense matrices and vectors.
 
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::{Vec3, dot};
+
+// The door stands below `solver-plugins/lib`, so it does not take these from there.
+pub(crate) type Vec3 = [f64; 3];
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    let [i, j, k] = [[1, 2], [2, 0], [0, 1]].map(|[p, q]| a[p] * b[q] - a[q] * b[p]);
+    [i, j, k]
+}
 
 /// The rotation by the vector `w` (rad), row by row (Rodrigues).
 pub(crate) fn rotation(w: Vec3) -> [Vec3; 3] {

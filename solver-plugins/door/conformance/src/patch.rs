@@ -1,13 +1,13 @@
 //! Checks of an element's patch part.
 
 use crate::breaches::{Ask, Breaches, DT};
+use crate::linear::{Vec3, cross};
 use crate::linear::{norm, rotation};
 use crate::meeting::{THREADS, meet_in_turn};
 use crate::neighbours::{self, mixed, of_lanes};
 use crate::shapes::{Patches, moved};
 use crate::subject::{PatchAnswer, PatchState, Subject};
 use crate::{Run, Seen, rules, worse};
-use plyflow_geometry::vec3::{Vec3, cross};
 
 const LANES: usize = 16;
 /// Calls of a thread between two looks at whether enough have met.

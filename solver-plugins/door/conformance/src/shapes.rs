@@ -2,9 +2,9 @@
 //! direction of the material axes.
 
 use crate::Sequence;
+use crate::linear::{Vec3, cross, dot};
 use crate::linear::{rotation, turn};
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::{Vec3, cross, dot};
 
 /// Elements side by side, one in each lane.
 #[derive(Clone)]

@@ -1,6 +1,8 @@
 //! Location of points in an undeformed quad mesh, seen from above.
 
-use crate::{Bins, Vec3, rectangle};
+use crate::bins::Bins;
+use crate::rectangle;
+use crate::vec3::Vec3;
 use plyflow_fixed::FixedBits;
 
 /// A place in a quad mesh: a cell and the bilinear weights of its nodes.
