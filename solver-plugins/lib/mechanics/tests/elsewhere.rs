@@ -115,7 +115,7 @@ fn a_sheet_whose_cells_are_all_of_one_kind_gives_the_bits_of_a_sheet_of_that_kin
     for (mut mixed, mut plain) in pairs {
         steps(&mut mixed, 300);
         steps(&mut plain, 300);
-        assert!(bits(&mixed.x()) == bits(&plain.x()) && bits(&mixed.v()) == bits(&plain.v()));
+        assert!(bits(mixed.x()) == bits(plain.x()) && bits(mixed.v()) == bits(plain.v()));
         assert_eq!(mixed.energies(), plain.energies());
         assert_eq!(mixed.critical_step(), plain.critical_step());
         assert_eq!(mixed.mass(), plain.mass());

@@ -4,7 +4,6 @@ use crate::boundary::CutDrive;
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::request::Feedback;
-use crate::stack::Body;
 use plyflow_geometry::vec3::{V, norm, sub};
 use plyflow_mechanics::mirror::Planes;
 
