@@ -16,7 +16,7 @@ BOOK := . ./.tools/env && CARGO_TARGET_DIR=$(TARGET)/book-builder cargo
 QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p plyflow-study -p plyflow-sdk -p plyflow-geometry -p plyflow-surface \
   -p plyflow-kernels -p plyflow-blank -p plyflow-conformance
 
-.PHONY: help build demo check test long templates lint bench docs pictures clean
+.PHONY: help build demo check test long templates lint bench book docs pictures clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -57,7 +57,6 @@ lint: ## check form, lints and JSON Schemas
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
 	$(BOOK) fmt --manifest-path docs/builder/Cargo.toml --check
-	$(BOOK) clippy --locked --manifest-path docs/builder/Cargo.toml --all-targets -- -D warnings
 	scripts/check-docs
 	scripts/check-bits
 	scripts/check-imports
@@ -66,10 +65,13 @@ bench: build ## measure; rows go to docs/benchmarks
 	$(CARGO) build $(CARGO_FLAGS) -p plyflow-benches
 	$(TARGET)/release/plyflow-benches
 
-docs: ## build the book (target/book) and the pages of the code (target/doc), and check their links
+book: ## build the book into target/book, and check its links and formulas
 	@scripts/setup
 	scripts/check-docs
-	$(BOOK) run --locked --manifest-path docs/builder/Cargo.toml
+	$(BOOK) test --quiet --locked --manifest-path docs/builder/Cargo.toml
+	$(BOOK) run --quiet --locked --manifest-path docs/builder/Cargo.toml
+
+docs: book ## the book, and the pages of the code (target/doc)
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(SHELL) -c '$(CARGO) doc $(CARGO_FLAGS) --workspace --no-deps'
 
 pictures: build ## make the pictures of the book anew from runs; half an hour
