@@ -146,8 +146,8 @@ impl Survey {
     /// search ended; pieces come neighbour after neighbour.
     pub fn nearest_of(&self, at: Vec3, piece: &Piece, hints: &mut [usize]) -> (ClosestPoint, Vec3) {
         let body = piece.body as usize;
-        let found = self.trees[body].closest_from(at, hints[body]);
-        hints[body] = found.triangle as usize;
+        let (found, place) = self.trees[body].closest_from(at, hints[body]);
+        hints[body] = place;
         let normal = self.shells[body].area_normal(found.triangle as usize);
         (found, unit(normal))
     }

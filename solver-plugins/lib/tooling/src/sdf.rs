@@ -428,8 +428,8 @@ fn sample(tree: &SurfaceTree, origin: Vec3, spacing: f64, nodes: [usize; 3]) -> 
                     // Up and down by turns, so that the next node is a neighbour.
                     let k = if j % 2 == 0 { l } else { nodes[2] - 1 - l };
                     let p = [x, y, origin[2] + k as f64 * spacing];
-                    let closest = tree.closest_from(p, hint);
-                    hint = closest.triangle as usize;
+                    let (closest, place) = tree.closest_from(p, hint);
+                    hint = place;
                     slab[j * nodes[2] + k] = closest.signed_distance as f32;
                 }
             }
