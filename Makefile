@@ -30,7 +30,7 @@ demo: build ## run the joggle spar: coarse run, zones, local runs, report
 	@echo 'report: $(subst /workflow,/report,$(DEMO:.yaml=.html))'
 
 check: ## form, lints and the tests that need no HDF5: under a minute once built
-	@scripts/setup
+	@scripts/setup python
 	$(CARGO) fmt --all --check
 	scripts/check-docs
 	scripts/check-bits
@@ -53,7 +53,7 @@ templates: build ## build, check and run the element templates outside of the re
 	scripts/check-templates
 
 lint: ## check form, lints and JSON Schemas
-	@scripts/setup
+	@scripts/setup python
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
 	$(BOOK) fmt --manifest-path docs/builder/Cargo.toml --check

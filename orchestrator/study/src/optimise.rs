@@ -2,7 +2,7 @@
 //!
 //! What a method asks for is a function of the search and of what has been told, and of nothing else: no time, no number of threads, and no
 //! state that would have to be kept. A method is begun anew each time and sees the same answers in the same order, until it asks for a
-//! point that has none ([`ask`]). So a search that was stopped anywhere goes on, and one with a larger budget goes on where the smaller
+//! point that has none ([`Search::ask`]). So a search that was stopped anywhere goes on, and one with a larger budget goes on where the smaller
 //! one ended.
 //!
 //! A method never sees a number of a result. It is told the *order* of the points ([`rank`]): a point that has failed is behind all others,

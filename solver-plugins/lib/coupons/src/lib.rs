@@ -5,7 +5,7 @@
 //! - [`specimen`]: material, element and mesh become a [`plyflow_mechanics::model::Model`];
 //! - [`run`]: the time loop of a [`run::Test`]: steps, samples, frames, energy ledger, health;
 //! - [`output`]: curves, plots, results and attributes of the artifact;
-//! - [`reference`]: curves to compare with, from CSV files;
+//! - [`mod@reference`]: curves to compare with, from CSV files;
 //! - one module for each test.
 //!
 //! All quantities are SI. Results are the same for any number of threads.

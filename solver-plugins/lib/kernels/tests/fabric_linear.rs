@@ -1,7 +1,7 @@
 //! The linear fabric against its closed forms.
 
 use plyflow_kernels::fabric_linear::FabricLinear;
-use plyflow_sdk::{Material, MembraneBatch};
+use plyflow_sdk::{BendingBatch, Material, MembraneBatch};
 
 const PLY: &str = r#"{"fibre_modulus_1": 3e9, "fibre_modulus_2": 1e9, "shear_modulus": 4e5, "thickness": 4e-4, "areal_mass": 0.4,
     "bending": {"family_1": 4e-4, "family_2": 2e-4, "twist": 1e-4}}"#;
@@ -59,6 +59,27 @@ fn a_picture_frame_measures_the_shear_modulus() {
 fn without_bending_it_has_none_and_with_it_families_bend_alone() {
     let law = FabricLinear::create(PLY).unwrap();
     assert!(law.sizes().has_bending);
+    let (mut moment, mut energy, mut tangent) = ([0.0; 24], [0.0; 8], [0.0; 24]);
+    let curvature: Vec<f64> = [20.0, 0.0, 5.0].iter().flat_map(|k| [*k; 8]).collect();
+    law.bending(&mut BendingBatch {
+        lanes: 8,
+        dt: 0.0,
+        metric: &[1.0; 24],
+        curvature: &curvature,
+        history: &mut [],
+        moment: &mut moment,
+        energy: &mut energy,
+        tangent: Some(&mut tangent),
+    });
+    let at = |rows: [f64; 24]| [rows[0], rows[8], rows[16]];
+    // Family 1 bends and the ply twists: family 2 feels nothing of either.
+    let wanted = [4e-4 * 20.0, 0.0, 1e-4 * 5.0];
+    for (found, wanted) in at(moment).iter().zip(wanted) {
+        assert!((found - wanted).abs() < 1e-15, "{found} {wanted}");
+    }
+    let stored = 0.5 * (wanted[0] * 20.0 + 2.0 * wanted[2] * 5.0);
+    assert!((energy[0] / stored - 1.0).abs() < 1e-12, "{}", energy[0]);
+    assert_eq!(at(tangent), [4e-4, 2e-4, 1e-4]);
     let plain = PLY.replace(
         r#",
     "bending": {"family_1": 4e-4, "family_2": 2e-4, "twist": 1e-4}"#,

@@ -44,11 +44,6 @@ pub trait Load {
     fn apply(&mut self, on: &mut dyn Loaded, time: f64);
 }
 
-/// Nothing that changes.
-impl Load for () {
-    fn apply(&mut self, _: &mut dyn Loaded, _: f64) {}
-}
-
 /// Equal steps, counted: step `k` begins at `start + k dt`. Times come from the count, not from a sum, so that frames fall on the same
 /// instants in every run.
 #[derive(Debug, Clone, PartialEq)]

@@ -30,7 +30,7 @@ impl Fixed {
     }
 }
 
-/// A dead load at a node (global axes); [`Model::load_factor`] multiplies it.
+/// A dead load at a node (global axes); [`Model::set_load_factor`] multiplies it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NodalLoad {
     /// Node of the model.
@@ -74,7 +74,7 @@ impl Model {
         }
     }
 
-    /// Sets the nodal loads; [`Model::load_factor`] multiplies them.
+    /// Sets the nodal loads; [`Model::set_load_factor`] multiplies them.
     pub fn set_loads(&mut self, loads: Vec<NodalLoad>) {
         let sum = |of: &dyn Fn(&NodalLoad) -> V| {
             let some = loads.iter().any(|l| of(l) != [0.0; 3]);

@@ -4,31 +4,12 @@ use crate::error::{FormingError, Result};
 use crate::request::Parameters;
 use crate::stack::{StackSheet, sheet};
 use plyflow_blank::Blank;
+use plyflow_geometry::rectangle::{Rectangle, grown, holds_inside, hull};
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::mirror::Planes;
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::DoubleDiaphragm;
 use plyflow_tooling::ToolMesh;
-
-/// Extent in the plane: x0, y0, x1, y1 (m).
-type Box2 = [f64; 4];
-
-fn union(a: Box2, b: Box2) -> Box2 {
-    [
-        a[0].min(b[0]),
-        a[1].min(b[1]),
-        a[2].max(b[2]),
-        a[3].max(b[3]),
-    ]
-}
-
-fn grown(b: Box2, by: f64) -> Box2 {
-    [b[0] - by, b[1] - by, b[2] + by, b[3] + by]
-}
-
-fn inside(b: Box2, x: f64, y: f64) -> bool {
-    x > b[0] && x < b[2] && y > b[1] && y < b[3]
-}
 
 /// Places of everything before meshing.
 pub struct Layout {
@@ -36,11 +17,11 @@ pub struct Layout {
     pub bottom_z: f64,
     /// Of the plies, from the tool upwards: the parts of their blanks between mirror planes.
     pub plies: Vec<Blank>,
-    all_plies: Box2,
+    all_plies: Rectangle,
     /// Beyond this box the films are joined.
-    joint: Box2,
+    joint: Rectangle,
     /// Where elements of the films are even: the plies with free film around them, and the tool.
-    fine: Box2,
+    fine: Rectangle,
     /// The lower film, flat; the upper one has a part of its cells.
     pub film: QuadMesh,
     film_size: f64,
@@ -68,7 +49,7 @@ impl Layout {
         let all_plies = plies
             .iter()
             .map(Blank::bounds)
-            .reduce(union)
+            .reduce(hull)
             .ok_or_else(|| FormingError::Scene("the scene has no ply".into()))?;
         let film_size = p.film_size();
         if film_size < 0.999 * p.element_size {
@@ -81,7 +62,7 @@ impl Layout {
         // At least three cells of free film around the plies, so that the step at their edge has room.
         let margin = process.film_joint_margin.si().max(3.0 * film_size);
         let joint = grown(all_plies, margin);
-        let fine = union(
+        let fine = hull(
             grown(joint, film_size),
             grown([lo[0], lo[1], hi[0], hi[1]], 0.03),
         );
@@ -111,10 +92,10 @@ impl Layout {
         })
     }
 
-    fn is_inside(&self, b: Box2, cell: &[u32; 4]) -> bool {
+    fn is_inside(&self, b: Rectangle, cell: &[u32; 4]) -> bool {
         let p = cell.map(|n| self.film.points[n as usize]);
         let c = [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]));
-        inside(b, c[0], c[1])
+        holds_inside(b, c[0], c[1])
     }
 
     /// Whether a cell of the film lies where its elements are even.
@@ -130,7 +111,7 @@ impl Layout {
     /// Whether a place lies over a ply, or within a film element beside one.
     pub fn over_ply(&self, [x, y]: [f64; 2]) -> bool {
         let beside = 1.01 * self.film_size;
-        let in_box = inside(grown(self.all_plies, beside), x, y);
+        let in_box = holds_inside(grown(self.all_plies, beside), x, y);
         // Rectangles of one stack cover nearly the same: the box around all of them has no steps between them.
         let rectangles = self.plies.iter().all(|b| matches!(b, Blank::Rectangle(_)));
         in_box && (rectangles || self.plies.iter().any(|b| b.distance([x, y]) < beside))
@@ -138,7 +119,7 @@ impl Layout {
 }
 
 /// Whether the frame, of these half sizes (m), holds what is to be fine; `margin`: free film around the plies (m).
-fn check_frame(half: [f64; 2], fine: Box2, margin: f64, film_size: f64) -> Result<()> {
+fn check_frame(half: [f64; 2], fine: Rectangle, margin: f64, film_size: f64) -> Result<()> {
     if (0..2).all(|k| fine[k] >= -half[k] && fine[k + 2] <= half[k]) {
         return Ok(());
     }

@@ -2,6 +2,7 @@
 
 use crate::stack::place::SheetIndex;
 use plyflow_geometry::vec3::V;
+use plyflow_geometry::{Bins, rectangle};
 use plyflow_mechanics::contact::SlaveItem;
 use plyflow_mechanics::mesh::NONE;
 use plyflow_mechanics::model::Model;
@@ -18,16 +19,16 @@ pub fn locate(model: &Model, master: SheetIndex, slaves: &[u32]) -> Vec<SlaveIte
     }
     let first = master.cell_range(model).start as u32;
     let corners: Vec<[V; 4]> = (cells.iter().map(|c| c.map(|n| x[n as usize]))).collect();
-    let bins = Bins::of_cells(&corners);
+    let placed = Cells::new(&corners);
     slaves
         .iter()
         .map(|n| {
             let p = x[*n as usize];
-            let inside = bins.near(p).iter().find_map(|c| {
+            let inside = placed.near(p).iter().find_map(|c| {
                 let xi = inverse_bilinear(corners[*c as usize], p)?;
                 (xi[0].abs() <= 1.0 + 1e-9 && xi[1].abs() <= 1.0 + 1e-9).then_some((*c, xi))
             });
-            let (cell, xi) = inside.unwrap_or_else(|| (bins.nearest(p), [0.0; 2]));
+            let (cell, xi) = inside.unwrap_or_else(|| (placed.nearest(p), [0.0; 2]));
             SlaveItem::new(*n, cell + first, xi)
         })
         .collect()
@@ -60,64 +61,36 @@ pub fn inverse_bilinear(q: [V; 4], p: V) -> Option<[f64; 2]> {
     Some(xi)
 }
 
-/// Cell centres sorted into square bins.
-pub struct Bins {
+/// Cells of a sheet by their centres.
+struct Cells {
     centres: Vec<[f64; 2]>,
-    lo: [f64; 2],
-    size: f64,
-    shape: [usize; 2],
-    cells: Vec<Vec<u32>>,
+    bins: Bins,
 }
 
-impl Bins {
-    /// Of quads seen from above.
-    pub fn of_cells(corners: &[[V; 4]]) -> Self {
+impl Cells {
+    /// Of quads seen from above, of which there is one at least.
+    fn new(corners: &[[V; 4]]) -> Self {
         let centre = |p: &[V; 4]| [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]));
-        Self::new(corners.iter().map(centre).collect())
-    }
-
-    fn new(centres: Vec<[f64; 2]>) -> Self {
-        let (mut lo, mut hi) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for c in &centres {
-            for k in 0..2 {
-                lo[k] = lo[k].min(c[k]);
-                hi[k] = hi[k].max(c[k]);
-            }
-        }
-        let area = ((hi[0] - lo[0]) * (hi[1] - lo[1])).max(1e-12);
+        let centres: Vec<[f64; 2]> = corners.iter().map(centre).collect();
+        let [x0, y0, x1, y1] = rectangle::around(centres.iter().copied());
+        let area = ((x1 - x0) * (y1 - y0)).max(1e-12);
         // About four cells a bin.
         let size = 2.0 * (area / centres.len() as f64).sqrt();
-        let shape = [0, 1].map(|k| ((hi[k] - lo[k]) / size) as usize + 1);
-        let mut bins = Self {
-            centres,
-            lo,
-            size,
-            shape,
-            cells: vec![Vec::new(); shape[0] * shape[1]],
-        };
-        for c in 0..bins.centres.len() {
-            let [i, j] = bins.bin(bins.centres[c]);
-            bins.cells[j * bins.shape[0] + i].push(c as u32);
+        let count = [x1 - x0, y1 - y0].map(|w| (w / size) as usize + 1);
+        let mut bins = Bins::new([x0, y0], [size; 2], count);
+        for (c, centre) in centres.iter().enumerate() {
+            bins.insert(c as u32, *centre, *centre);
         }
-        bins
-    }
-
-    fn bin(&self, p: [f64; 2]) -> [usize; 2] {
-        [0, 1].map(|k| {
-            let i = ((p[k] - self.lo[k]) / self.size).max(0.0) as usize;
-            i.min(self.shape[k] - 1)
-        })
+        Self { centres, bins }
     }
 
     /// Cells around a place.
-    pub fn near(&self, p: V) -> Vec<u32> {
-        let [i, j] = self.bin([p[0], p[1]]);
-        let mut found = Vec::new();
-        for b in j.saturating_sub(1)..(j + 2).min(self.shape[1]) {
-            for a in i.saturating_sub(1)..(i + 2).min(self.shape[0]) {
-                found.extend_from_slice(&self.cells[b * self.shape[0] + a]);
-            }
-        }
+    fn near(&self, p: V) -> Vec<u32> {
+        let [i, j] = self.bins.place([p[0], p[1]]);
+        let [last_i, last_j] = self.bins.count().map(|n| n - 1);
+        let from = [i.saturating_sub(1), j.saturating_sub(1)];
+        let to = [last_i.min(i + 1), last_j.min(j + 1)];
+        let found: Vec<u32> = self.bins.between(from, to).collect();
         // A graded mesh has cells larger than a bin: then look at all.
         if found.is_empty() {
             (0..self.centres.len() as u32).collect()
