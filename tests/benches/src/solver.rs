@@ -2,7 +2,7 @@
 
 use crate::cases::Row;
 use plyflow_e2e::{program, repository};
-use plyflow_kernels::built_in;
+use plyflow_kernels::built_in::{self, BuiltIn};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -168,7 +168,9 @@ pub fn solver() -> Vec<Row> {
     let folder = copy(0.2);
     let strips = folder.path().join("workflows/coupons/angle-study");
     let presses = folder.path().join("workflows/peers/hemisphere-press");
-    for element in built_in::elements().map(|e| e.name) {
+    // Strip and press set the hourglass control of their element, and take a fabric.
+    let controlled = |e: &&BuiltIn| e.manifest.contains("\"hourglass_floor\"");
+    for element in built_in::elements().filter(controlled).map(|e| e.name) {
         let pulled = |time: &str| least(3, || run(&strips, &strip(element, "3 mm", time), 1));
         let (one, longer) = (pulled("4 ms"), pulled("12 ms"));
         rows.push(one.row(format!("{element}, strip, no contact, 1 thread")));

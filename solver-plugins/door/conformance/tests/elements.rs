@@ -53,7 +53,10 @@ fn nothing_is_found_in_the_membrane_element_with_film_and_with_fabric() {
 fn nothing_is_found_in_the_fully_integrated_membrane_with_film_and_with_fabric() {
     sound(&with_film::<M4f>("{}"), &MEMBRANE);
     for form in ["fibre-energy", "hypoelastic"] {
-        sound(&with_fabric::<M4f>("{}", form), &MEMBRANE);
+        sound(
+            &with_fabric::<M4f>(r#"{"fibres_along_sides": true}"#, form),
+            &MEMBRANE,
+        );
     }
 }
 

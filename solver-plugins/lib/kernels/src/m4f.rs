@@ -7,9 +7,10 @@
 //!
 //! Every in-plane mode has its stiffness from the material, so nothing has to be controlled. The price: 4 calls of the material instead of
 //! one, and locking where stiff fibres are not parallel to the sides, because all four points then forbid what the element cannot do
-//! otherwise. [`crate::m4`] is the element for fabrics; this one is for films and for telling hourglass control from material.
+//! otherwise: a coarse spar of plies at +-45 deg sheared by -8 deg where [`crate::m4`] gives -22 deg. So a material as stiff along its fibres as a
+//! fabric is refused unless the fibres run along the sides. The element is for films, and for telling hourglass control from material.
 
-use crate::quad::{FIELDS, MAX_LANES, fields_of, largest, material_frame};
+use crate::quad::{FIELDS, MAX_LANES, fields_of, largest, material_frame, stiffness_at_rest};
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
 use plyflow_sdk::abi::PF_OK;
@@ -26,19 +27,34 @@ const SIGNS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]
 /// 1 / sqrt(3).
 const GAUSS: f64 = 0.577_350_269_189_625_8;
 
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Parameters {}
+/// Largest tangent over shear tangent at rest from which a material counts as a fabric: an isotropic sheet has at most 6, a fabric some 10,000.
+const FABRIC: f64 = 100.0;
 
-/// The formulation; it has no parameters.
+/// Parameters; see the manifest.
+#[derive(Default, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Parameters {
+    fibres_along_sides: bool,
+}
+
+/// The formulation.
 pub struct M4f;
 
 impl Element for M4f {
     const MANIFEST: &'static str = include_str!("m4f/manifest.json");
 
-    fn create(parameters: &str, _: &MaterialRef) -> Result<Self, String> {
-        let Parameters {} = serde_json::from_str(parameters)
+    fn create(parameters: &str, material: &MaterialRef) -> Result<Self, String> {
+        let p: Parameters = serde_json::from_str(parameters)
             .map_err(|e| format!("parameters of element 'm4f': {e}"))?;
+        let (largest, shear) = stiffness_at_rest(material)?;
+        if largest > FABRIC * shear && !p.fibres_along_sides {
+            return Err(format!(
+                "element 'm4f' locks where stiff fibres are not parallel to its sides, and this material is {:.0} times as stiff along its fibres \
+                 as in shear (at most {FABRIC}): its shear would come out far too small. Use 'm4', or say 'fibres_along_sides: true' where all \
+                 elements lie along the fibres",
+                largest / shear
+            ));
+        }
         Ok(Self)
     }
 

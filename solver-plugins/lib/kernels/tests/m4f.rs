@@ -10,6 +10,7 @@ const Y: f64 = 2.1e9;
 const NU: f64 = 0.3;
 const H: f64 = 1e-3;
 const AXIS: [f64; 3] = [1.0, 0.0, 0.0];
+const ALONG: &str = r#"{"fibres_along_sides": true}"#;
 
 fn square(side: f64) -> Quad {
     let a = 0.5 * side;
@@ -95,7 +96,41 @@ fn the_step_is_below_that_of_one_point_and_above_two_thirds_of_it() {
 }
 
 #[test]
-fn parameters_are_refused_as_it_has_none() {
+fn a_fabric_is_refused_unless_its_fibres_run_along_the_sides() {
+    let error = El::new::<M4f>("{}", &ply()).err().unwrap();
+    for part in [
+        "locks",
+        "times as stiff",
+        "Use 'm4'",
+        "fibres_along_sides: true",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    assert!(El::new::<M4f>(ALONG, &ply()).is_ok());
+}
+
+/// In the mode in which a square bends in its plane, fibres along the diagonals are strained by what the element cannot do otherwise: the
+/// energy grows with the fibres' stiffness, though the fabric could shear instead. This is what the refusal is about.
+#[test]
+fn stiff_fibres_along_the_diagonals_lock_the_mode_in_which_a_square_bends() {
+    let side = 0.01;
+    let k = 1e-4 / side;
+    let bent = square(side).map(|p| [p[0] + k * p[0] * p[1], p[1], p[2]]);
+    let energy = |axis: [f64; 3], json: &str| {
+        let m = fabric(json).unwrap();
+        let e = El::new::<M4f>(ALONG, &m).unwrap();
+        let mut batch = e.initialise(&[square(side); 8], &[axis; 8]);
+        total(&e.forces(&mut batch, &[bent; 8]), 8, 0)
+    };
+    let soft = r#"{"fibre_modulus":3e6,"shear":{"coefficients":[0,100]},"thickness":4e-4,"areal_mass":0.44}"#;
+    let stiff = soft.replace("3e6", "3e9");
+    let r = 0.5f64.sqrt();
+    let grows = energy([r, r, 0.0], &stiff) / energy([r, r, 0.0], soft);
+    assert!(grows > 500.0, "{grows}");
+}
+
+#[test]
+fn a_parameter_that_it_does_not_have_is_refused_by_name() {
     let error = El::new::<M4f>(r#"{"hourglass": 1}"#, &ply()).err().unwrap();
     assert!(
         error.contains("'m4f'") && error.contains("hourglass"),

@@ -21,7 +21,12 @@ fn fields_of_the_manifest_are_the_rows_that_the_elements_write() {
     let m = fabric(&ncf("fibre-energy", "")).unwrap();
     for (text, sizes) in [
         (M4::MANIFEST, El::new::<M4>("{}", &m).unwrap().sizes),
-        (M4f::MANIFEST, El::new::<M4f>("{}", &m).unwrap().sizes),
+        (
+            M4f::MANIFEST,
+            El::new::<M4f>(r#"{"fibres_along_sides": true}"#, &m)
+                .unwrap()
+                .sizes,
+        ),
         (Rf4::MANIFEST, El::new::<Rf4>("{}", &m).unwrap().sizes),
     ] {
         let json: serde_json::Value = serde_json::from_str(text).unwrap();
