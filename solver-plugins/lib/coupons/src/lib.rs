@@ -15,6 +15,7 @@
 
 pub mod bias_extension;
 pub mod bias_plane;
+pub mod buckling;
 pub mod cantilever;
 pub mod film;
 pub mod inflation;
