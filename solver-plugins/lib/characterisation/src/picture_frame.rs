@@ -4,21 +4,12 @@
 use crate::csv::Table;
 use crate::stitch::{StitchFit, fit_stitch};
 use crate::voce::rms;
-use crate::yarns::{Points, Yarns, YarnsFit, fit_yarns, joined};
+pub use crate::yarns::LIMITS;
+use crate::yarns::{FEWEST_ROWS, Points, Yarns, YarnsFit, fit_yarns, joined};
 use crate::zero::{self, Start, Zero};
 use plyflow_fixed::FixedBits;
 use serde::Deserialize;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
-
-/// Highest degree of a shear polynomial that `material-fabric` takes.
-pub const MAXIMUM_DEGREE: usize = 9;
-/// What `material-fabric` takes as the end of the fitted range (rad).
-pub const LIMITS: [f64; 2] = [
-    5.0 * std::f64::consts::PI / 180.0,
-    80.0 * std::f64::consts::PI / 180.0,
-];
-/// A test with fewer rows is refused.
-pub const FEWEST_ROWS: usize = 20;
 
 /// The rig.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,12 +3,21 @@
 use crate::confidence::{autocorrelation, of_curve, of_mean, student};
 use crate::linear::{Polynomial, Solution, bayes_criterion, fit_polynomial};
 use crate::material::significant;
-use crate::picture_frame::{FEWEST_ROWS, LIMITS, MAXIMUM_DEGREE};
 use crate::voce::rms;
 use plyflow_fixed::FixedBits;
 use plyflow_kernels::fabric::Fabric;
 use plyflow_sdk::Material;
 use serde_json::json;
+
+/// Highest degree of a shear polynomial that `material-fabric` takes.
+pub const MAXIMUM_DEGREE: usize = 9;
+/// What `material-fabric` takes as the end of the fitted range (rad).
+pub const LIMITS: [f64; 2] = [
+    5.0 * std::f64::consts::PI / 180.0,
+    80.0 * std::f64::consts::PI / 180.0,
+];
+/// A test with fewer rows is refused.
+pub const FEWEST_ROWS: usize = 20;
 
 /// Points of a table after the one at zero shear; `material-fabric` takes 64 in all.
 const TABLE_POINTS: usize = 40;
