@@ -1,7 +1,7 @@
 //! Slip in the artifact: fields, sections, results.
 
+use crate::measured::{Measured, check_names, columns};
 use crate::slip::{Course, Faces, Line, Slip, course, mirrored, size};
-use crate::{Measured, check_names, columns};
 use plyflow_defects::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_model::artifact::{

@@ -1,7 +1,7 @@
 //! Local runs of zones with meshes of different fineness: how far their distances from the tool are from those of the finest.
 
 use crate::advice::{Advice, advise};
-use crate::measured;
+use crate::column::measured;
 use plyflow_defects::{FieldErrors, Ply, of_run};
 use plyflow_model::artifact::{Cell, Column, Forming, MeshStudy, Table, Zone, ZoneAdvice};
 use plyflow_sdk::{Host, Input, Log, StepError};
@@ -175,10 +175,15 @@ fn read(host: &Host, input: Input, foot_margin: f64) -> Result<Option<Run>, Step
     };
     let frame = of_run::last_frame(&input, &host.meshes(&input)?)?;
     let tool = of_run::tool(host, &input)?;
+    let of = of_run::Frame {
+        host,
+        input: &input,
+        frame,
+    };
     let mut plies = Vec::new();
     for sheet in formed.plies() {
         let place = (sheet.name.as_str(), sheet.offset);
-        plies.push(of_run::ply(host, &input, frame, place, &tool, foot_margin)?);
+        plies.push(of_run::ply(of, place, &tool, foot_margin)?);
     }
     Ok(Some(Run {
         zone,
