@@ -6,7 +6,7 @@ use crate::ply::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_model::artifact::{self, Cause, DefectKind as Kind};
-use plyflow_surface::{Curvature, Ridge, ridge_line, sharpness};
+use plyflow_surface::{Bound, Curvature, Ridge, ridge_line, sharpness};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
@@ -187,14 +187,18 @@ fn wrinkles(ply: &Ply, off: &[bool], crested: &[Curvature], settings: &Settings)
         if !nodes.iter().any(beyond) {
             continue;
         }
-        let bound = nodes
+        let threshold = nodes
             .iter()
             .map(|&i| -limit(i as usize, hold))
             .fold(f64::INFINITY, f64::min);
+        let bound = Bound {
+            threshold,
+            margin: &margin,
+        };
         let long = |r: &Ridge| r.length >= settings.minimum_wrinkle_length;
         let ridge_of = |nodes: &[u32]| {
             let (topology, formed) = (&ply.topology, &ply.formed);
-            let ridge = ridge_line(topology, formed, crested, nodes, bound, &margin);
+            let ridge = ridge_line(topology, formed, crested, nodes, bound);
             ridge.filter(|r| long(r) && nodes.iter().any(beyond))
         };
         // What is curved as a crest reaches at most to half of the flank.

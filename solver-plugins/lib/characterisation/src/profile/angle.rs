@@ -7,7 +7,7 @@
 
 use super::grid::{Grid, legendre};
 use super::terms::{Choice, Profile, ProfileFit, Stations, overhang_reaches, spread};
-use crate::linear::least_squares;
+use crate::linear::{Solution, least_squares};
 use nalgebra::DMatrix;
 use plyflow_fixed::FixedBits;
 
@@ -222,6 +222,26 @@ struct Trial {
 }
 
 impl Trial {
+    fn new(grid: &Grid, basis: &Basis, profile: &Profile, unknowns: Vec<f64>, length: f64) -> Self {
+        let (feet, arc) = misfit(&curve(grid, basis, &unknowns, length), profile);
+        Self {
+            left: squares(&feet),
+            unknowns,
+            length,
+            feet,
+            arc,
+        }
+    }
+
+    /// The change of the unknowns that lessens the distances most, were they linear. `shape`: the curve.
+    fn change(&self, shape: &Curve) -> Result<Solution, String> {
+        let matrix = DMatrix::from_fn(self.feet.len(), self.unknowns.len(), |i, j| {
+            self.feet[i].normal_part(&shape.change[j])
+        });
+        let right: Vec<f64> = self.feet.iter().map(|f| f.distance).collect();
+        least_squares(&matrix, &right)
+    }
+
     /// As far along a change of the unknowns and towards another length as the sum of squares allows. `at` tries.
     fn moved(&self, change: &[f64], longer: f64, at: impl Fn(Vec<f64>, f64) -> Self) -> Self {
         let mut factor = 1.0;
@@ -254,25 +274,12 @@ pub fn fit(
     };
     unknowns.resize(terms, 0.0);
     let given = choice.overhang;
-    let at = |unknowns: Vec<f64>, length: f64| {
-        let (feet, arc) = misfit(&curve(grid, &basis, &unknowns, length), profile);
-        Trial {
-            left: squares(&feet),
-            unknowns,
-            length,
-            feet,
-            arc,
-        }
-    };
+    let at = |unknowns, length| Trial::new(grid, &basis, profile, unknowns, length);
     let mut now = at(unknowns, given.unwrap_or(length));
     let mut solved = None;
     for _ in 0..ITERATIONS {
         let shape = curve(grid, &basis, &now.unknowns, now.length);
-        let matrix = DMatrix::from_fn(now.feet.len(), terms, |i, j| {
-            now.feet[i].normal_part(&shape.change[j])
-        });
-        let right: Vec<f64> = now.feet.iter().map(|f| f.distance).collect();
-        let solution = least_squares(&matrix, &right)?;
+        let solution = now.change(&shape)?;
         let longer = given.unwrap_or(now.arc);
         let step = solution.unknowns.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         let moved = (longer - now.length).abs() / now.length;

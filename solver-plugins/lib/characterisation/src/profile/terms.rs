@@ -16,6 +16,39 @@ pub struct Profile {
 /// A profile with fewer points is refused.
 pub const FEWEST_POINTS: usize = 12;
 
+/// Whether points go along the strip from the clamp to the tip. `tolerance` (m): so far a point may lie back. `place(i)`: where it stands.
+fn goes_outwards(
+    x: &[f64],
+    deflection: &[f64],
+    tolerance: f64,
+    place: &dyn Fn(usize) -> String,
+) -> Result<(), String> {
+    let n = x.len();
+    let half = (n / 20).max(3);
+    for i in 1..n {
+        // Which way the strip went up to the last point; out of the clamp it goes along x.
+        let (a, b) = (i.saturating_sub(half), i - 1);
+        let way = [x[b] - x[a], deflection[b] - deflection[a]];
+        let length = way[0].fixed_hypot(way[1]);
+        let along = if length > tolerance {
+            way.map(|w| w / length)
+        } else {
+            [1.0, 0.0]
+        };
+        let forward = (x[i] - x[b]) * along[0] + (deflection[i] - deflection[b]) * along[1];
+        if forward < -tolerance {
+            return Err(format!(
+                "{}: the points turn back along the strip here (x = {:.3} mm after {:.3} mm); they must be \
+                 ordered from the clamp to the tip",
+                place(i),
+                1e3 * x[i],
+                1e3 * x[i - 1]
+            ));
+        }
+    }
+    Ok(())
+}
+
 impl Profile {
     /// Checks points `x` (m, outwards) and `z` (m, height, upwards), of which `place(i)` says in messages
     /// where they stand. The first point must lie within `clamp_tolerance` (m) of x = z = 0.
@@ -56,28 +89,7 @@ impl Profile {
             ));
         }
         let deflection: Vec<f64> = z.iter().map(|z| -z).collect();
-        let half = (n / 20).max(3);
-        for i in 1..n {
-            // Which way the strip went up to the last point; out of the clamp it goes along x.
-            let (a, b) = (i.saturating_sub(half), i - 1);
-            let way = [x[b] - x[a], deflection[b] - deflection[a]];
-            let length = way[0].fixed_hypot(way[1]);
-            let along = if length > clamp_tolerance {
-                way.map(|w| w / length)
-            } else {
-                [1.0, 0.0]
-            };
-            let forward = (x[i] - x[b]) * along[0] + (deflection[i] - deflection[b]) * along[1];
-            if forward < -clamp_tolerance {
-                return Err(format!(
-                    "{}: the points turn back along the strip here (x = {:.3} mm after {:.3} mm); they must be \
-                     ordered from the clamp to the tip",
-                    place(i),
-                    1e3 * x[i],
-                    1e3 * x[i - 1]
-                ));
-            }
-        }
+        goes_outwards(x, &deflection, clamp_tolerance, place)?;
         let mean = deflection.iter().sum::<f64>() / n as f64;
         if mean <= 0.0 {
             return Err(format!(

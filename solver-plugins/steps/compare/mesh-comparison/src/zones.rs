@@ -92,20 +92,8 @@ pub fn compare(
     })
 }
 
-/// The runs of one zone, the finest first; gives the advice for it.
-fn one(
-    host: &Host,
-    zone: &str,
-    runs: &[Run],
-    target: f64,
-    rows: &mut Vec<Vec<Cell>>,
-) -> Result<Advice, StepError> {
-    let [finest, next, ..] = runs else {
-        return Err(format!(
-            "zone {zone} has one run; a comparison needs two or more of different sizes"
-        )
-        .into());
-    };
+/// Whether the runs are of one box and the finest finer than the next.
+fn comparable(zone: &str, runs: &[Run], finest: &Run, next: &Run) -> Result<(), StepError> {
     if let Some(other) = runs.iter().find(|r| !finest.zone.is(&r.zone)) {
         let (a, b) = (&finest.input.step, &other.input.step);
         return Err(format!(
@@ -122,6 +110,24 @@ fn one(
         )
         .into());
     }
+    Ok(())
+}
+
+/// The runs of one zone, the finest first; gives the advice for it.
+fn one(
+    host: &Host,
+    zone: &str,
+    runs: &[Run],
+    target: f64,
+    rows: &mut Vec<Vec<Cell>>,
+) -> Result<Advice, StepError> {
+    let [finest, next, ..] = runs else {
+        return Err(format!(
+            "zone {zone} has one run; a comparison needs two or more of different sizes"
+        )
+        .into());
+    };
+    comparable(zone, runs, finest, next)?;
     let mut measured = Vec::new();
     for run in runs {
         let found = FieldErrors::of(&[&run.plies], &[&finest.plies], |_, _| true);
