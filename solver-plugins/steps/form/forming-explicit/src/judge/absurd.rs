@@ -7,7 +7,7 @@ use crate::load::Load;
 use crate::request::Parameters;
 use crate::stack::{Body, RigidName};
 use crate::watch::Watch;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::scene::Process;
 
 /// Mass that is added over the sheets' own, beyond which a run is none of these sheets. Shipped studies have up to 75 in films.
@@ -216,7 +216,7 @@ fn check_places(p: &Parameters, forming: &Forming) -> Result<()> {
     let opening = press.die.opening_radius.si();
     for (body, _) in forming.plies() {
         let points = forming.reference_points(body);
-        let square = |x: &V| x[0] * x[0] + x[1] * x[1];
+        let square = |x: &Vec3| x[0] * x[0] + x[1] * x[1];
         let reach = points.iter().map(square).fold(0.0, f64::max).sqrt();
         if reach <= opening {
             return Err(FormingError::Absurd(format!(
