@@ -4,7 +4,10 @@ use plyflow_sdk::{Host, Step, StepError};
 use plyflow_testing::{Machine, run_on};
 use serde_json::json;
 
-const MANIFEST: &str = r#"{"name":"stops","version":"0.1.0","kind":"step","summary":"Stops.","output":{"kind":"table"}}"#;
+const MANIFEST: &str = r#"{
+    "name": "stops", "version": "0.1.0", "vendor": "Plyflow", "kind": "step", "role": "example", "summary": "Stops.",
+    "parameters": {}, "inputs": {}, "output": {"kind": "example"}, "results": {}
+}"#;
 
 /// An error of a plugin's own that wraps what the host said, as a `?` inside of the plugin makes it.
 #[derive(Debug)]

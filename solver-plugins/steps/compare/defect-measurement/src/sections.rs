@@ -58,7 +58,7 @@ type Cut<'a> = (&'a str, &'a str, Option<Vec<SectionPoint>>);
 
 impl Section<'_> {
     /// The path as seen from above, and what its corners are told by.
-    fn from_above(&self, sheets: &[Sheet<'_>], along: &[f64]) -> (Vec<[f64; 2]>, Vec<f64>) {
+    fn seen_from_above(&self, sheets: &[Sheet<'_>], along: &[f64]) -> (Vec<[f64; 2]>, Vec<f64>) {
         let path = self.path;
         let mut above = (path.to_vec(), along.to_vec());
         if self.on == SectionOn::FlatPly {
@@ -101,7 +101,7 @@ impl Section<'_> {
     ) -> Result<(artifact::Section, Plot), StepError> {
         let (label, path, number) = (self.label, self.path, self.number);
         let along = stations(path);
-        let above = self.from_above(sheets, &along);
+        let above = self.seen_from_above(sheets, &along);
         let (points, facets) = (tool.points(), tool.triangles());
         let of_tool = path_section(points, points, facets, &above.0, &above.1);
         let mut lines: Vec<Cut<'_>> = vec![("tool", "tool", of_tool.into_iter().next())];
