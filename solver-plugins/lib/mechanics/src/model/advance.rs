@@ -1,7 +1,11 @@
 //! Forces on the nodes, and where they take them.
 
-use super::*;
+use super::blocks::{NODE_CHUNK, chunks_or_none};
+use super::boundary::Fixed;
+use super::parts::{Model, NodeWork};
 use crate::team;
+use crate::vec3::{Vec3, add, dot, scale, sub};
+use rayon::prelude::*;
 
 /// What moves or turns the nodes of a model in a step.
 #[derive(Clone, Copy)]
@@ -118,7 +122,7 @@ impl Model {
         self.follow(&before);
         self.workspace.before = before;
         if !self.workspace.work.kinetic.is_finite() {
-            let bad = |v: &V| !v.iter().all(|c| c.is_finite());
+            let bad = |v: &Vec3| !v.iter().all(|c| c.is_finite());
             self.workspace.work.bad = self.state.v.iter().position(bad).map(|n| n as u32);
         }
         self.rotate();
@@ -146,7 +150,7 @@ impl Model {
     }
 
     /// Puts the driven nodes where their drive wants them. `before`: their positions and velocities.
-    fn follow(&mut self, before: &[(V, V)]) {
+    fn follow(&mut self, before: &[(Vec3, Vec3)]) {
         let Some(drive) = &self.boundary.drive else {
             return;
         };

@@ -1,6 +1,6 @@
 //! What of a model changes from step to step.
 
-use super::*;
+use super::parts::Model;
 use crate::archive::{Archive, ArchiveError};
 
 impl Model {

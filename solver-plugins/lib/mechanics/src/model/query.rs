@@ -1,7 +1,17 @@
 //! What a model tells of itself: energies, critical step, fields, volume.
 
-use super::*;
-use crate::energy::SheetEnergy;
+use super::batch::{batch_critical_step, cell_critical_steps, patch_rows};
+use super::blocks::NODE_CHUNK;
+use super::parts::{CellPlace, Model};
+use crate::contact::ContactEnergy;
+use crate::energy::{Ledger, SheetEnergy};
+use crate::mesh::area_vector;
+use crate::sheet::Batch;
+use crate::vec3::{Vec3, add, dot, scale};
+use crate::{LANES, MechanicsError};
+use plyflow_abi::{PF_ENERGY_BENDING, PF_ENERGY_HOURGLASS, PF_ENERGY_MEMBRANE};
+use rayon::prelude::*;
+use std::sync::Arc;
 
 impl Model {
     /// Largest share of the penalty force that contacts hand to their multipliers in a step, once
@@ -13,7 +23,7 @@ impl Model {
     }
 
     /// `[n]` positions with which it was built (m).
-    pub fn start(&self) -> &Arc<[V]> {
+    pub fn start(&self) -> &Arc<[Vec3]> {
         &self.topology.start
     }
 
@@ -68,7 +78,7 @@ impl Model {
     }
 
     /// By node of a sheet: sum of a quarter of the area vectors of its cells around it (m2).
-    pub fn node_areas(&self, sheet: usize) -> Vec<V> {
+    pub fn node_areas(&self, sheet: usize) -> Vec<Vec3> {
         let sheet = &self.topology.sheets[sheet];
         let mut areas = vec![[0.0; 3]; self.state.x.len()];
         for cell in &self.topology.cells[sheet.cell_range.0..sheet.cell_range.1] {
