@@ -1,6 +1,6 @@
 //! Elementary functions on lanes.
 
-use crate::Lanes;
+use crate::lanes::Lanes;
 
 /// Polynomial `c[0] + c[1] x + ..`.
 #[inline(always)]

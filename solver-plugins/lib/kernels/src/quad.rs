@@ -14,7 +14,7 @@ use crate::{Lanes, WIDTH, dispatch};
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
 use plyflow_sdk::abi::PF_OK;
-use plyflow_sdk::{Aligned, ElementBatch, MaterialRef, MembraneBatch};
+use plyflow_sdk::{Aligned, ElementBatch, ElementSizes, MaterialRef, MembraneBatch};
 
 /// Rows of constants: b11, b21, b12, b22 (1/m), h1, h2 (m), area (m2), k, k_n (N/m).
 pub const CONSTANTS: usize = 9;
@@ -26,6 +26,18 @@ pub const MAX_LANES: usize = 64;
 /// exact in-plane bending of a fully integrated element (1/12) needs no control, and light films
 /// would lose their time step.
 const HOURGLASS_CAP: f64 = 0.25;
+
+/// Sizes of the quadrilateral.
+pub(crate) fn sizes() -> ElementSizes {
+    ElementSizes {
+        nodes: 4,
+        dofs_per_node: 3,
+        constants: CONSTANTS,
+        material_points: 1,
+        fields: FIELDS,
+        ..Default::default()
+    }
+}
 
 /// Stack rows, aligned as the ABI asks.
 #[repr(align(64))]
