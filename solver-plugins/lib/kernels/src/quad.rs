@@ -188,7 +188,7 @@ pub fn initialise(batch: &mut ElementBatch<'_>, material: &MaterialRef, hourglas
 /// What one batch of at most `N` lanes needs between the material call and the forces. Rows of n
 /// lanes lie one after the other from the start of each field.
 #[repr(align(64))]
-struct Scratch<const N: usize> {
+pub(crate) struct Scratch<const N: usize> {
     /// g1, g2: `[2][3][lanes]`.
     g: [[f64; N]; 6],
     metric: [[f64; N]; 3],
@@ -201,7 +201,7 @@ struct Scratch<const N: usize> {
 
 impl<const N: usize> Scratch<N> {
     #[inline(always)]
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             g: [[0.0; N]; 6],
             metric: [[0.0; N]; 3],
@@ -212,7 +212,7 @@ impl<const N: usize> Scratch<N> {
         }
     }
 
-    fn view(&mut self) -> View<'_> {
+    pub(crate) fn view(&mut self) -> View<'_> {
         View {
             g: self.g.as_flattened_mut(),
             metric: self.metric.as_flattened_mut(),
@@ -225,16 +225,17 @@ impl<const N: usize> Scratch<N> {
 }
 
 /// A [`Scratch`] of any size.
-struct View<'a> {
-    g: &'a mut [f64],
-    metric: &'a mut [f64],
-    stress: &'a mut [f64],
-    energy: &'a mut [f64],
-    stiffness: &'a mut [f64],
+pub(crate) struct View<'a> {
+    pub(crate) g: &'a mut [f64],
+    pub(crate) metric: &'a mut [f64],
+    pub(crate) stress: &'a mut [f64],
+    pub(crate) energy: &'a mut [f64],
+    pub(crate) stiffness: &'a mut [f64],
     mode: &'a mut [f64],
 }
 
-fn material_call(
+/// The material's part of a point, in the rows of `s`; its code.
+pub(crate) fn material_call(
     material: &MaterialRef,
     history: &mut [f64],
     n: usize,

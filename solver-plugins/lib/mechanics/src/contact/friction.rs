@@ -1,5 +1,6 @@
 //! Coefficients of friction: constant, or by pressure and by the angle between sliding and fibres.
 
+use super::penalty::{Tangential, friction_force};
 use crate::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use plyflow_fixed::FixedBits;
 
@@ -222,6 +223,14 @@ pub(crate) struct Sliding<'a> {
     pub held: Vec3,
     pub vt: Vec3,
     pub spring: f64,
+}
+
+impl Sliding<'_> {
+    /// Friction under a law, by a slip spring of stiffness `k` (N/m) and a damper `c` (N s/m), in a step `dt` (s).
+    #[inline(always)]
+    pub(super) fn friction(&self, law: &impl Coulomb, dt: f64, k: f64, c: f64) -> Tangential {
+        friction_force(self.held, self.vt, dt, k, c, law.limit(self))
+    }
 }
 
 /// What gives Coulomb's limit. The contacts are compiled once for each law: the constant one costs one product.

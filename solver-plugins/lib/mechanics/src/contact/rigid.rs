@@ -2,8 +2,7 @@
 
 use super::friction::{Constant, Coulomb, Sliding};
 use super::penalty::{
-    ContactEnergy, ContactSettings, Follow, Pace, TOGETHER, content, friction_force, normal_force,
-    waking,
+    ContactEnergy, ContactSettings, Follow, Pace, TOGETHER, content, normal_force, waking,
 };
 use super::regions::FrictionLaw;
 use super::sheets::SheetContact;
@@ -559,7 +558,8 @@ fn touch<F: Coulomb>(
     if !law.friction.is_smooth() {
         let vt = sub(v, scale(n, dot(v, n)));
         let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-        let limit = law.friction.limit(&Sliding {
+        let (spring, damper) = (law.slip_factor * k, law.slip_factor * c);
+        let sliding = Sliding {
             node: item.node,
             cell: crate::mesh::NONE,
             x: law.x,
@@ -567,16 +567,9 @@ fn touch<F: Coulomb>(
             force: normal.force,
             held: rest,
             vt,
-            spring: law.slip_factor * k * law.dt,
-        });
-        let f = friction_force(
-            rest,
-            vt,
-            law.dt,
-            law.slip_factor * k,
-            law.slip_factor * c,
-            limit,
-        );
+            spring: spring * law.dt,
+        };
+        let f = sliding.friction(law.friction, law.dt, spring, damper);
         item.slip = f.slip;
         item.force = add(item.force, f.force);
         energy.stored += f.stored;

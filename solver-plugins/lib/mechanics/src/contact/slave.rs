@@ -3,7 +3,7 @@
 use super::blend::Pull;
 use super::closest::{Closest, FACES, Found, RIM, Surface, combine, shape};
 use super::friction::{Coulomb, Sliding};
-use super::penalty::{ContactEnergy, Follow, friction_force, grown, normal_force};
+use super::penalty::{ContactEnergy, Follow, grown, normal_force};
 use crate::mesh::NONE;
 use crate::mirror::{Image, reflect};
 use crate::vec3::{Vec3, add, dot, norm, scale, sub, unit};
@@ -462,7 +462,8 @@ fn react<F: Coulomb>(
     let n = unit(way);
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-    let limit = law.friction.limit(&Sliding {
+    let (spring, damper) = (law.slip_factor * k, law.slip_factor * c);
+    let sliding = Sliding {
         node: item.node,
         cell: item.cell,
         x: s.x,
@@ -470,16 +471,9 @@ fn react<F: Coulomb>(
         force: normal.force,
         held: rest,
         vt,
-        spring: law.slip_factor * k * law.dt,
-    });
-    let f = friction_force(
-        rest,
-        vt,
-        law.dt,
-        law.slip_factor * k,
-        law.slip_factor * c,
-        limit,
-    );
+        spring: spring * law.dt,
+    };
+    let f = sliding.friction(law.friction, law.dt, spring, damper);
     item.active = true;
     item.slip = f.slip;
     item.normal_force = normal.force;

@@ -26,33 +26,12 @@ pub use shape::ASK_INTERVAL;
 pub use spent::{Clock, Spent};
 
 use crate::MechanicsError;
-use crate::contact::{
-    Bearing, ContactEnergy, FoldItem, Pace, RigidContact, SelfContact, SheetContact, Surface,
-};
+use crate::contact::{Bearing, ContactEnergy, FoldItem, Pace, Surface};
 use crate::team;
-use crate::vec3::{Vec3, dot, norm, unit};
+use crate::vec3::{dot, norm, unit};
 use batch::{Motion, Present, component_status};
 use blocks::{NODE_CHUNK, run_blocks, run_patch_blocks};
 use rayon::prelude::*;
-
-/// Adds the forces of all contacts to `force` (N), one after the other.
-fn scatter_contacts(
-    rigid: &[RigidContact],
-    sheets: &[SheetContact],
-    folds: &[SelfContact],
-    cells: &[[u32; 4]],
-    force: &mut [Vec3],
-) {
-    for contact in rigid {
-        contact.scatter(force);
-    }
-    for contact in sheets {
-        contact.scatter(cells, force);
-    }
-    for contact in folds {
-        contact.scatter(cells, force);
-    }
-}
 
 /// What presses on sheets in a bag besides pressure (Pa), as films that are stretched over edges do: so much of their contacts' forces does not
 /// grow with the pressure.
@@ -79,15 +58,7 @@ impl Model {
         };
         let scatter = || {
             if computed {
-                let (rigid, sheets) = (&self.contacts.rigid, &self.contacts.sheets);
-                let folds = &self.contacts.folds;
-                scatter_contacts(
-                    rigid,
-                    sheets,
-                    folds,
-                    &self.topology.cells,
-                    &mut self.contacts.force,
-                );
+                self.contacts.scatter(&self.topology.cells);
             }
         };
         let elements = || {
@@ -276,15 +247,7 @@ impl Model {
                 contact.look_between(&self.contacts.sheets);
             }
             if !self.compute_contacts() {
-                let (rigid, sheets) = (&self.contacts.rigid, &self.contacts.sheets);
-                let folds = &self.contacts.folds;
-                scatter_contacts(
-                    rigid,
-                    sheets,
-                    folds,
-                    &self.topology.cells,
-                    &mut self.contacts.force,
-                );
+                self.contacts.scatter(&self.topology.cells);
             }
             part.add_to(&mut self.workspace.spent.contacts);
         } else {

@@ -148,6 +148,21 @@ pub(super) struct Contacts {
     pub step_energies: Vec<ContactEnergy>,
 }
 
+impl Contacts {
+    /// Puts the forces of all on the nodes, one after the other. `cells`: the model's.
+    pub fn scatter(&mut self, cells: &[[u32; 4]]) {
+        for contact in &self.rigid {
+            contact.scatter(&mut self.force);
+        }
+        for contact in &self.sheets {
+            contact.scatter(cells, &mut self.force);
+        }
+        for contact in &self.folds {
+            contact.scatter(cells, &mut self.force);
+        }
+    }
+}
+
 /// Kept from step to step only for their room: a step allocates nothing. Nothing here is part of an answer.
 #[derive(Default)]
 pub(super) struct Workspace {
