@@ -10,6 +10,9 @@ use core::sync::atomic::{AtomicU8, Ordering};
 /// Lanes in one value; batches are a multiple of it.
 pub const WIDTH: usize = 8;
 
+/// 1.5 * 2^52: adding it rounds to a whole number.
+pub(crate) const SHIFT: f64 = 6_755_399_441_055_744.0;
+
 /// Eight f64 values treated alike.
 pub trait Lanes:
     Copy
@@ -146,7 +149,13 @@ impl Lanes for Portable {
     }
     #[inline(always)]
     fn power_of_two(self) -> Self {
-        self.map(|x| f64::from_bits((x.to_bits() << 52).wrapping_add(1023 << 52)))
+        self.map(|x| {
+            debug_assert!(
+                (-1022.0..=1023.0).contains(&(x - SHIFT)),
+                "2^({x} - {SHIFT})"
+            );
+            f64::from_bits((x.to_bits() << 52).wrapping_add(1023 << 52))
+        })
     }
 }
 
@@ -419,6 +428,8 @@ macro_rules! dispatch {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident $(, lanes $n:ident)?) => {
         $(#[$meta])*
         $vis fn $name($($arg: $ty),*) $(-> $ret)? {
+            // Lanes past the last would be those of the next row.
+            $(debug_assert!($n.is_multiple_of($crate::lanes::WIDTH), "{} lanes", $n);)?
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx512f,avx512dq")]

@@ -58,6 +58,10 @@ pub(super) fn pulled(found: &Found, offset: f64) -> (Pull, bool) {
     let Some((below, shares)) = blend(found, offset).filter(|b| b.1[0] < 1.0) else {
         return (plain(), true);
     };
+    debug_assert!(
+        (shares.iter().sum::<f64>() - 1.0).abs() < 1e-6 && below <= 0.0,
+        "{shares:?}"
+    );
     let along = |c: &Closest, share: f64| -> Vec3 { scale(c.arm, share / c.distance2.sqrt()) };
     let mut pull = Pull::plain(d + below - offset, along(&found.first, shares[0]));
     for (k, c) in found.others.iter().enumerate() {

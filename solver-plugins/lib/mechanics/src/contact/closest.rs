@@ -121,6 +121,10 @@ pub(super) fn closest(
         };
         half = g11.min(g22).sqrt();
     }
+    debug_assert!(
+        (0..2).all(|k| (low[k]..=high[k]).contains(&xi[k])),
+        "{xi:?}"
+    );
     let weights = shape(xi);
     let arm = sub(p, combine(weights, &x));
     Closest {

@@ -70,6 +70,7 @@ impl Pace {
     /// most `most`. Small gaps at rest last by the acceleration, large ones by the speed.
     #[inline]
     pub(super) fn steps(&self, gap: f64, now: f64, most: f64) -> u64 {
+        debug_assert!(gap >= 0.0 && now >= 0.0);
         let mut time = gap / self.speed;
         let a = self.acceleration;
         if a.is_finite() {
@@ -190,6 +191,7 @@ pub(super) fn normal_force(
     held: f64,
     work: f64,
 ) -> Normal {
+    debug_assert!(stiffness > 0.0 && damping >= 0.0 && held >= 0.0);
     let spring = (held - stiffness * gap).max(0.0);
     let damper = if spring > 0.0 {
         (-damping * vn).max(-spring)
@@ -264,6 +266,8 @@ pub(super) fn friction_force(
         both
     };
     let damping = -dot(sub(force, slip), vt) * dt;
+    // Sliding loses energy, and so does the damper: the force is what is nearest to both within the limit.
+    debug_assert!(friction >= 0.0 && damping >= -1e-9 * limit * dot(vt, vt).sqrt() * dt);
     Tangential {
         slip,
         force,

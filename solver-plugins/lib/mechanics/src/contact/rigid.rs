@@ -254,7 +254,11 @@ impl RigidContact {
         }
         self.between.resize(self.items.len(), Between::There);
         for (k, between) in self.between.iter_mut().enumerate() {
-            let lies_on = |c: &usize| sheets[*c].items[k].lies_on_its_cell();
+            let lies_on = |c: &usize| {
+                let item = &sheets[*c].items[k];
+                debug_assert_eq!(item.node, self.items[k].node, "of the same nodes");
+                item.lies_on_its_cell()
+            };
             *between = match (self.through.iter().all(lies_on), *between) {
                 (false, _) => Between::Gone,
                 (true, Between::Gone) => Between::Coming,
@@ -323,6 +327,11 @@ impl RigidContact {
             },
         };
         self.cycle += 1;
+        debug_assert!(
+            [0, self.items.len()].contains(&self.wakes.len()),
+            "'{}' has other items than when it looked last",
+            self.name
+        );
         self.wakes.resize(self.items.len(), 0);
         self.spans
             .resize_with(self.items.len().div_ceil(SPAN), Span::default);

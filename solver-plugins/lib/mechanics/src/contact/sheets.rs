@@ -158,6 +158,11 @@ impl SheetContact {
             law,
         };
         self.cycle += 1;
+        debug_assert!(
+            [0, self.items.len()].contains(&self.wakes.len()),
+            "'{}' has other items than when it looked last",
+            self.name
+        );
         self.wakes.resize(self.items.len(), 0);
         self.spans
             .resize_with(self.items.len().div_ceil(SPAN), Span::default);

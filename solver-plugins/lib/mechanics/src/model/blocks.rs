@@ -51,7 +51,9 @@ impl<B> Block<B> {
 
     /// Place of a node of the block.
     pub(super) fn place(&self, node: u32) -> u16 {
-        self.nodes.partition_point(|n| *n < node) as u16
+        let place = self.nodes.partition_point(|n| *n < node);
+        debug_assert!(self.nodes.get(place) == Some(&node) && place <= usize::from(u16::MAX));
+        place as u16
     }
 }
 
