@@ -328,3 +328,24 @@ fn block_on_an_incline_slides_by_coulombs_law_above_it() {
         "{got} against {expected}"
     );
 }
+
+/// Sleep and planes are kept by item: what is taken out later leaves others with what was its own. Seen by `make checked` alone.
+#[cfg(debug_assertions)]
+#[test]
+#[should_panic(expected = "other items than when it looked last")]
+fn a_contact_whose_items_change_after_it_has_looked_is_told() {
+    let floor = Arc::new(Plane { height: 0.0 });
+    let items = (0..2).map(RigidItem::new).collect();
+    let settings = ContactSettings::default();
+    let mut contact = RigidContact::new("floor".into(), floor, 0.0, 0.3, &settings, items);
+    let pace = Pace {
+        dt: 1e-6,
+        speed: 10.0,
+        acceleration: f64::INFINITY,
+        growth: 1.0,
+    };
+    let (x, v) = ([[0.0, 0.0, 1.0]; 2], [[0.0; 3]; 2]);
+    contact.compute(&x, &v, pace);
+    contact.items.remove(0);
+    contact.compute(&x, &v, pace);
+}

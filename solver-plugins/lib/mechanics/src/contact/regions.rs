@@ -3,7 +3,8 @@
 use super::friction::{Constant, Coulomb, Sliding, VaryingFriction};
 use std::sync::Arc;
 
-/// Coulomb coefficient of a pair of surfaces.
+/// Coulomb coefficient of a pair of surfaces. Each kind of contact tells the laws apart by itself, once in a step and outside of its loop over nodes,
+/// whose arguments are its own.
 #[derive(Debug, Clone)]
 pub enum FrictionLaw {
     /// The same everywhere.
