@@ -173,7 +173,7 @@ impl Model {
         self.mixed_cell_field(sheet, index, Some(index))
     }
 
-    /// The same of a sheet with two elements, in one of which ([`Elsewhere`]) the field has another row, or none: then
+    /// The same of a sheet with two elements, in one of which ([`crate::sheet::Elsewhere`]) the field has another row, or none: then
     /// it is 0 there.
     pub fn mixed_cell_field(
         &self,
@@ -195,7 +195,7 @@ impl Model {
     }
 
     /// Row `index` of the patch fields of a sheet, per mesh-local node (0 where there is no patch: at its edge and within
-    /// [`Elsewhere`]).
+    /// [`crate::sheet::Elsewhere`]).
     pub fn patch_field(&self, sheet: usize, index: usize) -> Vec<f64> {
         let (b0, b1) = self.topology.sheets[sheet].patch_range;
         let mut values = vec![0.0; self.topology.sheets[sheet].nodes.len()];
