@@ -1,22 +1,20 @@
 //! YAML -> resolved workflow. Every error has file, line, column, the value, what was expected and the
 //! nearest valid name; all errors of a pass are reported together.
 
-mod blank;
 mod catalog;
 mod check;
 mod diagnostics;
 mod evidence;
 mod expect;
-mod friction;
 mod graph;
 mod hints;
 mod load;
 mod overrides;
 mod parameters;
 mod paths;
-mod process;
 pub mod resolved;
 mod scene;
+mod scene_rules;
 mod study;
 mod wires;
 mod yaml;

@@ -7,6 +7,7 @@ use crate::load::Draft;
 use crate::resolved::{Expectation, ResolvedStep, ResponseFrom, Study, StudyResponse};
 use crate::wires::Wiring;
 use crate::yaml::{Entry, Kind, Node};
+use plyflow_model::text::is_word;
 use plyflow_model::workflow::ResponseOf;
 use plyflow_study::{Expression, ExpressionError, Kind as ValueKind, Names, Value};
 
@@ -40,7 +41,7 @@ pub(super) fn responses(
     let entries = root.get("responses").map_or(&[][..], Node::entries);
     let mut all: Vec<StudyResponse> = Vec::new();
     for entry in entries.iter() {
-        if !crate::scene::is_word(&entry.key) {
+        if !is_word(&entry.key) {
             let message = format!("`{}` cannot name a response", entry.key);
             let d = problems.add(source, &entry.key_span, message);
             d.given(entry.key.clone())

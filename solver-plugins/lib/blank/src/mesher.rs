@@ -1,10 +1,10 @@
 //! From the coarse mesh to elements: every quad becomes four, every triangle three; then the nodes near the edge are moved to
 //! where the elements are best.
 
-use crate::MeshError;
 use crate::coarse::{Coarse, OnEdge, coarse_mesh, grid_spacings, key};
 use crate::edge::{Curve, check_features};
-use crate::quality::Quality;
+use crate::error::MeshError;
+use crate::quality;
 use crate::smooth::{Place, smooth};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::outline::{Millimetres, Point, Region};
@@ -41,7 +41,7 @@ pub fn mesh_region(region: &Region, size: f64) -> Result<QuadMesh, MeshError> {
         0.25 * hx * hy,
     );
     let mesh = ordered(&fine, size);
-    let quality = Quality::new(&mesh, region, size);
+    let quality = quality::of(&mesh, region, size);
     if quality.least_scaled_jacobian <= 0.0 {
         return Err(MeshError::Coarse {
             size: 1e3 * size,

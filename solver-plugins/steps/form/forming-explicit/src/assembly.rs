@@ -21,7 +21,8 @@ use plyflow_mechanics::model::{Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_mechanics::vec3::V;
 use plyflow_model::material::{Material, MaterialEntry};
-use plyflow_model::scene::{Process, Scene, Sheet, SheetKind, first_axis};
+use plyflow_model::rules;
+use plyflow_model::scene::{Scene, Sheet, SheetKind, first_axis};
 use std::sync::Arc;
 
 /// Least distance of the mid-surfaces of two bare films in contact (m). They are 0.08 mm thick; at so small a
@@ -60,32 +61,9 @@ pub struct StackSheet {
 /// The stack of a scene, bottom to top, with offsets.
 ///
 /// # Errors
-/// When it does not fit the process: film, plies, film for double-diaphragm forming, plies alone for a press.
+/// When the scene breaks a rule ([`rules::check`]), or has fibres that the solver cannot compute.
 pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>, String> {
-    let n = scene.sheets.len();
-    let kinds: Vec<SheetKind> = scene.sheets.iter().map(|s| s.kind).collect();
-    let plies =
-        |kinds: &[SheetKind]| !kinds.is_empty() && kinds.iter().all(|k| *k == SheetKind::Ply);
-    let (fits, expected) = match scene.process {
-        Process::DoubleDiaphragm(_) => (
-            n >= 3
-                && plies(&kinds[1..n - 1])
-                && kinds[0] == SheetKind::Diaphragm
-                && kinds[n - 1] == SheetKind::Diaphragm,
-            "one diaphragm, one or more plies, one diaphragm",
-        ),
-        Process::Press(_) => (plies(&kinds), "one or more plies, no diaphragm"),
-    };
-    if !fits {
-        return Err(format!(
-            "the sheets of scene '{}' must be, from the tool upwards, for the process {}: {expected}",
-            scene.name,
-            scene.process.word()
-        ));
-    }
-    if let Some(fault) = plyflow_model::regions::faults(scene).into_iter().next() {
-        return Err(fault.text);
-    }
+    rules::check(scene).map_err(|fault| format!("scene.{fault}"))?;
     let mut stack = scene
         .sheets
         .iter()
@@ -123,12 +101,6 @@ const SQUARE: f64 = 1e-6;
 
 /// Whether the solver can compute a sheet as the scene has it.
 fn check_sheet(sheet: &Sheet) -> Result<(), String> {
-    if ["bed", "die", "holder"].contains(&sheet.name.as_str()) {
-        return Err(format!(
-            "sheet '{}' has the name of a rigid part; give it another name",
-            sheet.name
-        ));
-    }
     if let (SheetKind::Ply, Some(second)) = (sheet.kind, sheet.fibre_2) {
         let degrees = |angle: f64| (1e6 * angle.to_degrees()).round() / 1e6;
         let between = second.si() - sheet.fibre_1.si();

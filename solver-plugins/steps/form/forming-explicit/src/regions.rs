@@ -12,7 +12,7 @@ use plyflow_mechanics::sheet::OtherMaterial;
 use plyflow_mechanics::vec3::V;
 use plyflow_model::artifact::RegionFacts;
 use plyflow_model::outline::Point;
-use plyflow_model::regions::{PlyRegion, Stitches, area, asymmetry, holds};
+use plyflow_model::regions::{PlyRegion, Stitches, area, holds};
 use plyflow_model::scene::Sheet;
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ impl Placed<'_> {
 /// The regions of a sheet.
 ///
 /// # Errors
-/// When one has no shape ([`plyflow_model::regions::faults`] tells more).
+/// When one has no shape ([`plyflow_model::rules::regions`] tells more).
 pub fn of_sheet(sheet: &Sheet) -> Result<Vec<Placed<'_>>, String> {
     let centre = sheet.centre.map(|c| c.si());
     let place = |region: &'_ PlyRegion| region.corners(centre);
@@ -148,8 +148,8 @@ pub fn unstitched(
     }))
 }
 
-/// Whether the regions of a ply lie on what is computed of it as the scene means them: each holds a node (or the middle of an element, where it removes
-/// stitches), and they are their own images in mirror planes.
+/// Whether the regions of a ply lie on what is computed of it as the scene means them: each holds a node, or the middle of an element where it removes
+/// stitches.
 ///
 /// # Errors
 /// A text for the user.
@@ -159,11 +159,6 @@ pub fn check(
     cells: &[[u32; 4]],
     planes: Planes,
 ) -> Result<(), String> {
-    for axis in (0..2).filter(|a| planes.0[*a]) {
-        if let Some(text) = asymmetry(sheet, axis) {
-            return Err(text);
-        }
-    }
     for placed in of_sheet(sheet)? {
         let images = planes.images();
         let seen = |at: V| images.iter().any(|i| placed.holds(reflect(at, *i)));

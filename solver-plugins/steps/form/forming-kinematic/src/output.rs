@@ -4,9 +4,8 @@ use crate::net::{self, Fabric, Generators, Net, Stop};
 use crate::ply::{Draped, Ply, Stops, lay, plies, stops};
 use crate::root::drop_on;
 use crate::surface::SmoothSurface;
-use plyflow_blank::Quality;
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_model::artifact::{FieldError, Forming, RigidBody, Sheet, SheetBody};
+use plyflow_model::artifact::{FieldError, Forming, MeshQuality, RigidBody, Sheet, SheetBody};
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
@@ -37,7 +36,7 @@ fn default_grid() -> f64 {
 struct Done {
     ply: Ply,
     mesh: QuadMesh,
-    quality: Option<Quality>,
+    quality: Option<MeshQuality>,
     draped: Draped,
     start: [f64; 2],
     net_nodes: usize,
@@ -287,7 +286,7 @@ fn number(why: Stop) -> f64 {
 
 fn sheet(d: &Done) -> Sheet {
     let (s, material) = (&d.ply.scene, &d.ply.material);
-    let [first, second] = d.ply.stated();
+    let [first, second] = d.ply.scene.fibres();
     Sheet {
         material: Some(material.name.clone()),
         areal_mass: Some(material.areal_mass.si()),
