@@ -282,6 +282,23 @@ impl Source {
     }
 }
 
+/// A text that names something, where it is written.
+pub struct Mention<'a> {
+    /// The file.
+    pub source: &'a Source,
+    /// Where in it.
+    pub span: &'a Span,
+    /// The text.
+    pub text: &'a str,
+}
+
+impl<'a> Mention<'a> {
+    /// Of a text of a file.
+    pub fn new(source: &'a Source, span: &'a Span, text: &'a str) -> Self {
+        Self { source, span, text }
+    }
+}
+
 /// Collects findings.
 #[derive(Debug, Default)]
 pub struct Problems {

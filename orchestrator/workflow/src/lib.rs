@@ -4,6 +4,7 @@
 mod catalog;
 mod check;
 mod diagnostics;
+mod draft;
 mod evidence;
 mod expect;
 mod graph;
@@ -13,9 +14,11 @@ mod overrides;
 mod parameters;
 mod paths;
 pub mod resolved;
+mod results;
 mod scene;
 mod scene_rules;
 mod study;
+mod text;
 mod wires;
 mod yaml;
 
@@ -26,6 +29,6 @@ pub use graph::{dependencies, graph, to_dot, to_mermaid};
 pub use load::{
     Part, check_part, load, load_with, plugin_search_folders, resolve, resolve_with_points,
 };
-pub use overrides::Override;
+pub use overrides::{Override, OverrideError};
 pub use resolved::ResolvedWorkflow;
 pub use study::PointsOf;

@@ -1,15 +1,15 @@
 //! Scenes: a file or a mapping -> canonical JSON with its materials inside.
 
 use crate::check::{Checker, repeated_keys};
-use crate::diagnostics::{Problems, Source};
+use crate::diagnostics::{Mention, Problems, Source};
 use crate::hints::other_format;
 use crate::parameters::{Place, Resolver, find, named, unreadable};
 use crate::paths;
 use crate::scene_rules;
+use crate::text::written;
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
-use plyflow_files::text::decode;
 use plyflow_model::manifest::{PluginKind, Shape};
 use plyflow_model::{material::Material, scene::Scene, schema};
 use serde_json::{Value, json};
@@ -33,7 +33,8 @@ pub fn read(
     let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => bytes,
         Err(e) => {
-            unreadable(problems, from, span, given, &path, &e);
+            let given = Mention::new(from, span, given);
+            unreadable(problems, &given, &path, &e);
             return None;
         }
     };
@@ -48,7 +49,7 @@ pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Opti
     let text = match written(bytes) {
         Ok(text) => text,
         Err(why) => {
-            problems.add_unreadable(&shown(&path), why);
+            problems.add_unreadable(&shown(&path), why.to_string());
             return None;
         }
     };
@@ -76,18 +77,6 @@ pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Opti
             None
         }
     }
-}
-
-/// The text of a file that people write. Names in it are compared and shown, so that its encoding must be certain: UTF-8, or UTF-16 with its mark.
-pub fn written(bytes: Vec<u8>) -> Result<String, String> {
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return decode(&bytes).map(|text| text.into_owned());
-    }
-    String::from_utf8(bytes).map_err(|e| {
-        let good = &e.as_bytes()[..e.utf8_error().valid_up_to()];
-        let line = good.iter().filter(|b| **b == b'\n').count() + 1;
-        format!("the file is not text in UTF-8, from line {line}: save it as UTF-8")
-    })
 }
 
 /// The path as messages show it: relative when it lies below the current folder.
@@ -336,7 +325,8 @@ fn override_parameters(
     // As the material's file names it: perhaps by a path from there.
     let mut named = resolver.material_plugins.iter().rev();
     let (_, source, plugin) = named.find(|(pointer, ..)| *pointer == at.pointer)?;
-    let found = find(catalog, resolver.problems, source, plugin, &with.span, kind)?;
+    let mention = Mention::new(source, &with.span, plugin);
+    let found = find(catalog, resolver.problems, &mention, kind)?;
     if !matches!(with.kind, Kind::Map(_)) {
         let message = format!("`with` is {}", with.describe());
         let d = resolver.problems.add(at.source, &with.span, message);

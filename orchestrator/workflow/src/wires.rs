@@ -2,7 +2,7 @@
 //! fanned out.
 
 use crate::diagnostics::{Problems, Source};
-use crate::load::Draft;
+use crate::draft::Draft;
 use crate::resolved::{Dimension, ResolvedInput};
 use crate::yaml::{Kind, Node, Span};
 use petgraph::graph::{DiGraph, NodeIndex};

@@ -307,7 +307,11 @@ mod tests {
         for wrong in ["4", "4 gb", "GiB", "-1 GB", "0 B", "4 GiBs", ""] {
             assert!(wrong.parse::<Memory>().is_err(), "{wrong}");
         }
-        assert!("4 gib".parse::<Memory>().unwrap_err().contains("`GiB`"));
+        assert!("4 gib"
+                .parse::<Memory>()
+                .unwrap_err()
+                .to_string()
+                .contains("`GiB`"));
     }
 
     #[test]

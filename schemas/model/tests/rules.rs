@@ -158,7 +158,7 @@ fn whose_fibres_a_law_by_angle_means_is_clear_in_every_contact() {
         ("fabric_diaphragm", json!("lower"), "no fibres"),
         ("tool_diaphragm", Value::Null, "a law without `angle`"),
     ] {
-        let path = format!("friction.{class}.angle");
+        let path = format!("friction.{class}.angle.of");
         assert_refused(with(class, of), Rule::Friction, &[&path, says]);
     }
     let region = press(|s| {
@@ -285,4 +285,27 @@ fn tools_that_cannot_be_built_are_refused_by_their_words() {
         let path = format!("tool.joggle_spar.{key}");
         assert_refused(spar(key, value), Rule::Tool, &[&path, says]);
     }
+}
+
+#[test]
+fn a_class_is_needed_unless_all_its_neighbours_are_pairs() {
+    let with = |pairs: Value| {
+        bag(|s| {
+            s["friction"]["pairs"] = pairs;
+            s["friction"]
+                .as_object_mut()
+                .unwrap()
+                .remove("fabric_fabric");
+        })
+    };
+    let pair = json!([{"between": ["b", "a"], "coefficient": 0.3}]);
+    assert_eq!(refused(with(pair)), Ok(()));
+    assert_refused(
+        with(json!([])),
+        Rule::Friction,
+        &[
+            "friction.fabric_fabric: `fabric_fabric` is missing",
+            "`a` and `b` touch",
+        ],
+    );
 }

@@ -9,7 +9,7 @@ use crate::nearest::nearest;
 use crate::process::Process;
 use crate::rules::known::Known;
 use crate::rules::surfaces::{Class, Contact, contacts, rigid_parts, same_pair};
-use crate::scene::{Sheet, SheetKind};
+use crate::scene::Sheet;
 use crate::units::{Number, si_number};
 
 /// Largest coefficient that is computed with.
@@ -26,23 +26,19 @@ struct At {
 /// All that is wrong with the friction of a scene. `in_order`: whether the sheets make a stack, so that it is known what touches.
 pub fn check(known: &Known<'_>, in_order: bool) -> Vec<Fault> {
     let mut found = Vec::new();
-    if let Some(friction) = known.friction {
-        missing(known, friction, &mut found);
-    }
     for at in laws(known) {
         law(&at, &mut found);
     }
     if let (Some(friction), Some(process), Some(sheets)) =
         (known.friction, known.process, known.whole_stack())
     {
-        let contacts = match in_order {
-            true => contacts(&sheets, process),
-            false => Vec::new(),
-        };
-        pairs(friction, process, &sheets, &contacts, &mut found);
+        let contacts = contacts(&sheets, process);
+        missing(friction, &contacts, &mut found);
+        let known_to_rub = if in_order { &contacts[..] } else { &[] };
+        pairs(friction, process, &sheets, known_to_rub, &mut found);
         // Whose fibres count is asked only where all else is right.
-        if found.is_empty() {
-            fibres(known, friction, &sheets, &contacts, &mut found);
+        if in_order && found.is_empty() {
+            fibres(known, friction, &contacts, &mut found);
         }
     }
     found
@@ -99,32 +95,27 @@ fn laws(known: &Known<'_>) -> Vec<At> {
     all
 }
 
-/// Coefficients of the surfaces that touch in this stack and process.
-fn missing(known: &Known<'_>, friction: &Friction, found: &mut Vec<Fault>) {
-    let films = known
-        .numbered()
-        .any(|(_, s)| s.kind == SheetKind::Diaphragm);
-    let why_films = "the stack has diaphragms";
-    let press = matches!(known.process, Some(Process::Press(_)));
-    let plies = known.plies().count() > 1;
-    for (class, needed, why) in [
-        (Class::ToolDiaphragm, films, why_films),
-        (Class::FabricDiaphragm, films, why_films),
-        (Class::DiaphragmDiaphragm, films, why_films),
-        (Class::FabricFabric, plies, "plies lie on each other"),
-        (Class::ToolFabric, press, "a press touches the plies"),
-    ] {
-        let name = class.word();
-        if needed && of_class(friction, class).is_none() {
-            let path = Path::to("friction").key(name);
+/// Classes that are not told, and of which two surfaces that touch are no pair with a law of their own.
+fn missing(friction: &Friction, contacts: &[Contact<'_>], found: &mut Vec<Fault>) {
+    for class in Class::ALL {
+        let named = |c: &&Contact<'_>| friction.pairs.iter().any(|p| c.is_of(p.names()));
+        let mut of_it = contacts.iter().filter(|c| c.next && c.class == class);
+        if of_class(friction, class).is_some() {
+            continue;
+        }
+        if let Some(Contact {
+            parts: [lower, upper],
+            ..
+        }) = of_it.find(|c| !named(c))
+        {
+            let name = class.word();
+            let text = format!("`{name}` is missing in `friction`");
             found.push(
-                Fault::text(
-                    Rule::Friction,
-                    path,
-                    format!("`{name}` is missing in `friction`"),
-                )
-                .expected(format!("`{name}: ..`"))
-                .help(format!("it is needed because {why}")),
+                Fault::text(Rule::Friction, Path::to("friction").key(name), text)
+                    .expected(format!("`{name}: ..`"))
+                    .help(format!(
+                        "it is needed because `{lower}` and `{upper}` touch"
+                    )),
             );
         }
     }
@@ -328,16 +319,13 @@ fn pairs(
 fn fibres(
     known: &Known<'_>,
     friction: &Friction,
-    sheets: &[&Sheet],
     contacts: &[Contact<'_>],
     found: &mut Vec<Fault>,
 ) {
-    let is_ply = |name: &str| {
-        let of = |s: &&&Sheet| s.name == name && s.kind == SheetKind::Ply;
-        sheets.iter().find(of).is_some()
-    };
+    let is_ply = |name: &str| known.plies().any(|(_, ply)| ply.name == name);
     let at = Path::to("friction");
     let mut wrong = |path: Path, law: &AngleLaw, [lower, upper]: [&str; 2]| {
+        let path = path.key("of");
         let text = match (law.of, is_ply(lower), is_ply(upper)) {
             (Some(Place::Lower), true, _) | (Some(Place::Upper), _, true) => return,
             (None, true, false) | (None, false, true) => return,
@@ -365,6 +353,7 @@ fn fibres(
     let folds = (known.plies()).map(|(_, ply)| Contact {
         parts: [&ply.name, &ply.name],
         class: Class::FabricFabric,
+        next: true,
     });
     let all = contacts.iter().copied().chain(folds);
     for contact in all {

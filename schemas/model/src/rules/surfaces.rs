@@ -56,6 +56,9 @@ pub struct Contact<'a> {
     pub parts: [&'a str; 2],
     /// What they are.
     pub class: Class,
+    /// Whether nothing lies between them. Further apart they touch past the edges of what does, and rub as one of the pairs between where nothing
+    /// else is said.
+    pub next: bool,
 }
 
 impl Contact<'_> {
@@ -79,39 +82,41 @@ pub fn rigid_parts(process: &Process) -> &'static [&'static str] {
     }
 }
 
-/// All contacts of a stack that is in order, from the tool upwards.
+/// All contacts of a stack, from the tool upwards.
 pub fn contacts<'a>(sheets: &[&'a Sheet], process: &Process) -> Vec<Contact<'a>> {
-    let Some(first) = sheets.first() else {
-        return Vec::new();
-    };
-    let contact = |lower: &'a str, upper: &'a str, class| Contact {
-        parts: [lower, upper],
-        class,
-    };
+    let last = sheets.len().saturating_sub(1);
+    let bag = matches!(process, Process::DoubleDiaphragm(_));
     let mut found = Vec::new();
-    match process {
-        Process::DoubleDiaphragm(_) => {
-            for part in rigid_parts(process) {
-                found.push(contact(part, &first.name, Class::ToolDiaphragm));
-            }
-        }
-        // Past the edges of the others any ply may touch any part.
-        Process::Press(_) => {
-            for part in rigid_parts(process) {
-                for ply in sheets {
-                    found.push(match *part {
-                        // The plate over the plies.
-                        "die" => contact(&ply.name, part, Class::ToolFabric),
-                        _ => contact(part, &ply.name, Class::ToolFabric),
-                    });
-                }
-            }
+    for part in rigid_parts(process) {
+        // In a press any ply may touch any part, past the edges of the others.
+        for (k, sheet) in sheets
+            .iter()
+            .enumerate()
+            .take(if bag { 1 } else { last + 1 })
+        {
+            let name = sheet.name.as_str();
+            // The die is the plate over the plies.
+            let over = *part == "die";
+            found.push(Contact {
+                parts: if over { [name, part] } else { [part, name] },
+                class: if bag {
+                    Class::ToolDiaphragm
+                } else {
+                    Class::ToolFabric
+                },
+                next: k == if over { last } else { 0 },
+            });
         }
     }
     for (k, lower) in sheets.iter().enumerate() {
-        // Past the edges of what lies between them any two sheets may touch: plies slide on each other.
-        for upper in &sheets[k + 1..] {
-            found.push(contact(&lower.name, &upper.name, Class::of(lower, upper)));
+        // Plies slide, so that any two sheets may touch; beyond the plies the two films do.
+        for (j, upper) in sheets.iter().enumerate().skip(k + 1) {
+            let class = Class::of(lower, upper);
+            found.push(Contact {
+                parts: [&lower.name, &upper.name],
+                class,
+                next: j == k + 1 || class == Class::DiaphragmDiaphragm,
+            });
         }
     }
     found

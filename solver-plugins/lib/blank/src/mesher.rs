@@ -5,7 +5,7 @@ use crate::coarse::{Coarse, OnEdge, coarse_mesh, grid_spacings, key};
 use crate::edge::{Curve, check_features};
 use crate::error::MeshError;
 use crate::quality;
-use crate::smooth::{Place, smooth};
+use crate::smooth::{Moving, Place};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::outline::{Millimetres, Point, Region};
 use std::collections::BTreeMap;
@@ -33,13 +33,14 @@ pub fn mesh_region(region: &Region, size: f64) -> Result<QuadMesh, MeshError> {
     let mut fine = split(&coarse, &curves);
     hold_grid(&mut fine);
     let [hx, hy] = grid_spacings(region, 2.0 * size);
-    smooth(
-        &mut fine.points,
-        &mut fine.places,
-        &fine.cells,
-        &curves,
-        0.25 * hx * hy,
-    );
+    Moving {
+        points: &mut fine.points,
+        places: &mut fine.places,
+        cells: &fine.cells,
+        curves: &curves,
+        area: 0.25 * hx * hy,
+    }
+    .smooth();
     let mesh = ordered(&fine, size);
     let quality = quality::of(&mesh, region, size);
     if quality.least_scaled_jacobian <= 0.0 {
