@@ -1,55 +1,10 @@
 //! Blanks cut at mirror planes.
 
-use crate::{Blank, MeshError};
-use plyflow_mechanics::mirror::Planes;
-use plyflow_model::outline::{Millimetres, Point, Region, sides};
-
-/// How far (m) an edge may lie from its mirror image: what decimals of a scene leave.
-const APART: f64 = 1e-7;
-
-/// The part of a blank with x >= 0 (y >= 0) beside the planes.
-pub(crate) fn part(blank: &Blank, planes: Planes) -> Result<Blank, MeshError> {
-    let mut blank = blank.clone();
-    for k in (0..2).filter(|k| planes.0[*k]) {
-        check(&blank, k)?;
-        blank = match blank {
-            Blank::Rectangle(mut b) => {
-                b[k] = 0.0;
-                Blank::Rectangle(b)
-            }
-            Blank::Region(region) => Blank::Region(positive(&region, k)),
-        };
-    }
-    Ok(blank)
-}
-
-/// Whether the blank is its own mirror image in plane `k`.
-fn check(blank: &Blank, k: usize) -> Result<(), MeshError> {
-    let apart = |p: &Point| -> (f64, Point) {
-        let mut image = *p;
-        image[k] = -image[k];
-        let distance = match blank {
-            Blank::Rectangle(b) => (b[k] + b[k + 2]).abs(),
-            Blank::Region(region) => region.distance_to_edge(image),
-        };
-        (distance, *p)
-    };
-    let corners = blank.outline();
-    let all = corners.iter().chain(blank.holes().iter().flatten());
-    let worst = all.map(apart).max_by(|a, b| a.0.total_cmp(&b.0));
-    match worst {
-        Some((distance, at)) if distance > APART => Err(MeshError::Asymmetric {
-            plane: ['x', 'y'][k],
-            at: Millimetres(at),
-            apart: 1e3 * distance,
-        }),
-        _ => Ok(()),
-    }
-}
+use plyflow_model::outline::{APART, Point, Region, sides};
 
 /// The part of a region on the positive side of plane `k`. Contours that the plane cuts become chains from the plane to
 /// the plane; sides along it join them, and they are the only ones on it.
-fn positive(region: &Region, k: usize) -> Region {
+pub(crate) fn positive(region: &Region, k: usize) -> Region {
     let mut chains: Vec<Vec<Point>> = Vec::new();
     let mut closed: Vec<Vec<Point>> = Vec::new();
     for contour in region.contours() {
@@ -143,6 +98,8 @@ fn join(mut chains: Vec<Vec<Point>>, k: usize) -> Vec<Vec<Point>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blank::Blank;
+    use plyflow_mechanics::mirror::Planes;
     use plyflow_model::outline::signed_area;
     use std::f64::consts::TAU;
 

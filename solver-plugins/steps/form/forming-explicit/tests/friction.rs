@@ -125,19 +125,23 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
     for (friction, words) in [
         (
             with(vec![pair(["inner", "oter"])]),
-            vec!["pairs[0].between", "'oter'", "did you mean 'outer'?"],
+            vec!["pairs[0].between", "`oter`", "did you mean `outer`?"],
         ),
         (
             with(vec![pair(["bed", "inner"])]),
-            vec!["'bed'", "tool, inner, outer, die, holder"],
+            vec!["`bed`", "`tool`, `die`, `holder`, `inner`, `outer`"],
         ),
         (
             with(vec![pair(["tool", "holder"])]),
-            vec!["do not rub", "tool and inner; outer and die"],
+            vec!["do not rub", "`[tool, inner]`", "`[outer, die]`"],
         ),
         (
             with(vec![pair(["inner", "outer"]), pair(["outer", "inner"])]),
-            vec!["pairs[1].between", "already the pair of friction.pairs[0]"],
+            vec![
+                "pairs[1].between",
+                "named twice",
+                "at friction.pairs[0].between",
+            ],
         ),
         (
             tool(json!(-0.1)),
@@ -145,7 +149,7 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
         ),
         (
             tool(json!({})),
-            vec!["friction.tool_fabric.coefficient", "not given"],
+            vec!["friction.tool_fabric.coefficient", "has no `coefficient`"],
         ),
         (
             tool(
@@ -155,7 +159,7 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
         ),
         (
             tool(json!({"pressure": {"table": table(&[("1 kPa", 0.2), ("1 kPa", 0.3)])}})),
-            vec!["tool_fabric.pressure.table[1]", "growing pressures"],
+            vec!["tool_fabric.pressure.table[1]", "more than the 1000 Pa"],
         ),
         (
             tool(
@@ -181,7 +185,7 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
         ),
         (
             json!({"tool_fabric": 0.2}),
-            vec!["friction.fabric_fabric", "inner and outer touch"],
+            vec!["friction.fabric_fabric", "`inner` and `outer` touch"],
         ),
     ] {
         let p = parameters(&friction);

@@ -1,0 +1,395 @@
+//! Rules of friction: what must be given, laws that make sense, and pairs of surfaces that touch.
+
+use crate::fault::{Fault, Path, Phrase, Rule, Shown, degrees};
+use crate::friction::{
+    AngleLaw, Coefficient, Friction, FrictionLaw, FrictionPair, Place, PressureLaw,
+};
+use crate::manifest::one_of;
+use crate::nearest::nearest;
+use crate::process::Process;
+use crate::rules::known::Known;
+use crate::rules::surfaces::{Class, Contact, contacts, rigid_parts, same_pair};
+use crate::scene::Sheet;
+use crate::units::{Number, si_number};
+
+/// Largest coefficient that is computed with.
+pub const LARGEST: f64 = 2.0;
+
+/// A law with its place in a scene.
+struct At {
+    path: Path,
+    /// Of its coefficient: the same where that is all.
+    own: Path,
+    law: FrictionLaw,
+}
+
+/// All that is wrong with the friction of a scene. `in_order`: whether the sheets make a stack, so that it is known what touches.
+pub fn check(known: &Known<'_>, in_order: bool) -> Vec<Fault> {
+    let mut found = Vec::new();
+    for at in laws(known) {
+        law(&at, &mut found);
+    }
+    if let (Some(friction), Some(process), Some(sheets)) =
+        (known.friction, known.process, known.whole_stack())
+    {
+        let contacts = contacts(&sheets, process);
+        missing(friction, &contacts, &mut found);
+        let known_to_rub = if in_order { &contacts[..] } else { &[] };
+        pairs(friction, process, &sheets, known_to_rub, &mut found);
+        // Whose fibres count is asked only where all else is right.
+        if in_order && found.is_empty() {
+            fibres(known, friction, &contacts, &mut found);
+        }
+    }
+    found
+}
+
+/// What a scene's friction says of a class.
+pub fn of_class(friction: &Friction, class: Class) -> Option<&Coefficient> {
+    match class {
+        Class::ToolDiaphragm => &friction.tool_diaphragm,
+        Class::ToolFabric => &friction.tool_fabric,
+        Class::FabricDiaphragm => &friction.fabric_diaphragm,
+        Class::FabricFabric => &friction.fabric_fabric,
+        Class::DiaphragmDiaphragm => &friction.diaphragm_diaphragm,
+    }
+    .as_ref()
+}
+
+/// All laws and coefficients of a scene; a coefficient as a law that has nothing else.
+fn laws(known: &Known<'_>) -> Vec<At> {
+    let mut all = Vec::new();
+    let mut add = |path: Path, given: &Coefficient| {
+        let (own, law) = match given {
+            Coefficient::Law(law) => (path.key("coefficient"), (**law).clone()),
+            Coefficient::Constant(c) => {
+                let law = FrictionLaw {
+                    coefficient: Some(*c),
+                    ..FrictionLaw::default()
+                };
+                (path.clone(), law)
+            }
+        };
+        all.push(At { path, own, law });
+    };
+    for (s, sheet) in known.plies() {
+        for (r, region) in sheet.regions.iter().enumerate() {
+            let path = Path::to("sheets").item(s).key("regions").item(r);
+            for (key, given) in &region.friction {
+                add(path.key("friction").key(key), given);
+            }
+        }
+    }
+    let at = Path::to("friction");
+    if let Some(friction) = known.friction {
+        for class in Class::ALL {
+            if let Some(given) = of_class(friction, class) {
+                add(at.key(class.word()), given);
+            }
+        }
+        for (k, pair) in friction.pairs.iter().enumerate() {
+            let path = at.key("pairs").item(k);
+            add(path, &Coefficient::Law(Box::new(pair.law())));
+        }
+    }
+    all
+}
+
+/// Classes that are not told, and of which two surfaces that touch are no pair with a law of their own.
+fn missing(friction: &Friction, contacts: &[Contact<'_>], found: &mut Vec<Fault>) {
+    for class in Class::ALL {
+        let named = |c: &&Contact<'_>| friction.pairs.iter().any(|p| c.is_of(p.names()));
+        let mut of_it = contacts.iter().filter(|c| c.next && c.class == class);
+        if of_class(friction, class).is_some() {
+            continue;
+        }
+        if let Some(Contact {
+            parts: [lower, upper],
+            ..
+        }) = of_it.find(|c| !named(c))
+        {
+            let name = class.word();
+            let text = format!("`{name}` is missing in `friction`");
+            found.push(
+                Fault::text(Rule::Friction, Path::to("friction").key(name), text)
+                    .expected(format!("`{name}: ..`"))
+                    .help(format!(
+                        "it is needed because `{lower}` and `{upper}` touch"
+                    )),
+            );
+        }
+    }
+}
+
+fn number(path: Path, value: f64) -> Fault {
+    Fault::given(Rule::Friction, path, si_number(value))
+}
+
+/// Whether a coefficient is one.
+fn coefficient(path: Path, Number(value): Number) -> Option<Fault> {
+    let expected = format!("a coefficient from 0 to {LARGEST}");
+    (!(0.0..=LARGEST).contains(&value)).then(|| number(path, value).expected(expected))
+}
+
+/// "no row", "one row": what a table with too few of them has.
+pub fn row_count(rows: usize) -> &'static str {
+    if rows == 0 { "no row" } else { "one row" }
+}
+
+/// Two or more rows in which `key` grows: values in SI with their texts.
+fn rows(table: &Path, key: &str, rows: &[(f64, String)], found: &mut Vec<Fault>) {
+    if rows.len() < 2 {
+        let text = format!("the table has {}", row_count(rows.len()));
+        let fault = Fault::text(Rule::Friction, table.clone(), text);
+        found.push(fault.expected(format!("two or more rows with growing `{key}`")));
+        return;
+    }
+    let at = |k: usize| table.item(k).key(key);
+    if let Some(k) = (0..rows.len()).find(|k| !(rows[*k].0 >= 0.0 && rows[*k].0.is_finite())) {
+        let fault = Fault::given(Rule::Friction, at(k), rows[k].1.clone());
+        found.push(fault.expected("0 or more"));
+    } else if let Some(k) = (1..rows.len()).find(|k| rows[*k].0 <= rows[k - 1].0) {
+        let before = (at(k - 1), rows[k - 1].1.clone());
+        let fault = Fault::given(Rule::Friction, at(k), rows[k].1.clone());
+        found.push(fault.expected(Phrase::with_value(
+            "more than the ",
+            before,
+            " of the row before",
+        )));
+    }
+}
+
+/// A law by pressure and direction: one coefficient or a table of them, tables in order.
+fn law(At { path, own, law }: &At, found: &mut Vec<Fault>) {
+    let mut largest = law.coefficient.map_or(0.0, |c| c.0);
+    match (&law.pressure, law.coefficient) {
+        (Some(PressureLaw::Table(_)), Some(_)) => found.push(
+            Fault::text(
+                Rule::Friction,
+                own.clone(),
+                "`coefficient` stands beside a table by pressure, which says it all",
+            )
+            .shown(Shown::Key)
+            .help("remove one of the two"),
+        ),
+        (Some(PressureLaw::Table(table)), None) => {
+            let at = path.key("pressure").key("table");
+            let pressures = table
+                .iter()
+                .map(|r| (r.pressure.si(), r.pressure.to_string()));
+            rows(&at, "pressure", &pressures.collect::<Vec<_>>(), found);
+            for (k, row) in table.iter().enumerate() {
+                found.extend(coefficient(at.item(k).key("coefficient"), row.coefficient));
+                largest = largest.max(row.coefficient.0);
+            }
+        }
+        (_, None) => found.push(
+            Fault::text(
+                Rule::Friction,
+                own.clone(),
+                "the law of friction has no `coefficient`",
+            )
+            .expected("`coefficient: ..`, a number from 0 to 2")
+            .help("only a table by pressure says it in another place"),
+        ),
+        (_, Some(c)) => found.extend(coefficient(own.clone(), c)),
+    }
+    if let Some(PressureLaw::Power(power)) = &law.pressure {
+        let at = path.key("pressure").key("power");
+        if !(power.reference.si() > 0.0 && power.reference.si().is_finite()) {
+            let fault = Fault::given(
+                Rule::Friction,
+                at.key("reference"),
+                power.reference.to_string(),
+            );
+            found.push(fault.expected("more than 0 Pa"));
+        }
+        let exponent = power.exponent.0;
+        if !(exponent > -1.0 && exponent <= 1.0) {
+            found.push(
+                number(at.key("exponent"), exponent).expected(
+                    "more than -1, as friction would not grow with pressure, and at most 1",
+                ),
+            );
+        }
+    }
+    if let Some(law) = &law.angle {
+        angle(&path.key("angle"), law, largest, found);
+    }
+}
+
+/// Factors by angle; `largest`: the coefficient that they are of.
+fn angle(path: &Path, law: &AngleLaw, largest: f64, found: &mut Vec<Fault>) {
+    let at = path.key("factors");
+    let angles = law
+        .factors
+        .iter()
+        .map(|r| (r.angle.si(), degrees(r.angle.si())));
+    rows(&at, "angle", &angles.collect::<Vec<_>>(), found);
+    for (k, row) in law.factors.iter().enumerate() {
+        if row.angle.si() > std::f64::consts::FRAC_PI_2 + 1e-9 {
+            let fault = Fault::given(
+                Rule::Friction,
+                at.item(k).key("angle"),
+                degrees(row.angle.si()),
+            );
+            found.push(fault.expected("an angle from 0 to 90 deg: a fibre has no sense"));
+        }
+        let factor = row.factor.0;
+        if !(factor >= 0.0 && factor * largest <= LARGEST) {
+            let expected = match factor >= 0.0 {
+                true => format!(
+                    "a coefficient of at most {LARGEST} in all (here {})",
+                    factor * largest
+                ),
+                false => "0 or more".into(),
+            };
+            found.push(number(at.item(k).key("factor"), factor).expected(expected));
+        }
+    }
+    if !(1..=2).contains(&law.family) {
+        found.push(number(path.key("family"), f64::from(law.family)).expected("1 or 2"));
+    }
+}
+
+/// Pairs that name what the scene does not have, what does not touch (where that is known), or the same twice.
+fn pairs(
+    friction: &Friction,
+    process: &Process,
+    sheets: &[&Sheet],
+    contacts: &[Contact<'_>],
+    found: &mut Vec<Fault>,
+) {
+    let sheets = sheets.iter().map(|s| s.name.as_str());
+    let names: Vec<&str> = rigid_parts(process).iter().copied().chain(sheets).collect();
+    let at = Path::to("friction").key("pairs");
+    for (k, pair) in friction.pairs.iter().enumerate() {
+        let path = at.item(k).key("between");
+        let between = pair.names();
+        let unknown = (0..2).filter(|i| !names.contains(&between[*i]));
+        let unknown: Vec<Fault> = unknown
+            .map(|i| {
+                let name = between[i];
+                let text = format!("no surface of this scene is called `{name}`");
+                let mut fault = Fault::text(Rule::Pairs, path.item(i), text);
+                if names.len() <= 12 {
+                    fault = fault.expected(one_of(names.iter().copied()));
+                }
+                match nearest(name, names.iter().copied()) {
+                    Some(nearest) => fault.help(format!("did you mean `{nearest}`?")),
+                    None => fault,
+                }
+            })
+            .collect();
+        if !unknown.is_empty() {
+            found.extend(unknown);
+            continue;
+        }
+        let [one, other] = between;
+        let mut before = friction.pairs[..k].iter();
+        let same = |p: &FrictionPair| same_pair(p.names(), between);
+        if let Some(j) = before.position(same) {
+            let text = format!("the pair of `{one}` and `{other}` is named twice");
+            let first = at.item(j).key("between");
+            found.push(
+                Fault::text(Rule::Pairs, path, text).help(Phrase::with_place(
+                    "it stands ",
+                    first,
+                    " already; remove one",
+                )),
+            );
+        } else if !contacts.is_empty() && !contacts.iter().any(|c| c.is_of(between)) {
+            let text = format!("`{one}` and `{other}` do not rub on each other in this scene");
+            let mut fault = Fault::text(Rule::Pairs, path, text).help(
+                "any two sheets rub, a bag's lowest film on what is rigid, and every ply of a press on its parts",
+            );
+            if contacts.len() <= 12 {
+                let all = contacts
+                    .iter()
+                    .map(|c| format!("[{}, {}]", c.parts[0], c.parts[1]));
+                let all: Vec<String> = all.collect();
+                fault = fault.expected(one_of(all.iter().map(String::as_str)));
+            }
+            found.push(fault);
+        }
+    }
+}
+
+/// Laws by the angle to fibres: in every contact that has one it must be clear whose fibres count.
+fn fibres(
+    known: &Known<'_>,
+    friction: &Friction,
+    contacts: &[Contact<'_>],
+    found: &mut Vec<Fault>,
+) {
+    let is_ply = |name: &str| known.plies().any(|(_, ply)| ply.name == name);
+    let at = Path::to("friction");
+    let mut wrong = |path: Path, law: &AngleLaw, [lower, upper]: [&str; 2]| {
+        let path = path.key("of");
+        let text = match (law.of, is_ply(lower), is_ply(upper)) {
+            (Some(Place::Lower), true, _) | (Some(Place::Upper), _, true) => return,
+            (None, true, false) | (None, false, true) => return,
+            (None, true, true) => format!("`{lower}` and `{upper}` both have fibres"),
+            _ => format!(
+                "the surface meant of `{lower}` (lower) and `{upper}` (upper) has no fibres"
+            ),
+        };
+        // The first contact of a law tells enough.
+        if found.iter().any(|f: &Fault| f.path == path) {
+            return;
+        }
+        let expected = match (is_ply(lower), is_ply(upper)) {
+            (true, true) => "`of: lower` or `of: upper`",
+            (true, false) | (false, true) => "no `of`, or that of the ply",
+            (false, false) => "a law without `angle`",
+        };
+        found.push(Fault::text(Rule::Friction, path, text).expected(expected));
+    };
+    let by_angle = |given: &Coefficient| match given {
+        Coefficient::Law(law) => law.angle.clone(),
+        Coefficient::Constant(_) => None,
+    };
+    // A ply that folds touches itself.
+    let folds = (known.plies()).map(|(_, ply)| Contact {
+        parts: [&ply.name, &ply.name],
+        class: Class::FabricFabric,
+        next: true,
+    });
+    let all = contacts.iter().copied().chain(folds);
+    for contact in all {
+        let mut own = friction.pairs.iter();
+        let own = own.position(|p| contact.is_of(p.names()));
+        match own {
+            Some(k) => {
+                if let Some(law) = &friction.pairs[k].angle {
+                    wrong(at.key("pairs").item(k).key("angle"), law, contact.parts);
+                }
+            }
+            None => {
+                let word = contact.class.word();
+                if let Some(law) = of_class(friction, contact.class).and_then(by_angle) {
+                    wrong(at.key(word).key("angle"), &law, contact.parts);
+                }
+            }
+        }
+        for (s, sheet) in known.plies() {
+            let Some(partner) = (0..2).find(|k| contact.parts[*k] == sheet.name) else {
+                continue;
+            };
+            let partner = contact.parts[1 - partner];
+            for (r, region) in sheet.regions.iter().enumerate() {
+                let word = contact.class.word();
+                let key = [partner, word, crate::regions::ALL]
+                    .into_iter()
+                    .find(|key| region.friction.contains_key(*key));
+                if let Some((key, law)) =
+                    key.and_then(|key| Some((key, by_angle(&region.friction[key])?)))
+                {
+                    let path = Path::to("sheets").item(s).key("regions").item(r);
+                    let path = path.key("friction").key(key).key("angle");
+                    wrong(path, &law, contact.parts);
+                }
+            }
+        }
+    }
+}
