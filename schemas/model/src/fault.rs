@@ -235,6 +235,13 @@ impl Fault {
         self
     }
 
+    /// The same at another place.
+    #[must_use]
+    pub fn at(mut self, path: Path) -> Self {
+        self.path = path;
+        self
+    }
+
     /// Is to be shown there.
     #[must_use]
     pub fn shown(mut self, shown: Shown) -> Self {

@@ -33,7 +33,7 @@ pub fn check(known: &Known<'_>, in_order: bool) -> Vec<Fault> {
         (known.friction, known.process, known.whole_stack())
     {
         let contacts = contacts(&sheets, process);
-        missing(friction, &contacts, &mut found);
+        classes(friction, &contacts, &mut found);
         let known_to_rub = if in_order { &contacts[..] } else { &[] };
         pairs(friction, process, &sheets, known_to_rub, &mut found);
         // Whose fibres count is asked only where all else is right.
@@ -95,28 +95,24 @@ fn laws(known: &Known<'_>) -> Vec<At> {
     all
 }
 
+/// Of a class that is not told, of which these two touch.
+pub fn missing(class: Class, [lower, upper]: [&str; 2]) -> Fault {
+    let name = class.word();
+    let text = format!("`{name}` is missing in `friction`");
+    Fault::text(Rule::Friction, Path::to("friction").key(name), text)
+        .expected(format!("`{name}: ..`"))
+        .help(format!(
+            "it is needed because `{lower}` and `{upper}` touch"
+        ))
+}
+
 /// Classes that are not told, and of which two surfaces that touch are no pair with a law of their own.
-fn missing(friction: &Friction, contacts: &[Contact<'_>], found: &mut Vec<Fault>) {
+fn classes(friction: &Friction, contacts: &[Contact<'_>], found: &mut Vec<Fault>) {
     for class in Class::ALL {
         let named = |c: &&Contact<'_>| friction.pairs.iter().any(|p| c.is_of(p.names()));
         let mut of_it = contacts.iter().filter(|c| c.next && c.class == class);
-        if of_class(friction, class).is_some() {
-            continue;
-        }
-        if let Some(Contact {
-            parts: [lower, upper],
-            ..
-        }) = of_it.find(|c| !named(c))
-        {
-            let name = class.word();
-            let text = format!("`{name}` is missing in `friction`");
-            found.push(
-                Fault::text(Rule::Friction, Path::to("friction").key(name), text)
-                    .expected(format!("`{name}: ..`"))
-                    .help(format!(
-                        "it is needed because `{lower}` and `{upper}` touch"
-                    )),
-            );
+        if of_class(friction, class).is_none() {
+            found.extend(of_it.find(|c| !named(c)).map(|c| missing(class, c.parts)));
         }
     }
 }
@@ -315,6 +311,32 @@ fn pairs(
     }
 }
 
+/// The ply whose fibres a law by angle means in a contact of two surfaces, the lower one first; `plies`: the plies among them.
+///
+/// # Errors
+/// When it is not clear which, or it has none.
+pub fn whose<T>(law: &AngleLaw, parts: [&str; 2], plies: [Option<T>; 2]) -> Result<T, Fault> {
+    let [lower, upper] = parts;
+    let (text, expected) = match (law.of, plies) {
+        (Some(Place::Lower), [Some(ply), _]) | (Some(Place::Upper), [_, Some(ply)]) => {
+            return Ok(ply);
+        }
+        (None, [Some(ply), None] | [None, Some(ply)]) => return Ok(ply),
+        (None, [Some(_), Some(_)]) => (
+            format!("`{lower}` and `{upper}` both have fibres"),
+            "`of: lower` or `of: upper`",
+        ),
+        (_, plies) => (
+            format!("the surface meant of `{lower}` (lower) and `{upper}` (upper) has no fibres"),
+            match plies {
+                [None, None] => "a law without `angle`",
+                _ => "no `of`, or that of the ply",
+            },
+        ),
+    };
+    Err(Fault::text(Rule::Friction, Path::to("friction"), text).expected(expected))
+}
+
 /// Laws by the angle to fibres: in every contact that has one it must be clear whose fibres count.
 fn fibres(
     known: &Known<'_>,
@@ -322,35 +344,21 @@ fn fibres(
     contacts: &[Contact<'_>],
     found: &mut Vec<Fault>,
 ) {
-    let is_ply = |name: &str| known.plies().any(|(_, ply)| ply.name == name);
     let at = Path::to("friction");
-    let mut wrong = |path: Path, law: &AngleLaw, [lower, upper]: [&str; 2]| {
-        let path = path.key("of");
-        let text = match (law.of, is_ply(lower), is_ply(upper)) {
-            (Some(Place::Lower), true, _) | (Some(Place::Upper), _, true) => return,
-            (None, true, false) | (None, false, true) => return,
-            (None, true, true) => format!("`{lower}` and `{upper}` both have fibres"),
-            _ => format!(
-                "the surface meant of `{lower}` (lower) and `{upper}` (upper) has no fibres"
-            ),
-        };
+    let mut look = |path: Path, law: &AngleLaw, parts: [&str; 2]| {
+        let ply = |name: &str| known.plies().find(|(_, ply)| ply.name == name);
+        let fault = whose(law, parts, parts.map(ply)).err();
+        let fault = fault.map(|f| f.at(path.key("of")));
         // The first contact of a law tells enough.
-        if found.iter().any(|f: &Fault| f.path == path) {
-            return;
-        }
-        let expected = match (is_ply(lower), is_ply(upper)) {
-            (true, true) => "`of: lower` or `of: upper`",
-            (true, false) | (false, true) => "no `of`, or that of the ply",
-            (false, false) => "a law without `angle`",
-        };
-        found.push(Fault::text(Rule::Friction, path, text).expected(expected));
+        found.extend(fault.filter(|f| found.iter().all(|other| other.path != f.path)));
     };
     let by_angle = |given: &Coefficient| match given {
         Coefficient::Law(law) => law.angle.clone(),
         Coefficient::Constant(_) => None,
     };
-    // A ply that folds touches itself.
-    let folds = (known.plies()).map(|(_, ply)| Contact {
+    // A ply that folds rubs on itself as plies do on each other.
+    let folding = known.plies().filter(|_| friction.fabric_fabric.is_some());
+    let folds = folding.map(|(_, ply)| Contact {
         parts: [&ply.name, &ply.name],
         class: Class::FabricFabric,
         next: true,
@@ -362,13 +370,13 @@ fn fibres(
         match own {
             Some(k) => {
                 if let Some(law) = &friction.pairs[k].angle {
-                    wrong(at.key("pairs").item(k).key("angle"), law, contact.parts);
+                    look(at.key("pairs").item(k).key("angle"), law, contact.parts);
                 }
             }
             None => {
                 let word = contact.class.word();
                 if let Some(law) = of_class(friction, contact.class).and_then(by_angle) {
-                    wrong(at.key(word).key("angle"), &law, contact.parts);
+                    look(at.key(word).key("angle"), &law, contact.parts);
                 }
             }
         }
@@ -387,7 +395,7 @@ fn fibres(
                 {
                     let path = Path::to("sheets").item(s).key("regions").item(r);
                     let path = path.key("friction").key(key).key("angle");
-                    wrong(path, &law, contact.parts);
+                    look(path, &law, contact.parts);
                 }
             }
         }

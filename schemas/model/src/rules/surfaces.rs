@@ -28,11 +28,13 @@ impl Class {
         Self::DiaphragmDiaphragm,
     ];
 
-    /// Of two sheets.
-    pub fn of(a: &Sheet, b: &Sheet) -> Self {
-        match (a.kind, b.kind) {
-            (SheetKind::Ply, SheetKind::Ply) => Self::FabricFabric,
-            (SheetKind::Diaphragm, SheetKind::Diaphragm) => Self::DiaphragmDiaphragm,
+    /// Of two sheets, or of one and what is rigid.
+    pub fn of(a: SheetKind, b: Option<SheetKind>) -> Self {
+        match (a, b) {
+            (SheetKind::Ply, None) => Self::ToolFabric,
+            (SheetKind::Diaphragm, None) => Self::ToolDiaphragm,
+            (SheetKind::Ply, Some(SheetKind::Ply)) => Self::FabricFabric,
+            (SheetKind::Diaphragm, Some(SheetKind::Diaphragm)) => Self::DiaphragmDiaphragm,
             _ => Self::FabricDiaphragm,
         }
     }
@@ -111,7 +113,7 @@ pub fn contacts<'a>(sheets: &[&'a Sheet], process: &Process) -> Vec<Contact<'a>>
     for (k, lower) in sheets.iter().enumerate() {
         // Plies slide, so that any two sheets may touch; beyond the plies the two films do.
         for (j, upper) in sheets.iter().enumerate().skip(k + 1) {
-            let class = Class::of(lower, upper);
+            let class = Class::of(lower.kind, Some(upper.kind));
             found.push(Contact {
                 parts: [&lower.name, &upper.name],
                 class,

@@ -26,12 +26,12 @@ pub fn repeated(known: &Known<'_>) -> Vec<Fault> {
 
 /// What is not its own image beside the mirror planes of a scene that is sound without them.
 pub fn check(known: &Known<'_>) -> Vec<Fault> {
-    let mut found = Vec::new();
+    if known.symmetry.is_empty() {
+        return Vec::new();
+    }
+    let mut found = fibres(known);
     for (k, plane) in known.symmetry.iter().enumerate() {
         let path = Path::to("symmetry").item(k);
-        if k == 0 {
-            found.extend(fibres(known, &path));
-        }
         found.extend(beside(known, *plane).into_iter().map(|text| {
             Fault::text(Rule::Symmetry, path.clone(), text)
                 .expected("a scene that is its own mirror image")
@@ -76,43 +76,40 @@ fn beside(known: &Known<'_>, plane: MirrorPlane) -> Vec<String> {
     found
 }
 
+/// What mirror planes do to the fibre families of a sheet.
+///
+/// # Errors
+/// When its fibres lie askew to them.
+pub fn families(sheet: &Sheet) -> Result<Families, Fault> {
+    sheet.families().ok_or_else(|| {
+        let text = format!(
+            "the fibres of sheet `{}` (fibre_1 at {}) are not their own mirror image",
+            sheet.name,
+            degrees(sheet.fibre_1.si())
+        );
+        Fault::text(Rule::Symmetry, Path::to("symmetry").item(0), text)
+            .expected("fibres along x and y, or at 45 deg to them")
+            .help("turn them, or leave out `symmetry`")
+    })
+}
+
 /// Fibres that lie askew to the planes, and friction by the angle to a family that the planes exchange.
-fn fibres(known: &Known<'_>, path: &Path) -> Vec<Fault> {
+fn fibres(known: &Known<'_>) -> Vec<Fault> {
     let by_angle = known.friction.is_some_and(depends_on_angle)
         || known.plies().any(|(_, ply)| regions_depend_on_angle(ply));
-    let of = |sheet: &Sheet| {
-        match sheet.families() {
-        None => Some(
-            Fault::text(
-                Rule::Symmetry,
-                path.clone(),
-                format!(
-                    "the fibres of sheet `{}` (fibre_1 at {}) are not their own mirror image",
-                    sheet.name,
-                    degrees(sheet.fibre_1.si())
-                ),
-            )
-            .expected("fibres along x and y, or at 45 deg to them")
-            .help("turn them, or leave out `symmetry`"),
-        ),
-        Some(Families::Exchanged) if by_angle => Some(
-            Fault::text(
-                Rule::Symmetry,
-                path.clone(),
-                format!(
-                    "friction depends on the angle to one fibre family (`angle`), which the plane exchanges with the other one in sheet `{}`",
-                    sheet.name
-                ),
-            )
-            .help("leave out `angle` or `symmetry`, or lay the fibres along x and y"),
-        ),
-        Some(_) => None,
-    }
+    let of = |sheet: &Sheet| match families(sheet) {
+        Err(askew) => Some(askew),
+        Ok(Families::Exchanged) if by_angle => {
+            let text = format!(
+                "friction depends on the angle to one fibre family (`angle`), which the plane exchanges with the other one in sheet `{}`",
+                sheet.name
+            );
+            let fault = Fault::text(Rule::Symmetry, Path::to("symmetry").item(0), text);
+            Some(fault.help("leave out `angle` or `symmetry`, or lay the fibres along x and y"))
+        }
+        Ok(_) => None,
     };
-    known
-        .numbered()
-        .filter_map(|(_, sheet)| of(sheet))
-        .collect()
+    known.numbered().filter_map(|(_, s)| of(s)).collect()
 }
 
 fn by_angle(given: &Coefficient) -> bool {

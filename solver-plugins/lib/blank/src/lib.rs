@@ -19,4 +19,3 @@ pub use blank::Blank;
 pub use edge::{LEAST_FEATURE, SHARP};
 pub use error::MeshError;
 pub use mesher::mesh_region;
-pub use plyflow_model::artifact::MeshQuality as Quality;

@@ -7,7 +7,6 @@ use crate::load::Load;
 use crate::request::Parameters;
 use crate::stack::{Body, RigidName};
 use crate::watch::Watch;
-use plyflow_geometry::vec3::V;
 use plyflow_model::scene::Process;
 
 /// Mass that is added over the sheets' own, beyond which a run is none of these sheets. Shipped studies have up to 75 in films.
@@ -34,7 +33,7 @@ pub fn check(p: &Parameters, forming: &Forming) -> Result<()> {
     check_masses(p, forming)?;
     check_loads(p)?;
     check_drag(p, forming)?;
-    check_places(p, forming)
+    check_places(forming)
 }
 
 /// Box (m) in plan of the nodes of a sheet before forming, of the whole.
@@ -189,8 +188,8 @@ fn check_drag(p: &Parameters, forming: &Forming) -> Result<()> {
     Ok(())
 }
 
-/// Whether plies lie over the tool, and in a press reach the die.
-fn check_places(p: &Parameters, forming: &Forming) -> Result<()> {
+/// Whether plies lie over the tool.
+fn check_places(forming: &Forming) -> Result<()> {
     if forming.zone.is_some() {
         return Ok(());
     }
@@ -207,24 +206,6 @@ fn check_places(p: &Parameters, forming: &Forming) -> Result<()> {
                 mm(to),
                 mm([low[0], low[1]]),
                 mm([high[0], high[1]])
-            )));
-        }
-    }
-    let Process::Press(press) = &p.scene.process else {
-        return Ok(());
-    };
-    let opening = press.die.opening_radius.si();
-    for (body, _) in forming.plies() {
-        let points = forming.reference_points(body);
-        let square = |x: &V| x[0] * x[0] + x[1] * x[1];
-        let reach = points.iter().map(square).fold(0.0, f64::max).sqrt();
-        if reach <= opening {
-            return Err(FormingError::Absurd(format!(
-                "scene: ply '{}' reaches {:.1} mm from the axis, the opening of the die {:.1} mm (process.press.die.opening_radius): it would never touch the die. \
-                 Expected a ply that covers the opening",
-                body.name,
-                1e3 * reach,
-                1e3 * opening
             )));
         }
     }
