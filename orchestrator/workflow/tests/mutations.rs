@@ -576,6 +576,16 @@ const CASES: &[Case] = &[
     ),
     (
         S,
+        "    width: 300 mm\n",
+        "    width: 300 mm\n    regions:\n      - name: a\n        rectangle: {length: 20 mm, width: 20 mm}\n        friction: {all: {pressure: {table: [\n          {pressure: 2 kPa, coefficient: 0.3},\n          {pressure: 1 kPa, coefficient: 0.2}]}}}\n",
+        6,
+        &[
+            "`pressure` is `1 kPa`",
+            "more than the 2 kPa of the row before",
+        ],
+    ),
+    (
+        S,
         "name: upper-film",
         "regions: [{name: a, rectangle: {length: 20 mm, width: 20 mm}, friction: {all: 0.1}}]\n    name: upper-film",
         0,
@@ -745,6 +755,27 @@ const CASES: &[Case] = &[
             "the tool is not its own mirror image in the plane y = 0",
             "out of `symmetry`",
         ],
+    ),
+    (
+        S,
+        "    width: 300 mm\n",
+        "    width: 300 mm\n    regions:\n      - {name: a, rectangle: {length: 20 mm, width: 20 mm}, friction: {all: {coefficient: 0.5, angle: {factors: [{angle: 0 deg, factor: 1}, {angle: 90 deg, factor: 1.5}]}}}}\nsymmetry: [x]\n",
+        3,
+        &["which the plane exchanges with the other one in sheet `ply-1`"],
+    ),
+    (
+        S,
+        "    joggles:\n",
+        "    corner: 1 mm\n    joggles:\n",
+        0,
+        &["`corner` is `1 mm`", "at least"],
+    ),
+    (
+        S,
+        "name: ply-1",
+        "name: tool",
+        0,
+        &["the name `tool` is taken"],
     ),
     (
         S,

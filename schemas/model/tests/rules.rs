@@ -86,6 +86,74 @@ fn a_bag_without_pressure_forms_nothing() {
 }
 
 #[test]
+fn a_table_of_pressures_runs_over_its_phase_and_draws_no_more_than_the_bag_has() {
+    let table = |rows: &[(f64, f64)]| {
+        let row =
+            |(share, kpa): &(f64, f64)| json!({"share": share, "pressure": format!("{kpa} kPa")});
+        json!({"table": rows.iter().map(row).collect::<Vec<_>>()})
+    };
+    let with = |name: &str, rows: &[(f64, f64)]| {
+        bag(|s| s["process"]["double_diaphragm"][name] = table(rows))
+    };
+    let sound = [(0.0, 0.0), (0.5, 90.0), (1.0, 100.0)];
+    assert_eq!(refused(with("bag_pressure", &sound)), Ok(()));
+    let cases: [(&str, &[(f64, f64)], &str, &str); 8] = [
+        (
+            "bag_pressure",
+            &[(0.0, 0.0)],
+            "table: the table has one row",
+            "two or more",
+        ),
+        (
+            "bag_pressure",
+            &[(0.1, 0.0), (1.0, 9.0)],
+            "table[0].share: given 0.1",
+            "where bagging begins",
+        ),
+        (
+            "bag_pressure",
+            &[(0.0, 5.0), (1.0, 9.0)],
+            "table[0].pressure: given 0.05 bar",
+            "so that nothing jumps",
+        ),
+        (
+            "bag_pressure",
+            &[(0.0, 0.0), (0.5, 9.0), (0.5, 9.0), (1.0, 9.0)],
+            "table[2].share: given 0.5",
+            "more than the 0.5",
+        ),
+        (
+            "bag_pressure",
+            &[(0.0, 0.0), (0.9, 9.0)],
+            "table[1].share: given 0.9",
+            "where bagging ends",
+        ),
+        (
+            "forming_pressure",
+            &[(0.0, 0.0), (0.3, -1.0), (1.0, 9.0)],
+            "table[1].pressure: given -0.01 bar",
+            "0 Pa or more",
+        ),
+        (
+            "forming_pressure",
+            &[(0.0, 0.0), (0.5, 120.0), (1.0, 9.0)],
+            "table[1].pressure: given 1.2 bar",
+            "at most `bag_pressure` (1 bar)",
+        ),
+        (
+            "forming_pressure",
+            &[(0.0, 0.0), (0.8, 9.0)],
+            "table[1].share: given 0.8",
+            "where drawing ends",
+        ),
+    ];
+    for (name, rows, given, expected) in cases {
+        let path = format!("process.double_diaphragm.{name}.{given}");
+        assert_refused(with(name, rows), Rule::Pressure, &[&path, expected]);
+    }
+}
+
+#[test]
 fn a_gap_of_the_holder_is_as_thick_as_the_plies() {
     let with = |gap: &str| press(|s| s["process"]["press"]["holder"]["hold"]["gap"] = json!(gap));
     assert_eq!(refused(with("0.8 mm")), Ok(()));
@@ -116,6 +184,22 @@ fn families_cross_at_the_least_angle_that_a_net_takes() {
         with("5.9 deg"),
         Rule::Fibres,
         &["sheets[1].fibre_2", "6 deg or more"],
+    );
+}
+
+#[test]
+fn a_ply_says_where_both_families_run_and_each_sheet_has_a_name_of_its_own() {
+    let one = bag(|s| drop(s["sheets"][1].as_object_mut().unwrap().remove("fibre_2")));
+    assert_refused(
+        one,
+        Rule::Size,
+        &["sheets[1].fibre_2: a ply needs `fibre_2`"],
+    );
+    let twice = bag(|s| s["sheets"][2]["name"] = json!("a"));
+    assert_refused(
+        twice,
+        Rule::Name,
+        &["sheets[2].name: the name `a` is taken"],
     );
 }
 
@@ -171,6 +255,25 @@ fn whose_fibres_a_law_by_angle_means_is_clear_in_every_contact() {
             "sheets[0].regions[0].friction.all.angle",
             "both have fibres",
         ],
+    );
+}
+
+#[test]
+fn a_ply_that_folds_rubs_on_itself_where_plies_have_friction() {
+    let factors = json!([{"angle": "0 deg", "factor": 1}, {"angle": "90 deg", "factor": 1.2}]);
+    let law = json!({"coefficient": 0.3, "angle": {"factors": factors}});
+    let one = |plies: Value| {
+        press(|s| {
+            s["sheets"].as_array_mut().unwrap().pop();
+            s["friction"] = json!({"tool_fabric": 0.2, "fabric_fabric": plies});
+            s["sheets"][0]["regions"] = json!([{"name": "r", "rectangle": {"length": "20 mm", "width": "20 mm"}, "friction": {"all": law}}]);
+        })
+    };
+    assert_eq!(refused(one(Value::Null)), Ok(()));
+    assert_refused(
+        one(json!(0.3)),
+        Rule::Friction,
+        &["`a` and `a` both have fibres"],
     );
 }
 
@@ -300,6 +403,10 @@ fn a_class_is_needed_unless_all_its_neighbours_are_pairs() {
     };
     let pair = json!([{"between": ["b", "a"], "coefficient": 0.3}]);
     assert_eq!(refused(with(pair)), Ok(()));
+    let ends = [["tool", "a"], ["holder", "a"], ["b", "die"]];
+    let ends = ends.map(|between| json!({"between": between, "coefficient": 0.2}));
+    let rigid = press(|s| s["friction"] = json!({"fabric_fabric": 0.3, "pairs": ends}));
+    assert_eq!(refused(rigid), Ok(()));
     assert_refused(
         with(json!([])),
         Rule::Friction,

@@ -146,7 +146,7 @@ pub fn is_mirrored(tool: &Tool, axis: usize) -> bool {
 }
 
 /// Lengths (m) and angles (rad) that differ by less are the same: what decimals of a scene leave.
-const SAME: f64 = 1e-7;
+const SAME: f64 = 1e-5;
 
 fn spar_is_mirrored(shape: &SparShape, axis: usize) -> bool {
     let image = |j: &JoggleShape| match axis {

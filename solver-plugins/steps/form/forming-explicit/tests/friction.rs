@@ -62,10 +62,15 @@ fn pairs_take_the_place_of_their_class_in_either_order() {
     // What holds a ply through another one rubs as the weaker of the surfaces between does.
     assert_eq!(constant(&m, "die/inner"), 0.4);
     assert_eq!(constant(&m, "tool/outer"), 0.2);
-    // A class whose pairs are all named is not needed.
+    // A class whose pairs are all named is not needed, nor a law of those that have another ply between them.
     model(
         &json!({"tool_fabric": 0.2, "pairs": [{"between": ["outer", "inner"], "coefficient": 0.4}]}),
     );
+    let pair = |between: [&str; 2], mu: f64| json!({"between": between, "coefficient": mu});
+    let m = model(&json!({"fabric_fabric": 0.3,
+        "pairs": [pair(["tool", "inner"], 0.2), pair(["holder", "inner"], 0.1), pair(["outer", "die"], 0.5)]}));
+    assert_eq!(constant(&m, "die/inner"), 0.3);
+    assert_eq!(constant(&m, "holder/outer"), 0.1);
 }
 
 #[test]
