@@ -7,6 +7,7 @@ use crate::friction::{
 use crate::manifest::one_of;
 use crate::nearest::nearest;
 use crate::process::Process;
+use crate::regions::ALL;
 use crate::rules::known::Known;
 use crate::rules::surfaces::{Class, Contact, contacts, rigid_parts, same_pair};
 use crate::scene::Sheet;
@@ -14,6 +15,9 @@ use crate::units::{Number, si_number};
 
 /// Largest coefficient that is computed with.
 pub const LARGEST: f64 = 2.0;
+
+/// Most names or pairs that are listed as what was expected.
+const MOST_LISTED: usize = 12;
 
 /// A law with its place in a scene.
 struct At {
@@ -248,6 +252,24 @@ fn angle(path: &Path, law: &AngleLaw, largest: f64, found: &mut Vec<Fault>) {
     }
 }
 
+/// Those of two names of surfaces that a scene does not have.
+fn unknown(between: [&str; 2], names: &[&str], path: &Path) -> Vec<Fault> {
+    let missing = (0..2).filter(|i| !names.contains(&between[*i]));
+    let told = missing.map(|i| {
+        let name = between[i];
+        let text = format!("no surface of this scene is called `{name}`");
+        let mut fault = Fault::text(Rule::Pairs, path.item(i), text);
+        if names.len() <= MOST_LISTED {
+            fault = fault.expected(one_of(names.iter().copied()));
+        }
+        match nearest(name, names.iter().copied()) {
+            Some(nearest) => fault.help(format!("did you mean `{nearest}`?")),
+            None => fault,
+        }
+    });
+    told.collect()
+}
+
 /// Pairs that name what the scene does not have, what does not touch (where that is known), or the same twice.
 fn pairs(
     friction: &Friction,
@@ -262,21 +284,7 @@ fn pairs(
     for (k, pair) in friction.pairs.iter().enumerate() {
         let path = at.item(k).key("between");
         let between = pair.names();
-        let unknown = (0..2).filter(|i| !names.contains(&between[*i]));
-        let unknown: Vec<Fault> = unknown
-            .map(|i| {
-                let name = between[i];
-                let text = format!("no surface of this scene is called `{name}`");
-                let mut fault = Fault::text(Rule::Pairs, path.item(i), text);
-                if names.len() <= 12 {
-                    fault = fault.expected(one_of(names.iter().copied()));
-                }
-                match nearest(name, names.iter().copied()) {
-                    Some(nearest) => fault.help(format!("did you mean `{nearest}`?")),
-                    None => fault,
-                }
-            })
-            .collect();
+        let unknown = unknown(between, &names, &path);
         if !unknown.is_empty() {
             found.extend(unknown);
             continue;
@@ -299,7 +307,7 @@ fn pairs(
             let mut fault = Fault::text(Rule::Pairs, path, text).help(
                 "any two sheets rub, a bag's lowest film on what is rigid, and every ply of a press on its parts",
             );
-            if contacts.len() <= 12 {
+            if contacts.len() <= MOST_LISTED {
                 let all = contacts
                     .iter()
                     .map(|c| format!("[{}, {}]", c.parts[0], c.parts[1]));
@@ -352,10 +360,6 @@ fn fibres(
         // The first contact of a law tells enough.
         found.extend(fault.filter(|f| found.iter().all(|other| other.path != f.path)));
     };
-    let by_angle = |given: &Coefficient| match given {
-        Coefficient::Law(law) => law.angle.clone(),
-        Coefficient::Constant(_) => None,
-    };
     // A ply that folds rubs on itself as plies do on each other.
     let folding = known.plies().filter(|_| friction.fabric_fabric.is_some());
     let folds = folding.map(|(_, ply)| Contact {
@@ -363,41 +367,48 @@ fn fibres(
         class: Class::FabricFabric,
         next: true,
     });
-    let all = contacts.iter().copied().chain(folds);
-    for contact in all {
+    for contact in contacts.iter().copied().chain(folds) {
         let mut own = friction.pairs.iter();
-        let own = own.position(|p| contact.is_of(p.names()));
-        match own {
-            Some(k) => {
-                if let Some(law) = &friction.pairs[k].angle {
-                    look(at.key("pairs").item(k).key("angle"), law, contact.parts);
-                }
+        if let Some(k) = own.position(|p| contact.is_of(p.names())) {
+            if let Some(law) = &friction.pairs[k].angle {
+                look(at.key("pairs").item(k).key("angle"), law, contact.parts);
             }
-            None => {
-                let word = contact.class.word();
-                if let Some(law) = of_class(friction, contact.class).and_then(by_angle) {
-                    look(at.key(word).key("angle"), &law, contact.parts);
-                }
-            }
+        } else if let Some(law) = of_class(friction, contact.class).and_then(by_angle) {
+            let path = at.key(contact.class.word()).key("angle");
+            look(path, law, contact.parts);
         }
-        for (s, sheet) in known.plies() {
-            let Some(partner) = (0..2).find(|k| contact.parts[*k] == sheet.name) else {
-                continue;
-            };
-            let partner = contact.parts[1 - partner];
-            for (r, region) in sheet.regions.iter().enumerate() {
-                let word = contact.class.word();
-                let key = [partner, word, crate::regions::ALL]
-                    .into_iter()
-                    .find(|key| region.friction.contains_key(*key));
-                if let Some((key, law)) =
-                    key.and_then(|key| Some((key, by_angle(&region.friction[key])?)))
-                {
-                    let path = Path::to("sheets").item(s).key("regions").item(r);
-                    let path = path.key("friction").key(key).key("angle");
-                    look(path, &law, contact.parts);
-                }
+        for (path, law) in in_regions(known, &contact) {
+            look(path, law, contact.parts);
+        }
+    }
+}
+
+/// The part of what a scene gives for two surfaces that is by the angle to fibres.
+pub fn by_angle(given: &Coefficient) -> Option<&AngleLaw> {
+    match given {
+        Coefficient::Law(law) => law.angle.as_ref(),
+        Coefficient::Constant(_) => None,
+    }
+}
+
+/// Laws by the angle to fibres that a contact has in regions of its plies.
+fn in_regions<'a>(known: &Known<'a>, contact: &Contact<'_>) -> Vec<(Path, &'a AngleLaw)> {
+    let mut found = Vec::new();
+    let word = contact.class.word();
+    for (s, sheet) in known.plies() {
+        let Some(own) = contact.parts.iter().position(|name| *name == sheet.name) else {
+            continue;
+        };
+        let keys = [contact.parts[1 - own], word, ALL];
+        for (r, region) in sheet.regions.iter().enumerate() {
+            let told = keys
+                .into_iter()
+                .find_map(|key| Some((key, region.friction.get(key)?)));
+            if let Some((key, law)) = told.and_then(|(key, given)| Some((key, by_angle(given)?))) {
+                let path = Path::to("sheets").item(s).key("regions").item(r);
+                found.push((path.key("friction").key(key).key("angle"), law));
             }
         }
     }
+    found
 }

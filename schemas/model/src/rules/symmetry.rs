@@ -2,9 +2,9 @@
 //! the answers of a material are looked at by who has them.
 
 use crate::fault::{Fault, Path, Rule, degrees, mm};
-use crate::friction::{Coefficient, Friction};
+use crate::friction::Friction;
 use crate::outline::Millimetres;
-use crate::rules::friction::of_class;
+use crate::rules::friction::{by_angle, of_class};
 use crate::rules::known::Known;
 use crate::rules::regions::asymmetric;
 use crate::rules::surfaces::Class;
@@ -95,11 +95,11 @@ pub fn families(sheet: &Sheet) -> Result<Families, Fault> {
 
 /// Fibres that lie askew to the planes, and friction by the angle to a family that the planes exchange.
 fn fibres(known: &Known<'_>) -> Vec<Fault> {
-    let by_angle = known.friction.is_some_and(depends_on_angle)
+    let depends = known.friction.is_some_and(depends_on_angle)
         || known.plies().any(|(_, ply)| regions_depend_on_angle(ply));
     let of = |sheet: &Sheet| match families(sheet) {
         Err(askew) => Some(askew),
-        Ok(Families::Exchanged) if by_angle => {
+        Ok(Families::Exchanged) if depends => {
             let text = format!(
                 "friction depends on the angle to one fibre family (`angle`), which the plane exchanges with the other one in sheet `{}`",
                 sheet.name
@@ -112,17 +112,15 @@ fn fibres(known: &Known<'_>) -> Vec<Fault> {
     known.numbered().filter_map(|(_, s)| of(s)).collect()
 }
 
-fn by_angle(given: &Coefficient) -> bool {
-    matches!(given, Coefficient::Law(law) if law.angle.is_some())
-}
-
 fn depends_on_angle(friction: &Friction) -> bool {
     let classes = Class::ALL.into_iter();
     let mut classes = classes.filter_map(|class| of_class(friction, class));
-    classes.any(by_angle) || friction.pairs.iter().any(|p| p.angle.is_some())
+    classes.any(|given| by_angle(given).is_some())
+        || friction.pairs.iter().any(|p| p.angle.is_some())
 }
 
 fn regions_depend_on_angle(ply: &Sheet) -> bool {
     let regions = ply.regions.iter();
-    regions.flat_map(|r| r.friction.values()).any(by_angle)
+    let mut given = regions.flat_map(|r| r.friction.values());
+    given.any(|given| by_angle(given).is_some())
 }

@@ -282,8 +282,8 @@ fn impossible_parameters_are_errors_that_name_the_parameter_and_its_bound() {
         &["fillet: given 66 mm", "at most 0.5 x `top_width`"],
     );
     check(
-        text(&|s| s.height = mm(10.0)),
-        &["height: given 10 mm", "higher than its fillet"],
+        text(&|s| s.height = mm(14.0)),
+        &["height: given 14 mm", "higher than its fillet"],
     );
     check(
         text(&|s| s.corner = Some(mm(5.0))),
