@@ -282,7 +282,10 @@ fn impossible_parameters_are_errors_that_name_the_parameter_and_its_bound() {
         &["fillet: given 66 mm", "at most 0.5 x `top_width`"],
     );
     check(
-        text(&|s| s.height = mm(14.0)),
+        text(&|s| {
+            s.height = mm(14.0);
+            (s.joggles[0].rise, s.joggles[1].rise) = (mm(-10.0), mm(10.0));
+        }),
         &["height: given 14 mm", "higher than its fillet"],
     );
     check(

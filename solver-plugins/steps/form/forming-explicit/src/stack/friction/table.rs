@@ -6,15 +6,18 @@ use crate::stack::place::SheetIndex;
 use crate::stack::regions::{self, PlacedRegion};
 use plyflow_fixed::FixedBits;
 use plyflow_mechanics::contact::{
-    AngleDependence, FibreField, FrictionLaw, Partner, PressureDependence, RegionalFriction,
-    SheetCells, VaryingFriction, Whose,
+    AngleDependence, FibreField, FrictionLaw, LARGEST_COEFFICIENT, Partner, PressureDependence,
+    RegionalFriction, SheetCells, VaryingFriction, Whose,
 };
 use plyflow_mechanics::model::Model;
 use plyflow_model::friction::{self as scene, AngleLaw, Coefficient, PressureLaw};
-use plyflow_model::rules::friction::{missing, of_class, whose};
+use plyflow_model::rules::friction::{LARGEST, missing, of_class, whose};
 use plyflow_model::rules::surfaces::{Class, same_pair};
 use plyflow_model::scene::{Scene, Sheet, SheetKind};
 use std::sync::Arc;
+
+// Contact cuts off what rules refuse.
+const _: () = assert!(LARGEST_COEFFICIENT == LARGEST);
 
 /// The friction of a scene that keeps its rules.
 pub struct FrictionTable<'a> {
