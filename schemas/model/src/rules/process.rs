@@ -75,10 +75,20 @@ pub fn check(known: &Known<'_>) -> Vec<Fault> {
     let mut found = Vec::new();
     match known.process {
         Some(Process::DoubleDiaphragm(p)) => {
+            if p.clearance.si() < 0.0 {
+                let fault = Fault::given(Rule::Frame, at("clearance"), mm(p.clearance.si()));
+                found.push(fault.expected("0 mm or more: the stack begins above the tool"));
+            }
             pressures(p, &mut found);
             frame(known, p, &mut found);
         }
         Some(Process::Press(press)) => {
+            let stroke = press.stroke.si();
+            if stroke.is_nan() || stroke <= 0.0 {
+                let path = Path::to("process").key("press").key("stroke");
+                let fault = Fault::given(Rule::Press, path, mm(stroke));
+                found.push(fault.expected("more than 0 mm, the way of the punch"));
+            }
             found.extend(gap(known, press));
             found.extend(reach_of_die(known, press));
         }

@@ -8,7 +8,7 @@ use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::mirror::Planes;
 use plyflow_model::artifact::MeshQuality;
 use plyflow_model::budget::{self, Wanted};
-use plyflow_model::outline::{Millimetres, Point, Region};
+use plyflow_model::outline::{Point, Region};
 use plyflow_model::scene::Sheet;
 
 /// The blank of a ply, placed over the tool.
@@ -75,24 +75,12 @@ impl Blank {
         }
     }
 
-    /// The part of it with x >= 0 (y >= 0) beside mirror planes.
-    ///
-    /// # Errors
-    /// When it is not its own mirror image in one of them.
-    pub fn part(&self, planes: Planes) -> Result<Self, MeshError> {
+    /// The part of it with x >= 0 (y >= 0) beside mirror planes, in which it is its own image
+    /// ([`plyflow_model::rules::symmetry`]).
+    #[must_use]
+    pub fn part(&self, planes: Planes) -> Self {
         let mut part = self.clone();
         for k in (0..2).filter(|k| planes.0[*k]) {
-            let whole = match &part {
-                Self::Rectangle(b) => &Region::rectangle(*b),
-                Self::Region(region) => region,
-            };
-            if let Some((at, apart)) = whole.asymmetry(k) {
-                return Err(MeshError::Asymmetric {
-                    plane: ['x', 'y'][k],
-                    at: Millimetres(at),
-                    apart: 1e3 * apart,
-                });
-            }
             part = match part {
                 Self::Rectangle(mut b) => {
                     b[k] = 0.0;
@@ -101,7 +89,7 @@ impl Blank {
                 Self::Region(region) => Self::Region(cut::positive(&region, k)),
             };
         }
-        Ok(part)
+        part
     }
 
     /// Material of it (m2).

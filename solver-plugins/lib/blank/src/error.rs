@@ -28,19 +28,6 @@ pub enum MeshError {
         /// Largest elements that follow it (mm).
         wanted: f64,
     },
-    /// It is not its own mirror image. Lengths in mm.
-    #[error(
-        "the blank is not its own mirror image in the plane {plane} = 0: the image of its edge at {at} lies {apart:.3} mm off \
-         the edge; move the blank or change its outline, or leave `{plane}` out of `symmetry`"
-    )]
-    Asymmetric {
-        /// x or y.
-        plane: char,
-        /// Where.
-        at: Millimetres,
-        /// How far apart they are (mm).
-        apart: f64,
-    },
     /// The edge cannot be followed at this size.
     #[error(
         "the outline cannot be followed with elements of {size:.3} mm near {at}: {why}; take smaller elements"

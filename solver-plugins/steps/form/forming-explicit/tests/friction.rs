@@ -186,7 +186,7 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
             plies(
                 json!({"coefficient": 0.3, "angle": {"factors": factors(&[("0 deg", 1.0), ("90 deg", 0.5)])}}),
             ),
-            vec!["fabric_fabric.angle.of", "`lower` or `upper`"],
+            vec!["fabric_fabric.angle.of", "`of: lower` or `of: upper`"],
         ),
         (
             json!({"tool_fabric": 0.2}),

@@ -256,6 +256,7 @@ fn what_contacts_see_of_every_rigid_part_is_held_against_what_is_drawn_of_it() {
 #[test]
 fn a_tool_that_leaves_the_frame_says_so() {
     let p = bag(1, |p| {
+        p["scene"]["sheets"][1]["width"] = json!("0.04 m");
         p["scene"]["process"]["double_diaphragm"]["frame_width"] = json!("0.05 m")
     });
     assert_told(&refused(&p), &["scene.tool", "the frame is too small"]);

@@ -31,7 +31,6 @@ pub fn check(p: &Parameters, forming: &Forming) -> Result<()> {
     check_elements(p, forming)?;
     check_phases(p, forming)?;
     check_masses(p, forming)?;
-    check_loads(p)?;
     check_drag(p, forming)?;
     check_places(forming)
 }
@@ -123,36 +122,6 @@ fn check_masses(p: &Parameters, forming: &Forming) -> Result<()> {
         )));
     }
     Ok(())
-}
-
-/// Whether anything forms.
-fn check_loads(p: &Parameters) -> Result<()> {
-    match &p.scene.process {
-        Process::DoubleDiaphragm(process) => {
-            for (name, pressure) in [
-                ("bag_pressure", process.bag_pressure.last()),
-                ("forming_pressure", process.forming_pressure.last()),
-            ] {
-                if pressure <= 0.0 {
-                    return Err(FormingError::Absurd(format!(
-                        "scene.process.double_diaphragm.{name}: given {pressure} Pa at the end; expected more than 0 Pa: without it nothing is formed"
-                    )));
-                }
-            }
-            if process.clearance.si() < 0.0 {
-                return Err(FormingError::Absurd(format!(
-                    "scene.process.double_diaphragm.clearance: given {:.3} mm; expected 0 mm or more: the stack begins above the tool",
-                    1e3 * process.clearance.si()
-                )));
-            }
-            Ok(())
-        }
-        Process::Press(press) if press.stroke.si() <= 0.0 => Err(FormingError::Absurd(format!(
-            "scene.process.press.stroke: given {:.3} mm; expected more than 0 mm, the way of the punch",
-            1e3 * press.stroke.si()
-        ))),
-        Process::Press(_) => Ok(()),
-    }
 }
 
 /// Whether damping leaves the motion to what forms.

@@ -107,11 +107,7 @@ pub fn blank(sheet: &StackSheet) -> Result<Blank> {
 /// The part of a ply's blank that mirror planes bound: all of it without planes.
 ///
 /// # Errors
-/// As [`blank`]; when it is not its own mirror image.
+/// As [`blank`].
 pub fn blank_part(sheet: &StackSheet, planes: Planes) -> Result<Blank> {
-    let part = blank(sheet)?.part(planes);
-    part.map_err(|source| FormingError::Mesh {
-        ply: sheet.scene.name.clone(),
-        source,
-    })
+    Ok(blank(sheet)?.part(planes))
 }
