@@ -2,6 +2,7 @@
 
 use plyflow_blank::MeshError;
 use plyflow_mechanics::MechanicsError;
+use plyflow_model::fault::Fault;
 use plyflow_sdk::StepError;
 
 /// What a function gives, or why not.
@@ -23,6 +24,9 @@ pub enum FormingError {
     /// Something else of the scene, by itself or with the parameters.
     #[error("{0}")]
     Scene(String),
+    /// A rule of scenes that is broken.
+    #[error("scene.{0}")]
+    Rule(#[from] Fault),
     /// What is not its own mirror image in the planes of the scene.
     #[error("{0}")]
     Symmetry(String),

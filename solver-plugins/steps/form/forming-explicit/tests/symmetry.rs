@@ -279,9 +279,9 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
     let p = press("rf4", 0.0, &["x", "y"]);
     let text = refused(&p, |s| s["sheets"][0]["centre"] = json!(["0.001 m", "0 m"]));
     for part in [
-        "ply 'ply_1'",
+        "ply `ply_1`",
         "plane x = 0",
-        "2.000 mm",
+        "2 mm off",
         "leave `x` out of `symmetry`",
     ] {
         assert!(text.contains(part), "{part}: {text}");
@@ -291,7 +291,7 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
         s["sheets"][0]["fibre_2"] = json!(format!("{} rad", 0.5 + std::f64::consts::FRAC_PI_2));
     });
     assert!(
-        text.contains("symmetry: [x, y]") && text.contains("28.648 deg"),
+        text.contains("symmetry[0]") && text.contains("28.648 deg"),
         "{text}"
     );
 
@@ -302,12 +302,8 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
                      "side_step": ["0 m", "0 m"], "fillet": "0.004 m"}], "facet_size": "0.004 m"}});
     let p = diaphragms("m4", &["x", "y"]);
     let text = refused(&p, |s| s["tool"] = spar.clone());
-    for part in [
-        "the tool is not its own mirror image in the plane x = 0",
-        "mm off its surface",
-    ] {
-        assert!(text.contains(part), "{part}: {text}");
-    }
+    let part = "the tool is not its own mirror image in the plane x = 0";
+    assert!(text.contains(part), "{text}");
     let mut half = diaphragms("m4", &["y"]);
     let mut scene = serde_json::to_value(&half.scene).unwrap();
     scene["tool"] = spar;
@@ -364,7 +360,7 @@ fn friction_by_the_angle_to_one_of_two_exchanged_families_is_refused() {
         "angle": {"family": 1, "factors": [{"angle": "0 rad", "factor": 1.0}, {"angle": "1.5 rad", "factor": 0.5}]}}]);
     let p = press("m4", DIAGONAL, &["y"]);
     let text = refused(&p, |s| s["friction"]["pairs"] = law.clone());
-    for part in ["symmetry: [y]", "`angle`", "'ply_1'"] {
+    for part in ["symmetry[0]", "`angle`", "`ply_1`"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     let mut along = press("m4", 0.0, &["y"]);

@@ -34,8 +34,8 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     let stack = sheet::stack(scene)?;
     let tool = tool::rigid(p)?;
     let planes = symmetry::planes(scene);
-    symmetry::check(scene, planes, &stack, &tool.mesh)?;
-    let plates = Plates::new(press, &stack, tool.mesh.bounds()[1][2])?;
+    symmetry::check_tool(planes, &tool.mesh)?;
+    let plates = Plates::new(press, &stack, tool.mesh.bounds()[1][2]);
     plates.check_passage(press, &tool.mesh)?;
     let elements = Elements { p, components };
     let mut parts = Parts::default();
@@ -129,7 +129,7 @@ fn add_contacts(
     for ply in &mut placed {
         ply.slaves = ply.sheet.nodes(model).to_vec();
     }
-    let contacts = StackContacts::new(stack, p)?;
+    let contacts = StackContacts::new(stack, p);
     let plies = layers(&placed);
     for pair in plies.windows(2) {
         contacts.add_pair(model, pair[1], pair[0], 1.0)?;

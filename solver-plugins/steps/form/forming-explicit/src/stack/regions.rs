@@ -8,7 +8,7 @@ use plyflow_mechanics::mirror::{Planes, reflect};
 use plyflow_mechanics::model::Model;
 use plyflow_model::artifact::RegionFacts;
 use plyflow_model::outline::Point;
-use plyflow_model::regions::{PlyRegion, Stitches, area, asymmetry, holds};
+use plyflow_model::regions::{PlyRegion, Stitches, area, holds};
 use plyflow_model::scene::Sheet;
 
 /// A region where it lies over the tool.
@@ -28,7 +28,7 @@ impl PlacedRegion<'_> {
 /// The regions of a sheet.
 ///
 /// # Errors
-/// When one has no shape ([`plyflow_model::regions::faults`] tells more).
+/// When one has no shape ([`plyflow_model::rules::regions`] tells more).
 pub fn of_sheet(sheet: &Sheet) -> Result<Vec<PlacedRegion<'_>>> {
     let centre = sheet.centre.map(|c| c.si());
     let place = |region: &'_ PlyRegion| region.corners(centre);
@@ -73,14 +73,9 @@ pub fn without_stitches(sheet: &Sheet, points: &[Vec3], cells: &[[u32; 4]]) -> R
     Ok(cells.iter().map(|c| removed(centre(points, c))).collect())
 }
 
-/// Whether the regions of a ply lie on what is computed of it as the scene means them: each holds a node (or the middle of an element, where it removes
-/// stitches), and they are their own images in mirror planes.
+/// Whether the regions of a ply lie on what is computed of it as the scene means them: each holds a node, or the middle of an element where it
+/// removes stitches.
 pub fn check(sheet: &Sheet, points: &[Vec3], cells: &[[u32; 4]], planes: Planes) -> Result<()> {
-    for axis in (0..2).filter(|a| planes.0[*a]) {
-        if let Some(text) = asymmetry(sheet, axis) {
-            return Err(FormingError::Symmetry(text));
-        }
-    }
     for placed in of_sheet(sheet)? {
         let images = planes.images();
         let seen = |at: Vec3| images.iter().any(|i| placed.holds(reflect(at, *i)));

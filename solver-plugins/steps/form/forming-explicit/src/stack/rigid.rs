@@ -19,9 +19,6 @@ pub enum RigidName {
 }
 
 impl RigidName {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Tool, Self::Bed, Self::Die, Self::Holder];
-
     /// The name.
     pub fn word(self) -> &'static str {
         match self {

@@ -1,7 +1,8 @@
 use super::*;
-use crate::sweep::Sweep;
+use crate::build;
+use crate::chord::CHORD_TOLERANCE;
 use plyflow_geometry::vec3::{Vec3, add, cross, dot, scale, sub, unit};
-use plyflow_model::scene::{Scene, Tool};
+use plyflow_model::scene::{FlatTool, JoggleSpar, RampedSpar, Scene, Tool};
 use plyflow_model::units::{Angle, Length};
 
 const MM: f64 = 1e-3;
@@ -51,7 +52,7 @@ fn curvatures(patch: &dyn Fn(f64, f64) -> Vec3, u: f64, v: f64, d: f64) -> [f64;
 }
 
 /// Smallest radius of curvature over top, fillets and walls (m).
-fn smallest_radius(s: &Sweep) -> f64 {
+fn smallest_radius(s: &SparShape) -> f64 {
     let ([low, high], half, radius) = s.top();
     let mut largest: f64 = 0.0;
     let mut look = |patch: &dyn Fn(f64, f64) -> Vec3, u: f64, v: f64| {
@@ -104,7 +105,7 @@ fn smallest_radius(s: &Sweep) -> f64 {
 
 #[test]
 fn no_radius_is_smaller_than_the_10_mm_of_the_thesis() {
-    let found = smallest_radius(&spar_sweep(&demo()).unwrap());
+    let found = smallest_radius(&demo().shape().unwrap());
     println!("smallest radius {:.2} mm", found / MM);
     assert!(found >= 10.0 * MM, "found {:.3} mm", found / MM);
 }
@@ -116,7 +117,7 @@ fn straight_ramps_without_steps_are_nearly_as_blunt_as_the_stated_fillets() {
         j.skew = Angle(0.0);
         j.side_step = [mm(0.0); 2];
     }
-    let found = smallest_radius(&spar_sweep(&spar).unwrap()) / MM;
+    let found = smallest_radius(&spar.shape().unwrap()) / MM;
     assert!(
         found > 0.93 * 14.0 && found < 1.01 * 14.0,
         "stated 14 mm; found {found:.3} mm"
@@ -125,7 +126,7 @@ fn straight_ramps_without_steps_are_nearly_as_blunt_as_the_stated_fillets() {
 
 #[test]
 fn curvature_measure_sees_a_sharper_fillet() {
-    let mut sweep = spar_sweep(&demo()).unwrap();
+    let mut sweep = demo().shape().unwrap();
     sweep.fillet = 6.0 * MM;
     let found = smallest_radius(&sweep);
     assert!(found < 6.1 * MM, "found {:.3} mm", found / MM);
@@ -133,7 +134,7 @@ fn curvature_measure_sees_a_sharper_fillet() {
 
 #[test]
 fn top_rises_by_each_joggle_and_walls_step_outwards() {
-    let sweep = spar_sweep(&demo()).unwrap();
+    let sweep = demo().shape().unwrap();
     let z = |x: f64, y: f64| sweep.deform([x * MM, y * MM, sweep.height])[2] / MM;
     for y in [-50.0, 0.0, 50.0] {
         assert!((z(-200.0, y) - 110.0).abs() < 1e-9);
@@ -155,7 +156,7 @@ fn top_rises_by_each_joggle_and_walls_step_outwards() {
 #[test]
 fn spar_is_closed_stands_on_the_bed_and_has_the_stated_length() {
     let spar = demo();
-    let mesh = joggle_spar(&spar).unwrap();
+    let mesh = build(&Tool::JoggleSpar(spar.clone())).unwrap();
     println!(
         "{} points, {} facets",
         mesh.points.len(),
@@ -191,12 +192,12 @@ fn spar_is_closed_stands_on_the_bed_and_has_the_stated_length() {
 
 #[test]
 fn facets_follow_the_curved_surface_within_the_chord_tolerance() {
-    let coarse = joggle_spar(&demo()).unwrap();
+    let coarse = build(&Tool::JoggleSpar(demo())).unwrap();
     let fine = JoggleSpar {
         facet_size: mm(1.5),
         ..demo()
     };
-    let tree = crate::SurfaceTree::new(&joggle_spar(&fine).unwrap());
+    let tree = crate::SurfaceTree::new(&build(&Tool::JoggleSpar(fine)).unwrap());
     let largest = (0..coarse.triangles.len())
         .step_by(7)
         .map(|t| {
@@ -222,7 +223,7 @@ fn flat_block_has_the_closed_form_volume() {
         fillet: mm(8.0),
         facet_size: mm(4.0),
     };
-    let mesh = flat(&block).unwrap();
+    let mesh = build(&Tool::Flat(block)).unwrap();
     assert!(mesh.is_watertight());
     assert!(mesh.longest_edge() <= 0.004);
     let (r, c, pi) = (8.0, 16.0, std::f64::consts::PI);
@@ -250,7 +251,7 @@ fn impossible_parameters_are_errors_that_name_the_parameter_and_its_bound() {
     let text = |change: &dyn Fn(&mut JoggleSpar)| {
         let mut spar = demo();
         change(&mut spar);
-        joggle_spar(&spar).unwrap_err().to_string()
+        build(&Tool::JoggleSpar(spar)).unwrap_err().to_string()
     };
     let check = |text: String, parts: &[&str]| {
         for part in parts {
@@ -259,7 +260,10 @@ fn impossible_parameters_are_errors_that_name_the_parameter_and_its_bound() {
     };
     check(
         text(&|s| s.joggles[1].length = mm(15.0)),
-        &["joggles[1].length is 15 mm", "need at least 2"],
+        &[
+            "scene.tool.joggle_spar.joggles[1].length: given 15 mm",
+            "at least 2",
+        ],
     );
     check(
         text(&|s| s.joggles[0].start = mm(-300.0)),
@@ -267,29 +271,35 @@ fn impossible_parameters_are_errors_that_name_the_parameter_and_its_bound() {
     );
     check(
         text(&|s| s.joggles[1].start = mm(-100.0)),
-        &["joggles[1].start", "end of joggles[0]"],
+        &["joggles[1].start", "before the one above ends"],
     );
     check(
         text(&|s| s.joggles[1].start = mm(260.0)),
-        &["joggles[1].start", "beyond the rounded end"],
+        &["joggles[1].start", "beyond the tool"],
     );
     check(
-        text(&|s| s.fillet = mm(60.0)),
-        &["top_width is 130 mm", "it must exceed"],
+        text(&|s| s.fillet = mm(66.0)),
+        &["fillet: given 66 mm", "at most 0.5 x `top_width`"],
     );
     check(
-        text(&|s| s.height = mm(10.0)),
-        &["height is 10 mm", "higher than its fillet"],
+        text(&|s| {
+            s.height = mm(14.0);
+            (s.joggles[0].rise, s.joggles[1].rise) = (mm(-10.0), mm(10.0));
+        }),
+        &["height: given 14 mm", "higher than its fillet"],
     );
     check(
         text(&|s| s.corner = Some(mm(5.0))),
-        &["corner is 5 mm", "needs at least"],
+        &["corner: given 5 mm", "at least"],
     );
     check(
         text(&|s| s.length = mm(-1.0)),
-        &["length is -1 mm", "greater than 0 mm"],
+        &["length: given -1 mm", "more than 0 mm"],
     );
-    check(text(&|s| s.draft = Angle(1.4)), &["draft is 80.21 deg"]);
+    check(
+        text(&|s| s.draft = Angle(1.4)),
+        &["draft: given 80.214 deg"],
+    );
 }
 
 /// A spar with the thesis' ratios of its ramps, 1:18 and 1:36.
@@ -311,7 +321,7 @@ fn recessed() -> RampedSpar {
 #[test]
 fn a_ramped_spar_falls_back_in_its_middle_by_depth_and_side_depth() {
     let spar = recessed();
-    let mesh = ramped_spar(&spar).unwrap();
+    let mesh = build(&Tool::RampedSpar(spar)).unwrap();
     assert!(mesh.is_watertight() && mesh.longest_edge() <= 0.005);
     let top = |x: f64| {
         let near = mesh.points.iter().filter(|p| (p[0] - x).abs() < 3e-3);
@@ -341,24 +351,24 @@ fn a_ramped_spar_tells_what_does_not_fit_in_its_own_words() {
     let told = |change: &dyn Fn(&mut RampedSpar)| {
         let mut spar = recessed();
         change(&mut spar);
-        ramped_spar(&spar).unwrap_err().to_string()
+        build(&Tool::RampedSpar(spar)).unwrap_err().to_string()
     };
     for (text, says) in [
         (
             told(&|s| s.recess = mm(250.0)),
-            ["`ramped_spar`: recess is 250 mm", "two ramps of 180 mm"],
+            ["ramped_spar.recess: given 250 mm", "two ramps of 180 mm"],
         ),
         (
             told(&|s| s.ramp = mm(5.0)),
-            ["`ramped_spar`: ramp is 5 mm", "need at least"],
+            ["ramped_spar.ramp: given 5 mm", "at least"],
         ),
         (
             told(&|s| s.depth = mm(-1.0)),
-            ["`ramped_spar`: depth is -1 mm", "at least 0 mm"],
+            ["ramped_spar.depth: given -1 mm", "at least 0 mm"],
         ),
         (
             told(&|s| s.height = mm(10.0)),
-            ["`ramped_spar`: height is 10 mm", "raise the tool"],
+            ["ramped_spar.height: given 10 mm", "raise the tool"],
         ),
     ] {
         assert!(says.iter().all(|w| text.contains(w)), "{text}");

@@ -1,49 +1,46 @@
-//! Whether a tool that is made from parameters has not too many facets to be made.
+//! The surface of a scene's tool.
 
+use crate::chord::CHORD_TOLERANCE;
 use crate::error::ToolError;
-use plyflow_model::budget::{self, Wanted};
+use crate::mesh::ToolMesh;
+use crate::{double_dome, hemisphere, stl, sweep, tetrahedron};
 use plyflow_model::scene::Tool;
+use plyflow_model::tool::rules;
+use std::path::Path;
 
-/// Estimates the facets from the tool's extent in plan, before any is made. Files have the facets that they have.
-pub(crate) fn allow(tool: &Tool) -> Result<(), ToolError> {
-    let Some((plan, facet)) = plan_and_facet(tool) else {
-        return Ok(());
-    };
-    // Two facets for each square of that side, on top and below. The generators refuse lengths that are none.
-    let count = 4.0 * plan / (facet * facet);
-    if !(plan > 0.0 && facet > 0.0 && count.is_finite()) {
-        return Ok(());
-    }
-    budget::allow(Wanted {
-        what: "the tool's surface",
-        of: "facets",
-        count,
-        most: budget::MOST_FACETS,
-        bytes: budget::FACET_BYTES,
-        parameter: "facet_size",
-        size: facet,
-    })
-    .map_err(ToolError::TooMany)
+/// The surface of a scene's tool. STL paths are taken as they stand: absolute, or relative to the working
+/// directory (see [`build_from`]).
+///
+/// # Errors
+/// When the tool's words make no surface ([`rules::check`]), or its file is none.
+pub fn build(tool: &Tool) -> Result<ToolMesh, ToolError> {
+    build_from(tool, Path::new(""))
 }
 
-/// Area in plan (m2) and largest edge of a facet (m).
-fn plan_and_facet(tool: &Tool) -> Option<(f64, f64)> {
-    let circle = |r: f64| std::f64::consts::PI * r * r;
-    Some(match tool {
-        Tool::JoggleSpar(s) => (s.length.si() * s.top_width.si(), s.facet_size.si()),
-        Tool::RampedSpar(s) => (s.length.si() * s.top_width.si(), s.facet_size.si()),
-        Tool::Flat(f) => (f.length.si() * f.width.si(), f.facet_size.si()),
-        Tool::Tetrahedron(t) => (0.25 * 3f64.sqrt() * t.edge.si().powi(2), t.facet_size.si()),
-        Tool::DoubleDome(d) => (circle(d.dome_radius.si()), d.facet_size.si()),
-        Tool::Hemisphere(h) => (circle(h.radius.si()), h.facet_size.si()),
-        Tool::Stl(_) => return None,
+/// As [`build`], with STL paths relative to `folder`, the one that holds the scene file.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
+    rules::check(tool)?;
+    Ok(match tool {
+        Tool::JoggleSpar(t) => sweep::mesh(&t.shape()?, t.facet_size.si(), CHORD_TOLERANCE),
+        Tool::Flat(t) => sweep::mesh(&t.shape()?, t.facet_size.si(), CHORD_TOLERANCE),
+        Tool::RampedSpar(t) => sweep::mesh(&t.shape()?, t.facet_size.si(), CHORD_TOLERANCE),
+        Tool::Tetrahedron(t) => tetrahedron::tetrahedron(t),
+        Tool::DoubleDome(t) => double_dome::double_dome(t),
+        Tool::Hemisphere(t) => hemisphere::hemisphere(t.radius.si(), t.facet_size.si()),
+        Tool::Stl(s) => {
+            let path = folder.join(&s.file);
+            stl::read(&path, s.unit.si(), s.translate.map(|t| t.si()))?
+        }
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::build;
-    use plyflow_model::scene::Tool;
+    use super::*;
+    use plyflow_model::tool::rules::plan_and_facet;
     use std::time::Instant;
 
     fn tool(facet: &str) -> Vec<Tool> {
@@ -80,7 +77,7 @@ mod tests {
     #[test]
     fn the_estimate_is_no_more_than_what_is_made() {
         for tool in tool("5 mm") {
-            let (plan, facet) = super::plan_and_facet(&tool).unwrap();
+            let (plan, facet) = plan_and_facet(&tool).unwrap();
             let made = build(&tool).unwrap().triangles.len() as f64;
             assert!(
                 4.0 * plan / (facet * facet) < 1.2 * made,

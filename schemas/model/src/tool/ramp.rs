@@ -5,7 +5,7 @@ use plyflow_fixed::FixedBits;
 /// A rise over a length with circular fillets of one radius at its foot and head; C1, with curvature 0 or
 /// 1/radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Ramp {
+pub struct Ramp {
     length: f64,
     rise: f64,
     radius: f64,
@@ -18,7 +18,7 @@ pub(crate) struct Ramp {
 impl Ramp {
     /// `length` counts the fillets. `None` where the arcs do not fit: `length` must be at least
     /// [`Ramp::shortest`].
-    pub(crate) fn new(length: f64, rise: f64, radius: f64) -> Option<Self> {
+    pub fn new(length: f64, rise: f64, radius: f64) -> Option<Self> {
         let height = rise.abs();
         if height == 0.0 {
             return Some(Self {
@@ -48,7 +48,7 @@ impl Ramp {
 
     /// Shortest length in which both fillets fit (they meet with no straight part between), and the slope
     /// stays under 45 degrees.
-    pub(crate) fn shortest(rise: f64, radius: f64) -> f64 {
+    pub fn shortest(rise: f64, radius: f64) -> f64 {
         let height = rise.abs();
         let half = std::f64::consts::FRAC_PI_4;
         let arcs_at_45 = 2.0 * radius * (1.0 - half.fixed_cos());
@@ -60,7 +60,7 @@ impl Ramp {
     }
 
     /// Height at distance `s` from the foot; 0 before it and `rise` beyond `length`.
-    pub(crate) fn height(&self, s: f64) -> f64 {
+    pub fn height(&self, s: f64) -> f64 {
         let top = self.rise.abs();
         let sign = self.rise.signum();
         let arc = |s: f64| self.radius - (self.radius * self.radius - s * s).max(0.0).sqrt();
@@ -79,7 +79,7 @@ impl Ramp {
     }
 
     /// Largest slope, without sign.
-    pub(crate) fn slope(&self) -> f64 {
+    pub fn slope(&self) -> f64 {
         self.slope
     }
 }
