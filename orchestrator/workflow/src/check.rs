@@ -191,7 +191,13 @@ impl<'a> Checker<'a> {
         let Some(dimension) = Dimension::ALL.into_iter().find(|d| d.name() == dimension) else {
             return;
         };
-        let Some(value) = quantity(node, dimension, what, key, self.source, self.problems) else {
+        let given = Given {
+            node,
+            what,
+            key,
+            source: self.source,
+        };
+        let Some(value) = quantity(&given, dimension, self.problems) else {
             return;
         };
         let bound = |name| {
@@ -292,7 +298,13 @@ impl<'a> Checker<'a> {
             .filter_map(|v| v["const"].as_str())
             .collect();
         if constants.len() == variants.len() {
-            choice(node, &constants, what, key, self.source, self.problems);
+            let given = Given {
+                node,
+                what,
+                key,
+                source: self.source,
+            };
+            choice(&given, &constants, self.problems);
             return;
         }
         let names: Vec<(&str, &'a Value)> = variants
@@ -478,25 +490,40 @@ pub fn out_of_bounds<'p>(
     d.given(node.describe()).expected(expected)
 }
 
+/// A value of a file.
+pub struct Given<'a> {
+    /// The value.
+    pub node: &'a Node,
+    /// What it is called.
+    pub what: &'a str,
+    /// Where its key stands, to point at when the value is empty.
+    pub key: &'a Span,
+    /// The file.
+    pub source: &'a Source,
+}
+
+impl Given<'_> {
+    /// Where to point.
+    fn span(&self) -> &Span {
+        // An empty value has no extent; its key has.
+        match self.node.kind {
+            Kind::Null => self.key,
+            _ => &self.node.span,
+        }
+    }
+}
+
 /// Reads a quantity or reports why it is none.
-pub fn quantity(
-    node: &Node,
-    dimension: Dimension,
-    what: &str,
-    key: &Span,
-    source: &Source,
-    problems: &mut Problems,
-) -> Option<f64> {
+pub fn quantity(given: &Given<'_>, dimension: Dimension, problems: &mut Problems) -> Option<f64> {
+    let Given {
+        node, what, source, ..
+    } = given;
     let text = match &node.kind {
         Kind::Text(text) => text.clone(),
         Kind::Number(n) => n.to_string(),
         _ => {
-            let span = if node.kind == Kind::Null {
-                key
-            } else {
-                &node.span
-            };
-            let d = problems.add(source, span, format!("`{what}` is {}", node.describe()));
+            let message = format!("`{what}` is {}", node.describe());
+            let d = problems.add(source, given.span(), message);
             let (article, example) = (dimension.with_article(), dimension.example());
             d.given(node.describe())
                 .expected(format!("{article} such as `{example}`"));
@@ -520,22 +547,18 @@ pub fn quantity(
 
 /// Reads one of some names or reports the nearest.
 pub fn choice<'n>(
-    node: &Node,
+    given: &Given<'_>,
     names: &[&'n str],
-    what: &str,
-    key: &Span,
-    source: &Source,
     problems: &mut Problems,
 ) -> Option<&'n str> {
+    let Given {
+        node, what, source, ..
+    } = given;
     if let Some(found) = node.text().and_then(|t| names.iter().find(|n| **n == t)) {
         return Some(found);
     }
-    let span = if node.kind == Kind::Null {
-        key
-    } else {
-        &node.span
-    };
-    let d = problems.add(source, span, format!("`{what}` is {}", node.describe()));
+    let message = format!("`{what}` is {}", node.describe());
+    let d = problems.add(source, given.span(), message);
     d.given(node.describe())
         .expected(one_of(names.iter().copied()));
     if let Some(text) = node.text() {

@@ -282,10 +282,29 @@ impl Source {
     }
 }
 
+/// A text that names something, where it is written.
+pub struct Mention<'a> {
+    /// The file.
+    pub source: &'a Source,
+    /// Where in it.
+    pub span: &'a Span,
+    /// The text.
+    pub text: &'a str,
+}
+
+impl<'a> Mention<'a> {
+    /// Of a text of a file.
+    pub fn new(source: &'a Source, span: &'a Span, text: &'a str) -> Self {
+        Self { source, span, text }
+    }
+}
+
 /// Collects findings.
 #[derive(Debug, Default)]
 pub struct Problems {
     items: Vec<Diagnostic>,
+    /// Of each of them its place in the tree, beyond the file's own text where it comes from elsewhere.
+    places: Vec<Span>,
     read: BTreeMap<Utf8PathBuf, String>,
     forms: Vec<(Utf8PathBuf, Utf8PathBuf)>,
     parsed: BTreeMap<Utf8PathBuf, (Source, Node)>,
@@ -299,6 +318,7 @@ impl Problems {
         span: &Span,
         message: impl Into<String>,
     ) -> &mut Diagnostic {
+        let place = span.clone();
         let set = source.set.iter().rev().find(|s| s.start <= span.start);
         let mut message = shown(message);
         let (file, text, span) = match set {
@@ -318,6 +338,7 @@ impl Problems {
             }
         };
         let (line, column) = line_column(text, span.start);
+        self.places.push(place);
         self.push(Diagnostic {
             file,
             line,
@@ -335,6 +356,7 @@ impl Problems {
 
     /// Adds a finding about a file that cannot be read as a whole.
     pub fn add_unreadable(&mut self, file: &Utf8Path, message: String) -> &mut Diagnostic {
+        self.places.push(0..0);
         self.push(Diagnostic {
             file: file.to_owned(),
             line: 0,
@@ -405,6 +427,11 @@ impl Problems {
     /// How many so far; to learn whether a part added any.
     pub fn count(&self) -> usize {
         self.items.len()
+    }
+
+    /// Where in their trees all findings behind the first `from` lie.
+    pub fn places_from(&self, from: usize) -> Vec<Span> {
+        self.places[from..].to_vec()
     }
 
     /// Sorted by file (in the order of first mention) and place; the same finding is listed once, though

@@ -1,23 +1,24 @@
 //! YAML -> resolved workflow. Every error has file, line, column, the value, what was expected and the
 //! nearest valid name; all errors of a pass are reported together.
 
-mod blank;
 mod catalog;
 mod check;
 mod diagnostics;
+mod draft;
 mod evidence;
 mod expect;
-mod friction;
 mod graph;
 mod hints;
 mod load;
 mod overrides;
 mod parameters;
 mod paths;
-mod process;
 pub mod resolved;
+mod results;
 mod scene;
+mod scene_rules;
 mod study;
+mod text;
 mod wires;
 mod yaml;
 
@@ -28,6 +29,6 @@ pub use graph::{dependencies, graph, to_dot, to_mermaid};
 pub use load::{
     Part, check_part, load, load_with, plugin_search_folders, resolve, resolve_with_points,
 };
-pub use overrides::Override;
+pub use overrides::{Override, OverrideError};
 pub use resolved::ResolvedWorkflow;
 pub use study::PointsOf;

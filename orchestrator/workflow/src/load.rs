@@ -1,45 +1,25 @@
 //! A workflow file -> [`ResolvedWorkflow`], or everything that is wrong with it.
 
-use crate::catalog::{Catalog, CatalogEntry, Plugins};
+use crate::catalog::{Catalog, Plugins};
 use crate::check::Checker;
-use crate::diagnostics::{Diagnostics, Problems, Source};
+use crate::diagnostics::{Diagnostics, Mention, Problems, Source};
+use crate::draft::{Draft, WORKFLOW};
 use crate::evidence::{Evidence, Resolution};
 use crate::expect;
 use crate::hints::other_format;
 use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
 use crate::resolved::{FailurePolicy, ResolvedStep, ResolvedWorkflow, Resources};
-use crate::scene::is_word;
 use crate::study::{Asked, Family, PointsOf};
 use crate::wires::{self, Wiring};
-use crate::yaml::{Entry, Kind, Node};
+use crate::yaml::{Kind, Node};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
+use plyflow_model::canonical;
 use plyflow_model::manifest::PluginKind;
+use plyflow_model::text::is_word;
 use plyflow_model::units::{Dimension, parse_quantity};
-use plyflow_model::{canonical, schema};
-use serde_json::Value;
 use std::collections::HashSet;
-use std::rc::Rc;
-use std::sync::LazyLock;
-
-pub(crate) static WORKFLOW: LazyLock<Value> = LazyLock::new(schema::workflow);
-
-/// One step while it is being resolved.
-#[derive(Clone)]
-pub(crate) struct Draft<'n> {
-    /// Its entry in `steps`.
-    pub entry: &'n Entry,
-    /// Its plugin, if it was found.
-    pub plugin: Option<Rc<CatalogEntry>>,
-}
-
-impl Draft<'_> {
-    /// Its name.
-    pub fn name(&self) -> &str {
-        &self.entry.key
-    }
-}
 
 /// Reads a workflow file, looks every name up, checks every parameter, and hashes every file.
 ///
@@ -176,7 +156,7 @@ fn load_into(
     let wiring = wires::connect(&drafts, &source, problems);
     let asked = family
         .as_ref()
-        .map(|f| Asked::read(f, &root, &drafts, &wiring, &source, problems));
+        .map(|f| Asked::read(f, &root, (&drafts, &wiring), &source, problems));
     if let (None, Some(e)) = (
         &asked,
         root.entry("responses")
@@ -190,8 +170,8 @@ fn load_into(
         d.expected("a block `study` or `optimise`, or no `responses`");
     }
     let expectations = expect::expectations(&root, &drafts, asked.as_ref(), &source, problems);
-    let mut resolve = |draft: &Draft<'_>, i: usize, problems: &mut Problems| {
-        step(draft, &wiring, i, &source, catalog, problems)
+    let mut resolve = |draft: &Draft<'_>, problems: &mut Problems| {
+        step(draft, &wiring, &source, catalog, problems)
     };
     let (steps, mut study) = match &family {
         Some(family) => family.steps(&drafts, &wiring, &source, problems, &mut resolve)?,
@@ -232,12 +212,11 @@ fn one_each(
     drafts: &[Draft<'_>],
     wiring: &Wiring,
     problems: &mut Problems,
-    resolve: &mut dyn FnMut(&Draft<'_>, usize, &mut Problems) -> Option<ResolvedStep>,
+    resolve: &mut dyn FnMut(&Draft<'_>, &mut Problems) -> Option<ResolvedStep>,
 ) -> Option<Vec<ResolvedStep>> {
     let mut steps: Vec<Option<ResolvedStep>> = drafts
         .iter()
-        .enumerate()
-        .map(|(i, draft)| resolve(draft, i, problems))
+        .map(|draft| resolve(draft, problems))
         .collect();
     if problems.count() > 0 {
         return None;
@@ -330,16 +309,14 @@ fn drafts<'n>(
                 .expected("letters, digits, `_` and `-`, at most 64");
         }
         let plugin = entry.value.get("plugin").and_then(|node| {
-            find(
-                catalog,
-                problems,
-                source,
-                node.text()?,
-                &node.span,
-                PluginKind::Step,
-            )
+            let name = Mention::new(source, &node.span, node.text()?);
+            find(catalog, problems, &name, PluginKind::Step)
         });
-        drafts.push(Draft { entry, plugin });
+        drafts.push(Draft {
+            entry,
+            index: drafts.len(),
+            plugin,
+        });
     }
     drafts
 }
@@ -347,7 +324,6 @@ fn drafts<'n>(
 fn step(
     draft: &Draft<'_>,
     wiring: &Wiring,
-    index: usize,
     source: &Source,
     catalog: &Plugins<'_>,
     problems: &mut Problems,
@@ -379,8 +355,8 @@ fn step(
         components,
         parameters: parameters.into(),
         files: resolver.files,
-        inputs: wiring.inputs[index].clone(),
-        dimensions: wiring.dimensions[index].clone(),
+        inputs: wiring.inputs[draft.index].clone(),
+        dimensions: wiring.dimensions[draft.index].clone(),
         output_kind: output.kind.clone(),
         collection: output.collection,
         resources: resources(node.get("resources")),

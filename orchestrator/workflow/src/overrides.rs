@@ -28,15 +28,29 @@ impl Word {
     }
 }
 
+/// Why a text is no override.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OverrideError {
+    /// It has no `=`.
+    #[error("no `=`; {}", WANTED)]
+    NoValue,
+    /// What stands before it names no parameter.
+    #[error("`{}` does not name a parameter of a step; {}", .0, WANTED)]
+    NoTarget(String),
+    /// What stands behind it is no YAML.
+    #[error("the value is no YAML: {0}")]
+    NoYaml(String),
+}
+
+/// What an override looks like.
+const WANTED: &str = "expected STEP.PARAMETER=VALUE, such as detect.over_shear_positive='9 deg'";
+
 impl std::str::FromStr for Override {
-    type Err = String;
+    type Err = OverrideError;
 
     /// Reads `detect.over_shear_positive=9 deg` or, for a parameter inside another, `detect.a.b=1`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wanted = "expected STEP.PARAMETER=VALUE, such as detect.over_shear_positive='9 deg'";
-        let (target, value) = text
-            .split_once('=')
-            .ok_or_else(|| format!("no `=`; {wanted}"))?;
+    fn from_str(text: &str) -> Result<Self, OverrideError> {
+        let (target, value) = text.split_once('=').ok_or(OverrideError::NoValue)?;
         let mut start = 0;
         let mut words = target.split('.').map(|w| {
             let word = Word::at(start, w);
@@ -46,11 +60,9 @@ impl std::str::FromStr for Override {
         let step = words.next().unwrap_or_else(|| Word::at(0, ""));
         let path: Vec<Word> = words.collect();
         if step.name.is_empty() || path.is_empty() || path.iter().any(|w| w.name.is_empty()) {
-            return Err(format!(
-                "`{target}` does not name a parameter of a step; {wanted}"
-            ));
+            return Err(OverrideError::NoTarget(target.to_owned()));
         }
-        let mut node = parse(value).map_err(|e| format!("the value is no YAML: {}", e.message))?;
+        let mut node = parse(value).map_err(|e| OverrideError::NoYaml(e.message))?;
         shift(&mut node, target.len() + 1);
         Ok(Self {
             text: text.to_owned(),

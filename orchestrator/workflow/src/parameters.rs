@@ -2,8 +2,8 @@
 //! components looked up. Everything wrong is reported where it stands.
 
 use crate::catalog::{CatalogEntry, CatalogError, Plugins};
-use crate::check::{choice, out_of_bounds, quantity};
-use crate::diagnostics::{Problems, Source};
+use crate::check::{Given, choice, out_of_bounds, quantity};
+use crate::diagnostics::{Mention, Problems, Source};
 use crate::hints::{list_help, number_help};
 use crate::resolved::{InputFile, PluginId};
 use crate::yaml::{Kind, Node, Span};
@@ -44,6 +44,16 @@ pub(crate) struct Place<'s> {
 }
 
 impl<'s> Place<'s> {
+    /// The value that stands there.
+    pub fn of<'n>(&'n self, node: &'n Node) -> Given<'n> {
+        Given {
+            node,
+            what: &self.what,
+            key: &self.key,
+            source: self.source,
+        }
+    }
+
     /// A value below this one.
     pub fn below(&self, name: &str, what: String, key: &Span) -> Place<'s> {
         let escaped = name.replace('~', "~0").replace('/', "~1");
@@ -154,12 +164,10 @@ impl<'a> Resolver<'a> {
             },
             Shape::Choice(values) => {
                 let names: Vec<&str> = values.iter().map(String::as_str).collect();
-                let (what, key) = (&at.what, &at.key);
-                choice(node, &names, what, key, at.source, self.problems).map(|v| json!(v))
+                choice(&at.of(node), &names, self.problems).map(|v| json!(v))
             }
             Shape::Quantity(dimension, bounds) => {
-                let (what, key) = (&at.what, &at.key);
-                let v = quantity(node, *dimension, what, key, at.source, self.problems)?;
+                let v = quantity(&at.of(node), *dimension, self.problems)?;
                 self.bounded(v, bounds, node, at)
             }
             Shape::List(of, items) => self.list(node, of, items, at),
@@ -294,7 +302,8 @@ impl<'a> Resolver<'a> {
                 Some(path)
             }
             Err(e) => {
-                unreadable(self.problems, at.source, &node.span, text, &path, &e);
+                let given = Mention::new(at.source, &node.span, text);
+                unreadable(self.problems, &given, &path, &e);
                 None
             }
         }
@@ -338,7 +347,8 @@ impl<'a> Resolver<'a> {
         kind: PluginKind,
         at: &Place<'_>,
     ) -> Option<Value> {
-        let found = find(self.catalog, self.problems, at.source, name, span, kind)?;
+        let mention = Mention::new(at.source, span, name);
+        let found = find(self.catalog, self.problems, &mention, kind)?;
         let manifest = &found.manifest;
         // Components are told apart by name inside a step.
         let clash = self
@@ -380,9 +390,11 @@ impl<'a> Resolver<'a> {
 /// Reports a file that cannot be read, with the nearest name in its folder.
 pub fn unreadable(
     problems: &mut Problems,
-    source: &Source,
-    span: &Span,
-    given: &str,
+    &Mention {
+        source,
+        span,
+        text: given,
+    }: &Mention<'_>,
     path: &Utf8Path,
     error: &FileError,
 ) {
@@ -437,9 +449,11 @@ pub fn unreadable(
 pub(crate) fn find(
     catalog: &Plugins<'_>,
     problems: &mut Problems,
-    source: &Source,
-    name: &str,
-    span: &Span,
+    &Mention {
+        source,
+        span,
+        text: name,
+    }: &Mention<'_>,
     kind: PluginKind,
 ) -> Option<Rc<CatalogEntry>> {
     let article = if kind == PluginKind::Element {

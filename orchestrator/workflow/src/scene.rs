@@ -1,17 +1,17 @@
 //! Scenes: a file or a mapping -> canonical JSON with its materials inside.
 
 use crate::check::{Checker, repeated_keys};
-use crate::diagnostics::{Problems, Source};
+use crate::diagnostics::{Mention, Problems, Source};
 use crate::hints::other_format;
 use crate::parameters::{Place, Resolver, find, named, unreadable};
 use crate::paths;
+use crate::scene_rules;
+use crate::text::written;
 use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
-use plyflow_files::text::decode;
 use plyflow_model::manifest::{PluginKind, Shape};
-use plyflow_model::units::{Dimension, parse_quantity};
-use plyflow_model::{material::Material, regions, scene::Scene, schema};
+use plyflow_model::{material::Material, scene::Scene, schema};
 use serde_json::{Value, json};
 use std::sync::{Arc, LazyLock};
 
@@ -33,7 +33,8 @@ pub fn read(
     let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
         Ok(bytes) => bytes,
         Err(e) => {
-            unreadable(problems, from, span, given, &path, &e);
+            let given = Mention::new(from, span, given);
+            unreadable(problems, &given, &path, &e);
             return None;
         }
     };
@@ -48,7 +49,7 @@ pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Opti
     let text = match written(bytes) {
         Ok(text) => text,
         Err(why) => {
-            problems.add_unreadable(&shown(&path), why);
+            problems.add_unreadable(&shown(&path), why.to_string());
             return None;
         }
     };
@@ -76,18 +77,6 @@ pub fn parse(problems: &mut Problems, path: Utf8PathBuf, bytes: Vec<u8>) -> Opti
             None
         }
     }
-}
-
-/// The text of a file that people write. Names in it are compared and shown, so that its encoding must be certain: UTF-8, or UTF-16 with its mark.
-pub fn written(bytes: Vec<u8>) -> Result<String, String> {
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return decode(&bytes).map(|text| text.into_owned());
-    }
-    String::from_utf8(bytes).map_err(|e| {
-        let good = &e.as_bytes()[..e.utf8_error().valid_up_to()];
-        let line = good.iter().filter(|b| **b == b'\n').count() + 1;
-        format!("the file is not text in UTF-8, from line {line}: save it as UTF-8")
-    })
 }
 
 /// The path as messages show it: relative when it lies below the current folder.
@@ -176,9 +165,10 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
         return None;
     }
     Checker::new(&SCENE, at.source, resolver.problems).check(node, "the scene");
-    rules(node, at.source, resolver.problems);
+    let found = resolver.problems.places_from(before);
     let tool = stl_file(resolver, node, at);
     let materials = materials(resolver, node, at);
+    scene_rules::tell(node, &materials, &found, at.source, resolver.problems);
     if resolver.problems.count() > before {
         return None;
     }
@@ -192,18 +182,9 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
     match serde_json::from_value::<Scene>(scene).and_then(|mut scene| {
         // Prose does not matter to any result.
         scene.description = None;
-        let faults = regions::faults(&scene);
-        serde_json::to_value(scene).map(|value| (value, faults))
+        serde_json::to_value(scene)
     }) {
-        Ok((value, faults)) => {
-            for fault in &faults {
-                let region = region_of(node, fault);
-                let at_region = region.map_or(&at.key, |n| &n.span);
-                let d = (resolver.problems).add(at.source, at_region, fault.text.clone());
-                d.help("places of a region are relative to its ply's `centre`");
-            }
-            faults.is_empty().then_some(value)
-        }
+        Ok(value) => Some(value),
         Err(e) => {
             // The schema is made from the types, so that only what it cannot say comes here.
             resolver
@@ -212,12 +193,6 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
             None
         }
     }
-}
-
-/// The region of a scene that a fault is about.
-fn region_of<'n>(scene: &'n Node, fault: &regions::Fault) -> Option<&'n Node> {
-    let sheet = scene.get("sheets")?.items().get(fault.sheet)?;
-    sheet.get("regions")?.items().get(fault.region)
 }
 
 fn stl_file(resolver: &mut Resolver<'_>, scene: &Node, at: &Place<'_>) -> Option<Utf8PathBuf> {
@@ -350,7 +325,8 @@ fn override_parameters(
     // As the material's file names it: perhaps by a path from there.
     let mut named = resolver.material_plugins.iter().rev();
     let (_, source, plugin) = named.find(|(pointer, ..)| *pointer == at.pointer)?;
-    let found = find(catalog, resolver.problems, source, plugin, &with.span, kind)?;
+    let mention = Mention::new(source, &with.span, plugin);
+    let found = find(catalog, resolver.problems, &mention, kind)?;
     if !matches!(with.kind, Kind::Map(_)) {
         let message = format!("`with` is {}", with.describe());
         let d = resolver.problems.add(at.source, &with.span, message);
@@ -407,153 +383,4 @@ fn material_value(
     let mut material: Material = serde_json::from_value(value).ok()?;
     material.source = None;
     serde_json::to_value(material).ok()
-}
-
-/// Rules that types and bounds cannot say. Works on the tree, so that a wrong type elsewhere does not hide
-/// a broken rule.
-fn rules(scene: &Node, source: &Source, problems: &mut Problems) {
-    sheet_rules(scene, source, problems);
-    crate::friction::rules(scene, source, problems);
-    symmetry_rules(scene, source, problems);
-    crate::process::rules(scene, source, problems);
-    let Some(tool) = scene.get("tool") else {
-        return;
-    };
-    if let Some(flat) = tool.get("flat") {
-        at_most(flat, "fillet", "height", 1.0, source, problems);
-    }
-    if let Some(spar) = tool.get("joggle_spar") {
-        at_most(spar, "fillet", "height", 1.0, source, problems);
-        // Both top edges are rounded.
-        at_most(spar, "fillet", "top_width", 0.5, source, problems);
-        joggle_rules(spar, source, problems);
-    }
-}
-
-/// Every mirror plane once.
-fn symmetry_rules(scene: &Node, source: &Source, problems: &mut Problems) {
-    let planes = scene.get("symmetry").map_or(&[][..], Node::items);
-    for (i, plane) in planes.iter().enumerate() {
-        let text = plane.text();
-        if text.is_some() && planes[..i].iter().any(|p| p.text() == text) {
-            let message = format!("the plane {} is named twice", plane.describe());
-            let d = problems.add(source, &plane.span, message);
-            d.given(plane.describe())
-                .expected("each of `x` and `y` at most once");
-        }
-    }
-}
-
-fn sheet_rules(scene: &Node, source: &Source, problems: &mut Problems) {
-    let Some(entry) = scene.entry("sheets") else {
-        return;
-    };
-    if matches!(&entry.value.kind, Kind::List(items) if items.is_empty()) {
-        let d = problems.add(source, &entry.key_span, "the scene has no sheet");
-        d.expected("at least one sheet")
-            .help("list plies and diaphragms from the tool upwards");
-    }
-    // What is rigid is a body of the artifact, or a part that rubs, under its own name.
-    let mut names: Vec<&str> = vec!["tool", "bed", "die", "holder"];
-    for sheet in entry.value.items() {
-        if let Some(node) = sheet.get("name") {
-            let name = node.text().unwrap_or_default();
-            if names.contains(&name) {
-                let d = problems.add(source, &node.span, format!("the name `{name}` is taken"));
-                d.given(name).expected(
-                    "a name of its own for every sheet, other than `tool`, `bed`, `die` and `holder`",
-                );
-            } else if !is_word(name) {
-                let d = problems.add(source, &node.span, format!("`{name}` cannot name a body"));
-                d.given(name).expected("letters, digits, `_` and `-`");
-            }
-            names.push(name);
-        }
-        crate::blank::rules(sheet, source, problems);
-    }
-}
-
-fn joggle_rules(spar: &Node, source: &Source, problems: &mut Problems) {
-    let length = |n: &Node, name: &str| {
-        n.get(name)
-            .and_then(Node::text)
-            .and_then(|t| parse_quantity(t, Dimension::Length).ok())
-    };
-    let Some(joggles) = spar.get("joggles") else {
-        return;
-    };
-    let mut last_end = f64::NEG_INFINITY;
-    for joggle in joggles.items() {
-        let (Some(start), Some(ramp)) = (length(joggle, "start"), length(joggle, "length")) else {
-            continue;
-        };
-        let Some(node) = joggle.get("start") else {
-            continue;
-        };
-        if start < last_end {
-            let d = problems.add(
-                source,
-                &node.span,
-                "this joggle begins before the one above ends",
-            );
-            d.given(node.describe())
-                .expected("joggles in order of `start`, without overlap");
-        }
-        last_end = last_end.max(start + ramp);
-        if let Some(total) = length(spar, "length")
-            && start.abs().max((start + ramp).abs()) > total / 2.0
-        {
-            let d = problems.add(source, &node.span, "this joggle reaches beyond the tool");
-            d.given(node.describe())
-                .expected(format!("a ramp within ±{} m", total / 2.0));
-            d.help("`start` counts from the tool's centre");
-        }
-    }
-}
-
-/// Checks `small <= factor * large` for two lengths of a mapping.
-fn at_most(
-    node: &Node,
-    small: &str,
-    large: &str,
-    factor: f64,
-    source: &Source,
-    problems: &mut Problems,
-) {
-    let read = |name: &str| {
-        let node = node.get(name)?;
-        parse_quantity(node.text()?, Dimension::Length)
-            .ok()
-            .map(|v| (v, node))
-    };
-    let (Some((a, place)), Some((b, limit))) = (read(small), read(large)) else {
-        return;
-    };
-    if a > factor * b {
-        let bound = if factor == 1.0 {
-            String::new()
-        } else {
-            format!("{factor} x ")
-        };
-        let d = problems.add(
-            source,
-            &place.span,
-            format!("`{small}` is {}", place.describe()),
-        );
-        d.given(place.describe());
-        d.expected(format!(
-            "at most {bound}`{large}` ({})",
-            limit.text().unwrap_or_default()
-        ));
-    }
-}
-
-/// Names that can stand in artifacts, labels and file names.
-pub fn is_word(name: &str) -> bool {
-    !name.is_empty()
-        && name.len() <= 64
-        && name.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_')
-        && name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
 }

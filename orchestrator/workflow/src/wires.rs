@@ -2,11 +2,12 @@
 //! fanned out.
 
 use crate::diagnostics::{Problems, Source};
-use crate::load::Draft;
+use crate::draft::Draft;
 use crate::resolved::{Dimension, ResolvedInput};
 use crate::yaml::{Kind, Node, Span};
 use petgraph::graph::{DiGraph, NodeIndex};
 use plyflow_model::manifest::{InputPort, Manifest};
+use plyflow_model::text::is_word;
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
 
@@ -285,7 +286,7 @@ impl Reader<'_, '_> {
             return fans;
         };
         for entry in node.entries() {
-            if !crate::scene::is_word(&entry.key) {
+            if !is_word(&entry.key) {
                 let message = format!("`{}` cannot name the items of a fan-out", entry.key);
                 let d = self.problems.add(self.source, &entry.key_span, message);
                 d.given(entry.key.clone())

@@ -20,7 +20,7 @@ fn scene(sheets: &[(&str, &str)], friction: &str, process: &str) -> String {
     };
     let process = match process {
         "press" => {
-            "process:\n  press:\n    stroke: 50 mm\n    forming_time: 1 s\n    settling_time: 0 s\n    die: {opening_radius: 53 mm, edge_radius: 6 mm}\n".to_owned()
+            "process:\n  press:\n    stroke: 50 mm\n    forming_time: 1 s\n    settling_time: 0 s\n    die: {opening_radius: 20 mm, edge_radius: 6 mm}\n".to_owned()
         }
         _ => common::SCENE[common::SCENE.find("process:").unwrap()..].to_owned(),
     };
@@ -124,8 +124,8 @@ fn pairs_of_friction_are_those_of_the_process() {
         of("double_diaphragm", "low+tool bed+low low+a high+a low+high"),
         ""
     );
-    assert_eq!(of("press", "tool+a die+b a+b"), "");
-    // Where plies of another outline do not lie between.
+    assert_eq!(of("press", "tool+a tool+b die+b die+a a+b"), "");
+    // Plies slide: what is further apart in the stack meets past the edges of the others, as the solver has it.
     let sheets = [
         ("low", "diaphragm"),
         ("a", "ply"),
@@ -133,20 +133,12 @@ fn pairs_of_friction_are_those_of_the_process() {
         ("high", "diaphragm"),
     ];
     let pairs = "  pairs:\n    - {between: [low, b], coefficient: 0.3}\n";
-    let equal = scene(&sheets, pairs, "double_diaphragm");
-    assert!(
-        told(&equal).contains("`low` and `b` do not rub"),
-        "{}",
-        told(&equal)
-    );
-    let shifted = equal.replacen("name: b,", "name: b, centre: [9 mm, 0 mm],", 1);
-    assert_ne!(equal, shifted);
-    assert_eq!(told(&shifted), "");
+    assert_eq!(told(&scene(&sheets, pairs, "double_diaphragm")), "");
     for (process, pair, says) in [
         ("press", "bed+a", "called `bed`"),
         // This press has none.
         ("press", "holder+a", "called `holder`"),
-        ("press", "die+a", "do not rub"),
+        ("press", "die+tool", "do not rub"),
         ("double_diaphragm", "bed+a", "do not rub"),
         ("double_diaphragm", "a+a", "do not rub"),
         ("double_diaphragm", "low+a a+low", "named twice"),
@@ -179,14 +171,14 @@ fn the_frame_holds_every_ply_where_it_lies() {
 }
 
 #[test]
-fn families_cross_at_five_degrees_or_more() {
+fn families_cross_at_six_degrees_or_more() {
     for (first, second, sound) in [
         ("45 deg", "-45 deg", true),
-        ("0 deg", "5 deg", true),
-        ("0 deg", "-175 deg", true),
-        ("10 deg", "14.9 deg", false),
+        ("0 deg", "6 deg", true),
+        ("0 deg", "-174 deg", true),
+        ("10 deg", "15.9 deg", false),
         ("10 deg", "190 deg", false),
-        ("-90 deg", "86 deg", false),
+        ("-90 deg", "85 deg", false),
     ] {
         let study = Study::sound();
         study.mutate(S, "fibre_1: 45 deg", &format!("fibre_1: {first}"));
@@ -213,4 +205,44 @@ fn an_stl_without_its_unit_is_told_the_form() {
         let found = told(&text);
         assert!(found.contains(says), "{found}");
     }
+}
+
+#[test]
+fn a_gap_of_the_holder_and_an_opening_of_the_die_are_held_against_the_plies() {
+    let with = |die: &str, gap: &str| {
+        let text = scene(&[("a", "ply"), ("b", "ply")], "", "press");
+        let die = format!("die: {{opening_radius: {die}, edge_radius: 6 mm}}");
+        let holder = format!("{die}\n    holder: {{hold: {{gap: {gap}}}}}");
+        let changed = text.replace("die: {opening_radius: 20 mm, edge_radius: 6 mm}", &holder);
+        assert_ne!(changed, text);
+        told(&changed)
+    };
+    assert_eq!(with("20 mm", "0.8 mm"), "");
+    // The materials' files say how thick the plies are.
+    let thin = with("20 mm", "0.7 mm");
+    assert!(
+        thin.contains("`gap` is `0.7 mm`") && thin.contains("0.8 mm thick"),
+        "{thin}"
+    );
+    let wide = with("40 mm", "0.8 mm");
+    assert!(wide.contains("`opening_radius` is `40 mm`"), "{wide}");
+}
+
+#[test]
+fn a_slip_in_one_part_hides_nothing_in_another() {
+    let text = scene(
+        &[("low", "diaphragm"), ("a", "ply"), ("high", "ply")],
+        "",
+        "bag",
+    );
+    let text = text.replacen("fibre_2: 90 deg", "fibre_1: 90 deg, fibre_2: 90", 1);
+    let text = text.replacen("fabric_fabric: 0.35", "fabric_fabric: 0,35", 1);
+    let found = told(&text);
+    for says in ["a diaphragm above it", "has no unit", "write `0.35`"] {
+        assert!(found.contains(says), "{says} in {found}");
+    }
+    assert!(
+        !found.contains("needs `fibre_2`") && !found.contains("is missing"),
+        "{found}"
+    );
 }

@@ -7,6 +7,7 @@
 //! A plugin of somebody else may tell more than a type has: readers pass over what they do not know, and what is handed on from one artifact to
 //! the next ([`Sheet`], [`Zone`]) keeps it. What a type has as an `Option` or a list may be left out.
 
+mod attributes;
 mod boundary;
 mod census;
 mod characterisation;
@@ -22,6 +23,7 @@ mod shown;
 mod study_table;
 mod zones;
 
+pub use attributes::Attributes;
 pub use boundary::{Boundary, Feedback};
 pub use census::{
     Census, CensusBody, CensusCircle, CensusComparison, CensusCurve, CensusRun, CensusRunBody,
@@ -40,8 +42,8 @@ pub use coupon::{Coupon, ElementCount, SpecimenBody};
 pub use defects::{Defects, PlyDefects, Thresholds};
 pub use export::Export;
 pub use forming::{
-    Depth, DepthPeak, Energy, FieldError, Forming, MeshQuality, Penetration, PenetrationPeak,
-    PlainBody, RegionFacts, RigidBody, Sheet, SheetBody,
+    Depth, DepthPeak, Energy, FieldError, Forming, MeshQuality, POOR_JACOBIAN, Penetration,
+    PenetrationPeak, PlainBody, RegionFacts, RigidBody, Sheet, SheetBody,
 };
 pub use measurement::{
     Compressed, FamilyCompression, FibreCompression, MeasuredBody, MeasuredDefect, Measurement,
@@ -55,11 +57,3 @@ pub use study_table::{
     StudySamples, StudyTable, StudyValue, StudyVariable,
 };
 pub use zones::{Rectangle, Zone, Zones, area, current_zones, which_count};
-
-/// A kind of artifact by its attributes.
-pub trait Attributes:
-    serde::Serialize + serde::de::DeserializeOwned + schemars::JsonSchema
-{
-    /// The name of the kind, as the manifests of plugins have it.
-    const KIND: &'static str;
-}

@@ -78,6 +78,11 @@ pub struct FrictionPair {
 }
 
 impl FrictionPair {
+    /// Its two names, as given.
+    pub fn names(&self) -> [&str; 2] {
+        self.between.each_ref().map(String::as_str)
+    }
+
     /// Its law.
     pub fn law(&self) -> FrictionLaw {
         FrictionLaw {

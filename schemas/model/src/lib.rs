@@ -7,16 +7,21 @@
 pub mod artifact;
 pub mod budget;
 pub mod canonical;
+pub mod contour;
+pub mod fault;
 pub mod friction;
 pub mod job;
 pub mod manifest;
 pub mod material;
 pub mod nearest;
 pub mod outline;
+pub mod process;
 pub mod regions;
+pub mod rules;
 pub mod scene;
 pub mod schema;
 pub mod text;
+pub mod tool;
 pub mod units;
 pub mod workflow;
 

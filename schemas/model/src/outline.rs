@@ -1,14 +1,10 @@
 //! Outlines of blanks: polygons with holes, checked and brought to one form.
 
-use crate::scene::{Contour, Sheet};
 use plyflow_fixed::FixedBits;
 use std::fmt;
 
 /// A point in the plane (m).
 pub type Point = [f64; 2];
-
-/// Corners of the polygon that stands for a circle. Its area is less than the circle's by 5e-5 of it.
-pub const CIRCLE_CORNERS: usize = 360;
 
 /// Most corners of a contour: what is checked grows with their square.
 pub const MOST_CORNERS: usize = 5000;
@@ -100,9 +96,16 @@ pub enum OutlineError {
         /// A place where they meet.
         at: Millimetres,
     },
-    /// The sheet has a size twice, or holes without an outline.
-    #[error("{0}")]
-    Form(&'static str),
+    /// Holes without an outline.
+    #[error(
+        "`holes` stand without `outline`; give a rectangle with holes as an outline of four points"
+    )]
+    HolesAlone,
+    /// The sheet has a size twice.
+    #[error(
+        "`outline` stands beside `length` or `width`; expected an outline, or length and width of a rectangle"
+    )]
+    TwoSizes,
 }
 
 impl OutlineError {
@@ -113,7 +116,7 @@ impl OutlineError {
             | Self::Repeated { contour, .. }
             | Self::Crossing { contour, .. } => Some(*contour),
             Self::Outside { hole, .. } | Self::Holes { hole, .. } => Some(*hole),
-            Self::Form(_) => None,
+            Self::HolesAlone | Self::TwoSizes => None,
         }
     }
 }
@@ -130,60 +133,24 @@ impl fmt::Display for Millimetres {
     }
 }
 
-impl Contour {
-    /// Corners relative to the sheet's centre (m), as given.
-    pub fn corners(&self) -> Vec<Point> {
-        match self {
-            Self::Polygon(points) => points.iter().map(|p| p.map(|c| c.si())).collect(),
-            Self::Round(round) => {
-                let ([x, y], r) = (
-                    round.circle.centre.map(|c| c.si()),
-                    round.circle.radius.si(),
-                );
-                let turn = std::f64::consts::TAU / CIRCLE_CORNERS as f64;
-                (0..CIRCLE_CORNERS)
-                    .map(|k| {
-                        let (s, c) = (turn * k as f64).fixed_sin_cos();
-                        [x + r * c, y + r * s]
-                    })
-                    .collect()
-            }
-        }
-    }
+/// The mirror image of a point in the plane x = 0 (`axis` 0) or y = 0 (1).
+pub fn mirrored(mut point: Point, axis: usize) -> Point {
+    point[axis] = -point[axis];
+    point
 }
 
-impl Sheet {
-    /// The region of a sheet with an `outline`, over the tool; `None` for a sheet without one.
-    ///
-    /// # Errors
-    /// When outline and holes bound no region, or stand beside `length` and `width`.
-    pub fn region(&self) -> Result<Option<Region>, OutlineError> {
-        let Some(outline) = &self.outline else {
-            return if self.holes.is_empty() {
-                Ok(None)
-            } else {
-                Err(OutlineError::Form(
-                    "`holes` stand without `outline`; give a rectangle with holes as an outline of four points",
-                ))
-            };
-        };
-        if self.length.is_some() || self.width.is_some() {
-            return Err(OutlineError::Form(
-                "`outline` stands beside `length` or `width`; expected an outline, or length and width of a rectangle",
-            ));
-        }
-        let centre = self.centre.map(|c| c.si());
-        let placed = |contour: &Contour| -> Vec<Point> {
-            let corners = contour.corners().into_iter();
-            corners
-                .map(|p| [p[0] + centre[0], p[1] + centre[1]])
-                .collect()
-        };
-        Region::new(placed(outline), self.holes.iter().map(placed).collect()).map(Some)
-    }
-}
+/// How far (m) an edge may lie from its mirror image: what decimals of a scene leave.
+pub const APART: f64 = 1e-7;
 
 impl Region {
+    /// A rectangle from x0, y0 to x1, y1 (m).
+    pub fn rectangle([x0, y0, x1, y1]: [f64; 4]) -> Self {
+        Self {
+            outline: vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]],
+            holes: Vec::new(),
+        }
+    }
+
     /// Checks the contours and turns them the right way round.
     ///
     /// # Errors
@@ -243,6 +210,15 @@ impl Region {
     /// Whether a point lies inside (even-odd rule).
     pub fn contains(&self, p: Point) -> bool {
         self.contours().fold(false, |odd, c| odd != winds(c, p))
+    }
+
+    /// The corner whose mirror image in the plane x = 0 (`axis` 0) or y = 0 (1) lies furthest off all edges, and how far (m); `None` for a
+    /// region that is its own image.
+    pub fn asymmetry(&self, axis: usize) -> Option<(Point, f64)> {
+        let off = |p: &Point| (*p, self.distance_to_edge(mirrored(*p, axis)));
+        let worst = self.contours().flatten().map(off);
+        let worst = worst.max_by(|a, b| a.1.total_cmp(&b.1));
+        worst.filter(|(_, apart)| *apart > APART)
     }
 
     /// Distance of a point from the nearest contour (m).

@@ -6,6 +6,16 @@
 
 use std::borrow::Cow;
 
+/// Whether a text can be a name in artifacts, labels and file names: letters, digits, `_` and `-`, at most 64.
+pub fn is_word(name: &str) -> bool {
+    !name.is_empty()
+        && name.len() <= 64
+        && name.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_')
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+}
+
 /// Whether a terminal could take this character for more than a letter. Line ends and tabs are allowed.
 #[must_use]
 pub fn steers(c: char) -> bool {

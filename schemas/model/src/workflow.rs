@@ -7,9 +7,11 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 mod optimise;
+mod stated;
 mod study;
 
 pub use optimise::{Optimise, OptimiseMethod};
+pub use stated::{OnFailure, ResultValue, Stated};
 pub use study::{
     Direction, ExpectResponse, FamilyOf, PointSet, PointsOf, Response, ResponseOf, Sample,
     SampleMethod, Scalar, Scale, Span, Study, Values,
@@ -51,17 +53,6 @@ pub struct Workflow {
     #[serde(default, skip_serializing_if = "Expectations::is_empty")]
     #[schemars(extend("x-expected" = "a list of expectations, or the path of a JSON file with them"))]
     pub expect: Expectations,
-}
-
-/// Failure policy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum OnFailure {
-    /// Independent branches finish.
-    #[default]
-    KeepGoing,
-    /// Running steps are stopped.
-    FailFast,
 }
 
 /// One step.
@@ -154,26 +145,6 @@ pub struct Expect {
     pub stated: Stated,
 }
 
-/// What a number is expected to be, with its unit.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Stated {
-    /// Expected value, with the unit of the result (`argmax`, `argmin` of a response: of the variable).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub value: Option<ResultValue>,
-    /// Allowed absolute deviation from `value`; of a response also from zero, from symmetry, or against the direction.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<ResultValue>,
-    /// Lower bound.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub minimum: Option<ResultValue>,
-    /// Upper bound.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub maximum: Option<ResultValue>,
-    /// Where the expectation comes from.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub source: Option<String>,
-}
-
 /// What of several results is held against an expectation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -232,16 +203,6 @@ pub struct Expected {
     pub expectations: Vec<Expectable>,
 }
 
-/// A value of a result: a plain number when the result has no unit, else text with a unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum ResultValue {
-    /// Dimensionless.
-    Number(f64),
-    /// With a unit.
-    Quantity(String),
-}
-
 /// An amount of memory in bytes, written `4 GiB` or `500 MB`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Memory(
@@ -263,32 +224,44 @@ impl Memory {
     ];
 }
 
-impl std::str::FromStr for Memory {
-    type Err = String;
+/// A text that is no amount of memory.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{text}` is no amount of memory; expected one such as `4 GiB` or `500 MB`{}",
+    .nearest.map_or(String::new(), |n| format!(" (did you mean `{n}`?)"))
+)]
+pub struct MemoryError {
+    /// As given.
+    pub text: String,
+    /// The unit that was probably meant.
+    pub nearest: Option<&'static str>,
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl std::str::FromStr for Memory {
+    type Err = MemoryError;
+
+    fn from_str(text: &str) -> Result<Self, MemoryError> {
         let text = text.trim();
         let split = text
             .find(|c: char| !(c.is_ascii_digit() || c == '.'))
             .unwrap_or(text.len());
         let (number, unit) = text.split_at(split);
-        let wrong =
-            || format!("`{text}` is no amount of memory; expected one such as `4 GiB` or `500 MB`");
-        let number: f64 = number.parse().map_err(|_| wrong())?;
+        let wrong = |nearest| MemoryError {
+            text: text.to_owned(),
+            nearest,
+        };
+        let number: f64 = number.parse().map_err(|_| wrong(None))?;
         let unit = unit.trim();
         let Some((_, factor)) = Memory::UNITS.iter().find(|(name, _)| *name == unit) else {
             let names = Memory::UNITS.iter().map(|(name, _)| *name);
-            return Err(match crate::nearest::nearest(unit, names) {
-                Some(n) => format!("{} (did you mean `{n}`?)", wrong()),
-                None => wrong(),
-            });
+            return Err(wrong(crate::nearest::nearest(unit, names)));
         };
         let bytes = number * *factor as f64;
         // Above 2^53 bytes the product is no longer exact, and no machine has that much.
         if bytes > 0.0 && bytes < 9e15 {
             Ok(Memory(bytes.round() as u64))
         } else {
-            Err(wrong())
+            Err(wrong(None))
         }
     }
 }
@@ -334,7 +307,13 @@ mod tests {
         for wrong in ["4", "4 gb", "GiB", "-1 GB", "0 B", "4 GiBs", ""] {
             assert!(wrong.parse::<Memory>().is_err(), "{wrong}");
         }
-        assert!("4 gib".parse::<Memory>().unwrap_err().contains("`GiB`"));
+        assert!(
+            "4 gib"
+                .parse::<Memory>()
+                .unwrap_err()
+                .to_string()
+                .contains("`GiB`")
+        );
     }
 
     #[test]

@@ -1,10 +1,13 @@
 //! Expectations over the points of a study.
 
-use super::{Family, report, within};
 use crate::diagnostics::{Problems, Source};
-use crate::expect::value;
-use crate::load::Draft;
+use crate::draft::Draft;
 use crate::resolved::{FamilyExpectation, StudyResponse};
+use crate::results::value;
+use crate::study::optimise::looked_for;
+use crate::study::responses::responses;
+use crate::study::space::Family;
+use crate::study::told::{report, within};
 use crate::wires::Wiring;
 use crate::yaml::{Kind, Node};
 use plyflow_model::workflow::FamilyOf;
@@ -23,13 +26,11 @@ impl<'a> Asked<'a> {
     pub fn read(
         family: &'a Family,
         root: &Node,
-        drafts: &[Draft<'_>],
-        wiring: &Wiring,
+        steps: (&[Draft<'_>], &Wiring),
         source: &Source,
         problems: &mut Problems,
     ) -> Self {
-        let responses =
-            super::responses::responses(root, family, (drafts, wiring), source, problems);
+        let responses = responses(root, family, steps, source, problems);
         let declared = root.get("responses").map_or(&[][..], Node::entries);
         Self {
             family,
@@ -45,7 +46,7 @@ impl<'a> Asked<'a> {
         source: &Source,
         problems: &mut Problems,
     ) -> Option<crate::resolved::Optimisation> {
-        super::optimise::looked_for(self.family, &self.responses, root, source, problems)
+        looked_for(self.family, &self.responses, root, source, problems)
     }
 
     /// Reads an expectation over the points; everything wrong is reported.

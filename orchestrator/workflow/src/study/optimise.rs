@@ -1,14 +1,16 @@
 //! The block `optimise`: its search, and what became of its points.
 
-use super::{Family, report, within};
 use crate::check::Checker;
 use crate::diagnostics::{Problems, Source};
-use crate::load::WORKFLOW;
+use crate::draft::WORKFLOW;
 use crate::resolved::{Budget, Optimisation, Study, StudyResponse};
+use crate::study::points;
+use crate::study::space::{Begun, Family};
+use crate::study::told::{in_unit_of, report, within};
 use crate::yaml::{Kind, Node};
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_study::optimise::{Along, DEFAULT_POPULATION, Outcome, Search, Way};
-use plyflow_study::{Expression, ExpressionError, Names, Points, Problem, Quantity, Table, Value};
+use plyflow_study::{Expression, ExpressionError, Names, Points, Quantity, Table, Value};
 use std::collections::HashMap;
 
 /// Gives the points with which an optimisation is looked at, by the name of the workflow, what names the search, and the search: none for
@@ -17,13 +19,6 @@ pub type PointsOf<'a> = dyn Fn(&str, &str, &Search) -> Option<Vec<Vec<Value>>> +
 
 /// Digits of a response that constraints look at.
 const DIGITS: usize = 12;
-
-/// A search, and the points that it has asked for.
-pub(crate) struct Begun {
-    search: Search,
-    asked: Vec<Vec<Value>>,
-    digest: String,
-}
 
 impl Family {
     /// Reads the block, and finds its variables in the steps. `None` when something is wrong (and reported).
@@ -97,7 +92,7 @@ fn digest(node: &Node) -> String {
 
 /// The schema check has passed.
 fn search(node: &Node, source: &Source, problems: &mut Problems) -> Option<Search> {
-    let over = super::points::over(node.get("over")?, source, problems)?;
+    let over = points::over(node.get("over")?, source, problems)?;
     let whole = |key: &str| node.get(key).and_then(|n| n.to_json().as_u64());
     let way = match node.get("method").and_then(Node::text) {
         Some("simplex") => Way::Simplex,
@@ -145,32 +140,6 @@ fn search(node: &Node, source: &Source, problems: &mut Problems) -> Option<Searc
     })
 }
 
-/// A value in the unit of another, where both are quantities.
-fn in_unit_of(value: &Value, other: &Value) -> Result<Value, Problem> {
-    match (value, other) {
-        (Value::Quantity(value), Value::Quantity(other)) => {
-            value.in_unit_of(other).map(Value::Quantity)
-        }
-        _ => Ok(value.clone()),
-    }
-}
-
-/// Each value once, quantities in the unit of the first: a method tells values apart, not their spelling.
-pub(super) fn in_one_unit(values: Vec<Value>) -> Result<Vec<Value>, Problem> {
-    let mut all: Vec<Value> = Vec::new();
-    for value in values {
-        let value = match all.first() {
-            Some(first) if first.kind() == value.kind() => in_unit_of(&value, first)?,
-            // Of another kind: told with both, later.
-            _ => value,
-        };
-        if !all.contains(&value) {
-            all.push(value);
-        }
-    }
-    Ok(all)
-}
-
 /// The value at which a variable begins, as the variable writes it.
 fn begins(
     node: &Node,
@@ -179,7 +148,7 @@ fn begins(
     source: &Source,
     problems: &mut Problems,
 ) -> Option<Value> {
-    let given = super::points::value(node, source, problems)?;
+    let given = points::value(node, source, problems)?;
     let value = match along {
         Along::Steps(all) | Along::Choice(all) => in_unit_of(&given, &all[0]),
         Along::Range(_) => Ok(given.clone()),

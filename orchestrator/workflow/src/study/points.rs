@@ -1,8 +1,8 @@
 //! The block `study` -> a table of values. The schema check has passed: what is read here has its form.
 
-use super::{report, within};
-use crate::diagnostics::{Problems, Source};
+use crate::diagnostics::{Mention, Problems, Source};
 use crate::parameters::{named, unreadable};
+use crate::study::told::{in_one_unit, is_column, report, within};
 use crate::yaml::{Entry, Kind, Node, Span};
 use plyflow_files::number::{Decimal, Signs};
 use plyflow_files::open::{self, MOST_WRITTEN};
@@ -98,7 +98,7 @@ impl Reader<'_> {
             return self.range(node).map(Along::Range);
         }
         let values = self.values(node, key)?;
-        let values = super::optimise::in_one_unit(values)
+        let values = in_one_unit(values)
             .map_err(|problem| self.tell(problem, &node.span))
             .ok()?;
         let si: Vec<Option<f64>> = values.iter().map(Value::si).collect();
@@ -212,7 +212,7 @@ impl Reader<'_> {
         let letter = |c: char| c.is_ascii_alphabetic() || c == '_';
         let all = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let is_name = name.starts_with(letter) && name.chars().all(all) && name.len() <= 64;
-        if is_name && super::responses::is_column(name) {
+        if is_name && is_column(name) {
             let message = format!("`{name}` is a column that every table of a study has");
             self.tell(Problem::new(message).expected("another name"), span);
             return None;
@@ -392,7 +392,8 @@ impl Reader<'_> {
         let bytes = match open::read(path.as_std_path(), MOST_WRITTEN) {
             Ok(bytes) => bytes,
             Err(e) => {
-                unreadable(self.problems, self.source, &way.value.span, file, &path, &e);
+                let given = Mention::new(self.source, &way.value.span, file);
+                unreadable(self.problems, &given, &path, &e);
                 return None;
             }
         };

@@ -1,33 +1,16 @@
 //! `responses`: what is read from every point; and expectations on results of steps, at every point.
 
-use super::{Family, report, within};
 use crate::diagnostics::{Problems, Source};
-use crate::expect::declared;
-use crate::load::Draft;
+use crate::draft::Draft;
 use crate::resolved::{Expectation, ResolvedStep, ResponseFrom, Study, StudyResponse};
+use crate::results::declared;
+use crate::study::space::Family;
+use crate::study::told::{is_column, report, within};
 use crate::wires::Wiring;
 use crate::yaml::{Entry, Kind, Node};
+use plyflow_model::text::is_word;
 use plyflow_model::workflow::ResponseOf;
 use plyflow_study::{Expression, ExpressionError, Kind as ValueKind, Names, Value};
-
-/// Columns of the table that are always there, so that no variable and no response is named so. Beside them are `key_STEP`
-/// and, of an optimisation, `excess_1` and so on.
-pub(super) const COLUMNS: [&str; 9] = [
-    "asked",
-    "feasible",
-    "best_so_far",
-    "point",
-    "status",
-    "failed_step",
-    "failure_class",
-    "cause",
-    "seed",
-];
-
-/// Whether a name is that of a column that the table of a study has anyway.
-pub(super) fn is_column(name: &str) -> bool {
-    COLUMNS.contains(&name) || name.starts_with("key_") || name.starts_with("excess_")
-}
 
 /// Reads the responses; everything wrong is reported.
 pub(super) fn responses(
@@ -40,7 +23,7 @@ pub(super) fn responses(
     let entries = root.get("responses").map_or(&[][..], Node::entries);
     let mut all: Vec<StudyResponse> = Vec::new();
     for entry in entries.iter() {
-        if !crate::scene::is_word(&entry.key) {
+        if !is_word(&entry.key) {
             let message = format!("`{}` cannot name a response", entry.key);
             let d = problems.add(source, &entry.key_span, message);
             d.given(entry.key.clone())

@@ -1,6 +1,8 @@
 //! The kind `boundary`: what drives a fine run of a zone, or a coarse run of the whole again.
 
-use super::{Attributes, Sheet, Zone};
+use crate::artifact::attributes::Attributes;
+use crate::artifact::forming::Sheet;
+use crate::artifact::zones::Zone;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,7 @@
 //! The kinds `census`, the wrinkles of a formed ply, and `census-comparison`, those of several runs side by side.
 
-use super::{Attributes, Map, Plot, Table};
+use crate::artifact::attributes::Attributes;
+use crate::artifact::shown::{Map, Plot, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;

@@ -1,6 +1,7 @@
 //! The kind `characterisation`: a law fitted to test data.
 
-use super::{Attributes, Plot, TextFile};
+use crate::artifact::attributes::Attributes;
+use crate::artifact::shown::{Plot, TextFile};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

@@ -1,6 +1,7 @@
 //! The kind `comparison`: wrinkles, bridging and shear of coarse, fine and reference runs at the same places.
 
-use super::{Attributes, Rectangle};
+use crate::artifact::attributes::Attributes;
+use crate::artifact::zones::Rectangle;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

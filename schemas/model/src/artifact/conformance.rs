@@ -1,6 +1,6 @@
 //! The kind `conformance`: how far a component keeps the contract of its kind.
 
-use super::Attributes;
+use crate::artifact::attributes::Attributes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,8 @@
 //! The kind `coupon`: a run of a test on a coupon.
 
-use super::{Attributes, Energy, Plot};
+use crate::artifact::attributes::Attributes;
+use crate::artifact::forming::Energy;
+use crate::artifact::shown::Plot;
 use crate::scene::SheetKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! The kind `defects`: what a detection flags on the plies of a formed run.
 
-use super::Attributes;
+use crate::artifact::attributes::Attributes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

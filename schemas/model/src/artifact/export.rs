@@ -1,6 +1,7 @@
 //! The kind `export`: files for other programs.
 
-use super::{Attributes, TextFile};
+use super::attributes::Attributes;
+use super::shown::TextFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,8 @@
 //! The kind `forming`: a formed stack of sheets.
 
-use super::{Attributes, Zone};
-use crate::outline::Point;
+use crate::artifact::attributes::Attributes;
+use crate::artifact::zones::Zone;
+use crate::outline::{Millimetres, Point};
 use crate::regions::Stitches;
 use crate::scene::{MirrorPlane, SheetKind, first_axis};
 use schemars::JsonSchema;
@@ -215,6 +216,25 @@ pub struct MeshQuality {
     pub area_error: f64,
     /// `[x, y]` (m), where the element with the smallest scaled Jacobian lies.
     pub worst_at: Point,
+}
+
+/// Below this scaled Jacobian a mesh is called poor.
+pub const POOR_JACOBIAN: f64 = 0.3;
+
+impl MeshQuality {
+    /// What a user should know of a poor mesh.
+    pub fn warning(&self) -> Option<String> {
+        (self.least_scaled_jacobian < POOR_JACOBIAN).then(|| {
+            format!(
+                "its mesh is poor: least scaled Jacobian {:.2} (warning below {POOR_JACOBIAN}), angles from {:.0} to {:.0} deg, worst at \
+                 {}; round off narrow corners of the outline or take smaller elements",
+                self.least_scaled_jacobian,
+                self.least_angle.to_degrees(),
+                self.largest_angle.to_degrees(),
+                Millimetres(self.worst_at)
+            )
+        })
+    }
 }
 
 /// How far to trust a run by its energies.

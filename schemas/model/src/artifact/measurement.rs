@@ -1,6 +1,8 @@
 //! The kind `measurement`: what a metrologist measures on formed plies and on a scan of one.
 
-use super::{Attributes, Defect, DefectKind, Map, Plot, Series, Table};
+use crate::artifact::attributes::Attributes;
+use crate::artifact::comparison::{Defect, DefectKind};
+use crate::artifact::shown::{Map, Plot, Series, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

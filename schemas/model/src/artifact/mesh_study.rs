@@ -1,6 +1,8 @@
 //! The kind `mesh-study`: how results settle as a mesh is refined, and which element size does for a target error.
 
-use super::{Attributes, Plot, Rectangle, Table};
+use crate::artifact::attributes::Attributes;
+use crate::artifact::shown::{Plot, Table};
+use crate::artifact::zones::Rectangle;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! The kind `study-table`: what became of the points of a study. No step writes it, but `plyflow run`.
 
-use super::Attributes;
+use crate::artifact::attributes::Attributes;
 use crate::workflow::ResponseOf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! The kind `zones`: where finer runs look closer, in the undeformed plane.
 
-use super::Attributes;
+use crate::artifact::attributes::Attributes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

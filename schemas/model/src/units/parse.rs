@@ -4,9 +4,9 @@
 //! right, `/` divides by the next factor only; `factor = symbol power?`; `power = "2" | "^2" | "-2" |
 //! "²"`. A leading `1` stands for "nothing above the stroke": `0.004 1/mm`.
 
-use super::symbols::{ALIASES, COMPOUND, FOREIGN, PREFIXES, SYMBOLS, Symbol};
-use super::{Dimension, Exponents, UnitError};
 use crate::nearest::nearest;
+use crate::units::dimension::{Dimension, Exponents, UnitError, si_number};
+use crate::units::symbols::{ALIASES, COMPOUND, FOREIGN, PREFIXES, SYMBOLS, Symbol};
 
 /// A unit, reduced to SI: value = number x 10^`decimal` x `numerator` / `denominator` x (pi/180)^`degrees` + `offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -467,17 +467,33 @@ fn without_comma(text: &str, rest: &str) -> Option<Vec<String>> {
     (!written.is_empty()).then_some(written)
 }
 
+/// Why a unit is no plain one of SI.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SiError {
+    /// It is a multiple of one.
+    #[error("1 `{unit}` is {value} in SI units; expected the SI unit, and numbers in it")]
+    Multiple {
+        /// As given.
+        unit: String,
+        /// One of it in SI.
+        value: f64,
+    },
+    /// It is no unit.
+    #[error(transparent)]
+    NoUnit(#[from] UnitError),
+}
+
 /// Whether a unit is a plain one of SI: artifacts hold no other numbers.
 ///
 /// # Errors
-/// A sentence: what the unit is in SI, or why it is none.
-pub fn check_si(unit: &str) -> Result<(), String> {
-    match parse_quantity_in(&format!("1 {unit}"), unit) {
-        Ok(1.0) => Ok(()),
-        Ok(value) => Err(format!(
-            "1 `{unit}` is {value} in SI units; expected the SI unit, and numbers in it"
-        )),
-        Err(e) => Err(e.to_string()),
+/// What the unit is in SI, or why it is none.
+pub fn check_si(unit: &str) -> Result<(), SiError> {
+    match parse_quantity_in(&format!("1 {unit}"), unit)? {
+        1.0 => Ok(()),
+        value => Err(SiError::Multiple {
+            unit: unit.to_owned(),
+            value,
+        }),
     }
 }
 
@@ -485,7 +501,7 @@ pub fn check_si(unit: &str) -> Result<(), String> {
 /// anything else.
 pub fn plain_number(text: &str) -> Option<String> {
     match parse_quantity(text, Dimension::Dimensionless) {
-        Ok(value) => Some(super::si_number(value)),
+        Ok(value) => Some(si_number(value)),
         Err(UnitError::Comma { written, .. }) => match &written[..] {
             [one] => plain_number(one),
             _ => None,

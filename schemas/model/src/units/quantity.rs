@@ -1,6 +1,7 @@
 //! The newtypes.
 
-use super::{Dimension, parse_quantity};
+use crate::units::dimension::{Dimension, UnitError, si_number, si_text};
+use crate::units::parse::parse_quantity;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -11,20 +12,6 @@ use std::fmt;
 /// the description.
 pub const QUANTITY_PATTERN: &str =
     r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*(1?\s*/\s*)?[A-Za-z°µμ%].*$";
-
-/// The shortest text that reads back as the same double: `0.005`, `100000`, `1e-20`.
-pub fn si_number(value: f64) -> String {
-    let text = format!("{value:?}");
-    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
-}
-
-/// A quantity as text in the SI base unit: `0.005 m`.
-pub fn si_text(value: f64, dimension: Dimension) -> String {
-    match dimension.base_unit() {
-        "" => si_number(value),
-        unit => format!("{} {unit}", si_number(value)),
-    }
-}
 
 /// Reads the text of one quantity; refuses bare numbers with the unit that is missing.
 struct QuantityVisitor(Dimension);
@@ -47,7 +34,7 @@ impl Visitor<'_> for QuantityVisitor {
 
     fn visit_f64<E: de::Error>(self, v: f64) -> Result<f64, E> {
         let text = si_number(v);
-        Err(E::custom(super::UnitError::MissingUnit {
+        Err(E::custom(UnitError::MissingUnit {
             text,
             dimension: Some(self.0),
         }))
@@ -88,7 +75,7 @@ macro_rules! quantities {
         }
 
         impl std::str::FromStr for $name {
-            type Err = super::UnitError;
+            type Err = UnitError;
             fn from_str(text: &str) -> Result<Self, Self::Err> {
                 parse_quantity(text, Self::DIMENSION).map(Self)
             }

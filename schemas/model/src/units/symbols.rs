@@ -1,6 +1,6 @@
 //! Which units there are, and which words people write for them.
 
-use super::Exponents;
+use crate::units::dimension::Exponents;
 
 /// SI prefixes and their powers of ten.
 pub(super) const PREFIXES: [(&str, i32); 12] = [

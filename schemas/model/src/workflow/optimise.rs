@@ -1,6 +1,6 @@
 //! The block `optimise` of a workflow.
 
-use super::{Scalar, Values};
+use crate::workflow::study::{Scalar, Values};
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! The block `study` of a workflow, its responses, and what is expected of them.
 
-use super::{OnFailure, Stated};
+use crate::workflow::stated::{OnFailure, Stated};
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! Triangles and quads twice as large as the elements: cells of a grid well inside, Delaunay triangles from there to the edge,
 //! merged in pairs to quads where they make good ones.
 
-use crate::MeshError;
 use crate::edge::{Curve, Stop};
+use crate::error::MeshError;
 use plyflow_fixed::FixedBits;
 use plyflow_model::outline::{Millimetres, Point, Region, cross, segment_distance, winds};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};

@@ -1,6 +1,6 @@
 //! Contours as the mesher sees them: places along them, their corners, the narrowest parts of a region.
 
-use crate::MeshError;
+use crate::error::MeshError;
 use plyflow_fixed::FixedBits;
 use plyflow_model::outline::{Millimetres, Point, Region, cross, segment_distance, signed_area};
 

@@ -1,11 +1,11 @@
 //! From the coarse mesh to elements: every quad becomes four, every triangle three; then the nodes near the edge are moved to
 //! where the elements are best.
 
-use crate::MeshError;
 use crate::coarse::{Coarse, OnEdge, coarse_mesh, grid_spacings, key};
 use crate::edge::{Curve, check_features};
-use crate::quality::Quality;
-use crate::smooth::{Place, smooth};
+use crate::error::MeshError;
+use crate::quality;
+use crate::smooth::{Moving, Place};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::outline::{Millimetres, Point, Region};
 use std::collections::BTreeMap;
@@ -33,15 +33,16 @@ pub fn mesh_region(region: &Region, size: f64) -> Result<QuadMesh, MeshError> {
     let mut fine = split(&coarse, &curves);
     hold_grid(&mut fine);
     let [hx, hy] = grid_spacings(region, 2.0 * size);
-    smooth(
-        &mut fine.points,
-        &mut fine.places,
-        &fine.cells,
-        &curves,
-        0.25 * hx * hy,
-    );
+    Moving {
+        points: &mut fine.points,
+        places: &mut fine.places,
+        cells: &fine.cells,
+        curves: &curves,
+        area: 0.25 * hx * hy,
+    }
+    .smooth();
     let mesh = ordered(&fine, size);
-    let quality = Quality::new(&mesh, region, size);
+    let quality = quality::of(&mesh, region, size);
     if quality.least_scaled_jacobian <= 0.0 {
         return Err(MeshError::Coarse {
             size: 1e3 * size,

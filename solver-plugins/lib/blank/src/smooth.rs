@@ -43,107 +43,113 @@ fn cost(p: [Point; 4], area: f64) -> f64 {
     sum
 }
 
-/// Moves the nodes of `cells`; `area` is that of a good cell (m2).
-pub fn smooth(
-    points: &mut [Point],
-    places: &mut [Place],
-    cells: &[[u32; 4]],
-    curves: &[Curve],
-    area: f64,
-) {
-    let mut around: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
-    for (c, cell) in cells.iter().enumerate() {
-        for n in cell {
-            around[*n as usize].push(c as u32);
+/// A mesh whose nodes move.
+pub struct Moving<'a> {
+    /// Of every node (m).
+    pub points: &'a mut [Point],
+    /// How each may move.
+    pub places: &'a mut [Place],
+    /// Nodes of every cell.
+    pub cells: &'a [[u32; 4]],
+    /// Contours that nodes move along.
+    pub curves: &'a [Curve],
+    /// That of a good cell (m2).
+    pub area: f64,
+}
+
+impl Moving<'_> {
+    /// Moves the nodes.
+    pub fn smooth(&mut self) {
+        let mut around: Vec<Vec<u32>> = vec![Vec::new(); self.points.len()];
+        for (c, cell) in self.cells.iter().enumerate() {
+            for n in cell {
+                around[*n as usize].push(c as u32);
+            }
         }
-    }
-    let moving: Vec<usize> = (0..points.len())
-        .filter(|n| places[*n] != Place::Fixed)
-        .collect();
-    for share in STEPS {
-        let step = share * area.sqrt();
-        // A node is tried again only after one of its cells has changed.
-        let mut waiting = vec![true; points.len()];
-        for _ in 0..ROUNDS {
-            for n in &moving {
-                if std::mem::take(&mut waiting[*n])
-                    && improve(*n, points, places, cells, &around[*n], curves, area, step)
-                {
-                    for m in around[*n].iter().flat_map(|c| cells[*c as usize]) {
-                        waiting[m as usize] = true;
+        let moving: Vec<usize> = (0..self.points.len())
+            .filter(|n| self.places[*n] != Place::Fixed)
+            .collect();
+        for share in STEPS {
+            let step = share * self.area.sqrt();
+            // A node is tried again only after one of its cells has changed.
+            let mut waiting = vec![true; self.points.len()];
+            for _ in 0..ROUNDS {
+                for n in &moving {
+                    if std::mem::take(&mut waiting[*n]) && self.improve(*n, &around[*n], step) {
+                        for m in around[*n].iter().flat_map(|c| self.cells[*c as usize]) {
+                            waiting[m as usize] = true;
+                        }
                     }
                 }
             }
         }
     }
-}
 
-/// Tries the places around a node; whether one is better.
-fn improve(
-    n: usize,
-    points: &mut [Point],
-    places: &mut [Place],
-    cells: &[[u32; 4]],
-    around: &[u32],
-    curves: &[Curve],
-    area: f64,
-    step: f64,
-) -> bool {
-    let at = points[n];
-    let total = |at: Point| -> f64 {
-        around
-            .iter()
-            .map(|c| {
-                let cell = cells[*c as usize];
-                cost(
-                    cell.map(|m| {
-                        if m as usize == n {
-                            at
-                        } else {
-                            points[m as usize]
-                        }
-                    }),
-                    area,
-                )
-            })
-            .sum()
-    };
-    let mut best = (total(at) * (1.0 - 1e-9), None);
-    let mut consider = |point: Point, place: Place| {
-        let cost = total(point);
-        if cost < best.0 {
-            best = (cost, Some((point, place)));
-        }
-    };
-    match places[n] {
-        Place::Fixed => return false,
-        Place::Free => {
-            const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
-            let ways = [
-                [1.0, 0.0],
-                [D, D],
-                [0.0, 1.0],
-                [-D, D],
-                [-1.0, 0.0],
-                [-D, -D],
-                [0.0, -1.0],
-                [D, -D],
-            ];
-            for w in ways {
-                consider([at[0] + step * w[0], at[1] + step * w[1]], Place::Free);
+    /// Tries the places a `step` (m) around a node of the cells `around`; whether one is better.
+    fn improve(&mut self, n: usize, around: &[u32], step: f64) -> bool {
+        let Self {
+            points,
+            places,
+            cells,
+            curves,
+            area,
+        } = self;
+        let at = points[n];
+        let total = |at: Point| -> f64 {
+            around
+                .iter()
+                .map(|c| {
+                    let cell = cells[*c as usize];
+                    cost(
+                        cell.map(|m| {
+                            if m as usize == n {
+                                at
+                            } else {
+                                points[m as usize]
+                            }
+                        }),
+                        *area,
+                    )
+                })
+                .sum()
+        };
+        let mut best = (total(at) * (1.0 - 1e-9), None);
+        let mut consider = |point: Point, place: Place| {
+            let cost = total(point);
+            if cost < best.0 {
+                best = (cost, Some((point, place)));
+            }
+        };
+        match places[n] {
+            Place::Fixed => return false,
+            Place::Free => {
+                const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
+                let ways = [
+                    [1.0, 0.0],
+                    [D, D],
+                    [0.0, 1.0],
+                    [-D, D],
+                    [-1.0, 0.0],
+                    [-D, -D],
+                    [0.0, -1.0],
+                    [D, -D],
+                ];
+                for w in ways {
+                    consider([at[0] + step * w[0], at[1] + step * w[1]], Place::Free);
+                }
+            }
+            Place::OnEdge(contour, way) => {
+                for w in [-1.0, 1.0] {
+                    let way = curves[contour].wrapped(way + w * step);
+                    consider(curves[contour].point(way), Place::OnEdge(contour, way));
+                }
             }
         }
-        Place::OnEdge(contour, way) => {
-            for w in [-1.0, 1.0] {
-                let way = curves[contour].wrapped(way + w * step);
-                consider(curves[contour].point(way), Place::OnEdge(contour, way));
-            }
-        }
+        let Some((point, place)) = best.1 else {
+            return false;
+        };
+        points[n] = point;
+        places[n] = place;
+        true
     }
-    let Some((point, place)) = best.1 else {
-        return false;
-    };
-    points[n] = point;
-    places[n] = place;
-    true
 }

@@ -1,6 +1,7 @@
 //! Meshes of the shapes that plies are cut to, at several element sizes.
 
-use plyflow_blank::{Blank, LEAST_FEATURE, Quality, mesh_region};
+use plyflow_blank::quality::{self, most_cells_at_inner_node};
+use plyflow_blank::{Blank, LEAST_FEATURE, mesh_region};
 use plyflow_mechanics::mesh::{NONE, QuadMesh};
 use plyflow_model::outline::{Point, Region, segment_distance, sides};
 use plyflow_model::scene::Sheet;
@@ -149,7 +150,7 @@ fn meshes_follow_their_outlines_with_sound_quads() {
         for size in [0.004, 0.005, 0.0075, 0.01, 0.015] {
             let what = format!("{name} at {size} m");
             let mesh = mesh_region(&region, size).unwrap_or_else(|e| panic!("{what}: {e}"));
-            let q = Quality::new(&mesh, &region, size);
+            let q = quality::of(&mesh, &region, size);
             // One cell at least has the angle of the sharpest corner, or a part of it.
             let corner = f64::to_radians(sharpest.min(90.0));
             assert!(
@@ -165,7 +166,7 @@ fn meshes_follow_their_outlines_with_sound_quads() {
             assert!(q.edge_ratio < 4.0, "{what}: {q:?}");
             // In the star's arms no two triangles can join without a flat cell at the edge.
             let most = if name == "star" { 6 } else { 5 };
-            assert!(q.most_cells_at_inner_node <= most, "{what}: {q:?}");
+            assert!(most_cells_at_inner_node(&mesh) <= most, "{what}: {q:?}");
             // Straight sides are followed exactly; chords cut off a share of the square of their length over the radius.
             let curved = region.contours().any(|c| c.len() > 12);
             let bound = if curved {
@@ -237,8 +238,8 @@ fn the_mesh_of_a_contour_does_not_depend_on_its_sense() {
             mesh_region(&other, 0.01).unwrap(),
         );
         let (a, b) = (
-            Quality::new(&a, &region, 0.01),
-            Quality::new(&b, &other, 0.01),
+            quality::of(&a, &region, 0.01),
+            quality::of(&b, &other, 0.01),
         );
         // Only where a contour begins may differ, and with it where the nodes of a round one lie.
         assert!(
@@ -291,7 +292,7 @@ fn random_blanks_are_meshed_soundly_or_refused_with_a_size_that_works() {
         let size = 0.003 + 0.007 * random.next();
         match mesh_region(&region, size) {
             Ok(mesh) => {
-                let q = Quality::new(&mesh, &region, size);
+                let q = quality::of(&mesh, &region, size);
                 let what = format!("case {case}: {region:?} at {size}: {q:?}");
                 let narrowest = region
                     .contours()
@@ -300,7 +301,7 @@ fn random_blanks_are_meshed_soundly_or_refused_with_a_size_that_works() {
                 let bound = 0.3f64.min(0.95 * narrowest.to_radians().sin());
                 assert!(q.least_scaled_jacobian > bound, "{what}");
                 assert!(q.least_edge > 0.15, "{what}");
-                assert!(q.most_cells_at_inner_node <= 5, "{what}");
+                assert!(most_cells_at_inner_node(&mesh) <= 5, "{what}");
                 follows(&mesh, &region, &what);
                 meshed += 1;
             }

@@ -1,6 +1,7 @@
 //! Whether the tool that is computed is the tool that was given: the checks of all steps that form over a scene's tool.
 
 use crate::audit::{FieldError, Piece, Survey};
+use crate::build::build;
 use crate::mesh::ToolMesh;
 use crate::sdf::SignedDistanceGrid;
 use crate::tree::SurfaceTree;
@@ -57,13 +58,13 @@ fn thickness(sheet: &Sheet) -> f64 {
 }
 
 /// The triangles of a scene's tool, once they are known to be a tool in the right place: its file can be read and has one outside
-/// ([`crate::build`]), it is no speck beside `spacing` (m), stands on the bed with all of its bodies, fits into the frame and has no walls
+/// ([`build`]), it is no speck beside `spacing` (m), stands on the bed with all of its bodies, fits into the frame and has no walls
 /// thinner than a ply.
 ///
 /// # Errors
 /// A text for the user: what was given, what is expected, what to do.
 pub fn checked(scene: &Scene, spacing: f64) -> Result<ToolMesh, String> {
-    let mesh = crate::build(&scene.tool).map_err(|e| e.to_string())?;
+    let mesh = build(&scene.tool).map_err(|e| e.to_string())?;
     if mesh.triangles.is_empty() {
         return Err("scene.tool: it has no facet; expected a surface".into());
     }

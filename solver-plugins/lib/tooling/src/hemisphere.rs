@@ -1,41 +1,20 @@
 //! Half a sphere on the bed.
 
-use crate::CHORD_TOLERANCE;
-use crate::error::{ToolError, mm};
+use crate::chord::CHORD_TOLERANCE;
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
 use plyflow_geometry::vec3::{Vec3, scale, slerp};
 use std::f64::consts::FRAC_PI_2;
 
 /// Four octants, each divided evenly; the bottom is the same net pressed flat.
-pub(crate) fn hemisphere(radius: f64, facet: f64) -> Result<ToolMesh, ToolError> {
-    for (name, value) in [("radius", radius), ("facet_size", facet)] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(ToolError::length(
-                "hemisphere",
-                name,
-                value,
-                "it must be greater than 0 mm".into(),
-                "give a positive length",
-            ));
-        }
-    }
-    if facet > radius {
-        return Err(ToolError::length(
-            "hemisphere",
-            "facet_size",
-            facet,
-            format!("it must be at most the radius, {}", mm(radius)),
-            "take smaller facets",
-        ));
-    }
+pub(crate) fn hemisphere(radius: f64, facet: f64) -> ToolMesh {
     let mut n = (FRAC_PI_2 / arc_step(radius, CHORD_TOLERANCE, facet))
         .ceil()
         .max(2.0) as usize;
     loop {
         let mesh = divided(radius, n);
         if mesh.longest_edge() <= facet {
-            return Ok(mesh);
+            return mesh;
         }
         n += n / 8 + 1;
     }
@@ -137,18 +116,9 @@ mod tests {
 
     #[test]
     fn facets_keep_their_size_and_stand_on_the_bed() {
-        let mesh = hemisphere(0.05, 0.004).unwrap();
+        let mesh = hemisphere(0.05, 0.004);
         assert!(mesh.longest_edge() <= 0.004);
         let [lo, hi] = mesh.bounds();
         assert!(lo[2].abs() < 1e-12 && (hi[2] - 0.05).abs() < 1e-12);
-    }
-
-    #[test]
-    fn unusable_radius_is_an_error_that_names_it() {
-        let text = hemisphere(-0.05, 0.004).unwrap_err().to_string();
-        assert!(
-            text.contains("hemisphere") && text.contains("radius is -50 mm"),
-            "{text}"
-        );
     }
 }

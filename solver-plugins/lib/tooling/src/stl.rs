@@ -19,15 +19,6 @@ pub(crate) fn read(path: &Path, unit: f64, translate: Vec3) -> Result<ToolMesh, 
         problem,
         remedy: remedy.to_owned(),
     };
-    if !(unit > 0.0 && unit.is_finite()) {
-        return Err(ToolError::length(
-            "stl",
-            "unit",
-            unit,
-            "it must be greater than 0 mm".into(),
-            "give the length of one unit of the file, such as `1 mm`",
-        ));
-    }
     let bytes = open::read(path, MOST_DATA).map_err(|source| ToolError::Read {
         path: path.to_owned(),
         source,
@@ -220,7 +211,7 @@ mod tests {
 
     #[test]
     fn surface_survives_the_round_trip_in_both_formats() {
-        let mesh = hemisphere(0.05, 0.008).unwrap();
+        let mesh = hemisphere(0.05, 0.008);
         for file in [binary(&mesh), ascii(&mesh)] {
             let back = read(file.path(), 1e-3, [0.0, 0.0, 0.01]).unwrap();
             assert_eq!(back.points.len(), mesh.points.len());
@@ -233,7 +224,7 @@ mod tests {
 
     #[test]
     fn all_solids_of_a_text_file_are_read_and_each_must_have_its_outside() {
-        let dome = hemisphere(0.05, 0.01).unwrap();
+        let dome = hemisphere(0.05, 0.01);
         let moved = |turned: bool| {
             let mut mesh = dome.clone();
             mesh.points.iter_mut().for_each(|p| p[0] += 0.2);
@@ -267,7 +258,7 @@ mod tests {
 
     #[test]
     fn facets_without_area_are_dropped() {
-        let mut mesh = hemisphere(0.05, 0.01).unwrap();
+        let mut mesh = hemisphere(0.05, 0.01);
         let count = mesh.triangles.len();
         mesh.triangles.insert(3, [5, 5, 6]);
         assert_eq!(
@@ -281,7 +272,7 @@ mod tests {
 
     #[test]
     fn wrong_orientation_is_an_error_that_says_so() {
-        let mesh = hemisphere(0.05, 0.01).unwrap();
+        let mesh = hemisphere(0.05, 0.01);
         let text = |mesh: &ToolMesh| {
             read(binary(mesh).path(), 1e-3, [0.0; 3])
                 .unwrap_err()
@@ -320,7 +311,7 @@ mod tests {
 
     #[test]
     fn a_hole_is_named_with_its_place_and_not_taken_for_a_wrong_side() {
-        let mesh = hemisphere(0.05, 0.01).unwrap();
+        let mesh = hemisphere(0.05, 0.01);
         let mut holed = mesh.clone();
         let top = |t: &[u32; 3]| t.iter().all(|&p| mesh.points[p as usize][2] > 0.04);
         let at = mesh.triangles.iter().position(top).unwrap();
@@ -337,7 +328,7 @@ mod tests {
 
     #[test]
     fn a_file_that_is_cut_off_or_something_else_is_called_so() {
-        let whole = std::fs::read(binary(&hemisphere(0.05, 0.01).unwrap()).path()).unwrap();
+        let whole = std::fs::read(binary(&hemisphere(0.05, 0.01)).path()).unwrap();
         let told = |bytes: &[u8]| {
             let mut file = tempfile::NamedTempFile::new().unwrap();
             file.write_all(bytes).unwrap();

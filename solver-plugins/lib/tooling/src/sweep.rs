@@ -2,222 +2,73 @@
 //! joggles. Structured, closed, with exact fillets before deformation.
 
 use crate::mesh::ToolMesh;
-use crate::ramp::Ramp;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::Vec3;
+use plyflow_model::tool::shape::{JoggleShape, SparShape};
 use std::f64::consts::FRAC_PI_2;
 
-/// The shape. Theoretical corners are where the top plane meets the planes of the walls.
-#[derive(Debug, Clone)]
-pub(crate) struct Sweep {
-    /// x of the theoretical corners at both ends.
-    pub ends: [f64; 2],
-    /// y of the theoretical corners is +- this.
-    pub half_width: f64,
-    /// Height of the undeformed top over the bed.
-    pub height: f64,
-    /// Angle of the walls from the vertical.
-    pub draft: f64,
-    /// Radius between top and walls.
-    pub fillet: f64,
-    /// Radius in plan of the vertical edges at the theoretical corners; at least [`Sweep::setback`].
-    pub corner: f64,
-    pub joggles: Vec<JoggleShape>,
-}
-
-/// One joggle. Top and walls follow the same profile, each with its part: where a rise and a step of a wall
-/// meet on the edge between, their curvatures add as vectors, so the profile's amplitude is that of the sum
-/// and its fillets are the sharpest of the joggle.
-#[derive(Debug, Clone)]
-pub(crate) struct JoggleShape {
-    pub start: f64,
-    pub length: f64,
-    pub skew: f64,
-    /// From 0 to the amplitude, square to the slanted ramp.
-    pub profile: Ramp,
-    /// Change of height (m).
-    pub rise: f64,
-    /// Outward steps of the walls at y < 0 and y > 0 (m).
-    pub sides: [f64; 2],
-    pub fillet: f64,
-}
-
-impl JoggleShape {
-    /// Length of the vector of rise and larger side step.
-    pub fn amplitude(rise: f64, sides: [f64; 2]) -> f64 {
-        rise.fixed_hypot(sides[0].abs().max(sides[1].abs()))
-    }
-
-    /// Part of the joggle that has happened at (x, y): 0 to 1.
-    fn progress(&self, x: f64, y: f64) -> f64 {
-        let amplitude = Self::amplitude(self.rise, self.sides);
-        if amplitude == 0.0 {
-            return 0.0;
+/// The closed surface with edges up to `facet` and chords within `tolerance`.
+pub(crate) fn mesh(shape: &SparShape, facet: f64, tolerance: f64) -> ToolMesh {
+    let grid = TopGrid::new(shape, facet, tolerance);
+    let mut mesh = ToolMesh::default();
+    let mut top = vec![Vec::new(); grid.lines.len()];
+    for (i, line) in grid.lines.iter().enumerate() {
+        for j in 0..=grid.across {
+            let [x, y] = line.point(j, grid.across);
+            top[i].push(mesh.push(shape.deform([x, y, shape.height])));
         }
-        let s = (x - self.start - y * self.skew.fixed_tan()) * self.skew.fixed_cos();
-        self.profile.height(s) / amplitude
     }
-
-    fn widening(&self) -> f64 {
-        self.sides[0].max(self.sides[1]).max(0.0)
+    for i in 0..grid.lines.len() - 1 {
+        for j in 0..grid.across {
+            mesh.quad(top[i][j], top[i + 1][j], top[i + 1][j + 1], top[i][j + 1]);
+        }
     }
+    mesh_walls(shape, &mut mesh, &grid, &top, [facet, tolerance]);
+    mesh
 }
 
-impl Sweep {
-    /// Angle of the fillet's arc.
-    pub fn arc_angle(&self) -> f64 {
-        FRAC_PI_2 - self.draft
-    }
-
-    /// Distance from the theoretical corner to where the fillet begins on the top.
-    pub fn setback(&self) -> f64 {
-        self.fillet * (0.5 * self.arc_angle()).fixed_tan()
-    }
-
-    /// Limits of the level top: x low, x high, half width, and its radius in plan.
-    pub fn top(&self) -> ([f64; 2], f64, f64) {
-        let t = self.setback();
-        let radius = (self.corner - t).max(0.0);
-        (
-            [self.ends[0] + t, self.ends[1] - t],
-            self.half_width - t,
-            radius,
-        )
-    }
-
-    /// Height that the joggles add at (x, y).
-    pub fn lift(&self, x: f64, y: f64) -> f64 {
-        self.joggles.iter().map(|j| j.rise * j.progress(x, y)).sum()
-    }
-
-    /// Outward step of a wall at x; side 0 is y < 0.
-    fn side_step(&self, x: f64, side: usize) -> f64 {
-        let y = if side == 0 {
-            -self.half_width
-        } else {
-            self.half_width
-        };
-        self.joggles
+/// Fillets, walls and the bottom, hung on the outline of the top.
+fn mesh_walls(
+    shape: &SparShape,
+    mesh: &mut ToolMesh,
+    grid: &TopGrid,
+    top: &[Vec<u32>],
+    [facet, tolerance]: [f64; 2],
+) {
+    let outline = grid.outline();
+    let arc = shape.arc_angle();
+    let arcs = (arc / arc_step(shape.fillet, tolerance, facet))
+        .ceil()
+        .max(3.0) as usize;
+    let longest = outline
+        .iter()
+        .map(|o| shape.wall_length(o.base, o.normal))
+        .fold(0.0, f64::max);
+    let walls = (longest / (SLACK * facet)).ceil().max(1.0) as usize;
+    let mut ring: Vec<u32> = outline.iter().map(|o| top[o.line][o.place]).collect();
+    for k in 1..=arcs + walls {
+        let next: Vec<u32> = outline
             .iter()
-            .map(|j| j.sides[side] * j.progress(x, y))
-            .sum()
-    }
-
-    /// Moves a point of the undeformed shape. The walls and fillets step sideways as they are; the top
-    /// stretches between them, from its middle third on.
-    pub fn deform(&self, p: Vec3) -> Vec3 {
-        let [x, y, z] = p;
-        let side = usize::from(y > 0.0);
-        let reach = self.half_width - self.corner.max(self.setback());
-        let w = (y.abs() / reach).clamp(0.0, 1.0);
-        let y = y + y.signum() * w * w * (3.0 - 2.0 * w) * self.side_step(x, side);
-        [x, y, z + self.lift(x, y)]
-    }
-
-    /// Offset from the top's outline and height of the undeformed profile at angle `a` of the fillet.
-    pub fn fillet_point(&self, a: f64) -> (f64, f64) {
-        (
-            self.fillet * a.fixed_sin(),
-            self.height - self.fillet * (1.0 - a.fixed_cos()),
-        )
-    }
-
-    /// The same at length `s` down the wall.
-    pub fn wall_point(&self, s: f64) -> (f64, f64) {
-        let (d, z) = self.fillet_point(self.arc_angle());
-        (
-            d + s * self.draft.fixed_sin(),
-            z - s * self.draft.fixed_cos(),
-        )
-    }
-
-    /// The deformed point at an offset and height of the profile, over a point of the top's outline.
-    pub fn surface(&self, base: [f64; 2], normal: [f64; 2], profile: (f64, f64)) -> Vec3 {
-        let (d, z) = profile;
-        self.deform([base[0] + d * normal[0], base[1] + d * normal[1], z])
-    }
-
-    /// Length of the wall down to the bed at a point of the outline.
-    pub fn wall_length(&self, base: [f64; 2], normal: [f64; 2]) -> f64 {
-        let z = |s: f64| self.surface(base, normal, self.wall_point(s))[2];
-        let (mut low, mut high) = (0.0, 2.0 * self.height + 1.0);
-        // Bisection to the last bit: the walls fall steadily, and speed does not matter here.
-        for _ in 0..80 {
-            let middle = 0.5 * (low + high);
-            if z(middle) > 0.0 {
-                low = middle
-            } else {
-                high = middle
-            }
+            .map(|o| {
+                let profile = if k <= arcs {
+                    shape.fillet_point(arc * k as f64 / arcs as f64)
+                } else {
+                    let length = shape.wall_length(o.base, o.normal);
+                    shape.wall_point(length * (k - arcs) as f64 / walls as f64)
+                };
+                let mut p = shape.surface(o.base, o.normal, profile);
+                if k == arcs + walls {
+                    p[2] = 0.0;
+                }
+                mesh.push(p)
+            })
+            .collect();
+        for b in 0..ring.len() {
+            let c = (b + 1) % ring.len();
+            mesh.quad(ring[b], next[b], next[c], ring[c]);
         }
-        0.5 * (low + high)
+        ring = next;
     }
-
-    /// The closed surface with edges up to `facet` and chords within `tolerance`.
-    pub fn mesh(&self, facet: f64, tolerance: f64) -> ToolMesh {
-        let grid = TopGrid::new(self, facet, tolerance);
-        let mut mesh = ToolMesh::default();
-        let mut top = vec![Vec::new(); grid.lines.len()];
-        for (i, line) in grid.lines.iter().enumerate() {
-            for j in 0..=grid.across {
-                let [x, y] = line.point(j, grid.across);
-                top[i].push(mesh.push(self.deform([x, y, self.height])));
-            }
-        }
-        for i in 0..grid.lines.len() - 1 {
-            for j in 0..grid.across {
-                mesh.quad(top[i][j], top[i + 1][j], top[i + 1][j + 1], top[i][j + 1]);
-            }
-        }
-        self.mesh_walls(&mut mesh, &grid, &top, facet, tolerance);
-        mesh
-    }
-
-    /// Fillets, walls and the bottom, hung on the outline of the top.
-    fn mesh_walls(
-        &self,
-        mesh: &mut ToolMesh,
-        grid: &TopGrid,
-        top: &[Vec<u32>],
-        facet: f64,
-        tolerance: f64,
-    ) {
-        let outline = grid.outline();
-        let arc = self.arc_angle();
-        let arcs = (arc / arc_step(self.fillet, tolerance, facet))
-            .ceil()
-            .max(3.0) as usize;
-        let longest = outline
-            .iter()
-            .map(|o| self.wall_length(o.base, o.normal))
-            .fold(0.0, f64::max);
-        let walls = (longest / (SLACK * facet)).ceil().max(1.0) as usize;
-        let mut ring: Vec<u32> = outline.iter().map(|o| top[o.line][o.place]).collect();
-        for k in 1..=arcs + walls {
-            let next: Vec<u32> = outline
-                .iter()
-                .map(|o| {
-                    let profile = if k <= arcs {
-                        self.fillet_point(arc * k as f64 / arcs as f64)
-                    } else {
-                        let length = self.wall_length(o.base, o.normal);
-                        self.wall_point(length * (k - arcs) as f64 / walls as f64)
-                    };
-                    let mut p = self.surface(o.base, o.normal, profile);
-                    if k == arcs + walls {
-                        p[2] = 0.0;
-                    }
-                    mesh.push(p)
-                })
-                .collect();
-            for b in 0..ring.len() {
-                let c = (b + 1) % ring.len();
-                mesh.quad(ring[b], next[b], next[c], ring[c]);
-            }
-            ring = next;
-        }
-        mesh_bottom(mesh, grid, &outline, &ring);
-    }
+    mesh_bottom(mesh, grid, &outline, &ring);
 }
 
 /// The bottom on z = 0 inside the outline's last ring, in the lines of the top.
@@ -291,10 +142,10 @@ struct TopGrid {
 }
 
 impl TopGrid {
-    fn new(sweep: &Sweep, facet: f64, tolerance: f64) -> Self {
+    fn new(shape: &SparShape, facet: f64, tolerance: f64) -> Self {
         let step = SLACK * facet;
-        let ([low, high], half, radius) = sweep.top();
-        let foot = radius + sweep.wall_point(sweep.height / sweep.draft.fixed_cos()).0;
+        let ([low, high], half, radius) = shape.top();
+        let foot = radius + shape.wall_point(shape.height / shape.draft.fixed_cos()).0;
         let turns = (FRAC_PI_2 / arc_step(foot, tolerance, facet))
             .ceil()
             .max(2.0) as usize;
@@ -315,7 +166,7 @@ impl TopGrid {
                 normal: std::f64::consts::PI - angle,
             });
         }
-        for x in stations(sweep, low + radius, high - radius, step, tolerance) {
+        for x in stations(shape, low + radius, high - radius, step, tolerance) {
             lines.push(TopLine {
                 x,
                 half,
@@ -331,7 +182,7 @@ impl TopGrid {
             });
         }
         let widest =
-            2.0 * half + 2.0 * sweep.joggles.iter().map(JoggleShape::widening).sum::<f64>();
+            2.0 * half + 2.0 * shape.joggles.iter().map(JoggleShape::widening).sum::<f64>();
         TopGrid {
             lines,
             across: (widest / step).ceil().max(2.0) as usize,
@@ -375,10 +226,10 @@ impl TopGrid {
 }
 
 /// x between the corners, closer where a joggle bends the surface.
-fn stations(sweep: &Sweep, low: f64, high: f64, step: f64, tolerance: f64) -> Vec<f64> {
+fn stations(shape: &SparShape, low: f64, high: f64, step: f64, tolerance: f64) -> Vec<f64> {
     let mut breaks = vec![(low, step)];
-    let foot = sweep.half_width + (sweep.height + 0.05) * sweep.draft.fixed_tan();
-    for j in &sweep.joggles {
+    let foot = shape.half_width + (shape.height + 0.05) * shape.draft.fixed_tan();
+    for j in &shape.joggles {
         let slant = foot * j.skew.fixed_tan().abs();
         let fine = (arc_step(j.fillet, tolerance, f64::MAX) * j.fillet).min(step);
         breaks.push(((j.start - slant).max(low), fine));
@@ -398,3 +249,6 @@ fn stations(sweep: &Sweep, low: f64, high: f64, step: f64, tolerance: f64) -> Ve
     found.pop();
     found
 }
+
+#[cfg(test)]
+pub(crate) mod tests;

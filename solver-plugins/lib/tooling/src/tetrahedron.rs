@@ -1,7 +1,6 @@
 //! A pyramid over an equilateral triangle with rounded edges and top.
 
-use crate::CHORD_TOLERANCE;
-use crate::error::{ToolError, mm};
+use crate::chord::CHORD_TOLERANCE;
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;
 use plyflow_fixed::FixedBits;
@@ -9,45 +8,16 @@ use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, slerp, sub, uni
 use plyflow_model::scene::TetrahedronTool;
 use std::f64::consts::FRAC_PI_6;
 
-const TOOL: &str = "tetrahedron";
-
 /// The closed surface, standing on z = 0.
-pub(crate) fn tetrahedron(t: &TetrahedronTool) -> Result<ToolMesh, ToolError> {
+pub(crate) fn tetrahedron(t: &TetrahedronTool) -> ToolMesh {
     let (edge, height, radius) = (t.edge.si(), t.height.si(), t.radius.si());
     let facet = t.facet_size.si();
-    for (name, value) in [
-        ("edge", edge),
-        ("height", height),
-        ("radius", radius),
-        ("facet_size", facet),
-    ] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(ToolError::length(
-                TOOL,
-                name,
-                value,
-                "it must be greater than 0 mm".into(),
-                "give a positive length",
-            ));
-        }
-    }
     let shape = Shape::new(edge, height, radius);
-    // The sphere of the top may sink to the bed, not below.
-    let largest = height * shape.normals[0][2];
-    if radius >= largest {
-        return Err(ToolError::length(
-            TOOL,
-            "radius",
-            radius,
-            format!("it must be less than {}", mm(largest)),
-            "take a smaller radius or a higher tool",
-        ));
-    }
     let mut size = facet;
     loop {
         let mesh = shape.mesh(size, CHORD_TOLERANCE);
         if mesh.longest_edge() <= facet {
-            return Ok(mesh);
+            return mesh;
         }
         size *= 0.9;
     }
@@ -230,7 +200,7 @@ mod tests {
     #[test]
     fn every_point_lies_on_a_face_an_edge_or_the_top() {
         let t = regular("15 mm", "6 mm");
-        let mesh = tetrahedron(&t).unwrap();
+        let mesh = tetrahedron(&t);
         assert!(mesh.is_watertight() && mesh.longest_edge() <= 0.006);
         let shape = Shape::new(t.edge.si(), t.height.si(), t.radius.si());
         for p in mesh.points.iter().filter(|p| p[2] > 0.0) {
@@ -256,7 +226,7 @@ mod tests {
     #[test]
     fn volume_is_that_of_the_pyramid_less_what_the_rounding_takes() {
         // Rounded by 0.1 mm: next to nothing.
-        let sharp = tetrahedron(&regular("0.1 mm", "10 mm")).unwrap();
+        let sharp = tetrahedron(&regular("0.1 mm", "10 mm"));
         let whole = 3f64.sqrt() / 4.0 * 0.2f64.powi(2) * 0.163_299 / 3.0;
         assert!(
             (sharp.volume() / whole - 1.0).abs() < 1e-4,
@@ -264,7 +234,7 @@ mod tests {
             sharp.volume() / whole
         );
         // Per length of an edge the rounding takes r^2 (cot(d/2) - (pi - d)/2), d the angle between the faces.
-        let round = tetrahedron(&regular("2 mm", "4 mm")).unwrap();
+        let round = tetrahedron(&regular("2 mm", "4 mm"));
         let between = (1.0f64 / 3.0).acos();
         let section = 2e-3f64.powi(2)
             * (1.0 / (0.5 * between).tan() - 0.5 * (std::f64::consts::PI - between));
@@ -272,17 +242,6 @@ mod tests {
         assert!(
             (taken / (3.0 * 0.2 * section) - 1.0).abs() < 0.02,
             "{taken}"
-        );
-    }
-
-    #[test]
-    fn a_radius_that_reaches_the_bed_is_told() {
-        let text = tetrahedron(&regular("60 mm", "6 mm"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            text.contains("radius is 60 mm") && text.contains("less than 54.433 mm"),
-            "{text}"
         );
     }
 }

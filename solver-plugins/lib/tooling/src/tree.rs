@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn closest_point_equals_the_search_over_all_facets() {
-        let mesh = hemisphere(0.05, 0.01).unwrap();
+        let mesh = hemisphere(0.05, 0.01);
         let tree = SurfaceTree::new(&mesh);
         for i in 0..500 {
             let f = |k: f64| ((i as f64 * k).fract() - 0.5) * 0.16;
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn distance_does_not_depend_on_the_hint() {
-        let mesh = hemisphere(0.05, 0.01).unwrap();
+        let mesh = hemisphere(0.05, 0.01);
         let tree = SurfaceTree::new(&mesh);
         for i in 0..200 {
             let f = |k: f64| ((i as f64 * k).fract() - 0.5) * 0.16;

@@ -1,6 +1,7 @@
 //! The scenes and materials of the repository.
 
 use plyflow_model::material::{Material, MaterialEntry};
+use plyflow_model::rules::{self, known::Known};
 use plyflow_model::scene::{Scene, SheetKind};
 use std::path::{Path, PathBuf};
 
@@ -111,4 +112,12 @@ fn preform_of_the_joggle_spar_ends_above_the_bed() {
         left * 1e3
     );
     println!("{:.1} mm of wall stay free on each side", left * 1e3);
+}
+
+#[test]
+fn every_scene_keeps_all_rules_that_its_words_can_tell() {
+    for (path, scene) in scenes() {
+        let faults = rules::faults(&Known::from(&scene));
+        assert_eq!(faults, [], "{}", path.display());
+    }
 }

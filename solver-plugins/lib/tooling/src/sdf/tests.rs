@@ -41,7 +41,10 @@ fn points_near(mesh: &ToolMesh, band: f64, count: usize) -> Vec<(Vec3, f64)> {
 }
 
 fn spar() -> ToolMesh {
-    crate::spar::joggle_spar(&crate::spar::tests::demo()).unwrap()
+    crate::build(&plyflow_model::scene::Tool::JoggleSpar(
+        crate::sweep::tests::demo(),
+    ))
+    .unwrap()
 }
 
 /// Largest error and its 99 % quantile.
@@ -97,7 +100,7 @@ fn gradient_points_from_the_surface_with_nearly_unit_length() {
 #[test]
 fn distance_to_a_hemisphere_approaches_the_closed_form() {
     // Fine facets: where the surface is smooth the spline adds less than they do.
-    let mesh = hemisphere(0.03, 0.001).unwrap();
+    let mesh = hemisphere(0.03, 0.001);
     let error = |h: f64| {
         let grid = SignedDistanceGrid::build(&mesh, h, 4e-3);
         (0..4000)
@@ -195,7 +198,7 @@ fn walls_are_right_on_both_sides_down_to_the_bed() {
 
 #[test]
 fn far_points_are_left_out_and_near_points_are_not() {
-    let mesh = hemisphere(0.05, 0.004).unwrap();
+    let mesh = hemisphere(0.05, 0.004);
     let grid = SignedDistanceGrid::build(&mesh, 3e-3, 6e-3);
     let tree = SurfaceTree::new(&mesh.without_bottom(0.1));
     let limit = 4e-3;
@@ -234,7 +237,7 @@ fn far_points_are_left_out_and_near_points_are_not() {
 
 #[test]
 fn many_points_give_the_same_as_one_by_one() {
-    let mesh = hemisphere(0.05, 0.006).unwrap();
+    let mesh = hemisphere(0.05, 0.006);
     let grid = SignedDistanceGrid::build(&mesh, 3e-3, 6e-3);
     let points: Vec<Vec3> = (0..500)
         .map(|n| {
@@ -255,7 +258,7 @@ fn many_points_give_the_same_as_one_by_one() {
 
 #[test]
 fn grid_is_the_same_bytes_for_any_number_of_threads() {
-    let mesh = hemisphere(0.05, 0.006).unwrap();
+    let mesh = hemisphere(0.05, 0.006);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -294,7 +297,7 @@ fn perimeter(radius: f64, size: f64, at: impl Fn(f64) -> f64) -> f64 {
 fn elements_on_the_shifted_field_are_as_long_as_the_surface() {
     // Around a ball near its foot, where it curves both ways; elements of 5 and 8 mm are some 1 and 3 % of it short on the surface.
     let radius = 0.02;
-    let mesh = hemisphere(radius, 0.0004).unwrap();
+    let mesh = hemisphere(radius, 0.0004);
     let grid = SignedDistanceGrid::build(&mesh, 1.5e-3, 9e-3);
     let around = std::f64::consts::TAU * radius;
     for size in [5e-3, 8e-3] {

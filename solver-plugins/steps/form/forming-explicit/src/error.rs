@@ -2,6 +2,7 @@
 
 use plyflow_blank::MeshError;
 use plyflow_mechanics::MechanicsError;
+use plyflow_model::fault::Fault;
 use plyflow_sdk::StepError;
 
 /// What a function gives, or why not.
@@ -23,6 +24,9 @@ pub enum FormingError {
     /// Something else of the scene, by itself or with the parameters.
     #[error("{0}")]
     Scene(String),
+    /// A rule of scenes that is broken.
+    #[error("scene.{0}")]
+    Rule(#[from] Fault),
     /// What is not its own mirror image in the planes of the scene.
     #[error("{0}")]
     Symmetry(String),
@@ -74,8 +78,7 @@ impl FormingError {
         }
     }
 
-    /// What the host is told: its own word where it stopped the step, the text otherwise. (A `?` in a function that gives a
-    /// [`StepError`] would make a text of a cancelled step.)
+    /// What the host is told: its own word where it stopped the step, the text otherwise.
     pub fn at_the_door(self) -> StepError {
         match self {
             Self::Host(stopped) => stopped,

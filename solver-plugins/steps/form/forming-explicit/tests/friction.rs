@@ -62,10 +62,15 @@ fn pairs_take_the_place_of_their_class_in_either_order() {
     // What holds a ply through another one rubs as the weaker of the surfaces between does.
     assert_eq!(constant(&m, "die/inner"), 0.4);
     assert_eq!(constant(&m, "tool/outer"), 0.2);
-    // A class whose pairs are all named is not needed.
+    // A class whose pairs are all named is not needed, nor a law of those that have another ply between them.
     model(
         &json!({"tool_fabric": 0.2, "pairs": [{"between": ["outer", "inner"], "coefficient": 0.4}]}),
     );
+    let pair = |between: [&str; 2], mu: f64| json!({"between": between, "coefficient": mu});
+    let m = model(&json!({"fabric_fabric": 0.3,
+        "pairs": [pair(["tool", "inner"], 0.2), pair(["holder", "inner"], 0.1), pair(["outer", "die"], 0.5)]}));
+    assert_eq!(constant(&m, "die/inner"), 0.3);
+    assert_eq!(constant(&m, "holder/outer"), 0.1);
 }
 
 #[test]
@@ -125,19 +130,23 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
     for (friction, words) in [
         (
             with(vec![pair(["inner", "oter"])]),
-            vec!["pairs[0].between", "'oter'", "did you mean 'outer'?"],
+            vec!["pairs[0].between", "`oter`", "did you mean `outer`?"],
         ),
         (
             with(vec![pair(["bed", "inner"])]),
-            vec!["'bed'", "tool, inner, outer, die, holder"],
+            vec!["`bed`", "`tool`, `die`, `holder`, `inner`, `outer`"],
         ),
         (
             with(vec![pair(["tool", "holder"])]),
-            vec!["do not rub", "tool and inner; outer and die"],
+            vec!["do not rub", "`[tool, inner]`", "`[outer, die]`"],
         ),
         (
             with(vec![pair(["inner", "outer"]), pair(["outer", "inner"])]),
-            vec!["pairs[1].between", "already the pair of friction.pairs[0]"],
+            vec![
+                "pairs[1].between",
+                "named twice",
+                "at friction.pairs[0].between",
+            ],
         ),
         (
             tool(json!(-0.1)),
@@ -145,7 +154,7 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
         ),
         (
             tool(json!({})),
-            vec!["friction.tool_fabric.coefficient", "not given"],
+            vec!["friction.tool_fabric.coefficient", "has no `coefficient`"],
         ),
         (
             tool(
@@ -155,7 +164,7 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
         ),
         (
             tool(json!({"pressure": {"table": table(&[("1 kPa", 0.2), ("1 kPa", 0.3)])}})),
-            vec!["tool_fabric.pressure.table[1]", "growing pressures"],
+            vec!["tool_fabric.pressure.table[1]", "more than the 1000 Pa"],
         ),
         (
             tool(
@@ -177,11 +186,11 @@ fn pairs_and_laws_that_make_no_sense_are_refused_with_what_to_do() {
             plies(
                 json!({"coefficient": 0.3, "angle": {"factors": factors(&[("0 deg", 1.0), ("90 deg", 0.5)])}}),
             ),
-            vec!["fabric_fabric.angle.of", "`lower` or `upper`"],
+            vec!["fabric_fabric.angle.of", "`of: lower` or `of: upper`"],
         ),
         (
             json!({"tool_fabric": 0.2}),
-            vec!["friction.fabric_fabric", "inner and outer touch"],
+            vec!["friction.fabric_fabric", "`inner` and `outer` touch"],
         ),
     ] {
         let p = parameters(&friction);

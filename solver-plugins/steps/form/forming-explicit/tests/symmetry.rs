@@ -5,7 +5,7 @@ mod common;
 use common::scenes::{diaphragm, gentle_press as press, ply};
 use common::{BuiltIn, apart, fabric, form, twins, woven};
 use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome, Parameters, build_global};
-use plyflow_geometry::vec3::{V, add, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, norm, scale, sub};
 use plyflow_kernels::{m4::M4, rf4::Rf4, s4::S4};
 use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_mechanics::energy::Ledger;
@@ -42,7 +42,7 @@ fn diaphragms(element: &str, symmetry: &[&str]) -> Parameters {
 
 /// Positions of all bodies' points at every frame.
 #[derive(Default)]
-struct Frames(Vec<Vec<Vec<V>>>);
+struct Frames(Vec<Vec<Vec<Vec3>>>);
 
 impl Observer for Frames {
     fn frame(&mut self, forming: &Forming, _: f64) -> Result<(), StepError> {
@@ -55,7 +55,7 @@ impl Observer for Frames {
     }
 }
 
-fn frames(p: &Parameters) -> (Forming, Outcome, Vec<Vec<Vec<V>>>) {
+fn frames(p: &Parameters) -> (Forming, Outcome, Vec<Vec<Vec<Vec3>>>) {
     let mut forming = build_global(p, &BuiltIn).unwrap();
     let mut seen = Frames::default();
     let outcome = forming.run(&p.control(), &mut seen);
@@ -77,7 +77,7 @@ fn fields_of(element: &str) -> Vec<ElementField> {
 fn fields_agree(element: &str, whole: &Forming, part: &Forming) {
     let (a, b) = (&whole.bodies[0], &part.bodies[0]);
     let (r, q) = (whole.reference_points(a), part.reference_points(b));
-    let centres = |points: &[V], cells: &[[u32; 4]]| -> Vec<V> {
+    let centres = |points: &[Vec3], cells: &[[u32; 4]]| -> Vec<Vec3> {
         let at = |c: &[u32; 4]| {
             let sum = c.iter().fold([0.0; 3], |s, n| add(s, points[*n as usize]));
             scale(sum, 0.25)
@@ -204,7 +204,7 @@ fn a_half_between_diaphragms_is_the_whole_as_far_as_that_is_symmetric() {
                 .map(|(t, p)| norm(sub(now[*t], *p)))
                 .fold(far, f64::max);
             for axis in [0, 1] {
-                let image = |p: &V| {
+                let image = |p: &Vec3| {
                     let mut p = *p;
                     p[axis] = -p[axis];
                     p
@@ -279,9 +279,9 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
     let p = press("rf4", 0.0, &["x", "y"]);
     let text = refused(&p, |s| s["sheets"][0]["centre"] = json!(["0.001 m", "0 m"]));
     for part in [
-        "ply 'ply_1'",
+        "ply `ply_1`",
         "plane x = 0",
-        "2.000 mm",
+        "2 mm off",
         "leave `x` out of `symmetry`",
     ] {
         assert!(text.contains(part), "{part}: {text}");
@@ -291,7 +291,7 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
         s["sheets"][0]["fibre_2"] = json!(format!("{} rad", 0.5 + std::f64::consts::FRAC_PI_2));
     });
     assert!(
-        text.contains("symmetry: [x, y]") && text.contains("28.648 deg"),
+        text.contains("symmetry[0]") && text.contains("28.648 deg"),
         "{text}"
     );
 
@@ -302,12 +302,8 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
                      "side_step": ["0 m", "0 m"], "fillet": "0.004 m"}], "facet_size": "0.004 m"}});
     let p = diaphragms("m4", &["x", "y"]);
     let text = refused(&p, |s| s["tool"] = spar.clone());
-    for part in [
-        "the tool is not its own mirror image in the plane x = 0",
-        "mm off its surface",
-    ] {
-        assert!(text.contains(part), "{part}: {text}");
-    }
+    let part = "the tool is not its own mirror image in the plane x = 0";
+    assert!(text.contains(part), "{text}");
     let mut half = diaphragms("m4", &["y"]);
     let mut scene = serde_json::to_value(&half.scene).unwrap();
     scene["tool"] = spar;
@@ -364,7 +360,7 @@ fn friction_by_the_angle_to_one_of_two_exchanged_families_is_refused() {
         "angle": {"family": 1, "factors": [{"angle": "0 rad", "factor": 1.0}, {"angle": "1.5 rad", "factor": 0.5}]}}]);
     let p = press("m4", DIAGONAL, &["y"]);
     let text = refused(&p, |s| s["friction"]["pairs"] = law.clone());
-    for part in ["symmetry: [y]", "`angle`", "'ply_1'"] {
+    for part in ["symmetry[0]", "`angle`", "`ply_1`"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     let mut along = press("m4", 0.0, &["y"]);

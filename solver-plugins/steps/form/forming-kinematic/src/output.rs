@@ -4,10 +4,9 @@ use crate::net::{self, Fabric, Generators, Net, Stop};
 use crate::ply::{Draped, Ply, Stops, lay, plies, stops};
 use crate::root::drop_on;
 use crate::surface::SmoothSurface;
-use plyflow_blank::Quality;
 use plyflow_geometry::vec3::distance;
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_model::artifact::{FieldError, Forming, RigidBody, Sheet, SheetBody};
+use plyflow_model::artifact::{FieldError, Forming, MeshQuality, RigidBody, Sheet, SheetBody};
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
@@ -37,7 +36,7 @@ fn default_grid() -> f64 {
 struct Done {
     ply: Ply,
     mesh: QuadMesh,
-    quality: Option<Quality>,
+    quality: Option<MeshQuality>,
     draped: Draped,
     start: [f64; 2],
     net_nodes: usize,
@@ -63,9 +62,14 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
         Process::DoubleDiaphragm(_) => 0.0,
         Process::Press(_) => tool.bounds()[0][2],
     };
+    let over = Over {
+        surface: &surface,
+        bounds: tool.bounds(),
+        bed,
+    };
     for (k, ply) in plies.iter().enumerate() {
         let part = |f: f64| 0.95 * (k as f64 + f) / plies.len() as f64;
-        done.push(drape(host, &p, &surface, &tool, (ply, bed), part)?);
+        done.push(drape(host, &p, &over, ply, part)?);
     }
     let seconds = started.elapsed().as_secs_f64();
     report(host, 0.95, "writing");
@@ -156,17 +160,26 @@ fn allow_net(fabric: &Fabric) -> Result<(), String> {
     })
 }
 
+/// What plies are draped over.
+struct Over<'a> {
+    surface: &'a SmoothSurface,
+    /// The box around it (m).
+    bounds: [[f64; 3]; 2],
+    /// Height of what the tool stands on (m).
+    bed: f64,
+}
+
 fn drape(
     host: &Host,
     p: &Parameters,
-    surface: &SmoothSurface,
-    tool: &ToolMesh,
-    (ply, bed): (&Ply, f64),
+    over: &Over<'_>,
+    ply: &Ply,
     part: impl Fn(f64) -> f64,
 ) -> Result<Done, StepError> {
+    let (surface, bed) = (over.surface, over.bed);
     let name = &ply.scene.name;
     let [x, y] = start_of(p, ply)?;
-    let [low, high] = tool.bounds();
+    let [low, high] = over.bounds;
     let reach = 0.5 * (high[2] - low[2]).max(ply.offset) + 2.0 * ply.offset;
     let (place, normal) = surface
         .top(x, y)
@@ -287,7 +300,7 @@ fn number(why: Stop) -> f64 {
 
 fn sheet(d: &Done) -> Sheet {
     let (s, material) = (&d.ply.scene, &d.ply.material);
-    let [first, second] = d.ply.stated();
+    let [first, second] = d.ply.scene.fibres();
     Sheet {
         material: Some(material.name.clone()),
         areal_mass: Some(material.areal_mass.si()),

@@ -2,13 +2,14 @@
 
 use crate::net::{Net, Node, Stop};
 use crate::surface::DrapeSurface;
-use plyflow_blank::{Blank, Quality};
+use plyflow_blank::Blank;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, add, scale, sub};
 use plyflow_mechanics::mesh::QuadMesh;
+use plyflow_model::artifact::MeshQuality;
 use plyflow_model::material::{Material, MaterialEntry};
+use plyflow_model::rules;
 use plyflow_model::scene::{Scene, Sheet, SheetKind};
-use std::f64::consts::FRAC_PI_2;
 
 /// A ply with its place in the stack.
 #[derive(Debug, Clone)]
@@ -26,8 +27,9 @@ pub struct Ply {
 /// The plies of a scene from the tool upwards; films count with their thickness.
 ///
 /// # Errors
-/// When there is no ply, or one has no size or no directions to lay a net along.
+/// When the scene breaks a rule ([`rules::check`]).
 pub fn plies(scene: &Scene) -> Result<Vec<Ply>, String> {
+    rules::check(scene).map_err(|fault| format!("scene.{fault}"))?;
     let mut below = 0.0;
     let mut found = Vec::new();
     for sheet in &scene.sheets {
@@ -49,41 +51,17 @@ pub fn plies(scene: &Scene) -> Result<Vec<Ply>, String> {
             offset,
             blank: Blank::new(sheet).map_err(|e| e.to_string())?,
         };
-        let [a, b] = ply.directions();
-        if (b - a).fixed_sin() < 0.1 {
-            return Err(format!(
-                "the fibres of ply '{}' run at {:.1} deg to each other; a net needs at least 6 deg: change \
-                 fibre_1 or fibre_2",
-                sheet.name,
-                (b - a).to_degrees()
-            ));
-        }
         found.push(ply);
-    }
-    if found.is_empty() {
-        return Err(format!(
-            "scene '{}' has no sheet of kind 'ply': there is nothing to drape",
-            scene.name
-        ));
     }
     Ok(found)
 }
 
 impl Ply {
-    /// Angles of the families as the scene states them (rad).
-    pub fn stated(&self) -> [f64; 2] {
-        let first = self.scene.fibre_1.si();
-        [
-            first,
-            self.scene.fibre_2.map_or(first + FRAC_PI_2, |a| a.si()),
-        ]
-    }
-
     /// Directions of the net (rad), the second counter-clockwise of the first by less than half a turn: the
     /// families in the order of the scene, or the other way round, so that the stitch still lies between them.
     pub fn directions(&self) -> [f64; 2] {
         use std::f64::consts::TAU;
-        let [first, second] = self.stated();
+        let [first, second] = self.scene.fibres();
         let (a, b) = if (second - first).fixed_sin() >= 0.0 {
             (first, second)
         } else {
@@ -96,7 +74,7 @@ impl Ply {
     ///
     /// # Errors
     /// When the elements cannot follow its outline.
-    pub fn mesh(&self, element_size: f64) -> Result<(QuadMesh, Option<Quality>), String> {
+    pub fn mesh(&self, element_size: f64) -> Result<(QuadMesh, Option<MeshQuality>), String> {
         let mesh = self.blank.mesh(element_size);
         mesh.map_err(|e| format!("ply '{}': {e}", self.scene.name))
     }

@@ -336,13 +336,13 @@ fn wrong_input_is_refused_with_what_to_do() {
     assert!(away.contains("is not below it"), "{away}");
     let along = drape(json!({"scene": scene(hemisphere(), [0.1, 0.1], [0.0, 3.0])})).unwrap_err();
     assert!(
-        along.contains("fibre_1") && along.contains("3.0 deg"),
+        along.contains("fibre_1") && along.contains("3 deg apart"),
         "{along}"
     );
     let mut bare = scene(hemisphere(), [0.1, 0.1], [0.0, 90.0]);
     bare["sheets"] = json!([bare["sheets"][0]]);
     let none = drape(json!({"scene": bare})).unwrap_err();
-    assert!(none.contains("nothing to drape"), "{none}");
+    assert!(none.contains("plies and a diaphragm above it"), "{none}");
     let huge = on_hemisphere(0.09, json!({"net_spacing": 0.5})).unwrap_err();
     assert!(huge.contains("net_spacing"), "{huge}");
 }

@@ -38,7 +38,7 @@ pub fn build_bag(
     let mut tool = tool::rigid(p)?;
     tool.warnings.extend(coarse_grid(p));
     let planes = symmetry::planes(scene);
-    symmetry::check(scene, planes, &stack, &tool.mesh)?;
+    symmetry::check_tool(planes, &tool.mesh)?;
     let at = Layout::new(&stack, process, p, &tool.mesh, planes)?;
     let elements = Elements { p, components };
     let mut parts = Parts::default();
@@ -49,7 +49,7 @@ pub fn build_bag(
         parts.add_ply(sheet, blank, z, &elements)?;
     }
     films::add_top(&mut parts, &at, &stack, &elements)?;
-    let cycle = Cycle::new(process, [at.bottom_z, stack[0].offset])?;
+    let cycle = Cycle::new(process, [at.bottom_z, stack[0].offset]);
     let in_plan = |n: &u32| [0, 1].map(|k| parts.points[*n as usize][k]);
     let drive = FrameDrive {
         plan: frame.iter().map(in_plan).collect(),

@@ -25,7 +25,7 @@ pub fn add_contacts(
     p: &Parameters,
     tool: &mut ToolSurfaces,
 ) -> Result<()> {
-    let contacts = StackContacts::new(stack, p)?;
+    let contacts = StackContacts::new(stack, p);
     let layers = layers(placed);
     let (bottom, top) = (layers[0], layers[layers.len() - 1]);
     let plies = &layers[1..top.place.0];

@@ -38,10 +38,7 @@ fn radius_above(tool: &ToolMesh, z: f64) -> f64 {
 
 impl Plates {
     /// For a stack over a punch whose top ends at `tool_top` (m).
-    ///
-    /// # Errors
-    /// When the plies do not fit into the holder's gap.
-    pub fn new(press: &Press, stack: &[StackSheet], tool_top: f64) -> Result<Self> {
+    pub fn new(press: &Press, stack: &[StackSheet], tool_top: f64) -> Self {
         let thickness: f64 = stack.iter().map(|s| s.thickness).sum();
         let blank = tool_top - press.stroke.si();
         let die = OpenPlate {
@@ -50,28 +47,16 @@ impl Plates {
             opening: press.die.opening_radius.si(),
             edge: press.die.edge_radius.si(),
         };
-        let holder = match &press.holder {
-            None => None,
-            Some(holder) => Some(OpenPlate {
-                height: match &holder.hold {
-                    Hold::Force(_) => blank,
-                    // As thick as the plies but for rounding of their sum.
-                    Hold::Gap(gap) if gap.si() >= thickness * (1.0 - 1e-9) => die.height - gap.si(),
-                    Hold::Gap(gap) => {
-                        return Err(FormingError::Scene(format!(
-                            "process.press.holder.hold.gap: given {:.3} mm, the plies are {:.3} mm thick; expected a gap that they \
-                             fit into, or `hold: {{force: ..}}` to squeeze them",
-                            1e3 * gap.si(),
-                            1e3 * thickness
-                        )));
-                    }
-                },
-                side: -1.0,
-                opening: holder.opening_radius.map_or(die.opening, |r| r.si()),
-                edge: holder.edge_radius.map_or(die.edge, |r| r.si()),
-            }),
-        };
-        Ok(Self { blank, die, holder })
+        let holder = press.holder.as_ref().map(|holder| OpenPlate {
+            height: match &holder.hold {
+                Hold::Force(_) => blank,
+                Hold::Gap(gap) => die.height - gap.si(),
+            },
+            side: -1.0,
+            opening: holder.opening_radius.map_or(die.opening, |r| r.si()),
+            edge: holder.edge_radius.map_or(die.edge, |r| r.si()),
+        });
+        Self { blank, die, holder }
     }
 
     /// By name.

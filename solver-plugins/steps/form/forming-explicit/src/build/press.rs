@@ -13,7 +13,7 @@ use crate::stack::{
     StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
 };
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;
 use plyflow_model::STANDARD_GRAVITY;
@@ -34,8 +34,8 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     let stack = sheet::stack(scene)?;
     let tool = tool::rigid(p)?;
     let planes = symmetry::planes(scene);
-    symmetry::check(scene, planes, &stack, &tool.mesh)?;
-    let plates = Plates::new(press, &stack, tool.mesh.bounds()[1][2])?;
+    symmetry::check_tool(planes, &tool.mesh)?;
+    let plates = Plates::new(press, &stack, tool.mesh.bounds()[1][2]);
     plates.check_passage(press, &tool.mesh)?;
     let elements = Elements { p, components };
     let mut parts = Parts::default();
@@ -61,7 +61,7 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     load.apply(&mut model, 0.0);
     let reference = model.start().clone();
     // Largest distance of a point from the axis (m).
-    let from_axis = |q: &V| q[0].fixed_hypot(q[1]);
+    let from_axis = |q: &Vec3| q[0].fixed_hypot(q[1]);
     let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
     let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, tool.error)]);
     for (name, plate) in plates.named() {
@@ -129,7 +129,7 @@ fn add_contacts(
     for ply in &mut placed {
         ply.slaves = ply.sheet.nodes(model).to_vec();
     }
-    let contacts = StackContacts::new(stack, p)?;
+    let contacts = StackContacts::new(stack, p);
     let plies = layers(&placed);
     for pair in plies.windows(2) {
         contacts.add_pair(model, pair[1], pair[0], 1.0)?;

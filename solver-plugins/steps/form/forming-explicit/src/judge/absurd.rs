@@ -7,7 +7,6 @@ use crate::load::Load;
 use crate::request::Parameters;
 use crate::stack::{Body, RigidName};
 use crate::watch::Watch;
-use plyflow_geometry::vec3::V;
 use plyflow_model::scene::Process;
 
 /// Mass that is added over the sheets' own, beyond which a run is none of these sheets. Shipped studies have up to 75 in films.
@@ -32,9 +31,8 @@ pub fn check(p: &Parameters, forming: &Forming) -> Result<()> {
     check_elements(p, forming)?;
     check_phases(p, forming)?;
     check_masses(p, forming)?;
-    check_loads(p)?;
     check_drag(p, forming)?;
-    check_places(p, forming)
+    check_places(forming)
 }
 
 /// Box (m) in plan of the nodes of a sheet before forming, of the whole.
@@ -126,36 +124,6 @@ fn check_masses(p: &Parameters, forming: &Forming) -> Result<()> {
     Ok(())
 }
 
-/// Whether anything forms.
-fn check_loads(p: &Parameters) -> Result<()> {
-    match &p.scene.process {
-        Process::DoubleDiaphragm(process) => {
-            for (name, pressure) in [
-                ("bag_pressure", process.bag_pressure.last()),
-                ("forming_pressure", process.forming_pressure.last()),
-            ] {
-                if pressure <= 0.0 {
-                    return Err(FormingError::Absurd(format!(
-                        "scene.process.double_diaphragm.{name}: given {pressure} Pa at the end; expected more than 0 Pa: without it nothing is formed"
-                    )));
-                }
-            }
-            if process.clearance.si() < 0.0 {
-                return Err(FormingError::Absurd(format!(
-                    "scene.process.double_diaphragm.clearance: given {:.3} mm; expected 0 mm or more: the stack begins above the tool",
-                    1e3 * process.clearance.si()
-                )));
-            }
-            Ok(())
-        }
-        Process::Press(press) if press.stroke.si() <= 0.0 => Err(FormingError::Absurd(format!(
-            "scene.process.press.stroke: given {:.3} mm; expected more than 0 mm, the way of the punch",
-            1e3 * press.stroke.si()
-        ))),
-        Process::Press(_) => Ok(()),
-    }
-}
-
 /// Whether damping leaves the motion to what forms.
 fn check_drag(p: &Parameters, forming: &Forming) -> Result<()> {
     let m = &forming.model;
@@ -189,8 +157,8 @@ fn check_drag(p: &Parameters, forming: &Forming) -> Result<()> {
     Ok(())
 }
 
-/// Whether plies lie over the tool, and in a press reach the die.
-fn check_places(p: &Parameters, forming: &Forming) -> Result<()> {
+/// Whether plies lie over the tool.
+fn check_places(forming: &Forming) -> Result<()> {
     if forming.zone.is_some() {
         return Ok(());
     }
@@ -207,24 +175,6 @@ fn check_places(p: &Parameters, forming: &Forming) -> Result<()> {
                 mm(to),
                 mm([low[0], low[1]]),
                 mm([high[0], high[1]])
-            )));
-        }
-    }
-    let Process::Press(press) = &p.scene.process else {
-        return Ok(());
-    };
-    let opening = press.die.opening_radius.si();
-    for (body, _) in forming.plies() {
-        let points = forming.reference_points(body);
-        let square = |x: &V| x[0] * x[0] + x[1] * x[1];
-        let reach = points.iter().map(square).fold(0.0, f64::max).sqrt();
-        if reach <= opening {
-            return Err(FormingError::Absurd(format!(
-                "scene: ply '{}' reaches {:.1} mm from the axis, the opening of the die {:.1} mm (process.press.die.opening_radius): it would never touch the die. \
-                 Expected a ply that covers the opening",
-                body.name,
-                1e3 * reach,
-                1e3 * opening
             )));
         }
     }

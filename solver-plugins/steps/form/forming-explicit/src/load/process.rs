@@ -166,7 +166,7 @@ mod tests {
             "film_joint_margin": "0.03 m"});
         let process = serde_json::from_value(process).unwrap();
         let load = |sealed_volume, pumped_volume| Load::Process {
-            cycle: Cycle::new(&process, [0.1, 0.0]).unwrap(),
+            cycle: Cycle::new(&process, [0.1, 0.0]),
             tool_volume: 1e-3,
             sealed_volume,
             pumped_volume,

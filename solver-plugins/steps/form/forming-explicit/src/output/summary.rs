@@ -31,7 +31,7 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<artifact::Sheet> {
                 added_mass: Some(added),
                 element: Some(choice.plugin.clone()),
                 regions: regions::attributes(&s.scene),
-                mesh_quality: body.quality.as_ref().map(mesh_quality),
+                mesh_quality: body.quality,
                 ..artifact::Sheet::new(&body.name, s.scene.kind, s.thickness, s.offset)
             };
             if let Some([cells, _]) = forming.model.bending_cells(body.sheet.0) {
@@ -50,18 +50,6 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<artifact::Sheet> {
             sheet
         })
         .collect()
-}
-
-fn mesh_quality(q: &plyflow_blank::Quality) -> MeshQuality {
-    MeshQuality {
-        least_scaled_jacobian: q.least_scaled_jacobian,
-        least_angle: q.least_angle,
-        largest_angle: q.largest_angle,
-        edge_ratio: q.edge_ratio,
-        least_edge: q.least_edge,
-        area_error: q.area_error,
-        worst_at: q.worst_at,
-    }
 }
 
 /// Penetrations by pair, at the end and largest on the way.
@@ -232,8 +220,7 @@ fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<(
 fn write_shape(host: &Host, forming: &Forming) -> Result<()> {
     let outlined = || forming.bodies.iter().filter_map(|b| b.quality);
     if outlined().next().is_some() {
-        let least =
-            |f: fn(plyflow_blank::Quality) -> f64| outlined().map(f).fold(f64::INFINITY, f64::min);
+        let least = |f: fn(MeshQuality) -> f64| outlined().map(f).fold(f64::INFINITY, f64::min);
         host.result(
             "mesh_scaled_jacobian",
             least(|q| q.least_scaled_jacobian),

@@ -3,10 +3,12 @@
 use crate::error::Result;
 use crate::stack::place::SheetIndex;
 use crate::stack::sheet::StackSheet;
-use crate::stack::symmetry::Families;
-use plyflow_geometry::vec3::V;
+use crate::stack::symmetry;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::mirror::{Image, Planes, Whole};
+use plyflow_model::artifact::MeshQuality;
+use plyflow_model::scene::Families;
 
 /// A sheet as a body of the artifact.
 #[derive(Debug, Clone)]
@@ -20,7 +22,7 @@ pub struct Body {
     /// Where mirror planes bound what is computed: the whole, of which that is the beginning.
     pub mirrored: Option<MirroredBody>,
     /// Quality of a mesh that follows an outline.
-    pub quality: Option<plyflow_blank::Quality>,
+    pub quality: Option<MeshQuality>,
 }
 
 impl Body {
@@ -42,7 +44,7 @@ impl Body {
     pub fn mirrored(
         sheet: &StackSheet,
         index: SheetIndex,
-        points: &[V],
+        points: &[Vec3],
         cells: &[[u32; 4]],
         planes: Planes,
     ) -> Result<Self> {
@@ -52,7 +54,7 @@ impl Body {
             body.cells.clone_from(&whole.cells);
             body.mirrored = Some(MirroredBody {
                 whole,
-                families: Families::of(sheet, planes)?,
+                families: symmetry::families(sheet)?,
             });
         }
         Ok(body)

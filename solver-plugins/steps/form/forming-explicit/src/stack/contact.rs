@@ -29,12 +29,9 @@ pub struct StackContacts<'a> {
 
 impl<'a> StackContacts<'a> {
     /// For a stack of the scene.
-    ///
-    /// # Errors
-    /// When the scene's friction makes no sense.
-    pub fn new(stack: &'a [StackSheet], p: &'a Parameters) -> Result<Self> {
-        let friction = FrictionTable::new(&p.scene)?;
-        Ok(Self { stack, friction, p })
+    pub fn new(stack: &'a [StackSheet], p: &'a Parameters) -> Self {
+        let friction = FrictionTable { scene: &p.scene };
+        Self { stack, friction, p }
     }
 
     /// The sheet at a place.

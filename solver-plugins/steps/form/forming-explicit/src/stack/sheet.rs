@@ -3,11 +3,11 @@
 use crate::error::{FormingError, Result};
 use plyflow_blank::Blank;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::mirror::Planes;
 use plyflow_model::material::{Material, MaterialEntry};
-use plyflow_model::regions::faults;
-use plyflow_model::scene::{Process, Scene, Sheet, SheetKind, first_axis};
+use plyflow_model::rules;
+use plyflow_model::scene::{Scene, Sheet, SheetKind, first_axis};
 
 /// A sheet of the stack with what the contacts and the output need.
 #[derive(Debug, Clone)]
@@ -32,32 +32,9 @@ impl StackSheet {
 /// The stack of a scene, bottom to top, with offsets.
 ///
 /// # Errors
-/// When it does not fit the process: film, plies, film for double-diaphragm forming, plies alone for a press.
+/// When the scene breaks a rule ([`rules::check`]), or has fibres that the solver cannot compute.
 pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>> {
-    let n = scene.sheets.len();
-    let kinds: Vec<SheetKind> = scene.sheets.iter().map(|s| s.kind).collect();
-    let plies =
-        |kinds: &[SheetKind]| !kinds.is_empty() && kinds.iter().all(|k| *k == SheetKind::Ply);
-    let (fits, expected) = match scene.process {
-        Process::DoubleDiaphragm(_) => (
-            n >= 3
-                && plies(&kinds[1..n - 1])
-                && kinds[0] == SheetKind::Diaphragm
-                && kinds[n - 1] == SheetKind::Diaphragm,
-            "one diaphragm, one or more plies, one diaphragm",
-        ),
-        Process::Press(_) => (plies(&kinds), "one or more plies, no diaphragm"),
-    };
-    if !fits {
-        return Err(FormingError::Scene(format!(
-            "the sheets of scene '{}' must be, from the tool upwards, for the process {}: {expected}",
-            scene.name,
-            scene.process.word()
-        )));
-    }
-    if let Some(fault) = faults(scene).into_iter().next() {
-        return Err(FormingError::Scene(fault.text));
-    }
+    rules::check(scene)?;
     let mut stack = scene
         .sheets
         .iter()
@@ -95,12 +72,6 @@ const SQUARE: f64 = 1e-6;
 
 /// Whether the solver can compute a sheet as the scene has it.
 fn check_sheet(sheet: &Sheet) -> Result<()> {
-    if ["bed", "die", "holder"].contains(&sheet.name.as_str()) {
-        return Err(FormingError::Scene(format!(
-            "sheet '{}' has the name of a rigid part; give it another name",
-            sheet.name
-        )));
-    }
     if let (SheetKind::Ply, Some(second)) = (sheet.kind, sheet.fibre_2) {
         let degrees = |angle: f64| (1e6 * angle.to_degrees()).round() / 1e6;
         let between = second.si() - sheet.fibre_1.si();
@@ -118,7 +89,7 @@ fn check_sheet(sheet: &Sheet) -> Result<()> {
 }
 
 /// Direction of material axis e1 in the undeformed plane.
-pub fn axis(sheet: &Sheet) -> V {
+pub fn axis(sheet: &Sheet) -> Vec3 {
     let first = sheet.fibre_1.si();
     let square = || first + std::f64::consts::FRAC_PI_2;
     let e1 = first_axis(first, sheet.fibre_2.map_or_else(square, |a| a.si()));
@@ -136,11 +107,7 @@ pub fn blank(sheet: &StackSheet) -> Result<Blank> {
 /// The part of a ply's blank that mirror planes bound: all of it without planes.
 ///
 /// # Errors
-/// As [`blank`]; when it is not its own mirror image.
+/// As [`blank`].
 pub fn blank_part(sheet: &StackSheet, planes: Planes) -> Result<Blank> {
-    let part = blank(sheet)?.part(planes);
-    part.map_err(|source| FormingError::Mesh {
-        ply: sheet.scene.name.clone(),
-        source,
-    })
+    Ok(blank(sheet)?.part(planes))
 }

@@ -4,23 +4,21 @@
 //! 45 degrees to them the plane exchanges the families and shear keeps its sign.
 
 use crate::error::{FormingError, Result};
-use crate::stack::sheet::{self, StackSheet};
+use crate::stack::sheet::StackSheet;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::{V, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 use plyflow_mechanics::LANES;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::mirror::{Planes, reflect};
 use plyflow_mechanics::sheet::Aligned;
-use plyflow_model::friction::Coefficient;
-use plyflow_model::scene::{MirrorPlane, Scene, first_axis};
+use plyflow_model::rules;
+use plyflow_model::scene::{Families, MirrorPlane, Scene, first_axis};
 use plyflow_sdk::{BendingBatch, MembraneBatch};
 use plyflow_tooling::{SurfaceTree, ToolMesh};
 
 /// How far (share of the box's diagonal) a tool's corners may lie from its mirror image: facets follow the same surface
 /// with other chords on either side.
 const TOOL_APART: f64 = 1e-4;
-/// How far fibres may be from the directions that are possible (rad).
-const FIBRES_APART: f64 = 1e-6;
 /// Largest difference of mirrored responses of a material, over its largest response.
 const RESPONSE_APART: f64 = 1e-9;
 
@@ -41,85 +39,33 @@ fn given(planes: Planes) -> String {
     format!("symmetry: [{}]", words.collect::<Vec<_>>().join(", "))
 }
 
-/// What a mirror plane does to the fibre families of a sheet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Families {
-    /// Each is its own mirror image; shear changes its sign.
-    Kept,
-    /// They are each other's; shear keeps its sign.
-    Exchanged,
+/// What the planes of a scene do to the fibre families of a sheet.
+///
+/// # Errors
+/// When its fibres lie askew to them.
+pub fn families(sheet: &StackSheet) -> Result<Families> {
+    Ok(rules::symmetry::families(&sheet.scene)?)
 }
 
-impl Families {
-    /// Of a sheet of the scene: the same for both planes.
-    ///
-    /// # Errors
-    /// When its fibres lie in neither way to the planes.
-    pub fn of(sheet: &StackSheet, planes: Planes) -> Result<Self> {
-        let [x, y, _] = sheet::axis(&sheet.scene).map(f64::abs);
-        if x.min(y) < FIBRES_APART {
-            Ok(Self::Kept)
-        } else if (x - y).abs() < FIBRES_APART {
-            Ok(Self::Exchanged)
-        } else {
-            Err(FormingError::Symmetry(format!(
-                "{}: the fibres of sheet '{}' (fibre_1 at {:.3} deg) are not their own mirror image; expected fibres along x \
-                 and y, or at 45 deg to them. Turn them, or leave out `symmetry`",
-                given(planes),
-                sheet.scene.name,
-                sheet.scene.fibre_1.si().to_degrees()
-            )))
-        }
-    }
-
-    /// The mirror image of components 11, 22 and 12 (of a metric, a curvature, a stress or a moment).
-    fn image(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
-        match self {
-            Self::Kept => [a, b, -c],
-            Self::Exchanged => [b, a, c],
-        }
+/// The mirror image of components 11, 22 and 12 (of a metric, a curvature, a stress or a moment).
+fn image_of(families: Families, [a, b, c]: [f64; 3]) -> [f64; 3] {
+    match families {
+        Families::Kept => [a, b, -c],
+        Families::Exchanged => [b, a, c],
     }
 }
 
-/// Whether tool and friction are their own mirror images. Frame, bed, die and holder always are; blanks, fibres and
-/// materials are looked at where they are made.
-pub fn check(scene: &Scene, planes: Planes, stack: &[StackSheet], tool: &ToolMesh) -> Result<()> {
-    if !planes.any() {
-        return Ok(());
-    }
-    check_tool(planes, tool)?;
-    let f = &scene.friction;
-    let classes = [
-        &f.tool_diaphragm,
-        &f.tool_fabric,
-        &f.fabric_diaphragm,
-        &f.fabric_fabric,
-        &f.diaphragm_diaphragm,
-    ];
-    let by_class = classes.iter().any(|c| match c {
-        Some(Coefficient::Law(law)) => law.angle.is_some(),
-        _ => false,
-    });
-    let by_angle = by_class || f.pairs.iter().any(|p| p.angle.is_some());
-    for sheet in stack {
-        if Families::of(sheet, planes)? == Families::Exchanged && by_angle {
-            return Err(FormingError::Symmetry(format!(
-                "{}: friction depends on the angle to one fibre family (`angle`), which the plane exchanges with the other one \
-                 in sheet '{}'; leave out `angle` or `symmetry`, or lay the fibres along x and y",
-                given(planes),
-                sheet.scene.name
-            )));
-        }
-    }
-    Ok(())
-}
-
-fn check_tool(planes: Planes, tool: &ToolMesh) -> Result<()> {
+/// Whether the triangles of a tool are their own mirror images. Frame, bed, die and holder always are; materials are looked at where
+/// they are made, all else by the rules of scenes.
+///
+/// # Errors
+/// Which point has no image, and how far it is off.
+pub fn check_tool(planes: Planes, tool: &ToolMesh) -> Result<()> {
     let [low, high] = tool.bounds();
     let most = TOOL_APART * norm(sub(high, low));
     let tree = SurfaceTree::new(tool);
     for k in (0..2).filter(|k| planes.0[*k]) {
-        let off = |p: &V| {
+        let off = |p: &Vec3| {
             let image = reflect(*p, [k == 0, k == 1]);
             (norm(sub(tree.closest(image).point, image)), *p)
         };
@@ -155,7 +101,7 @@ pub fn check_material(element: &ElementInstance, sheet: &StackSheet, planes: Pla
         return Ok(());
     }
     let material = &*element.material;
-    let families = Families::of(sheet, planes)?;
+    let families = families(sheet)?;
     let refuse = |what: &str, share: f64| {
         let (how, other) = match families {
             Families::Kept => (
@@ -238,7 +184,7 @@ fn rows(families: Families, sample: impl Fn(usize) -> [f64; 3]) -> Aligned {
     let mut values = Aligned::zeros(3 * LANES);
     for k in 0..SAMPLES {
         let own = sample(k);
-        let image = families.image(own);
+        let image = image_of(families, own);
         for r in 0..3 {
             values[r * LANES + k] = own[r];
             values[r * LANES + SAMPLES + k] = image[r];
@@ -253,7 +199,7 @@ fn difference(families: Families, answers: &[f64], energy: &[f64]) -> f64 {
     let mut apart = [0.0f64; 4];
     let mut size = [f64::MIN_POSITIVE; 4];
     for k in 0..SAMPLES {
-        let (image, other) = (families.image(lane(k)), lane(SAMPLES + k));
+        let (image, other) = (image_of(families, lane(k)), lane(SAMPLES + k));
         for r in 0..3 {
             apart[r] = apart[r].max((image[r] - other[r]).abs());
             size[r] = size[r].max(image[r].abs()).max(other[r].abs());

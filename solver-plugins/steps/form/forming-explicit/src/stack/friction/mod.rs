@@ -1,7 +1,5 @@
 //! Which surfaces rub on each other, and by which law.
 
-pub mod check;
-pub mod pairs;
 pub mod table;
 pub mod through;
 

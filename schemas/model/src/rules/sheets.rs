@@ -1,0 +1,151 @@
+//! Rules of single sheets: names, sizes, fibres.
+
+use crate::fault::{Fault, Path, Rule, Shown};
+use crate::outline::{ContourName, OutlineError, Region};
+use crate::rules::known::Known;
+use crate::scene::{Sheet, SheetKind};
+use crate::text::is_word;
+use crate::units::si_number;
+
+/// Names that sheets may not have: what is rigid is a body of the artifact, or a part that rubs, under its own name.
+pub const RIGID: [&str; 4] = ["tool", "bed", "die", "holder"];
+
+/// Least angle between the fibre families (deg). Nearer to each other they are one family, and no yarn lies across: a net of cells so
+/// slim is none.
+pub const LEAST_CROSSING: f64 = 6.0;
+
+/// All that is wrong with single sheets.
+pub fn check(known: &Known<'_>) -> Vec<Fault> {
+    let mut found = Vec::new();
+    let mut names = RIGID.to_vec();
+    for (k, sheet) in known.numbered() {
+        let at = Path::to("sheets").item(k);
+        found.extend(name(sheet, &names, at.key("name")));
+        names.push(&sheet.name);
+        match sheet.kind {
+            SheetKind::Ply => {
+                size(sheet, &at, &mut found);
+                found.extend(fibres(sheet, at.key("fibre_2")));
+            }
+            SheetKind::Diaphragm => diaphragm(sheet, &at, &mut found),
+        }
+    }
+    found
+}
+
+fn name(sheet: &Sheet, taken: &[&str], path: Path) -> Option<Fault> {
+    let name = &sheet.name;
+    if taken.contains(&name.as_str()) {
+        return Some(
+            Fault::text(Rule::Name, path, format!("the name `{name}` is taken")).expected(
+                "a name of its own for every sheet, other than `tool`, `bed`, `die` and `holder`",
+            ),
+        );
+    }
+    (!is_word(name)).then(|| {
+        Fault::text(Rule::Name, path, format!("`{name}` cannot name a body"))
+            .expected("letters, digits, `_` and `-`")
+    })
+}
+
+/// What only plies have.
+fn diaphragm(sheet: &Sheet, at: &Path, found: &mut Vec<Fault>) {
+    for (name, given) in [
+        ("length", sheet.length.is_some()),
+        ("width", sheet.width.is_some()),
+        ("outline", sheet.outline.is_some()),
+        ("holes", !sheet.holes.is_empty()),
+        ("centre", sheet.centre.iter().any(|c| c.si() != 0.0)),
+        ("fibre_1", sheet.fibre_1.si() != 0.0),
+        ("fibre_2", sheet.fibre_2.is_some()),
+        ("regions", !sheet.regions.is_empty()),
+    ] {
+        if given {
+            let fault = Fault::text(
+                Rule::Size,
+                at.key(name),
+                format!("a diaphragm has no `{name}`"),
+            );
+            found.push(fault.shown(Shown::Key).help(
+                "diaphragms fill the frame of the process and have no fibres; only plies have a shape of their own",
+            ));
+        }
+    }
+}
+
+fn size(sheet: &Sheet, at: &Path, found: &mut Vec<Fault>) {
+    let outlined = sheet.outline.is_some();
+    let needs = |name: &str, example: &str| {
+        let text = format!("a ply needs `{name}`");
+        Fault::text(Rule::Size, at.key(name), text)
+            .shown(Shown::Beside("kind"))
+            .expected(format!("`{name}: {example}`, say"))
+    };
+    for (name, given) in [("length", sheet.length), ("width", sheet.width)] {
+        match given {
+            Some(_) if outlined => {
+                let text = format!("`{name}` stands beside `outline`");
+                found.push(
+                    Fault::text(Rule::Size, at.key(name), text)
+                        .shown(Shown::Key)
+                        .expected("an `outline`, or `length` and `width` of a rectangle"),
+                );
+            }
+            None if !outlined => found.push(needs(name, "300 mm").help(
+                "a ply that is no rectangle has an `outline` instead of `length` and `width`",
+            )),
+            _ => {}
+        }
+    }
+    if sheet.fibre_2.is_none() {
+        found.push(needs("fibre_2", "45 deg"));
+    }
+    found.extend(outline(sheet, at));
+}
+
+/// What is wrong with outline and holes.
+fn outline(sheet: &Sheet, at: &Path) -> Option<Fault> {
+    // Relative to the sheet's centre, as they are written.
+    let holes = sheet.holes.iter().map(|hole| hole.corners()).collect();
+    let error = match &sheet.outline {
+        Some(outline) => Region::new(outline.corners(), holes).err()?,
+        None => sheet.region().err()?,
+    };
+    let path = match error.contour() {
+        Some(ContourName::Hole(i)) => at.key("holes").item(i),
+        Some(ContourName::Outline) => at.key("outline"),
+        None => at.key("holes"),
+    };
+    let fault = match error {
+        OutlineError::HolesAlone => {
+            Fault::text(Rule::Outline, path, "`holes` stand without `outline`")
+                .shown(Shown::Key)
+                .expected("an `outline` around the holes")
+                .help("a rectangle with holes is an outline of four points")
+        }
+        error => Fault::text(Rule::Outline, path, error.to_string()).help(
+            "points count from 0 in the order of the file; places are relative to the sheet's `centre`",
+        ),
+    };
+    Some(fault)
+}
+
+/// The families must cross.
+fn fibres(sheet: &Sheet, path: Path) -> Option<Fault> {
+    let (first, second) = (sheet.fibre_1.si(), sheet.fibre_2?.si());
+    // A fibre has no sense: directions 180 deg apart are the same.
+    let apart = (second - first).to_degrees().rem_euclid(180.0);
+    let apart = apart.min(180.0 - apart);
+    // To rounding of degrees in radians.
+    (apart < LEAST_CROSSING - 1e-9).then(|| {
+        let text = format!(
+            "`fibre_1` and `fibre_2` lie along each other, {} deg apart",
+            si_number((1e3 * apart).round() / 1e3)
+        );
+        Fault::text(Rule::Fibres, path, text)
+            .expected(format!(
+                "a direction that crosses `fibre_1` at {LEAST_CROSSING} deg or more"
+            ))
+            .help("the families of most fabrics cross at 90 deg: `fibre_1: -45 deg`, `fibre_2: 45 deg`, say")
+    })
+}
