@@ -57,6 +57,22 @@ def cantilever():
     return style.save_svg(figure, "cantilever")
 
 
+def buckling():
+    """Load and amplitude of a strip between clamps that come together: shells and the elastica."""
+    place = runs.run("coupons/buckling/workflow")
+    figure, panels = plt.subplots(1, 2, figsize=(7, 2.8), layout="constrained")
+    for axes, name, unit, label in zip(panels, ("load", "amplitude"), (1e-3, MM), ("load per width (N/mm)", "amplitude (mm)")):
+        for element, colour in (("rf4", BLUE), ("s4", ORANGE)):
+            run = runs.artifact(place, f"elastica_40_{element}")
+            axes.plot(run.array("curves/run/shortening")[::8] * 100, run.array(f"curves/run/{name}")[::8] * unit, "o", color=colour,
+                      markersize=3.2 if element == "rf4" else 2, markerfacecolor="white", markeredgewidth=0.9, label=f"{element}, 40 elements")
+        x, y = (run.array(f"curves/elastica/{c}") for c in ("shortening", name))
+        axes.plot(x * 100, y * unit, color=INK, linewidth=1.2, label="elastica")
+        axes.set(xlabel="end shortening (% of the length)", ylabel=label, xlim=(0, 40), ylim=(0, None))
+    panels[1].legend(loc="lower right")
+    return style.save_svg(figure, "buckling")
+
+
 def hemisphere():
     """The woven ply of case A in 5 mm shells, pressed: shear from above and the wrinkles from the side."""
     place = runs.run("hemisphere/workflow-coarse")

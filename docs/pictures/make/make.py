@@ -13,7 +13,7 @@ import spar
 PICTURES = {
     "spar-zones": spar.spar_zones, "tool-spar": spar.tool_spar, "forming-stages": spar.forming_stages, "shear-angle": spar.shear_angle,
     "local-wrinkle": spar.local_wrinkle, "cross-section": spar.cross_section, "energy-ledger": spar.energy_ledger,
-    "kinematic": spar.kinematic, "bias-extension": coupons.bias_extension, "cantilever": coupons.cantilever,
+    "kinematic": spar.kinematic, "bias-extension": coupons.bias_extension, "cantilever": coupons.cantilever, "buckling": coupons.buckling,
     "hemisphere": coupons.hemisphere, "speed-error": diagrams.speed_error, "bag-layers": diagrams.bag_layers,
     "workflow-graph": diagrams.workflow_graph, "floors": diagrams.floors, "study": browser.study, "report": browser.report,
 }

@@ -343,35 +343,21 @@ fn write(
     let x = out.curve("profile/x", "m", &x)?;
     let z = out.curve("profile/z", "m", &z)?;
     let form = (p.stiffness.filter(|_| p.foundation().is_none())).map(|b| Elastica::of(b, p));
-    let mut closed = None;
-    if let Some(form) = &form {
-        let at: Vec<f64> = (0..=200)
-            .map(|i| p.shortening * f64::from(i) / 200.0)
-            .collect();
-        let states: Vec<elastica::State> = at.iter().map(|s| elastica::at(*s)).collect();
-        let loads: Vec<f64> = states.iter().map(|s| s.load * form.euler).collect();
-        let heights: Vec<f64> = states.iter().map(|s| s.amplitude * p.length).collect();
-        closed = Some((
-            out.curve("elastica/shortening", "1", &at)?,
-            out.curve("elastica/load", "N/m", &loads)?,
-            out.curve("elastica/amplitude", "m", &heights)?,
-        ));
-    }
+    let closed = (form.as_ref())
+        .map(|form| form.curves(&mut out, p))
+        .transpose()?;
+    let closed = closed.as_ref();
     let axis = ("end shortening over length", "1");
     let label = "load per width over end shortening";
-    let mut plot = out.plot("load", label, axis, ("load per width", "N/mm"));
-    plot = plot.series("this run", &shortening, &load, Style::Line);
-    if let Some((s, load, _)) = &closed {
-        plot = plot.series("elastica", s, load, Style::Dashed);
-    }
-    plot.done();
+    out.plot("load", label, axis, ("load per width", "N/mm"))
+        .series("this run", &shortening, &load, Style::Line)
+        .also("elastica", closed.map(|c| (&*c.0, &*c.1)), Style::Dashed)
+        .done();
     let label = "amplitude over end shortening";
-    let mut plot = out.plot("amplitude", label, axis, ("amplitude", "mm"));
-    plot = plot.series("this run", &shortening, &amplitude, Style::Line);
-    if let Some((s, _, height)) = &closed {
-        plot = plot.series("elastica", s, height, Style::Dashed);
-    }
-    plot.done();
+    out.plot("amplitude", label, axis, ("amplitude", "mm"))
+        .series("this run", &shortening, &amplitude, Style::Line)
+        .also("elastica", closed.map(|c| (&*c.0, &*c.2)), Style::Dashed)
+        .done();
     out.plot(
         "profile",
         "middle line at the end",
@@ -399,6 +385,25 @@ impl Elastica {
         Self {
             euler: stiffness * wave * wave,
         }
+    }
+
+    /// Writes its curves: paths of shortening, load and amplitude.
+    fn curves(
+        &self,
+        out: &mut Output<'_>,
+        p: &Parameters,
+    ) -> Result<(String, String, String), StepError> {
+        let at: Vec<f64> = (0..=200)
+            .map(|i| p.shortening * f64::from(i) / 200.0)
+            .collect();
+        let states: Vec<elastica::State> = at.iter().map(|s| elastica::at(*s)).collect();
+        let loads: Vec<f64> = states.iter().map(|s| s.load * self.euler).collect();
+        let heights: Vec<f64> = states.iter().map(|s| s.amplitude * p.length).collect();
+        Ok((
+            out.curve("elastica/shortening", "1", &at)?,
+            out.curve("elastica/load", "N/m", &loads)?,
+            out.curve("elastica/amplitude", "m", &heights)?,
+        ))
     }
 }
 

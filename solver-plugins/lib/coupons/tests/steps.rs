@@ -3,8 +3,9 @@
 
 use plyflow_coupons::{
     bias_extension::Plugin as BiasExtension, bias_plane::Plugin as BiasPlane,
-    cantilever::Plugin as Cantilever, film::Plugin as Film, inflation::Plugin as Inflation,
-    picture_frame::Plugin as PictureFrame, pure_bending::Plugin as PureBending,
+    buckling::Plugin as Buckling, cantilever::Plugin as Cantilever, film::Plugin as Film,
+    inflation::Plugin as Inflation, picture_frame::Plugin as PictureFrame,
+    pure_bending::Plugin as PureBending,
 };
 use plyflow_kernels::built_in::component;
 use plyflow_sdk::Step;
@@ -246,4 +247,51 @@ fn a_size_a_thousandfold_too_small_is_refused_before_any_element_is_made() {
         "m4",
         json!({"pressure": 2000.0, "ramp_time": 0.006, "hold_time": 0.001}),
     );
+}
+
+/// A strip with a stiffness of 8 N mm, softer along its fibres for the step.
+fn strip(element: &str) -> Value {
+    let mut material = ncf();
+    material["with"]["fibre_modulus"] = json!(3e8);
+    material["with"]["bending"] = json!({"positive": {"stiffness": 0.008}});
+    json!({
+        "material": material, "element": {"plugin": element, "with": {"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01}},
+        "element_size": 0.005, "length": 0.1, "width": 0.01, "family": 1, "shortening": 0.1, "time": 0.3, "settling_time": 0.02,
+        "foundation_thickness": 0.001, "disturbance": 10.0, "stiffness": 0.008, "step_safety": 0.8, "damping": 5.0, "frames": 3,
+        "kinetic_bound": 0.05
+    })
+}
+
+#[test]
+fn a_strip_buckles_under_eulers_load_and_goes_on_as_the_elastica() {
+    for element in ["rf4", "s4"] {
+        let run =
+            run_on::<Buckling>(&ALONE, strip(element), &[], &[]).unwrap_or_else(|e| panic!("{e}"));
+        // 20 elements; 40 are held to a quarter of this in workflows/coupons/buckling.
+        assert!(run.result("critical_load_error") < 0.04, "{element}");
+        assert!(run.result("load_error_at_end") < 0.08, "{element}");
+        assert!(run.result("amplitude_error_at_end") < 0.08, "{element}");
+        assert!(run.result("drift_ratio") < 0.01, "{element}");
+    }
+}
+
+#[test]
+fn a_membrane_is_not_asked_to_buckle_without_a_word() {
+    let error = run_on::<Buckling>(&ALONE, strip("m4"), &[], &[]).err();
+    let error = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("a membrane, which does not bend"), "{error}");
+}
+
+#[test]
+fn same_bytes_on_one_and_two_threads_buckling() {
+    let mut with = strip("rf4");
+    for (name, value) in [
+        ("element_size", 0.0025),
+        ("width", 0.06),
+        ("time", 0.004),
+        ("settling_time", 0.001),
+    ] {
+        with[name] = json!(value);
+    }
+    same_on_one_and_two_threads::<Buckling>(&with);
 }
