@@ -16,7 +16,7 @@ BOOK := . ./.tools/env && CARGO_TARGET_DIR=$(TARGET)/book-builder cargo
 QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p plyflow-study -p plyflow-sdk -p plyflow-geometry -p plyflow-surface \
   -p plyflow-kernels -p plyflow-blank -p plyflow-conformance
 
-.PHONY: help build demo check test checked long templates lint bench book docs pictures clean
+.PHONY: help build demo check test checked long hard-cases templates lint bench book docs pictures clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -52,6 +52,9 @@ long: ## run the tests that take many minutes
 	@scripts/setup
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -p plyflow-faults -p plyflow-forming-explicit -- --ignored --nocapture
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-characterisation --all-features --test calibration -- --ignored --nocapture
+
+hard-cases: build ## run what is made to break elements, laws and contacts, and write docs/hard-cases.md
+	scripts/hard-cases
 
 templates: build ## build, check and run the element templates outside of the repository
 	scripts/check-templates
