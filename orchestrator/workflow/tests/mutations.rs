@@ -758,9 +758,9 @@ const CASES: &[Case] = &[
     ),
     (
         S,
-        "    width: 300 mm\n",
-        "    width: 300 mm\n    regions:\n      - {name: a, rectangle: {length: 20 mm, width: 20 mm}, friction: {all: {coefficient: 0.5, angle: {factors: [{angle: 0 deg, factor: 1}, {angle: 90 deg, factor: 1.5}]}}}}\nsymmetry: [x]\n",
-        3,
+        "  - name: upper-film\n    kind: diaphragm\n    material: film.yaml\n",
+        "    regions:\n      - {name: a, rectangle: {length: 20 mm, width: 20 mm}, friction: {all: {coefficient: 0.5, angle: {factors: [{angle: 0 deg, factor: 1}, {angle: 90 deg, factor: 1.5}]}}}}\n  - name: upper-film\n    kind: diaphragm\n    material: film.yaml\nsymmetry: [x]\n",
+        5,
         &["which the plane exchanges with the other one in sheet `ply-1`"],
     ),
     (
