@@ -194,9 +194,9 @@ pub struct Fault {
     /// Why.
     pub problem: Problem,
     /// What was expected.
-    pub expected: Option<Phrase>,
+    pub expected: Option<Box<Phrase>>,
     /// What to do.
-    pub help: Option<Phrase>,
+    pub help: Option<Box<Phrase>>,
 }
 
 impl Fault {
@@ -224,14 +224,14 @@ impl Fault {
     /// States what was expected.
     #[must_use]
     pub fn expected(mut self, text: impl Into<Phrase>) -> Self {
-        self.expected = Some(text.into());
+        self.expected = Some(Box::new(text.into()));
         self
     }
 
     /// States the remedy.
     #[must_use]
     pub fn help(mut self, text: impl Into<Phrase>) -> Self {
-        self.help = Some(text.into());
+        self.help = Some(Box::new(text.into()));
         self
     }
 

@@ -97,7 +97,8 @@ fn a_table_of_pressures_runs_over_its_phase_and_draws_no_more_than_the_bag_has()
     };
     let sound = [(0.0, 0.0), (0.5, 90.0), (1.0, 100.0)];
     assert_eq!(refused(with("bag_pressure", &sound)), Ok(()));
-    let cases: [(&str, &[(f64, f64)], &str, &str); 8] = [
+    type Rows<'a> = &'a [(f64, f64)];
+    let cases: [(&str, Rows<'_>, &str, &str); 8] = [
         (
             "bag_pressure",
             &[(0.0, 0.0)],
@@ -213,14 +214,12 @@ fn names_of_all_rigid_parts_are_taken_whatever_the_process() {
 
 #[test]
 fn sheets_that_are_no_neighbours_rub_past_the_edges_of_the_others() {
-    let with = |between: [&str; 2], scene: fn(&dyn Fn(&mut Value)) -> Value| {
-        scene(&|s: &mut Value| {
-            s["friction"]["pairs"] = json!([{"between": between, "coefficient": 0.3}]);
-        })
-    };
-    assert_eq!(refused(with(["low", "b"], |c| bag(|s| c(s)))), Ok(()));
-    assert_eq!(refused(with(["die", "a"], |c| press(|s| c(s)))), Ok(()));
-    let apart = with(["tool", "a"], |c| bag(|s| c(s)));
+    let pair = |between: [&str; 2]| json!([{"between": between, "coefficient": 0.3}]);
+    let in_bag = |between| bag(|s| s["friction"]["pairs"] = pair(between));
+    let in_press = |between| press(|s| s["friction"]["pairs"] = pair(between));
+    assert_eq!(refused(in_bag(["low", "b"])), Ok(()));
+    assert_eq!(refused(in_press(["die", "a"])), Ok(()));
+    let apart = in_bag(["tool", "a"]);
     assert_refused(
         apart,
         Rule::Pairs,
@@ -312,7 +311,8 @@ fn what_lies_beside_mirror_planes_is_its_own_image() {
             (json!("-45 deg"), json!("45 deg"));
     };
     assert_eq!(refused(with(both(), &turned)), Ok(()));
-    let cases: [(Value, &dyn Fn(&mut Value), &str); 8] = [
+    type Change<'a> = &'a dyn Fn(&mut Value);
+    let cases: [(Value, Change<'_>, &str); 8] = [
         (json!(["x", "x"]), &|_| (), "named twice"),
         (
             both(),
