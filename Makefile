@@ -16,7 +16,7 @@ BOOK := . ./.tools/env && CARGO_TARGET_DIR=$(TARGET)/book-builder cargo
 QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p plyflow-study -p plyflow-sdk -p plyflow-geometry -p plyflow-surface \
   -p plyflow-kernels -p plyflow-blank -p plyflow-conformance
 
-.PHONY: help build demo check test long templates lint bench book docs pictures clean
+.PHONY: help build demo check test checked long templates lint bench book docs pictures clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -43,6 +43,10 @@ test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	$(CARGO) test $(CARGO_FLAGS) --workspace
 	scripts/check-vtk
 	scripts/check-report
+
+checked: ## run the tests of mechanics and kernels with debug assertions and overflow checks: minutes
+	@scripts/setup
+	$(CARGO) test --profile checked --locked -p plyflow-mechanics -p plyflow-kernels --lib --tests
 
 long: ## run the tests that take many minutes
 	@scripts/setup

@@ -2,7 +2,7 @@
 //! `cargo run -p plyflow-artifact --example vtk-sample -- FILE [FRAMES [SIDE]]`; the Python check in
 //! `tests/vtk` opens it.
 
-use plyflow_artifact::{ArtifactWriter, On};
+use plyflow_artifact::{ArtifactWriter, FieldInfo, On};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -37,12 +37,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let on_points: Vec<f64> = (0..(n + 1) * (n + 1))
                 .map(|i| (i as f64 * 0.1 + t * 50.0).sin())
                 .collect();
-            w.frame_field(name, On::Points, "contact_pressure", 1, "Pa", &on_points)?;
+            w.frame_field(
+                name,
+                FieldInfo::new(On::Points, "contact_pressure", 1, "Pa"),
+                &on_points,
+            )?;
             let on_cells: Vec<f64> = (0..n * n).map(|i| (i as f64 * 0.3 - t).cos()).collect();
             if *name == "film" {
-                w.frame_field(name, On::Cells, "principal_stretch", 1, "1", &on_cells)?;
+                w.frame_field(
+                    name,
+                    FieldInfo::new(On::Cells, "principal_stretch", 1, "1"),
+                    &on_cells,
+                )?;
             } else {
-                w.frame_field(name, On::Cells, "shear_angle", 1, "rad", &on_cells)?;
+                w.frame_field(
+                    name,
+                    FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
+                    &on_cells,
+                )?;
             }
         }
         w.end_frame()?;

@@ -30,6 +30,18 @@ pub struct FieldInfo {
     pub unit: String,
 }
 
+impl FieldInfo {
+    /// Of these.
+    pub fn new(on: On, name: &str, components: u32, unit: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            on,
+            components,
+            unit: unit.to_owned(),
+        }
+    }
+}
+
 /// A body.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BodyInfo {

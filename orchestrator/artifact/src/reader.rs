@@ -61,6 +61,16 @@ fn read_small(path: &Path) -> Option<Vec<(String, small::Value)>> {
     small::read(&std::fs::read(path).ok()?)
 }
 
+/// Times of the frames (s).
+fn read_times(file: Option<&File>, frames: u64) -> Result<Vec<f64>> {
+    let mut times = vec![0.0; frames as usize];
+    if let (Some(file), true) = (file, frames > 0) {
+        let d = file.open_dataset("/plyflow/times", DType::F64, &[frames])?;
+        d.read_rows(0, frames, DType::F64, bytes_mut(&mut times))?;
+    }
+    Ok(times)
+}
+
 impl Artifact {
     /// Opens an artifact.
     ///
@@ -110,17 +120,12 @@ impl Artifact {
             Some(t) => Some(serde_json::from_str(&t).map_err(|e| parse("collection", e))?),
             None => None,
         };
-        let mut times = vec![0.0; contents.frames as usize];
-        if let (Some(file), true) = (&file, contents.frames > 0) {
-            let d = file.open_dataset("/plyflow/times", DType::F64, &[contents.frames])?;
-            d.read_rows(0, contents.frames, DType::F64, bytes_mut(&mut times))?;
-        }
+        let times = read_times(file.as_ref(), contents.frames)?;
         let (kind, attributes, provenance) =
             (text("kind")?, text("attributes")?, text("provenance")?);
         drop(source);
-        let path = path.to_owned();
         Ok(Self {
-            path,
+            path: path.to_owned(),
             file,
             kind,
             attributes,

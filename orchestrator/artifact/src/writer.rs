@@ -1,6 +1,6 @@
 //! Writing an artifact.
 
-use crate::contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, NamedValue, On};
+use crate::contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, NamedValue};
 use crate::error::{ArtifactError, ErrorKind, Result, bad_order, bad_shape, bad_value};
 use crate::h5::{DType, Dataset, File, Location, bytes, bytes_mut};
 use crate::mesh::BodyWriter;
@@ -269,30 +269,11 @@ impl ArtifactWriter {
     /// # Errors
     /// No open frame, unknown body, wrong size, NaN or out of single range, given twice, or not a field
     /// of the first frame.
-    pub fn frame_field(
-        &mut self,
-        body: &str,
-        on: On,
-        name: &str,
-        components: u32,
-        unit: &str,
-        values: &[f64],
-    ) -> Result<()> {
-        check_name("field name", name)?;
+    pub fn frame_field(&mut self, body: &str, field: FieldInfo, values: &[f64]) -> Result<()> {
+        check_name("field name", &field.name)?;
         let frame = self.frames;
         let (file, body) = self.open_body(body)?;
-        let unit = unit.to_owned();
-        body.field(
-            file,
-            frame,
-            FieldInfo {
-                name: name.to_owned(),
-                on,
-                components,
-                unit,
-            },
-            values,
-        )
+        body.field(file, frame, field, values)
     }
 
     /// Ends the open frame.

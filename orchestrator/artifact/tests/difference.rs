@@ -1,6 +1,8 @@
 //! Whatever differs between two artifacts is told, with its place and size, and nothing else is.
 
-use plyflow_artifact::{Artifact, ArtifactWriter, DType, Difference, How, On, differences};
+use plyflow_artifact::{
+    Artifact, ArtifactWriter, DType, Difference, FieldInfo, How, On, differences,
+};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -52,8 +54,12 @@ fn write(path: &Path, made: &Made) {
             now[3 * made.moved.1 + 2] += made.moved.2;
         }
         w.frame_points("ply_1", &now).unwrap();
-        w.frame_field("ply_1", On::Cells, made.field.0, 1, "rad", &[made.field.1])
-            .unwrap();
+        w.frame_field(
+            "ply_1",
+            FieldInfo::new(On::Cells, made.field.0, 1, "rad"),
+            &[made.field.1],
+        )
+        .unwrap();
         w.end_frame().unwrap();
     }
     let bytes: Vec<u8> = made.forces.iter().flat_map(|x| x.to_ne_bytes()).collect();

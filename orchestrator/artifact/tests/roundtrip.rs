@@ -1,6 +1,6 @@
 //! What is written is read back, and the same calls make the same bytes.
 
-use plyflow_artifact::{Artifact, ArtifactWriter, DType, ErrorKind, On};
+use plyflow_artifact::{Artifact, ArtifactWriter, DType, ErrorKind, FieldInfo, On};
 use serde_json::json;
 use std::path::Path;
 
@@ -41,13 +41,25 @@ fn write(path: &Path) {
             let points: Vec<f64> = (0..18).map(|i| point(b, f, i)).collect();
             w.frame_points(name, &points).unwrap();
             let values: Vec<f64> = (0..18).map(|i| value(b, f, i)).collect();
-            w.frame_field(name, On::Points, "contact_pressure", 1, "Pa", &values[..6])
-                .unwrap();
+            w.frame_field(
+                name,
+                FieldInfo::new(On::Points, "contact_pressure", 1, "Pa"),
+                &values[..6],
+            )
+            .unwrap();
             if b == 0 {
-                w.frame_field(name, On::Cells, "shear_angle", 1, "rad", &values[..2])
-                    .unwrap();
-                w.frame_field(name, On::Points, "undeformed", 3, "m", &values)
-                    .unwrap();
+                w.frame_field(
+                    name,
+                    FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
+                    &values[..2],
+                )
+                .unwrap();
+                w.frame_field(
+                    name,
+                    FieldInfo::new(On::Points, "undeformed", 3, "m"),
+                    &values,
+                )
+                .unwrap();
             }
         }
         w.end_frame().unwrap();
@@ -163,10 +175,7 @@ fn nan_is_refused_with_its_place_in_the_text() {
     let e = w
         .frame_field(
             "ply",
-            On::Points,
-            "p",
-            2,
-            "Pa",
+            FieldInfo::new(On::Points, "p", 2, "Pa"),
             &[0., 0., 0., 0., 0., f64::NAN, 0., 0.],
         )
         .unwrap_err();
@@ -206,7 +215,7 @@ fn a_frame_is_refused_when_a_field_or_points_of_the_first_are_missing() {
     let mut w = one_body(&dir.path().join("a.h5"));
     w.begin_frame(0.0).unwrap();
     w.frame_points("ply", &[0.0; 12]).unwrap();
-    w.frame_field("ply", On::Cells, "s", 1, "1", &[1.0])
+    w.frame_field("ply", FieldInfo::new(On::Cells, "s", 1, "1"), &[1.0])
         .unwrap();
     w.end_frame().unwrap();
     w.begin_frame(1.0).unwrap();
@@ -214,11 +223,11 @@ fn a_frame_is_refused_when_a_field_or_points_of_the_first_are_missing() {
     w.frame_points("ply", &[0.0; 12]).unwrap();
     assert!(w.end_frame().unwrap_err().message.contains("'s'"));
     let late = w
-        .frame_field("ply", On::Cells, "t", 1, "1", &[1.0])
+        .frame_field("ply", FieldInfo::new(On::Cells, "t", 1, "1"), &[1.0])
         .unwrap_err();
     assert!(late.message.contains("not in frame 0"), "{late}");
     let size = w
-        .frame_field("ply", On::Cells, "s", 1, "1", &[1.0, 2.0])
+        .frame_field("ply", FieldInfo::new(On::Cells, "s", 1, "1"), &[1.0, 2.0])
         .unwrap_err();
     assert_eq!(size.kind, ErrorKind::BadShape);
 }

@@ -7,7 +7,7 @@ use crate::emitter::LONGEST_TEXT;
 use crate::host::HostState;
 use crate::process;
 use plyflow_abi::*;
-use plyflow_artifact::{ArtifactError, DType, ErrorKind, On, check_result};
+use plyflow_artifact::{ArtifactError, DType, ErrorKind, FieldInfo, On, check_result};
 use plyflow_model::job::{LogLevel, NamedResult, Progress};
 use plyflow_model::manifest::PluginKind;
 use plyflow_model::text::shortened;
@@ -466,7 +466,8 @@ unsafe extern "C" fn frame_field(
         let (body, name, unit) = unsafe { (text(body)?, text(name)?, text(unit)?) };
         si(&format!("field '{name}' of '{body}'"), unit)?;
         let values = unsafe { slice(values, times(count, 1)?, name) }?;
-        w.frame_field(body, on(place)?, name, components, unit, values)
+        let field = FieldInfo::new(on(place)?, name, components, unit);
+        w.frame_field(body, field, values)
     })
 }
 

@@ -20,6 +20,7 @@ pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable
 pub use input::{Expectation, Instance, ReportInput, Verdict};
 pub use read::{COUNTS, Measure, Way, Ways, ways};
 pub use summary::summary;
+pub use units::bytes;
 
 use camino::{Utf8Path, Utf8PathBuf};
 use draw::Sharpness;

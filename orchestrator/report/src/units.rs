@@ -109,8 +109,8 @@ fn date(days: i64) -> [i64; 3] {
     [year, since_january + 1, day]
 }
 
-/// A size in bytes.
-pub(crate) fn bytes(n: u64) -> String {
+/// A size in bytes as people read it.
+pub fn bytes(n: u64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
     let (mut value, mut unit) = (n as f64, 0);
     while value >= 1024.0 && unit + 1 < units.len() {

@@ -4,7 +4,7 @@ mod common;
 
 use camino::Utf8PathBuf;
 use common::Study;
-use plyflow_artifact::On;
+use plyflow_artifact::{FieldInfo, On};
 use plyflow_report::write_report;
 use serde_json::{Value, json};
 
@@ -25,13 +25,21 @@ fn page_with(about: &Value) -> String {
     for (body, top) in [("left", 3e-3), ("right", 6e-3)] {
         w.frame_points(body, &points).unwrap();
         let height: Vec<f64> = (0..9).map(|k| top * f64::from(k) / 8.0).collect();
-        w.frame_field(body, On::Points, "height", 1, "m", &height)
+        w.frame_field(body, FieldInfo::new(On::Points, "height", 1, "m"), &height)
             .unwrap();
     }
-    w.frame_field("left", On::Cells, "moment", 1, "N", &[-0.1, 0.0, 0.1, 0.2])
-        .unwrap();
-    w.frame_field("left", On::Points, "way", 3, "m", &[0.0; 27])
-        .unwrap();
+    w.frame_field(
+        "left",
+        FieldInfo::new(On::Cells, "moment", 1, "N"),
+        &[-0.1, 0.0, 0.1, 0.2],
+    )
+    .unwrap();
+    w.frame_field(
+        "left",
+        FieldInfo::new(On::Points, "way", 3, "m"),
+        &[0.0; 27],
+    )
+    .unwrap();
     w.end_frame().unwrap();
     w.attributes(&about.to_string()).unwrap();
     study.finish(w, ("step", &[]), "a-stranger-s-kind", &[], vec![]);

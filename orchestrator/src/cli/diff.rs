@@ -6,7 +6,7 @@ use super::table::number;
 use crate::exit;
 use crate::plan::Key;
 use crate::said::{Done, Stop, print, warn};
-use crate::store::{Flaw, Journal, check_artifact, record_beside};
+use crate::store::{Flaw, Journal, Store, check_artifact, record_beside};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::{Artifact, Difference, How, differences};
 use plyflow_model::text::one_line;
@@ -102,6 +102,18 @@ fn pairs(args: &DiffArgs) -> Result<Vec<Pair>, Stop> {
 /// Label of a step or item, and its artifact; `None`: it has not run to its end.
 type Made = (String, Option<Utf8PathBuf>);
 
+/// The items that there can be: the longest collection, and all items that were recorded. A journal knows names and items by their hashes
+/// alone, so it is asked for all of these.
+fn items_of(store: &Store, keys: &[Key]) -> (u64, BTreeSet<Vec<u64>>) {
+    let records = keys.iter().filter_map(|key| store.read_record(key).ok());
+    let (mut longest, mut recorded) = (0, BTreeSet::new());
+    for record in records {
+        longest = longest.max(record.collection.map_or(0, |labels| labels.len() as u64));
+        recorded.insert(record.item);
+    }
+    (longest, recorded)
+}
+
 /// What a workflow ran last, whatever program and plugins it was.
 fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made>, Stop> {
     let opened = open(&Workflow {
@@ -126,14 +138,8 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
         return Err(nothing());
     }
     let journal = Journal::read(&path).map_err(Stop::machine(format!("reading {path}")))?;
-    // A journal knows names and items by their hashes alone, so it is asked for all that there can be.
     let keys = journal.last_keys();
-    let records = keys.iter().filter_map(|key| store.read_record(key).ok());
-    let (mut longest, mut recorded) = (0, BTreeSet::new());
-    for record in records {
-        longest = longest.max(record.collection.map_or(0, |labels| labels.len() as u64));
-        recorded.insert(record.item);
-    }
+    let (longest, recorded) = items_of(store, &keys);
     let (mut found, mut named) = (Vec::new(), BTreeSet::new());
     for at in wanted {
         let (step, collections) = (

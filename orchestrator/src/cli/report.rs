@@ -117,6 +117,24 @@ pub fn is_written(path: &Utf8Path, fingerprint: &str) -> bool {
     is_current(path, fingerprint)
 }
 
+/// What a page tells of a row that something was expected of.
+fn expectation(r: &Row) -> Option<Expectation> {
+    let e = r.expected.as_ref()?;
+    Some(Expectation {
+        step: r.step.clone(),
+        item: r.item.clone(),
+        result: r.name.clone(),
+        unit: r.unit.clone(),
+        got: r.value,
+        value: e.value,
+        tolerance: e.tolerance,
+        minimum: e.minimum,
+        maximum: e.maximum,
+        source: e.source.clone(),
+        met: r.verdict() == Some(Verdict::Ok),
+    })
+}
+
 /// All that a report or a summary is made of. `given`, `until`: the workflow as the user asked for it; `page`: where the report lies.
 pub fn input(
     opened: &Opened,
@@ -137,22 +155,6 @@ pub fn input(
                 .unwrap_or_default(),
             record: record.clone(),
         }
-    };
-    let expectation = |r: &Row| {
-        let e = r.expected.as_ref()?;
-        Some(Expectation {
-            step: r.step.clone(),
-            item: r.item.clone(),
-            result: r.name.clone(),
-            unit: r.unit.clone(),
-            got: r.value,
-            value: e.value,
-            tolerance: e.tolerance,
-            minimum: e.minimum,
-            maximum: e.maximum,
-            source: e.source.clone(),
-            met: r.verdict() == Some(Verdict::Ok),
-        })
     };
     let failed = |label: &str| failures.iter().any(|f| f.label == label);
     let did_not_run = |id: &Id| {

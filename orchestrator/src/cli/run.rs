@@ -16,6 +16,13 @@ use interrupts::Interrupts;
 use settings::{ROUNDS, observer, options};
 use std::time::Instant;
 
+fn damaged_again() -> Stop {
+    let text = format!(
+        "made again {ROUNDS} times in this run, and each time damaged when it was read: look after the disk and the memory of this machine"
+    );
+    Stop::new(exit::DAMAGED, text)
+}
+
 /// `plyflow run`.
 ///
 /// # Errors
@@ -69,10 +76,7 @@ pub fn run(args: &RunArgs) -> Done {
             break;
         }
         if round == ROUNDS {
-            let text = format!(
-                "made again {ROUNDS} times in this run, and each time damaged when it was read: look after the disk and the memory of this machine"
-            );
-            return Err(Stop::new(exit::DAMAGED, text));
+            return Err(damaged_again());
         }
     }
     let end = conclude(args, &opened, &session, &all, begun);

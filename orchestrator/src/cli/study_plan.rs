@@ -105,6 +105,25 @@ impl<'s> Prospects<'s> {
         self.steps.iter().map(|s| s.without).sum()
     }
 
+    /// The first points that are to run, one a line; empty when there are none.
+    fn to_run(&self) -> String {
+        let mut out = String::new();
+        if !self.open.is_empty() {
+            out += "\npoints to run:\n";
+            for (p, failure) in self.open.iter().take(SHOWN) {
+                out += &format!("  {}", self.study.points[*p].name);
+                if let Some(text) = failure {
+                    out += &format!("   failed last time: {}", shortened(text));
+                }
+                out.push('\n');
+            }
+            if self.open.len() > SHOWN {
+                out += &format!("  and {} more\n", self.open.len() - SHOWN);
+            }
+        }
+        out
+    }
+
     /// In words.
     pub fn text(&self) -> String {
         let names: Vec<String> = self
@@ -156,19 +175,7 @@ impl<'s> Prospects<'s> {
             "estimate (CPU)",
         ];
         out += &table(&heads, &rows, &[2, 3, 4, 5, 6]);
-        if !self.open.is_empty() {
-            out += "\npoints to run:\n";
-            for (p, failure) in self.open.iter().take(SHOWN) {
-                out += &format!("  {}", self.study.points[*p].name);
-                if let Some(text) = failure {
-                    out += &format!("   failed last time: {}", shortened(text));
-                }
-                out.push('\n');
-            }
-            if open > SHOWN {
-                out += &format!("  and {} more\n", open - SHOWN);
-            }
-        }
+        out += &self.to_run();
         out + "\n" + &self.cost() + &ahead(self.study, self.of_a_point())
     }
 
@@ -322,17 +329,7 @@ impl Step {
                     1.0
                 }
             };
-            // What it took itself when it ran last, with other parameters perhaps, is nearer than what others took.
-            let plan = &session.core.graph().steps[*at];
-            let own = (by_step[*at].iter())
-                .map(|id| {
-                    let item = &session.core.instances()[*id].item;
-                    let last = session.journal.last(&plan.name, item)?;
-                    Some(cost_of(session, &last)?.cpu_seconds)
-                })
-                .sum::<Option<f64>>()
-                .filter(|_| !by_step[*at].is_empty());
-            match own.or(took) {
+            match own(session, *at, &by_step[*at]).or(took) {
                 Some(cpu) => step.estimate += part * cpu,
                 None => step.without += 1,
             }
@@ -390,4 +387,15 @@ fn ahead_json(study: &Study, of_a_point: Option<f64>) -> serde_json::Value {
         "budget_runs": runs, "budget_cpu_seconds": cpu, "asked": study.points.len(), "at_most_more": left,
         "estimated_cpu_seconds_more": more,
     })
+}
+
+/// CPU time (s) that a step took itself when it ran last, with other parameters perhaps: nearer than what others took. `ids`: its instances.
+fn own(session: &Session<'_>, step: usize, ids: &[Id]) -> Option<f64> {
+    let name = &session.core.graph().steps[step].name;
+    let last = ids.iter().map(|id| {
+        let item = &session.core.instances()[*id].item;
+        let last = session.journal.last(name, item)?;
+        Some(cost_of(session, &last)?.cpu_seconds)
+    });
+    last.sum::<Option<f64>>().filter(|_| !ids.is_empty())
 }

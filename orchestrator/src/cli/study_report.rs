@@ -49,6 +49,14 @@ pub fn written(session: &Session<'_>, page: &Utf8Path) -> Vec<String> {
     points.filter_map(|p| address(page, &p.name)).collect()
 }
 
+fn value(v: &StudyValue) -> Value {
+    match v {
+        StudyValue::Number { shown, .. } => Value::Number(*shown),
+        StudyValue::Text(t) => Value::Text(t.clone()),
+        StudyValue::Bool(b) => Value::Flag(*b),
+    }
+}
+
 /// What the page at `page` shows of a study; `None`: the workflow is none, or not all of it was asked for. `records`: those of the page's
 /// instances, in their order.
 pub fn family(
@@ -67,11 +75,6 @@ pub fn family(
         by_step[session.core.instances()[*id].step].push(at);
     }
     let table = Table::read(session, records);
-    let value = |v: &StudyValue| match v {
-        StudyValue::Number { shown, .. } => Value::Number(*shown),
-        StudyValue::Text(t) => Value::Text(t.clone()),
-        StudyValue::Bool(b) => Value::Flag(*b),
-    };
     let points = study
         .points
         .iter()

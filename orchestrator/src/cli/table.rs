@@ -1,6 +1,7 @@
 //! Plain tables, and how what stands in them is written.
 
 use plyflow_model::text::one_line;
+pub use plyflow_report::bytes;
 
 /// Columns padded to their widest cell; columns listed in `right` are aligned to the right. A
 /// cell is one line, whatever others have put into it.
@@ -50,21 +51,6 @@ pub fn number(value: f64) -> String {
         return text;
     }
     format!("{value:.5e}")
-}
-
-/// A size in bytes as people read it.
-pub fn bytes(n: u64) -> String {
-    let units = ["B", "KiB", "MiB", "GiB", "TiB"];
-    let (mut value, mut unit) = (n as f64, 0);
-    while value >= 1024.0 && unit + 1 < units.len() {
-        value /= 1024.0;
-        unit += 1;
-    }
-    if unit == 0 {
-        format!("{n} B")
-    } else {
-        format!("{value:.1} {}", units[unit])
-    }
 }
 
 /// A name with its unit, as in the head of a table: `angle [deg]`.

@@ -137,11 +137,6 @@ impl<'g> Core<'g> {
         self.running == 0 && (self.stopping || self.open == 0)
     }
 
-    /// Whether the run is being stopped.
-    pub fn is_stopping(&self) -> bool {
-        self.stopping
-    }
-
     /// All instances found so far.
     pub fn instances(&self) -> &[Instance] {
         &self.instances

@@ -3,7 +3,7 @@
 use super::pace::{Pace, duration_text, progress_text};
 use crate::engine::core::{Core, Id};
 use crate::engine::{Observer, Update};
-use plyflow_model::job::LogLevel;
+use plyflow_model::job::{LogLevel, Progress};
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
@@ -19,6 +19,25 @@ pub struct Lines {
 fn say(text: &str) {
     // A closed standard error must not stop a run.
     crate::said::warn(&format!("{text}\n"));
+}
+
+impl Lines {
+    fn progress(&mut self, core: &Core<'_>, id: Id, p: &Progress) {
+        let Some((pace, told)) = self.running.get_mut(&id) else {
+            return;
+        };
+        let now = Instant::now();
+        let left = pace.left(p.fraction, now);
+        if told.elapsed() >= PACE {
+            *told = now;
+            let text = progress_text(p, left);
+            let percent = 100.0 * p.fraction;
+            say(&format!(
+                "         {} {percent:.0} %: {text}",
+                core.label(id)
+            ));
+        }
+    }
 }
 
 impl Observer for Lines {
@@ -40,22 +59,7 @@ impl Observer for Lines {
                     core.label(id)
                 ));
             }
-            Update::Progress(p) => {
-                let Some((pace, told)) = self.running.get_mut(&id) else {
-                    return;
-                };
-                let now = Instant::now();
-                let left = pace.left(p.fraction, now);
-                if told.elapsed() >= PACE {
-                    *told = now;
-                    let text = progress_text(p, left);
-                    let percent = 100.0 * p.fraction;
-                    say(&format!(
-                        "         {} {percent:.0} %: {text}",
-                        core.label(id)
-                    ));
-                }
-            }
+            Update::Progress(p) => self.progress(core, id, p),
             Update::Log { level, text } if *level <= LogLevel::Warn => {
                 let word = if *level == LogLevel::Error {
                     "error   "

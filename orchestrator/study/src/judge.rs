@@ -87,6 +87,8 @@ pub fn judge(claim: Claim, marks: &[Mark], within: (f64, f64)) -> Found {
                 .then(b.0.cmp(&a.0))
         })
     };
+    let is_most = matches!(claim.of, FamilyOf::Max | FamilyOf::Argmax);
+    let sign = if is_most { 1.0 } else { -1.0 };
     match claim.of {
         FamilyOf::Each => {
             let (at, value) = worst(&mut known.iter().copied()).unwrap_or((0, f64::NAN));
@@ -101,7 +103,6 @@ pub fn judge(claim: Claim, marks: &[Mark], within: (f64, f64)) -> Found {
             (found.value, found.at, found.stands) = (Some(value), vec![at], true);
         }
         FamilyOf::Max | FamilyOf::Min => {
-            let sign = if claim.of == FamilyOf::Max { 1.0 } else { -1.0 };
             let (at, value) = largest(known.iter().map(|(i, v)| (*i, sign * v)));
             let value = sign * value;
             found.stands = match claim.of {
@@ -111,11 +112,6 @@ pub fn judge(claim: Claim, marks: &[Mark], within: (f64, f64)) -> Found {
             (found.value, found.at) = (Some(value), vec![at]);
         }
         FamilyOf::Argmax | FamilyOf::Argmin => {
-            let sign = if claim.of == FamilyOf::Argmax {
-                1.0
-            } else {
-                -1.0
-            };
             let (_, extreme) = largest(known.iter().map(|(i, v)| (*i, sign * v)));
             let ties = known.iter().filter(|(_, v)| sign * v == extreme);
             let at = worst(&mut ties.map(|(i, _)| (*i, marks[*i].along)));

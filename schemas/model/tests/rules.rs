@@ -1,5 +1,10 @@
 //! Rules of a scene that a plugin or the workflow alone used to know: whoever reads the scene now refuses the same.
 
+/// What is changed of a scene.
+type Change<'a> = &'a dyn Fn(&mut Value);
+/// Rows of a table: seconds and kPa, say.
+type Rows<'a> = &'a [(f64, f64)];
+
 use plyflow_model::fault::Rule;
 use plyflow_model::rules;
 use plyflow_model::scene::Scene;
@@ -97,8 +102,7 @@ fn a_table_of_pressures_runs_over_its_phase_and_draws_no_more_than_the_bag_has()
     };
     let sound = [(0.0, 0.0), (0.5, 90.0), (1.0, 100.0)];
     assert_eq!(refused(with("bag_pressure", &sound)), Ok(()));
-    type Rows<'a> = &'a [(f64, f64)];
-    let cases: [(&str, Rows<'_>, &str, &str); 8] = [
+    let cases: [(&str, Rows, &str, &str); 8] = [
         (
             "bag_pressure",
             &[(0.0, 0.0)],
@@ -214,12 +218,14 @@ fn names_of_all_rigid_parts_are_taken_whatever_the_process() {
 
 #[test]
 fn sheets_that_are_no_neighbours_rub_past_the_edges_of_the_others() {
-    let pair = |between: [&str; 2]| json!([{"between": between, "coefficient": 0.3}]);
-    let in_bag = |between| bag(|s| s["friction"]["pairs"] = pair(between));
-    let in_press = |between| press(|s| s["friction"]["pairs"] = pair(between));
-    assert_eq!(refused(in_bag(["low", "b"])), Ok(()));
-    assert_eq!(refused(in_press(["die", "a"])), Ok(()));
-    let apart = in_bag(["tool", "a"]);
+    let with = |between: [&str; 2], scene: fn(Change) -> Value| {
+        scene(&|s: &mut Value| {
+            s["friction"]["pairs"] = json!([{"between": between, "coefficient": 0.3}]);
+        })
+    };
+    assert_eq!(refused(with(["low", "b"], |c| bag(|s| c(s)))), Ok(()));
+    assert_eq!(refused(with(["die", "a"], |c| press(|s| c(s)))), Ok(()));
+    let apart = with(["tool", "a"], |c| bag(|s| c(s)));
     assert_refused(
         apart,
         Rule::Pairs,
@@ -311,8 +317,7 @@ fn what_lies_beside_mirror_planes_is_its_own_image() {
             (json!("-45 deg"), json!("45 deg"));
     };
     assert_eq!(refused(with(both(), &turned)), Ok(()));
-    type Change<'a> = &'a dyn Fn(&mut Value);
-    let cases: [(Value, Change<'_>, &str); 8] = [
+    let cases: [(Value, Change, &str); 8] = [
         (json!(["x", "x"]), &|_| (), "named twice"),
         (
             both(),

@@ -61,18 +61,16 @@ fn what_a_step_starts_ends_when_either_process_of_the_worker_is_killed_or_the_ti
         let mut run = start(&place, "fork hang", &token, &[]);
         if which != "time" {
             wait_for("all processes", || alive(&token) == 5);
-            assert_eq!(
-                unsafe { libc::kill(worker(which, run.id()), libc::SIGKILL) },
-                0
-            );
+            let worker = find_worker(which, run.id()).unwrap();
+            assert_eq!(unsafe { libc::kill(worker, libc::SIGKILL) }, 0);
         }
         assert_eq!(run.wait().unwrap().code(), Some(4), "{which}");
         assert_eq!(alive(&token), 0, "{which}");
     }
 }
 
-/// The process of a worker that has this word in its command line.
-fn worker(word: &str, engine: u32) -> i32 {
+/// The process of a worker that has this word in its command line, if there is one.
+fn find_worker(word: &str, engine: u32) -> Option<i32> {
     let mark = format!("{word}\0{engine}\0");
     let all = std::fs::read_dir("/proc").unwrap().flatten();
     let is = |e: &std::fs::DirEntry| {
@@ -80,12 +78,16 @@ fn worker(word: &str, engine: u32) -> i32 {
         // The one with the signals ahead of it is the worker; what it forked has the same words.
         String::from_utf8_lossy(&line).contains(&mark)
     };
-    let mut found: Vec<i32> = all
-        .filter(is)
+    all.filter(is)
         .filter_map(|e| e.file_name().to_str()?.parse().ok())
-        .collect();
-    found.sort_unstable();
-    found[0]
+        .min()
+}
+
+/// Waits until the step of a run is in its worker. To count processes is not enough: while the run reads what the library says of itself, and does
+/// not listen to signals yet, there are as many.
+fn wait_for_worker(run: &Child, token: &str) {
+    let is_there = || find_worker("--inside", run.id()).is_some() && alive(token) == 3;
+    wait_for("the worker", is_there);
 }
 
 #[test]
@@ -93,7 +95,7 @@ fn a_closed_terminal_stops_a_run_as_sigterm_does_and_twice_is_once() {
     let place = Place::new(STEP);
     let token = token("hangup");
     let mut run = start(&place, "hang", &token, &[]);
-    wait_for("the worker", || alive(&token) == 3);
+    wait_for_worker(&run, &token);
     signal(&run, libc::SIGHUP);
     signal(&run, libc::SIGHUP);
     assert_eq!(run.wait().unwrap().code(), Some(130));
@@ -114,7 +116,7 @@ fn who_ignores_a_closed_terminal_goes_on() {
         });
     }
     let mut run = command.spawn().unwrap();
-    wait_for("the worker", || alive(&token) == 3);
+    wait_for_worker(&run, &token);
     signal(&run, libc::SIGHUP);
     assert_eq!(
         run.wait().unwrap().code(),

@@ -7,6 +7,7 @@ use base64::Engine;
 /// Samples per pixel and direction.
 const FINE: usize = 2;
 
+// As in the geometry of the plugins, which what draws runs cannot use: orchestrator and plugins share the schemas alone.
 fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

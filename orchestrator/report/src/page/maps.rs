@@ -23,6 +23,32 @@ pub(super) fn legends(study: &Study) -> Vec<Legend> {
     Field::ALL.iter().filter_map(of).collect()
 }
 
+/// A quantity on a ply of the global run: flat, and formed from both sides.
+fn triple(
+    study: &Study,
+    legend: &Legend,
+    ply: &Ply,
+    (overlay, places): (&Overlay, &[Place]),
+    sharp: Sharpness,
+) -> Result<[Markup; 3], DrawError> {
+    let mine: Vec<&Place> = places.iter().filter(|p| p.ply == ply.name).collect();
+    let selectable = Overlay {
+        places: &mine,
+        ..overlay.clone()
+    };
+    let view = |side| {
+        let how = FormedView {
+            side,
+            tool: study.tool.as_ref(),
+            whole_tool: true,
+            width: FORMED,
+        };
+        formed(ply, legend, overlay, how, sharp)
+    };
+    let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
+    Ok([plan, view(Side::Front)?, view(Side::Back)?])
+}
+
 /// Maps of the global run: each quantity on each ply, flat and formed.
 pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness) -> Drawn {
     if study.plies.is_empty() {
@@ -36,27 +62,9 @@ pub(super) fn global(study: &Study, n: usize, places: &[Place], sharp: Sharpness
     let has = |(l, p): &(&Legend, &Ply)| l.at_points(p).is_some();
     let pairs = (legends.iter()).flat_map(|l| study.plies.iter().map(move |p| (l, p)));
     let pairs: Vec<(&Legend, &Ply)> = pairs.filter(has).collect();
-    let draw = |(legend, ply): &(&Legend, &Ply)| {
-        let mine: Vec<&Place> = places.iter().filter(|p| p.ply == ply.name).collect();
-        let selectable = Overlay {
-            places: &mine,
-            ..overlay.clone()
-        };
-        let view = |side| {
-            let how = FormedView {
-                side,
-                tool: study.tool.as_ref(),
-                whole_tool: true,
-                width: FORMED,
-            };
-            formed(ply, legend, &overlay, how, sharp)
-        };
-        let plan = flat(ply, legend, &selectable, FLAT, sharp)?;
-        Ok([plan, view(Side::Front)?, view(Side::Back)?])
-    };
     let drawn: Vec<_> = pairs
         .par_iter()
-        .map(draw)
+        .map(|(legend, ply)| triple(study, legend, ply, (&overlay, places), sharp))
         .collect::<Result<_, DrawError>>()?;
     let rows = || pairs.iter().zip(&drawn);
     let of = |field| rows().filter(move |((l, _), _)| l.field == field);

@@ -1,7 +1,7 @@
 //! What a made-up forming run has besides its sheets: further fields, and its history.
 
 use super::shapes::Sheet;
-use plyflow_artifact::{ArtifactWriter, DType, On};
+use plyflow_artifact::{ArtifactWriter, DType, FieldInfo, On};
 
 /// Fields that no map shows: a scalar on cells, one on points, a vector, and one that is the same everywhere.
 pub fn further_fields(w: &mut ArtifactWriter, name: &str, s: &Sheet, last: bool) {
@@ -16,7 +16,7 @@ pub fn further_fields(w: &mut ArtifactWriter, name: &str, s: &Sheet, last: bool)
         ("displacement", On::Points, 3, "m", &moved),
         ("thickness", On::Points, 1, "m", &vec![0.0005; n]),
     ] {
-        w.frame_field(name, on, what, components, unit, values)
+        w.frame_field(name, FieldInfo::new(on, what, components, unit), values)
             .unwrap();
     }
 }

@@ -3,7 +3,7 @@
 use super::shapes::{HALF, wavy};
 use super::{Study, key};
 use camino::Utf8Path;
-use plyflow_artifact::On;
+use plyflow_artifact::{FieldInfo, On};
 use plyflow_report::{
     Family, Fate, Origin, Point, ReportInput, Response, Sampled, Value, Variable,
 };
@@ -154,8 +154,12 @@ fn ply(study: &mut Study, label: &str, step: &str, wave: f64, with_ply: bool) {
         w.begin_frame(1.0).unwrap();
         w.frame_points("ply_1", &s.formed).unwrap();
         let shear: Vec<f64> = s.shear.iter().map(|v| v * (0.5 + wave)).collect();
-        w.frame_field("ply_1", On::Cells, "shear_angle", 1, "rad", &shear)
-            .unwrap();
+        w.frame_field(
+            "ply_1",
+            FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
+            &shear,
+        )
+        .unwrap();
         w.end_frame().unwrap();
         let attributes = json!({"sheets": [{"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": 0.0002}], "zone": null, "element_size": 0.004,
             "warnings": if wave > 1.4 { json!(["the ply <folds>"]) } else { json!([]) }});

@@ -7,7 +7,7 @@ mod shapes;
 
 use camino::{Utf8Path, Utf8PathBuf};
 use extras::{further_fields, history};
-use plyflow_artifact::{ArtifactWriter, DType, On};
+use plyflow_artifact::{ArtifactWriter, DType, FieldInfo, On};
 use plyflow_model::job::{Cost, NamedResult, Record};
 use plyflow_report::{Expectation, Instance, ReportInput};
 use serde_json::{Value, json};
@@ -114,8 +114,12 @@ impl Study {
             for (name, s) in &sheets {
                 w.frame_points(name, if last { &s.formed } else { &s.flat })
                     .unwrap();
-                w.frame_field(name, On::Cells, "shear_angle", 1, "rad", &s.shear)
-                    .unwrap();
+                w.frame_field(
+                    name,
+                    FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
+                    &s.shear,
+                )
+                .unwrap();
                 further_fields(&mut w, name, s, last);
             }
             w.end_frame().unwrap();
@@ -173,16 +177,32 @@ impl Study {
                 .map(|c| f64::from(u8::from(high(c))))
                 .collect();
             w.frame_points(name, &s.formed).unwrap();
-            w.frame_field(name, On::Cells, "shear_angle", 1, "rad", &s.shear)
+            w.frame_field(
+                name,
+                FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
+                &s.shear,
+            )
+            .unwrap();
+            w.frame_field(
+                name,
+                FieldInfo::new(On::Points, "nodal_distance", 1, "m"),
+                &s.distance,
+            )
+            .unwrap();
+            w.frame_field(
+                name,
+                FieldInfo::new(On::Points, "curvature_max", 1, "1/m"),
+                &s.curvature,
+            )
+            .unwrap();
+            w.frame_field(name, FieldInfo::new(On::Cells, "flag", 1, "1"), &flag)
                 .unwrap();
-            w.frame_field(name, On::Points, "nodal_distance", 1, "m", &s.distance)
-                .unwrap();
-            w.frame_field(name, On::Points, "curvature_max", 1, "1/m", &s.curvature)
-                .unwrap();
-            w.frame_field(name, On::Cells, "flag", 1, "1", &flag)
-                .unwrap();
-            w.frame_field(name, On::Points, "undeformed", 3, "m", &s.flat)
-                .unwrap();
+            w.frame_field(
+                name,
+                FieldInfo::new(On::Points, "undeformed", 3, "m"),
+                &s.flat,
+            )
+            .unwrap();
         }
         w.end_frame().unwrap();
         let area = if flat_tool { 0.0 } else { 0.0018 };
@@ -305,16 +325,32 @@ impl Study {
                     .map(|d| f64::from(u8::from(*d > 0.002)))
                     .collect();
                 w.frame_points(&body, &s.formed).unwrap();
-                w.frame_field(&body, On::Points, "nodal_distance", 1, "m", &s.distance)
+                w.frame_field(
+                    &body,
+                    FieldInfo::new(On::Points, "nodal_distance", 1, "m"),
+                    &s.distance,
+                )
+                .unwrap();
+                w.frame_field(
+                    &body,
+                    FieldInfo::new(On::Points, "curvature_max", 1, "1/m"),
+                    &s.curvature,
+                )
+                .unwrap();
+                w.frame_field(&body, FieldInfo::new(On::Points, "defect", 1, "1"), &defect)
                     .unwrap();
-                w.frame_field(&body, On::Points, "curvature_max", 1, "1/m", &s.curvature)
-                    .unwrap();
-                w.frame_field(&body, On::Points, "defect", 1, "1", &defect)
-                    .unwrap();
-                w.frame_field(&body, On::Points, "undeformed", 3, "m", &s.flat)
-                    .unwrap();
-                w.frame_field(&body, On::Cells, "shear_angle", 1, "rad", &s.shear)
-                    .unwrap();
+                w.frame_field(
+                    &body,
+                    FieldInfo::new(On::Points, "undeformed", 3, "m"),
+                    &s.flat,
+                )
+                .unwrap();
+                w.frame_field(
+                    &body,
+                    FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
+                    &s.shear,
+                )
+                .unwrap();
             }
         }
         if !zones.is_empty() {
@@ -348,12 +384,16 @@ impl Study {
             };
             let defect: Vec<f64> = s.distance.iter().enumerate().map(number).collect();
             w.frame_points(name, &s.formed).unwrap();
-            w.frame_field(name, On::Points, "defect", 1, "1", &defect)
+            w.frame_field(name, FieldInfo::new(On::Points, "defect", 1, "1"), &defect)
                 .unwrap();
             if *name == "ply_2" {
                 let along: Vec<f64> = s.flat.chunks_exact(3).map(|p| 0.01 * p[1]).collect();
-                w.frame_field(name, On::Points, "slip_along", 1, "m", &along)
-                    .unwrap();
+                w.frame_field(
+                    name,
+                    FieldInfo::new(On::Points, "slip_along", 1, "m"),
+                    &along,
+                )
+                .unwrap();
             }
         }
         w.end_frame().unwrap();
@@ -425,8 +465,12 @@ impl Study {
             p[2] = 0.004 * (40.0 * p[0]).sin() * (30.0 * p[1]).cos();
         }
         w.frame_points("fabric", &bent).unwrap();
-        w.frame_field("fabric", On::Cells, "shear_angle", 1, "rad", &s.shear)
-            .unwrap();
+        w.frame_field(
+            "fabric",
+            FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
+            &s.shear,
+        )
+        .unwrap();
         w.end_frame().unwrap();
         let angle: Vec<f64> = (0..=400)
             .map(|i| f64::from(i - 200) * 0.8 / 200.0)

@@ -36,17 +36,7 @@ impl<'s> Table<'s> {
             }
         }
         let records: HashMap<Id, &Record> = records.iter().map(|(id, r)| (*id, r)).collect();
-        let mut by_step: Vec<Vec<Id>> = vec![Vec::new(); session.core.graph().steps.len()];
-        for (id, instance) in session.core.instances().iter().enumerate() {
-            by_step[instance.step].push(id);
-        }
-        for ids in &mut by_step {
-            ids.sort_by(|a, b| {
-                session.core.instances()[*a]
-                    .item
-                    .cmp(&session.core.instances()[*b].item)
-            });
-        }
+        let by_step = by_step(session);
         let mut known: HashMap<usize, Fate> = HashMap::new();
         let lines = study.points.iter().enumerate().map(|(at, point)| {
             let fates: Vec<usize> = point.steps.clone();
@@ -170,4 +160,20 @@ fn response(
         Some(ResponseOf::Max) => values.iter().copied().reduce(f64::max),
         Some(ResponseOf::Min) => values.iter().copied().reduce(f64::min),
     }
+}
+
+/// The instances of each step, by their items.
+fn by_step(session: &Session<'_>) -> Vec<Vec<Id>> {
+    let mut by_step: Vec<Vec<Id>> = vec![Vec::new(); session.core.graph().steps.len()];
+    for (id, instance) in session.core.instances().iter().enumerate() {
+        by_step[instance.step].push(id);
+    }
+    for ids in &mut by_step {
+        ids.sort_by(|a, b| {
+            session.core.instances()[*a]
+                .item
+                .cmp(&session.core.instances()[*b].item)
+        });
+    }
+    by_step
 }

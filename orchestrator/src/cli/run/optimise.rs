@@ -20,7 +20,7 @@ use crate::plan::Key;
 use crate::said::{Done, Stop};
 use plyflow_plugin_host::children_seconds;
 use plyflow_study::Value;
-use plyflow_study::optimise::{Asked, Told};
+use plyflow_study::optimise::{Asked, Search, Told};
 use plyflow_workflow::resolved::{Budget, Optimisation, Study};
 use std::collections::{BTreeMap, HashSet};
 use std::time::Instant;
@@ -43,6 +43,21 @@ struct Way {
     settled: bool,
     /// What the machine could not do.
     broken: Option<String>,
+}
+
+/// The points of the next round: what the search asks for, as far as the budget goes; none when it is over.
+fn asked(search: &Search, o: &Optimisation, way: &mut Way) -> Result<Vec<Vec<Value>>, Stop> {
+    let mut points = match search.ask(&way.told).map_err(wrong)? {
+        Asked::Points(points) => points,
+        Asked::Settled => Vec::new(),
+    };
+    way.settled = points.is_empty();
+    points.truncate(match o.budget {
+        Budget::Runs(most) => (most as usize).saturating_sub(way.told.len()),
+        Budget::CpuSeconds(most) if way.cpu_seconds >= most => 0,
+        Budget::CpuSeconds(_) => usize::MAX,
+    });
+    Ok(points)
 }
 
 /// Runs an optimisation to the end of its budget.
@@ -72,16 +87,7 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
         ..Way::default()
     };
     loop {
-        let mut points = match search.ask(&way.told).map_err(wrong)? {
-            Asked::Points(points) => points,
-            Asked::Settled => Vec::new(),
-        };
-        way.settled = points.is_empty();
-        points.truncate(match o.budget {
-            Budget::Runs(most) => (most as usize).saturating_sub(way.told.len()),
-            Budget::CpuSeconds(most) if way.cpu_seconds >= most => 0,
-            Budget::CpuSeconds(_) => usize::MAX,
-        });
+        let points = asked(search, &o, &mut way)?;
         keep(&o, &way, &points).write(&folder).map_err(machine())?;
         if points.is_empty() {
             break;

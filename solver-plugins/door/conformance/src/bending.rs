@@ -3,12 +3,13 @@
 use crate::breaches::{Ask, Breaches, DT};
 use crate::buffer::Guarded;
 use crate::cycle::Cycles;
-use crate::law::{Law, largest, metrics, size, undeformed};
-use crate::material::{LANES, zero_dt};
-use crate::meeting::{Counter, THREADS, meet_in_turn, same};
+use crate::law::{LANES, Law, largest, metrics, size, undeformed, zero_dt};
+use crate::meeting::{self, CALLS, Counter, same};
 use crate::neighbours::{self, ALL, mixed, of_lanes};
+use crate::rules;
+use crate::run::{Run, Seen, worse};
+use crate::sequence::Sequence;
 use crate::slope::Energies;
-use crate::{Run, Seen, Sequence, rules, worse};
 use plyflow_fixed::FixedBits;
 use plyflow_sdk::abi::*;
 
@@ -18,8 +19,6 @@ const GENTLE: f64 = 50.0;
 const SHARP: f64 = 500.0;
 /// Steps from flat to a bent state: laws that integrate want small ones.
 const STEPS: usize = 60;
-/// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 500;
 
 /// The largest curvatures that a law is judged at (1/m): radii of less than five thicknesses are no bending of a sheet.
 fn sharp(law: &Law) -> f64 {
@@ -38,7 +37,15 @@ fn start(law: &Law, lanes: usize) -> Guarded {
 }
 
 fn call(law: &Law, history: &mut Guarded, metric: &[f64], curvature: &[f64], ask: Ask) -> Answer {
-    call_after(DT, law, history, metric, curvature, ask)
+    let sheet = Sheet { metric, curvature };
+    call_after(DT, law, history, sheet, ask)
+}
+
+/// What bending is called with: `[3][lanes]` each, curvatures in 1/m.
+#[derive(Clone, Copy)]
+struct Sheet<'a> {
+    metric: &'a [f64],
+    curvature: &'a [f64],
 }
 
 /// Calls bending with another time since the previous call.
@@ -46,8 +53,7 @@ fn call_after(
     dt: f64,
     law: &Law,
     history: &mut Guarded,
-    metric: &[f64],
-    curvature: &[f64],
+    Sheet { metric, curvature }: Sheet<'_>,
     ask: Ask,
 ) -> Answer {
     let lanes = metric.len() / 3;
@@ -151,11 +157,15 @@ pub(crate) fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
     run.check(rules::BENDING_THREADS, || threads(law));
     run.check(rules::BENDING_ZERO_DT, || {
         let (m, k) = (metrics(LANES, 0.02, 107), curvatures(LANES, GENTLE, 109));
-        let flat = [0.0; 3 * LANES];
+        let sheet = |curvature| Sheet {
+            metric: &m,
+            curvature,
+        };
+        let (flat, bent) = (sheet(&[0.0; 3 * LANES]), sheet(&k));
         zero_dt(|dt| {
             let mut history = start(law, LANES);
-            let rest = call_after(0.0, law, &mut history, &m, &flat, Ask::NOTHING);
-            let a = call_after(dt, law, &mut history, &m, &k, Ask::EVERYTHING);
+            let rest = call_after(0.0, law, &mut history, flat, Ask::NOTHING);
+            let a = call_after(dt, law, &mut history, bent, Ask::EVERYTHING);
             let outputs = vec![a.moment, a.energy, a.tangent];
             (rest.breaches, a.breaches, outputs)
         })
@@ -215,7 +225,7 @@ fn hammer(
     law: &Law,
     (history, metric, curvature): (&Guarded, &[f64], &[f64]),
     ask: Ask,
-    (after, want): (&Guarded, &Answer),
+    (after, want): &(Guarded, Answer),
     counter: &Counter<'_>,
 ) -> usize {
     let Some(bending) = law.functions().bending else {
@@ -258,26 +268,20 @@ fn hammer(
 }
 
 fn threads(law: &Law) -> Seen {
-    let alone: Vec<_> = (0..THREADS)
-        .map(|t| {
-            let seed = 201 + 2 * t as u64;
-            let (m, k) = (metrics(LANES, 0.02, seed), curvatures(LANES, GENTLE, seed));
-            let history = bend(law, &m, &k, Ask::NOTHING).0;
-            let answers = Ask::HAMMERED.map(|ask| {
-                let mut after = history.clone();
-                let answer = call(law, &mut after, &m, &k, ask);
-                (ask, after, answer)
-            });
-            (history, m, k, answers)
-        })
-        .collect();
-    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
-        let (history, m, k, answers) = &alone[t];
-        let (ask, after, want) = &answers[a];
-        let differing = hammer(law, (history, m, k), *ask, (after, want), counter);
-        (CALLS, differing)
-    });
-    met.seen()
+    let start = |thread: usize| {
+        let seed = 201 + 2 * thread as u64;
+        let (m, k) = (metrics(LANES, 0.02, seed), curvatures(LANES, GENTLE, seed));
+        let history = bend(law, &m, &k, Ask::NOTHING).0;
+        (history, m, k)
+    };
+    let alone = |(history, m, k): &(Guarded, Vec<f64>, Vec<f64>), ask| {
+        let mut after = history.clone();
+        let answer = call(law, &mut after, m, k, ask);
+        (after, answer)
+    };
+    meeting::judge(start, alone, |(history, m, k), ask, want, counter| {
+        hammer(law, (history, m, k), ask, want, counter)
+    })
 }
 
 /// As of the membrane: in 2000 steps to and fro, gently and sharply.

@@ -2,6 +2,7 @@
 
 use crate::buffer::Guarded;
 use plyflow_sdk::abi::*;
+use std::ffi::c_void;
 
 /// Time step of the calls that move (s); laws that do not depend on rates do not notice.
 pub(crate) const DT: f64 = 1e-6;
@@ -137,6 +138,26 @@ pub(crate) enum Refusal {
 }
 
 impl Refusal {
+    /// What `create` of a table made, or why it made nothing.
+    pub(crate) fn or_instance(
+        create: impl FnOnce(*mut *mut c_void, *mut pf_error) -> i32,
+    ) -> Result<*mut c_void, Self> {
+        let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
+        let code = create(&raw mut instance, &raw mut error);
+        if code != PF_OK {
+            let text = error.get();
+            return Err(match code {
+                PF_ERROR if !text.is_empty() => Self::Said(text),
+                _ => Self::Broken(format!("create returned {code} with the text '{text}'")),
+            });
+        }
+        if instance.is_null() {
+            let text = "create returned 0 (PF_OK) but left the instance NULL";
+            return Err(Self::Broken(text.into()));
+        }
+        Ok(instance)
+    }
+
     pub(crate) fn text(&self) -> &str {
         let (Self::Said(text) | Self::Broken(text)) = self;
         text

@@ -1,6 +1,6 @@
 //! Closed cycles of strain or curvature: what a law takes, it may not give back twice.
 
-use crate::{Seen, worse};
+use crate::run::{Seen, worse};
 
 /// Steps of a cycle.
 const STEPS: usize = 2000;

@@ -1,19 +1,17 @@
 //! Checks of an element formulation: its calls, its buffers, its lanes.
 
 use crate::breaches::{Ask, Breaches, Refusal};
-use crate::meeting::{THREADS, meet_in_turn};
+use crate::check::{Check, Sink};
 use crate::neighbours::{self, mixed, of_lanes};
+use crate::run::{Run, Seen};
+use crate::sequence::Sequence;
 use crate::shapes::Elements;
-use crate::subject::{Answer, Masses, Motion, State, Subject};
-use crate::{Check, Run, Seen, Sequence, Sink, element_motion, patch, rules};
+use crate::subject::{Answer, Masses, Motion, STRAIN, State, Subject};
+use crate::{element_motion, meeting, patch, rules};
 use plyflow_sdk::abi::*;
 
 /// Lanes of the sets that the mechanics are judged on.
 const LANES: usize = 16;
-/// Strain of the deformed states.
-pub(crate) const STRAIN: f64 = 0.02;
-/// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 500;
 
 /// Checks an element formulation made with `parameters` (JSON, SI numbers) for a material: its element part and,
 /// when it has one, its patch part. `fields` are the numbers of element and patch fields in its manifest; `None`
@@ -106,61 +104,19 @@ fn sizes(subject: &Subject, fields: Option<[usize; 2]>) -> Seen {
     }
 }
 
-/// Initialise and one call of forces on a set, deformed by `strain`.
-pub(crate) fn once(
-    subject: &Subject,
-    elements: &Elements,
-    strain: f64,
-    ask: Ask,
-) -> (State, Masses, Answer) {
-    let (mut state, masses) = subject.initialise(elements);
-    let x = elements.deformed(strain, 7);
-    // The first call is at rest, as the solver makes it.
-    let first = subject.forces(&mut state, &elements.reference, Motion::default(), ask);
-    let motion = Motion {
-        from: Some(&elements.reference),
-        spin: None,
-    };
-    let mut answer = subject.forces(&mut state, &x, motion, ask);
-    let mut breaches = masses.breaches.clone();
-    breaches.add(first.breaches);
-    breaches.add(std::mem::take(&mut answer.breaches));
-    answer.breaches = breaches;
-    (state, masses, answer)
-}
-
 /// The calls as such: status, guard zones, whole and finite outputs. Whether the rest can be judged.
 fn calls(run: &mut Run<'_>, subject: &Subject) -> bool {
-    let mut all = Breaches::default();
-    let well = run.check(rules::STATUS, || {
+    let made = "20 batches of 8 to 64 elements, strains to 30 %";
+    run.calls(made, &rules::OF_ELEMENTS, || {
+        let mut all = Breaches::default();
         for (lanes, strain) in [(8, 0.0), (8, STRAIN), (24, STRAIN), (64, STRAIN), (64, 0.3)] {
             for ask in Ask::ALL {
                 let elements = Elements::new(subject.nodes(), lanes, 11);
-                all.add(once(subject, &elements, strain, ask).2.breaches);
+                all.add(subject.once(&elements, strain, ask).2.breaches);
             }
         }
-        match all.status.take() {
-            Some(text) => Seen::Bad(text),
-            None => Seen::Well("20 batches of 8 to 64 elements, strains to 30 %".into()),
-        }
-    });
-    let mut verdict = |rule, fault: Option<String>, what: &str| {
-        run.check(rule, || match fault {
-            Some(text) => Seen::Bad(text),
-            None => Seen::Well(what.into()),
-        })
-    };
-    verdict(
-        rules::GUARDS,
-        all.guards,
-        "4 KiB before and after each buffer are untouched",
-    );
-    let whole = verdict(rules::COMPLETE, all.gaps, "all outputs are written");
-    let finite = verdict(rules::FINITE, all.finite, "all outputs are finite");
-    if !(well && whole && finite) {
-        run.skip(&rules::OF_ELEMENTS, "not checked: repair the above first");
-    }
-    well && whole && finite
+        all
+    })
 }
 
 /// Everything that a call gave, as bits by lane.
@@ -184,9 +140,9 @@ pub(crate) fn bits(state: &State, masses: &Masses, a: &Answer, l: usize) -> Vec<
 
 fn repeatable(subject: &Subject, twin: &Subject) -> Seen {
     let elements = Elements::new(subject.nodes(), LANES, 13);
-    let first = once(subject, &elements, STRAIN, Ask::EVERYTHING);
+    let first = subject.once(&elements, STRAIN, Ask::EVERYTHING);
     for (which, again) in [("the same", subject), ("another", twin)] {
-        let second = once(again, &elements, STRAIN, Ask::EVERYTHING);
+        let second = again.once(&elements, STRAIN, Ask::EVERYTHING);
         for l in 0..LANES {
             if bits(&first.0, &first.1, &first.2, l) != bits(&second.0, &second.1, &second.2, l) {
                 return Seen::Bad(format!(
@@ -234,9 +190,9 @@ fn lanes(subject: &Subject) -> Seen {
 
 fn asking(subject: &Subject) -> Seen {
     let elements = Elements::new(subject.nodes(), LANES, 13);
-    let all = once(subject, &elements, STRAIN, Ask::EVERYTHING);
+    let all = subject.once(&elements, STRAIN, Ask::EVERYTHING);
     for ask in Ask::ALL {
-        let some = once(subject, &elements, STRAIN, ask);
+        let some = subject.once(&elements, STRAIN, ask);
         let mut want = all.2.clone();
         if !ask.fields {
             want.fields.clear();
@@ -255,28 +211,18 @@ fn asking(subject: &Subject) -> Seen {
 }
 
 fn threads(subject: &Subject) -> Seen {
-    let sets: Vec<Elements> = (0..THREADS)
-        .map(|t| Elements::new(subject.nodes(), LANES, 101 + 2 * t as u64))
-        .collect();
-    // One thread alone, from a state at the deformed position.
-    let alone: Vec<_> = sets
-        .iter()
-        .map(|set| {
-            let state = once(subject, set, STRAIN, Ask::NOTHING).0;
-            let x = set.deformed(STRAIN, 7);
-            let answers = Ask::HAMMERED.map(|ask| {
-                let mut after = state.clone();
-                let a = subject.forces(&mut after, &x, Motion::default(), ask);
-                (ask, after, a)
-            });
-            (state, x, answers)
-        })
-        .collect();
-    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
-        let (state, x, answers) = &alone[t];
-        let (ask, after, want) = &answers[a];
-        let differing = subject.hammer((state, x), *ask, (after, want), CALLS, counter);
-        (CALLS, differing)
-    });
-    met.seen()
+    // From a state at the deformed position.
+    let start = |thread: usize| {
+        let set = Elements::new(subject.nodes(), LANES, 101 + 2 * thread as u64);
+        let state = subject.once(&set, STRAIN, Ask::NOTHING).0;
+        (state, set.deformed(STRAIN, 7))
+    };
+    let alone = |(state, x): &(State, Vec<f64>), ask| {
+        let mut after = state.clone();
+        let answer = subject.forces(&mut after, x, Motion::default(), ask);
+        (after, answer)
+    };
+    meeting::judge(start, alone, |(state, x), ask, want, counter| {
+        subject.hammer((state, x), ask, want, counter)
+    })
 }

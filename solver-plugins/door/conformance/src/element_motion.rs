@@ -1,12 +1,13 @@
 //! Checks of an element's mechanics: rest, mass, balance, frame, energy, work, critical step.
 
 use crate::breaches::{Ask, Breaches};
-use crate::element::{STRAIN, once};
 use crate::linear::{Vec3, cross};
 use crate::linear::{largest_eigenvalue, rotation};
+use crate::rules;
+use crate::run::{Run, Seen, worse};
+use crate::sequence::Sequence;
 use crate::shapes::{Elements, moved};
-use crate::subject::{Answer, Masses, Motion, State, Subject};
-use crate::{Run, Seen, Sequence, rules, worse};
+use crate::subject::{Answer, Masses, Motion, STRAIN, State, Subject};
 use plyflow_fixed::FixedBits;
 
 pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, lanes: usize) {
@@ -44,11 +45,12 @@ impl<'a> Case<'a> {
     fn new(subject: &'a Subject, elements: &'a Elements) -> Self {
         let (mut state, masses) = subject.initialise(elements);
         let position = elements.deformed(STRAIN, 37);
-        let identity = rotation([0.0; 3]);
-        let spin = spins(elements, 0.5 * STRAIN / STEPS as f64);
-        let answer = path(
-            subject, &mut state, elements, &position, &spin, &identity, [0.0; 3], 0,
-        );
+        let still = Rigid {
+            q: rotation([0.0; 3]),
+            shift: [0.0; 3],
+            steps: 0,
+        };
+        let answer = path(subject, &mut state, elements, &position, &still);
         Self {
             subject,
             elements,
@@ -183,20 +185,19 @@ impl<'a> Case<'a> {
 
     fn frame(&self) -> Seen {
         let q = rotation([0.62, 1.23, 1.84]);
-        let shift = [0.07, -0.13, 0.04];
-        // Spins are added up by whoever follows them: many small ones.
-        let turning = if self.subject.rotates() { 4000 } else { 1 };
         let (mut state, _) = self.subject.initialise(self.elements);
-        let spin = spins(self.elements, 0.5 * STRAIN / STEPS as f64);
+        let motion = Rigid {
+            q,
+            shift: [0.07, -0.13, 0.04],
+            // Spins are added up by whoever follows them: many small ones.
+            steps: if self.subject.rotates() { 4000 } else { 1 },
+        };
         let turned = path(
             self.subject,
             &mut state,
             self.elements,
             &self.position,
-            &spin,
-            &q,
-            shift,
-            turning,
+            &motion,
         );
         if let Some(text) = turned.breaches.any() {
             return Seen::Bad(text);
@@ -377,7 +378,7 @@ impl<'a> Case<'a> {
     fn critical_step(&self) -> Seen {
         let (mut largest, mut smallest) = ((0.0f64, 0, ""), f64::INFINITY);
         for (strain, name) in [(0.0, "at rest"), (STRAIN, "at 2 %"), (0.1, "at 10 %")] {
-            let (state, _, answer) = once(self.subject, self.elements, strain, Ask::EVERYTHING);
+            let (state, _, answer) = self.subject.once(self.elements, strain, Ask::EVERYTHING);
             let x = self.elements.deformed(strain, 7);
             for (l, eigenvalue) in self.eigenvalues(&state, &x).into_iter().enumerate() {
                 let step = answer.step[l];
@@ -446,18 +447,22 @@ fn spins(elements: &Elements, angle: f64) -> Vec<f64> {
         .collect()
 }
 
-/// From rest: a rigid motion to (`q`, `shift`) in `turning` steps, then in [`STEPS`] steps to `position`, seen from
-/// there, with `spin` in each. Positions move without a jump only when `turning` is more than 1.
+/// A rigid motion: a rotation `q` and a shift (m). Positions move without a jump only in more than one step; none: at once.
+struct Rigid {
+    q: [Vec3; 3],
+    shift: Vec3,
+    steps: usize,
+}
+
+/// From rest: a rigid motion, then in [`STEPS`] steps to `position`, seen from there, with a spin of each node.
 fn path(
     subject: &Subject,
     state: &mut State,
     elements: &Elements,
     position: &[f64],
-    spin: &[f64],
-    q: &[Vec3; 3],
-    shift: Vec3,
-    turning: usize,
+    rigid: &Rigid,
 ) -> Answer {
+    let (q, shift, turning) = (&rigid.q, rigid.shift, rigid.steps);
     let lanes = elements.lanes;
     let reference = &elements.reference;
     let mut breaches = Breaches::default();
@@ -479,7 +484,8 @@ fn path(
         breaches.add(std::mem::take(&mut answer.breaches));
         before = x;
     }
-    let spin = moved(spin, lanes, q, [0.0; 3]);
+    let spin = spins(elements, 0.5 * STRAIN / STEPS as f64);
+    let spin = moved(&spin, lanes, q, [0.0; 3]);
     for i in 1..=STEPS {
         let flat = between(reference, position, i as f64 / STEPS as f64);
         let x = moved(&flat, lanes, q, shift);

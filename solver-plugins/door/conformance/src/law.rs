@@ -1,12 +1,18 @@
 //! A material under test: every call goes through guarded buffers.
 
-use crate::Sequence;
 use crate::breaches::{Ask, Breaches, DT, Refusal};
 use crate::buffer::Guarded;
-use crate::meeting::{Counter, same};
+use crate::meeting::{CALLS, Counter, same};
+use crate::run::Seen;
+use crate::sequence::Sequence;
 use plyflow_fixed::FixedBits;
 use plyflow_sdk::abi::*;
 use std::ffi::c_void;
+
+/// Lanes of the sets that a law is judged on.
+pub(crate) const LANES: usize = 16;
+/// Strain of the states where the calls as such are looked at.
+pub(crate) const STRAIN: f64 = 0.02;
 
 /// A material under test.
 pub(crate) struct Law {
@@ -46,20 +52,9 @@ impl Law {
         functions: *const pf_material_functions,
         parameters: &str,
     ) -> Result<Self, Refusal> {
-        let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
         let text = pf_str::new(parameters);
-        let code = unsafe { ((*functions).create)(text, &raw mut instance, &raw mut error) };
-        if code != PF_OK {
-            let text = error.get();
-            return Err(match code {
-                PF_ERROR if !text.is_empty() => Refusal::Said(text),
-                _ => Refusal::Broken(format!("create returned {code} with the text '{text}'")),
-            });
-        }
-        if instance.is_null() {
-            let text = "create returned 0 (PF_OK) but left the instance NULL";
-            return Err(Refusal::Broken(text.into()));
-        }
+        let create = |new, error| unsafe { ((*functions).create)(text, new, error) };
+        let instance = Refusal::or_instance(create)?;
         let mut new = Self {
             functions,
             instance,
@@ -138,14 +133,13 @@ impl Law {
         }
     }
 
-    /// Calls membrane `times` times from the same history with as little around the calls as can be, so that calls of
+    /// Calls membrane [`CALLS`] times from the same history with as little around the calls as can be, so that calls of
     /// several threads meet, through the `counter` of all; how many differ from the history and the answer that one thread got.
     pub(crate) fn hammer(
         &self,
         (history, metric): (&Guarded, &[f64]),
         ask: Ask,
-        (after, want): (&Guarded, &Answer),
-        times: usize,
+        (after, want): &(Guarded, Answer),
         counter: &Counter<'_>,
     ) -> usize {
         let lanes = metric.len() / 3;
@@ -168,7 +162,7 @@ impl Law {
             },
         };
         let membrane = unsafe { (*self.functions).membrane };
-        (0..times)
+        (0..CALLS)
             .filter(|_| {
                 now.slice_mut().copy_from_slice(history.slice());
                 let code = counter.during(|| unsafe { membrane(self.instance, &raw const batch) });
@@ -224,4 +218,42 @@ pub(crate) fn size(values: &[f64]) -> f64 {
 /// To divide by.
 pub(crate) fn largest(values: &[f64]) -> f64 {
     size(values).max(f64::MIN_POSITIVE)
+}
+
+/// Whether a call with dt = 0 is answered: in finite numbers, and where it makes no difference whether a step takes a
+/// microsecond or a millisecond, as these are. `answer`: what was seen in a call at rest with dt = 0 and in a step from there
+/// that takes so long, and the outputs of that step.
+pub(crate) fn zero_dt(answer: impl Fn(f64) -> (Breaches, Breaches, Vec<Vec<f64>>)) -> Seen {
+    const SAME: f64 = 1e-9;
+    let after = |dt: f64| {
+        let (at_rest, step, outputs) = answer(dt);
+        match (at_rest.any(), step.any()) {
+            (Some(text), _) => Err(format!("at rest with dt = 0: {text}")),
+            (_, Some(text)) => Err(format!("with dt = {dt} s: {text}")),
+            _ => Ok(outputs),
+        }
+    };
+    let (short, long, none) = match (after(DT), after(1e-3), after(0.0)) {
+        (Ok(short), Ok(long), Ok(none)) => (short, long, none),
+        (Err(text), ..) | (_, Err(text), _) | (.., Err(text)) => return Seen::Bad(text),
+    };
+    let apart = |a: &[Vec<f64>], b: &[Vec<f64>]| {
+        a.iter().zip(b).fold(0.0f64, |worst, (a, b)| {
+            let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+            worst.max(off.fold(0.0, f64::max) / largest(a))
+        })
+    };
+    let rates = apart(&short, &long);
+    if rates > SAME {
+        return Seen::Well(format!(
+            "finite; this law depends on dt ({rates:.1e} between steps of 1 us and 1 ms), and all other checks are those \
+             of steps of 1 us"
+        ));
+    }
+    let differ = apart(&short, &none);
+    Seen::Number {
+        measured: differ,
+        limit: SAME,
+        what: format!("steps of 1 us and 1 ms agree; a step of dt = 0 differs by {differ:.1e}"),
+    }
 }

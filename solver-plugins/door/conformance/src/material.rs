@@ -1,19 +1,13 @@
 //! Checks of a material: its calls, its buffers, its lanes.
 
-use crate::breaches::{Ask, Breaches, DT, Refusal};
+use crate::breaches::{Ask, Breaches, Refusal};
 use crate::buffer::Guarded;
-use crate::law::{Answer, Law, largest, metrics, trellis, undeformed};
-use crate::meeting::{THREADS, meet_in_turn};
+use crate::check::{Check, Rule, Sink};
+use crate::law::{Answer, LANES, Law, STRAIN, metrics, trellis, undeformed, zero_dt};
 use crate::neighbours::{self, ALL, mixed, of_lanes};
-use crate::{Check, Run, Seen, Sink, bending, material_law, rules};
+use crate::run::{Run, Seen};
+use crate::{bending, material_law, meeting, rules};
 use plyflow_sdk::abi::*;
-
-/// Lanes of the sets that a law is judged on.
-pub(crate) const LANES: usize = 16;
-/// Strain of the states where the calls as such are looked at.
-pub(crate) const STRAIN: f64 = 0.02;
-/// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 500;
 
 /// Checks a material made with `parameters` (JSON, SI numbers, with `thickness` and `areal_mass`): its membrane part
 /// and, when it has one, its bending.
@@ -38,7 +32,7 @@ pub unsafe fn check_material(
     });
     if let (Some(law), Some(twin)) = (&law, &twin)
         && run.check(
-            crate::Rule {
+            Rule {
                 expected: "thickness and areal mass are those of the parameters, bending is there when has_bending is 1",
                 remedy: "take thickness and areal_mass from the parameters: the mesh's masses rest on them",
                 ..rules::SIZES
@@ -105,8 +99,9 @@ fn other_sheet(parameters: &serde_json::Value, law: &Law) -> Option<String> {
 }
 
 fn calls(run: &mut Run<'_>, law: &Law) -> bool {
-    let mut all = Breaches::default();
-    let well = run.check(rules::STATUS, || {
+    let made = "10 batches of 8 to 64 lanes, strains to 30 %, shear to 60 degrees";
+    run.calls(made, &rules::OF_MATERIALS, || {
+        let mut all = Breaches::default();
         for (lanes, strain) in [(8, 0.0), (8, STRAIN), (24, STRAIN), (64, STRAIN), (64, 0.3)] {
             for ask in [Ask::NOTHING, Ask::EVERYTHING] {
                 let mut history = law.start(lanes);
@@ -117,28 +112,8 @@ fn calls(run: &mut Run<'_>, law: &Law) -> bool {
                 }
             }
         }
-        match all.status.take() {
-            Some(text) => Seen::Bad(text),
-            None => Seen::Well(
-                "10 batches of 8 to 64 lanes, strains to 30 %, shear to 60 degrees".into(),
-            ),
-        }
-    });
-    let mut verdict = |rule, fault: Option<String>, what: &str| {
-        run.check(rule, || match fault {
-            Some(text) => Seen::Bad(text),
-            None => Seen::Well(what.into()),
-        })
-    };
-    let what = "4 KiB before and after each buffer are untouched";
-    verdict(rules::GUARDS, all.guards, what);
-    let whole = verdict(rules::COMPLETE, all.gaps, "all outputs are written");
-    let finite = verdict(rules::FINITE, all.finite, "all outputs are finite");
-    let on = well && whole && finite;
-    if !on {
-        run.skip(&rules::OF_MATERIALS, "not checked: repair the above first");
-    }
-    on
+        all
+    })
 }
 
 /// Rest, then a state; everything that it gave.
@@ -201,62 +176,18 @@ fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
 }
 
 fn threads(law: &Law) -> Seen {
-    let alone: Vec<_> = (0..THREADS)
-        .map(|t| {
-            let metric = metrics(LANES, STRAIN, 201 + 2 * t as u64);
-            let mut history = law.start(LANES);
-            let _ = law.membrane(&mut history, &undeformed(LANES), Ask::NOTHING);
-            let answers = Ask::HAMMERED.map(|ask| {
-                let mut after = history.clone();
-                let answer = law.membrane(&mut after, &metric, ask);
-                (ask, after, answer)
-            });
-            (history, metric, answers)
-        })
-        .collect();
-    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
-        let (history, metric, answers) = &alone[t];
-        let (ask, after, want) = &answers[a];
-        let differing = law.hammer((history, metric), *ask, (after, want), CALLS, counter);
-        (CALLS, differing)
-    });
-    met.seen()
-}
-
-/// Whether a call with dt = 0 is answered: in finite numbers, and where it makes no difference whether a step takes a
-/// microsecond or a millisecond, as these are. `answer`: what was seen in a call at rest with dt = 0 and in a step from there
-/// that takes so long, and the outputs of that step.
-pub(crate) fn zero_dt(answer: impl Fn(f64) -> (Breaches, Breaches, Vec<Vec<f64>>)) -> Seen {
-    const SAME: f64 = 1e-9;
-    let after = |dt: f64| {
-        let (at_rest, step, outputs) = answer(dt);
-        match (at_rest.any(), step.any()) {
-            (Some(text), _) => Err(format!("at rest with dt = 0: {text}")),
-            (_, Some(text)) => Err(format!("with dt = {dt} s: {text}")),
-            _ => Ok(outputs),
-        }
+    let start = |thread: usize| {
+        let metric = metrics(LANES, STRAIN, 201 + 2 * thread as u64);
+        let mut history = law.start(LANES);
+        let _ = law.membrane(&mut history, &undeformed(LANES), Ask::NOTHING);
+        (history, metric)
     };
-    let (short, long, none) = match (after(DT), after(1e-3), after(0.0)) {
-        (Ok(short), Ok(long), Ok(none)) => (short, long, none),
-        (Err(text), ..) | (_, Err(text), _) | (.., Err(text)) => return Seen::Bad(text),
+    let alone = |(history, metric): &(Guarded, Vec<f64>), ask| {
+        let mut after = history.clone();
+        let answer = law.membrane(&mut after, metric, ask);
+        (after, answer)
     };
-    let apart = |a: &[Vec<f64>], b: &[Vec<f64>]| {
-        a.iter().zip(b).fold(0.0f64, |worst, (a, b)| {
-            let off = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-            worst.max(off.fold(0.0, f64::max) / largest(a))
-        })
-    };
-    let rates = apart(&short, &long);
-    if rates > SAME {
-        return Seen::Well(format!(
-            "finite; this law depends on dt ({rates:.1e} between steps of 1 us and 1 ms), and all other checks are those \
-             of steps of 1 us"
-        ));
-    }
-    let differ = apart(&short, &none);
-    Seen::Number {
-        measured: differ,
-        limit: SAME,
-        what: format!("steps of 1 us and 1 ms agree; a step of dt = 0 differs by {differ:.1e}"),
-    }
+    meeting::judge(start, alone, |(history, metric), ask, want, counter| {
+        law.hammer((history, metric), ask, want, counter)
+    })
 }

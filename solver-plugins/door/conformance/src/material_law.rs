@@ -3,11 +3,12 @@
 use crate::breaches::Ask;
 use crate::buffer::Guarded;
 use crate::cycle::Cycles;
-use crate::law::{Answer, Law, largest, metrics, size, trellis, undeformed};
+use crate::law::{Answer, LANES, Law, STRAIN, largest, metrics, size, trellis, undeformed};
 use crate::linear::largest_eigenpair;
-use crate::material::{LANES, STRAIN};
+
+use crate::rules;
+use crate::run::{Run, Seen, worse};
 use crate::slope::Energies;
-use crate::{Run, Seen, rules, worse};
 use plyflow_fixed::FixedBits;
 
 /// Random strains: their size and seed.

@@ -4,7 +4,8 @@
 //! Calls at once say little, too: a core reads what it wrote from its own store buffer, whatever the others have written there
 //! since, and scratch memory of 400 bytes in a global went through a quarter of all checks. So calls are paused in their midst.
 
-use crate::Seen;
+use crate::breaches::Ask;
+use crate::run::Seen;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicUsize, Ordering, compiler_fence};
 use std::sync::{Barrier, Mutex, PoisonError};
@@ -15,8 +16,11 @@ pub(crate) fn same(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
+/// Calls of a thread between two looks at whether enough have met.
+pub(crate) const CALLS: usize = 500;
+
 /// Threads that call at once: where calls are paused more would only wait for a core.
-pub(crate) const THREADS: usize = 2;
+const THREADS: usize = 2;
 
 /// Calls that were paused while another one began, of all threads together, after which enough have met: what a call keeps in a
 /// global for a hundredth of its time is disturbed in 98 of 100 checks, for a tenth practically always.
@@ -299,8 +303,30 @@ impl Drop for Pausing<'_> {
     }
 }
 
+/// Lets every thread make its own call over and over, with and without the optional outputs in turn: whether all get what one
+/// thread alone gets. `start`: what the call of a thread begins with; `alone`: what it gives; `hammer`: of [`CALLS`] calls, how
+/// many differ from that.
+pub(crate) fn judge<S: Sync, A: Sync>(
+    start: impl Fn(usize) -> S,
+    alone: impl Fn(&S, Ask) -> A,
+    hammer: impl Fn(&S, Ask, &A, &Counter<'_>) -> usize + Sync,
+) -> Seen {
+    let threads = (0..THREADS).map(|t| {
+        let start = start(t);
+        let answers = Ask::HAMMERED.map(|ask| alone(&start, ask));
+        (start, answers)
+    });
+    let threads: Vec<_> = threads.collect();
+    let met = meet_in_turn(Ask::HAMMERED.len(), |kind, thread, counter| {
+        let (start, answers) = &threads[thread];
+        let (ask, want) = (Ask::HAMMERED[kind], &answers[kind]);
+        (CALLS, hammer(start, ask, want, counter))
+    });
+    met.seen()
+}
+
 /// Lets calls meet ([`meet`]) once for each of several `kinds` of them, by number, until some differ; what came of the worst.
-pub(crate) fn meet_in_turn(
+fn meet_in_turn(
     kinds: usize,
     work: impl Fn(usize, usize, &Counter<'_>) -> (usize, usize) + Sync,
 ) -> Met {

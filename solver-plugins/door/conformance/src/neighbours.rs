@@ -1,6 +1,6 @@
 //! Whether a lane's bits depend on the lanes beside it.
 
-use crate::Seen;
+use crate::run::Seen;
 use crate::shapes::pick;
 
 /// Lanes of the set from which batches are picked.

@@ -3,15 +3,15 @@
 use crate::breaches::{Ask, Breaches, DT};
 use crate::linear::{Vec3, cross};
 use crate::linear::{norm, rotation};
-use crate::meeting::{THREADS, meet_in_turn};
+use crate::meeting;
 use crate::neighbours::{self, mixed, of_lanes};
+use crate::rules;
+use crate::run::{Run, Seen, worse};
 use crate::shapes::{Patches, moved};
-use crate::subject::{PatchAnswer, PatchState, Subject};
-use crate::{Run, Seen, rules, worse};
+use crate::subject::Subject;
+use crate::subject::patch::{PatchAnswer, PatchState};
 
 const LANES: usize = 16;
-/// Calls of a thread between two looks at whether enough have met.
-const CALLS: usize = 500;
 
 pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, twin: &Subject) {
     if subject.slots() == 0 {
@@ -161,30 +161,21 @@ fn asking(subject: &Subject, patches: &Patches) -> Seen {
 
 fn threads(subject: &Subject) -> Seen {
     let set = |t| Patches::new(subject.nodes(), subject.slots(), LANES, 201 + 2 * t as u64);
-    let Some(sets) = (0..THREADS).map(set).collect::<Option<Vec<Patches>>>() else {
+    if set(0).is_none() {
         return Seen::Nothing("no patch fits".into());
+    }
+    let start = |thread: usize| {
+        let set = set(thread).expect("whether one fits does not depend on the seed");
+        (bend(subject, &set, Ask::NOTHING).0, set.bent(57))
     };
-    // One thread alone, from a state at the bent position.
-    let alone: Vec<_> = sets
-        .iter()
-        .map(|set| {
-            let state = bend(subject, set, Ask::NOTHING).0;
-            let x = set.bent(57);
-            let answers = Ask::HAMMERED.map(|ask| {
-                let mut after = state.clone();
-                let a = subject.patch_forces(&mut after, &x, 0.0, ask);
-                (ask, after, a)
-            });
-            (state, x, answers)
-        })
-        .collect();
-    let met = meet_in_turn(Ask::HAMMERED.len(), |a, t, counter| {
-        let (state, x, answers) = &alone[t];
-        let (ask, after, want) = &answers[a];
-        let differing = subject.hammer_patches((state, x), *ask, (after, want), CALLS, counter);
-        (CALLS, differing)
-    });
-    met.seen()
+    let alone = |(state, x): &(PatchState, Vec<f64>), ask| {
+        let mut after = state.clone();
+        let answer = subject.patch_forces(&mut after, x, 0.0, ask);
+        (after, answer)
+    };
+    meeting::judge(start, alone, |(state, x), ask, want, counter| {
+        subject.hammer_patches((state, x), ask, want, counter)
+    })
 }
 
 struct Case<'a> {

@@ -1,6 +1,6 @@
 //! What is demanded of components, in the order in which it is checked.
 
-use crate::Rule;
+use crate::check::Rule;
 
 const fn rule(name: &'static str, expected: &'static str, remedy: &'static str) -> Rule {
     Rule {

@@ -1,9 +1,9 @@
 //! Elements and patches to try a formulation on: skewed, stretched, small, large, tilted in space, with any
 //! direction of the material axes.
 
-use crate::Sequence;
 use crate::linear::{Vec3, cross, dot};
 use crate::linear::{rotation, turn};
+use crate::sequence::Sequence;
 use plyflow_fixed::FixedBits;
 
 /// Elements side by side, one in each lane.

@@ -1,6 +1,6 @@
 //! Derivatives of an energy that may have kinks, from differences.
 
-use crate::worse;
+use crate::run::worse;
 
 /// Differences of an energy on both sides of a state.
 ///

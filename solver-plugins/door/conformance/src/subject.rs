@@ -1,15 +1,16 @@
 //! An element under test: every call goes through guarded buffers.
 
-mod patch;
+pub(crate) mod patch;
 
 use crate::breaches::{Ask, Breaches, DT, Refusal};
 use crate::buffer::Guarded;
-use crate::meeting::{Counter, same};
+use crate::meeting::{CALLS, Counter, same};
 use crate::shapes::Elements;
 use plyflow_sdk::abi::*;
 use std::ffi::c_void;
 
-pub(crate) use patch::{PatchAnswer, PatchState};
+/// Strain of the deformed states.
+pub(crate) const STRAIN: f64 = 0.02;
 
 /// An element formulation made for a material.
 pub(crate) struct Subject {
@@ -45,6 +46,34 @@ pub(crate) struct Masses {
     /// Empty without rotations.
     pub(crate) inertia: Vec<f64>,
     pub(crate) breaches: Breaches,
+}
+
+/// What a call of `forces` reads and writes beside the state, between guard zones.
+struct Buffers {
+    position: Guarded,
+    velocity: Guarded,
+    spin: Guarded,
+    force: Guarded,
+    moment: Guarded,
+    energy: Guarded,
+    fields: Guarded,
+    step: Guarded,
+}
+
+/// Outputs of `forces` as `plyflow.h` calls them.
+const OUTPUTS: [&str; 5] = ["force", "moment", "energy", "fields", "critical_step"];
+
+impl Buffers {
+    /// In the order of [`OUTPUTS`].
+    fn outputs(&self) -> [&Guarded; 5] {
+        [
+            &self.force,
+            &self.moment,
+            &self.energy,
+            &self.fields,
+            &self.step,
+        ]
+    }
 }
 
 /// What a call of `forces` gave.
@@ -97,21 +126,9 @@ impl Subject {
         parameters: &str,
         material: &pf_material,
     ) -> Result<Self, Refusal> {
-        let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
         let text = pf_str::new(parameters);
-        let code =
-            unsafe { ((*functions).create)(text, material, &raw mut instance, &raw mut error) };
-        if code != PF_OK {
-            let text = error.get();
-            return Err(match code {
-                PF_ERROR if !text.is_empty() => Refusal::Said(text),
-                _ => Refusal::Broken(format!("create returned {code} with the text '{text}'")),
-            });
-        }
-        if instance.is_null() {
-            let text = "create returned 0 (PF_OK) but left the instance NULL";
-            return Err(Refusal::Broken(text.into()));
-        }
+        let create = |new, error| unsafe { ((*functions).create)(text, material, new, error) };
+        let instance = Refusal::or_instance(create)?;
         let mut of_material = pf_material_sizes::default();
         unsafe { ((*material.functions).sizes)(material.instance, &raw mut of_material) };
         let mut new = Self {
@@ -217,6 +234,29 @@ impl Subject {
         (state, masses)
     }
 
+    /// Initialise and one call of forces on a set, deformed by `strain`.
+    pub(crate) fn once(
+        &self,
+        elements: &Elements,
+        strain: f64,
+        ask: Ask,
+    ) -> (State, Masses, Answer) {
+        let (mut state, masses) = self.initialise(elements);
+        let x = elements.deformed(strain, 7);
+        // The first call is at rest, as the solver makes it.
+        let first = self.forces(&mut state, &elements.reference, Motion::default(), ask);
+        let motion = Motion {
+            from: Some(&elements.reference),
+            spin: None,
+        };
+        let mut answer = self.forces(&mut state, &x, motion, ask);
+        let mut breaches = masses.breaches.clone();
+        breaches.add(first.breaches);
+        breaches.add(std::mem::take(&mut answer.breaches));
+        answer.breaches = breaches;
+        (state, masses, answer)
+    }
+
     /// Calls forces at `position` (`[nodes][3][lanes]`); histories advance.
     pub(crate) fn forces(
         &self,
@@ -225,119 +265,64 @@ impl Subject {
         motion: Motion<'_>,
         ask: Ask,
     ) -> Answer {
-        let (n, lanes) = (self.nodes(), state.lanes);
-        let vectors = 3 * n * lanes;
-        let turning = if self.rotates() { vectors } else { 0 };
-        let mut x = Guarded::of(position);
+        let lanes = state.lanes;
         let velocity: Vec<f64> = match motion.from {
             Some(from) => position
                 .iter()
                 .zip(from)
                 .map(|(b, a)| (b - a) / DT)
                 .collect(),
-            None => vec![0.0; vectors],
+            None => vec![0.0; position.len()],
         };
         let spin: Vec<f64> = match motion.spin {
             Some(angle) => angle.iter().map(|a| a / DT).collect(),
-            None => vec![0.0; vectors],
+            None => vec![0.0; position.len()],
         };
-        let (mut v, mut w) = (Guarded::of(&velocity), Guarded::of(&spin));
-        let mut force = Guarded::poisoned(vectors);
-        let mut moment = Guarded::poisoned(turning);
-        let mut energy = Guarded::poisoned(PF_ENERGIES * lanes);
-        let rows = if ask.fields {
-            self.sizes.fields as usize
-        } else {
-            0
-        };
-        let mut fields = Guarded::poisoned(rows * lanes);
-        let mut step = Guarded::poisoned(if ask.bound { lanes } else { 0 });
         let constants = state.constants.slice().to_vec();
-        let mut batch = self.batch(lanes, x.pointer(), state);
+        let mut buffers = self.buffers([position, &velocity, &spin], ask, Guarded::poisoned);
+        let mut batch = self.forces_batch(state, &mut buffers, ask);
         batch.dt = if motion.from.is_some() { DT } else { 0.0 };
-        batch.force = force.pointer();
-        batch.energy = energy.pointer();
-        if self.sees_velocity() {
-            batch.velocity = v.pointer();
-        }
-        if self.rotates() {
-            batch.spin = w.pointer();
-            batch.moment = moment.pointer();
-        }
-        if ask.fields {
-            batch.fields = fields.pointer();
-        }
-        if ask.bound {
-            batch.critical_step = step.pointer();
-        }
         let code = unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
         let mut b = Breaches::default();
         let call = "forces";
         b.status(call, code);
-        b.unchanged(call, "position", &x, position);
-        b.unchanged(call, "velocity", &v, &velocity);
-        b.unchanged(call, "spin", &w, &spin);
+        b.unchanged(call, "position", &buffers.position, position);
+        b.unchanged(call, "velocity", &buffers.velocity, &velocity);
+        b.unchanged(call, "spin", &buffers.spin, &spin);
         b.unchanged(call, "constants", &state.constants, &constants);
         b.zones(call, "history", &state.history);
         b.zones(call, "material_history", &state.material_history);
-        for (name, buffer) in [
-            ("force", &force),
-            ("moment", &moment),
-            ("energy", &energy),
-            ("fields", &fields),
-            ("critical_step", &step),
-        ] {
+        let outputs = buffers.outputs();
+        for (name, buffer) in OUTPUTS.iter().zip(outputs) {
             b.output(call, name, buffer, lanes);
         }
+        let [force, moment, energy, fields, step] = outputs.map(|o| o.slice().to_vec());
         Answer {
-            force: force.slice().to_vec(),
-            moment: moment.slice().to_vec(),
-            energy: energy.slice().to_vec(),
-            fields: fields.slice().to_vec(),
-            step: step.slice().to_vec(),
+            force,
+            moment,
+            energy,
+            fields,
+            step,
             breaches: b,
         }
     }
 }
 
 impl Subject {
-    /// Calls forces `times` times on the same state with as little around the calls as can be, so that calls of
+    /// Calls forces [`CALLS`] times on the same state with as little around the calls as can be, so that calls of
     /// several threads meet, through the `counter` of all; how many differ from the state and the answer that one thread got.
     pub(crate) fn hammer(
         &self,
         (state, position): (&State, &[f64]),
         ask: Ask,
-        (after, want): (&State, &Answer),
-        times: usize,
+        (after, want): &(State, Answer),
         counter: &Counter<'_>,
     ) -> usize {
-        let (vectors, lanes) = (position.len(), state.lanes);
-        let turning = if self.rotates() { vectors } else { 0 };
+        let still = vec![0.0; position.len()];
+        let mut buffers = self.buffers([position, &still, &still], ask, Guarded::zeros);
         let mut now = state.clone();
-        let mut x = Guarded::of(position);
-        let (mut v, mut w) = (Guarded::zeros(turning), Guarded::zeros(turning));
-        let mut force = Guarded::zeros(vectors);
-        let mut moment = Guarded::zeros(turning);
-        let mut energy = Guarded::zeros(PF_ENERGIES * lanes);
-        let mut fields = Guarded::zeros(want.fields.len());
-        let mut step = Guarded::zeros(want.step.len());
-        let mut batch = self.batch(lanes, x.pointer(), &mut now);
-        batch.force = force.pointer();
-        batch.energy = energy.pointer();
-        if self.sees_velocity() {
-            batch.velocity = v.pointer();
-        }
-        if self.rotates() {
-            batch.spin = w.pointer();
-            batch.moment = moment.pointer();
-        }
-        if ask.fields {
-            batch.fields = fields.pointer();
-        }
-        if ask.bound {
-            batch.critical_step = step.pointer();
-        }
-        (0..times)
+        let batch = self.forces_batch(&mut now, &mut buffers, ask);
+        (0..CALLS)
             .filter(|_| {
                 let (to, from) = (&mut now.history, state.history.slice());
                 to.slice_mut().copy_from_slice(from);
@@ -346,17 +331,59 @@ impl Subject {
                 let call =
                     || unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
                 let code = counter.during(call);
-                let outputs = [
-                    (&force, &want.force[..]),
-                    (&moment, &want.moment),
-                    (&energy, &want.energy),
-                    (&fields, &want.fields),
-                    (&step, &want.step),
-                    (&now.history, after.history.slice()),
-                    (&now.material_history, after.material_history.slice()),
+                let gave = [
+                    &want.force,
+                    &want.moment,
+                    &want.energy,
+                    &want.fields,
+                    &want.step,
                 ];
-                code != PF_OK || outputs.iter().any(|(got, want)| !same(got.slice(), want))
+                code != PF_OK
+                    || !same(now.history.slice(), after.history.slice())
+                    || !same(now.material_history.slice(), after.material_history.slice())
+                    || !(buffers.outputs().iter().zip(gave))
+                        .all(|(got, want)| same(got.slice(), want))
             })
             .count()
+    }
+
+    /// Buffers for a call of `forces` with position, velocity and spin (`[nodes][3][lanes]`); `output` makes those of a length
+    /// that it writes.
+    fn buffers(&self, inputs: [&[f64]; 3], ask: Ask, output: fn(usize) -> Guarded) -> Buffers {
+        let [position, velocity, spin] = inputs.map(Guarded::of);
+        let vectors = inputs[0].len();
+        let lanes = vectors / (3 * self.nodes());
+        let fields = self.sizes.fields as usize * lanes;
+        Buffers {
+            position,
+            velocity,
+            spin,
+            force: output(vectors),
+            moment: output(if self.rotates() { vectors } else { 0 }),
+            energy: output(PF_ENERGIES * lanes),
+            fields: output(if ask.fields { fields } else { 0 }),
+            step: output(if ask.bound { lanes } else { 0 }),
+        }
+    }
+
+    /// A batch with everything that `forces` gets to see.
+    fn forces_batch(&self, state: &mut State, to: &mut Buffers, ask: Ask) -> pf_element_batch {
+        let mut batch = self.batch(state.lanes, to.position.pointer(), state);
+        batch.force = to.force.pointer();
+        batch.energy = to.energy.pointer();
+        if self.sees_velocity() {
+            batch.velocity = to.velocity.pointer();
+        }
+        if self.rotates() {
+            batch.spin = to.spin.pointer();
+            batch.moment = to.moment.pointer();
+        }
+        if ask.fields {
+            batch.fields = to.fields.pointer();
+        }
+        if ask.bound {
+            batch.critical_step = to.step.pointer();
+        }
+        batch
     }
 }

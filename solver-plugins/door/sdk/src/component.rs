@@ -1,12 +1,10 @@
 //! Components (element formulations and materials) behind safe traits, and the caller's side of a
 //! material. Array shapes, index order and units are those of `plyflow.h`.
 
-mod table;
+pub(crate) mod table;
 
 use crate::aligned::are_aligned;
 use plyflow_abi::*;
-
-pub use table::{element_table, material_table};
 
 /// Sizes and properties of a material.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -13,18 +13,19 @@
 
 mod aligned;
 mod component;
+mod error;
 mod step;
 
 pub use aligned::Aligned;
 
 pub use component::{
     BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,
-    MaterialSizes, MembraneBatch, PatchBatch, element_table, material_table,
+    MaterialSizes, MembraneBatch, PatchBatch,
+    table::{element_table, material_table},
 };
+pub use error::StepError;
 pub use plyflow_abi as abi;
-pub use step::{
-    BodyInfo, Cost, FieldInfo, Host, Input, Log, Meshes, On, Progress, Step, StepError, run_step,
-};
+pub use step::{BodyInfo, Cost, FieldInfo, Host, Input, Log, Meshes, On, Progress, Step, run_step};
 
 /// Exports a [`Step`] as the plugin of this shared library.
 #[macro_export]
@@ -101,13 +102,4 @@ macro_rules! export_material {
             &raw const PLUGIN
         }
     };
-}
-
-/// The text of a caught panic.
-pub(crate) fn panic_text(payload: &(dyn std::any::Any + Send)) -> String {
-    payload
-        .downcast_ref::<&str>()
-        .map(|s| (*s).to_owned())
-        .or_else(|| payload.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "a panic without a text".to_owned())
 }

@@ -1,10 +1,11 @@
 //! Steps: the host's services with Rust types.
 
-use crate::panic_text;
+use crate::error::{StepError, panic_text};
 use plyflow_abi::*;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A step plugin.
 pub trait Step {
@@ -15,31 +16,6 @@ pub trait Step {
     /// # Errors
     /// Any [`StepError`]; its text becomes the step's failure in the run.
     fn run(host: &Host) -> Result<(), StepError>;
-}
-
-/// Why a step stopped.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum StepError {
-    /// The host asked to stop.
-    Cancelled,
-    /// Anything else: what was wrong, where, and what to do.
-    Failed(String),
-}
-
-impl StepError {
-    /// What a user reads of it.
-    pub fn text(&self) -> &str {
-        match self {
-            Self::Cancelled => "the host asked to stop",
-            Self::Failed(text) => text,
-        }
-    }
-}
-
-impl<T: std::fmt::Display> From<T> for StepError {
-    fn from(value: T) -> Self {
-        Self::Failed(value.to_string())
-    }
 }
 
 /// Where the values of a field sit.
@@ -188,6 +164,8 @@ impl Default for Progress<'_> {
 /// The running step's view of the host.
 pub struct Host {
     services: *const pf_services,
+    /// Whether the step was told to stop.
+    told_to_stop: AtomicBool,
 }
 
 // The contract (plyflow.h): any thread may call services until `run` returns, and the host does one call at a time.
@@ -203,30 +181,39 @@ macro_rules! call {
 mod read;
 mod write;
 
-fn check(code: i32, what: impl FnOnce() -> String) -> Result<(), StepError> {
-    let why = match code {
-        PF_OK => return Ok(()),
-        PF_CANCELLED => return Err(StepError::Cancelled),
-        PF_NOT_FOUND => "not found",
-        PF_BAD_SHAPE => "the sizes do not match",
-        PF_BAD_VALUE => "a value is NaN, infinite or out of range",
-        _ => "the host refused",
-    };
-    Err(StepError::Failed(format!("{}: {why}", what())))
-}
-
 impl Host {
     /// Wraps a services table.
     ///
     /// # Safety
     /// `services` must be valid for the life of the `Host`.
     pub unsafe fn new(services: *const pf_services) -> Self {
-        Self { services }
+        Self {
+            services,
+            told_to_stop: AtomicBool::new(false),
+        }
     }
 
     /// The raw table, for code that passes it on.
     pub fn raw(&self) -> *const pf_services {
         self.services
+    }
+
+    fn check(&self, code: i32, what: impl FnOnce() -> String) -> Result<(), StepError> {
+        let why = match code {
+            PF_OK => return Ok(()),
+            PF_CANCELLED => return Err(self.stop()),
+            PF_NOT_FOUND => "not found",
+            PF_BAD_SHAPE => "the sizes do not match",
+            PF_BAD_VALUE => "a value is NaN, infinite or out of range",
+            _ => "the host refused",
+        };
+        Err(StepError::Failed(format!("{}: {why}", what())))
+    }
+
+    /// What a step is told that shall stop. However it passes that on, it ends as cancelled.
+    fn stop(&self) -> StepError {
+        self.told_to_stop.store(true, Ordering::Relaxed);
+        StepError::Cancelled
     }
 
     fn text(&self, s: pf_str) -> &str {
@@ -278,7 +265,7 @@ impl Host {
     /// Only that one.
     pub fn check_cancelled(&self) -> Result<(), StepError> {
         if call!(self.cancelled()) != 0 {
-            Err(StepError::Cancelled)
+            Err(self.stop())
         } else {
             Ok(())
         }
@@ -329,7 +316,7 @@ impl Host {
             functions: std::ptr::null(),
             manifest: pf_str::new(""),
         };
-        check(
+        self.check(
             call!(self.find_component(kind, pf_str::new(name), &raw mut c)),
             || {
                 let what = if kind == PF_KIND_ELEMENT {
@@ -359,6 +346,7 @@ pub unsafe fn run_step<S: Step>(services: *const pf_services) -> i32 {
     match catch_unwind(AssertUnwindSafe(|| S::run(&host))) {
         Ok(Ok(())) => PF_OK,
         Ok(Err(StepError::Cancelled)) => PF_CANCELLED,
+        Ok(Err(_)) if host.told_to_stop.load(Ordering::Relaxed) => PF_CANCELLED,
         Ok(Err(StepError::Failed(text))) => {
             fail(&text);
             PF_ERROR

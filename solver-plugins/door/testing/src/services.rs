@@ -1,7 +1,6 @@
 //! The service table of the host in memory.
 
-use crate::Vec3;
-use crate::{Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput};
+use crate::memory::{Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput, Vec3};
 use plyflow_model::manifest::Manifest;
 use plyflow_sdk::On;
 use plyflow_sdk::abi::*;
@@ -39,7 +38,7 @@ pub(super) fn table(host: *mut c_void) -> pf_services {
         host,
         log,
         progress: no_progress,
-        cancelled: never,
+        cancelled,
         fail,
         threads,
         parameters,
@@ -83,6 +82,10 @@ unsafe extern "C" fn no_progress(_: *mut c_void, _: *const pf_progress) {}
 
 unsafe extern "C" fn never(_: *mut c_void) -> i32 {
     0
+}
+
+unsafe extern "C" fn cancelled(host: *mut c_void) -> i32 {
+    unsafe { state(host) }.machine.cancelled.into()
 }
 
 unsafe extern "C" fn ignored(_: *mut c_void) {}

@@ -1,7 +1,7 @@
 //! Elements on meshes that follow an outline: a uniform strain is uniform, a parabola's curvature is that of the parabola.
 
 use plyflow_blank::mesh_region;
-use plyflow_geometry::vec3::{V, norm};
+use plyflow_geometry::vec3::{Vec3, norm};
 use plyflow_kernels::{fabric::Fabric, m4::M4, rf4::Rf4};
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::mesh::{QuadMesh, limit_patches};
@@ -34,16 +34,16 @@ fn element<E: Element>() -> ElementInstance {
     }
 }
 
-struct Held(Vec<V>);
+struct Held(Vec<Vec3>);
 
 impl Drive for Held {
-    fn position(&self, k: usize, _: f64) -> V {
+    fn position(&self, k: usize, _: f64) -> Vec3 {
         self.0[k]
     }
 }
 
 /// A model of a mesh whose nodes are held where `to` puts them, after one step.
-fn held<E: Element>(mesh: &QuadMesh, to: impl Fn(V) -> V) -> Model {
+fn held<E: Element>(mesh: &QuadMesh, to: impl Fn(Vec3) -> Vec3) -> Model {
     let m = mesh.cells.len();
     let element = element::<E>();
     let mut patches = mesh.patches();
@@ -67,7 +67,7 @@ fn held<E: Element>(mesh: &QuadMesh, to: impl Fn(V) -> V) -> Model {
         damping: 0.0,
     };
     let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
-    let places: Vec<V> = mesh.points.iter().map(|x| to(*x)).collect();
+    let places: Vec<Vec3> = mesh.points.iter().map(|x| to(*x)).collect();
     model.x_mut().copy_from_slice(&places.clone());
     model.set_step(1e-9);
     let nodes = (0..mesh.points.len() as u32).collect();

@@ -185,6 +185,24 @@ pub fn parse(
 /// A column that is in a file: where, which, and its unit as the file writes it.
 type Picked = (usize, Column, String);
 
+/// The decimal sign of all numbers of the file. `last`: line of the header, or of the row of units below it.
+fn decimal(
+    lines: &Lines,
+    separator: Separator,
+    picked: &[Picked],
+    last: usize,
+) -> Result<Decimal, RowError> {
+    let mut signs = Signs::default();
+    let mut rows = lines.rows(separator);
+    while let Some(row) = rows.read()? {
+        if row.line > last {
+            let cells = picked.iter().filter_map(|p| row.cells.get(p.0));
+            cells.for_each(|c| signs.note(row.line, c));
+        }
+    }
+    signs.decide().map_err(|(line, e)| RowError::at(line, e))
+}
+
 fn of_rows(bytes: &[u8], source: &str, wanted: &[Column]) -> Result<Table, RowError> {
     let lines = Lines::new(bytes)?;
     let Some((_, first)) = lines.first() else {
@@ -202,16 +220,7 @@ fn of_rows(bytes: &[u8], source: &str, wanted: &[Column]) -> Result<Table, RowEr
         heads.pop();
     }
     let picked = pick(&heads, wanted, line)?;
-    // The decimal sign is that of all numbers of the file.
-    let mut signs = Signs::default();
-    let mut rows = lines.rows(separator);
-    while let Some(row) = rows.read()? {
-        if row.line > last {
-            let cells = picked.iter().filter_map(|p| row.cells.get(p.0));
-            cells.for_each(|c| signs.note(row.line, c));
-        }
-    }
-    let decimal = signs.decide().map_err(|(line, e)| RowError::at(line, e))?;
+    let decimal = decimal(&lines, separator, &picked, last)?;
     let mut table = Table {
         source: source.to_owned(),
         lines: Vec::new(),
@@ -348,6 +357,31 @@ fn heading(column: &Column) -> String {
     format!("{} [{unit}]", column.name)
 }
 
+/// The unit of a column that is read.
+fn unit_of(head: &Head, column: &Column, line: usize) -> Result<String, RowError> {
+    let what = column.dimension.with_article();
+    let say = |e: String| {
+        let problem = format!(
+            "column '{}': {e}; expected {what}, such as `{}`",
+            column.name,
+            heading(column)
+        );
+        RowError::at(line, problem)
+    };
+    let Some(unit) = head.unit.as_deref() else {
+        return Err(say("has no unit".into()));
+    };
+    parse_unit_of(unit, column.dimension).map_err(|e| match e {
+        plyflow_model::units::UnitError::WrongDimension { got, .. } => say(format!(
+            "the unit '{}' does not fit: it is {got}{}",
+            shown(unit),
+            as_force(&got, column.dimension)
+        )),
+        e => say(format!("{}: {}", e.reason(), e.help())),
+    })?;
+    Ok(unit.to_owned())
+}
+
 fn pick(heads: &[Head], wanted: &[Column], line: usize) -> Result<Vec<Picked>, RowError> {
     let mut picked = Vec::new();
     for column in wanted {
@@ -385,27 +419,7 @@ fn pick(heads: &[Head], wanted: &[Column], line: usize) -> Result<Vec<Picked>, R
                 return Err(RowError::at(line, problem));
             }
         };
-        let what = column.dimension.with_article();
-        let say = |e: String| {
-            let problem = format!(
-                "column '{}': {e}; expected {what}, such as `{}`",
-                column.name,
-                heading(column)
-            );
-            RowError::at(line, problem)
-        };
-        let Some(unit) = heads[index].unit.as_deref() else {
-            return Err(say("has no unit".into()));
-        };
-        parse_unit_of(unit, column.dimension).map_err(|e| match e {
-            plyflow_model::units::UnitError::WrongDimension { got, .. } => say(format!(
-                "the unit '{}' does not fit: it is {got}{}",
-                shown(unit),
-                as_force(&got, column.dimension)
-            )),
-            e => say(format!("{}: {}", e.reason(), e.help())),
-        })?;
-        picked.push((index, *column, unit.to_owned()));
+        picked.push((index, *column, unit_of(&heads[index], column, line)?));
     }
     Ok(picked)
 }

@@ -4,21 +4,12 @@
 use crate::csv::Table;
 use crate::stitch::{StitchFit, fit_stitch};
 use crate::voce::rms;
-use crate::yarns::{Points, Yarns, YarnsFit, fit_yarns, joined};
+pub use crate::yarns::LIMITS;
+use crate::yarns::{FEWEST_ROWS, Points, Yarns, YarnsFit, fit_yarns, joined};
 use crate::zero::{self, Start, Zero};
 use plyflow_fixed::FixedBits;
 use serde::Deserialize;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
-
-/// Highest degree of a shear polynomial that `material-fabric` takes.
-pub const MAXIMUM_DEGREE: usize = 9;
-/// What `material-fabric` takes as the end of the fitted range (rad).
-pub const LIMITS: [f64; 2] = [
-    5.0 * std::f64::consts::PI / 180.0,
-    80.0 * std::f64::consts::PI / 180.0,
-];
-/// A test with fewer rows is refused.
-pub const FEWEST_ROWS: usize = 20;
 
 /// The rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,6 +58,40 @@ pub struct Test {
     pub zero: Zero,
     /// Ends (rad) of the largest piece without a row, from the square frame on.
     pub gap: [f64; 2],
+}
+
+/// Whether a test shears far enough, in rows enough, for a law. `source`: its file.
+fn check_reach(points: &Points, source: &str) -> Result<(), String> {
+    let reached = points.angle.iter().fold(0.0f64, |m, g| m.max(*g));
+    if reached < 5f64.to_radians() {
+        return Err(format!(
+            "{}: the test reaches a shear angle of {:.2} deg only; is the displacement in the unit of the header, \
+             and `frame_side` right?",
+            source,
+            reached.to_degrees()
+        ));
+    }
+    if points.angle.len() < FEWEST_ROWS {
+        return Err(format!(
+            "{}: {} rows lie after the force begins to rise; a shear curve needs at least {FEWEST_ROWS}",
+            source,
+            points.angle.len()
+        ));
+    }
+    Ok(())
+}
+
+/// Ends of the largest piece without a row, from the square frame on.
+fn widest_gap(angle: &[f64]) -> [f64; 2] {
+    let ends = std::iter::once(0.0).chain(angle.iter().copied());
+    let pieces = ends.zip(angle.iter().copied());
+    pieces.fold([0.0; 2], |widest: [f64; 2], (a, b)| {
+        if b - a > widest[1] - widest[0] {
+            [a, b]
+        } else {
+            widest
+        }
+    })
 }
 
 impl Test {
@@ -121,31 +146,8 @@ impl Test {
             points.angle.push(angle);
             points.force.push(frame.normalised(force[i] - none, angle));
         }
-        let reached = points.angle.iter().fold(0.0f64, |m, g| m.max(*g));
-        if reached < 5f64.to_radians() {
-            return Err(format!(
-                "{}: the test reaches a shear angle of {:.2} deg only; is the displacement in the unit of the header, \
-                 and `frame_side` right?",
-                table.source,
-                reached.to_degrees()
-            ));
-        }
-        if points.angle.len() < FEWEST_ROWS {
-            return Err(format!(
-                "{}: {} rows lie after the force begins to rise; a shear curve needs at least {FEWEST_ROWS}",
-                table.source,
-                points.angle.len()
-            ));
-        }
-        let ends = std::iter::once(0.0).chain(points.angle.iter().copied());
-        let pieces = ends.zip(points.angle.iter().copied());
-        let gap = pieces.fold([0.0; 2], |widest: [f64; 2], (a, b)| {
-            if b - a > widest[1] - widest[0] {
-                [a, b]
-            } else {
-                widest
-            }
-        });
+        check_reach(&points, &table.source)?;
+        let gap = widest_gap(&points.angle);
         Ok(Self { points, zero, gap })
     }
 

@@ -31,6 +31,48 @@ const PLACES: usize = 400;
 /// A record that begins within this (m) begins before the sled moves.
 const AT_REST: f64 = 1e-3;
 
+/// Rows in the window; the test covers it.
+fn rows_inside(table: &Table, s: &[f64], [from, to]: [f64; 2]) -> Result<usize, String> {
+    let (first, last) = (
+        s.first().copied().unwrap_or(0.0),
+        s.last().copied().unwrap_or(0.0),
+    );
+    if first > from || last < to {
+        return Err(format!(
+            "{}: the test covers {:.2} mm to {:.2} mm; the mean is taken from {:.2} mm to {:.2} mm",
+            table.source,
+            1e3 * first,
+            1e3 * last,
+            1e3 * from,
+            1e3 * to
+        ));
+    }
+    let inside = s.iter().filter(|v| (from..=to).contains(*v)).count();
+    if inside < FEWEST_ROWS {
+        return Err(format!(
+            "{}: {inside} rows lie in the window; at least {FEWEST_ROWS} are needed",
+            table.source
+        ));
+    }
+    Ok(inside)
+}
+
+/// Integrals of the force and of its square over the displacement in the window.
+fn integrals(s: &[f64], f: &[f64], [from, to]: [f64; 2]) -> [f64; 2] {
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for i in 1..s.len() {
+        let (a, b) = (s[i - 1].clamp(from, to), s[i].clamp(from, to));
+        if a == b {
+            continue;
+        }
+        let at = |v: f64| f[i - 1] + (f[i] - f[i - 1]) * (v - s[i - 1]) / (s[i] - s[i - 1]);
+        let (fa, fb) = (at(a), at(b));
+        sum += 0.5 * (fa + fb) * (b - a);
+        squares += (fa * fa + fa * fb + fb * fb) / 3.0 * (b - a);
+    }
+    [sum, squares]
+}
+
 /// Evaluates the columns `displacement` and `force` of a table; `window`: from, to (m); `normal` force (N).
 ///
 /// The mean is the integral of the force over the displacement (straight between the rows) over the window's
@@ -55,38 +97,8 @@ pub fn evaluate(table: &Table, window: [f64; 2], normal: f64) -> Result<Pull, St
     }
     let (s, f) = (table.values("displacement")?, table.values("force")?);
     table.goes_forward("displacement", "one file holds one pull")?;
-    let (first, last) = (
-        s.first().copied().unwrap_or(0.0),
-        s.last().copied().unwrap_or(0.0),
-    );
-    if first > from || last < to {
-        return Err(format!(
-            "{}: the test covers {:.2} mm to {:.2} mm; the mean is taken from {:.2} mm to {:.2} mm",
-            table.source,
-            1e3 * first,
-            1e3 * last,
-            1e3 * from,
-            1e3 * to
-        ));
-    }
-    let inside = s.iter().filter(|v| (from..=to).contains(*v)).count();
-    if inside < FEWEST_ROWS {
-        return Err(format!(
-            "{}: {inside} rows lie in the window; at least {FEWEST_ROWS} are needed",
-            table.source
-        ));
-    }
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for i in 1..s.len() {
-        let (a, b) = (s[i - 1].clamp(from, to), s[i].clamp(from, to));
-        if a == b {
-            continue;
-        }
-        let at = |v: f64| f[i - 1] + (f[i] - f[i - 1]) * (v - s[i - 1]) / (s[i] - s[i - 1]);
-        let (fa, fb) = (at(a), at(b));
-        sum += 0.5 * (fa + fb) * (b - a);
-        squares += (fa * fa + fa * fb + fb * fb) / 3.0 * (b - a);
-    }
+    let inside = rows_inside(table, s, window)?;
+    let [sum, squares] = integrals(s, f, window);
     let mean = sum / (to - from);
     let variance = squares / (to - from) - mean * mean;
     if mean <= 0.0 {
@@ -117,7 +129,7 @@ pub fn evaluate(table: &Table, window: [f64; 2], normal: f64) -> Result<Pull, St
         scatter: variance.max(0.0).sqrt() / normal,
         error: student(independent as usize - 1) * rms(&places) / independent.sqrt() / normal,
         drift: drift / normal,
-        at_rest: (first <= AT_REST).then(|| f[0] / normal),
+        at_rest: (s[0] <= AT_REST).then(|| f[0] / normal),
     })
 }
 

@@ -3,12 +3,21 @@
 use crate::confidence::{autocorrelation, of_curve, of_mean, student};
 use crate::linear::{Polynomial, Solution, bayes_criterion, fit_polynomial};
 use crate::material::significant;
-use crate::picture_frame::{FEWEST_ROWS, LIMITS, MAXIMUM_DEGREE};
 use crate::voce::rms;
 use plyflow_fixed::FixedBits;
 use plyflow_kernels::fabric::Fabric;
 use plyflow_sdk::Material;
 use serde_json::json;
+
+/// Highest degree of a shear polynomial that `material-fabric` takes.
+pub const MAXIMUM_DEGREE: usize = 9;
+/// What `material-fabric` takes as the end of the fitted range (rad).
+pub const LIMITS: [f64; 2] = [
+    5.0 * std::f64::consts::PI / 180.0,
+    80.0 * std::f64::consts::PI / 180.0,
+];
+/// A test with fewer rows is refused.
+pub const FEWEST_ROWS: usize = 20;
 
 /// Points of a table after the one at zero shear; `material-fabric` takes 64 in all.
 const TABLE_POINTS: usize = 40;
@@ -137,6 +146,34 @@ struct Tried {
     solution: Solution,
 }
 
+/// Polynomials of all degrees that the points determine, the one with the least criterion first. `degree`: one that is asked for.
+fn tried(
+    tests: &[Points],
+    (angle, force): (&[f64], &[f64]),
+    degree: Option<usize>,
+) -> Result<Vec<Tried>, String> {
+    let floor = 1e-6 * rms(force);
+    let most = MAXIMUM_DEGREE.min(angle.len() / ROWS_PER_COEFFICIENT);
+    let mut tried = Vec::new();
+    for d in (2..=most).chain(degree.filter(|d| !(2..=most).contains(d))) {
+        let (polynomial, solution) = match fit_polynomial(angle, force, d) {
+            Ok(found) => found,
+            Err(_) if degree.is_some_and(|g| g != d) => continue,
+            Err(e) => return Err(e),
+        };
+        let left = rms_within(tests, d).unwrap_or(solution.rms);
+        tried.push(Tried {
+            criterion: bayes_criterion(left, floor, angle.len(), d),
+            misfit: bayes_criterion(left, floor, angle.len(), 0),
+            degree: d,
+            polynomial,
+            solution,
+        });
+    }
+    tried.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    Ok(tried)
+}
+
 /// Fits the yarns' law to points of shear angle and force of tests that share it.
 ///
 /// Of the degrees that the material takes up to the largest angle, the one with the least Bayesian information
@@ -154,25 +191,7 @@ pub fn fit_yarns(tests: &[Points], degree: Option<usize>) -> Result<YarnsFit, St
         ));
     }
     let limit = angle.iter().fold(0.0f64, |m, g| m.max(*g));
-    let floor = 1e-6 * rms(&force);
-    let most = MAXIMUM_DEGREE.min(angle.len() / ROWS_PER_COEFFICIENT);
-    let mut tried = Vec::new();
-    for d in (2..=most).chain(degree.filter(|d| !(2..=most).contains(d))) {
-        let (polynomial, solution) = match fit_polynomial(&angle, &force, d) {
-            Ok(found) => found,
-            Err(_) if degree.is_some_and(|g| g != d) => continue,
-            Err(e) => return Err(e),
-        };
-        let left = rms_within(tests, d).unwrap_or(solution.rms);
-        tried.push(Tried {
-            criterion: bayes_criterion(left, floor, angle.len(), d),
-            misfit: bayes_criterion(left, floor, angle.len(), 0),
-            degree: d,
-            polynomial,
-            solution,
-        });
-    }
-    tried.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let tried = tried(tests, (&angle, &force), degree)?;
     let mut refused: Option<Refused> = None;
     let asked = |t: &&Tried| degree.is_none_or(|d| d == t.degree);
     for t in tried.iter().filter(asked) {
@@ -234,16 +253,96 @@ pub fn joined(tests: &[Points]) -> (Vec<f64>, Vec<f64>) {
     all.map(|(g, f)| (*g, *f)).unzip()
 }
 
+fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// The fit of the degree that Akaike's criterion would take, from that of `best` on: what a degree that is too low leaves is no scatter, so that
+/// and its directions are those of this one.
+fn wide<'a>(best: &'a Tried, tried: &'a [Tried]) -> &'a Tried {
+    let by_akaike = |t: &&Tried| t.misfit + AKAIKE * t.degree as f64;
+    (tried.iter().filter(|t| t.degree >= best.degree))
+        .min_by(|a, b| by_akaike(a).total_cmp(&by_akaike(b)))
+        .unwrap_or(best)
+}
+
+/// What is `told` of a law of its own for each specimen, of the degree `best`, and what those of the degree `wide` leave over: specimens that differ are no scatter
+/// within one. `None` of one test, or where one of them does not determine its polynomial.
+fn by_specimen(
+    tests: &[Points],
+    [best, wide]: [usize; 2],
+    told: &dyn Fn(&Polynomial) -> Vec<f64>,
+) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
+    let (mut own, mut within) = (Vec::new(), Vec::new());
+    for t in tests {
+        if let Ok((p, _)) = fit_polynomial(&t.angle, &t.force, wide) {
+            within.extend(t.angle.iter().zip(&t.force).map(|(g, f)| f - p.value(*g)));
+        }
+        let (p, _) = fit_polynomial(&t.angle, &t.force, best).ok()?;
+        own.push(told(&p));
+    }
+    (tests.len() > 1).then_some((own, within))
+}
+
+/// What is `told` of changes by one standard error each, where the forces scatter by `deviation` (N/m). `unit`: the largest angle (rad).
+fn of_scatter(
+    wide: &Tried,
+    (deviation, unit): (f64, f64),
+    told: &dyn Fn(&Polynomial) -> Vec<f64>,
+) -> Vec<Vec<f64>> {
+    let of_powers = |v: &Vec<f64>| -> Vec<f64> {
+        let scaled = v.iter().enumerate();
+        let c = scaled.map(|(j, c)| deviation * c / unit.powi(j as i32 + 1));
+        told(&Polynomial {
+            coefficients: std::iter::once(0.0).chain(c).collect(),
+        })
+    };
+    wide.solution.spread.iter().map(of_powers).collect()
+}
+
+/// Angles (rad) at which the error is told, as far as all tests reach.
+fn places(tests: &[Points]) -> Vec<f64> {
+    let largest = |t: &Points| t.angle.iter().fold(0.0f64, |m, g| m.max(*g));
+    let limit = tests.iter().map(largest).fold(f64::INFINITY, f64::min);
+    let part = |i: usize| LEAST_ANGLE + (1.0 - LEAST_ANGLE) * i as f64 / (PLACES - 1) as f64;
+    (0..PLACES).map(|i| limit * part(i)).collect()
+}
+
+/// What is `told` of the laws that follow when the zero of a test is moved by its error.
+fn zero_moved(
+    test: &Points,
+    tests: &[Points],
+    degree: usize,
+    told: &dyn Fn(&Polynomial) -> Vec<f64>,
+) -> impl Iterator<Item = Vec<f64>> {
+    shifted(test, tests).into_iter().filter_map(move |moved| {
+        let (angle, force) = joined(&moved);
+        let (p, _) = fit_polynomial(&angle, &force, degree).ok()?;
+        Some(told(&p))
+    })
+}
+
+/// The fits of other degrees than these that may be right, each with the root of its weight.
+fn other_degrees<'a>(tried: &'a [Tried], [best, wide]: [&Tried; 2]) -> Vec<(f64, &'a Tried)> {
+    let weight = |t: &Tried| {
+        let apart = best.misfit - t.misfit + MODEL * (best.degree as f64 - t.degree as f64);
+        (0.5 * apart).fixed_exp()
+    };
+    let sum: f64 = tried.iter().map(weight).sum();
+    (tried.iter())
+        .filter(|t| t.degree != best.degree && t.degree != wide.degree)
+        .filter(|t| weight(t) > 1e-3 * sum)
+        .map(|t| ((weight(t) / sum).sqrt(), t))
+        .collect()
+}
+
 /// The error of a law that comes of the fit `best`.
 ///
 /// What moves it: the scatter of the forces, as far as they are independent of their neighbours; where the zero was found, its error; which degree is
 /// right, each of the others by the root of its weight (model averaging, Hoeting et al., Stat. Sci. 14 (1999) 382); what the law
 /// leaves of the data where they do not scatter about it; what a table levels; and, with several tests, their spread where that is more.
 fn uncertain(yarns: &Yarns, best: &Tried, tried: &[Tried], tests: &[Points]) -> YarnsError {
-    let largest = |t: &Points| t.angle.iter().fold(0.0f64, |m, g| m.max(*g));
-    let limit = tests.iter().map(largest).fold(f64::INFINITY, f64::min);
-    let part = |i: usize| LEAST_ANGLE + (1.0 - LEAST_ANGLE) * i as f64 / (PLACES - 1) as f64;
-    let places: Vec<f64> = (0..PLACES).map(|i| limit * part(i)).collect();
+    let places = places(tests);
     // The forces there, then the stiffness at rest.
     let told = |p: &Polynomial| -> Vec<f64> {
         let forces = places.iter().map(|g| p.value(*g));
@@ -252,7 +351,6 @@ fn uncertain(yarns: &Yarns, best: &Tried, tried: &[Tried], tests: &[Points]) -> 
     let law: Vec<f64> = (places.iter().map(|g| yarns.value(*g)))
         .chain([yarns.stiffness()])
         .collect();
-    let less = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
     let central = told(&best.polynomial);
     let (angle, force) = joined(tests);
     let unit = angle.iter().fold(0.0f64, |m, v| m.max(v.abs()));
@@ -261,47 +359,16 @@ fn uncertain(yarns: &Yarns, best: &Tried, tried: &[Tried], tests: &[Points]) -> 
         let all = angle.iter().zip(&force);
         all.map(|(g, f)| f - t.polynomial.value(*g)).collect()
     };
-    // What a degree that is too low leaves is no scatter: that and its directions are those of the degree that Akaike's criterion would take.
-    let by_akaike = |t: &&Tried| t.misfit + AKAIKE * t.degree as f64;
-    let wide = (tried.iter().filter(|t| t.degree >= best.degree))
-        .min_by(|a, b| by_akaike(a).total_cmp(&by_akaike(b)))
-        .unwrap_or(best);
+    let wide = wide(best, tried);
     let left = rest(best);
-    // Specimens that differ are no scatter within one: that is what is left over by laws of their own.
-    let mut own = Vec::new();
-    let mut within = Vec::new();
-    for t in tests {
-        if let Ok((p, _)) = fit_polynomial(&t.angle, &t.force, wide.degree) {
-            within.extend(t.angle.iter().zip(&t.force).map(|(g, f)| f - p.value(*g)));
-        }
-        if let Ok((p, _)) = fit_polynomial(&t.angle, &t.force, best.degree) {
-            own.push(told(&p));
-        }
-    }
-    let within = if tests.len() > 1 && own.len() == tests.len() {
-        within
-    } else {
-        own.clear();
-        rest(wide)
-    };
+    let (own, within) = by_specimen(tests, [best.degree, wide.degree], &told)
+        .unwrap_or_else(|| (Vec::new(), rest(wide)));
     let time = autocorrelation(if own.is_empty() { &left } else { &within });
     let freedom = (left.len() - wide.degree).max(1) as f64;
     let deviation = rms(&within) * (left.len() as f64 / freedom * time).sqrt();
-    let of_powers = |v: &Vec<f64>| -> Vec<f64> {
-        let scaled = v.iter().enumerate();
-        let c = scaled.map(|(j, c)| deviation * c / unit.powi(j as i32 + 1));
-        told(&Polynomial {
-            coefficients: std::iter::once(0.0).chain(c).collect(),
-        })
-    };
-    let mut changes: Vec<Vec<f64>> = wide.solution.spread.iter().map(of_powers).collect();
+    let mut changes = of_scatter(wide, (deviation, unit), &told);
     for t in tests {
-        for moved in shifted(t, tests) {
-            let (angle, force) = joined(&moved);
-            if let Ok((p, _)) = fit_polynomial(&angle, &force, best.degree) {
-                changes.push(less(&told(&p), &central));
-            }
-        }
+        changes.extend(zero_moved(t, tests, best.degree, &told).map(|p| less(&p, &central)));
     }
     let (mut changes, freedom) = of_mean(
         &own,
@@ -309,16 +376,8 @@ fn uncertain(yarns: &Yarns, best: &Tried, tried: &[Tried], tests: &[Points]) -> 
         (freedom / time).max(1.0) as usize,
         &[1.0; PLACES],
     );
-    let weight = |t: &Tried| {
-        let apart = best.misfit - t.misfit + MODEL * (best.degree as f64 - t.degree as f64);
-        (0.5 * apart).fixed_exp()
-    };
-    let sum: f64 = tried.iter().map(weight).sum();
-    let others = tried
-        .iter()
-        .filter(|t| t.degree != best.degree && t.degree != wide.degree);
-    changes.extend(others.filter(|t| weight(t) > 1e-3 * sum).map(|t| {
-        let root = (weight(t) / sum).sqrt();
+    let others = other_degrees(tried, [best, wide]);
+    changes.extend(others.into_iter().map(|(root, t)| {
         let apart = less(&told(&t.polynomial), &central);
         apart.into_iter().map(|c| c * root).collect()
     }));

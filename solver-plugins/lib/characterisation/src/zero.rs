@@ -224,6 +224,34 @@ fn spacing(d: &[f64]) -> f64 {
     next.map_or(0.0, |v| v - d[0])
 }
 
+/// The zero that a level force tells which then rises, where it rises beyond the `square` frame (m). `deviation`, `largest`: of the force (N).
+fn after_level(
+    d: &[f64],
+    f: &[f64],
+    (deviation, largest, square): (f64, f64, f64),
+) -> Option<Zero> {
+    let level = level_rows(d, f, deviation);
+    let slack = level.and_then(|rows| onset(d, f, rows, deviation));
+    if let Some([at, level, error, along]) = slack
+        && at - d[0] > square
+    {
+        let rows = d.partition_point(|v| *v < at);
+        let start = match at.abs() <= square && level.abs() <= (SURE * error).max(NOTHING * largest)
+        {
+            true => Start::Together,
+            false => Start::Slack(rows),
+        };
+        return Some(Zero {
+            displacement: at,
+            force: level,
+            force_error: error,
+            displacement_error: along,
+            start,
+        });
+    }
+    None
+}
+
 /// Reads how a test begins off its first rows: displacement (m) and force (N) in order, `side` between the hinges (m).
 ///
 /// A level force that then rises tells both zeros. Without one, a test that begins with no force begins where the frame is square, since any
@@ -240,24 +268,8 @@ pub fn find(d: &[f64], f: &[f64], side: f64, kinked: bool) -> Zero {
     };
     let deviation = noise(d, f, largest);
     let square = SQUARE * side / std::f64::consts::SQRT_2;
-    let level = level_rows(d, f, deviation).filter(|_| !kinked);
-    let slack = level.and_then(|rows| onset(d, f, rows, deviation));
-    if let Some([at, level, error, along]) = slack
-        && at - d[0] > square
-    {
-        let rows = d.partition_point(|v| *v < at);
-        let start = match at.abs() <= square && level.abs() <= (SURE * error).max(NOTHING * largest)
-        {
-            true => Start::Together,
-            false => Start::Slack(rows),
-        };
-        return Zero {
-            displacement: at,
-            force: level,
-            force_error: error,
-            displacement_error: along,
-            start,
-        };
+    if let Some(zero) = after_level(d, f, (deviation, largest, square)).filter(|_| !kinked) {
+        return zero;
     }
     let Some(drawn) = beginning(d, f, side, deviation) else {
         return right(deviation);

@@ -16,83 +16,23 @@
 //! length - width.
 
 mod imperfection;
+mod terms;
 mod write;
 
 use crate::reference::Curve;
 use crate::run::{Test, run, with_threads};
-use crate::specimen::{Common, Specimen, element};
+use crate::specimen::{Specimen, element};
 use crate::strip::{CLAMPED, Grid, check_bends, fibre_strain, rows};
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
-use plyflow_mechanics::history::{constant_speed_way, linear};
+use plyflow_geometry::vec3::Vec3;
+use plyflow_mechanics::history::constant_speed_way;
 use plyflow_mechanics::model::{Drive, NodalLoad};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::units::Dimension;
 use plyflow_sdk::{Host, Step, StepError};
-use serde::Deserialize;
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
-
-/// Place of point B in the central square zone: from its centre (0) to its corners (1).
-#[derive(Debug, Clone, Copy, Deserialize)]
-struct PointB {
-    /// Along the pull.
-    along: f64,
-    /// Across it.
-    across: f64,
-}
-
-/// A range of displacements (m).
-#[derive(Debug, Clone, Copy, Deserialize)]
-struct Range {
-    from: f64,
-    to: f64,
-}
-
-/// Parameters (SI).
-#[derive(Debug, Clone, Deserialize)]
-pub struct Parameters {
-    #[serde(flatten)]
-    common: Common,
-    /// Length between the clamps (m).
-    length: f64,
-    /// Width (m).
-    width: f64,
-    /// Way of the moving clamp (m).
-    displacement: f64,
-    /// Time for it (s).
-    pull_time: f64,
-    /// Share of the time in which it starts, and in which it stops.
-    ramp_share: f64,
-    /// Largest out-of-plane place of the undeformed specimen (m).
-    imperfection: f64,
-    /// Largest of the lateral load in the same shape (Pa).
-    transverse_load: f64,
-    /// Which random shape.
-    seed: u64,
-    /// Amplitude at which a wrinkle counts (m).
-    onset_amplitude: f64,
-    /// Point B.
-    point_b: PointB,
-    /// Radius of the gauges (m).
-    gauge_radius: f64,
-    /// Shear angle at which the stitches begin to fail (rad).
-    #[serde(default)]
-    failure_angle: Option<f64>,
-    /// Displacements over which the amplitude is to stand.
-    #[serde(default)]
-    plateau: Option<Range>,
-    /// Displacement at which the amplitude is compared with its peak.
-    #[serde(default)]
-    late: Option<f64>,
-    /// Way after the onset at which heights are told.
-    after_onset: f64,
-    /// CSV with columns displacement, amplitude.
-    #[serde(default)]
-    measured_amplitude: Option<String>,
-    /// CSV with columns displacement, shear_angle.
-    #[serde(default)]
-    measured_shear: Option<String>,
-}
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use terms::Histories;
+pub use terms::Parameters;
 
 /// Way of the moving clamp: smooth start, constant speed, smooth stop.
 #[derive(Debug, Clone, Copy)]
@@ -112,11 +52,11 @@ impl Pull {
 struct Clamps {
     pull: Pull,
     /// Place at the start, and whether the clamp moves.
-    nodes: Vec<(V, bool)>,
+    nodes: Vec<(Vec3, bool)>,
 }
 
 impl Drive for Clamps {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let (mut x, moves) = self.nodes[k];
         if moves {
             x[0] += self.pull.at(t);
@@ -124,47 +64,8 @@ impl Drive for Clamps {
         x
     }
 
-    fn spin(&self, _k: usize, _t: f64) -> Option<V> {
+    fn spin(&self, _k: usize, _t: f64) -> Option<Vec3> {
         Some([0.0; 3])
-    }
-}
-
-/// Histories, one value per sample.
-#[derive(Debug, Default)]
-struct Histories {
-    displacement: Vec<f64>,
-    force: Vec<f64>,
-    shear_a: Vec<f64>,
-    shear_b: Vec<f64>,
-    shear_largest: Vec<f64>,
-    top: Vec<f64>,
-    bottom: Vec<f64>,
-    section: Vec<f64>,
-    fibre_strain: f64,
-}
-
-impl Histories {
-    fn half_height(&self) -> Vec<f64> {
-        self.top
-            .iter()
-            .zip(&self.bottom)
-            .map(|(t, b)| 0.5 * (t + b))
-            .collect()
-    }
-
-    /// Value of a history at a displacement.
-    fn at(&self, values: &[f64], displacement: f64) -> f64 {
-        linear(&self.displacement, values, displacement)
-    }
-
-    /// Displacement at which a history first exceeds `level`, linear between the samples.
-    fn first_above(&self, values: &[f64], level: f64) -> Option<f64> {
-        let i = values.iter().position(|v| *v > level)?;
-        if i == 0 {
-            return Some(self.displacement[0]);
-        }
-        let share = (level - values[i - 1]) / (values[i] - values[i - 1]);
-        Some(self.displacement[i - 1] + share * (self.displacement[i] - self.displacement[i - 1]))
     }
 }
 
@@ -219,16 +120,6 @@ impl Test for BiasExtension {
     }
 }
 
-/// Shear angle (rad) of the pin-jointed net in the central zone; 90 degrees when it is stretched out.
-fn net_angle(length: f64, width: f64, displacement: f64) -> f64 {
-    let free = length - width;
-    FRAC_PI_2
-        - 2.0
-            * ((free + displacement) / (SQRT_2 * free))
-                .min(1.0)
-                .fixed_acos()
-}
-
 /// The step plugin `coupon-bias-extension`.
 pub struct Plugin;
 
@@ -258,13 +149,11 @@ fn grid(p: &Parameters) -> Grid {
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     p.common.allow(p.length * p.width)?;
     check(p)?;
-    let curve = |path: &Option<String>, y| {
-        path.as_ref()
-            .map(|f| Curve::read(f, ("displacement", Dimension::Length), y))
-            .transpose()
-    };
-    let amplitude = curve(&p.measured_amplitude, ("amplitude", Dimension::Length))?;
-    let shear = curve(&p.measured_shear, ("shear_angle", Dimension::Angle))?;
+    let x = ("displacement", Dimension::Length);
+    let y = ("amplitude", Dimension::Length);
+    let amplitude = Curve::given(p.measured_amplitude.as_ref(), x, y)?;
+    let y = ("shear_angle", Dimension::Angle);
+    let shear = Curve::given(p.measured_shear.as_ref(), x, y)?;
     let grid = grid(p);
     let mut mesh = grid.mesh();
     let shape = imperfection::Shape::new(p.seed, p.length, p.width);
@@ -286,7 +175,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         time: p.pull_time,
         ramp: p.ramp_share * p.pull_time,
     };
-    let nodes: Vec<(V, bool)> = (driven.iter())
+    let nodes: Vec<(Vec3, bool)> = (driven.iter())
         .map(|n| {
             (
                 specimen.mesh.points[*n as usize],
@@ -298,24 +187,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     specimen
         .model
         .set_driven(driven, Box::new(Clamps { pull, nodes }));
-    let half_diagonal = [0.5 * (p.length - p.width), 0.5 * p.width];
-    let middle = 0.5 * p.length;
-    let b = [
-        middle + p.point_b.along * half_diagonal[0],
-        p.point_b.across * half_diagonal[1],
-    ];
-    let h = grid.xs[1] - grid.xs[0];
-    let mut test = BiasExtension {
-        pull,
-        moving,
-        gauge_a: gauge(&specimen, [middle, 0.0], p.gauge_radius),
-        gauge_b: gauge(&specimen, b, p.gauge_radius),
-        section: (0..specimen.mesh.points.len() as u32)
-            .filter(|n| (specimen.mesh.points[*n as usize][0] - middle).abs() < 1.01 * h)
-            .collect(),
-        sum: (0.0, 0.0),
-        histories: Histories::default(),
-    };
+    let mut test = measuring(p, &grid, &specimen, (pull, moving));
     let outcome = run(host, &p.common, &mut specimen, &mut test)?;
     write::Done {
         p,
@@ -324,6 +196,33 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         shear,
     }
     .write(host, &specimen, &outcome)
+}
+
+/// What is measured where; `moving`: driven nodes of the clamp that moves.
+fn measuring(
+    p: &Parameters,
+    grid: &Grid,
+    specimen: &Specimen,
+    (pull, moving): (Pull, Vec<usize>),
+) -> BiasExtension {
+    let half_diagonal = [0.5 * (p.length - p.width), 0.5 * p.width];
+    let middle = 0.5 * p.length;
+    let b = [
+        middle + p.point_b.along * half_diagonal[0],
+        p.point_b.across * half_diagonal[1],
+    ];
+    let h = grid.xs[1] - grid.xs[0];
+    BiasExtension {
+        pull,
+        moving,
+        gauge_a: gauge(specimen, [middle, 0.0], p.gauge_radius),
+        gauge_b: gauge(specimen, b, p.gauge_radius),
+        section: (0..specimen.mesh.points.len() as u32)
+            .filter(|n| (specimen.mesh.points[*n as usize][0] - middle).abs() < 1.01 * h)
+            .collect(),
+        sum: (0.0, 0.0),
+        histories: Histories::default(),
+    }
 }
 
 /// The lateral load at the nodes: its value there times the area that a node stands for.
@@ -422,16 +321,4 @@ fn check(p: &Parameters) -> Result<(), StepError> {
         .into());
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_net_has_the_angles_that_the_thesis_gives() {
-        assert!((net_angle(0.3, 0.15, 0.045).to_degrees() - 43.6).abs() < 0.05);
-        assert!(net_angle(0.2, 0.1, 0.0).abs() < 1e-12);
-        assert!((net_angle(0.2, 0.1, 0.05) - FRAC_PI_2).abs() < 1e-12);
-    }
 }

@@ -7,13 +7,13 @@
 
 use crate::output::Output;
 use crate::rotated_mesh::{least_jacobian, turned_rectangle};
-use crate::run::{Outcome, Test, run, with_threads};
+use crate::run::{Finished, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::{linear, smooth_step};
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_mechanics::model::{Drive, Fixed};
+use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::Style;
 use plyflow_sdk::{Host, Step, StepError};
@@ -37,14 +37,14 @@ pub struct Parameters {
 }
 
 struct Grips {
-    points: Vec<V>,
+    points: Vec<Vec3>,
     length: f64,
     extension: f64,
     time: f64,
 }
 
 impl Drive for Grips {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let half = 0.5 * self.extension * smooth_step(t, 0.0, self.time);
         let [x, y, z] = self.points[k];
         let sign = if x > 0.5 * self.length { 1.0 } else { -1.0 };
@@ -152,22 +152,14 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         .filter(|(_, x)| at_end(x[0]))
         .map(|(n, _)| n as u32)
         .collect();
-    let points: Vec<V> = driven.iter().map(|n| mesh.points[*n as usize]).collect();
+    let points: Vec<Vec3> = driven.iter().map(|n| mesh.points[*n as usize]).collect();
     let side = (points.iter())
         .map(|x| if x[0] > 0.5 * p.length { 1.0 } else { -1.0 })
         .collect();
     let middle = middle(&mesh, p.length, p.width);
     let axis = [eighth.fixed_cos(), -eighth.fixed_sin(), 0.0];
     let mut specimen = Specimen::new(host, &p.common, mesh, axis, Pressed::No)?;
-    for node in 0..specimen.mesh.points.len() as u32 {
-        specimen.model.fix(
-            node,
-            Fixed {
-                translations: [false, false, true],
-                ..Fixed::default()
-            },
-        );
-    }
+    specimen.keep_flat();
     let grips = Grips {
         points,
         length: p.length,
@@ -187,7 +179,13 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         fibre_strain: 0.0,
     };
     let outcome = run(host, &p.common, &mut specimen, &mut test)?;
-    write(host, p, &specimen, &test, jacobian, &outcome)
+    let done = Finished {
+        p,
+        specimen: &specimen,
+        test: &test,
+        outcome: &outcome,
+    };
+    write(host, &done, jacobian)
 }
 
 /// Displacement, force and centre shear of one run.
@@ -260,12 +258,10 @@ pub fn spread(curves: &[(&[f64], &[f64])]) -> Spread {
 
 fn write(
     host: &Host,
-    p: &Parameters,
-    specimen: &Specimen,
-    test: &BiasPlane,
+    done: &Finished<'_, Parameters, BiasPlane>,
     jacobian: f64,
-    outcome: &Outcome,
 ) -> Result<(), StepError> {
+    let (p, test) = (done.p, done.test);
     let mut out = Output::new(host);
     let x = out.curve("run/displacement", "m", &test.displacement)?;
     let force = out.curve("run/force", "N", &test.force)?;
@@ -305,16 +301,7 @@ fn write(
         plot = plot.series(label, x, y, *style);
     }
     plot.done();
-    if !others.is_empty() {
-        let mut curves: Vec<(&[f64], &[f64])> = vec![(&test.displacement, &test.force)];
-        curves.extend(others.iter().map(|r| (&*r.displacement, &*r.force)));
-        let s = spread(&curves);
-        host.result("force_spread_before_peak", s.before, "1")?;
-        if let Some(after) = s.after {
-            host.result("force_spread_after_peak", after, "1")?;
-        }
-        host.result("force_spread_largest", s.largest, "1")?;
-    }
+    spreads(host, test, &others)?;
     let last = |v: &[f64]| v.last().copied().unwrap_or(0.0);
     let peak = crate::reference::largest_between(&test.force);
     host.result("force_peak", peak, "N")?;
@@ -323,7 +310,23 @@ fn write(
     host.result("fibre_strain_largest", test.fibre_strain, "1")?;
     host.result("least_jacobian", jacobian, "1")?;
     out.about.mesh_angle = Some(p.mesh_angle);
-    out.finish(&p.common, specimen, outcome)
+    out.finish(&p.common, done.specimen, done.outcome)
+}
+
+/// Tells how far the forces of other meshes are from the run's own.
+fn spreads(host: &Host, test: &BiasPlane, others: &[Record]) -> Result<(), StepError> {
+    if others.is_empty() {
+        return Ok(());
+    }
+    let mut curves: Vec<(&[f64], &[f64])> = vec![(&test.displacement, &test.force)];
+    curves.extend(others.iter().map(|r| (&*r.displacement, &*r.force)));
+    let s = spread(&curves);
+    host.result("force_spread_before_peak", s.before, "1")?;
+    if let Some(after) = s.after {
+        host.result("force_spread_after_peak", after, "1")?;
+    }
+    host.result("force_spread_largest", s.largest, "1")?;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use crate::strip::{
     self, CLAMPED, Grid, axis_of_family, check_family, fibre_strain, largest, rows,
 };
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
@@ -62,15 +62,15 @@ pub struct Parameters {
 }
 
 struct Held {
-    places: Vec<V>,
+    places: Vec<Vec3>,
 }
 
 impl Drive for Held {
-    fn position(&self, k: usize, _t: f64) -> V {
+    fn position(&self, k: usize, _t: f64) -> Vec3 {
         self.places[k]
     }
 
-    fn spin(&self, _k: usize, _t: f64) -> Option<V> {
+    fn spin(&self, _k: usize, _t: f64) -> Option<Vec3> {
         Some([0.0; 3])
     }
 }
@@ -137,11 +137,6 @@ impl Step for Plugin {
     }
 }
 
-fn profile(path: Option<&String>) -> Result<Option<Curve>, StepError> {
-    path.map(|path| Curve::read(path, ("x", Dimension::Length), ("z", Dimension::Length)))
-        .transpose()
-}
-
 /// Columns and rows: the clamped columns, the clamp line at x = 0, the tip at the overhang.
 fn grid(p: &Parameters, rotates: bool) -> Grid {
     let size = p.common.element_size;
@@ -172,10 +167,9 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         )
         .into());
     }
-    let (reference, other) = (
-        profile(p.reference.as_ref())?,
-        profile(p.compared_with.as_ref())?,
-    );
+    let (x, z) = (("x", Dimension::Length), ("z", Dimension::Length));
+    let reference = Curve::given(p.reference.as_ref(), x, z)?;
+    let other = Curve::given(p.compared_with.as_ref(), x, z)?;
     let grid = grid(p, strip::rotates(host, &p.common)?);
     let axis = axis_of_family(p.family);
     let mut specimen = Specimen::new(host, &p.common, grid.mesh(), axis, Pressed::No)?;

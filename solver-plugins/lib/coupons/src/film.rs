@@ -9,12 +9,12 @@
 
 use crate::output::Output;
 use crate::reference::Curve;
-use crate::run::{Outcome, Test, run, with_threads};
+use crate::run::{Finished, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
-use plyflow_mechanics::model::{Drive, Fixed};
+use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
@@ -64,7 +64,7 @@ struct Edges {
 }
 
 impl Drive for Edges {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let stretch = 1.0 + self.strain * smooth_step(t, 0.0, self.time);
         let [x, y] = self.points[k];
         [x * stretch, if self.both { y * stretch } else { y }, 0.0]
@@ -122,20 +122,11 @@ impl Step for Plugin {
     }
 }
 
-fn curve(path: Option<&String>) -> Result<Option<Curve>, StepError> {
-    path.map(|path| {
-        Curve::read(
-            path,
-            ("nominal_strain", Dimension::Dimensionless),
-            ("nominal_stress", Dimension::Pressure),
-        )
-    })
-    .transpose()
-}
-
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
-    let closed_form = curve(p.closed_form.as_ref())?;
-    let measured = curve(p.measured.as_ref())?;
+    let x = ("nominal_strain", Dimension::Dimensionless);
+    let y = ("nominal_stress", Dimension::Pressure);
+    let closed_form = Curve::given(p.closed_form.as_ref(), x, y)?;
+    let measured = Curve::given(p.measured.as_ref(), x, y)?;
     p.common.allow(p.length * p.width)?;
     let xs = even_axis(-0.5 * p.length, 0.5 * p.length, p.common.element_size);
     let ys = even_axis(-0.5 * p.width, 0.5 * p.width, p.common.element_size);
@@ -155,15 +146,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         .collect();
     let gauge = gauge(&xs, &ys);
     let mut specimen = Specimen::new(host, &p.common, mesh, [1.0, 0.0, 0.0], Pressed::No)?;
-    for node in 0..specimen.mesh.points.len() as u32 {
-        specimen.model.fix(
-            node,
-            Fixed {
-                translations: [false, false, true],
-                ..Fixed::default()
-            },
-        );
-    }
+    specimen.keep_flat();
     let edges = Edges {
         points,
         strain: p.strain,
@@ -182,7 +165,13 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     };
     let outcome = run(host, &p.common, &mut specimen, &mut film)?;
     let references = (closed_form.as_ref(), measured.as_ref());
-    write(host, p, &specimen, &film, references, &outcome)
+    let done = Finished {
+        p,
+        specimen: &specimen,
+        test: &film,
+        outcome: &outcome,
+    };
+    write(host, &done, references)
 }
 
 /// Nodes near a quarter of the length from the centre on both sides, on the grid line nearest the axis, and
@@ -197,12 +186,10 @@ fn gauge(xs: &[f64], ys: &[f64]) -> ([usize; 2], f64) {
 
 fn write(
     host: &Host,
-    p: &Parameters,
-    specimen: &Specimen,
-    film: &Film,
+    done: &Finished<'_, Parameters, Film>,
     (closed_form, measured): (Option<&Curve>, Option<&Curve>),
-    outcome: &Outcome,
 ) -> Result<(), StepError> {
+    let (p, film) = (done.p, done.test);
     let mut out = Output::new(host);
     let x = out.curve("run/nominal_strain", "1", &film.strain)?;
     let y = out.curve("run/nominal_stress", "Pa", &film.stress)?;
@@ -248,5 +235,5 @@ fn write(
     let last = |v: &[f64]| v.last().copied().unwrap_or(0.0);
     host.result("strain_end", last(&film.strain), "1")?;
     host.result("stress_end", last(&film.stress), "Pa")?;
-    out.finish(&p.common, specimen, outcome)
+    out.finish(&p.common, done.specimen, done.outcome)
 }

@@ -4,11 +4,11 @@
 //! pressure there is no equilibrium near by and the disc runs away. The test then stops and says so.
 
 use crate::output::Output;
-use crate::reference::Curve;
-use crate::run::{Outcome, Test, run, with_threads};
+use crate::reference::{Curve, rising};
+use crate::run::{Finished, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Drive, Pressures};
@@ -40,10 +40,10 @@ pub struct Parameters {
 }
 
 /// The rim stays where it is.
-struct Rim(Vec<V>);
+struct Rim(Vec<Vec3>);
 
 impl Drive for Rim {
-    fn position(&self, k: usize, _t: f64) -> V {
+    fn position(&self, k: usize, _t: f64) -> Vec3 {
         self.0[k]
     }
 }
@@ -118,51 +118,18 @@ impl Test for Inflation {
 /// the centre is node 0. Edges are near `size` (m).
 pub fn disc(radius: f64, size: f64) -> QuadMesh {
     let half = ((0.55 * radius / size).round() as i32).max(1);
-    let core = 0.6 * radius;
     let layers = ((0.43 * radius / size).round() as usize).max(1);
-    let mut points = Vec::new();
-    let mut cells = Vec::new();
-    // The centre first: index 0.
-    let side = 2 * half + 1;
-    let number = |i: i32, j: i32| -> u32 {
-        let (k, c) = ((j + half) * side + i + half, half * side + half);
-        match k.cmp(&c) {
-            std::cmp::Ordering::Less => k as u32 + 1,
-            std::cmp::Ordering::Equal => 0,
-            std::cmp::Ordering::Greater => k as u32,
-        }
-    };
-    points.resize((side * side) as usize, [0.0; 3]);
-    for j in -half..=half {
-        for i in -half..=half {
-            let (u, v) = (
-                f64::from(i) / f64::from(half),
-                f64::from(j) / f64::from(half),
-            );
-            let [x, y] = round(u, v);
-            // Between the straight square and the disc.
-            let straight = std::f64::consts::FRAC_1_SQRT_2;
-            let blend = |square: f64, disc: f64| core * (0.6 * straight * square + 0.4 * disc);
-            points[number(i, j) as usize] = [blend(u, x), blend(v, y), 0.0];
-        }
-    }
-    for j in -half..half {
-        for i in -half..half {
-            cells.push([
-                number(i, j),
-                number(i + 1, j),
-                number(i + 1, j + 1),
-                number(i, j + 1),
-            ]);
-        }
-    }
+    let QuadMesh {
+        mut points,
+        mut cells,
+    } = core(half, 0.6 * radius);
     let mut ring: Vec<(i32, i32)> = Vec::new();
     ring.extend((-half..half).map(|j| (half, j)));
     ring.extend((-half + 1..=half).rev().map(|i| (i, half)));
     ring.extend((-half + 1..=half).rev().map(|j| (-half, j)));
     ring.extend((-half..half).map(|i| (i, -half)));
-    let mut inner: Vec<u32> = ring.iter().map(|(i, j)| number(*i, *j)).collect();
-    let start: Vec<V> = inner.iter().map(|n| points[*n as usize]).collect();
+    let mut inner: Vec<u32> = ring.iter().map(|(i, j)| number(half, *i, *j)).collect();
+    let start: Vec<Vec3> = inner.iter().map(|n| points[*n as usize]).collect();
     for layer in 1..=layers {
         let s = layer as f64 / layers as f64;
         let outer: Vec<u32> = (ring.iter().zip(&start))
@@ -185,6 +152,50 @@ pub fn disc(radius: f64, size: f64) -> QuadMesh {
             cells.push([inner[k], outer[k], outer[next], inner[next]]);
         }
         inner = outer;
+    }
+    QuadMesh { points, cells }
+}
+
+/// Number of a node of the core, `half` elements on either side of its centre, which comes first: 0.
+fn number(half: i32, i: i32, j: i32) -> u32 {
+    let (k, c) = (
+        (j + half) * (2 * half + 1) + i + half,
+        half * (2 * half + 1) + half,
+    );
+    match k.cmp(&c) {
+        std::cmp::Ordering::Less => k as u32 + 1,
+        std::cmp::Ordering::Equal => 0,
+        std::cmp::Ordering::Greater => k as u32,
+    }
+}
+
+/// The core of a disc, `width` (m) to the middles of its sides.
+fn core(half: i32, width: f64) -> QuadMesh {
+    let side = 2 * half + 1;
+    let mut points = vec![[0.0; 3]; (side * side) as usize];
+    let mut cells = Vec::new();
+    for j in -half..=half {
+        for i in -half..=half {
+            let (u, v) = (
+                f64::from(i) / f64::from(half),
+                f64::from(j) / f64::from(half),
+            );
+            let [x, y] = round(u, v);
+            // Between the straight square and the disc.
+            let straight = std::f64::consts::FRAC_1_SQRT_2;
+            let blend = |square: f64, disc: f64| width * (0.6 * straight * square + 0.4 * disc);
+            points[number(half, i, j) as usize] = [blend(u, x), blend(v, y), 0.0];
+        }
+    }
+    for j in -half..half {
+        for i in -half..half {
+            cells.push([
+                number(half, i, j),
+                number(half, i + 1, j),
+                number(half, i + 1, j + 1),
+                number(half, i, j + 1),
+            ]);
+        }
     }
     QuadMesh { points, cells }
 }
@@ -216,14 +227,11 @@ impl Step for Plugin {
 }
 
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
-    let reference = match &p.reference {
-        Some(path) => Some(Curve::read(
-            path,
-            ("centre_height", Dimension::Length),
-            ("pressure", Dimension::Pressure),
-        )?),
-        None => None,
-    };
+    let (x, y) = (
+        ("centre_height", Dimension::Length),
+        ("pressure", Dimension::Pressure),
+    );
+    let reference = Curve::given(p.reference.as_ref(), x, y)?;
     if p.common.element_size > 0.5 * p.radius {
         return Err(format!(
             "element_size: given {} m; expected at most half the radius, {} m",
@@ -255,17 +263,21 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         ran_away: false,
     };
     let outcome = run(host, &p.common, &mut specimen, &mut inflation)?;
-    write(host, p, &specimen, &inflation, reference.as_ref(), &outcome)
+    let done = Finished {
+        p,
+        specimen: &specimen,
+        test: &inflation,
+        outcome: &outcome,
+    };
+    write(host, &done, reference.as_ref())
 }
 
 fn write(
     host: &Host,
-    p: &Parameters,
-    specimen: &Specimen,
-    test: &Inflation,
+    done: &Finished<'_, Parameters, Inflation>,
     reference: Option<&Curve>,
-    outcome: &Outcome,
 ) -> Result<(), StepError> {
+    let (p, test) = (done.p, done.test);
     let mut out = Output::new(host);
     let x = out.curve("run/centre_height", "m", &test.height)?;
     let y = out.curve("run/pressure", "Pa", &test.applied)?;
@@ -275,17 +287,13 @@ fn write(
         theory = Some((x, out.curve("reference/pressure", "Pa", &curve.y)?));
         compare(host, test, curve)?;
     }
-    let mut plot = out.plot(
-        "pressure",
-        "Inflated disc: pressure over the height of its centre",
-        ("height of the centre", "mm"),
-        ("pressure", "kPa"),
-    );
-    plot = plot.series("this run", &x, &y, Style::Line);
-    if let Some((x, y)) = &theory {
-        plot = plot.series("membrane theory", x, y, Style::Dashed);
-    }
-    plot.done();
+    let title = "Inflated disc: pressure over the height of its centre";
+    let axes = (("height of the centre", "mm"), ("pressure", "kPa"));
+    let known = theory.as_ref().map(|(x, y)| (&**x, &**y));
+    out.plot("pressure", title, axes.0, axes.1)
+        .series("this run", &x, &y, Style::Line)
+        .also("membrane theory", known, Style::Dashed)
+        .done();
     if test.ran_away {
         out.warn(format!(
             "the disc ran away: its centre passed {:.1} mm at {:.0} Pa of {:.0} Pa. There is no equilibrium \
@@ -306,7 +314,7 @@ fn write(
     let carried = -test.rim.1 / (std::f64::consts::PI * p.radius * p.radius);
     host.result("rim_balance", carried / pressure, "1")?;
     out.about.radius = Some(p.radius);
-    out.finish(&p.common, specimen, outcome)
+    out.finish(&p.common, done.specimen, done.outcome)
 }
 
 /// Errors against the curve of equilibria.
@@ -322,15 +330,13 @@ fn compare(host: &Host, test: &Inflation, curve: &Curve) -> Result<(), StepError
     }
     // Along the ramp: heights increase there.
     let ramp = test.height.len() as f64 * test.ramp / (test.ramp + test.hold);
-    let mut points: Vec<(f64, f64)> = test
+    let points = test
         .height
         .iter()
         .copied()
         .zip(test.applied.iter().copied())
-        .take(ramp as usize)
-        .collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (heights, pressures): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+        .take(ramp as usize);
+    let (heights, pressures) = rising(points);
     let error = curve.relative_rms(&heights, &pressures).ok_or_else(|| {
         "reference: fewer than two points of the run lie in its range of heights".to_owned()
     })?;

@@ -63,6 +63,30 @@ impl<'a> Output<'a> {
         self.about.warnings.push(text);
     }
 
+    fn warn_of_energies(&mut self, p: &Common, outcome: &Outcome) {
+        let h = &outcome.health;
+        if h.peak_kinetic_ratio > p.kinetic_bound {
+            self.warn(format!(
+                "kinetic energy reached {:.1} % of internal energy (bound {:.1} %): the test is not \
+                 quasi-static. Give it a longer duration or less mass scaling",
+                100.0 * h.peak_kinetic_ratio,
+                100.0 * p.kinetic_bound
+            ));
+        }
+        if h.peak_drift_ratio > 0.01 {
+            self.warn(format!(
+                "{:.1} % of the external work is unaccounted for: reduce step_safety",
+                100.0 * h.peak_drift_ratio
+            ));
+        }
+        if outcome.hourglass_ratio > 0.02 {
+            self.warn(format!(
+                "hourglass energy reached {:.1} % of internal energy: refine the mesh",
+                100.0 * outcome.hourglass_ratio
+            ));
+        }
+    }
+
     /// Writes the attributes, with plots and warnings, and nothing else: for tests with results of their own.
     ///
     /// # Errors
@@ -103,26 +127,7 @@ impl<'a> Output<'a> {
                 .write_f64(&format!("history/{name}"), &[n], "J", &data)?;
         }
         let h = &outcome.health;
-        if h.peak_kinetic_ratio > p.kinetic_bound {
-            self.warn(format!(
-                "kinetic energy reached {:.1} % of internal energy (bound {:.1} %): the test is not \
-                 quasi-static. Give it a longer duration or less mass scaling",
-                100.0 * h.peak_kinetic_ratio,
-                100.0 * p.kinetic_bound
-            ));
-        }
-        if h.peak_drift_ratio > 0.01 {
-            self.warn(format!(
-                "{:.1} % of the external work is unaccounted for: reduce step_safety",
-                100.0 * h.peak_drift_ratio
-            ));
-        }
-        if outcome.hourglass_ratio > 0.02 {
-            self.warn(format!(
-                "hourglass energy reached {:.1} % of internal energy: refine the mesh",
-                100.0 * outcome.hourglass_ratio
-            ));
-        }
+        self.warn_of_energies(p, outcome);
         let elements = specimen.model.element_count();
         let element_cycles = elements as f64 * outcome.cycles as f64;
         self.about = Coupon {
@@ -161,6 +166,15 @@ impl Plot<'_, '_> {
     pub fn series(mut self, label: &str, x: &str, y: &str, style: Style) -> Self {
         self.plot.series.push(Series::new(label, x, y).drawn(style));
         self
+    }
+
+    /// Adds a series where there is one.
+    #[must_use]
+    pub fn also(self, label: &str, curve: Option<(&str, &str)>, style: Style) -> Self {
+        match curve {
+            Some((x, y)) => self.series(label, x, y, style),
+            None => self,
+        }
     }
 
     /// Puts it into the artifact.

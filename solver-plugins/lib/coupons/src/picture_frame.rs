@@ -7,11 +7,11 @@
 //! (numerics: dW/dg = F_norm cos g per undeformed area).
 
 use crate::output::Output;
-use crate::reference::Curve;
-use crate::run::{Outcome, SAMPLES, Test, run, with_threads};
+use crate::reference::{Curve, largest_between, rising};
+use crate::run::{Finished, SAMPLES, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::Drive;
@@ -80,7 +80,7 @@ struct Frame {
 }
 
 impl Drive for Frame {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let half = 0.5 * self.path.angle(t);
         let (c, s) = (half.fixed_cos(), half.fixed_sin());
         let [x, y] = self.corners[k];
@@ -184,21 +184,12 @@ impl Step for Plugin {
 
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     check(p)?;
-    let reference = match &p.reference {
-        Some(path) => Some(Curve::read(
-            path,
-            ("shear_angle", Dimension::Angle),
-            ("normalised_force", Dimension::ForcePerLength),
-        )?),
-        None => None,
-    };
-    let whole = match &p.path_reference {
-        Some(path) => Some(Curve::read(
-            path,
-            ("path_length", Dimension::Angle),
-            ("normalised_force", Dimension::ForcePerLength),
-        )?),
-        None => None,
+    let force = ("normalised_force", Dimension::ForcePerLength);
+    let angle = ("shear_angle", Dimension::Angle);
+    let length = ("path_length", Dimension::Angle);
+    let references = References {
+        first_leg: Curve::given(p.reference.as_ref(), angle, force)?,
+        whole_path: Curve::given(p.path_reference.as_ref(), length, force)?,
     };
     p.common.allow(p.side * p.side)?;
     let axis = even_axis(0.0, p.side, p.common.element_size);
@@ -234,11 +225,13 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         extremes: [0.0; 2],
     };
     let outcome = run(host, &p.common, &mut specimen, &mut test)?;
-    let references = References {
-        first_leg: reference,
-        whole_path: whole,
+    let done = Finished {
+        p,
+        specimen: &specimen,
+        test: &test,
+        outcome: &outcome,
     };
-    write(host, p, &specimen, &test, &references, &outcome)
+    write(host, &done, &references)
 }
 
 /// What the run is compared with.
@@ -271,12 +264,10 @@ fn check(p: &Parameters) -> Result<(), StepError> {
 
 fn write(
     host: &Host,
-    p: &Parameters,
-    specimen: &Specimen,
-    test: &PictureFrame,
+    done: &Finished<'_, Parameters, PictureFrame>,
     references: &References,
-    outcome: &Outcome,
 ) -> Result<(), StepError> {
+    let (p, test) = (done.p, done.test);
     let reference = references.first_leg.as_ref();
     let mut out = Output::new(host);
     let lever = |g: f64| 2.0 * p.side * (0.25 * std::f64::consts::PI - 0.5 * g).fixed_cos();
@@ -303,66 +294,64 @@ fn write(
         theory = Some((x, y, n));
     }
     let axis = ("shear angle", "deg");
-    let mut plot = out.plot(
-        "force",
-        "Picture frame: cross-head force",
-        axis,
-        ("force", "N"),
-    );
-    plot = plot.series("this run", &angle, &force, Style::Line);
-    if let Some((x, y, _)) = &theory {
-        plot = plot.series("closed form of the input curve", x, y, Style::Dashed);
-    }
-    plot.done();
+    let label = ("force", "N");
+    let title = "Picture frame: cross-head force";
+    let known = theory.as_ref().map(|(x, y, _)| (&**x, &**y));
+    out.plot("force", title, axis, label)
+        .series("this run", &angle, &force, Style::Line)
+        .also("closed form of the input curve", known, Style::Dashed)
+        .done();
     let label = ("normalised force", "N/m");
-    let mut plot = out.plot(
-        "normalised",
-        "Picture frame: normalised shear force",
-        axis,
-        label,
-    );
-    plot = plot.series("this run", &angle, &norm, Style::Line);
-    if let Some((x, _, n)) = &theory {
-        plot = plot.series("input curve", x, n, Style::Dashed);
-    }
-    plot.done();
+    let title = "Picture frame: normalised shear force";
+    let known = theory.as_ref().map(|(x, _, n)| (&**x, &**n));
+    out.plot("normalised", title, axis, label)
+        .series("this run", &angle, &norm, Style::Line)
+        .also("input curve", known, Style::Dashed)
+        .done();
     if let Some(curve) = reference {
-        // The first leg: on the way back a damaged stitch has another curve.
-        let first = p.path[0];
-        let mut points: Vec<(f64, f64)> = test
-            .angle
-            .iter()
-            .copied()
-            .zip(normalised.iter().copied())
-            .take(SAMPLES / p.path.len())
-            .filter(|(g, _)| g * first > 0.0)
-            .collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
-        let error = curve.relative_rms(&x, &y).ok_or_else(|| {
-            "reference: fewer than two measured points lie in its range of shear angles".to_owned()
-        })?;
+        let error = first_leg_error(p, test, &normalised, curve)?;
         host.result("force_error", error, "1")?;
     }
-    write_path(host, &mut out, p, test, (&normalised, &norm), references)?;
+    write_path(host, &mut out, done, (&normalised, &norm), references)?;
     let sizes: Vec<f64> = test.force.iter().map(|f| f.abs()).collect();
-    let peak = crate::reference::largest_between(&sizes);
+    let peak = largest_between(&sizes);
     host.result("force_peak", peak, "N")?;
     host.result("shear_min", test.extremes[0], "rad")?;
     host.result("shear_max", test.extremes[1], "rad")?;
     out.about.side = Some(p.side);
-    out.finish(&p.common, specimen, outcome)
+    out.finish(&p.common, done.specimen, done.outcome)
+}
+
+/// Error of the normalised force on the first leg: on the way back a damaged stitch has another curve.
+fn first_leg_error(
+    p: &Parameters,
+    test: &PictureFrame,
+    normalised: &[f64],
+    curve: &Curve,
+) -> Result<f64, StepError> {
+    let first = p.path[0];
+    let points = test
+        .angle
+        .iter()
+        .copied()
+        .zip(normalised.iter().copied())
+        .take(SAMPLES / p.path.len())
+        .filter(|(g, _)| g * first > 0.0);
+    let (x, y) = rising(points);
+    curve.relative_rms(&x, &y).ok_or_else(|| {
+        "reference: fewer than two measured points lie in its range of shear angles".into()
+    })
 }
 
 /// What belongs to a path of several legs: its curve, its work, the largest force of each leg.
 fn write_path(
     host: &Host,
     out: &mut Output<'_>,
-    p: &Parameters,
-    test: &PictureFrame,
+    done: &Finished<'_, Parameters, PictureFrame>,
     (normalised, norm): (&[f64], &str),
     references: &References,
 ) -> Result<(), StepError> {
+    let (p, test) = (done.p, done.test);
     let area = p.side * p.side;
     let density: Vec<f64> = test.work_history.iter().map(|w| w / area).collect();
     let length = out.curve("run/path_length", "rad", &test.length)?;
@@ -382,25 +371,17 @@ fn write_path(
             let x = out.curve("reference/path_length", "rad", &curve.x)?;
             theory = Some((x, out.curve("reference/path_force", "N/m", &curve.y)?));
         }
-        let mut plot = out.plot(
-            "path",
-            "Picture frame: normalised force along the path",
-            axis,
-            ("normalised force", "N/m"),
-        );
-        plot = plot.series("this run", &length, norm, Style::Line);
-        if let Some((x, y)) = &theory {
-            plot = plot.series("closed form", x, y, Style::Dashed);
-        }
-        plot.done();
-        out.plot(
-            "work",
-            "Picture frame: work per area along the path",
-            axis,
-            ("work", "N/m"),
-        )
-        .series("this run", &length, &work, Style::Line)
-        .done();
+        let known = theory.as_ref().map(|(x, y)| (&**x, &**y));
+        let label = ("normalised force", "N/m");
+        let title = "Picture frame: normalised force along the path";
+        out.plot("path", title, axis, label)
+            .series("this run", &length, norm, Style::Line)
+            .also("closed form", known, Style::Dashed)
+            .done();
+        let title = "Picture frame: work per area along the path";
+        out.plot("work", title, axis, ("work", "N/m"))
+            .series("this run", &length, &work, Style::Line)
+            .done();
     }
     if let Some(curve) = &references.whole_path {
         let error = curve

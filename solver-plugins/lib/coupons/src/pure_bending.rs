@@ -18,8 +18,8 @@
 mod shape;
 
 use crate::output::Output;
-use crate::reference::Curve;
-use crate::run::{Outcome, Test, run, with_threads};
+use crate::reference::{Curve, rising};
+use crate::run::{Finished, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
 use crate::strip::{self, CLAMPED, Grid, axis_of_family, check_family, fibre_strain, rows};
 use plyflow_fixed::FixedBits;
@@ -174,26 +174,13 @@ impl Step for Plugin {
 
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     check(p)?;
-    let reference = match &p.reference {
-        Some(path) => Some(Curve::read(
-            path,
-            ("curvature", Dimension::Curvature),
-            ("moment", Dimension::Force),
-        )?),
-        None => None,
-    };
+    let (x, y) = (
+        ("curvature", Dimension::Curvature),
+        ("moment", Dimension::Force),
+    );
+    let reference = Curve::given(p.reference.as_ref(), x, y)?;
     p.common.allow(p.length * p.width)?;
-    // An even number of elements along the strip: a column of nodes lies in its middle.
-    let half = (0.5 * p.length / p.common.element_size)
-        .round()
-        .max((CLAMPED + 1) as f64) as usize;
-    let h = 0.5 * p.length / half as f64;
-    let grid = Grid {
-        xs: (0..=2 * half)
-            .map(|i| h * (i as f64 - half as f64))
-            .collect(),
-        ys: rows(p.width, p.common.element_size),
-    };
+    let (h, half, grid) = grid(p);
     let columns = grid.xs.len();
     let sheared = p.shear_angle != 0.0;
     let driven: Vec<u32> = (0..(columns * grid.ys.len()) as u32)
@@ -207,17 +194,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let rotates = strip::rotates(host, &p.common)?;
     let mut specimen = Specimen::new(host, &p.common, grid.mesh(), axis, Pressed::No)?;
     let shape = Shape { h, half };
-    let history = History {
-        // Seen from family 2 along X, family 1 lies along -Y: the same shear leans the other way.
-        shear: if p.family == 2 {
-            -p.shear_angle
-        } else {
-            p.shear_angle
-        },
-        shear_time: if sheared { p.shear_time } else { 0.0 },
-        curvatures: std::iter::once(0.0).chain(p.path.iter().copied()).collect(),
-        leg: p.leg_time,
-    };
+    let history = history(p);
     let roll = Roll {
         shape,
         history: history.clone(),
@@ -244,7 +221,48 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         curvature_error: 0.0,
     };
     let outcome = run(host, &p.common, &mut specimen, &mut test)?;
-    write(host, p, &specimen, &test, reference.as_ref(), &outcome)
+    let done = Finished {
+        p,
+        specimen: &specimen,
+        test: &test,
+        outcome: &outcome,
+    };
+    write(host, &done, reference.as_ref())
+}
+
+/// What is done to the strip over time.
+fn history(p: &Parameters) -> History {
+    History {
+        // Seen from family 2 along X, family 1 lies along -Y: the same shear leans the other way.
+        shear: if p.family == 2 {
+            -p.shear_angle
+        } else {
+            p.shear_angle
+        },
+        shear_time: if p.shear_angle != 0.0 {
+            p.shear_time
+        } else {
+            0.0
+        },
+        curvatures: std::iter::once(0.0).chain(p.path.iter().copied()).collect(),
+        leg: p.leg_time,
+    }
+}
+
+/// The mesh, with the distance of its columns (m) and their number on either side of the middle.
+fn grid(p: &Parameters) -> (f64, usize, Grid) {
+    // An even number of elements along the strip: a column of nodes lies in its middle.
+    let half = (0.5 * p.length / p.common.element_size)
+        .round()
+        .max((CLAMPED + 1) as f64) as usize;
+    let h = 0.5 * p.length / half as f64;
+    let grid = Grid {
+        xs: (0..=2 * half)
+            .map(|i| h * (i as f64 - half as f64))
+            .collect(),
+        ys: rows(p.width, p.common.element_size),
+    };
+    (h, half, grid)
 }
 
 fn check(p: &Parameters) -> Result<(), StepError> {
@@ -285,13 +303,7 @@ fn check(p: &Parameters) -> Result<(), StepError> {
 /// Error measures against the reference: relative root mean square, and the largest difference over the
 /// reference's value where the curvature is at least a tenth of its largest.
 fn errors(reference: &Curve, curvature: &[f64], moment: &[f64]) -> Option<[f64; 2]> {
-    let mut points: Vec<(f64, f64)> = curvature
-        .iter()
-        .copied()
-        .zip(moment.iter().copied())
-        .collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (k, m): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+    let (k, m) = rising(curvature.iter().copied().zip(moment.iter().copied()));
     let rms = reference.relative_rms(&k, &m)?;
     let most = k.iter().map(|k| k.abs()).fold(0.0, f64::max);
     let largest = k
@@ -305,12 +317,10 @@ fn errors(reference: &Curve, curvature: &[f64], moment: &[f64]) -> Option<[f64; 
 
 fn write(
     host: &Host,
-    p: &Parameters,
-    specimen: &Specimen,
-    test: &PureBending,
+    done: &Finished<'_, Parameters, PureBending>,
     reference: Option<&Curve>,
-    outcome: &Outcome,
 ) -> Result<(), StepError> {
+    let (p, test) = (done.p, done.test);
     let mut out = Output::new(host);
     let k = out.curve("run/curvature", "1/m", &test.curvature)?;
     let m = out.curve("run/moment", "N", &test.moment)?;
@@ -326,20 +336,14 @@ fn write(
         )),
         None => None,
     };
-    let mut plot = out.plot(
-        "moment",
-        "Pure bending: moment per width",
-        ("curvature", "1/mm"),
-        ("moment per width", "N"),
-    );
-    plot = plot.series("this run, virtual work", &k, &m, Style::Line);
-    if let Some(end) = &end {
-        plot = plot.series("this run, moment at an end", &k, end, Style::Dashed);
-    }
-    if let Some((x, y)) = &law {
-        plot = plot.series("law that was put in", x, y, Style::Dashed);
-    }
-    plot.done();
+    let axes = (("curvature", "1/mm"), ("moment per width", "N"));
+    let known = law.as_ref().map(|(x, y)| (&**x, &**y));
+    let end_moment = end.as_ref().map(|end| (&*k, &**end));
+    out.plot("moment", "Pure bending: moment per width", axes.0, axes.1)
+        .series("this run, virtual work", &k, &m, Style::Line)
+        .also("this run, moment at an end", end_moment, Style::Dashed)
+        .also("law that was put in", known, Style::Dashed)
+        .done();
     if let Some(c) = reference {
         let missing =
             || "reference: fewer than two points of the run lie in its range of curvatures";
@@ -359,5 +363,5 @@ fn write(
     out.about.family = Some(p.family);
     out.about.shear_angle = Some(p.shear_angle);
     out.about.rotations = Some(test.rotates);
-    out.finish(&p.common, specimen, outcome)
+    out.finish(&p.common, done.specimen, done.outcome)
 }

@@ -44,6 +44,18 @@ impl Curve {
         Ok(curve)
     }
 
+    /// As [`Curve::read`], of a file that may be given.
+    ///
+    /// # Errors
+    /// As [`Curve::read`].
+    pub fn given(
+        path: Option<&String>,
+        x: (&'static str, Dimension),
+        y: (&'static str, Dimension),
+    ) -> Result<Option<Self>, StepError> {
+        path.map(|path| Self::read(path, x, y)).transpose()
+    }
+
     /// Value at x, linear between the points; the ends hold beyond them.
     pub fn at(&self, x: f64) -> f64 {
         linear(&self.x, &self.y, x)
@@ -87,6 +99,13 @@ impl Curve {
         }
         Some((error, size, length))
     }
+}
+
+/// Points (x, y) in the order of x.
+pub fn rising(points: impl Iterator<Item = (f64, f64)>) -> (Vec<f64>, Vec<f64>) {
+    let mut points: Vec<(f64, f64)> = points.collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points.into_iter().unzip()
 }
 
 /// Largest of values sampled evenly, also between samples: the top of the parabola through the largest sample and its neighbours; at an end the sample.

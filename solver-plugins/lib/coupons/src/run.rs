@@ -52,6 +52,18 @@ pub struct Outcome {
     pub seconds: f64,
 }
 
+/// A test that has run, as what writes its results takes it.
+pub struct Finished<'a, P, T> {
+    /// The test's parameters.
+    pub p: &'a P,
+    /// The specimen at the end.
+    pub specimen: &'a Specimen,
+    /// What was measured.
+    pub test: &'a T,
+    /// What came of the run.
+    pub outcome: &'a Outcome,
+}
+
 /// Runs the test to its end: writes a frame at the start, `frames` evenly spaced ones, and keeps the
 /// ledger. The body is called `specimen`; it is defined here.
 ///
@@ -71,78 +83,28 @@ pub fn run(
         &cells,
         &SpecimenBody::new(p.thickness()),
     )?;
-    let end = test.duration();
     let started = Instant::now();
-    let mut shown = (Instant::now(), 0);
-    let (mut time, mut ledger) = (Vec::new(), Vec::new());
-    let mut smallest_step = f64::INFINITY;
-    let mut next_frame = 0;
-    let frames = p.frames.max(1);
-    let interval = end / SAMPLES as f64;
-    let mut critical = 0.0;
-    let mut looked = None;
+    let mut course = Course {
+        host,
+        p,
+        interval: test.duration() / SAMPLES as f64,
+        specimen,
+        test,
+        critical: None,
+        smallest_step: f64::INFINITY,
+        time: Vec::new(),
+        ledger: Vec::new(),
+        frames: 0,
+        shown: (Instant::now(), 0),
+    };
     for sample in 0..SAMPLES {
-        let stale = looked.is_none_or(|c| specimen.model.cycle() >= c + CRITICAL_EVERY);
-        if stale {
-            critical = specimen.model.critical_step().map_err(|e| e.to_string())?;
-            looked = Some(specimen.model.cycle());
-        }
-        let wanted = p
-            .time_step
-            .unwrap_or(f64::INFINITY)
-            .min(p.step_safety * critical);
-        // Of two and more: what is measured is the mean over the steps between samples, and the first of all says nothing yet.
-        let steps = (interval / wanted).ceil().max(2.0);
-        if steps.is_nan() || steps > 1e9 {
-            return Err(format!(
-                "the critical step has fallen to {critical:.3e} s at t = {:.5} s: an element has collapsed. \
-                 Try a finer mesh or a larger hourglass stiffness",
-                specimen.model.time()
-            )
-            .into());
-        }
-        let steps = steps as u64;
-        specimen.model.set_step(interval / steps as f64);
-        smallest_step = smallest_step.min(specimen.model.dt());
-        let start = interval * sample as f64;
-        for k in 0..steps {
-            // Times from the count, not from a sum.
-            let t = start + specimen.model.dt() * k as f64;
-            test.apply(specimen, t);
-            specimen
-                .model
-                .step_from(t, k == 0)
-                .map_err(|e| e.to_string())?;
-            test.stepped(specimen);
-            if k == 0 {
-                test.sample(specimen, t);
-                let energies = specimen.model.energies();
-                time.push(t);
-                ledger.push(energies);
-                if sample * frames >= next_frame * SAMPLES {
-                    frame(host, specimen, t)?;
-                    next_frame += 1;
-                }
-                host.check_cancelled()?;
-                report(host, specimen, test, &energies, end, &mut shown);
-            }
-            // At once: what runs away does not wait for the next sample.
-            if test.done() {
-                break;
-            }
-        }
-        if test.done() {
+        course.advance(sample)?;
+        if course.test.done() {
             break;
         }
     }
-    // A step has moved the time to its end.
-    let t = specimen.model.time();
-    test.apply(specimen, t);
-    specimen.model.step(true).map_err(|e| e.to_string())?;
-    test.sample(specimen, t);
-    time.push(t);
-    ledger.push(specimen.model.energies());
-    frame(host, specimen, t)?;
+    course.end()?;
+    let ledger = course.ledger;
     let internal = ledger.iter().map(Ledger::internal).fold(0.0, f64::max);
     let hourglass = ledger.iter().map(|l| l.hourglass).fold(0.0, f64::max);
     Ok(Outcome {
@@ -152,12 +114,132 @@ pub fn run(
         } else {
             0.0
         },
-        time,
+        time: course.time,
         ledger,
-        cycles: specimen.model.cycle(),
-        smallest_step,
+        cycles: course.specimen.model.cycle(),
+        smallest_step: course.smallest_step,
         seconds: started.elapsed().as_secs_f64(),
     })
+}
+
+/// A test on its way.
+struct Course<'a> {
+    host: &'a Host,
+    p: &'a Common,
+    specimen: &'a mut Specimen,
+    test: &'a mut dyn Test,
+    /// Time between two samples (s).
+    interval: f64,
+    /// The critical step (s), and the cycle in which it was looked at.
+    critical: Option<(f64, u64)>,
+    /// Smallest step so far (s).
+    smallest_step: f64,
+    /// Times of the ledger (s).
+    time: Vec<f64>,
+    ledger: Vec<Ledger>,
+    /// Frames that are written.
+    frames: usize,
+    /// When progress was last reported, and at which cycle.
+    shown: (Instant, u64),
+}
+
+impl Course<'_> {
+    /// Chooses the step until the next sample; how many of them there are.
+    fn steps(&mut self) -> Result<u64, StepError> {
+        let (p, model) = (self.p, &mut self.specimen.model);
+        let (critical, looked) = match self.critical {
+            Some((step, cycle)) if model.cycle() < cycle + CRITICAL_EVERY => (step, cycle),
+            _ => {
+                let step = model.critical_step().map_err(|e| e.to_string())?;
+                (step, model.cycle())
+            }
+        };
+        self.critical = Some((critical, looked));
+        let wanted = p
+            .time_step
+            .unwrap_or(f64::INFINITY)
+            .min(p.step_safety * critical);
+        // Of two and more: what is measured is the mean over the steps between samples, and the first of all says nothing yet.
+        let steps = (self.interval / wanted).ceil().max(2.0);
+        if steps.is_nan() || steps > 1e9 {
+            return Err(format!(
+                "the critical step has fallen to {critical:.3e} s at t = {:.5} s: an element has collapsed. \
+                 Try a finer mesh or a larger hourglass stiffness",
+                model.time()
+            )
+            .into());
+        }
+        let steps = steps as u64;
+        model.set_step(self.interval / steps as f64);
+        self.smallest_step = self.smallest_step.min(model.dt());
+        Ok(steps)
+    }
+
+    /// Takes a sample, and goes on to the next.
+    fn advance(&mut self, sample: usize) -> Result<(), StepError> {
+        let steps = self.steps()?;
+        let start = self.interval * sample as f64;
+        for k in 0..steps {
+            // Times from the count, not from a sum.
+            let t = start + self.specimen.model.dt() * k as f64;
+            self.test.apply(self.specimen, t);
+            let stepped = self.specimen.model.step_from(t, k == 0);
+            stepped.map_err(|e| e.to_string())?;
+            self.test.stepped(self.specimen);
+            if k == 0 {
+                self.sample(t);
+                if sample * self.p.frames.max(1) >= self.frames * SAMPLES {
+                    frame(self.host, self.specimen, t)?;
+                    self.frames += 1;
+                }
+                self.host.check_cancelled()?;
+                self.report();
+            }
+            // At once: what runs away does not wait for the next sample.
+            if self.test.done() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn sample(&mut self, t: f64) {
+        self.test.sample(self.specimen, t);
+        self.time.push(t);
+        self.ledger.push(self.specimen.model.energies());
+    }
+
+    /// The last sample and frame.
+    fn end(&mut self) -> Result<(), StepError> {
+        // A step has moved the time to its end.
+        let t = self.specimen.model.time();
+        self.test.apply(self.specimen, t);
+        self.specimen.model.step(true).map_err(|e| e.to_string())?;
+        self.sample(t);
+        frame(self.host, self.specimen, t)
+    }
+
+    fn report(&mut self) {
+        let elapsed = self.shown.0.elapsed().as_secs_f64();
+        if elapsed < 0.2 {
+            return;
+        }
+        let model = &self.specimen.model;
+        let (cycle, energies) = (model.cycle(), model.energies());
+        let internal = energies.internal();
+        self.host.progress(&Progress {
+            fraction: model.time() / self.test.duration(),
+            simulated_time: model.time(),
+            rate: (cycle - self.shown.1) as f64 / elapsed,
+            energy_ratio: if internal > 0.0 {
+                energies.kinetic / internal
+            } else {
+                -1.0
+            },
+            phase: self.test.phase(),
+        });
+        self.shown = (Instant::now(), cycle);
+    }
 }
 
 fn frame(host: &Host, specimen: &Specimen, t: f64) -> Result<(), StepError> {
@@ -172,34 +254,6 @@ fn frame(host: &Host, specimen: &Specimen, t: f64) -> Result<(), StepError> {
         host.write_field("specimen", on, &f.name, 1, &f.unit, &values)?;
     }
     host.end_frame()
-}
-
-fn report(
-    host: &Host,
-    specimen: &Specimen,
-    test: &dyn Test,
-    e: &Ledger,
-    end: f64,
-    shown: &mut (Instant, u64),
-) {
-    let elapsed = shown.0.elapsed().as_secs_f64();
-    if elapsed < 0.2 {
-        return;
-    }
-    let cycle = specimen.model.cycle();
-    let internal = e.internal();
-    host.progress(&Progress {
-        fraction: specimen.model.time() / end,
-        simulated_time: specimen.model.time(),
-        rate: (cycle - shown.1) as f64 / elapsed,
-        energy_ratio: if internal > 0.0 {
-            e.kinetic / internal
-        } else {
-            -1.0
-        },
-        phase: test.phase(),
-    });
-    *shown = (Instant::now(), cycle);
 }
 
 /// Runs `f` in a pool of the threads that the host allows.

@@ -1,12 +1,12 @@
 //! A specimen: one sheet of a material, meshed, with an element formulation.
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::component::{
     ElementField, ElementInstance, MaterialInstance, element_fields,
 };
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_mechanics::model::{Model, StepSettings};
+use plyflow_mechanics::model::{Fixed, Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::material::Material;
@@ -119,6 +119,17 @@ pub fn element(host: &Host, p: &Common) -> Result<(ElementInstance, Vec<ElementF
 }
 
 impl Specimen {
+    /// Keeps all nodes in the plane in which they are (z).
+    pub fn keep_flat(&mut self) {
+        let in_plane = Fixed {
+            translations: [false, false, true],
+            ..Fixed::default()
+        };
+        for node in 0..self.mesh.points.len() as u32 {
+            self.model.fix(node, in_plane);
+        }
+    }
+
     /// Builds the model of one sheet. `axis` is the direction of material axis e1 in the undeformed plane;
     /// e2 lies 90 degrees counter-clockwise from it (seen against the normal).
     ///
@@ -128,7 +139,7 @@ impl Specimen {
         host: &Host,
         p: &Common,
         mesh: QuadMesh,
-        axis: V,
+        axis: Vec3,
         pressed: Pressed,
     ) -> Result<Self, StepError> {
         let (element, fields) = element(host, p)?;

@@ -9,7 +9,7 @@
 //! line must be one of those, or the strip is clamped a tenth of an element off.
 
 use crate::specimen::{Common, Specimen, element};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_sdk::{Host, StepError};
@@ -94,7 +94,7 @@ pub fn rows(width: f64, size: f64) -> Vec<f64> {
 }
 
 /// Direction of material axis e1 (undeformed plane) that puts fibre family 1 or 2 along x.
-pub fn axis_of_family(family: u32) -> V {
+pub fn axis_of_family(family: u32) -> Vec3 {
     if family == 2 {
         // e2 lies 90 degrees counter-clockwise from e1.
         [0.0, -1.0, 0.0]

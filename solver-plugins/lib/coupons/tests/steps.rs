@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 /// One thread, with Plyflow's own components.
 const ALONE: Machine = Machine {
     threads: 1,
+    cancelled: false,
     component,
 };
 
@@ -66,7 +67,7 @@ fn content(a: &MemoryArtifact) -> Vec<(String, Vec<u64>)> {
 
 fn same_on_one_and_two_threads<S: Step>(parameters: &Value) {
     let with = |threads| {
-        let machine = Machine { threads, component };
+        let machine = Machine { threads, ..ALONE };
         run_on::<S>(&machine, parameters.clone(), &[], &[]).unwrap_or_else(|e| panic!("{e}"))
     };
     let (one, two) = (with(1), with(2));

@@ -111,11 +111,7 @@ pub fn align_where(
         found.rms = (squares.sum::<f64>() / kept.max(1) as f64).sqrt();
         let (change, decided) = solve(&rows);
         found.decided = decided;
-        // Turned about the middle of the points; turns are scaled with their extent, so that all unknowns are lengths.
-        let turn = UnitQuaternion::from_scaled_axis(change.fixed_rows::<3>(0) / extent);
-        let shift = Translation3::from(change.fixed_rows::<3>(3).into_owned());
-        let about = Translation3::from(pivot.coords);
-        found.motion = shift * about * turn * about.inverse() * found.motion;
+        found.motion = moved(&change, extent, pivot) * found.motion;
         found.last_motion = change.norm();
         if found.last_motion < CONVERGED * extent {
             found.converged = true;
@@ -167,6 +163,15 @@ fn row(
         // On the surface: above it, a point lies along its facet's normal and not along this one.
         smooth: six(Point3::from(closest.point), Vector3::from(smooth)),
     })
+}
+
+/// A change of shift and turn about `pivot`, the middle of the points, as a motion. Turns are scaled with the `extent` of the points (m), so that all
+/// unknowns are lengths.
+fn moved(change: &Vector6<f64>, extent: f64, pivot: Point3<f64>) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_scaled_axis(change.fixed_rows::<3>(0) / extent);
+    let shift = Translation3::from(change.fixed_rows::<3>(3).into_owned());
+    let about = Translation3::from(pivot.coords);
+    shift * about * turn * about.inverse()
 }
 
 /// The motion of least squares that takes the distances away, without the motions that the smooth surface does not decide.

@@ -1,6 +1,6 @@
 //! Areas of defects, to the line at which the ply comes back to the tool.
 
-use crate::measure::Ply;
+use crate::ply::Ply;
 use nalgebra::{Matrix3, Vector3};
 use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 

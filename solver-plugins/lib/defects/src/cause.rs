@@ -1,6 +1,7 @@
 //! What a wrinkle most likely comes from, by what the fields say about its place.
 
-use crate::measure::{Defect, Ply, mean_along};
+use crate::measure::{Defect, mean_along};
+use crate::ply::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::rectangle;
 use plyflow_geometry::vec3::distance;

@@ -1,7 +1,7 @@
 //! The crests of one connected place. Two wrinkles that meet, such as one across a spar and one along its edge, are connected, and have each a direction and
 //! a length of its own: a crest that turns a corner is several, and what branches off is one by itself.
 
-use crate::Ply;
+use crate::ply::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{distance, dot, norm, sub};
 use plyflow_surface::Ridge;

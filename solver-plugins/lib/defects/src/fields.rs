@@ -1,6 +1,6 @@
 //! How far the positions, the distances from the tool and the shear angles of one way to the answer are from those of another.
 
-use crate::measure::Ply;
+use crate::ply::Ply;
 use plyflow_geometry::vec3::distance;
 use plyflow_geometry::{Location, QuadLocator};
 use plyflow_surface::weighted_quantiles;

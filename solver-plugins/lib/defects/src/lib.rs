@@ -13,10 +13,12 @@ mod measure;
 #[cfg(feature = "steps")]
 pub mod of_run;
 pub mod pairs;
+mod ply;
 mod points;
 pub mod scan;
 
 pub use cause::{Limits, Neighbour, find_causes, relative_angle};
 pub use fields::{FieldErrors, QUANTILES, distance_at};
-pub use measure::{Defect, Ply, RidgeShear, Settings, Tool, measure, quantiles};
+pub use measure::{Defect, RidgeShear, Settings, measure, quantiles};
+pub use ply::{Ply, Shape, Tool};
 pub use plyflow_model::artifact::{Cause, DefectKind as Kind};

@@ -1,14 +1,12 @@
 //! Wrinkles and bridging of one formed ply.
 
 use crate::area::{Extent, NONE, extents, sample};
-use crate::crests::crests;
+use crate::crests::{Crest, crests};
+use crate::ply::Ply;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::{Vec3, cross, distance, dot, scale, sub, unit};
+use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_model::artifact::{self, Cause, DefectKind as Kind};
-use plyflow_surface::{
-    Crests, Curvature, NodalDistance, Ridge, Surface, Topology, curvatures, nodal_distances,
-    ridge_line, sharpness,
-};
+use plyflow_surface::{Bound, Curvature, Ridge, ridge_line, sharpness};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
@@ -27,120 +25,6 @@ pub struct Settings {
     pub minimum_wrinkle_length: f64,
     /// Smaller areas are no bridging (m2).
     pub minimum_bridging_area: f64,
-}
-
-/// A formed ply: of a simulation, or scanned.
-#[derive(Debug, Clone)]
-pub struct Ply {
-    /// Name of the sheet.
-    pub name: String,
-    /// Its mesh, quads or triangles.
-    pub topology: Topology,
-    /// `[nodes]` in the flat ply (m); of a scan, which knows none, where they are.
-    pub undeformed: Vec<Vec3>,
-    /// `[nodes]` (m).
-    pub formed: Vec<Vec3>,
-    /// `[cells]` (rad); empty when it is not known.
-    pub shear_angle: Vec<f64>,
-    /// `[cells]` the smaller of the two strains along fibres; empty when they are not known.
-    pub fibre_strain: Vec<f64>,
-    /// By family, `[cells]`: the strain along its fibres; empty when they are not known.
-    pub fibre_strains: [Vec<f64>; 2],
-    /// `[nodes]`.
-    pub distance: Vec<NodalDistance>,
-    /// `[nodes]`.
-    pub curvature: Vec<Curvature>,
-    /// `[nodes]` crest curvature of the tool at the closest point (1/m, zero or negative).
-    pub tool_crest: Vec<f64>,
-}
-
-/// A tool and its own crests.
-#[derive(Debug, Clone)]
-pub struct Tool {
-    /// Its surface.
-    pub surface: Surface,
-    crests: Crests,
-}
-
-impl Tool {
-    /// Takes the curvatures of a tool's surface.
-    pub fn new(surface: Surface) -> Self {
-        let crests = Crests::new(&surface);
-        Self { surface, crests }
-    }
-}
-
-impl Ply {
-    /// Takes distances and curvatures of a ply whose mid-plane lies `offset` (m) from the tool when all sheets
-    /// lie on it. Nothing is known of its strains ([`Ply::shear_angle`], [`Ply::fibre_strain`]). Cells may be wound either way, all alike: what is a crest
-    /// is told by the side on which the tool lies.
-    pub fn new(
-        name: String,
-        topology: Topology,
-        undeformed: Vec<Vec3>,
-        formed: Vec<Vec3>,
-        tool: &Tool,
-        offset: f64,
-        foot_margin: f64,
-    ) -> Self {
-        let distance = nodal_distances(&tool.surface, &formed, offset, foot_margin);
-        let mut curvature = curvatures(&topology, &formed);
-        if faces(&topology, &formed, &tool.surface, &distance) {
-            curvature.iter_mut().for_each(turn_over);
-        }
-        let tool_crest = (distance.iter().zip(&formed))
-            .map(|(d, p)| tool.crests.at(*p, d.triangle))
-            .collect();
-        Self {
-            name,
-            topology,
-            undeformed,
-            formed,
-            shear_angle: Vec::new(),
-            fibre_strain: Vec::new(),
-            fibre_strains: [Vec::new(), Vec::new()],
-            distance,
-            curvature,
-            tool_crest,
-        }
-    }
-
-    /// The mean of a cell field (`[cells]`) at a node; `None` when the field is empty.
-    pub fn at_node(&self, field: &[f64], node: u32) -> Option<f64> {
-        let cells = self.topology.cells_of(node as usize);
-        let sum: f64 = cells
-            .iter()
-            .map(|&c| field.get(c as usize))
-            .sum::<Option<f64>>()?;
-        (!cells.is_empty()).then(|| sum / cells.len() as f64)
-    }
-}
-
-impl Ply {
-    /// Takes account of plies below that do not lie under all of its nodes: by node, what (m) of its offset is not there.
-    pub fn lower(&mut self, missing: &[f64]) {
-        for (distance, missing) in self.distance.iter_mut().zip(missing) {
-            distance.value += missing;
-        }
-    }
-}
-
-/// Whether a ply's normals point, on the whole and by area, to the tool: its cells are wound the other way round. It is asked of the nodes that are
-/// judged alone, past a free edge the tool has no side.
-fn faces(topology: &Topology, formed: &[Vec3], tool: &Surface, distance: &[NodalDistance]) -> bool {
-    let (normals, areas) = (topology.normals(formed), topology.node_areas(formed));
-    let outwards = |i: usize| {
-        let [a, b, c] = tool.triangles()[distance[i].triangle].map(|k| tool.points()[k as usize]);
-        areas[i] * dot(normals[i], unit(cross(sub(b, a), sub(c, a))))
-    };
-    let judged = (0..formed.len()).filter(|&i| distance[i].judged);
-    judged.map(outwards).sum::<f64>() < 0.0
-}
-
-/// The curvature as seen from the other side.
-fn turn_over(seen: &mut Curvature) {
-    (seen.max, seen.min) = (-seen.max, -seen.min);
-    seen.normal = scale(seen.normal, -1.0);
 }
 
 /// The curvature with the more negative of the two principal ones first, where one is that of a crest.
@@ -252,49 +136,9 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     let off: Vec<bool> = (0..n)
         .map(|i| judged[i] && ply.distance[i].value > settings.distance_threshold)
         .collect();
-    let limit = |i: usize, share: f64| ply.tool_crest[i] - share * settings.curvature_threshold;
-    let hold = settings.crest_hold;
     let crested: Vec<Curvature> = ply.curvature.iter().map(as_crest).collect();
-    let curved: Vec<bool> = (0..n)
-        .map(|i| off[i] && crested[i].max < limit(i, hold))
-        .collect();
-    let crest = without_gaps(ply, &off, curved);
-    let margin: Vec<f64> = (ply.distance.iter())
-        .map(|d| d.value - settings.distance_threshold)
-        .collect();
-    let mut wrinkles = Vec::new();
-    for nodes in ply.topology.node_components(&crest) {
-        let beyond = |&i: &u32| crested[i as usize].max < limit(i as usize, 1.0);
-        if !nodes.iter().any(beyond) {
-            continue;
-        }
-        let bound = nodes
-            .iter()
-            .map(|&i| -limit(i as usize, hold))
-            .fold(f64::INFINITY, f64::min);
-        let long = |r: &Ridge| r.length >= settings.minimum_wrinkle_length;
-        let ridge_of = |nodes: &[u32]| {
-            let (topology, formed) = (&ply.topology, &ply.formed);
-            let ridge = ridge_line(topology, formed, &crested, nodes, bound, &margin);
-            ridge.filter(|r| long(r) && nodes.iter().any(beyond))
-        };
-        // What is curved as a crest reaches at most to half of the flank.
-        let beside = 0.6 * flank(highest_node(ply, &nodes), curvature(&crested, &nodes));
-        let parts = crests(ply, &nodes, beside, ridge_of);
-        wrinkles.extend(parts.into_iter().filter(|(_, r)| long(r)));
-    }
-    let mut set = vec![NONE; n];
-    let mut nearest = vec![f64::INFINITY; n];
-    for (w, (nodes, _)) in wrinkles.iter().enumerate() {
-        let reach = flank(highest_node(ply, nodes), curvature(&crested, nodes));
-        let lengths = ply.topology.path_lengths(&ply.formed, nodes, &off, reach);
-        for i in 0..n {
-            if lengths[i] < nearest[i] {
-                nearest[i] = lengths[i];
-                set[i] = w;
-            }
-        }
-    }
+    let wrinkles = wrinkles(ply, &off, &crested, settings);
+    let mut set = with_flanks(ply, &off, &crested, &wrinkles);
     let rest: Vec<bool> = (0..n).map(|i| off[i] && set[i] == NONE).collect();
     let bridges = ply.topology.node_components(&rest);
     for (b, nodes) in bridges.iter().enumerate() {
@@ -324,6 +168,62 @@ pub fn measure(ply: &Ply, inside: &[bool], settings: &Settings) -> Vec<Defect> {
     bridging.sort_by(|a, b| b.area.total_cmp(&a.area));
     found.extend(bridging);
     found
+}
+
+/// Nodes and ridge of each wrinkle, without its flanks. `off`: the nodes that stand off; `crested`: [`as_crest`] of all.
+fn wrinkles(ply: &Ply, off: &[bool], crested: &[Curvature], settings: &Settings) -> Vec<Crest> {
+    let limit = |i: usize, share: f64| ply.tool_crest[i] - share * settings.curvature_threshold;
+    let hold = settings.crest_hold;
+    let curved: Vec<bool> = (0..off.len())
+        .map(|i| off[i] && crested[i].max < limit(i, hold))
+        .collect();
+    let crest = without_gaps(ply, off, curved);
+    let margin: Vec<f64> = (ply.distance.iter())
+        .map(|d| d.value - settings.distance_threshold)
+        .collect();
+    let mut wrinkles = Vec::new();
+    for nodes in ply.topology.node_components(&crest) {
+        let beyond = |&i: &u32| crested[i as usize].max < limit(i as usize, 1.0);
+        if !nodes.iter().any(beyond) {
+            continue;
+        }
+        let threshold = nodes
+            .iter()
+            .map(|&i| -limit(i as usize, hold))
+            .fold(f64::INFINITY, f64::min);
+        let bound = Bound {
+            threshold,
+            margin: &margin,
+        };
+        let long = |r: &Ridge| r.length >= settings.minimum_wrinkle_length;
+        let ridge_of = |nodes: &[u32]| {
+            let (topology, formed) = (&ply.topology, &ply.formed);
+            let ridge = ridge_line(topology, formed, crested, nodes, bound);
+            ridge.filter(|r| long(r) && nodes.iter().any(beyond))
+        };
+        // What is curved as a crest reaches at most to half of the flank.
+        let beside = 0.6 * flank(highest_node(ply, &nodes), curvature(crested, &nodes));
+        let parts = crests(ply, &nodes, beside, ridge_of);
+        wrinkles.extend(parts.into_iter().filter(|(_, r)| long(r)));
+    }
+    wrinkles
+}
+
+/// By node, to which wrinkle it belongs ([`NONE`]: to none): that whose crest is the nearest, as far as its flanks reach.
+fn with_flanks(ply: &Ply, off: &[bool], crested: &[Curvature], wrinkles: &[Crest]) -> Vec<usize> {
+    let mut set = vec![NONE; off.len()];
+    let mut nearest = vec![f64::INFINITY; off.len()];
+    for (w, (nodes, _)) in wrinkles.iter().enumerate() {
+        let reach = flank(highest_node(ply, nodes), curvature(crested, nodes));
+        let lengths = ply.topology.path_lengths(&ply.formed, nodes, off, reach);
+        for i in 0..off.len() {
+            if lengths[i] < nearest[i] {
+                nearest[i] = lengths[i];
+                set[i] = w;
+            }
+        }
+    }
+    set
 }
 
 /// Crests and the single nodes between pieces of one: such a node stands off, is convex too, and touches two pieces. (Between

@@ -1,6 +1,6 @@
 //! Tool and plies of a formed run: the same for every step that measures defects.
 
-use crate::{Neighbour, Ply, Tool};
+use crate::{Neighbour, Ply, Shape, Tool};
 pub use plyflow_model::artifact::Sheet;
 use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::draped::Formed;
@@ -34,39 +34,49 @@ pub fn last_frame(input: &Input, meshes: &Meshes) -> Result<usize, StepError> {
     last.ok_or_else(|| format!("'{}' has no frame: there is nothing to measure", input.step).into())
 }
 
-/// A ply in the frame `frame` of a run, its distances and curvatures taken; without fields. `offset`: of its mid-surface from the
+/// A frame of a run.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    /// What reads it.
+    pub host: &'a Host,
+    /// The run.
+    pub input: &'a Input,
+    /// Number of the frame.
+    pub frame: usize,
+}
+
+/// A ply in a frame of a run, its distances and curvatures taken; without fields. `offset`: of its mid-surface from the
 /// tool (m). Of a net that does not reach everywhere it is the part that is draped ([`plyflow_surface::draped`]).
 ///
 /// # Errors
 /// When the run has no such body, or its mesh or frame cannot be read.
 pub fn ply(
-    host: &Host,
-    input: &Input,
-    frame: usize,
+    of: Frame<'_>,
     (name, offset): (&str, f64),
     tool: &Tool,
     foot_margin: f64,
 ) -> Result<Ply, StepError> {
-    Ok(part_of_ply(host, input, frame, (name, offset), tool, foot_margin)?.0)
+    Ok(part_of_ply(of, (name, offset), tool, foot_margin)?.0)
 }
 
 fn part_of_ply(
-    host: &Host,
-    input: &Input,
-    frame: usize,
+    of: Frame<'_>,
     (name, offset): (&str, f64),
     tool: &Tool,
     foot_margin: f64,
 ) -> Result<(Ply, Formed), StepError> {
+    let Frame { host, input, frame } = of;
     let meshes = host.meshes(input)?;
     let body = meshes.body(name)?;
     let mut formed = Formed::read(host, input, body, frame)?;
     let topology = Topology::new(formed.flat.len(), body.nodes_per_cell, &formed.cells);
     let mut ply = Ply::new(
         name.to_owned(),
-        topology,
-        std::mem::take(&mut formed.flat),
-        std::mem::take(&mut formed.points),
+        Shape {
+            topology,
+            undeformed: std::mem::take(&mut formed.flat),
+            formed: std::mem::take(&mut formed.points),
+        },
         tool,
         offset,
         foot_margin,
@@ -82,17 +92,16 @@ fn part_of_ply(
 /// # Errors
 /// When the run has no such body or no shear angle, or they cannot be read.
 pub fn strained_ply(
-    host: &Host,
-    input: &Input,
-    frame: usize,
+    of: Frame<'_>,
     sheet: &Sheet,
     tool: &Tool,
     foot_margin: f64,
 ) -> Result<Ply, StepError> {
+    let Frame { host, input, frame } = of;
     let meshes = host.meshes(input)?;
     let body = meshes.body(&sheet.name)?;
     let place = (sheet.name.as_str(), sheet.offset);
-    let (mut ply, part) = part_of_ply(host, input, frame, place, tool, foot_margin)?;
+    let (mut ply, part) = part_of_ply(of, place, tool, foot_margin)?;
     let field = |name: &str| -> Result<Vec<f64>, StepError> {
         Ok(part.of_cells(host.frame_field(input, body, frame, name)?))
     };

@@ -150,6 +150,52 @@ fn columns(lines: &Lines) -> Result<Columns, RowError> {
     Ok(unnamed)
 }
 
+/// The cells of a header: in `x [mm] y [mm]` a unit belongs to the name before it.
+fn with_units(cells: &[String], separator: Separator) -> Vec<String> {
+    if separator != Separator::Blanks {
+        return cells.to_vec();
+    }
+    let mut joined: Vec<String> = Vec::new();
+    for cell in cells {
+        match joined.last_mut() {
+            Some(before) if cell.starts_with(['[', '(']) => *before += &format!(" {cell}"),
+            _ => joined.push(cell.clone()),
+        }
+    }
+    joined
+}
+
+/// The units of three columns from a row of units, as instruments write it.
+fn row_of_units(cells: &[String], index: [usize; 3]) -> Option<[Option<String>; 3]> {
+    let of = index.map(|k| {
+        cells
+            .get(k)
+            .map(|c| c.trim_matches(['[', ']', '(', ')']).to_owned())
+    });
+    let lengths = of.iter().flatten().filter(|u| is_length(u)).count();
+    (lengths == 3).then_some(of)
+}
+
+/// The units `told` of x, y and z, in m; none of all or of none.
+fn units_of(told: &[Option<String>; 3], line: usize) -> Result<Option<[f64; 3]>, RowError> {
+    match told {
+        [None, None, None] => Ok(None),
+        [Some(x), Some(y), Some(z)] => {
+            let mut of = [0.0; 3];
+            for (unit, into) in [x, y, z].into_iter().zip(&mut of) {
+                let text = format!("1 {unit}");
+                *into = parse_quantity(&text, Dimension::Length)
+                    .map_err(|e| RowError::at(line, format!("the unit `{}`: {e}", shown(unit))))?;
+            }
+            Ok(Some(of))
+        }
+        _ => Err(RowError::at(
+            line,
+            "some of the columns x, y, z have a unit, and some have none; give it to all three, or to none",
+        )),
+    }
+}
+
 /// The columns of a header at a line; `None` where it has not one each of x, y and z.
 fn named(
     lines: &Lines,
@@ -157,18 +203,7 @@ fn named(
     separator: Separator,
     line: usize,
 ) -> Result<Option<Columns>, RowError> {
-    let mut cells: Vec<String> = cells.to_vec();
-    if separator == Separator::Blanks {
-        // `x [mm] y [mm]`: a unit belongs to the name before it.
-        let mut joined: Vec<String> = Vec::new();
-        for cell in cells {
-            match joined.last_mut() {
-                Some(before) if cell.starts_with(['[', '(']) => *before += &format!(" {cell}"),
-                _ => joined.push(cell),
-            }
-        }
-        cells = joined;
-    }
+    let cells = with_units(cells, separator);
     let heads: Vec<Head> = cells.iter().map(|c| head(c)).collect();
     let mut index = [0; 3];
     for (axis, into) in index.iter_mut().enumerate() {
@@ -188,42 +223,12 @@ fn named(
     if told.iter().all(Option::is_none)
         && let Some((below, ways)) = first_behind(lines, line)
     {
-        // A row of units, as instruments write it.
-        let units = ways.iter().find_map(|(_, cells)| {
-            let of = index.map(|k| {
-                cells
-                    .get(k)
-                    .map(|c| c.trim_matches(['[', ']', '(', ')']).to_owned())
-            });
-            of.iter()
-                .flatten()
-                .filter(|u| is_length(u))
-                .count()
-                .eq(&3)
-                .then_some(of)
-        });
+        let units = (ways.iter()).find_map(|(_, cells)| row_of_units(cells, index));
         if let Some(units) = units {
             (told, last) = (units, below);
         }
     }
-    let unit = match &told {
-        [None, None, None] => None,
-        [Some(x), Some(y), Some(z)] => {
-            let mut of = [0.0; 3];
-            for (unit, into) in [x, y, z].into_iter().zip(&mut of) {
-                let text = format!("1 {unit}");
-                *into = parse_quantity(&text, Dimension::Length)
-                    .map_err(|e| RowError::at(last, format!("the unit `{}`: {e}", shown(unit))))?;
-            }
-            Some(of)
-        }
-        _ => {
-            return Err(RowError::at(
-                last,
-                "some of the columns x, y, z have a unit, and some have none; give it to all three, or to none",
-            ));
-        }
-    };
+    let unit = units_of(&told, last)?;
     Ok(Some(Columns {
         index,
         unit,

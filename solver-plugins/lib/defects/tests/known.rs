@@ -2,7 +2,8 @@
 
 use plyflow_defects::scan::join;
 use plyflow_defects::{
-    Cause, Defect, FieldErrors, Kind, Limits, Neighbour, Ply, Settings, Tool, find_causes, measure,
+    Cause, Defect, FieldErrors, Kind, Limits, Neighbour, Ply, Settings, Shape, Tool, find_causes,
+    measure,
 };
 use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_surface::{Surface, Topology, triangles};
@@ -99,9 +100,11 @@ fn ply(topology: Topology, formed: Vec<Vec3>) -> Ply {
     let undeformed = formed.iter().map(|p| [p[0], p[1], 0.0]).collect();
     Ply::new(
         "ply".into(),
-        topology,
-        undeformed,
-        formed,
+        Shape {
+            topology,
+            undeformed,
+            formed,
+        },
         &tool(),
         OFFSET,
         SETTINGS.foot_margin,
@@ -414,9 +417,11 @@ fn a_crest_goes_on_through_a_hollow_bend_of_the_tool() {
         let undeformed = points.iter().map(|&[s, y]| [s, y, 0.0]).collect();
         let ply = Ply::new(
             "ply".into(),
-            Topology::new(points.len(), 4, &cells),
-            undeformed,
-            formed,
+            Shape {
+                topology: Topology::new(points.len(), 4, &cells),
+                undeformed,
+                formed,
+            },
             &tool,
             OFFSET,
             // The bend is the lowest of this tool.
@@ -498,7 +503,12 @@ fn errors_of_fields_count_by_area() {
             .map(|p| [p[0], p[1], TOP + OFFSET + off(p[0])])
             .collect();
         let topology = Topology::new(flat.len(), 4, &cells);
-        Ply::new("ply".into(), topology, flat, formed, &tool(), OFFSET, 0.0)
+        let shape = Shape {
+            topology,
+            undeformed: flat,
+            formed,
+        };
+        Ply::new("ply".into(), shape, &tool(), OFFSET, 0.0)
     };
     let uneven: Vec<f64> = (-100..0)
         .map(|i| 0.001 * f64::from(i))
@@ -551,9 +561,11 @@ fn causes_follow_from_the_fields() {
         let topology = Topology::new(4, 4, &[0, 1, 2, 3]);
         Ply::new(
             "other".into(),
-            topology,
-            flat.into(),
-            flat.into(),
+            Shape {
+                topology,
+                undeformed: flat.into(),
+                formed: flat.into(),
+            },
             &tool(),
             0.0,
             0.0,
@@ -633,9 +645,11 @@ fn a_wrinkle_over_a_large_facet_between_fillets_is_measured_as_on_a_plane() {
         let margin = SETTINGS.foot_margin;
         let ply = Ply::new(
             "ply".into(),
-            topology,
-            undeformed,
-            bumps.clone(),
+            Shape {
+                topology,
+                undeformed,
+                formed: bumps.clone(),
+            },
             tool,
             OFFSET,
             margin,

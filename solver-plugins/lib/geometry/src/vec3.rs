@@ -4,8 +4,6 @@ use plyflow_fixed::FixedBits;
 
 /// A point or vector (m unless said otherwise).
 pub type Vec3 = [f64; 3];
-/// The same.
-pub type V = Vec3;
 
 /// a + b.
 #[inline(always)]

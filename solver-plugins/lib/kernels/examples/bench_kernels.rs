@@ -7,7 +7,7 @@ mod common;
 mod s4_support;
 
 use common::{El, FILM, Mat, fabric, film, ncf, woven};
-use plyflow_kernels::{Level, limit_level, m4::M4, rf4::Rf4};
+use plyflow_kernels::{Level, limit_level, m4::M4, m4f::M4f, rf4::Rf4};
 use plyflow_sdk::Element;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::time::Instant;
@@ -65,6 +65,8 @@ fn cases() {
     );
     elements::<M4>("m4", "ncf hypoelastic", &ncf("hypoelastic"));
     elements::<M4>("m4", "film", &film(FILM).expect("valid"));
+    elements::<M4f>("m4f", "film", &film(FILM).expect("valid"));
+    elements::<M4f>("m4f", "linear isotropic", &plain);
     patches("ncf fibre-energy", &ncf("fibre-energy"));
     shells("ncf fibre-energy", "{}", &ncf("fibre-energy"));
     let total = r#"{"bending":"total","twist":"material"}"#;

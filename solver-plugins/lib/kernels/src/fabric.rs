@@ -13,42 +13,21 @@
 mod bending;
 mod checks;
 mod cubic;
+mod fibre_energy;
 mod hypoelastic;
 mod parameters;
+mod ply;
 mod shear;
 mod stitch;
 mod yarn;
 
-use crate::{Lanes, WIDTH, dispatch};
-use bending::Bending;
+pub use ply::Fabric;
+
+use crate::{Lanes, dispatch};
 use parameters::Parameters;
+use ply::Form;
 use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
-use shear::{Shear, ShearOf, Yarn};
-use yarn::Law;
-
-/// A floor for squared stretches.
-const LEAST: f64 = 1e-6;
-/// Rows of history of the form `fibre-energy` with a stitch: largest shear angle, its sine.
-const STITCH_HISTORY: usize = 2;
-
-#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Form {
-    FibreEnergy,
-    Hypoelastic,
-}
-
-/// A fabric ply.
-pub struct Fabric {
-    form: Form,
-    /// Fibre stiffness in tension and in compression (N/m).
-    tension: f64,
-    compression: f64,
-    shear: Shear,
-    bending: Option<Bending>,
-    thickness: f64,
-    areal_mass: f64,
-}
+use shear::{ShearOf, Yarn};
 
 impl Material for Fabric {
     const MANIFEST: &'static str = include_str!("fabric/manifest.json");
@@ -61,7 +40,7 @@ impl Material for Fabric {
 
     fn sizes(&self) -> MaterialSizes {
         let membrane_history = match self.form {
-            Form::FibreEnergy if self.shear.stitch.is_some() => STITCH_HISTORY,
+            Form::FibreEnergy if self.shear.stitch.is_some() => fibre_energy::HISTORY,
             Form::FibreEnergy => 0,
             Form::Hypoelastic => hypoelastic::HISTORY,
         };
@@ -76,14 +55,7 @@ impl Material for Fabric {
 
     fn membrane(&self, b: &mut MembraneBatch<'_>) {
         let (n, stiffness) = (b.lanes, b.stiffness.as_deref_mut().unwrap_or(&mut []));
-        match self.form {
-            Form::FibreEnergy => {
-                membrane(self, n, b.metric, b.history, b.stress, b.energy, stiffness);
-            }
-            Form::Hypoelastic => {
-                hypoelastic::membrane(self, n, b.metric, b.history, b.stress, b.energy, stiffness);
-            }
-        }
+        membrane(self, n, b.metric, b.history, b.stress, b.energy, stiffness);
     }
 
     fn bending(&self, b: &mut BendingBatch<'_>) {
@@ -104,23 +76,6 @@ dispatch!(fn membrane(
     stiffness: &mut [f64],
 ) = membrane_kernel);
 
-/// Calls a kernel that is written for one kind of yarns.
-macro_rules! for_yarn {
-    ($f:expr, $kernel:ident::<$V:ident>($($arg:expr),* $(,)?)) => {{
-        let stitch = $f.shear.stitch.as_ref();
-        match &$f.shear.yarn {
-            Yarn::Polynomial(yarn) => {
-                $kernel::<$V, _>($f, ShearOf { yarn: &**yarn, stitch }, $($arg),*);
-            }
-            Yarn::Table(yarn) => $kernel::<$V, _>($f, ShearOf { yarn, stitch }, $($arg),*),
-            Yarn::Signed(yarn) => {
-                $kernel::<$V, _>($f, ShearOf { yarn: &**yarn, stitch }, $($arg),*);
-            }
-        }
-    }};
-}
-use for_yarn;
-
 #[inline(always)]
 fn membrane_kernel<V: Lanes>(
     f: &Fabric,
@@ -131,72 +86,31 @@ fn membrane_kernel<V: Lanes>(
     energy: &mut [f64],
     stiffness: &mut [f64],
 ) {
-    for_yarn!(
-        f,
-        membrane_of::<V>(n, metric, history, stress, energy, stiffness)
-    );
-}
-
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn membrane_of<V: Lanes, L: Law>(
-    f: &Fabric,
-    law: ShearOf<'_, L>,
-    n: usize,
-    metric: &[f64],
-    history: &mut [f64],
-    stress: &mut [f64],
-    energy: &mut [f64],
-    stiffness: &mut [f64],
-) {
-    let (one, half) = (V::splat(1.0), V::splat(0.5));
-    let (tension, compression) = (V::splat(f.tension), V::splat(f.compression));
-    for c in (0..n).step_by(WIDTH) {
-        let c11 = V::load(metric, c).max(V::splat(LEAST));
-        let c22 = V::load(metric, n + c).max(V::splat(LEAST));
-        let c12 = V::load(metric, 2 * n + c);
-        let (i1, i2) = (one / c11, one / c22);
-        // 1/l, and l = C / l: one division and one root for each family.
-        let (r1, r2) = (i1.sqrt(), i2.sqrt());
-        let (d1, d2) = (c11 * r1 - one, c22 * r2 - one);
-        let zero = V::splat(0.0);
-        let k1 = V::select(d1.lt(zero), compression, tension);
-        let k2 = V::select(d2.lt(zero), compression, tension);
-        let rr = r1 * r2;
-        let s = c12 * rr;
-        let shear = if law.stitch.is_some() {
-            let (g, sine) = (V::load(history, c), V::load(history, n + c));
-            let (shear, g, sine) = law.with_stitch(s, g, sine);
-            g.store(history, c);
-            sine.store(history, n + c);
-            shear
-        } else {
-            law.yarn(s)
-        };
-        let fs = shear.force * s;
-        (k1 * d1 * r1 - fs * i1).store(stress, c);
-        (k2 * d2 * r2 - fs * i2).store(stress, n + c);
-        (shear.force * rr).store(stress, 2 * n + c);
-        (half * (k1 * d1 * d1 + k2 * d2 * d2) + shear.energy).store(energy, c);
-        if !stiffness.is_empty() {
-            let slope = law.slopes(s).0;
-            let (a1, a2) = (tension * i1 * r1, tension * i2 * r2);
-            let (largest, soft) = tangents(slope, s, i1, i2, a1, a2, shear.force.abs());
-            largest.store(stiffness, c);
-            soft.store(stiffness, n + c);
-        }
+    let stitch = f.shear.stitch.as_ref();
+    // Compiled for each kind of yarns and each form.
+    macro_rules! of_yarn {
+        ($yarn:expr) => {{
+            let law = ShearOf {
+                yarn: $yarn,
+                stitch,
+            };
+            match f.form {
+                Form::FibreEnergy => {
+                    fibre_energy::membrane::<V, _>(
+                        f, law, n, metric, history, stress, energy, stiffness,
+                    );
+                }
+                Form::Hypoelastic => {
+                    hypoelastic::membrane::<V, _>(
+                        f, law, n, metric, history, stress, energy, stiffness,
+                    );
+                }
+            }
+        }};
     }
-}
-
-/// Bounds of the largest eigenvalue of dS/dE and of the shear tangent dS12 / d(2 E12); both are
-/// positive also while the stitch softens, and count compressed fibres as stretched ones. `a1`, `a2`
-/// are the fibre tangents k / l^3, `slope` bounds dF/ds. The shear part is F' (ds/dE)^2 + F d2s/dE2, each factor by its
-/// Frobenius norm.
-#[inline(always)]
-fn tangents<V: Lanes>(slope: V, s: V, i1: V, i2: V, a1: V, a2: V, force: V) -> (V, V) {
-    let two = V::splat(2.0);
-    let gradient = s * s * (i1 * i1 + i2 * i2) + two * i1 * i2;
-    let widest = i1.max(i2);
-    let largest = a1.max(a2) + slope * gradient + V::splat(8.0) * force * widest * widest;
-    (largest, slope * i1 * i2)
+    match &f.shear.yarn {
+        Yarn::Polynomial(yarn) => of_yarn!(&**yarn),
+        Yarn::Table(yarn) => of_yarn!(yarn),
+        Yarn::Signed(yarn) => of_yarn!(&**yarn),
+    }
 }

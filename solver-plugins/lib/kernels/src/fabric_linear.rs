@@ -8,6 +8,7 @@
 //! The families do not know of each other, as in a fabric and unlike in a plate. The law of an orthotropic sheet without coupling (any
 //! textbook, such as Jones, Mechanics of Composite Materials, 2.4, with nu12 = 0); it neither locks nor loses a stitch: `material-fabric` does.
 
+use crate::strain::{green_strain, store_with_work};
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
 
@@ -128,12 +129,9 @@ fn membrane_kernel<V: Lanes>(
     stress: &mut [f64],
     energy: &mut [f64],
 ) {
-    let (half, one) = (V::splat(0.5), V::splat(1.0));
     for c in (0..n).step_by(WIDTH) {
-        let e11 = half * (V::load(metric, c) - one);
-        let e22 = half * (V::load(metric, n + c) - one);
-        let e12 = half * V::load(metric, 2 * n + c);
-        linear(d, [e11, e22, e12], n, c, stress, energy);
+        let e = green_strain::<V>(metric, n, c);
+        linear(d, e, n, c, stress, energy);
     }
 }
 
@@ -154,10 +152,5 @@ fn bending_kernel<V: Lanes>(
 /// `s = [d0 e11, d1 e22, d2 e12]` and half its work on e.
 #[inline(always)]
 fn linear<V: Lanes>(d: [f64; 3], e: [V; 3], n: usize, c: usize, s: &mut [f64], energy: &mut [f64]) {
-    let [s11, s22, s12] = [0, 1, 2].map(|r| V::splat(d[r]) * e[r]);
-    s11.store(s, c);
-    s22.store(s, n + c);
-    s12.store(s, 2 * n + c);
-    let twice = s11 * e[0] + s22 * e[1] + V::splat(2.0) * s12 * e[2];
-    (V::splat(0.5) * twice).store(energy, c);
+    store_with_work([0, 1, 2].map(|r| V::splat(d[r]) * e[r]), e, n, c, s, energy);
 }

@@ -1,6 +1,6 @@
 //! Elementary functions on lanes.
 
-use crate::Lanes;
+use crate::lanes::{Lanes, SHIFT};
 
 /// Polynomial `c[0] + c[1] x + ..`.
 #[inline(always)]
@@ -15,7 +15,6 @@ pub fn polynomial<V: Lanes>(x: V, c: &[f64]) -> V {
 /// e^x with a relative error below 1e-15; x is clamped to [-708, 709].
 #[inline(always)]
 pub fn exp<V: Lanes>(x: V) -> V {
-    const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it rounds to a whole number
     // ln 2 in two parts; the first has 21 trailing zero bits, so n * HIGH is exact.
     const HIGH: f64 = 6.931_471_803_691_238e-1;
     const LOW: f64 = 1.908_214_929_270_587_7e-10;
@@ -50,6 +49,7 @@ const INVERSE_FACTORIAL: [f64; 14] = {
 pub fn asin<V: Lanes>(x: V) -> V {
     let (half, one) = (V::splat(0.5), V::splat(1.0));
     let a = x.abs();
+    debug_assert!(V::all(a.lt(V::splat(1.0 + 1e-9))));
     let small = a.lt(half);
     let z = (one - a).max(V::splat(0.0)) * half;
     let t = V::select(small, a * a, z);

@@ -9,6 +9,7 @@
 //! for verification and for foils in small strain: like every St. Venant-Kirchhoff law it softens in
 //! strong compression. The metric has no influence on the moments.
 
+use crate::strain::{green_strain, store_with_work};
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
 
@@ -120,12 +121,9 @@ fn membrane_kernel<V: Lanes>(
     stress: &mut [f64],
     energy: &mut [f64],
 ) {
-    let (half, one) = (V::splat(0.5), V::splat(1.0));
     for c in (0..n).step_by(WIDTH) {
-        let e11 = half * (V::load(metric, c) - one);
-        let e22 = half * (V::load(metric, n + c) - one);
-        let e12 = half * V::load(metric, 2 * n + c);
-        quadratic(m.membrane, m.nu, [e11, e22, e12], n, c, stress, energy);
+        let e = green_strain::<V>(metric, n, c);
+        quadratic(m.membrane, m.nu, e, n, c, stress, energy);
     }
 }
 
@@ -159,9 +157,5 @@ fn quadratic<V: Lanes>(
     let s11 = d * (e[0] + other * e[1]);
     let s22 = d * (e[1] + other * e[0]);
     let s12 = d * shear * e[2];
-    s11.store(s, c);
-    s22.store(s, n + c);
-    s12.store(s, 2 * n + c);
-    let twice = s11 * e[0] + s22 * e[1] + V::splat(2.0) * s12 * e[2];
-    (V::splat(0.5) * twice).store(energy, c);
+    store_with_work([s11, s22, s12], e, n, c, s, energy);
 }

@@ -1,6 +1,6 @@
 //! Eight f64 lanes: one trait, one type per instruction set.
 //!
-//! A kernel is written once, generic over [`Lanes`], and instantiated by [`crate::dispatch!`] for
+//! A kernel is written once, generic over [`Lanes`], and instantiated by `dispatch!` for
 //! AVX-512, for AVX2 and for any machine. Only IEEE operations with one rounding are offered (no
 //! fused multiply-add), so all three give the same bits.
 
@@ -9,6 +9,9 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 /// Lanes in one value; batches are a multiple of it.
 pub const WIDTH: usize = 8;
+
+/// 1.5 * 2^52: adding it rounds to a whole number.
+pub(crate) const SHIFT: f64 = 6_755_399_441_055_744.0;
 
 /// Eight f64 values treated alike.
 pub trait Lanes:
@@ -146,7 +149,13 @@ impl Lanes for Portable {
     }
     #[inline(always)]
     fn power_of_two(self) -> Self {
-        self.map(|x| f64::from_bits((x.to_bits() << 52).wrapping_add(1023 << 52)))
+        self.map(|x| {
+            debug_assert!(
+                (-1022.0..=1023.0).contains(&(x - SHIFT)),
+                "2^({x} - {SHIFT})"
+            );
+            f64::from_bits((x.to_bits() << 52).wrapping_add(1023 << 52))
+        })
     }
 }
 
@@ -360,7 +369,7 @@ mod x86 {
     }
 }
 
-/// Instruction set that [`crate::dispatch!`] picks, the widest last.
+/// Instruction set that kernels run with, the widest last.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Level {
     /// Any machine.
@@ -415,60 +424,39 @@ pub const USUAL: usize = 32;
 ///
 /// `= kernel, lanes n` does the same for a kernel whose argument `n` is the number of lanes: when it is
 /// [`USUAL`], code runs in which it, and with it the distance between rows, is a constant.
-#[macro_export]
 macro_rules! dispatch {
-    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident) => {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident $(, lanes $n:ident)?) => {
         $(#[$meta])*
         $vis fn $name($($arg: $ty),*) $(-> $ret)? {
+            // Lanes past the last would be those of the next row.
+            $(debug_assert!($n.is_multiple_of($crate::lanes::WIDTH), "{} lanes", $n);)?
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx512f,avx512dq")]
                 fn wide($($arg: $ty),*) $(-> $ret)? {
-                    $kernel::<$crate::Avx512>($($arg),*)
+                    $crate::lanes::dispatch!(@run $kernel::<$crate::lanes::Avx512> ($($arg),*) $($n)?)
                 }
                 #[target_feature(enable = "avx2")]
                 fn half($($arg: $ty),*) $(-> $ret)? {
-                    $kernel::<$crate::Avx2>($($arg),*)
+                    $crate::lanes::dispatch!(@run $kernel::<$crate::lanes::Avx2> ($($arg),*) $($n)?)
                 }
-                match $crate::level() {
+                match $crate::lanes::level() {
                     // SAFETY: `level` has found the instruction set on this machine.
-                    $crate::Level::Avx512 => return unsafe { wide($($arg),*) },
-                    $crate::Level::Avx2 => return unsafe { half($($arg),*) },
-                    $crate::Level::Portable => {}
+                    $crate::lanes::Level::Avx512 => return unsafe { wide($($arg),*) },
+                    $crate::lanes::Level::Avx2 => return unsafe { half($($arg),*) },
+                    $crate::lanes::Level::Portable => {}
                 }
             }
-            $kernel::<$crate::Portable>($($arg),*)
+            $kernel::<$crate::lanes::Portable>($($arg),*)
         }
     };
-    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident, lanes $n:ident) => {
-        $(#[$meta])*
-        $vis fn $name($($arg: $ty),*) $(-> $ret)? {
-            #[cfg(target_arch = "x86_64")]
-            {
-                #[target_feature(enable = "avx512f,avx512dq")]
-                fn wide($($arg: $ty),*) $(-> $ret)? {
-                    if $n == $crate::USUAL {
-                        let $n = $crate::USUAL;
-                        return $kernel::<$crate::Avx512>($($arg),*);
-                    }
-                    $kernel::<$crate::Avx512>($($arg),*)
-                }
-                #[target_feature(enable = "avx2")]
-                fn half($($arg: $ty),*) $(-> $ret)? {
-                    if $n == $crate::USUAL {
-                        let $n = $crate::USUAL;
-                        return $kernel::<$crate::Avx2>($($arg),*);
-                    }
-                    $kernel::<$crate::Avx2>($($arg),*)
-                }
-                match $crate::level() {
-                    // SAFETY: `level` has found the instruction set on this machine.
-                    $crate::Level::Avx512 => return unsafe { wide($($arg),*) },
-                    $crate::Level::Avx2 => return unsafe { half($($arg),*) },
-                    $crate::Level::Portable => {}
-                }
-            }
-            $kernel::<$crate::Portable>($($arg),*)
+    (@run $kernel:ident::<$lanes:ty> $args:tt) => { $kernel::<$lanes> $args };
+    (@run $kernel:ident::<$lanes:ty> $args:tt $n:ident) => {{
+        if $n == $crate::lanes::USUAL {
+            let $n = $crate::lanes::USUAL;
+            return $kernel::<$lanes> $args;
         }
-    };
+        $kernel::<$lanes> $args
+    }};
 }
+pub(crate) use dispatch;

@@ -1,6 +1,6 @@
 //! What Plyflow's own component plugins are made of: the element formulations [`m4`], [`m4f`], [`rf4`] and
 //! [`s4`], the materials [`fabric`], [`fabric_linear`], [`isotropic`] and [`marlow`], and the lane arithmetic under them ([`Lanes`],
-//! [`dispatch!`], [`exp`], [`asin`]).
+//! [`exp`], [`asin`]).
 //!
 //! The plugin crates `element-*` and `material-*` only export these types: a library may be linked
 //! together with others, the exported symbol of a plugin may not. A stranger's plugin needs none
@@ -21,6 +21,7 @@ pub mod marlow;
 pub mod quad;
 pub mod rf4;
 pub mod s4;
+mod strain;
 mod thickening;
 
 pub use functions::{asin, exp, polynomial};

@@ -66,14 +66,7 @@ impl Element for M4 {
     }
 
     fn sizes(&self) -> ElementSizes {
-        ElementSizes {
-            nodes: 4,
-            dofs_per_node: 3,
-            constants: quad::CONSTANTS,
-            material_points: 1,
-            fields: quad::FIELDS,
-            ..Default::default()
-        }
+        quad::sizes()
     }
 
     fn initialise(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) {

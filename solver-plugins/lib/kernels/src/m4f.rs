@@ -10,11 +10,14 @@
 //! otherwise: a coarse spar of plies at +-45 deg sheared by -8 deg where [`crate::m4`] gives -22 deg. So a material as stiff along its fibres as a
 //! fabric is refused unless the fibres run along the sides. The element is for films, and for telling hourglass control from material.
 
-use crate::quad::{FIELDS, MAX_LANES, fields_of, largest, material_frame, stiffness_at_rest};
+use crate::quad::{
+    FIELDS, MAX_LANES, Scratch, View, fields_of, largest, material_call, material_frame,
+    stiffness_at_rest,
+};
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
-use plyflow_sdk::abi::PF_OK;
-use plyflow_sdk::{Aligned, Element, ElementBatch, ElementSizes, MaterialRef, MembraneBatch};
+use plyflow_sdk::abi::{PF_ENERGIES, PF_OK};
+use plyflow_sdk::{Aligned, Element, ElementBatch, ElementSizes, MaterialRef};
 
 /// Points of the 2 x 2 Gauss rule.
 const POINTS: usize = 4;
@@ -83,54 +86,72 @@ impl Element for M4f {
                 batch.mass[i * n + l] = area * areal_mass;
             }
         }
-        if batch.critical_step.is_some() {
-            let history = POINTS * material.sizes().membrane_history * n;
-            let mut history = Aligned::zeros(history);
-            let mut scratch = Scratch::new();
-            let code = scratch.evaluate(
-                &batch.constants,
-                batch.position,
-                &mut history,
+        if let Some(step) = batch.critical_step.as_deref_mut() {
+            let points = Points {
+                constants: &batch.constants,
                 n,
-                0.0,
+                position: batch.position,
                 material,
-                true,
-            );
-            if let Some(step) = batch.critical_step.as_deref_mut() {
-                match code {
-                    PF_OK => scratch.critical_step(&batch.constants, n, areal_mass, step),
-                    _ => step.fill(0.0),
-                }
+            };
+            let mut history = Aligned::zeros(POINTS * material.sizes().membrane_history * n);
+            let mut s = Scratch::<MAX_LANES>::new();
+            step.fill(0.0);
+            let code = points.each(&mut history, 0.0, true, &mut s.view(), |constants, s| {
+                add_stiffness(constants, n, s, step);
+            });
+            match code {
+                PF_OK => points.critical_step(step),
+                _ => step.fill(0.0),
             }
         }
     }
 
     fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
-        let n = batch.lanes;
-        let mut s = Scratch::new();
-        let wanted = batch.critical_step.is_some();
-        let code = s.evaluate(
-            &batch.constants,
-            batch.position,
-            batch.material_history,
-            n,
-            batch.dt,
-            material,
-            wanted,
-        );
-        if code != PF_OK {
-            return code;
+        // As in [`crate::quad`]; of one point at a time, which stays in the nearest cache.
+        match batch.lanes {
+            0..=16 => forces_with(batch, material, Scratch::<16>::new().view()),
+            17..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
+            _ => forces_with(batch, material, Scratch::<MAX_LANES>::new().view()),
         }
-        forces_of(&batch.constants, n, &s, batch.force, batch.energy);
-        if let Some(step) = batch.critical_step.as_deref_mut() {
-            s.critical_step(&batch.constants, n, material.sizes().areal_mass, step);
-        }
-        if let Some(fields) = batch.fields.as_deref_mut() {
-            let [metric, stress] = s.means(&batch.constants, n);
-            fields_of(n, &metric, &stress, fields);
-        }
-        PF_OK
     }
+}
+
+fn forces_with(batch: &mut ElementBatch<'_>, material: &MaterialRef, mut s: View<'_>) -> i32 {
+    let n = batch.lanes;
+    let points = Points {
+        constants: &batch.constants,
+        n,
+        position: batch.position,
+        material,
+    };
+    let (force, energy) = (&mut *batch.force, &mut *batch.energy);
+    force[..12 * n].fill(0.0);
+    energy[..PF_ENERGIES * n].fill(0.0);
+    let mut step = batch.critical_step.as_deref_mut();
+    if let Some(step) = &mut step {
+        step.fill(0.0);
+    }
+    let mut means = batch.fields.as_ref().map(|_| [[0.0; 3 * MAX_LANES]; 2]);
+    let (history, wanted) = (&mut *batch.material_history, step.is_some());
+    let code = points.each(history, batch.dt, wanted, &mut s, |constants, s| {
+        add_forces(constants, n, s, force, energy);
+        if let Some(step) = &mut step {
+            add_stiffness(constants, n, s, step);
+        }
+        if let Some(means) = &mut means {
+            points.add_means(constants, s, means);
+        }
+    });
+    if code != PF_OK {
+        return code;
+    }
+    if let Some(step) = step {
+        points.critical_step(step);
+    }
+    if let (Some(fields), Some([metric, stress])) = (batch.fields.as_deref_mut(), means) {
+        fields_of(n, &metric, &stress, fields);
+    }
+    PF_OK
 }
 
 /// Constants of an element with corners `x` (m) and the fabric's `axis`, and the areas of its nodes (m2).
@@ -166,115 +187,92 @@ fn reference(x: [Vec3; 4], axis: Vec3) -> ([f64; CONSTANTS], [f64; 4]) {
     (constants, areas)
 }
 
-/// Rows of one point, of n lanes each, one after the other from the start of each field.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-struct Point {
-    /// g1, g2: `[2][3][lanes]`.
-    g: [f64; 6 * MAX_LANES],
-    metric: [f64; 3 * MAX_LANES],
-    stress: [f64; 3 * MAX_LANES],
-    energy: [f64; MAX_LANES],
-    stiffness: [f64; 2 * MAX_LANES],
+/// The points of a batch, one after the other.
+struct Points<'a> {
+    constants: &'a [f64],
+    n: usize,
+    position: &'a [f64],
+    material: &'a MaterialRef,
 }
 
-/// What a batch needs between the material's calls and the forces.
-struct Scratch([Point; POINTS]);
-
-impl Scratch {
-    fn new() -> Self {
-        Self(
-            [Point {
-                g: [0.0; 6 * MAX_LANES],
-                metric: [0.0; 3 * MAX_LANES],
-                stress: [0.0; 3 * MAX_LANES],
-                energy: [0.0; MAX_LANES],
-                stiffness: [0.0; 2 * MAX_LANES],
-            }; POINTS],
-        )
-    }
-
-    /// Metric and stress at all points; the material's code.
-    fn evaluate(
-        &mut self,
-        constants: &[f64],
-        position: &[f64],
+impl Points<'_> {
+    /// Calls `then` with the constants of each point once its metric and stress stand in `s`, and its tangents where these are `wanted`;
+    /// the material's code.
+    fn each(
+        &self,
         history: &mut [f64],
-        n: usize,
         dt: f64,
-        material: &MaterialRef,
-        stiffness: bool,
+        wanted: bool,
+        s: &mut View<'_>,
+        mut then: impl FnMut(&[f64], &View<'_>),
     ) -> i32 {
-        let rows = material.sizes().membrane_history * n;
-        for (p, point) in self.0.iter_mut().enumerate() {
-            metric_of(position, &constants[p * PER_POINT * n..], n, point);
-            let code = material.membrane(&mut MembraneBatch {
-                lanes: n,
-                dt,
-                metric: &point.metric[..3 * n],
-                history: &mut history[p * rows..(p + 1) * rows],
-                stress: &mut point.stress[..3 * n],
-                energy: &mut point.energy[..n],
-                stiffness: stiffness.then_some(&mut point.stiffness[..2 * n]),
-            });
+        let n = self.n;
+        let rows = self.material.sizes().membrane_history * n;
+        for p in 0..POINTS {
+            let constants = &self.constants[p * PER_POINT * n..];
+            metric_of(self.position, constants, n, s);
+            let history = &mut history[p * rows..(p + 1) * rows];
+            let code = material_call(self.material, history, n, dt, s, wanted);
             if code != PF_OK {
                 return code;
             }
+            then(constants, s);
         }
         PF_OK
     }
 
-    /// A bound of 2 / omega_max, as that of [`crate::quad`], summed over the points, with the lightest node's mass.
-    fn critical_step(&self, constants: &[f64], n: usize, areal_mass: f64, step: &mut [f64]) {
-        for l in 0..n {
-            let mut sum = 0.0;
-            for (p, point) in self.0.iter().enumerate() {
-                let b = |r: usize| constants[(p * PER_POINT + r) * n + l];
-                let product = |r: usize, s: usize| (0..4).map(|i| b(r + i) * b(s + i)).sum::<f64>();
-                let gradient = largest(product(0, 0), product(4, 4), product(0, 4));
-                let row = |of: &[f64], r: usize| of[r * n + l];
-                let metric = [0, 1, 2].map(|r| row(&point.metric, r));
-                let stress = [0, 1, 2].map(|r| row(&point.stress, r));
-                let [tangent, shear] = [0, 1].map(|r| row(&point.stiffness, r).max(0.0));
-                let stretch = largest(metric[0], metric[1], metric[2]);
-                let pulled = largest(stress[0], stress[1], stress[2]).max(0.0);
-                let along = (tangent * metric[0].max(metric[1])).sqrt();
-                let across = (shear * (metric[0] + metric[1])).sqrt();
-                let material = (tangent * stretch).min((along + across).powi(2));
-                sum += b(8) * (material + pulled) * gradient;
-            }
-            let mass = areal_mass * constants[(CONSTANTS - 1) * n + l];
-            step[l] = 2.0 * (mass / sum).sqrt();
+    /// A bound of 2 / omega_max with the lightest node's mass, in the place of what [`add_stiffness`] has summed.
+    fn critical_step(&self, step: &mut [f64]) {
+        let areal_mass = self.material.sizes().areal_mass;
+        for (l, step) in step[..self.n].iter_mut().enumerate() {
+            let mass = areal_mass * self.constants[(CONSTANTS - 1) * self.n + l];
+            *step = 2.0 * (mass / *step).sqrt();
         }
     }
 
-    /// Metric and stress, `[3][lanes]` each, in the mean over the area.
-    fn means(&self, constants: &[f64], n: usize) -> [[f64; 3 * MAX_LANES]; 2] {
-        let area = |p: usize, l: usize| constants[(p * PER_POINT + 8) * n + l];
-        let mut means = [[0.0; 3 * MAX_LANES]; 2];
+    /// Adds a point's part of the means of metric and stress over the area, `[3][lanes]` each.
+    fn add_means(&self, constants: &[f64], s: &View<'_>, means: &mut [[f64; 3 * MAX_LANES]; 2]) {
+        let n = self.n;
+        let area = |p: usize, l: usize| self.constants[(p * PER_POINT + 8) * n + l];
         for k in 0..3 * n {
             let all: f64 = (0..POINTS).map(|p| area(p, k % n)).sum();
-            for (p, point) in self.0.iter().enumerate() {
-                let share = area(p, k % n) / all;
-                means[0][k] += share * point.metric[k];
-                means[1][k] += share * point.stress[k];
-            }
+            let share = constants[8 * n + k % n] / all;
+            means[0][k] += share * s.metric[k];
+            means[1][k] += share * s.stress[k];
         }
-        means
     }
 }
 
-dispatch!(fn metric_of(position: &[f64], constants: &[f64], n: usize, s: &mut Point) = metric_kernel, lanes n);
-dispatch!(fn forces_of(
+/// Adds a point's part of a bound of the stiffness (N/m) of each lane, as that of [`crate::quad`].
+fn add_stiffness(constants: &[f64], n: usize, s: &View<'_>, sum: &mut [f64]) {
+    for l in 0..n {
+        let b = |r: usize| constants[r * n + l];
+        let product = |r: usize, s: usize| (0..4).map(|i| b(r + i) * b(s + i)).sum::<f64>();
+        let gradient = largest(product(0, 0), product(4, 4), product(0, 4));
+        let row = |of: &[f64], r: usize| of[r * n + l];
+        let metric = [0, 1, 2].map(|r| row(s.metric, r));
+        let stress = [0, 1, 2].map(|r| row(s.stress, r));
+        let [tangent, shear] = [0, 1].map(|r| row(s.stiffness, r).max(0.0));
+        let stretch = largest(metric[0], metric[1], metric[2]);
+        let pulled = largest(stress[0], stress[1], stress[2]).max(0.0);
+        let along = (tangent * metric[0].max(metric[1])).sqrt();
+        let across = (shear * (metric[0] + metric[1])).sqrt();
+        let material = (tangent * stretch).min((along + across).powi(2));
+        sum[l] += b(8) * (material + pulled) * gradient;
+    }
+}
+
+dispatch!(fn metric_of(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) = metric_kernel, lanes n);
+dispatch!(fn add_forces(
     constants: &[f64],
     n: usize,
-    s: &Scratch,
+    s: &View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
 ) = forces_kernel, lanes n);
 
 #[inline(always)]
-fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut Point) {
+fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mut View<'_>) {
     for c in (0..n).step_by(WIDTH) {
         let slope = |r: usize| V::load(constants, r * n + c);
         let (mut c11, mut c22, mut c12) = (V::splat(0.0), V::splat(0.0), V::splat(0.0));
@@ -285,53 +283,43 @@ fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mu
                 g1 = g1 + slope(i) * x;
                 g2 = g2 + slope(4 + i) * x;
             }
-            g1.store(&mut s.g, k * n + c);
-            g2.store(&mut s.g, (3 + k) * n + c);
+            g1.store(s.g, k * n + c);
+            g2.store(s.g, (3 + k) * n + c);
             c11 = c11 + g1 * g1;
             c22 = c22 + g2 * g2;
             c12 = c12 + g1 * g2;
         }
-        c11.store(&mut s.metric, c);
-        c22.store(&mut s.metric, n + c);
-        c12.store(&mut s.metric, 2 * n + c);
+        c11.store(s.metric, c);
+        c22.store(s.metric, n + c);
+        c12.store(s.metric, 2 * n + c);
     }
 }
 
+/// Adds a point's part.
 #[inline(always)]
 fn forces_kernel<V: Lanes>(
     constants: &[f64],
     n: usize,
-    s: &Scratch,
+    s: &View<'_>,
     force: &mut [f64],
     energy: &mut [f64],
 ) {
     for c in (0..n).step_by(WIDTH) {
-        let mut f = [[V::splat(0.0); 3]; 4];
-        let mut stored = V::splat(0.0);
-        for (p, point) in s.0.iter().enumerate() {
-            let row = |r: usize| V::load(constants, (p * PER_POINT + r) * n + c);
-            let area = row(8);
-            let s11 = V::load(&point.stress, c) * area;
-            let s22 = V::load(&point.stress, n + c) * area;
-            let s12 = V::load(&point.stress, 2 * n + c) * area;
-            for k in 0..3 {
-                let g1 = V::load(&point.g, k * n + c);
-                let g2 = V::load(&point.g, (3 + k) * n + c);
-                let t1 = s11 * g1 + s12 * g2;
-                let t2 = s12 * g1 + s22 * g2;
-                for (i, node) in f.iter_mut().enumerate() {
-                    node[k] = node[k] + (row(i) * t1 + row(4 + i) * t2);
-                }
-            }
-            stored = stored + V::load(&point.energy, c) * area;
-        }
-        for (i, node) in f.iter().enumerate() {
-            for (k, component) in node.iter().enumerate() {
-                component.store(force, (3 * i + k) * n + c);
+        let row = |r: usize| V::load(constants, r * n + c);
+        let area = row(8);
+        let s11 = V::load(s.stress, c) * area;
+        let s22 = V::load(s.stress, n + c) * area;
+        let s12 = V::load(s.stress, 2 * n + c) * area;
+        for k in 0..3 {
+            let g1 = V::load(s.g, k * n + c);
+            let g2 = V::load(s.g, (3 + k) * n + c);
+            let t1 = s11 * g1 + s12 * g2;
+            let t2 = s12 * g1 + s22 * g2;
+            for i in 0..4 {
+                let at = (3 * i + k) * n + c;
+                (V::load(force, at) + (row(i) * t1 + row(4 + i) * t2)).store(force, at);
             }
         }
-        stored.store(energy, c);
-        V::splat(0.0).store(energy, n + c);
-        V::splat(0.0).store(energy, 2 * n + c);
+        (V::load(energy, c) + V::load(s.energy, c) * area).store(energy, c);
     }
 }

@@ -14,7 +14,7 @@ use crate::{Lanes, WIDTH, dispatch};
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
 use plyflow_sdk::abi::PF_OK;
-use plyflow_sdk::{Aligned, ElementBatch, MaterialRef, MembraneBatch};
+use plyflow_sdk::{Aligned, ElementBatch, ElementSizes, MaterialRef, MembraneBatch};
 
 /// Rows of constants: b11, b21, b12, b22 (1/m), h1, h2 (m), area (m2), k, k_n (N/m).
 pub const CONSTANTS: usize = 9;
@@ -26,6 +26,18 @@ pub const MAX_LANES: usize = 64;
 /// exact in-plane bending of a fully integrated element (1/12) needs no control, and light films
 /// would lose their time step.
 const HOURGLASS_CAP: f64 = 0.25;
+
+/// Sizes of the quadrilateral.
+pub(crate) fn sizes() -> ElementSizes {
+    ElementSizes {
+        nodes: 4,
+        dofs_per_node: 3,
+        constants: CONSTANTS,
+        material_points: 1,
+        fields: FIELDS,
+        ..Default::default()
+    }
+}
 
 /// Stack rows, aligned as the ABI asks.
 #[repr(align(64))]
@@ -176,7 +188,7 @@ pub fn initialise(batch: &mut ElementBatch<'_>, material: &MaterialRef, hourglas
 /// What one batch of at most `N` lanes needs between the material call and the forces. Rows of n
 /// lanes lie one after the other from the start of each field.
 #[repr(align(64))]
-struct Scratch<const N: usize> {
+pub(crate) struct Scratch<const N: usize> {
     /// g1, g2: `[2][3][lanes]`.
     g: [[f64; N]; 6],
     metric: [[f64; N]; 3],
@@ -189,7 +201,7 @@ struct Scratch<const N: usize> {
 
 impl<const N: usize> Scratch<N> {
     #[inline(always)]
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             g: [[0.0; N]; 6],
             metric: [[0.0; N]; 3],
@@ -200,7 +212,7 @@ impl<const N: usize> Scratch<N> {
         }
     }
 
-    fn view(&mut self) -> View<'_> {
+    pub(crate) fn view(&mut self) -> View<'_> {
         View {
             g: self.g.as_flattened_mut(),
             metric: self.metric.as_flattened_mut(),
@@ -213,16 +225,17 @@ impl<const N: usize> Scratch<N> {
 }
 
 /// A [`Scratch`] of any size.
-struct View<'a> {
-    g: &'a mut [f64],
-    metric: &'a mut [f64],
-    stress: &'a mut [f64],
-    energy: &'a mut [f64],
-    stiffness: &'a mut [f64],
+pub(crate) struct View<'a> {
+    pub(crate) g: &'a mut [f64],
+    pub(crate) metric: &'a mut [f64],
+    pub(crate) stress: &'a mut [f64],
+    pub(crate) energy: &'a mut [f64],
+    pub(crate) stiffness: &'a mut [f64],
     mode: &'a mut [f64],
 }
 
-fn material_call(
+/// The material's part of a point, in the rows of `s`; its code.
+pub(crate) fn material_call(
     material: &MaterialRef,
     history: &mut [f64],
     n: usize,

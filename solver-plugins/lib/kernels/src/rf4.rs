@@ -63,17 +63,10 @@ impl Element for Rf4 {
 
     fn sizes(&self) -> ElementSizes {
         ElementSizes {
-            nodes: 4,
-            dofs_per_node: 3,
-            constants: quad::CONSTANTS,
-            history: 0,
-            material_points: 1,
-            fields: quad::FIELDS,
             patch_nodes: PATCH_NODES,
             patch_constants: PATCH_CONSTANTS,
-            patch_history: 0,
             patch_fields: PATCH_FIELDS,
-            ..Default::default()
+            ..quad::sizes()
         }
     }
 

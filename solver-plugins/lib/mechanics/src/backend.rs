@@ -8,7 +8,7 @@ use crate::archive::{Archive, ArchiveError};
 use crate::contact::RigidMotion;
 use crate::energy::Ledger;
 use crate::model::{Clock, Model, Pressures};
-use crate::vec3::V;
+use crate::vec3::Vec3;
 use std::ops::Range;
 
 /// What a load reads and sets before a step.
@@ -20,7 +20,7 @@ pub trait Loaded {
     fn set_pressures(&mut self, pressures: Pressures);
 
     /// Sets the acceleration of free fall (m/s2), global axes.
-    fn set_body_acceleration(&mut self, acceleration: V);
+    fn set_body_acceleration(&mut self, acceleration: Vec3);
 
     /// Sets what the nodal loads are multiplied by.
     fn set_load_factor(&mut self, factor: f64);
@@ -29,7 +29,7 @@ pub trait Loaded {
     fn volume_below(&mut self) -> f64;
 
     /// Force (N) of the sheets on the rigid surface of a contact in the last step.
-    fn rigid_force(&self, contact: usize) -> V;
+    fn rigid_force(&self, contact: usize) -> Vec3;
 
     /// How the rigid surface of a contact moves.
     fn rigid_motion(&self, contact: usize) -> RigidMotion;
@@ -83,10 +83,10 @@ pub trait Backend: Loaded {
     ) -> Result<(), MechanicsError>;
 
     /// `[n]` positions (m).
-    fn positions(&self) -> &[V];
+    fn positions(&self) -> &[Vec3];
 
     /// `[n]` velocities at the half step (m/s).
-    fn velocities(&self) -> &[V];
+    fn velocities(&self) -> &[Vec3];
 
     /// Where the work of the load has gone (J).
     fn energies(&self) -> Ledger;
@@ -107,7 +107,7 @@ impl Loaded for Model {
         Model::set_pressures(self, pressures);
     }
 
-    fn set_body_acceleration(&mut self, acceleration: V) {
+    fn set_body_acceleration(&mut self, acceleration: Vec3) {
         Model::set_body_acceleration(self, acceleration);
     }
 
@@ -119,7 +119,7 @@ impl Loaded for Model {
         Model::volume_below(self)
     }
 
-    fn rigid_force(&self, contact: usize) -> V {
+    fn rigid_force(&self, contact: usize) -> Vec3 {
         self.rigid_contacts()[contact].resultant()
     }
 
@@ -165,11 +165,11 @@ impl Backend for Model {
         Ok(())
     }
 
-    fn positions(&self) -> &[V] {
+    fn positions(&self) -> &[Vec3] {
         self.x()
     }
 
-    fn velocities(&self) -> &[V] {
+    fn velocities(&self) -> &[Vec3] {
         self.v()
     }
 

@@ -86,7 +86,7 @@ pub enum MechanicsError {
         /// Its cell.
         cell: usize,
         /// Middle of the cell (m).
-        place: vec3::V,
+        place: vec3::Vec3,
         /// What has become of it.
         what: String,
     },

@@ -1,6 +1,6 @@
 //! Quad meshes of flat sheets.
 
-use crate::vec3::{cross, norm, scale, sub};
+use crate::vec3::{Vec3, cross, norm, scale, sub};
 
 /// No neighbour: the edge is on the boundary.
 pub const NONE: u32 = u32::MAX;
@@ -248,9 +248,56 @@ pub fn area_vector(p: [[f64; 3]; 4]) -> [f64; 3] {
     scale(cross(sub(p[2], p[0]), sub(p[3], p[1])), 0.5)
 }
 
+/// An order of points in which every run of `group` lies close together: halves by the longer extent, cut at
+/// whole groups. Within a group the order is the given one.
+pub(crate) fn compact_order(points: &[Vec3], group: usize) -> Vec<u32> {
+    fn split(order: &mut [u32], points: &[Vec3], group: usize) {
+        if order.len() <= group {
+            order.sort_unstable();
+            return;
+        }
+        let extent = |c: usize| {
+            let of = |n: &u32| points[*n as usize][c];
+            let low = order.iter().map(of).fold(f64::INFINITY, f64::min);
+            let high = order.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+            high - low
+        };
+        let sizes = [extent(0), extent(1), extent(2)];
+        let axis = (0..3).fold(0, |m, c| if sizes[c] > sizes[m] { c } else { m });
+        let half = order.len().div_ceil(group).div_ceil(2) * group;
+        let key = |n: &u32| points[*n as usize][axis];
+        order.select_nth_unstable_by(half - 1, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+        let (left, right) = order.split_at_mut(half);
+        split(left, points, group);
+        split(right, points, group);
+    }
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    split(&mut order, points, group);
+    order
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn groups_of_a_grid_are_compact() {
+        let points: Vec<Vec3> = (0..96 * 64)
+            .map(|i| [f64::from(i % 96), f64::from(i / 96), 0.0])
+            .collect();
+        let order = compact_order(&points, 256);
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert!(sorted.iter().enumerate().all(|(i, n)| i as u32 == *n));
+        for group in order.chunks(256) {
+            for c in 0..2 {
+                let of = |n: &u32| points[*n as usize][c];
+                let low = group.iter().map(of).fold(f64::INFINITY, f64::min);
+                let high = group.iter().map(of).fold(0.0, f64::max);
+                assert!(high - low < 32.0, "{low} to {high}");
+            }
+        }
+    }
 
     #[test]
     fn graded_axis_reaches_both_ends_and_never_jumps() {

@@ -6,7 +6,7 @@
 //! its image, so that the model has exactly a half or a quarter of the whole's energy, and its gradient.
 
 use crate::mesh::{NONE, Patch, QuadMesh, limit_patches};
-use crate::vec3::V;
+use crate::vec3::Vec3;
 
 /// By plane, x = 0 and y = 0: whether something is mirrored in it.
 pub type Image = [bool; 2];
@@ -26,7 +26,7 @@ pub(crate) fn mirrored_in(neighbour: u32) -> Option<usize> {
 
 /// A vector mirrored in the planes of `image`.
 #[inline(always)]
-pub fn reflect(v: V, image: Image) -> V {
+pub fn reflect(v: Vec3, image: Image) -> Vec3 {
     let turn = |c: f64, mirrored: bool| if mirrored { -c } else { c };
     [turn(v[0], image[0]), turn(v[1], image[1]), v[2]]
 }
@@ -60,12 +60,12 @@ impl Planes {
 
     /// The planes on which a point lies.
     #[inline]
-    pub fn holding(self, p: V) -> Image {
+    pub fn holding(self, p: Vec3) -> Image {
         [0, 1].map(|k| self.0[k] && p[k] == 0.0)
     }
 
     /// Share of a node at `p` that belongs to the modelled part: 1/2 on a plane, 1/4 on both.
-    pub fn share(self, p: V) -> f64 {
+    pub fn share(self, p: Vec3) -> f64 {
         let on = self.holding(p).iter().filter(|on| **on).count();
         [1.0, 0.5, 0.25][on]
     }
@@ -105,7 +105,7 @@ pub struct Whole {
 
 impl Whole {
     /// Mirrors a part with the points `points` (m) and cells in their numbers.
-    pub fn new(points: &[V], cells: &[[u32; 4]], planes: Planes) -> Self {
+    pub fn new(points: &[Vec3], cells: &[[u32; 4]], planes: Planes) -> Self {
         let mut whole = Self::default();
         let index = |[x, y]: Image| usize::from(x) + 2 * usize::from(y);
         // By image: numbers of its nodes.
@@ -135,7 +135,7 @@ impl Whole {
     }
 
     /// Points (m) of the whole from those of the part.
-    pub fn points(&self, part: &[V]) -> Vec<V> {
+    pub fn points(&self, part: &[Vec3]) -> Vec<Vec3> {
         let at = |(n, image): &(u32, Image)| reflect(part[*n as usize], *image);
         self.nodes.iter().map(at).collect()
     }
@@ -221,7 +221,7 @@ pub fn on_outer_boundary(mesh: &QuadMesh, planes: Planes) -> Vec<bool> {
 }
 
 /// A plane on which both points lie.
-pub(crate) fn common(planes: Planes, a: V, b: V) -> Option<usize> {
+pub(crate) fn common(planes: Planes, a: Vec3, b: Vec3) -> Option<usize> {
     let (a, b) = (planes.holding(a), planes.holding(b));
     (0..2).find(|k| a[*k] && b[*k])
 }
@@ -249,8 +249,8 @@ mod tests {
             (grid.points.len(), grid.cells.len())
         );
         assert_eq!(&points[..part.points.len()], &part.points[..]);
-        let number = |p: V| {
-            let near = |q: &V| norm(sub(*q, p)) < 1e-12;
+        let number = |p: Vec3| {
+            let near = |q: &Vec3| norm(sub(*q, p)) < 1e-12;
             grid.points
                 .iter()
                 .position(near)

@@ -46,6 +46,15 @@ pub enum Pressed {
     Both,
 }
 
+/// Pressures at the current time (Pa).
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Pressures {
+    /// From below on cells pressed below.
+    pub below: f64,
+    /// From above on cells pressed above.
+    pub above: f64,
+}
+
 /// What a sheet is made of, before it becomes part of a model.
 pub struct SheetSpec {
     /// Name of its body.

@@ -2,7 +2,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::contact::{
     ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem,
@@ -13,10 +13,10 @@ use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use std::sync::Arc;
 
 /// Shears the upper sheet along y at its left edge, and lifts that.
-struct Shear(Vec<V>);
+struct Shear(Vec<Vec3>);
 
 impl Drive for Shear {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let [x, y, z] = self.0[k];
         [x, y + 2.0 * t, z + 0.5 * t]
     }
@@ -28,7 +28,7 @@ fn pressed_stack() -> Model {
     let mesh = QuadMesh::grid(&even_axis(0.0, 0.1, 0.01), &even_axis(0.0, 0.08, 0.01));
     let n = mesh.points.len() as u32;
     let m = mesh.cells.len();
-    let mut points: Vec<V> = Vec::new();
+    let mut points: Vec<Vec3> = Vec::new();
     let mut specs = Vec::new();
     for k in 0..2u32 {
         let z = THICKNESS * (0.5 + f64::from(k));
@@ -106,7 +106,7 @@ fn a_model_that_takes_up_a_state_goes_on_with_the_same_bits() {
     assert!(archive.is_at_end());
     assert_eq!(other.cycle(), 777);
     steps(&mut other, 500);
-    let bits = |v: &[V]| -> Vec<u64> { v.as_flattened().iter().map(|x| x.to_bits()).collect() };
+    let bits = |v: &[Vec3]| -> Vec<u64> { v.as_flattened().iter().map(|x| x.to_bits()).collect() };
     assert!(bits(model.x()) == bits(other.x()) && bits(model.v()) == bits(other.v()));
     let spins = |m: &Model| bits(m.spins().unwrap());
     assert!(spins(&model) == spins(&other) && spins(&model).iter().any(|s| *s != 0));

@@ -3,13 +3,13 @@
 mod common;
 
 use common::slave::{OFFSET, contact, evaluate, gradient_error, gradient_error_of, pace, scene};
-use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use plyflow_mechanics::contact::{ContactSettings, SheetContact, SlaveItem, Surface};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Model, StepSettings};
 
 /// The same cells as a bowl: four planes that meet at the slave's corner, with folds of `folds` (rad).
-fn bowl(folds: [f64; 2], place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
+fn bowl(folds: [f64; 2], place: [f64; 2], height: f64) -> (QuadMesh, Vec<Vec3>) {
     let axis = [-0.008, 0.0, 0.008];
     let mut mesh = QuadMesh::grid(&axis, &axis);
     let ground =
@@ -103,7 +103,7 @@ fn around_the_corner_of_a_bowl_the_force_turns_smoothly_and_does_no_work() {
 
 /// A film at the foot of a block's rounded corner, as it lay after forming: its cells on the ground and on the two walls are hollow towards each
 /// other, and the fourth, which lies on the corner's edge, is not. One slave at `place` from the node that they share.
-fn foot_of_a_corner(place: V) -> (QuadMesh, Vec<V>) {
+fn foot_of_a_corner(place: Vec3) -> (QuadMesh, Vec<Vec3>) {
     let axis = [-0.016, 0.0, 0.016];
     let mut mesh = QuadMesh::grid(&axis, &axis);
     let millimetres = [
@@ -129,7 +129,7 @@ fn foot_of_a_corner(place: V) -> (QuadMesh, Vec<V>) {
 fn at_the_foot_of_a_corner_the_force_turns_smoothly_between_ground_and_both_walls_and_does_no_work()
 {
     // Where the slave is pressed into the foot with some 2 to 10 % of the distance at which it touches.
-    let middle: V = [-1.75e-4, -2.3e-4, 4.3e-4];
+    let middle: Vec3 = [-1.75e-4, -2.3e-4, 4.3e-4];
     for (radius, upright) in [(4e-6, false), (2e-5, false), (5e-5, false), (2e-5, true)] {
         const STEPS: usize = 720;
         let at = |k: usize| {
@@ -349,8 +349,8 @@ fn a_slave_on_a_flank_is_held_where_the_sheet_is_bent_so_sharply_that_nodes_norm
 /// over the cell.
 struct Catch {
     mesh: QuadMesh,
-    x: Vec<V>,
-    normals: Vec<V>,
+    x: Vec<Vec3>,
+    normals: Vec<Vec3>,
     contact: SheetContact,
 }
 
@@ -361,11 +361,11 @@ impl Catch {
         for p in &mut mesh.points {
             p[2] = 0.5 * bend * p[0] * p[0];
         }
-        let normal = |p: &V| {
+        let normal = |p: &Vec3| {
             let n = [-bend * p[0], 0.0, 1.0];
             scale(n, 1.0 / norm(n))
         };
-        let mut normals: Vec<V> = mesh.points.iter().map(normal).collect();
+        let mut normals: Vec<Vec3> = mesh.points.iter().map(normal).collect();
         normals.push([0.0, 0.0, 1.0]);
         let mut x = mesh.points.clone();
         // The cell in the middle reaches from -4 to 4 mm.

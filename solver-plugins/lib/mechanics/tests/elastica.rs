@@ -3,7 +3,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::history::smooth_step;
@@ -31,16 +31,16 @@ fn way(t: f64) -> f64 {
 }
 
 /// Both ends, without rotation; the right one comes nearer.
-struct Ends(Vec<V>);
+struct Ends(Vec<Vec3>);
 
 impl Drive for Ends {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let p = self.0[k];
         let by = if p[0] > 0.5 * LENGTH { way(t) } else { 0.0 };
         [p[0] - by, p[1], p[2]]
     }
 
-    fn spin(&self, _: usize, _: f64) -> Option<V> {
+    fn spin(&self, _: usize, _: f64) -> Option<Vec3> {
         Some([0.0; 3])
     }
 }
@@ -78,7 +78,7 @@ fn strip(element: ElementInstance, n: usize) -> (Model, Vec<usize>) {
     let driven: Vec<u32> = (0..mesh.points.len() as u32)
         .filter(|i| held(mesh.points[*i as usize][0]))
         .collect();
-    let places: Vec<V> = driven.iter().map(|n| mesh.points[*n as usize]).collect();
+    let places: Vec<Vec3> = driven.iter().map(|n| mesh.points[*n as usize]).collect();
     let right = (0..places.len()).filter(|k| places[*k][0] > 0.5 * LENGTH);
     let right = right.collect();
     model.set_driven(driven, Box::new(Ends(places)));

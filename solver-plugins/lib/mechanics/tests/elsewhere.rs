@@ -2,7 +2,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::{V, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::component::ElementInstance;
@@ -14,15 +14,15 @@ use plyflow_mechanics::sheet::{Elsewhere, SheetSpec};
 /// Elements of 10 mm.
 const SIZE: f64 = 0.01;
 
-struct Clamp(Vec<V>);
+struct Clamp(Vec<Vec3>);
 
 impl Drive for Clamp {
-    fn position(&self, k: usize, _t: f64) -> V {
+    fn position(&self, k: usize, _t: f64) -> Vec3 {
         self.0[k]
     }
 }
 
-fn centre(mesh: &QuadMesh, cell: &[u32; 4]) -> V {
+fn centre(mesh: &QuadMesh, cell: &[u32; 4]) -> Vec3 {
     let corners = cell.map(|n| mesh.points[n as usize]);
     [0, 1, 2].map(|k| 0.25 * corners.iter().map(|p| p[k]).sum::<f64>())
 }
@@ -32,7 +32,7 @@ fn spec(
     mesh: &QuadMesh,
     element: ElementInstance,
     other: Option<ElementInstance>,
-    elsewhere: impl Fn(V) -> bool,
+    elsewhere: impl Fn(Vec3) -> bool,
 ) -> SheetSpec {
     let bending = QuadMesh {
         points: mesh.points.clone(),
@@ -68,7 +68,7 @@ fn model(mesh: &QuadMesh, spec: SheetSpec, step: f64) -> Model {
     model
 }
 
-fn bits(v: &[V]) -> Vec<u64> {
+fn bits(v: &[Vec3]) -> Vec<u64> {
     v.as_flattened().iter().map(|x| x.to_bits()).collect()
 }
 
@@ -76,7 +76,7 @@ fn bits(v: &[V]) -> Vec<u64> {
 fn flapping(
     element: ElementInstance,
     other: Option<ElementInstance>,
-    elsewhere: impl Fn(V) -> bool,
+    elsewhere: impl Fn(Vec3) -> bool,
 ) -> Model {
     let mesh = QuadMesh::grid(&even_axis(0.0, 0.24, SIZE), &even_axis(0.0, 0.2, SIZE));
     let mut model = model(&mesh, spec(&mesh, element, other, elsewhere), 8e-6);
@@ -125,7 +125,8 @@ fn a_sheet_whose_cells_are_all_of_one_kind_gives_the_bits_of_a_sheet_of_that_kin
 #[test]
 fn a_sheet_of_two_elements_has_the_same_bits_on_two_threads_and_from_its_archive() {
     // A corner and an island of 7 x 7 elements bend.
-    let outside = |p: V| p[0] + p[1] > 0.15 && (p[0] - 0.18).abs().max((p[1] - 0.14).abs()) > 0.035;
+    let outside =
+        |p: Vec3| p[0] + p[1] > 0.15 && (p[0] - 0.18).abs().max((p[1] - 0.14).abs()) > 0.035;
     for element in [common::rotation_free, common::shell] {
         let start = || flapping(element(), Some(common::membrane()), outside);
         let on = |threads: usize| {
@@ -230,7 +231,7 @@ fn hung(whole: bool) -> (Model, QuadMesh) {
 fn a_strip_bends_up_to_where_membranes_begin_and_these_hang_from_it_like_a_chain() {
     let ((mixed, mesh), (loaded, short)) = (hung(true), hung(false));
     let at = |model: &Model, mesh: &QuadMesh, x: f64| {
-        let is = |p: &V| (p[0] - x).abs() < 1e-9 && (p[1] - SIZE).abs() < 1e-9;
+        let is = |p: &Vec3| (p[0] - x).abs() < 1e-9 && (p[1] - SIZE).abs() < 1e-9;
         model.x()[mesh.points.iter().position(is).unwrap()]
     };
     let (a, b) = (at(&mixed, &mesh, 0.1), at(&loaded, &short, 0.1));

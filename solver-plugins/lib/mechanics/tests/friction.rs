@@ -3,7 +3,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::{V, add, dot, scale};
+use plyflow_geometry::vec3::{Vec3, add, dot, scale};
 use plyflow_mechanics::contact::{
     AngleDependence, ContactSettings, FibreField, FrictionLaw, Plane, PressureDependence,
     RigidContact, RigidItem, RigidSurface, SheetCells, SheetContact, SlaveItem, VaryingFriction,
@@ -16,7 +16,7 @@ use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use std::sync::Arc;
 
 /// A sheet of the fabric; its nodes follow `first` of the model.
-fn sheet(name: &str, mesh: &QuadMesh, first: u32, axis: V, pressed: Pressed) -> SheetSpec {
+fn sheet(name: &str, mesh: &QuadMesh, first: u32, axis: Vec3, pressed: Pressed) -> SheetSpec {
     SheetSpec {
         axis,
         pressed: vec![pressed; mesh.cells.len()],
@@ -26,9 +26,9 @@ fn sheet(name: &str, mesh: &QuadMesh, first: u32, axis: V, pressed: Pressed) -> 
 
 /// Holds nodes where they start, but for the last ones, which move along `direction`.
 struct Pull {
-    start: Vec<V>,
+    start: Vec<Vec3>,
     still: usize,
-    direction: V,
+    direction: Vec3,
     /// When it begins, length (m) and duration (s) of the way.
     begin: f64,
     way: f64,
@@ -36,7 +36,7 @@ struct Pull {
 }
 
 impl Drive for Pull {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         if k < self.still {
             return self.start[k];
         }
@@ -56,7 +56,7 @@ struct Drum {
 }
 
 impl RigidSurface for Drum {
-    fn distance(&self, p: V) -> (f64, V) {
+    fn distance(&self, p: Vec3) -> (f64, Vec3) {
         let r = p[0].hypot(p[2]);
         (r - self.radius, [p[0] / r, 0.0, p[2] / r])
     }
@@ -72,14 +72,14 @@ fn belt(angle: f64, friction: f64) -> f64 {
         &even_axis(0.0, 0.01, 0.005),
     );
     // Along s: down the left tail's end, over the drum, down the right tail.
-    let place = |s: f64| -> (V, V) {
+    let place = |s: f64| -> (Vec3, Vec3) {
         let turned = ((s - TAIL) / RADIUS).clamp(0.0, angle) - 0.5 * angle;
         let tangent = [turned.cos(), 0.0, -turned.sin()];
         let foot = [RADIUS * turned.sin(), 0.0, RADIUS * turned.cos()];
         let beyond = (s - TAIL).min(0.0) + (s - TAIL - arc).max(0.0);
         (add(foot, scale(tangent, beyond)), tangent)
     };
-    let points: Vec<V> = mesh
+    let points: Vec<Vec3> = mesh
         .points
         .iter()
         .map(|p| add(place(p[0]).0, [0.0, p[1], 0.0]))
@@ -160,7 +160,7 @@ fn a_belt_around_a_drum_follows_the_capstan_equation() {
 }
 
 /// The cell of a grid below a point, and the place in it.
-fn locate(mesh: &QuadMesh, p: V) -> (u32, [f64; 2]) {
+fn locate(mesh: &QuadMesh, p: Vec3) -> (u32, [f64; 2]) {
     let inside = |c: &[u32; 4]| {
         let (a, b) = (mesh.points[c[0] as usize], mesh.points[c[2] as usize]);
         let xi = [0, 1].map(|k| 2.0 * (p[k] - a[k]) / (b[k] - a[k]) - 1.0);
@@ -212,7 +212,7 @@ fn heavy_sandwich(
         grid([-0.05, 0.07], 0.03),
         grid([-0.025, 0.025], 0.025),
     ];
-    let mut points: Vec<V> = Vec::new();
+    let mut points: Vec<Vec3> = Vec::new();
     let mut specs = Vec::new();
     let mut first = [0; 3];
     for (k, mesh) in meshes.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::{V, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::contact::{ContactSettings, SheetContact, SlaveItem};
@@ -50,7 +50,7 @@ fn model(planes: Planes) -> (Model, QuadMesh) {
 }
 
 /// A deformation that both planes mirror.
-fn deformed(p: V) -> V {
+fn deformed(p: Vec3) -> Vec3 {
     let (x, y) = (p[0] / 0.03, p[1] / 0.02);
     [
         p[0] * (1.01 + 0.02 * y * y),
@@ -60,7 +60,7 @@ fn deformed(p: V) -> V {
 }
 
 /// Puts a part to `x` (its own nodes) and makes a step from rest: energies there and forces.
-fn forces(planes: Planes, x: &[V]) -> (f64, f64, Vec<V>, Model) {
+fn forces(planes: Planes, x: &[Vec3]) -> (f64, f64, Vec<Vec3>, Model) {
     let (mut model, _) = model(planes);
     model.x_mut()[..x.len()].copy_from_slice(x);
     model.place_ghosts();
@@ -71,7 +71,7 @@ fn forces(planes: Planes, x: &[V]) -> (f64, f64, Vec<V>, Model) {
     (e.membrane + e.hourglass, e.bending, forces, model)
 }
 
-fn place(mesh: &QuadMesh) -> Vec<V> {
+fn place(mesh: &QuadMesh) -> Vec<Vec3> {
     mesh.points.iter().map(|p| deformed(*p)).collect()
 }
 
@@ -90,7 +90,7 @@ fn energies_and_forces_of_halves_and_quarters_are_those_of_the_whole() {
         assert!((n * b / bending - 1.0).abs() < 1e-12, "{b} {bending}");
         assert!((n * model.mass().iter().sum::<f64>() - 0.06 * 0.04).abs() < 1e-12);
         for (p, f) in mesh.points.iter().zip(own) {
-            let near = |q: &V| norm(sub(*q, *p)) < 1e-9;
+            let near = |q: &Vec3| norm(sub(*q, *p)) < 1e-9;
             let twin = all[whole.points.iter().position(near).unwrap()];
             // What pushes off a plane is held there.
             let on = planes.holding(*p);
@@ -157,7 +157,7 @@ fn ghosts_follow_their_images_and_rigid_motion_along_a_plane_costs_nothing() {
     assert_eq!(ghosts, 5);
     for p in &model.x()[mesh.points.len()..] {
         let stands = [p[0], p[1] - 0.3 * way, p[2] + 0.2 * way];
-        let near = |q: &V| norm(sub(*q, stands)) < 1e-12;
+        let near = |q: &Vec3| norm(sub(*q, stands)) < 1e-12;
         assert!(
             p[0] < 0.0 && whole.points(&mesh.points).iter().any(near),
             "{p:?}"
@@ -214,13 +214,13 @@ fn a_quarter_that_takes_up_a_state_goes_on_with_the_same_bits() {
 }
 
 /// A trough z = 0.3 |x| along y of elements of 10 mm, and a finer one that is pressed 0.1 mm into it.
-fn troughs(planes: Planes) -> (Model, Vec<V>) {
+fn troughs(planes: Planes) -> (Model, Vec<Vec3>) {
     const OFFSET: f64 = 1e-3;
     let low = if planes.0[0] { 0.0 } else { -0.04 };
     let mesh = |size: f64| QuadMesh::grid(&even_axis(low, 0.04, size), &even_axis(0.0, 0.02, size));
     let (lower, upper) = (mesh(0.01), mesh(0.004));
     let over = 0.9 * OFFSET * (1.0 + 0.3f64 * 0.3).sqrt();
-    let mut points: Vec<V> = Vec::new();
+    let mut points: Vec<Vec3> = Vec::new();
     let mut specs = Vec::new();
     for (mesh, up) in [(&lower, 0.0), (&upper, over)] {
         let first = points.len() as u32;
@@ -292,7 +292,7 @@ fn in_a_fold_on_a_plane_a_node_touches_the_image_of_the_other_face() {
         let fastest = whole.v().iter().map(|v| norm(*v)).fold(0.0, f64::max);
         assert!(fastest > 0.1, "{fastest}");
         for (n, p) in own.iter().enumerate() {
-            let near = |q: &V| norm(sub(*q, *p)) < 1e-9;
+            let near = |q: &Vec3| norm(sub(*q, *p)) < 1e-9;
             let twin = places.iter().position(near).unwrap();
             let (a, b) = (half.v()[n], whole.v()[twin]);
             assert!(

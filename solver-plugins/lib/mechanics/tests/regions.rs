@@ -3,7 +3,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_kernels::m4::M4;
 use plyflow_mechanics::contact::{
     ContactSettings, FrictionLaw, NodeLaws, Partner, Plane, RegionalFriction, RigidContact,
@@ -25,10 +25,10 @@ const STEP: StepSettings = StepSettings {
 };
 
 /// Holds nodes where they start.
-struct Still(Vec<V>);
+struct Still(Vec<Vec3>);
 
 impl Drive for Still {
-    fn position(&self, k: usize, _: f64) -> V {
+    fn position(&self, k: usize, _: f64) -> Vec3 {
         self.0[k]
     }
 }
@@ -125,7 +125,7 @@ fn laws(slave: NodeLaws, partner: Partner) -> FrictionLaw {
 }
 
 /// Law 1 for the nodes of these places.
-fn inside(model: &Model, sheet: usize, holds: impl Fn(V) -> bool) -> NodeLaws {
+fn inside(model: &Model, sheet: usize, holds: impl Fn(Vec3) -> bool) -> NodeLaws {
     NodeLaws::new(&model.sheets()[sheet].nodes, |n| {
         u16::from(holds(model.x()[n as usize]))
     })

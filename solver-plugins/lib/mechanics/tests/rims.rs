@@ -3,7 +3,7 @@
 mod common;
 
 use common::slave::{OFFSET, contact, evaluate, gradient_errors, pace, scene, scene_of};
-use plyflow_geometry::vec3::{V, add, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, dot, norm, scale, sub};
 use plyflow_mechanics::contact::{
     ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem, Surface, ledge,
     rim_height,
@@ -24,7 +24,7 @@ fn held(cell: f64, past: [f64; 2]) -> f64 {
 
 /// A flat sheet of four cells of the length `cell` (m) and a slave at `height` (m) over its plane, past its rims x = cell and y = -cell by the shares `past`
 /// of the ledge, or as far inside of the sheet as in its middle where that is 0.
-fn beside(cell: f64, past: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
+fn beside(cell: f64, past: [f64; 2], height: f64) -> (QuadMesh, Vec<Vec3>) {
     let at = |p: f64, inside: f64| if p > 0.0 { 1.0 + LEDGE * p } else { inside };
     let place = [cell * at(past[0], 0.4), -cell * at(past[1], 0.3)];
     let (mesh, mut x) = scene_of(cell, 0.0, place, height);
@@ -36,8 +36,8 @@ fn beside(cell: f64, past: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
 fn surface_of<'a>(
     mesh: &'a QuadMesh,
     neighbours: &'a [[u32; 4]],
-    x: &'a [V],
-    normals: &'a [V],
+    x: &'a [Vec3],
+    normals: &'a [Vec3],
 ) -> Surface<'a> {
     Surface {
         cells: &mesh.cells,
@@ -330,7 +330,7 @@ fn past_the_rim_of_a_flank_whose_nodes_have_other_normals_the_distance_shrinks_t
 
 /// Draws a sheet over the rim of one that lies on a rigid plane, down the ledge, at a depth of 1 % of their distance.
 struct DrawnOff {
-    start: Vec<V>,
+    start: Vec<Vec3>,
     /// How many nodes of those driven lie still.
     still: usize,
     duration: f64,
@@ -339,7 +339,7 @@ struct DrawnOff {
 const CELL: f64 = 0.008;
 
 impl Drive for DrawnOff {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let x = self.start[k];
         if k < self.still {
             return x;
@@ -357,7 +357,7 @@ fn over_a_tool_a_slave_goes_down_the_ledge_and_the_tool_does_not_hold_it_up() {
     let lower = QuadMesh::grid(&axis, &axis);
     let n = lower.points.len() as u32;
     let half = 0.5 * OFFSET;
-    let mut points: Vec<V> = lower
+    let mut points: Vec<Vec3> = lower
         .points
         .iter()
         .map(|p| add(*p, [0.0, 0.0, half]))

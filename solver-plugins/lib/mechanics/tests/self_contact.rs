@@ -2,7 +2,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::{V, add, cross, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, norm, scale, sub};
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::contact::{ContactSettings, FoldSpec, Plane, RigidContact, RigidItem};
@@ -33,9 +33,9 @@ impl Strip {
         place: impl Fn(f64) -> [f64; 2],
         pressed: impl Fn(f64) -> Pressed,
         free: impl Fn(f64) -> bool,
-    ) -> (Model, Vec<V>) {
+    ) -> (Model, Vec<Vec3>) {
         let mesh = QuadMesh::grid(&self.stations, &even_axis(0.0, self.width, self.cell));
-        let at = |p: &V| {
+        let at = |p: &Vec3| {
             let [x, z] = place(p[0]);
             [x, p[1], z]
         };
@@ -91,9 +91,10 @@ fn penetrations(model: &Model) -> (f64, f64, usize) {
 
 /// Whether, seen along y, a lengthwise line of nodes crosses itself: then the sheet has passed through itself.
 fn crosses_itself(model: &Model, stations: usize) -> bool {
-    let turn = |a: V, b: V, c: V| (b[0] - a[0]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[0] - a[0]);
+    let turn =
+        |a: Vec3, b: Vec3, c: Vec3| (b[0] - a[0]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[0] - a[0]);
     model.x().chunks(stations).any(|line| {
-        let sides: Vec<&[V]> = line.windows(2).collect();
+        let sides: Vec<&[Vec3]> = line.windows(2).collect();
         sides.iter().enumerate().any(|(i, p)| {
             sides[(i + 2).min(sides.len())..].iter().any(|q| {
                 turn(p[0], p[1], q[0]) * turn(p[0], p[1], q[1]) < 0.0
@@ -105,14 +106,14 @@ fn crosses_itself(model: &Model, stations: usize) -> bool {
 
 /// The end of a strip goes over to its other end in half a circle.
 struct FoldOver {
-    start: Vec<V>,
+    start: Vec<Vec3>,
     still: usize,
     radius: f64,
     duration: f64,
 }
 
 impl Drive for FoldOver {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         if k < self.still {
             return self.start[k];
         }
@@ -216,7 +217,7 @@ fn zigzag_stations(legs: usize, cell: f64) -> Vec<f64> {
 }
 
 /// Forces (N) along z that the contacts with itself bring on each of the legs.
-fn on_legs(model: &Model, flat: &[V], legs: usize) -> Vec<f64> {
+fn on_legs(model: &Model, flat: &[Vec3], legs: usize) -> Vec<f64> {
     let mut f = vec![[0.0; 3]; flat.len()];
     for c in model.self_contacts() {
         c.scatter(model.cells(), &mut f);
@@ -286,7 +287,7 @@ fn thrown(
     cell: f64,
     friction: f64,
     contact: ContactSettings,
-) -> (Model, Vec<V>) {
+) -> (Model, Vec<Vec3>) {
     let stations = zigzag_stations(2, cell);
     let strip = Strip {
         stations,
@@ -309,7 +310,7 @@ fn thrown(
     (model, flat)
 }
 
-fn momentum(model: &Model) -> (V, V) {
+fn momentum(model: &Model) -> (Vec3, Vec3) {
     let (mut linear, mut angular) = ([0.0; 3], [0.0; 3]);
     for n in 0..model.x().len() {
         let p = scale(model.v()[n], model.mass()[n]);
@@ -382,7 +383,7 @@ fn a_strip_thrown_at_itself_bounces_off() {
     }
 }
 
-fn bits(v: &[V]) -> Vec<u64> {
+fn bits(v: &[Vec3]) -> Vec<u64> {
     v.as_flattened().iter().map(|x| x.to_bits()).collect()
 }
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::history::smooth_step;
@@ -10,10 +10,10 @@ use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Fixed, Hold, Model, NodalLoad, StepSettings};
 use plyflow_mechanics::relax::{Tolerance, relax};
 
-struct Clamp(Vec<V>);
+struct Clamp(Vec<Vec3>);
 
 impl Drive for Clamp {
-    fn position(&self, k: usize, _t: f64) -> V {
+    fn position(&self, k: usize, _t: f64) -> Vec3 {
         self.0[k]
     }
 }
@@ -141,7 +141,7 @@ fn work_of_weight_and_loads_balances_the_energies() {
 
 /// Nodes whose surroundings pull along x and out of the plane, and hold them more stiffly the further they go.
 struct Surroundings {
-    at: Vec<V>,
+    at: Vec<Vec3>,
     /// (N).
     pull: Vec<f64>,
     /// (N/m).
@@ -164,7 +164,7 @@ impl Surroundings {
 }
 
 impl Drive for Surroundings {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let (way, [from, duration]) = self.goes;
         let [x, y, z] = self.at[k];
         [x + way * smooth_step(t, from, duration), y, z]
@@ -249,8 +249,8 @@ fn a_shell_that_is_led_to_a_cylinder_has_the_bending_energy_of_one() {
     let (radius, frames) = (0.1, 24);
     let mesh = QuadMesh::grid(&even_axis(-0.15, 0.15, 0.01), &even_axis(0.0, 0.1, 0.02));
     // Rolled to `share` of the curvature 1 / radius, and turned by as much about the three axes one after the other.
-    let shape = |share: f64, bent: f64| -> Vec<V> {
-        let turn = |v: V, a: usize, angle: f64| {
+    let shape = |share: f64, bent: f64| -> Vec<Vec3> {
+        let turn = |v: Vec3, a: usize, angle: f64| {
             let (s, c) = angle.sin_cos();
             let (i, j) = ((a + 1) % 3, (a + 2) % 3);
             let mut w = v;
@@ -259,7 +259,7 @@ fn a_shell_that_is_led_to_a_cylinder_has_the_bending_energy_of_one() {
             w
         };
         let k = bent / radius;
-        let rolled = |[x, y, _]: V| {
+        let rolled = |[x, y, _]: Vec3| {
             let across = if k == 0.0 { x } else { (k * x).sin() / k };
             let up = if k == 0.0 {
                 0.0
@@ -302,7 +302,7 @@ fn a_shell_that_is_led_to_a_cylinder_has_the_bending_energy_of_one() {
 #[test]
 fn nodes_that_are_led_come_to_the_normals_that_they_are_given() {
     let mesh = QuadMesh::grid(&even_axis(0.0, 0.1, 0.02), &even_axis(0.0, 0.1, 0.02));
-    let led = |normal: V| {
+    let led = |normal: Vec3| {
         let spec = common::sheet("strip", &mesh, 0, common::stiff_shell());
         let settings = StepSettings {
             target_step: 0.0,
@@ -311,7 +311,7 @@ fn nodes_that_are_led_come_to_the_normals_that_they_are_given() {
         };
         let mut model = Model::new(mesh.points.clone(), vec![spec], settings).unwrap();
         // Of the nodes at x < 0.05 alone: the flat sheet is bent between them and the others.
-        let normals: Vec<(u32, V)> = (0..mesh.points.len() as u32)
+        let normals: Vec<(u32, Vec3)> = (0..mesh.points.len() as u32)
             .filter(|n| mesh.points[*n as usize][0] < 0.05)
             .map(|n| (n, normal))
             .collect();

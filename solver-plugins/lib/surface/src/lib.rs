@@ -21,7 +21,7 @@ pub use conformity::{NodalDistance, foot_height, nodal_distances};
 pub use crests::{Crests, tool_crests};
 pub use curvature::{Curvature, curvatures};
 pub use distribution::{bin_width, density, weighted_mean, weighted_quantiles};
-pub use ridge::{Ridge, SHARP, ridge_line, sharpness};
+pub use ridge::{Bound, Ridge, SHARP, ridge_line, sharpness};
 pub use section::{SectionPoint, line_length, path_section, plane_section, stations};
 pub use smooth::{SmoothSheet, StandOff};
 pub use topology::{Topology, triangles};

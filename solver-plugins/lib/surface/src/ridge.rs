@@ -18,22 +18,30 @@ pub struct Ridge {
     pub length: f64,
 }
 
+/// What bounds a region.
+#[derive(Debug, Clone, Copy)]
+pub struct Bound<'a> {
+    /// Curvature from which on a node is in it (1/m).
+    pub threshold: f64,
+    /// `[nodes]` what else bounds it, at least 0 inside; empty: nothing else.
+    pub margin: &'a [f64],
+}
+
 /// The ridge of a connected `region` (nodes of a mesh at `points`): the path over sides and diagonals of cells between the two
 /// ends of the region that is shortest when a length counts the more the less the ply is curved there (a minimal path, Cohen and Kimmel
 /// 1997). Each node is then moved across the ridge to the top of the parabola through the curvatures
 /// of its ring, and the line is smoothed once (1/4, 1/2, 1/4): both keep the steps of a mesh that lies at an
 /// angle to the ridge from lengthening the line. At an end where the node ahead is curved less than
-/// `threshold` (1/m, the bound of the region), or has a negative `margin` (`[nodes]`, what else bounds the region, at
-/// least 0 inside; empty: nothing else), the line goes on to where the first of them falls to its bound between
+/// the bound says, or has a negative margin, the line goes on to where the first of them falls to its bound between
 /// the two. `None` for an empty region.
 pub fn ridge_line(
     topology: &Topology,
     points: &[Vec3],
     curvature: &[Curvature],
     region: &[u32],
-    threshold: f64,
-    margin: &[f64],
+    bound: Bound<'_>,
 ) -> Option<Ridge> {
+    let Bound { threshold, margin } = bound;
     let mut inside = vec![false; topology.nodes()];
     region.iter().for_each(|&i| inside[i as usize] = true);
     let crest_region = Region {

@@ -1,6 +1,6 @@
 //! A meshed sheet as a smooth surface through its nodes, and how far nodes stand off it so that elements are as long as the material.
 
-use crate::Topology;
+use crate::topology::Topology;
 use nalgebra::DMatrix;
 use plyflow_geometry::Location;
 use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};

@@ -3,10 +3,17 @@
 mod common;
 
 use plyflow_geometry::vec3::{Vec3, cross, distance, dot, norm, sub};
-use plyflow_surface::{Curvature, Topology, curvatures, ridge_line};
+use plyflow_surface::{Bound, Curvature, Topology, curvatures, ridge_line};
 use std::f64::consts::PI;
 
 const RADIUS: f64 = 0.01;
+
+fn bound(threshold: f64) -> Bound<'static> {
+    Bound {
+        threshold,
+        margin: &[],
+    }
+}
 
 fn of(
     n: usize,
@@ -145,7 +152,7 @@ fn ridge_length_does_not_depend_on_the_angle_between_mesh_and_wrinkle() {
             let chosen: Vec<bool> = k.iter().map(|k| k.max < -threshold).collect();
             let regions = t.node_components(&chosen);
             let region = regions.iter().max_by_key(|r| r.len()).unwrap();
-            let ridge = ridge_line(&t, &points, &k, region, threshold, &[]).unwrap();
+            let ridge = ridge_line(&t, &points, &k, region, bound(threshold)).unwrap();
             let error = (ridge.length / expected - 1.0).abs();
             assert!(
                 error < 0.05,
@@ -180,7 +187,7 @@ fn ridge_of_a_wavy_crest_follows_its_curve() {
         .collect();
     let regions = t.node_components(&chosen);
     let region = regions.iter().max_by_key(|r| r.len()).unwrap();
-    let ridge = ridge_line(&t, &points, &k, region, 80.0, &[]).unwrap();
+    let ridge = ridge_line(&t, &points, &k, region, bound(80.0)).unwrap();
     let expected: f64 = (-300..300)
         .map(|i| {
             let (a, b) = (i as f64 * 1e-4, (i + 1) as f64 * 1e-4);

@@ -3,7 +3,7 @@
 use super::Subject;
 use crate::breaches::{Ask, Breaches};
 use crate::buffer::Guarded;
-use crate::meeting::{Counter, same};
+use crate::meeting::{CALLS, Counter, same};
 use crate::shapes::Patches;
 use plyflow_sdk::abi::*;
 
@@ -150,8 +150,7 @@ impl Subject {
         &self,
         (state, position): (&PatchState, &[f64]),
         ask: Ask,
-        (after, want): (&PatchState, &PatchAnswer),
-        times: usize,
+        (after, want): &(PatchState, PatchAnswer),
         counter: &Counter<'_>,
     ) -> usize {
         let Some(call) = (unsafe { (*self.functions).patch_forces }) else {
@@ -173,7 +172,7 @@ impl Subject {
         if ask.bound {
             batch.stiffness = stiffness.pointer();
         }
-        (0..times)
+        (0..CALLS)
             .filter(|_| {
                 let (to, from) = (&mut now.history, state.history.slice());
                 to.slice_mut().copy_from_slice(from);

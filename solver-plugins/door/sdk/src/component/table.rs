@@ -4,7 +4,7 @@ use super::{
     BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,
     MaterialSizes, MembraneBatch, PatchBatch,
 };
-use crate::panic_text;
+use crate::error::panic_text;
 use plyflow_abi::*;
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -159,7 +159,7 @@ unsafe fn create_guarded<T>(
     code
 }
 
-/// The function table of an [`Element`].
+/// The function table of an [`Element`]. Long, as its entries are written inside, where nothing but the table can reach them.
 pub const fn element_table<E: Element>() -> pf_element_functions {
     unsafe extern "C" fn create<E: Element>(
         parameters: pf_str,
@@ -294,7 +294,7 @@ struct MaterialInstance<M> {
     sizes: MaterialSizes,
 }
 
-/// The function table of a [`Material`].
+/// The function table of a [`Material`], written as [`element_table`].
 pub const fn material_table<M: Material>() -> pf_material_functions {
     unsafe extern "C" fn create<M: Material>(
         parameters: pf_str,

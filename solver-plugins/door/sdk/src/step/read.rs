@@ -1,6 +1,7 @@
 //! What a step reads: its inputs, their attributes, arrays, meshes and frames.
 
-use super::{BodyInfo, Host, Input, Meshes, On, StepError, check};
+use super::{BodyInfo, Host, Input, Meshes, On};
+use crate::error::StepError;
 use plyflow_abi::*;
 use serde::de::DeserializeOwned;
 
@@ -78,7 +79,7 @@ impl Host {
         let mut data = vec![T::default(); shape.iter().product()];
         let bytes = size_of_val(data.as_slice()) as u64;
         let buffer = data.as_mut_ptr().cast();
-        check(
+        self.check(
             call!(self.array_read(input.handle, pf_str::new(path), dtype, buffer, bytes)),
             || format!("reading '{path}' of '{}'", input.step),
         )?;
@@ -147,7 +148,7 @@ impl Host {
         let mut points = vec![[0.0; 3]; body.points];
         let mut cells = vec![0u32; body.cells * body.nodes_per_cell];
         let (p, c) = (points.as_mut_ptr().cast(), cells.as_mut_ptr());
-        check(
+        self.check(
             call!(self.mesh_read(input.handle, pf_str::new(&body.name), p, c)),
             || format!("body '{}' of '{}'", body.name, input.step),
         )?;
@@ -168,7 +169,7 @@ impl Host {
         let mut points = vec![[0.0; 3]; body.points];
         let p = points.as_mut_ptr().cast();
         let name = pf_str::new(&body.name);
-        check(
+        self.check(
             call!(self.frame_points_read(input.handle, name, frame as u64, p)),
             || format!("frame {frame} of body '{}' of '{}'", body.name, input.step),
         )?;
@@ -202,7 +203,7 @@ impl Host {
         let mut values = vec![0.0; rows * field.components as usize];
         let (p, n) = (values.as_mut_ptr(), values.len() as u64);
         let (b, f) = (pf_str::new(&body.name), pf_str::new(name));
-        check(
+        self.check(
             call!(self.frame_field_read(input.handle, b, frame as u64, on, f, p, n)),
             || format!("field '{name}' of body '{}' of '{}'", body.name, input.step),
         )?;

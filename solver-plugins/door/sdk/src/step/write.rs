@@ -1,6 +1,7 @@
 //! What a step writes: attributes, arrays, meshes, frames, results and collections.
 
-use super::{Host, On, StepError, check};
+use super::{Host, On};
+use crate::error::StepError;
 use plyflow_abi::*;
 
 /// As JSON. By way of a value, whose keys are sorted: the text hangs on what is told, not on the order of a type's fields.
@@ -16,7 +17,7 @@ impl Host {
     /// When the host refuses.
     pub fn write_attributes(&self, value: &impl serde::Serialize) -> Result<(), StepError> {
         let text = json_text(value)?;
-        check(call!(self.attributes_write(pf_str::new(&text))), || {
+        self.check(call!(self.attributes_write(pf_str::new(&text))), || {
             "writing attributes".into()
         })
     }
@@ -46,7 +47,7 @@ impl Host {
             *to = *from as u64;
         }
         let (p, u) = (pf_str::new(path), pf_str::new(unit));
-        check(
+        self.check(
             call!(self.array_write(p, &raw const info, u, data.as_ptr().cast())),
             what,
         )
@@ -96,7 +97,7 @@ impl Host {
         let (n, m) = (points.len() as u64, (cells.len() / k) as u64);
         let (p, c) = (points.as_ptr().cast(), cells.as_ptr());
         let (b, j) = (pf_str::new(body), pf_str::new(&json));
-        check(call!(self.mesh_define(b, n, p, m, k as u32, c, j)), || {
+        self.check(call!(self.mesh_define(b, n, p, m, k as u32, c, j)), || {
             format!("body '{body}'")
         })
     }
@@ -106,7 +107,7 @@ impl Host {
     /// # Errors
     /// When a frame is open or the time does not grow.
     pub fn begin_frame(&self, time: f64) -> Result<(), StepError> {
-        check(call!(self.frame_begin(time)), || {
+        self.check(call!(self.frame_begin(time)), || {
             format!("frame at {time} s")
         })
     }
@@ -121,7 +122,7 @@ impl Host {
             points.as_ptr().cast(),
             points.len() as u64,
         );
-        check(call!(self.frame_points(b, p, n)), || {
+        self.check(call!(self.frame_points(b, p, n)), || {
             format!("points of body '{body}'")
         })
     }
@@ -146,7 +147,7 @@ impl Host {
         };
         let (b, f, u) = (pf_str::new(body), pf_str::new(name), pf_str::new(unit));
         let (p, n) = (values.as_ptr(), values.len() as u64);
-        check(
+        self.check(
             call!(self.frame_field(b, on, f, components, u, p, n)),
             || format!("field '{name}' of body '{body}'"),
         )
@@ -157,7 +158,7 @@ impl Host {
     /// # Errors
     /// When a body lacks a field that it had in the first frame.
     pub fn end_frame(&self) -> Result<(), StepError> {
-        check(call!(self.frame_end()), || "ending a frame".into())
+        self.check(call!(self.frame_end()), || "ending a frame".into())
     }
 
     /// A named number for `plyflow results`.
@@ -166,7 +167,7 @@ impl Host {
     /// When the value is not finite or the name is taken.
     pub fn result(&self, name: &str, value: f64, unit: &str) -> Result<(), StepError> {
         let (n, u) = (pf_str::new(name), pf_str::new(unit));
-        check(call!(self.result(n, value, u, 0)), || {
+        self.check(call!(self.result(n, value, u, 0)), || {
             format!("result '{name}' = {value}")
         })
     }
@@ -177,7 +178,7 @@ impl Host {
     /// As [`Host::result`].
     pub fn measured(&self, name: &str, value: f64, unit: &str) -> Result<(), StepError> {
         let (n, u) = (pf_str::new(name), pf_str::new(unit));
-        check(call!(self.result(n, value, u, PF_RESULT_MEASURED)), || {
+        self.check(call!(self.result(n, value, u, PF_RESULT_MEASURED)), || {
             format!("result '{name}' = {value}")
         })
     }
@@ -188,7 +189,7 @@ impl Host {
     /// When the plugin's manifest does not declare a collection.
     pub fn collection(&self, names: &[String]) -> Result<(), StepError> {
         let json = serde_json::to_string(names).map_err(|e| StepError::Failed(e.to_string()))?;
-        check(
+        self.check(
             call!(self.collection(names.len() as u64, pf_str::new(&json))),
             || "declaring the collection".into(),
         )

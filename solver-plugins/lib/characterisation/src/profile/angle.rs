@@ -6,7 +6,7 @@
 //! curve; the length is the arc at the last point, unless the overhang is given.
 
 use super::grid::{Grid, legendre};
-use super::{Choice, Method, Profile, ProfileFit, Stations, overhang_reaches, spread};
+use super::terms::{Choice, Profile, ProfileFit, Stations, overhang_reaches, spread};
 use crate::linear::{Solution, least_squares};
 use nalgebra::DMatrix;
 use plyflow_fixed::FixedBits;
@@ -210,6 +210,54 @@ impl Curve {
     }
 }
 
+/// Unknowns, and what their curve misses of the points.
+struct Trial {
+    unknowns: Vec<f64>,
+    length: f64,
+    feet: Vec<Foot>,
+    /// Arc at the last point (m).
+    arc: f64,
+    /// Sum of the squared distances (m2).
+    left: f64,
+}
+
+impl Trial {
+    fn new(grid: &Grid, basis: &Basis, profile: &Profile, unknowns: Vec<f64>, length: f64) -> Self {
+        let (feet, arc) = misfit(&curve(grid, basis, &unknowns, length), profile);
+        Self {
+            left: squares(&feet),
+            unknowns,
+            length,
+            feet,
+            arc,
+        }
+    }
+
+    /// The change of the unknowns that lessens the distances most, were they linear. `shape`: the curve.
+    fn change(&self, shape: &Curve) -> Result<Solution, String> {
+        let matrix = DMatrix::from_fn(self.feet.len(), self.unknowns.len(), |i, j| {
+            self.feet[i].normal_part(&shape.change[j])
+        });
+        let right: Vec<f64> = self.feet.iter().map(|f| f.distance).collect();
+        least_squares(&matrix, &right)
+    }
+
+    /// As far along a change of the unknowns and towards another length as the sum of squares allows. `at` tries.
+    fn moved(&self, change: &[f64], longer: f64, at: impl Fn(Vec<f64>, f64) -> Self) -> Self {
+        let mut factor = 1.0;
+        loop {
+            let parts = self.unknowns.iter().zip(change);
+            let unknowns = parts.map(|(b, d)| b + factor * d).collect();
+            let tried = at(unknowns, self.length + factor * (longer - self.length));
+            // The length follows the last point, so the sum may rise a little on the way.
+            if tried.left <= self.left * 1.05 + 1e-20 || factor < 0.05 {
+                return tried;
+            }
+            factor *= 0.5;
+        }
+    }
+}
+
 /// Fits; `start`: unknowns of a lower degree and the length found with them.
 pub fn fit(
     grid: &Grid,
@@ -220,93 +268,49 @@ pub fn fit(
 ) -> Result<ProfileFit, String> {
     let terms = degree - 2;
     let basis = basis(grid, terms);
-    let (mut unknowns, mut length) = match start {
+    let (mut unknowns, length) = match start {
         Some((unknowns, length)) => (unknowns.clone(), *length),
         None => guess(grid, profile, terms)?,
     };
     unknowns.resize(terms, 0.0);
     let given = choice.overhang;
-    length = given.unwrap_or(length);
-    let (mut now, mut arc) = misfit(&curve(grid, &basis, &unknowns, length), profile);
-    let mut left = squares(&now);
+    let at = |unknowns, length| Trial::new(grid, &basis, profile, unknowns, length);
+    let mut now = at(unknowns, given.unwrap_or(length));
     let mut solved = None;
     for _ in 0..ITERATIONS {
-        let shape = curve(grid, &basis, &unknowns, length);
-        let matrix = DMatrix::from_fn(now.len(), terms, |i, j| {
-            now[i].normal_part(&shape.change[j])
-        });
-        let right: Vec<f64> = now.iter().map(|f| f.distance).collect();
-        let solution = least_squares(&matrix, &right)?;
-        let longer = given.unwrap_or(arc);
+        let shape = curve(grid, &basis, &now.unknowns, now.length);
+        let solution = now.change(&shape)?;
+        let longer = given.unwrap_or(now.arc);
         let step = solution.unknowns.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let moved = (longer - length).abs() / length;
-        let mut factor = 1.0;
-        loop {
-            let tried: Vec<f64> = unknowns
-                .iter()
-                .zip(&solution.unknowns)
-                .map(|(b, d)| b + factor * d)
-                .collect();
-            let stretched = length + factor * (longer - length);
-            let (feet, reached) = misfit(&curve(grid, &basis, &tried, stretched), profile);
-            let sum = squares(&feet);
-            // The length follows the last point, so the sum may rise a little on the way.
-            if sum <= left * 1.05 + 1e-20 || factor < 0.05 {
-                (unknowns, length, now, arc, left) = (tried, stretched, feet, reached, sum);
-                break;
-            }
-            factor *= 0.5;
-        }
+        let moved = (longer - now.length).abs() / now.length;
+        now = now.moved(&solution.unknowns, longer, at);
         solved = Some(solution);
         if step < 1e-10 && moved < 1e-11 {
             break;
         }
     }
     let solution = solved.ok_or("the fit of the profile did not start")?;
-    if !left.is_finite() || unknowns.iter().any(|b| !b.is_finite()) {
+    if !now.left.is_finite() || now.unknowns.iter().any(|b| !b.is_finite()) {
         return Err(format!(
             "the fit of degree {degree} to the profile does not converge"
         ));
     }
     if let Some(overhang) = given {
-        overhang_reaches(overhang, arc)?;
+        overhang_reaches(overhang, now.arc)?;
     }
-    Ok(finish(
-        grid,
+    let rows = now.feet.len() as f64;
+    let variance = now.left / (rows - terms as f64).max(1.0);
+    let stations = stations(grid, &now.unknowns, now.length);
+    Ok(ProfileFit {
         degree,
-        unknowns,
-        length,
-        now.len(),
-        left,
-        &solution,
-        choice,
-    ))
-}
-
-fn finish(
-    grid: &Grid,
-    degree: usize,
-    unknowns: Vec<f64>,
-    length: f64,
-    rows: usize,
-    left: f64,
-    solution: &Solution,
-    choice: &Choice,
-) -> ProfileFit {
-    let variance = left / (rows as f64 - unknowns.len() as f64).max(1.0);
-    let curve = stations(grid, &unknowns, length);
-    ProfileFit {
-        degree,
-        spread: spread(solution, variance.sqrt()),
-        rms: (left / rows as f64).sqrt(),
+        unknowns: now.unknowns,
+        spread: spread(&solution, variance.sqrt()),
+        rms: (now.left / rows).sqrt(),
         condition: solution.condition,
-        length,
-        monotone: curve.bends_monotonically(choice.trim),
-        stations: curve,
-        method: Method::TangentAngle,
-        reach: 0.0,
-        unknowns,
-    }
+        length: now.length,
+        monotone: stations.bends_monotonically(choice.trim),
+        stations,
+    })
 }
 
 pub fn squares(feet: &[Foot]) -> f64 {

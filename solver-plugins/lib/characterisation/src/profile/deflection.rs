@@ -1,7 +1,7 @@
 //! A clamped polynomial y(x): `y = xi^2 sum c_j P_j(2 xi - 1)`, `xi = x / reach`.
 
 use super::grid::{Grid, legendre};
-use super::{Choice, Method, Profile, ProfileFit, Stations, overhang_reaches, spread};
+use super::terms::{Choice, Profile, ProfileFit, Stations, overhang_reaches, spread};
 use crate::linear::least_squares;
 use nalgebra::DMatrix;
 use plyflow_fixed::FixedBits;
@@ -52,8 +52,6 @@ pub fn fit(
         length,
         monotone: curve.bends_monotonically(choice.trim),
         stations: curve,
-        method: Method::Deflection,
-        reach,
     })
 }
 

@@ -6,7 +6,7 @@
 //! the noise of the points, and the errors that follow from it hold.
 
 use super::angle::{Curve, Foot, misfit, squares};
-use super::{Profile, overhang_reaches};
+use super::terms::{Profile, overhang_reaches};
 use crate::confidence::autocorrelation;
 use crate::linear::least_squares;
 use crate::voce::{Saturation, Voce, VoceFit};

@@ -1,6 +1,7 @@
 //! The laws of the thesis (tables 3.1 and 3.2), and what testing machines would record of them.
 
-use super::{Elastica, Noise, elastica};
+use super::elastica::{Elastica, elastica};
+use super::noise::Noise;
 use plyflow_fixed::FixedBits;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 

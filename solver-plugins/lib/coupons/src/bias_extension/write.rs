@@ -1,6 +1,6 @@
 //! Curves, plots and results of a bias extension.
 
-use super::{Histories, Parameters, net_angle};
+use super::terms::{Histories, Parameters, net_angle};
 use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::Outcome;

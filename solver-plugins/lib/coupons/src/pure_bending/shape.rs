@@ -1,7 +1,7 @@
 //! The folded strip.
 
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::model::Drive;
 
@@ -70,7 +70,7 @@ pub(super) struct Roll {
 }
 
 impl Drive for Roll {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let (i, y) = self.nodes[k];
         let (shear, curvature) = self.history.at(t);
         let [x, z, _] = self.shape.column(i, shear, curvature);
@@ -78,7 +78,7 @@ impl Drive for Roll {
         [x, y + along * shear.fixed_sin(), z]
     }
 
-    fn spin(&self, k: usize, t: f64) -> Option<V> {
+    fn spin(&self, k: usize, t: f64) -> Option<Vec3> {
         let small = 1e-6 * self.history.leg;
         let turn = |t: f64| {
             let (shear, curvature) = self.history.at(t);

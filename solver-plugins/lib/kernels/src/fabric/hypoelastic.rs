@@ -12,45 +12,19 @@
 //! The frames turn with the fibres, so what eqs 3.10-3.17 do by polar decomposition needs no
 //! rotation here. Strain increments are taken at mid-step; the sine is clamped to 0.985 (80 deg).
 
-use super::shear::{ShearOf, Yarn};
+use super::ply::{Fabric, LEAST, tangents};
+use super::shear::ShearOf;
 use super::yarn::Law;
-use super::{Fabric, LEAST, for_yarn, tangents};
-use crate::{Lanes, WIDTH, dispatch};
+use crate::{Lanes, WIDTH};
 
 /// Rows: C11 - 1, C22 - 1, C12 before; N1, N2, T1, T2 (N/m); F_norm cos g / 2 (N/m) before; work
 /// (J/m2); largest shear angle of the stitch and its sine.
 pub(super) const HISTORY: usize = 11;
 const SINE_LIMIT: f64 = 0.985;
 
-dispatch!(pub(super) fn membrane(
-    f: &Fabric,
-    n: usize,
-    metric: &[f64],
-    history: &mut [f64],
-    stress: &mut [f64],
-    energy: &mut [f64],
-    stiffness: &mut [f64],
-) = membrane_kernel);
-
+/// Stresses and energies from the metric and the [`HISTORY`]; `stiffness` may be empty.
 #[inline(always)]
-fn membrane_kernel<V: Lanes>(
-    f: &Fabric,
-    n: usize,
-    metric: &[f64],
-    history: &mut [f64],
-    stress: &mut [f64],
-    energy: &mut [f64],
-    stiffness: &mut [f64],
-) {
-    for_yarn!(
-        f,
-        membrane_of::<V>(n, metric, history, stress, energy, stiffness)
-    );
-}
-
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn membrane_of<V: Lanes, L: Law>(
+pub(super) fn membrane<V: Lanes, L: Law>(
     f: &Fabric,
     law: ShearOf<'_, L>,
     n: usize,

@@ -3,10 +3,10 @@
 use super::bending::{Bending, Law, Laws, Voce};
 use super::checks::{self, not_negative, positive};
 use super::cubic::Cubic;
+use super::ply::{Fabric, Form};
 use super::shear::Shear;
 use super::stitch::Stitch;
 use super::yarn::{Branch, Table};
-use super::{Fabric, Form};
 use serde::Deserialize;
 
 #[derive(Deserialize)]

@@ -10,7 +10,7 @@
 //! strain's derivative by a rotation is never longer than that by its director.
 
 use super::forces::View;
-use super::{S4, row};
+use super::section::{S4, row};
 use crate::quad::largest;
 use nalgebra::{Matrix3, Vector3};
 use plyflow_geometry::vec3::{Vec3, cross, dot, mix, norm};

@@ -1,7 +1,7 @@
 //! Kinematics, superposition of the layers and nodal forces of `s4`, on lanes.
 
 use super::rotation::{cross, dot, mix, scaled, sub, turn};
-use super::{Layers, row};
+use super::section::{Layers, row};
 use crate::{Lanes, WIDTH, dispatch, thickening};
 
 /// What one batch of at most `N` lanes needs between the material calls. Rows of n lanes lie one

@@ -3,7 +3,7 @@
 //! Written out component by component: what `array::from_fn` and `array::map` call is not compiled
 //! for the instruction set of the kernel, which costs a factor of ten.
 
-use crate::Lanes;
+use crate::lanes::{Lanes, SHIFT};
 
 type V3<V> = [V; 3];
 
@@ -77,7 +77,6 @@ pub(super) fn turn<V: Lanes>(d: &V3<V>, t: &V3<V>) -> V3<V> {
 /// `sin a / a`, `cos a` and `(1 - cos a) / a^2` of any angle, from its square.
 #[inline(always)]
 fn long_way<V: Lanes>(squared: V) -> V3<V> {
-    const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52: adding it rounds to a whole number
     let (one, two, half) = (V::splat(1.0), V::splat(2.0), V::splat(0.5));
     // The floor keeps the quotients below defined; at 1e-100 rad they are 1 and 1/2.
     let a = squared.sqrt().max(V::splat(1e-100));

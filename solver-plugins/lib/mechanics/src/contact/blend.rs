@@ -1,8 +1,7 @@
 //! Concave folds and corners of a master, where a slave lies between several of its cells.
 
-use super::search::{Closest, FACES, Found};
-use super::slave::Pull;
-use crate::vec3::{V, dot, scale};
+use super::closest::{Closest, FACES, Found};
+use crate::vec3::{Vec3, dot, scale};
 use nalgebra::{Matrix5, Vector5};
 
 /// Faces that may share a slave: the closest, and the others around its corner.
@@ -26,6 +25,28 @@ pub(super) fn shares(first: &Closest, beside: &Closest, other: &Closest, offset:
     e > 1e-9 * offset && other.distance2.sqrt() - first.distance2.sqrt() < e
 }
 
+/// Gap and its gradient for the slave: `first` and `others` are minus the gradients for the cells' points.
+pub(super) struct Pull {
+    pub(super) gap: f64,
+    pub(super) first: Vec3,
+    /// Shares of the other cells.
+    pub(super) shares: [f64; FACES],
+    pub(super) others: [Vec3; FACES],
+}
+
+impl Pull {
+    /// By one cell alone, along `first`.
+    #[inline(always)]
+    pub(super) fn plain(gap: f64, first: Vec3) -> Self {
+        Self {
+            gap,
+            first,
+            shares: [0.0; FACES],
+            others: [[0.0; 3]; FACES],
+        }
+    }
+}
+
 /// Pull of the cells around a slave, and whether it is that of the closest alone.
 #[inline]
 pub(super) fn pulled(found: &Found, offset: f64) -> (Pull, bool) {
@@ -37,7 +58,11 @@ pub(super) fn pulled(found: &Found, offset: f64) -> (Pull, bool) {
     let Some((below, shares)) = blend(found, offset).filter(|b| b.1[0] < 1.0) else {
         return (plain(), true);
     };
-    let along = |c: &Closest, share: f64| -> V { scale(c.arm, share / c.distance2.sqrt()) };
+    debug_assert!(
+        (shares.iter().sum::<f64>() - 1.0).abs() < 1e-6 && below <= 0.0,
+        "{shares:?}"
+    );
+    let along = |c: &Closest, share: f64| -> Vec3 { scale(c.arm, share / c.distance2.sqrt()) };
     let mut pull = Pull::plain(d + below - offset, along(&found.first, shares[0]));
     for (k, c) in found.others.iter().enumerate() {
         if let Some(c) = c {

@@ -8,14 +8,16 @@
 //! A search in space finds the pairs that may touch; it is done anew only when some node may have moved
 //! further than the margin that the last one allowed for. In between each pair is followed by walking.
 
-use super::blend::pulled;
-use super::friction::{Constant, Coulomb, FrictionLaw};
-use super::proximity::{Blocks, Candidate, Reach};
-use super::search::{Closest, Surface, cell_normal, combine, shape, track};
-use super::slave::{Law, Pull, SEARCH_INTERVAL, SlaveItem, hold, relative_speed, scatter, touch};
-use super::{ContactEnergy, ContactSettings, Follow, Pace, content};
+use super::blend::{Pull, pulled};
+use super::closest::{Closest, Surface, cell_normal, combine, shape};
+use super::friction::{Constant, Coulomb};
+use super::penalty::{ContactEnergy, ContactSettings, Follow, Pace, content};
+use super::proximity::{Blocks, Candidate, Reach, is_far};
+use super::regions::FrictionLaw;
+use super::search::track;
+use super::slave::{Law, SEARCH_INTERVAL, SlaveItem, hold, relative_speed, scatter, touch};
 use crate::archive::{Archive, ArchiveError};
-use crate::vec3::{V, dot, norm, scale, sub};
+use crate::vec3::{Vec3, dot, norm, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -49,7 +51,7 @@ pub struct FoldItem {
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Search {
     /// `[slaves]` positions at the last search (m); empty before the first.
-    x: Vec<V>,
+    x: Vec<Vec3>,
     /// How far a node may have moved since the displacements were looked at (m).
     travelled: f64,
     /// At how much of that they are looked at again (m).
@@ -69,7 +71,7 @@ pub struct FoldSpec {
     /// Coulomb coefficient.
     pub friction: FrictionLaw,
     /// `[nodes]` positions in the flat, undeformed sheet (m).
-    pub undeformed: Arc<[V]>,
+    pub undeformed: Arc<[Vec3]>,
 }
 
 /// A sheet on itself.
@@ -89,7 +91,7 @@ pub struct SelfContact {
     /// How often pairs were searched.
     pub searches: u64,
     slaves: Vec<u32>,
-    undeformed: Arc<[V]>,
+    undeformed: Arc<[Vec3]>,
     blocks: Blocks,
     near: f64,
     margin: f64,
@@ -156,11 +158,11 @@ impl SelfContact {
     pub(crate) fn compute(
         &mut self,
         s: &Surface<'_>,
-        v: &[V],
+        v: &[Vec3],
         pace: Pace,
         stride: f64,
         bearing: Bearing<'_>,
-        onto: Option<&mut [V]>,
+        onto: Option<&mut [Vec3]>,
     ) -> ContactEnergy {
         if self.slaves.is_empty() {
             return ContactEnergy::default();
@@ -179,9 +181,9 @@ impl SelfContact {
         &mut self,
         friction: &F,
         s: &Surface<'_>,
-        v: &[V],
+        v: &[Vec3],
         pace: Pace,
-        onto: Option<&mut [V]>,
+        onto: Option<&mut [Vec3]>,
     ) -> ContactEnergy {
         let law = Law {
             dt: pace.dt,
@@ -236,13 +238,13 @@ impl SelfContact {
     }
 
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
-    pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
+    pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [Vec3]) {
         scatter(self.items.iter().map(|i| &i.slave), cells, f);
     }
 
     /// Whether two points that the last search found out of reach may have come within the thickness. What
     /// counts is how far nodes have moved against each other: the mean motion is taken off.
-    fn is_search_due(&mut self, x: &[V], stride: f64) -> bool {
+    fn is_search_due(&mut self, x: &[Vec3], stride: f64) -> bool {
         let search = &mut self.search;
         if search.x.is_empty() {
             return true;
@@ -251,15 +253,15 @@ impl SelfContact {
         if search.travelled + stride < search.room {
             return false;
         }
-        let moved = |(n, then): (&u32, &V)| sub(x[*n as usize], *then);
+        let moved = |(n, then): (&u32, &Vec3)| sub(x[*n as usize], *then);
         let pairs = || self.slaves.iter().zip(&search.x);
         let mut mean = [0.0; 3];
         for d in pairs().map(moved) {
             mean = crate::vec3::add(mean, d);
         }
         mean = scale(mean, 1.0 / self.slaves.len() as f64);
-        let from_mean = |d: V| sub(d, mean);
-        let square = |d: V| dot(d, d);
+        let from_mean = |d: Vec3| sub(d, mean);
+        let square = |d: Vec3| dot(d, d);
         let most = pairs()
             .map(moved)
             .map(from_mean)
@@ -291,7 +293,7 @@ impl SelfContact {
             let node = group[0].node;
             let begin = kept[..carried].partition_point(|i| i.slave.node < node);
             let end = kept[..carried].partition_point(|i| i.slave.node <= node);
-            let mut taken: Vec<(V, V)> = kept[begin..end]
+            let mut taken: Vec<(Vec3, Vec3)> = kept[begin..end]
                 .iter()
                 .map(|i| (i.slave.direction, self.foot(s, &i.slave)))
                 .collect();
@@ -300,7 +302,7 @@ impl SelfContact {
                 let foot = combine(shape(c.xi), &self.corners(s, c.cell));
                 // The nearest of a direction hides what lies behind it; and a patch that the slave touches, or has
                 // passed through by a little, is not met again from its other side.
-                let is_known = |(d, f): &(V, V)| {
+                let is_known = |(d, f): &(Vec3, Vec3)| {
                     dot(*d, direction) > 0.0 || norm(sub(*f, foot)) < self.near + self.edge
                 };
                 if taken.len() < MOST && !taken.iter().any(is_known) {
@@ -321,16 +323,16 @@ impl SelfContact {
         self.searches += 1;
     }
 
-    fn corners(&self, s: &Surface<'_>, cell: u32) -> [V; 4] {
+    fn corners(&self, s: &Surface<'_>, cell: u32) -> [Vec3; 4] {
         s.cells[cell as usize].map(|n| self.undeformed[n as usize])
     }
 
     /// Where the closest point lies in the undeformed sheet (m).
-    fn foot(&self, s: &Surface<'_>, item: &SlaveItem) -> V {
+    fn foot(&self, s: &Surface<'_>, item: &SlaveItem) -> Vec3 {
         combine(shape(item.xi), &self.corners(s, item.cell))
     }
 
-    fn pair(&self, s: &Surface<'_>, c: &Candidate, direction: V) -> FoldItem {
+    fn pair(&self, s: &Surface<'_>, c: &Candidate, direction: Vec3) -> FoldItem {
         let mut slave = SlaveItem::new(c.node, c.cell, c.xi);
         slave.direction = direction;
         // It was out of reach before, so it cannot be deep inside.
@@ -402,18 +404,9 @@ impl SelfContact {
     }
 }
 
-/// Whether no corner of a cell is `near` (m) a point in the undeformed sheet.
-#[inline]
-pub(super) fn is_far(cell: [u32; 4], undeformed: &[V], own: V, near: f64) -> bool {
-    cell.iter().all(|n| {
-        let d = sub(undeformed[*n as usize], own);
-        dot(d, d) > near * near
-    })
-}
-
 /// On which side of the cell that is closest now (its normal: `up`) a slave lies that was on `side` of the last one.
 #[inline]
-fn side_of(side: f64, item: &SlaveItem, first: &Closest, up: V, offset: f64) -> f64 {
+fn side_of(side: f64, item: &SlaveItem, first: &Closest, up: Vec3, offset: f64) -> f64 {
     let (distance, along) = (first.distance2.sqrt(), dot(first.arm, up));
     if !item.active && distance > offset {
         // Apart, it lies where it is seen to lie.
@@ -432,7 +425,7 @@ fn side_of(side: f64, item: &SlaveItem, first: &Closest, up: V, offset: f64) -> 
 fn follow<F: Coulomb>(
     pair: &mut FoldItem,
     s: &Surface<'_>,
-    v: &[V],
+    v: &[Vec3],
     pace: &Pace,
     law: &Law<'_, F>,
     open: impl Fn(u32) -> bool,
@@ -486,7 +479,7 @@ mod tests {
     use crate::mesh::NONE;
 
     /// Two cells folded flat onto each other along y at x = 0: the upper one faces up, the lower one down.
-    const X: [V; 7] = [
+    const X: [Vec3; 7] = [
         [-1e-2, 0.0, 0.0],
         [0.0, 0.0, 0.0],
         [0.0, 1e-2, 0.0],
@@ -499,7 +492,7 @@ mod tests {
 
     /// Follows a slave in touch (0.1 mm deep) that was last seen in `direction` of the upper cell and is now found on the
     /// lower one.
-    fn found_below(direction: V, slave: V) -> FoldItem {
+    fn found_below(direction: Vec3, slave: Vec3) -> FoldItem {
         let mut x = X;
         x[6] = slave;
         let surface = Surface {

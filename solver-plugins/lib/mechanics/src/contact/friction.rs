@@ -1,29 +1,11 @@
 //! Coefficients of friction: constant, or by pressure and by the angle between sliding and fibres.
 
-use super::regions::RegionalFriction;
-use crate::vec3::{V, add, cross, dot, norm, scale, sub, unit};
+use super::penalty::{Tangential, friction_force};
+use crate::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use plyflow_fixed::FixedBits;
-use std::sync::Arc;
 
 /// No law gives more, whatever the pressure: the largest coefficient that a scene may state.
 pub const LARGEST_COEFFICIENT: f64 = 2.0;
-
-/// Coulomb coefficient of a pair of surfaces.
-#[derive(Debug, Clone)]
-pub enum FrictionLaw {
-    /// The same everywhere.
-    Constant(f64),
-    /// By pressure and direction.
-    Varying(Arc<VaryingFriction>),
-    /// By the places of the sheets that touch.
-    Regional(Arc<RegionalFriction>),
-}
-
-impl From<f64> for FrictionLaw {
-    fn from(coefficient: f64) -> Self {
-        Self::Constant(coefficient)
-    }
-}
 
 /// Coefficient by pressure.
 #[derive(Debug, Clone, PartialEq)]
@@ -160,7 +142,7 @@ impl SheetCells {
     }
 
     /// A quarter of the areas (m2) of the cells around a node.
-    fn area(&self, node: u32, x: &[V]) -> f64 {
+    fn area(&self, node: u32, x: &[Vec3]) -> f64 {
         let area = |c: &u32| {
             let p = self.cells[*c as usize].map(|n| x[n as usize]);
             0.5 * norm(cross(sub(p[2], p[0]), sub(p[3], p[1])))
@@ -180,7 +162,7 @@ pub struct FibreField {
 }
 
 /// Lines through the middle of a cell along its two coordinates (m).
-fn middle_lines(p: [V; 4]) -> [V; 2] {
+fn middle_lines(p: [Vec3; 4]) -> [Vec3; 2] {
     let along =
         |a: usize, b: usize, c: usize, d: usize| scale(sub(add(p[a], p[b]), add(p[c], p[d])), 0.5);
     [along(1, 2, 0, 3), along(2, 3, 0, 1)]
@@ -189,7 +171,7 @@ fn middle_lines(p: [V; 4]) -> [V; 2] {
 impl FibreField {
     /// Fibres along `direction` (in the sheet's plane) at the positions `x` (m) of the model's nodes. `cells`: those of the
     /// sheet, of which the first has the number `first_cell` in the model.
-    pub fn new(cells: &[[u32; 4]], first_cell: usize, x: &[V], direction: V) -> Self {
+    pub fn new(cells: &[[u32; 4]], first_cell: usize, x: &[Vec3], direction: Vec3) -> Self {
         let components = cells.iter().map(|cell| {
             let [a, b] = middle_lines(cell.map(|n| x[n as usize]));
             let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
@@ -204,19 +186,19 @@ impl FibreField {
         }
     }
 
-    fn of_own_cell(&self, cell: usize, x: &[V]) -> V {
+    fn of_own_cell(&self, cell: usize, x: &[Vec3]) -> Vec3 {
         let [a, b] = middle_lines(self.sheet.cells[cell].map(|n| x[n as usize]));
         let [ca, cb] = self.components[cell];
         unit(add(scale(a, ca), scale(b, cb)))
     }
 
     /// Direction in a cell (model number).
-    fn in_cell(&self, cell: u32, x: &[V]) -> V {
+    fn in_cell(&self, cell: u32, x: &[Vec3]) -> Vec3 {
         self.of_own_cell((cell - self.first_cell) as usize, x)
     }
 
     /// Mean direction of the cells around a node, not of unit length.
-    fn at_node(&self, node: u32, x: &[V]) -> V {
+    fn at_node(&self, node: u32, x: &[Vec3]) -> Vec3 {
         let cells = self.sheet.around(node).iter();
         cells.fold([0.0; 3], |sum, c| {
             add(sum, self.of_own_cell(*c as usize, x))
@@ -231,16 +213,24 @@ pub(crate) struct Sliding<'a> {
     /// Master cell, or [`crate::mesh::NONE`] on a rigid surface.
     pub cell: u32,
     /// `[nodes]` positions (m).
-    pub x: &'a [V],
+    pub x: &'a [Vec3],
     /// Unit normal of the contact.
-    pub normal: V,
+    pub normal: Vec3,
     /// Normal force (N).
     pub force: f64,
     /// Force held by the slip spring (N), sliding velocity (m/s), and step times stiffness (N s/m): what the trial force
     /// is made of.
-    pub held: V,
-    pub vt: V,
+    pub held: Vec3,
+    pub vt: Vec3,
     pub spring: f64,
+}
+
+impl Sliding<'_> {
+    /// Friction under a law, by a slip spring of stiffness `k` (N/m) and a damper `c` (N s/m), in a step `dt` (s).
+    #[inline(always)]
+    pub(super) fn friction(&self, law: &impl Coulomb, dt: f64, k: f64, c: f64) -> Tangential {
+        friction_force(self.held, self.vt, dt, k, c, law.limit(self))
+    }
 }
 
 /// What gives Coulomb's limit. The contacts are compiled once for each law: the constant one costs one product.
@@ -331,8 +321,8 @@ mod tests {
         let start = [0.6f64.cos(), 0.6f64.sin(), 0.0];
         let field = FibreField::new(&mesh.cells, 0, &mesh.points, start);
         // F has the columns f1 and f2.
-        let (f1, f2): (V, V) = ([0.9, 0.1, 0.3], [0.4, 0.8, -0.2]);
-        let x: Vec<V> = mesh
+        let (f1, f2): (Vec3, Vec3) = ([0.9, 0.1, 0.3], [0.4, 0.8, -0.2]);
+        let x: Vec<Vec3> = mesh
             .points
             .iter()
             .map(|p| add(scale(f1, p[0]), scale(f2, p[1])))

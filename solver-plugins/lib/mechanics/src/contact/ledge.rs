@@ -1,9 +1,9 @@
 //! What a sheet goes on by past its rims, and how it ends there: ours, `docs/decisions/0050-what-slides-off-an-edge.md`.
 
-use super::search::{Closest, RIM, Surface, combine};
-use super::slave::Pull;
+use super::blend::Pull;
+use super::closest::{Closest, RIM, Surface, combine};
 use crate::mesh::NONE;
-use crate::vec3::{V, add, cross, dot, norm, scale, sub};
+use crate::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 /// Whether a closest point lies where what a cell goes on by past a free rim ends.
 pub(super) fn at_rim(c: &Closest) -> bool {
@@ -39,7 +39,7 @@ pub fn ledge(offset: f64, height: f64) -> f64 {
 
 /// How long (m) cells at rims are across these: nine in ten are longer. `cells`, `neighbours`: those of one sheet; `x`: positions of all nodes (m).
 /// `None`: the sheet has no rim.
-pub fn rim_height(cells: &[[u32; 4]], neighbours: &[[u32; 4]], x: &[V]) -> Option<f64> {
+pub fn rim_height(cells: &[[u32; 4]], neighbours: &[[u32; 4]], x: &[Vec3]) -> Option<f64> {
     let heights = cells.iter().zip(neighbours).flat_map(|(cell, near)| {
         let x = cell.map(|n| x[n as usize]);
         let [south, east, north, west] = [0, 1, 2, 3].map(|k| sub(x[(k + 1) % 4], x[k]));

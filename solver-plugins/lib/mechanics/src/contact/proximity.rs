@@ -5,10 +5,9 @@
 //! lie within a right angle (Volino and Magnenat-Thalmann, Comput. Graph. Forum 13 (1994) 155); of the others,
 //! those whose boxes overlap are looked at node by node. So a flat sheet costs a pass over its cells.
 
-use super::folds::is_far;
-use super::search::{Surface, closest};
-use crate::mesh::area_vector;
-use crate::vec3::{V, add, dot, norm, scale, sub, unit};
+use super::closest::{Surface, closest};
+use crate::mesh::{area_vector, compact_order};
+use crate::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 use plyflow_fixed::FixedBits;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
@@ -35,10 +34,10 @@ struct Block {
 /// Where a block is.
 #[derive(Clone, Copy)]
 struct Extent {
-    low: V,
-    high: V,
+    low: Vec3,
+    high: Vec3,
     /// Mean direction of its normals.
-    axis: V,
+    axis: Vec3,
     /// Largest angle of a normal with it (rad).
     spread: f64,
 }
@@ -50,7 +49,7 @@ pub(super) struct Reach<'a> {
     /// Cells nearer than this in the undeformed sheet (m) are none of a node's.
     pub(super) near: f64,
     /// `[nodes]` undeformed positions (m).
-    pub(super) undeformed: &'a [V],
+    pub(super) undeformed: &'a [Vec3],
 }
 
 /// A node and a cell of its sheet within reach.
@@ -60,7 +59,7 @@ pub(super) struct Candidate {
     pub(super) cell: u32,
     pub(super) xi: [f64; 2],
     /// From the closest point to the node (m), and its length.
-    pub(super) arm: V,
+    pub(super) arm: Vec3,
     pub(super) distance: f64,
 }
 
@@ -71,16 +70,16 @@ impl Blocks {
         range: (usize, usize),
         cells: &[[u32; 4]],
         slaves: &[u32],
-        undeformed: &[V],
+        undeformed: &[Vec3],
         reach: f64,
     ) -> Self {
         let centre = |c: usize| {
             let corners = cells[c].map(|n| undeformed[n as usize]);
             scale(corners.into_iter().fold([0.0; 3], add), 0.25)
         };
-        let centres: Vec<V> = (range.0..range.1).map(centre).collect();
+        let centres: Vec<Vec3> = (range.0..range.1).map(centre).collect();
         let size = CELLS.max((2.5 * reach).powi(2).ceil() as usize);
-        let order = crate::model::compact_order(&centres, size);
+        let order = compact_order(&centres, size);
         let mut home = vec![u32::MAX; undeformed.len()];
         let mut around: Vec<(u32, u32)> = Vec::new();
         let mut blocks: Vec<Block> = Vec::new();
@@ -211,7 +210,7 @@ impl Block {
         }
         let area = |c: &u32| area_vector(s.cells[*c as usize].map(|n| s.x[n as usize]));
         let axis = unit(self.cells.iter().map(area).fold([0.0; 3], add));
-        let cosine = |a: V| dot(a, axis) / norm(a).max(1e-300);
+        let cosine = |a: Vec3| dot(a, axis) / norm(a).max(1e-300);
         let least = self.cells.iter().map(area).map(cosine).fold(1.0, f64::min);
         Extent {
             low,
@@ -227,9 +226,18 @@ impl Extent {
         (0..3).all(|c| self.low[c] <= o.high[c] + reach && o.low[c] <= self.high[c] + reach)
     }
 
-    fn holds(&self, x: V, reach: f64) -> bool {
+    fn holds(&self, x: Vec3, reach: f64) -> bool {
         (0..3).all(|c| x[c] >= self.low[c] - reach && x[c] <= self.high[c] + reach)
     }
+}
+
+/// Whether no corner of a cell is `near` (m) a point in the undeformed sheet.
+#[inline]
+pub(super) fn is_far(cell: [u32; 4], undeformed: &[Vec3], own: Vec3, near: f64) -> bool {
+    cell.iter().all(|n| {
+        let d = sub(undeformed[*n as usize], own);
+        dot(d, d) > near * near
+    })
 }
 
 /// Adds the pairs of `nodes` with those of `cells` (in `extent`) that are far in the sheet and near in space.
@@ -282,10 +290,10 @@ mod tests {
     use crate::mesh::{QuadMesh, even_axis};
 
     /// A strip wound up into a spiral whose layers are 2 mm apart.
-    fn spiral() -> (QuadMesh, Vec<V>) {
+    fn spiral() -> (QuadMesh, Vec<Vec3>) {
         let mesh = QuadMesh::grid(&even_axis(0.0, 0.4, 0.002), &even_axis(0.0, 0.05, 0.002));
         let pitch = 0.002 / std::f64::consts::TAU;
-        let wind = |p: &V| {
+        let wind = |p: &Vec3| {
             // Length of the spiral r = a + b t, to first order in b / r.
             let t = ((0.01f64.powi(2) + 2.0 * pitch * p[0]).sqrt() - 0.01) / pitch;
             let r = 0.01 + pitch * t;
@@ -348,8 +356,8 @@ mod tests {
         // Whole blocks.
         let mesh = QuadMesh::grid(&even_axis(0.0, 0.256, 0.002), &even_axis(0.0, 0.256, 0.002));
         // Waves with slopes of up to 37 degrees.
-        let lift = |p: &V| [p[0], p[1], 0.05 * (15.0 * p[0]).sin()];
-        let x: Vec<V> = mesh.points.iter().map(lift).collect();
+        let lift = |p: &Vec3| [p[0], p[1], 0.05 * (15.0 * p[0]).sin()];
+        let x: Vec<Vec3> = mesh.points.iter().map(lift).collect();
         let neighbours = mesh.neighbours();
         let s = Surface {
             cells: &mesh.cells,

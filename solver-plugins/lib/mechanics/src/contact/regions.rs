@@ -1,6 +1,25 @@
-//! Friction by place: other coefficients in regions of the sheets that touch.
+//! Which law of friction holds: one everywhere, or others in regions of the sheets that touch.
 
-use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
+use super::friction::{Constant, Coulomb, Sliding, VaryingFriction};
+use std::sync::Arc;
+
+/// Coulomb coefficient of a pair of surfaces. Each kind of contact tells the laws apart by itself, once in a step and outside of its loop over nodes,
+/// whose arguments are its own.
+#[derive(Debug, Clone)]
+pub enum FrictionLaw {
+    /// The same everywhere.
+    Constant(f64),
+    /// By pressure and direction.
+    Varying(Arc<VaryingFriction>),
+    /// By the places of the sheets that touch.
+    Regional(Arc<RegionalFriction>),
+}
+
+impl From<f64> for FrictionLaw {
+    fn from(coefficient: f64) -> Self {
+        Self::Constant(coefficient)
+    }
+}
 
 /// By node of a sheet: which of some laws holds there, 0 outside of all regions.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

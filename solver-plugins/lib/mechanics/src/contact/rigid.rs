@@ -1,13 +1,13 @@
 //! Sheet nodes on a rigid surface, at rest or moving without turning.
 
-use super::friction::{Constant, Coulomb, FrictionLaw, Sliding};
-use super::sheets::SheetContact;
-use super::{
-    ContactEnergy, ContactSettings, Follow, Pace, TOGETHER, content, friction_force, normal_force,
-    waking,
+use super::friction::{Constant, Coulomb, Sliding};
+use super::penalty::{
+    ContactEnergy, ContactSettings, Follow, Pace, TOGETHER, content, normal_force, waking,
 };
+use super::regions::FrictionLaw;
+use super::sheets::SheetContact;
 use crate::archive::{Archive, ArchiveError};
-use crate::vec3::{V, add, dot, norm, scale, sub};
+use crate::vec3::{Vec3, add, dot, norm, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub trait RigidSurface: Send + Sync {
     /// Signed distance (m, positive outside) and its gradient at a point. Far from the surface the
     /// distance may be any positive lower bound of the true one.
-    fn distance(&self, point: V) -> (f64, V);
+    fn distance(&self, point: Vec3) -> (f64, Vec3);
 
     /// Whether to ask for a distance costs so much that nodes in touch, or nearly so, keep their tangent planes for some steps.
     fn is_costly(&self) -> bool {
@@ -32,7 +32,7 @@ pub struct Plane {
 }
 
 impl RigidSurface for Plane {
-    fn distance(&self, point: V) -> (f64, V) {
+    fn distance(&self, point: Vec3) -> (f64, Vec3) {
         (point[2] - self.height, [0.0, 0.0, 1.0])
     }
 }
@@ -54,7 +54,7 @@ pub struct OpenPlate {
 }
 
 impl RigidSurface for OpenPlate {
-    fn distance(&self, p: V) -> (f64, V) {
+    fn distance(&self, p: Vec3) -> (f64, Vec3) {
         let y = self.side * (p[2] - self.height);
         let r = (p[0] * p[0] + p[1] * p[1]).sqrt();
         let a = self.opening + self.edge;
@@ -82,9 +82,9 @@ impl RigidSurface for OpenPlate {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct RigidMotion {
     /// Way from where the surface is described (m).
-    pub shift: V,
+    pub shift: Vec3,
     /// Mean velocity over the last step (m/s), as that of the nodes.
-    pub velocity: V,
+    pub velocity: Vec3,
 }
 
 /// One node that may touch the surface.
@@ -105,9 +105,9 @@ pub struct RigidItem {
     /// Normal part of the force on the node in the last step (N); for reports.
     pub normal_force: f32,
     /// Friction force held by the slip spring (N).
-    pub slip: V,
+    pub slip: Vec3,
     /// Force on the node in the last step (N).
-    pub force: V,
+    pub force: Vec3,
 }
 
 impl RigidItem {
@@ -196,7 +196,7 @@ enum Between {
 /// from its tangent plane by less than a tenth of a micrometre, the penetration with which a multiplier is content.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct TangentPlane {
-    gradient: V,
+    gradient: Vec3,
     level: f64,
 }
 
@@ -254,7 +254,11 @@ impl RigidContact {
         }
         self.between.resize(self.items.len(), Between::There);
         for (k, between) in self.between.iter_mut().enumerate() {
-            let lies_on = |c: &usize| sheets[*c].items[k].lies_on_its_cell();
+            let lies_on = |c: &usize| {
+                let item = &sheets[*c].items[k];
+                debug_assert_eq!(item.node, self.items[k].node, "of the same nodes");
+                item.lies_on_its_cell()
+            };
             *between = match (self.through.iter().all(lies_on), *between) {
                 (false, _) => Between::Gone,
                 (true, Between::Gone) => Between::Coming,
@@ -265,7 +269,7 @@ impl RigidContact {
 
     /// Computes the force of every item from positions (m) and velocities (m/s). `pace`: of the nodes; the surface's own
     /// speed comes on top.
-    pub fn compute(&mut self, x: &[V], v: &[V], pace: Pace) -> ContactEnergy {
+    pub fn compute(&mut self, x: &[Vec3], v: &[Vec3], pace: Pace) -> ContactEnergy {
         match self.friction.clone() {
             FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), x, v, pace),
             FrictionLaw::Varying(law) => self.compute_with(&*law, x, v, pace),
@@ -276,10 +280,10 @@ impl RigidContact {
     /// The same by one thread, which then adds the forces to `f` (N).
     pub(crate) fn compute_onto(
         &mut self,
-        x: &[V],
-        v: &[V],
+        x: &[Vec3],
+        v: &[Vec3],
         pace: Pace,
-        f: &mut [V],
+        f: &mut [Vec3],
     ) -> ContactEnergy {
         let energy = self.compute(x, v, pace);
         self.scatter(f);
@@ -289,8 +293,8 @@ impl RigidContact {
     fn compute_with<F: Coulomb>(
         &mut self,
         friction: &F,
-        x: &[V],
-        v: &[V],
+        x: &[Vec3],
+        v: &[Vec3],
         pace: Pace,
     ) -> ContactEnergy {
         let motion = self.motion;
@@ -323,6 +327,11 @@ impl RigidContact {
             },
         };
         self.cycle += 1;
+        debug_assert!(
+            [0, self.items.len()].contains(&self.wakes.len()),
+            "'{}' has other items than when it looked last",
+            self.name
+        );
         self.wakes.resize(self.items.len(), 0);
         self.spans
             .resize_with(self.items.len().div_ceil(SPAN), Span::default);
@@ -357,7 +366,7 @@ impl RigidContact {
     }
 
     /// Adds the forces on the nodes to `f` (N).
-    pub fn scatter(&self, f: &mut [V]) {
+    pub fn scatter(&self, f: &mut [Vec3]) {
         for (items, span) in self.items.chunks(SPAN).zip(&self.spans) {
             if span.touches {
                 for item in items.iter().filter(|i| i.normal_force > 0.0) {
@@ -380,7 +389,7 @@ impl RigidContact {
     }
 
     /// Sum of the forces on the nodes (N) in the last step; on the surface acts the opposite.
-    pub fn resultant(&self) -> V {
+    pub fn resultant(&self) -> Vec3 {
         let touching = self.spans.iter().filter(|s| s.touches);
         touching.fold([0.0; 3], |sum, s| add(sum, s.force))
     }
@@ -397,7 +406,7 @@ struct Span {
     /// Whether any touched in the last call.
     touches: bool,
     /// Sum of their forces (N).
-    force: V,
+    force: Vec3,
     energy: ContactEnergy,
 }
 
@@ -407,7 +416,7 @@ struct Looking<'a, F> {
     motion: RigidMotion,
     pace: Pace,
     cycle: u64,
-    v: &'a [V],
+    v: &'a [Vec3],
     law: Law<'a, F>,
 }
 
@@ -500,7 +509,7 @@ impl<F: Coulomb> Looking<'_, F> {
 
     /// Gap of an item (m) and its gradient; from the plane while the item keeps it.
     #[inline(always)]
-    fn gap(&self, item: &RigidItem, plane: Option<&mut TangentPlane>) -> (f64, V) {
+    fn gap(&self, item: &RigidItem, plane: Option<&mut TangentPlane>) -> (f64, Vec3) {
         let n = item.node as usize;
         let x = sub(self.law.x[n], self.motion.shift);
         if let Some(plane) = &plane
@@ -528,7 +537,7 @@ const INTERVAL: u64 = 8;
 struct Law<'a, F> {
     dt: f64,
     friction: &'a F,
-    x: &'a [V],
+    x: &'a [Vec3],
     offset: f64,
     slip_factor: f64,
     follow: Follow,
@@ -539,8 +548,8 @@ struct Law<'a, F> {
 fn touch<F: Coulomb>(
     item: &mut RigidItem,
     gap: f64,
-    g: V,
-    v: V,
+    g: Vec3,
+    v: Vec3,
     law: &Law<'_, F>,
 ) -> ContactEnergy {
     let (k, c) = (item.stiffness, f64::from(item.damping));
@@ -558,7 +567,8 @@ fn touch<F: Coulomb>(
     if !law.friction.is_smooth() {
         let vt = sub(v, scale(n, dot(v, n)));
         let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-        let limit = law.friction.limit(&Sliding {
+        let (spring, damper) = (law.slip_factor * k, law.slip_factor * c);
+        let sliding = Sliding {
             node: item.node,
             cell: crate::mesh::NONE,
             x: law.x,
@@ -566,16 +576,9 @@ fn touch<F: Coulomb>(
             force: normal.force,
             held: rest,
             vt,
-            spring: law.slip_factor * k * law.dt,
-        });
-        let f = friction_force(
-            rest,
-            vt,
-            law.dt,
-            law.slip_factor * k,
-            law.slip_factor * c,
-            limit,
-        );
+            spring: spring * law.dt,
+        };
+        let f = sliding.friction(law.friction, law.dt, spring, damper);
         item.slip = f.slip;
         item.force = add(item.force, f.force);
         energy.stored += f.stored;

@@ -6,17 +6,21 @@
 //! A force along an interpolated normal is smoother to look at but is no gradient: two flat sheets under
 //! 1 bar then flutter, and gain energy without bound (tried; `docs/decisions/0003`).
 
-use super::blend::pulled;
-use super::friction::{Constant, Coulomb, FrictionLaw};
+use super::blend::{Pull, pulled};
+use super::closest::{Closest, Found, Surface, cell_normal, combine, middle};
+use super::friction::{Constant, Coulomb};
 use super::ledge::{BEVEL, Ledge, at_rim, ends_at, past_rim};
-use super::search::{Closest, Found, Surface, cell_normal, combine, middle, track};
-use super::slave::{
-    Law, Pull, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
+use super::penalty::{
+    ContactEnergy, ContactSettings, Follow, Pace, SWIFT, TOGETHER, content, waking,
 };
-use super::{ContactEnergy, ContactSettings, Follow, Pace, SWIFT, TOGETHER, content, waking};
+use super::regions::FrictionLaw;
+use super::search::track;
+use super::slave::{
+    Law, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
+};
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
-use crate::vec3::{V, add, dot, norm, scale, sub, unit};
+use crate::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -94,7 +98,7 @@ impl SheetContact {
     }
 
     /// Computes the force of every slave from positions and velocities (m/s).
-    pub fn compute(&mut self, s: &Surface<'_>, v: &[V], pace: Pace) -> ContactEnergy {
+    pub fn compute(&mut self, s: &Surface<'_>, v: &[Vec3], pace: Pace) -> ContactEnergy {
         self.compute_by_law(s, v, pace, None)
     }
 
@@ -103,9 +107,9 @@ impl SheetContact {
     pub(crate) fn compute_onto(
         &mut self,
         s: &Surface<'_>,
-        v: &[V],
+        v: &[Vec3],
         pace: Pace,
-        f: &mut [V],
+        f: &mut [Vec3],
     ) -> ContactEnergy {
         self.compute_by_law(s, v, pace, Some(f))
     }
@@ -113,9 +117,9 @@ impl SheetContact {
     fn compute_by_law(
         &mut self,
         s: &Surface<'_>,
-        v: &[V],
+        v: &[Vec3],
         pace: Pace,
-        onto: Option<&mut [V]>,
+        onto: Option<&mut [Vec3]>,
     ) -> ContactEnergy {
         match self.friction.clone() {
             FrictionLaw::Constant(mu) => self.compute_with(&Constant(mu), s, v, pace, onto),
@@ -128,9 +132,9 @@ impl SheetContact {
         &mut self,
         friction: &F,
         s: &Surface<'_>,
-        v: &[V],
+        v: &[Vec3],
         pace: Pace,
-        onto: Option<&mut [V]>,
+        onto: Option<&mut [Vec3]>,
     ) -> ContactEnergy {
         let side = self.side;
         let law = Law {
@@ -154,6 +158,11 @@ impl SheetContact {
             law,
         };
         self.cycle += 1;
+        debug_assert!(
+            [0, self.items.len()].contains(&self.wakes.len()),
+            "'{}' has other items than when it looked last",
+            self.name
+        );
         self.wakes.resize(self.items.len(), 0);
         self.spans
             .resize_with(self.items.len().div_ceil(SPAN), Span::default);
@@ -197,7 +206,7 @@ impl SheetContact {
     }
 
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
-    pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [V]) {
+    pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [Vec3]) {
         for (items, span) in self.items.chunks(SPAN).zip(&self.spans) {
             if span.touches {
                 scatter(items.iter(), cells, f);
@@ -240,7 +249,7 @@ struct Span {
 /// What following the slaves of a contact needs.
 struct Following<'a, F> {
     surface: Surface<'a>,
-    v: &'a [V],
+    v: &'a [Vec3],
     side: f64,
     let_in: Option<f64>,
     ledge: f64,
@@ -421,7 +430,7 @@ fn apart(
     item: &mut SlaveItem,
     gap: f64,
     s: &Surface<'_>,
-    v: &[V],
+    v: &[Vec3],
     pace: &Pace,
     plain: bool,
 ) -> Met {
@@ -462,7 +471,7 @@ fn pull_of<F: Coulomb>(
         return Some(bevelled(pulled(found, offset)));
     }
     // Where a sheet is bent sharply, what lies between its nodes' normals is far from those of its cells.
-    let on_own_side = |n: V| side * dot(first.arm, n) > 0.1 * distance;
+    let on_own_side = |n: Vec3| side * dot(first.arm, n) > 0.1 * distance;
     if own_normal(s, first).is_some_and(on_own_side) {
         return Some(bevelled(pulled(found, offset)));
     }
@@ -474,7 +483,7 @@ fn pull_of<F: Coulomb>(
 /// Unit normal of the cell at the closest point on it, or of it and the next one where that point lies on the edge between them; `None` at a
 /// corner, where the node's normal is as good.
 #[inline(never)]
-fn own_normal(s: &Surface<'_>, c: &Closest) -> Option<V> {
+fn own_normal(s: &Surface<'_>, c: &Closest) -> Option<Vec3> {
     let own = cell_normal(s, c.cell, c.xi);
     let edge = match c.free {
         [true, true] => return Some(own),

@@ -1,11 +1,12 @@
 //! One node of a sheet on another sheet: its state, its force in touch, and where that goes.
 
+use super::blend::Pull;
+use super::closest::{Closest, FACES, Found, RIM, Surface, combine, shape};
 use super::friction::{Coulomb, Sliding};
-use super::search::{Closest, FACES, Found, RIM, Surface, combine, shape};
-use super::{ContactEnergy, Follow, friction_force, grown, normal_force};
+use super::penalty::{ContactEnergy, Follow, grown, normal_force};
 use crate::mesh::NONE;
 use crate::mirror::{Image, reflect};
-use crate::vec3::{V, add, dot, norm, scale, sub, unit};
+use crate::vec3::{Vec3, add, dot, norm, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 
 /// A further cell of a concave fold or corner that a slave touches.
@@ -18,7 +19,7 @@ pub(super) struct Face {
     /// Place in the cell, -1..1.
     pub(super) xi: [f64; 2],
     /// Its share of the force (N).
-    pub(super) force: V,
+    pub(super) force: Vec3,
 }
 
 impl Face {
@@ -53,7 +54,7 @@ pub struct SlaveItem {
     /// heavy sheet rides on ([`super::ContactSettings::largest_augmentation`]).
     pub(crate) follows: u8,
     /// Direction from master to slave at the last search.
-    pub(super) direction: V,
+    pub(super) direction: Vec3,
     /// Place in the cell, -1..1.
     pub xi: [f64; 2],
     /// Normal stiffness (N/m).
@@ -64,9 +65,9 @@ pub struct SlaveItem {
     pub multiplier: f64,
     pub(super) work: f64,
     /// Friction force held by the slip spring (N).
-    pub slip: V,
+    pub slip: Vec3,
     /// Force on the slave (N): minus this acts on the cells' nodes.
-    pub force: V,
+    pub force: Vec3,
     /// Of one that lies between several cells, those besides `cell`; the first without a cell ends them. Few ever do: the
     /// place for them is made when it is first needed, and kept.
     others: Option<Box<[Face; FACES]>>,
@@ -164,7 +165,7 @@ impl SlaveItem {
     }
 
     /// Lays the normal force (N) and the friction `along` (N) on the cells that pull.
-    fn share_out(&mut self, pull: &Pull, found: &Found, normal: f64, along: V) {
+    fn share_out(&mut self, pull: &Pull, found: &Found, normal: f64, along: Vec3) {
         let own = 1.0 - pull.shares.iter().sum::<f64>();
         self.force = add(scale(pull.first, normal), scale(along, own));
         let others = self
@@ -198,7 +199,7 @@ impl SlaveItem {
     /// closest one, or a slave has got behind a rim. To push it out would make energy from nothing. It is left
     /// standing; as the slave comes out it shrinks, and it never grows again.
     #[inline(always)]
-    fn admit(&mut self, depth: f64, rel: V, dt: f64, offset: f64) -> f64 {
+    fn admit(&mut self, depth: f64, rel: Vec3, dt: f64, offset: f64) -> f64 {
         let jump = depth - self.penetration;
         if self.guarded && jump > SLACK * offset && jump > SLACK * offset + 2.0 * norm(rel) * dt {
             self.ignored += jump;
@@ -250,12 +251,16 @@ pub(super) const SEARCH_INTERVAL: u8 = 4;
 pub(super) fn scatter<'a>(
     items: impl Iterator<Item = &'a SlaveItem>,
     cells: &[[u32; 4]],
-    f: &mut [V],
+    f: &mut [Vec3],
 ) {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx2")]
-        fn wide<'a>(items: impl Iterator<Item = &'a SlaveItem>, cells: &[[u32; 4]], f: &mut [V]) {
+        fn wide<'a>(
+            items: impl Iterator<Item = &'a SlaveItem>,
+            cells: &[[u32; 4]],
+            f: &mut [Vec3],
+        ) {
             scatter_each(items, cells, f);
         }
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -267,7 +272,11 @@ pub(super) fn scatter<'a>(
 }
 
 #[inline(always)]
-fn scatter_each<'a>(items: impl Iterator<Item = &'a SlaveItem>, cells: &[[u32; 4]], f: &mut [V]) {
+fn scatter_each<'a>(
+    items: impl Iterator<Item = &'a SlaveItem>,
+    cells: &[[u32; 4]],
+    f: &mut [Vec3],
+) {
     for item in items.filter(|i| i.active) {
         let mut own = item.force;
         if item.between {
@@ -281,7 +290,7 @@ fn scatter_each<'a>(items: impl Iterator<Item = &'a SlaveItem>, cells: &[[u32; 4
 
 /// Adds what acts on the other cells of an item that lies between several to `f` (N), and gives what is left for its own.
 #[inline(never)]
-fn scatter_others(item: &SlaveItem, cells: &[[u32; 4]], f: &mut [V]) -> V {
+fn scatter_others(item: &SlaveItem, cells: &[[u32; 4]], f: &mut [Vec3]) -> Vec3 {
     let mut own = item.force;
     for other in item.others() {
         own = sub(own, other.force);
@@ -294,38 +303,16 @@ fn scatter_others(item: &SlaveItem, cells: &[[u32; 4]], f: &mut [V]) -> V {
 
 /// Takes `force` (N) off the nodes of a cell, at a place in it.
 #[inline(always)]
-fn push(cell: [u32; 4], xi: [f64; 2], force: V, f: &mut [V]) {
+fn push(cell: [u32; 4], xi: [f64; 2], force: Vec3, f: &mut [Vec3]) {
     for (w, n) in shape(xi).iter().zip(cell) {
         let n = n as usize;
         f[n] = sub(f[n], scale(force, *w));
     }
 }
 
-/// Gap and its gradient for the slave: `first` and `others` are minus the gradients for the cells' points.
-pub(super) struct Pull {
-    pub(super) gap: f64,
-    pub(super) first: V,
-    /// Shares of the other cells.
-    pub(super) shares: [f64; FACES],
-    pub(super) others: [V; FACES],
-}
-
-impl Pull {
-    /// By one cell alone, along `first`.
-    #[inline(always)]
-    pub(super) fn plain(gap: f64, first: V) -> Self {
-        Self {
-            gap,
-            first,
-            shares: [0.0; FACES],
-            others: [[0.0; 3]; FACES],
-        }
-    }
-}
-
 /// Weights of the place that a slave keeps, and the way from there to the slave (m).
 #[inline(always)]
-fn held_arm(item: &SlaveItem, s: &Surface<'_>) -> ([f64; 4], V) {
+fn held_arm(item: &SlaveItem, s: &Surface<'_>) -> ([f64; 4], Vec3) {
     let weights = item.weights();
     let x = s.cells[item.cell as usize].map(|n| s.x[n as usize]);
     (weights, sub(s.x[item.node as usize], combine(weights, &x)))
@@ -339,7 +326,7 @@ pub(super) fn held_gap(item: &SlaveItem, s: &Surface<'_>, offset: f64) -> f64 {
 
 /// How fast (m/s) a slave moves against the place of the master that it was seen to be nearest to.
 #[inline(always)]
-pub(super) fn relative_speed(item: &SlaveItem, s: &Surface<'_>, v: &[V]) -> f64 {
+pub(super) fn relative_speed(item: &SlaveItem, s: &Surface<'_>, v: &[Vec3]) -> f64 {
     let master = s.cells[item.cell as usize].map(|n| v[n as usize]);
     norm(sub(v[item.node as usize], combine(item.weights(), &master)))
 }
@@ -350,7 +337,7 @@ pub(super) fn relative_speed(item: &SlaveItem, s: &Surface<'_>, v: &[V]) -> f64 
 pub(super) fn hold<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
-    v: &[V],
+    v: &[Vec3],
     law: &Law<'_, F>,
 ) -> ContactEnergy {
     let (weights, arm) = held_arm(item, s);
@@ -377,7 +364,7 @@ pub(super) struct Law<'a, F> {
 pub(super) fn touch<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
-    v: &[V],
+    v: &[Vec3],
     pull: &Pull,
     found: &Found,
     law: &Law<'_, F>,
@@ -395,9 +382,9 @@ pub(super) fn touch<F: Coulomb>(
 fn touch_one<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
-    v: &[V],
+    v: &[Vec3],
     gap: f64,
-    direction: V,
+    direction: Vec3,
     weights: [f64; 4],
     law: &Law<'_, F>,
 ) -> ContactEnergy {
@@ -415,7 +402,7 @@ fn touch_one<F: Coulomb>(
 fn touch_several<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
-    v: &[V],
+    v: &[Vec3],
     pull: &Pull,
     found: &Found,
     law: &Law<'_, F>,
@@ -448,7 +435,7 @@ struct Reaction {
     /// Normal force (N).
     normal: f64,
     /// Friction (N).
-    along: V,
+    along: Vec3,
     energy: ContactEnergy,
 }
 
@@ -458,9 +445,9 @@ fn react<F: Coulomb>(
     item: &mut SlaveItem,
     s: &Surface<'_>,
     gap: f64,
-    rel: V,
+    rel: Vec3,
     vn: f64,
-    way: V,
+    way: Vec3,
     law: &Law<'_, F>,
 ) -> Reaction {
     let (k, c) = (item.stiffness, item.damping);
@@ -475,7 +462,8 @@ fn react<F: Coulomb>(
     let n = unit(way);
     let vt = sub(rel, scale(n, dot(rel, n)));
     let rest = sub(item.slip, scale(n, dot(item.slip, n)));
-    let limit = law.friction.limit(&Sliding {
+    let (spring, damper) = (law.slip_factor * k, law.slip_factor * c);
+    let sliding = Sliding {
         node: item.node,
         cell: item.cell,
         x: s.x,
@@ -483,16 +471,9 @@ fn react<F: Coulomb>(
         force: normal.force,
         held: rest,
         vt,
-        spring: law.slip_factor * k * law.dt,
-    });
-    let f = friction_force(
-        rest,
-        vt,
-        law.dt,
-        law.slip_factor * k,
-        law.slip_factor * c,
-        limit,
-    );
+        spring: spring * law.dt,
+    };
+    let f = sliding.friction(law.friction, law.dt, spring, damper);
     item.active = true;
     item.slip = f.slip;
     item.normal_force = normal.force;

@@ -1,16 +1,21 @@
 //! What of a model others may see and change.
 
-use super::*;
+use super::boundary::Held;
+use super::parts::Model;
+use super::spent::{Clock, Spent};
+use crate::contact::{RigidContact, SelfContact, SheetContact};
+use crate::sheet::{Pressures, Sheet};
+use crate::vec3::{Vec3, scale, sub};
 
 /// What is there.
 impl Model {
     /// `[n]` positions (m).
-    pub fn x(&self) -> &[V] {
+    pub fn x(&self) -> &[Vec3] {
         &self.state.x
     }
 
     /// `[n]` velocities at the half step (m/s).
-    pub fn v(&self) -> &[V] {
+    pub fn v(&self) -> &[Vec3] {
         &self.state.v
     }
 
@@ -20,7 +25,7 @@ impl Model {
     }
 
     /// `[n]` unit normals of the sheets.
-    pub fn normals(&self) -> &[V] {
+    pub fn normals(&self) -> &[Vec3] {
         &self.state.normals
     }
 
@@ -128,12 +133,12 @@ impl Model {
 /// What sets it down somewhere: a start that something else has computed.
 impl Model {
     /// `[n]` positions (m). Contacts that have looked already do not see a jump: for starts alone.
-    pub fn x_mut(&mut self) -> &mut [V] {
+    pub fn x_mut(&mut self) -> &mut [Vec3] {
         &mut self.state.x
     }
 
     /// `[n]` velocities at the half step (m/s).
-    pub fn v_mut(&mut self) -> &mut [V] {
+    pub fn v_mut(&mut self) -> &mut [Vec3] {
         &mut self.state.v
     }
 
@@ -165,12 +170,12 @@ impl Model {
     }
 
     /// Sets the acceleration of free fall (m/s2), global axes.
-    pub fn set_body_acceleration(&mut self, acceleration: V) {
+    pub fn set_body_acceleration(&mut self, acceleration: Vec3) {
         self.boundary.body_acceleration = acceleration;
     }
 
     /// Acceleration of free fall (m/s2), global axes.
-    pub fn body_acceleration(&self) -> V {
+    pub fn body_acceleration(&self) -> Vec3 {
         self.boundary.body_acceleration
     }
 

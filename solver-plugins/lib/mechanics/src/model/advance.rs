@@ -1,7 +1,11 @@
 //! Forces on the nodes, and where they take them.
 
-use super::*;
+use super::blocks::{NODE_CHUNK, chunks_or_none};
+use super::boundary::Fixed;
+use super::parts::{Model, NodeWork};
 use crate::team;
+use crate::vec3::{Vec3, add, dot, scale, sub};
+use rayon::prelude::*;
 
 /// What moves or turns the nodes of a model in a step.
 #[derive(Clone, Copy)]
@@ -118,12 +122,15 @@ impl Model {
         self.follow(&before);
         self.workspace.before = before;
         if !self.workspace.work.kinetic.is_finite() {
-            let bad = |v: &V| !v.iter().all(|c| c.is_finite());
+            let bad = |v: &Vec3| !v.iter().all(|c| c.is_finite());
             self.workspace.work.bad = self.state.v.iter().position(bad).map(|n| n as u32);
         }
         self.rotate();
         self.state.max_speed = self.workspace.work.speed.sqrt();
         self.state.max_acceleration = self.workspace.work.change.sqrt() / dt;
+        let work = &self.workspace.work;
+        // Nothing that is not finite comes into the ledger without a node that is told as bad.
+        debug_assert!(work.bad.is_some() || (work.external + work.damping).is_finite());
         self.state.ledger.external += self.workspace.work.external;
         self.state.ledger.damping += self.workspace.work.damping;
         self.state.time += dt;
@@ -146,11 +153,13 @@ impl Model {
     }
 
     /// Puts the driven nodes where their drive wants them. `before`: their positions and velocities.
-    fn follow(&mut self, before: &[(V, V)]) {
+    fn follow(&mut self, before: &[(Vec3, Vec3)]) {
         let Some(drive) = &self.boundary.drive else {
             return;
         };
         let dt = self.state.dt;
+        let anchors = &self.boundary.anchors.at;
+        debug_assert!([0, before.len()].contains(&anchors.len()));
         for (k, (n, (x, v))) in self.boundary.driven.iter().zip(before).enumerate() {
             let n = *n as usize;
             let mut target = drive.position(k, self.state.time + dt);
@@ -265,6 +274,7 @@ impl Moving {
         let spin = to::<N>(&mut c.spin[start..]);
         let (moment, q) = (of::<N>(&c.moment[start..]), of::<N>(&c.external[start..]));
         let inertia = by_component::<N>(c.inertia, start);
+        debug_assert!(inertia.iter().all(|i| *i >= 0.0));
         let mut per_inertia = inertia.map(reciprocal);
         for (k, fixed) in part::<N>(c.fixed, start).iter().enumerate() {
             let free = to(&mut per_inertia[3 * k..]);
@@ -320,6 +330,7 @@ impl Moving {
             external => of::<N>(&external[start..]),
         };
         let mass = by_component::<N>(c.mass, start);
+        debug_assert!(mass.iter().all(|m| *m >= 0.0));
         let mut per_mass = mass.map(reciprocal);
         for (k, fixed) in part::<N>(c.fixed, start).iter().enumerate() {
             let free = to(&mut per_mass[3 * k..]);

@@ -1,11 +1,11 @@
 //! What of a model changes from step to step.
 
-use super::*;
+use super::parts::Model;
 use crate::archive::{Archive, ArchiveError};
 
 impl Model {
     /// Writes the state between two steps, or takes it up in a model that was built in the same way: the next steps then
-    /// give the same bits. Left out: what every step computes anew, the fields, and what [`Drive`]s and callers keep.
+    /// give the same bits. Left out: what every step computes anew, the fields, and what [`super::Drive`]s and callers keep.
     ///
     /// # Errors
     /// When the bytes cannot be written or are not those of such a model; the model is then of no use.

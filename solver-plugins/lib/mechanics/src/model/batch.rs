@@ -1,7 +1,13 @@
 //! Calls of element formulations on batches, and the cells' areas.
 
-use super::*;
+use super::transpose::gather;
 use crate::component::MOST_PATCH_NODES;
+use crate::sheet::{
+    Aligned, Batch, PatchBatch, Pressures, Sheet, empty_element_batch, empty_patch_batch,
+};
+use crate::vec3::Vec3;
+use crate::{LANES, MechanicsError};
+use plyflow_abi::*;
 
 pub(super) fn component_status(code: i32, sheet: &str) -> Result<(), MechanicsError> {
     if code == PF_OK {
@@ -151,12 +157,24 @@ pub(super) fn cell_areas_dispatch(p: &[f64; 12 * LANES], area: &mut [f64]) {
 /// Where the nodes are and how they move.
 #[derive(Clone, Copy)]
 pub(super) struct Motion<'a> {
-    pub(super) x: &'a [V],
-    pub(super) v: &'a [V],
+    pub(super) x: &'a [Vec3],
+    pub(super) v: &'a [Vec3],
     /// Empty when no sheet has rotations.
-    pub(super) spin: &'a [V],
+    pub(super) spin: &'a [Vec3],
     /// Step just done (s).
     pub(super) dt: f64,
+}
+
+/// What the elements of a step see.
+#[derive(Clone, Copy)]
+pub(super) struct Present<'a> {
+    pub(super) sheets: &'a [Sheet],
+    pub(super) motion: Motion<'a>,
+    pub(super) pressures: Pressures,
+    /// Whether area vectors are wanted of all cells.
+    pub(super) areas: bool,
+    /// Whether the elements' fields are wanted.
+    pub(super) fields: bool,
 }
 
 /// Forces of a batch into `work`; cell areas too where they are needed.
@@ -222,7 +240,7 @@ fn sum_of(row: &[f64]) -> f64 {
 }
 
 /// Positions `[patch_nodes][3][LANES]` of a batch of patches; unused slots repeat the centre.
-fn gather_patches(sheet: &Sheet, batch: &PatchBatch, x: &[V], position: &mut [f64]) {
+fn gather_patches(sheet: &Sheet, batch: &PatchBatch, x: &[Vec3], position: &mut [f64]) {
     let rows = 3 * LANES * batch.nodes.len();
     let width = 3 * LANES * sheet.element.sizes.patch_nodes;
     gather(&batch.nodes, x, &mut position[..rows]);
@@ -268,14 +286,14 @@ pub(super) fn pressure_forces(
 }
 
 /// The smallest critical step of a batch (s).
-pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[V]) -> f64 {
+pub(super) fn batch_critical_step(sheet: &Sheet, batch: &Batch, x: &[Vec3]) -> f64 {
     let steps = cell_critical_steps(sheet, batch, x);
     steps.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// Critical steps of a batch's elements (s); 0 where they fail or give none. Works on copies of the histories: asking changes
 /// nothing.
-pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<f64> {
+pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[Vec3]) -> Vec<f64> {
     let mut position = Buffer([0.0; 12 * LANES]);
     gather(&batch.nodes, x, &mut position.0);
     let mut history = batch.history.clone();
@@ -307,7 +325,7 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[V]) -> Vec<
 }
 
 /// Row sums of the bending stiffness (N/m) by model node; infinite where a patch fails or gives none.
-pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32, f64)> {
+pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[Vec3]) -> Vec<(u32, f64)> {
     let width = sheet.element.sizes.patch_nodes;
     let mut position = Aligned::zeros(3 * width * LANES);
     gather_patches(sheet, batch, x, &mut position);
@@ -342,22 +360,23 @@ pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[V]) -> Vec<(u32
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vec3::{cross, dot};
 
     /// Volume enclosed by bilinear cells: a third of the flux of x, by 2 x 2 Gauss points (exact).
-    fn volume(points: &[V], cells: &[[u32; 4]]) -> f64 {
+    fn volume(points: &[Vec3], cells: &[[u32; 4]]) -> f64 {
         let g = 1.0 / 3.0f64.sqrt();
         let mut sum = 0.0;
         for cell in cells {
             let p = cell.map(|n| points[n as usize]);
             for (a, b) in [(-g, -g), (g, -g), (g, g), (-g, g)] {
-                let at = |w: [f64; 4]| -> V {
+                let at = |w: [f64; 4]| -> Vec3 {
                     std::array::from_fn(|c| (0..4).map(|k| w[k] * p[k][c]).sum())
                 };
                 let w = crate::contact::shape([a, b]);
                 let (wa, wb) = ((1.0 - b, 1.0 + b), (1.0 - a, 1.0 + a));
                 let tx = at([-wa.0, wa.0, wa.1, -wa.1].map(|w| 0.25 * w));
                 let ty = at([-wb.0, -wb.1, wb.1, wb.0].map(|w| 0.25 * w));
-                sum += dot(at(w), crate::vec3::cross(tx, ty)) / 3.0;
+                sum += dot(at(w), cross(tx, ty)) / 3.0;
             }
         }
         sum
@@ -366,7 +385,7 @@ mod tests {
     #[test]
     fn pressure_weights_are_the_gradient_of_the_enclosed_volume() {
         // A cube of six warped quads.
-        let mut points: Vec<V> = (0..8)
+        let mut points: Vec<Vec3> = (0..8)
             .map(|i| [(i & 1) as f64, ((i >> 1) & 1) as f64, (i >> 2) as f64])
             .collect();
         for (i, p) in points.iter_mut().enumerate() {

@@ -4,13 +4,24 @@
 //! blocks around it instead of every element's forces from all over memory. Blocks do not depend on the
 //! number of threads, and neither does the order of any sum.
 
+use super::batch::{
+    BatchWorkspace, PatchWorkspace, Present, pressure_forces, run_batch, run_patch,
+};
 use super::transpose::{Sum, scatter};
-use super::*;
+use crate::LANES;
+use crate::sheet::{Batch, PatchBatch};
+use crate::team::least;
+use crate::vec3::{Vec3, add};
+use plyflow_abi::PF_OK;
 use rayon::iter::Either;
+use rayon::prelude::*;
 use std::cell::RefCell;
 
 /// Batches in a block: 16 x 16 elements.
 pub(super) const BLOCK: usize = 8;
+
+/// Nodes that are moved together.
+pub(super) const NODE_CHUNK: usize = 256;
 
 /// Blocks that a thread takes at most without leaving some to the others.
 const TOGETHER: usize = 4;
@@ -40,7 +51,9 @@ impl<B> Block<B> {
 
     /// Place of a node of the block.
     pub(super) fn place(&self, node: u32) -> u16 {
-        self.nodes.partition_point(|n| *n < node) as u16
+        let place = self.nodes.partition_point(|n| *n < node);
+        debug_assert!(self.nodes.get(place) == Some(&node) && place <= usize::from(u16::MAX));
+        place as u16
     }
 }
 
@@ -61,7 +74,7 @@ pub(super) struct Sums {
     pub(super) moment: Vec<Sum>,
     /// Pressure (N); empty when nothing presses.
     pub(super) pressure: Vec<Sum>,
-    /// Sums of a quarter of the cells' area vectors (m2), every [`NORMAL_INTERVAL`] steps.
+    /// Sums of a quarter of the cells' area vectors (m2), every [`super::NORMAL_INTERVAL`] steps.
     pub(super) area: Vec<Sum>,
 }
 
@@ -112,7 +125,7 @@ impl Sums {
     }
 
     /// Sum of `of` (one of the arrays) at a node, in the order of [`Sums::collect`].
-    pub(super) fn at(&self, of: &[Sum], node: usize) -> V {
+    pub(super) fn at(&self, of: &[Sum], node: usize) -> Vec3 {
         let chunk = node / NODE_CHUNK;
         let (start, end) = (self.more_start[chunk], self.more_start[chunk + 1]);
         let more = &self.more[start as usize..end as usize];
@@ -128,7 +141,7 @@ impl Sums {
 
     /// Adds the sums `of` (one of the arrays) at the nodes of a chunk to `to`.
     #[inline(always)]
-    pub(super) fn collect(&self, of: &[Sum], chunk: usize, to: &mut [V]) {
+    pub(super) fn collect(&self, of: &[Sum], chunk: usize, to: &mut [Vec3]) {
         let base = chunk * NODE_CHUNK;
         for (t, place) in to.iter_mut().zip(&self.first[base..]) {
             let part = &of[*place as usize].0;
@@ -151,46 +164,6 @@ pub(super) struct Part<'a> {
     moment: &'a mut [Sum],
     pressure: &'a mut [Sum],
     area: &'a mut [Sum],
-}
-
-/// An order of points in which every run of `group` lies close together: halves by the longer extent, cut at
-/// whole groups. Within a group the order is the given one.
-pub(crate) fn compact_order(points: &[V], group: usize) -> Vec<u32> {
-    fn split(order: &mut [u32], points: &[V], group: usize) {
-        if order.len() <= group {
-            order.sort_unstable();
-            return;
-        }
-        let extent = |c: usize| {
-            let of = |n: &u32| points[*n as usize][c];
-            let low = order.iter().map(of).fold(f64::INFINITY, f64::min);
-            let high = order.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-            high - low
-        };
-        let sizes = [extent(0), extent(1), extent(2)];
-        let axis = (0..3).fold(0, |m, c| if sizes[c] > sizes[m] { c } else { m });
-        let half = order.len().div_ceil(group).div_ceil(2) * group;
-        let key = |n: &u32| points[*n as usize][axis];
-        order.select_nth_unstable_by(half - 1, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
-        let (left, right) = order.split_at_mut(half);
-        split(left, points, group);
-        split(right, points, group);
-    }
-    let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    split(&mut order, points, group);
-    order
-}
-
-/// What the elements of a step see.
-#[derive(Clone, Copy)]
-pub(super) struct Present<'a> {
-    pub(super) sheets: &'a [Sheet],
-    pub(super) motion: Motion<'a>,
-    pub(super) pressures: Pressures,
-    /// Whether area vectors are wanted of all cells.
-    pub(super) areas: bool,
-    /// Whether the elements' fields are wanted.
-    pub(super) fields: bool,
 }
 
 /// The first `n` chunks of an array, the last of which may be shorter; empty ones of an array that is empty because it is not wanted.
@@ -227,7 +200,7 @@ pub(super) fn run_blocks(blocks: &mut [Block<Batch>], sums: &mut Sums, present: 
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .zip_eq(others)
         .with_max_len(TOGETHER)
-        .with_min_len(crate::team::least())
+        .with_min_len(least())
         .for_each(|((block, force), ((moment, pressure), area))| {
             let part = Part {
                 force,
@@ -300,7 +273,7 @@ pub(super) fn run_patch_blocks(
         .par_iter_mut()
         .zip_eq(sums.force[..places].par_chunks_exact_mut(stride))
         .with_max_len(TOGETHER)
-        .with_min_len(crate::team::least())
+        .with_min_len(least())
         .for_each(|(block, force)| {
             PATCH_WORK.with_borrow_mut(|work| run_patch_block(block, force, present, work));
         });
@@ -337,25 +310,6 @@ fn scatter_all(places: &[[u16; LANES]], count: usize, rows: &[f64], minus: bool,
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn groups_of_a_grid_are_compact() {
-        let points: Vec<V> = (0..96 * 64)
-            .map(|i| [f64::from(i % 96), f64::from(i / 96), 0.0])
-            .collect();
-        let order = compact_order(&points, 256);
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        assert!(sorted.iter().enumerate().all(|(i, n)| i as u32 == *n));
-        for group in order.chunks(256) {
-            for c in 0..2 {
-                let of = |n: &u32| points[*n as usize][c];
-                let low = group.iter().map(of).fold(f64::INFINITY, f64::min);
-                let high = group.iter().map(of).fold(0.0, f64::max);
-                assert!(high - low < 32.0, "{low} to {high}");
-            }
-        }
-    }
 
     #[test]
     fn sums_of_blocks_come_together_at_their_nodes() {

@@ -1,9 +1,24 @@
 //! Building a model: sheets, batches, masses.
 
-use super::*;
+use super::batch::{Rates, component_status};
+use super::blocks::{BLOCK, Block, Sums};
+use super::boundary::{Anchors, Boundary, Drive, Held, Loads, Supports};
+use super::mirror::Mirroring;
+use super::parts::{
+    CellPlace, Contacts, Elements, Model, Rotations, State, StepSettings, Topology, Workspace,
+};
+use super::transpose::gather;
 use crate::component::ElementInstance;
-use crate::mesh::Patch;
+use crate::energy::Ledger;
+use crate::mesh::{NONE, Patch, QuadMesh, compact_order};
 use crate::mirror::{Mirrors, mirrored_in};
+use crate::sheet::{
+    Aligned, Batch, Kind, PatchBatch, Pressed, Pressures, Shared, Sheet, SheetSpec,
+    empty_element_batch,
+};
+use crate::vec3::{Vec3, add, norm, scale, sub};
+use crate::{LANES, MechanicsError};
+use plyflow_abi::*;
 use std::sync::Arc;
 
 impl Model {
@@ -12,7 +27,7 @@ impl Model {
     /// # Errors
     /// When a component fails or a mass or step makes no sense.
     pub fn new(
-        points: Vec<V>,
+        points: Vec<Vec3>,
         specs: Vec<SheetSpec>,
         settings: StepSettings,
     ) -> Result<Self, MechanicsError> {
@@ -24,7 +39,7 @@ impl Model {
     /// # Errors
     /// As [`Model::new`].
     pub fn mirrored(
-        points: Vec<V>,
+        points: Vec<Vec3>,
         specs: Vec<SheetSpec>,
         settings: StepSettings,
         mirrors: Mirrors,
@@ -104,7 +119,7 @@ impl Model {
             cells: cells.clone(),
         };
         let shift = |c: u32| {
-            if c == crate::mesh::NONE || mirrored_in(c).is_some() {
+            if c == NONE || mirrored_in(c).is_some() {
                 c
             } else {
                 c + cell0 as u32
@@ -121,7 +136,7 @@ impl Model {
         let s = spec.element.sizes;
         let rotates = spec.element.rotates();
         check_elsewhere(&spec)?;
-        let centres: Vec<V> = cells
+        let centres: Vec<Vec3> = cells
             .iter()
             .map(|c| {
                 scale(
@@ -204,7 +219,7 @@ impl Model {
                 s.patch_nodes - 1
             )));
         }
-        let centres: Vec<V> = spec
+        let centres: Vec<Vec3> = spec
             .patches
             .iter()
             .map(|p| self.state.x[spec.nodes[p.nodes[0] as usize] as usize])
@@ -297,7 +312,7 @@ impl Model {
     fn initialise(
         &mut self,
         sheet: &mut Sheet,
-        axis: V,
+        axis: Vec3,
         orders: &[(Kind, Vec<u32>)],
         least: &[f64],
         areal_mass: f64,
@@ -435,7 +450,7 @@ impl Model {
 
 /// The cells of a sheet by formulation, each group of them in an order of its own: a block has elements of one kind, and membranes cost what
 /// membranes cost.
-fn orders(spec: &SheetSpec, centres: &[V]) -> Vec<(Kind, Vec<u32>)> {
+fn orders(spec: &SheetSpec, centres: &[Vec3]) -> Vec<(Kind, Vec<u32>)> {
     let both = |there: bool| if there { &[false, true][..] } else { &[false] };
     let kind = |c: usize| Kind {
         elsewhere: spec.elsewhere.as_ref().is_some_and(|e| e.cells[c]),
@@ -453,7 +468,7 @@ fn orders(spec: &SheetSpec, centres: &[V]) -> Vec<(Kind, Vec<u32>)> {
         let own: Vec<u32> = (0..centres.len() as u32)
             .filter(|c| kind(*c as usize) == wanted)
             .collect();
-        let places: Vec<V> = own.iter().map(|c| centres[*c as usize]).collect();
+        let places: Vec<Vec3> = own.iter().map(|c| centres[*c as usize]).collect();
         let order = compact_order(&places, BLOCK * LANES);
         (wanted, order.iter().map(|k| own[*k as usize]).collect())
     };

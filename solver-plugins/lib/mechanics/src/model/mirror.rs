@@ -1,37 +1,34 @@
-//! What a model cut at mirror planes does besides: holds nodes on the planes, moves its ghosts.
+//! Mirror planes at which a model is cut: which nodes lie on them, where its ghosts are.
 
+use super::blocks::Sums;
 use super::transpose::Sum;
-use super::*;
+use crate::MechanicsError;
 use crate::mesh::NONE;
 use crate::mirror::{Ghost, MIRRORED, Mirrors, Planes, common, reflect};
-use std::sync::Arc;
-
-/// Stiffness of the contact with a mirror plane over mass / step^2. It comes on top of what [`Model::set_contact_stiffness`]
-/// gives out: small, so that all stays stable, and so that the other contacts are those of the whole model.
-const PLANE_STIFFNESS: f64 = 0.1;
+use crate::vec3::{Vec3, unit};
 
 /// Planes and ghosts of a model; per-node arrays in its numbering.
 #[derive(Default)]
 pub(super) struct Mirroring {
-    planes: Planes,
+    pub(super) planes: Planes,
     ghosts: Vec<Ghost>,
     /// By ghost: where its image's sums are among the patches', and where its own begin in `places`.
     places_of: Vec<(u32, u32)>,
     places: Vec<u32>,
     /// Nodes on a plane, and the plane.
-    held: Vec<(u32, u8)>,
+    pub(super) held: Vec<(u32, u8)>,
     /// `[n]` share of a node that is modelled; empty without planes.
     share: Vec<f64>,
 }
 
 impl Mirroring {
-    pub(super) fn new(mirrors: Mirrors, points: &[V]) -> Self {
+    pub(super) fn new(mirrors: Mirrors, points: &[Vec3]) -> Self {
         let planes = mirrors.planes;
         let mut is_ghost = vec![false; points.len()];
         for g in &mirrors.ghosts {
             is_ghost[g.node as usize] = true;
         }
-        let on = |(n, p): (usize, &V)| {
+        let on = |(n, p): (usize, &Vec3)| {
             let (on, ghost) = (planes.holding(*p), is_ghost[n]);
             let held = (0..2).filter(move |k| on[*k] && !ghost);
             held.map(|k| (n as u32, k as u8)).collect::<Vec<_>>()
@@ -69,7 +66,7 @@ impl Mirroring {
     }
 
     /// Marks the edges of cells on a plane in their neighbours.
-    pub(super) fn mark(&self, cells: &[[u32; 4]], x: &[V], neighbours: &mut [[u32; 4]]) {
+    pub(super) fn mark(&self, cells: &[[u32; 4]], x: &[Vec3], neighbours: &mut [[u32; 4]]) {
         if !self.planes.any() {
             return;
         }
@@ -123,98 +120,25 @@ impl Mirroring {
     }
 
     /// Puts the ghosts where the images of their nodes are.
-    pub(super) fn follow(&self, x: &mut [V]) {
+    pub(super) fn follow(&self, x: &mut [Vec3]) {
         for g in &self.ghosts {
             x[g.node as usize] = reflect(x[g.of as usize], g.image);
         }
     }
 
     /// Turns the area vectors at the planes into those of the whole (times the share): without the part across.
-    pub(super) fn level(&self, areas: &mut [V]) {
+    pub(super) fn level(&self, areas: &mut [Vec3]) {
         for (n, k) in &self.held {
             areas[*n as usize][usize::from(*k)] = 0.0;
         }
     }
 
     /// The same for unit normals.
-    pub(super) fn level_normals(&self, normals: &mut [V]) {
+    pub(super) fn level_normals(&self, normals: &mut [Vec3]) {
         self.level(normals);
         for (n, _) in &self.held {
             let normal = &mut normals[*n as usize];
-            *normal = crate::vec3::unit(*normal);
+            *normal = unit(*normal);
         }
-    }
-}
-
-impl Model {
-    /// The planes at which the model is cut.
-    pub fn planes(&self) -> Planes {
-        self.topology.mirroring.planes
-    }
-
-    /// Puts the ghosts to their places after [`Model::x`] was changed by hand; steps do it themselves.
-    pub fn place_ghosts(&mut self) {
-        self.topology.mirroring.follow(&mut self.state.x);
-    }
-
-    /// Holds the nodes of the planes on them. A rotation about an axis in a plane would turn it: only that about its
-    /// normal is free.
-    pub(super) fn hold_at_planes(&mut self) {
-        let mut fixed = std::collections::BTreeMap::<u32, Fixed>::new();
-        for (n, k) in &self.topology.mirroring.held {
-            let k = usize::from(*k);
-            let of = fixed.entry(*n).or_default();
-            of.translations[k] = true;
-            for c in (0..3).filter(|c| *c != k) {
-                of.rotations[c] = true;
-            }
-        }
-        for (n, fixed) in fixed {
-            self.fix(n, fixed);
-        }
-    }
-
-    /// Adds the contact of all nodes beside a mirror plane with it, without friction: there they meet their own images.
-    /// Call it after [`Model::set_contact_stiffness`].
-    pub fn add_plane_contacts(&mut self, settings: &ContactSettings) {
-        let dt2 = self.topology.settings.target_step.powi(2);
-        for k in (0..2).filter(|k| self.topology.mirroring.planes.0[*k]) {
-            let mut seen = vec![false; self.state.x.len()];
-            for sheet in &self.topology.sheets {
-                let mut items = Vec::new();
-                for n in &sheet.nodes {
-                    let i = *n as usize;
-                    if std::mem::replace(&mut seen[i], true) || self.state.x[i][k] == 0.0 {
-                        continue;
-                    }
-                    let mut item = RigidItem::new(*n);
-                    item.stiffness = PLANE_STIFFNESS * self.topology.mass[i] / dt2;
-                    let critical = 2.0 * (item.stiffness * self.topology.mass[i]).sqrt();
-                    item.damping = (settings.damping_ratio * critical) as f32;
-                    items.push(item);
-                }
-                let name = format!("symmetry_{}/{}", ["x", "y"][k], sheet.name);
-                let surface = Arc::new(MirrorPlane(k));
-                let without = ContactSettings {
-                    augmentation: 0.0,
-                    ..*settings
-                };
-                self.contacts
-                    .rigid
-                    .push(RigidContact::new(name, surface, 0.0, 0.0, &without, items));
-            }
-        }
-    }
-}
-
-/// The plane through the origin square to an axis, solid on its negative side.
-struct MirrorPlane(usize);
-
-impl RigidSurface for MirrorPlane {
-    fn distance(&self, point: V) -> (f64, V) {
-        (
-            point[self.0],
-            std::array::from_fn(|c| f64::from(u8::from(c == self.0))),
-        )
     }
 }

@@ -5,11 +5,12 @@ mod advance;
 mod archive;
 mod batch;
 mod blocks;
+mod boundary;
 mod build;
 mod drive;
-mod hold;
 mod mirror;
 mod parts;
+mod planes;
 mod query;
 mod rotation;
 mod shape;
@@ -18,112 +19,19 @@ mod stiffness;
 mod support;
 mod transpose;
 
-use batch::*;
-pub(crate) use blocks::compact_order;
-use blocks::*;
-use hold::Anchors;
-pub use hold::Hold;
-use mirror::Mirroring;
-use parts::*;
-use rotation::Rotations;
+pub use crate::sheet::Pressures;
+pub use boundary::{Drive, Fixed, Held, Hold, NodalLoad};
+pub use parts::{Model, StepSettings};
 pub use shape::ASK_INTERVAL;
 pub use spent::{Clock, Spent};
-pub use support::{Fixed, NodalLoad};
-use support::{Loads, Supports};
-use transpose::gather;
 
-use crate::contact::*;
-use crate::energy::Ledger;
-use crate::mesh::{QuadMesh, area_vector};
-use crate::sheet::*;
-use crate::team::{self, Sharing};
-use crate::vec3::{V, add, dot, norm, scale, sub};
-use crate::{LANES, MechanicsError};
-use plyflow_abi::*;
+use crate::MechanicsError;
+use crate::contact::{Bearing, ContactEnergy, FoldItem, Pace, Surface};
+use crate::team;
+use crate::vec3::{dot, norm, unit};
+use batch::{Motion, Present, component_status};
+use blocks::{NODE_CHUNK, run_blocks, run_patch_blocks};
 use rayon::prelude::*;
-use std::sync::Arc;
-
-/// How a node is held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Held {
-    /// Moves freely.
-    Free,
-    /// Follows the position given by [`Drive`].
-    Driven,
-}
-
-/// Gives the positions of the driven nodes.
-pub trait Drive: Send + Sync {
-    /// Writes the position (m) at time `t` (s) of driven node `k`, in the order of
-    /// [`Model::set_driven`].
-    fn position(&self, k: usize, t: f64) -> V;
-
-    /// Spin (rad/s, global axes) of driven node `k` at time `t` (s), for sheets whose nodes rotate;
-    /// `None`: its rotation is free.
-    fn spin(&self, _k: usize, _t: f64) -> Option<V> {
-        None
-    }
-
-    /// How driven node `k` is held at time `t` (s), if it may go off its position along its sheet; `None`: it may not.
-    fn hold(&self, _k: usize, _t: f64) -> Option<Hold> {
-        None
-    }
-}
-
-/// Constants of the time integration.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StepSettings {
-    /// Wanted step (s): elements below it are mass-scaled to reach it.
-    pub target_step: f64,
-    /// Share of the estimated critical step that is used.
-    pub safety: f64,
-    /// Mass-proportional damping (1/s).
-    pub damping: f64,
-}
-
-/// Pressures at the current time (Pa).
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Pressures {
-    /// From below on cells pressed below.
-    pub below: f64,
-    /// From above on cells pressed above.
-    pub above: f64,
-}
-
-/// A model: sheets with their contacts, what acts on them, and where they are. Per-node arrays are in the model's numbering.
-pub struct Model {
-    /// What changes from step to step.
-    state: State,
-    /// What stays as it was built.
-    topology: Topology,
-    elements: Elements,
-    contacts: Contacts,
-    /// What holds, drives and presses.
-    boundary: Boundary,
-    workspace: Workspace,
-}
-
-/// Adds the forces of all contacts to `force` (N), one after the other.
-fn scatter_contacts(
-    rigid: &[RigidContact],
-    sheets: &[SheetContact],
-    folds: &[SelfContact],
-    cells: &[[u32; 4]],
-    force: &mut [V],
-) {
-    for contact in rigid {
-        contact.scatter(force);
-    }
-    for contact in sheets {
-        contact.scatter(cells, force);
-    }
-    for contact in folds {
-        contact.scatter(cells, force);
-    }
-}
-
-/// Nodes that are moved together.
-const NODE_CHUNK: usize = 256;
 
 /// What presses on sheets in a bag besides pressure (Pa), as films that are stretched over edges do: so much of their contacts' forces does not
 /// grow with the pressure.
@@ -150,15 +58,7 @@ impl Model {
         };
         let scatter = || {
             if computed {
-                let (rigid, sheets) = (&self.contacts.rigid, &self.contacts.sheets);
-                let folds = &self.contacts.folds;
-                scatter_contacts(
-                    rigid,
-                    sheets,
-                    folds,
-                    &self.topology.cells,
-                    &mut self.contacts.force,
-                );
+                self.contacts.scatter(&self.topology.cells);
             }
         };
         let elements = || {
@@ -197,7 +97,7 @@ impl Model {
                 normals.fill([0.0; 3]);
                 sums.collect(&sums.area, chunk, normals);
                 for normal in normals {
-                    *normal = crate::vec3::unit(*normal);
+                    *normal = unit(*normal);
                 }
             });
         self.topology
@@ -347,15 +247,7 @@ impl Model {
                 contact.look_between(&self.contacts.sheets);
             }
             if !self.compute_contacts() {
-                let (rigid, sheets) = (&self.contacts.rigid, &self.contacts.sheets);
-                let folds = &self.contacts.folds;
-                scatter_contacts(
-                    rigid,
-                    sheets,
-                    folds,
-                    &self.topology.cells,
-                    &mut self.contacts.force,
-                );
+                self.contacts.scatter(&self.topology.cells);
             }
             part.add_to(&mut self.workspace.spent.contacts);
         } else {

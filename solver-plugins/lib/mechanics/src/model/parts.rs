@@ -1,22 +1,52 @@
 //! The parts of a model.
 
-use super::*;
+use super::blocks::{Block, Sums};
+use super::boundary::{Boundary, Fixed};
+use super::mirror::Mirroring;
+use super::spent::Spent;
+use crate::contact::{ContactEnergy, RigidContact, SelfContact, SheetContact};
 use crate::energy::Ledger;
-use crate::vec3::{V, dot};
+use crate::sheet::{Batch, PatchBatch, Sheet};
+use crate::team::Sharing;
+use crate::vec3::{Vec3, dot};
 use std::sync::Arc;
+
+/// A model: sheets with their contacts, what acts on them, and where they are. Per-node arrays are in the model's numbering.
+pub struct Model {
+    /// What changes from step to step.
+    pub(super) state: State,
+    /// What stays as it was built.
+    pub(super) topology: Topology,
+    pub(super) elements: Elements,
+    pub(super) contacts: Contacts,
+    /// What holds, drives and presses.
+    pub(super) boundary: Boundary,
+    pub(super) workspace: Workspace,
+}
+
+/// Constants of the time integration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepSettings {
+    /// Wanted step (s): elements below it are mass-scaled to reach it.
+    pub target_step: f64,
+    /// Share of the estimated critical step that is used.
+    pub safety: f64,
+    /// Mass-proportional damping (1/s).
+    pub damping: f64,
+}
 
 /// Where the nodes are and how they move.
 pub(super) struct State {
     /// `[n]` positions (m).
-    pub x: Vec<V>,
+    pub x: Vec<Vec3>,
     /// `[n]` velocities at the half step (m/s).
-    pub v: Vec<V>,
+    pub v: Vec<Vec3>,
     /// `[n]` unit normals of the sheets.
-    pub normals: Vec<V>,
+    pub normals: Vec<Vec3>,
     /// Spins and moments, where nodes rotate.
     pub rotations: Option<Box<Rotations>>,
     /// `[n]` forces on the nodes in the last step (N).
-    pub force: Vec<V>,
+    pub force: Vec<Vec3>,
     /// Time (s) of the positions.
     pub time: f64,
     /// Steps done.
@@ -35,10 +65,35 @@ pub(super) struct State {
     pub ledger: Ledger,
 }
 
+/// Rotational state; per-node arrays in the model's numbering.
+pub(super) struct Rotations {
+    /// `[n]` spins at the half step (rad/s).
+    pub(super) spin: Vec<Vec3>,
+    /// `[n]` rotary inertias (kg m2); 0: the node does not rotate.
+    pub(super) inertia: Vec<f64>,
+    /// The same with 0 for driven nodes; empty when none is.
+    pub(super) free_inertia: Vec<f64>,
+}
+
+impl Rotations {
+    pub(super) fn new(n: usize) -> Self {
+        Self {
+            spin: vec![[0.0; 3]; n],
+            inertia: vec![0.0; n],
+            free_inertia: Vec::new(),
+        }
+    }
+
+    /// Holds components of a node's rotation at zero.
+    pub(super) fn fix(&mut self, node: usize, fixed: Fixed) {
+        self.spin[node] = fixed.rotation(self.spin[node]);
+    }
+}
+
 /// Sheets, cells and masses as they were built.
 pub(super) struct Topology {
     /// `[n]` positions with which it was built (m); shared, so that what needs them keeps no copy of its own.
-    pub start: Arc<[V]>,
+    pub start: Arc<[Vec3]>,
     /// Sheets from the tool upwards.
     pub sheets: Vec<Sheet>,
     /// `[cells][4]` model nodes of all sheets' cells.
@@ -84,7 +139,7 @@ pub(super) struct Contacts {
     /// `[n]` stiffness that self-contacts may add to a node (N/m); empty without them.
     pub room: Vec<f64>,
     /// `[n]` forces of the contacts (N); zero between steps.
-    pub force: Vec<V>,
+    pub force: Vec<Vec3>,
     /// Of all together in the last step.
     pub energy: ContactEnergy,
     /// By contact, rigid ones, sheets on sheets, sheets on themselves: stored at present, lost so far (J).
@@ -93,26 +148,19 @@ pub(super) struct Contacts {
     pub step_energies: Vec<ContactEnergy>,
 }
 
-/// What holds, drives and presses.
-pub(super) struct Boundary {
-    /// Pressures, set before each step.
-    pub pressures: Pressures,
-    /// The pressure above (Pa) in the last step.
-    pub last_above: f64,
-    /// Acceleration of free fall (m/s2), global axes.
-    pub body_acceleration: V,
-    /// What the nodal loads are multiplied by.
-    pub load_factor: f64,
-    pub loads: Loads,
-    pub supports: Supports,
-    /// `[n]` how a node is held.
-    pub held: Vec<Held>,
-    /// Driven nodes, in the order of [`Drive::position`].
-    pub driven: Vec<u32>,
-    pub drive: Option<Box<dyn Drive>>,
-    pub anchors: Anchors,
-    /// `[n]` pressure, weight and nodal loads (N): what does external work on free nodes. Empty when nothing acts.
-    pub external_force: Vec<V>,
+impl Contacts {
+    /// Puts the forces of all on the nodes, one after the other. `cells`: the model's.
+    pub fn scatter(&mut self, cells: &[[u32; 4]]) {
+        for contact in &self.rigid {
+            contact.scatter(&mut self.force);
+        }
+        for contact in &self.sheets {
+            contact.scatter(cells, &mut self.force);
+        }
+        for contact in &self.folds {
+            contact.scatter(cells, &mut self.force);
+        }
+    }
 }
 
 /// Kept from step to step only for their room: a step allocates nothing. Nothing here is part of an answer.
@@ -123,9 +171,9 @@ pub(super) struct Workspace {
     /// Their sum.
     pub work: NodeWork,
     /// By driven node: position and velocity before the step.
-    pub before: Vec<(V, V)>,
+    pub before: Vec<(Vec3, Vec3)>,
     /// By driven node: spin before the step.
-    pub spins: Vec<V>,
+    pub spins: Vec<Vec3>,
     /// Parts of a volume (m3).
     pub volumes: Vec<f64>,
     /// How threads share the work.
@@ -158,7 +206,7 @@ pub(super) struct NodeWork {
 impl NodeWork {
     /// Counts a node of mass or rotary inertia `m` with its new velocity or spin.
     #[inline(always)]
-    pub fn count(&mut self, m: f64, node: usize, v: V) {
+    pub fn count(&mut self, m: f64, node: usize, v: Vec3) {
         let v2 = dot(v, v);
         self.kinetic += 0.5 * m * v2;
         if !v2.is_finite() {

@@ -1,7 +1,17 @@
 //! What a model tells of itself: energies, critical step, fields, volume.
 
-use super::*;
-use crate::energy::SheetEnergy;
+use super::batch::{batch_critical_step, cell_critical_steps, patch_rows};
+use super::blocks::NODE_CHUNK;
+use super::parts::{CellPlace, Model};
+use crate::contact::ContactEnergy;
+use crate::energy::{Ledger, SheetEnergy};
+use crate::mesh::area_vector;
+use crate::sheet::Batch;
+use crate::vec3::{Vec3, add, dot, scale};
+use crate::{LANES, MechanicsError};
+use plyflow_abi::{PF_ENERGY_BENDING, PF_ENERGY_HOURGLASS, PF_ENERGY_MEMBRANE};
+use rayon::prelude::*;
+use std::sync::Arc;
 
 impl Model {
     /// Largest share of the penalty force that contacts hand to their multipliers in a step, once
@@ -13,7 +23,7 @@ impl Model {
     }
 
     /// `[n]` positions with which it was built (m).
-    pub fn start(&self) -> &Arc<[V]> {
+    pub fn start(&self) -> &Arc<[Vec3]> {
         &self.topology.start
     }
 
@@ -68,7 +78,7 @@ impl Model {
     }
 
     /// By node of a sheet: sum of a quarter of the area vectors of its cells around it (m2).
-    pub fn node_areas(&self, sheet: usize) -> Vec<V> {
+    pub fn node_areas(&self, sheet: usize) -> Vec<Vec3> {
         let sheet = &self.topology.sheets[sheet];
         let mut areas = vec![[0.0; 3]; self.state.x.len()];
         for cell in &self.topology.cells[sheet.cell_range.0..sheet.cell_range.1] {
@@ -163,7 +173,7 @@ impl Model {
         self.mixed_cell_field(sheet, index, Some(index))
     }
 
-    /// The same of a sheet with two elements, in one of which ([`Elsewhere`]) the field has another row, or none: then
+    /// The same of a sheet with two elements, in one of which ([`crate::sheet::Elsewhere`]) the field has another row, or none: then
     /// it is 0 there.
     pub fn mixed_cell_field(
         &self,
@@ -185,7 +195,7 @@ impl Model {
     }
 
     /// Row `index` of the patch fields of a sheet, per mesh-local node (0 where there is no patch: at its edge and within
-    /// [`Elsewhere`]).
+    /// [`crate::sheet::Elsewhere`]).
     pub fn patch_field(&self, sheet: usize, index: usize) -> Vec<f64> {
         let (b0, b1) = self.topology.sheets[sheet].patch_range;
         let mut values = vec![0.0; self.topology.sheets[sheet].nodes.len()];

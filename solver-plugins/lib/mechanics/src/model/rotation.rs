@@ -5,35 +5,16 @@
 //! no orientation.
 
 use super::advance::{Turns, free_of, free_or_all};
-use super::*;
+use super::blocks::NODE_CHUNK;
+use super::boundary::Fixed;
+use super::parts::{Model, NodeWork, Rotations};
+use crate::MechanicsError;
+use crate::mesh::area_vector;
 use crate::mirror::Planes;
-use crate::vec3::cross;
+use crate::team::least;
+use crate::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use plyflow_fixed::FixedBits;
-
-/// Rotational state; per-node arrays in the model's numbering.
-pub(super) struct Rotations {
-    /// `[n]` spins at the half step (rad/s).
-    pub(super) spin: Vec<V>,
-    /// `[n]` rotary inertias (kg m2); 0: the node does not rotate.
-    pub(super) inertia: Vec<f64>,
-    /// The same with 0 for driven nodes; empty when none is.
-    free_inertia: Vec<f64>,
-}
-
-impl Rotations {
-    pub(super) fn new(n: usize) -> Self {
-        Self {
-            spin: vec![[0.0; 3]; n],
-            inertia: vec![0.0; n],
-            free_inertia: Vec::new(),
-        }
-    }
-
-    /// Holds components of a node's rotation at zero.
-    pub(super) fn fix(&mut self, node: usize, fixed: Fixed) {
-        self.spin[node] = fixed.rotation(self.spin[node]);
-    }
-}
+use rayon::prelude::*;
 
 impl Model {
     /// Brings the nodes to `x` (`[n]`, m) in one step of `dt` (s), and the elements with them: forces, energies, and what they keep of the
@@ -42,7 +23,12 @@ impl Model {
     ///
     /// # Errors
     /// When a component fails, or the model is cut at mirror planes, whose other half has a share in the normals.
-    pub fn lead(&mut self, x: Vec<V>, dt: f64, normals: &[(u32, V)]) -> Result<(), MechanicsError> {
+    pub fn lead(
+        &mut self,
+        x: Vec<Vec3>,
+        dt: f64,
+        normals: &[(u32, Vec3)],
+    ) -> Result<(), MechanicsError> {
         if self.planes() != Planes::default() {
             return Err(MechanicsError::Input(
                 "a model that is cut at mirror planes cannot be led to a state on its way".into(),
@@ -78,7 +64,7 @@ impl Model {
     }
 
     /// `[n]` sums of the directed areas (m2) of the cells around the nodes, were these at `x`.
-    fn normals_at(&self, x: &[V]) -> Vec<V> {
+    fn normals_at(&self, x: &[Vec3]) -> Vec<Vec3> {
         let mut normals = vec![[0.0; 3]; x.len()];
         for cell in &self.topology.cells {
             let area = area_vector(cell.map(|n| x[n as usize]));
@@ -91,7 +77,7 @@ impl Model {
     }
 
     /// `[n]` spins (rad/s) at the half step; `None` when no sheet's nodes rotate.
-    pub fn spins(&self) -> Option<&[V]> {
+    pub fn spins(&self) -> Option<&[Vec3]> {
         self.state.rotations.as_deref().map(|r| r.spin.as_slice())
     }
 
@@ -122,7 +108,7 @@ impl Model {
         self.turn_driven(&mut r, &before, &mut work);
         self.workspace.spins = before;
         if !work.kinetic.is_finite() {
-            let bad = |w: &V| !w.iter().all(|c| c.is_finite());
+            let bad = |w: &Vec3| !w.iter().all(|c| c.is_finite());
             work.bad = work.bad.or(r.spin.iter().position(bad).map(|n| n as u32));
         }
         self.workspace.work = self.workspace.work.add(work);
@@ -142,7 +128,7 @@ impl Model {
         r.spin
             .par_chunks_mut(NODE_CHUNK)
             .enumerate()
-            .with_min_len(crate::team::least())
+            .with_min_len(least())
             .map(|(chunk, spin)| {
                 let nodes = chunk * NODE_CHUNK..chunk * NODE_CHUNK + spin.len();
                 let mut moment = [[0.0; 3]; NODE_CHUNK];
@@ -166,7 +152,7 @@ impl Model {
     }
 
     /// Spins of the driven nodes, which were `before`, and their works.
-    fn turn_driven(&mut self, r: &mut Rotations, before: &[V], work: &mut NodeWork) {
+    fn turn_driven(&mut self, r: &mut Rotations, before: &[Vec3], work: &mut NodeWork) {
         let turning = Turning {
             dt: self.state.dt,
             damping: self.topology.settings.damping,
@@ -201,7 +187,7 @@ impl Model {
 
 /// The smallest rotation (rad, along its axis) that brings the direction of `from` to that of `to`; none where one of them has no
 /// direction, or they are opposite and there are many.
-fn turn_between(from: V, to: V) -> V {
+fn turn_between(from: Vec3, to: Vec3) -> Vec3 {
     let axis = cross(from, to);
     let sine = norm(axis);
     if sine == 0.0 {
@@ -217,25 +203,25 @@ struct Turning<'a> {
     kick: f64,
     inertia: &'a [f64],
     fixed: &'a [Fixed],
-    loads: &'a [V],
+    loads: &'a [Vec3],
     load_factor: f64,
 }
 
 impl Turning<'_> {
     #[inline(always)]
-    fn load(&self, n: usize) -> V {
-        let load = |m: &V| scale(*m, self.load_factor);
+    fn load(&self, n: usize) -> Vec3 {
+        let load = |m: &Vec3| scale(*m, self.load_factor);
         self.loads.get(n).map_or([0.0; 3], load)
     }
 
     /// The next spin of a node that `moment` and its load turn.
     #[inline(always)]
-    fn free(&self, n: usize, old: V, moment: V, work: &mut NodeWork) -> V {
+    fn free(&self, n: usize, old: Vec3, moment: Vec3, work: &mut NodeWork) -> Vec3 {
         let (dt, alpha) = (self.dt, self.damping);
         let (lo, hi) = (1.0 / dt - 0.5 * alpha, 1.0 / (1.0 / dt + 0.5 * alpha));
         let load = self.load(n);
         let per_inertia = self.kick / self.inertia[n];
-        let mut w: V =
+        let mut w: Vec3 =
             std::array::from_fn(|c| (lo * old[c] + per_inertia * (moment[c] + load[c])) * hi);
         if let Some(f) = self.fixed.get(n) {
             w = f.rotation(w);

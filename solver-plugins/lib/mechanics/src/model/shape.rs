@@ -6,9 +6,13 @@
 //! it. So the shapes themselves are looked at, independently of what the elements say; what only the element knows (its directors) it
 //! tells by a critical step of 0.
 
-use super::*;
-use crate::vec3::cross;
+use super::blocks::NODE_CHUNK;
+use super::parts::Model;
+use crate::mesh::area_vector;
+use crate::vec3::{Vec3, add, cross, dot, norm, scale, sub};
+use crate::{MechanicsError, team};
 use plyflow_fixed::FixedBits;
+use rayon::prelude::*;
 
 /// Steps between two looks at the shapes: some thousandths of a step's work.
 pub(super) const LOOK: u64 = 1024;
@@ -35,13 +39,13 @@ enum Fault {
     Stepless,
 }
 
-fn cosine(a: V, b: V) -> f64 {
+fn cosine(a: Vec3, b: Vec3) -> f64 {
     let size = (dot(a, a) * dot(b, b)).sqrt();
     if size > 0.0 { dot(a, b) / size } else { 1.0 }
 }
 
 /// Directed areas of the corners: twice those of the triangles of a corner and its two neighbours.
-fn corners(p: &[V; 4]) -> [V; 4] {
+fn corners(p: &[Vec3; 4]) -> [Vec3; 4] {
     std::array::from_fn(|i| {
         let (next, last) = (p[(i + 1) % 4], p[(i + 3) % 4]);
         cross(sub(next, p[i]), sub(last, p[i]))
@@ -49,7 +53,7 @@ fn corners(p: &[V; 4]) -> [V; 4] {
 }
 
 /// Of a cell by itself.
-fn fault_of(p: &[V; 4], reference: &[V; 4]) -> Option<Fault> {
+fn fault_of(p: &[Vec3; 4], reference: &[Vec3; 4]) -> Option<Fault> {
     let area = norm(area_vector(*p)) / norm(area_vector(*reference)).max(f64::MIN_POSITIVE);
     if area < LEAST_AREA {
         return Some(Fault::Collapsed(area));
@@ -76,7 +80,7 @@ impl Model {
     /// # Errors
     /// When one is no element any more: which, where, when, and what has become of it.
     pub fn check_shapes(&self) -> Result<(), MechanicsError> {
-        let at = |x: &[V], cell: usize| self.topology.cells[cell].map(|n| x[n as usize]);
+        let at = |x: &[Vec3], cell: usize| self.topology.cells[cell].map(|n| x[n as usize]);
         for sheet in &self.topology.sheets {
             let of_element = &sheet.element;
             let bends = of_element.rotates() || of_element.sizes.patch_nodes > 0;
@@ -161,14 +165,14 @@ impl Model {
 mod tests {
     use super::*;
 
-    const SQUARE: [V; 4] = [
+    const SQUARE: [Vec3; 4] = [
         [0.0, 0.0, 0.0],
         [1.0, 0.0, 0.0],
         [1.0, 1.0, 0.0],
         [0.0, 1.0, 0.0],
     ];
 
-    fn moved(f: impl Fn(V) -> V) -> Option<Fault> {
+    fn moved(f: impl Fn(Vec3) -> Vec3) -> Option<Fault> {
         fault_of(&SQUARE.map(f), &SQUARE)
     }
 

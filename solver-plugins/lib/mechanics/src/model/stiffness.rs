@@ -1,7 +1,10 @@
 //! How stiff contacts are, from the masses that they couple and the step.
 
-use super::*;
-use crate::contact::{WHOLE, ledge, rim_height};
+use super::parts::Model;
+use crate::contact::{
+    ContactSettings, FoldSpec, SelfContact, SheetContact, WHOLE, ledge, rim_height,
+};
+use crate::mesh::NONE;
 
 /// Share of the thinner sheet from which on a contact is deep ([`SheetContact::deep`]).
 const DEEP: f64 = 0.1;
@@ -53,12 +56,12 @@ impl Model {
         let heights: Vec<_> = heights.collect();
         for contact in &mut self.contacts.sheets {
             contact.augmentation = augmentation;
-            let on = (contact.items.iter().map(|i| i.cell)).find(|c| *c != crate::mesh::NONE);
+            let on = (contact.items.iter().map(|i| i.cell)).find(|c| *c != NONE);
             let master = on.and_then(|c| heights.iter().find(|h| h.0.contains(&(c as usize))));
             if let Some((_, Some(height))) = master {
                 contact.ledge = ledge(contact.offset, *height);
             }
-            let items = contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
+            let items = contact.items.iter().filter(|i| i.cell != NONE);
             // Where they are kept further apart than they are thick, what is between them is to spare.
             let both = items.map(|i| {
                 let master = self.topology.cells[i.cell as usize][0];
@@ -67,11 +70,7 @@ impl Model {
             });
             contact.deep = both.fold(f64::INFINITY, f64::min);
             let (share, counted) = (contact.share, contact.counted);
-            for item in contact
-                .items
-                .iter_mut()
-                .filter(|i| i.cell != crate::mesh::NONE)
-            {
+            for item in contact.items.iter_mut().filter(|i| i.cell != NONE) {
                 let nodes = self.topology.cells[item.cell as usize];
                 let (slave, master) =
                     (whole(item.node), nodes.map(whole).iter().sum::<f64>() / 4.0);
@@ -97,7 +96,7 @@ impl Model {
             item.damping = (2.0 * c.damping_ratio * (item.stiffness * m).sqrt()) as f32;
         }
         for item in self.contacts.sheets.iter_mut().flat_map(|c| &mut c.items) {
-            if item.cell == crate::mesh::NONE {
+            if item.cell == NONE {
                 continue;
             }
             let nodes = self.topology.cells[item.cell as usize];
@@ -117,7 +116,7 @@ impl Model {
             masses.fold(0.0, f64::max)
         };
         let of_contact = |contact: &SheetContact| {
-            let items = || contact.items.iter().filter(|i| i.cell != crate::mesh::NONE);
+            let items = || contact.items.iter().filter(|i| i.cell != NONE);
             let slave = heaviest(&mut items().map(|i| i.node));
             let master = heaviest(&mut items().flat_map(|i| self.topology.cells[i.cell as usize]));
             (slave.min(master) > 0.0).then(|| slave.min(master) / slave.max(master))
@@ -143,7 +142,7 @@ impl Model {
         }
         for contact in &self.contacts.sheets {
             let items = contact.items.iter();
-            for item in items.filter(|i| i.cell != crate::mesh::NONE) {
+            for item in items.filter(|i| i.cell != NONE) {
                 let damping = 2.0 * contact.counted * item.damping;
                 row[item.node as usize] += damping;
                 for (k, n) in self.topology.cells[item.cell as usize].iter().enumerate() {
@@ -160,7 +159,7 @@ impl Model {
             item.damping = limited as f32;
         }
         let sheets = self.contacts.sheets.iter_mut().flat_map(|c| &mut c.items);
-        for item in sheets.filter(|i| i.cell != crate::mesh::NONE) {
+        for item in sheets.filter(|i| i.cell != NONE) {
             let nodes = self.topology.cells[item.cell as usize];
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.damping *= least.min(limit[item.node as usize]);
@@ -192,7 +191,7 @@ impl Model {
         }
         for contact in &self.contacts.sheets {
             let items = contact.items.iter();
-            for item in items.filter(|i| i.cell != crate::mesh::NONE) {
+            for item in items.filter(|i| i.cell != NONE) {
                 let stiffness = contact.counted * item.stiffness;
                 used[item.node as usize] += stiffness;
                 for (w, n) in item

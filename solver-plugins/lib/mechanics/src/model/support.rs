@@ -1,65 +1,8 @@
 //! Supports and nodal loads: fixed components, what driven nodes feel, forces and moments at nodes.
 
-use super::*;
-
-/// Components (global axes) of a node's motion that are held at zero.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Fixed {
-    /// Translations along x, y, z.
-    pub translations: [bool; 3],
-    /// Rotations about x, y, z.
-    pub rotations: [bool; 3],
-}
-
-impl Fixed {
-    #[inline(always)]
-    fn keep(held: [bool; 3], v: V) -> V {
-        std::array::from_fn(|c| if held[c] { 0.0 } else { v[c] })
-    }
-
-    /// The free part of a velocity.
-    #[inline(always)]
-    pub(super) fn translation(&self, v: V) -> V {
-        Self::keep(self.translations, v)
-    }
-
-    /// The free part of a spin.
-    #[inline(always)]
-    pub(super) fn rotation(&self, v: V) -> V {
-        Self::keep(self.rotations, v)
-    }
-}
-
-/// A dead load at a node (global axes); [`Model::set_load_factor`] multiplies it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NodalLoad {
-    /// Node of the model.
-    pub node: u32,
-    /// Force (N).
-    pub force: V,
-    /// Moment (N m); needs a sheet whose nodes rotate.
-    pub moment: V,
-}
-
-/// Dead loads by node.
-#[derive(Default)]
-pub(super) struct Loads {
-    /// `[n]` (N), or empty without forces.
-    pub(super) force: Vec<V>,
-    /// `[n]` (N m), or empty without moments.
-    pub(super) moment: Vec<V>,
-}
-
-/// What holds a model besides its drive.
-#[derive(Default)]
-pub(super) struct Supports {
-    /// `[n]`, or empty when nothing is fixed.
-    pub(super) fixed: Vec<Fixed>,
-    /// By driven node: force of the support on it (N).
-    pub(super) reaction: Vec<V>,
-    /// By driven node: moment of the support on it (N m).
-    pub(super) reaction_moment: Vec<V>,
-}
+use super::boundary::{Fixed, Held, Loads, NodalLoad};
+use super::parts::Model;
+use crate::vec3::{Vec3, add, dot};
 
 impl Model {
     /// Holds components of a node at zero. Held components do no work.
@@ -76,7 +19,7 @@ impl Model {
 
     /// Sets the nodal loads; [`Model::set_load_factor`] multiplies them.
     pub fn set_loads(&mut self, loads: Vec<NodalLoad>) {
-        let sum = |of: &dyn Fn(&NodalLoad) -> V| {
+        let sum = |of: &dyn Fn(&NodalLoad) -> Vec3| {
             let some = loads.iter().any(|l| of(l) != [0.0; 3]);
             let mut sums = vec![[0.0; 3]; if some { self.state.x.len() } else { 0 }];
             for load in loads.iter().filter(|_| some) {
@@ -103,12 +46,12 @@ impl Model {
 
     /// `[driven]` forces (N) of what drives the nodes on them in the last step, in the order of
     /// [`Model::set_driven`]: mass times acceleration less all other forces.
-    pub fn reactions(&self) -> &[V] {
+    pub fn reactions(&self) -> &[Vec3] {
         &self.boundary.supports.reaction
     }
 
     /// `[driven]` moments (N m) of what drives the nodes' rotations; zero where these are free.
-    pub fn reaction_moments(&self) -> &[V] {
+    pub fn reaction_moments(&self) -> &[Vec3] {
         &self.boundary.supports.reaction_moment
     }
 
@@ -140,7 +83,7 @@ impl Model {
     pub fn out_of_balance(&self) -> (f64, f64) {
         let (mut rest, mut load) = (0.0, 0.0);
         for n in (0..self.state.x.len()).filter(|n| self.boundary.held[*n] == Held::Free) {
-            let free = |f: V| {
+            let free = |f: Vec3| {
                 self.boundary
                     .supports
                     .fixed

@@ -4,7 +4,7 @@
 //! those of the plain loops.
 
 use crate::LANES;
-use crate::vec3::V;
+use crate::vec3::Vec3;
 
 /// A sum at a node; the fourth component is of no use but fills a register.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -13,7 +13,7 @@ pub(super) struct Sum(pub(super) [f64; 4]);
 
 /// Writes `[node][3][LANES]` of `nodes`.
 #[inline]
-pub(super) fn gather(nodes: &[[u32; LANES]], x: &[V], out: &mut [f64]) {
+pub(super) fn gather(nodes: &[[u32; LANES]], x: &[Vec3], out: &mut [f64]) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // Checked the line above.
@@ -56,11 +56,11 @@ pub(super) fn scatter(
 
 #[cfg(target_arch = "x86_64")]
 mod wide {
-    use super::{LANES, Sum, V};
+    use super::{LANES, Sum, Vec3};
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn gather(nodes: &[[u32; LANES]], x: &[V], out: &mut [f64]) {
+    pub(super) fn gather(nodes: &[[u32; LANES]], x: &[Vec3], out: &mut [f64]) {
         // The fourth component would be the next node's first, and past the end at the last node.
         let three = _mm256_set_epi64x(0, -1, -1, -1);
         for (nodes, rows) in nodes.iter().zip(out.chunks_exact_mut(3 * LANES)) {
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn lanes_and_nodes_hold_the_same_numbers() {
-        let x: Vec<V> = (0..40)
+        let x: Vec<Vec3> = (0..40)
             .map(|i| std::array::from_fn(|c| f64::from(i) + 0.01 * c as f64))
             .collect();
         // Also the last node, and one twice.

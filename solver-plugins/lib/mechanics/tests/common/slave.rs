@@ -1,6 +1,6 @@
 //! One slave on a sheet, and what it must be held by: the gradient of its own energy.
 
-use plyflow_geometry::vec3::{V, norm};
+use plyflow_geometry::vec3::{Vec3, norm};
 use plyflow_mechanics::contact::{
     ContactSettings, Pace, SheetContact, SlaveItem, Surface, ledge, rim_height,
 };
@@ -21,12 +21,12 @@ pub fn pace(dt: f64) -> Pace {
 
 /// Two by two cells of 8 mm, folded along x = 0 by `fold` (rad, positive: a valley) and warped a little; one
 /// slave above at `place` and `height` over the middle line of the fold.
-pub fn scene(fold: f64, place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
+pub fn scene(fold: f64, place: [f64; 2], height: f64) -> (QuadMesh, Vec<Vec3>) {
     scene_of(0.008, fold, place, height)
 }
 
 /// The same of cells of the length `cell` (m).
-pub fn scene_of(cell: f64, fold: f64, place: [f64; 2], height: f64) -> (QuadMesh, Vec<V>) {
+pub fn scene_of(cell: f64, fold: f64, place: [f64; 2], height: f64) -> (QuadMesh, Vec<Vec3>) {
     let axis = [-cell, 0.0, cell];
     let mut mesh = QuadMesh::grid(&axis, &axis);
     for (i, p) in mesh.points.iter_mut().enumerate() {
@@ -51,7 +51,7 @@ pub fn contact(slave: u32, cell: u32) -> SheetContact {
 }
 
 /// Energy (J) and forces (N) of a fresh contact.
-pub fn evaluate(mesh: &QuadMesh, x: &[V], cell: u32) -> (f64, Vec<V>) {
+pub fn evaluate(mesh: &QuadMesh, x: &[Vec3], cell: u32) -> (f64, Vec<Vec3>) {
     let normals = vec![[0.0, 0.0, 1.0]; x.len()];
     let neighbours = mesh.neighbours();
     let surface = Surface {
@@ -79,13 +79,13 @@ pub fn gradient_error(fold: f64, place: [f64; 2], height: f64) -> f64 {
 }
 
 /// By how much forces differ from the gradient of the energy, over the force on the slave.
-pub fn gradient_error_of(scene: (QuadMesh, Vec<V>)) -> f64 {
+pub fn gradient_error_of(scene: (QuadMesh, Vec<Vec3>)) -> f64 {
     let [slave, master] = gradient_errors(scene);
     slave.max(master)
 }
 
 /// The same of the slave, and of the master's nodes.
-pub fn gradient_errors((mesh, x): (QuadMesh, Vec<V>)) -> [f64; 2] {
+pub fn gradient_errors((mesh, x): (QuadMesh, Vec<Vec3>)) -> [f64; 2] {
     let place = x[x.len() - 1];
     let (energy, f) = evaluate(&mesh, &x, 0);
     assert!(energy > 0.0, "not in touch at {place:?}");

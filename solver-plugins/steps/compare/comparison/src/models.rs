@@ -281,9 +281,12 @@ fn read(
             return Err(what.into());
         }
         let margin = settings.foot_margin;
-        plies.push(of_run::strained_ply(
-            host, &input, frame, sheet, tool, margin,
-        )?);
+        let of = of_run::Frame {
+            host,
+            input: &input,
+            frame,
+        };
+        plies.push(of_run::strained_ply(of, sheet, tool, margin)?);
     }
     let name = match (role, zone) {
         (Role::Local, Some((_, zone))) => format!("local.{}", zone.name),

@@ -65,16 +65,14 @@ impl Agreement {
         let uncovered: Vec<bool> = (ply.formed.iter())
             .map(|p| scanned_face.closest(*p).on_free_edge)
             .collect();
+        let judged = |i: usize| scan.distance[i].judged && !closest[i].on_free_edge;
         let shares = Shares {
             size: sum(&areas, |_| true) / sum(&of_ply, |_| true),
             on_tool: share(&areas, |i| scan.distance[i].judged),
-            judged: share(&areas, |i| {
-                scan.distance[i].judged && !closest[i].on_free_edge
-            }),
+            judged: share(&areas, judged),
             covered: share(&of_ply, |i| !uncovered[i]),
         };
         shares.check(ply, scan)?;
-        let judged = |i: usize| scan.distance[i].judged && !closest[i].on_free_edge;
         let weights: Vec<f64> = (0..areas.len())
             .map(|i| if judged(i) { areas[i] } else { 0.0 })
             .collect();
@@ -89,19 +87,8 @@ impl Agreement {
         let magnitudes: Vec<f64> = deviation.iter().map(|d| d.abs()).collect();
         let squares: Vec<f64> = deviation.iter().map(|d| d * d).collect();
 
-        // Where only one of the two is, nobody knows what the other one would show: what lies there by more than half does not count.
-        let mut simulated = everywhere(&as_scanned(ply), settings);
-        simulated.retain(|d| mostly(d, &of_ply, |i| !uncovered[i]));
-        let mut scanned = everywhere(scan, settings);
-        scanned.retain(|d| mostly(d, &areas, |i| !closest[i].on_free_edge));
-        let middles: Vec<Vec3> = simulated
-            .iter()
-            .map(|d| middle(d, &ply.formed, &of_ply))
-            .collect();
-        let others: Vec<Vec3> = scanned
-            .iter()
-            .map(|d| middle(d, &scan.formed, &areas))
-            .collect();
+        let (simulated, middles) = found(&as_scanned(ply), &of_ply, settings, |i| !uncovered[i]);
+        let (scanned, others) = found(scan, &areas, settings, |i| !closest[i].on_free_edge);
         let (ours, theirs): (Vec<_>, Vec<_>) =
             (simulated.iter().collect(), scanned.iter().collect());
         let pairs = Pairs::of(&ours, &theirs, settings, |i, j| {
@@ -226,6 +213,21 @@ fn extent(points: &[Vec3]) -> String {
 fn upper_side(closest: &[Closest], tool: &Tool) -> f64 {
     let along = |c: &Closest| dot(c.normal, tool.surface.closest(c.point).normal);
     closest.iter().map(along).sum::<f64>().signum()
+}
+
+/// The defects of a ply with their middles (m). Where only one of the two is, nobody knows what the other one would show: what lies by more than
+/// half where the other is not `known` does not count.
+fn found(
+    ply: &Ply,
+    areas: &[f64],
+    settings: &Settings,
+    known: impl Fn(usize) -> bool,
+) -> (Vec<Defect>, Vec<Vec3>) {
+    let mut defects = everywhere(ply, settings);
+    defects.retain(|d| mostly(d, areas, &known));
+    let middles = defects.iter().map(|d| middle(d, &ply.formed, areas));
+    let middles = middles.collect();
+    (defects, middles)
 }
 
 /// A ply of which no more is known than of a scan.

@@ -1,6 +1,6 @@
 //! Fibre compression: on how much of a flat ply the fibres of a family are compressed, and by how much.
 
-use crate::{Measured, columns};
+use crate::measured::{Measured, columns};
 use plyflow_model::artifact::{
     Cell, Compressed, FamilyCompression, FibreCompression, Measurement, Table,
 };

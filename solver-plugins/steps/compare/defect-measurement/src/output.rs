@@ -2,12 +2,12 @@
 
 use crate::agreement::{self, Agreement};
 use crate::compression;
+use crate::measured::{Measured, SCAN, columns};
 use crate::read::{Beside, Run};
 use crate::region::Regions;
 use crate::sections::{Section, Sheet};
 use crate::slipping::Slipping;
 use crate::symmetry::Crests;
-use crate::{Measured, columns};
 use plyflow_defects::align::Alignment;
 use plyflow_defects::{Cause, Defect, Kind};
 use plyflow_model::artifact::{
@@ -50,9 +50,6 @@ const BOTH: [(&str, &str); 11] = [
     ("x", "m"),
     ("y", "m"),
 ];
-
-/// Name of the scan's body.
-pub const SCAN: &str = "scan";
 
 /// Quantiles of the distance that are told.
 const QUANTILES: [(&str, f64); 4] = [("q50", 0.5), ("q90", 0.9), ("q99", 0.99), ("largest", 1.0)];

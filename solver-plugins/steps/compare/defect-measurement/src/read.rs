@@ -1,9 +1,10 @@
 //! What is measured: the plies of a run, and a scan.
 
-use crate::output::SCAN;
-use crate::{Align, Parameters, sections};
+use crate::measured::SCAN;
+use crate::parameters::{Align, Parameters};
+use crate::sections;
 use plyflow_defects::align::{Alignment, MOST_PASSES, Settings, align_where};
-use plyflow_defects::{Ply, Tool, of_run, scan};
+use plyflow_defects::{Ply, Shape, Tool, of_run, scan};
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_sdk::{Host, Input, Log, StepError};
@@ -73,14 +74,12 @@ impl Run {
 
     /// Reads a ply and takes its distances and curvatures.
     pub fn ply(&self, host: &Host, sheet: &Sheet, foot_margin: f64) -> Result<Ply, StepError> {
-        of_run::strained_ply(
+        let of = of_run::Frame {
             host,
-            &self.input,
-            self.frame,
-            sheet,
-            &self.tool,
-            foot_margin,
-        )
+            input: &self.input,
+            frame: self.frame,
+        };
+        of_run::strained_ply(of, sheet, &self.tool, foot_margin)
     }
 }
 
@@ -231,13 +230,16 @@ impl Scan {
             });
         }
         let topology = Topology::new(points.len(), 3, facets.as_flattened());
-        let flat = points.clone();
-        let name = SCAN.to_owned();
         let missing: Vec<f64> = match &beneath {
             Some(beneath) => points.iter().map(|p| beneath.missing(*p)).collect(),
             None => Vec::new(),
         };
-        let mut ply = Ply::new(name, topology, flat, points, &run.tool, offset, foot_margin);
+        let shape = Shape {
+            topology,
+            undeformed: points.clone(),
+            formed: points,
+        };
+        let mut ply = Ply::new(SCAN.to_owned(), shape, &run.tool, offset, foot_margin);
         ply.lower(&missing);
         Ok(Self {
             ply,

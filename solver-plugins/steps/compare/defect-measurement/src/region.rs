@@ -1,6 +1,6 @@
 //! Shear in a place of the flat plies, outside of their wrinkles.
 
-use crate::{Measured, check_names, columns};
+use crate::measured::{Measured, check_names, columns};
 use plyflow_defects::Kind;
 use plyflow_model::artifact::{Cell, Table};
 use plyflow_sdk::{Host, StepError};

@@ -53,7 +53,43 @@ pub struct Section<'a> {
     pub number: usize,
 }
 
+/// Label, name and points of a line in which something is cut; none where it is not.
+type Cut<'a> = (&'a str, &'a str, Option<Vec<SectionPoint>>);
+
 impl Section<'_> {
+    /// The path as seen from above, and what its corners are told by.
+    fn seen_from_above(&self, sheets: &[Sheet<'_>], along: &[f64]) -> (Vec<[f64; 2]>, Vec<f64>) {
+        let path = self.path;
+        let mut above = (path.to_vec(), along.to_vec());
+        if self.on == SectionOn::FlatPly {
+            let lowest = sheets.iter().find_map(|s| Some((s, s.flat?)));
+            let line = lowest.and_then(|(s, flat)| s.cut(flat, path, along));
+            let line = line.unwrap_or_default();
+            above = (
+                line.iter().map(|p| [p.place[0], p.place[1]]).collect(),
+                line.iter().map(|p| p.station).collect(),
+            );
+        }
+        above
+    }
+
+    /// Writes the lines that there are; the series that show them.
+    fn arrays(&self, host: &Host, lines: &[Cut<'_>]) -> Result<Vec<Series>, StepError> {
+        let number = self.number;
+        let mut series = Vec::new();
+        for (label, name, line) in lines {
+            let Some(line) = line else { continue };
+            let [x, y] =
+                ["station", "height"].map(|n| format!("sections/section_{number}/{name}/{n}"));
+            let stations: Vec<f64> = line.iter().map(|p| p.station).collect();
+            let heights: Vec<f64> = line.iter().map(|p| p.place[2]).collect();
+            host.write_f64(&x, &[line.len()], "m", &stations)?;
+            host.write_f64(&y, &[line.len()], "m", &heights)?;
+            series.push(Series::new(*label, x, y));
+        }
+        Ok(series)
+    }
+
     /// Writes the lines in which it cuts the tool and the sheets: as they are seen from above, or the plies along a line of their
     /// material, and tool and scan below or above where that went on the first ply, the lowest. Of each the longest line counts. Gives what the
     /// attributes tell of it, and its plot.
@@ -65,20 +101,10 @@ impl Section<'_> {
     ) -> Result<(artifact::Section, Plot), StepError> {
         let (label, path, number) = (self.label, self.path, self.number);
         let along = stations(path);
-        // The path as seen from above, and what its corners are told by.
-        let mut above = (path.to_vec(), along.clone());
-        if self.on == SectionOn::FlatPly {
-            let lowest = sheets.iter().find_map(|s| Some((s, s.flat?)));
-            let line = lowest.and_then(|(s, flat)| s.cut(flat, path, &along));
-            let line = line.unwrap_or_default();
-            above = (
-                line.iter().map(|p| [p.place[0], p.place[1]]).collect(),
-                line.iter().map(|p| p.station).collect(),
-            );
-        }
+        let above = self.seen_from_above(sheets, &along);
         let (points, facets) = (tool.points(), tool.triangles());
         let of_tool = path_section(points, points, facets, &above.0, &above.1);
-        let mut lines = vec![("tool", "tool", of_tool.into_iter().next())];
+        let mut lines: Vec<Cut<'_>> = vec![("tool", "tool", of_tool.into_iter().next())];
         for sheet in sheets {
             let line = match sheet.flat.filter(|_| self.on == SectionOn::FlatPly) {
                 Some(flat) => sheet.cut(flat, path, &along),
@@ -92,17 +118,7 @@ impl Section<'_> {
             )
             .into());
         }
-        let mut series = Vec::new();
-        for (label, name, line) in &lines {
-            let Some(line) = line else { continue };
-            let [x, y] =
-                ["station", "height"].map(|n| format!("sections/section_{number}/{name}/{n}"));
-            let stations: Vec<f64> = line.iter().map(|p| p.station).collect();
-            let heights: Vec<f64> = line.iter().map(|p| p.place[2]).collect();
-            host.write_f64(&x, &[line.len()], "m", &stations)?;
-            host.write_f64(&y, &[line.len()], "m", &heights)?;
-            series.push(Series::new(*label, x, y));
-        }
+        let series = self.arrays(host, &lines)?;
         let axis = match self.on {
             SectionOn::FromAbove => "along the section",
             SectionOn::FlatPly => "along the section in the flat ply",

@@ -1,7 +1,7 @@
 //! Slip in the artifact: fields, sections, results.
 
+use crate::measured::{Measured, check_names, columns};
 use crate::slip::{Course, Faces, Line, Slip, course, mirrored, size};
-use crate::{Measured, check_names, columns};
 use plyflow_defects::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_model::artifact::{
@@ -173,20 +173,7 @@ impl Slipping {
                 }
             }
         }
-        for (k, section) in asked.slip_sections.iter().enumerate() {
-            let line = asked.line(section, &faces)?;
-            let before = slipping.cuts.len();
-            for [lower, upper] in &pairs {
-                slipping.cut(host, (k, &line), [*lower, *upper], &faces)?;
-            }
-            if slipping.cuts.len() == before {
-                return Err(format!(
-                    "slip_sections: '{}' through {:?} m meets no two plies that lie on each other; its place is one on the flat plies",
-                    section.name, section.at
-                )
-                .into());
-            }
-        }
+        slipping.along(host, asked, &pairs, &faces)?;
         let names = slipping.names.clone();
         slipping.fields = names
             .into_iter()
@@ -244,6 +231,31 @@ impl Slipping {
         Ok(())
     }
 
+    /// Results and arrays of all sections.
+    fn along(
+        &mut self,
+        host: &Host,
+        asked: &Asked,
+        pairs: &[[usize; 2]],
+        faces: &Faces<'_>,
+    ) -> Result<(), StepError> {
+        for (k, section) in asked.slip_sections.iter().enumerate() {
+            let line = asked.line(section, faces)?;
+            let before = self.cuts.len();
+            for [lower, upper] in pairs {
+                self.cut(host, (k, &line), [*lower, *upper], faces)?;
+            }
+            if self.cuts.len() == before {
+                return Err(format!(
+                    "slip_sections: '{}' through {:?} m meets no two plies that lie on each other; its place is one on the flat plies",
+                    section.name, section.at
+                )
+                .into());
+            }
+        }
+        Ok(())
+    }
+
     /// Results and arrays of two plies along a section, where the one lies on the other there.
     fn cut(
         &mut self,
@@ -271,23 +283,7 @@ impl Slipping {
             host.log(Log::Warn, &text);
         }
         for (part, course) in PARTS.iter().zip([&along, &across]) {
-            let told = |what: &str, value: f64, unit: &str| {
-                host.result(
-                    &format!("section_slip_{what}.{name}.{part}.{lower}.{upper}"),
-                    value,
-                    unit,
-                )
-            };
-            told("max", course.max, "m")?;
-            told("mean", course.mean, "m")?;
-            let Some(parity) = course.parity else {
-                continue;
-            };
-            told("symmetric", parity.symmetric, "m")?;
-            told("antisymmetric", parity.antisymmetric, "m")?;
-            if let Some(share) = parity.asymmetry() {
-                told("asymmetry", share, "1")?;
-            }
+            tell(host, &format!("{name}.{part}.{lower}.{upper}"), course)?;
         }
         let cut = Cut {
             section: number,
@@ -457,4 +453,22 @@ fn told(course: Course) -> SlipCourse {
         antisymmetric: parity.map(|p| p.antisymmetric),
         asymmetry: parity.and_then(|p| p.asymmetry()),
     }
+}
+
+/// Results of one part of slip along a section. `of`: section, part and plies, as their names end.
+fn tell(host: &Host, of: &str, course: &Course) -> Result<(), StepError> {
+    let told = |what: &str, value: f64, unit: &str| {
+        host.result(&format!("section_slip_{what}.{of}"), value, unit)
+    };
+    told("max", course.max, "m")?;
+    told("mean", course.mean, "m")?;
+    let Some(parity) = course.parity else {
+        return Ok(());
+    };
+    told("symmetric", parity.symmetric, "m")?;
+    told("antisymmetric", parity.antisymmetric, "m")?;
+    if let Some(share) = parity.asymmetry() {
+        told("asymmetry", share, "1")?;
+    }
+    Ok(())
 }

@@ -1,6 +1,6 @@
 //! How the crests of a ply lie: oblique to the tool, how far apart, and as their own mirror image.
 
-use crate::Measured;
+use crate::measured::Measured;
 use plyflow_defects::{Defect, Kind};
 use plyflow_fixed::FixedBits;
 use std::f64::consts::{FRAC_PI_2, PI};

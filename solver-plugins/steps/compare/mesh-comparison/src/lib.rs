@@ -4,9 +4,11 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod advice;
+mod column;
 mod zones;
 
 pub use advice::{Advice, advise};
+use column::measured;
 use plyflow_fixed::FixedBits;
 use plyflow_model::artifact::{
     Axis, Cell, Column, Forming, MeshStudy, Paths, Plot, Series, Style, Table,
@@ -211,14 +213,6 @@ fn columns() -> Vec<Column> {
     columns.extend(TOLD.map(|t| Column::new(t.1, "rad")));
     columns.extend(["quartiles' error", "extremes' error"].map(|label| Column::new(label, "")));
     columns
-}
-
-/// A column of seconds that are told from the results.
-fn measured(label: &str, result: &str) -> Column {
-    Column {
-        measured: Some(result.to_owned()),
-        ..Column::new(label, "s")
-    }
 }
 
 /// Box plots of the shear angles over the element size.

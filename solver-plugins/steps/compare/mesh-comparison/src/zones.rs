@@ -1,7 +1,7 @@
 //! Local runs of zones with meshes of different fineness: how far their distances from the tool are from those of the finest.
 
 use crate::advice::{Advice, advise};
-use crate::measured;
+use crate::column::measured;
 use plyflow_defects::{FieldErrors, Ply, of_run};
 use plyflow_model::artifact::{Cell, Column, Forming, MeshStudy, Table, Zone, ZoneAdvice};
 use plyflow_sdk::{Host, Input, Log, StepError};
@@ -92,20 +92,8 @@ pub fn compare(
     })
 }
 
-/// The runs of one zone, the finest first; gives the advice for it.
-fn one(
-    host: &Host,
-    zone: &str,
-    runs: &[Run],
-    target: f64,
-    rows: &mut Vec<Vec<Cell>>,
-) -> Result<Advice, StepError> {
-    let [finest, next, ..] = runs else {
-        return Err(format!(
-            "zone {zone} has one run; a comparison needs two or more of different sizes"
-        )
-        .into());
-    };
+/// Whether the runs are of one box and the finest finer than the next.
+fn comparable(zone: &str, runs: &[Run], finest: &Run, next: &Run) -> Result<(), StepError> {
     if let Some(other) = runs.iter().find(|r| !finest.zone.is(&r.zone)) {
         let (a, b) = (&finest.input.step, &other.input.step);
         return Err(format!(
@@ -122,6 +110,24 @@ fn one(
         )
         .into());
     }
+    Ok(())
+}
+
+/// The runs of one zone, the finest first; gives the advice for it.
+fn one(
+    host: &Host,
+    zone: &str,
+    runs: &[Run],
+    target: f64,
+    rows: &mut Vec<Vec<Cell>>,
+) -> Result<Advice, StepError> {
+    let [finest, next, ..] = runs else {
+        return Err(format!(
+            "zone {zone} has one run; a comparison needs two or more of different sizes"
+        )
+        .into());
+    };
+    comparable(zone, runs, finest, next)?;
     let mut measured = Vec::new();
     for run in runs {
         let found = FieldErrors::of(&[&run.plies], &[&finest.plies], |_, _| true);
@@ -175,10 +181,15 @@ fn read(host: &Host, input: Input, foot_margin: f64) -> Result<Option<Run>, Step
     };
     let frame = of_run::last_frame(&input, &host.meshes(&input)?)?;
     let tool = of_run::tool(host, &input)?;
+    let of = of_run::Frame {
+        host,
+        input: &input,
+        frame,
+    };
     let mut plies = Vec::new();
     for sheet in formed.plies() {
         let place = (sheet.name.as_str(), sheet.offset);
-        plies.push(of_run::ply(host, &input, frame, place, &tool, foot_margin)?);
+        plies.push(of_run::ply(of, place, &tool, foot_margin)?);
     }
     Ok(Some(Run {
         zone,

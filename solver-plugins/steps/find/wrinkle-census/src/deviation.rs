@@ -1,6 +1,6 @@
 //! How far a ply stands off what it rests on.
 
-use crate::Ply;
+use crate::ply::Ply;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::{Surface, of_run, triangles};

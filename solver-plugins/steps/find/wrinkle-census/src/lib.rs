@@ -11,6 +11,7 @@ mod deviation;
 mod moments;
 mod parameters;
 mod plot;
+mod ply;
 mod spread;
 mod surface;
 mod trace;
@@ -23,14 +24,13 @@ pub use waves::{Criteria, Side, median, waves};
 
 use parameters::Parameters;
 use plot::{Curve, Plots};
+use ply::Ply;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{
-    Census, CensusBody, CensusCircle, CrossSection, Forming, Map, Panel, SectionWrinkle, Sheet,
-    Wrinkle,
+    Census, CensusBody, CensusCircle, CrossSection, Map, Panel, SectionWrinkle, Wrinkle,
 };
-use plyflow_sdk::{Host, Input, On, Step, StepError, export_step};
+use plyflow_sdk::{Host, On, Step, StepError, export_step};
 use plyflow_surface::Topology;
-use plyflow_surface::draped::DrapedPart;
 use plyflow_surface::{weighted_mean, weighted_quantiles};
 use spread::Spread;
 use std::f64::consts::TAU;
@@ -40,23 +40,6 @@ pub struct WrinkleCensus;
 
 export_step!(WrinkleCensus);
 
-/// A ply in its last frame.
-struct Ply {
-    name: String,
-    /// Undeformed and formed points (m).
-    flat: Vec<Vec3>,
-    points: Vec<Vec3>,
-    cells: Vec<u32>,
-    shear: Vec<f64>,
-    /// Distance of its mid-surface from the tool when the stack lies on it, and thickness of the stack (m).
-    offset: f64,
-    stack: f64,
-    /// What of it is bent how much; `None` when the artifact does not say.
-    moments: Option<(On, Vec<f64>)>,
-    /// What of the run's ply this is; `None`: all.
-    part: Option<DrapedPart>,
-}
-
 impl Step for WrinkleCensus {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
@@ -64,8 +47,8 @@ impl Step for WrinkleCensus {
         let p: Parameters = host.parameters()?;
         p.check()?;
         let input = host.input("formed")?;
-        let frame = last_frame(host, &input)?;
-        let ply = read(host, &input, frame, p.ply.as_deref())?;
+        let frame = ply::last_frame(host, &input)?;
+        let ply = ply::read(host, &input, frame, p.ply.as_deref())?;
         let rests = deviation::rests(host, &input, frame, &ply, p.surfaces.as_deref())?;
         let cut = Cut::new(&ply.points, &ply.cells, &ply.shear);
         let [x, y] = [p.centre[0], p.centre[1]];
@@ -106,53 +89,6 @@ impl Step for WrinkleCensus {
         })?;
         results(host, &counted[0], inner)
     }
-}
-
-fn last_frame(host: &Host, input: &Input) -> Result<usize, StepError> {
-    let frames = host.meshes(input)?.times.len();
-    let last = frames.checked_sub(1);
-    last.ok_or_else(|| format!("'{}' has no frame to measure", input.step).into())
-}
-
-fn read(host: &Host, input: &Input, frame: usize, wanted: Option<&str>) -> Result<Ply, StepError> {
-    let formed: Forming = host.attributes(input)?;
-    let plies: Vec<&Sheet> = formed.plies().collect();
-    let sheet = match wanted {
-        Some(name) => plies.iter().find(|s| s.name == name).ok_or_else(|| {
-            let there: Vec<&str> = plies.iter().map(|s| s.name.as_str()).collect();
-            format!("ply: given '{name}'; expected one of {}", there.join(", "))
-        })?,
-        None => plies
-            .first()
-            .ok_or_else(|| format!("'{}' has no ply", input.step))?,
-    };
-    let meshes = host.meshes(input)?;
-    let body = meshes.body(&sheet.name)?;
-    if body.nodes_per_cell != 4 {
-        let n = body.nodes_per_cell;
-        return Err(format!(
-            "ply '{}' has cells of {n} nodes; quads are expected",
-            sheet.name
-        )
-        .into());
-    }
-    let part = plyflow_surface::draped::Formed::read(host, input, body, frame)?;
-    let shear = host.frame_field(input, body, frame, "shear_angle")?;
-    let moments = moments::read(host, input, body, frame)?;
-    Ok(Ply {
-        name: sheet.name.clone(),
-        shear: part.of_cells(shear),
-        moments: moments.map(|(on, values)| match on {
-            On::Points => (on, part.at_nodes(values)),
-            On::Cells => (on, part.of_cells(values)),
-        }),
-        offset: sheet.offset,
-        stack: formed.sheets.iter().map(|s| s.thickness).sum(),
-        points: part.points,
-        flat: part.flat,
-        cells: part.cells,
-        part: part.part,
-    })
 }
 
 /// A number as a label has it, to a thousandth and without digits that say nothing: labels are what tells curves apart, here and in other censuses.
@@ -366,34 +302,7 @@ fn fields(
     deviation: Option<Vec<f64>>,
     plots: &mut Plots,
 ) -> Result<Vec<Map>, StepError> {
-    let topology = Topology::new(ply.flat.len(), 4, &ply.cells);
-    let mut spreads = Vec::new();
-    if let Some(values) = deviation {
-        let weights = topology.node_areas(&ply.flat);
-        if let Some(radius) = p.dome_radius {
-            dome(host, p, ply, radius, &values, &weights)?;
-        }
-        spreads.push(Spread {
-            name: "deviation",
-            title: "Deviation from punch and die",
-            unit: "m",
-            shown: "mm",
-            on: On::Points,
-            values,
-            weights,
-        });
-    }
-    if let Some((on, values)) = ply.moments.clone() {
-        spreads.push(Spread {
-            name: "bending_moment",
-            title: "RMS bending moment along the fibres",
-            unit: "N",
-            shown: "N",
-            weights: moments::weights(on, &topology, &ply.flat),
-            on,
-            values,
-        });
-    }
+    let spreads = spreads(host, p, ply, deviation)?;
     for spread in &spreads {
         spread.write(host, plots)?;
     }
@@ -427,14 +336,51 @@ fn fields(
     Ok(maps)
 }
 
-/// Deviation of what lies within a radius of the axis.
+/// The distributions of deviation and moments, where they are known.
+fn spreads(
+    host: &Host,
+    p: &Parameters,
+    ply: &Ply,
+    deviation: Option<Vec<f64>>,
+) -> Result<Vec<Spread>, StepError> {
+    let topology = Topology::new(ply.flat.len(), 4, &ply.cells);
+    let mut spreads = Vec::new();
+    if let Some(values) = deviation {
+        let weights = topology.node_areas(&ply.flat);
+        if let Some(radius) = p.dome_radius {
+            dome(host, p, ply, radius, (&values, &weights))?;
+        }
+        spreads.push(Spread {
+            name: "deviation",
+            title: "Deviation from punch and die",
+            unit: "m",
+            shown: "mm",
+            on: On::Points,
+            values,
+            weights,
+        });
+    }
+    if let Some((on, values)) = ply.moments.clone() {
+        spreads.push(Spread {
+            name: "bending_moment",
+            title: "RMS bending moment along the fibres",
+            unit: "N",
+            shown: "N",
+            weights: moments::weights(on, &topology, &ply.flat),
+            on,
+            values,
+        });
+    }
+    Ok(spreads)
+}
+
+/// Deviation of what lies within a radius (m) of the axis. `values`: `[nodes]` (m), `weights`: areas that they stand for (m2).
 fn dome(
     host: &Host,
     p: &Parameters,
     ply: &Ply,
     radius: f64,
-    values: &[f64],
-    weights: &[f64],
+    (values, weights): (&[f64], &[f64]),
 ) -> Result<(), StepError> {
     let within = |q: &Vec3| (q[0] - p.centre[0]).fixed_hypot(q[1] - p.centre[1]) <= radius;
     let weights: Vec<f64> = (ply.points.iter().zip(weights))

@@ -1,6 +1,5 @@
 //! Curves of the artifact and the plots that show them.
 
-use crate::spread::Spread;
 use plyflow_model::artifact::{Axis, CensusCurve, Plot, Series};
 use plyflow_sdk::{Host, StepError};
 
@@ -61,36 +60,5 @@ impl Plots {
             y: Axis::new("height", "mm"),
             series,
         });
-    }
-
-    /// Writes a probability density and its plot.
-    ///
-    /// # Errors
-    /// When the host refuses.
-    pub fn density(
-        &mut self,
-        host: &Host,
-        of: &Spread,
-        centres: &[f64],
-        density: &[f64],
-        inverse: &str,
-    ) -> Result<(), StepError> {
-        let curve = Curve {
-            name: of.name.to_owned(),
-            label: "by area".to_owned(),
-            x: ("value", of.unit, centres),
-            y: ("density", inverse, density),
-        };
-        let plot = format!("{}_density", of.name);
-        let series = self.curve(host, &plot, &curve)?;
-        self.plots.push(Plot {
-            name: plot,
-            title: Some(format!("{}, by area", of.title)),
-            note: None,
-            x: Axis::new(of.title.to_lowercase(), of.shown),
-            y: Axis::new("probability density", format!("1/{}", of.shown)),
-            series: vec![series],
-        });
-        Ok(())
     }
 }

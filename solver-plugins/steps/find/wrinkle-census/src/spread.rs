@@ -1,6 +1,7 @@
 //! The distribution of a quantity over a ply: quantiles among the results and a density as a plot.
 
-use crate::plot::Plots;
+use crate::plot::{Curve, Plots};
+use plyflow_model::artifact::{Axis, Plot};
 use plyflow_sdk::{Host, On, StepError};
 use plyflow_surface::{bin_width, density, weighted_mean, weighted_quantiles};
 
@@ -46,6 +47,22 @@ impl Spread {
         let density = density(&self.values, &self.weights, width, count);
         let centres: Vec<f64> = (0..count).map(|i| (i as f64 + 0.5) * width).collect();
         let inverse = if self.unit == "m" { "1/m" } else { "1/N" };
-        plots.density(host, self, &centres, &density, inverse)
+        let curve = Curve {
+            name: name.to_owned(),
+            label: "by area".to_owned(),
+            x: ("value", self.unit, &centres),
+            y: ("density", inverse, &density),
+        };
+        let plot = format!("{name}_density");
+        let series = plots.curve(host, &plot, &curve)?;
+        plots.plots.push(Plot {
+            name: plot,
+            title: Some(format!("{}, by area", self.title)),
+            note: None,
+            x: Axis::new(self.title.to_lowercase(), self.shown),
+            y: Axis::new("probability density", format!("1/{}", self.shown)),
+            series: vec![series],
+        });
+        Ok(())
     }
 }

@@ -78,8 +78,7 @@ impl FormingError {
         }
     }
 
-    /// What the host is told: its own word where it stopped the step, the text otherwise. (A `?` in a function that gives a
-    /// [`StepError`] would make a text of a cancelled step.)
+    /// What the host is told: its own word where it stopped the step, the text otherwise.
     pub fn at_the_door(self) -> StepError {
         match self {
             Self::Host(stopped) => stopped,

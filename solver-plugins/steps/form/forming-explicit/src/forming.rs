@@ -3,7 +3,7 @@
 use crate::boundary::Beginning;
 use crate::load::Load;
 use crate::stack::{Body, RigidBody, RigidName, StackSheet};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::MechanicsError;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::backend::{Backend, Load as _, Stretch};
@@ -25,7 +25,7 @@ pub struct Forming {
     /// Bodies of the artifact, bottom to top.
     pub bodies: Vec<Body>,
     /// `[n]` points at the start (m).
-    pub reference: Arc<[V]>,
+    pub reference: Arc<[Vec3]>,
     /// The tool.
     pub tool: ToolMesh,
     /// What else is rigid, to be looked at.
@@ -51,18 +51,18 @@ impl Forming {
     }
 
     /// Positions (m) of a body's points now.
-    pub fn points(&self, body: &Body) -> Vec<V> {
+    pub fn points(&self, body: &Body) -> Vec<Vec3> {
         self.whole_points(body, self.model.x())
     }
 
     /// Reference points (m) of a body.
-    pub fn reference_points(&self, body: &Body) -> Vec<V> {
+    pub fn reference_points(&self, body: &Body) -> Vec<Vec3> {
         self.whole_points(body, &self.reference)
     }
 
-    fn whole_points(&self, body: &Body, x: &[V]) -> Vec<V> {
+    fn whole_points(&self, body: &Body, x: &[Vec3]) -> Vec<Vec3> {
         let nodes = body.sheet.nodes(&self.model);
-        let part: Vec<V> = nodes.iter().map(|n| x[*n as usize]).collect();
+        let part: Vec<Vec3> = nodes.iter().map(|n| x[*n as usize]).collect();
         match &body.mirrored {
             Some(m) => m.whole.points(&part),
             None => part,
@@ -106,7 +106,7 @@ impl Forming {
     }
 
     /// Where the part of that name has moved (m).
-    pub fn shift(&self, part: RigidName) -> V {
+    pub fn shift(&self, part: RigidName) -> Vec3 {
         let of = |c: &&RigidContact| part.is_of(&c.name);
         let found = self.model.rigid_contacts().iter().find(of);
         found.map_or([0.0; 3], |c| c.motion.shift)

@@ -4,7 +4,7 @@ mod common;
 
 use common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::{Forming, Observer, Outcome, Parameters, build_global};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_kernels::rf4::Rf4;
 use plyflow_mechanics::component::element_fields;
 use plyflow_mechanics::energy::Ledger;
@@ -128,7 +128,7 @@ fn membranes_tell_their_shear_and_no_curvature() {
     let field = |name: &str| &seen.0.iter().find(|f| f.0 == name).unwrap().1;
     let body = &forming.bodies[0];
     let points = forming.reference_points(body);
-    let largest = |values: &[f64], places: &[V], left: bool| {
+    let largest = |values: &[f64], places: &[Vec3], left: bool| {
         let own = values
             .iter()
             .zip(places)
@@ -142,7 +142,7 @@ fn membranes_tell_their_shear_and_no_curvature() {
     let middle = |c: &[u32; 4]| {
         [0, 1, 2].map(|k| 0.25 * c.iter().map(|n| points[*n as usize][k]).sum::<f64>())
     };
-    let centres: Vec<V> = body.cells.iter().map(middle).collect();
+    let centres: Vec<Vec3> = body.cells.iter().map(middle).collect();
     let [left, right] = [true, false].map(|l| largest(field("shear_angle"), &centres, l));
     assert!(left.min(right) > 0.01, "{left} and {right} rad");
 }

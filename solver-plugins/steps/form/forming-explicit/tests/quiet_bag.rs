@@ -17,7 +17,7 @@ mod common;
 use common::scenes::{self, ply};
 use common::{BuiltIn, fabric};
 use plyflow_forming_explicit::{Forming, Parameters, build_global, inverse_bilinear};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::shape;
 use plyflow_mechanics::history::smooth_step;
 use plyflow_mechanics::mesh::QuadMesh;
@@ -68,12 +68,12 @@ fn parameters(bag: &Bag) -> Parameters {
 
 /// The frame: it stretches the films, waits for the air to be drawn, and goes down.
 struct Frame {
-    start: Vec<V>,
+    start: Vec<Vec3>,
     way: f64,
 }
 
 impl Drive for Frame {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let stretch = 1.0 + 0.01 * smooth_step(t, 0.0, PHASES[0]);
         let down = self.way * smooth_step(t, PHASES[0] + PHASES[1], PHASES[2]);
         let [x, y, z] = self.start[k];

@@ -12,7 +12,7 @@ use plyflow_forming_explicit::{
     Feedback, Forming, HistoryRow, LocalInput, LocalSheet, Observer, Outcome, Parameters, Start,
     build_global, build_local, feed_back, inverse_bilinear,
 };
-use plyflow_geometry::vec3::{V, add, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, norm, scale, sub};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_mechanics::mesh::area_vector;
@@ -108,7 +108,7 @@ fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
     let (film, ply) = (8e-5, 4e-4);
     // Its nodes hang between those of the ply: it lies on these.
     let body = forming.bodies.iter().find(|b| b.name == "ply_1").unwrap();
-    let on_top = |p: &&V| (p[0] - 17e-3).abs() < 17e-3 && p[1].abs() < 17e-3;
+    let on_top = |p: &&Vec3| (p[0] - 17e-3).abs() < 17e-3 && p[1].abs() < 17e-3;
     let of_ply = forming.points(body);
     let mut gaps = Vec::new();
     for p in of_ply.iter().filter(on_top) {
@@ -138,7 +138,7 @@ struct Film {
     short: bool,
     time: Vec<f64>,
     /// `[frames][bodies][nodes]` (m).
-    points: Vec<Vec<Vec<V>>>,
+    points: Vec<Vec<Vec<Vec3>>>,
     /// How often a late start said that it is on its way, and how often it may.
     settled: usize,
     settles: Option<usize>,
@@ -171,8 +171,8 @@ fn fed(
     forming: &Forming,
     film: &Film,
     body: usize,
-    wanted: impl Fn(V) -> bool,
-    extra: V,
+    wanted: impl Fn(Vec3) -> bool,
+    extra: Vec3,
 ) -> LocalSheet {
     let b = &forming.bodies[body];
     let points = forming.reference_points(b);
@@ -180,7 +180,7 @@ fn fed(
         .filter(|n| wanted(points[*n as usize]))
         .collect();
     let end = film.time[film.time.len() - 1];
-    let position: Vec<Vec<V>> = (film.points.iter().zip(&film.time))
+    let position: Vec<Vec<Vec3>> = (film.points.iter().zip(&film.time))
         .map(|(frame, t)| {
             let at = |n: &u32| add(frame[body][*n as usize], scale(extra, (t / end).powi(2)));
             driven.iter().map(at).collect()
@@ -211,8 +211,8 @@ fn a_run_that_is_fed_its_own_motion_repeats_itself_and_one_that_is_fed_more_foll
     let mut film = Film::default();
     let mut first = build_global(&p, &BuiltIn).unwrap();
     first.run(&p.control(), &mut film).unwrap();
-    let deep = |[x, y, _]: V| x.abs() < 0.03 && y.abs() < 0.02;
-    let again = |extra: V| {
+    let deep = |[x, y, _]: Vec3| x.abs() < 0.03 && y.abs() < 0.02;
+    let again = |extra: Vec3| {
         let mut forming = build_global(&p, &BuiltIn).unwrap();
         let sheets = vec![fed(&first, &film, 1, deep, extra)];
         let time = film.time.clone();
@@ -295,16 +295,16 @@ fn cut_out(
     driven.sort_unstable();
     driven.dedup();
     let at = |frame: usize, k: &u32| film.points[frame][body][nodes[*k as usize] as usize];
-    let position: Vec<Vec<V>> = (0..film.time.len())
+    let position: Vec<Vec<Vec3>> = (0..film.time.len())
         .map(|f| driven.iter().map(|k| at(f, k)).collect())
         .collect();
     let flat: Vec<f64> = position.iter().flatten().flatten().copied().collect();
     let slopes = spline_slopes(&film.time, &flat, 3 * driven.len());
     let every: Vec<u32> = (0..nodes.len() as u32).collect();
-    let state = |f: usize| every.iter().map(|k| at(f, k)).collect::<Vec<V>>();
+    let state = |f: usize| every.iter().map(|k| at(f, k)).collect::<Vec<Vec3>>();
     let start = (first > 0).then(|| {
         let span = film.time[first + 1] - film.time[first - 1];
-        let rate = |(a, b): (&V, &V)| scale(sub(*b, *a), 1.0 / span);
+        let rate = |(a, b): (&Vec3, &Vec3)| scale(sub(*b, *a), 1.0 / span);
         Start {
             path: (1..=first).map(state).collect(),
             velocity: state(first - 1)
@@ -352,7 +352,7 @@ struct Zone {
     /// By body: its sheet and its nodes' numbers in the whole's.
     parts: Vec<(LocalSheet, Vec<u32>)>,
     /// `[bodies][nodes]` (m) at its first frame.
-    first: Vec<Vec<V>>,
+    first: Vec<Vec<Vec3>>,
 }
 
 impl Whole {
@@ -371,9 +371,9 @@ impl Whole {
     }
 
     /// `[frames][driven]` normals of a ply at the `driven` nodes of a part of it with these `nodes`, and their rates (1/s).
-    fn normals(&self, body: usize, driven: &[u32], nodes: &[u32]) -> [Vec<Vec<V>>; 2] {
+    fn normals(&self, body: usize, driven: &[u32], nodes: &[u32]) -> [Vec<Vec<Vec3>>; 2] {
         let cells = &self.forming.bodies[body].cells;
-        let at = |points: &Vec<Vec<V>>| -> Vec<V> {
+        let at = |points: &Vec<Vec<Vec3>>| -> Vec<Vec3> {
             let points = &points[body];
             let mut normals = vec![[0.0; 3]; points.len()];
             for cell in cells {
@@ -385,7 +385,7 @@ impl Whole {
             let of_part = driven.iter().map(|k| normals[nodes[*k as usize] as usize]);
             of_part.map(|n| scale(n, 1.0 / norm(n))).collect()
         };
-        let normals: Vec<Vec<V>> = self.film.points.iter().map(at).collect();
+        let normals: Vec<Vec<Vec3>> = self.film.points.iter().map(at).collect();
         let flat: Vec<f64> = normals.iter().flatten().flatten().copied().collect();
         let rates = spline_slopes(&self.film.time, &flat, 3 * driven.len());
         let rows = rates.chunks_exact(3 * driven.len());
@@ -473,7 +473,7 @@ impl Whole {
         let of = |f: &Forming| f.points(&f.bodies[body]);
         let [a, b, c] = [&zone.forming, &other.forming, &self.forming].map(of);
         let nodes = &zone.parts[body].1;
-        let mean = |place: &dyn Fn(usize) -> V| {
+        let mean = |place: &dyn Fn(usize) -> Vec3| {
             let ways = a.iter().enumerate().map(|(k, x)| norm(sub(*x, place(k))));
             ways.sum::<f64>() / a.len() as f64
         };

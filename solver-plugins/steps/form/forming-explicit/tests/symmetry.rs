@@ -5,7 +5,7 @@ mod common;
 use common::scenes::{diaphragm, gentle_press as press, ply};
 use common::{BuiltIn, apart, fabric, form, twins, woven};
 use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome, Parameters, build_global};
-use plyflow_geometry::vec3::{V, add, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, norm, scale, sub};
 use plyflow_kernels::{m4::M4, rf4::Rf4, s4::S4};
 use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_mechanics::energy::Ledger;
@@ -42,7 +42,7 @@ fn diaphragms(element: &str, symmetry: &[&str]) -> Parameters {
 
 /// Positions of all bodies' points at every frame.
 #[derive(Default)]
-struct Frames(Vec<Vec<Vec<V>>>);
+struct Frames(Vec<Vec<Vec<Vec3>>>);
 
 impl Observer for Frames {
     fn frame(&mut self, forming: &Forming, _: f64) -> Result<(), StepError> {
@@ -55,7 +55,7 @@ impl Observer for Frames {
     }
 }
 
-fn frames(p: &Parameters) -> (Forming, Outcome, Vec<Vec<Vec<V>>>) {
+fn frames(p: &Parameters) -> (Forming, Outcome, Vec<Vec<Vec<Vec3>>>) {
     let mut forming = build_global(p, &BuiltIn).unwrap();
     let mut seen = Frames::default();
     let outcome = forming.run(&p.control(), &mut seen);
@@ -77,7 +77,7 @@ fn fields_of(element: &str) -> Vec<ElementField> {
 fn fields_agree(element: &str, whole: &Forming, part: &Forming) {
     let (a, b) = (&whole.bodies[0], &part.bodies[0]);
     let (r, q) = (whole.reference_points(a), part.reference_points(b));
-    let centres = |points: &[V], cells: &[[u32; 4]]| -> Vec<V> {
+    let centres = |points: &[Vec3], cells: &[[u32; 4]]| -> Vec<Vec3> {
         let at = |c: &[u32; 4]| {
             let sum = c.iter().fold([0.0; 3], |s, n| add(s, points[*n as usize]));
             scale(sum, 0.25)
@@ -204,7 +204,7 @@ fn a_half_between_diaphragms_is_the_whole_as_far_as_that_is_symmetric() {
                 .map(|(t, p)| norm(sub(now[*t], *p)))
                 .fold(far, f64::max);
             for axis in [0, 1] {
-                let image = |p: &V| {
+                let image = |p: &Vec3| {
                     let mut p = *p;
                     p[axis] = -p[axis];
                     p

@@ -10,7 +10,7 @@ mod common;
 use common::scenes::{bag, gentle_press, ply};
 use common::{apart, form, woven};
 use plyflow_forming_explicit::{Forming, Outcome, Parameters};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_kernels::m4::M4;
 use plyflow_mechanics::component::element_fields;
 use plyflow_sdk::Element as _;
@@ -67,8 +67,8 @@ fn assert_sound(what: &str, forming: &Forming, outcome: &Outcome) {
 
 /// An element of a ply: its corners at the start and now (m), and by how much (rad) its fibres have opened beyond a right angle.
 struct Element {
-    then: [V; 4],
-    now: [V; 4],
+    then: [Vec3; 4],
+    now: [Vec3; 4],
     opened: f64,
 }
 
@@ -81,7 +81,7 @@ fn elements(forming: &Forming, body: usize) -> Vec<Element> {
         .find(|f| f.name == "shear_angle")
         .expect("a field");
     let shear = forming.field(body, shear, &all);
-    let at = |points: &[V], c: &[u32; 4]| c.map(|n| points[n as usize]);
+    let at = |points: &[Vec3], c: &[u32; 4]| c.map(|n| points[n as usize]);
     let cells = body.cells.iter().zip(shear);
     cells
         .map(|(c, s)| Element {
@@ -92,7 +92,7 @@ fn elements(forming: &Forming, body: usize) -> Vec<Element> {
         .collect()
 }
 
-fn middle(corners: &[V; 4]) -> V {
+fn middle(corners: &[Vec3; 4]) -> Vec3 {
     [0, 1, 2].map(|k| corners.iter().map(|c| c[k]).sum::<f64>() / 4.0)
 }
 
@@ -145,7 +145,7 @@ mod double_dome {
 
     /// Distance (m) of a point from the tool, the angle of its normal about the x axis, and the normal's component along x: the
     /// tool is turned about that axis. Parallel surfaces have the same normals.
-    fn normal_at(p: V) -> (f64, [f64; 2]) {
+    fn normal_at(p: Vec3) -> (f64, [f64; 2]) {
         let r = p[1].hypot(p[2]);
         let turn = p[1].atan2(p[2]);
         let both = RADIUS + WAIST;
@@ -164,7 +164,7 @@ mod double_dome {
 
     /// Total curvature of an element on the tool: the area of its normals on the sphere, which projects to the cylinder around
     /// its axis x without loss.
-    fn curvature(now: &[V; 4]) -> f64 {
+    fn curvature(now: &[Vec3; 4]) -> f64 {
         let q = now.map(|p| normal_at(p).1);
         0.5 * ((q[2][0] - q[0][0]) * (q[3][1] - q[1][1])
             - (q[2][1] - q[0][1]) * (q[3][0] - q[1][0]))
@@ -274,7 +274,7 @@ mod stl {
 
     /// Corners of the facets in a file's units.
     fn facets(mesh: &ToolMesh) -> Vec<[[f32; 3]; 3]> {
-        let in_file = |p: V| [0, 1, 2].map(|k| (1e3 * p[k] - ORIGIN[k]) as f32);
+        let in_file = |p: Vec3| [0, 1, 2].map(|k| (1e3 * p[k] - ORIGIN[k]) as f32);
         (0..mesh.triangles.len())
             .map(|t| mesh.corners(t).map(in_file))
             .collect()

@@ -5,7 +5,7 @@ use crate::course::Observer;
 use crate::error::Result;
 use crate::forming::Forming;
 use crate::request::Control;
-use plyflow_geometry::vec3::{V, add, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, norm, scale, sub};
 use plyflow_mechanics::model::Model;
 
 /// Steps in which elements are led from one state of the path to the next.
@@ -51,7 +51,7 @@ pub fn begin(
         let from = forming.model.x().to_vec();
         for k in 1..=STEPS {
             let share = f64::from(k) / f64::from(STEPS);
-            let to = |(a, b): (&V, &V)| add(*a, scale(sub(*b, *a), share));
+            let to = |(a, b): (&Vec3, &Vec3)| add(*a, scale(sub(*b, *a), share));
             let x = from.iter().zip(state).map(to).collect();
             let arrives = s + 1 == start.path.len() && k == STEPS;
             let normals = if arrives { &start.normals[..] } else { &[] };
@@ -72,7 +72,7 @@ pub fn begin(
 }
 
 /// 99.9 % quantile of how far (m) nodes of plies are from where they were `placed`.
-fn shift(forming: &Forming, placed: &[V]) -> f64 {
+fn shift(forming: &Forming, placed: &[Vec3]) -> f64 {
     let nodes = (forming.plies()).flat_map(|(body, _)| body.sheet.nodes(&forming.model));
     let way = |n: usize| norm(sub(forming.model.x()[n], placed[n]));
     let mut ways: Vec<f64> = nodes.map(|n| way(*n as usize)).collect();

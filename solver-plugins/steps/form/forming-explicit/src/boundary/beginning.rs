@@ -3,18 +3,18 @@
 use crate::error::{FormingError, Result};
 use crate::request::LocalSheet;
 use crate::stack::StackSheet;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 
 /// Where all sheets of a zone are when it begins late, and how they came there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Beginning {
     /// `[states][n]`, as [`Start::path`](crate::Start::path).
-    pub path: Vec<Vec<V>>,
+    pub path: Vec<Vec<Vec3>>,
     /// `[n]`, as [`Start::velocity`](crate::Start::velocity).
-    pub velocity: Vec<V>,
+    pub velocity: Vec<Vec3>,
     /// Nodes of the cut, and the normals (of any length) that the coarse surface has there: the zone's own elements are only on one
     /// side of them.
-    pub normals: Vec<(u32, V)>,
+    pub normals: Vec<(u32, Vec3)>,
     /// When it begins (s).
     pub time: f64,
 }

@@ -1,7 +1,7 @@
 //! How other runs drive nodes: those of the cut of a zone, or of the plies of a whole scene.
 
 use crate::request::LocalSheet;
-use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use plyflow_mechanics::history::{hermite, hermite_rate, locate};
 use plyflow_mechanics::model::{Drive, Hold};
 
@@ -9,13 +9,13 @@ use plyflow_mechanics::model::{Drive, Hold};
 pub struct CutDrive {
     time: Vec<f64>,
     /// `[frames][driven]` (m).
-    position: Vec<Vec<V>>,
+    position: Vec<Vec<Vec3>>,
     /// `[frames][driven]` (m/s).
-    velocity: Vec<Vec<V>>,
+    velocity: Vec<Vec<Vec3>>,
     /// `[frames][driven]`; `None` where the other run tells no normal.
-    normal: Vec<Vec<Option<[V; 2]>>>,
+    normal: Vec<Vec<Option<[Vec3; 2]>>>,
     /// `[frames][driven]` (N); `None` where the cut gives no way.
-    pull: Vec<Vec<Option<V>>>,
+    pull: Vec<Vec<Option<Vec3>>>,
     /// `[driven]` (N/m).
     stiffness: Vec<f64>,
 }
@@ -55,7 +55,7 @@ impl CutDrive {
 }
 
 impl Drive for CutDrive {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let (i, s) = locate(&self.time, t);
         let w = hermite(s, self.time[i + 1] - self.time[i]);
         let (p, q) = (self.position[i][k], self.position[i + 1][k]);
@@ -64,7 +64,7 @@ impl Drive for CutDrive {
     }
 
     /// Turns the node as the coarse surface's normal n turns, `n x n' / n^2`, and not about it.
-    fn spin(&self, k: usize, t: f64) -> Option<V> {
+    fn spin(&self, k: usize, t: f64) -> Option<Vec3> {
         let (i, s) = locate(&self.time, t);
         let h = self.time[i + 1] - self.time[i];
         if t < self.time[0] || t > self.time[self.time.len() - 1] {
@@ -81,7 +81,7 @@ impl Drive for CutDrive {
 
     fn hold(&self, k: usize, t: f64) -> Option<Hold> {
         let (i, s) = locate(&self.time, t);
-        let between = |a: V, b: V| add(a, scale(sub(b, a), s));
+        let between = |a: Vec3, b: Vec3| add(a, scale(sub(b, a), s));
         let ([n, _], [m, _]) = (self.normal[i][k]?, self.normal[i + 1][k]?);
         let normal = between(n, m);
         Some(Hold {

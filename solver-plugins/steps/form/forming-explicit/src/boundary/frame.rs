@@ -1,7 +1,7 @@
 //! How the frame of a bag drives the edges of its films.
 
 use crate::load::Cycle;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::model::Drive;
 
 /// Stretches the films, then moves the frame straight down.
@@ -13,7 +13,7 @@ pub struct FrameDrive {
 }
 
 impl Drive for FrameDrive {
-    fn position(&self, k: usize, t: f64) -> V {
+    fn position(&self, k: usize, t: f64) -> Vec3 {
         let s = 1.0 + self.cycle.stretch(t);
         [
             s * self.plan[k][0],

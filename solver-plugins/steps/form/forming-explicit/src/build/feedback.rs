@@ -4,7 +4,7 @@ use crate::boundary::CutDrive;
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::request::Feedback;
-use plyflow_geometry::vec3::{V, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 use plyflow_mechanics::mirror::Planes;
 
 /// Drives nodes of the plies of a whole scene as fine runs have moved them.
@@ -31,7 +31,7 @@ pub fn feed_back(forming: &mut Forming, input: Feedback) -> Result<()> {
             ))
         })?;
         let own = forming.reference_points(body);
-        let near = |(a, b): (&V, &V)| norm(sub(*a, *b)) < SAME_PLACE;
+        let near = |(a, b): (&Vec3, &Vec3)| norm(sub(*a, *b)) < SAME_PLACE;
         if own.len() != sheet.points.len() || !own.iter().zip(&sheet.points).all(near) {
             return Err(FormingError::Input(format!(
                 "what is fed back was made for another mesh of ply '{}' ({} nodes; this run has {}): give this run the scene and \

@@ -13,7 +13,7 @@ use crate::stack::{
     StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
 };
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;
 use plyflow_model::STANDARD_GRAVITY;
@@ -61,7 +61,7 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     load.apply(&mut model, 0.0);
     let reference = model.start().clone();
     // Largest distance of a point from the axis (m).
-    let from_axis = |q: &V| q[0].fixed_hypot(q[1]);
+    let from_axis = |q: &Vec3| q[0].fixed_hypot(q[1]);
     let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
     let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, tool.error)]);
     for (name, plate) in plates.named() {

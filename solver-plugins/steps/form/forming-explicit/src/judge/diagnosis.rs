@@ -5,7 +5,7 @@ use crate::forming::Forming;
 use crate::measure::{Penetration, cell_strain};
 use crate::stack::sheet;
 use crate::words::in_mm;
-use plyflow_geometry::vec3::{V, norm};
+use plyflow_geometry::vec3::{Vec3, norm};
 use std::fmt::Write;
 
 /// Share of [`open_shares`] from which on a ledger counts as opening.
@@ -140,7 +140,7 @@ fn likely(cell: Option<&Weakest>, deep: Option<f64>, kinetic: f64) -> (&'static 
     }
 }
 
-fn centre(points: &[V], nodes: &[u32]) -> V {
+fn centre(points: &[Vec3], nodes: &[u32]) -> Vec3 {
     let n = nodes.len() as f64;
     nodes.iter().fold([0.0; 3], |s, k| {
         let p = points[*k as usize];
@@ -171,7 +171,7 @@ fn weakest(forming: &Forming) -> Option<Weakest> {
     let mut sheets = forming.bodies.iter().zip(&forming.stack);
     let (body, sheet) = sheets.find(|(b, _)| b.sheet.cell_range(m).contains(&cell))?;
     let nodes = m.cells()[cell];
-    let of = |points: &[V]| nodes.map(|n| points[n as usize]);
+    let of = |points: &[Vec3]| nodes.map(|n| points[n as usize]);
     let (shear, strain) = cell_strain(of(&forming.reference), of(m.x()), sheet::axis(&sheet.scene));
     Some(Weakest {
         shear,

@@ -2,7 +2,7 @@
 
 use crate::forming::Forming;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::mesh::NONE;
 
 /// Largest ways in plan (m) of nodes at the rims of plies, holes included, since they lay flat.
@@ -16,7 +16,7 @@ pub struct DrawIn {
 
 impl DrawIn {
     /// Counts a sheet: `cells` and what lies across their edges (`[cells][4]`), its points `then` and `now` (m).
-    fn count(&mut self, cells: &[[u32; 4]], neighbours: &[[u32; 4]], then: &[V], now: &[V]) {
+    fn count(&mut self, cells: &[[u32; 4]], neighbours: &[[u32; 4]], then: &[Vec3], now: &[Vec3]) {
         for (cell, near) in cells.iter().zip(neighbours) {
             // Edge e goes from node e to the next one.
             for (e, node) in cell.iter().enumerate() {
@@ -66,7 +66,7 @@ mod tests {
             points: (0..15).map(point).collect(),
             cells: (0..8).map(cell).collect(),
         };
-        let mut now: Vec<V> = mesh.points.clone();
+        let mut now: Vec<Vec3> = mesh.points.clone();
         for p in &mut now {
             *p = [p[0] + 0.1 * (0.02 - p[0]), p[1], p[2] + p[0]];
         }

@@ -3,7 +3,7 @@
 use crate::forming::Forming;
 use crate::stack::SHARE_SQUEEZED;
 use crate::words::in_mm;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::{RigidItem, SlaveItem};
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ pub struct Penetration {
     /// Largest of its nodes in touch (m).
     pub largest: f64,
     /// Where that node is (m); `None` when none touches.
-    pub place: Option<V>,
+    pub place: Option<Vec3>,
     /// 99.9 % quantile of them (m).
     pub q999: f64,
     /// By how much two sheets are kept further apart than they are thick (m).
@@ -35,7 +35,7 @@ pub struct Penetration {
 
 impl Penetration {
     /// `depths`: of the nodes in touch, how deep (m) and where (m).
-    fn new(pair: &str, mut depths: Vec<(f64, V)>, spare: f64, thinner: f64) -> Self {
+    fn new(pair: &str, mut depths: Vec<(f64, Vec3)>, spare: f64, thinner: f64) -> Self {
         depths.sort_by(|a, b| a.0.total_cmp(&b.0));
         let last = depths.len().saturating_sub(1);
         let at = (0.999 * depths.len() as f64) as usize;
@@ -124,13 +124,13 @@ pub struct PenetrationPeak {
     /// When that was (s).
     pub largest_time: f64,
     /// Where that node was (m); `None` when none touched.
-    pub place: Option<V>,
+    pub place: Option<Vec3>,
     /// Largest 99.9 % quantile (m): of the frames with [`MANY`] nodes in touch where there are such, else of all.
     pub q999: f64,
     /// When that was (s).
     pub q999_time: f64,
     /// Where its deepest node was then (m).
-    pub q999_place: Option<V>,
+    pub q999_place: Option<Vec3>,
     /// Whether [`MANY`] nodes touched then.
     pub many: bool,
 }
@@ -162,11 +162,11 @@ impl Forming {
                 .map(|s| s.thickness)
                 .collect()
         };
-        let judge = |pair: &str, spare: f64, depths: Vec<(f64, V)>| {
+        let judge = |pair: &str, spare: f64, depths: Vec<(f64, Vec3)>| {
             let thinner = thickness(pair).into_iter().fold(f64::INFINITY, f64::min);
             Penetration::new(pair, depths, spare, thinner)
         };
-        let between = |pair: &str, offset: f64, depths: Vec<(f64, V)>| {
+        let between = |pair: &str, offset: f64, depths: Vec<(f64, Vec3)>| {
             let spare = offset - 0.5 * thickness(pair).iter().sum::<f64>();
             judge(pair, spare, depths)
         };
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn what_is_kept_further_apart_than_it_is_thick_overlaps_later() {
-        let depths: Vec<(f64, V)> = (0..2000)
+        let depths: Vec<(f64, Vec3)> = (0..2000)
             .map(|i| (f64::from(i) / 1e8, [0.0, 0.0, f64::from(i)]))
             .collect();
         let close = Penetration::new("film/ply", depths.clone(), 0.0, 8e-5);

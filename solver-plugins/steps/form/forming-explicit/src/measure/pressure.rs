@@ -2,7 +2,7 @@
 
 use crate::forming::Forming;
 use crate::stack::{Body, RigidName};
-use plyflow_geometry::vec3::{V, dot, norm};
+use plyflow_geometry::vec3::{Vec3, dot, norm};
 use plyflow_mechanics::contact::RigidContact;
 use plyflow_model::scene::Scene;
 
@@ -46,7 +46,7 @@ impl Forming {
             }
         }
         let (nodes, areas) = (body.sheet.nodes(m), m.node_areas(body.sheet.0));
-        let pressure = |(n, area): (&u32, &V)| force[*n as usize] / norm(*area).max(1e-12);
+        let pressure = |(n, area): (&u32, &Vec3)| force[*n as usize] / norm(*area).max(1e-12);
         let part: Vec<f64> = nodes.iter().zip(&areas).map(pressure).collect();
         match &body.mirrored {
             Some(b) => b.whole.at_nodes(|n, _| part[n]),

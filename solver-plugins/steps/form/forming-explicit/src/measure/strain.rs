@@ -3,7 +3,7 @@
 use crate::forming::Forming;
 use crate::stack::sheet;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::{V, add, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, dot, norm, scale, sub};
 
 /// Strains of the plies' elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,9 +19,9 @@ pub fn ply_strains(forming: &Forming) -> PlyStrains {
     let (mut low, mut high, mut fibre) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
     for (body, sheet) in forming.plies() {
         let axis = sheet::axis(&sheet.scene);
-        let mut count = |cells: &[[u32; 4]], then: &[V], now: &[V]| {
+        let mut count = |cells: &[[u32; 4]], then: &[Vec3], now: &[Vec3]| {
             for cell in cells {
-                let of = |points: &[V]| cell.map(|n| points[n as usize]);
+                let of = |points: &[Vec3]| cell.map(|n| points[n as usize]);
                 let (g, e) = cell_strain(of(then), of(now), axis);
                 (low, high) = (low.min(g), high.max(g));
                 fibre = fibre.max(e);
@@ -41,11 +41,11 @@ pub fn ply_strains(forming: &Forming) -> PlyStrains {
 }
 
 /// Shear angle (rad) and largest fibre strain by size at the centre of a cell.
-pub fn cell_strain(then: [V; 4], now: [V; 4], axis: V) -> (f64, f64) {
-    let mid = |p: &[V; 4]| (sub(p[2], p[0]), sub(p[3], p[1]));
+pub fn cell_strain(then: [Vec3; 4], now: [Vec3; 4], axis: Vec3) -> (f64, f64) {
+    let mid = |p: &[Vec3; 4]| (sub(p[2], p[0]), sub(p[3], p[1]));
     let ((a, b), (d, e)) = (mid(&then), mid(&now));
     let det = a[0] * b[1] - a[1] * b[0];
-    let map = |u: V| {
+    let map = |u: Vec3| {
         let s = (u[0] * b[1] - u[1] * b[0]) / det;
         let t = (a[0] * u[1] - a[1] * u[0]) / det;
         add(scale(d, s), scale(e, t))

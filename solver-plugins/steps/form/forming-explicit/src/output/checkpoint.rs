@@ -5,7 +5,7 @@
 
 use crate::course::Course;
 use crate::forming::Forming;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::archive::Archive;
 use plyflow_sdk::{Host, Log, On, StepError};
 use serde::{Deserialize, Serialize};
@@ -102,7 +102,7 @@ pub enum Part<'a> {
     /// Time (s).
     Begin(f64),
     /// Points of a body (m).
-    Points(Cow<'a, str>, Cow<'a, [V]>),
+    Points(Cow<'a, str>, Cow<'a, [Vec3]>),
     /// A field of a body: whether on its cells, name, unit, values.
     Field(
         Cow<'a, str>,

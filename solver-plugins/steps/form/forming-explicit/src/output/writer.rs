@@ -4,7 +4,7 @@ use crate::course::{Course, Observer};
 use crate::forming::Forming;
 use crate::output::checkpoint::{Part, Recorder};
 use crate::stack::RigidName;
-use plyflow_geometry::vec3::{V, add};
+use plyflow_geometry::vec3::{Vec3, add};
 use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::energy::Ledger;
 use plyflow_sdk::{Host, Log, Progress, StepError};
@@ -90,7 +90,7 @@ impl Observer for Writer<'_> {
                 .put(&Part::Field(name(), false, field, unit, pressure))?;
         }
         if forming.load.press().is_some() {
-            let moved = |points: &[V], part: RigidName| -> Vec<V> {
+            let moved = |points: &[Vec3], part: RigidName| -> Vec<Vec3> {
                 let shift = forming.shift(part);
                 points.iter().map(|x| add(*x, shift)).collect()
             };

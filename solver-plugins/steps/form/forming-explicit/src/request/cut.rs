@@ -1,15 +1,15 @@
 //! What other runs give: how the cut of a zone moves, and where nodes of a whole scene go.
 
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::Zone;
 
 /// Where a sheet is when its zone begins late, and how it came there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     /// `[states][n]` positions (m) on the way from the undeformed state, in time; the last is the one to begin at.
-    pub path: Vec<Vec<V>>,
+    pub path: Vec<Vec<Vec3>>,
     /// `[n]` velocities (m/s) there.
-    pub velocity: Vec<V>,
+    pub velocity: Vec<Vec3>,
 }
 
 /// A sheet of the zone as the boundary artifact holds it.
@@ -18,21 +18,21 @@ pub struct LocalSheet {
     /// Name, as in the scene.
     pub name: String,
     /// `[n]` undeformed points (m).
-    pub points: Vec<V>,
+    pub points: Vec<Vec3>,
     /// `[m]` cells.
     pub cells: Vec<[u32; 4]>,
     /// `[k]` driven nodes.
     pub driven: Vec<u32>,
     /// `[frames][k]` positions (m).
-    pub position: Vec<Vec<V>>,
+    pub position: Vec<Vec<Vec3>>,
     /// `[frames][k]` velocities (m/s).
-    pub velocity: Vec<Vec<V>>,
+    pub velocity: Vec<Vec<Vec3>>,
     /// `[frames][k]` normals of the coarse surface; empty when the artifact has none, and then rotations are free.
-    pub normal: Vec<Vec<V>>,
+    pub normal: Vec<Vec<Vec3>>,
     /// `[frames][k]` their rates (1/s); as `normal`.
-    pub normal_rate: Vec<Vec<V>>,
+    pub normal_rate: Vec<Vec<Vec3>>,
     /// `[frames][k]` forces of the surroundings on them (N); empty when the cut gives no way.
-    pub pull: Vec<Vec<V>>,
+    pub pull: Vec<Vec<Vec3>>,
     /// `[k]` how stiffly they hold (N/m); as `pull`.
     pub stiffness: Vec<f64>,
     /// Where a run that begins late begins; `None` for one that begins with the process.

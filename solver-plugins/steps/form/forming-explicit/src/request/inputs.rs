@@ -3,7 +3,7 @@
 use crate::error::{FormingError, Result};
 use crate::request::cut::{LocalInput, LocalSheet, Start};
 use crate::request::parameters::Parameters;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Boundary, MeshStudy, Rectangle, Zones};
 use plyflow_model::material::MaterialEntry;
 use plyflow_model::scene::{Scene, SheetKind};
@@ -191,7 +191,7 @@ fn read_vectors(
     input: &Input,
     path: &str,
     expected: [usize; 3],
-) -> Result<Vec<Vec<V>>> {
+) -> Result<Vec<Vec<Vec3>>> {
     let (v, shape) = host.array_f64(input, path)?;
     if shape != expected {
         return Err(FormingError::Input(format!(
@@ -212,7 +212,7 @@ fn read_start(host: &Host, input: &Input, name: &str) -> Result<Option<Start>> {
     }
     let (ways, shape) = host.array_f64(input, &path)?;
     let (velocity, _) = host.array_f64(input, &velocity)?;
-    let vectors = |v: &[f64]| -> Vec<V> { v.as_chunks::<3>().0.to_vec() };
+    let vectors = |v: &[f64]| -> Vec<Vec3> { v.as_chunks::<3>().0.to_vec() };
     let row = shape[1..].iter().product::<usize>().max(1);
     Ok(Some(Start {
         path: ways.chunks_exact(row).map(vectors).collect(),

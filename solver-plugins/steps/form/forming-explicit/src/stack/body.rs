@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::stack::place::SheetIndex;
 use crate::stack::sheet::StackSheet;
 use crate::stack::symmetry;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::mirror::{Image, Planes, Whole};
 use plyflow_model::artifact::MeshQuality;
@@ -44,7 +44,7 @@ impl Body {
     pub fn mirrored(
         sheet: &StackSheet,
         index: SheetIndex,
-        points: &[V],
+        points: &[Vec3],
         cells: &[[u32; 4]],
         planes: Planes,
     ) -> Result<Self> {

@@ -10,16 +10,16 @@ use crate::stack::contact::StackContacts;
 use crate::stack::place::{Layer, StackPlace};
 use crate::stack::rigid::RigidName;
 use crate::stack::sheet::StackSheet;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::{RigidContact, RigidItem, RigidSurface, SheetContact, SlaveItem};
 use plyflow_mechanics::model::Model;
 use std::collections::HashSet;
 use std::sync::Arc;
 
 /// Where on its cell a slave is nearest to.
-fn place(item: &SlaveItem, cells: &[[u32; 4]], x: &[V]) -> V {
+fn place(item: &SlaveItem, cells: &[[u32; 4]], x: &[Vec3]) -> Vec3 {
     let corners = cells[item.cell as usize].map(|n| x[n as usize]);
-    let add = |sum: V, (w, p): (f64, V)| [0, 1, 2].map(|c| sum[c] + w * p[c]);
+    let add = |sum: Vec3, (w, p): (f64, Vec3)| [0, 1, 2].map(|c| sum[c] + w * p[c]);
     item.weights().into_iter().zip(corners).fold([0.0; 3], add)
 }
 

@@ -5,7 +5,7 @@ use crate::request::{ComponentChoice, Parameters};
 use crate::stack::sheet::StackSheet;
 use crate::stack::{regions, symmetry};
 use plyflow_abi::pf_component;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::mesh::{Patch, QuadMesh};
 use plyflow_mechanics::mirror::{Ghost, Mirrors, Planes, part_patches, reflect};
@@ -167,7 +167,7 @@ const SAME_PLACE: f64 = 1e-6;
 
 /// Whether a place of the undeformed plane or, with mirror planes, one of its images lies in a zone: so what is computed
 /// beside a plane is what its other side would be.
-fn is_in(zones: &[Rectangle], at: V, planes: Planes) -> bool {
+fn is_in(zones: &[Rectangle], at: Vec3, planes: Planes) -> bool {
     planes.images().iter().any(|image| {
         let [x, y, _] = reflect(at, *image);
         let within = |v: f64, low: f64, high: f64| v >= low - SAME_PLACE && v <= high + SAME_PLACE;
@@ -192,7 +192,7 @@ pub fn bending_part(mesh: &QuadMesh, elsewhere: Option<&Elsewhere>) -> QuadMesh 
 /// Node patches of a sheet's mesh whose nodes have the numbers `nodes`, for its element. Ghosts beyond mirror planes are
 /// added to the points, to `nodes` and to `mirrors`.
 pub fn patches(
-    points: &mut Vec<V>,
+    points: &mut Vec<Vec3>,
     nodes: &mut Vec<u32>,
     mesh: &QuadMesh,
     element: &ElementInstance,

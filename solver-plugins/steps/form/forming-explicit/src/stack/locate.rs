@@ -1,7 +1,7 @@
 //! Where in the undeformed plane nodes lie on the cells of a sheet.
 
 use crate::stack::place::SheetIndex;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_geometry::{Bins, rectangle};
 use plyflow_mechanics::contact::SlaveItem;
 use plyflow_mechanics::mesh::NONE;
@@ -18,7 +18,7 @@ pub fn locate(model: &Model, master: SheetIndex, slaves: &[u32]) -> Vec<SlaveIte
             .collect();
     }
     let first = master.cell_range(model).start as u32;
-    let corners: Vec<[V; 4]> = (cells.iter().map(|c| c.map(|n| x[n as usize]))).collect();
+    let corners: Vec<[Vec3; 4]> = (cells.iter().map(|c| c.map(|n| x[n as usize]))).collect();
     let placed = Cells::new(&corners);
     slaves
         .iter()
@@ -35,7 +35,7 @@ pub fn locate(model: &Model, master: SheetIndex, slaves: &[u32]) -> Vec<SlaveIte
 }
 
 /// Local coordinates of a point in the plane of a quad seen from above.
-pub fn inverse_bilinear(q: [V; 4], p: V) -> Option<[f64; 2]> {
+pub fn inverse_bilinear(q: [Vec3; 4], p: Vec3) -> Option<[f64; 2]> {
     let mut xi = [0.0f64; 2];
     for _ in 0..20 {
         let w = plyflow_mechanics::contact::shape(xi);
@@ -69,8 +69,8 @@ struct Cells {
 
 impl Cells {
     /// Of quads seen from above, of which there is one at least.
-    fn new(corners: &[[V; 4]]) -> Self {
-        let centre = |p: &[V; 4]| [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]));
+    fn new(corners: &[[Vec3; 4]]) -> Self {
+        let centre = |p: &[Vec3; 4]| [0, 1].map(|k| 0.25 * (p[0][k] + p[1][k] + p[2][k] + p[3][k]));
         let centres: Vec<[f64; 2]> = corners.iter().map(centre).collect();
         let [x0, y0, x1, y1] = rectangle::around(centres.iter().copied());
         let area = ((x1 - x0) * (y1 - y0)).max(1e-12);
@@ -85,7 +85,7 @@ impl Cells {
     }
 
     /// Cells around a place.
-    fn near(&self, p: V) -> Vec<u32> {
+    fn near(&self, p: Vec3) -> Vec<u32> {
         let [i, j] = self.bins.place([p[0], p[1]]);
         let [last_i, last_j] = self.bins.count().map(|n| n - 1);
         let from = [i.saturating_sub(1), j.saturating_sub(1)];
@@ -99,7 +99,7 @@ impl Cells {
         }
     }
 
-    fn nearest(&self, p: V) -> u32 {
+    fn nearest(&self, p: Vec3) -> u32 {
         let d = |c: u32| {
             let q = self.centres[c as usize];
             (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2)

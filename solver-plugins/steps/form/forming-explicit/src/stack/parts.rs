@@ -8,7 +8,7 @@ use crate::stack::place::{Placed, SheetIndex};
 use crate::stack::sheet::{self, StackSheet};
 use crate::stack::{regions, symmetry};
 use plyflow_blank::Blank;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::component::ElementInstance;
 use plyflow_mechanics::mesh::{Patch, QuadMesh};
 use plyflow_mechanics::mirror::Mirrors;
@@ -18,7 +18,7 @@ use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 #[derive(Default)]
 pub struct Parts {
     /// `[nodes]` (m).
-    pub points: Vec<V>,
+    pub points: Vec<Vec3>,
     /// The sheets.
     pub specs: Vec<SheetSpec>,
     /// Their bodies in the artifact.

@@ -2,7 +2,7 @@
 
 use crate::error::{FormingError, Result};
 use crate::stack::place::SheetIndex;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::NodeLaws;
 use plyflow_mechanics::mirror::{Planes, reflect};
 use plyflow_mechanics::model::Model;
@@ -20,7 +20,7 @@ pub struct PlacedRegion<'a> {
 }
 
 impl PlacedRegion<'_> {
-    fn holds(&self, at: V) -> bool {
+    fn holds(&self, at: Vec3) -> bool {
         holds(&self.corners, [at[0], at[1]])
     }
 }
@@ -57,7 +57,7 @@ pub fn nodes_of<'m>(model: &'m Model, sheet: &str) -> &'m [u32] {
 }
 
 /// Middle of a cell (m).
-pub fn centre(points: &[V], cell: &[u32; 4]) -> V {
+pub fn centre(points: &[Vec3], cell: &[u32; 4]) -> Vec3 {
     let corners = cell.map(|n| points[n as usize]);
     [0, 1, 2].map(|k| 0.25 * corners.iter().map(|x| x[k]).sum::<f64>())
 }
@@ -66,19 +66,19 @@ pub fn centre(points: &[V], cell: &[u32; 4]) -> V {
 ///
 /// # Errors
 /// As [`of_sheet`].
-pub fn without_stitches(sheet: &Sheet, points: &[V], cells: &[[u32; 4]]) -> Result<Vec<bool>> {
+pub fn without_stitches(sheet: &Sheet, points: &[Vec3], cells: &[[u32; 4]]) -> Result<Vec<bool>> {
     let mut all = of_sheet(sheet)?;
     all.retain(|r| r.region.stitches == Some(Stitches::Removed));
-    let removed = |at: V| all.iter().any(|r| r.holds(at));
+    let removed = |at: Vec3| all.iter().any(|r| r.holds(at));
     Ok(cells.iter().map(|c| removed(centre(points, c))).collect())
 }
 
 /// Whether the regions of a ply lie on what is computed of it as the scene means them: each holds a node, or the middle of an element where it
 /// removes stitches.
-pub fn check(sheet: &Sheet, points: &[V], cells: &[[u32; 4]], planes: Planes) -> Result<()> {
+pub fn check(sheet: &Sheet, points: &[Vec3], cells: &[[u32; 4]], planes: Planes) -> Result<()> {
     for placed in of_sheet(sheet)? {
         let images = planes.images();
-        let seen = |at: V| images.iter().any(|i| placed.holds(reflect(at, *i)));
+        let seen = |at: Vec3| images.iter().any(|i| placed.holds(reflect(at, *i)));
         let (region, name) = (&placed.region.name, &sheet.name);
         if !placed.region.friction.is_empty() && !points.iter().any(|p| seen(*p)) {
             return Err(FormingError::Scene(format!(

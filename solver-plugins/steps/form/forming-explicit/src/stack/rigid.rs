@@ -1,7 +1,7 @@
 //! Rigid parts: their names, and how the artifact shows them.
 
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::{OpenPlate, RigidSurface};
 use plyflow_tooling::FieldError;
 
@@ -42,7 +42,7 @@ pub struct RigidBody {
     /// Which it is.
     pub name: RigidName,
     /// Points at the start (m).
-    pub points: Vec<V>,
+    pub points: Vec<Vec3>,
     /// Quads.
     pub cells: Vec<[u32; 4]>,
     /// What they show.
@@ -53,7 +53,7 @@ impl RigidBody {
     /// The largest difference of its cells, cut along their diagonals, from a plate: at the cells' middles, and those of their sides.
     pub fn error_against(&self, plate: &OpenPlate) -> FieldError {
         let corner = |n: u32| self.points[n as usize];
-        let middle = |of: &[V]| -> V {
+        let middle = |of: &[Vec3]| -> Vec3 {
             std::array::from_fn(|k| of.iter().map(|p| p[k]).sum::<f64>() / of.len() as f64)
         };
         let mut worst = FieldError::default();

@@ -3,7 +3,7 @@
 use crate::error::{FormingError, Result};
 use plyflow_blank::Blank;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::mirror::Planes;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::rules;
@@ -89,7 +89,7 @@ fn check_sheet(sheet: &Sheet) -> Result<()> {
 }
 
 /// Direction of material axis e1 in the undeformed plane.
-pub fn axis(sheet: &Sheet) -> V {
+pub fn axis(sheet: &Sheet) -> Vec3 {
     let first = sheet.fibre_1.si();
     let square = || first + std::f64::consts::FRAC_PI_2;
     let e1 = first_axis(first, sheet.fibre_2.map_or_else(square, |a| a.si()));

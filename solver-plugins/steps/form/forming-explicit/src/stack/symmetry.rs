@@ -6,7 +6,7 @@
 use crate::error::{FormingError, Result};
 use crate::stack::sheet::StackSheet;
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::{V, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 use plyflow_mechanics::LANES;
 use plyflow_mechanics::component::{ElementInstance, MaterialInstance};
 use plyflow_mechanics::mirror::{Planes, reflect};
@@ -65,7 +65,7 @@ pub fn check_tool(planes: Planes, tool: &ToolMesh) -> Result<()> {
     let most = TOOL_APART * norm(sub(high, low));
     let tree = SurfaceTree::new(tool);
     for k in (0..2).filter(|k| planes.0[*k]) {
-        let off = |p: &V| {
+        let off = |p: &Vec3| {
             let image = reflect(*p, [k == 0, k == 1]);
             (norm(sub(tree.closest(image).point, image)), *p)
         };

@@ -3,7 +3,7 @@
 use crate::error::{FormingError, Result};
 use crate::request::Parameters;
 use crate::stack::place::SheetIndex;
-use plyflow_geometry::vec3::{V, cross, norm, sub};
+use plyflow_geometry::vec3::{Vec3, cross, norm, sub};
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;
 use plyflow_tooling::{RigidTool, SignedDistanceGrid, given};
@@ -21,7 +21,7 @@ pub fn rigid(p: &Parameters) -> Result<RigidTool> {
 pub struct ToolSurface(pub SignedDistanceGrid);
 
 impl RigidSurface for ToolSurface {
-    fn distance(&self, point: V) -> (f64, V) {
+    fn distance(&self, point: Vec3) -> (f64, Vec3) {
         self.0.distance_and_gradient(point)
     }
 
@@ -66,7 +66,7 @@ impl ToolSurfaces {
 
 /// The side (m) of a square as large as the median element of a flat sheet over the tool, whose box is given: towards the frame a film's
 /// elements grow, and of a large frame most may be large. Of one that lies nowhere over it, of all its elements.
-fn typical_size(model: &Model, sheet: SheetIndex, [low, high]: [V; 2]) -> f64 {
+fn typical_size(model: &Model, sheet: SheetIndex, [low, high]: [Vec3; 2]) -> f64 {
     let corners = |cell: &[u32; 4]| cell.map(|n| model.x()[n as usize]);
     let area = |cell: &&[u32; 4]| {
         let [a, b, c, d] = corners(cell);

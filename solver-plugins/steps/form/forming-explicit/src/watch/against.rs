@@ -5,12 +5,12 @@ use crate::watch::deep::{CHUNK, Deep};
 use crate::watch::rigid::{Hint, Shape, from_plate};
 use crate::watch::sheet::{Near, Seat};
 use crate::watch::watcher::{Moment, has_come_through};
-use plyflow_geometry::vec3::{V, norm, sub};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
 
 /// A node's place when it was looked at, and its distance (m) from a part then, which can have shrunk by no more than the node has moved.
 #[derive(Clone, Copy)]
 pub struct Clear {
-    at: V,
+    at: Vec3,
     distance: f64,
     /// Triangle of the tool that was closest.
     hint: Hint,

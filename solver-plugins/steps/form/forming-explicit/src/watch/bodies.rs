@@ -6,7 +6,7 @@ use crate::watch::pairs::{Numbers, Pair, pairs};
 use crate::watch::rigid::{Part, Shape, Triangles};
 use crate::watch::sheet::SheetMesh;
 use crate::watch::watcher::{Moment, Watcher};
-use plyflow_geometry::vec3::{V, cross, norm, sub};
+use plyflow_geometry::vec3::{Vec3, cross, norm, sub};
 
 /// Share of the thinner sheet below which a depth counts as none, except at the end.
 const FLOOR: f64 = 0.02;
@@ -79,13 +79,13 @@ impl Bodies {
     }
 
     /// As [`Bodies::pair_of_sheets`], of a node at a place: what films do an element away from all plies, by the boxes around these, is a pair of its own.
-    pub fn pair_of_sheets_at(&self, moment: &Moment<'_>, [a, b]: [usize; 2], place: V) -> usize {
+    pub fn pair_of_sheets_at(&self, moment: &Moment<'_>, [a, b]: [usize; 2], place: Vec3) -> usize {
         let pair = self.pair_of_sheets(a, b);
         let Some([_, off]) = self.numbers.films.filter(|[films, _]| *films == pair) else {
             return pair;
         };
         let reach = self.sheets[a].size.max(self.sheets[b].size);
-        let in_reach = |[low, high]: &[V; 2]| {
+        let in_reach = |[low, high]: &[Vec3; 2]| {
             (0..3).all(|k| (low[k] - reach..=high[k] + reach).contains(&place[k]))
         };
         match self.of_plies(moment.boxes).any(in_reach) {
@@ -133,9 +133,9 @@ fn parts(forming: &Forming) -> Vec<Part> {
 }
 
 /// Side (m) of a square as large as the median cell over the tool of a sheet that lies flat; of one that lies nowhere over it, of all its cells.
-fn size_over(mesh: &SheetMesh, start: &[V], [low, high]: [V; 2]) -> f64 {
-    let area = |q: [V; 4]| 0.5 * norm(cross(sub(q[2], q[0]), sub(q[3], q[1])));
-    let is_over = |q: &[V; 4]| {
+fn size_over(mesh: &SheetMesh, start: &[Vec3], [low, high]: [Vec3; 2]) -> f64 {
+    let area = |q: [Vec3; 4]| 0.5 * norm(cross(sub(q[2], q[0]), sub(q[3], q[1])));
+    let is_over = |q: &[Vec3; 4]| {
         (0..2).all(|k| {
             let middle = 0.25 * q.iter().map(|x| x[k]).sum::<f64>();
             low[k] <= middle && middle <= high[k]

@@ -1,6 +1,6 @@
 //! A bilinear cell, and the point of it that is closest to another.
 
-use plyflow_geometry::vec3::{V, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, dot, norm, scale, sub};
 
 /// Steps to the closest point of a cell at most.
 const STEPS: usize = 12;
@@ -15,7 +15,7 @@ pub struct Foot {
     /// Squared distance (m2).
     pub square: f64,
     /// From it to the point (m).
-    pub away: V,
+    pub away: Vec3,
     /// By coordinate: whether the closest point of the whole surface may lie across the side where it ends, and on which.
     pub out: [i8; 2],
 }
@@ -25,19 +25,19 @@ pub fn weights(xi: [f64; 2]) -> [f64; 4] {
     CORNERS.map(|c| 0.25 * (1.0 + c[0] * xi[0]) * (1.0 + c[1] * xi[1]))
 }
 
-pub fn mix(w: [f64; 4], q: &[V; 4]) -> V {
+pub fn mix(w: [f64; 4], q: &[Vec3; 4]) -> Vec3 {
     [0, 1, 2].map(|k| w[0] * q[0][k] + w[1] * q[1][k] + w[2] * q[2][k] + w[3] * q[3][k])
 }
 
 /// Derivatives of the place by the two coordinates.
-pub fn tangents(q: &[V; 4], xi: [f64; 2]) -> [V; 2] {
+pub fn tangents(q: &[Vec3; 4], xi: [f64; 2]) -> [Vec3; 2] {
     let along = CORNERS.map(|c| 0.25 * c[0] * (1.0 + c[1] * xi[1]));
     let across = CORNERS.map(|c| 0.25 * c[1] * (1.0 + c[0] * xi[0]));
     [mix(along, q), mix(across, q)]
 }
 
 /// Closest point of a bilinear cell: Gauss and Newton's steps within its bounds.
-pub fn foot(q: &[V; 4], p: V, start: [f64; 2]) -> Foot {
+pub fn foot(q: &[Vec3; 4], p: Vec3, start: [f64; 2]) -> Foot {
     let mut xi = start.map(|c| c.clamp(-1.0, 1.0));
     for step in 0..=STEPS {
         let away = sub(p, mix(weights(xi), q));
@@ -95,7 +95,7 @@ pub fn corner(out: [i8; 2]) -> usize {
     }
 }
 
-pub fn direction(v: V) -> V {
+pub fn direction(v: Vec3) -> Vec3 {
     let n = norm(v);
     if n > 0.0 { scale(v, 1.0 / n) } else { v }
 }

@@ -1,7 +1,7 @@
 //! What the watch finds, and what it remembers of a run.
 
 use crate::watch::sheet::Seat;
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// Nodes that are looked at together.
@@ -15,7 +15,7 @@ pub struct Deep {
     /// Node of the model.
     pub node: u32,
     /// Its place (m).
-    pub place: V,
+    pub place: Vec3,
 }
 
 impl Deep {

@@ -3,7 +3,7 @@
 use crate::watch::deep::{CHUNK, Deep};
 use crate::watch::rigid::Triangles;
 use crate::watch::sheet::{SheetMesh, SheetTree};
-use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use plyflow_tooling::ToolMesh;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -16,11 +16,11 @@ const PER_ELEMENT: f64 = 4.0;
 /// A place on a convex edge of the tool.
 #[derive(Debug, Clone, Copy)]
 struct Place {
-    at: V,
+    at: Vec3,
     /// Out of the tool (unit).
-    out: V,
+    out: Vec3,
     /// Along the surface, across the edge (unit).
-    across: V,
+    across: Vec3,
     /// Sine of the angle between the facets.
     turn: f64,
 }
@@ -37,12 +37,12 @@ pub const UNKNOWN: u32 = u32::MAX;
 
 /// A sheet at which they are held.
 pub struct Look<'a> {
-    pub x: &'a [V],
+    pub x: &'a [Vec3],
     pub mesh: &'a SheetMesh,
     pub tree: &'a SheetTree,
-    pub bounds: [V; 2],
+    pub bounds: [Vec3; 2],
     /// Where the tool has moved (m).
-    pub shift: V,
+    pub shift: Vec3,
     /// Size of the elements (m).
     pub size: f64,
     /// Half of the sheet's thickness (m).
@@ -67,7 +67,7 @@ impl Edges {
             };
         }
         // Beyond a mirror plane there is nothing of the sheets that are computed.
-        let beyond = |at: &V| (0..2).any(|k| mirrored[k] && at[k] < 0.0);
+        let beyond = |at: &Vec3| (0..2).any(|k| mirrored[k] && at[k] < 0.0);
         for place in edges(tool, spacing) {
             if beyond(&place.at) {
                 continue;
@@ -92,7 +92,7 @@ impl Edges {
         sheet: usize,
         triangles: &Triangles,
         look: &Look<'_>,
-        counts: impl Fn(V) -> bool,
+        counts: impl Fn(Vec3) -> bool,
     ) -> [Deep; 2] {
         let depths: Vec<f64> = (self.places.par_iter())
             .zip(&mut self.last[sheet])
@@ -188,7 +188,7 @@ fn edge(tool: &ToolMesh, [s, t]: [usize; 2], [a, b]: [u32; 2], spacing: f64) -> 
     (0..=parts).map(place).collect()
 }
 
-fn direction(v: V) -> V {
+fn direction(v: Vec3) -> Vec3 {
     let n = norm(v);
     if n > 0.0 { scale(v, 1.0 / n) } else { v }
 }

@@ -10,7 +10,7 @@ use crate::watch::pairs::Pair;
 use crate::watch::rigid::Shape;
 use crate::watch::sheet::{Bent, Seat, SheetTree};
 use crate::watch::watcher::{Moment, Watcher};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -70,9 +70,9 @@ impl Watch {
         if anew {
             watched.anew_at = Some(model.cycle());
         }
-        let boxes: Vec<[V; 2]> = sheets.iter().map(|s| s.mesh.bounds(model.x())).collect();
+        let boxes: Vec<[Vec3; 2]> = sheets.iter().map(|s| s.mesh.bounds(model.x())).collect();
         let parts = self.bodies.parts.iter();
-        let shifts: Vec<V> = parts.map(|p| forming.shift(p.name)).collect();
+        let shifts: Vec<Vec3> = parts.map(|p| forming.shift(p.name)).collect();
         let bent: Vec<Bent> = sheets.iter().map(|s| Bent::new(&s.mesh)).collect();
         let moment = Moment {
             x: model.x(),
@@ -177,7 +177,7 @@ impl Watch {
                 continue;
             };
             // What a film does an element away from all plies no ply feels.
-            let on_plies = |at: V| {
+            let on_plies = |at: Vec3| {
                 let mut trees = bodies.of_plies(trees).flatten();
                 trees.any(|tree| tree.cell_within(at, sheet.size, &mut { UNKNOWN }).is_some())
             };

@@ -1,7 +1,7 @@
 //! Rigid parts as the watch sees them: the tool's triangles, the bed, the plates of a press.
 
 use crate::stack::RigidName;
-use plyflow_geometry::vec3::{V, add, cross, norm, scale};
+use plyflow_geometry::vec3::{Vec3, add, cross, norm, scale};
 use plyflow_mechanics::contact::OpenPlate;
 use plyflow_surface::Surface;
 use plyflow_tooling::ToolMesh;
@@ -42,9 +42,9 @@ pub struct OnTool {
     /// Distance (m), positive outside.
     pub distance: f64,
     /// The point (m).
-    pub at: V,
+    pub at: Vec3,
     /// Out of the tool there (unit).
-    pub normal: V,
+    pub normal: Vec3,
     /// The triangle that it lies on.
     pub triangle: Hint,
 }
@@ -59,7 +59,7 @@ impl Triangles {
     }
 
     /// The closest point of a body. The hint makes a search shorter and changes nothing of what is found.
-    fn of_body(&self, body: usize, p: V, hint: Hint) -> OnTool {
+    fn of_body(&self, body: usize, p: Vec3, hint: Hint) -> OnTool {
         let surface = &self.bodies[body];
         let c = match hint.0 as usize == body {
             true => surface.closest_from(p, hint.1 as usize),
@@ -75,14 +75,14 @@ impl Triangles {
 
     /// Of bodies that stand on or in each other the least of their distances is that of what they are together. `hint`: a triangle that is
     /// probably near, such as the last one or (0, 0).
-    pub fn closest(&self, p: V, hint: Hint) -> OnTool {
+    pub fn closest(&self, p: Vec3, hint: Hint) -> OnTool {
         let mut all = (0..self.bodies.len()).map(|b| self.of_body(b, p, hint));
         let first = all.next().expect("a tool has a body");
         all.fold(first, |a, b| if b.distance < a.distance { b } else { a })
     }
 
     /// Distance (m), positive outside.
-    pub fn distance(&self, p: V, hint: Hint) -> f64 {
+    pub fn distance(&self, p: Vec3, hint: Hint) -> f64 {
         let all = (0..self.bodies.len()).map(|b| self.of_body(b, p, hint).distance);
         all.fold(f64::INFINITY, f64::min)
     }
@@ -156,7 +156,7 @@ fn parts(tool: &ToolMesh) -> Vec<Vec<[u32; 3]>> {
 
 /// Distance (m, positive outside) from a plate with a rounded opening: in the half plane of the axis, the nearest point of its outline, which is a
 /// straight face, a quarter of a circle and a straight wall.
-pub fn from_plate(plate: &OpenPlate, p: V) -> f64 {
+pub fn from_plate(plate: &OpenPlate, p: Vec3) -> f64 {
     let r = (p[0] * p[0] + p[1] * p[1]).sqrt();
     // Into the plate from its face.
     let y = plate.side * (p[2] - plate.height);
@@ -181,8 +181,8 @@ mod tests {
     use plyflow_mechanics::contact::RigidSurface;
 
     /// A box with these corners (m).
-    fn block(low: V, high: V) -> ToolMesh {
-        let corner = |k: usize| -> V {
+    fn block(low: Vec3, high: Vec3) -> ToolMesh {
+        let corner = |k: usize| -> Vec3 {
             std::array::from_fn(|d| if k >> d & 1 == 1 { high[d] } else { low[d] })
         };
         let sides = [

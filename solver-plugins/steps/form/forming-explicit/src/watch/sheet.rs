@@ -2,7 +2,7 @@
 
 use crate::watch::cell::{Foot, corner, direction, edge, foot, mix, tangents, weights};
 use plyflow_geometry::TriangleTree;
-use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use plyflow_mechanics::mirror::Planes;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -81,14 +81,14 @@ pub struct SheetTree {
 
 impl SheetTree {
     /// The cell that is closest to a place (m), each as two triangles. `hint`: a cell that is probably near.
-    pub fn cell(&self, p: V, hint: u32) -> u32 {
+    pub fn cell(&self, p: Vec3, hint: u32) -> u32 {
         // Its first triangle, where all cells have two.
         let triangle = (2 * hint as usize).min(self.cells.len() - 1);
         self.cells[self.tree.closest_from(p, triangle)]
     }
 
     /// The same, if it is nearer than `reach` (m). `last`: the triangle that was found last, if any (of a tree over the same cells), and is now.
-    pub fn cell_within(&self, p: V, reach: f64, last: &mut u32) -> Option<u32> {
+    pub fn cell_within(&self, p: Vec3, reach: f64, last: &mut u32) -> Option<u32> {
         let hint = Some(*last as usize).filter(|t| *t < self.cells.len());
         let found = self.tree.closest_within(p, reach, hint)?;
         *last = found as u32;
@@ -99,7 +99,7 @@ impl SheetTree {
 /// How a sheet is bent at one time, found out where it is asked for: a normal counts for up to four cells, and a cell for four nodes.
 pub struct Bent {
     /// By node, in the sheet's numbers: [`SheetMesh::normal_at_node`].
-    normals: Vec<OnceLock<V>>,
+    normals: Vec<OnceLock<Vec3>>,
     /// By cell: [`SheetMesh::bulge`] in its middle (m).
     middles: Vec<OnceLock<f64>>,
 }
@@ -141,7 +141,7 @@ fn cells_around(cells: &[[u32; 4]], nodes: usize) -> (Vec<u32>, Vec<u32>) {
 
 impl SheetMesh {
     /// Of cells in the numbers of a model with points that started at `start` (m).
-    pub fn new(cells: &[[u32; 4]], start: &[V], planes: Planes) -> Self {
+    pub fn new(cells: &[[u32; 4]], start: &[Vec3], planes: Planes) -> Self {
         let mut nodes: Vec<u32> = cells.iter().flatten().copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
@@ -202,7 +202,7 @@ impl SheetMesh {
     }
 
     /// The box around it (m).
-    pub fn bounds(&self, x: &[V]) -> [V; 2] {
+    pub fn bounds(&self, x: &[Vec3]) -> [Vec3; 2] {
         let all = self.nodes.iter().map(|n| x[*n as usize]);
         all.fold(
             [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]],
@@ -216,7 +216,7 @@ impl SheetMesh {
     }
 
     /// The cell with the nearest middle.
-    pub fn nearest_middle(&self, x: &[V], p: V) -> u32 {
+    pub fn nearest_middle(&self, x: &[Vec3], p: Vec3) -> u32 {
         let mut best = (f64::INFINITY, 0);
         for cell in 0..self.cells.len() as u32 {
             let away = sub(mix([0.25; 4], &self.corners(x, cell)), p);
@@ -229,8 +229,8 @@ impl SheetMesh {
     }
 
     /// A tree over its cells as they are now; `None` when they have no area.
-    pub fn tree(&self, x: &[V]) -> Option<SheetTree> {
-        let points: Vec<V> = self.nodes.iter().map(|n| x[*n as usize]).collect();
+    pub fn tree(&self, x: &[Vec3]) -> Option<SheetTree> {
+        let points: Vec<Vec3> = self.nodes.iter().map(|n| x[*n as usize]).collect();
         let (mut triangles, mut cells) = (Vec::new(), Vec::new());
         for (c, [a, b, d, e]) in self.local.iter().enumerate() {
             for t in [[*a, *b, *d], [*a, *d, *e]] {
@@ -265,12 +265,12 @@ impl SheetMesh {
         &self.around[self.first[n] as usize..self.first[n + 1] as usize]
     }
 
-    fn corners(&self, x: &[V], cell: u32) -> [V; 4] {
+    fn corners(&self, x: &[Vec3], cell: u32) -> [Vec3; 4] {
         self.cells[cell as usize].map(|n| x[n as usize])
     }
 
     /// The closest point to `p` (m), from a place near it: down to the closest of all cells that can be reached so.
-    pub fn closest(&self, x: &[V], p: V, from: (u32, [f64; 2])) -> Near {
+    pub fn closest(&self, x: &[Vec3], p: Vec3, from: (u32, [f64; 2])) -> Near {
         let (mut cell, start) = from;
         let mut best = foot(&self.corners(x, cell), p, start);
         for _ in 0..CROSSED {
@@ -308,7 +308,7 @@ impl SheetMesh {
         self.describe(x, cell, &best)
     }
 
-    fn describe(&self, x: &[V], cell: u32, f: &Foot) -> Near {
+    fn describe(&self, x: &[Vec3], cell: u32, f: &Foot) -> Near {
         let q = self.corners(x, cell);
         let nodes = self.cells[cell as usize];
         let across = self.across[cell as usize];
@@ -367,7 +367,7 @@ impl SheetMesh {
     }
 
     /// Normal of a cell at the middle of the edge between two of its nodes.
-    fn normal_at_edge(&self, x: &[V], cell: u32, ends: [u32; 2]) -> V {
+    fn normal_at_edge(&self, x: &[Vec3], cell: u32, ends: [u32; 2]) -> Vec3 {
         let nodes = self.cells[cell as usize];
         let at = |e: usize| ends.contains(&nodes[e]) && ends.contains(&nodes[(e + 1) % 4]);
         let xi = match (0..4).find(|e| at(*e)) {
@@ -383,7 +383,7 @@ impl SheetMesh {
 
     /// Unit normal of the smooth sheet at a node: of the cells around it, each the less the longer its sides there
     /// (N. Max, J. Graphics Tools 4, 1999).
-    pub fn normal_at_node(&self, x: &[V], node: u32) -> V {
+    pub fn normal_at_node(&self, x: &[Vec3], node: u32) -> Vec3 {
         let mut sum = [0.0; 3];
         for cell in self.around(node) {
             let nodes = self.cells[*cell as usize];
@@ -399,14 +399,14 @@ impl SheetMesh {
     }
 
     /// Normal (of any length) of a cell in its middle.
-    pub fn normal_in(&self, x: &[V], cell: u32) -> V {
+    pub fn normal_in(&self, x: &[Vec3], cell: u32) -> Vec3 {
         let [a, b, c, d] = self.corners(x, cell);
         cross(sub(c, a), sub(d, b))
     }
 
     /// How far (m) the smooth sheet through the nodes lies off the cell at a place in it: half of how far the tangent planes of the corners lie
     /// off it there, which is exact for a parabola; at most what it is for an element whose diagonal turns by one radian.
-    pub fn bulge(&self, x: &[V], bent: &Bent, cell: u32, xi: [f64; 2]) -> f64 {
+    pub fn bulge(&self, x: &[Vec3], bent: &Bent, cell: u32, xi: [f64; 2]) -> f64 {
         let (nodes, local) = (self.cells[cell as usize], self.local[cell as usize]);
         let q = self.corners(x, cell);
         let [a, b] = tangents(&q, xi);
@@ -427,7 +427,7 @@ impl SheetMesh {
     }
 
     /// The same in the middle of the cells around a node, the largest.
-    pub fn bulge_around(&self, x: &[V], bent: &Bent, node: u32) -> f64 {
+    pub fn bulge_around(&self, x: &[Vec3], bent: &Bent, node: u32) -> f64 {
         let of = |c: u32| {
             let known = &bent.middles[c as usize];
             *known.get_or_init(|| self.bulge(x, bent, c, [0.0; 2]))
@@ -442,16 +442,16 @@ mod tests {
     use super::*;
     use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 
-    fn grid(shape: impl Fn(f64, f64) -> f64) -> (SheetMesh, Vec<V>) {
+    fn grid(shape: impl Fn(f64, f64) -> f64) -> (SheetMesh, Vec<Vec3>) {
         let mesh = QuadMesh::grid(&even_axis(0.0, 0.1, 0.01), &even_axis(0.0, 0.06, 0.01));
         let sheet = SheetMesh::new(&mesh.cells, &mesh.points, Planes::default());
-        let lifted = |p: &V| [p[0], p[1], shape(p[0], p[1])];
+        let lifted = |p: &Vec3| [p[0], p[1], shape(p[0], p[1])];
         let x = mesh.points.iter().map(lifted).collect();
         (sheet, x)
     }
 
     /// Nearest of many points of all cells.
-    fn nearest(sheet: &SheetMesh, x: &[V], p: V) -> f64 {
+    fn nearest(sheet: &SheetMesh, x: &[Vec3], p: Vec3) -> f64 {
         let steps = || (0..=40).map(|k| -1.0 + 0.05 * f64::from(k));
         let mut best = f64::INFINITY;
         for cell in 0..sheet.cells().len() as u32 {
@@ -496,8 +496,9 @@ mod tests {
     #[test]
     fn past_its_edge_a_sheet_has_no_side_and_at_a_mirror_plane_it_has_no_edge() {
         let (sheet, x) = grid(|_, _| 0.0);
-        let at =
-            |sheet: &SheetMesh, p: V| sheet.closest(&x, p, (sheet.nearest_middle(&x, p), [0.0; 2]));
+        let at = |sheet: &SheetMesh, p: Vec3| {
+            sheet.closest(&x, p, (sheet.nearest_middle(&x, p), [0.0; 2]))
+        };
         assert_eq!(at(&sheet, [-0.003, 0.03, -0.002]).to_rim, 0.0);
         assert_eq!(at(&sheet, [0.102, 0.062, 0.002]).to_rim, 0.0);
         assert!((at(&sheet, [0.004, 0.03, -0.002]).to_rim - 0.004).abs() < 1e-9);

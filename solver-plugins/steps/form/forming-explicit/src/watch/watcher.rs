@@ -1,7 +1,7 @@
 //! A sheet that is watched, and where on it a node's closest point is.
 
 use crate::watch::sheet::{Bent, Near, Seat, SheetMesh, SheetTree};
-use plyflow_geometry::vec3::V;
+use plyflow_geometry::vec3::Vec3;
 use std::sync::OnceLock;
 
 /// Distance (m) from a sheet's middle surface over which a node may have come through it since the row before.
@@ -19,15 +19,15 @@ pub struct Watcher {
 
 /// Everything at one time.
 pub struct Moment<'a> {
-    pub x: &'a [V],
+    pub x: &'a [Vec3],
     /// By part (m).
-    pub shifts: &'a [V],
+    pub shifts: &'a [Vec3],
     /// By sheet, where everything is looked at anew.
     pub trees: Option<&'a [Option<SheetTree>]>,
     /// By sheet, where something seems to have come through it and nothing else is looked at anew.
     pub asked: &'a [OnceLock<Option<SheetTree>>],
     /// By sheet (m).
-    pub boxes: &'a [[V; 2]],
+    pub boxes: &'a [[Vec3; 2]],
     /// By sheet.
     pub bent: &'a [Bent],
     pub first: bool,
@@ -74,7 +74,7 @@ pub fn has_come_through(before: f64, over: f64) -> bool {
 }
 
 /// Whether a place is outside of a box by more than what matters.
-fn is_off([low, high]: [V; 2], p: V) -> bool {
+fn is_off([low, high]: [Vec3; 2], p: Vec3) -> bool {
     (0..3).any(|k| p[k] < low[k] - LEAP || p[k] > high[k] + LEAP)
 }
 
@@ -88,8 +88,8 @@ mod tests {
     fn what_seems_to_have_come_through_the_far_side_of_a_fold_is_looked_for_on_the_near_side_too() {
         // A sheet folded back on itself over 6 mm: its far half lies below, its near one above.
         let mesh = QuadMesh::grid(&even_axis(-0.1, 0.1, 0.01), &even_axis(0.0, 0.04, 0.01));
-        let folded = |p: &V| [p[0].abs(), p[1], 0.003 * f64::signum(p[0])];
-        let mut x: Vec<V> = mesh.points.iter().map(folded).collect();
+        let folded = |p: &Vec3| [p[0].abs(), p[1], 0.003 * f64::signum(p[0])];
+        let mut x: Vec<Vec3> = mesh.points.iter().map(folded).collect();
         let start = [mesh.points.clone(), vec![[0.0; 3]]].concat();
         let sheet = Watcher {
             mesh: SheetMesh::new(&mesh.cells, &start, Planes::default()),

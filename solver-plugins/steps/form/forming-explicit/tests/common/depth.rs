@@ -1,7 +1,7 @@
 //! How deep the nodes of sheets lie in other sheets, from their places alone: nothing here is shared with contact.
 
 use plyflow_forming_explicit::Forming;
-use plyflow_geometry::vec3::{V, add, cross, dot, norm, scale, sub, unit};
+use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub, unit};
 use plyflow_model::scene::SheetKind;
 
 /// The deepest node of one sheet in another.
@@ -15,11 +15,11 @@ pub struct Depth {
     /// that.
     pub depth: f64,
     /// Where the node is (m).
-    pub place: V,
+    pub place: Vec3,
 }
 
 /// A point of a bilinear cell and its distance (m) from `p`; whether it lies on one of the cell's sides without a neighbour.
-fn closest(q: [V; 4], free: [bool; 4], p: V) -> (f64, V, bool) {
+fn closest(q: [Vec3; 4], free: [bool; 4], p: Vec3) -> (f64, Vec3, bool) {
     let mix = |w: [f64; 4]| (0..4).fold([0.0; 3], |s, k| add(s, scale(q[k], w[k])));
     let shape = |[u, v]: [f64; 2]| [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v];
     let distance = |at: [f64; 2]| norm(sub(p, mix(shape(at))));
@@ -80,7 +80,7 @@ fn deepest(forming: &Forming, slave: usize, master: usize) -> Option<Depth> {
     };
     let touching = 0.5 * (own.thickness + other.thickness);
     let side = if slave > master { 1.0 } else { -1.0 };
-    let cells: Vec<([V; 4], [bool; 4], V, f64)> = (cells.iter())
+    let cells: Vec<([Vec3; 4], [bool; 4], Vec3, f64)> = (cells.iter())
         .map(|c| {
             let q = c.map(|n| points[n as usize]);
             let middle = scale(q.into_iter().fold([0.0; 3], add), 0.25);
@@ -88,7 +88,7 @@ fn deepest(forming: &Forming, slave: usize, master: usize) -> Option<Depth> {
             (q, [0, 1, 2, 3].map(|k| !shared(edge(c, k))), middle, radius)
         })
         .collect();
-    let depth = |p: &V| {
+    let depth = |p: &Vec3| {
         // What is further away than this is not in it.
         let mut best = (4e-3, [0.0; 3], [0.0; 3], true);
         for (q, free, middle, radius) in &cells {

@@ -4,48 +4,32 @@
 pub mod depth;
 pub mod scenes;
 
-use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component, pf_str};
+use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_forming_explicit::{
     Components, Forming, FormingError, Observer, Outcome, Parameters, build_global,
 };
-use plyflow_geometry::vec3::{V, norm, sub};
-use plyflow_kernels::{fabric::Fabric, m4::M4, marlow::Marlow, rf4::Rf4, s4::S4};
+use plyflow_geometry::vec3::{Vec3, norm, sub};
+use plyflow_kernels::built_in;
 use plyflow_mechanics::energy::Ledger;
-use plyflow_sdk::{StepError, element_table, material_table};
+use plyflow_sdk::StepError;
 use serde_json::{Value, json};
 
-/// The elements, the fabric and the film.
+/// The components that come along with Plyflow.
 pub struct BuiltIn;
 
-fn component(kind: u32, functions: *const std::ffi::c_void) -> pf_component {
-    pf_component {
-        kind,
-        reserved: 0,
-        functions,
-        manifest: pf_str::new("{}"),
+impl BuiltIn {
+    fn of(kind: u32, name: &str) -> Result<pf_component, FormingError> {
+        let found = built_in::component(kind, name);
+        found.ok_or_else(|| FormingError::value("component", name, "one that comes along"))
     }
 }
 
 impl Components for BuiltIn {
     fn element(&self, name: &str) -> Result<pf_component, FormingError> {
-        let table = match name {
-            "rf4" => element_table::<Rf4>(),
-            "s4" => element_table::<S4>(),
-            _ => element_table::<M4>(),
-        };
-        let table = Box::leak(Box::new(table));
-        Ok(component(PF_KIND_ELEMENT, std::ptr::from_ref(table).cast()))
+        Self::of(PF_KIND_ELEMENT, name)
     }
     fn material(&self, name: &str) -> Result<pf_component, FormingError> {
-        let table = match name {
-            "material-fabric" => material_table::<Fabric>(),
-            _ => material_table::<Marlow>(),
-        };
-        let table = Box::leak(Box::new(table));
-        Ok(component(
-            PF_KIND_MATERIAL,
-            std::ptr::from_ref(table).cast(),
-        ))
+        Self::of(PF_KIND_MATERIAL, name)
     }
 }
 
@@ -119,8 +103,8 @@ pub fn stopped(p: &Parameters, threads: usize) -> String {
 }
 
 /// For each point of `a` the one of `b` that began at the same place.
-pub fn twins(a: &[V], b: &[V]) -> Vec<usize> {
-    let near = |p: &V| {
+pub fn twins(a: &[Vec3], b: &[Vec3]) -> Vec<usize> {
+    let near = |p: &Vec3| {
         let by = |i: &usize, j: &usize| norm(sub(b[*i], *p)).total_cmp(&norm(sub(b[*j], *p)));
         let best = (0..b.len()).min_by(by).unwrap();
         assert!(norm(sub(b[best], *p)) < 1e-9, "{p:?}");

@@ -1,0 +1,60 @@
+//! The form `fibre-energy`: an energy of the fibres' stretches and of the sine of the shear angle.
+
+use super::ply::{Fabric, LEAST, tangents};
+use super::shear::ShearOf;
+use super::yarn::Law;
+use crate::{Lanes, WIDTH};
+
+/// Rows of history with a stitch: largest shear angle, its sine.
+pub(super) const HISTORY: usize = 2;
+
+/// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty.
+#[inline(always)]
+pub(super) fn membrane<V: Lanes, L: Law>(
+    f: &Fabric,
+    law: ShearOf<'_, L>,
+    n: usize,
+    metric: &[f64],
+    history: &mut [f64],
+    stress: &mut [f64],
+    energy: &mut [f64],
+    stiffness: &mut [f64],
+) {
+    let (one, half) = (V::splat(1.0), V::splat(0.5));
+    let (tension, compression) = (V::splat(f.tension), V::splat(f.compression));
+    for c in (0..n).step_by(WIDTH) {
+        let c11 = V::load(metric, c).max(V::splat(LEAST));
+        let c22 = V::load(metric, n + c).max(V::splat(LEAST));
+        let c12 = V::load(metric, 2 * n + c);
+        let (i1, i2) = (one / c11, one / c22);
+        // 1/l, and l = C / l: one division and one root for each family.
+        let (r1, r2) = (i1.sqrt(), i2.sqrt());
+        let (d1, d2) = (c11 * r1 - one, c22 * r2 - one);
+        let zero = V::splat(0.0);
+        let k1 = V::select(d1.lt(zero), compression, tension);
+        let k2 = V::select(d2.lt(zero), compression, tension);
+        let rr = r1 * r2;
+        let s = c12 * rr;
+        let shear = if law.stitch.is_some() {
+            let (g, sine) = (V::load(history, c), V::load(history, n + c));
+            let (shear, g, sine) = law.with_stitch(s, g, sine);
+            g.store(history, c);
+            sine.store(history, n + c);
+            shear
+        } else {
+            law.yarn(s)
+        };
+        let fs = shear.force * s;
+        (k1 * d1 * r1 - fs * i1).store(stress, c);
+        (k2 * d2 * r2 - fs * i2).store(stress, n + c);
+        (shear.force * rr).store(stress, 2 * n + c);
+        (half * (k1 * d1 * d1 + k2 * d2 * d2) + shear.energy).store(energy, c);
+        if !stiffness.is_empty() {
+            let slope = law.slopes(s).0;
+            let (a1, a2) = (tension * i1 * r1, tension * i2 * r2);
+            let (largest, soft) = tangents(slope, s, i1, i2, a1, a2, shear.force.abs());
+            largest.store(stiffness, c);
+            soft.store(stiffness, n + c);
+        }
+    }
+}
