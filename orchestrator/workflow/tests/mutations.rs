@@ -759,7 +759,7 @@ const CASES: &[Case] = &[
     (
         S,
         "  - name: upper-film\n    kind: diaphragm\n    material: film.yaml\n",
-        "    regions:\n      - {name: a, rectangle: {length: 20 mm, width: 20 mm}, friction: {all: {coefficient: 0.5, angle: {factors: [{angle: 0 deg, factor: 1}, {angle: 90 deg, factor: 1.5}]}}}}\n  - name: upper-film\n    kind: diaphragm\n    material: film.yaml\nsymmetry: [x]\n",
+        "    regions:\n      - {name: a, rectangle: {length: 20 mm, width: 20 mm}, friction: {upper-film: {coefficient: 0.5, angle: {factors: [{angle: 0 deg, factor: 1}, {angle: 90 deg, factor: 1.5}]}}}}\n  - name: upper-film\n    kind: diaphragm\n    material: film.yaml\nsymmetry: [x]\n",
         5,
         &["which the plane exchanges with the other one in sheet `ply-1`"],
     ),
