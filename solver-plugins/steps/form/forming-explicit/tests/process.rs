@@ -46,7 +46,7 @@ fn parameters(symmetry: &[&str], change: impl Fn(&mut Value)) -> Parameters {
                        {"name": "ply", "kind": "ply", "material": fabric(), "length": "0.12 m", "width": "0.09 m",
                         "fibre_1": "-0.7853981633974483 rad", "fibre_2": "0.7853981633974483 rad"},
                        diaphragm("upper")],
-            "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "diaphragm_diaphragm": 0.3},
+            "friction": {"tool_diaphragm": 0.5, "fabric_diaphragm": 0.4, "fabric_fabric": 0.35, "diaphragm_diaphragm": 0.3},
             "process": {"double_diaphragm": process},
             "symmetry": symmetry
         },
@@ -77,8 +77,9 @@ fn run(forming: &mut Forming, p: &Parameters, end: f64, mut see: impl FnMut(&mut
 fn hung(symmetry: &[&str], weight: &str) -> (Forming, [f64; 3]) {
     let mut p = parameters(symmetry, |process| {
         process["weight"] = json!(weight);
-        process["bag_pressure"] = json!("0 Pa");
-        process["forming_pressure"] = json!("0 Pa");
+        // As good as none, which a scene may not have.
+        process["bag_pressure"] = json!("1e-6 Pa");
+        process["forming_pressure"] = json!("1e-6 Pa");
         process["bagging_time"] = json!("0.5 s");
         process["film_pre_stretch"] = json!(0.0);
     });
