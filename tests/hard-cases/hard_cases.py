@@ -27,6 +27,8 @@ PAGE = ROOT / "docs" / "hard-cases.md"
 ALWAYS = {"drift_ratio": {"maximum": 0.01}}
 # What tells where a stop is: a place, the parameter that is refused, or the component that refuses.
 LOCATED = re.compile(r"at \(-?[\d.]+, -?[\d.]+, -?[\d.]+\) mm|: given |^element '\w+'")
+# Units of axes, and what numbers in SI are multiplied by for them.
+SHOWN = {"1": 1.0, "mm": 1e3, "N/mm": 1e-3}
 DEEP = ("ply_depth_ratio", "overlap_ratio")
 
 

@@ -255,7 +255,7 @@ fn strip(element: &str) -> Value {
     material["with"]["fibre_modulus"] = json!(3e8);
     material["with"]["bending"] = json!({"positive": {"stiffness": 0.008}});
     json!({
-        "material": material, "element": {"plugin": element, "with": {"hourglass": 1.0, "hourglass_floor": 3000.0, "hourglass_normal": 0.01}},
+        "material": material, "element": {"plugin": element, "with": {"hourglass": 1.0, "hourglass_floor": 3000.0}},
         "element_size": 0.005, "length": 0.1, "width": 0.01, "family": 1, "shortening": 0.1, "time": 0.3, "settling_time": 0.02,
         "foundation_thickness": 0.001, "disturbance": 10.0, "stiffness": 0.008, "step_safety": 0.8, "damping": 5.0, "frames": 3,
         "kinetic_bound": 0.05
