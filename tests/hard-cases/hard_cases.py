@@ -135,7 +135,7 @@ def picture(case: dict, rows: list[Row], places: dict[str, tuple[str, ...]]) -> 
     for i, row in enumerate(done):
         artifact = runs.artifact(places[row.step], row.step)
         plot = next(p for p in artifact.attributes["plots"] if p["name"] == wanted)
-        scale = [1000.0 if plot[axis]["unit"] in ("mm",) else 1.0 for axis in "xy"]
+        scale = [SHOWN[plot[axis]["unit"]] for axis in "xy"]
         for series in plot["series"]:
             x, y = (artifact.array(series[axis].removeprefix("data/")) * s for axis, s in zip("xy", scale))
             if series is plot["series"][0]:
