@@ -295,3 +295,13 @@ fn same_bytes_on_one_and_two_threads_buckling() {
     }
     same_on_one_and_two_threads::<Buckling>(&with);
 }
+
+#[test]
+fn a_strip_on_springs_that_has_not_buckled_gives_no_wave_length() {
+    let mut with = strip("rf4");
+    with["foundation_modulus"] = json!(15e3);
+    with["shortening"] = json!(0.001);
+    let error = run_on::<Buckling>(&ALONE, with, &[], &[]).err();
+    let error = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("did not buckle"), "{error}");
+}
