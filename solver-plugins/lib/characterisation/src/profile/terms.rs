@@ -128,7 +128,7 @@ pub enum Method {
 pub struct Choice {
     /// What is fitted.
     pub method: Method,
-    /// Degree of the polynomial; `None`: by the rule of [`fit`].
+    /// Degree of the polynomial; `None`: by the rule of [`super::fit`].
     pub degree: Option<usize>,
     /// Highest degree that the rule may take.
     pub maximum_degree: usize,
