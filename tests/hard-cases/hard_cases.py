@@ -28,7 +28,7 @@ ALWAYS = {"drift_ratio": {"maximum": 0.01}}
 # What tells where a stop is: a place, the parameter that is refused, or the component that refuses.
 LOCATED = re.compile(r"at \(-?[\d.]+, -?[\d.]+, -?[\d.]+\) mm|: given |^element '\w+'")
 # Units of axes, and what numbers in SI are multiplied by for them.
-SHOWN = {"1": 1.0, "mm": 1e3, "N/mm": 1e-3}
+SHOWN = {"1": 1.0, "s": 1.0, "mm": 1e3, "N/mm": 1e-3}
 DEEP = ("ply_depth_ratio", "overlap_ratio")
 
 
@@ -124,9 +124,9 @@ def run(name: str, rows: list[Row]) -> tuple[str, ...]:
 
 
 def picture(case: dict, rows: list[Row], places: dict[str, tuple[str, ...]]) -> str | None:
-    """Draws the plot of the case's artifacts that its `picture` names, a line for each row; the file's name."""
+    """Draws the plot of the case's artifacts that its `picture` names, a line for each row (of `only`); the file's name."""
     wanted = case.get("picture")
-    done = [r for r in rows if r.failure is None]
+    done = [r for r in rows if r.failure is None and r.step in case.get("only", [r.step])]
     if not wanted or not done:
         return None
     figure, axes = style.plt.subplots(figsize=(4.6, 2.9), layout="constrained")

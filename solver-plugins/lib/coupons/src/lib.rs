@@ -18,6 +18,7 @@ pub mod bias_plane;
 pub mod buckling;
 pub mod cantilever;
 pub mod film;
+pub mod friction;
 pub mod inflation;
 pub mod output;
 pub mod picture_frame;

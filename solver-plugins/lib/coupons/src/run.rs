@@ -246,12 +246,8 @@ fn frame(host: &Host, specimen: &Specimen, t: f64) -> Result<(), StepError> {
     host.begin_frame(t)?;
     host.write_points("specimen", specimen.model.x())?;
     for f in &specimen.fields {
-        let (on, values) = if f.patch {
-            (On::Points, specimen.model.patch_field(0, f.row))
-        } else {
-            (On::Cells, specimen.model.cell_field(0, f.row))
-        };
-        host.write_field("specimen", on, &f.name, 1, &f.unit, &values)?;
+        let on = if f.patch { On::Points } else { On::Cells };
+        host.write_field("specimen", on, &f.name, 1, &f.unit, &specimen.values(f))?;
     }
     host.end_frame()
 }

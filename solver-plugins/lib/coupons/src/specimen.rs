@@ -1,4 +1,4 @@
-//! A specimen: one sheet of a material, meshed, with an element formulation.
+//! A specimen: one sheet of a material, or some, meshed, with an element formulation.
 
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL};
 use plyflow_geometry::vec3::Vec3;
@@ -80,9 +80,21 @@ impl Common {
     }
 }
 
+/// A sheet of a specimen of several.
+pub struct Stacked {
+    /// Its name in the model.
+    pub name: &'static str,
+    /// Its mesh, with node numbers of its own.
+    pub mesh: QuadMesh,
+    /// Direction of material axis e1 in the undeformed plane.
+    pub axis: Vec3,
+    /// Which of its faces a pressure acts on.
+    pub pressed: Pressed,
+}
+
 /// A specimen as a model and as a body.
 pub struct Specimen {
-    /// The model; its one sheet has the nodes of the mesh, in the same numbers.
+    /// The model; its sheets have the nodes of the mesh, in the same numbers.
     pub model: Model,
     /// The mesh at the start.
     pub mesh: QuadMesh,
@@ -142,28 +154,51 @@ impl Specimen {
         axis: Vec3,
         pressed: Pressed,
     ) -> Result<Self, StepError> {
-        let (element, fields) = element(host, p)?;
-        let m = mesh.cells.len();
-        let spec = SheetSpec {
-            name: "specimen".into(),
-            nodes: (0..mesh.points.len() as u32).collect(),
-            cells: mesh.cells.clone(),
-            patches: mesh.patches(),
+        let sheet = Stacked {
+            name: "specimen",
+            mesh,
             axis,
-            layers: vec![1.0; m],
-            pressed: vec![pressed; m],
-            least_areal_mass: vec![0.0; m],
-            element,
-            elsewhere: None,
-            other_material: None,
+            pressed,
         };
+        Self::of_sheets(host, p, &[sheet])
+    }
+
+    /// Builds the model of several sheets of the same material and element. Its mesh is that of all, one after the other.
+    ///
+    /// # Errors
+    /// When a component refuses or the meshes make no model.
+    pub fn of_sheets(host: &Host, p: &Common, sheets: &[Stacked]) -> Result<Self, StepError> {
+        let mut mesh = QuadMesh::default();
+        let mut specs = Vec::new();
+        let mut fields = Vec::new();
+        for sheet in sheets {
+            let (element, of_element) = element(host, p)?;
+            fields = of_element;
+            let (first, n) = (mesh.points.len() as u32, sheet.mesh.points.len() as u32);
+            let m = sheet.mesh.cells.len();
+            specs.push(SheetSpec {
+                name: sheet.name.into(),
+                nodes: (first..first + n).collect(),
+                cells: sheet.mesh.cells.clone(),
+                patches: sheet.mesh.patches(),
+                axis: sheet.axis,
+                layers: vec![1.0; m],
+                pressed: vec![sheet.pressed; m],
+                least_areal_mass: vec![0.0; m],
+                element,
+                elsewhere: None,
+                other_material: None,
+            });
+            mesh.points.extend(&sheet.mesh.points);
+            let moved = |c: &[u32; 4]| c.map(|node| node + first);
+            mesh.cells.extend(sheet.mesh.cells.iter().map(moved));
+        }
         let settings = StepSettings {
             target_step: p.time_step.unwrap_or(0.0),
             safety: p.step_safety,
             damping: p.damping,
         };
-        let model =
-            Model::new(mesh.points.clone(), vec![spec], settings).map_err(|e| e.to_string())?;
+        let model = Model::new(mesh.points.clone(), specs, settings).map_err(|e| e.to_string())?;
         Ok(Self {
             model,
             mesh,
@@ -171,14 +206,21 @@ impl Specimen {
         })
     }
 
-    /// Values of a field of the element by name: per cell, or per point for patch fields. Needs a step that
-    /// kept fields (a frame or a sample).
+    /// Values of a field of the element: per cell, or per point for patch fields. Needs a step that kept fields (a frame or a sample).
+    pub fn values(&self, field: &ElementField) -> Vec<f64> {
+        let of = |sheet: usize| {
+            if field.patch {
+                self.model.patch_field(sheet, field.row)
+            } else {
+                self.model.cell_field(sheet, field.row)
+            }
+        };
+        (0..self.model.sheets().len()).flat_map(of).collect()
+    }
+
+    /// The same of a field by name; none when the element does not have it.
     pub fn field(&self, name: &str) -> Option<Vec<f64>> {
-        let f = self.fields.iter().find(|f| f.name == name)?;
-        Some(if f.patch {
-            self.model.patch_field(0, f.row)
-        } else {
-            self.model.cell_field(0, f.row)
-        })
+        let field = self.fields.iter().find(|f| f.name == name)?;
+        Some(self.values(field))
     }
 }

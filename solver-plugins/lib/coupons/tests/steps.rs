@@ -4,8 +4,8 @@
 use plyflow_coupons::{
     bias_extension::Plugin as BiasExtension, bias_plane::Plugin as BiasPlane,
     buckling::Plugin as Buckling, cantilever::Plugin as Cantilever, film::Plugin as Film,
-    inflation::Plugin as Inflation, picture_frame::Plugin as PictureFrame,
-    pure_bending::Plugin as PureBending,
+    friction::Plugin as Friction, inflation::Plugin as Inflation,
+    picture_frame::Plugin as PictureFrame, pure_bending::Plugin as PureBending,
 };
 use plyflow_kernels::built_in::component;
 use plyflow_sdk::Step;
@@ -106,6 +106,48 @@ fn same_bytes_on_one_and_two_threads_film_and_disc() {
         "material": film(), "element": element("m4"), "element_size": 0.005, "pressure": 2000.0,
         "ramp_time": 0.006, "hold_time": 0.001, "frames": 3
     }));
+}
+
+/// A soft belt, block or stack of the fabric, with membranes.
+fn sliding(case: &str, mut more: Value) -> Value {
+    let mut material = ncf();
+    material["with"]["fibre_modulus"] = json!(3e8);
+    more["material"] = material;
+    more["case"] = json!(case);
+    more["element"] = element("m4");
+    more
+}
+
+#[test]
+fn friction_follows_its_closed_forms_and_a_block_stays_below_its_angle() {
+    let run = |with: Value| run_on::<Friction>(&ALONE, with, &[], &[]).unwrap();
+    let belt = json!({"coefficient": 0.5, "element_size": 0.005, "time_step": 5e-6});
+    let belt = run(sliding("capstan", belt));
+    assert!(belt.result("friction_error") < 0.03);
+    let law = (0.5 * std::f64::consts::FRAC_PI_2).exp();
+    assert!((belt.result("force_ratio_law") - law).abs() < 1e-12);
+
+    let slope = |degrees: f64| {
+        let with = json!({"coefficient": 0.4, "slope": degrees.to_radians(), "element_size": 0.01, "time_step": 1e-5});
+        run(sliding("incline", with))
+    };
+    let (stays, slides) = (slope(21.5), slope(30.0));
+    assert!(stays.result("slid").abs() < 2e-6);
+    assert!(!stays.results.contains_key("friction_error"));
+    assert!(slides.result("friction_error") < 0.01);
+    assert!(slides.result("slid") > 1e-3);
+
+    let stack =
+        json!({"coefficient": 0.3, "pressure": 2e4, "element_size": 0.01, "time_step": 1e-5});
+    let stack = run(sliding("stack", stack));
+    assert!(stack.result("friction_error") < 0.01);
+    assert!((stack.result("pulling_force_law") - 30.0).abs() < 1e-9);
+}
+
+#[test]
+fn same_bytes_on_one_and_two_threads_a_stack_of_three_sheets() {
+    let with = json!({"coefficient": 0.3, "element_size": 0.003, "time_step": 2e-5, "frames": 3});
+    same_on_one_and_two_threads::<Friction>(&sliding("stack", with));
 }
 
 #[test]
