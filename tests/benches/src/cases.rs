@@ -1,6 +1,7 @@
 //! The cases.
 
 use crate::machine::Class;
+use crate::ratios;
 use plyflow_e2e::{program, repository};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -297,20 +298,32 @@ pub fn points() -> Vec<Row> {
 
 /// Element-steps per second of one core, as the kernels' own example measures them.
 pub fn kernels() -> Vec<Row> {
+    let row = |(case, v): (String, Value)| {
+        let rate = v["million_per_second"].as_f64().expect("a rate");
+        Row::new(case, 1e3 / rate, "ns per element-step")
+    };
+    kernel_rows(&[]).into_iter().map(row).collect()
+}
+
+/// The same over the calibrating loop of that example, with the widest instruction set alone and for a shorter time.
+pub fn kernel_ratios() -> Vec<Row> {
+    let row = |(case, v): (String, Value)| {
+        let ratio = v["calibrations"].as_f64().expect("a ratio");
+        Row::new(format!("{case}, ratio"), ratio, "calibrations")
+    };
+    kernel_rows(&["--short"]).into_iter().map(row).collect()
+}
+
+/// What the kernels' example prints, with the names of its cases.
+fn kernel_rows(words: &[&str]) -> Vec<(String, Value)> {
     let target = program()
         .parent()
         .and_then(Path::parent)
         .expect("a target folder");
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args([
-            "run",
-            "--quiet",
-            "--release",
-            "-p",
-            "plyflow-kernels",
-            "--example",
-            "bench_kernels",
-        ])
+        .args(["run", "--quiet", "--release", "-p", "plyflow-kernels"])
+        .args(["--example", "bench_kernels", "--"])
+        .args(words)
         .current_dir(repository())
         .env("CARGO_TARGET_DIR", target)
         .stderr(Stdio::inherit())
@@ -328,10 +341,18 @@ pub fn kernels() -> Vec<Row> {
             word("part"),
             word("lanes")
         );
-        let rate = v["million_per_second"].as_f64().expect("a rate");
-        Row::new(case, 1e3 / rate, "ns per element-step")
+        (case, v)
     };
     text.lines().map(row).collect()
+}
+
+/// Name, CPU time (ns) and calibration (ns) of a look at so many finished steps.
+pub fn no_op(n: usize) -> (String, f64, f64) {
+    let folder = fanned_out(n);
+    run(folder.path());
+    let (cost, calibration) =
+        ratios::beside(|| 1e9 * least(3, || spent(|| run(folder.path()))).cpu);
+    (format!("no-op of {n} steps fanned out"), cost, calibration)
 }
 
 /// The coarse joggle spar from nothing: cost, rate and energy balance of its global run.

@@ -49,6 +49,18 @@ fn widest(times: usize) -> f64 {
     multiply_add(times)
 }
 
+/// Nanoseconds for one multiplication and addition of the loop as any x86-64 or ARM has it: the least of some slices of milliseconds.
+pub fn nanoseconds_per_operation() -> f64 {
+    const TIMES: usize = 100_000;
+    let slice = || {
+        let clock = Instant::now();
+        black_box(multiply_add(black_box(TIMES)));
+        clock.elapsed().as_secs_f64()
+    };
+    let least = (0..20).map(|_| slice()).fold(f64::INFINITY, f64::min);
+    1e9 * least / (TIMES * SMALL) as f64
+}
+
 /// Operations per second (1/s) of `threads` threads, the best of five.
 fn operations(threads: usize) -> f64 {
     const TIMES: usize = 2_000_000;

@@ -1,11 +1,13 @@
 //! Measures the built program from outside and appends one JSON row per case to a file under
 //! `docs/benchmarks`, named after the machine's processor.
 //!
-//! `plyflow-benches [engine] [points] [kernels] [solver] [profile] [limits] [study] [busy]`: these groups, or all.
+//! `plyflow-benches [engine] [points] [kernels] [solver] [profile] [limits] [study] [busy] [ratios]`: these groups, or all.
+//! `plyflow-benches compare`: the ratios beside the last recorded ones; records nothing.
 
 mod cases;
 mod limits;
 mod machine;
+mod ratios;
 mod solver;
 
 use std::io::Write;
@@ -15,7 +17,10 @@ type Group = (&'static str, fn() -> Vec<cases::Row>);
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let groups: [Group; 8] = [
+    if wanted == ["compare"] {
+        return ratios::compare();
+    }
+    let groups: [Group; 9] = [
         ("engine", cases::engine),
         ("points", cases::points),
         ("kernels", cases::kernels),
@@ -24,6 +29,7 @@ fn main() {
         ("limits", limits::limits),
         ("study", cases::study),
         ("busy", solver::busy),
+        ("ratios", ratios::ratios),
     ];
     if let Some(odd) = wanted
         .iter()

@@ -1,6 +1,7 @@
 //! Whole steps of the solver: without and with contact, by thread, by element size.
 
 use crate::cases::Row;
+use crate::ratios;
 use plyflow_e2e::{program, repository};
 use plyflow_kernels::built_in::{self, BuiltIn};
 use serde_json::{Value, json};
@@ -201,6 +202,28 @@ pub fn solver() -> Vec<Row> {
     rows.push(whole_stroke(&presses));
     rows.extend(spar(&folder.path().join("workflows/joggle-spar")));
     rows
+}
+
+/// Name, cost of an element's step (CPU ns) and calibration (ns) of short runs with one thread: a strip, a press, and a small bag.
+pub fn short_runs() -> Vec<(String, f64, f64)> {
+    let folder = copy(0.1);
+    let place = |name: &str| folder.path().join("workflows").join(name);
+    let bag = "plyflow: 1\nname: bench\nsteps:\n  bag:\n    plugin: forming-explicit\n    with: {scene: block.yaml, element: m4, \
+               element_size: 16 mm, diaphragm_element_size: 16 mm, tool_grid: 2 mm, time_step: 20 us, frames: 4}\n";
+    let of = |case: &str, place: &Path, workflow: &str| {
+        let (cost, calibration) = ratios::beside(|| least(2, || run(place, workflow, 1)).cost());
+        (format!("{case}, 1 thread"), cost, calibration)
+    };
+    let presses = place("peers/hemisphere-press");
+    vec![
+        of(
+            "rf4, strip, no contact",
+            &place("coupons/angle-study"),
+            &strip("rf4", "3 mm", "4 ms"),
+        ),
+        of("s4, press 3 mm", &presses, &press("s4", 3.0, 1.6)),
+        of("m4, block 16 mm in a bag", &place("hard-cases"), bag),
+    ]
 }
 
 /// Where the time of a step goes, one thread: in a press, in a bag, and in a bag at rest.

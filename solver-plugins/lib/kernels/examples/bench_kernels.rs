@@ -1,5 +1,6 @@
 //! Element-steps per second of one core, through the C tables, on data that a forming run would
-//! have: `cargo run --release -p plyflow-kernels --example bench_kernels`. One JSON row per case.
+//! have: `cargo run --release -p plyflow-kernels --example bench_kernels`. One JSON row per case, with its cost over that of an operation
+//! of a calibrating loop which takes turns with it. `-- --short`: the widest instruction set alone, each case for a quarter of a second.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -10,6 +11,7 @@ use common::{El, FILM, Mat, fabric, film, ncf, woven};
 use plyflow_kernels::{Level, limit_level, m4::M4, m4f::M4f, rf4::Rf4};
 use plyflow_sdk::Element;
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::hint::black_box;
 use std::time::Instant;
 
 /// Every array on a cache line of its own, as the ABI asks of hosts: otherwise each load of eight lanes
@@ -40,14 +42,38 @@ const LANES: usize = 32;
 /// thread's workspace does in a run.
 const BATCHES: usize = 16;
 /// How long a case is timed (s).
-const WATCHED: f64 = 1.0;
+fn watched() -> f64 {
+    if is_short() { 0.25 } else { 1.0 }
+}
+
+fn is_short() -> bool {
+    std::env::args().any(|word| word == "--short")
+}
 
 fn main() {
     for level in [Level::Avx512, Level::Avx2, Level::Portable] {
         if limit_level(level) == level {
             cases();
+            if is_short() {
+                return;
+            }
         }
     }
+}
+
+/// Operations of a slice of the calibrating loop.
+const OPERATIONS: usize = 64 * 2_000;
+
+/// Multiplications and additions on numbers that stay in registers, without wide instructions.
+fn calibrate() -> f64 {
+    let mut a = [1.0f64; 64];
+    let (b, c) = (black_box(0.999_999), black_box(1e-6));
+    for _ in 0..black_box(OPERATIONS / 64) {
+        for a in &mut a {
+            *a = *a * b + c;
+        }
+    }
+    a.iter().sum()
 }
 
 fn cases() {
@@ -109,31 +135,51 @@ fn shells(name: &str, json: &str, material: &Mat) {
     row("s4", name, "element", rate);
 }
 
-fn row(element: &str, material: &str, what: &str, rate: f64) {
+/// Rate of a case (1/s), and what one piece of its work takes over an operation of the calibrating loop.
+#[derive(Clone, Copy)]
+struct Rate {
+    per_second: f64,
+    calibrations: f64,
+}
+
+fn row(element: &str, material: &str, what: &str, rate: Rate) {
     println!(
-        r#"{{"element":"{element}","material":"{material}","part":"{what}","lanes":"{:?}","million_per_second":{:.1}}}"#,
+        r#"{{"element":"{element}","material":"{material}","part":"{what}","lanes":"{:?}","million_per_second":{:.1},"calibrations":{:.3}}}"#,
         plyflow_kernels::level(),
-        rate * 1e-6
+        rate.per_second * 1e-6,
+        rate.calibrations
     );
 }
 
 /// `count` pieces of work over the shortest time that a slice of some milliseconds has taken: others who use the
 /// machine only make a slice longer.
-fn best(mut work: impl FnMut(), count: usize) -> f64 {
+fn best(mut work: impl FnMut(), count: usize) -> Rate {
     const PASSES: usize = 50;
-    let mut fastest = f64::INFINITY;
-    let watch = Instant::now();
-    while watch.elapsed().as_secs_f64() < WATCHED {
+    let timed = |f: &mut dyn FnMut()| {
         let start = Instant::now();
-        for _ in 0..PASSES {
-            work();
-        }
-        fastest = fastest.min(start.elapsed().as_secs_f64());
+        f();
+        start.elapsed().as_secs_f64()
+    };
+    let (mut fastest, mut loops) = (f64::INFINITY, f64::INFINITY);
+    let watch = Instant::now();
+    while watch.elapsed().as_secs_f64() < watched() {
+        fastest = fastest.min(timed(&mut || {
+            for _ in 0..PASSES {
+                work();
+            }
+        }));
+        loops = loops.min(timed(&mut || {
+            black_box(calibrate());
+        }));
     }
-    (PASSES * count) as f64 / fastest
+    let pieces = (PASSES * count) as f64;
+    Rate {
+        per_second: pieces / fastest,
+        calibrations: (fastest / pieces) / (loops / OPERATIONS as f64),
+    }
 }
 
-fn elements<E: Element>(element: &str, name: &str, material: &Mat) -> f64 {
+fn elements<E: Element>(element: &str, name: &str, material: &Mat) -> Rate {
     let e = El::new::<E>("{}", material).expect("the element is valid");
     let mut r = common::Random(7);
     let mut data = Vec::new();
@@ -211,10 +257,9 @@ fn patches(name: &str, material: &Mat) {
     );
     row("rf4", name, "patch", rate);
     let membrane = elements::<Rf4>("rf4", name, material);
-    row(
-        "rf4",
-        name,
-        "element + patch",
-        1.0 / (1.0 / rate + 1.0 / membrane),
-    );
+    let both = Rate {
+        per_second: 1.0 / (1.0 / rate.per_second + 1.0 / membrane.per_second),
+        calibrations: rate.calibrations + membrane.calibrations,
+    };
+    row("rf4", name, "element + patch", both);
 }
