@@ -107,17 +107,27 @@ pub(crate) trait Location {
         } else {
             text.as_bytes()
         };
-        self.write_raw(name, t.0, t.0, &[], bytes.as_ptr().cast())
+        // SAFETY: one value of as many bytes as the type has.
+        unsafe { self.write_raw(name, t.0, t.0, &[], bytes.as_ptr().cast()) }
     }
 
     /// Writes integers; an empty shape makes one value.
+    ///
+    /// # Errors
+    /// When they are not as many as the shape has.
     fn write_i64(&self, name: &str, shape: &[u64], values: &[i64]) -> Result<()> {
         let t = DType::I64;
-        self.write_raw(name, t.file(), t.memory(), shape, values.as_ptr().cast())
+        shape::check_buffer(size_of_val(values), shape::elements(shape)?, t.size())?;
+        // SAFETY: as many values of the type as the shape has, as was just found.
+        unsafe { self.write_raw(name, t.file(), t.memory(), shape, values.as_ptr().cast()) }
     }
 
+    /// Writes an attribute of a type of the file from one in memory.
+    ///
+    /// # Safety
+    /// `data` points to as many values of the type `memory` as the shape has.
     #[doc(hidden)]
-    fn write_raw(
+    unsafe fn write_raw(
         &self,
         name: &str,
         file: hid_t,
@@ -127,6 +137,7 @@ pub(crate) trait Location {
     ) -> Result<()> {
         let c = c_name(name)?;
         let s = space(shape, false)?;
+        // SAFETY: in the lock (`handle`); a name, and the values that the attribute is made for (the caller's promise).
         locked(|| unsafe {
             let id = H5Acreate2(self.id(), c.as_ptr(), file, s.0, DEFAULT, DEFAULT);
             checked(id, || format!("making the attribute '{name}'"))?;
@@ -141,6 +152,8 @@ pub(crate) trait Location {
     /// A text attribute, or `None` if there is none of that name.
     fn read_text(&self, name: &str) -> Result<Option<String>> {
         let c = c_name(name)?;
+        // SAFETY: in the lock (`handle`); a name, and a buffer of the bytes that the type has: the attribute is one value of it, and a text of
+        // fixed length, as is looked at before it is read.
         locked(|| unsafe {
             let id = H5Aopen(self.id(), c.as_ptr(), DEFAULT);
             if id < 0 {
@@ -167,6 +180,7 @@ pub(crate) trait Location {
     /// An integer attribute, or `None` if there is none of that name.
     fn read_integer(&self, name: &str) -> Result<Option<i64>> {
         let c = c_name(name)?;
+        // SAFETY: in the lock (`handle`); a name, and room for the one value that the attribute has, as is looked at before it is read.
         locked(|| unsafe {
             let id = H5Aopen(self.id(), c.as_ptr(), DEFAULT);
             if id < 0 {
@@ -208,6 +222,7 @@ impl File {
         let access = plist(H5P_CLS_FILE_ACCESS)?;
         let creation = plist(H5P_CLS_FILE_CREATE)?;
         let c = c_path(path)?;
+        // SAFETY: in the lock (`handle`); a path, identifiers and numbers.
         locked(|| unsafe {
             let v110 = H5F_libver_t::H5F_LIBVER_V110;
             H5Pset_libver_bounds(access.0, v110, v110);
@@ -225,6 +240,7 @@ impl File {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let access = plist(H5P_CLS_FILE_ACCESS)?;
         let c = c_path(path)?;
+        // SAFETY: as in `create`.
         locked(|| unsafe {
             H5Pset_file_locking(access.0, 0, 1);
             let id = H5Fopen(c.as_ptr(), H5F_ACC_RDONLY, access.0);
@@ -237,6 +253,7 @@ impl File {
     pub(crate) fn close(self) -> Result<()> {
         let id = self.0.0;
         std::mem::forget(self);
+        // SAFETY: in the lock; `self`, which would close it a second time, is forgotten.
         locked(|| checked(unsafe { H5Fclose(id) }, || "closing the artifact".into()))?;
         if CLOSE_FAILED.swap(false, Ordering::Relaxed) {
             let text = "a part of the artifact could not be written; is the disk full?";
@@ -249,6 +266,7 @@ impl File {
     pub(crate) fn create_group(&self, path: &str) -> Result<Group> {
         let creation = plist(H5P_CLS_GROUP_CREATE)?;
         let c = c_name(path)?;
+        // SAFETY: in the lock (`handle`); a path, identifiers and numbers.
         locked(|| unsafe {
             H5Pset_link_creation_order(creation.0, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
             H5Pset_obj_track_times(creation.0, 0);
@@ -270,6 +288,7 @@ impl File {
     /// Opens a group.
     pub(crate) fn open_group(&self, path: &str) -> Result<Group> {
         let c = c_name(path)?;
+        // SAFETY: in the lock (`handle`); a path and identifiers.
         locked(|| unsafe {
             let id = H5Gopen2(self.id(), c.as_ptr(), DEFAULT);
             checked(id, || format!("opening the group {path}"))?;
@@ -280,12 +299,14 @@ impl File {
     /// Whether a link of that path exists; links on the way must exist.
     pub(crate) fn exists(&self, path: &str) -> bool {
         let Ok(c) = c_name(path) else { return false };
+        // SAFETY: as in `open_group`.
         locked(|| unsafe { H5Lexists(self.id(), c.as_ptr(), DEFAULT) > 0 })
     }
 
     /// A link from `path` to `target` (a path in this file).
     pub(crate) fn soft_link(&self, target: &str, path: &str) -> Result<()> {
         let (t, p) = (c_name(target)?, c_name(path)?);
+        // SAFETY: in the lock (`handle`); two paths and identifiers.
         locked(|| unsafe {
             let code = H5Lcreate_soft(t.as_ptr(), self.id(), p.as_ptr(), DEFAULT, DEFAULT);
             checked(code, || format!("linking {path} to {target}"))?;
@@ -295,7 +316,8 @@ impl File {
 
     /// Makes a dataset of fixed shape (contiguous) and writes it.
     ///
-    /// `data` holds the product of `shape` elements of `dtype`.
+    /// # Errors
+    /// When `data` does not hold the elements of `shape`.
     pub(crate) fn write(
         &self,
         path: &str,
@@ -303,8 +325,10 @@ impl File {
         shape: &[u64],
         data: &[u8],
     ) -> Result<Dataset> {
+        shape::check_buffer(data.len(), shape::elements(shape)?, dtype.size())?;
         let d = self.create_dataset(path, dtype, shape, None)?;
         if !data.is_empty() {
+            // SAFETY: in the lock (`handle`); the dataset was made with this shape, whose bytes `data` has, as was just found.
             locked(|| unsafe {
                 let code = H5Dwrite(
                     d.id(),
@@ -344,6 +368,7 @@ impl File {
         let (c, s) = (c_name(path)?, space(shape, chunk.is_some())?);
         let creation = plist(H5P_CLS_DATASET_CREATE)?;
         let access = plist(H5P_CLS_DATASET_ACCESS)?;
+        // SAFETY: in the lock (`handle`); a path, identifiers, and as many sizes of a chunk as the rank that stands beside them.
         locked(|| unsafe {
             H5Pset_obj_track_times(creation.0, 0);
             H5Pset_fill_time(creation.0, H5D_fill_time_t::H5D_FILL_TIME_NEVER);
@@ -379,6 +404,7 @@ impl File {
     /// When there is none, or it has another: buffers are made by the shape.
     pub(crate) fn open_dataset(&self, path: &str, dtype: DType, shape: &[u64]) -> Result<Dataset> {
         let c = c_name(path)?;
+        // SAFETY: in the lock (`handle`), where `check_shape` is, too; a path and identifiers.
         locked(|| unsafe {
             let id = H5Dopen2(self.id(), c.as_ptr(), DEFAULT);
             checked(id, || format!("opening the dataset {path}"))?;
@@ -405,13 +431,13 @@ fn c_path(path: &Path) -> Result<CString> {
 
 /// The bytes of a slice of plain numbers.
 pub(crate) fn bytes<T: Plain>(values: &[T]) -> &[u8] {
-    // Plain types have no padding and no invalid bytes.
+    // SAFETY: the slice's own bytes, borrowed as it is; plain types have no padding.
     unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
 }
 
 /// The bytes of a slice of plain numbers, to read into.
 pub(crate) fn bytes_mut<T: Plain>(values: &mut [T]) -> &mut [u8] {
-    // Any bytes make a plain number.
+    // SAFETY: the slice's own bytes, borrowed alone as it is; any bytes that are written there make plain numbers.
     unsafe { std::slice::from_raw_parts_mut(values.as_mut_ptr().cast(), size_of_val(values)) }
 }
 

@@ -21,6 +21,11 @@ pub struct Plugin {
     functions: *const c_void,
 }
 
+// SAFETY: `functions` is a static table in a library that stays loaded, which nobody writes to (plyflow.h); safe code cannot follow it.
+unsafe impl Send for Plugin {}
+// SAFETY: as for `Send`.
+unsafe impl Sync for Plugin {}
+
 /// The fixed beginning of a descriptor: what may be read before its version is known.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -65,22 +70,29 @@ impl Plugin {
         }
         // dlopen searches the system's folders for a name without a slash.
         let full = path.canonicalize_utf8()?;
+        // SAFETY: runs the library's initialisers, of which nothing is known: see `load`. The process is there for this library, and may die of it.
         let library = unsafe { Library::open(Some(full.as_std_path()), RTLD_NOW | RTLD_LOCAL) };
         let library = library.map_err(|e| Breach::Loader {
             why: full_text(&e),
             full,
         })?;
-        let plugin = unsafe { library.get::<pf_entry>(PF_SYMBOL) }.map(|entry| unsafe { entry() });
+        // SAFETY: what is called `plyflow_plugin` has this type in every version of plyflow.h; a library that gives the name to something else
+        // breaks a contract that cannot be looked at.
+        let entry = unsafe { library.get::<pf_entry>(PF_SYMBOL) };
+        // SAFETY: as above; it takes nothing.
+        let plugin = entry.map(|entry| unsafe { entry() });
         // Function tables and manifest live in the library.
         std::mem::forget(library);
         let plugin = plugin.map_err(|_| Breach::Foreign)?;
         if plugin.is_null() {
             return Err(Breach::NullDescriptor);
         }
+        // SAFETY: not NULL, so a descriptor, whose beginning is the same in every version.
         check_head(unsafe { plugin.cast::<Head>().read_unaligned() })?;
         if !plugin.is_aligned() {
             return Err(Breach::Unaligned);
         }
+        // SAFETY: aligned, static (the library stays loaded), and of this version and size, as its head says.
         Self::check(path, unsafe { &*plugin })
     }
 
@@ -96,11 +108,13 @@ impl Plugin {
         }
         // No table has grown since ABI 1.0, so today's size is the least one for a plugin of any minor. When one grows,
         // the least size must be that of the plugin's own `abi_minor`: else every plugin built before is refused.
+        // SAFETY: not NULL, so a table, and every table begins with its size.
         let size = unsafe { d.functions.cast::<u64>().read_unaligned() };
         if size < least as u64 {
             return Err(Breach::TableSize { kind, size, least });
         }
         check_pointers(kind, d.functions)?;
+        // SAFETY: a static text of a library that stays loaded.
         let text: &'static str = unsafe { d.manifest.as_str() }.map_err(Breach::ManifestText)?;
         let manifest = read_manifest(text)?;
         if manifest.kind != kind {
@@ -178,7 +192,8 @@ fn check_pointers(kind: PluginKind, functions: *const c_void) -> Result<(), Brea
         PluginKind::Material => &["create", "destroy", "sizes", "membrane"],
     };
     for (i, name) in names.iter().enumerate() {
-        // Every table is a u64 followed by pointers (checked against plyflow.h in schemas/abi).
+        // SAFETY: the table has the size of its kind (`check`), which is a u64 followed by pointers (checked against plyflow.h in schemas/abi), of
+        // which these are the first.
         let slot = unsafe { functions.cast::<usize>().add(1 + i).read_unaligned() };
         if slot == 0 {
             return Err(Breach::NullFunction { kind, name });

@@ -18,6 +18,8 @@ extern "C" fn on_terminate(_: libc::c_int) {
 /// Makes this process a worker: SIGTERM asks the step to stop, Ctrl-C and a closed terminal are left to the engine
 /// (which sends SIGTERM), and the process dies when the thread that started it ends.
 pub(crate) fn become_worker() {
+    // SAFETY: zeros are an action without flags and mask; the handler is a function that stays, and only stores to an atomic, as a handler may.
+    // The other calls take numbers, and NULL for what is not wanted.
     unsafe {
         let mut action: libc::sigaction = std::mem::zeroed();
         action.sa_sigaction = on_terminate as *const () as usize;
@@ -32,29 +34,38 @@ pub(crate) fn become_worker() {
 
 /// Limits the memory that this process may use for data, and tells its libraries; 0: no limit.
 ///
-/// Call before any other thread exists.
-pub(crate) fn limit_memory(bytes: u64) {
+/// # Safety
+/// No other thread exists: one might read the environment.
+pub(crate) unsafe fn limit_memory(bytes: u64) {
     if bytes > 0 {
+        // SAFETY: nobody else reads or writes the environment (the caller's promise).
         unsafe { std::env::set_var(plyflow_model::budget::MEMORY_VARIABLE, bytes.to_string()) };
         let limit = libc::rlimit {
             rlim_cur: bytes,
             rlim_max: bytes,
         };
+        // SAFETY: a whole limit of this function.
         unsafe { libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) };
     }
 }
 
 /// Number of threads for libraries that read it from the environment (OpenMP, Rayon).
 ///
-/// Call before any other thread exists.
-pub(crate) fn announce_threads(threads: u32) {
+/// # Safety
+/// As [`limit_memory`].
+pub(crate) unsafe fn announce_threads(threads: u32) {
     for name in ["OMP_NUM_THREADS", "RAYON_NUM_THREADS"] {
+        // SAFETY: as in `limit_memory`.
         unsafe { std::env::set_var(name, threads.to_string()) };
     }
 }
 
 /// The standard output for messages alone: what a plugin prints goes to standard error.
+///
+/// Where the system gives no second number for it, it is the number of the standard output itself: called once, by a process that then
+/// writes to it through nothing else of its own.
 pub(crate) fn private_stdout() -> File {
+    // SAFETY: the calls take numbers. The file owns a number that was just made for it; 1 if there is none, see above.
     unsafe {
         let fd = libc::fcntl(1, libc::F_DUPFD_CLOEXEC, 3);
         if fd < 0 {
@@ -77,7 +88,9 @@ pub fn children_seconds() -> f64 {
 }
 
 fn cpu_seconds_of(whose: libc::c_int) -> f64 {
+    // SAFETY: numbers alone, for which zeros are values.
     let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+    // SAFETY: a whole struct of this function.
     unsafe { libc::getrusage(whose, &raw mut usage) };
     let seconds = |t: libc::timeval| t.tv_sec as f64 + t.tv_usec as f64 * 1e-6;
     seconds(usage.ru_utime) + seconds(usage.ru_stime)
@@ -95,6 +108,7 @@ pub(crate) fn peak_memory() -> u64 {
 /// Name of the machine.
 pub(crate) fn host_name() -> String {
     let mut buffer = [0u8; 256];
+    // SAFETY: a buffer of this function and its length, but for a last zero.
     unsafe { libc::gethostname(buffer.as_mut_ptr().cast(), buffer.len() - 1) };
     let end = buffer.iter().position(|b| *b == 0).unwrap_or(0);
     String::from_utf8_lossy(&buffer[..end]).into_owned()

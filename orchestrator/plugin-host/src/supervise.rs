@@ -12,8 +12,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Runs `work` in a child of this process and ends this process as the child ended, after everything below it.
 ///
-/// Call it while there is one thread. The child calls `inside` first; it dies when this process does.
-pub fn supervise(inside: impl FnOnce(), work: impl FnOnce() -> i32) -> ! {
+/// The child calls `inside` first; it dies when this process does.
+///
+/// # Safety
+/// This process has one thread: a child has no other, and locks that others held would never be let go in it.
+pub unsafe fn supervise(inside: impl FnOnce(), work: impl FnOnce() -> i32) -> ! {
+    // SAFETY: `fork` in a process of one thread (the caller's promise), so that the child may do all that this process may. The other calls of the
+    // system take numbers, a set of signals that `hear` has made, and NULL for what is not wanted.
     unsafe {
         libc::prctl(libc::PR_SET_CHILD_SUBREAPER, 1 as libc::c_ulong);
         let heard = hear();
@@ -51,7 +56,9 @@ pub fn supervise(inside: impl FnOnce(), work: impl FnOnce() -> i32) -> ! {
 }
 
 /// Blocks the signals that a supervisor waits for.
-unsafe fn hear() -> libc::sigset_t {
+fn hear() -> libc::sigset_t {
+    // SAFETY: a set of signals is plain bits, for which zeros are a value; the calls get a whole one of this function, numbers of signals, and
+    // NULL for what is not wanted.
     unsafe {
         let mut set: libc::sigset_t = std::mem::zeroed();
         libc::sigemptyset(&raw mut set);
@@ -70,7 +77,9 @@ unsafe fn hear() -> libc::sigset_t {
 }
 
 /// Waits until the worker has ended and returns its status; until the engine has, and returns that of a kill.
-unsafe fn attend(heard: &libc::sigset_t, worker: libc::pid_t, engine: libc::pid_t) -> c_int {
+fn attend(heard: &libc::sigset_t, worker: libc::pid_t, engine: libc::pid_t) -> c_int {
+    // SAFETY: the calls get a set of signals and a number of this function or its caller, NULL for what is not wanted, and numbers of processes. The
+    // worker has not been waited for yet: its number is no other's.
     unsafe {
         loop {
             // Its own children and what was left to it.
@@ -95,7 +104,9 @@ unsafe fn attend(heard: &libc::sigset_t, worker: libc::pid_t, engine: libc::pid_
 }
 
 /// Ends this process with the status of another: its code, or the signal that killed it.
-unsafe fn end_as(status: c_int) -> ! {
+fn end_as(status: c_int) -> ! {
+    // SAFETY: the calls get a limit and a set of signals (plain bits) of this function, numbers, and NULL for what is not wanted; the signal's
+    // handler is the system's own.
     unsafe {
         if !libc::WIFSIGNALED(status) {
             libc::_exit(libc::WEXITSTATUS(status));
@@ -130,6 +141,7 @@ fn end_all(spared: &[u32]) {
                 continue;
             };
             any = true;
+            // SAFETY: numbers and NULL. A child that has not been waited for: its number is no other's.
             unsafe {
                 libc::kill(child, libc::SIGKILL);
                 libc::waitpid(child, std::ptr::null_mut(), 0);
@@ -175,6 +187,7 @@ impl Orphans {
     /// (`sh -c 'server & exec plyflow run ..'`): theirs could not be told from those of a step.
     pub fn adopt() {
         if children().is_empty() {
+            // SAFETY: numbers alone.
             unsafe { libc::prctl(libc::PR_SET_CHILD_SUBREAPER, 1 as libc::c_ulong) };
             ADOPTING.store(true, Ordering::Relaxed);
         }
@@ -192,7 +205,7 @@ impl Orphans {
 /// that the two processes of a step can be told apart.
 ///
 /// # Safety
-/// `arguments` is the `argv` of `main`, with `count` entries.
+/// `arguments` is the `argv` of `main`, with `count` entries, and the process has one thread: nobody else reads the words meanwhile.
 pub unsafe fn rename_argument(
     arguments: *const *const c_char,
     count: c_int,
@@ -203,6 +216,8 @@ pub unsafe fn rename_argument(
         return;
     }
     for i in 0..usize::try_from(count).unwrap_or(0) {
+        // SAFETY: one of the `count` entries, a text that ends with a zero and may be written to, as C says of the `argv` of `main` (the caller's
+        // promise); the new word has as many bytes as the old one.
         unsafe {
             let word = *arguments.add(i);
             if !word.is_null() && std::ffi::CStr::from_ptr(word) == from {

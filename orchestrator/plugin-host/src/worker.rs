@@ -20,8 +20,11 @@ type Failure = (FailureKind, String);
 /// and talks in [`Message`]s on standard output. What the plugin prints goes to standard error.
 ///
 /// Returns the exit code: 0 when the artifact is whole, 1 when the step failed, 2 when there is no job.
+///
+/// # Safety
+/// This process has one thread: the environment is written to.
 #[must_use]
-pub fn worker_main(source: &str) -> i32 {
+pub unsafe fn worker_main(source: &str) -> i32 {
     process::become_worker();
     let mut out = process::private_stdout();
     let mut document = String::new();
@@ -36,8 +39,11 @@ pub fn worker_main(source: &str) -> i32 {
     drop(document);
     match job {
         Ok(job) => {
-            process::announce_threads(job.threads.max(1));
-            process::limit_memory(job.memory_limit);
+            // SAFETY: one thread (the caller's promise): nothing above has begun another.
+            unsafe {
+                process::announce_threads(job.threads.max(1));
+                process::limit_memory(job.memory_limit);
+            }
             run_job(&job, &mut out)
         }
         Err(e) => {
@@ -96,6 +102,8 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
     let clock = Instant::now();
     let table = services::table(&state);
     let functions = plugin.functions().cast::<pf_step_functions>();
+    // SAFETY: `load` has found a step, with a whole table of functions that stays. The services' table lives until `run` returns, as the state
+    // behind it does.
     let code = unsafe { ((*functions).run)(&raw const table) };
     let wall_seconds = clock.elapsed().as_secs_f64();
 

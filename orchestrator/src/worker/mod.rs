@@ -10,28 +10,43 @@ use rustix::process::{Pid, Signal};
 /// process that loads libraries.
 ///
 /// All end by `_exit`: a plugin's clean-up at exit must not turn a finished step into a crash.
-pub fn main(arguments: &[String], inside: impl FnOnce()) -> ! {
+///
+/// # Safety
+/// This process has one thread.
+pub unsafe fn main(arguments: &[String], inside: impl FnOnce()) -> ! {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    match words[..] {
-        ["--describe", library] => describe(inside, library, None),
-        ["--describe", library, hash] => describe(inside, library, Some(hash)),
-        [source] => supervise(inside, || plyflow_plugin_host::worker_main(source)),
+    let work = match words[..] {
+        ["--describe", library] => Work::Describe(library, None),
+        ["--describe", library, hash] => Work::Describe(library, Some(hash)),
+        [source] => Work::Step(source),
         [source, "--parent", parent] => match follow(parent) {
-            Ok(()) => supervise(inside, || plyflow_plugin_host::worker_main(source)),
+            Ok(()) => Work::Step(source),
             Err(alone) => refuse(&alone.to_string()),
         },
         _ => refuse("wants the file of a job, or - for standard input"),
-    }
+    };
+    let work = || match work {
+        Work::Describe(library, hash) => {
+            plyflow_plugin_host::describe_main(Utf8Path::new(library), hash)
+        }
+        // SAFETY: one thread (the caller's promise), in the child that is forked from it, too.
+        Work::Step(source) => unsafe { plyflow_plugin_host::worker_main(source) },
+    };
+    // SAFETY: one thread (the caller's promise).
+    unsafe { supervise(inside, work) }
 }
 
-fn describe(inside: impl FnOnce(), library: &str, hash: Option<&str>) -> ! {
-    supervise(inside, || {
-        plyflow_plugin_host::describe_main(Utf8Path::new(library), hash)
-    })
+/// What a worker is for.
+enum Work<'a> {
+    /// To tell what a library is, if its bytes have this BLAKE3.
+    Describe(&'a str, Option<&'a str>),
+    /// To do the job of a file.
+    Step(&'a str),
 }
 
 fn refuse(text: &str) -> ! {
     crate::said::warn(&format!("plyflow step-worker: {text}\n"));
+    // SAFETY: a number; what is left undone at an exit of this kind is of no use to anybody here.
     unsafe { libc::_exit(2) }
 }
 

@@ -132,22 +132,7 @@ fn load_into(
         return None;
     }
     overrides::apply(&mut root, overrides, &mut source, problems, catalog);
-    let family = match (root.get("study"), root.entry("optimise")) {
-        (Some(_), Some(e)) if e.value.kind != Kind::Null => {
-            let d = problems.add(
-                &source,
-                &e.key_span,
-                "`study` and `optimise` in one workflow",
-            );
-            d.expected("one of them");
-            return None;
-        }
-        (Some(study), _) => Some(Family::read(study, &root, &source, problems)?),
-        (None, Some(e)) => Some(Family::read_optimise(
-            &e.value, &root, points, &source, problems,
-        )?),
-        (None, None) => None,
-    };
+    let family = family(&root, points, &source, problems)?;
     let shown = family.as_ref().map(|f| f.first(&root));
     Checker::new(&WORKFLOW, &source, problems)
         .check(shown.as_ref().unwrap_or(&root), "the workflow");
@@ -157,17 +142,8 @@ fn load_into(
     let asked = family
         .as_ref()
         .map(|f| Asked::read(f, &root, (&drafts, &wiring), &source, problems));
-    if let (None, Some(e)) = (
-        &asked,
-        root.entry("responses")
-            .filter(|e| e.value.kind != Kind::Null),
-    ) {
-        let d = problems.add(
-            &source,
-            &e.key_span,
-            "`responses` in a workflow without a study",
-        );
-        d.expected("a block `study` or `optimise`, or no `responses`");
+    if asked.is_none() {
+        no_responses(&root, &source, problems);
     }
     let expectations = expect::expectations(&root, &drafts, asked.as_ref(), &source, problems);
     let mut resolve = |draft: &Draft<'_>, problems: &mut Problems| {
@@ -186,12 +162,6 @@ fn load_into(
         }
         _ => expectations.of_results,
     };
-    let of_study = root.get("study").and_then(|s| s.get("on_failure"));
-    let on_failure = of_study.or(root.get("on_failure"));
-    let on_failure = match on_failure.and_then(Node::text) {
-        Some("fail-fast") => FailurePolicy::FailFast,
-        _ => FailurePolicy::KeepGoing,
-    };
     let workflow = ResolvedWorkflow {
         name: root.get("name")?.text()?.to_owned(),
         file: absolute(&source.folder, path.file_name()?),
@@ -201,10 +171,52 @@ fn load_into(
             .map(str::to_owned),
         steps,
         expectations,
-        on_failure,
+        on_failure: on_failure(&root),
         study,
     };
     Some((workflow, named_folders(&root, &source)))
+}
+
+/// The study or the optimisation, where the workflow is one; the outer `None` when it is wrong (and reported).
+fn family(
+    root: &Node,
+    points: &PointsOf<'_>,
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<Option<Family>> {
+    Some(match (root.get("study"), root.entry("optimise")) {
+        (Some(_), Some(e)) if e.value.kind != Kind::Null => {
+            let message = "`study` and `optimise` in one workflow";
+            let d = problems.add(source, &e.key_span, message);
+            d.expected("one of them");
+            return None;
+        }
+        (Some(study), _) => Some(Family::read(study, root, source, problems)?),
+        (None, Some(e)) => Some(Family::read_optimise(
+            &e.value, root, points, source, problems,
+        )?),
+        (None, None) => None,
+    })
+}
+
+/// Reports responses of a workflow that has no points to take them from.
+fn no_responses(root: &Node, source: &Source, problems: &mut Problems) {
+    let entry = root.entry("responses");
+    if let Some(e) = entry.filter(|e| e.value.kind != Kind::Null) {
+        let message = "`responses` in a workflow without a study";
+        let d = problems.add(source, &e.key_span, message);
+        d.expected("a block `study` or `optimise`, or no `responses`");
+    }
+}
+
+/// What happens to the other steps when one fails: as the study says, else as the workflow does.
+fn on_failure(root: &Node) -> FailurePolicy {
+    let of_study = root.get("study").and_then(|s| s.get("on_failure"));
+    let written = of_study.or(root.get("on_failure")).and_then(Node::text);
+    match written {
+        Some("fail-fast") => FailurePolicy::FailFast,
+        _ => FailurePolicy::KeepGoing,
+    }
 }
 
 /// The steps of a workflow that is no study, in topological order.

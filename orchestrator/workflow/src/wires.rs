@@ -368,8 +368,22 @@ fn order(
             graph.add_edge(NodeIndex::new(*from), NodeIndex::new(*to), ());
         }
     }
+    if report_cycles(&graph, drafts, edges, source, problems) {
+        return Vec::new();
+    }
+    sorted(&graph)
+}
+
+/// Reports the steps that wait for each other, with their path; whether there are any.
+fn report_cycles(
+    graph: &DiGraph<(), ()>,
+    drafts: &[Draft<'_>],
+    edges: &[(usize, usize, Span)],
+    source: &Source,
+    problems: &mut Problems,
+) -> bool {
     let mut cyclic = false;
-    for component in petgraph::algo::tarjan_scc(&graph) {
+    for component in petgraph::algo::tarjan_scc(graph) {
         let members: BTreeSet<usize> = component.iter().map(|n| n.index()).collect();
         let Some(&first) = members.first() else {
             continue;
@@ -379,7 +393,7 @@ fn order(
             continue;
         }
         cyclic = true;
-        let path = cycle(&graph, first, &members);
+        let path = cycle(graph, first, &members);
         let names: Vec<&str> = path.iter().map(|&i| drafts[i].name()).collect();
         // The wire that closes the cycle into its first step of the file.
         let closing = path[path.len() - 2];
@@ -396,21 +410,19 @@ fn order(
             .expected("a step that does not depend on this one");
         d.help("remove one of these wires");
     }
-    if cyclic {
-        return Vec::new();
-    }
-    let mut waiting: Vec<usize> = (0..drafts.len())
-        .map(|i| {
-            graph
-                .neighbors_directed(NodeIndex::new(i), petgraph::Incoming)
-                .count()
-        })
+    cyclic
+}
+
+/// The nodes of a graph without cycles in topological order, ties in the order of their numbers.
+fn sorted(graph: &DiGraph<(), ()>) -> Vec<usize> {
+    let mut waiting: Vec<usize> = (graph.node_indices())
+        .map(|n| graph.neighbors_directed(n, petgraph::Incoming).count())
         .collect();
-    let mut ready: BinaryHeap<Reverse<usize>> = (0..drafts.len())
+    let mut ready: BinaryHeap<Reverse<usize>> = (0..waiting.len())
         .filter(|&i| waiting[i] == 0)
         .map(Reverse)
         .collect();
-    let mut order = Vec::with_capacity(drafts.len());
+    let mut order = Vec::with_capacity(waiting.len());
     while let Some(Reverse(i)) = ready.pop() {
         order.push(i);
         for next in graph.neighbors(NodeIndex::new(i)) {

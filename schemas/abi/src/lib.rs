@@ -59,8 +59,9 @@ pub struct pf_str {
     pub len: u64,
 }
 
-// A pf_str is a plain view; what it points to is static or guarded by the contract.
+// SAFETY: a pointer and a length. Safe code cannot follow the pointer: `as_str` is unsafe, and who calls it sees to it that the text is there.
 unsafe impl Sync for pf_str {}
+// SAFETY: as for `Sync`.
 unsafe impl Send for pf_str {}
 
 impl pf_str {
@@ -83,9 +84,10 @@ impl pf_str {
         if self.data.is_null() || self.len == 0 {
             return Ok("");
         }
-        core::str::from_utf8(unsafe {
-            core::slice::from_raw_parts(self.data.cast::<u8>(), self.len as usize)
-        })
+        // SAFETY: not null, so there are `len` readable bytes for `'a` (the caller's promise).
+        let bytes =
+            unsafe { core::slice::from_raw_parts(self.data.cast::<u8>(), self.len as usize) };
+        core::str::from_utf8(bytes)
     }
 }
 
@@ -101,8 +103,10 @@ pub struct pf_plugin {
     pub manifest: pf_str,
     pub functions: *const c_void,
 }
-// The descriptor is static and read-only.
+// SAFETY: plain values and pointers that safe code cannot follow. What they point to is static and read-only (plyflow.h), so that whoever
+// follows them may do so in any thread.
 unsafe impl Sync for pf_plugin {}
+// SAFETY: as for `Sync`.
 unsafe impl Send for pf_plugin {}
 
 pub type pf_entry = unsafe extern "C" fn() -> *const pf_plugin;
@@ -310,8 +314,10 @@ pub struct pf_material {
     pub functions: *const pf_material_functions,
     pub instance: *const c_void,
 }
-// Functions are static; the instance does not change after create (contract in plyflow.h).
+// SAFETY: two pointers that safe code cannot follow. The functions are static, and an instance does not change after `create` and is called by
+// several threads at once (plyflow.h), so that whoever follows them may do so in any thread.
 unsafe impl Sync for pf_material {}
+// SAFETY: as for `Sync`.
 unsafe impl Send for pf_material {}
 
 #[repr(C)]

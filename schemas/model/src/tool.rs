@@ -89,6 +89,7 @@ pub struct Joggle {
 /// A spar of trapezoidal section whose top and side walls fall back over a ramp, stay back, and return over a ramp of
 /// the same length: the kind of tool of thesis chapter 6. With a ramp of 180 mm a depth of 10 mm is its ratio of 1:18 for
 /// the top, and a side depth of 5 mm its 1:36 for the sides; the other sizes are not in the thesis.
+// The section's keys stand again as in `JoggleSpar`: put into one struct by `flatten`, unknown keys would no longer be refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RampedSpar {

@@ -52,8 +52,11 @@ struct Spent {
 }
 
 fn cpu_seconds(who: i32) -> f64 {
+    // SAFETY: numbers alone, for which zeros are values.
     let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
-    assert_eq!(unsafe { libc::getrusage(who, &raw mut usage) }, 0);
+    // SAFETY: a whole struct of this function.
+    let code = unsafe { libc::getrusage(who, &raw mut usage) };
+    assert_eq!(code, 0);
     let seconds = |t: libc::timeval| t.tv_sec as f64 + 1e-6 * t.tv_usec as f64;
     seconds(usage.ru_utime) + seconds(usage.ru_stime)
 }

@@ -278,8 +278,9 @@ pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
 /// When there is no such process.
 pub fn signal(child: &Child, number: i32) {
     let pid = i32::try_from(child.id()).expect("a process number");
-    // A signal to a child that has not been waited for cannot meet another process.
-    assert_eq!(unsafe { libc::kill(pid, number) }, 0);
+    // SAFETY: numbers alone. A child that has not been waited for: its number is no other's.
+    let code = unsafe { libc::kill(pid, number) };
+    assert_eq!(code, 0);
 }
 
 /// Live worker processes of the engine with this process number.

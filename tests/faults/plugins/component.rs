@@ -25,13 +25,16 @@ impl Step for Plugin {
         let component = host.component(PF_KIND_MATERIAL, &p.material)?;
         let functions = component.functions.cast::<pf_material_functions>();
         let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
+        // SAFETY: the host's table of a material, valid until the process ends; a text, room for the instance and a whole `pf_error`.
         let code =
             unsafe { ((*functions).create)(pf_str::new("{}"), &raw mut instance, &raw mut error) };
         if code != PF_OK {
             return Err(StepError::Failed(error.get()));
         }
         let mut sizes = pf_material_sizes::default();
+        // SAFETY: the instance that the table has just made; a whole struct, as its `size` says.
         unsafe { ((*functions).sizes)(instance, &raw mut sizes) };
+        // SAFETY: made above, ended once.
         unsafe { ((*functions).destroy)(instance) };
         host.result("thickness", sizes.thickness, "m")
     }

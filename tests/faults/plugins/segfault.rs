@@ -17,6 +17,7 @@ impl Step for Plugin {
     fn run(host: &Host) -> Result<(), StepError> {
         let p = std::hint::black_box(std::ptr::without_provenance_mut::<u8>(8));
         host.log(Log::Info, "about to write to address 8");
+        // SAFETY: none. Address 8 is nobody's, and that the process dies of it is what the tests are about.
         unsafe { p.write_volatile(1) };
         Ok(())
     }

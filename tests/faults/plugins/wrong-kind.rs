@@ -2,7 +2,8 @@
 
 use plyflow_sdk::abi::*;
 
-unsafe extern "C" fn run(_: *const pf_services) -> i32 {
+/// Does nothing.
+extern "C" fn run(_: *const pf_services) -> i32 {
     PF_OK
 }
 

@@ -7,7 +7,8 @@ fn main() {
         (Some("--describe"), Some(library)) => {
             plyflow_plugin_host::describe_main(library.as_str().into(), None)
         }
-        (Some(job), None) => plyflow_plugin_host::worker_main(job),
+        // SAFETY: one thread: that of `main`, which has begun no other.
+        (Some(job), None) => unsafe { plyflow_plugin_host::worker_main(job) },
         _ => {
             eprintln!("usage: faults-worker JOB | --describe LIBRARY");
             2

@@ -18,6 +18,7 @@ fn start(place: &Place, wish: &str, token: &str, more: &[&str]) -> Child {
     command.env("STRANGER", wish).env("TOKEN", token);
     command.stdout(log.try_clone().unwrap()).stderr(log);
     // As in a terminal, also where the tests themselves run under `nohup`.
+    // SAFETY: between `fork` and `exec` a signal's handling is set, which is async-signal-safe; no handler of this program's is replaced.
     unsafe {
         command.pre_exec(|| {
             libc::signal(libc::SIGHUP, libc::SIG_DFL);
@@ -62,7 +63,9 @@ fn what_a_step_starts_ends_when_either_process_of_the_worker_is_killed_or_the_ti
         if which != "time" {
             wait_for("all processes", || alive(&token) == 5);
             let worker = find_worker(which, run.id()).unwrap();
-            assert_eq!(unsafe { libc::kill(worker, libc::SIGKILL) }, 0);
+            // SAFETY: numbers alone; a process of the run, which has just been seen and goes on until it is killed.
+            let code = unsafe { libc::kill(worker, libc::SIGKILL) };
+            assert_eq!(code, 0);
         }
         assert_eq!(run.wait().unwrap().code(), Some(4), "{which}");
         assert_eq!(alive(&token), 0, "{which}");
@@ -109,6 +112,7 @@ fn who_ignores_a_closed_terminal_goes_on() {
     let token = token("nohup");
     let mut command = place.command(&["run", "--trust", "workflow.yaml", "--no-report", "--quiet"]);
     command.env("STRANGER", "hang").env("TOKEN", &token);
+    // SAFETY: between `fork` and `exec` a signal's handling is set, which is async-signal-safe; no handler of this program's is replaced.
     unsafe {
         command.pre_exec(|| {
             libc::signal(libc::SIGHUP, libc::SIG_IGN);

@@ -124,7 +124,9 @@ fn workers_of(parent: u32) -> usize {
 }
 
 fn signal(child: &Child, number: i32) {
-    assert_eq!(unsafe { libc::kill(child.id() as i32, number) }, 0);
+    // SAFETY: numbers alone. A child that has not been waited for: its number is no other's.
+    let code = unsafe { libc::kill(child.id() as i32, number) };
+    assert_eq!(code, 0);
 }
 
 const FAN_OUT: &str = "

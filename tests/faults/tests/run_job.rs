@@ -456,6 +456,7 @@ fn a_terminated_worker_stops_its_step_as_cancelled() {
     let dir = tempfile::tempdir().unwrap();
     let mut child = spawn(&job(&dir, "sleep", "test", json!({"seconds": 60.0})), &dir);
     first_line(&mut child);
+    // SAFETY: numbers alone. A child that has not been waited for: its number is no other's.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));

@@ -1,4 +1,8 @@
 //! The library's lock, its errors and its handles.
+//!
+//! **What makes calls sound.** The library asks for one call at a time, started before, and looks at every identifier itself: one that it
+//! does not know, or of another class, is an error that it returns. So a call in [`locked`] needs no more than pointers that are right for
+//! its length: names end with a zero ([`CString`]), and arrays have the length that the call takes from elsewhere.
 
 use crate::error::{ArtifactError, ErrorKind, Result};
 use hdf5_sys::h5::{H5dont_atexit, H5open, hsize_t};
@@ -23,6 +27,8 @@ pub(super) const DEFAULT: hid_t = 0;
 /// call them immutable: a plain read may be moved by the compiler to before the start, and is in release
 /// builds.
 pub(super) fn id(name: &'static hid_t) -> hid_t {
+    // SAFETY: a static of the library that is there as long as the process, aligned, and written by `H5open` alone: under the lock and before
+    // `locked` lets anybody go on. Before that it is 0, or a number that the library does not know.
     unsafe { std::ptr::read_volatile(name) }
 }
 
@@ -31,6 +37,7 @@ static INIT: Once = Once::new();
 /// Runs `f` alone in the library, which is started on first use.
 pub(super) fn locked<T>(f: impl FnOnce() -> T) -> T {
     let _guard = hdf5_sys::LOCK.lock();
+    // SAFETY: the lock is held. Plain calls; no function is given to be called on errors.
     INIT.call_once(|| unsafe {
         // Handles may outlive `main`; the library must not close them behind our back.
         H5dont_atexit();
@@ -42,10 +49,15 @@ pub(super) fn locked<T>(f: impl FnOnce() -> T) -> T {
 
 /// The innermost description on the library's error stack.
 pub(super) fn last_error() -> String {
+    /// # Safety
+    /// Called by `H5Ewalk2`, which was given a `String` for `out` and gives an error of its stack.
     unsafe extern "C" fn visit(_: c_uint, e: *const H5E_error2_t, out: *mut c_void) -> i32 {
+        // SAFETY: what `H5Ewalk2` was given below, which nobody else has during the walk.
         let out = unsafe { &mut *out.cast::<String>() };
+        // SAFETY: the library's description of an error, there for this call.
         let text = unsafe { (*e).desc };
         if out.is_empty() && !text.is_null() {
+            // SAFETY: not NULL, so a text of the library's that ends with a zero, there for this call.
             *out = unsafe { CStr::from_ptr(text) }
                 .to_string_lossy()
                 .into_owned();
@@ -53,6 +65,7 @@ pub(super) fn last_error() -> String {
         0
     }
     let mut text = String::new();
+    // SAFETY: `visit` gets `text`, whose type it knows, and keeps nothing of it; it does not panic. An error's place is the thread's own.
     unsafe {
         H5Ewalk2(
             H5E_DEFAULT,
@@ -88,6 +101,7 @@ pub(super) struct Handle(pub(super) hid_t, pub(super) unsafe fn(hid_t) -> i32);
 
 impl Drop for Handle {
     fn drop(&mut self) {
+        // SAFETY: a function that closes identifiers, in the lock; the identifier is this handle's, and closed once.
         if locked(|| unsafe { (self.1)(self.0) }) < 0 {
             CLOSE_FAILED.store(true, Ordering::Relaxed);
         }
@@ -100,7 +114,10 @@ pub(super) static CLOSE_FAILED: AtomicBool = AtomicBool::new(false);
 
 macro_rules! closer {
     ($name:ident, $f:ident) => {
+        /// # Safety
+        /// Called in [`locked`].
         pub(super) unsafe fn $name(id: hid_t) -> i32 {
+            // SAFETY: in the lock (the caller's promise); an identifier of another kind is an error that is returned.
             unsafe { $f(id) }
         }
     };
@@ -115,12 +132,14 @@ closer!(close_plist, H5Pclose);
 
 pub(super) fn plist(class: &'static hid_t) -> Result<Handle> {
     // The class has its number only once the library has started.
+    // SAFETY: in the lock.
     let id = locked(|| unsafe { H5Pcreate(id(class)) });
     checked(id, || "making a property list".into())?;
     Ok(Handle(id, close_plist))
 }
 
 pub(super) fn space(shape: &[u64], growing: bool) -> Result<Handle> {
+    // SAFETY: in the lock; arrays of as many sizes as the rank that stands beside them, or NULL for "as they are".
     let id = locked(|| unsafe {
         if shape.is_empty() {
             H5Screate(H5S_class_t::H5S_SCALAR)
@@ -137,6 +156,7 @@ pub(super) fn space(shape: &[u64], growing: bool) -> Result<Handle> {
 }
 
 pub(super) fn text_type(bytes: usize, ascii: bool) -> Result<Handle> {
+    // SAFETY: in the lock; identifiers and numbers alone.
     locked(|| unsafe {
         let id = checked(H5Tcopy(id(H5T_C_S1)), || "making a text type".into())?;
         let t = Handle(id, close_type);

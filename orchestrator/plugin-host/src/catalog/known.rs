@@ -277,6 +277,7 @@ fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)
         Ok(None) | Err(_) => {
             // What the library started goes too, also where it has left the group.
             if let Ok(group) = libc::pid_t::try_from(child.id()) {
+                // SAFETY: numbers alone. The group of a child that has not been waited for: its number is no other's.
                 unsafe { libc::kill(-group, libc::SIGKILL) };
             }
             child.kill()?;

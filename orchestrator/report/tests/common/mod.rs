@@ -3,10 +3,12 @@
 
 mod extras;
 pub mod family;
+mod labels;
 mod shapes;
 
 use camino::{Utf8Path, Utf8PathBuf};
 use extras::{further_fields, history};
+use labels::{as_refs, key, label_of, split};
 use plyflow_artifact::{ArtifactWriter, DType, FieldInfo, On};
 use plyflow_model::job::{Cost, NamedResult, Record};
 use plyflow_report::{Expectation, Instance, ReportInput};
@@ -560,29 +562,6 @@ pub fn expectation(
         source: Some("thesis 5.5 <table>".into()),
         met,
     }
-}
-
-fn label_of(step: &str, item: &[&str]) -> String {
-    if item.is_empty() {
-        step.into()
-    } else {
-        format!("{step}[{}]", item.join(","))
-    }
-}
-
-fn as_refs(item: &[String]) -> Vec<&str> {
-    item.iter().map(String::as_str).collect()
-}
-
-fn split(label: &str) -> (String, Vec<String>) {
-    match label.split_once('[') {
-        Some((step, item)) => (step.into(), vec![item.trim_end_matches(']').into()]),
-        None => (label.into(), vec![]),
-    }
-}
-
-fn key(label: &str) -> String {
-    label.bytes().map(|b| format!("{b:02x}")).collect()
 }
 
 pub const ZONES: [(&str, [f64; 4]); 2] = [

@@ -34,7 +34,9 @@ impl Interrupts {
     /// A closed terminal counts once: the shell and the kernel may both tell of it, and the second would not let steps end in order.
     /// Whoever ignores it (`nohup`) goes on.
     fn listen_to_hangups(write: UnixStream) -> std::io::Result<()> {
+        // SAFETY: zeros are an action without flags and mask.
         let mut before: libc::sigaction = unsafe { std::mem::zeroed() };
+        // SAFETY: NULL for no new action, and a whole one of this function for that which is there.
         let asked = unsafe { libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut before) };
         if asked == 0 && before.sa_sigaction == libc::SIG_IGN {
             return Ok(());
@@ -45,7 +47,7 @@ impl Interrupts {
                 let _ = rustix::io::write(&write, b"X");
             }
         };
-        // An atomic and a write to a socket that does not block: both are allowed in a handler.
+        // SAFETY: an atomic and a write to a socket that does not block: both are allowed in a handler.
         unsafe { signal_hook::low_level::register(signal_hook::consts::SIGHUP, tell) }?;
         Ok(())
     }

@@ -57,17 +57,86 @@ impl<'a> Asked<'a> {
         problems: &mut Problems,
     ) -> Option<FamilyExpectation> {
         let before = problems.count();
+        let response = self.response(item, source, problems)?;
+        let of = of(item);
+        if !self.is_for_this(item, of, source, problems) {
+            return None;
+        }
+        let over = self.over(item, of, source, problems)?;
+        let points = self.points(item, of, source, problems)?;
+        // What is stated is a place along a variable, or a value of the response.
+        let place = matches!(of, FamilyOf::Argmax | FamilyOf::Argmin | FamilyOf::Best);
+        let variable = over
+            .filter(|_| place)
+            .map(|i| &self.family.points.variables[i]);
+        let of_response = &self.responses[response];
+        let (unit, what) = match variable {
+            Some(v) => (v.unit.clone(), v.name.as_str()),
+            None => (of_response.unit.clone(), of_response.name.as_str()),
+        };
+        let mut number = |key: &str| {
+            let entry = item.entry(key).filter(|e| e.value.kind != Kind::Null)?;
+            value(entry, &unit, what, source, problems)
+        };
+        let (expected, tolerance) = (number("value"), number("tolerance"));
+        let (minimum, maximum) = (number("minimum"), number("maximum"));
+        if let (Some(_), Some(e)) = (tolerance.filter(|t| *t < 0.0), item.entry("tolerance")) {
+            problems.add(source, &e.value.span, "`tolerance` is negative");
+        }
+        let relative = item
+            .get("relative_tolerance")
+            .and_then(|n| n.to_json().as_f64());
+        let about = match item.get("about") {
+            Some(node) if of == FamilyOf::SymmetricAbout => {
+                Some(self.about(node, over?, source, problems)?)
+            }
+            _ => None,
+        };
+        stated(item, of, source, problems);
+        let si_unit = variable.map_or(unit, |v| v.kind.si_unit());
+        let found = FamilyExpectation {
+            response,
+            of,
+            over,
+            about,
+            increasing: item.get("direction").and_then(Node::text) == Some("increasing"),
+            points,
+            condition: item.get("where").and_then(Node::text).map(str::to_owned),
+            unit: si_unit,
+            value: expected,
+            tolerance,
+            relative_tolerance: relative,
+            minimum,
+            maximum,
+            source: item.get("source").and_then(Node::text).map(str::to_owned),
+        };
+        if problems.count() == before {
+            self.comparable(&found, item, source, problems);
+        }
+        (problems.count() == before).then_some(found)
+    }
+
+    /// The response that is named; `None` when there is none, or none that is right (and reported).
+    fn response(&self, item: &Node, source: &Source, problems: &mut Problems) -> Option<usize> {
         let node = item.get("response")?;
         let name = node.text()?;
-        let Some(response) = self.responses.iter().position(|r| r.name == name) else {
-            if !self.declared.iter().any(|d| d == name) {
-                let d = problems.add(source, &node.span, format!("there is no response `{name}`"));
-                d.given(name)
-                    .suggest(name, self.declared.iter().map(String::as_str));
-            }
-            return None;
-        };
-        let of = of(item);
+        let found = self.responses.iter().position(|r| r.name == name);
+        if found.is_none() && !self.declared.iter().any(|d| d == name) {
+            let d = problems.add(source, &node.span, format!("there is no response `{name}`"));
+            d.given(name)
+                .suggest(name, self.declared.iter().map(String::as_str));
+        }
+        found
+    }
+
+    /// Whether this can be told of an optimisation, or of a study, whichever the workflow is.
+    fn is_for_this(
+        &self,
+        item: &Node,
+        of: FamilyOf,
+        source: &Source,
+        problems: &mut Problems,
+    ) -> bool {
         let searched = self.family.search.is_some();
         if searched != (of == FamilyOf::Best)
             && matches!(
@@ -89,60 +158,9 @@ impl<'a> Asked<'a> {
                 true => "a method chooses the points: expect something `of: best`",
                 false => "it is for `optimise`; use `max`, `min`, `argmax` or `argmin`",
             });
-            return None;
+            return false;
         }
-        let over = self.over(item, of, source, problems)?;
-        let points = self.points(item, of, source, problems)?;
-        let variable = over.map(|i| &self.family.points.variables[i]);
-        let (unit, what) = match (of, variable) {
-            (FamilyOf::Argmax | FamilyOf::Argmin | FamilyOf::Best, Some(v)) => {
-                (v.unit.clone(), v.name.as_str())
-            }
-            _ => (self.responses[response].unit.clone(), name),
-        };
-        let mut number = |key: &str| {
-            let entry = item.entry(key).filter(|e| e.value.kind != Kind::Null)?;
-            value(entry, &unit, what, source, problems)
-        };
-        let (expected, tolerance) = (number("value"), number("tolerance"));
-        let (minimum, maximum) = (number("minimum"), number("maximum"));
-        if let (Some(_), Some(e)) = (tolerance.filter(|t| *t < 0.0), item.entry("tolerance")) {
-            problems.add(source, &e.value.span, "`tolerance` is negative");
-        }
-        let relative = item
-            .get("relative_tolerance")
-            .and_then(|n| n.to_json().as_f64());
-        let about = match item.get("about") {
-            Some(node) if of == FamilyOf::SymmetricAbout => {
-                Some(self.about(node, over?, source, problems)?)
-            }
-            _ => None,
-        };
-        stated(item, of, source, problems);
-        let si_unit = match (of, variable) {
-            (FamilyOf::Argmax | FamilyOf::Argmin | FamilyOf::Best, Some(v)) => v.kind.si_unit(),
-            _ => unit,
-        };
-        let found = FamilyExpectation {
-            response,
-            of,
-            over,
-            about,
-            increasing: item.get("direction").and_then(Node::text) == Some("increasing"),
-            points,
-            condition: item.get("where").and_then(Node::text).map(str::to_owned),
-            unit: si_unit,
-            value: expected,
-            tolerance,
-            relative_tolerance: relative,
-            minimum,
-            maximum,
-            source: item.get("source").and_then(Node::text).map(str::to_owned),
-        };
-        if problems.count() == before {
-            self.comparable(&found, item, source, problems);
-        }
-        (problems.count() == before).then_some(found)
+        true
     }
 
     /// The variable along which is looked. `None` when something is wrong.
@@ -338,40 +356,43 @@ fn of(item: &Node) -> FamilyOf {
 
 /// Whether an expectation states what its kind needs, and nothing else.
 fn stated(item: &Node, of: FamilyOf, source: &Source, problems: &mut Problems) {
-    let given = |key: &str| item.get(key).is_some();
-    let along = matches!(
-        of,
-        FamilyOf::Monotone | FamilyOf::ZeroWhere | FamilyOf::SymmetricAbout
-    );
-    let wanted: &[(&str, bool, &str)] = &[
+    for (key, whose, expected) in [
         (
             "about",
-            of == FamilyOf::SymmetricAbout,
+            FamilyOf::SymmetricAbout,
             "`about: ..`, where the points mirror each other",
         ),
         (
             "direction",
-            of == FamilyOf::Monotone,
+            FamilyOf::Monotone,
             "`direction: increasing` or `decreasing`",
         ),
-    ];
-    for (key, needed, expected) in wanted {
+    ] {
         match item.entry(key) {
-            Some(e) if !needed && e.value.kind != Kind::Null => {
+            Some(e) if of != whose && e.value.kind != Kind::Null => {
                 let message = format!("`{key}` with `of: {}`", of.word());
                 problems
                     .add(source, &e.key_span, message)
                     .help("leave it out");
             }
-            None if *needed => {
+            None if of == whose => {
                 let message = format!("`{}` without `{key}`", of.word());
-                problems
-                    .add(source, &item.span, message)
-                    .expected(*expected);
+                problems.add(source, &item.span, message).expected(expected);
             }
             _ => {}
         }
     }
+    bounds_stated(item, of, source, problems);
+}
+
+/// Whether an expectation has the bounds that its kind needs, and no others: a claim along a variable has a tolerance alone, a number
+/// has a value or a limit.
+fn bounds_stated(item: &Node, of: FamilyOf, source: &Source, problems: &mut Problems) {
+    let given = |key: &str| item.get(key).is_some();
+    let along = matches!(
+        of,
+        FamilyOf::Monotone | FamilyOf::ZeroWhere | FamilyOf::SymmetricAbout
+    );
     let foreign: &[&str] = if along {
         &["value", "minimum", "maximum"]
     } else {

@@ -7,7 +7,7 @@ use crate::resolved::{Budget, Optimisation, Study, StudyResponse};
 use crate::study::points;
 use crate::study::space::{Begun, Family};
 use crate::study::told::{in_unit_of, report, within};
-use crate::yaml::{Kind, Node};
+use crate::yaml::{Entry, Kind, Node};
 use plyflow_model::units::{Dimension, parse_quantity};
 use plyflow_study::optimise::{Along, DEFAULT_POPULATION, Outcome, Search, Way};
 use plyflow_study::{Expression, ExpressionError, Names, Points, Quantity, Table, Value};
@@ -199,6 +199,31 @@ pub(super) fn looked_for(
     let begun = family.search.as_ref()?;
     let entry = root.entry("optimise")?;
     let node = &entry.value;
+    let (objective, maximise) = objective(entry, responses, source, problems)?;
+    let budget = budget(node, source, problems)?;
+    let (subject_to, constraints) =
+        conditions(node, family, &begun.asked[0], responses, source, problems)?;
+    Some(Optimisation {
+        objective,
+        maximise,
+        subject_to,
+        constraints,
+        method: node.get("method")?.text()?.to_owned(),
+        seed: begun.search.seed as u32,
+        budget,
+        digest: begun.digest.clone(),
+        search: Some((begun.search.clone(), begun.asked.clone())),
+    })
+}
+
+/// The response that `optimise` names, and whether it shall be large; everything wrong is reported.
+fn objective(
+    entry: &Entry,
+    responses: &[StudyResponse],
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<(usize, bool)> {
+    let node = &entry.value;
     let given = |key: &str| node.entry(key).filter(|e| e.value.kind != Kind::Null);
     let (target, maximise) = match (given("minimise"), given("maximise")) {
         (Some(e), None) => (e, false),
@@ -224,7 +249,18 @@ pub(super) fn looked_for(
         d.suggest(name, responses.iter().map(|r| r.name.as_str()));
         return None;
     };
-    let budget = budget(node, source, problems)?;
+    Some((objective, maximise))
+}
+
+/// The conditions of `subject_to`, and of how many parts they consist; everything wrong is reported.
+fn conditions(
+    node: &Node,
+    family: &Family,
+    first: &[Value],
+    responses: &[StudyResponse],
+    source: &Source,
+    problems: &mut Problems,
+) -> Option<(Vec<String>, usize)> {
     let (mut subject_to, mut constraints) = (Vec::new(), 0);
     for item in node.get("subject_to").map_or(&[][..], Node::items) {
         let text = item.text()?;
@@ -232,7 +268,7 @@ pub(super) fn looked_for(
         let probe = |i: usize| Some(1.25 + i as f64 / 7.0);
         let some: Vec<Option<f64>> = (0..responses.len()).map(probe).collect();
         let names = names(&family.names, responses);
-        let values = values(&begun.asked[0], responses, &some);
+        let values = values(first, responses, &some);
         let names = Names {
             all: &names,
             bare: true,
@@ -257,17 +293,7 @@ pub(super) fn looked_for(
             }
         }
     }
-    Some(Optimisation {
-        objective,
-        maximise,
-        subject_to,
-        constraints,
-        method: node.get("method")?.text()?.to_owned(),
-        seed: begun.search.seed as u32,
-        budget,
-        digest: begun.digest.clone(),
-        search: Some((begun.search.clone(), begun.asked.clone())),
-    })
+    Some((subject_to, constraints))
 }
 
 fn names(variables: &[String], responses: &[StudyResponse]) -> Vec<String> {

@@ -561,30 +561,11 @@ impl Cells {
         }
         let (line, heads) = all.remove(0);
         let mut heads: Vec<Head> = heads.iter().map(|c| Head::of(c)).collect();
-        let number = |cell: &str| plyflow_files::number::plain(cell, decimal).is_some();
-        // Units in a row of their own stand above numbers; words above words are values.
-        if heads.iter().all(|h| h.unit.is_none())
-            && let [(_, below), (_, next), ..] = &all[..]
-        {
-            let unit = |cell: &str| {
-                cell.trim_matches(['[', ']', '(', ')', '-'])
-                    .trim()
-                    .to_owned()
-            };
-            let fits = |(cell, next): (&String, &String)| {
-                let unit = unit(cell);
-                unit.is_empty()
-                    || (!number(cell)
-                        && number(next)
-                        && plyflow_model::units::parse_unit(&unit).is_ok())
-            };
-            let any = below.iter().any(|c| !unit(c).is_empty());
-            if any && below.iter().zip(next).all(fits) {
-                for (head, cell) in heads.iter_mut().zip(below) {
-                    head.unit = Some(unit(cell));
-                }
-                all.remove(0);
+        if let Some(units) = row_of_units(&heads, &all, decimal) {
+            for (head, unit) in heads.iter_mut().zip(units) {
+                head.unit = Some(unit);
             }
+            all.remove(0);
         }
         Ok(Self {
             heads: (line, heads),
@@ -592,6 +573,34 @@ impl Cells {
             decimal,
         })
     }
+}
+
+/// The units of the columns, where they have a row of their own below the head. Such a row stands above numbers; words above words
+/// are values.
+fn row_of_units(
+    heads: &[Head],
+    rows: &[(usize, Vec<String>)],
+    decimal: Decimal,
+) -> Option<Vec<String>> {
+    let [(_, below), (_, next), ..] = rows else {
+        return None;
+    };
+    if heads.iter().any(|h| h.unit.is_some()) {
+        return None;
+    }
+    let number = |cell: &str| plyflow_files::number::plain(cell, decimal).is_some();
+    let unit = |cell: &String| {
+        cell.trim_matches(['[', ']', '(', ')', '-'])
+            .trim()
+            .to_owned()
+    };
+    let units: Vec<String> = below.iter().map(unit).collect();
+    let fits = |((cell, unit), next): ((&String, &String), &String)| {
+        unit.is_empty()
+            || (!number(cell) && number(next) && plyflow_model::units::parse_unit(unit).is_ok())
+    };
+    let any = units.iter().any(|u| !u.is_empty());
+    (any && below.iter().zip(&units).zip(next).all(fits)).then_some(units)
 }
 
 fn whole(node: &Node) -> Option<u32> {

@@ -229,23 +229,15 @@ impl Family {
             .enumerate()
             .map(|(i, d)| (d.name(), i))
             .collect();
-        let mut depends: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); drafts.len()];
+        let depends = self.depends(drafts, wiring, &index);
         // Positions of the resolved steps: by step of the file, by point.
         let mut at: Vec<Vec<usize>> = vec![Vec::new(); drafts.len()];
         let mut steps: Vec<ResolvedStep> = Vec::new();
         let mut contents: HashMap<blake3::Hash, usize> = HashMap::new();
         for &i in &wiring.order {
-            let own = &mut BTreeSet::new();
-            self.used(&drafts[i].entry.value, own);
-            let inputs = wiring.inputs[i].iter().map(|w| w.from.as_str());
-            for from in inputs.chain(wiring.dimensions[i].iter().map(|d| d.over.as_str())) {
-                own.extend(depends[index[from]].iter().copied());
-            }
-            depends[i] = std::mem::take(own);
-            let on: Vec<usize> = depends[i].iter().copied().collect();
             let mut known: HashMap<String, usize> = HashMap::new();
             for (p, point) in self.points.all.iter().enumerate() {
-                let part = point.part(&self.points.variables, &on);
+                let part = point.part(&self.points.variables, &depends[i]);
                 if let Some(there) = known.get(&part) {
                     at[i].push(*there);
                     continue;
@@ -288,6 +280,26 @@ impl Family {
         }
         let study = self.study(drafts, wiring, &at);
         Some((steps, Some(study)))
+    }
+
+    /// The variables on which each step depends, by its own text or through what it is wired to.
+    fn depends(
+        &self,
+        drafts: &[Draft<'_>],
+        wiring: &Wiring,
+        index: &HashMap<&str, usize>,
+    ) -> Vec<Vec<usize>> {
+        let mut depends: Vec<Vec<usize>> = vec![Vec::new(); drafts.len()];
+        for &i in &wiring.order {
+            let mut own = BTreeSet::new();
+            self.used(&drafts[i].entry.value, &mut own);
+            let inputs = wiring.inputs[i].iter().map(|w| w.from.as_str());
+            for from in inputs.chain(wiring.dimensions[i].iter().map(|d| d.over.as_str())) {
+                own.extend(depends[index[from]].iter().copied());
+            }
+            depends[i] = own.into_iter().collect();
+        }
+        depends
     }
 
     /// One step of the file at one point, under its name in the file.

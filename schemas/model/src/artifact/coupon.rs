@@ -49,10 +49,10 @@ pub struct Coupon {
     /// Of a bias extension in the plane: angle between the elements' edges and the fibres (rad).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh_angle: Option<f64>,
-    /// Of a bias extension: length between the clamps (m).
+    /// Of a bias extension and of buckling: length between the clamps (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length: Option<f64>,
-    /// Of a bias extension: width (m).
+    /// Of a bias extension and of buckling: width (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub width: Option<f64>,
     /// Of a bias extension: time in which the moving clamp goes its way (s).
@@ -67,7 +67,7 @@ pub struct Coupon {
     /// Of a cantilever: how far the strip stands out of the clamp (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub overhang: Option<f64>,
-    /// Of a cantilever and of pure bending: the fibre family along the strip, 1 or 2.
+    /// Of a cantilever, of pure bending and of buckling: the fibre family along the strip, 1 or 2.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub family: Option<u32>,
     /// Of pure bending: shear of the strip before it is bent (rad).

@@ -106,6 +106,7 @@ const BOUNDS: [&str; 3] = ["minimum", "maximum", "exclusive_minimum"];
 impl TryFrom<RawDeclaration> for Declaration {
     type Error = String;
 
+    /// Long, as it goes through the types of a parameter once, each with the keys that it allows.
     fn try_from(raw: RawDeclaration) -> Result<Self, String> {
         let missing = |key: &str| format!("type `{}` needs `{key}`", raw.r#type);
         let (shape, allowed): (Shape, &[&str]) = match raw.r#type.as_str() {
@@ -177,6 +178,7 @@ impl TryFrom<RawDeclaration> for Declaration {
 }
 
 impl From<Declaration> for RawDeclaration {
+    /// Long, as it goes through the types of a parameter once.
     fn from(d: Declaration) -> Self {
         let mut raw = RawDeclaration {
             doc: d.doc,

@@ -71,7 +71,7 @@ impl Dimension {
         Dimension::Dimensionless,
     ];
 
-    /// (name in manifests, with article, example, SI base unit, exponents).
+    /// (name in manifests, with article, example, SI base unit, exponents). Long, as it is a table, one row for each dimension.
     const fn row(
         self,
     ) -> (

@@ -80,6 +80,7 @@ fn call_after(
     let mut b = Breaches::default();
     let name = "bending";
     if let Some(bending) = law.functions().bending {
+        // SAFETY: the law's own instance, and a batch with the guarded buffers that plyflow.h asks of this call, of the lengths for its sizes.
         b.status(name, unsafe { bending(law.instance(), &raw const batch) });
     }
     b.unchanged(name, "metric", &c, metric);
@@ -255,6 +256,7 @@ fn hammer(
     (0..CALLS)
         .filter(|_| {
             now.slice_mut().copy_from_slice(history.slice());
+            // SAFETY: as in the call above, with buffers of this thread's own.
             let code = counter.during(|| unsafe { bending(law.instance(), &raw const batch) });
             let outputs = [
                 (&moment, &want.moment[..]),

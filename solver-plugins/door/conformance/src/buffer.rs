@@ -8,8 +8,8 @@ const GUARD_BITS: u64 = 0x7ff8_6a2d_0000_0000;
 const POISON_BITS: u64 = 0x7ff8_90f5_0000_0000;
 
 #[derive(Clone, Copy)]
-#[repr(align(64))]
-struct Line(#[expect(dead_code, reason = "read through a pointer")] [f64; 8]);
+#[repr(C, align(64))]
+struct Line([f64; 8]);
 
 /// A buffer as the contract has it: 64-byte aligned, with nothing that a component may touch around it.
 #[derive(Clone)]
@@ -56,12 +56,14 @@ impl Guarded {
 
     fn all(&self) -> &[f64] {
         let first: *const f64 = self.lines.as_ptr().cast();
-        // Lines are arrays of 8 doubles without gaps.
+        // SAFETY: a line is nothing but 8 doubles (`repr(C)`, 64 bytes), so the vector's lines are that many doubles in one allocation, borrowed as
+        // `self` is.
         unsafe { std::slice::from_raw_parts(first, 8 * self.lines.len()) }
     }
 
     fn all_mut(&mut self) -> &mut [f64] {
         let first: *mut f64 = self.lines.as_mut_ptr().cast();
+        // SAFETY: as in `all`; `self` is borrowed alone, and with it the lines.
         unsafe { std::slice::from_raw_parts_mut(first, 8 * self.lines.len()) }
     }
 
@@ -77,6 +79,7 @@ impl Guarded {
     /// For the component. It has the whole allocation in reach, as a plugin has the caller's memory.
     pub(crate) fn pointer(&mut self) -> *mut f64 {
         let first: *mut f64 = self.lines.as_mut_ptr().cast();
+        // SAFETY: every buffer has a guard zone before it and one behind it (`filled`).
         unsafe { first.add(GUARD) }
     }
 
@@ -107,6 +110,7 @@ mod tests {
                 let mut b = Guarded::zeros(len);
                 assert_eq!(b.breach(), None);
                 assert_eq!(b.pointer() as usize % 64, 0);
+                // SAFETY: in the guard zone before or behind the buffer, which is part of the allocation.
                 unsafe { *b.pointer().offset(at) = 0.0 };
                 assert_eq!(b.breach(), Some(at));
             }

@@ -21,7 +21,7 @@ const LANES: usize = 16;
 /// caller sees to it that some material is accepted.
 ///
 /// # Safety
-/// `functions` and `material` must be valid for the length of the call.
+/// `functions` must be a whole table and `material` a whole material, valid for the length of the call; what their functions do is under test.
 #[must_use]
 pub unsafe fn check_element(
     functions: *const pf_element_functions,
@@ -31,6 +31,7 @@ pub unsafe fn check_element(
     sink: &mut dyn Sink,
 ) -> Vec<Check> {
     let mut run = Run::new(sink);
+    // SAFETY: valid for this call (the caller's promise), which no subject outlives.
     let create = || unsafe { Subject::create(functions, parameters, material) };
     let (mut subject, mut twin) = (None, None);
     run.check(rules::CREATE, || match (create(), create()) {

@@ -21,12 +21,15 @@ pub(crate) struct Law {
     pub(crate) sizes: pf_material_sizes,
 }
 
-// The contract: several threads call one instance at once. That is what is tested.
+// SAFETY: plyflow.h asks of an instance that several threads may call it at once. That is what is tested: one that breaks it may break the process,
+// which is there for the plugin under test.
 unsafe impl Sync for Law {}
+// SAFETY: as for `Sync`.
 unsafe impl Send for Law {}
 
 impl Drop for Law {
     fn drop(&mut self) {
+        // SAFETY: made by this table's `create`, ended once; the table is valid as long as the law lives (`create`).
         unsafe { ((*self.functions).destroy)(self.instance) };
     }
 }
@@ -47,12 +50,14 @@ impl Law {
     /// Makes an instance and reads its sizes.
     ///
     /// # Safety
-    /// `functions` must be valid as long as the law lives.
+    /// `functions` must be a whole table, valid as long as the law lives. What its functions do with what they are given is under test: it may be more
+    /// than plyflow.h allows, within the guard zones of [`Guarded`].
     pub(crate) unsafe fn create(
         functions: *const pf_material_functions,
         parameters: &str,
     ) -> Result<Self, Refusal> {
         let text = pf_str::new(parameters);
+        // SAFETY: a valid table (the caller's promise), a text, and room for the instance and the error that `or_instance` has.
         let create = |new, error| unsafe { ((*functions).create)(text, new, error) };
         let instance = Refusal::or_instance(create)?;
         let mut new = Self {
@@ -60,6 +65,7 @@ impl Law {
             instance,
             sizes: pf_material_sizes::default(),
         };
+        // SAFETY: the instance that the table has just made; a whole struct, as its `size` says.
         let code = unsafe { ((*functions).sizes)(instance, &raw mut new.sizes) };
         if code != PF_OK {
             return Err(Refusal::Broken(format!("sizes returned {code}")));
@@ -72,6 +78,7 @@ impl Law {
     }
 
     pub(crate) fn functions(&self) -> &pf_material_functions {
+        // SAFETY: valid as long as the law lives (`create`).
         unsafe { &*self.functions }
     }
 
@@ -116,7 +123,8 @@ impl Law {
                 std::ptr::null_mut()
             },
         };
-        let code = unsafe { ((*self.functions).membrane)(self.instance, &raw const batch) };
+        // SAFETY: this table's instance, and a batch with the guarded buffers that plyflow.h asks of this call, of the lengths for its sizes.
+        let code = unsafe { (self.functions().membrane)(self.instance, &raw const batch) };
         let mut b = Breaches::default();
         let call = "membrane";
         b.status(call, code);
@@ -161,10 +169,11 @@ impl Law {
                 std::ptr::null_mut()
             },
         };
-        let membrane = unsafe { (*self.functions).membrane };
+        let membrane = self.functions().membrane;
         (0..CALLS)
             .filter(|_| {
                 now.slice_mut().copy_from_slice(history.slice());
+                // SAFETY: as in `membrane`, with buffers of this thread's own.
                 let code = counter.during(|| unsafe { membrane(self.instance, &raw const batch) });
                 let outputs = [
                     (&stress, &want.stress[..]),

@@ -13,7 +13,7 @@ use plyflow_sdk::abi::*;
 /// and, when it has one, its bending.
 ///
 /// # Safety
-/// `functions` must be a valid table for the length of the call.
+/// `functions` must be a whole table that is valid for the length of the call; what its functions do is under test.
 #[must_use]
 pub unsafe fn check_material(
     functions: *const pf_material_functions,
@@ -21,6 +21,7 @@ pub unsafe fn check_material(
     sink: &mut dyn Sink,
 ) -> Vec<Check> {
     let mut run = Run::new(sink);
+    // SAFETY: valid for this call (the caller's promise), which no law outlives.
     let create = || unsafe { Law::create(functions, parameters) };
     let (mut law, mut twin) = (None, None);
     run.check(rules::CREATE, || match (create(), create()) {
@@ -71,7 +72,7 @@ fn sizes(functions: *const pf_material_functions, parameters: &str, law: &Law) -
             with[name] = (factor * value).into();
         }
     }
-    // The functions are valid for the length of `check_material`.
+    // SAFETY: valid for the length of `check_material` (its caller's promise), which calls this.
     match unsafe { Law::create(functions, &with.to_string()) } {
         Ok(other) => match other_sheet(&with, &other) {
             Some(text) => Seen::Bad(text),

@@ -147,9 +147,11 @@ impl Pauses {
     /// # Safety
     /// The timer was made and not deleted.
     unsafe fn set(&self) {
+        // SAFETY: numbers alone, for which zeros are values.
         let mut times: libc::itimerspec = unsafe { std::mem::zeroed() };
         let longer = self.longer.load(Ordering::Relaxed);
         times.it_value.tv_nsec = i64::from(self.every.subsec_nanos()) << longer;
+        // SAFETY: a timer that is there (the caller's promise), whole times, and NULL for those before.
         unsafe { libc::timer_settime(self.timer, 0, &raw const times, std::ptr::null_mut()) };
     }
 }

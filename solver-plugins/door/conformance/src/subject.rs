@@ -21,12 +21,15 @@ pub(crate) struct Subject {
     material: pf_material,
 }
 
-// The contract: several threads call one instance at once. That is what is tested.
+// SAFETY: plyflow.h asks of an instance that several threads may call it at once. That is what is tested: one that breaks it may break the process,
+// which is there for the plugin under test.
 unsafe impl Sync for Subject {}
+// SAFETY: as for `Sync`.
 unsafe impl Send for Subject {}
 
 impl Drop for Subject {
     fn drop(&mut self) {
+        // SAFETY: made by this table's `create`, ended once; the table is valid as long as the subject lives (`create`).
         unsafe { ((*self.functions).destroy)(self.instance) };
     }
 }
@@ -120,16 +123,19 @@ impl Subject {
     /// Makes an instance and reads its sizes.
     ///
     /// # Safety
-    /// `functions` and `material` must be valid as long as the subject lives.
+    /// `functions` must be a whole table, and `material` a whole material, valid as long as the subject lives. What their functions do with what they
+    /// are given is under test: it may be more than plyflow.h allows, within the guard zones of [`Guarded`].
     pub(crate) unsafe fn create(
         functions: *const pf_element_functions,
         parameters: &str,
         material: &pf_material,
     ) -> Result<Self, Refusal> {
         let text = pf_str::new(parameters);
+        // SAFETY: a valid table and material (the caller's promise), a text, and room for the instance and the error that `or_instance` has.
         let create = |new, error| unsafe { ((*functions).create)(text, material, new, error) };
         let instance = Refusal::or_instance(create)?;
         let mut of_material = pf_material_sizes::default();
+        // SAFETY: a valid material (the caller's promise); a whole struct, as its `size` says.
         unsafe { ((*material.functions).sizes)(material.instance, &raw mut of_material) };
         let mut new = Self {
             functions,
@@ -138,6 +144,7 @@ impl Subject {
             of_material,
             material: *material,
         };
+        // SAFETY: the instance that the table has just made; a whole struct, as its `size` says.
         let code = unsafe { ((*functions).sizes)(instance, &raw mut new.sizes) };
         if code != PF_OK {
             return Err(Refusal::Broken(format!("sizes returned {code}")));
@@ -145,8 +152,13 @@ impl Subject {
         Ok(new)
     }
 
+    fn functions(&self) -> &pf_element_functions {
+        // SAFETY: valid as long as the subject lives (`create`).
+        unsafe { &*self.functions }
+    }
+
     pub(crate) fn has_patch_functions(&self) -> bool {
-        let f = unsafe { &*self.functions };
+        let f = self.functions();
         f.patch_initialise.is_some() && f.patch_forces.is_some()
     }
 
@@ -215,7 +227,8 @@ impl Subject {
         if self.rotates() {
             batch.inertia = inertia.pointer();
         }
-        let code = unsafe { ((*self.functions).initialise)(self.instance, &raw const batch) };
+        // SAFETY: this table's instance, and a batch with the guarded buffers that plyflow.h asks of this call, of the lengths for its sizes.
+        let code = unsafe { (self.functions().initialise)(self.instance, &raw const batch) };
         let mut b = Breaches::default();
         let call = "initialise";
         b.status(call, code);
@@ -282,7 +295,8 @@ impl Subject {
         let mut buffers = self.buffers([position, &velocity, &spin], ask, Guarded::poisoned);
         let mut batch = self.forces_batch(state, &mut buffers, ask);
         batch.dt = if motion.from.is_some() { DT } else { 0.0 };
-        let code = unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
+        // SAFETY: as in `initialise`, with the buffers of this call.
+        let code = unsafe { (self.functions().forces)(self.instance, &raw const batch) };
         let mut b = Breaches::default();
         let call = "forces";
         b.status(call, code);
@@ -328,8 +342,8 @@ impl Subject {
                 to.slice_mut().copy_from_slice(from);
                 let (to, from) = (&mut now.material_history, state.material_history.slice());
                 to.slice_mut().copy_from_slice(from);
-                let call =
-                    || unsafe { ((*self.functions).forces)(self.instance, &raw const batch) };
+                // SAFETY: as in `forces`, with buffers of this thread's own.
+                let call = || unsafe { (self.functions().forces)(self.instance, &raw const batch) };
                 let code = counter.during(call);
                 let gave = [
                     &want.force,

@@ -128,7 +128,7 @@ fn judge_material(
     sink: &mut dyn Sink,
 ) -> Result<Vec<Check>, StepError> {
     let found = host.component(PF_KIND_MATERIAL, &material.plugin)?;
-    // The host gives the table of a material for a material.
+    // SAFETY: the host gives the table of a material for a material, valid until the process ends (plyflow.h).
     Ok(unsafe { check_material(found.functions.cast(), &parameters(material), sink) })
 }
 
@@ -145,6 +145,7 @@ fn judge_element(
     let found = host.component(PF_KIND_ELEMENT, &element.plugin)?;
     let text = parameters(material);
     let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
+    // SAFETY: the host's table of a material, valid until the process ends; a text, room for the instance and a whole `pf_error`.
     let code =
         unsafe { ((*functions).create)(pf_str::new(&text), &raw mut instance, &raw mut error) };
     if code != PF_OK {
@@ -163,8 +164,11 @@ fn judge_element(
     } else {
         element.with.to_string()
     };
+    // SAFETY: a text of the host's, valid until `run` returns.
     let fields = unsafe { found.manifest.as_str() }.map_or(None, declared_fields);
+    // SAFETY: the host's table of an element, and the material that was made above.
     let checks = unsafe { check_element(found.functions.cast(), &with, fields, &made, sink) };
+    // SAFETY: made above, ended once; the elements that had it are gone.
     unsafe { ((*functions).destroy)(instance) };
     Ok(checks)
 }

@@ -33,13 +33,15 @@ impl From<&[f64]> for Aligned {
 impl std::ops::Deref for Aligned {
     type Target = [f64];
     fn deref(&self) -> &[f64] {
-        // Line is repr(C) over [f64; 8].
+        // SAFETY: a `Line` is nothing but 8 doubles (`repr(C)`, 64 bytes, aligned to 64), so the vector's lines are that many doubles in one
+        // allocation; they are borrowed as `self` is.
         unsafe { std::slice::from_raw_parts(self.0.as_ptr().cast(), self.0.len() * 8) }
     }
 }
 
 impl std::ops::DerefMut for Aligned {
     fn deref_mut(&mut self) -> &mut [f64] {
+        // SAFETY: as in `deref`; `self` is borrowed alone, and with it the lines.
         unsafe { std::slice::from_raw_parts_mut(self.0.as_mut_ptr().cast(), self.0.len() * 8) }
     }
 }

@@ -236,6 +236,7 @@ impl MaterialRef {
         if raw.functions.is_null() || raw.instance.is_null() {
             return Err("the material has no function table or no instance (NULL)".into());
         }
+        // SAFETY: the caller's table and instance; `s` is a whole struct whose `size` says how much of it may be written.
         let code = unsafe { ((*raw.functions).sizes)(raw.instance, &raw mut s) };
         if code != PF_OK {
             return Err(format!("the material did not tell its sizes (code {code})"));
@@ -246,6 +247,7 @@ impl MaterialRef {
                 s.thickness, s.areal_mass
             ));
         }
+        // SAFETY: the caller's table.
         let bending = unsafe { (*raw.functions).bending };
         if s.has_bending != 0 && bending.is_none() {
             return Err(
@@ -307,6 +309,8 @@ impl MaterialRef {
             energy: b.energy.as_mut_ptr(),
             stiffness: pointer(&mut b.stiffness),
         };
+        // SAFETY: table and instance outlive `self` (`new`). The arrays are borrowed for the call, the written ones alone, and have the
+        // lengths and the alignment that plyflow.h says for this law's sizes and these lanes: the assertions above.
         unsafe { ((*self.raw.functions).membrane)(self.raw.instance, &raw const raw) }
     }
 
@@ -345,7 +349,9 @@ impl MaterialRef {
             energy: b.energy.as_mut_ptr(),
             tangent: pointer(&mut b.tangent),
         };
+        // SAFETY: the table outlives `self` (`new`).
         match unsafe { (*self.raw.functions).bending } {
+            // SAFETY: as in `membrane`, with the assertions above.
             Some(bending) if self.sizes.has_bending => unsafe {
                 bending(self.raw.instance, &raw const raw)
             },

@@ -35,6 +35,7 @@ macro_rules! export_step {
         #[unsafe(no_mangle)]
         pub extern "C" fn plyflow_plugin() -> *const $crate::abi::pf_plugin {
             unsafe extern "C" fn run(services: *const $crate::abi::pf_services) -> i32 {
+                // SAFETY: the host gives `run` a table that is valid until it returns (plyflow.h).
                 unsafe { $crate::run_step::<$step>(services) }
             }
             static FUNCTIONS: $crate::abi::pf_step_functions = $crate::abi::pf_step_functions {

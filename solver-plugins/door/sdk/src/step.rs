@@ -168,12 +168,14 @@ pub struct Host {
     told_to_stop: AtomicBool,
 }
 
-// The contract (plyflow.h): any thread may call services until `run` returns, and the host does one call at a time.
+// SAFETY: any thread may call services until `run` returns, and the host does one call at a time (plyflow.h); a `Host` lives no longer than
+// that (`Host::new`). The flag is atomic.
 unsafe impl Sync for Host {}
 
 macro_rules! call {
     ($self:ident . $f:ident ( $($a:expr),* )) => {
-        // The services table lives as long as the Host (contract of run_step).
+        // SAFETY: the table lives as long as the `Host` (`Host::new`). What is given with the call are texts, arrays and structs that are borrowed
+        // through it, each array as long as the call says or, where it says nothing, as `check_body` has found.
         unsafe { let s = &*$self.services; (s.$f)(s.host $(, $a)*) }
     };
 }
@@ -185,7 +187,7 @@ impl Host {
     /// Wraps a services table.
     ///
     /// # Safety
-    /// `services` must be valid for the life of the `Host`.
+    /// `services` must be a whole table of a host that keeps to plyflow.h, valid for the life of the `Host`: until the step's `run` returns.
     pub unsafe fn new(services: *const pf_services) -> Self {
         Self {
             services,
@@ -216,8 +218,9 @@ impl Host {
         StepError::Cancelled
     }
 
+    /// A text that a service of this host returned: nothing else is given here.
     fn text(&self, s: pf_str) -> &str {
-        // Host strings stay valid until `run` returns.
+        // SAFETY: the host's texts stay valid until `run` returns (plyflow.h), which the `Host` does not outlive (`Host::new`).
         unsafe { s.as_str() }.unwrap_or("")
     }
 
@@ -337,11 +340,14 @@ impl Host {
 /// `services` must be a valid table for the length of the call.
 pub unsafe fn run_step<S: Step>(services: *const pf_services) -> i32 {
     let size = size_of::<pf_services>() as u64;
+    // SAFETY: not null, so a table (the caller's promise), and every version of it begins with its size.
     if services.is_null() || unsafe { (*services).size } < size {
         // A host that accepts this plugin's ABI version has all of its services.
         return PF_ERROR;
     }
+    // SAFETY: a table that is valid for this call, which `host` does not outlive, and as large as this plugin knows it (above).
     let host = unsafe { Host::new(services) };
+    // SAFETY: the same table, still in the call; the text is borrowed through it.
     let fail = |text: &str| unsafe { ((*services).fail)((*services).host, pf_str::new(text)) };
     match catch_unwind(AssertUnwindSafe(|| S::run(&host))) {
         Ok(Ok(())) => PF_OK,

@@ -45,6 +45,7 @@ fn create(parameters: &str) -> Result<*mut c_void, (i32, String)> {
     let table = material_table::<Linear>();
     let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
     let p = pf_str::new(parameters);
+    // SAFETY: a text, room for the instance and a whole `pf_error`.
     match unsafe { (table.create)(p, &raw mut instance, &raw mut error) } {
         PF_OK => Ok(instance),
         code => Err((code, error.get())),
@@ -84,6 +85,7 @@ fn a_material_works_through_its_table_and_its_panics_become_a_status() {
         functions: &raw const table,
         instance,
     };
+    // SAFETY: the table and an instance that it has made, both alive to the end of the test.
     let material = unsafe { MaterialRef::new(raw) }.unwrap();
     assert_eq!(material.sizes().thickness, 0.1);
     assert!(!material.sizes().has_bending);
@@ -91,7 +93,9 @@ fn a_material_works_through_its_table_and_its_panics_become_a_status() {
     assert_eq!(call(&material, 1.5, &mut stress), (PF_OK, 1.5));
     assert_eq!(stress[7], 1.0);
     assert_eq!(call(&material, 1000.0, &mut stress).0, PF_PANIC);
+    // SAFETY: made above, ended once; nobody asks `material` any more.
     unsafe { (table.destroy)(instance) };
+    // SAFETY: NULL is no instance.
     unsafe { (table.destroy)(std::ptr::null_mut()) };
 }
 
@@ -103,6 +107,7 @@ fn a_short_slice_is_refused_before_the_material_writes() {
         functions: &raw const table,
         instance: create("4").unwrap(),
     };
+    // SAFETY: the table and an instance that it has made, both alive to the end of the test.
     let material = unsafe { MaterialRef::new(raw) }.unwrap();
     call(&material, 1.0, &mut Aligned::zeros(24)[..23]);
 }
@@ -115,6 +120,7 @@ fn a_slice_that_is_not_aligned_is_refused_before_the_material_loads_it() {
         functions: &raw const table,
         instance: create("4").unwrap(),
     };
+    // SAFETY: the table and an instance that it has made, both alive to the end of the test.
     let material = unsafe { MaterialRef::new(raw) }.unwrap();
     call(&material, 1.0, &mut Aligned::zeros(32)[1..25]);
 }
@@ -126,6 +132,7 @@ fn a_material_without_bending_has_no_moments_though_its_table_has_the_function()
         functions: &raw const table,
         instance: create("4").unwrap(),
     };
+    // SAFETY: the table and an instance that it has made, both alive to the end of the test.
     let material = unsafe { MaterialRef::new(raw) }.unwrap();
     let (rows, mut history) = (Aligned::filled(1.0, 24), Aligned::default());
     let [mut moment, mut tangent] = [Aligned::filled(777.0, 24), Aligned::filled(777.0, 24)];
@@ -200,10 +207,12 @@ fn an_element_gets_slices_of_the_documented_sizes() {
     };
     let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
     let none = std::ptr::null();
+    // SAFETY: a text, no material (which is what is tested), room for the instance and a whole `pf_error`.
     let code =
         unsafe { (table.create)(pf_str::new("{}"), none, &raw mut instance, &raw mut error) };
     assert_eq!(code, PF_ERROR);
     assert!(error.get().contains("no material"), "{}", error.get());
+    // SAFETY: as above, with a material that lives to the end of the test.
     let code = unsafe {
         (table.create)(
             pf_str::new("{}"),
@@ -238,15 +247,14 @@ fn an_element_gets_slices_of_the_documented_sizes() {
         critical_step: null,
         material: &raw const raw,
     };
-    assert_eq!(
-        unsafe { (table.initialise)(instance, &raw const batch) },
-        PF_OK
-    );
+    // SAFETY: the instance, and a batch with the arrays that it asks for, of the lengths for its sizes.
+    let code = unsafe { (table.initialise)(instance, &raw const batch) };
+    assert_eq!(code, PF_OK);
     assert_eq!(mass, [2.0; 32]);
-    assert_eq!(
-        unsafe { (table.forces)(instance, &raw const batch) },
-        PF_BAD_VALUE
-    );
+    // SAFETY: as above.
+    let code = unsafe { (table.forces)(instance, &raw const batch) };
+    assert_eq!(code, PF_BAD_VALUE);
+    // SAFETY: made above, ended once.
     unsafe { (table.destroy)(instance) };
 }
 
@@ -254,18 +262,22 @@ fn an_element_gets_slices_of_the_documented_sizes() {
 fn within<T: Copy>(room: usize, of: T, sizes: impl FnOnce(*mut T)) -> T {
     let mut there = of;
     let bytes = (&raw mut there).cast::<u8>();
+    // SAFETY: within `there`, which is `room` bytes and the rest; a size fits into the first 8.
     unsafe {
         bytes.write_bytes(0, room);
         bytes.add(room).write_bytes(0xAB, size_of::<T>() - room);
         bytes.cast::<u64>().write(room as u64);
     }
     sizes(&raw mut there);
+    // SAFETY: the rest of `there`, all of it written above.
     let left = unsafe { std::slice::from_raw_parts(bytes.add(room), size_of::<T>() - room) };
     assert!(
         left.iter().all(|b| *b == 0xAB),
         "beyond {room} bytes: {left:x?}"
     );
-    assert_eq!(unsafe { bytes.cast::<u64>().read() }, room as u64);
+    // SAFETY: the first 8 bytes of `there`.
+    let size = unsafe { bytes.cast::<u64>().read() };
+    assert_eq!(size, room as u64);
     there
 }
 
@@ -283,7 +295,9 @@ fn no_more_of_the_sizes_is_written_than_the_caller_has_room_for() {
         size_of::<pf_material_sizes>(),
     ] {
         let s = within(room, pf_material_sizes::default(), |s| {
-            assert_eq!(unsafe { (materials.sizes)(instance, s) }, PF_OK);
+            // SAFETY: the table's instance; a struct of which as much is there as its `size` says.
+            let code = unsafe { (materials.sizes)(instance, s) };
+            assert_eq!(code, PF_OK);
         });
         if room > size_of::<u64>() {
             assert_eq!((s.membrane_history, s.thickness), (1, 0.1));
@@ -294,16 +308,20 @@ fn no_more_of_the_sizes_is_written_than_the_caller_has_room_for() {
     }
     let mut element = std::ptr::null_mut();
     let (text, none) = (pf_str::new(""), std::ptr::null_mut());
+    // SAFETY: a text, a material that lives to the end of the test, room for the instance, and no `pf_error`.
     let code = unsafe { (elements.create)(text, &raw const raw, &raw mut element, none) };
     assert_eq!(code, PF_OK);
     // As ABI 1.0 had it, before `ignores_velocity`.
     let first = std::mem::offset_of!(pf_element_sizes, ignores_velocity);
     for room in [first, size_of::<pf_element_sizes>()] {
         let s = within(room, pf_element_sizes::default(), |s| {
-            assert_eq!(unsafe { (elements.sizes)(element, s) }, PF_OK);
+            // SAFETY: as above.
+            let code = unsafe { (elements.sizes)(element, s) };
+            assert_eq!(code, PF_OK);
         });
         assert_eq!((s.nodes, s.constants, s.material_points), (4, 2, 1));
     }
+    // SAFETY: made above, each ended once, the element before its material.
     unsafe {
         (elements.destroy)(element);
         (materials.destroy)(instance);

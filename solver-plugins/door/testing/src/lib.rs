@@ -10,7 +10,7 @@
 mod memory;
 mod services;
 
-pub use memory::{Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput};
+pub use memory::{Components, Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput};
 
 use memory::Vec3;
 use plyflow_model::manifest::{Manifest, Shape};
@@ -72,6 +72,7 @@ pub fn run_on<S: Step>(
         failure: String::new(),
     });
     let services = services::table((&raw const state).cast_mut().cast());
+    // SAFETY: a whole table, which lives through the call with the state behind it.
     let code = unsafe { run_step::<S>(&raw const services) };
     let state = state.into_inner().unwrap_or_else(PoisonError::into_inner);
     match code {

@@ -137,8 +137,30 @@ pub struct Machine {
     pub threads: u32,
     /// Whether the run is being stopped.
     pub cancelled: bool,
-    /// The component (`PF_KIND_*`) of that name; `None`: there is none.
-    pub component: fn(u32, &str) -> Option<pf_component>,
+    /// Element formulations and materials.
+    pub components: Components,
+}
+
+/// Where a host in memory has components from.
+#[derive(Debug, Clone, Copy)]
+pub struct Components(fn(u32, &str) -> Option<pf_component>);
+
+impl Components {
+    /// None at all.
+    pub const NONE: Self = Self(|_, _| None);
+
+    /// Those that `find` gives for a kind (`PF_KIND_*`) and a name.
+    ///
+    /// # Safety
+    /// What it gives is of that kind: a whole table that keeps to plyflow.h and a manifest that can be read, both valid until the process ends. Steps call
+    /// it without looking.
+    pub const unsafe fn new(find: fn(u32, &str) -> Option<pf_component>) -> Self {
+        Self(find)
+    }
+
+    pub(crate) fn find(self, kind: u32, name: &str) -> Option<pf_component> {
+        (self.0)(kind, name)
+    }
 }
 
 impl Default for Machine {
@@ -147,7 +169,7 @@ impl Default for Machine {
         Self {
             threads: 1,
             cancelled: false,
-            component: |_, _| None,
+            components: Components::NONE,
         }
     }
 }

@@ -31,104 +31,244 @@ impl State<'_> {
     }
 }
 
-/// The service table of a `Mutex` around a state.
+/// The service table of a `Mutex` around a state. Long, as it has one row for each service.
 pub(super) fn table(host: *mut c_void) -> pf_services {
     pf_services {
         size: size_of::<pf_services>() as u64,
         host,
-        log,
-        progress: no_progress,
-        cancelled,
-        fail,
-        threads,
-        parameters,
-        scratch: nothing,
-        inputs,
-        item: own_item,
-        attributes,
-        array_info,
-        array_read,
-        meshes,
-        mesh_read,
-        frame_points_read,
-        frame_field_read,
-        attributes_write,
-        array_write,
-        mesh_define,
-        frame_begin,
-        frame_points,
-        frame_field,
-        frame_end,
-        result,
-        collection,
-        find_component,
-        checkpoint: nothing,
-        checkpoint_due: never,
-        checkpoint_saved: ignored,
+        log: service!(log(level: u32, line: pf_str)),
+        progress: service!(no_progress(progress: *const pf_progress)),
+        cancelled: service!(cancelled() -> i32),
+        fail: service!(fail(why: pf_str)),
+        threads: service!(threads() -> u32),
+        parameters: service!(parameters() -> pf_str),
+        scratch: service!(nothing() -> pf_str),
+        inputs: service!(inputs() -> pf_str),
+        item: service!(own_item() -> pf_str),
+        attributes: service!(attributes(handle: u32) -> pf_str),
+        array_info: service!(array_info(
+            handle: u32,
+            path: pf_str,
+            info: *mut pf_array_info
+        ) -> i32),
+        array_read: service!(array_read(
+            handle: u32,
+            path: pf_str,
+            dtype: u32,
+            buffer: *mut c_void,
+            bytes: u64
+        ) -> i32),
+        meshes: service!(meshes(handle: u32) -> pf_str),
+        mesh_read: service!(mesh_read(
+            handle: u32,
+            name: pf_str,
+            points: *mut f64,
+            cells: *mut u32
+        ) -> i32),
+        frame_points_read: service!(frame_points_read(
+            handle: u32,
+            name: pf_str,
+            frame: u64,
+            points: *mut f64
+        ) -> i32),
+        frame_field_read: service!(frame_field_read(
+            handle: u32,
+            body: pf_str,
+            frame: u64,
+            on: u32,
+            name: pf_str,
+            values: *mut f64,
+            count: u64
+        ) -> i32),
+        attributes_write: service!(attributes_write(json: pf_str) -> i32),
+        array_write: service!(array_write(
+            path: pf_str,
+            info: *const pf_array_info,
+            unit: pf_str,
+            data: *const c_void
+        ) -> i32),
+        mesh_define: service!(mesh_define(
+            name: pf_str,
+            n: u64,
+            points: *const f64,
+            m: u64,
+            k: u32,
+            cells: *const u32,
+            attributes: pf_str
+        ) -> i32),
+        frame_begin: service!(frame_begin(time: f64) -> i32),
+        frame_points: service!(frame_points(name: pf_str, points: *const f64, n: u64) -> i32),
+        frame_field: service!(frame_field(
+            body: pf_str,
+            on: u32,
+            name: pf_str,
+            components: u32,
+            unit: pf_str,
+            values: *const f64,
+            count: u64
+        ) -> i32),
+        frame_end: service!(frame_end() -> i32),
+        result: service!(result(name: pf_str, value: f64, unit: pf_str, flags: u32) -> i32),
+        collection: service!(collection(n: u64, names: pf_str) -> i32),
+        find_component: service!(find_component(
+            kind: u32,
+            name: pf_str,
+            found: *mut pf_component
+        ) -> i32),
+        checkpoint: service!(nothing() -> pf_str),
+        checkpoint_due: service!(never() -> i32),
+        checkpoint_saved: service!(ignored()),
     }
 }
 
-/// The state behind a host pointer, for one call at a time: services may be called from any thread.
-unsafe fn state<'a>(host: *mut c_void) -> MutexGuard<'a, State<'a>> {
-    let state = unsafe { &*host.cast::<Mutex<State<'a>>>() };
-    state.lock().unwrap_or_else(PoisonError::into_inner)
+/// A call of a service, while it is served: the state behind `host`, and the right to follow the pointers that the plugin gave.
+#[derive(Clone, Copy)]
+struct Call<'c> {
+    state: &'c Mutex<State<'c>>,
 }
 
-fn text(s: pf_str) -> String {
-    unsafe { s.as_str() }.unwrap_or("").to_owned()
+/// The C function of a service, whose arguments after the [`Call`] are those after `host`.
+macro_rules! service {
+    ($service:ident($($argument:ident: $kind:ty),*) $(-> $answer:ty)?) => {{
+        /// # Safety
+        /// As plyflow.h asks of a step that calls a service.
+        unsafe extern "C" fn entry(host: *mut c_void $(, $argument: $kind)*) $(-> $answer)? {
+            // SAFETY: a step calls this through the table of `table`, with that table's `host`, until its `run` returns, and what it gives is
+            // valid for the call: that is its part of plyflow.h. All of it goes to the service, and lives no longer there than the `Call`.
+            let call = unsafe { Call::of(host) };
+            $service(call $(, $argument)*)
+        }
+        entry
+    }};
+}
+use service;
+
+impl<'c> Call<'c> {
+    /// The call of a service.
+    ///
+    /// # Safety
+    /// `host` is that of a [`table`] whose state lives for `'c`. Whatever is given to the methods that take pointers was given to the service in
+    /// this call, in the place that plyflow.h has for it: texts and arrays are there for `'c`, aligned for their type and in the length that stands beside them, and nobody
+    /// else reads or writes what the service is to write.
+    unsafe fn of(host: *mut c_void) -> Self {
+        // SAFETY: `table` was given a pointer to a `Mutex<State>`, which lives for `'c` (above). Threads may call at once: see
+        // `shared_by_threads`.
+        let state = unsafe { &*host.cast::<Mutex<State<'c>>>() };
+        Self { state }
+    }
+
+    /// The state, for one call at a time: services may be called from any thread.
+    fn state(self) -> MutexGuard<'c, State<'c>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn text(self, s: pf_str) -> String {
+        // SAFETY: a text that the step gave in this call (`Call::of`).
+        unsafe { s.as_str() }.unwrap_or("").to_owned()
+    }
+
+    /// `n` values that the step gave.
+    ///
+    /// # Panics
+    /// When they are NULL, or too many to be.
+    fn values<T: Plain>(self, p: *const T, n: usize) -> &'c [T] {
+        if n == 0 {
+            return &[];
+        }
+        assert!(!p.is_null(), "{n} values at NULL");
+        assert!(n <= isize::MAX as usize / size_of::<T>(), "{n} values");
+        // SAFETY: `n` values that the step gave in this call (`Call::of`), of a type that any bytes make; not NULL and not too many (above).
+        unsafe { std::slice::from_raw_parts(p, n) }
+    }
+
+    /// Writes to where the step has room for as many values.
+    ///
+    /// # Panics
+    /// When that is NULL.
+    fn fill<T: Plain>(self, to: *mut T, values: &[T]) {
+        if values.is_empty() {
+            return;
+        }
+        assert!(!to.is_null(), "room for {} values at NULL", values.len());
+        // SAFETY: room of the step's own for as many values (`Call::of`; the caller has looked at the length), apart from what the host holds.
+        unsafe { to.copy_from_nonoverlapping(values.as_ptr(), values.len()) };
+    }
+
+    /// Writes an answer to where the step has room for it.
+    ///
+    /// # Panics
+    /// When that is NULL.
+    fn answer<T>(self, to: *mut T, answer: T) {
+        assert!(!to.is_null(), "room for an answer at NULL");
+        // SAFETY: not NULL, so room for one `T` that the step gave in this call (`Call::of`); what was there is not read.
+        unsafe { to.write(answer) };
+    }
 }
 
-unsafe extern "C" fn no_progress(_: *mut c_void, _: *const pf_progress) {}
+/// Threads of a step may call services at once ([`Call::of`]).
+const _: fn() = || {
+    fn shared_by_threads<T: Sync>() {}
+    shared_by_threads::<Mutex<State<'_>>>();
+};
 
-unsafe extern "C" fn never(_: *mut c_void) -> i32 {
+/// Types that any bytes make.
+trait Plain: Copy {}
+
+impl Plain for f64 {}
+
+impl Plain for Vec3 {}
+
+impl Plain for u32 {}
+
+impl Plain for pf_array_info {}
+
+fn no_progress(_: Call<'_>, _: *const pf_progress) {}
+
+fn never(_: Call<'_>) -> i32 {
     0
 }
 
-unsafe extern "C" fn cancelled(host: *mut c_void) -> i32 {
-    unsafe { state(host) }.machine.cancelled.into()
+fn cancelled(call: Call<'_>) -> i32 {
+    call.state().machine.cancelled.into()
 }
 
-unsafe extern "C" fn ignored(_: *mut c_void) {}
+fn ignored(_: Call<'_>) {}
 
-unsafe extern "C" fn threads(host: *mut c_void) -> u32 {
-    unsafe { state(host) }.machine.threads
+fn threads(call: Call<'_>) -> u32 {
+    call.state().machine.threads
 }
 
-unsafe extern "C" fn nothing(_: *mut c_void) -> pf_str {
+fn nothing(_: Call<'_>) -> pf_str {
     pf_str::new("")
 }
 
-unsafe extern "C" fn find_component(
-    host: *mut c_void,
-    kind: u32,
-    name: pf_str,
-    found: *mut pf_component,
-) -> i32 {
-    match (unsafe { state(host) }.machine.component)(kind, &text(name)) {
+fn find_component(call: Call<'_>, kind: u32, name: pf_str, found: *mut pf_component) -> i32 {
+    let components = call.state().machine.components;
+    match components.find(kind, &call.text(name)) {
         Some(component) => {
-            unsafe { found.write(component) };
+            call.answer(found, component);
             PF_OK
         }
         None => PF_NOT_FOUND,
     }
 }
 
-unsafe extern "C" fn log(host: *mut c_void, _: u32, line: pf_str) {
-    unsafe { state(host) }.output.log.push(text(line));
+fn log(call: Call<'_>, _: u32, line: pf_str) {
+    call.state().output.log.push(call.text(line));
 }
 
-unsafe extern "C" fn fail(host: *mut c_void, why: pf_str) {
-    unsafe { state(host) }.failure = text(why);
+fn fail(call: Call<'_>, why: pf_str) {
+    call.state().failure = call.text(why);
 }
 
-unsafe extern "C" fn parameters(host: *mut c_void) -> pf_str {
-    let mut s = unsafe { state(host) };
+fn parameters(call: Call<'_>) -> pf_str {
+    let mut s = call.state();
     let text = s.parameters.to_string();
     s.keep(text)
 }
 
-unsafe extern "C" fn inputs(host: *mut c_void) -> pf_str {
-    let mut s = unsafe { state(host) };
+fn inputs(call: Call<'_>) -> pf_str {
+    let mut s = call.state();
     let list: Value = (s.inputs.iter().enumerate())
         .map(|(handle, i)| {
             json!({"handle": handle, "port": i.port, "step": i.step, "kind": i.artifact.kind, "item": i.item,
@@ -138,26 +278,25 @@ unsafe extern "C" fn inputs(host: *mut c_void) -> pf_str {
     s.keep(list.to_string())
 }
 
-unsafe extern "C" fn own_item(host: *mut c_void) -> pf_str {
-    let mut s = unsafe { state(host) };
+fn own_item(call: Call<'_>) -> pf_str {
+    let mut s = call.state();
     let text = json!(s.item).to_string();
     s.keep(text)
 }
 
-unsafe extern "C" fn attributes(host: *mut c_void, handle: u32) -> pf_str {
-    let mut s = unsafe { state(host) };
+fn attributes(call: Call<'_>, handle: u32) -> pf_str {
+    let mut s = call.state();
     let text = s.inputs[handle as usize].artifact.attributes.to_string();
     s.keep(text)
 }
 
-unsafe extern "C" fn array_info(
-    host: *mut c_void,
-    handle: u32,
-    path: pf_str,
-    info: *mut pf_array_info,
-) -> i32 {
-    let s = unsafe { state(host) };
-    let Some((shape, _)) = s.inputs[handle as usize].artifact.arrays.get(&text(path)) else {
+fn array_info(call: Call<'_>, handle: u32, path: pf_str, info: *mut pf_array_info) -> i32 {
+    let s = call.state();
+    let Some((shape, _)) = s.inputs[handle as usize]
+        .artifact
+        .arrays
+        .get(&call.text(path))
+    else {
         return PF_NOT_FOUND;
     };
     let mut found = pf_array_info {
@@ -168,37 +307,42 @@ unsafe extern "C" fn array_info(
     for (to, from) in found.shape.iter_mut().zip(shape) {
         *to = *from as u64;
     }
-    unsafe { *info = found };
+    call.answer(info, found);
     PF_OK
 }
 
-unsafe extern "C" fn array_read(
-    host: *mut c_void,
+fn array_read(
+    call: Call<'_>,
     handle: u32,
     path: pf_str,
     dtype: u32,
     buffer: *mut c_void,
     bytes: u64,
 ) -> i32 {
-    let s = unsafe { state(host) };
-    let Some((_, values)) = s.inputs[handle as usize].artifact.arrays.get(&text(path)) else {
+    let s = call.state();
+    let Some((_, values)) = s.inputs[handle as usize]
+        .artifact
+        .arrays
+        .get(&call.text(path))
+    else {
         return PF_NOT_FOUND;
     };
     let width = if dtype == PF_F64 { 8 } else { 4 };
     if bytes != width * values.len() as u64 {
         return PF_BAD_SHAPE;
     }
-    for (i, &v) in values.iter().enumerate() {
-        match dtype {
-            PF_F64 => unsafe { *buffer.cast::<f64>().add(i) = v },
-            _ => unsafe { *buffer.cast::<u32>().add(i) = v as u32 },
+    match dtype {
+        PF_F64 => call.fill(buffer.cast(), values),
+        _ => {
+            let values: Vec<u32> = values.iter().map(|v| *v as u32).collect();
+            call.fill(buffer.cast(), &values);
         }
     }
     PF_OK
 }
 
-unsafe extern "C" fn meshes(host: *mut c_void, handle: u32) -> pf_str {
-    let mut s = unsafe { state(host) };
+fn meshes(call: Call<'_>, handle: u32) -> pf_str {
+    let mut s = call.state();
     let artifact = s.inputs[handle as usize].artifact;
     let bodies: Vec<Value> = (artifact.bodies.iter())
         .map(|b| {
@@ -215,8 +359,8 @@ unsafe extern "C" fn meshes(host: *mut c_void, handle: u32) -> pf_str {
     s.keep(json!({"times": artifact.times, "bodies": bodies}).to_string())
 }
 
-fn find<'a>(s: &State<'a>, handle: u32, name: pf_str) -> Option<&'a MemoryBody> {
-    let name = text(name);
+/// A body of an input by name.
+fn find<'a>(s: &State<'a>, handle: u32, name: &str) -> Option<&'a MemoryBody> {
     s.inputs[handle as usize]
         .artifact
         .bodies
@@ -224,33 +368,29 @@ fn find<'a>(s: &State<'a>, handle: u32, name: pf_str) -> Option<&'a MemoryBody> 
         .find(|b| b.name == name)
 }
 
-unsafe extern "C" fn mesh_read(
-    host: *mut c_void,
-    handle: u32,
-    name: pf_str,
-    points: *mut f64,
-    cells: *mut u32,
-) -> i32 {
-    let s = unsafe { state(host) };
-    let Some(body) = find(&s, handle, name) else {
+fn mesh_read(call: Call<'_>, handle: u32, name: pf_str, points: *mut f64, cells: *mut u32) -> i32 {
+    let s = call.state();
+    let Some(body) = find(&s, handle, &call.text(name)) else {
         return PF_NOT_FOUND;
     };
-    unsafe {
-        points.copy_from_nonoverlapping(body.points.as_ptr().cast(), 3 * body.points.len());
-        cells.copy_from_nonoverlapping(body.cells.as_ptr(), body.cells.len());
+    // The step made room for the whole cells that it was told of.
+    if !body.cells.len().is_multiple_of(body.nodes_per_cell) {
+        return PF_BAD_SHAPE;
     }
+    call.fill(points, body.points.as_flattened());
+    call.fill(cells, &body.cells);
     PF_OK
 }
 
-unsafe extern "C" fn frame_points_read(
-    host: *mut c_void,
+fn frame_points_read(
+    call: Call<'_>,
     handle: u32,
     name: pf_str,
     frame: u64,
     points: *mut f64,
 ) -> i32 {
-    let s = unsafe { state(host) };
-    let Some(body) = find(&s, handle, name) else {
+    let s = call.state();
+    let Some(body) = find(&s, handle, &call.text(name)) else {
         return PF_NOT_FOUND;
     };
     if frame as usize >= s.inputs[handle as usize].artifact.times.len() {
@@ -258,12 +398,16 @@ unsafe extern "C" fn frame_points_read(
     }
     // A body that does not move has its reference points in every frame.
     let from = body.frames.get(frame as usize).unwrap_or(&body.points);
-    unsafe { points.copy_from_nonoverlapping(from.as_ptr().cast(), 3 * from.len()) };
+    // The step made room for the points that it was told of.
+    if from.len() != body.points.len() {
+        return PF_BAD_SHAPE;
+    }
+    call.fill(points, from.as_flattened());
     PF_OK
 }
 
-unsafe extern "C" fn frame_field_read(
-    host: *mut c_void,
+fn frame_field_read(
+    call: Call<'_>,
     handle: u32,
     body: pf_str,
     frame: u64,
@@ -272,11 +416,11 @@ unsafe extern "C" fn frame_field_read(
     values: *mut f64,
     count: u64,
 ) -> i32 {
-    let s = unsafe { state(host) };
-    let Some(body) = find(&s, handle, body) else {
+    let s = call.state();
+    let Some(body) = find(&s, handle, &call.text(body)) else {
         return PF_NOT_FOUND;
     };
-    let name = text(name);
+    let name = call.text(name);
     let fields = body.fields.get(frame as usize);
     let Some(field) = fields.and_then(|f| f.iter().find(|f| f.name == name)) else {
         return PF_NOT_FOUND;
@@ -284,54 +428,55 @@ unsafe extern "C" fn frame_field_read(
     if field.values.len() as u64 != count {
         return PF_BAD_SHAPE;
     }
-    unsafe { values.copy_from_nonoverlapping(field.values.as_ptr(), field.values.len()) };
+    call.fill(values, &field.values);
     PF_OK
 }
 
-unsafe extern "C" fn attributes_write(host: *mut c_void, json: pf_str) -> i32 {
-    match serde_json::from_str::<Value>(&text(json)) {
+fn attributes_write(call: Call<'_>, json: pf_str) -> i32 {
+    match serde_json::from_str::<Value>(&call.text(json)) {
         Ok(value) if value.is_object() => {
-            unsafe { state(host) }.output.attributes = value;
+            call.state().output.attributes = value;
             PF_OK
         }
         _ => PF_BAD_VALUE,
     }
 }
 
-unsafe extern "C" fn array_write(
-    host: *mut c_void,
+fn array_write(
+    call: Call<'_>,
     path: pf_str,
     info: *const pf_array_info,
     _unit: pf_str,
     data: *const c_void,
 ) -> i32 {
-    let info = unsafe { &*info };
+    let [info] = call.values(info, 1) else {
+        return PF_BAD_VALUE;
+    };
     let shape: Vec<usize> = info.shape[..info.rank as usize]
         .iter()
         .map(|&n| n as usize)
         .collect();
     let count = shape.iter().product();
     let values: Vec<f64> = match info.dtype {
-        PF_F64 => (0..count)
-            .map(|i| unsafe { *data.cast::<f64>().add(i) })
-            .collect(),
-        PF_U32 => (0..count)
-            .map(|i| f64::from(unsafe { *data.cast::<u32>().add(i) }))
+        PF_F64 => call.values(data.cast::<f64>(), count).to_vec(),
+        PF_U32 => (call.values(data.cast::<u32>(), count).iter())
+            .map(|v| f64::from(*v))
             .collect(),
         _ => return PF_BAD_VALUE,
     };
     if values.iter().any(|v| !v.is_finite()) {
         return PF_BAD_VALUE;
     }
-    let taken = unsafe { state(host) }
+    let taken = call
+        .state()
         .output
         .arrays
-        .insert(text(path), (shape, values));
+        .insert(call.text(path), (shape, values));
     if taken.is_some() { PF_BAD_VALUE } else { PF_OK }
 }
 
-unsafe extern "C" fn mesh_define(
-    host: *mut c_void,
+fn mesh_define(
+    call: Call<'_>,
     name: pf_str,
     n: u64,
     points: *const f64,
@@ -340,15 +485,11 @@ unsafe extern "C" fn mesh_define(
     cells: *const u32,
     attributes: pf_str,
 ) -> i32 {
-    let mut s = unsafe { state(host) };
+    let mut s = call.state();
     let output = &mut s.output;
-    let points = (0..n as usize)
-        .map(|i| [0, 1, 2].map(|d| unsafe { *points.add(3 * i + d) }))
-        .collect::<Vec<Vec3>>();
-    let cells: Vec<u32> = (0..m as usize * k as usize)
-        .map(|i| unsafe { *cells.add(i) })
-        .collect();
-    let name = text(name);
+    let points: Vec<Vec3> = call.values(points.cast(), n as usize).to_vec();
+    let cells = call.values(cells, m as usize * k as usize).to_vec();
+    let name = call.text(name);
     let bad = points.iter().flatten().any(|v| !v.is_finite())
         || cells.iter().any(|&i| u64::from(i) >= n)
         || !output.times.is_empty()
@@ -356,7 +497,7 @@ unsafe extern "C" fn mesh_define(
     if bad {
         return PF_BAD_VALUE;
     }
-    let attributes = serde_json::from_str(&text(attributes)).unwrap_or(Value::Null);
+    let attributes = serde_json::from_str(&call.text(attributes)).unwrap_or(Value::Null);
     output.bodies.push(MemoryBody {
         name,
         points,
@@ -368,8 +509,8 @@ unsafe extern "C" fn mesh_define(
     PF_OK
 }
 
-unsafe extern "C" fn frame_begin(host: *mut c_void, time: f64) -> i32 {
-    let mut s = unsafe { state(host) };
+fn frame_begin(call: Call<'_>, time: f64) -> i32 {
+    let mut s = call.state();
     if s.frame_open || !time.is_finite() || s.output.times.last().is_some_and(|&t| t >= time) {
         return PF_BAD_VALUE;
     }
@@ -382,14 +523,9 @@ unsafe extern "C" fn frame_begin(host: *mut c_void, time: f64) -> i32 {
     PF_OK
 }
 
-unsafe extern "C" fn frame_points(
-    host: *mut c_void,
-    name: pf_str,
-    points: *const f64,
-    n: u64,
-) -> i32 {
-    let name = text(name);
-    let mut s = unsafe { state(host) };
+fn frame_points(call: Call<'_>, name: pf_str, points: *const f64, n: u64) -> i32 {
+    let name = call.text(name);
+    let mut s = call.state();
     let bodies = &mut s.output.bodies;
     let Some(body) = bodies.iter_mut().find(|b| b.name == name) else {
         return PF_NOT_FOUND;
@@ -400,9 +536,7 @@ unsafe extern "C" fn frame_points(
     if frame.len() as u64 != n {
         return PF_BAD_SHAPE;
     }
-    for (i, p) in frame.iter_mut().enumerate() {
-        *p = [0, 1, 2].map(|d| unsafe { *points.add(3 * i + d) });
-    }
+    frame.copy_from_slice(call.values(points.cast(), n as usize));
     if frame.iter().flatten().all(|v| v.is_finite()) {
         PF_OK
     } else {
@@ -410,8 +544,8 @@ unsafe extern "C" fn frame_points(
     }
 }
 
-unsafe extern "C" fn frame_field(
-    host: *mut c_void,
+fn frame_field(
+    call: Call<'_>,
     body: pf_str,
     on: u32,
     name: pf_str,
@@ -420,8 +554,8 @@ unsafe extern "C" fn frame_field(
     values: *const f64,
     count: u64,
 ) -> i32 {
-    let body = text(body);
-    let mut s = unsafe { state(host) };
+    let body = call.text(body);
+    let mut s = call.state();
     let bodies = &mut s.output.bodies;
     let Some(body) = bodies.iter_mut().find(|b| b.name == body) else {
         return PF_NOT_FOUND;
@@ -433,9 +567,7 @@ unsafe extern "C" fn frame_field(
     if rows as u64 * u64::from(components) != count {
         return PF_BAD_SHAPE;
     }
-    let values: Vec<f64> = (0..count as usize)
-        .map(|i| unsafe { *values.add(i) })
-        .collect();
+    let values = call.values(values, count as usize).to_vec();
     if values.iter().any(|v| !v.is_finite()) {
         return PF_BAD_VALUE;
     }
@@ -443,7 +575,7 @@ unsafe extern "C" fn frame_field(
         return PF_BAD_VALUE;
     };
     fields.push(MemoryField {
-        name: text(name),
+        name: call.text(name),
         on,
         components,
         values,
@@ -451,8 +583,8 @@ unsafe extern "C" fn frame_field(
     PF_OK
 }
 
-unsafe extern "C" fn frame_end(host: *mut c_void) -> i32 {
-    let mut s = unsafe { state(host) };
+fn frame_end(call: Call<'_>) -> i32 {
+    let mut s = call.state();
     if std::mem::take(&mut s.frame_open) {
         PF_OK
     } else {
@@ -460,15 +592,9 @@ unsafe extern "C" fn frame_end(host: *mut c_void) -> i32 {
     }
 }
 
-unsafe extern "C" fn result(
-    host: *mut c_void,
-    name: pf_str,
-    value: f64,
-    unit: pf_str,
-    flags: u32,
-) -> i32 {
-    let mut s = unsafe { state(host) };
-    let (name, unit) = (text(name), text(unit));
+fn result(call: Call<'_>, name: pf_str, value: f64, unit: pf_str, flags: u32) -> i32 {
+    let mut s = call.state();
+    let (name, unit) = (call.text(name), call.text(unit));
     let measured = flags & PF_RESULT_MEASURED != 0;
     let declared = s
         .manifest
@@ -489,9 +615,9 @@ unsafe extern "C" fn result(
     }
 }
 
-unsafe extern "C" fn collection(host: *mut c_void, n: u64, names: pf_str) -> i32 {
-    let mut s = unsafe { state(host) };
-    let names: Vec<String> = serde_json::from_str(&text(names)).unwrap_or_default();
+fn collection(call: Call<'_>, n: u64, names: pf_str) -> i32 {
+    let mut s = call.state();
+    let names: Vec<String> = serde_json::from_str(&call.text(names)).unwrap_or_default();
     if names.len() as u64 != n || !s.manifest.output.as_ref().is_some_and(|o| o.collection) {
         return PF_BAD_VALUE;
     }

@@ -26,6 +26,7 @@ fn component<T>(kind: u32, table: T) -> pf_component {
 }
 
 fn element<E: Element>() -> ElementInstance {
+    // SAFETY: tables of the kinds that are said, which are never freed.
     unsafe {
         let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
         let material = MaterialInstance::create(&material, FABRIC, "material").unwrap();

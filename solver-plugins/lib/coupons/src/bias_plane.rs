@@ -5,15 +5,16 @@
 //! the fibres to lock, so the force must not depend on how the mesh lies. Runs with other meshes,
 //! wired to the port `others`, are compared with this one at equal displacements.
 
+use crate::drives::Ends;
 use crate::output::Output;
 use crate::rotated_mesh::{least_jacobian, turned_rectangle};
 use crate::run::{Finished, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
+use crate::strip::fibre_strain;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::{linear, smooth_step};
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::Style;
 use plyflow_sdk::{Host, Step, StepError};
@@ -34,22 +35,6 @@ pub struct Parameters {
     time: f64,
     /// Between element edges and fibres (rad).
     mesh_angle: f64,
-}
-
-struct Grips {
-    points: Vec<Vec3>,
-    length: f64,
-    extension: f64,
-    time: f64,
-}
-
-impl Drive for Grips {
-    fn position(&self, k: usize, t: f64) -> Vec3 {
-        let half = 0.5 * self.extension * smooth_step(t, 0.0, self.time);
-        let [x, y, z] = self.points[k];
-        let sign = if x > 0.5 * self.length { 1.0 } else { -1.0 };
-        [x + sign * half, y, z]
-    }
 }
 
 struct BiasPlane {
@@ -94,10 +79,7 @@ impl Test for BiasPlane {
             let sum: f64 = self.middle.iter().map(|c| shear[*c]).sum();
             self.shear.push(sum / self.middle.len() as f64);
         }
-        for name in ["fibre_strain_1", "fibre_strain_2"] {
-            let strain = specimen.field(name).unwrap_or_default();
-            self.fibre_strain = strain.iter().fold(self.fibre_strain, |m, e| m.max(e.abs()));
-        }
+        self.fibre_strain = self.fibre_strain.max(fibre_strain(specimen));
     }
 
     fn phase(&self) -> &'static str {
@@ -152,19 +134,20 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         .filter(|(_, x)| at_end(x[0]))
         .map(|(n, _)| n as u32)
         .collect();
-    let points: Vec<Vec3> = driven.iter().map(|n| mesh.points[*n as usize]).collect();
-    let side = (points.iter())
+    let places: Vec<Vec3> = driven.iter().map(|n| mesh.points[*n as usize]).collect();
+    let side = (places.iter())
         .map(|x| if x[0] > 0.5 * p.length { 1.0 } else { -1.0 })
         .collect();
     let middle = middle(&mesh, p.length, p.width);
     let axis = [eighth.fixed_cos(), -eighth.fixed_sin(), 0.0];
     let mut specimen = Specimen::new(host, &p.common, mesh, axis, Pressed::No)?;
     specimen.keep_flat();
-    let grips = Grips {
-        points,
-        length: p.length,
-        extension: p.extension,
+    let grips = Ends {
+        places,
+        middle: 0.5 * p.length,
+        way: p.extension,
         time: p.time,
+        clamped: false,
     };
     specimen.model.set_driven(driven, Box::new(grips));
     let mut test = BiasPlane {

@@ -14,6 +14,7 @@
 
 pub mod elastica;
 
+use crate::drives::Ends;
 use crate::output::Output;
 use crate::run::{Outcome, Test, run, with_threads};
 use crate::specimen::{Common, Specimen};
@@ -21,7 +22,7 @@ use crate::strip::{self, CLAMPED, Grid, axis_of_family, check_family, fibre_stra
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::smooth_step;
-use plyflow_mechanics::model::{Drive, Fixed, NodalLoad};
+use plyflow_mechanics::model::{Fixed, NodalLoad};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::Style;
 use plyflow_sdk::{Host, Step, StepError};
@@ -61,26 +62,6 @@ impl Parameters {
     /// Stiffness of the springs per area (N/m3); none: a free strip.
     fn foundation(&self) -> Option<f64> {
         (self.foundation_modulus).map(|modulus| modulus / self.foundation_thickness)
-    }
-}
-
-/// Clamps that come together about the middle of the strip.
-struct Clamps {
-    places: Vec<Vec3>,
-    /// How far both together go (m).
-    way: f64,
-    time: f64,
-}
-
-impl Drive for Clamps {
-    fn position(&self, k: usize, t: f64) -> Vec3 {
-        let [x, y, z] = self.places[k];
-        let way = 0.5 * self.way * smooth_step(t, 0.0, self.time);
-        [if x < 0.0 { x + way } else { x - way }, y, z]
-    }
-
-    fn spin(&self, _k: usize, _t: f64) -> Option<Vec3> {
-        Some([0.0; 3])
     }
 }
 
@@ -273,12 +254,14 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let columns = grid.xs.len();
     let mut driven = grid.columns(0..CLAMPED);
     driven.extend(grid.columns(columns - CLAMPED..columns));
-    let clamps = Clamps {
+    let clamps = Ends {
         places: (driven.iter())
             .map(|n| specimen.mesh.points[*n as usize])
             .collect(),
-        way: p.shortening * p.length,
+        middle: 0.0,
+        way: -p.shortening * p.length,
         time: p.time,
+        clamped: true,
     };
     specimen.model.set_driven(driven, Box::new(clamps));
     let plane = Fixed {

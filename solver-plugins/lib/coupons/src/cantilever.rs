@@ -7,6 +7,7 @@
 //! Places are written with the clamp line at x = 0 (see [`crate::strip`]) and z negative downwards, whichever
 //! face looks up.
 
+use crate::drives::Held;
 use crate::output::Output;
 use crate::reference::Curve;
 use crate::run::{Outcome, Test, run, with_threads};
@@ -15,9 +16,7 @@ use crate::strip::{
     self, CLAMPED, Grid, axis_of_family, check_family, fibre_strain, largest, rows,
 };
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::smooth_step;
-use plyflow_mechanics::model::Drive;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::Style;
 use plyflow_model::units::Dimension;
@@ -59,20 +58,6 @@ pub struct Parameters {
     /// CSV with columns x, z of another profile, e.g. of another law.
     #[serde(default)]
     compared_with: Option<String>,
-}
-
-struct Held {
-    places: Vec<Vec3>,
-}
-
-impl Drive for Held {
-    fn position(&self, k: usize, _t: f64) -> Vec3 {
-        self.places[k]
-    }
-
-    fn spin(&self, _k: usize, _t: f64) -> Option<Vec3> {
-        Some([0.0; 3])
-    }
 }
 
 struct Cantilever {

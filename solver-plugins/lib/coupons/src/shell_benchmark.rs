@@ -4,13 +4,14 @@
 //!
 //! The numbers of the paper have no units; here they are SI (m, N, Pa).
 
+use crate::drives::Held;
 use crate::output::Output;
 use crate::specimen::{Common, Specimen};
 use plyflow_characterisation::csv::{self, Column};
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
-use plyflow_mechanics::model::{Drive, Fixed, Model, NodalLoad};
+use plyflow_mechanics::model::{Fixed, Model, NodalLoad};
 use plyflow_mechanics::relax::{Tolerance, relax};
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::{ElementCount, SpecimenBody, Style};
@@ -65,18 +66,6 @@ struct Setup {
     loads: Vec<NodalLoad>,
     /// Name, node, direction of the displacements.
     watched: Vec<(&'static str, u32, Vec3)>,
-}
-
-/// Nodes that stay where they are.
-struct Clamp(Vec<Vec3>);
-
-impl Drive for Clamp {
-    fn position(&self, k: usize, _t: f64) -> Vec3 {
-        self.0[k]
-    }
-    fn spin(&self, _k: usize, _t: f64) -> Option<Vec3> {
-        Some([0.0; 3])
-    }
 }
 
 fn force(node: u32, force: Vec3) -> NodalLoad {
@@ -300,16 +289,11 @@ fn benchmark(host: &Host, p: &Parameters) -> Result<(), StepError> {
     if specimen.model.spins().is_none() {
         refuse_rotations(p, &setup)?;
     }
-    let clamp = Clamp(
-        setup
-            .clamped
-            .iter()
-            .map(|n| setup.mesh.points[*n as usize])
-            .collect(),
-    );
-    specimen
-        .model
-        .set_driven(setup.clamped.clone(), Box::new(clamp));
+    let places = (setup.clamped.iter())
+        .map(|n| setup.mesh.points[*n as usize])
+        .collect();
+    let clamp = Box::new(Held { places });
+    specimen.model.set_driven(setup.clamped.clone(), clamp);
     for (n, f) in &setup.fixed {
         specimen.model.fix(*n, *f);
     }

@@ -112,10 +112,11 @@ pub fn element(host: &Host, p: &Common) -> Result<(ElementInstance, Vec<ElementF
     with["areal_mass"] = p.areal_mass().into();
     let found = host.component(PF_KIND_MATERIAL, &p.material.plugin)?;
     let what = format!("material '{}'", p.material.name);
-    // The host's tables stay valid until the process ends.
+    // SAFETY: the host gives the table of a material for a material, valid until the process ends (plyflow.h).
     let material = unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }
         .map_err(|e| e.to_string())?;
     let found = host.component(PF_KIND_ELEMENT, &p.element.plugin)?;
+    // SAFETY: a text of the host's, valid until `run` returns.
     let manifest = unsafe { found.manifest.as_str() }
         .unwrap_or("{}")
         .to_owned();
@@ -125,6 +126,7 @@ pub fn element(host: &Host, p: &Common) -> Result<(ElementInstance, Vec<ElementF
         p.element.with.to_string()
     };
     let what = format!("element '{}'", p.element.plugin);
+    // SAFETY: as above, of an element.
     let element = unsafe { ElementInstance::create(&found, &parameters, material, &what) }
         .map_err(|e| e.to_string())?;
     Ok((element, element_fields(&manifest)))

@@ -9,14 +9,15 @@ use plyflow_coupons::{
 };
 use plyflow_kernels::built_in::component;
 use plyflow_sdk::Step;
-use plyflow_testing::{Machine, MemoryArtifact, MemoryInput, run_on};
+use plyflow_testing::{Components, Machine, MemoryArtifact, MemoryInput, run_on};
 use serde_json::{Value, json};
 
 /// One thread, with Plyflow's own components.
 const ALONE: Machine = Machine {
     threads: 1,
     cancelled: false,
-    component,
+    // SAFETY: Plyflow's own, which are static.
+    components: unsafe { Components::new(component) },
 };
 
 fn element(name: &str) -> Value {

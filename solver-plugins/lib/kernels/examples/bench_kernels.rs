@@ -27,12 +27,15 @@ fn on_lines(layout: Layout) -> Layout {
         .expect("a size that has room for 64 more")
 }
 
-// The system's allocator with a stricter alignment, the same in both calls.
+// SAFETY: the system's allocator with a stricter alignment, which serves who asks for a lesser one, the same in both calls. It grows by the
+// trait's own `realloc`, which is made of these two.
 unsafe impl GlobalAlloc for Lines {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: a layout of the size that the caller promises to be more than 0.
         unsafe { System.alloc(on_lines(layout)) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: from `alloc`, with the layout that it was given there.
         unsafe { System.dealloc(pointer, on_lines(layout)) }
     }
 }

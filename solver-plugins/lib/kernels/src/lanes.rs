@@ -14,6 +14,19 @@ pub const WIDTH: usize = 8;
 pub(crate) const SHIFT: f64 = 6_755_399_441_055_744.0;
 
 /// Eight f64 values treated alike.
+///
+/// Other crates have [`Portable`] alone. What the wide types do may run only on a machine with their instructions, which the
+/// kernels' entries look for:
+///
+/// ```
+/// use plyflow_kernels::{Lanes, Portable};
+/// assert!(Portable::all(Portable::splat(1.0).lt(Portable::splat(2.0))));
+/// ```
+///
+/// ```compile_fail
+/// use plyflow_kernels::{Avx512, Lanes};
+/// let _ = Avx512::splat(1.0);
+/// ```
 pub trait Lanes:
     Copy
     + Add<Output = Self>
@@ -159,16 +172,23 @@ impl Lanes for Portable {
     }
 }
 
+// Not for other crates: their operations are safe functions that only a machine with the instruction set may run.
 #[cfg(target_arch = "x86_64")]
-pub use x86::{Avx2, Avx512};
+pub(crate) use x86::{Avx2, Avx512};
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::{Add, Div, Lanes, Mul, Neg, Sub, WIDTH};
     use core::arch::x86_64::*;
 
-    // SAFETY of this module: values of these types are made only inside functions that
-    // `dispatch!` enters after it has found the instruction set on the machine.
+    /// An intrinsic of arithmetic: on values alone, without an address.
+    macro_rules! arithmetic {
+        ($($operation:tt)*) => {{
+            // SAFETY: all that such an intrinsic asks for is that the machine has its instruction set. Kernels of these types are entered
+            // through `dispatch!` alone, which looks for that first; other crates cannot name the types, and so cannot call this.
+            unsafe { $($operation)* }
+        }};
+    }
 
     /// AVX-512 (F and DQ).
     #[derive(Clone, Copy)]
@@ -184,14 +204,14 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn $name(self, o: Self) -> Self {
-                    unsafe { Self($wide(self.0, o.0)) }
+                    arithmetic! { Self($wide(self.0, o.0)) }
                 }
             }
             impl $trait for Avx2 {
                 type Output = Self;
                 #[inline(always)]
                 fn $name(self, o: Self) -> Self {
-                    unsafe { Self($half(self.0, o.0), $half(self.1, o.1)) }
+                    arithmetic! { Self($half(self.0, o.0), $half(self.1, o.1)) }
                 }
             }
         };
@@ -205,7 +225,7 @@ mod x86 {
         type Output = Self;
         #[inline(always)]
         fn neg(self) -> Self {
-            unsafe { Self(_mm512_xor_pd(self.0, _mm512_set1_pd(-0.0))) }
+            arithmetic! { Self(_mm512_xor_pd(self.0, _mm512_set1_pd(-0.0))) }
         }
     }
 
@@ -213,7 +233,7 @@ mod x86 {
         type Output = Self;
         #[inline(always)]
         fn neg(self) -> Self {
-            unsafe {
+            arithmetic! {
                 let s = _mm256_set1_pd(-0.0);
                 Self(_mm256_xor_pd(self.0, s), _mm256_xor_pd(self.1, s))
             }
@@ -224,37 +244,39 @@ mod x86 {
         type Mask = __mmask8;
         #[inline(always)]
         fn splat(x: f64) -> Self {
-            unsafe { Self(_mm512_set1_pd(x)) }
+            arithmetic! { Self(_mm512_set1_pd(x)) }
         }
         #[inline(always)]
         fn load(from: &[f64], at: usize) -> Self {
             let p = from[at..at + WIDTH].as_ptr();
+            // SAFETY: the slice has eight places; the instruction set as in `arithmetic`.
             unsafe { Self(_mm512_loadu_pd(p)) }
         }
         #[inline(always)]
         fn store(self, to: &mut [f64], at: usize) {
             let p = to[at..at + WIDTH].as_mut_ptr();
+            // SAFETY: the slice has eight places, borrowed alone; the instruction set as in `arithmetic`.
             unsafe { _mm512_storeu_pd(p, self.0) }
         }
         #[inline(always)]
         fn sqrt(self) -> Self {
-            unsafe { Self(_mm512_sqrt_pd(self.0)) }
+            arithmetic! { Self(_mm512_sqrt_pd(self.0)) }
         }
         #[inline(always)]
         fn abs(self) -> Self {
-            unsafe { Self(_mm512_andnot_pd(_mm512_set1_pd(-0.0), self.0)) }
+            arithmetic! { Self(_mm512_andnot_pd(_mm512_set1_pd(-0.0), self.0)) }
         }
         #[inline(always)]
         fn min(self, o: Self) -> Self {
-            unsafe { Self(_mm512_min_pd(self.0, o.0)) }
+            arithmetic! { Self(_mm512_min_pd(self.0, o.0)) }
         }
         #[inline(always)]
         fn max(self, o: Self) -> Self {
-            unsafe { Self(_mm512_max_pd(self.0, o.0)) }
+            arithmetic! { Self(_mm512_max_pd(self.0, o.0)) }
         }
         #[inline(always)]
         fn lt(self, o: Self) -> Self::Mask {
-            unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, o.0) }
+            arithmetic! { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, o.0) }
         }
         #[inline(always)]
         fn all(mask: Self::Mask) -> bool {
@@ -262,11 +284,11 @@ mod x86 {
         }
         #[inline(always)]
         fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-            unsafe { Self(_mm512_mask_blend_pd(mask, no.0, yes.0)) }
+            arithmetic! { Self(_mm512_mask_blend_pd(mask, no.0, yes.0)) }
         }
         #[inline(always)]
         fn copysign(self, sign: Self) -> Self {
-            unsafe {
+            arithmetic! {
                 let s = _mm512_set1_pd(-0.0);
                 Self(_mm512_or_pd(
                     _mm512_and_pd(s, sign.0),
@@ -276,7 +298,7 @@ mod x86 {
         }
         #[inline(always)]
         fn power_of_two(self) -> Self {
-            unsafe {
+            arithmetic! {
                 let n = _mm512_slli_epi64::<52>(_mm512_castpd_si512(self.0));
                 let one = _mm512_castpd_si512(_mm512_set1_pd(1.0));
                 Self(_mm512_castsi512_pd(_mm512_add_epi64(n, one)))
@@ -288,16 +310,18 @@ mod x86 {
         type Mask = (__m256d, __m256d);
         #[inline(always)]
         fn splat(x: f64) -> Self {
-            unsafe { Self(_mm256_set1_pd(x), _mm256_set1_pd(x)) }
+            arithmetic! { Self(_mm256_set1_pd(x), _mm256_set1_pd(x)) }
         }
         #[inline(always)]
         fn load(from: &[f64], at: usize) -> Self {
             let p = from[at..at + WIDTH].as_ptr();
+            // SAFETY: the slice has eight places, twice four; the instruction set as in `arithmetic`.
             unsafe { Self(_mm256_loadu_pd(p), _mm256_loadu_pd(p.add(4))) }
         }
         #[inline(always)]
         fn store(self, to: &mut [f64], at: usize) {
             let p = to[at..at + WIDTH].as_mut_ptr();
+            // SAFETY: the slice has eight places, twice four, borrowed alone; the instruction set as in `arithmetic`.
             unsafe {
                 _mm256_storeu_pd(p, self.0);
                 _mm256_storeu_pd(p.add(4), self.1);
@@ -305,26 +329,26 @@ mod x86 {
         }
         #[inline(always)]
         fn sqrt(self) -> Self {
-            unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
+            arithmetic! { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
         }
         #[inline(always)]
         fn abs(self) -> Self {
-            unsafe {
+            arithmetic! {
                 let s = _mm256_set1_pd(-0.0);
                 Self(_mm256_andnot_pd(s, self.0), _mm256_andnot_pd(s, self.1))
             }
         }
         #[inline(always)]
         fn min(self, o: Self) -> Self {
-            unsafe { Self(_mm256_min_pd(self.0, o.0), _mm256_min_pd(self.1, o.1)) }
+            arithmetic! { Self(_mm256_min_pd(self.0, o.0), _mm256_min_pd(self.1, o.1)) }
         }
         #[inline(always)]
         fn max(self, o: Self) -> Self {
-            unsafe { Self(_mm256_max_pd(self.0, o.0), _mm256_max_pd(self.1, o.1)) }
+            arithmetic! { Self(_mm256_max_pd(self.0, o.0), _mm256_max_pd(self.1, o.1)) }
         }
         #[inline(always)]
         fn lt(self, o: Self) -> Self::Mask {
-            unsafe {
+            arithmetic! {
                 (
                     _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, o.0),
                     _mm256_cmp_pd::<_CMP_LT_OQ>(self.1, o.1),
@@ -333,11 +357,11 @@ mod x86 {
         }
         #[inline(always)]
         fn all(mask: Self::Mask) -> bool {
-            unsafe { _mm256_movemask_pd(_mm256_and_pd(mask.0, mask.1)) == 0xf }
+            arithmetic! { _mm256_movemask_pd(_mm256_and_pd(mask.0, mask.1)) == 0xf }
         }
         #[inline(always)]
         fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-            unsafe {
+            arithmetic! {
                 Self(
                     _mm256_blendv_pd(no.0, yes.0, mask.0),
                     _mm256_blendv_pd(no.1, yes.1, mask.1),
@@ -346,7 +370,7 @@ mod x86 {
         }
         #[inline(always)]
         fn copysign(self, sign: Self) -> Self {
-            unsafe {
+            arithmetic! {
                 let s = _mm256_set1_pd(-0.0);
                 Self(
                     _mm256_or_pd(_mm256_and_pd(s, sign.0), _mm256_andnot_pd(s, self.0)),
@@ -356,7 +380,7 @@ mod x86 {
         }
         #[inline(always)]
         fn power_of_two(self) -> Self {
-            unsafe {
+            arithmetic! {
                 let one = _mm256_castpd_si256(_mm256_set1_pd(1.0));
                 let a = _mm256_slli_epi64::<52>(_mm256_castpd_si256(self.0));
                 let b = _mm256_slli_epi64::<52>(_mm256_castpd_si256(self.1));
@@ -443,6 +467,7 @@ macro_rules! dispatch {
                 match $crate::lanes::level() {
                     // SAFETY: `level` has found the instruction set on this machine.
                     $crate::lanes::Level::Avx512 => return unsafe { wide($($arg),*) },
+                    // SAFETY: as above.
                     $crate::lanes::Level::Avx2 => return unsafe { half($($arg),*) },
                     $crate::lanes::Level::Portable => {}
                 }

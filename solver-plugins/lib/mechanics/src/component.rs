@@ -62,8 +62,10 @@ pub struct MaterialInstance {
     instance: *mut c_void,
 }
 
-// The contract of plyflow.h: instances do not change after create; functions are static.
+// SAFETY: an instance does not change after `create`, several threads call it at once, and functions are static (plyflow.h). `destroy` comes last,
+// from whichever thread drops it.
 unsafe impl Send for MaterialInstance {}
+// SAFETY: as for `Send`.
 unsafe impl Sync for MaterialInstance {}
 
 impl MaterialInstance {
@@ -73,7 +75,7 @@ impl MaterialInstance {
     /// The component's own text when it refuses.
     ///
     /// # Safety
-    /// `component` must hold a valid material table that outlives the instance.
+    /// If `component` says that it is a material, it must hold a material table that keeps to plyflow.h and outlives the instance.
     pub unsafe fn create(
         component: &pf_component,
         parameters: &str,
@@ -89,7 +91,9 @@ impl MaterialInstance {
         let functions: *const pf_material_functions = component.functions.cast();
         let mut instance = std::ptr::null_mut();
         let mut error = pf_error::default();
+        // SAFETY: a material, so this is its table (the caller's promise).
         let create = unsafe { (*functions).create };
+        // SAFETY: a text, room for the instance and a whole `pf_error`, all of this function.
         let code = unsafe { create(pf_str::new(parameters), &raw mut instance, &raw mut error) };
         if code != PF_OK {
             return Err(fail(error.get()));
@@ -98,8 +102,11 @@ impl MaterialInstance {
             functions,
             instance,
         };
+        // SAFETY: the table, and the instance that it has just made: `Self` keeps both together with the reference, and ends the instance when it
+        // is dropped.
         let reference = unsafe { MaterialRef::new(raw) }.map_err(|text| {
             if !instance.is_null() {
+                // SAFETY: made above, and nobody else has it.
                 unsafe { ((*functions).destroy)(instance) };
             }
             fail(text)
@@ -119,6 +126,7 @@ impl MaterialInstance {
 
 impl Drop for MaterialInstance {
     fn drop(&mut self) {
+        // SAFETY: `create` has made the instance with this table. Elements hold their material by an `Arc`: nobody uses it any more.
         unsafe { ((*self.functions).destroy)(self.instance) };
     }
 }
@@ -133,17 +141,20 @@ pub struct ElementInstance {
     pub material: Arc<MaterialInstance>,
 }
 
+// SAFETY: as for `MaterialInstance`, whose contract is that of an element, too.
 unsafe impl Send for ElementInstance {}
+// SAFETY: as for `Send`.
 unsafe impl Sync for ElementInstance {}
 
 impl ElementInstance {
-    /// Makes an instance for `material`.
+    /// Makes an instance for `material`. Long, as it looks at each thing that the solver takes for granted afterwards, one after the other.
     ///
     /// # Errors
     /// The component's own text, or sizes that the solver cannot serve.
     ///
     /// # Safety
-    /// `component` must hold a valid element table that outlives the instance.
+    /// If `component` says that it is an element, it must hold an element table that keeps to plyflow.h and outlives the instance, and a manifest
+    /// that can be read.
     pub unsafe fn create(
         component: &pf_component,
         parameters: &str,
@@ -161,6 +172,8 @@ impl ElementInstance {
         let mut instance = std::ptr::null_mut();
         let mut error = pf_error::default();
         let raw: *const pf_material = material.reference.raw();
+        // SAFETY: an element, so this is its table (the caller's promise). A text, room for the instance and a whole `pf_error`, all of this
+        // function; the material is kept by `Self` as long as the instance.
         let code = unsafe {
             ((*functions).create)(
                 pf_str::new(parameters),
@@ -180,6 +193,7 @@ impl ElementInstance {
             size: size_of::<pf_element_sizes>() as u64,
             ..Default::default()
         };
+        // SAFETY: the instance that the table has just made; `s` is a whole struct, as its `size` says.
         let code = unsafe { ((*functions).sizes)(instance, &raw mut s) };
         let sizes = ElementSizes {
             nodes: s.nodes as usize,
@@ -204,6 +218,7 @@ impl ElementInstance {
             return Err(fail(format!("did not tell its sizes (code {code})")));
         }
         // Fields are read by the rows that the manifest gives them.
+        // SAFETY: the component's manifest (the caller's promise).
         let manifest = unsafe { component.manifest.as_str() }.unwrap_or("{}");
         let declared = element_fields(manifest);
         let count = |patch| declared.iter().filter(|f| f.patch == patch).count();
@@ -231,6 +246,7 @@ impl ElementInstance {
                 sizes.dofs_per_node
             )));
         }
+        // SAFETY: the caller's table.
         let patches = unsafe {
             (*functions).patch_initialise.is_some() && (*functions).patch_forces.is_some()
         };
@@ -253,25 +269,49 @@ impl ElementInstance {
         self.sizes.dofs_per_node == 6
     }
 
-    pub(crate) fn initialise(&self, batch: &pf_element_batch) -> i32 {
+    /// Calls the function of that name.
+    ///
+    /// # Safety
+    /// The batch has all that plyflow.h asks of the call: `LANES` lanes, every array that it names for this call and none else, each
+    /// 64-byte aligned, as long as [`Self::sizes`] and its material's sizes make it, there for the call; none that is written may be
+    /// borrowed by anybody else.
+    pub(crate) unsafe fn initialise(&self, batch: &pf_element_batch) -> i32 {
+        // SAFETY: instance and table live as long as `self` (`create`); the batch is the caller's promise.
         unsafe { ((*self.functions).initialise)(self.instance, batch) }
     }
 
+    /// Calls the function of that name.
+    ///
+    /// # Safety
+    /// As [`Self::initialise`]; constants are only read, and may be shared.
     #[inline]
-    pub(crate) fn forces(&self, batch: &pf_element_batch) -> i32 {
+    pub(crate) unsafe fn forces(&self, batch: &pf_element_batch) -> i32 {
+        // SAFETY: as in `initialise`.
         unsafe { ((*self.functions).forces)(self.instance, batch) }
     }
 
-    pub(crate) fn patch_initialise(&self, batch: &pf_patch_batch) -> i32 {
+    /// Calls the function of that name, if there is one.
+    ///
+    /// # Safety
+    /// As [`Self::initialise`].
+    pub(crate) unsafe fn patch_initialise(&self, batch: &pf_patch_batch) -> i32 {
+        // SAFETY: the table lives as long as `self` (`create`).
         match unsafe { (*self.functions).patch_initialise } {
+            // SAFETY: as in `initialise`.
             Some(f) => unsafe { f(self.instance, batch) },
             None => PF_OK,
         }
     }
 
+    /// Calls the function of that name, if there is one.
+    ///
+    /// # Safety
+    /// As [`Self::forces`].
     #[inline]
-    pub(crate) fn patch_forces(&self, batch: &pf_patch_batch) -> i32 {
+    pub(crate) unsafe fn patch_forces(&self, batch: &pf_patch_batch) -> i32 {
+        // SAFETY: the table lives as long as `self` (`create`).
         match unsafe { (*self.functions).patch_forces } {
+            // SAFETY: as in `initialise`.
             Some(f) => unsafe { f(self.instance, batch) },
             None => PF_OK,
         }
@@ -280,6 +320,7 @@ impl ElementInstance {
 
 impl Drop for ElementInstance {
     fn drop(&mut self) {
+        // SAFETY: `create` has made the instance with this table, and `self` is its only owner. Its material is dropped after it.
         unsafe { ((*self.functions).destroy)(self.instance) };
     }
 }
@@ -333,7 +374,7 @@ mod tests {
         }
     }
 
-    unsafe extern "C" fn forgetful(
+    extern "C" fn forgetful(
         _: pf_str,
         _: *const pf_material,
         _: *mut *mut c_void,
@@ -352,11 +393,14 @@ mod tests {
         };
         let sheet = plyflow_sdk::material_table::<Sheet>();
         let sheet = component(PF_KIND_MATERIAL, (&raw const sheet).cast());
+        // SAFETY: the table of a material, which lives to the end of the test.
         let material = unsafe { MaterialInstance::create(&sheet, "{}", "sheet") };
         let material = material.expect("a material");
         let mut quad = plyflow_sdk::element_table::<Quad>();
         let make = |table: &pf_element_functions| {
             let quad = component(PF_KIND_ELEMENT, std::ptr::from_ref(table).cast());
+            // SAFETY: the table of an element, which lives to the end of the test; in one case its `create` makes no instance, which is looked at
+            // before anything is done with it.
             unsafe { ElementInstance::create(&quad, "{}", Arc::clone(&material), "quad") }
         };
         assert!(make(&quad).is_ok());

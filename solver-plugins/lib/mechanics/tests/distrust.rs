@@ -88,6 +88,7 @@ fn a_bound_that_is_none_allows_no_step() {
 
 #[test]
 fn an_element_that_declares_more_fields_than_its_sizes_tell_is_refused() {
+    // SAFETY: tables of the kinds that are said, and manifests, which are never freed.
     let create = |manifest: &'static str| unsafe {
         let component = |kind, functions, manifest| pf_component {
             kind,

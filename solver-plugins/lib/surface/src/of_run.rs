@@ -4,7 +4,18 @@ use crate::{Surface, triangles};
 use plyflow_geometry::QuadLocator;
 use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_model::outline::{Point, Region};
-use plyflow_sdk::{Host, Input, Meshes, StepError};
+use plyflow_sdk::{BodyInfo, Host, Input, Meshes, StepError};
+
+/// Whether a body is of quads.
+///
+/// # Errors
+/// Calls the body `what` and says how many nodes its cells have, when it is not.
+pub fn check_quads(what: &str, body: &BodyInfo) -> Result<(), StepError> {
+    match body.nodes_per_cell {
+        4 => Ok(()),
+        n => Err(format!("{what} has cells of {n} nodes; quads are expected").into()),
+    }
+}
 
 /// Places on the edge of a ply lie on it, however they were rounded (m).
 const ROUNDING: f64 = 1e-6;

@@ -19,19 +19,22 @@ fn more(bytes: usize) {
     MOST.fetch_max(now, Relaxed);
 }
 
-// Hands everything on to the system's allocator as it came.
+// SAFETY: hands everything on to the system's allocator as it came, and gives back what that gives.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         more(layout.size());
+        // SAFETY: what the caller promises is what the system's allocator asks for.
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
         HELD.fetch_sub(layout.size(), Relaxed);
+        // SAFETY: what the caller promises is what the system's allocator asks for.
         unsafe { System.dealloc(place, layout) }
     }
     unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         more(size);
         HELD.fetch_sub(layout.size(), Relaxed);
+        // SAFETY: what the caller promises is what the system's allocator asks for.
         unsafe { System.realloc(place, layout, size) }
     }
 }

@@ -141,5 +141,7 @@ pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
 /// Sends a signal to a child that has not been waited for.
 pub fn signal(child: &Child, number: i32) {
     let pid = i32::try_from(child.id()).unwrap();
-    assert_eq!(unsafe { libc::kill(pid, number) }, 0);
+    // SAFETY: numbers alone. A child that has not been waited for: its number is no other's.
+    let code = unsafe { libc::kill(pid, number) };
+    assert_eq!(code, 0);
 }

@@ -70,7 +70,7 @@ impl Subject {
             history: Guarded::zeros(rows * lanes),
         };
         let mut b = Breaches::default();
-        let Some(call) = (unsafe { (*self.functions).patch_initialise }) else {
+        let Some(call) = self.functions().patch_initialise else {
             return (state, b);
         };
         let mut position = Guarded::of(&patches.reference);
@@ -81,6 +81,7 @@ impl Subject {
         batch.count = count.pointer();
         batch.area = area.pointer();
         batch.axis = axis.pointer();
+        // SAFETY: this table's instance, and a batch with the guarded buffers that plyflow.h asks of this call, of the lengths for its sizes.
         let code = unsafe { call(self.instance, &raw const batch) };
         let call = "patch_initialise";
         b.status(call, code);
@@ -122,7 +123,8 @@ impl Subject {
         }
         let mut b = Breaches::default();
         let call = "patch_forces";
-        if let Some(f) = unsafe { (*self.functions).patch_forces } {
+        if let Some(f) = self.functions().patch_forces {
+            // SAFETY: as in `patch_initialise`, with the buffers of this call.
             b.status(call, unsafe { f(self.instance, &raw const batch) });
         }
         b.unchanged(call, "position", &x, position);
@@ -153,7 +155,7 @@ impl Subject {
         (after, want): &(PatchState, PatchAnswer),
         counter: &Counter<'_>,
     ) -> usize {
-        let Some(call) = (unsafe { (*self.functions).patch_forces }) else {
+        let Some(call) = self.functions().patch_forces else {
             return 0;
         };
         let lanes = state.lanes;
@@ -176,6 +178,7 @@ impl Subject {
             .filter(|_| {
                 let (to, from) = (&mut now.history, state.history.slice());
                 to.slice_mut().copy_from_slice(from);
+                // SAFETY: as in `patch_forces`, with buffers of this thread's own.
                 let code = counter.during(|| unsafe { call(self.instance, &raw const batch) });
                 let outputs = [
                     (&force, &want.force[..]),

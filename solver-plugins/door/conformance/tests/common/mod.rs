@@ -55,6 +55,7 @@ pub const KINKED: &str = r#"{"form": "fibre-energy", "fibre_modulus": 3e9, "comp
 /// Checks of a material.
 pub fn of_material<M: Material>(parameters: &str) -> Vec<Check> {
     let table = material_table::<M>();
+    // SAFETY: a whole table, which lives through the call.
     unsafe { check_material(&raw const table, parameters, &mut Silent) }
 }
 
@@ -63,13 +64,16 @@ pub fn of_element<E: Element, M: Material>(with: &str, material: &str) -> Vec<Ch
     let (materials, elements) = (material_table::<M>(), element_table::<E>());
     let (mut instance, mut error) = (std::ptr::null_mut(), pf_error::default());
     let text = pf_str::new(material);
+    // SAFETY: a text, room for the instance and a whole `pf_error`.
     let code = unsafe { (materials.create)(text, &raw mut instance, &raw mut error) };
     assert_eq!(code, PF_OK, "{}", error.get());
     let raw = pf_material {
         functions: &raw const materials,
         instance,
     };
+    // SAFETY: a whole table and a material that has just been made, both alive through the call.
     let found = unsafe { check_element(&raw const elements, with, None, &raw, &mut Silent) };
+    // SAFETY: made above, ended once; the elements that had it are gone.
     unsafe { (materials.destroy)(instance) };
     found
 }

@@ -1,4 +1,10 @@
 //! The C function tables of components: what a host calls.
+//!
+//! **What makes it sound.** The functions are reached through the tables alone, which are plugins' side of plyflow.h. Its promises are what every
+//! function here asks of its caller (`# Safety` of each in one place): an instance is one that the same table's `create` made and
+//! `destroy` has not ended; texts, materials and batches are whole and there for the call; the arrays of a batch are NULL or have the
+//! lengths that the instance's sizes and the batch's lanes give them, do not overlap, and nobody else writes what is read or touches
+//! what is written. One row is shared by batches: constants, which are written in the initialise calls alone.
 
 use super::{
     BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,
@@ -15,39 +21,55 @@ struct ElementInstance<E> {
     sizes: ElementSizes,
 }
 
+/// # Safety
+/// `p` is NULL or points to `n` doubles that are there, and not written to, for `'a`.
 unsafe fn rows<'a>(p: *const f64, n: usize) -> &'a [f64] {
     if p.is_null() {
         &[]
     } else {
+        // SAFETY: not NULL, so `n` doubles as the caller promises.
         unsafe { std::slice::from_raw_parts(p, n) }
     }
 }
 
+/// # Safety
+/// `p` is NULL or points to `n` doubles that are there, and nobody else's, for `'a`.
 unsafe fn rows_mut<'a>(p: *mut f64, n: usize) -> &'a mut [f64] {
     if p.is_null() {
         &mut []
     } else {
+        // SAFETY: not NULL, so `n` doubles as the caller promises.
         unsafe { std::slice::from_raw_parts_mut(p, n) }
     }
 }
 
+/// [`rows_mut`] of an output that is there when it is wanted.
+///
+/// # Safety
+/// As [`rows_mut`].
 unsafe fn some_mut<'a>(p: *mut f64, n: usize) -> Option<&'a mut [f64]> {
-    if p.is_null() {
-        None
-    } else {
-        Some(unsafe { std::slice::from_raw_parts_mut(p, n) })
-    }
+    // SAFETY: the caller's promise.
+    (!p.is_null()).then(|| unsafe { rows_mut(p, n) })
 }
 
 /// Constants as the first call or as a later one sees them.
+///
+/// # Safety
+/// As [`rows_mut`] in the first call, as [`rows`] in a later one: other batches may read them at the same time.
 unsafe fn constants<'a>(p: *mut f64, n: usize, first: bool) -> Constants<'a> {
     if first {
+        // SAFETY: the caller's promise for a first call.
         Constants::Open(unsafe { rows_mut(p, n) })
     } else {
+        // SAFETY: the caller's promise for a later call.
         Constants::Fixed(unsafe { rows(p, n) })
     }
 }
 
+/// The slices of a batch of elements.
+///
+/// # Safety
+/// `b` keeps to plyflow.h, with these sizes of the element and of its material, for `'a`; `first`: in an initialise call.
 unsafe fn element_batch<'a>(
     b: &pf_element_batch,
     s: &ElementSizes,
@@ -56,6 +78,7 @@ unsafe fn element_batch<'a>(
 ) -> ElementBatch<'a> {
     let lanes = b.lanes as usize;
     let v = s.nodes * 3 * lanes;
+    // SAFETY: every array has the length that plyflow.h gives it (the caller's promise); those that are written are apart from all others.
     unsafe {
         ElementBatch {
             lanes,
@@ -81,6 +104,10 @@ unsafe fn element_batch<'a>(
     }
 }
 
+/// The slices of a batch of patches.
+///
+/// # Safety
+/// As [`element_batch`], with a batch of patches.
 unsafe fn patch_batch<'a>(
     b: &pf_patch_batch,
     s: &ElementSizes,
@@ -89,6 +116,7 @@ unsafe fn patch_batch<'a>(
 ) -> PatchBatch<'a> {
     let lanes = b.lanes as usize;
     let v = s.patch_nodes * 3 * lanes;
+    // SAFETY: as in `element_batch`.
     unsafe {
         PatchBatch {
             lanes,
@@ -114,6 +142,8 @@ unsafe fn patch_batch<'a>(
 /// `out` must point to as many bytes as its first u64 says, `T` must be a C struct that begins with that u64.
 unsafe fn hand_over<T: Copy>(given: &T, out: *mut T) {
     let head = size_of::<u64>();
+    // SAFETY: `out` is there as far as its first u64 says (the caller's promise), `given` as far as `T` goes; what is copied ends at the nearer
+    // of both, and the two are different structs. Bytes beyond `given`'s fields are none: sizes are structs of C without gaps.
     unsafe {
         let room = usize::try_from(out.cast::<u64>().read()).unwrap_or(usize::MAX);
         let bytes = size_of::<T>().min(room).saturating_sub(head);
@@ -137,6 +167,10 @@ fn guarded(f: impl FnOnce() -> i32) -> i32 {
     catch_unwind(AssertUnwindSafe(f)).unwrap_or(PF_PANIC)
 }
 
+/// Hands over what `f` makes, or the text of why it did not.
+///
+/// # Safety
+/// `out` has room for a pointer, `error` is NULL or a whole struct; both are the caller's own for the call.
 unsafe fn create_guarded<T>(
     out: *mut *mut c_void,
     error: *mut pf_error,
@@ -144,7 +178,8 @@ unsafe fn create_guarded<T>(
 ) -> i32 {
     let (code, text) = match catch_unwind(AssertUnwindSafe(f)) {
         Ok(Ok(value)) => {
-            unsafe { *out = Box::into_raw(Box::new(value)).cast() };
+            // SAFETY: room for a pointer (the caller's promise).
+            unsafe { out.write(Box::into_raw(Box::new(value)).cast()) };
             return PF_OK;
         }
         Ok(Err(text)) => (PF_ERROR, text),
@@ -154,9 +189,36 @@ unsafe fn create_guarded<T>(
         ),
     };
     if !error.is_null() {
-        unsafe { (*error).set(&text) };
+        // SAFETY: not NULL, so a whole struct of the caller's own (its promise). Written as a whole first: in C it may begin as it lay in memory.
+        unsafe {
+            error.write(pf_error::default());
+            (*error).set(&text);
+        }
     }
     code
+}
+
+/// An instance and a batch as a function of a table is given them.
+///
+/// # Safety
+/// `instance` is one of `T` that was made by [`create_guarded`] and not ended, `batch` a whole struct, both for `'a`.
+unsafe fn given<'a, T, B>(instance: *const c_void, batch: *const B) -> (&'a T, &'a B) {
+    // SAFETY: the caller's promise; an instance does not change, so it may be shared by threads.
+    unsafe { (&*instance.cast::<T>(), &*batch) }
+}
+
+/// Ends an instance; NULL is none.
+///
+/// # Safety
+/// `instance` is NULL or one of `T` that was made by [`create_guarded`], which nobody uses any more.
+unsafe fn end<T>(instance: *mut c_void) {
+    guarded(|| {
+        if !instance.is_null() {
+            // SAFETY: the box that `create_guarded` gave away (the caller's promise).
+            drop(unsafe { Box::from_raw(instance.cast::<T>()) });
+        }
+        PF_OK
+    });
 }
 
 /// The function table of an [`Element`]. Long, as its entries are written inside, where nothing but the table can reach them.
@@ -167,47 +229,46 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         out: *mut *mut c_void,
         error: *mut pf_error,
     ) -> i32 {
-        unsafe {
-            create_guarded(out, error, || {
-                if material.is_null() {
-                    return Err("the element was given no material (NULL)".into());
-                }
-                let material = MaterialRef::new(*material)?;
-                let text = parameters.as_str().map_err(|e| e.to_string())?;
-                let element = E::create(text, &material)?;
-                let sizes = element.sizes();
-                fits(&[
-                    sizes.nodes,
-                    sizes.dofs_per_node,
-                    sizes.constants,
-                    sizes.history,
-                    sizes.material_points,
-                    sizes.fields,
-                    sizes.patch_nodes,
-                    sizes.patch_constants,
-                    sizes.patch_history,
-                    sizes.patch_fields,
-                ])?;
-                Ok(ElementInstance {
-                    element,
-                    material,
-                    sizes,
-                })
+        let make = || {
+            if material.is_null() {
+                return Err("the element was given no material (NULL)".into());
+            }
+            // SAFETY: plyflow.h (see above): a material that outlives the instance, of which functions and instance may be kept.
+            let material = unsafe { MaterialRef::new(*material) }?;
+            // SAFETY: a text that is there for the call.
+            let text = unsafe { parameters.as_str() }.map_err(|e| e.to_string())?;
+            let element = E::create(text, &material)?;
+            let sizes = element.sizes();
+            fits(&[
+                sizes.nodes,
+                sizes.dofs_per_node,
+                sizes.constants,
+                sizes.history,
+                sizes.material_points,
+                sizes.fields,
+                sizes.patch_nodes,
+                sizes.patch_constants,
+                sizes.patch_history,
+                sizes.patch_fields,
+            ])?;
+            Ok(ElementInstance {
+                element,
+                material,
+                sizes,
             })
-        }
+        };
+        // SAFETY: plyflow.h (see above): room for the instance, and for a text or none.
+        unsafe { create_guarded(out, error, make) }
     }
     unsafe extern "C" fn destroy<E: Element>(instance: *mut c_void) {
-        guarded(|| {
-            if !instance.is_null() {
-                drop(unsafe { Box::from_raw(instance.cast::<ElementInstance<E>>()) });
-            }
-            PF_OK
-        });
+        // SAFETY: plyflow.h (see above): an instance of this table, which the host has done with.
+        unsafe { end::<ElementInstance<E>>(instance) }
     }
     unsafe extern "C" fn sizes<E: Element>(
         instance: *const c_void,
         out: *mut pf_element_sizes,
     ) -> i32 {
+        // SAFETY: plyflow.h (see above): an instance of this table.
         let s = unsafe { &(*instance.cast::<ElementInstance<E>>()).sizes };
         let given = pf_element_sizes {
             size: 0,
@@ -224,6 +285,7 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
             ignores_velocity: u32::from(s.ignores_velocity),
             reserved: 0,
         };
+        // SAFETY: plyflow.h (see above): a struct of sizes whose `size` says how much of it is there.
         unsafe { hand_over(&given, out) };
         PF_OK
     }
@@ -231,12 +293,12 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         instance: *const c_void,
         batch: *const pf_element_batch,
     ) -> i32 {
-        guarded(|| unsafe {
-            let i = &*instance.cast::<ElementInstance<E>>();
-            i.element.initialise(
-                &mut element_batch(&*batch, &i.sizes, &i.material.sizes, true),
-                &i.material,
-            );
+        guarded(|| {
+            // SAFETY: plyflow.h (see above): an instance of this table and a batch.
+            let (i, batch) = unsafe { given::<ElementInstance<E>, _>(instance, batch) };
+            // SAFETY: its arrays have the lengths of the instance's sizes; a call in which constants are written.
+            let mut batch = unsafe { element_batch(batch, &i.sizes, &i.material.sizes, true) };
+            i.element.initialise(&mut batch, &i.material);
             PF_OK
         })
     }
@@ -244,24 +306,24 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         instance: *const c_void,
         batch: *const pf_element_batch,
     ) -> i32 {
-        guarded(|| unsafe {
-            let i = &*instance.cast::<ElementInstance<E>>();
-            i.element.forces(
-                &mut element_batch(&*batch, &i.sizes, &i.material.sizes, false),
-                &i.material,
-            )
+        guarded(|| {
+            // SAFETY: plyflow.h (see above): an instance of this table and a batch.
+            let (i, batch) = unsafe { given::<ElementInstance<E>, _>(instance, batch) };
+            // SAFETY: its arrays have the lengths of the instance's sizes; a call in which constants are only read.
+            let mut batch = unsafe { element_batch(batch, &i.sizes, &i.material.sizes, false) };
+            i.element.forces(&mut batch, &i.material)
         })
     }
     unsafe extern "C" fn patch_initialise<E: Element>(
         instance: *const c_void,
         batch: *const pf_patch_batch,
     ) -> i32 {
-        guarded(|| unsafe {
-            let i = &*instance.cast::<ElementInstance<E>>();
-            i.element.patch_initialise(
-                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes, true),
-                &i.material,
-            );
+        guarded(|| {
+            // SAFETY: plyflow.h (see above): an instance of this table and a batch.
+            let (i, batch) = unsafe { given::<ElementInstance<E>, _>(instance, batch) };
+            // SAFETY: its arrays have the lengths of the instance's sizes; a call in which constants are written.
+            let mut batch = unsafe { patch_batch(batch, &i.sizes, &i.material.sizes, true) };
+            i.element.patch_initialise(&mut batch, &i.material);
             PF_OK
         })
     }
@@ -269,12 +331,12 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         instance: *const c_void,
         batch: *const pf_patch_batch,
     ) -> i32 {
-        guarded(|| unsafe {
-            let i = &*instance.cast::<ElementInstance<E>>();
-            i.element.patch_forces(
-                &mut patch_batch(&*batch, &i.sizes, &i.material.sizes, false),
-                &i.material,
-            )
+        guarded(|| {
+            // SAFETY: plyflow.h (see above): an instance of this table and a batch.
+            let (i, batch) = unsafe { given::<ElementInstance<E>, _>(instance, batch) };
+            // SAFETY: its arrays have the lengths of the instance's sizes; a call in which constants are only read.
+            let mut batch = unsafe { patch_batch(batch, &i.sizes, &i.material.sizes, false) };
+            i.element.patch_forces(&mut batch, &i.material)
         })
     }
     pf_element_functions {
@@ -301,27 +363,26 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
         out: *mut *mut c_void,
         error: *mut pf_error,
     ) -> i32 {
-        unsafe {
-            create_guarded(out, error, || {
-                let material = M::create(parameters.as_str().map_err(|e| e.to_string())?)?;
-                let sizes = material.sizes();
-                fits(&[sizes.membrane_history, sizes.bending_history])?;
-                Ok(MaterialInstance { material, sizes })
-            })
-        }
+        let make = || {
+            // SAFETY: plyflow.h (see above): a text that is there for the call.
+            let text = unsafe { parameters.as_str() }.map_err(|e| e.to_string())?;
+            let material = M::create(text)?;
+            let sizes = material.sizes();
+            fits(&[sizes.membrane_history, sizes.bending_history])?;
+            Ok(MaterialInstance { material, sizes })
+        };
+        // SAFETY: plyflow.h (see above): room for the instance, and for a text or none.
+        unsafe { create_guarded(out, error, make) }
     }
     unsafe extern "C" fn destroy<M: Material>(instance: *mut c_void) {
-        guarded(|| {
-            if !instance.is_null() {
-                drop(unsafe { Box::from_raw(instance.cast::<MaterialInstance<M>>()) });
-            }
-            PF_OK
-        });
+        // SAFETY: plyflow.h (see above): an instance of this table, which the host has done with.
+        unsafe { end::<MaterialInstance<M>>(instance) }
     }
     unsafe extern "C" fn sizes<M: Material>(
         instance: *const c_void,
         out: *mut pf_material_sizes,
     ) -> i32 {
+        // SAFETY: plyflow.h (see above): an instance of this table.
         let s = unsafe { &(*instance.cast::<MaterialInstance<M>>()).sizes };
         let given = pf_material_sizes {
             size: 0,
@@ -332,6 +393,7 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
             thickness: s.thickness,
             areal_mass: s.areal_mass,
         };
+        // SAFETY: plyflow.h (see above): a struct of sizes whose `size` says how much of it is there.
         unsafe { hand_over(&given, out) };
         PF_OK
     }
@@ -339,19 +401,23 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
         instance: *const c_void,
         b: *const pf_membrane_batch,
     ) -> i32 {
-        guarded(|| unsafe {
-            let i = &*instance.cast::<MaterialInstance<M>>();
-            let b = &*b;
+        guarded(|| {
+            // SAFETY: plyflow.h (see above): an instance of this table and a batch.
+            let (i, b) = unsafe { given::<MaterialInstance<M>, _>(instance, b) };
             let lanes = b.lanes as usize;
-            i.material.membrane(&mut MembraneBatch {
-                lanes,
-                dt: b.dt,
-                metric: rows(b.metric, 3 * lanes),
-                history: rows_mut(b.history, i.sizes.membrane_history * lanes),
-                stress: rows_mut(b.stress, 3 * lanes),
-                energy: rows_mut(b.energy, lanes),
-                stiffness: some_mut(b.stiffness, 2 * lanes),
-            });
+            // SAFETY: its arrays have the lengths of the instance's sizes.
+            let mut batch = unsafe {
+                MembraneBatch {
+                    lanes,
+                    dt: b.dt,
+                    metric: rows(b.metric, 3 * lanes),
+                    history: rows_mut(b.history, i.sizes.membrane_history * lanes),
+                    stress: rows_mut(b.stress, 3 * lanes),
+                    energy: rows_mut(b.energy, lanes),
+                    stiffness: some_mut(b.stiffness, 2 * lanes),
+                }
+            };
+            i.material.membrane(&mut batch);
             PF_OK
         })
     }
@@ -359,20 +425,24 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
         instance: *const c_void,
         b: *const pf_bending_batch,
     ) -> i32 {
-        guarded(|| unsafe {
-            let i = &*instance.cast::<MaterialInstance<M>>();
-            let b = &*b;
+        guarded(|| {
+            // SAFETY: plyflow.h (see above): an instance of this table and a batch.
+            let (i, b) = unsafe { given::<MaterialInstance<M>, _>(instance, b) };
             let lanes = b.lanes as usize;
-            i.material.bending(&mut BendingBatch {
-                lanes,
-                dt: b.dt,
-                metric: rows(b.metric, 3 * lanes),
-                curvature: rows(b.curvature, 3 * lanes),
-                history: rows_mut(b.history, i.sizes.bending_history * lanes),
-                moment: rows_mut(b.moment, 3 * lanes),
-                energy: rows_mut(b.energy, lanes),
-                tangent: some_mut(b.tangent, 3 * lanes),
-            });
+            // SAFETY: its arrays have the lengths of the instance's sizes.
+            let mut batch = unsafe {
+                BendingBatch {
+                    lanes,
+                    dt: b.dt,
+                    metric: rows(b.metric, 3 * lanes),
+                    curvature: rows(b.curvature, 3 * lanes),
+                    history: rows_mut(b.history, i.sizes.bending_history * lanes),
+                    moment: rows_mut(b.moment, 3 * lanes),
+                    energy: rows_mut(b.energy, lanes),
+                    tangent: some_mut(b.tangent, 3 * lanes),
+                }
+            };
+            i.material.bending(&mut batch);
             PF_OK
         })
     }

@@ -41,6 +41,7 @@ pub struct Mat(pub MaterialRef);
 fn make(table: &'static pf_material_functions, json: &str) -> Result<Mat, String> {
     let mut instance: *mut c_void = std::ptr::null_mut();
     let mut error = pf_error::default();
+    // SAFETY: a text, room for the instance and a whole `pf_error`.
     let code = unsafe { (table.create)(pf_str::new(json), &raw mut instance, &raw mut error) };
     if code != PF_OK {
         let text: Vec<u8> = error
@@ -51,7 +52,7 @@ fn make(table: &'static pf_material_functions, json: &str) -> Result<Mat, String
             .collect();
         return Err(String::from_utf8_lossy(&text).into_owned());
     }
-    // Leaked on purpose: the process is a test.
+    // SAFETY: a static table, and an instance that is never ended: the process is a test.
     unsafe {
         MaterialRef::new(pf_material {
             functions: table,
@@ -187,6 +188,7 @@ impl El {
         let mut instance: *mut c_void = std::ptr::null_mut();
         let mut error = pf_error::default();
         let material = *m.0.raw();
+        // SAFETY: a text, a material that is never ended, room for the instance and a whole `pf_error`.
         let code = unsafe {
             (table.create)(
                 pf_str::new(json),
@@ -205,7 +207,9 @@ impl El {
             return Err(String::from_utf8_lossy(&text).into_owned());
         }
         let mut sizes = pf_element_sizes::default();
-        assert_eq!(unsafe { (table.sizes)(instance, &raw mut sizes) }, PF_OK);
+        // SAFETY: the instance that the table has just made; a whole struct, as its `size` says.
+        let code = unsafe { (table.sizes)(instance, &raw mut sizes) };
+        assert_eq!(code, PF_OK);
         Ok(Self {
             table,
             instance,
@@ -264,10 +268,10 @@ impl El {
             critical_step: e.step.as_mut_ptr(),
             ..self.batch(n)
         };
-        assert_eq!(
-            unsafe { (self.table.initialise)(self.instance, &raw const b) },
-            PF_OK
-        );
+        // SAFETY: this table's instance, which is never ended, and a batch with the arrays of this call, of the lengths for its sizes and lanes. Not all are
+        // aligned to 64 bytes: what is tested is this crate's own, which takes doubles as they lie.
+        let code = unsafe { (self.table.initialise)(self.instance, &raw const b) };
+        assert_eq!(code, PF_OK);
         e
     }
 
@@ -280,6 +284,8 @@ impl El {
         force: &mut [f64],
         energy: &mut [f64],
     ) {
+        let vectors = [position.len(), velocity.len(), force.len()];
+        assert_eq!((vectors, energy.len()), ([12 * e.lanes; 3], 3 * e.lanes));
         let b = pf_element_batch {
             position: position.as_ptr(),
             velocity: velocity.as_ptr(),
@@ -289,10 +295,9 @@ impl El {
             energy: energy.as_mut_ptr(),
             ..self.batch(e.lanes)
         };
-        assert_eq!(
-            unsafe { (self.table.forces)(self.instance, &raw const b) },
-            PF_OK
-        );
+        // SAFETY: as in `initialise`; the caller's arrays were looked at above.
+        let code = unsafe { (self.table.forces)(self.instance, &raw const b) };
+        assert_eq!(code, PF_OK);
     }
 
     pub fn forces(&self, e: &mut Elements, position: &[[[f64; 3]; 4]]) -> Forces {
@@ -316,10 +321,9 @@ impl El {
             critical_step: f.step.as_mut_ptr(),
             ..self.batch(n)
         };
-        assert_eq!(
-            unsafe { (self.table.forces)(self.instance, &raw const b) },
-            PF_OK
-        );
+        // SAFETY: as in `initialise`.
+        let code = unsafe { (self.table.forces)(self.instance, &raw const b) };
+        assert_eq!(code, PF_OK);
         f
     }
 }
@@ -403,7 +407,9 @@ impl El {
             ..self.patch_batch(n)
         };
         let f = self.table.patch_initialise.unwrap();
-        assert_eq!(unsafe { f(self.instance, &raw const b) }, PF_OK);
+        // SAFETY: as in `initialise`, of patches.
+        let code = unsafe { f(self.instance, &raw const b) };
+        assert_eq!(code, PF_OK);
         p
     }
 
@@ -427,7 +433,9 @@ impl El {
             ..self.patch_batch(n)
         };
         let call = self.table.patch_forces.unwrap();
-        assert_eq!(unsafe { call(self.instance, &raw const b) }, PF_OK);
+        // SAFETY: as in `initialise`, of patches.
+        let code = unsafe { call(self.instance, &raw const b) };
+        assert_eq!(code, PF_OK);
         f
     }
 
@@ -439,6 +447,11 @@ impl El {
         force: &mut [f64],
         energy: &mut [f64],
     ) {
+        let vectors = [position.len(), force.len()];
+        assert_eq!(
+            (vectors, energy.len()),
+            ([3 * p.nodes * p.lanes; 2], p.lanes)
+        );
         let b = pf_patch_batch {
             position: position.as_ptr(),
             constants: p.constants.as_mut_ptr(),
@@ -448,7 +461,9 @@ impl El {
             ..self.patch_batch(p.lanes)
         };
         let call = self.table.patch_forces.unwrap();
-        assert_eq!(unsafe { call(self.instance, &raw const b) }, PF_OK);
+        // SAFETY: as in `initialise`, of patches; the caller's arrays were looked at above.
+        let code = unsafe { call(self.instance, &raw const b) };
+        assert_eq!(code, PF_OK);
     }
 }
 

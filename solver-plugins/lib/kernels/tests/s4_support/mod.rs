@@ -27,15 +27,16 @@ pub fn isotropic(json: &str) -> Result<Mat, String> {
     let table = TABLE.get_or_init(material_table::<Isotropic>);
     let mut instance: *mut c_void = std::ptr::null_mut();
     let mut error = pf_error::default();
+    // SAFETY: a text, room for the instance and a whole `pf_error`.
     let code = unsafe { (table.create)(pf_str::new(json), &raw mut instance, &raw mut error) };
     if code != PF_OK {
         return Err(text(&error));
     }
-    // Leaked on purpose: the process is a test.
     let material = pf_material {
         functions: table,
         instance,
     };
+    // SAFETY: a static table, and an instance that is never ended: the process is a test.
     unsafe { MaterialRef::new(material) }.map(Mat)
 }
 
@@ -104,6 +105,7 @@ impl Shell {
         let mut instance: *mut c_void = std::ptr::null_mut();
         let mut error = pf_error::default();
         let material = *m.0.raw();
+        // SAFETY: a text, a material that is never ended, room for the instance and a whole `pf_error`.
         let code = unsafe {
             (table.create)(
                 pf_str::new(json),
@@ -116,7 +118,9 @@ impl Shell {
             return Err(text(&error));
         }
         let mut sizes = pf_element_sizes::default();
-        assert_eq!(unsafe { (table.sizes)(instance, &raw mut sizes) }, PF_OK);
+        // SAFETY: the instance that the table has just made; a whole struct, as its `size` says.
+        let code = unsafe { (table.sizes)(instance, &raw mut sizes) };
+        assert_eq!(code, PF_OK);
         Ok(Self {
             table,
             instance,
@@ -182,6 +186,8 @@ impl Shell {
             critical_step: e.step.as_mut_ptr(),
             ..self.batch(n, 0.0)
         };
+        // SAFETY: this table's instance, which is never ended, and a batch with the arrays of this call, of the lengths for its sizes and lanes. Not all are
+        // aligned to 64 bytes: what is tested is this crate's own, which takes doubles as they lie.
         let code = unsafe { (self.table.initialise)(self.instance, &raw const b) };
         assert_eq!(code, PF_OK);
         e
@@ -212,6 +218,7 @@ impl Shell {
             critical_step: f.step.as_mut_ptr(),
             ..self.batch(n, dt)
         };
+        // SAFETY: as in `initialise`.
         let code = unsafe { (self.table.forces)(self.instance, &raw const b) };
         assert_eq!(code, PF_OK);
         f
@@ -220,6 +227,9 @@ impl Shell {
     /// Forces and energies alone, into buffers of the caller (`[node][3][lanes]` rows).
     pub fn forces_into(&self, e: &mut Batch, position: &[f64], spin: &[f64], out: [&mut [f64]; 3]) {
         let [force, moment, energy] = out;
+        let vectors = [position.len(), spin.len(), force.len(), moment.len()];
+        assert_eq!(vectors, [12 * e.lanes; 4]);
+        assert!(energy.len() >= 3 * e.lanes);
         let b = pf_element_batch {
             position: position.as_ptr(),
             velocity: position.as_ptr(),
@@ -232,6 +242,7 @@ impl Shell {
             energy: energy.as_mut_ptr(),
             ..self.batch(e.lanes, 1e-6)
         };
+        // SAFETY: as in `initialise`; the caller's arrays were looked at above.
         let code = unsafe { (self.table.forces)(self.instance, &raw const b) };
         assert_eq!(code, PF_OK);
     }
@@ -249,6 +260,7 @@ impl Shell {
             energy: w.as_mut_ptr(),
             ..self.batch(e.lanes, 0.0)
         };
+        // SAFETY: as in `initialise`; without spins and moments, which are NULL.
         unsafe { (self.table.forces)(self.instance, &raw const b) }
     }
 }

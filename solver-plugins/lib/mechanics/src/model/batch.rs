@@ -147,7 +147,7 @@ pub(super) fn cell_areas_dispatch(p: &[f64; 12 * LANES], area: &mut [f64]) {
             cell_areas(p, area);
         }
         if std::arch::is_x86_feature_detected!("avx2") {
-            // Checked the line above.
+            // SAFETY: AVX2, all that `wide` asks for, was found the line above.
             return unsafe { wide(p, area) };
         }
     }
@@ -197,15 +197,19 @@ pub(super) fn run_batch(batch: &mut Batch, present: Present<'_>, work: &mut Batc
     }
     if element.rotates() {
         gather(&batch.nodes, motion.spin, &mut work.rates.spin.0);
+        if !element.sizes.ignores_velocity {
+            gather(&batch.nodes, motion.v, &mut work.rates.velocity.0);
+        }
+        // After both are written: a pointer that was taken before would be none to what is borrowed anew.
         work.rates.attach(&mut raw);
         if element.sizes.ignores_velocity {
             raw.velocity = std::ptr::null();
-        } else {
-            gather(&batch.nodes, motion.v, &mut work.rates.velocity.0);
         }
         raw.moment = work.moment.0.as_mut_ptr();
     }
-    batch.status = element.forces(&raw);
+    // SAFETY: the workspace has room for the 4 nodes that every element here has (`ElementInstance::create`), the batch's own arrays were made for
+    // this element's sizes; all are aligned, and borrowed by nobody else until the call ends. Constants are shared, and only read.
+    batch.status = unsafe { element.forces(&raw) };
     if !batch.layers.is_empty() {
         let rows = work.force.0.chunks_exact_mut(LANES);
         for row in rows
@@ -262,7 +266,9 @@ pub(super) fn run_patch(batch: &mut PatchBatch, present: Present<'_>, work: &mut
         batch.fields = Aligned::zeros(sheet.element.sizes.patch_fields * LANES);
         raw.fields = batch.fields.as_mut_ptr();
     }
-    batch.status = sheet.element.patch_forces(&raw);
+    // SAFETY: the workspace has room for `MOST_PATCH_NODES`, which no element here exceeds (`ElementInstance::create`), the batch's own arrays were
+    // made for this element's sizes; all are aligned, and borrowed by nobody else until the call ends. Constants are shared, and only read.
+    batch.status = unsafe { sheet.element.patch_forces(&raw) };
     batch.energy = sum_of(&work.energy.0[..batch.count as usize]);
 }
 
@@ -315,7 +321,8 @@ pub(super) fn cell_critical_steps(sheet: &Sheet, batch: &Batch, x: &[Vec3]) -> V
     raw.force = force.as_mut_ptr();
     raw.energy = energy.as_mut_ptr();
     raw.critical_step = step.as_mut_ptr();
-    if element.forces(&raw) != PF_OK {
+    // SAFETY: arrays of this function, of the lengths for 4 nodes and `LANES` lanes, and copies of the batch's own; constants are only read.
+    if unsafe { element.forces(&raw) } != PF_OK {
         return vec![0.0; batch.count as usize];
     }
     let bound = |l: usize| step[l] * batch.mass_factor.get(l).map_or(1.0, |f| f.sqrt());
@@ -339,7 +346,9 @@ pub(super) fn patch_rows(sheet: &Sheet, batch: &PatchBatch, x: &[Vec3]) -> Vec<(
     raw.force = force.as_mut_ptr();
     raw.energy = energy.as_mut_ptr();
     raw.stiffness = stiffness.as_mut_ptr();
-    let failed = sheet.element.patch_forces(&raw) != PF_OK;
+    // SAFETY: arrays of this function, of the lengths for the element's patch nodes and `LANES` lanes, and a copy of the batch's history; constants
+    // are only read.
+    let failed = unsafe { sheet.element.patch_forces(&raw) } != PF_OK;
     let safe = |row: f64| {
         if failed || row.is_nan() {
             f64::INFINITY

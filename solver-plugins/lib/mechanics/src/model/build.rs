@@ -300,7 +300,9 @@ impl Model {
             stiffness: std::ptr::null_mut(),
             material: spec.element.material.reference().raw(),
         };
-        component_status(spec.element.patch_initialise(&raw), &spec.name)?;
+        // SAFETY: arrays of this function and the batch's history, of the lengths for the element's sizes and `LANES` lanes, borrowed by nobody else.
+        let code = unsafe { spec.element.patch_initialise(&raw) };
+        component_status(code, &spec.name)?;
         batch.constants = shared.keep(constants);
         let used = (0..LANES).map(|l| of(l).nodes.len()).max();
         batch.nodes.truncate(used.unwrap_or(0));
@@ -347,7 +349,10 @@ impl Model {
             if element.rotates() {
                 raw.inertia = inertia.as_mut_ptr();
             }
-            component_status(element.initialise(&raw), &sheet.name)?;
+            // SAFETY: arrays of this function for 4 nodes and `LANES` lanes, and the batch's own, which were made for this element's sizes; all are
+            // aligned, and borrowed by nobody else until the next call has ended.
+            let code = unsafe { element.initialise(&raw) };
+            component_status(code, &sheet.name)?;
             raw.axis = std::ptr::null();
             raw.mass = std::ptr::null_mut();
             raw.inertia = std::ptr::null_mut();
@@ -358,7 +363,9 @@ impl Model {
             raw.force = force.as_mut_ptr();
             raw.energy = energy.as_mut_ptr();
             raw.critical_step = step.as_mut_ptr();
-            component_status(element.forces(&raw), &sheet.name)?;
+            // SAFETY: as above, with the arrays of this call.
+            let code = unsafe { element.forces(&raw) };
+            component_status(code, &sheet.name)?;
             batch.constants = shared.keep(constants);
             let batch_layers = std::mem::take(&mut batch.layers);
             let layers = |l: usize| batch_layers.get(l).copied().unwrap_or(1.0);

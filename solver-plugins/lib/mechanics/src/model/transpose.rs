@@ -16,7 +16,7 @@ pub(super) struct Sum(pub(super) [f64; 4]);
 pub(super) fn gather(nodes: &[[u32; LANES]], x: &[Vec3], out: &mut [f64]) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
-        // Checked the line above.
+        // SAFETY: AVX2, all that it asks for, was found the line above.
         return unsafe { wide::gather(nodes, x, out) };
     }
     for (nodes, rows) in nodes.iter().zip(out.chunks_exact_mut(3 * LANES)) {
@@ -40,7 +40,7 @@ pub(super) fn scatter(
 ) {
     #[cfg(target_arch = "x86_64")]
     if count == LANES && std::arch::is_x86_feature_detected!("avx2") {
-        // Checked the line above.
+        // SAFETY: AVX2, all that it asks for, was found the line above.
         return unsafe { wide::scatter(places, rows, minus, to) };
     }
     let (x, rest) = rows[..3 * LANES].split_at(LANES);
@@ -65,9 +65,10 @@ mod wide {
         let three = _mm256_set_epi64x(0, -1, -1, -1);
         for (nodes, rows) in nodes.iter().zip(out.chunks_exact_mut(3 * LANES)) {
             for l in (0..LANES).step_by(4) {
-                // The three components of a node that is there.
-                let at = |i: usize| unsafe {
-                    _mm256_maskload_pd(x[nodes[l + i] as usize].as_ptr(), three)
+                let at = |i: usize| {
+                    let node: &Vec3 = &x[nodes[l + i] as usize];
+                    // SAFETY: the mask has the three components of the node alone.
+                    unsafe { _mm256_maskload_pd(node.as_ptr(), three) }
                 };
                 let (a, b, c, d) = (at(0), at(1), at(2), at(3));
                 let (ab_xz, cd_xz) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
@@ -79,7 +80,7 @@ mod wide {
                 ];
                 for (k, row) in row.into_iter().enumerate() {
                     let to = &mut rows[k * LANES + l..k * LANES + l + 4];
-                    // Four places, as sliced.
+                    // SAFETY: four places, as sliced.
                     unsafe { _mm256_storeu_pd(to.as_mut_ptr(), row) };
                 }
             }
@@ -91,7 +92,7 @@ mod wide {
         for l in (0..LANES).step_by(4) {
             let row = |k: usize| {
                 let from = &rows[k * LANES + l..k * LANES + l + 4];
-                // Four places, as sliced.
+                // SAFETY: four places, as sliced.
                 unsafe { _mm256_loadu_pd(from.as_ptr()) }
             };
             let (x, y, z) = (row(0), row(1), row(2));
@@ -105,7 +106,7 @@ mod wide {
             ];
             for (i, vector) in vectors.into_iter().enumerate() {
                 let sum = to[places[l + i] as usize].0.as_mut_ptr();
-                // A sum is aligned to its 32 bytes.
+                // SAFETY: the four doubles of a sum, which is aligned to its 32 bytes and borrowed alone.
                 unsafe {
                     let old = _mm256_load_pd(sum);
                     let new = if minus {

@@ -31,6 +31,7 @@ fn component<T>(kind: u32, table: T) -> pf_component {
 /// An element of a fabric given by its parameters.
 #[allow(dead_code)]
 pub fn instance<E: Element>(fabric: &str) -> ElementInstance {
+    // SAFETY: tables of the kinds that are said, which are never freed.
     unsafe {
         let material = component(PF_KIND_MATERIAL, material_table::<Fabric>());
         let material = MaterialInstance::create(&material, fabric, "material").unwrap();

@@ -4,6 +4,7 @@ use plyflow_defects::{Ply, Settings, Tool, of_run};
 use plyflow_geometry::rectangle;
 use plyflow_model::artifact::{Forming, Rectangle, Role, Sheet, Zone, Zones, current_zones};
 use plyflow_sdk::{Host, Input, Meshes, StepError};
+use plyflow_surface::of_run::check_quads;
 use std::collections::BTreeMap;
 
 /// The zones that count, by name, and those in whose places they are ([`current_zones`]).
@@ -272,14 +273,7 @@ fn read(
     let sheets: Vec<Sheet> = formed.plies().cloned().collect();
     for sheet in &sheets {
         let body = meshes.body(&sheet.name)?;
-        if body.nodes_per_cell != 4 {
-            let (ply, n) = (&sheet.name, body.nodes_per_cell);
-            let what = format!(
-                "ply '{ply}' of '{}' has cells of {n} nodes; quads are expected",
-                input.step
-            );
-            return Err(what.into());
-        }
+        check_quads(&format!("ply '{}' of '{}'", sheet.name, input.step), body)?;
         let margin = settings.foot_margin;
         let of = of_run::Frame {
             host,

@@ -11,7 +11,8 @@ use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Defects, Forming, PlainBody, PlyDefects, Sheet};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::draped::{DRAPED, DrapedPart, Formed};
-use plyflow_surface::{Surface, Topology, of_run};
+use plyflow_surface::of_run::{self, check_quads};
+use plyflow_surface::{Surface, Topology};
 
 /// The step.
 pub struct DefectDetection;
@@ -83,14 +84,7 @@ fn judge(
 ) -> Result<Judged, StepError> {
     let meshes = host.meshes(input)?;
     let body = meshes.body(&sheet.name)?;
-    if body.nodes_per_cell != 4 {
-        let n = body.nodes_per_cell;
-        return Err(format!(
-            "ply '{}' has cells of {n} nodes; quads are expected",
-            sheet.name
-        )
-        .into());
-    }
+    check_quads(&format!("ply '{}'", sheet.name), body)?;
     let (undeformed, cells) = host.mesh(input, body)?;
     let points = host.frame_points(input, body, frame)?;
     let part = Formed::read(host, input, body, frame)?;
@@ -175,6 +169,53 @@ fn over_sheared(ply: &Judged, limits: &Thresholds) -> Option<String> {
     })
 }
 
+/// Points and fields of a ply in the open frame.
+fn write_ply(host: &Host, p: &Judged) -> Result<(), StepError> {
+    let number =
+        |flags: &[bool]| -> Vec<f64> { flags.iter().map(|&f| f64::from(u8::from(f))).collect() };
+    let f = &p.found;
+    host.write_points(&p.name, &p.points)?;
+    host.write_field(&p.name, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
+    host.write_field(
+        &p.name,
+        On::Points,
+        "nodal_distance",
+        1,
+        "m",
+        &f.nodal_distance,
+    )?;
+    host.write_field(
+        &p.name,
+        On::Points,
+        "curvature_max",
+        1,
+        "1/m",
+        &f.curvature_max,
+    )?;
+    host.write_field(
+        &p.name,
+        On::Cells,
+        "over_shear",
+        1,
+        "1",
+        &number(&f.over_shear),
+    )?;
+    if let Some(draped) = &p.draped {
+        host.write_field(&p.name, On::Cells, DRAPED, 1, "1", &number(draped))?;
+    }
+    let poor = number(&f.poor_conformity);
+    host.write_field(&p.name, On::Points, "poor_conformity", 1, "1", &poor)?;
+    host.write_field(&p.name, On::Cells, "flag", 1, "1", &number(&f.flag))?;
+    host.write_field(
+        &p.name,
+        On::Points,
+        "undeformed",
+        3,
+        "m",
+        p.undeformed.as_flattened(),
+    )
+}
+
 fn write(
     host: &Host,
     time: f64,
@@ -186,50 +227,7 @@ fn write(
     }
     host.begin_frame(time)?;
     for p in plies {
-        let number = |flags: &[bool]| -> Vec<f64> {
-            flags.iter().map(|&f| f64::from(u8::from(f))).collect()
-        };
-        let f = &p.found;
-        host.write_points(&p.name, &p.points)?;
-        host.write_field(&p.name, On::Cells, "shear_angle", 1, "rad", &p.shear_angle)?;
-        host.write_field(
-            &p.name,
-            On::Points,
-            "nodal_distance",
-            1,
-            "m",
-            &f.nodal_distance,
-        )?;
-        host.write_field(
-            &p.name,
-            On::Points,
-            "curvature_max",
-            1,
-            "1/m",
-            &f.curvature_max,
-        )?;
-        host.write_field(
-            &p.name,
-            On::Cells,
-            "over_shear",
-            1,
-            "1",
-            &number(&f.over_shear),
-        )?;
-        if let Some(draped) = &p.draped {
-            host.write_field(&p.name, On::Cells, DRAPED, 1, "1", &number(draped))?;
-        }
-        let poor = number(&f.poor_conformity);
-        host.write_field(&p.name, On::Points, "poor_conformity", 1, "1", &poor)?;
-        host.write_field(&p.name, On::Cells, "flag", 1, "1", &number(&f.flag))?;
-        host.write_field(
-            &p.name,
-            On::Points,
-            "undeformed",
-            3,
-            "m",
-            p.undeformed.as_flattened(),
-        )?;
+        write_ply(host, p)?;
     }
     host.end_frame()?;
     host.write_attributes(&Defects {

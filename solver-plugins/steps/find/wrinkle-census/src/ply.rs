@@ -4,7 +4,8 @@ use crate::moments;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_sdk::{Host, Input, On, StepError};
-use plyflow_surface::draped::DrapedPart;
+use plyflow_surface::draped::{DrapedPart, Formed};
+use plyflow_surface::of_run::check_quads;
 
 /// A ply in its last frame.
 pub struct Ply {
@@ -56,15 +57,8 @@ pub fn read(
     };
     let meshes = host.meshes(input)?;
     let body = meshes.body(&sheet.name)?;
-    if body.nodes_per_cell != 4 {
-        let n = body.nodes_per_cell;
-        return Err(format!(
-            "ply '{}' has cells of {n} nodes; quads are expected",
-            sheet.name
-        )
-        .into());
-    }
-    let part = plyflow_surface::draped::Formed::read(host, input, body, frame)?;
+    check_quads(&format!("ply '{}'", sheet.name), body)?;
+    let part = Formed::read(host, input, body, frame)?;
     let shear = host.frame_field(input, body, frame, "shear_angle")?;
     let moments = moments::read(host, input, body, frame)?;
     Ok(Ply {

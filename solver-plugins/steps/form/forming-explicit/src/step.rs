@@ -18,7 +18,9 @@ use plyflow_sdk::{Host, Log, Progress};
 
 struct HostComponents<'a>(&'a Host);
 
-impl Components for HostComponents<'_> {
+// SAFETY: a host gives tables of the kind that it is asked for, valid until the process ends; its texts are valid until `run` returns, which the
+// `Host` does not outlive (plyflow.h).
+unsafe impl Components for HostComponents<'_> {
     fn element(&self, name: &str) -> Result<pf_component> {
         Ok(self.0.component(PF_KIND_ELEMENT, name)?)
     }

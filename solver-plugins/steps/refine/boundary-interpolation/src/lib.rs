@@ -24,6 +24,7 @@ use plyflow_model::artifact::{
 };
 use plyflow_model::budget::{self, Wanted};
 use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
+use plyflow_surface::of_run::check_quads;
 use serde::Deserialize;
 
 /// The step.
@@ -290,14 +291,7 @@ fn drive(
     p: &Parameters,
 ) -> Result<Option<Driven>, StepError> {
     let body = meshes.body(&sheet.name)?;
-    if body.nodes_per_cell != 4 {
-        let n = body.nodes_per_cell;
-        return Err(format!(
-            "sheet '{}' has cells of {n} nodes; quads are expected",
-            sheet.name
-        )
-        .into());
-    }
+    check_quads(&format!("sheet '{}'", sheet.name), body)?;
     let (points, cells) = host.mesh(input, body)?;
     let ply = sheet.is_ply();
     let within = if ply { bounds(&points) } else { joint };
@@ -493,65 +487,71 @@ fn corners(b: Rectangle) -> Vec<[f64; 2]> {
 fn write(host: &Host, times: &[f64], first: usize, sheets: &[Driven]) -> Result<(), StepError> {
     let f = times.len() - first;
     host.write_f64("time", &[f], "s", &times[first..])?;
-    for s in sheets {
-        let (k, n) = (s.fine.driven_nodes.len(), s.fine.points.len());
-        host.define_mesh(
-            &s.sheet.name,
-            &s.fine.points,
-            4,
-            &s.fine.grid.cells,
-            &PlainBody {},
+    sheets
+        .iter()
+        .try_for_each(|s| write_sheet(host, times, first, s))
+}
+
+/// Mesh and motion of a sheet.
+fn write_sheet(host: &Host, times: &[f64], first: usize, s: &Driven) -> Result<(), StepError> {
+    let f = times.len() - first;
+    let (k, n) = (s.fine.driven_nodes.len(), s.fine.points.len());
+    host.define_mesh(
+        &s.sheet.name,
+        &s.fine.points,
+        4,
+        &s.fine.grid.cells,
+        &PlainBody {},
+    )?;
+    host.write_u32(
+        &format!("{}/driven_nodes", s.sheet.name),
+        &[k],
+        &s.fine.driven_nodes,
+    )?;
+    let motion = [
+        ("position", "m", "velocity", "m/s", Some(&s.position)),
+        ("normal", "1", "normal_rate", "1/s", s.normal.as_ref()),
+    ];
+    for (what, unit, rate, rate_unit, values) in motion {
+        let Some(values) = values else { continue };
+        let slopes = spline_slopes(times, values, 3 * k);
+        let [values, slopes] = [values, &slopes].map(|v| &v[3 * k * first..]);
+        host.write_f64(
+            &format!("{}/{what}", s.sheet.name),
+            &[f, k, 3],
+            unit,
+            values,
         )?;
-        host.write_u32(
-            &format!("{}/driven_nodes", s.sheet.name),
+        host.write_f64(
+            &format!("{}/{rate}", s.sheet.name),
+            &[f, k, 3],
+            rate_unit,
+            slopes,
+        )?;
+    }
+    if let Some(pull) = &s.pull {
+        host.write_f64(
+            &format!("{}/pull", s.sheet.name),
+            &[f, k, 3],
+            "N",
+            &pull.force[3 * k * first..],
+        )?;
+        host.write_f64(
+            &format!("{}/stiffness", s.sheet.name),
             &[k],
-            &s.fine.driven_nodes,
+            "N/m",
+            &pull.stiffness,
         )?;
-        let motion = [
-            ("position", "m", "velocity", "m/s", Some(&s.position)),
-            ("normal", "1", "normal_rate", "1/s", s.normal.as_ref()),
-        ];
-        for (what, unit, rate, rate_unit, values) in motion {
-            let Some(values) = values else { continue };
-            let slopes = spline_slopes(times, values, 3 * k);
-            let [values, slopes] = [values, &slopes].map(|v| &v[3 * k * first..]);
-            host.write_f64(
-                &format!("{}/{what}", s.sheet.name),
-                &[f, k, 3],
-                unit,
-                values,
-            )?;
-            host.write_f64(
-                &format!("{}/{rate}", s.sheet.name),
-                &[f, k, 3],
-                rate_unit,
-                slopes,
-            )?;
-        }
-        if let Some(pull) = &s.pull {
-            host.write_f64(
-                &format!("{}/pull", s.sheet.name),
-                &[f, k, 3],
-                "N",
-                &pull.force[3 * k * first..],
-            )?;
-            host.write_f64(
-                &format!("{}/stiffness", s.sheet.name),
-                &[k],
-                "N/m",
-                &pull.stiffness,
-            )?;
-        }
-        if let Some(start) = &s.start {
-            let shape = [start.states, n, 3];
-            host.write_f64(&format!("{}/path", s.sheet.name), &shape, "m", &start.path)?;
-            host.write_f64(
-                &format!("{}/start_velocity", s.sheet.name),
-                &[n, 3],
-                "m/s",
-                &start.velocity,
-            )?;
-        }
+    }
+    if let Some(start) = &s.start {
+        let shape = [start.states, n, 3];
+        host.write_f64(&format!("{}/path", s.sheet.name), &shape, "m", &start.path)?;
+        host.write_f64(
+            &format!("{}/start_velocity", s.sheet.name),
+            &[n, 3],
+            "m/s",
+            &start.velocity,
+        )?;
     }
     Ok(())
 }

@@ -46,11 +46,11 @@ impl Layout {
             .iter()
             .map(|sheet| sheet::blank_part(sheet, planes))
             .collect::<Result<_>>()?;
-        let all_plies = plies
+        // There is one: `sheet::stack` refuses what is not one or more plies between two films.
+        let all_plies = plies[1..]
             .iter()
             .map(Blank::bounds)
-            .reduce(hull)
-            .ok_or_else(|| FormingError::Scene("the scene has no ply".into()))?;
+            .fold(plies[0].bounds(), hull);
         let film_size = p.film_size();
         if film_size < 0.999 * p.element_size {
             return Err(FormingError::Scene(format!(

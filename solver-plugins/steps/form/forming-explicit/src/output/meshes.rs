@@ -42,9 +42,9 @@ const OF_FILMS: &str = "principal_stretch";
 pub fn fields_of(host: &Host, kind: SheetKind, p: &Parameters) -> Result<Vec<ElementField>> {
     let of_element = |name: &str| -> Result<Vec<ElementField>> {
         let found = host.component(PF_KIND_ELEMENT, name)?;
-        Ok(element_fields(
-            unsafe { found.manifest.as_str() }.unwrap_or("{}"),
-        ))
+        // SAFETY: a text of the host's, valid until `run` returns.
+        let manifest = unsafe { found.manifest.as_str() };
+        Ok(element_fields(manifest.unwrap_or("{}")))
     };
     let (choice, elsewhere) = match kind {
         SheetKind::Diaphragm => (&p.diaphragm_element, None),

@@ -14,7 +14,11 @@ use plyflow_model::artifact::Rectangle;
 use std::sync::Arc;
 
 /// Finds components: the host, or a test.
-pub trait Components {
+///
+/// # Safety
+/// What it gives is of the kind that it says: whole tables that keep to plyflow.h, valid until the process ends, and manifests that can be read as
+/// long as `self` is there.
+pub unsafe trait Components {
     /// The element formulation of that name.
     ///
     /// # Errors
@@ -75,6 +79,7 @@ impl Elements<'_> {
             sheet.material.name, sheet.scene.name
         );
         let found = self.components.material(&sheet.material.plugin)?;
+        // SAFETY: what `Components` promises.
         Ok(unsafe { MaterialInstance::create(&found, &with.to_string(), &what) }?)
     }
 
@@ -95,6 +100,7 @@ impl Elements<'_> {
         } else {
             choice.with.to_string()
         };
+        // SAFETY: what `Components` promises.
         Ok(unsafe { ElementInstance::create(&found, &parameters, material, &what) }?)
     }
 

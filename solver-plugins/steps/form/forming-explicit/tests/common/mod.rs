@@ -24,7 +24,8 @@ impl BuiltIn {
     }
 }
 
-impl Components for BuiltIn {
+// SAFETY: Plyflow's own, which are static.
+unsafe impl Components for BuiltIn {
     fn element(&self, name: &str) -> Result<pf_component, FormingError> {
         Self::of(PF_KIND_ELEMENT, name)
     }
