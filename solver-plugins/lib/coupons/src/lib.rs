@@ -17,6 +17,7 @@ pub mod bias_extension;
 pub mod bias_plane;
 pub mod buckling;
 pub mod cantilever;
+pub mod distortion;
 pub mod film;
 pub mod inflation;
 pub mod output;
