@@ -3,6 +3,7 @@
 //! The pressure rises smoothly to its end value and is held there. A film has a limit point: beyond that
 //! pressure there is no equilibrium near by and the disc runs away. The test then stops and says so.
 
+use crate::distortion;
 use crate::output::Output;
 use crate::reference::{Curve, rising};
 use crate::run::{Finished, Test, run, with_threads};
@@ -241,7 +242,9 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         .into());
     }
     p.common.allow(std::f64::consts::PI * p.radius * p.radius)?;
-    let mesh = disc(p.radius, p.common.element_size);
+    let mut mesh = disc(p.radius, p.common.element_size);
+    // The height is that of the node in the centre.
+    distortion::scatter(&mut mesh, p.common.distortion, |n| n == 0)?;
     let rim: Vec<u32> = (mesh.on_boundary().iter().enumerate())
         .filter(|(_, on)| **on)
         .map(|(n, _)| n as u32)
@@ -313,6 +316,7 @@ fn write(
     // Vertical balance of the film: the rim carries the pressure on the plane disc below the dome.
     let carried = -test.rim.1 / (std::f64::consts::PI * p.radius * p.radius);
     host.result("rim_balance", carried / pressure, "1")?;
+    distortion::tell(host, &done.specimen.mesh, p.common.distortion)?;
     out.about.radius = Some(p.radius);
     out.finish(&p.common, done.specimen, done.outcome)
 }

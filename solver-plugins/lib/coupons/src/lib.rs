@@ -17,6 +17,7 @@ pub mod bias_extension;
 pub mod bias_plane;
 pub mod buckling;
 pub mod cantilever;
+pub mod distortion;
 mod drives;
 pub mod film;
 pub mod friction;

@@ -6,6 +6,7 @@
 //! equal power; a law of normalised shear force gives `F = 2 F_norm(g) L cos((pi/2 - g)/2)`
 //! (numerics: dW/dg = F_norm cos g per undeformed area).
 
+use crate::distortion;
 use crate::output::Output;
 use crate::reference::{Curve, largest_between, rising};
 use crate::run::{Finished, SAMPLES, Test, run, with_threads};
@@ -28,6 +29,9 @@ pub struct Parameters {
     common: Common,
     /// Side of the frame (m).
     side: f64,
+    /// Length of the elements along x over that along y.
+    #[serde(default = "square")]
+    stretch: f64,
     /// Shear angles (rad) that are visited one after the other, from 0.
     path: Vec<f64>,
     /// Time from one angle to the next (s).
@@ -41,6 +45,10 @@ pub struct Parameters {
     /// Energy per undeformed area that the whole path should cost (J/m2).
     #[serde(default)]
     dissipation: Option<f64>,
+}
+
+fn square() -> f64 {
+    1.0
 }
 
 /// The shear angle over time: smooth legs between the angles of the path.
@@ -191,9 +199,11 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         first_leg: Curve::given(p.reference.as_ref(), angle, force)?,
         whole_path: Curve::given(p.path_reference.as_ref(), length, force)?,
     };
-    p.common.allow(p.side * p.side)?;
-    let axis = even_axis(0.0, p.side, p.common.element_size);
-    let mesh = QuadMesh::grid(&axis, &axis);
+    p.common.allow(p.side * p.side * p.stretch)?;
+    let axis = |size: f64| even_axis(0.0, p.side, size);
+    let size = p.common.element_size;
+    let mut mesh = QuadMesh::grid(&axis(size), &axis(size / p.stretch));
+    distortion::scatter(&mut mesh, p.common.distortion, |_| false)?;
     let driven: Vec<u32> = (mesh.on_boundary().iter().enumerate())
         .filter(|(_, on)| **on)
         .map(|(n, _)| n as u32)
@@ -318,6 +328,7 @@ fn write(
     host.result("force_peak", peak, "N")?;
     host.result("shear_min", test.extremes[0], "rad")?;
     host.result("shear_max", test.extremes[1], "rad")?;
+    distortion::tell(host, &done.specimen.mesh, p.common.distortion)?;
     out.about.side = Some(p.side);
     out.finish(&p.common, done.specimen, done.outcome)
 }

@@ -17,6 +17,7 @@
 
 mod shape;
 
+use crate::distortion;
 use crate::output::Output;
 use crate::reference::{Curve, rising};
 use crate::run::{Finished, Test, run, with_threads};
@@ -192,7 +193,13 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         .collect();
     let axis = axis_of_family(p.family);
     let rotates = strip::rotates(host, &p.common)?;
-    let mut specimen = Specimen::new(host, &p.common, grid.mesh(), axis, Pressed::No)?;
+    let mut mesh = grid.mesh();
+    let clamp = |n: usize| {
+        let (i, _) = grid.place(n as u32);
+        i < CLAMPED || i + CLAMPED >= columns
+    };
+    distortion::scatter(&mut mesh, p.common.distortion, clamp)?;
+    let mut specimen = Specimen::new(host, &p.common, mesh, axis, Pressed::No)?;
     let shape = Shape { h, half };
     let history = history(p);
     let roll = Roll {
@@ -360,6 +367,7 @@ fn write(
     let path = most(&p.path);
     host.result("curvature_error", test.curvature_error / path, "1")?;
     host.result("fibre_strain_largest", test.fibre_strain, "1")?;
+    distortion::tell(host, &done.specimen.mesh, p.common.distortion)?;
     out.about.family = Some(p.family);
     out.about.shear_angle = Some(p.shear_angle);
     out.about.rotations = Some(test.rotates);

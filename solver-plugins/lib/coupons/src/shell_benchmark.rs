@@ -4,6 +4,7 @@
 //!
 //! The numbers of the paper have no units; here they are SI (m, N, Pa).
 
+use crate::distortion;
 use crate::drives::Held;
 use crate::output::Output;
 use crate::specimen::{Common, Specimen};
@@ -277,13 +278,14 @@ fn benchmark(host: &Host, p: &Parameters) -> Result<(), StepError> {
         .into());
     }
     let guard = usize::from(!crate::strip::rotates(host, &p.common)?);
-    let setup = match p.case {
+    let mut setup = match p.case {
         Case::CantileverShear => cantilever(p, 10.0, guard),
         Case::CantileverMoment => cantilever(p, 12.0, guard),
         Case::SlitAnnulus => annulus(p, guard),
         Case::Hemisphere => hemisphere(p),
         Case::SemiCylinder => semi_cylinder(p),
     };
+    distort(p, &mut setup)?;
     let mesh = setup.mesh.clone();
     let mut specimen = Specimen::new(host, &p.common, mesh, [1.0, 0.0, 0.0], Pressed::No)?;
     if specimen.model.spins().is_none() {
@@ -302,6 +304,20 @@ fn benchmark(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let states = load(host, p, &setup, &mut specimen)?;
     let seconds = started.elapsed().as_secs_f64();
     write(host, p, &setup, &specimen, (&states, seconds))
+}
+
+/// Moves nodes within a flat mesh off their places.
+fn distort(p: &Parameters, setup: &mut Setup) -> Result<(), StepError> {
+    let share = p.common.distortion;
+    if share > 0.0 && setup.mesh.points.iter().any(|x| x[2] != 0.0) {
+        return Err(format!(
+            "distortion: given {share} for a curved shell; expected 0, or a case that is flat at the start: cantilever-shear, cantilever-moment \
+             or slit-annulus"
+        )
+        .into());
+    }
+    let kept: Vec<u32> = setup.clamped.clone();
+    distortion::scatter(&mut setup.mesh, share, |n| kept.contains(&(n as u32)))
 }
 
 /// Elements without rotations cannot be given moments, nor symmetry planes that a curved shell bends across.
@@ -445,6 +461,7 @@ fn write(
     let residual = states.iter().map(|s| s.residual).fold(0.0, f64::max);
     host.result("hourglass_ratio", hourglass, "1")?;
     host.result("residual", residual, "1")?;
+    distortion::tell(host, &specimen.mesh, p.common.distortion)?;
     host.result("elements", specimen.model.element_count() as f64, "1")?;
     host.result("cycles", specimen.model.cycle() as f64, "1")?;
     let work = specimen.model.element_count() as f64 * specimen.model.cycle() as f64;

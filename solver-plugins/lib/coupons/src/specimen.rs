@@ -34,6 +34,9 @@ pub struct Common {
     /// Edge of the elements (m); 0 where the test says it otherwise.
     #[serde(default)]
     pub element_size: f64,
+    /// How far nodes are off their places, over their shortest edges ([`crate::distortion`]); 0 where a test does not offer it.
+    #[serde(default)]
+    pub distortion: f64,
     /// Wanted step (s): elements below it are mass-scaled. Without it the natural step is used.
     #[serde(default)]
     pub time_step: Option<f64>,

@@ -7,6 +7,8 @@ mod batch;
 mod blocks;
 mod boundary;
 mod build;
+#[cfg(test)]
+mod critical;
 mod drive;
 mod mirror;
 mod parts;
