@@ -55,6 +55,7 @@ checked: ## run the tests of mechanics and kernels with debug assertions and ove
 long: ## run the tests that take many minutes
 	@scripts/setup
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -p plyflow-faults -p plyflow-forming-explicit -p plyflow-mechanics -- --ignored --nocapture
+	. ./.tools/env && PLYFLOW_OPERATIONS=all cargo test $(CARGO_FLAGS) -p plyflow-e2e --test disk -- --nocapture
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-characterisation --all-features --test calibration -- --ignored --nocapture
 
 hard-cases: build ## run what is made to break elements, laws and contacts, and write docs/hard-cases.md

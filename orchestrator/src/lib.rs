@@ -1,6 +1,7 @@
 //! Plyflow: runs forming studies. A workflow is planned ([`plan`]), decided on and driven ([`engine`]),
 //! each step in a process of its own ([`worker`]), with its artifacts in a [`store`].
 
+pub mod advice;
 pub mod cli;
 pub mod engine;
 pub mod exit;

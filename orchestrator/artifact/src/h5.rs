@@ -26,7 +26,7 @@ use hdf5_sys::h5t::{
 };
 use std::ffi::{CString, c_void};
 use std::path::Path;
-use std::sync::atomic::Ordering;
+use std::sync::PoisonError;
 
 /// Type of an element, in the file (little-endian) and in memory (native).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -255,8 +255,9 @@ impl File {
         std::mem::forget(self);
         // SAFETY: in the lock; `self`, which would close it a second time, is forgotten.
         locked(|| checked(unsafe { H5Fclose(id) }, || "closing the artifact".into()))?;
-        if CLOSE_FAILED.swap(false, Ordering::Relaxed) {
-            let text = "a part of the artifact could not be written; is the disk full?";
+        let mut failed = CLOSE_FAILED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(why) = failed.take() {
+            let text = format!("a part of the artifact could not be written (HDF5: {why})");
             return Err(ArtifactError::new(ErrorKind::Io, text));
         }
         Ok(())

@@ -16,6 +16,7 @@ mod mesh;
 mod reader;
 pub mod seal;
 mod small;
+pub mod whole;
 mod writer;
 
 pub use contents::{ArrayInfo, BodyInfo, Contents, DATA_MODEL, FieldInfo, NamedValue, On};

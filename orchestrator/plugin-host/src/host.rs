@@ -25,8 +25,8 @@ pub(crate) struct Output {
     /// Gone when finished.
     pub(crate) writer: Option<ArtifactWriter>,
     pub(crate) results: Vec<NamedResult>,
-    /// The first write that was refused: the artifact breaks the data model, whatever the plugin says.
-    pub(crate) refused: Option<String>,
+    /// The first write that was refused, by the data model or by the disk: there is no artifact, whatever the plugin says.
+    pub(crate) refused: Option<ArtifactError>,
     /// What the plugin said of its failure.
     pub(crate) failure: Option<String>,
     /// The last thing that a service refused, for the failure's text.
@@ -127,10 +127,9 @@ impl<'a, 'w> HostState<'a, 'w> {
             }
             Err(e) => {
                 output.detail = Some(e.message.clone());
-                if output.refused.is_none() {
-                    output.refused = Some(e.message);
-                }
-                status(e.kind)
+                let code = status(e.kind);
+                output.refused.get_or_insert(e);
+                code
             }
         }
     }

@@ -98,7 +98,7 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
         .as_secs_f64();
     let plugin = load(job)?;
     let malformed = |text: String| (FailureKind::Malformed, text);
-    let state = HostState::new(job, &plugin, emitter).map_err(|e| malformed(e.message))?;
+    let state = HostState::new(job, &plugin, emitter).map_err(|e| (kind_of(e.kind), e.message))?;
     let clock = Instant::now();
     let table = services::table(&state);
     let functions = plugin.functions().cast::<pf_step_functions>();
@@ -124,11 +124,9 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
             job.plugin.name
         )));
     }
-    let bytes = writer.finish(&job.provenance).map_err(|e| match e.kind {
-        // A full disk is no fault of the plugin's.
-        ErrorKind::Io => (FailureKind::Error, e.message),
-        _ => malformed(e.message),
-    })?;
+    let bytes = writer
+        .finish(&job.provenance)
+        .map_err(|e| (kind_of(e.kind), e.message))?;
     let hash = sealed_hash(job, bytes)?;
     let record = Record {
         version: JOB_VERSION,
@@ -147,6 +145,14 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
     };
     put_on_disk(job, &record)?;
     Ok(record)
+}
+
+/// The class of a step's failure by that of its artifact's: a full disk is no fault of the plugin's.
+fn kind_of(kind: ErrorKind) -> FailureKind {
+    match kind {
+        ErrorKind::Io => FailureKind::Error,
+        _ => FailureKind::Malformed,
+    }
 }
 
 /// Writes the record; what was long in the making outlasts a power cut, with its artifact.
@@ -216,6 +222,8 @@ fn judge(job: &Job, code: i32, output: &mut crate::host::Output) -> Result<(), F
     let name = &job.plugin.name;
     if let Some(refused) = output.refused.take() {
         // A write was refused: that is the cause, whatever the plugin made of it.
+        let kind = kind_of(refused.kind);
+        let refused = refused.message;
         let text = match (code, said) {
             (PF_OK, _) => format!(
                 "{refused} (the host refused this write; the plugin '{name}' did not heed it)"
@@ -224,7 +232,7 @@ fn judge(job: &Job, code: i32, output: &mut crate::host::Output) -> Result<(), F
             (_, Some(said)) => said,
             (_, None) => refused,
         };
-        return Err((FailureKind::Malformed, text));
+        return Err((kind, text));
     }
     match code {
         PF_OK => Ok(()),

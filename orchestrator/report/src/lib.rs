@@ -61,13 +61,7 @@ pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportEr
     if let Some(folder) = out.parent().filter(|f| !f.as_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(wrong)?;
     }
-    let name = out.file_name().unwrap_or("report.html");
-    let partial = out.with_file_name(format!(".{name}.{}.partial", std::process::id()));
-    std::fs::write(&partial, &page).map_err(wrong)?;
-    std::fs::rename(&partial, out).map_err(|e| {
-        let _ = std::fs::remove_file(&partial);
-        wrong(e)
-    })?;
+    plyflow_artifact::whole::write(out.as_std_path(), page.as_bytes()).map_err(wrong)?;
     Ok(page.len() as u64)
 }
 

@@ -44,6 +44,7 @@ pub fn clean(args: &CleanArgs) -> Done {
     };
     let unused = unused(&store, args.all)?;
     removed.artifacts(&store, &unused).map_err(failed())?;
+    removed.lone_records(&store).map_err(failed())?;
     removed.set_aside(&store).map_err(failed())?;
     removed.checkpoints(&store).map_err(failed())?;
     if args.all && !args.dry_run {
@@ -56,18 +57,24 @@ pub fn clean(args: &CleanArgs) -> Done {
 /// Keys of artifacts that no workflow's last run uses; `all`: of all artifacts.
 fn unused(store: &Store, all: bool) -> Result<Vec<Key>, Stop> {
     let failed = || Stop::machine(format!("cleaning {}", store.root()));
-    let mut used = BTreeSet::new();
-    let mut noted = None;
+    let (mut used, mut known) = (BTreeSet::new(), BTreeSet::new());
+    let (mut noted, now) = (None, std::time::SystemTime::now());
+    let mut is_ahead = false;
     if !all {
         for run in store.runs().map_err(failed())? {
             let journal = whole(&run.journal())?;
             used.extend(journal.last_keys());
-            noted = noted.max(modified(&run.journal()));
+            known.extend(journal.known_keys());
+            let written = modified(&run.journal());
+            is_ahead |= written > Some(now);
+            noted = noted.max(written);
         }
     }
     // What has come since any journal was last written to is the work of a run that could not note it: the disk was full, or it was
     // killed between the two. The next run finds it by its file.
-    let unnoted = |key: &Key| noted.is_some() && modified(&store.artifact(key)) > noted;
+    let later = |key: &Key| noted.is_some() && modified(&store.artifact(key)) > noted;
+    // A journal from the future: the clock was set back since, and dates tell nothing until the next run has written to it.
+    let unnoted = |key: &Key| later(key) || (is_ahead && !known.contains(key));
     let mut keys = store.keys().map_err(failed())?;
     keys.retain(|k| !used.contains(k) && !unnoted(k));
     Ok(keys)
@@ -98,6 +105,19 @@ impl Removed {
             self.size += size_of(&store.earlier_artifact(&key));
             if !self.dry_run {
                 store.remove_earlier(&key)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Records without an artifact: what a run has left that was killed between the two.
+    fn lone_records(&mut self, store: &Store) -> io::Result<()> {
+        for key in store.recorded_keys()? {
+            if store.size(&key).is_none() && !store.has_earlier(&key) {
+                self.size += size_of(&store.record(&key));
+                if !self.dry_run {
+                    std::fs::remove_file(store.record(&key))?;
+                }
             }
         }
         Ok(())

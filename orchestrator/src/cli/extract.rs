@@ -142,13 +142,7 @@ fn write_all(files: &[TextFile], folder: &Utf8Path, force: bool) -> Result<Strin
 
 /// Under a temporary name first, so that a whole file is there at any moment.
 fn write(path: &Utf8Path, text: &str) -> std::io::Result<()> {
-    let name = path.file_name().unwrap_or("file");
-    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
-    let written = std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path));
-    if written.is_err() {
-        let _ = std::fs::remove_file(&partial);
-    }
-    written
+    plyflow_artifact::whole::write(path.as_std_path(), text.as_bytes())
 }
 
 #[cfg(test)]

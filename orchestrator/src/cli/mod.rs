@@ -28,6 +28,7 @@ mod verify;
 
 pub use args::Cli;
 
+use crate::advice;
 use crate::exit;
 use crate::said::{Done, warn};
 use args::Command;
@@ -63,7 +64,7 @@ pub fn main() -> u8 {
         Ok(()) => exit::OK,
         Err(stop) => {
             if !stop.text.is_empty() {
-                warn(&format!("plyflow: {}\n", stop.text));
+                warn(&format!("plyflow: {}\n", advice::with(&stop.text)));
             }
             stop.code
         }

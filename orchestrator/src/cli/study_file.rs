@@ -7,6 +7,7 @@ use super::found::points::Table;
 use super::study::as_csv;
 use crate::engine::Session;
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_artifact::whole;
 use plyflow_artifact::{ArtifactError, ArtifactWriter, DType};
 use plyflow_model::artifact::{
     self, Attributes, StudyFailure, StudyKeys, StudySamples, StudyTable, StudyVariable,
@@ -38,10 +39,9 @@ pub fn write(
     artifact: &Utf8Path,
 ) -> io::Result<()> {
     let temporary = |path: &Utf8Path| {
-        let name = path.file_name().unwrap_or("study");
-        path.with_file_name(format!(".{name}.{}", std::process::id()))
+        Utf8PathBuf::try_from(whole::begun(path.as_std_path())).map_err(|e| e.into_io_error())
     };
-    let (text, file) = (temporary(csv), temporary(artifact));
+    let (text, file) = (temporary(csv)?, temporary(artifact)?);
     let done = std::fs::write(&text, as_csv(table))
         .and_then(|()| make(table, session, &file).map_err(io::Error::other))
         .and_then(|()| replace(&text, csv))

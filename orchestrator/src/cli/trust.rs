@@ -282,7 +282,7 @@ fn forget(given: &Utf8Path, word: &str) -> Done {
             format!("{given}: it is not in the list {path}; `plyflow trust` shows what is"),
         ));
     }
-    let beside = Utf8PathBuf::from(format!("{path}.{}", std::process::id()));
+    let beside = plyflow_artifact::whole::begun(path.as_std_path());
     let mut lines = kept.join("\n");
     if !lines.is_empty() {
         lines.push('\n');
@@ -297,6 +297,8 @@ fn forget(given: &Utf8Path, word: &str) -> Done {
             .mode(0o600)
             .open(&beside)?;
         file.write_all(lines.as_bytes())?;
+        // It is the user's own: a power cut must not leave an empty one.
+        file.sync_all()?;
         std::fs::rename(&beside, &path)
     };
     write().map_err(Stop::machine(format!("writing {path}")))?;

@@ -4,6 +4,7 @@ use super::args::{TextOrJson, VerifyArgs, Workflow};
 use super::machine::default_memory;
 use super::open::{cores, locked, open, store_root};
 use super::table::bytes;
+use crate::advice;
 use crate::engine::core::Limits;
 use crate::engine::{Compared, Local, Options, Purpose, Session};
 use crate::exit;
@@ -93,14 +94,28 @@ impl Findings<'_> {
             }
         }
         keys.extend(self.store.earlier_keys()?);
+        let noted = self.noted()?;
         for key in lone.iter().filter(|k| !keys.contains(k)) {
-            // One that a run places at this moment has its artifact right after it.
-            if self.store.size(key).is_none() {
+            // One that a run places at this moment has its artifact right after it, and one of which no journal knows is all that a run
+            // has left that was killed between the two: nothing has gone.
+            if self.store.size(key).is_none() && noted.contains(key) {
                 let path = self.store.record(key);
                 self.note(&path, "the artifact of this record has gone");
             }
         }
         Ok(())
+    }
+
+    /// Keys of artifacts that journals know to have been in the store.
+    fn noted(&self) -> std::io::Result<BTreeSet<Key>> {
+        let mut noted = BTreeSet::new();
+        for run in self.store.runs()? {
+            // What is wrong with a journal is told when it is its turn.
+            if let Ok(journal) = Journal::read(&run.journal()) {
+                noted.extend(journal.known_keys());
+            }
+        }
+        Ok(noted)
     }
 
     fn caches(&mut self) -> std::io::Result<()> {
@@ -248,7 +263,8 @@ fn again(args: &VerifyArgs) -> Done {
     }
     print(&out)?;
     if let Some(first) = summary.failures.first() {
-        warn(&format!("plyflow: {}: {}\n", first.label, first.reason));
+        let reason = advice::with(&first.reason);
+        warn(&format!("plyflow: {}: {reason}\n", first.label));
         return Err(Stop::silent(exit::STEP_FAILED));
     }
     let other = |(_, how): &(String, Compared)| matches!(how, Compared::Other { .. });

@@ -165,18 +165,35 @@ impl Session<'_> {
         }
     }
 
+    /// Why an instance that has ended says nothing for its key: what it was to load was exchanged before it was heard of, which for one
+    /// that has nothing to say is now; or what it had loaded was written over, and it crashed.
+    fn changed_under(&mut self, id: Id, outcome: &Outcome) -> Option<String> {
+        let crashed = matches!(outcome, Outcome::Signal(_) | Outcome::Silent(_));
+        let changed = match self.heard.remove(&id) {
+            Some(Some(reason)) => Some(reason),
+            Some(None) if !crashed => None,
+            _ => self.changed(id),
+        }?;
+        match outcome {
+            Outcome::Done(_) | Outcome::Cancelled => Some(changed),
+            Outcome::Failed { .. } | Outcome::Signal(_) | Outcome::Silent(_) => {
+                Some(format!("{changed} (it ended so: {})", outcome.reason()))
+            }
+            // Neither has to do with what it loaded.
+            Outcome::TimedOut(_) | Outcome::NotStarted(_) => None,
+        }
+    }
+
     fn heed(&mut self, report: Report, observer: &mut dyn Observer) {
         if let Report::Message { id, .. } = &report {
             self.look_again(*id);
         }
+        if let Report::Ended { id, outcome } = &report
+            && let Some(reason) = self.changed_under(*id, outcome)
+        {
+            return self.fail(*id, &reason, observer);
+        }
         match report {
-            Report::Ended { id, outcome }
-                if matches!(outcome, Outcome::Done(_) | Outcome::Cancelled)
-                    && self.heard.get(&id).is_some_and(Option::is_some) =>
-            {
-                let reason = self.heard.remove(&id).flatten().unwrap_or_default();
-                self.fail(id, &reason, observer);
-            }
             Report::Message { id, message } => match &message {
                 Message::Progress(p) => observer.update(&self.core, id, &Update::Progress(p)),
                 Message::Log { level, text } => {

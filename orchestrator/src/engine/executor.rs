@@ -1,6 +1,7 @@
 //! Where jobs run. The engine hands over self-contained jobs and hears back in reports; it never assumes
 //! that a job is a child process or even on this machine.
 
+use crate::advice;
 use plyflow_model::job::{FailureKind, Job, Message, Record};
 use std::io;
 use std::time::Duration;
@@ -109,6 +110,17 @@ impl FailureClass {
             ("the artifact cannot be put into the store", Self::Machine),
             ("stopped at its time limit", Self::TimeLimit),
         ];
+        // An optimisation takes a failure for an answer and never asks again: a full disk, a kill from outside, or what was exchanged in
+        // the middle of a run must not be one, however the step told it.
+        let outside = [
+            "the worker crashed: SIGKILL",
+            "the worker was told to stop from outside",
+            "since this run began; run again",
+            "its input cannot be kept",
+        ];
+        if advice::on(reason).is_some() || outside.iter().any(|words| reason.contains(words)) {
+            return Self::Machine;
+        }
         let found = classes.iter().find(|(begin, _)| reason.starts_with(begin));
         found.map_or(Self::Error, |(_, class)| *class)
     }
@@ -165,6 +177,25 @@ pub trait Executor {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_came_from_outside_tells_nothing_of_a_step() {
+        let full = std::io::Error::from_raw_os_error(libc::ENOSPC);
+        let stopped = Outcome::Failed {
+            kind: FailureKind::Cancelled,
+            message: "the worker was told to stop from outside".into(),
+        };
+        for reason in [
+            format!("field 'x' of body 'ply': the host refused: {full}"),
+            format!("malformed artifact: {full}"),
+            Outcome::Signal("SIGKILL".into()).reason(),
+            stopped.reason(),
+            "the plugin /a.so has changed since this run began; run again, and what is finished is kept".into(),
+            "its input cannot be kept: made again 2 times in this run".into(),
+        ] {
+            assert_eq!(FailureClass::of(&reason), FailureClass::Machine, "{reason}");
+        }
+    }
 
     #[test]
     fn a_failure_has_the_class_of_how_it_ended() {

@@ -1,7 +1,7 @@
 //! Opens the journal of a run, and says what of its files was found damaged.
 
 use crate::store::{Journal, RunFolder, Scanned, Store};
-use camino::Utf8PathBuf;
+use camino::{Utf8Path, Utf8PathBuf};
 use std::io;
 
 /// The journal of a run that writes, and what of its files was found damaged.
@@ -10,7 +10,12 @@ pub(super) fn open_for_writing(
     folder: &RunFolder,
     ahead: Option<Scanned>,
 ) -> io::Result<(Journal, Vec<String>)> {
-    folder.prepare()?;
+    let named = |what: &Utf8Path| {
+        let what = what.to_owned();
+        move |e: io::Error| io::Error::new(e.kind(), format!("{what}: {e}"))
+    };
+    folder.prepare().map_err(named(&folder.tmp()))?;
+    store.clear_killed();
     let mut told = store.take_unplaced(folder);
     let path = folder.journal();
     let kept = |place: Option<Utf8PathBuf>| {
@@ -23,9 +28,9 @@ pub(super) fn open_for_writing(
             let place = kept(store.set_aside(&path)?);
             let text = format!("the journal {path} is damaged: {e}{place}, and a new one begun");
             told.push(text);
-            Journal::open(&path)?
+            Journal::open(&path).map_err(named(&path))?
         }
-        Err(e) => return Err(e),
+        Err(e) => return Err(named(&path)(e)),
     };
     if journal.is_damaged() {
         let place = kept(store.set_aside(&Journal::damaged_file(&path))?);

@@ -4,7 +4,7 @@ use super::names::{EARLIER_ENDING, ENDING, RECORD_ENDING, key_of, list, safe_nam
 use super::run::RunFolder;
 use crate::plan::Key;
 use camino::{Utf8Path, Utf8PathBuf};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::io;
 
 /// A store.
@@ -13,6 +13,8 @@ pub struct Store {
     root: Utf8PathBuf,
     /// Folders of `artifacts` that are known to be there.
     pub(super) shards: RefCell<[bool; 256]>,
+    /// Whether its own name, and those in it, have been put on the disk.
+    pub(super) is_kept: Cell<bool>,
 }
 
 impl Store {
@@ -21,6 +23,7 @@ impl Store {
         Self {
             root,
             shards: RefCell::new([false; 256]),
+            is_kept: Cell::new(false),
         }
     }
 

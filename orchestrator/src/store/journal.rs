@@ -8,6 +8,7 @@
 use crate::plan::{ByKey, Ingredients, InputKey, Key};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, FileError, MOST_NOTED};
+use rustix::fs::{Timespec, Timestamps, UTIME_NOW};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs::File;
@@ -24,6 +25,18 @@ const LOOKED_FOR: usize = 1 << 16;
 const HEAD: usize = 12;
 /// At most this long after a record it is on the disk, and at most this often the disk is asked.
 const FLUSH: Duration = Duration::from_millis(200);
+
+/// The time of the file system itself, as a new file gets it.
+const NOW: Timestamps = Timestamps {
+    last_access: Timespec {
+        tv_sec: 0,
+        tv_nsec: UTIME_NOW,
+    },
+    last_modification: Timespec {
+        tv_sec: 0,
+        tv_nsec: UTIME_NOW,
+    },
+};
 
 /// A record. The common ones come first and are small; `Detail` is decoded only when someone asks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -225,6 +238,8 @@ impl Journal {
                 Self::scan(path, bytes)
             }
         };
+        // Its date is never later than what this run makes, also where the clock was set back (`clean` goes by it).
+        let _ = rustix::fs::futimens(&file, &NOW);
         let length = journal.bytes.len();
         if whole < MAGIC.len() && !journal.damaged {
             file.set_len(0)?;
@@ -378,6 +393,11 @@ impl Journal {
         self.last.get(&slot(step, item)).copied()
     }
 
+    /// The keys of all artifacts that are known to have been in the store.
+    pub fn known_keys(&self) -> impl Iterator<Item = Key> {
+        self.known.keys().copied()
+    }
+
     /// The last keys of all instances, sorted.
     pub fn last_keys(&self) -> Vec<Key> {
         let mut keys: Vec<Key> = self.last.values().copied().collect();
@@ -491,8 +511,17 @@ impl Journal {
     /// Hands what is new to the kernel, and to the disk when the last time is long enough ago.
     ///
     /// # Errors
-    /// When the file cannot be written. What is new is kept, and the next call tries again.
+    /// When the file cannot be written, with its name. What is new is kept, and the next call tries again.
     pub fn tick(&mut self) -> io::Result<()> {
+        self.hand_over().map_err(|e| self.named(&e))
+    }
+
+    /// An error with the file that it is of.
+    fn named(&self, e: &io::Error) -> io::Error {
+        io::Error::new(e.kind(), format!("the journal {}: {e}", self.path))
+    }
+
+    fn hand_over(&mut self) -> io::Result<()> {
         let Some(file) = &mut self.file else {
             return Ok(());
         };
@@ -520,10 +549,10 @@ impl Journal {
     /// When the file cannot be written.
     pub fn flush(&mut self) -> io::Result<()> {
         self.tick()?;
-        if let (Some(file), Some(_)) = (&self.file, self.unsynced.take()) {
-            file.sync_data()?;
+        match (&self.file, self.unsynced.take()) {
+            (Some(file), Some(_)) => file.sync_data().map_err(|e| self.named(&e)),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// Writes a new file that holds only what the last run of each instance used, and why it failed.

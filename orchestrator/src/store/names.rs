@@ -67,7 +67,7 @@ pub fn list(folder: &Utf8Path) -> io::Result<Vec<Utf8PathBuf>> {
 pub fn place(from: &Utf8Path, to: &Utf8Path) -> io::Result<()> {
     match fs::rename(from, to) {
         Err(e) if e.kind() == io::ErrorKind::CrossesDevices => {
-            let beside = Utf8PathBuf::from(format!("{to}.{}", std::process::id()));
+            let beside = plyflow_artifact::whole::begun(to.as_std_path());
             let copied = fs::copy(from, &beside)
                 .and_then(|_| fs::File::open(&beside)?.sync_all())
                 .and_then(|()| fs::rename(&beside, to));

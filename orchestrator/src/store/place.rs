@@ -6,6 +6,7 @@ use super::names::{ENDING, key_of, list, place};
 use super::run::RunFolder;
 use crate::plan::Key;
 use camino::Utf8Path;
+use plyflow_artifact::whole;
 use std::{fs, io};
 
 impl Store {
@@ -28,6 +29,7 @@ impl Store {
         for run in self.runs()? {
             fs::remove_dir_all(&run.root)?;
         }
+        self.clear_killed();
         let resolved = self.root().join("resolved");
         for file in list(&resolved)? {
             let name = file.file_name().unwrap_or_default();
@@ -43,6 +45,12 @@ impl Store {
             Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
             _ => Ok(()),
         }
+    }
+
+    /// Removes what killed commands have only begun to write: what is known of plugin libraries, and resolved workflows.
+    pub fn clear_killed(&self) {
+        whole::clear_killed(self.root().as_std_path());
+        whole::clear_killed(self.root().join("resolved").as_std_path());
     }
 
     /// Makes a finished artifact visible: the record first, so that a visible artifact has one. `lasting`: when this returns, both
@@ -76,6 +84,12 @@ impl Store {
             // Names lie in folders, which the disk keeps apart from the files.
             for folder in target.ancestors().skip(1).take(2) {
                 fs::File::open(folder)?.sync_all()?;
+            }
+            // The store itself may be new.
+            if !self.is_kept.replace(true) {
+                for folder in self.root().ancestors().take(2) {
+                    fs::File::open(folder)?.sync_all()?;
+                }
             }
         }
         Ok(())

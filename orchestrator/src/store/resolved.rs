@@ -5,6 +5,7 @@
 
 use crate::plan::Key;
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_artifact::whole;
 use plyflow_files::open::{self, MOST_NOTED};
 use plyflow_workflow::resolved::{
     Dimension, Expectation, FailurePolicy, InputFile, Parameters, PluginId, ResolvedInput,
@@ -99,19 +100,13 @@ pub fn write(
     (resolution, recipes): (&Resolution, &[Key]),
 ) {
     let place = place(root, file);
-    let temporary = Utf8PathBuf::from(format!("{place}.{}", std::process::id()));
     if place.is_dir() {
         let _ = super::Store::new(root.to_owned()).set_aside(&place);
     }
-    let written = encode(circumstances, resolution, recipes).is_some_and(|bytes| {
-        root.is_dir()
-            && std::fs::create_dir_all(root.join("resolved"))
-                .and_then(|()| std::fs::write(&temporary, bytes))
-                .and_then(|()| std::fs::rename(&temporary, &place))
-                .is_ok()
-    });
-    if !written {
-        let _ = std::fs::remove_file(&temporary);
+    let bytes = encode(circumstances, resolution, recipes);
+    if let Some(bytes) = bytes.filter(|_| root.is_dir()) {
+        let _ = std::fs::create_dir_all(root.join("resolved"))
+            .and_then(|()| whole::write(place.as_std_path(), &bytes));
     }
 }
 

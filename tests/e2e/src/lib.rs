@@ -2,6 +2,11 @@
 //!
 //! The program is a child process throughout, as for a user; the plugins are those of `tests/faults`.
 
+pub mod crash;
+pub mod disk;
+pub mod random;
+pub mod watch;
+
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

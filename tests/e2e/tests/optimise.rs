@@ -1,5 +1,6 @@
 //! Optimisations: a method asks for points, is told what became of them, and goes on, whatever happens in between.
 
+use plyflow_e2e::disk::{Disk, Victim};
 use plyflow_e2e::{Study, repository, wait_for, well};
 use serde_json::Value;
 use std::process::Command;
@@ -69,6 +70,31 @@ fn a_search_that_is_killed_or_grows_ends_with_the_bytes_of_one_that_was_not() {
     let again = study.run(&[]);
     assert_eq!((again.code, again.executed, again.failed), (Some(0), 0, 0));
     assert_eq!(table(&study), table(&whole));
+}
+
+#[test]
+fn a_full_disk_and_a_killed_worker_are_no_answer_to_a_search() {
+    let whole = Study::new(&with_budget(EVOLUTION, 12));
+    assert_eq!(whole.run(&["--jobs", "1"]).code, Some(0));
+    for at in (60..300).step_by(20) {
+        let study = Study::new(&with_budget(EVOLUTION, 12));
+        let orders = tempfile::tempdir().expect("a folder");
+        let disk = Disk::new(&study.path(""), &orders.path().join("orders"));
+        // For a moment only, so that what it did to a point can be noted.
+        match at % 40 {
+            0 => disk.kill(at, Victim::Doer, false),
+            _ => disk.fail(at, Some(at + 4), libc::ENOSPC, false),
+        }
+        let mut command = study.command(&["run", "--no-report", "--jobs", "1"]);
+        disk.under(&mut command);
+        let output = command.output().expect("plyflow starts");
+        let text = String::from_utf8_lossy(&output.stderr);
+        let code = output.status.code();
+        assert!(matches!(code, None | Some(0 | 1 | 4)), "{at}: {text}");
+        disk.reset();
+        assert_eq!(study.run(&["--jobs", "1"]).code, Some(0), "{at}");
+        assert_eq!(table(&study), table(&whole), "{at}: {text}");
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Caching, kills, stops, locks: what is finished is kept and the same command goes on.
 
+use plyflow_e2e::random::Random;
 use plyflow_e2e::{Study, ended, signal, wait_for, well, workers_of};
 use std::time::Duration;
 
@@ -127,6 +128,41 @@ fn one_and_two_jobs_and_one_and_four_threads_give_the_same_bytes() {
         let other = Study::new(MIXED);
         assert_eq!(other.run(&["--jobs", jobs]), well(STEPS, 0));
         assert_eq!(other.artifacts(), one.artifacts(), "{jobs} jobs");
+    }
+}
+
+#[test]
+fn any_order_of_the_steps_in_the_file_and_any_number_of_jobs_give_the_same_bytes() {
+    let mut random = Random::new(5, 0);
+    let mut lines = Vec::new();
+    for k in 0..24 {
+        // Steps of different lengths, so that they become ready in another order with every number of jobs.
+        lines.push(match k {
+            0..4 => format!("  s{k}: {{plugin: trivial, with: {{value: {k}}}}}\n"),
+            _ if k % 5 == 0 => format!(
+                "  s{k}: {{plugin: sleep, with: {{seconds: 0.0{}}}, from: {{in: s{}}}}}\n",
+                random.below(9),
+                random.below(k)
+            ),
+            _ => format!(
+                "  s{k}: {{plugin: sum, from: {{in: [s{}, s{}]}}}}\n",
+                random.below(k / 2),
+                k / 2 + random.below(k - k / 2)
+            ),
+        });
+    }
+    let study = |lines: &[String]| Study::new(&format!("steps:\n{}", lines.concat()));
+    let first = study(&lines);
+    assert_eq!(first.run(&["--jobs", "1"]), well(24, 0));
+    for jobs in ["1", "2", "4", "4"] {
+        random.shuffle(&mut lines);
+        let other = study(&lines);
+        assert_eq!(other.run(&["--jobs", jobs]), well(24, 0));
+        assert_eq!(
+            other.artifacts(),
+            first.artifacts(),
+            "{jobs} jobs, {lines:?}"
+        );
     }
 }
 

@@ -18,8 +18,7 @@ use hdf5_sys::h5t::{
     H5T_C_S1, H5T_cset_t, H5T_str_t, H5Tclose, H5Tcopy, H5Tset_cset, H5Tset_size, H5Tset_strpad,
 };
 use std::ffi::{CStr, CString, c_uint, c_void};
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, Once, PoisonError};
 
 pub(super) const DEFAULT: hid_t = 0;
 
@@ -101,16 +100,20 @@ pub(super) struct Handle(pub(super) hid_t, pub(super) unsafe fn(hid_t) -> i32);
 
 impl Drop for Handle {
     fn drop(&mut self) {
-        // SAFETY: a function that closes identifiers, in the lock; the identifier is this handle's, and closed once.
-        if locked(|| unsafe { (self.1)(self.0) }) < 0 {
-            CLOSE_FAILED.store(true, Ordering::Relaxed);
-        }
+        locked(|| {
+            // SAFETY: a function that closes identifiers, in the lock; the identifier is this handle's, and closed once.
+            if unsafe { (self.1)(self.0) } < 0 {
+                let why = last_error();
+                let mut failed = CLOSE_FAILED.lock().unwrap_or_else(PoisonError::into_inner);
+                failed.get_or_insert(why);
+            }
+        });
     }
 }
 
-/// Whether closing a handle has failed. The library keeps small parts back until then, and lets them go even when the disk does not take
+/// Why closing a handle has failed, if it has. The library keeps small parts back until then, and lets them go even when the disk does not take
 /// them; the file could be closed afterwards as if nothing had happened.
-pub(super) static CLOSE_FAILED: AtomicBool = AtomicBool::new(false);
+pub(super) static CLOSE_FAILED: Mutex<Option<String>> = Mutex::new(None);
 
 macro_rules! closer {
     ($name:ident, $f:ident) => {

@@ -7,6 +7,7 @@ use crate::supervise::Orphans;
 use crate::trust::{Place, Stranger, Trust};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::seal::{read_document, seal, sealed};
+use plyflow_artifact::whole;
 use plyflow_workflow::CatalogEntry;
 use plyflow_workflow::resolved::PluginId;
 use serde::{Deserialize, Serialize};
@@ -231,15 +232,13 @@ impl PluginCatalog {
             version: CACHE_VERSION,
             libraries,
         };
-        let temporary = Utf8PathBuf::from(format!("{path}.{}", std::process::id()));
-        let written = path
+        let _ = path
             .parent()
             .map_or(Ok(()), std::fs::create_dir_all)
-            .and_then(|()| std::fs::write(&temporary, seal(&serde_json::to_string(&file)?)))
-            .and_then(|()| std::fs::rename(&temporary, path));
-        if written.is_err() {
-            let _ = std::fs::remove_file(&temporary);
-        }
+            .and_then(|()| {
+                let text = seal(&serde_json::to_string(&file)?);
+                whole::write(path.as_std_path(), text.as_bytes())
+            });
         cache.libraries = file.libraries;
         cache.changed = false;
     }

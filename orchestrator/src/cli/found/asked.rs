@@ -37,13 +37,9 @@ impl Kept {
     /// # Errors
     /// When a file cannot be written.
     pub fn write(&self, folder: &RunFolder) -> std::io::Result<()> {
-        let (path, new) = (
-            folder.root.join("asked.json"),
-            folder.root.join("asked.new"),
-        );
+        let path = folder.root.join("asked.json");
         std::fs::create_dir_all(&folder.root)?;
-        std::fs::write(&new, serde_json::to_vec(self)?)?;
-        std::fs::rename(new, path)
+        plyflow_artifact::whole::write(path.as_std_path(), &serde_json::to_vec(self)?)
     }
 }
 

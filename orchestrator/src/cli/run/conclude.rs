@@ -1,5 +1,6 @@
 //! The end of a run: its report, its table, its summary and its exit code.
 
+use crate::advice;
 use crate::cli::args::{LogFormat, RunArgs};
 use crate::cli::found::points::Table;
 use crate::cli::found::rows::Found;
@@ -141,7 +142,8 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
             Ok(()) => of_study += &format!("table: {csv}, {artifact}\n"),
             // As with the report: the artifacts are whole.
             Err(e) => warn(&format!(
-                "plyflow: the table of the study was not written: {e}\n"
+                "plyflow: the table of the study was not written: {}\n",
+                advice::with(&e.to_string())
             )),
         }
     }
@@ -162,7 +164,8 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         && let Err(e) = plyflow_report::write_report(&input, path)
     {
         // The artifacts are whole: a report that cannot be written is no failed run.
-        warn(&format!("plyflow: the report was not written: {e}\n"));
+        let text = advice::with(&e.to_string());
+        warn(&format!("plyflow: the report was not written: {text}\n"));
         written = None;
     }
     let told = match show {
@@ -260,7 +263,7 @@ fn failure_text(first: &Failure, summary: &Summary) -> String {
     out += &format!(
         "\nfirst failure: {}\n  {}\n",
         first.label,
-        first.reason.replace('\n', "\n  ")
+        advice::with(&first.reason).replace('\n', "\n  ")
     );
     if let Some(log) = &first.log {
         let bytes = end_of(log).unwrap_or_default();
