@@ -240,7 +240,9 @@ impl Rows<'_> {
                 .sum();
             // Only now: a line end at the edge of a cell counts, too.
             self.record.trim();
-            let line = after - 1 - within;
+            // A quotation that goes on to the end of the file has the last line end in itself.
+            let begun = self.record.position().map_or(0, |p| p.line() as usize);
+            let line = (after - 1).saturating_sub(within).max(begun);
             if within > 0 && (self.header_read || self.record.iter().any(|c| c.len() > 200)) {
                 return Err(RowError::at(
                     line,
