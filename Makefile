@@ -3,7 +3,7 @@
 # One profile for everything, so that the demo, the tests, clippy and the benches share one build of HDF5.
 CARGO_FLAGS ?= --release --locked
 # What tests need and users do not.
-NOT_SHIPPED := --exclude plyflow-faults --exclude plyflow-e2e --exclude plyflow-benches
+NOT_SHIPPED := --exclude plyflow-faults --exclude plyflow-e2e --exclude plyflow-benches --exclude plyflow-fuzz
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 PLYFLOW := $(TARGET)/release/plyflow
 # The workflow of `make demo`; `make demo DEMO=workflows/flat-tool/workflow.yaml` runs another.
@@ -20,7 +20,7 @@ QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p pl
 CHECKED := $(foreach crate,mechanics kernels,$(foreach look,debug-assertions overflow-checks,\
   --config profile.release.package.plyflow-$(crate).$(look)=true))
 
-.PHONY: help build demo check test checked long hard-cases templates lint bench book docs pictures clean
+.PHONY: help build demo check test checked long fuzz hard-cases templates lint bench book docs pictures clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -57,6 +57,9 @@ long: ## run the tests that take many minutes
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -p plyflow-faults -p plyflow-forming-explicit -p plyflow-mechanics -- --ignored --nocapture
 	. ./.tools/env && PLYFLOW_OPERATIONS=all cargo test $(CARGO_FLAGS) -p plyflow-e2e --test disk -- --nocapture
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-characterisation --all-features --test calibration -- --ignored --nocapture
+
+fuzz: ## put readers of files under inputs that coverage leads; an hour, or make fuzz FUZZ_SECONDS=120
+	scripts/fuzz --seconds $(or $(FUZZ_SECONDS),3600)
 
 hard-cases: build ## run what is made to break elements, laws and contacts, and write docs/hard-cases.md
 	scripts/hard-cases

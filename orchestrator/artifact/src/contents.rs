@@ -109,7 +109,8 @@ impl Contents {
         let frames = self.frames.max(1);
         for b in &self.bodies {
             // Points are doubles, indices 64-bit, fields single precision.
-            if !fits(&[b.points], 24) || !fits(&[b.cells, b.nodes_per_cell.into()], 8) {
+            let rows = if b.moving { frames } else { 1 };
+            if !fits(&[b.points, rows], 24) || !fits(&[b.cells, b.nodes_per_cell.into()], 8) {
                 let (name, points, cells) = (&b.name, b.points, b.cells);
                 return Some(format!(
                     "body '{name}' has {points} points and {cells} cells"
@@ -127,7 +128,12 @@ impl Contents {
                 }
             }
         }
-        None
+        let array = |a: &&ArrayInfo| !fits(&a.shape, a.dtype.size() as u64);
+        let array = self.arrays.iter().find(array)?;
+        Some(format!(
+            "the array '{}' has the shape {:?}",
+            array.path, array.shape
+        ))
     }
 }
 
@@ -142,5 +148,30 @@ impl Contents {
     #[must_use]
     pub fn array(&self, path: &str) -> Option<&ArrayInfo> {
         self.arrays.iter().find(|a| a.path == path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_cannot_hold_is_told_of_arrays_too() {
+        let with = |shape: &[u64]| Contents {
+            arrays: vec![ArrayInfo {
+                path: "a".into(),
+                dtype: DType::F64,
+                shape: shape.to_vec(),
+                unit: "1".into(),
+            }],
+            ..Contents::default()
+        };
+        for shape in [&[][..], &[125], &[5, 25], &[0, 3]] {
+            assert_eq!(with(shape).beyond(1000), None, "{shape:?}");
+        }
+        for shape in [&[126][..], &[u64::MAX, 2], &[1 << 40]] {
+            let told = with(shape).beyond(1000).unwrap();
+            assert!(told.contains("the array 'a' has the shape"), "{told}");
+        }
     }
 }

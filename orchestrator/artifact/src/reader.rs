@@ -299,7 +299,15 @@ impl Artifact {
         d.read_all(DType::F64, bytes_mut(points))?;
         let path = format!("/VTKHDF/{body}/Connectivity");
         let d = self.file()?.open_dataset(&path, DType::I64, &[ids])?;
-        d.read_all(DType::U32, bytes_mut(cells))
+        d.read_all(DType::U32, bytes_mut(cells))?;
+        // Whoever reads a mesh goes from its cells to its points.
+        match cells.iter().find(|i| u64::from(**i) >= n) {
+            None => Ok(()),
+            Some(i) => Err(ArtifactError::new(
+                ErrorKind::NotAnArtifact,
+                format!("body '{body}' has {n} points, and a cell with the corner {i} (from 0)"),
+            )),
+        }
     }
 
     /// Reference points `[n]` (m) and cells `[m * k]` of a body.

@@ -247,6 +247,29 @@ fn a_mesh_is_refused_when_a_cell_names_no_point() {
 }
 
 #[test]
+fn a_mesh_whose_cell_names_no_point_is_not_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.h5");
+    write(&path);
+    let mut file = std::fs::read(&path).unwrap();
+    let cells: Vec<u8> = [0i64, 1, 2, 2, 3, 4]
+        .iter()
+        .flat_map(|i| i.to_le_bytes())
+        .collect();
+    let at = file.windows(cells.len()).position(|w| w == cells).unwrap();
+    file[at + 8] = 5;
+    std::fs::write(&path, file).unwrap();
+    let error = Artifact::open(&path).unwrap().mesh("tool").unwrap_err();
+    assert_eq!(error.kind, ErrorKind::NotAnArtifact);
+    assert!(
+        error
+            .message
+            .contains("5 points, and a cell with the corner 5"),
+        "{error}"
+    );
+}
+
+#[test]
 fn opening_is_refused_when_the_file_is_no_artifact() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.h5");

@@ -163,23 +163,29 @@ impl Scanned {
     }
 }
 
-/// Where the payload of the frame at `at` lies, when it checks.
-fn frame(bytes: &[u8], at: usize) -> Option<Range<usize>> {
+/// Where the payload of a frame at `at` would lie.
+fn payload(bytes: &[u8], at: usize) -> Option<Range<usize>> {
     let head = bytes.get(at..at + HEAD)?;
     let length = u32::from_le_bytes([head[0], head[1], head[2], head[3]]) as usize;
     let start = at + HEAD;
-    let payload = bytes.get(start..start.checked_add(length)?)?;
-    (checksum(payload) == head[4..]).then_some(start..start + length)
+    let end = start.checked_add(length)?;
+    (end <= bytes.len()).then_some(start..end)
+}
+
+/// Where the payload of the frame at `at` lies, when it checks.
+fn frame(bytes: &[u8], at: usize) -> Option<Range<usize>> {
+    let payload = payload(bytes, at)?;
+    (checksum(&bytes[payload.clone()]) == bytes[at + 4..at + HEAD]).then_some(payload)
 }
 
 /// Where the next frame begins that checks and can be decoded, from `at` on.
 fn next_frame(bytes: &[u8], at: usize) -> Option<usize> {
     let is_one = |at: &usize| {
-        let length = bytes.get(*at..at + 4)?;
-        let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]);
-        let short = (1..=LOOKED_FOR as u32).contains(&length);
-        let payload = frame(bytes, *at).filter(|_| short)?;
-        postcard::from_bytes::<Entry>(&bytes[payload]).ok()
+        let short = |p: &Range<usize>| (1..=LOOKED_FOR).contains(&p.len());
+        let payload = payload(bytes, *at).filter(short)?;
+        // Before it is hashed: in a file where many places look like a length, hashing behind each of them would not end.
+        let (_, rest) = postcard::take_from_bytes::<Entry>(&bytes[payload]).ok()?;
+        frame(bytes, *at).filter(|_| rest.is_empty())
     };
     (at..bytes.len().saturating_sub(HEAD)).find(|at| is_one(at).is_some())
 }

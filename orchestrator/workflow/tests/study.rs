@@ -325,6 +325,7 @@ fn a_table_that_is_wrong_is_told_with_its_line() {
     for (csv, line, says) in [
         ("limit [furlong]\n4\n", 1, "furlong"),
         ("limit [deg]\n4\nwide\n", 3, "`wide` is no number"),
+        ("limit [deg]\r4\rwide\r", 3, "`wide` is no number"),
         ("limit [deg],x\n4\n", 2, "1 cells, and the head 2"),
         ("limit [deg],\"\"\n4,1\n", 1, "cannot name a variable"),
         ("limit [deg],x\n4,\n", 2, "no value for `x`"),

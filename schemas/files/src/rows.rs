@@ -159,7 +159,6 @@ impl Lines {
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
-            .trim(csv::Trim::All)
             .delimiter(separator.sign())
             .from_reader(Bytes { text, at: 0 });
         Rows {
@@ -239,7 +238,11 @@ impl Rows<'_> {
             let within: usize = (self.record.iter())
                 .map(|c| c.bytes().filter(|b| *b == b'\n').count())
                 .sum();
-            let line = after - 1 - within;
+            // Only now: a line end at the edge of a cell counts, too.
+            self.record.trim();
+            // A quotation that goes on to the end of the file has the last line end in itself.
+            let begun = self.record.position().map_or(0, |p| p.line() as usize);
+            let line = (after - 1).saturating_sub(within).max(begun);
             if within > 0 && (self.header_read || self.record.iter().any(|c| c.len() > 200)) {
                 return Err(RowError::at(
                     line,
@@ -354,6 +357,8 @@ mod tests {
         for (text, line) in [
             ("a,b\n1,2\n3,\"x\n4,y\n5,z\n", 3),
             ("a,b\n1,\"x\n2,y\"\n3,z\n", 2),
+            ("a,b\n1,\"\n2,y\"\n3,z\n", 2),
+            ("a,b\n1,\"x\n\"\n3,z\n", 2),
         ] {
             assert_eq!(all(text, Separator::Comma).unwrap_err().line, line);
         }

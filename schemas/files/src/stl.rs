@@ -347,21 +347,23 @@ impl<'t> Text<'t> {
 
     /// Passes over a name: to the end of the line, or to the first facet in it. Returns whether there was one.
     fn name(&mut self) -> bool {
-        let line = &self.rest()[..self.in_line()];
-        let facet = (0..line.len()).find(|&k| {
-            let word = line[k..]
+        let rest = self.rest();
+        let ends = |b: u8| matches!(b, b'\n' | b'\r');
+        let blank = |b: u8| b.is_ascii_whitespace() && !ends(b);
+        let facet = |k: usize| {
+            let word = rest[k..]
                 .get(..6)
-                .is_some_and(|w| w[..5].eq_ignore_ascii_case(b"facet"));
-            let alone = k > 0 && line[k - 1].is_ascii_whitespace();
-            word && alone && line[k + 5].is_ascii_whitespace() && {
-                let after = line[k + 5..].trim_ascii_start();
-                after
-                    .get(..6)
-                    .is_some_and(|w| w.eq_ignore_ascii_case(b"normal"))
+                .is_some_and(|w| w[..5].eq_ignore_ascii_case(b"facet") && blank(w[5]));
+            word && k > 0 && blank(rest[k - 1]) && {
+                let after = rest[k + 5..].iter().take_while(|b| blank(**b)).count();
+                let after = rest.get(k + 5 + after..k + 11 + after);
+                after.is_some_and(|w| w.eq_ignore_ascii_case(b"normal"))
             }
-        });
-        self.skip(facet.unwrap_or(line.len()));
-        facet.is_some()
+        };
+        // No further than needed: a file may be one line of many solids.
+        let end = (0..rest.len()).find(|k| ends(rest[*k]) || facet(*k));
+        self.skip(end.unwrap_or(rest.len()));
+        end.is_some_and(|k| !ends(rest[k]))
     }
 
     fn solids(mut self) -> Result<Facets, StlError> {

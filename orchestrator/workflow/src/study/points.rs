@@ -399,7 +399,10 @@ impl Reader<'_> {
         };
         self.problems
             .note_file(&path, &crate::evidence::hash(&bytes));
-        let text = decode(&bytes).map(|t| t.into_owned()).unwrap_or_default();
+        // Lines as the reader of tables counts them, whatever ends them.
+        let text = decode(&bytes)
+            .map(|t| t.replace("\r\n", "\n").replace('\r', "\n"))
+            .unwrap_or_default();
         let folder = self.source.folder.clone();
         let table = Source {
             name: path,
