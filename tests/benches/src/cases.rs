@@ -1,7 +1,6 @@
 //! The cases.
 
 use crate::machine::Class;
-use crate::ratios;
 use plyflow_e2e::{program, repository};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -349,13 +348,21 @@ fn kernel_rows(words: &[&str]) -> Vec<(String, Value)> {
     text.lines().map(row).collect()
 }
 
-/// Name, CPU time (ns) and calibration (ns) of a look at so many finished steps.
-pub fn no_op(n: usize) -> (String, f64, f64) {
-    let folder = fanned_out(n);
-    run(folder.path());
-    let (cost, calibration) =
-        ratios::beside(|| 1e9 * least(3, || spent(|| run(folder.path()))).cpu);
-    (format!("no-op of {n} steps fanned out"), cost, calibration)
+/// A workflow whose steps are done, to be looked at again.
+pub struct NoOp(tempfile::TempDir);
+
+impl NoOp {
+    /// With so many steps.
+    pub fn of(n: usize) -> Self {
+        let folder = fanned_out(n);
+        run(folder.path());
+        Self(folder)
+    }
+
+    /// CPU time of a look (ns).
+    pub fn nanoseconds(&self) -> f64 {
+        1e9 * least(3, || spent(|| run(self.0.path()))).cpu
+    }
 }
 
 /// The coarse joggle spar from nothing: cost, rate and energy balance of its global run.

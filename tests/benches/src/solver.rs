@@ -1,7 +1,6 @@
 //! Whole steps of the solver: without and with contact, by thread, by element size.
 
 use crate::cases::Row;
-use crate::ratios;
 use plyflow_e2e::{program, repository};
 use plyflow_kernels::built_in::{self, BuiltIn};
 use serde_json::{Value, json};
@@ -204,24 +203,27 @@ pub fn solver() -> Vec<Row> {
     rows
 }
 
-/// Name, cost of an element's step (CPU ns) and calibration (ns) of short runs with one thread: a strip, a press, and a small bag.
-pub fn short_runs() -> Vec<(String, f64, f64)> {
+/// Name and what `over` makes of the cost of an element's step (CPU ns), of short runs with one thread: a strip, a press, and a small bag.
+pub fn short_runs(over: impl Fn(&dyn Fn() -> f64) -> f64) -> Vec<(String, f64)> {
     let folder = copy(0.1);
     let place = |name: &str| folder.path().join("workflows").join(name);
     let bag = "plyflow: 1\nname: bench\nsteps:\n  bag:\n    plugin: forming-explicit\n    with: {scene: block.yaml, element: m4, \
                element_size: 16 mm, diaphragm_element_size: 16 mm, tool_grid: 2 mm, time_step: 20 us, frames: 4}\n";
     let of = |case: &str, place: &Path, workflow: &str| {
-        let (cost, calibration) = ratios::beside(|| least(2, || run(place, workflow, 1)).cost());
-        (format!("{case}, 1 thread"), cost, calibration)
+        let cost = over(&|| least(2, || run(place, workflow, 1)).cost());
+        (format!("{case}, 1 thread"), cost)
     };
-    let presses = place("peers/hemisphere-press");
     vec![
         of(
             "rf4, strip, no contact",
             &place("coupons/angle-study"),
-            &strip("rf4", "3 mm", "4 ms"),
+            &strip("rf4", "4 mm", "2 ms"),
         ),
-        of("s4, press 3 mm", &presses, &press("s4", 3.0, 1.6)),
+        of(
+            "s4, press 4 mm",
+            &place("peers/hemisphere-press"),
+            &press("s4", 4.0, 2.1),
+        ),
         of("m4, block 16 mm in a bag", &place("hard-cases"), bag),
     ]
 }

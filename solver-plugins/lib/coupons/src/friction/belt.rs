@@ -1,6 +1,8 @@
 //! A belt around a drum.
 
-use super::{BEGIN, Finding, Finds, MEASURED, Means, PULL_TIME, Parameters, Pull, carry_out};
+use super::sliding::{
+    BEGIN, Finding, Finds, MEASURED, Means, PULL_TIME, Parameters, Pull, carry_out,
+};
 use crate::run::Test;
 use crate::specimen::Specimen;
 use plyflow_fixed::FixedBits;

@@ -1,6 +1,6 @@
 //! A block (a sheet under its weight) on a plane that is tilted at once.
 
-use super::{Finding, Finds, GRAVITY, Parameters, carry_out};
+use super::sliding::{Finding, Finds, GRAVITY, Parameters, carry_out};
 use crate::run::Test;
 use crate::specimen::Specimen;
 use plyflow_fixed::FixedBits;

@@ -1,6 +1,6 @@
 //! A sheet that is pulled out from between two others.
 
-use super::{
+use super::sliding::{
     BEGIN, Finding, Finds, GRAVITY, MEASURED, Means, PULL_TIME, Parameters, Pull, carry_out,
 };
 use crate::run::Test;
