@@ -117,7 +117,11 @@ impl Folder {
 /// whole cannot be read; and it can be shown in all ways, without what steers a terminal.
 pub(crate) fn judge(found: &Diagnostics, file: &Utf8Path, text: &[u8]) {
     assert!(!found.items.is_empty(), "refused without a word");
-    let lines = text.iter().filter(|b| **b == b'\n').count() + 1;
+    // A line ends with a line feed, or as on old machines with a carriage return that none follows.
+    let next = text.iter().skip(1).map(Some).chain([None]);
+    let ends =
+        |(b, next): &(&u8, Option<&u8>)| **b == b'\n' || (**b == b'\r' && *next != Some(&b'\n'));
+    let lines = text.iter().zip(next).filter(ends).count() + 1;
     let wide = text.starts_with(&[0xff, 0xfe]) || text.starts_with(&[0xfe, 0xff]);
     for d in &found.items {
         assert!(!d.message.trim().is_empty(), "no message: {d:?}");
