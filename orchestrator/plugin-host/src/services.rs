@@ -3,6 +3,8 @@
 //! What the plugin hands over is trusted as far as the contract goes (lengths are right, pointers are
 //! valid for the call); everything that can be checked is. No panic crosses into the plugin.
 //!
+//! Longer than other files: it has one function for each row of the table, which are read side by side.
+//!
 //! Every service is a safe function of a [`Call`], through which alone it reads what it was given; [`service`] makes the C function of it.
 
 use crate::emitter::LONGEST_TEXT;

@@ -1,4 +1,6 @@
 //! The block `study` -> a table of values. The schema check has passed: what is read here has its form.
+//!
+//! A little over 600 lines: each way to write points is a function, and all end in one table.
 
 use crate::diagnostics::{Mention, Problems, Source};
 use crate::parameters::{named, unreadable};

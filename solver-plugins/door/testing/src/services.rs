@@ -1,4 +1,6 @@
 //! The service table of the host in memory.
+//!
+//! A little over 600 lines: it has one function for each row of the table, as the real host has.
 
 use crate::memory::{Machine, MemoryArtifact, MemoryBody, MemoryField, MemoryInput, Vec3};
 use plyflow_model::manifest::Manifest;

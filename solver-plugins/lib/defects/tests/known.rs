@@ -1,4 +1,5 @@
 //! Defects of surfaces whose answers are known: measured on a mesh, on a scan's facets and on a cloud of points.
+//! A little over 600 lines: the surfaces are shared by all three ways to measure.
 
 use plyflow_defects::scan::join;
 use plyflow_defects::{
