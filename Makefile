@@ -56,7 +56,7 @@ long: ## run the tests that take many minutes
 	@scripts/setup
 	$(CARGO) test $(CARGO_FLAGS) -p plyflow-e2e -p plyflow-faults -p plyflow-forming-explicit -p plyflow-mechanics -- --ignored --nocapture
 	. ./.tools/env && PLYFLOW_OPERATIONS=all cargo test $(CARGO_FLAGS) -p plyflow-e2e --test disk -- --nocapture
-	$(CARGO) test $(CARGO_FLAGS) -p plyflow-characterisation --all-features --test calibration -- --ignored --nocapture
+	$(CARGO) test $(CARGO_FLAGS) -p plyflow-characterisation --test calibration -- --ignored --nocapture
 
 fuzz: ## put readers of files under inputs that coverage leads; an hour, or make fuzz FUZZ_SECONDS=120
 	scripts/fuzz --seconds $(or $(FUZZ_SECONDS),3600)

@@ -3,8 +3,10 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 use std::sync::OnceLock;
+
+use crate::Study;
 
 /// The library that is put before libc. Built on the first call.
 ///
@@ -246,4 +248,48 @@ pub fn read_log(path: &Path) -> Vec<Operation> {
 fn is_folder_of(all: &[Operation], path: &Path) -> bool {
     all.iter()
         .any(|o| matches!(o, Operation::MakeFolder(p) if p == path))
+}
+
+/// A study on a disk that does as it is told.
+pub struct Lab {
+    /// The study.
+    pub study: Study,
+    /// The disk that its folder lies on.
+    pub disk: Disk,
+    _orders: tempfile::TempDir,
+}
+
+impl Lab {
+    /// A study with these steps, on a sound disk.
+    ///
+    /// # Panics
+    /// When its folder cannot be written.
+    #[must_use]
+    pub fn new(steps: &str) -> Self {
+        let study = Study::new(steps);
+        let orders = tempfile::tempdir().expect("a folder");
+        let disk = Disk::new(&study.path(""), &orders.path().join("orders"));
+        Self {
+            study,
+            disk,
+            _orders: orders,
+        }
+    }
+
+    /// `plyflow` with these words, on this disk.
+    #[must_use]
+    pub fn command(&self, words: &[&str]) -> Command {
+        let mut command = self.study.command(words);
+        self.disk.under(&mut command);
+        command
+    }
+
+    /// Runs it to its end.
+    ///
+    /// # Panics
+    /// When it does not start.
+    #[must_use]
+    pub fn call(&self, words: &[&str]) -> Output {
+        self.command(words).output().expect("plyflow starts")
+    }
 }

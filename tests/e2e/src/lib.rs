@@ -14,9 +14,6 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// Members of the workspace that only tests need.
-const NOT_SHIPPED: [&str; 3] = ["plyflow-faults", "plyflow-e2e", "plyflow-benches"];
-
 /// `plyflow` of this build profile with all of its own plugins beside it; built on the first call, by the
 /// same command as `make build`, so that after that there is nothing to do.
 ///
@@ -26,32 +23,10 @@ const NOT_SHIPPED: [&str; 3] = ["plyflow-faults", "plyflow-e2e", "plyflow-benche
 pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        let mut words = vec!["--workspace"];
-        for package in NOT_SHIPPED {
-            words.extend(["--exclude", package]);
-        }
-        cargo_build(&words)
+        let profile = plyflow_faults::folder().parent().expect("a profile folder");
+        plyflow_faults::build(profile, &plyflow_faults::shipped());
+        profile.join("plyflow")
     })
-}
-
-fn cargo_build(words: &[&str]) -> PathBuf {
-    // TARGET/PROFILE/test-plugins
-    let profile = plyflow_faults::folder().parent().expect("a profile folder");
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
-    cargo.env(
-        "CARGO_TARGET_DIR",
-        profile.parent().expect("a target folder"),
-    );
-    cargo.args(["build", "--quiet"]).args(words);
-    if profile.ends_with("release") {
-        cargo.arg("--release");
-    }
-    assert!(
-        cargo.status().expect("cargo starts").success(),
-        "plyflow does not build"
-    );
-    profile.join("plyflow")
 }
 
 /// The root of the repository.

@@ -1,10 +1,9 @@
 //! A clock that is set back, or far forward, between runs and while one goes on: nothing is run again, lost or told wrongly.
 
-use plyflow_e2e::disk::Disk;
+use plyflow_e2e::disk::Lab;
 use plyflow_e2e::watch::leftovers;
-use plyflow_e2e::{Study, ended, wait_for, well, workers_of};
+use plyflow_e2e::{Ended, ended, wait_for, well, workers_of};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::time::{Duration, SystemTime};
 
 const STEPS: &str = "
@@ -19,38 +18,9 @@ const YEAR: i64 = 31_557_600;
 /// Ten years back and on, an hour, and before 1970.
 const JUMPS: [i64; 5] = [-10 * YEAR, 10 * YEAR, -3600, 3600, -60 * YEAR];
 
-struct Lab {
-    study: Study,
-    disk: Disk,
-    _orders: tempfile::TempDir,
-}
-
-fn lab(steps: &str) -> Lab {
-    let study = Study::new(steps);
-    let orders = tempfile::tempdir().expect("a folder");
-    let disk = Disk::new(&study.path(""), &orders.path().join("orders"));
-    Lab {
-        study,
-        disk,
-        _orders: orders,
-    }
-}
-
-impl Lab {
-    fn command(&self, words: &[&str]) -> Command {
-        let mut command = self.study.command(words);
-        self.disk.under(&mut command);
-        command
-    }
-
-    fn call(&self, words: &[&str]) -> Output {
-        self.command(words).output().expect("plyflow starts")
-    }
-
-    fn run(&self) -> plyflow_e2e::Ended {
-        let output = self.call(&["run", "--log-format", "json"]);
-        ended(&output.stderr, output.status)
-    }
+fn run(lab: &Lab) -> Ended {
+    let output = lab.call(&["run", "--log-format", "json"]);
+    ended(&output.stderr, output.status)
 }
 
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -87,12 +57,12 @@ fn seen_from(folder: &Path, jump: i64) {
 #[test]
 fn a_clock_that_jumps_between_runs_makes_nothing_run_again_and_nothing_vanish() {
     for jump in JUMPS {
-        let lab = lab(STEPS);
-        assert_eq!(lab.run(), well(4, 0));
+        let lab = Lab::new(STEPS);
+        assert_eq!(run(&lab), well(4, 0));
         let (bytes, results) = (lab.study.artifacts(), lab.study.results());
         seen_from(&lab.study.path(".plyflow"), jump);
         lab.disk.move_clock(jump);
-        assert_eq!(lab.run(), well(0, 4), "by {jump} s");
+        assert_eq!(run(&lab), well(0, 4), "by {jump} s");
         assert_eq!(lab.study.results(), results, "by {jump} s");
         for words in [&["verify"][..], &["clean"], &["plan"], &["report"]] {
             let output = lab.call(words);
@@ -107,7 +77,7 @@ fn a_clock_that_jumps_between_runs_makes_nothing_run_again_and_nothing_vanish() 
         // What is new is run, and only that.
         lab.study
             .write(&STEPS.replace("value: 2", "value: 3").replace("0.6", "0.0"));
-        assert_eq!(lab.run(), well(4, 0), "by {jump} s");
+        assert_eq!(run(&lab), well(4, 0), "by {jump} s");
         assert_eq!(lab.study.values("second", "sum"), [3.0]);
         assert!(leftovers(&lab.study.path(""), &lab.study.path(".plyflow")).is_empty());
     }
@@ -115,10 +85,10 @@ fn a_clock_that_jumps_between_runs_makes_nothing_run_again_and_nothing_vanish() 
 
 #[test]
 fn a_clock_that_jumps_while_a_step_runs_changes_no_byte_and_ends_no_step() {
-    let calm = lab(STEPS);
-    assert_eq!(calm.run(), well(4, 0));
+    let calm = Lab::new(STEPS);
+    assert_eq!(run(&calm), well(4, 0));
     for jump in JUMPS {
-        let lab = lab(STEPS);
+        let lab = Lab::new(STEPS);
         let log = std::fs::File::create(lab.study.path("run.log")).expect("a log");
         let mut head = lab.command(&["run", "--log-format", "json"]);
         let mut head = head.stderr(log).spawn().expect("plyflow starts");
@@ -138,17 +108,17 @@ fn a_clock_that_jumps_while_a_step_runs_changes_no_byte_and_ends_no_step() {
         );
         let said = lab.study.log();
         assert!(!said.contains("\"wall_seconds\":-"), "by {jump} s: {said}");
-        assert_eq!(lab.run(), well(0, 4), "by {jump} s");
+        assert_eq!(run(&lab), well(0, 4), "by {jump} s");
         // And back.
         lab.disk.move_clock(0);
-        assert_eq!(lab.run(), well(0, 4), "by {jump} s and back");
+        assert_eq!(run(&lab), well(0, 4), "by {jump} s and back");
     }
 }
 
 #[test]
 fn clean_keeps_what_a_run_could_not_note_also_when_the_clock_was_set_back_before_it() {
-    let lab = lab(STEPS);
-    assert_eq!(lab.run(), well(4, 0));
+    let lab = Lab::new(STEPS);
+    assert_eq!(run(&lab), well(4, 0));
     // As a full disk leaves it: nothing noted. The journal was last written to when the clock was an hour ahead.
     let journal = lab.study.path(".plyflow/runs/study/journal");
     let file = std::fs::File::options()
@@ -161,5 +131,5 @@ fn clean_keeps_what_a_run_could_not_note_also_when_the_clock_was_set_back_before
     let output = lab.call(&["clean"]);
     assert_eq!(output.status.code(), Some(0));
     assert_eq!(lab.study.artifacts().len(), 4, "finished work is lost");
-    assert_eq!(lab.run(), well(0, 4));
+    assert_eq!(run(&lab), well(0, 4));
 }

@@ -2,11 +2,10 @@
 //!
 //! The tests take a sample of the operations; `PLYFLOW_OPERATIONS=all` (`make long`) takes each.
 
-use plyflow_e2e::disk::{Disk, Operation, Victim, read_log};
+use plyflow_e2e::disk::{Lab, Operation, Victim, read_log};
 use plyflow_e2e::watch::leftovers;
-use plyflow_e2e::{Study, ended, wait_for, well, workers_of};
+use plyflow_e2e::{ended, wait_for, well, workers_of};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::process::Output;
 
 /// Every kind of artifact; a power cut, for which some are put on the disk, has tests of its own (`power`).
@@ -21,65 +20,36 @@ const COUNT: u64 = 4;
 /// One step after the other, so that operations have the same order each time.
 const RUN: [&str; 3] = ["run", "--jobs", "1"];
 
-/// A study on a disk that does as it is told.
-struct Lab {
-    study: Study,
-    disk: Disk,
-    _orders: tempfile::TempDir,
-}
-
-fn lab(steps: &str) -> Lab {
-    let study = Study::new(steps);
-    let orders = tempfile::tempdir().expect("a folder");
-    let disk = Disk::new(&study.path(""), &orders.path().join("orders"));
-    Lab {
-        study,
-        disk,
-        _orders: orders,
+/// The next run on a sound disk has nothing to do again, and leaves the same as one that nothing ever disturbed.
+fn heals(lab: &Lab, expected: &BTreeMap<String, Vec<u8>>, about: &str) {
+    let visible = lab.study.artifacts();
+    let store = lab.study.path(".plyflow");
+    for (name, bytes) in &visible {
+        assert!(
+            expected.get(name) == Some(bytes),
+            "{about}: {name} is not whole"
+        );
     }
-}
-
-impl Lab {
-    fn call(&self, words: &[&str]) -> Output {
-        let mut command = self.study.command(words);
-        self.disk.under(&mut command);
-        command.output().expect("plyflow starts")
-    }
-
-    fn store(&self) -> PathBuf {
-        self.study.path(".plyflow")
-    }
-
-    /// The next run on a sound disk has nothing to do again, and leaves the same as one that nothing ever disturbed.
-    fn heals(&self, expected: &BTreeMap<String, Vec<u8>>, about: &str) {
-        let visible = self.study.artifacts();
-        for (name, bytes) in &visible {
-            assert!(
-                expected.get(name) == Some(bytes),
-                "{about}: {name} is not whole"
-            );
-        }
-        let told = self.study.call(&["verify"]);
-        let text = told_by(&told);
-        assert_eq!(told.status.code(), Some(0), "{about}: verify: {text}");
-        // One that could not be placed is done too.
-        let unplaced = std::fs::read_dir(self.store().join("runs/study/unplaced"));
-        let unplaced = unplaced.into_iter().flatten().flatten();
-        let waiting = unplaced.filter(|e| {
-            let name = e.file_name().into_string().unwrap_or_default();
-            name.ends_with(".vtkhdf") && !visible.contains_key(&name)
-        });
-        let finished = visible.len() as u64 + waiting.count() as u64;
-        let output = self.study.call(&["run", "--log-format", "json"]);
-        let end = ended(&output.stderr, output.status);
-        let wanted = well(COUNT - finished, finished);
-        assert_eq!(end, wanted, "{about}: {}", told_by(&output));
-        assert!(self.study.artifacts() == *expected, "{about}: other bytes");
-        let left = leftovers(&self.study.path(""), &self.store());
-        assert!(left.is_empty(), "{about}: left behind: {left:?}");
-        let told = self.study.call(&["verify"]);
-        assert_eq!(told.status.code(), Some(0), "{about}: {}", told_by(&told));
-    }
+    let told = lab.study.call(&["verify"]);
+    let text = told_by(&told);
+    assert_eq!(told.status.code(), Some(0), "{about}: verify: {text}");
+    // One that could not be placed is done too.
+    let unplaced = std::fs::read_dir(store.join("runs/study/unplaced"));
+    let unplaced = unplaced.into_iter().flatten().flatten();
+    let waiting = unplaced.filter(|e| {
+        let name = e.file_name().into_string().unwrap_or_default();
+        name.ends_with(".vtkhdf") && !visible.contains_key(&name)
+    });
+    let finished = visible.len() as u64 + waiting.count() as u64;
+    let output = lab.study.call(&["run", "--log-format", "json"]);
+    let end = ended(&output.stderr, output.status);
+    let wanted = well(COUNT - finished, finished);
+    assert_eq!(end, wanted, "{about}: {}", told_by(&output));
+    assert!(lab.study.artifacts() == *expected, "{about}: other bytes");
+    let left = leftovers(&lab.study.path(""), &store);
+    assert!(left.is_empty(), "{about}: left behind: {left:?}");
+    let told = lab.study.call(&["verify"]);
+    assert_eq!(told.status.code(), Some(0), "{about}: {}", told_by(&told));
 }
 
 fn told_by(output: &Output) -> String {
@@ -95,12 +65,11 @@ struct Calm {
 }
 
 fn undisturbed() -> Calm {
-    let lab = lab(STEPS);
+    let lab = Lab::new(STEPS);
     let beside = tempfile::tempdir().expect("a folder");
     let log = beside.path().join("log");
-    let mut command = lab.study.command(&RUN);
-    lab.disk.under(&mut command);
-    let output = command
+    let output = lab
+        .command(&RUN)
         .env("FAULTS_LOG", &log)
         .output()
         .expect("plyflow starts");
@@ -160,7 +129,7 @@ fn says(errno: i32) -> [&'static str; 2] {
 fn fail(errno: i32, once: bool, sample: usize) {
     let calm = undisturbed();
     for from in calm.sample(sample, errno.unsigned_abs() as usize) {
-        let lab = lab(STEPS);
+        let lab = Lab::new(STEPS);
         let about = format!(
             "errno {errno} from operation {from} of {}, once: {once}",
             calm.count
@@ -183,7 +152,7 @@ fn fail(errno: i32, once: bool, sample: usize) {
             other => panic!("{about}: code {other:?}: {text}"),
         }
         lab.disk.reset();
-        lab.heals(&calm.artifacts, &about);
+        heals(&lab, &calm.artifacts, &about);
     }
 }
 
@@ -209,11 +178,10 @@ fn a_kill_at_any_operation_on_a_file_loses_nothing_shows_nothing_partial_and_lea
     let calm = undisturbed();
     for victim in [Victim::Head, Victim::Doer, Victim::Both] {
         for at in calm.sample(10, victim as usize) {
-            let lab = lab(STEPS);
+            let lab = Lab::new(STEPS);
             let about = format!("{victim:?} killed at operation {at} of {}", calm.count);
             lab.disk.kill(at, victim, at % 2 == 1);
-            let mut command = lab.study.command(&RUN);
-            lab.disk.under(&mut command);
+            let mut command = lab.command(&RUN);
             let log = std::fs::File::create(lab.study.path("run.log")).expect("a log");
             command.stdout(log.try_clone().expect("a log")).stderr(log);
             let mut head = command.spawn().expect("plyflow starts");
@@ -226,14 +194,14 @@ fn a_kill_at_any_operation_on_a_file_loses_nothing_shows_nothing_partial_and_lea
             );
             wait_for("the workers' end", || workers_of(head.id()) == 0);
             lab.disk.reset();
-            lab.heals(&calm.artifacts, &about);
+            heals(&lab, &calm.artifacts, &about);
         }
     }
 }
 
 #[test]
 fn a_finished_store_on_a_read_only_disk_can_be_looked_at() {
-    let lab = lab(STEPS);
+    let lab = Lab::new(STEPS);
     assert_eq!(lab.call(&RUN).status.code(), Some(0));
     let before = lab.study.results();
     lab.disk.fail(0, None, libc::EROFS, false);

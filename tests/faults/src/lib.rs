@@ -19,22 +19,15 @@ pub fn folder() -> &'static Path {
             .ancestors()
             .nth(if in_deps { 2 } else { 1 })
             .expect("a profile folder");
-        let target = profile.parent().expect("a target folder");
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .env("CARGO_TARGET_DIR", target);
         // Of the whole workspace: dependencies then have the features that `cargo test --workspace` gives them, and nothing is
         // compiled a second time.
-        cargo.args(["build", "--quiet", "--workspace"]);
-        for name in names() {
-            cargo.args(["--example", &name]);
-        }
-        if profile.ends_with("release") {
-            cargo.arg("--release");
-        }
-        let status = cargo.status().expect("cargo starts");
-        assert!(status.success(), "the test plugins do not build");
+        let mut words = vec!["--workspace".to_owned()];
+        words.extend(
+            names()
+                .into_iter()
+                .flat_map(|n| ["--example".to_owned(), n]),
+        );
+        build(profile, &words);
         gather(&profile.join("examples"), &profile.join("test-plugins"))
     })
 }
@@ -49,18 +42,42 @@ pub fn program() -> &'static Path {
         let exe = std::env::current_exe().expect("a test has a path");
         // TARGET/PROFILE/deps/TEST
         let profile = exe.ancestors().nth(2).expect("a profile folder").to_owned();
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
-        let target = profile.parent().expect("a target folder");
-        cargo.env("CARGO_TARGET_DIR", target);
-        cargo.args(["build", "--quiet", "--package", "plyflow"]);
-        if profile.ends_with("release") {
-            cargo.arg("--release");
-        }
-        let built = cargo.status().expect("cargo starts").success();
-        assert!(built, "plyflow does not build");
+        build(&profile, &[shipped(), vec!["--bin", "plyflow"]].concat());
         profile.join("plyflow")
     })
+}
+
+/// What `make build` builds, as words for cargo. Another choice of packages would give their dependencies other features, and then they
+/// would all be built twice.
+///
+/// # Panics
+/// When the Makefile does not say what is left out.
+#[must_use]
+pub fn shipped() -> Vec<&'static str> {
+    let makefile = include_str!("../../../Makefile");
+    let line = makefile
+        .lines()
+        .find_map(|l| l.strip_prefix("NOT_SHIPPED := "));
+    let mut words = vec!["--workspace"];
+    words.extend(line.expect("what is not shipped").split(' '));
+    words
+}
+
+/// Runs `cargo build` with these words and the profile whose folder is given (`TARGET/PROFILE`).
+///
+/// # Panics
+/// When something does not build.
+pub fn build<S: AsRef<std::ffi::OsStr>>(profile: &Path, words: &[S]) {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
+    let target = profile.parent().expect("a target folder");
+    cargo.env("CARGO_TARGET_DIR", target);
+    cargo.args(["build", "--quiet"]).args(words);
+    if profile.ends_with("release") {
+        cargo.arg("--release");
+    }
+    let built = cargo.status().expect("cargo starts").success();
+    assert!(built, "plyflow or its test plugins do not build");
 }
 
 /// Names of the plugins' examples: those of their sources.

@@ -1,7 +1,7 @@
 //! Writes the synthetic raw data of `workflows/characterisation`: what testing machines would record of the
 //! laws of the thesis, with a stated noise. The same bytes every time.
 //!
-//! `cargo run --release -p plyflow-characterisation --features synthetic --example reference_data`
+//! `cargo run --release -p plyflow-characterisation --example reference_data`
 
 use plyflow_characterisation::synthetic::{
     BENDING, Noise, frame_force, ncf_shear, overhang_at, sled_coefficient, woven_shear,

@@ -2,7 +2,8 @@
 //!
 //! Each test has a module that takes numbers in SI and gives a law with its residuals and its conditioning
 //! ([`cantilever`], [`bending`], [`picture_frame`], [`sled`]); [`csv`] reads raw data with located errors,
-//! [`material`] writes material files, [`output`] an artifact of kind `characterisation`.
+//! [`material`] writes material files, [`output`] an artifact of kind `characterisation`. [`synthetic`] makes raw data of known laws, by
+//! which a fit is judged.
 
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
@@ -20,7 +21,6 @@ pub mod picture_frame;
 pub mod profile;
 pub mod sled;
 pub mod stitch;
-#[cfg(feature = "synthetic")]
 pub mod synthetic;
 pub mod voce;
 pub mod yarns;

@@ -1,5 +1,4 @@
 //! Profiles of strips whose law is known, solved as an ODE: the law must come back.
-#![cfg(feature = "synthetic")]
 
 use plyflow_characterisation::bending::{Bending, characterise};
 use plyflow_characterisation::profile::{Choice, Method, Profile};

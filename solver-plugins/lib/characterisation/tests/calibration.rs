@@ -1,5 +1,4 @@
 //! The errors that are told hold: over many tests with noise the true error lies within the told one in 90 to 99 of 100.
-#![cfg(feature = "synthetic")]
 
 use plyflow_characterisation::bending::{Bending, characterise};
 use plyflow_characterisation::cantilever::mean_and_deviation;

@@ -1,5 +1,4 @@
 //! Picture-frame and cantilever tests of known laws: the laws must come back.
-#![cfg(feature = "synthetic")]
 
 use plyflow_characterisation::cantilever::{Formula, stiffness};
 use plyflow_characterisation::csv::{Column, Table, parse};
