@@ -72,9 +72,8 @@ pub fn extract(
 ) -> Result<Vec<Zone>, ExtractError> {
     let mut zones = if settings.boxes.is_empty() {
         let defects = defects(cells, settings);
-        let mut zones: Vec<(Rectangle, Rectangle)> = defects
-            .iter()
-            .map(|&d| (d, grown(d, blank, settings)))
+        let mut zones: Vec<(Rectangle, Rectangle)> = (defects.iter())
+            .map(|d| (d.bounds, grown(d.bounds, blank, settings)))
             .collect();
         merge(&mut zones, blank, settings);
         zones.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]).then(a.1[1].total_cmp(&b.1[1])));
@@ -111,8 +110,16 @@ fn name(index: usize) -> String {
     }
 }
 
-/// Boxes around connected sets of flagged cells that are large enough on some ply.
-fn defects(cells: &[FlaggedCell], settings: &Settings) -> Vec<Rectangle> {
+/// A connected set of flagged cells.
+pub(crate) struct FlaggedSet {
+    /// The box around it (m).
+    pub(crate) bounds: Rectangle,
+    /// Indices of its cells.
+    pub(crate) cells: Vec<usize>,
+}
+
+/// Connected sets of flagged cells that are large enough on some ply.
+pub(crate) fn defects(cells: &[FlaggedCell], settings: &Settings) -> Vec<FlaggedSet> {
     let set = connected(cells, settings.join_distance);
     let plies = cells.iter().map(|c| c.ply + 1).max().unwrap_or(0);
     let mut found = Vec::new();
@@ -122,16 +129,20 @@ fn defects(cells: &[FlaggedCell], settings: &Settings) -> Vec<Rectangle> {
         }
         let mut areas = vec![0.0; plies];
         let mut bounds = cells[root].bounds;
-        for (c, _) in cells.iter().zip(&set).filter(|(_, s)| **s == root) {
-            areas[c.ply] += c.area;
-            bounds = hull(bounds, c.bounds);
+        let members: Vec<usize> = (0..cells.len()).filter(|&c| set[c] == root).collect();
+        for &c in &members {
+            areas[cells[c].ply] += cells[c].area;
+            bounds = hull(bounds, cells[c].bounds);
         }
         // A little slack: areas of cells are sums of rounded numbers.
         if areas
             .iter()
             .any(|a| *a >= settings.minimum_area * (1.0 - 1e-9))
         {
-            found.push(bounds);
+            found.push(FlaggedSet {
+                bounds,
+                cells: members,
+            });
         }
     }
     found

@@ -3,9 +3,11 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod across;
 mod extract;
 mod grow;
 
+pub use across::{Across, across};
 pub use extract::{ExtractError, FlaggedCell, Settings, extract};
 pub use grow::{AtCut, grow};
 
@@ -43,7 +45,28 @@ fn first(host: &Host, settings: &Settings) -> Result<(), StepError> {
     if zones.is_empty() {
         host.log(Log::Info, "no defect is large enough for a zone");
     }
+    for cut in across(&cells, &zones, settings) {
+        tell_across(host, &cut, &zones[cut.zone], &plies[cut.ply]);
+    }
     write(host, settings, blank, zones)
+}
+
+/// Along its cut a zone goes as the coarse run has it, which shows a wrinkle badly.
+fn tell_across(host: &Host, cut: &Across, zone: &Zone, ply: &str) {
+    let axis = ["x", "y"];
+    let (normal, along) = (axis[cut.side % 2], axis[1 - cut.side % 2]);
+    let mm = |length: f64| (1e4 * length).round() / 10.0;
+    let text = format!(
+        "zone {} is cut across a defect: on ply '{ply}' both sides of its cut {normal} = {} mm are flagged over {} mm, between {along} = {} and {} mm. There the fine run \
+         goes as the coarse one has it, which shows no wrinkle well. Move that side to {normal} = {} mm or beyond, or draw the zone around the whole defect",
+        zone.name,
+        mm(zone.bounds[cut.side]),
+        mm(cut.length),
+        mm(cut.from_to[0]),
+        mm(cut.from_to[1]),
+        mm(cut.free_at),
+    );
+    host.log(Log::Warn, &text);
 }
 
 /// Those of the zones again, larger, whose local runs show a defect at the cut.

@@ -7,7 +7,7 @@ use plyflow_model::artifact::{
 use plyflow_sdk::On;
 use plyflow_testing::{MemoryArtifact, MemoryBody, MemoryField, MemoryInput, run};
 use plyflow_zone_extraction::{
-    AtCut, ExtractError, FlaggedCell, Settings, ZoneExtraction, extract, grow,
+    AtCut, ExtractError, FlaggedCell, Settings, ZoneExtraction, across, extract, grow,
 };
 use serde_json::{Map, Value, json};
 
@@ -148,6 +148,66 @@ fn specks_get_no_zone_even_when_both_plies_have_them() {
         (zones[0].bounds[2] - zones[0].bounds[0] - 0.040).abs() < 1e-12,
         "smallest size"
     );
+}
+
+/// Side, length and the place of a cut that is free of the defect, of all cuts across defects.
+fn cuts(cells: &[FlaggedCell], bounds: [f64; 4]) -> Vec<(usize, f64, f64)> {
+    let s = Settings {
+        boxes: vec![bounds.to_vec()],
+        ..settings()
+    };
+    let zones = draw(cells, BLANK, &s).unwrap();
+    let found = across(cells, &zones, &s);
+    let mut told = Vec::new();
+    for a in &found {
+        assert_eq!(a.zone, 0);
+        told.push((a.side, (1e6 * a.length).round() / 1e6, a.free_at));
+    }
+    told
+}
+
+#[test]
+fn a_cut_across_a_defect_is_found_by_its_side_its_length_and_where_it_would_be_free() {
+    let defect = patch(1, [-0.050, -0.040, 0.050, 0.040]);
+    // Through cells, and along their edges.
+    for x in [0.004, 0.010] {
+        let told = cuts(&defect, [x, -0.100, 0.100, 0.010]);
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert_eq!(told[0].0, 0);
+        assert!((told[0].1 - 0.050).abs() < 1e-6 && (told[0].2 + 0.050).abs() < 1e-9);
+        assert_eq!(told[1].0, 3);
+        assert!((told[1].1 - (0.050 - x)).abs() < 1e-6 && (told[1].2 - 0.040).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_cut_beside_a_defect_along_its_rim_or_at_the_edge_of_the_blank_is_none_across_it() {
+    let defect = patch(0, [-0.050, -0.040, 0.050, 0.040]);
+    assert!(cuts(&defect, [-0.060, -0.050, 0.060, 0.050]).is_empty());
+    assert!(cuts(&defect, [-0.050, -0.040, 0.050, 0.040]).is_empty());
+    assert!(cuts(&defect, [0.050, -0.040, 0.150, 0.040]).is_empty());
+    let at_edge = patch(0, [0.200, -0.150, 0.240, -0.100]);
+    assert!(cuts(&at_edge, [0.150, -0.150, 0.240, -0.050]).is_empty());
+    // On the two sides different plies, or what is too small for a zone.
+    let mut plies = patch(0, [-0.050, -0.040, 0.000, 0.040]);
+    plies.extend(patch(1, [0.000, -0.040, 0.050, 0.040]));
+    assert!(cuts(&plies, [0.000, -0.100, 0.100, 0.100]).is_empty());
+    assert!(
+        cuts(
+            &patch(0, [0.0, 0.0, 0.010, 0.010]),
+            [0.005, -0.05, 0.05, 0.05]
+        )
+        .is_empty()
+    );
+}
+
+#[test]
+fn zones_that_are_drawn_around_defects_are_not_cut_across_them() {
+    let mut cells = patch(0, [-0.150, -0.020, -0.060, 0.020]);
+    cells.extend(patch(0, [-0.020, 0.050, 0.042, 0.090]));
+    cells.extend(patch(1, [0.056, -0.150, 0.076, -0.050]));
+    let zones = draw(&cells, BLANK, &settings()).unwrap();
+    assert!(across(&cells, &zones, &settings()).is_empty());
 }
 
 #[test]
