@@ -39,8 +39,9 @@ check: ## form, lints and the tests that need no HDF5: under a minute once built
 	scripts/check-docs
 	scripts/check-bits
 	scripts/check-imports
+	scripts/check-tests
 	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
-	$(CARGO) test $(CARGO_FLAGS) $(QUICK) --lib --tests
+	$(CARGO) test $(CARGO_FLAGS) $(QUICK) --tests
 
 test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	@scripts/setup tests
@@ -50,7 +51,7 @@ test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 
 checked: ## run the tests of mechanics and kernels with debug assertions and overflow checks: minutes
 	@scripts/setup
-	$(CARGO) test $(CARGO_FLAGS) $(CHECKED) -p plyflow-mechanics -p plyflow-kernels --lib --tests
+	$(CARGO) test $(CARGO_FLAGS) $(CHECKED) -p plyflow-mechanics -p plyflow-kernels --tests
 
 long: ## run the tests that take many minutes
 	@scripts/setup
@@ -75,6 +76,7 @@ lint: ## check form, lints and JSON Schemas
 	scripts/check-docs
 	scripts/check-bits
 	scripts/check-imports
+	scripts/check-tests
 
 bench: build ## measure; rows go to docs/benchmarks
 	$(CARGO) build $(CARGO_FLAGS) -p plyflow-benches

@@ -29,6 +29,8 @@ ALWAYS = {"drift_ratio": {"maximum": 0.01}}
 LOCATED = re.compile(r"at \(-?[\d.]+, -?[\d.]+, -?[\d.]+\) mm|: given |^element '\w+'")
 # Units of axes, and what numbers in SI are multiplied by for them.
 SHOWN = {"1": 1.0, "s": 1.0, "mm": 1e3, "N/mm": 1e-3}
+# CPU seconds of all steps that rows stand on, by workflow, step and item: one is counted once, in however many rows it is.
+COSTS: dict[tuple[str, str, str], float] = {}
 DEEP = ("ply_depth_ratio", "overlap_ratio")
 
 
@@ -37,6 +39,8 @@ class Row:
 
     def __init__(self, case: dict, about: dict):
         self.case, self.step = case, about["step"]
+        # Of a comparison: the model that the row is about (`global`, `other.NAME`), or `zones` with the global run around them.
+        self.of: str | None = about.get("of")
         self.element = about.get("element", "")
         self.right: dict = about.get("right", case.get("right", {}))
         self.stops: str | None = about.get("stops", case.get("stops"))
@@ -45,6 +49,12 @@ class Row:
         self.warnings: list[str] = []
         self.failure: str | None = None
         self.cost: float | None = None
+
+    def name(self) -> str:
+        if self.of is None:
+            return self.step
+        scene = self.step.split("_")[0]
+        return {"global": f"{scene}_{self.element}", "zones": f"{scene}_zones_{self.element}"}.get(self.of, self.of.removeprefix("other."))
 
     def faults(self) -> list[str]:
         """Why it is wrong; empty when it is not."""
@@ -111,6 +121,8 @@ def run(name: str, rows: list[Row]) -> tuple[str, ...]:
     if events.returncode != 0 and not failures and "expect" not in events.stderr:
         raise SystemExit(f"hard-cases: {' '.join(command)} ended with code {events.returncode}:\n{events.stderr}")
     told = json.loads(runs.plyflow("results", *place, "--format", "json"))
+    for step in told["steps"]:
+        COSTS[name, step["step"], str(step.get("item"))] = step["cost"]["cpu_seconds"]
     steps = {s["step"]: s for s in told["steps"]}
     for row in rows:
         row.failure = failures.get(row.step)
@@ -118,9 +130,38 @@ def run(name: str, rows: list[Row]) -> tuple[str, ...]:
         if row.step in steps:
             row.cost = steps[row.step]["cost"]["cpu_seconds"]
             row.warnings = steps[row.step]["warnings"]
+        if row.of is not None:
+            row.cost = row.results.get(f"cost.{'total' if row.of == 'zones' else row.of}.cpu_seconds")
+            row.results = of_model(row.results, row.of)
         if row.failure is None and not row.results:
             row.failure = "was not run, because a step that it needs failed"
     return place
+
+
+def of_model(results: dict[str, float], of: str) -> dict[str, float]:
+    """Results of one model of a comparison, by their names without it."""
+    if of == "zones":
+        return {name: value for name, value in results.items() if "." not in name}
+    return {name.removesuffix(f".{of}"): value for name, value in results.items() if name.endswith(f".{of}")}
+
+
+def ladder(case: dict, rows: list[Row]) -> str:
+    """Draws error over cost of every fidelity, a part beside the other; the file's name."""
+    done = [r for r in rows if r.failure is None and r.cost and r.results.get("distance_error")]
+    scenes = list(dict.fromkeys(r.name().split("_")[0] for r in done))
+    figure, plots = style.plt.subplots(1, len(scenes), figsize=(7.2, 3.2), layout="constrained", sharey=True, squeeze=False)
+    kinds = {"drape": (style.INK, "s"), "m4": (style.ORANGE, "o"), "zones": (style.BLUE, "D"), "rf4": (style.GREEN, "^"), "s4": (style.GREEN, "v")}
+    for scene, axes in zip(scenes, plots[0]):
+        for row in (r for r in done if r.name().startswith(f"{scene}_")):
+            colour, marker = kinds["zones" if row.of == "zones" else row.element]
+            at = (row.cost, 1e3 * row.results["distance_error"])
+            axes.loglog(*at, marker, color=colour, markersize=6)
+            axes.annotate(row.name().removeprefix(f"{scene}_").replace("_", " "), at, textcoords="offset points", xytext=(5, 4), fontsize=8)
+        axes.set_title(scene)
+        axes.set_xlabel("CPU time (s)")
+        axes.margins(0.25)
+    plots[0][0].set_ylabel("distance error (mm)")
+    return style.save_svg(figure, f"hard-{case['name']}").name
 
 
 def picture(case: dict, rows: list[Row], places: dict[str, tuple[str, ...]]) -> str | None:
@@ -129,6 +170,8 @@ def picture(case: dict, rows: list[Row], places: dict[str, tuple[str, ...]]) -> 
     done = [r for r in rows if r.failure is None and r.step in case.get("only", [r.step])]
     if not wanted or not done:
         return None
+    if wanted == "ladder":
+        return ladder(case, done)
     figure, axes = style.plt.subplots(figsize=(4.6, 2.9), layout="constrained")
     colours = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.PURPLE, style.SKY)
     closed = False
@@ -160,7 +203,7 @@ def cell(text: str) -> str:
 def write(cases: list[tuple[dict, list[Row], str | None]]) -> str:
     rows = [r for _, rows, _ in cases for r in rows]
     count = {v: sum(r.verdict() == v for r in rows) for v in ("right", "stopped", "**wrong**")}
-    cpu = sum(r.cost or 0 for r in rows)
+    cpu = sum(COSTS.values())
     out = [
         "# Hard cases",
         "",
@@ -191,7 +234,7 @@ def write(cases: list[tuple[dict, list[Row], str | None]]) -> str:
             depth = next((f"{100 * row.results[d]:.0f} %" for d in DEEP if d in row.results), "")
             cost = f"{row.cost:.1f} s" if row.cost is not None else ""
             got = "; ".join(row.faults()) or row.got()
-            out.append(f"| `{row.step}` | {row.element} | {drift} | {depth} | {cost} | {cell(got)} | {row.verdict()} |")
+            out.append(f"| `{row.name()}` | {row.element} | {drift} | {depth} | {cost} | {cell(got)} | {row.verdict()} |")
         out.append("")
         if "after" in case:
             out += [case["after"].strip(), ""]
@@ -214,7 +257,7 @@ def main(names: list[str]) -> int:
         place = run(case["workflow"], rows)
         places = {row.step: place for row in rows}
         for row in rows:
-            print(f"{case['name']:<24} {row.step:<28} {row.verdict().strip('*')}", flush=True)
+            print(f"{case['name']:<24} {row.name():<28} {row.verdict().strip('*')}", flush=True)
             for fault in row.faults():
                 print(f"    {fault}", flush=True)
                 bad += 1

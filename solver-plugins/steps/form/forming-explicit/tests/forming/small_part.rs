@@ -4,10 +4,8 @@
 //! 7.5 %, both over their bounds; and at 10 mm elements over a 30 mm high block the ledger is open by 4.7 %. The mesh
 //! here is 7 mm and the block 20 mm high so that what it does claim can be judged.
 
-mod common;
-
-use common::scenes::bag;
-use common::{BuiltIn, Silent, form};
+use crate::common::scenes::bag;
+use crate::common::{BuiltIn, Silent, form};
 use plyflow_forming_explicit::{
     Feedback, Forming, HistoryRow, LocalInput, LocalSheet, Observer, Outcome, Parameters, Start,
     build_global, build_local, feed_back, inverse_bilinear,

@@ -1,10 +1,8 @@
 //! Plies that slide on each other past each other's edges: nothing goes through anything, told from the sheets' places alone.
 
-mod common;
-
-use common::BuiltIn;
-use common::depth::{Depth, depths};
-use common::scenes::{bag, ply};
+use crate::common::BuiltIn;
+use crate::common::depth::{Depth, depths};
+use crate::common::scenes::{bag, ply};
 use plyflow_forming_explicit::{Forming, Observer, Parameters, build_global, inverse_bilinear};
 use plyflow_mechanics::contact::shape;
 use plyflow_mechanics::energy::Ledger;
@@ -80,7 +78,8 @@ fn stack(plies: &[([f64; 2], f64)], change: impl FnOnce(&mut Value)) -> Paramete
     bag(plies.len(), |p| {
         for (k, (size, angle)) in plies.iter().enumerate() {
             let name = format!("ply_{}", k + 1);
-            p["scene"]["sheets"][k + 1] = ply(&name, &common::fabric(), *size, angle.to_radians());
+            p["scene"]["sheets"][k + 1] =
+                ply(&name, &crate::common::fabric(), *size, angle.to_radians());
         }
         p["element_size"] = json!(0.01);
         p["diaphragm_element_size"] = json!(0.012);

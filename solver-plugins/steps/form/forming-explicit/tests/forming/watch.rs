@@ -1,9 +1,7 @@
 //! The watch: what is in what is found, told and stopped, whatever the contacts think of it.
 
-mod common;
-
-use common::scenes::{bag, ply, press};
-use common::{BuiltIn, Silent, fabric, form};
+use crate::common::scenes::{bag, ply, press};
+use crate::common::{BuiltIn, Silent, fabric, form};
 use plyflow_forming_explicit::{
     Forming, PairDepth, Parameters, RigidName, Watch, Watched, build_global, depth_warnings,
 };
@@ -136,7 +134,7 @@ fn a_film_in_the_other_one_is_told_and_stops_a_run_near_a_ply_and_far_from_all_o
 fn through_a_fin(from: f64, length: &str) -> Vec<PairDepth> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("fin.stl");
-    let text = common::scenes::blocks(&[
+    let text = crate::common::scenes::blocks(&[
         ([-50.0, -30.0, 0.0], [50.0, 30.0, 15.0]),
         ([from, -20.0, 0.0], [from + 2.0, 20.0, 20.0]),
     ]);

@@ -1,10 +1,8 @@
 //! Runs made unstable on purpose: they stop with what it is, where and when, its likely cause and what to change, and up to then
 //! no frame holds anything that is no number.
 
-mod common;
-
-use common::BuiltIn;
-use common::scenes::{bag, press};
+use crate::common::BuiltIn;
+use crate::common::scenes::{bag, press};
 use plyflow_forming_explicit::{Forming, Observer, Parameters, build_global};
 use plyflow_kernels::m4::M4;
 use plyflow_mechanics::component::element_fields;

@@ -1,9 +1,7 @@
 //! Scenes that would be computed as something else than they say, or not at all: refused before the first step, with what to do.
 
-mod common;
-
-use common::scenes::{bag, press};
-use common::{BuiltIn, woven};
+use crate::common::scenes::{bag, press};
+use crate::common::{BuiltIn, woven};
 use plyflow_forming_explicit::{Parameters, RigidName, build_global};
 use serde_json::{Value, json};
 use std::fmt::Write;

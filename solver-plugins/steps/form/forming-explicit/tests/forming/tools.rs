@@ -5,10 +5,8 @@
 //! corners, with alternating signs, sums to the integral of the Gaussian curvature over the patch. It follows from the tool's shape
 //! alone.
 
-mod common;
-
-use common::scenes::{bag, gentle_press, ply};
-use common::{apart, form, woven};
+use crate::common::scenes::{bag, gentle_press, ply};
+use crate::common::{apart, form, woven};
 use plyflow_forming_explicit::{Forming, Outcome, Parameters};
 use plyflow_geometry::vec3::Vec3;
 use plyflow_kernels::m4::M4;

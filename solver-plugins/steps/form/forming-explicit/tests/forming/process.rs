@@ -1,8 +1,6 @@
 //! The double-diaphragm process in time: weight, pressures as histories.
 
-mod common;
-
-use common::{BuiltIn, fabric, form};
+use crate::common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::{
     Forming, HistoryRow, LocalInput, LocalSheet, MANY, Observer, Outcome, Parameters, Penetration,
     Start, build_global, build_local,

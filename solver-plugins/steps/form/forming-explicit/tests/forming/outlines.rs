@@ -1,9 +1,7 @@
 //! Plies of different outlines in one bag and in one press: each touches what really lies under and over it.
 
-mod common;
-
-use common::form;
-use common::scenes::{bag, press};
+use crate::common::form;
+use crate::common::scenes::{bag, press};
 use plyflow_forming_explicit::Forming;
 use plyflow_mechanics::model::Model;
 use serde_json::json;
@@ -70,7 +68,7 @@ fn plies_that_overlap_in_part_lie_on_the_film_and_under_it_where_the_other_one_i
 #[test]
 fn any_two_sheets_of_a_stack_have_a_contact_whatever_their_outlines() {
     let names = |p| -> Vec<String> {
-        let model = plyflow_forming_explicit::build_global(&p, &common::BuiltIn)
+        let model = plyflow_forming_explicit::build_global(&p, &crate::common::BuiltIn)
             .unwrap()
             .model;
         let rigid = model.rigid_contacts().iter().map(|c| c.name.clone());
@@ -127,7 +125,7 @@ fn any_two_sheets_of_a_stack_have_a_contact_whatever_their_outlines() {
 #[test]
 fn friction_of_what_meets_past_a_ply_can_be_named_and_else_is_that_of_its_neighbours() {
     let build = |p| {
-        plyflow_forming_explicit::build_global(&p, &common::BuiltIn)
+        plyflow_forming_explicit::build_global(&p, &crate::common::BuiltIn)
             .map_err(|e| panic!("{e}"))
             .unwrap()
             .model

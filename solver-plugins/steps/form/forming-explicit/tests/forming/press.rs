@@ -1,9 +1,7 @@
 //! A whole press stroke on a small part: a ply over a hemisphere of 25 mm radius, through a hole, between plates.
 
-mod common;
-
-use common::scenes::press;
-use common::{BuiltIn, form};
+use crate::common::scenes::press;
+use crate::common::{BuiltIn, form};
 use plyflow_forming_explicit::{Forming, Outcome, Parameters, build_global};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -376,7 +374,9 @@ fn an_open_ledger_stops_the_run_and_says_where() {
     // What rounding and the step's own error leave is beyond this.
     p.drift_bound = 1e-7;
     let mut forming = build_global(&p, &BuiltIn).unwrap();
-    let error = forming.run(&p.control(), &mut common::Silent).unwrap_err();
+    let error = forming
+        .run(&p.control(), &mut crate::common::Silent)
+        .unwrap_err();
     let text = error.to_string();
     for part in [
         "is unaccounted for (drift_bound",

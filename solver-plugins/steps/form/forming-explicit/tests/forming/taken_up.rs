@@ -1,9 +1,7 @@
 //! A run that is stopped and goes on tells the same as one that was not: what the watch has seen is part of its state.
 
-mod common;
-
-use common::BuiltIn;
-use common::scenes::bag;
+use crate::common::BuiltIn;
+use crate::common::scenes::bag;
 use plyflow_forming_explicit::{
     Course, Forming, FormingError, Observer, Outcome, Parameters, Watched, build_global,
     depth_attributes, depth_warnings,
@@ -85,7 +83,7 @@ fn a_run_that_goes_on_tells_the_depths_histories_and_warnings_of_one_that_was_no
             process[format!("{phase}_time")] = json!(format!("{time} s"));
         }
     });
-    let whole = run(&p, &mut common::Silent).unwrap();
+    let whole = run(&p, &mut crate::common::Silent).unwrap();
     assert!(whole.cycles > 8000, "the watch looks at everything again");
     let end = whole.history.last().unwrap().time;
     let mut stop = Stop {

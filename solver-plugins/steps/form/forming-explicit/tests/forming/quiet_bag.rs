@@ -12,10 +12,8 @@
 //! cells pushed them (some 1e-5 of the pressure's work, for ever): in the flat bag those of the films, which have one mesh, and
 //! those of plies under nodes of a film.
 
-mod common;
-
-use common::scenes::{self, ply};
-use common::{BuiltIn, fabric};
+use crate::common::scenes::{self, ply};
+use crate::common::{BuiltIn, fabric};
 use plyflow_forming_explicit::{Forming, Parameters, build_global, inverse_bilinear};
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::shape;

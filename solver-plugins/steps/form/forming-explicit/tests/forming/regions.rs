@@ -1,9 +1,7 @@
 //! Regions of plies in a scene: which contacts and elements they reach, and that one over all of a ply is what the scene says of all of it.
 
-mod common;
-
-use common::scenes::{bag, hourglass, ply, press};
-use common::{BuiltIn, fabric, form, woven};
+use crate::common::scenes::{bag, hourglass, ply, press};
+use crate::common::{BuiltIn, fabric, form, woven};
 use plyflow_forming_explicit::{Parameters, build_global};
 use plyflow_mechanics::contact::{FrictionLaw, Partner, RegionalFriction};
 use plyflow_mechanics::model::Model;

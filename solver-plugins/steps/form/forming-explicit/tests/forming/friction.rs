@@ -1,9 +1,7 @@
 //! The friction of a scene: classes, named pairs, laws of pressure and angle; and what is refused.
 
-mod common;
-
-use common::scenes::{ply, press};
-use common::{BuiltIn, fabric};
+use crate::common::scenes::{ply, press};
+use crate::common::{BuiltIn, fabric};
 use plyflow_forming_explicit::{Parameters, build_global};
 use plyflow_mechanics::contact::{FrictionLaw, PressureDependence, Whose};
 use plyflow_mechanics::model::Model;

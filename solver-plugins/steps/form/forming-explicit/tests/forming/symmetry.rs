@@ -1,9 +1,7 @@
 //! Halves and quarters of symmetric scenes against the whole ones.
 
-mod common;
-
-use common::scenes::{diaphragm, gentle_press as press, ply};
-use common::{BuiltIn, apart, fabric, form, twins, woven};
+use crate::common::scenes::{diaphragm, gentle_press as press, ply};
+use crate::common::{BuiltIn, apart, fabric, form, twins, woven};
 use plyflow_forming_explicit::{Forming, HistoryRow, Observer, Outcome, Parameters, build_global};
 use plyflow_geometry::vec3::{Vec3, add, norm, scale, sub};
 use plyflow_kernels::{m4::M4, rf4::Rf4, s4::S4};

@@ -1,8 +1,6 @@
 //! Whole runs whose plies bend in zones only, in one mesh: against runs of one element.
 
-mod common;
-
-use common::{BuiltIn, fabric, form};
+use crate::common::{BuiltIn, fabric, form};
 use plyflow_forming_explicit::{Forming, Observer, Outcome, Parameters, build_global};
 use plyflow_geometry::vec3::Vec3;
 use plyflow_kernels::rf4::Rf4;

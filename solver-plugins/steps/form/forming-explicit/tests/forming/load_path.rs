@@ -4,10 +4,8 @@
 //! thickness of what lies below, they took up to four fifths of the load past the film, without its friction: the finer the
 //! plies, the more, so that the whole stack slid further the finer it was meshed.
 
-mod common;
-
-use common::form;
-use common::scenes::bag;
+use crate::common::form;
+use crate::common::scenes::bag;
 use plyflow_forming_explicit::{Forming, Parameters};
 use serde_json::json;
 

@@ -1,9 +1,7 @@
 //! Runs that would end well and mean nothing: refused with what to do.
 
-mod common;
-
-use common::BuiltIn;
-use common::scenes::{bag, gentle_press, press};
+use crate::common::BuiltIn;
+use crate::common::scenes::{bag, gentle_press, press};
 use plyflow_forming_explicit::{
     Feedback, FormingError, LocalSheet, Parameters, Watch, Watched,
     absurd::{check, off_the_tool},

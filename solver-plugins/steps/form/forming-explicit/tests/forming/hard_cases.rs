@@ -1,9 +1,7 @@
 //! Scenes chosen to break a solver. Each either gets to its end within its bounds, or stops with a diagnosis that says where; none
 //! ends in numbers that are not, or says nothing of a bound that it broke.
 
-mod common;
-
-use common::{form, scenes};
+use crate::common::{form, scenes};
 use plyflow_forming_explicit::{Forming, Outcome, PairDepth, Parameters};
 use serde_json::{Value, json};
 
