@@ -65,7 +65,7 @@ class Row:
                 return [f"stopped otherwise: {self.failure}"]
             return [] if LOCATED.search(self.failure) else [f"stopped without saying where: {self.failure}"]
         if self.failure is not None:
-            return [f"stopped: {self.failure}"]
+            return [f"stopped: {self.failure.split('. ')[0]}"]
         odd = [f"{name} is {value}" for name, value in self.results.items() if not math.isfinite(value)]
         if self.tells and not any(re.search(self.tells, w) for w in self.warnings):
             odd.append(f"no warning says {self.tells}")
@@ -150,13 +150,15 @@ def ladder(case: dict, rows: list[Row]) -> str:
     done = [r for r in rows if r.failure is None and r.cost and r.results.get("distance_error")]
     scenes = list(dict.fromkeys(r.name().split("_")[0] for r in done))
     figure, plots = style.plt.subplots(1, len(scenes), figsize=(7.2, 3.2), layout="constrained", sharey=True, squeeze=False)
-    kinds = {"drape": (style.INK, "s"), "m4": (style.ORANGE, "o"), "zones": (style.BLUE, "D"), "rf4": (style.GREEN, "^"), "s4": (style.GREEN, "v")}
+    colours = {"drape": style.INK, "m4": style.ORANGE, "rf4": style.GREEN, "s4": style.PURPLE}
     for scene, axes in zip(scenes, plots[0]):
         for row in (r for r in done if r.name().startswith(f"{scene}_")):
-            colour, marker = kinds["zones" if row.of == "zones" else row.element]
-            at = (row.cost, 1e3 * row.results["distance_error"])
-            axes.loglog(*at, marker, color=colour, markersize=6)
-            axes.annotate(row.name().removeprefix(f"{scene}_").replace("_", " "), at, textcoords="offset points", xytext=(5, 4), fontsize=8)
+            # Zones are hollow: most of their cost is that of the run around them.
+            fill = "none" if row.of == "zones" else colours[row.element]
+            label = row.name().removeprefix(f"{scene}_").replace("_", " ")
+            marker = "D" if row.of == "zones" else "o"
+            axes.loglog(row.cost, 1e3 * row.results["distance_error"], marker, color=colours[row.element], markerfacecolor=fill, label=label)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         axes.set_title(scene)
         axes.set_xlabel("CPU time (s)")
         axes.margins(0.25)

@@ -72,8 +72,8 @@ pub enum MechanicsError {
     #[error(
         "element {cell} of sheet '{sheet}', at ({:.1}, {:.1}, {:.1}) mm, is no element any more at t = {time:.6} s (cycle {cycle}): {what}. \
          What it carries there means nothing, so the run stops. Likely cause: the sheet bends or is compressed more sharply than its \
-         elements can show, or it is pushed through something. What to try: a smaller element_size there, a larger hourglass_floor, \
-         a slower process",
+         elements can show, or it is pushed through something. What to try: a smaller element_size there, a larger hourglass_floor \
+         (of s4 hourglass_director, such as 0.5), a slower process",
         1e3 * place[0], 1e3 * place[1], 1e3 * place[2]
     )]
     Distorted {
