@@ -44,10 +44,34 @@ pub struct Diagnostic {
     /// Points of the study at which it was found; empty: it does not depend on them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<String>,
+    /// Further places at which the same is missing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub also: Vec<Further>,
     #[serde(skip)]
-    span: Span,
+    pub(crate) span: Span,
     #[serde(skip)]
     text: Option<Arc<String>>,
+    /// The step that was being resolved.
+    #[serde(skip)]
+    pub(crate) step: Option<Arc<str>>,
+    /// Whether it is about a thing outside of the file, and so is said once, wherever the file names the thing.
+    #[serde(skip)]
+    pub(crate) once: bool,
+    /// Folders that were searched, and what is there.
+    #[serde(skip)]
+    pub(crate) searched: Option<[String; 2]>,
+}
+
+/// A further place of a finding, in the same file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Further {
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// The step that it belongs to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<String>,
 }
 
 /// All findings of a pass, by file and place.
@@ -84,7 +108,7 @@ impl Diagnostics {
         self.items.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// `[{file, line, column, severity, message, given, expected, help}]`.
+    /// `[{file, line, column, severity, message, given, expected, help, points, also}]`.
     pub fn to_json(&self) -> serde_json::Value {
         serde_json::to_value(&self.items).unwrap_or_default()
     }
@@ -302,7 +326,8 @@ impl<'a> Mention<'a> {
 /// Collects findings.
 #[derive(Debug, Default)]
 pub struct Problems {
-    items: Vec<Diagnostic>,
+    pub(crate) items: Vec<Diagnostic>,
+    step: Option<Arc<str>>,
     /// Of each of them its place in the tree, beyond the file's own text where it comes from elsewhere.
     places: Vec<Span>,
     read: BTreeMap<Utf8PathBuf, String>,
@@ -311,6 +336,11 @@ pub struct Problems {
 }
 
 impl Problems {
+    /// Says of all findings from now on that they belong to a step, or to none.
+    pub fn of_step(&mut self, name: Option<&str>) {
+        self.step = name.map(Arc::from);
+    }
+
     /// Adds a finding at a place and returns it, to say more about it.
     pub fn add(
         &mut self,
@@ -349,8 +379,12 @@ impl Problems {
             expected: None,
             help: None,
             points: Vec::new(),
+            also: Vec::new(),
             span,
             text: Some(text.clone()),
+            step: None,
+            once: false,
+            searched: None,
         })
     }
 
@@ -367,12 +401,17 @@ impl Problems {
             expected: None,
             help: None,
             points: Vec::new(),
+            also: Vec::new(),
             span: 0..0,
             text: None,
+            step: None,
+            once: false,
+            searched: None,
         })
     }
 
-    fn push(&mut self, d: Diagnostic) -> &mut Diagnostic {
+    fn push(&mut self, mut d: Diagnostic) -> &mut Diagnostic {
+        d.step = self.step.clone();
         let i = self.items.len();
         self.items.push(d);
         &mut self.items[i]
@@ -433,55 +472,6 @@ impl Problems {
     pub fn places_from(&self, from: usize) -> Vec<Span> {
         self.places[from..].to_vec()
     }
-
-    /// Sorted by file (in the order of first mention) and place; the same finding is listed once, though
-    /// several steps may read the same file.
-    pub fn finish(self) -> Diagnostics {
-        let mut files: Vec<Utf8PathBuf> = Vec::new();
-        for d in &self.items {
-            if !files.contains(&d.file) {
-                files.push(d.file.clone());
-            }
-        }
-        let rank = |d: &Diagnostic| files.iter().position(|f| *f == d.file);
-        let mut items = self.items;
-        items.sort_by_key(|d| (rank(d), d.line, d.column));
-        let mut kept: Vec<Diagnostic> = Vec::new();
-        for d in items {
-            if d.points.is_empty() {
-                if !kept.contains(&d) {
-                    kept.push(d);
-                }
-                continue;
-            }
-            // What is wrong at one place for many points is one finding.
-            let same = |k: &&mut Diagnostic| {
-                !k.points.is_empty() && (&k.file, &k.span, k.line) == (&d.file, &d.span, d.line)
-            };
-            match kept.iter_mut().rev().find(same) {
-                Some(known) => {
-                    if !known.points.contains(&d.points[0]) {
-                        known.points.extend(d.points);
-                    }
-                }
-                None => kept.push(d),
-            }
-        }
-        for d in &mut kept {
-            match d.points.as_slice() {
-                [] => {}
-                [one] => d.message += &format!(" (at the point {})", excerpt(one, 200)),
-                [one, further @ ..] => {
-                    d.message += &format!(
-                        " (at the point {}, and something here also at {} more)",
-                        excerpt(one, 200),
-                        further.len()
-                    );
-                }
-            }
-        }
-        Diagnostics { items: kept }
-    }
 }
 
 impl Diagnostic {
@@ -499,8 +489,11 @@ impl Diagnostic {
             expected: made(&self.expected),
             help: made(&self.help),
             points: self.points.iter().map(|p| safe(p).into_owned()).collect(),
+            also: self.also.clone(),
             span: self.span.clone(),
             text,
+            step: self.step.clone(),
+            searched: None,
             ..*self
         }
     }
@@ -514,6 +507,18 @@ impl Diagnostic {
     /// States what was expected.
     pub fn expected(&mut self, text: impl Into<String>) -> &mut Self {
         self.expected = Some(shown(text));
+        self
+    }
+
+    /// States that it is about a thing outside of the file: it is said once, with all steps that name the thing.
+    pub fn once(&mut self) -> &mut Self {
+        self.once = true;
+        self
+    }
+
+    /// States which folders were searched, and what is there: the folders are listed once for all findings.
+    pub fn searched(&mut self, folders: String, there: String) -> &mut Self {
+        self.searched = Some([folders, there].map(shown));
         self
     }
 

@@ -7,6 +7,7 @@ mod diagnostics;
 mod draft;
 mod evidence;
 mod expect;
+mod gathered;
 mod graph;
 mod hints;
 mod load;
@@ -23,7 +24,7 @@ mod wires;
 mod yaml;
 
 pub use catalog::{Catalog, CatalogEntry, CatalogError};
-pub use diagnostics::{Diagnostic, Diagnostics, Severity};
+pub use diagnostics::{Diagnostic, Diagnostics, Further, Severity};
 pub use evidence::{Evidence, Resolution};
 pub use graph::{dependencies, graph, to_dot, to_mermaid};
 pub use load::{

@@ -322,7 +322,10 @@ fn drafts<'n>(
         }
         let plugin = entry.value.get("plugin").and_then(|node| {
             let name = Mention::new(source, &node.span, node.text()?);
-            find(catalog, problems, &name, PluginKind::Step)
+            problems.of_step(Some(&entry.key));
+            let found = find(catalog, problems, &name, PluginKind::Step);
+            problems.of_step(None);
+            found
         });
         drafts.push(Draft {
             entry,
@@ -350,6 +353,7 @@ fn step(
         what: "with".into(),
         key: with.map_or(&draft.entry.key_span, |e| &e.key_span).clone(),
     };
+    problems.of_step(Some(draft.name()));
     let mut resolver = Resolver::new(catalog, problems);
     let owner = format!("`{}`", manifest.name);
     // The schema check has spoken about a `with` that is no mapping.
@@ -358,6 +362,7 @@ fn step(
         .filter(|n| matches!(n.kind, crate::yaml::Kind::Map(_)));
     let parameters = canonical(resolver.mapping(block, &manifest.parameters, &owner, &place));
     let components = resolver.components_in_order();
+    resolver.problems.of_step(None);
     let output = manifest.output.as_ref()?;
     Some(ResolvedStep {
         name: draft.name().to_owned(),

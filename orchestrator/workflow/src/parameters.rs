@@ -3,7 +3,7 @@
 
 use crate::catalog::{CatalogEntry, CatalogError, Plugins};
 use crate::check::{Given, choice, out_of_bounds, quantity};
-use crate::diagnostics::{Mention, Problems, Source};
+use crate::diagnostics::{Diagnostic, Mention, Problems, Source};
 use crate::hints::{list_help, number_help};
 use crate::resolved::{InputFile, PluginId};
 use crate::yaml::{Kind, Node, Span};
@@ -400,7 +400,8 @@ pub fn unreadable(
 ) {
     let message = format!("cannot read `{}`: {error}", shown(given));
     let d = problems.add(source, span, message);
-    d.given(given)
+    d.once()
+        .given(given)
         .expected(format!("a file; the path is relative to {}", source.folder));
     if !matches!(error, FileError::Missing) {
         return;
@@ -479,24 +480,11 @@ pub(crate) fn find(
         Err(e) => {
             let names = catalog.names(kind);
             let d = problems.add(source, span, e.to_string());
+            d.once();
             d.given(name).expected(format!("{article} {kind} plugin"));
             match &e {
                 CatalogError::NotFound { searched, .. } => {
-                    let places: Vec<&str> = searched.iter().map(|p| p.as_str()).collect();
-                    let known = if names.is_empty() {
-                        "none".into()
-                    } else {
-                        names.join(", ")
-                    };
-                    d.help(format!(
-                        "searched {}; {kind} plugins there: {known}",
-                        places.join(", ")
-                    ));
-                    if let Some(n) =
-                        plyflow_model::nearest::nearest(name, names.iter().map(String::as_str))
-                    {
-                        d.help(format!("did you mean `{n}`?"));
-                    }
+                    not_found(d, name, searched, &names, kind)
                 }
                 CatalogError::Broken { .. } => {
                     d.help("rebuild the plugin against the ABI of this program");
@@ -507,6 +495,26 @@ pub(crate) fn find(
         }
     }
     None
+}
+
+/// Says where a plugin was looked for, and what is there.
+fn not_found(
+    d: &mut Diagnostic,
+    name: &str,
+    searched: &[Utf8PathBuf],
+    names: &[String],
+    kind: PluginKind,
+) {
+    let places: Vec<&str> = searched.iter().map(|p| p.as_str()).collect();
+    let known = if names.is_empty() {
+        "none".into()
+    } else {
+        names.join(", ")
+    };
+    match plyflow_model::nearest::nearest(name, names.iter().map(String::as_str)) {
+        Some(n) => d.help(format!("did you mean `{n}`?")),
+        None => d.searched(places.join(", "), format!("{kind} plugins there: {known}")),
+    };
 }
 
 /// The absolute path of a file that is named in another one: where there is none of that name, that of the same name in another form of

@@ -440,3 +440,44 @@ fn a_material_whose_plugin_is_named_by_a_path_from_its_file_may_be_varied_too() 
     let ply = &step(&w, "coarse").parameters["scene"]["sheets"][1];
     assert_eq!(ply["material"]["with"]["fibre_modulus"], json!(3e7));
 }
+
+#[test]
+fn a_plugin_that_many_steps_name_is_missed_once_with_the_place_of_each() {
+    let study = Study::sound();
+    let steps: String = (0..9)
+        .map(|i| format!("  s{i}: {{plugin: {}}}\n", ["nowhere", "not-there"][i % 2]))
+        .collect();
+    let text = format!("plyflow: 1\nname: lost\nsteps:\n{steps}");
+    std::fs::write(study.path("workflow.yaml"), text).unwrap();
+    let found = study.load().unwrap_err();
+    let [a, b] = &found.items[..] else {
+        panic!("{}", found.render(false));
+    };
+    assert_eq!((a.line, a.column, b.line), (4, 16, 5));
+    assert!(
+        a.message
+            .ends_with("(wanted by the steps `s0`, `s2` at 6:16, `s4` at 8:16, `s6` at 10:16 and `s8` at 12:16)"),
+        "{}",
+        a.message
+    );
+    let also: Vec<_> = b.also.iter().map(|p| (p.line, p.step.as_deref())).collect();
+    assert_eq!(also, [(7, Some("s3")), (9, Some("s5")), (11, Some("s7"))]);
+    let folders = |d: &plyflow_workflow::Diagnostic| d.help.as_ref().unwrap().contains("/plugins");
+    assert_eq!((folders(a), folders(b)), (true, false));
+}
+
+#[test]
+fn a_file_that_several_steps_read_is_missed_once() {
+    let study = Study::sound();
+    let step = "{plugin: forming-explicit, with: {scene: lost.yaml, element: m4}}";
+    let text = format!("plyflow: 1\nname: lost\nsteps:\n  a: {step}\n  b: {step}\n");
+    std::fs::write(study.path("workflow.yaml"), text).unwrap();
+    let found = study.load().unwrap_err();
+    let missed = |d: &&plyflow_workflow::Diagnostic| d.message.contains("lost.yaml");
+    assert_eq!(
+        found.items.iter().filter(missed).count(),
+        1,
+        "{}",
+        found.render(false)
+    );
+}

@@ -231,6 +231,10 @@ fn errors_of_a_workflow() {
         "  a: {plugin: wrong-abi}\n  b: {plugin: trivial, with: {valve: 1}}\n",
     );
     one("missing-library", "  a: {plugin: ./libmine.so}\n");
+    one(
+        "missing-plugins",
+        "  a: {plugin: nowhere}\n  b: {plugin: nowhere}\n  c: {plugin: not-there}\n  d: {plugin: nowhere}\n",
+    );
 }
 
 #[test]
