@@ -40,6 +40,7 @@ check: ## form, lints and the tests that need no HDF5: under a minute once built
 	scripts/check-bits
 	scripts/check-imports
 	scripts/check-tests
+	scripts/check-lengths
 	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
 	$(CARGO) test $(CARGO_FLAGS) $(QUICK) --tests
 
@@ -77,6 +78,7 @@ lint: ## check form, lints and JSON Schemas
 	scripts/check-bits
 	scripts/check-imports
 	scripts/check-tests
+	scripts/check-lengths
 
 bench: build ## measure; rows go to docs/benchmarks
 	$(CARGO) build $(CARGO_FLAGS) -p plyflow-benches

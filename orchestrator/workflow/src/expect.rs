@@ -183,6 +183,30 @@ fn expectation(
     };
     let (value, tolerance) = (number("value"), number("tolerance"));
     let (minimum, maximum) = (number("minimum"), number("maximum"));
+    consistent(item, result, tolerance, minimum, maximum, source, problems);
+    Some(Expectation {
+        step: name.to_owned(),
+        mean_over: Vec::new(),
+        result: result_name,
+        unit,
+        value,
+        tolerance,
+        minimum,
+        maximum,
+        source: item.get("source").and_then(Node::text).map(str::to_owned),
+    })
+}
+
+/// Whether an expectation of `result` states something, and nothing that contradicts itself.
+fn consistent(
+    item: &Node,
+    result: &Node,
+    tolerance: Option<f64>,
+    minimum: Option<f64>,
+    maximum: Option<f64>,
+    source: &Source,
+    problems: &mut Problems,
+) {
     let given = |key: &str| item.get(key).is_some();
     if !["value", "minimum", "maximum"].into_iter().any(given) {
         let d = problems.add(source, &result.span, "this expectation states nothing");
@@ -201,21 +225,11 @@ fn expectation(
     }
     if let (Some(low), Some(high)) = (minimum, maximum)
         && low > high
+        && let (Some(least), Some(most)) = (item.get("minimum"), item.get("maximum"))
     {
-        let span = &item.get("minimum")?.span;
-        let d = problems.add(source, span, "`minimum` is greater than `maximum`");
-        d.given(item.get("minimum")?.describe());
-        d.expected(format!("at most {}", item.get("maximum")?.describe()));
+        let message = "`minimum` is greater than `maximum`";
+        let d = problems.add(source, &least.span, message);
+        d.given(least.describe());
+        d.expected(format!("at most {}", most.describe()));
     }
-    Some(Expectation {
-        step: name.to_owned(),
-        mean_over: Vec::new(),
-        result: result_name,
-        unit,
-        value,
-        tolerance,
-        minimum,
-        maximum,
-        source: item.get("source").and_then(Node::text).map(str::to_owned),
-    })
 }

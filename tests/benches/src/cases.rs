@@ -228,16 +228,21 @@ pub fn engine() -> Vec<Row> {
             "ms",
         ));
     }
-    let help = least(5, || {
+    let help = help();
+    rows.push(Row::new("--help, CPU", 1e3 * help.cpu, "ms"));
+    rows.push(Row::new("--help, wall", 1e3 * help.wall, "ms"));
+    rows
+}
+
+/// What one call takes that only prints.
+fn help() -> Spent {
+    least(5, || {
         let all = spent(|| (0..50).for_each(|_| quiet(Command::new(program()).arg("--help"))));
         Spent {
             wall: all.wall / 50.0,
             cpu: all.cpu / 50.0,
         }
-    });
-    rows.push(Row::new("--help, CPU", 1e3 * help.cpu, "ms"));
-    rows.push(Row::new("--help, wall", 1e3 * help.wall, "ms"));
-    rows
+    })
 }
 
 /// A study of a thousand trivial points beside the same steps written out: to plan it, to run it, and to add one point.

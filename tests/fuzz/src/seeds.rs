@@ -179,7 +179,7 @@ fn resolved() -> Vec<u8> {
     std::fs::read(kept).expect("a file").split_off(64)
 }
 
-/// Writes the sound artifacts that patches are of into a folder.
+/// Writes the sound artifacts that patches are of into a folder. Long, as it lists what stands in each.
 ///
 /// # Panics
 /// When they cannot be written.

@@ -49,7 +49,7 @@ impl<'a> Asked<'a> {
         looked_for(self.family, &self.responses, root, source, problems)
     }
 
-    /// Reads an expectation over the points; everything wrong is reported.
+    /// Reads an expectation over the points; everything wrong is reported. Long, as it fills all fields of one, each from a key.
     pub fn expectation(
         &self,
         item: &Node,

@@ -224,11 +224,8 @@ impl Family {
         problems: &mut Problems,
         resolve: &mut dyn FnMut(&Draft<'_>, &mut Problems) -> Option<ResolvedStep>,
     ) -> Option<(Vec<ResolvedStep>, Option<Study>)> {
-        let index: HashMap<&str, usize> = drafts
-            .iter()
-            .enumerate()
-            .map(|(i, d)| (d.name(), i))
-            .collect();
+        let named = drafts.iter().enumerate();
+        let index: HashMap<&str, usize> = named.map(|(i, d)| (d.name(), i)).collect();
         let depends = self.depends(drafts, wiring, &index);
         // Positions of the resolved steps: by step of the file, by point.
         let mut at: Vec<Vec<usize>> = vec![Vec::new(); drafts.len()];
@@ -265,11 +262,7 @@ impl Family {
                 let content = content_of(i, &step);
                 let there = *contents.entry(content).or_insert(steps.len());
                 if there == steps.len() {
-                    if !part.is_empty() {
-                        step.base = Some(std::mem::take(&mut step.name));
-                        step.name = format!("{}@{part}", drafts[i].name());
-                    }
-                    steps.push(step);
+                    steps.push(at_part(step, &part));
                 }
                 known.insert(part, there);
                 at[i].push(there);
@@ -380,6 +373,16 @@ impl Family {
             optimisation: None,
         }
     }
+}
+
+/// A step at what is its `part` of a point: under a name of its own, if it depends on it.
+fn at_part(mut step: ResolvedStep, part: &str) -> ResolvedStep {
+    if !part.is_empty() {
+        let base = std::mem::take(&mut step.name);
+        step.name = format!("{base}@{part}");
+        step.base = Some(base);
+    }
+    step
 }
 
 /// What a step is, besides its name.

@@ -159,13 +159,13 @@ fn grid_points(mesh: &mut Coarse, region: &Region, rings: &[Vec<u32>], spacing: 
     Grid { numbers, cells }
 }
 
-/// Constrained Delaunay triangles inside the region, counter-clockwise.
-fn triangulate(
+/// A Delaunay triangulation of the nodes that keeps the contours and the sides of the grid's cells.
+fn constrained(
     mesh: &Coarse,
     rings: &[Vec<u32>],
     grid: &Grid,
     spacing: f64,
-) -> Result<Vec<[u32; 3]>, MeshError> {
+) -> Result<ConstrainedDelaunayTriangulation<Point2<f64>>, MeshError> {
     let fail = |n: u32, why| MeshError::Coarse {
         size: 0.5e3 * spacing,
         at: Millimetres(mesh.points[n as usize]),
@@ -200,6 +200,17 @@ fn triangulate(
             fix(c[k], c[(k + 1) % 4])?;
         }
     }
+    Ok(cdt)
+}
+
+/// Constrained Delaunay triangles inside the region, counter-clockwise.
+fn triangulate(
+    mesh: &Coarse,
+    rings: &[Vec<u32>],
+    grid: &Grid,
+    spacing: f64,
+) -> Result<Vec<[u32; 3]>, MeshError> {
+    let cdt = constrained(mesh, rings, grid, spacing)?;
     let contours: Vec<Vec<Point>> = rings
         .iter()
         .map(|r| r.iter().map(|n| mesh.points[*n as usize]).collect())
@@ -299,6 +310,45 @@ struct Pair {
     triangles: [usize; 2],
 }
 
+/// Merges pairs of triangles that are not `used`: the best pair first, after those that relieve a crowded node. `around`: how many cells a
+/// node has, which stay at least `least_cells`.
+fn merge_best_first(
+    mesh: &mut Coarse,
+    mut candidates: Vec<Pair>,
+    used: &mut [bool],
+    around: &mut [usize],
+    least_cells: &[usize],
+) {
+    loop {
+        let enough = |n: u32| around[n as usize] > least_cells[n as usize];
+        let crowded =
+            |n: u32| mesh.on_edge[n as usize].is_none() && around[n as usize] > MOST_CELLS;
+        let worth = |c: &Pair| {
+            let [a, b] = [c.edge.0, c.edge.1];
+            let relief = f64::from(u8::from(crowded(a))) + f64::from(u8::from(crowded(b)));
+            let free = c.triangles.iter().all(|t| !used[*t]) && enough(a) && enough(b);
+            let sound = c.sine
+                >= if relief > 0.0 {
+                    CROWDED_JACOBIAN
+                } else {
+                    MERGE_JACOBIAN
+                };
+            (free && sound).then_some(c.sine + relief)
+        };
+        candidates.retain(|c| c.triangles.iter().all(|t| !used[*t]));
+        let valued = candidates.iter().filter_map(|c| worth(c).map(|w| (w, c)));
+        // The first of equals.
+        let Some((_, best)) = valued.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
+            break;
+        };
+        best.triangles.iter().for_each(|t| used[*t] = true);
+        around[best.edge.0 as usize] -= 1;
+        around[best.edge.1 as usize] -= 1;
+        mesh.polygons.push(best.quad.to_vec());
+        mesh.regular.push(false);
+    }
+}
+
 /// Grid cells, then the best pairs of triangles as quads, then what is left as triangles. A pair is merged only where the nodes
 /// of their common side keep as many cells as they need.
 fn merge(mesh: &mut Coarse, curves: &[Curve], triangles: &[[u32; 3]], grid: &Grid) {
@@ -346,35 +396,7 @@ fn merge(mesh: &mut Coarse, curves: &[Curve], triangles: &[[u32; 3]], grid: &Gri
             }
         }
     }
-    // The best pair first, after those that relieve a crowded node.
-    loop {
-        let enough = |n: u32| around[n as usize] > least_cells[n as usize];
-        let crowded =
-            |n: u32| mesh.on_edge[n as usize].is_none() && around[n as usize] > MOST_CELLS;
-        let worth = |c: &Pair| {
-            let [a, b] = [c.edge.0, c.edge.1];
-            let relief = f64::from(u8::from(crowded(a))) + f64::from(u8::from(crowded(b)));
-            let free = c.triangles.iter().all(|t| !used[*t]) && enough(a) && enough(b);
-            let sound = c.sine
-                >= if relief > 0.0 {
-                    CROWDED_JACOBIAN
-                } else {
-                    MERGE_JACOBIAN
-                };
-            (free && sound).then_some(c.sine + relief)
-        };
-        candidates.retain(|c| c.triangles.iter().all(|t| !used[*t]));
-        let valued = candidates.iter().filter_map(|c| worth(c).map(|w| (w, c)));
-        // The first of equals.
-        let Some((_, best)) = valued.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
-            break;
-        };
-        best.triangles.iter().for_each(|t| used[*t] = true);
-        around[best.edge.0 as usize] -= 1;
-        around[best.edge.1 as usize] -= 1;
-        mesh.polygons.push(best.quad.to_vec());
-        mesh.regular.push(false);
-    }
+    merge_best_first(mesh, candidates, &mut used, &mut around, &least_cells);
     for (t, _) in triangles.iter().zip(&used).filter(|(_, used)| !**used) {
         mesh.polygons.push(t.to_vec());
         mesh.regular.push(false);

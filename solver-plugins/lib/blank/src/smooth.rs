@@ -27,6 +27,19 @@ const SIZE_WEIGHT: f64 = 0.2;
 /// A corner is taken as folded below this share of the wanted area.
 const FLAT: f64 = 0.02;
 
+const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Where a free node may step.
+const WAYS: [[f64; 2]; 8] = [
+    [1.0, 0.0],
+    [D, D],
+    [0.0, 1.0],
+    [-D, D],
+    [-1.0, 0.0],
+    [-D, -D],
+    [0.0, -1.0],
+    [D, -D],
+];
+
 /// Cost of a cell.
 fn cost(p: [Point; 4], area: f64) -> f64 {
     let mut sum = 0.0;
@@ -123,18 +136,7 @@ impl Moving<'_> {
         match places[n] {
             Place::Fixed => return false,
             Place::Free => {
-                const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
-                let ways = [
-                    [1.0, 0.0],
-                    [D, D],
-                    [0.0, 1.0],
-                    [-D, D],
-                    [-1.0, 0.0],
-                    [-D, -D],
-                    [0.0, -1.0],
-                    [D, -D],
-                ];
-                for w in ways {
+                for w in WAYS {
                     consider([at[0] + step * w[0], at[1] + step * w[1]], Place::Free);
                 }
             }

@@ -173,6 +173,18 @@ impl Step for Plugin {
     }
 }
 
+/// Those of the clamped ends; of a sheared strip also those of its long edges.
+fn driven_nodes(grid: &Grid, sheared: bool) -> Vec<u32> {
+    let columns = grid.xs.len();
+    (0..(columns * grid.ys.len()) as u32)
+        .filter(|n| {
+            let (i, j) = grid.place(*n);
+            let long_edge = j == 0 || j + 1 == grid.ys.len();
+            i < CLAMPED || i + CLAMPED >= columns || (sheared && long_edge)
+        })
+        .collect()
+}
+
 fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     check(p)?;
     let (x, y) = (
@@ -183,14 +195,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     p.common.allow(p.length * p.width)?;
     let (h, half, grid) = grid(p);
     let columns = grid.xs.len();
-    let sheared = p.shear_angle != 0.0;
-    let driven: Vec<u32> = (0..(columns * grid.ys.len()) as u32)
-        .filter(|n| {
-            let (i, j) = grid.place(*n);
-            let long_edge = j == 0 || j + 1 == grid.ys.len();
-            i < CLAMPED || i + CLAMPED >= columns || (sheared && long_edge)
-        })
-        .collect();
+    let driven = driven_nodes(&grid, p.shear_angle != 0.0);
     let axis = axis_of_family(p.family);
     let rotates = strip::rotates(host, &p.common)?;
     let mut mesh = grid.mesh();

@@ -293,6 +293,7 @@ dispatch!(fn membrane(
     stiffness: &mut [f64],
 ) = membrane_kernel);
 
+/// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
 fn membrane_kernel<V: Lanes>(
     f: &Marlow,

@@ -334,6 +334,7 @@ fn metric_kernel<V: Lanes>(position: &[f64], constants: &[f64], n: usize, s: &mu
     }
 }
 
+/// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
 fn forces_kernel<V: Lanes>(
     position: &[f64],

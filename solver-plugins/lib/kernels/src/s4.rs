@@ -257,6 +257,7 @@ impl S4 {
         }
     }
 
+    /// Long, as it lists what is computed, in the order in which each kernel needs what those before it have written.
     fn forces_with(
         &self,
         batch: &mut ElementBatch<'_>,

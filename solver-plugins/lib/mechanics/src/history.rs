@@ -79,16 +79,7 @@ pub fn spline_slopes(times: &[f64], values: &[f64], columns: usize) -> Vec<f64> 
     let under_way = times[0] > 0.0;
     if n == 2 || (n == 3 && under_way) {
         for c in 0..columns {
-            let (a, b) = (chord(0, c), chord(n - 2, c));
-            let few = match n {
-                2 if under_way => [a, a, 0.0],
-                2 => [0.0, 2.0 * a, 0.0],
-                // The parabola through all three.
-                _ => {
-                    let bend = (b - a) / (h[0] + h[1]);
-                    [a - bend * h[0], a + bend * h[0], b + bend * h[1]]
-                }
-            };
+            let few = few_slopes(&h, chord(0, c), chord(n - 2, c), under_way);
             (0..n).for_each(|i| slopes[i * columns + c] = few[i]);
         }
         return slopes;
@@ -133,6 +124,19 @@ pub fn spline_slopes(times: &[f64], values: &[f64], columns: usize) -> Vec<f64> 
         }
     }
     slopes
+}
+
+/// Slopes of the one piece that goes through two or three knots, of the spacings `h`: from the first chord `a` and the last one `b`.
+fn few_slopes(h: &[f64], a: f64, b: f64, under_way: bool) -> [f64; 3] {
+    match h.len() {
+        1 if under_way => [a, a, 0.0],
+        1 => [0.0, 2.0 * a, 0.0],
+        // The parabola through all three.
+        _ => {
+            let bend = (b - a) / (h[0] + h[1]);
+            [a - bend * h[0], a + bend * h[0], b + bend * h[1]]
+        }
+    }
 }
 
 /// A monotone cubic through given values: cubic Hermite pieces that lie between the values at their ends, with a continuous slope that

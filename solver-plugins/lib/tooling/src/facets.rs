@@ -137,6 +137,19 @@ fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
+/// Owner of a side that no triangle has, and of one that several have.
+const NONE: usize = usize::MAX;
+const MANY: usize = usize::MAX - 1;
+
+/// Takes the sides from a triangle that has them alone.
+fn leave(at: &mut HashMap<[u32; 2], usize>, corners: [u32; 3], owner: usize) {
+    for side in sides(corners) {
+        if at.get(&side) == Some(&owner) {
+            at.insert(side, NONE);
+        }
+    }
+}
+
 impl Surface {
     fn corners(&self, [a, b, c]: [u32; 3]) -> [Vec3; 3] {
         [a, b, c].map(|p| self.points[p as usize])
@@ -155,6 +168,17 @@ impl Surface {
         })
     }
 
+    /// Which side of a triangle is the longest: the first of equals.
+    fn longest_side(&self, corners: [u32; 3]) -> usize {
+        let length = |[a, b]: [u32; 2]| norm(sub(self.points[b as usize], self.points[a as usize]));
+        (0..3).fold(0, |k, j| {
+            match length(sides(corners)[j]) > length(sides(corners)[k]) {
+                true => j,
+                false => k,
+            }
+        })
+    }
+
     /// The longest first, so that what is made of the facet beyond is shorter: it comes to an end.
     fn take_flat_ones_in(&mut self, near: f64) {
         let mut heap: BinaryHeap<Flat> = (0..self.triangles.len())
@@ -163,8 +187,6 @@ impl Surface {
         if heap.is_empty() {
             return;
         }
-        const NONE: usize = usize::MAX;
-        const MANY: usize = usize::MAX - 1;
         let mut at: HashMap<[u32; 2], usize> = HashMap::with_capacity(3 * self.triangles.len());
         for (t, corners) in self.triangles.iter().enumerate() {
             for side in sides(*corners) {
@@ -180,22 +202,8 @@ impl Surface {
                 continue;
             }
             gone[triangle] = true;
-            let mut leave = |corners: [u32; 3], owner: usize| {
-                for side in sides(corners) {
-                    if at.get(&side) == Some(&owner) {
-                        at.insert(side, NONE);
-                    }
-                }
-            };
-            leave(corners, triangle);
-            let length =
-                |[a, b]: [u32; 2]| norm(sub(self.points[b as usize], self.points[a as usize]));
-            let k = (0..3).fold(0, |k, j| {
-                match length(sides(corners)[j]) > length(sides(corners)[k]) {
-                    true => j,
-                    false => k,
-                }
-            });
+            leave(&mut at, corners, triangle);
+            let k = self.longest_side(corners);
             let ([a, b], middle) = (sides(corners)[k], corners[(k + 2) % 3]);
             // The facet beyond, which passes the side from b to a.
             let beyond = at.get(&[b, a]).copied().filter(|&g| g < MANY && !gone[g]);
@@ -204,14 +212,7 @@ impl Surface {
             let Some(&far) = old.iter().find(|&&p| p != a && p != b) else {
                 continue;
             };
-            let mut leave = |corners: [u32; 3], owner: usize| {
-                for side in sides(corners) {
-                    if at.get(&side) == Some(&owner) {
-                        at.insert(side, NONE);
-                    }
-                }
-            };
-            leave(old, g);
+            leave(&mut at, old, g);
             gone[g] = true;
             if far == middle {
                 continue;
@@ -293,22 +294,23 @@ impl Surface {
             let Some((k, on)) = parted.remove(&t) else {
                 continue;
             };
-            let corners = self.triangles[t];
-            let ([a, b], far) = (sides(corners)[k], corners[(k + 2) % 3]);
-            let stops: Vec<u32> = [a]
-                .into_iter()
-                .chain(on.iter().map(|m| m.1))
-                .chain([b])
-                .collect();
-            self.triangles[t] = [stops[0], stops[1], far];
-            for pair in stops[1..].windows(2) {
-                self.triangles.push([pair[0], pair[1], far]);
-                self.facet.push(self.facet[t]);
-            }
+            self.part(t, k, on.iter().map(|m| m.1));
         }
         let any = self.triangles.len() > all.len() / 3;
         self.keep(|_| true);
         any
+    }
+
+    /// Parts the triangle `t` at the points `on` its side `k`, in their order along it.
+    fn part(&mut self, t: usize, k: usize, on: impl Iterator<Item = u32>) {
+        let corners = self.triangles[t];
+        let ([a, b], far) = (sides(corners)[k], corners[(k + 2) % 3]);
+        let stops: Vec<u32> = [a].into_iter().chain(on).chain([b]).collect();
+        self.triangles[t] = [stops[0], stops[1], far];
+        for pair in stops[1..].windows(2) {
+            self.triangles.push([pair[0], pair[1], far]);
+            self.facet.push(self.facet[t]);
+        }
     }
 }
 

@@ -356,7 +356,7 @@ struct MaterialInstance<M> {
     sizes: MaterialSizes,
 }
 
-/// The function table of a [`Material`], written as [`element_table`].
+/// The function table of a [`Material`]. Long, as it is written as [`element_table`].
 pub const fn material_table<M: Material>() -> pf_material_functions {
     unsafe extern "C" fn create<M: Material>(
         parameters: pf_str,

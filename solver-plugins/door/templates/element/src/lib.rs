@@ -134,6 +134,7 @@ impl Element for MyMembrane {
         }
     }
 
+    /// Long, so that all that makes an element of its own stands in one place, to be written anew.
     fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
         let lanes = batch.lanes;
         let mut metric = Rows([0.0; 3 * MAX_LANES]);

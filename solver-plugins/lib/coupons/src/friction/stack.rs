@@ -87,6 +87,26 @@ fn below(mesh: &QuadMesh, p: [f64; 3]) -> Option<(u32, [f64; 2])> {
     cells.find_map(|(i, c)| inside(c).map(|xi| (i as u32, xi)))
 }
 
+/// A sheet, by its number from below.
+fn mesh_of(k: usize, size: f64, thickness: f64) -> QuadMesh {
+    let (x, y) = SHEETS[k];
+    let mut mesh = QuadMesh::grid(&even_axis(x[0], x[1], size), &even_axis(-y, y, size));
+    for point in &mut mesh.points {
+        point[2] = thickness * k as f64;
+    }
+    mesh
+}
+
+/// The nodes of a sheet, from `first` on, on the cells from `cell0` on of the sheet below.
+fn items_on(lower: &QuadMesh, cell0: u32, upper: &QuadMesh, first: usize) -> Vec<SlaveItem> {
+    let item = |i: usize| {
+        let node = (first + i) as u32;
+        let (cell, xi) = below(lower, upper.points[i])?;
+        Some(SlaveItem::new(node, cell0 + cell, xi))
+    };
+    (0..upper.points.len()).filter_map(item).collect()
+}
+
 pub(super) fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     p.common.allow(
         SHEETS
@@ -95,14 +115,7 @@ pub(super) fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
             .sum::<f64>(),
     )?;
     let (size, thickness) = (p.common.element_size, p.common.thickness());
-    let meshes = [0, 1, 2].map(|k| {
-        let (x, y) = SHEETS[k];
-        let mut mesh = QuadMesh::grid(&even_axis(x[0], x[1], size), &even_axis(-y, y, size));
-        for point in &mut mesh.points {
-            point[2] = thickness * k as f64;
-        }
-        mesh
-    });
+    let meshes = [0, 1, 2].map(|k| mesh_of(k, size, thickness));
     let sheets = [0, 1, 2].map(|k| Stacked {
         name: ["lower", "middle", "upper"][k],
         mesh: meshes[k].clone(),
@@ -110,11 +123,8 @@ pub(super) fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         pressed: if k == 2 { Pressed::Above } else { Pressed::No },
     });
     let mut specimen = Specimen::of_sheets(host, &p.common, &sheets)?;
-    let first = [
-        0,
-        meshes[0].points.len(),
-        meshes[0].points.len() + meshes[1].points.len(),
-    ];
+    let n = meshes.each_ref().map(|m| m.points.len());
+    let first = [0, n[0], n[0] + n[1]];
     let points = specimen.mesh.points.clone();
     let model = &mut specimen.model;
     let mut driven: Vec<u32> = (0..first[1] as u32).collect();
@@ -139,12 +149,7 @@ pub(super) fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let contact = ContactSettings::default();
     for k in [1, 2] {
         let cell0 = model.sheets()[k - 1].cell_range.0 as u32;
-        let item = |i: usize| {
-            let node = (first[k] + i) as u32;
-            let (cell, xi) = below(&meshes[k - 1], meshes[k].points[i])?;
-            Some(SlaveItem::new(node, cell0 + cell, xi))
-        };
-        let items = (0..meshes[k].points.len()).filter_map(item).collect();
+        let items = items_on(&meshes[k - 1], cell0, &meshes[k], first[k]);
         let name = format!("{}/{}", sheets[k - 1].name, sheets[k].name);
         let on = SheetContact::new(name, 1.0, thickness, p.coefficient, &contact, items);
         model.add_sheet_contact(on);

@@ -23,6 +23,7 @@ pub(super) const HISTORY: usize = 11;
 const SINE_LIMIT: f64 = 0.985;
 
 /// Stresses and energies from the metric and the [`HISTORY`]; `stiffness` may be empty.
+/// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
 pub(super) fn membrane<V: Lanes, L: Law>(
     f: &Fabric,

@@ -177,6 +177,7 @@ pub(super) fn plate(constants: &[f64], n: usize, l: usize) -> f64 {
 }
 
 /// A bound of 2 / omega_max with the masses and inertias that `initialise` wrote; 0 of an element that is inside out.
+/// Long, as it adds up one bound: each kind of strain once, with the names that the formula has.
 pub(super) fn critical_step(
     s4: &S4,
     position: &[f64],

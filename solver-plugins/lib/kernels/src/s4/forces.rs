@@ -242,6 +242,7 @@ fn swell_kernel<V: Lanes>(power: u32, n: usize, s: &mut View<'_>) {
     }
 }
 
+/// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
 fn forces_kernel<V: Lanes>(
     position: &[f64],

@@ -69,6 +69,7 @@ pub(super) struct Found {
 pub(super) const RIM: f64 = 0.5;
 
 /// Closest point of one cell to `p` by Newton steps from `xi`, kept inside the cell.
+/// Long, as it is the innermost loop of contacts: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
 pub(super) fn closest(
     s: &Surface<'_>,

@@ -297,19 +297,12 @@ impl RigidContact {
         v: &[Vec3],
         pace: Pace,
     ) -> ContactEnergy {
+        self.make_room();
         let motion = self.motion;
         let looking = Looking {
             surface: self.surface.as_ref(),
             motion,
-            pace: Pace {
-                speed: pace.speed + 2.0 * norm(motion.velocity),
-                acceleration: if self.moves {
-                    f64::INFINITY
-                } else {
-                    pace.acceleration
-                },
-                ..pace
-            },
+            pace: self.pace(pace),
             cycle: self.cycle,
             v,
             law: Law {
@@ -327,19 +320,6 @@ impl RigidContact {
             },
         };
         self.cycle += 1;
-        debug_assert!(
-            [0, self.items.len()].contains(&self.wakes.len()),
-            "'{}' has other items than when it looked last",
-            self.name
-        );
-        self.wakes.resize(self.items.len(), 0);
-        self.spans
-            .resize_with(self.items.len().div_ceil(SPAN), Span::default);
-        self.between.resize(self.items.len(), Between::There);
-        let costly = self.surface.is_costly();
-        if costly {
-            self.planes.resize(self.items.len(), TangentPlane::NONE);
-        }
         let items = self.items.par_chunks_mut(SPAN);
         let spans = items
             .zip_eq(self.wakes.par_chunks_mut(SPAN))
@@ -347,7 +327,7 @@ impl RigidContact {
             .zip_eq(self.spans.par_iter_mut())
             .with_max_len(TOGETHER)
             .with_min_len(crate::team::least());
-        if costly {
+        if self.surface.is_costly() {
             let spans = spans.zip_eq(self.planes.par_chunks_mut(SPAN));
             let look = |((((items, wakes), between), span), planes): (_, &mut [_])| {
                 looking.span(items, (wakes, between), span, planes);
@@ -363,6 +343,31 @@ impl RigidContact {
             total.add(&span.energy);
         }
         total
+    }
+
+    /// How fast nodes may come to the surface, which may move too.
+    fn pace(&self, mut pace: Pace) -> Pace {
+        pace.speed += 2.0 * norm(self.motion.velocity);
+        if self.moves {
+            pace.acceleration = f64::INFINITY;
+        }
+        pace
+    }
+
+    /// What is known of each item, and of each span of them.
+    fn make_room(&mut self) {
+        debug_assert!(
+            [0, self.items.len()].contains(&self.wakes.len()),
+            "'{}' has other items than when it looked last",
+            self.name
+        );
+        self.wakes.resize(self.items.len(), 0);
+        self.spans
+            .resize_with(self.items.len().div_ceil(SPAN), Span::default);
+        self.between.resize(self.items.len(), Between::There);
+        if self.surface.is_costly() {
+            self.planes.resize(self.items.len(), TangentPlane::NONE);
+        }
     }
 
     /// Adds the forces on the nodes to `f` (N).

@@ -114,6 +114,7 @@ fn past_a_ridge(
 /// The closest point of the surface near where the slave was: of its cell, and of the cells across those
 /// sides that the point lies on, and (every eighth step) of those so near that a concave fold could make the
 /// neighbour closer. The walk enters only cells that are `open` to it.
+/// Long, as it is one walk over cells, inlined into every contact: each part goes on with the cells and sides that the one before has found.
 #[inline(always)]
 pub(super) fn track(
     s: &Surface<'_>,

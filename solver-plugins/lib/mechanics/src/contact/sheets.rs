@@ -136,6 +136,7 @@ impl SheetContact {
         pace: Pace,
         onto: Option<&mut [Vec3]>,
     ) -> ContactEnergy {
+        self.make_room();
         let side = self.side;
         let law = Law {
             dt: pace.dt,
@@ -158,14 +159,6 @@ impl SheetContact {
             law,
         };
         self.cycle += 1;
-        debug_assert!(
-            [0, self.items.len()].contains(&self.wakes.len()),
-            "'{}' has other items than when it looked last",
-            self.name
-        );
-        self.wakes.resize(self.items.len(), 0);
-        self.spans
-            .resize_with(self.items.len().div_ceil(SPAN), Span::default);
         if let Some(f) = onto {
             let items = self.items.chunks_mut(SPAN);
             let wakes = self.wakes.chunks_mut(SPAN);
@@ -188,6 +181,18 @@ impl SheetContact {
             total.add(&span.energy);
         }
         total
+    }
+
+    /// What is known of each item, and of each span of them.
+    fn make_room(&mut self) {
+        debug_assert!(
+            [0, self.items.len()].contains(&self.wakes.len()),
+            "'{}' has other items than when it looked last",
+            self.name
+        );
+        self.wakes.resize(self.items.len(), 0);
+        self.spans
+            .resize_with(self.items.len().div_ceil(SPAN), Span::default);
     }
 
     /// How its multipliers follow penetrations. What catches hurries nowhere: it bears what changes slowly, and nodes that slide over the edges of

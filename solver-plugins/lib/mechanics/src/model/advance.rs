@@ -1,11 +1,12 @@
 //! Forces on the nodes, and where they take them.
 
-use super::blocks::{NODE_CHUNK, chunks_or_none};
+use super::blocks::{NODE_CHUNK, Sums, chunks_or_none};
 use super::boundary::Fixed;
 use super::parts::{Model, NodeWork};
 use crate::team;
 use crate::vec3::{Vec3, add, dot, scale, sub};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What moves or turns the nodes of a model in a step.
 #[derive(Clone, Copy)]
@@ -47,6 +48,36 @@ pub(super) struct Turns<'a> {
     pub(super) fixed: &'a [Fixed],
 }
 
+/// What acts on nodes from outside: weight, pressure and loads.
+struct Acting<'a> {
+    /// (m/s2)
+    weight: Vec3,
+    /// By node, without scaling (kg).
+    own_mass: &'a [f64],
+    sums: &'a Sums,
+    /// By node (N), or empty.
+    loads: &'a [Vec3],
+    load_factor: f64,
+}
+
+impl Acting<'_> {
+    /// The forces on the `nodes` of a chunk.
+    #[inline(always)]
+    fn on(&self, chunk: usize, nodes: Range<usize>, external: &mut [Vec3]) {
+        for (q, m) in external.iter_mut().zip(&self.own_mass[nodes.clone()]) {
+            *q = scale(self.weight, *m);
+        }
+        if !self.sums.pressure.is_empty() {
+            self.sums.collect(&self.sums.pressure, chunk, external);
+        }
+        if !self.loads.is_empty() {
+            for (q, load) in external.iter_mut().zip(&self.loads[nodes]) {
+                *q = add(*q, scale(*load, self.load_factor));
+            }
+        }
+    }
+}
+
 /// Components whose sums are kept apart: eight nodes.
 const GROUP: usize = 24;
 
@@ -56,7 +87,6 @@ const TOGETHER: usize = 8;
 impl Model {
     /// Velocities and positions of the next step; works of the step.
     pub(super) fn advance(&mut self) {
-        let dt = self.state.dt;
         let weight = self.boundary.body_acceleration;
         let loaded = weight != [0.0; 3]
             || !self.boundary.loads.force.is_empty()
@@ -65,17 +95,19 @@ impl Model {
         // None are kept while nothing acts.
         let loaded_nodes = if loaded { self.state.x.len() } else { 0 };
         self.boundary.external_force.resize(loaded_nodes, [0.0; 3]);
-        let mut before = std::mem::take(&mut self.workspace.before);
-        before.clear();
-        let places = self.boundary.driven.iter().map(|n| *n as usize);
-        before.extend(places.map(|n| (self.state.x[n], self.state.v[n])));
+        let before = self.before();
         let (sums, patch_sums) = (&self.elements.sums, &self.elements.patch_sums);
         let free_mass = free_or_all(&self.topology.free_mass, &self.topology.mass);
         let fixed = &self.boundary.supports.fixed;
-        let own_mass = &self.topology.own_mass;
         let chunks = self.state.x.len().div_ceil(NODE_CHUNK);
         let external = chunks_or_none(&mut self.boundary.external_force, NODE_CHUNK, chunks);
-        let (loads, load_factor) = (&self.boundary.loads.force, self.boundary.load_factor);
+        let acting = Acting {
+            weight,
+            own_mass: &self.topology.own_mass,
+            sums,
+            loads: &self.boundary.loads.force,
+            load_factor: self.boundary.load_factor,
+        };
         self.state
             .x
             .par_chunks_mut(NODE_CHUNK)
@@ -94,17 +126,7 @@ impl Model {
                     patch_sums.collect(&patch_sums.force, chunk, force);
                 }
                 if moving.loaded {
-                    for (q, m) in external.iter_mut().zip(&own_mass[nodes.clone()]) {
-                        *q = scale(weight, *m);
-                    }
-                    if !sums.pressure.is_empty() {
-                        sums.collect(&sums.pressure, chunk, external);
-                    }
-                    if !loads.is_empty() {
-                        for (q, load) in external.iter_mut().zip(&loads[nodes.clone()]) {
-                            *q = add(*q, scale(*load, load_factor));
-                        }
-                    }
+                    acting.on(chunk, nodes.clone(), external);
                 }
                 moving.chunk(Components {
                     x: x.as_flattened_mut(),
@@ -121,6 +143,21 @@ impl Model {
         self.workspace.work = works.fold(NodeWork::default(), |sum, w| sum.add(*w));
         self.follow(&before);
         self.workspace.before = before;
+        self.close_step();
+    }
+
+    /// Positions and velocities of the driven nodes.
+    fn before(&mut self) -> Vec<(Vec3, Vec3)> {
+        let mut before = std::mem::take(&mut self.workspace.before);
+        before.clear();
+        let places = self.boundary.driven.iter().map(|n| *n as usize);
+        before.extend(places.map(|n| (self.state.x[n], self.state.v[n])));
+        before
+    }
+
+    /// What follows from the works of a step, when nodes have moved: rotations, energies, time.
+    fn close_step(&mut self) {
+        let dt = self.state.dt;
         if !self.workspace.work.kinetic.is_finite() {
             let bad = |v: &Vec3| !v.iter().all(|c| c.is_finite());
             self.workspace.work.bad = self.state.v.iter().position(bad).map(|n| n as u32);

@@ -34,7 +34,7 @@ impl Model {
         Self::mirrored(points, specs, settings, Mirrors::default())
     }
 
-    /// The same for the part of a model that mirror planes bound, with its ghosts among the points.
+    /// The same for the part of a model that mirror planes bound, with its ghosts among the points. Long, as it names each field of a model.
     ///
     /// # Errors
     /// As [`Model::new`].
@@ -114,39 +114,12 @@ impl Model {
             .iter()
             .map(|c| c.map(|k| spec.nodes[k as usize]))
             .collect();
-        let mesh = QuadMesh {
-            points: self.state.x.clone(),
-            cells: cells.clone(),
-        };
-        let shift = |c: u32| {
-            if c == NONE || mirrored_in(c).is_some() {
-                c
-            } else {
-                c + cell0 as u32
-            }
-        };
-        let mut neighbours = mesh.neighbours();
-        self.topology
-            .mirroring
-            .mark(&cells, &self.state.x, &mut neighbours);
-        self.topology
-            .neighbours
-            .extend(neighbours.into_iter().map(|e| e.map(shift)));
+        self.add_neighbours(&cells);
         let material = spec.element.material.reference().sizes();
         let s = spec.element.sizes;
         let rotates = spec.element.rotates();
         check_elsewhere(&spec)?;
-        let centres: Vec<Vec3> = cells
-            .iter()
-            .map(|c| {
-                scale(
-                    c.iter()
-                        .fold([0.0; 3], |m, n| add(m, self.state.x[*n as usize])),
-                    0.25,
-                )
-            })
-            .collect();
-        let orders = orders(&spec, &centres);
+        let orders = orders(&spec, &self.centres(&cells));
         self.topology
             .cell_place
             .resize(cell0 + cells.len(), CellPlace::default());
@@ -154,24 +127,7 @@ impl Model {
         self.topology
             .pressed_below
             .extend((0..cells.len()).map(pressed));
-        let groups = (orders.iter()).flat_map(|(e, o)| o.chunks(BLOCK * LANES).map(|g| (*e, g)));
-        for (kind, group) in groups {
-            let used = group.iter().flat_map(|c| cells[*c as usize]);
-            let mut block = Block::new(used);
-            for (b, chunk) in group.chunks(LANES).enumerate() {
-                for (l, c) in chunk.iter().enumerate() {
-                    self.topology.cell_place[cell0 + *c as usize] = CellPlace {
-                        block: self.elements.blocks.len() as u32,
-                        batch: b as u16,
-                        lane: l as u16,
-                    };
-                }
-                let of = (sheet_index, kind);
-                let batch = element_batch(of, &spec, &cells, chunk, &block);
-                block.batches.push(batch);
-            }
-            self.elements.blocks.push(block);
-        }
+        self.add_blocks(sheet_index, &spec, &cells, &orders);
         if rotates && self.state.rotations.is_none() {
             self.state.rotations = Some(Box::new(Rotations::new(self.state.x.len())));
         }
@@ -200,6 +156,66 @@ impl Model {
         )?;
         self.topology.sheets.push(sheet);
         Ok(())
+    }
+
+    fn centres(&self, cells: &[[u32; 4]]) -> Vec<Vec3> {
+        let sum = |c: &[u32; 4]| {
+            c.iter()
+                .fold([0.0; 3], |m, n| add(m, self.state.x[*n as usize]))
+        };
+        cells.iter().map(|c| scale(sum(c), 0.25)).collect()
+    }
+
+    /// Cells across the sides of the `cells` that a new sheet adds.
+    fn add_neighbours(&mut self, cells: &[[u32; 4]]) {
+        let cell0 = self.topology.cells.len() as u32;
+        let mesh = QuadMesh {
+            points: self.state.x.clone(),
+            cells: cells.to_vec(),
+        };
+        let shift = |c: u32| {
+            if c == NONE || mirrored_in(c).is_some() {
+                c
+            } else {
+                c + cell0
+            }
+        };
+        let mut neighbours = mesh.neighbours();
+        self.topology
+            .mirroring
+            .mark(cells, &self.state.x, &mut neighbours);
+        self.topology
+            .neighbours
+            .extend(neighbours.into_iter().map(|e| e.map(shift)));
+    }
+
+    /// Elements of the `cells` of a new sheet, in the order in which they shall stand in memory.
+    fn add_blocks(
+        &mut self,
+        sheet: u32,
+        spec: &SheetSpec,
+        cells: &[[u32; 4]],
+        orders: &[(Kind, Vec<u32>)],
+    ) {
+        let cell0 = self.topology.cells.len();
+        let groups = (orders.iter()).flat_map(|(e, o)| o.chunks(BLOCK * LANES).map(|g| (*e, g)));
+        for (kind, group) in groups {
+            let used = group.iter().flat_map(|c| cells[*c as usize]);
+            let mut block = Block::new(used);
+            for (b, chunk) in group.chunks(LANES).enumerate() {
+                for (l, c) in chunk.iter().enumerate() {
+                    self.topology.cell_place[cell0 + *c as usize] = CellPlace {
+                        block: self.elements.blocks.len() as u32,
+                        batch: b as u16,
+                        lane: l as u16,
+                    };
+                }
+                let of = (sheet, kind);
+                let batch = element_batch(of, spec, cells, chunk, &block);
+                block.batches.push(batch);
+            }
+            self.elements.blocks.push(block);
+        }
     }
 
     fn add_patches(
@@ -242,7 +258,7 @@ impl Model {
         Ok(())
     }
 
-    /// A batch of the patches `of(lane)`, of which `count` count.
+    /// A batch of the patches `of(lane)`, of which `count` count. Long, as it writes out the table of a call to the element, with a line for each array.
     fn patch_batch<'a>(
         &self,
         sheet: u32,
@@ -308,102 +324,6 @@ impl Model {
         batch.nodes.truncate(used.unwrap_or(0));
         batch.places.truncate(used.unwrap_or(0));
         Ok(batch)
-    }
-
-    /// Constants and masses of a sheet, with mass scaling to the wanted step and areal mass.
-    fn initialise(
-        &mut self,
-        sheet: &mut Sheet,
-        axis: Vec3,
-        orders: &[(Kind, Vec<u32>)],
-        least: &[f64],
-        areal_mass: f64,
-    ) -> Result<(), MechanicsError> {
-        let axis: Vec<f64> = (0..3 * LANES).map(|k| axis[k / LANES]).collect();
-        let axis = Aligned::from(axis.as_slice());
-        let mut position = Aligned::zeros(12 * LANES);
-        let mut force = Aligned::zeros(12 * LANES);
-        let mut moment = Aligned::zeros(12 * LANES);
-        let mut energy = Aligned::zeros(PF_ENERGIES * LANES);
-        let mut step = Aligned::zeros(LANES);
-        let mut mass = Aligned::zeros(4 * LANES);
-        let mut inertia = Aligned::zeros(4 * LANES);
-        let rates = Rates::zero();
-        let blocks = &mut self.elements.blocks[sheet.block_range.0..sheet.block_range.1];
-        let batches = blocks.iter_mut().flat_map(|b| &mut b.batches);
-        let mut shared = Shared::default();
-        let cells = orders.iter().flat_map(|(_, order)| order.chunks(LANES));
-        let mut added_mass = 0.0;
-        for (batch, cells) in batches.zip(cells) {
-            let element = sheet.element_of(batch);
-            gather(&batch.nodes, &self.state.x, &mut position);
-            let mut constants = Aligned::zeros(element.sizes.constants * LANES);
-            let mut raw = empty_element_batch(element, 0.0, &position);
-            raw.axis = axis.as_ptr();
-            raw.constants = constants.as_mut_ptr();
-            raw.history = batch.history.as_mut_ptr();
-            raw.material_history = batch.material_history.as_mut_ptr();
-            mass.fill(0.0);
-            inertia.fill(0.0);
-            raw.mass = mass.as_mut_ptr();
-            if element.rotates() {
-                raw.inertia = inertia.as_mut_ptr();
-            }
-            // SAFETY: arrays of this function for 4 nodes and `LANES` lanes, and the batch's own, which were made for this element's sizes; all are
-            // aligned, and borrowed by nobody else until the next call has ended.
-            let code = unsafe { element.initialise(&raw) };
-            component_status(code, &sheet.name)?;
-            raw.axis = std::ptr::null();
-            raw.mass = std::ptr::null_mut();
-            raw.inertia = std::ptr::null_mut();
-            if element.rotates() {
-                rates.attach(&mut raw);
-                raw.moment = moment.as_mut_ptr();
-            }
-            raw.force = force.as_mut_ptr();
-            raw.energy = energy.as_mut_ptr();
-            raw.critical_step = step.as_mut_ptr();
-            // SAFETY: as above, with the arrays of this call.
-            let code = unsafe { element.forces(&raw) };
-            component_status(code, &sheet.name)?;
-            batch.constants = shared.keep(constants);
-            let batch_layers = std::mem::take(&mut batch.layers);
-            let layers = |l: usize| batch_layers.get(l).copied().unwrap_or(1.0);
-            let mut factors = [1.0; LANES];
-            for l in 0..batch.count as usize {
-                let critical = step[l] * self.topology.settings.safety;
-                if !(critical > 0.0 && critical.is_finite()) {
-                    return Err(MechanicsError::Input(format!(
-                        "sheet '{}': an element has a critical step of {} s; its mesh or \
-                         material makes no sense",
-                        sheet.name, step[l]
-                    )));
-                }
-                let factor = (self.topology.settings.target_step / critical)
-                    .powi(2)
-                    .max(least[cells[l] as usize] / areal_mass)
-                    .max(1.0);
-                factors[l] = factor;
-                for k in 0..4 {
-                    let own = mass[k * LANES + l] * layers(l);
-                    let node = batch.nodes[k][l] as usize;
-                    self.topology.mass[node] += own * factor;
-                    self.topology.own_mass[node] += own;
-                    if let Some(r) = self.state.rotations.as_deref_mut()
-                        && element.rotates()
-                    {
-                        r.inertia[node] += inertia[k * LANES + l] * layers(l) * factor;
-                    }
-                    added_mass += own * (factor - 1.0);
-                }
-            }
-            batch.layers = batch_layers;
-            if factors != [1.0; LANES] {
-                batch.mass_factor = factors.to_vec();
-            }
-        }
-        sheet.added_mass = added_mass;
-        Ok(())
     }
 
     fn finish(&mut self) -> Result<(), MechanicsError> {

@@ -10,6 +10,7 @@ mod build;
 #[cfg(test)]
 mod critical;
 mod drive;
+mod masses;
 mod mirror;
 mod parts;
 mod planes;
@@ -111,15 +112,7 @@ impl Model {
     /// other. With one such wait for each contact, a small bag's threads waited for a tenth of the time and more. Gives whether the forces
     /// are on the nodes already, as one thread puts them there while the contacts are in its cache.
     fn compute_contacts(&mut self) -> bool {
-        // Both bodies may move so, and speeds and accelerations may grow while a node sleeps. 5 m/s is more than a film
-        // picks up under 1 bar over the gaps for which a node sleeps more than a few steps; 10 km/s2 is what 1 bar
-        // does to 10 kg/m2.
-        let pace = Pace {
-            dt: self.state.dt,
-            speed: 2.0 * (2.0 * self.state.max_speed).max(5.0),
-            acceleration: 2.0 * (2.0 * self.state.max_acceleration).max(1e4),
-            growth: self.growth(),
-        };
+        let pace = self.pace();
         self.boundary.last_above = self.boundary.pressures.above;
         let surface = Surface {
             cells: &self.topology.cells,
@@ -175,6 +168,18 @@ impl Model {
         }
         self.count_contacts();
         alone
+    }
+
+    /// How fast bodies may come to each other. Both may move so, and speeds and accelerations may grow while a node sleeps. 5 m/s is more
+    /// than a film picks up under 1 bar over the gaps for which a node sleeps more than a few steps; 10 km/s2 is what 1 bar does to
+    /// 10 kg/m2.
+    fn pace(&self) -> Pace {
+        Pace {
+            dt: self.state.dt,
+            speed: 2.0 * (2.0 * self.state.max_speed).max(5.0),
+            acceleration: 2.0 * (2.0 * self.state.max_acceleration).max(1e4),
+            growth: self.growth(),
+        }
     }
 
     /// The pressure on the stack over that of the last step, for [`Pace::growth`]: sheets in a bag press on each other in proportion to it. Both are

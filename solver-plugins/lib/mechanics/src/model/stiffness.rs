@@ -1,13 +1,83 @@
 //! How stiff contacts are, from the masses that they couple and the step.
 
+use super::mirror::Mirroring;
 use super::parts::Model;
 use crate::contact::{
     ContactSettings, FoldSpec, SelfContact, SheetContact, WHOLE, ledge, rim_height,
 };
 use crate::mesh::NONE;
+use std::ops::Range;
 
 /// Share of the thinner sheet from which on a contact is deep ([`SheetContact::deep`]).
 const DEEP: f64 = 0.1;
+
+/// Masses of nodes (kg): of the whole node where a mirror plane cuts it, so that contacts there are as stiff as in the whole model.
+struct Masses<'a> {
+    mass: &'a [f64],
+    mirroring: &'a Mirroring,
+}
+
+impl Masses<'_> {
+    fn whole(&self, n: u32) -> f64 {
+        self.mass[n as usize] / self.mirroring.share(n)
+    }
+
+    /// Of a node against a cell, what counts of it in the model.
+    fn reduced(&self, node: u32, cell: [u32; 4]) -> f64 {
+        let whole = |n: u32| self.whole(n);
+        let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
+        self.mirroring.share(node) / (1.0 / whole(node) + 1.0 / lightest)
+    }
+
+    /// Sets the stiffness of the items of a contact, and adds it to the `row` of each node that it acts on.
+    fn stiffen(
+        &self,
+        contact: &mut SheetContact,
+        cells: &[[u32; 4]],
+        c: &ContactSettings,
+        dt2: f64,
+        row: &mut [f64],
+    ) {
+        let whole = |n: u32| self.whole(n);
+        let augmentation = contact.augmentation;
+        let (share, counted) = (contact.share, contact.counted);
+        for item in contact.items.iter_mut().filter(|i| i.cell != NONE) {
+            let nodes = cells[item.cell as usize];
+            let (slave, master) = (whole(item.node), nodes.map(whole).iter().sum::<f64>() / 4.0);
+            let most = c.largest_augmentation(slave.min(master) / slave.max(master));
+            item.follows = (f64::from(WHOLE) * (most / augmentation).min(1.0)) as u8;
+            // None at all would leave every load to the penalty.
+            item.follows = item.follows.max(1);
+            item.stiffness = share * c.stiffness_factor * self.reduced(item.node, nodes) / dt2;
+            row[item.node as usize] += counted * item.stiffness;
+            for (k, n) in nodes.iter().enumerate() {
+                row[*n as usize] += counted * item.weights()[k] * item.stiffness;
+            }
+        }
+    }
+}
+
+/// From which depth on a contact is deep, and how high the ledge at the rim of its master is, from the sheets' `thickness` by node (m).
+fn set_depths(
+    contact: &mut SheetContact,
+    cells: &[[u32; 4]],
+    thickness: &[f64],
+    heights: &[(Range<usize>, Option<f64>)],
+) {
+    let on = (contact.items.iter().map(|i| i.cell)).find(|c| *c != NONE);
+    let master = on.and_then(|c| heights.iter().find(|h| h.0.contains(&(c as usize))));
+    if let Some((_, Some(height))) = master {
+        contact.ledge = ledge(contact.offset, *height);
+    }
+    let items = contact.items.iter().filter(|i| i.cell != NONE);
+    // Where they are kept further apart than they are thick, what is between them is to spare.
+    let both = items.map(|i| {
+        let master = cells[i.cell as usize][0];
+        let [a, b] = [i.node, master].map(|n| thickness[n as usize]);
+        (contact.offset - 0.5 * (a + b)).max(0.0) + DEEP * a.min(b)
+    });
+    contact.deep = both.fold(f64::INFINITY, f64::min);
+}
 
 impl Model {
     /// Sets stiffness and damping of all contacts from the masses that they couple, and bounds the
@@ -15,34 +85,64 @@ impl Model {
     /// the stability bound 4 to the elements. Contacts that touch where others do not count less ([`SheetContact::counted`]).
     pub fn set_contact_stiffness(&mut self, c: &ContactSettings) {
         let dt2 = self.topology.settings.target_step.powi(2);
-        let mass = &self.topology.mass;
-        // Of the whole node where a mirror plane cuts it, so that contacts there are as stiff as in the whole model.
-        let mirroring = &self.topology.mirroring;
-        let whole = |n: u32| mass[n as usize] / mirroring.share(n);
-        let reduced = |node: u32, cell: [u32; 4]| {
-            let lightest = cell.map(whole).into_iter().fold(f64::INFINITY, f64::min);
-            mirroring.share(node) / (1.0 / whole(node) + 1.0 / lightest)
+        let masses = Masses {
+            mass: &self.topology.mass,
+            mirroring: &self.topology.mirroring,
         };
         let augmentation = c
             .augmentation
             .min(c.largest_augmentation(self.mass_ratio()));
-        let mut thickness = vec![f64::INFINITY; mass.len()];
+        let mut thickness = vec![f64::INFINITY; masses.mass.len()];
         for sheet in &self.topology.sheets {
             for node in &sheet.nodes {
                 thickness[*node as usize] = sheet.thickness;
             }
         }
-        let mut row = vec![0.0; mass.len()];
+        let heights = self.rim_heights();
+        let mut row = vec![0.0; masses.mass.len()];
         for contact in &mut self.contacts.rigid {
             contact.augmentation = augmentation;
             let nodes = contact.items.iter().map(|i| thickness[i.node as usize]);
             contact.deep = DEEP * nodes.fold(f64::INFINITY, f64::min);
             let (share, counted) = (contact.share, contact.counted);
             for item in &mut contact.items {
-                item.stiffness = share * c.stiffness_factor * mass[item.node as usize] / dt2;
+                let mass = masses.mass[item.node as usize];
+                item.stiffness = share * c.stiffness_factor * mass / dt2;
                 row[item.node as usize] += counted * item.stiffness;
             }
         }
+        let cells = &self.topology.cells;
+        for contact in &mut self.contacts.sheets {
+            contact.augmentation = augmentation;
+            set_depths(contact, cells, &thickness, &heights);
+            masses.stiffen(contact, cells, c, dt2, &mut row);
+        }
+        let limit: Vec<f64> = row
+            .iter()
+            .zip(masses.mass)
+            .map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0))
+            .collect();
+        for item in self.contacts.rigid.iter_mut().flat_map(|c| &mut c.items) {
+            let m = masses.mass[item.node as usize];
+            item.stiffness *= limit[item.node as usize];
+            item.damping = (2.0 * c.damping_ratio * (item.stiffness * m).sqrt()) as f32;
+        }
+        for item in self.contacts.sheets.iter_mut().flat_map(|c| &mut c.items) {
+            if item.cell == NONE {
+                continue;
+            }
+            let nodes = cells[item.cell as usize];
+            let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
+            item.stiffness *= least.min(limit[item.node as usize]);
+            let reduced = masses.reduced(item.node, nodes);
+            item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
+        }
+        self.bound_contact_damping();
+        self.set_contact_room();
+    }
+
+    /// By sheet, its cells and how long (m) those at its rim are across it ([`rim_height`]).
+    fn rim_heights(&self) -> Vec<(Range<usize>, Option<f64>)> {
         let (cells, neighbours, x) = (
             &self.topology.cells,
             &self.topology.neighbours,
@@ -53,60 +153,7 @@ impl Model {
             let height = rim_height(&cells[from..to], &neighbours[from..to], x);
             (from..to, height)
         });
-        let heights: Vec<_> = heights.collect();
-        for contact in &mut self.contacts.sheets {
-            contact.augmentation = augmentation;
-            let on = (contact.items.iter().map(|i| i.cell)).find(|c| *c != NONE);
-            let master = on.and_then(|c| heights.iter().find(|h| h.0.contains(&(c as usize))));
-            if let Some((_, Some(height))) = master {
-                contact.ledge = ledge(contact.offset, *height);
-            }
-            let items = contact.items.iter().filter(|i| i.cell != NONE);
-            // Where they are kept further apart than they are thick, what is between them is to spare.
-            let both = items.map(|i| {
-                let master = self.topology.cells[i.cell as usize][0];
-                let [a, b] = [i.node, master].map(|n| thickness[n as usize]);
-                (contact.offset - 0.5 * (a + b)).max(0.0) + DEEP * a.min(b)
-            });
-            contact.deep = both.fold(f64::INFINITY, f64::min);
-            let (share, counted) = (contact.share, contact.counted);
-            for item in contact.items.iter_mut().filter(|i| i.cell != NONE) {
-                let nodes = self.topology.cells[item.cell as usize];
-                let (slave, master) =
-                    (whole(item.node), nodes.map(whole).iter().sum::<f64>() / 4.0);
-                let most = c.largest_augmentation(slave.min(master) / slave.max(master));
-                item.follows = (f64::from(WHOLE) * (most / augmentation).min(1.0)) as u8;
-                // None at all would leave every load to the penalty.
-                item.follows = item.follows.max(1);
-                item.stiffness = share * c.stiffness_factor * reduced(item.node, nodes) / dt2;
-                row[item.node as usize] += counted * item.stiffness;
-                for (k, n) in nodes.iter().enumerate() {
-                    row[*n as usize] += counted * item.weights()[k] * item.stiffness;
-                }
-            }
-        }
-        let limit: Vec<f64> = row
-            .iter()
-            .zip(mass)
-            .map(|(r, m)| (0.7 * m / (dt2 * r.max(1e-300))).min(1.0))
-            .collect();
-        for item in self.contacts.rigid.iter_mut().flat_map(|c| &mut c.items) {
-            let m = mass[item.node as usize];
-            item.stiffness *= limit[item.node as usize];
-            item.damping = (2.0 * c.damping_ratio * (item.stiffness * m).sqrt()) as f32;
-        }
-        for item in self.contacts.sheets.iter_mut().flat_map(|c| &mut c.items) {
-            if item.cell == NONE {
-                continue;
-            }
-            let nodes = self.topology.cells[item.cell as usize];
-            let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
-            item.stiffness *= least.min(limit[item.node as usize]);
-            let reduced = reduced(item.node, nodes);
-            item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
-        }
-        self.bound_contact_damping();
-        self.set_contact_room();
+        heights.collect()
     }
 
     /// The least share that the heaviest node of the lighter one of two sheets in contact has of the other's.

@@ -9,7 +9,7 @@ use plyflow_characterisation::cantilever::{
     stiffness,
 };
 use plyflow_characterisation::confidence::student;
-use plyflow_characterisation::csv::{Column, read};
+use plyflow_characterisation::csv::{Column, Table, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::Output;
 use plyflow_fixed::FixedBits;
@@ -56,6 +56,38 @@ fn warn(host: &Host, mean: f64, deviation: f64) {
     }
 }
 
+/// The angle (rad) of the specimens that have none of their own.
+fn angle(p: &Parameters, table: &Table) -> Result<f64, StepError> {
+    match (p.angle, p.formula) {
+        (Some(angle), _) => Ok(angle),
+        (None, Formula::Standard) => Ok(STANDARD_ANGLE),
+        (None, Formula::Peirce) if table.column("angle").is_some() => Ok(STANDARD_ANGLE),
+        (None, Formula::Peirce) => {
+            Err(format!(
+                "{}: the angle of the secant is not told, and 'peirce' hangs on it (the stiffness at 7.1 deg is 7.6 times that of the same \
+                 overhang at 41.5 deg); give a column `angle [deg]` or the parameter `angle`",
+                table.source
+            )
+            .into())
+        }
+    }
+}
+
+/// The stiffness of each specimen, and their mean.
+fn plot(out: &mut Output) {
+    let number = "curves/specimens/number";
+    out.plot(
+        "stiffness",
+        "Bending stiffness by specimen",
+        ("specimen", "1"),
+        ("bending stiffness", "N mm"),
+        vec![
+            Series::new("measured", number, "curves/specimens/stiffness").drawn(Style::Points),
+            Series::new("mean", number, "curves/specimens/mean").drawn(Style::Dashed),
+        ],
+    );
+}
+
 impl Step for CharacteriseCantilever {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
@@ -66,19 +98,7 @@ impl Step for CharacteriseCantilever {
         let table = read(&p.overhangs, &COLUMNS)?;
         table.at_least(1, "a stiffness")?;
         let overhangs = table.values("overhang")?;
-        let given = match (p.angle, p.formula) {
-            (Some(angle), _) => angle,
-            (None, Formula::Standard) => STANDARD_ANGLE,
-            (None, Formula::Peirce) if table.column("angle").is_some() => STANDARD_ANGLE,
-            (None, Formula::Peirce) => {
-                return Err(format!(
-                    "{}: the angle of the secant is not told, and 'peirce' hangs on it (the stiffness at 7.1 deg is 7.6 times that of the same \
-                     overhang at 41.5 deg); give a column `angle [deg]` or the parameter `angle`",
-                    table.source
-                )
-                .into());
-            }
-        };
+        let given = angle(&p, &table)?;
         let mut stiffnesses = Vec::new();
         for (i, overhang) in overhangs.iter().enumerate() {
             let angle = table.column("angle").map_or(given, |a| a[i]);
@@ -95,17 +115,7 @@ impl Step for CharacteriseCantilever {
         out.curve("curves/specimens/overhang", "m", overhangs);
         out.curve("curves/specimens/stiffness", "N m", &stiffnesses);
         out.curve("curves/specimens/mean", "N m", &vec![mean; n]);
-        let number = "curves/specimens/number";
-        out.plot(
-            "stiffness",
-            "Bending stiffness by specimen",
-            ("specimen", "1"),
-            ("bending stiffness", "N mm"),
-            vec![
-                Series::new("measured", number, "curves/specimens/stiffness").drawn(Style::Points),
-                Series::new("mean", number, "curves/specimens/mean").drawn(Style::Dashed),
-            ],
-        );
+        plot(&mut out);
         let relative = if mean > 0.0 {
             100.0 * deviation / mean
         } else {

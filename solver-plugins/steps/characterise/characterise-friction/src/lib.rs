@@ -78,25 +78,46 @@ fn warn(host: &Host, source: &str, pull: &Pull, window: [f64; 2]) {
     }
 }
 
+/// The force (N) that presses the sled down.
+fn normal_force(p: &Parameters) -> Result<f64, StepError> {
+    match (p.normal_force, p.sled_mass) {
+        (Some(force), None) => Ok(force),
+        (None, Some(mass)) => Ok(mass * GRAVITY),
+        (Some(_), Some(_)) => {
+            Err("both `normal_force` and `sled_mass` are given; give one of them".into())
+        }
+        (None, None) => {
+            Err("neither `normal_force` nor `sled_mass` is given; give one of them".into())
+        }
+    }
+}
+
+/// A line for a scene's `friction`: the coefficient with its deviation, from so many pulls, and what is known of the static peak.
+fn fragment(pair: &str, pulls: usize, dynamic: [f64; 2], peak: Option<[f64; 2]>) -> String {
+    let [mean, deviation] = dynamic.map(significant);
+    let peak = peak.map_or_else(String::new, |p| {
+        format!("; static peak {}", significant(p[0]))
+    });
+    format!(
+        "# Dynamic coefficient from {pulls} pulls, standard deviation {deviation}{peak}.\n\
+         # A fragment: its line goes into `friction:` of a scene.\nfriction:\n  {pair}: {mean}\n"
+    )
+}
+
+/// Of several pulls their spread; it has what one pull tells of itself in it.
+fn error_of(pulls: &[Pull], deviation: f64) -> f64 {
+    match pulls {
+        [only] => only.error,
+        _ => student(pulls.len() - 1) * deviation / (pulls.len() as f64).sqrt(),
+    }
+}
+
 impl Step for CharacteriseFriction {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
         let p: Parameters = host.parameters()?;
-        let normal = match (p.normal_force, p.sled_mass) {
-            (Some(force), None) => force,
-            (None, Some(mass)) => mass * GRAVITY,
-            (Some(_), Some(_)) => {
-                return Err(
-                    "both `normal_force` and `sled_mass` are given; give one of them".into(),
-                );
-            }
-            (None, None) => {
-                return Err(
-                    "neither `normal_force` nor `sled_mass` is given; give one of them".into(),
-                );
-            }
-        };
+        let normal = normal_force(&p)?;
         if p.pulls.is_empty() {
             return Err("`pulls` is empty; give at least one CSV file of a pull".into());
         }
@@ -137,30 +158,12 @@ impl Step for CharacteriseFriction {
             y,
             series,
         );
-        out.file(
-            "friction.yaml",
-            &format!(
-                "# Dynamic coefficient from {} pulls, standard deviation {}{}.\n\
-                 # A fragment: its line goes into `friction:` of a scene.\nfriction:\n  {}: {}\n",
-                pulls.len(),
-                significant(dynamic_deviation),
-                peak.map_or_else(String::new, |p| format!(
-                    "; static peak {}",
-                    significant(p[0])
-                )),
-                p.pair,
-                significant(dynamic)
-            ),
-        );
+        let text = fragment(&p.pair, pulls.len(), [dynamic, dynamic_deviation], peak);
+        out.file("friction.yaml", &text);
         out.about.pair = Some(p.pair);
         out.result("dynamic_coefficient", dynamic, "1");
         out.result("dynamic_deviation", dynamic_deviation, "1");
-        // Of several pulls their spread; it has what one pull tells of itself in it.
-        let error = match pulls[..] {
-            [only] => only.error,
-            _ => student(pulls.len() - 1) * dynamic_deviation / (pulls.len() as f64).sqrt(),
-        };
-        out.result("dynamic_error", error, "1");
+        out.result("dynamic_error", error_of(&pulls, dynamic_deviation), "1");
         if let Some([mean, deviation]) = peak {
             out.result("static_coefficient", mean, "1");
             out.result("static_deviation", deviation, "1");

@@ -153,9 +153,21 @@ pub fn measure_ways(
         Yardstick::Reference => Way::new("reference", ".reference", &reference),
         Yardstick::Zones => Way::new("total", "", &both),
     });
-    // What was run on the way to them, as in their costs.
+    add_costs(&mut measured.ways, models, passed_over);
+    if yardstick == Yardstick::Reference {
+        for m in local {
+            let mut way = Way::new(&m.name, &format!(".{}", m.name), &[m]);
+            way.errors = fields(&[m], &reference, zones);
+            measured.local.push(way);
+        }
+    }
+    Ok(measured)
+}
+
+/// Adds to each way what was run on the way to it, as in its costs.
+fn add_costs(ways: &mut [Way], models: &[Model], passed_over: &PassedOver) {
     let late = passed_over.global_began_late(models);
-    for way in &mut measured.ways {
+    for way in ways {
         if matches!(way.model.as_str(), "global" | "total") {
             way.began_late = late;
         }
@@ -165,14 +177,6 @@ pub fn measure_ways(
             _ => 0.0,
         };
     }
-    if yardstick == Yardstick::Reference {
-        for m in local {
-            let mut way = Way::new(&m.name, &format!(".{}", m.name), &[m]);
-            way.errors = fields(&[m], &reference, zones);
-            measured.local.push(way);
-        }
-    }
-    Ok(measured)
 }
 
 /// How far the fields of a way are from the reference; from fine runs of zones that stand in for it, each in its zone.

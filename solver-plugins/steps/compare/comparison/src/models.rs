@@ -83,6 +83,18 @@ impl PassedOver {
         global.began_late.filter(|_| !self.earlier_from_start)
     }
 
+    /// Counts what a run of an earlier pass took.
+    fn add_earlier(
+        &mut self,
+        host: &Host,
+        input: &Input,
+        formed: &Forming,
+    ) -> Result<(), StepError> {
+        self.earlier_cycles += cycles(formed);
+        self.earlier_from_start |= is_from_start(host, input, formed)?;
+        Ok(())
+    }
+
     /// All of them.
     pub fn all(&self) -> impl Iterator<Item = &Input> {
         self.superseded.iter().chain(&self.earlier)
@@ -101,18 +113,14 @@ pub fn read_models(
     superseded: &[Zone],
     settings: &Settings,
 ) -> Result<(Vec<Model>, PassedOver), StepError> {
-    let mut passed_over = PassedOver {
-        earlier: host.inputs_of("global")?,
-        ..Default::default()
-    };
-    let global = passed_over.earlier.pop();
-    let global = global.ok_or("global: no run arrives")?;
-    passed_over.earlier_coarse = passed_over.earlier.len();
-    for input in &passed_over.earlier {
-        let formed: Forming = host.attributes(input)?;
-        passed_over.earlier_cycles += cycles(&formed);
-        passed_over.earlier_from_start |= is_from_start(host, input, &formed)?;
+    let mut passed_over = PassedOver::default();
+    let mut earlier = host.inputs_of("global")?;
+    let global = earlier.pop().ok_or("global: no run arrives")?;
+    for input in &earlier {
+        passed_over.add_earlier(host, input, &host.attributes(input)?)?;
     }
+    passed_over.earlier_coarse = earlier.len();
+    passed_over.earlier = earlier;
     let passes = 1 + passed_over.earlier.len();
     let tool = of_run::tool(host, &global)?;
     let mut models = vec![read(host, global, Role::Global, None, &tool, settings)?];
@@ -150,8 +158,7 @@ pub fn read_models(
     for input in host.inputs_of("earlier")? {
         let formed: Forming = host.attributes(&input)?;
         passed_over.earlier_coarse += usize::from(formed.zone.is_none());
-        passed_over.earlier_cycles += cycles(&formed);
-        passed_over.earlier_from_start |= is_from_start(host, &input, &formed)?;
+        passed_over.add_earlier(host, &input, &formed)?;
         passed_over.earlier.push(input);
     }
     Ok((models, passed_over))

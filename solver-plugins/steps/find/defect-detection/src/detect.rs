@@ -78,18 +78,11 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
         .iter()
         .map(|d| d.judged && d.value > t.distance_threshold)
         .collect();
-    let over_shear: Vec<bool> = ply
-        .shear_angle
-        .iter()
-        .map(|&g| g > t.over_shear_positive || g < t.over_shear_negative)
-        .collect();
+    let is_over = |&g: &f64| g > t.over_shear_positive || g < t.over_shear_negative;
+    let over_shear: Vec<bool> = ply.shear_angle.iter().map(is_over).collect();
+    let is_poor = |&i: &u32| poor_conformity[i as usize];
     let poor: Vec<bool> = (0..ply.topology.cells())
-        .map(|c| {
-            ply.topology
-                .cell(c)
-                .iter()
-                .any(|&i| poor_conformity[i as usize])
-        })
+        .map(|c| ply.topology.cell(c).iter().any(is_poor))
         .collect();
     let flag: Vec<bool> = over_shear
         .iter()
@@ -106,24 +99,18 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
             .map(|(a, _)| a)
             .fold(0.0, |sum, a| sum + a)
     };
+    let shear = |pick: fn(f64, f64) -> f64| {
+        let angles = ply.shear_angle.iter().copied();
+        angles.reduce(pick).unwrap_or(0.0)
+    };
     let judged = distances.iter().filter(|d| d.judged).map(|d| d.value);
     let summary = PlyDefects {
         name: ply.name.to_owned(),
         flagged_area: area(&flag),
         over_shear_area: area(&over_shear),
         poor_conformity_area: area(&poor),
-        shear_min: ply
-            .shear_angle
-            .iter()
-            .copied()
-            .reduce(f64::min)
-            .unwrap_or(0.0),
-        shear_max: ply
-            .shear_angle
-            .iter()
-            .copied()
-            .reduce(f64::max)
-            .unwrap_or(0.0),
+        shear_min: shear(f64::min),
+        shear_max: shear(f64::max),
         distance_max: judged.reduce(f64::max).unwrap_or(0.0),
         undraped_area: None,
         locked_area: None,

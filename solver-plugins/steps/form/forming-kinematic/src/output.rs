@@ -4,7 +4,7 @@ use crate::net::{self, Fabric, Generators, Net, Stop};
 use crate::ply::{Draped, Ply, Stops, lay, plies, stops};
 use crate::root::drop_on;
 use crate::surface::SmoothSurface;
-use plyflow_geometry::vec3::distance;
+use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_model::artifact::{FieldError, Forming, MeshQuality, RigidBody, Sheet, SheetBody};
 use plyflow_model::budget::{self, Wanted};
@@ -169,6 +169,25 @@ struct Over<'a> {
     bed: f64,
 }
 
+/// Where the net of a ply begins on the tool, and the normal there.
+fn first_node(over: &Over<'_>, ply: &Ply, [x, y]: [f64; 2]) -> Result<(Vec3, Vec3), String> {
+    let (surface, [low, high]) = (over.surface, over.bounds);
+    let reach = 0.5 * (high[2] - low[2]).max(ply.offset) + 2.0 * ply.offset;
+    surface
+        .top(x, y)
+        .and_then(|(z, face)| drop_on(surface, [x, y, z], face, ply.offset, reach))
+        .ok_or_else(|| {
+            format!(
+                "ply '{}' cannot start at {}: the tool, which reaches from {} to {}, is not below it; give \
+                 another `start`",
+                ply.scene.name,
+                millimetres([x, y]),
+                millimetres([low[0], low[1]]),
+                millimetres([high[0], high[1]])
+            )
+        })
+}
+
 fn drape(
     host: &Host,
     p: &Parameters,
@@ -179,20 +198,7 @@ fn drape(
     let (surface, bed) = (over.surface, over.bed);
     let name = &ply.scene.name;
     let [x, y] = start_of(p, ply)?;
-    let [low, high] = over.bounds;
-    let reach = 0.5 * (high[2] - low[2]).max(ply.offset) + 2.0 * ply.offset;
-    let (place, normal) = surface
-        .top(x, y)
-        .and_then(|(z, face)| drop_on(surface, [x, y, z], face, ply.offset, reach))
-        .ok_or_else(|| {
-            format!(
-                "ply '{name}' cannot start at {}: the tool, which reaches from {} to {}, is not below it; give \
-                 another `start`",
-                millimetres([x, y]),
-                millimetres([low[0], low[1]]),
-                millimetres([high[0], high[1]])
-            )
-        })?;
+    let (place, normal) = first_node(over, ply, [x, y])?;
     let spacing = p.net_spacing.unwrap_or(0.25 * p.element_size);
     let fabric = Fabric {
         directions: ply.directions(),
@@ -360,6 +366,37 @@ fn warnings(p: &Parameters, d: &Done, unreached: usize) -> Vec<String> {
     texts
 }
 
+/// What the artifact says of the drape.
+fn forming(
+    p: &Parameters,
+    done: &[Done],
+    elements: u64,
+    field_error: FieldError,
+    warnings: Vec<String>,
+) -> Forming {
+    Forming {
+        scene: Some(p.scene.name.clone()),
+        sheets: done.iter().map(sheet).collect(),
+        contact_by_place: false,
+        symmetry: None,
+        element_size: p.element_size,
+        net_spacing: Some(p.net_spacing.unwrap_or(0.25 * p.element_size)),
+        zone: None,
+        time_step: None,
+        cycles: None,
+        element_cycles: None,
+        elements,
+        energy: None,
+        penetration: None,
+        overlap_bound: None,
+        overlap_peak_bound: None,
+        tool_field_error: [("tool".to_owned(), field_error)].into(),
+        depth: None,
+        depth_bound: None,
+        warnings,
+    }
+}
+
 fn write_summary(
     host: &Host,
     p: &Parameters,
@@ -395,27 +432,7 @@ fn write_summary(
     for w in &texts {
         host.log(Log::Warn, w);
     }
-    host.write_attributes(&Forming {
-        scene: Some(p.scene.name.clone()),
-        sheets: done.iter().map(sheet).collect(),
-        contact_by_place: false,
-        symmetry: None,
-        element_size: p.element_size,
-        net_spacing: Some(p.net_spacing.unwrap_or(0.25 * p.element_size)),
-        zone: None,
-        time_step: None,
-        cycles: None,
-        element_cycles: None,
-        elements: elements as u64,
-        energy: None,
-        penetration: None,
-        overlap_bound: None,
-        overlap_peak_bound: None,
-        tool_field_error: [("tool".to_owned(), field_error)].into(),
-        depth: None,
-        depth_bound: None,
-        warnings: texts,
-    })?;
+    host.write_attributes(&forming(p, done, elements as u64, field_error, texts))?;
     let strain = done.iter().map(|d| d.fibre_strain).fold(0.0, f64::max);
     let nodes = done.iter().map(|d| d.net_nodes).sum::<usize>() as f64;
     host.result("shear_max", high, "rad")?;

@@ -80,24 +80,15 @@ impl Step for BoundaryInterpolation {
         let input = host.input("formed")?;
         let run: Forming = host.attributes(&input)?;
         let meshes = host.meshes(&input)?;
-        if meshes.times.len() < 2 {
-            let n = meshes.times.len();
-            return Err(format!(
-                "'{}' has {n} frames; a motion needs at least 2. A kinematic drape is one state and cannot drive \
-                 a local run: take `formed` from a step such as forming-explicit",
-                input.step
-            )
-            .into());
-        }
+        check_frames(&input, meshes.times.len())?;
         let listed = &run.sheets;
         let joint = film_bounds(host, &input, &meshes, listed)?;
         let first = first_frame(host, &input, &meshes, listed, bounds, &p)?;
         let mut sheets = Vec::new();
         for (i, sheet) in listed.iter().enumerate() {
             host.check_cancelled()?;
-            let fraction = i as f64 / listed.len() as f64;
             host.progress(&Progress {
-                fraction,
+                fraction: i as f64 / listed.len() as f64,
                 phase: "reading the coarse motion",
                 ..Default::default()
             });
@@ -112,11 +103,7 @@ impl Step for BoundaryInterpolation {
             )?);
         }
         if sheets.is_empty() {
-            return Err(format!(
-                "no sheet of '{}' reaches into zone {} at {bounds:?} m",
-                input.step, zone.name
-            )
-            .into());
+            return Err(nothing_in(&input.step, &zone).into());
         }
         if !sheets.iter().any(|s| s.sheet.is_ply()) {
             return Err(too_small(&input.step, &zone, p.element_size).into());
@@ -492,10 +479,29 @@ fn write(host: &Host, times: &[f64], first: usize, sheets: &[Driven]) -> Result<
         .try_for_each(|s| write_sheet(host, times, first, s))
 }
 
+fn nothing_in(step: &str, zone: &Zone) -> String {
+    let (name, bounds) = (&zone.name, zone.bounds);
+    format!("no sheet of '{step}' reaches into zone {name} at {bounds:?} m")
+}
+
+/// That there is a motion.
+fn check_frames(input: &Input, n: usize) -> Result<(), StepError> {
+    if n < 2 {
+        return Err(format!(
+            "'{}' has {n} frames; a motion needs at least 2. A kinematic drape is one state and cannot drive \
+             a local run: take `formed` from a step such as forming-explicit",
+            input.step
+        )
+        .into());
+    }
+    Ok(())
+}
+
 /// Mesh and motion of a sheet.
 fn write_sheet(host: &Host, times: &[f64], first: usize, s: &Driven) -> Result<(), StepError> {
     let f = times.len() - first;
     let (k, n) = (s.fine.driven_nodes.len(), s.fine.points.len());
+    let at = |what: &str| format!("{}/{what}", s.sheet.name);
     host.define_mesh(
         &s.sheet.name,
         &s.fine.points,
@@ -503,11 +509,7 @@ fn write_sheet(host: &Host, times: &[f64], first: usize, s: &Driven) -> Result<(
         &s.fine.grid.cells,
         &PlainBody {},
     )?;
-    host.write_u32(
-        &format!("{}/driven_nodes", s.sheet.name),
-        &[k],
-        &s.fine.driven_nodes,
-    )?;
+    host.write_u32(&at("driven_nodes"), &[k], &s.fine.driven_nodes)?;
     let motion = [
         ("position", "m", "velocity", "m/s", Some(&s.position)),
         ("normal", "1", "normal_rate", "1/s", s.normal.as_ref()),
@@ -516,42 +518,17 @@ fn write_sheet(host: &Host, times: &[f64], first: usize, s: &Driven) -> Result<(
         let Some(values) = values else { continue };
         let slopes = spline_slopes(times, values, 3 * k);
         let [values, slopes] = [values, &slopes].map(|v| &v[3 * k * first..]);
-        host.write_f64(
-            &format!("{}/{what}", s.sheet.name),
-            &[f, k, 3],
-            unit,
-            values,
-        )?;
-        host.write_f64(
-            &format!("{}/{rate}", s.sheet.name),
-            &[f, k, 3],
-            rate_unit,
-            slopes,
-        )?;
+        host.write_f64(&at(what), &[f, k, 3], unit, values)?;
+        host.write_f64(&at(rate), &[f, k, 3], rate_unit, slopes)?;
     }
     if let Some(pull) = &s.pull {
-        host.write_f64(
-            &format!("{}/pull", s.sheet.name),
-            &[f, k, 3],
-            "N",
-            &pull.force[3 * k * first..],
-        )?;
-        host.write_f64(
-            &format!("{}/stiffness", s.sheet.name),
-            &[k],
-            "N/m",
-            &pull.stiffness,
-        )?;
+        host.write_f64(&at("pull"), &[f, k, 3], "N", &pull.force[3 * k * first..])?;
+        host.write_f64(&at("stiffness"), &[k], "N/m", &pull.stiffness)?;
     }
     if let Some(start) = &s.start {
         let shape = [start.states, n, 3];
-        host.write_f64(&format!("{}/path", s.sheet.name), &shape, "m", &start.path)?;
-        host.write_f64(
-            &format!("{}/start_velocity", s.sheet.name),
-            &[n, 3],
-            "m/s",
-            &start.velocity,
-        )?;
+        host.write_f64(&at("path"), &shape, "m", &start.path)?;
+        host.write_f64(&at("start_velocity"), &[n, 3], "m/s", &start.velocity)?;
     }
     Ok(())
 }
