@@ -18,6 +18,8 @@ import yaml
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs" / "pictures" / "make"))
 
+import determinism  # noqa: E402
+import recorded  # noqa: E402
 import runs  # noqa: E402
 import style  # noqa: E402
 
@@ -41,6 +43,9 @@ class Row:
         self.case, self.step = case, about["step"]
         # Of a comparison: the model that the row is about (`global`, `other.NAME`), or `zones` with the global run around them.
         self.of: str | None = about.get("of")
+        # In which way a step is repeated, see determinism.py; of which table of a record a row is, see recorded.py.
+        self.by: str | None = about.get("by")
+        self.table: str | None = about.get("table")
         self.element = about.get("element", "")
         self.right: dict = about.get("right", case.get("right", {}))
         self.stops: str | None = about.get("stops", case.get("stops"))
@@ -51,6 +56,8 @@ class Row:
         self.cost: float | None = None
 
     def name(self) -> str:
+        if self.by is not None:
+            return self.by if self.step == "all" else f"{self.by}_{self.step}"
         if self.of is None:
             return self.step
         scene = self.step.split("_")[0]
@@ -133,9 +140,19 @@ def run(name: str, rows: list[Row]) -> tuple[str, ...]:
         if row.of is not None:
             row.cost = row.results.get(f"cost.{'total' if row.of == 'zones' else row.of}.cpu_seconds")
             row.results = of_model(row.results, row.of)
+        if "pair" in row.case and row.failure is None:
+            row.results |= of_pair(runs.artifact(place, row.step).attributes["penetration"], row.case["pair"])
         if row.failure is None and not row.results:
             row.failure = "was not run, because a step that it needs failed"
     return place
+
+
+def of_pair(penetration: dict, pair: str) -> dict[str, float]:
+    """How deep a pair of bodies was in each other, and whether it ever touched."""
+    about = penetration.get(pair)
+    if about is None:
+        return {"pair_touches": 0}
+    return {"pair_touches": int(about["peak"]["max"] > 0.0), "pair_overlap": about["overlap"], "pair_overlap_peak": about["peak"]["overlap"]}
 
 
 def of_model(results: dict[str, float], of: str) -> dict[str, float]:
@@ -256,7 +273,14 @@ def main(names: list[str]) -> int:
         if names and case["name"] not in names:
             continue
         rows = [Row(case, about) for about in case["rows"]]
-        place = run(case["workflow"], rows)
+        if "record" in case:
+            recorded.read(case["record"], rows)
+            place = ()
+        elif any(r.by for r in rows):
+            determinism.measure(case["workflow"], rows, COSTS)
+            place = ()
+        else:
+            place = run(case["workflow"], rows)
         places = {row.step: place for row in rows}
         for row in rows:
             print(f"{case['name']:<24} {row.name():<28} {row.verdict().strip('*')}", flush=True)
