@@ -204,9 +204,10 @@ impl<'a> Run<'a> {
         let depths = self.watch.depths(&self.course.watched);
         let cycles = self.forming.model.cycle();
         let mut outcome = Outcome::of(self.course, depths, cycles, self.control.kinetic_bound);
-        outcome
-            .warnings
-            .extend(outcome.start_shift.and_then(late::too_late));
+        let at_end = outcome.health.kinetic_ratio_at_end;
+        let moving = diagnosis::still_moving(self.forming, at_end);
+        let late = outcome.start_shift.and_then(late::too_late);
+        outcome.warnings.extend(moving.into_iter().chain(late));
         Ok(outcome)
     }
 }

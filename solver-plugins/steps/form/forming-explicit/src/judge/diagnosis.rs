@@ -52,6 +52,21 @@ pub fn open_ledger(history: &[HistoryRow], end: f64, bound: f64) -> Option<Strin
     })
 }
 
+/// Kinetic over internal energy at the end above which something still moves. Parts at rest between diaphragms have 1e-9 to 5e-5.
+const AT_REST: f64 = 1e-4;
+
+/// What to say of a part that has not come to rest between its diaphragms, with this `ratio` of kinetic to internal energy. A press ends its stroke in motion.
+pub fn still_moving(forming: &Forming, ratio: f64) -> Option<String> {
+    (forming.load.press().is_none() && ratio > AT_REST).then(|| {
+        format!(
+            "the run has ended while the part was moving: kinetic energy is {:.1e} of internal energy, and {AT_REST:.0e} at most at rest. A sheet \
+             slips or snaps there, so what the end shows is not the end.{} Try a longer settling_time, 100 ms for instance",
+            ratio,
+            fastest(forming)
+        )
+    })
+}
+
 /// A text of what happened, where it shows, what the likely cause is and what to change. `what` opens it.
 pub fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
     let m = &forming.model;
