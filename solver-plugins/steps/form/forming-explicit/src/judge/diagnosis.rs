@@ -52,6 +52,26 @@ pub fn open_ledger(history: &[HistoryRow], end: f64, bound: f64) -> Option<Strin
     })
 }
 
+/// Share of the energy unaccounted for from which on a pair is named for it.
+const NAMED: f64 = 0.2;
+
+/// Which pair of bodies has made most of the energy that is unaccounted for, or lost it, if any has much of it.
+pub fn source(forming: &Forming, row: &HistoryRow) -> Option<String> {
+    let drift = row.ledger.drift();
+    let names = forming.model.interface_energies().map(|(name, _)| name);
+    let (name, made) = (names.zip(&row.interfaces))
+        .map(|(name, e)| (name, e.made()))
+        .max_by(|a, b| (a.1 * drift).total_cmp(&(b.1 * drift)))?;
+    (made * drift > NAMED * drift * drift).then(|| {
+        let what = if drift > 0.0 { "made" } else { "lost" };
+        format!(
+            "Most of it by contact of '{name}': {:.2e} J {what} of {:.2e} J",
+            made.abs(),
+            drift.abs()
+        )
+    })
+}
+
 /// Kinetic over internal energy at the end above which something still moves. Parts at rest between diaphragms have 1e-9 to 5e-5.
 const AT_REST: f64 = 1e-4;
 
@@ -84,6 +104,9 @@ pub fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
             100.0 * OPENING,
             row.time
         );
+    }
+    if let Some(source) = history.last().and_then(|r| source(forming, r)) {
+        let _ = write!(text, " {source}.");
     }
     let cell = weakest(forming);
     if let Some(c) = &cell {
