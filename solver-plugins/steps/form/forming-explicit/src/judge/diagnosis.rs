@@ -55,7 +55,7 @@ pub fn open_ledger(history: &[HistoryRow], end: f64, bound: f64) -> Option<Strin
 /// Share of the energy unaccounted for from which on a pair is named for it.
 const NAMED: f64 = 0.2;
 
-/// Which pair of bodies has made most of the energy that is unaccounted for, or lost it, if any has much of it.
+/// Which pair of bodies has made the largest part of the energy that is unaccounted for, or lost it, if any has much of it.
 pub fn source(forming: &Forming, row: &HistoryRow) -> Option<String> {
     let drift = row.ledger.drift();
     let names = forming.model.interface_energies().map(|(name, _)| name);
@@ -65,7 +65,7 @@ pub fn source(forming: &Forming, row: &HistoryRow) -> Option<String> {
     (made * drift > NAMED * drift * drift).then(|| {
         let what = if drift > 0.0 { "made" } else { "lost" };
         format!(
-            "Most of it by contact of '{name}': {:.2e} J {what} of {:.2e} J",
+            "The largest part by contact of '{name}': {:.2e} J {what} of {:.2e} J",
             made.abs(),
             drift.abs()
         )

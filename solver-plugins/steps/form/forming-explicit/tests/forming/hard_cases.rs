@@ -149,6 +149,33 @@ fn a_part_that_the_end_finds_in_motion_is_told_with_what_moves_fastest() {
     );
 }
 
+/// Two plies without any friction slide and swing between their films, and multipliers that are forgotten feed them (decision 4).
+#[test]
+fn energy_that_contacts_make_is_all_that_is_unaccounted_for_and_the_pair_is_named() {
+    let p = scenes::bag(2, |p| {
+        for mu in p["scene"]["friction"]
+            .as_object_mut()
+            .expect("a table")
+            .values_mut()
+        {
+            *mu = json!(0.0);
+        }
+        p["scene"]["process"]["double_diaphragm"]["drawing_time"] = json!("0.05 s");
+        p["frames"] = json!(10);
+        p["drift_bound"] = json!(1000.0);
+    });
+    let (_, outcome) = form(&p, 2);
+    let last = outcome.history.last().expect("rows");
+    let (drift, made) = (
+        last.ledger.drift(),
+        last.interfaces.iter().map(|e| e.made()).sum::<f64>(),
+    );
+    assert!(outcome.health.peak_drift_ratio > 0.01, "{drift}");
+    assert!((made - drift).abs() < 0.02 * drift.abs(), "{made} {drift}");
+    let told = |w: &String| w.contains("unaccounted") && w.contains("by contact of '");
+    assert!(outcome.warnings.iter().any(told), "{:?}", outcome.warnings);
+}
+
 #[test]
 fn four_plies_in_a_bag_stay_in_their_order() {
     let run = form(&bag(4, 0.012), 2);
