@@ -79,6 +79,8 @@ pub struct EnergyHealth {
     pub peak_drift_ratio: f64,
     /// Largest kinetic over internal, while internal is above 5 % of its largest value.
     pub peak_kinetic_ratio: f64,
+    /// Kinetic over internal at the end: of a part that has come to rest next to nothing.
+    pub kinetic_ratio_at_end: f64,
     /// Hourglass over internal at the end.
     pub hourglass_ratio: f64,
 }
@@ -95,11 +97,11 @@ pub fn judge(history: &[Ledger]) -> EnergyHealth {
         .map(|l| l.kinetic / l.internal())
         .fold(0.0, f64::max);
     let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
+    let at_end = |f: fn(&Ledger) -> f64| history.last().map_or(0.0, |l| ratio(f(l), l.internal()));
     EnergyHealth {
         peak_drift_ratio: ratio(peak(&|l| l.drift().abs()), peak_work),
         peak_kinetic_ratio: kinetic,
-        hourglass_ratio: history
-            .last()
-            .map_or(0.0, |l| ratio(l.hourglass, l.internal())),
+        kinetic_ratio_at_end: at_end(|l| l.kinetic),
+        hourglass_ratio: at_end(|l| l.hourglass),
     }
 }

@@ -127,7 +127,7 @@ impl Default for ContactSettings {
     }
 }
 
-/// What contacts did in a step (J): stored, lost to friction, lost to damping.
+/// What contacts did in a step (J): stored, lost to friction, lost to damping, and the work that was done on them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactEnergy {
     /// Stored in normal and slip springs.
@@ -136,6 +136,9 @@ pub struct ContactEnergy {
     pub friction: f64,
     /// Lost to damping in the step.
     pub damping: f64,
+    /// Mechanical work that was done on them in the step: by the mean of the forces before and after it. What is stored and lost beyond
+    /// the sum of it has come from nothing.
+    pub work: f64,
 }
 
 impl ContactEnergy {
@@ -145,13 +148,21 @@ impl ContactEnergy {
             stored: n * self.stored,
             friction: n * self.friction,
             damping: n * self.damping,
+            work: n * self.work,
         }
+    }
+
+    /// What they store and have lost beyond the work that was done on them (J): made from nothing, or below 0 lost without a word. Of energies
+    /// that are summed over steps, as those of [`crate::model::Model::interface_energies`] are.
+    pub fn made(&self) -> f64 {
+        self.stored + self.friction + self.damping - self.work
     }
 
     pub(super) fn add(&mut self, o: &Self) {
         self.stored += o.stored;
         self.friction += o.friction;
         self.damping += o.damping;
+        self.work += o.work;
     }
 }
 

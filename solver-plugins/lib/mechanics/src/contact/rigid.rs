@@ -567,7 +567,9 @@ fn touch<F: Coulomb>(
         stored: normal.stored,
         friction: 0.0,
         damping: normal.loss,
+        work: 0.0,
     };
+    let before = item.force;
     item.force = scale(g, normal.force);
     if !law.friction.is_smooth() {
         let vt = sub(v, scale(n, dot(v, n)));
@@ -590,6 +592,7 @@ fn touch<F: Coulomb>(
         energy.friction = f.friction;
         energy.damping += f.damping;
     }
+    energy.work = -0.5 * dot(add(before, item.force), v) * law.dt;
     item.normal_force = normal.force as f32;
     item.multiplier = normal.multiplier;
     item.work = normal.work;

@@ -474,6 +474,12 @@ fn react<F: Coulomb>(
         spring: spring * law.dt,
     };
     let f = sliding.friction(law.friction, law.dt, spring, damper);
+    let before = if item.active {
+        dot(item.force, rel)
+    } else {
+        0.0
+    };
+    let now = normal.force * vn + dot(f.force, rel);
     item.active = true;
     item.slip = f.slip;
     item.normal_force = normal.force;
@@ -487,6 +493,7 @@ fn react<F: Coulomb>(
             stored: normal.stored + f.stored,
             friction: f.friction,
             damping: normal.loss + f.damping,
+            work: -0.5 * (before + now) * law.dt,
         },
     }
 }

@@ -212,6 +212,7 @@ impl Model {
             i.stored = e.stored;
             i.friction += e.friction;
             i.damping += e.damping;
+            i.work += e.work;
         }
         self.state.ledger.friction += total.friction;
         self.state.ledger.damping += total.damping;

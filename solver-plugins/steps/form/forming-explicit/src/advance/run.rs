@@ -203,10 +203,14 @@ impl<'a> Run<'a> {
         self.add_row();
         let depths = self.watch.depths(&self.course.watched);
         let cycles = self.forming.model.cycle();
-        let mut outcome = Outcome::of(self.course, depths, cycles, self.control.kinetic_bound);
-        outcome
-            .warnings
-            .extend(outcome.start_shift.and_then(late::too_late));
+        let last = self.course.history.last();
+        let source = last.and_then(|r| diagnosis::source(self.forming, r));
+        let bound = self.control.kinetic_bound;
+        let mut outcome = Outcome::of(self.course, depths, cycles, bound, source);
+        let at_end = outcome.health.kinetic_ratio_at_end;
+        let moving = diagnosis::still_moving(self.forming, at_end);
+        let late = outcome.start_shift.and_then(late::too_late);
+        outcome.warnings.extend(moving.into_iter().chain(late));
         Ok(outcome)
     }
 }

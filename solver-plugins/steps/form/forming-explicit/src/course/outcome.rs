@@ -29,11 +29,18 @@ pub struct Outcome {
 
 impl Outcome {
     /// Of a run that has come to its end after `cycles` steps. `kinetic_bound`: kinetic over internal energy above which it is marked.
-    pub fn of(course: Course, depths: Vec<PairDepth>, cycles: u64, kinetic_bound: f64) -> Self {
+    /// `source`: whose contact energy unaccounted for comes from.
+    pub fn of(
+        course: Course,
+        depths: Vec<PairDepth>,
+        cycles: u64,
+        kinetic_bound: f64,
+        source: Option<String>,
+    ) -> Self {
         let ledgers: Vec<Ledger> = course.history.iter().map(|r| r.ledger).collect();
         let health = judge(&ledgers);
         Self {
-            warnings: warnings(&health, kinetic_bound),
+            warnings: warnings(&health, kinetic_bound, source.as_deref()),
             history: course.history,
             health,
             cycles,
@@ -48,7 +55,7 @@ impl Outcome {
 /// Share of the work from which on the user is told that it is unaccounted for.
 const DRIFT: f64 = 0.01;
 
-fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {
+fn warnings(h: &EnergyHealth, kinetic_bound: f64, source: Option<&str>) -> Vec<String> {
     let mut list = Vec::new();
     if h.peak_kinetic_ratio > kinetic_bound {
         list.push(format!(
@@ -60,8 +67,10 @@ fn warnings(h: &EnergyHealth, kinetic_bound: f64) -> Vec<String> {
     }
     if h.peak_drift_ratio > DRIFT {
         list.push(format!(
-            "{:.1} % of the external work is unaccounted for: reduce time_step or step_safety",
-            100.0 * h.peak_drift_ratio
+            "{:.1} % of the external work is unaccounted for: reduce time_step or step_safety{}{}",
+            100.0 * h.peak_drift_ratio,
+            if source.is_some() { ". " } else { "" },
+            source.unwrap_or_default()
         ));
     }
     if h.hourglass_ratio > 0.05 {

@@ -52,6 +52,41 @@ pub fn open_ledger(history: &[HistoryRow], end: f64, bound: f64) -> Option<Strin
     })
 }
 
+/// Share of the energy unaccounted for from which on a pair is named for it.
+const NAMED: f64 = 0.2;
+
+/// Which pair of bodies has made the largest part of the energy that is unaccounted for, or lost it, if any has much of it.
+pub fn source(forming: &Forming, row: &HistoryRow) -> Option<String> {
+    let drift = row.ledger.drift();
+    let names = forming.model.interface_energies().map(|(name, _)| name);
+    let (name, made) = (names.zip(&row.interfaces))
+        .map(|(name, e)| (name, e.made()))
+        .max_by(|a, b| (a.1 * drift).total_cmp(&(b.1 * drift)))?;
+    (made * drift > NAMED * drift * drift).then(|| {
+        let what = if drift > 0.0 { "made" } else { "lost" };
+        format!(
+            "The largest part by contact of '{name}': {:.2e} J {what} of {:.2e} J",
+            made.abs(),
+            drift.abs()
+        )
+    })
+}
+
+/// Kinetic over internal energy at the end above which something still moves. Parts at rest between diaphragms have 1e-9 to 5e-5.
+const AT_REST: f64 = 1e-4;
+
+/// What to say of a part that has not come to rest between its diaphragms, with this `ratio` of kinetic to internal energy. A press ends its stroke in motion.
+pub fn still_moving(forming: &Forming, ratio: f64) -> Option<String> {
+    (forming.load.press().is_none() && ratio > AT_REST).then(|| {
+        format!(
+            "the run has ended while the part was moving: kinetic energy is {:.1e} of internal energy, and {AT_REST:.0e} at most at rest. A sheet \
+             slips or snaps there, so what the end shows is not the end.{} Try a longer settling_time, 100 ms for instance",
+            ratio,
+            fastest(forming)
+        )
+    })
+}
+
 /// A text of what happened, where it shows, what the likely cause is and what to change. `what` opens it.
 pub fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
     let m = &forming.model;
@@ -69,6 +104,9 @@ pub fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
             100.0 * OPENING,
             row.time
         );
+    }
+    if let Some(source) = history.last().and_then(|r| source(forming, r)) {
+        let _ = write!(text, " {source}.");
     }
     let cell = weakest(forming);
     if let Some(c) = &cell {

@@ -27,10 +27,11 @@ pub fn write_energies(host: &Host, forming: &Forming, outcome: &Outcome) -> Resu
         ("bending", |e| e.bending),
         ("hourglass", |e| e.hourglass),
     ];
-    let interface: [Of<ContactEnergy>; 3] = [
+    let interface: [Of<ContactEnergy>; 4] = [
         ("stored", |e| e.stored),
         ("friction", |e| e.friction),
         ("damping", |e| e.damping),
+        ("work", |e| e.work),
     ];
     let write = |path: String, data: Vec<f64>| host.write_f64(&path, &[data.len()], "J", &data);
     let rows = &outcome.history;

@@ -180,6 +180,7 @@ fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<(
         pairs.map(|(p, peak)| f(p, peak)).fold(0.0, f64::max)
     };
     host.result("kinetic_ratio", h.peak_kinetic_ratio, "1")?;
+    host.result("kinetic_ratio_at_end", h.kinetic_ratio_at_end, "1")?;
     host.result("drift_ratio", h.peak_drift_ratio, "1")?;
     host.result("hourglass_ratio", h.hourglass_ratio, "1")?;
     host.result("penetration_max", worst(|p| p.largest), "m")?;

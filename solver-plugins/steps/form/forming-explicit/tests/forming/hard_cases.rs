@@ -125,11 +125,64 @@ fn steps_up_to_the_last_fiftieth_of_what_is_stable_give_the_same_ply() {
     assert!(mean < 2e-4, "{mean}");
 }
 
+/// What a run says when it ends before the part rests.
+fn told_to_move(outcome: &Outcome) -> Option<&String> {
+    let all = outcome.warnings.iter();
+    all.rev().find(|w| w.contains("while the part was moving"))
+}
+
+#[test]
+fn a_part_that_the_end_finds_in_motion_is_told_with_what_moves_fastest() {
+    let p = scenes::bag(1, |p| {
+        let process = &mut p["scene"]["process"]["double_diaphragm"];
+        process["drawing_time"] = json!("0.03 s");
+        process["settling_time"] = json!("0.001 s");
+        p["frames"] = json!(10);
+    });
+    let (_, outcome) = form(&p, 2);
+    let ratio = outcome.health.kinetic_ratio_at_end;
+    assert!(ratio > 1e-4, "{ratio:.1e}");
+    let told = told_to_move(&outcome).expect("a warning");
+    assert!(
+        told.contains("Fastest: '") && told.contains("settling_time"),
+        "{told}"
+    );
+}
+
+/// Two plies without any friction slide and swing between their films, and multipliers that are forgotten feed them (decision 4).
+#[test]
+fn energy_that_contacts_make_is_all_that_is_unaccounted_for_and_the_pair_is_named() {
+    let p = scenes::bag(2, |p| {
+        for mu in p["scene"]["friction"]
+            .as_object_mut()
+            .expect("a table")
+            .values_mut()
+        {
+            *mu = json!(0.0);
+        }
+        p["scene"]["process"]["double_diaphragm"]["drawing_time"] = json!("0.05 s");
+        p["frames"] = json!(10);
+        p["drift_bound"] = json!(1000.0);
+    });
+    let (_, outcome) = form(&p, 2);
+    let last = outcome.history.last().expect("rows");
+    let (drift, made) = (
+        last.ledger.drift(),
+        last.interfaces.iter().map(|e| e.made()).sum::<f64>(),
+    );
+    assert!(outcome.health.peak_drift_ratio > 0.01, "{drift}");
+    assert!((made - drift).abs() < 0.02 * drift.abs(), "{made} {drift}");
+    let told = |w: &String| w.contains("unaccounted") && w.contains("by contact of '");
+    assert!(outcome.warnings.iter().any(told), "{:?}", outcome.warnings);
+}
+
 #[test]
 fn four_plies_in_a_bag_stay_in_their_order() {
     let run = form(&bag(4, 0.012), 2);
     assert_sound("four plies", &run, 0.02);
-    let (forming, _) = &run;
+    let (forming, outcome) = &run;
+    assert_eq!(told_to_move(outcome), None);
+    assert!(outcome.health.kinetic_ratio_at_end < 1e-4);
     for p in forming.penetrations() {
         assert!(p.q999 < 0.1 * (p.thinner + p.spare), "{p:?}");
     }
