@@ -233,7 +233,7 @@ fn errors_of_a_workflow() {
     one("missing-library", "  a: {plugin: ./libmine.so}\n");
     one(
         "missing-plugins",
-        "  a: {plugin: nowhere}\n  b: {plugin: nowhere}\n  c: {plugin: not-there}\n  d: {plugin: nowhere}\n",
+        "  a: {plugin: ./libmine.so}\n  b: {plugin: ./libmine.so}\n  c: {plugin: trivail}\n  d: {plugin: trivail}\n",
     );
 }
 
