@@ -1,6 +1,6 @@
 //! Building a model: sheets, batches, masses.
 
-use super::batch::{Rates, component_status};
+use super::batch::component_status;
 use super::blocks::{BLOCK, Block, Sums};
 use super::boundary::{Anchors, Boundary, Drive, Held, Loads, Supports};
 use super::mirror::Mirroring;
@@ -14,7 +14,6 @@ use crate::mesh::{NONE, Patch, QuadMesh, compact_order};
 use crate::mirror::{Mirrors, mirrored_in};
 use crate::sheet::{
     Aligned, Batch, Kind, PatchBatch, Pressed, Pressures, Shared, Sheet, SheetSpec,
-    empty_element_batch,
 };
 use crate::vec3::{Vec3, add, norm, scale, sub};
 use crate::{LANES, MechanicsError};
