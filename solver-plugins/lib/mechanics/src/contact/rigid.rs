@@ -569,8 +569,7 @@ fn touch<F: Coulomb>(
         damping: normal.loss,
         work: 0.0,
     };
-    let before = item.force;
-    item.force = scale(g, normal.force);
+    let before = std::mem::replace(&mut item.force, scale(g, normal.force));
     if !law.friction.is_smooth() {
         let vt = sub(v, scale(n, dot(v, n)));
         let rest = sub(item.slip, scale(n, dot(item.slip, n)));
