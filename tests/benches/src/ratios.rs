@@ -11,11 +11,20 @@ const LOUD: f64 = 0.15;
 /// Unit of the rows.
 const UNIT: &str = "calibrations";
 
-/// Ratios: kernels, a strip, a press, a bag, and a look at steps that are done.
+/// Ratios to be recorded: kernels, a strip, a press, a bag, and a look at steps that are done.
 pub fn ratios() -> Vec<Row> {
+    measured(2)
+}
+
+/// The same, with so many runs of each.
+fn measured(times: usize) -> Vec<Row> {
     let mut rows = cases::kernel_ratios();
     let of = |(case, ratio): (String, f64)| Row::new(format!("{case}, ratio"), ratio, UNIT);
-    rows.extend(solver::short_runs(|work| over(work)).into_iter().map(of));
+    rows.extend(
+        solver::short_runs(times, |work| over(work))
+            .into_iter()
+            .map(of),
+    );
     let steps = 2_000;
     let no_op = cases::NoOp::of(steps);
     let ratio = over(&|| no_op.nanoseconds());
@@ -39,7 +48,7 @@ pub fn compare() {
         "over a calibrating loop", "now", "recorded"
     );
     let mut slower = Vec::new();
-    for row in ratios() {
+    for row in measured(1) {
         let Some((before, commit)) = recorded.get(&row.case) else {
             println!("{:<64} {:>10.2} {:>10}", row.case, row.value, "-");
             continue;

@@ -203,14 +203,15 @@ pub fn solver() -> Vec<Row> {
     rows
 }
 
-/// Name and what `over` makes of the cost of an element's step (CPU ns), of short runs with one thread: a strip, a press, and a small bag.
-pub fn short_runs(over: impl Fn(&dyn Fn() -> f64) -> f64) -> Vec<(String, f64)> {
+/// Name and what `over` makes of the cost of an element's step (CPU ns), of short runs with one thread, the least of so many `times`: a strip, a
+/// press, and a small bag.
+pub fn short_runs(times: usize, over: impl Fn(&dyn Fn() -> f64) -> f64) -> Vec<(String, f64)> {
     let folder = copy(0.1);
     let place = |name: &str| folder.path().join("workflows").join(name);
     let bag = "plyflow: 1\nname: bench\nsteps:\n  bag:\n    plugin: forming-explicit\n    with: {scene: block.yaml, element: m4, \
                element_size: 16 mm, diaphragm_element_size: 16 mm, tool_grid: 2 mm, time_step: 20 us, frames: 4}\n";
     let of = |case: &str, place: &Path, workflow: &str| {
-        let cost = over(&|| least(2, || run(place, workflow, 1)).cost());
+        let cost = over(&|| least(times, || run(place, workflow, 1)).cost());
         (format!("{case}, 1 thread"), cost)
     };
     vec![
