@@ -4,7 +4,9 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod coarse;
 mod cut;
+mod exchange;
 mod grid;
 mod late;
 mod place;
@@ -13,18 +15,18 @@ mod pull;
 pub use cut::Placed;
 pub use grid::{Grid, film_grid, ply_grid, ply_part};
 
+use coarse::{Pulls, Whole};
+use exchange::{Exchange, Part};
 use place::Place;
-use pull::{FORCES, Pull};
 
 use plyflow_geometry::rectangle;
-use plyflow_geometry::vec3::{Vec3, distance};
+use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_model::artifact::{
     Boundary, Forming, MeshStudy, PlainBody, Rectangle, Sheet, Zone, Zones,
 };
 use plyflow_model::budget::{self, Wanted};
-use plyflow_sdk::{BodyInfo, Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
-use plyflow_surface::of_run::check_quads;
+use plyflow_sdk::{Host, Input, Log, Meshes, Progress, Step, StepError, export_step};
 use serde::Deserialize;
 
 /// The step.
@@ -40,6 +42,7 @@ struct Parameters {
     start_time: Option<f64>,
     start_bend: Option<f64>,
     cut_stiffness: Option<f64>,
+    exchanged: Vec<Part>,
 }
 
 /// A sheet of the zone with its motion.
@@ -54,14 +57,6 @@ struct Driven {
     /// Of plies whose cut gives way.
     pull: Option<Pulls>,
     error: f64,
-}
-
-/// What the surroundings do at a cut that gives way.
-struct Pulls {
-    /// `[f][k][3]` (N).
-    force: Vec<f64>,
-    /// `[k]` (N/m).
-    stiffness: Vec<f64>,
 }
 
 /// First frame and undeformed mesh may differ by this (m) before the step warns.
@@ -82,6 +77,7 @@ impl Step for BoundaryInterpolation {
         let meshes = host.meshes(&input)?;
         check_frames(&input, meshes.times.len())?;
         let listed = &run.sheets;
+        let exchange = Exchange::read(host, &p.exchanged, &meshes.times)?;
         let joint = film_bounds(host, &input, &meshes, listed)?;
         let first = first_frame(host, &input, &meshes, listed, bounds, &p)?;
         let mut sheets = Vec::new();
@@ -92,15 +88,8 @@ impl Step for BoundaryInterpolation {
                 phase: "reading the coarse motion",
                 ..Default::default()
             });
-            sheets.extend(drive(
-                host,
-                &input,
-                &meshes,
-                sheet,
-                (bounds, joint),
-                first,
-                &p,
-            )?);
+            let runs = (&input, &meshes, exchange.as_ref());
+            sheets.extend(drive(host, runs, sheet, (bounds, joint), first, &p)?);
         }
         if sheets.is_empty() {
             return Err(nothing_in(&input.step, &zone).into());
@@ -110,7 +99,8 @@ impl Step for BoundaryInterpolation {
         }
         write(host, &meshes.times, first, &sheets)?;
         let times = &meshes.times[first..];
-        write_histories(host, &input, times)?;
+        let loads = exchange.as_ref().filter(|e| e.has(Part::Loads));
+        write_histories(host, loads.map_or(&input, |e| &e.input), times)?;
         let error = sheets.iter().map(|s| s.error).fold(0.0, f64::max);
         host.write_attributes(&Boundary {
             zone,
@@ -267,46 +257,47 @@ fn advised_size(host: &Host, zone: &Zone) -> Result<Option<f64>, StepError> {
     }
 }
 
-/// The part of a sheet in the zone and its motion; `None` when the sheet does not reach into it.
+/// The part of a sheet in the zone and its motion; `None` when the sheet does not reach into it. `runs`: the coarse run, and what another gives
+/// in its place.
 fn drive(
     host: &Host,
-    input: &Input,
-    meshes: &Meshes,
+    (input, meshes, exchange): (&Input, &Meshes, Option<&Exchange>),
     sheet: &Sheet,
     (zone, joint): (Rectangle, Rectangle),
     first: usize,
     p: &Parameters,
 ) -> Result<Option<Driven>, StepError> {
-    let body = meshes.body(&sheet.name)?;
-    check_quads(&format!("sheet '{}'", sheet.name), body)?;
-    let (points, cells) = host.mesh(input, body)?;
-    let ply = sheet.is_ply();
-    let within = if ply { bounds(&points) } else { joint };
+    let whole = Whole::read(host, input, meshes, sheet)?;
+    let within = if sheet.is_ply() {
+        bounds(&whole.points)
+    } else {
+        joint
+    };
     let Some(grid) = part(sheet, within, zone, p)? else {
         return Ok(None);
     };
-    let fine =
-        Placed::new(grid, &points, &cells).map_err(|e| format!("sheet '{}': {e}", sheet.name))?;
-    let motion = follow(host, input, meshes, body, &fine, ply)?;
-    let held = |stiffness: f64| {
-        let axis = axis(input, sheet)?;
-        let cut = Pull::new(&fine.grid, &fine.driven_nodes, &points, &cells, axis);
-        pulls(host, input, meshes, body, &cut, stiffness)
+    let own = whole.placed(grid)?;
+    let other = exchange.map(|e| e.placed(host, &sheet.name, own.fine.grid.clone()));
+    let other = other.transpose()?;
+    let from = |part| match &other {
+        Some(other) if exchange.is_some_and(|e| e.has(part)) => other,
+        _ => &own,
     };
-    let pull = p.cut_stiffness.filter(|_| ply).map(held).transpose()?;
-    let begin = late::start(host, input, meshes, body, &fine, first)?;
-    let start = motion.start;
-    if start > START_TOLERANCE && begin.is_none() {
-        let name = &sheet.name;
-        let text = format!(
-            "sheet '{name}': the first frame lies {:.2} mm from the undeformed mesh; the local run starts with a jump",
-            1e3 * start
-        );
-        host.log(Log::Warn, &text);
+    let mut motion = own.follow(host)?;
+    if let (Some(exchange), Some(other)) = (exchange, &other) {
+        exchange.mix(&mut motion, &other.follow(host)?, &own, first);
+    }
+    let held = p.cut_stiffness.filter(|_| sheet.is_ply());
+    let pull = held
+        .map(|s| from(Part::Forces).pulls(host, s))
+        .transpose()?;
+    let begin = from(Part::Start).start(host, first)?;
+    if begin.is_none() {
+        warn_of_a_jump(host, &sheet.name, motion.start);
     }
     Ok(Some(Driven {
         sheet: sheet.clone(),
-        fine,
+        fine: own.fine,
         position: motion.position,
         normal: motion.normal,
         start: begin,
@@ -315,45 +306,15 @@ fn drive(
     }))
 }
 
-/// Where the coarse run leads a fine sheet's driven nodes.
-#[derive(Default)]
-struct Motion {
-    position: Vec<f64>,
-    normal: Option<Vec<f64>>,
-    /// Largest interpolation error (m).
-    error: f64,
-    /// Largest distance of the first frame from the undeformed mesh (m).
-    start: f64,
-}
-
-/// Follows the coarse sheet `body` through its frames; what `turns` also in its normals.
-fn follow(
-    host: &Host,
-    input: &Input,
-    meshes: &Meshes,
-    body: &BodyInfo,
-    fine: &Placed,
-    turns: bool,
-) -> Result<Motion, StepError> {
-    let mut motion = Motion {
-        normal: turns.then(Vec::new),
-        ..Motion::default()
-    };
-    for frame in 0..meshes.times.len() {
-        let coarse = fine.surface(host.frame_points(input, body, frame)?);
-        let driven = fine.positions(&coarse);
-        motion.error = motion.error.max(fine.error(&driven, &coarse));
-        if frame == 0 {
-            let moved = |(&n, &d): (&u32, &Vec3)| distance(fine.points[n as usize], d);
-            let nodes = fine.driven_nodes.iter().zip(&driven);
-            motion.start = nodes.map(moved).fold(0.0, f64::max);
-        }
-        motion.position.extend(driven.into_iter().flatten());
-        if let Some(normal) = &mut motion.normal {
-            normal.extend(fine.normals(&coarse).into_iter().flatten());
-        }
+/// That the first frame lies `start` (m) from the undeformed mesh, if that is far.
+fn warn_of_a_jump(host: &Host, name: &str, start: f64) {
+    if start > START_TOLERANCE {
+        let text = format!(
+            "sheet '{name}': the first frame lies {:.2} mm from the undeformed mesh; the local run starts with a jump",
+            1e3 * start
+        );
+        host.log(Log::Warn, &text);
     }
-    Ok(motion)
 }
 
 /// Where both films are (m): beyond the line along which they are joined one sheet stands for both, which no film of a zone can.
@@ -417,49 +378,6 @@ fn part(
         )
     })?;
     Ok(grid)
-}
-
-/// Direction (rad, from x) of the first of the axes in which the coarse run tells a ply's membrane forces.
-fn axis(input: &Input, sheet: &Sheet) -> Result<f64, StepError> {
-    sheet.axis().ok_or_else(|| {
-        format!(
-            "`cut_stiffness` is given, and ply '{}' of '{}' does not tell where its fibres lie (`fibre_1`, `fibre_2`). Leave out `cut_stiffness`, or run that step again",
-            sheet.name, input.step
-        )
-        .into()
-    })
-}
-
-/// What the surroundings pull at a cut with, through the frames of the coarse sheet `body`. `stiffness`: theirs, of the cut's length (N/m2).
-fn pulls(
-    host: &Host,
-    input: &Input,
-    meshes: &Meshes,
-    body: &BodyInfo,
-    cut: &Pull,
-    stiffness: f64,
-) -> Result<Pulls, StepError> {
-    if let Some(missing) = FORCES
-        .iter()
-        .find(|name| body.fields.iter().all(|f| f.name != **name))
-    {
-        return Err(format!(
-            "`cut_stiffness` is given, and ply '{}' of '{}' has no field {missing}: its run must tell its membrane forces. Leave out `cut_stiffness`, or run that step again",
-            body.name, input.step
-        )
-        .into());
-    }
-    let mut force = Vec::new();
-    for frame in 0..meshes.times.len() {
-        let points = host.frame_points(input, body, frame)?;
-        let mut fields = [const { Vec::new() }; 3];
-        for (field, name) in fields.iter_mut().zip(FORCES) {
-            *field = host.frame_field(input, body, frame, name)?;
-        }
-        force.extend(cut.forces(&points, &fields).into_iter().flatten());
-    }
-    let stiffness = cut.lengths().iter().map(|l| stiffness * l).collect();
-    Ok(Pulls { force, stiffness })
 }
 
 fn bounds(points: &[Vec3]) -> Rectangle {
