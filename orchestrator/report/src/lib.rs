@@ -18,7 +18,7 @@ mod units;
 pub use draw::DrawError;
 pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable};
 pub use input::{Expectation, Instance, ReportInput, Verdict};
-pub use read::{COUNTS, Measure, Way, Ways, ways};
+pub use read::{COUNTS, Measure, OfClass, TARGETS, Way, Ways, advice, ways};
 pub use summary::summary;
 pub use units::bytes;
 

@@ -2,12 +2,32 @@
 
 use crate::input::ReportInput;
 use crate::plain::{Plot, Series, Style};
-use crate::read::{Measure, Way, Ways, advice, ways};
-use crate::units::{bytes, duration, fixed};
+use crate::read::{Measure, OfClass, TARGETS, Way, Ways, advice, ways};
+use crate::units::{bytes, duration, fixed, shown};
 use maud::{Markup, html};
 
-/// Errors for which the cheapest way is told.
-const TARGETS: [f64; 3] = [0.2, 0.1, 0.05];
+/// Errors that have a mean over defects and a total, with what stands over both in the table.
+const BOTH: [(Measure, &str); 4] = [
+    (Measure::Defects, "error"),
+    (Measure::Length, "length"),
+    (Measure::Amplitude, "amplitude"),
+    (Measure::BridgingArea, "bridging area"),
+];
+
+/// Errors that are plotted, and whether the plot is open when the page is; the others open with a click on their names.
+const PLOTTED: [(Measure, bool); Measure::COUNT] = [
+    (Measure::Defects, true),
+    (Measure::TotalDefects, true),
+    (Measure::Length, false),
+    (Measure::TotalLength, false),
+    (Measure::Amplitude, false),
+    (Measure::TotalAmplitude, false),
+    (Measure::BridgingArea, false),
+    (Measure::TotalBridgingArea, false),
+    (Measure::Position, true),
+    (Measure::Distance, false),
+    (Measure::Shear, false),
+];
 
 /// Whether something was compared with a reference, or with fine runs of zones.
 pub(super) fn has(input: &ReportInput) -> bool {
@@ -23,7 +43,10 @@ pub(super) fn section(input: &ReportInput) -> Markup {
                 h2 { "Speed against error" }
                 p {
                     "Error: the mean over all defects of the " (ways.yardstick()) ", and false ones, of the relative error of a wrinkle's length or a bridging's area; a missed and a false one count as 100 %. "
-                    "Times of several runs are added up, also of those that ran side by side. Position, distance: root mean square over the plies; shear: of its quantiles. A mark: no other way is both cheaper and better."
+                    "Times of several runs are added up, also of those that ran side by side. Position, distance: root mean square over the plies; shear: of its quantiles. A mark ●: no other way is both cheaper and better."
+                }
+                @if ways.list.iter().any(|w| w.error(Measure::TotalDefects).is_some()) {
+                    p { "In the mean a short wrinkle counts as much as a long one. The total counts every defect by its size: it is all that differs, with what is missed or false, over what the " (ways.yardstick()) " has. The mark ○ is of the total error." }
                 }
                 @if !ways.of_the_whole {
                     p { "Nobody ran the whole in fine elements here, so the fine runs of the zones are the measure, in these zones: how wrong they are themselves, and what lies outside of them, is not told." }
@@ -49,49 +72,105 @@ pub(super) fn section(input: &ReportInput) -> Markup {
 fn group(ways: &Ways) -> Markup {
     html! {
         div class="scroll" { table {
-            thead { tr {
-                th { "way" } th {}
-                @for head in ["CPU", "wall, added up", "memory", "CPU share", "error", "length", "amplitude", "bridging area", "missed", "false", "position, mm", "distance, mm", "shear, deg"] {
-                    th class="n" { (head) }
+            thead {
+                tr { th colspan="6" {}
+                    @for (_, name) in BOTH { th class="group" colspan="2" { (name) } }
+                    th colspan="5" {} }
+                tr {
+                    th { "way" } th {}
+                    @for head in ["CPU", "wall, added up", "memory", "CPU share"] { th class="n" { (head) } }
+                    @for _ in BOTH { th class="n" { "mean" } th class="n" { "total" } }
+                    @for head in ["missed", "false", "position, mm", "distance, mm", "shear, deg"] { th class="n" { (head) } }
                 }
-            } }
+            }
             tbody { @for way in &ways.list { (row(way)) } }
         } }
-        (plot("Error of defects over CPU time", "error (%)", ways, Measure::Defects, 100.0))
-        @if ways.list.iter().any(|w| w.error(Measure::Position).is_some()) {
-            (plot("Error of position over CPU time", "error (mm)", ways, Measure::Position, 1e3))
+        (by_size(ways))
+        p { "Error over CPU time, for the error that you choose:" }
+        @for (measure, open) in PLOTTED {
+            @if ways.list.iter().any(|w| w.error(measure).is_some()) {
+                details class="error-plot" open[open] {
+                    summary { (measure.title()) }
+                    (plot(ways, measure))
+                }
+            }
         }
         @for text in advice(ways, &TARGETS) { p { (text) } }
     }
 }
 
+fn percent(v: f64) -> String {
+    format!("{} %", fixed(100.0 * v, 1))
+}
+
+/// A dash for what is not known.
+fn told(v: Option<f64>, write: impl Fn(f64) -> String) -> String {
+    v.map_or("–".to_owned(), write)
+}
+
 fn row(way: &Way) -> Markup {
-    let percent = |v: f64| format!("{} %", fixed(100.0 * v, 1));
     // A drape costs a ten-thousandth.
     let share = format!(
         "{} %",
         fixed(100.0 * way.share, if way.share < 0.01 { 2 } else { 1 })
     );
-    let told = |v: Option<f64>, write: &dyn Fn(f64) -> String| v.map_or("–".to_owned(), write);
-    let sum = |a: usize, b: usize| told(way.counts.map(|c| c[a] + c[b]), &|v| fixed(v, 0));
-    let [error, length, amplitude, area, position, distance, shear] = way.errors;
-    let millimetres = |v: f64| fixed(1e3 * v, 2);
+    let sum = |a: usize, b: usize| told(way.counts.map(|c| c[a] + c[b]), |v| fixed(v, 0));
+    let millimetres = |m: Measure| told(way.error(m), |v| fixed(1e3 * v, 2));
+    let shear = told(way.error(Measure::Shear), |v| fixed(v.to_degrees(), 2));
     html! {
         tr {
-            th { (way.label()) } td { @if way.is_on_front(Measure::Defects) { "●" } }
+            th { (way.label()) }
+            td { @if way.is_on_front(Measure::Defects) { "●" } @if way.is_on_front(Measure::TotalDefects) { "○" } }
             td class="n" { (duration(way.cpu_seconds)) } td class="n" { (duration(way.wall_seconds)) }
-            td class="n" { (told(way.peak_memory, &|v| bytes(v as u64))) }
-            td class="n" { (share) } td class="n" { (told(error, &percent)) }
-            @for v in [length, amplitude, area] { td class="n" { (told(v, &percent)) } }
+            td class="n" { (told(way.peak_memory, |v| bytes(v as u64))) }
+            td class="n" { (share) }
+            @for (mean, _) in BOTH {
+                td class="n" { (told(way.error(mean), percent)) }
+                td class="n" { (told(mean.total().and_then(|m| way.error(m)), percent)) }
+            }
             td class="n" { (sum(0, 2)) } td class="n" { (sum(1, 3)) }
-            td class="n" { (told(position, &millimetres)) } td class="n" { (told(distance, &millimetres)) }
-            td class="n" { (told(shear, &|v| fixed(v.to_degrees(), 2))) }
+            td class="n" { (millimetres(Measure::Position)) } td class="n" { (millimetres(Measure::Distance)) }
+            td class="n" { (shear) }
         }
     }
 }
 
-/// An error of the ways, times `factor`, over their cost, and its front.
-fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) -> Markup {
+/// The errors by kind and size of the defects; nothing where no comparison tells them.
+fn by_size(ways: &Ways) -> Markup {
+    let rows = |w: &Way| !w.classes.is_empty();
+    let count = |v: f64| fixed(v, 0);
+    let of = |c: &OfClass| {
+        html! {
+            td { (c.title) }
+            @for v in [c.pairs, c.missed, c.wrong] { td class="n" { (count(v)) } }
+            @for v in [c.mean, c.total] { td class="n" { (told(v, percent)) } }
+        }
+    };
+    html! {
+        @if ways.list.iter().any(rows) {
+            details {
+                summary { "Errors by size: short and long wrinkles, small and large bridging" }
+                p class="note" { "A defect is of the class of its size in the " (ways.yardstick()) ", a false one of that of its own. Mean: of the relative errors of length or area over what both have. Total: all that differs, with what is missed or false, over what the " (ways.yardstick()) " has of the class." }
+                div class="scroll" { table {
+                    thead { tr { th { "way" } th { "defects" }
+                        @for head in ["in both", "missed", "false", "mean error", "total error"] { th class="n" { (head) } } } }
+                    tbody { @for way in ways.list.iter().filter(|w| rows(w)) {
+                        @for (k, class) in way.classes.iter().enumerate() {
+                            tr { @if k == 0 { th rowspan=(way.classes.len()) { (way.label()) } } (of(class)) }
+                        }
+                    } }
+                } }
+            }
+        }
+    }
+}
+
+/// An error of the ways over their cost, and its front.
+fn plot(ways: &Ways, measure: Measure) -> Markup {
+    let (factor, unit) = match measure.unit() {
+        "1" => (100.0, "%"),
+        unit => shown(unit),
+    };
     let told: Vec<(&Way, f64)> = (ways.list.iter())
         .filter_map(|w| Some((w, factor * w.error(measure)?)))
         .collect();
@@ -110,9 +189,9 @@ fn plot(title: &str, y_label: &str, ways: &Ways, measure: Measure, factor: f64) 
     );
     let x_label = format!("CPU time over that of the {} (%)", ways.yardstick());
     Plot {
-        title: title.into(),
+        title: format!("{} over CPU time", measure.title()).into(),
         x_label: x_label.into(),
-        y_label: y_label.into(),
+        y_label: format!("error ({unit})").into(),
         series: all,
         from_zero: true,
         legend_of_one: true,
@@ -135,12 +214,13 @@ mod tests {
             wall_seconds: 100.0 * share,
             peak_memory: None,
             share,
-            errors: [Some(error); 7],
+            errors: [Some(error); Measure::COUNT],
             counts: None,
+            classes: Vec::new(),
             is_reference: model == "reference",
             measured_by: "comparison".into(),
             start_time,
-            on_front: [start_time.is_none(); 7],
+            on_front: [start_time.is_none(); Measure::COUNT],
         }
     }
 
@@ -156,7 +236,7 @@ mod tests {
             of_the_whole: true,
         };
         let table: String = ways.list.iter().map(|w| row(w).0).collect();
-        let plot = plot("Error", "error (%)", &ways, Measure::Defects, 100.0).0;
+        let plot = plot(&ways, Measure::Defects).0;
         let (aria, legend) = plot.split_once("<figcaption").unwrap();
         for text in [&table[..], aria, legend] {
             for label in ["late (from 0.60 s)", "reference (from 0.70 s)"] {

@@ -16,6 +16,7 @@ pub mod pairs;
 mod ply;
 mod points;
 pub mod scan;
+pub mod sizes;
 
 pub use cause::{Limits, Neighbour, find_causes, relative_angle};
 pub use fields::{FieldErrors, QUANTILES, distance_at};

@@ -369,3 +369,124 @@ fn every_measure_has_a_front_of_its_own_and_the_reference_stands_on_it() {
     assert_eq!(reference.error(Measure::Position), Some(0.0));
     assert_eq!(reference.error(Measure::Shear), None, "nobody was measured");
 }
+
+/// Four short ridges that are wrong by 30 % and six long ones by 2 %: 13.2 % as a mean, and 22.5 of 355 mm in total.
+#[test]
+fn where_mean_and_total_name_different_ways_the_advice_says_so_and_both_have_a_front() {
+    let mut run = costs(10.0, 100.0);
+    run.extend([
+        ("defect_error", 0.132),
+        ("defect_total_error", 22.5 / 355.0),
+        ("defect_total_error.global", 0.9),
+        // Dearer: the short ones are right, and all the long ones wrong by 9 %.
+        ("cost.other.lean.cpu_seconds", 400.0),
+        ("cost.other.lean.wall_seconds", 400.0),
+        ("defect_error.other.lean", 0.054),
+        ("defect_total_error.other.lean", 27.0 / 355.0),
+    ]);
+    let ways = ways(&input(vec![comparison("one", &run)]));
+    let told: Vec<(&str, [bool; 2])> = (ways.list.iter())
+        .map(|w| {
+            let on = |m| w.is_on_front(m);
+            (
+                &w.model[..],
+                [Measure::Defects, Measure::TotalDefects].map(on),
+            )
+        })
+        .collect();
+    let expected = [
+        ("global", [true, true]),
+        ("total", [true, true]),
+        ("other.lean", [true, false]),
+        ("reference", [true, true]),
+    ];
+    assert_eq!(told, expected);
+    assert_eq!(
+        advice(&ways, &[0.2, 0.1, 0.07, 0.05]),
+        [
+            "For a mean and a total error of 20 % or less: coarse run and zones (10.0 % of the CPU time of the reference).",
+            "For a mean error of 10 % or less: lean (40.0 % of the CPU time of the reference). For a total error of 10 % or less: coarse run and zones (10.0 % of the CPU time of the reference). The two measures name different ways.",
+            "For a mean error of 7 % or less: lean (40.0 % of the CPU time of the reference). For a total error of 7 % or less: coarse run and zones (10.0 % of the CPU time of the reference). The two measures name different ways.",
+            "For a mean and a total error of 5 % or less there is none but the reference.",
+        ]
+    );
+}
+
+#[test]
+fn errors_by_size_have_the_bounds_of_their_comparison_and_leave_out_what_nobody_has() {
+    let mut run = costs(10.0, 100.0);
+    run.extend([
+        ("defect_error", 0.4),
+        ("wrinkle_class_from.medium", 0.02),
+        ("wrinkle_class_from.long", 0.04),
+        ("bridging_class_from.medium", 2e-4),
+        ("bridging_class_from.large", 5e-4),
+        ("wrinkle_pairs.short", 4.0),
+        ("missed_wrinkles.short", 0.0),
+        ("false_wrinkles.short", 0.0),
+        ("wrinkle_length_error.short", 0.3),
+        ("wrinkle_length_total_error.short", 0.29),
+        ("wrinkle_pairs.medium", 0.0),
+        ("missed_wrinkles.medium", 0.0),
+        ("false_wrinkles.medium", 0.0),
+        ("wrinkle_pairs.long", 0.0),
+        ("missed_wrinkles.long", 0.0),
+        ("false_wrinkles.long", 1.0),
+        ("bridging_pairs.medium.global", 1.0),
+        ("missed_bridging.medium.global", 2.0),
+        ("false_bridging.medium.global", 0.0),
+        ("bridging_area_error.medium.global", 0.1),
+    ]);
+    let ways = ways(&input(vec![comparison("one", &run)]));
+    let of = |model: &str| {
+        let way = ways.list.iter().find(|w| w.model == model).unwrap();
+        let told = |c: &OfClass| {
+            let numbers = [c.pairs, c.missed, c.wrong];
+            (c.title.clone(), c.name.clone(), numbers, c.mean, c.total)
+        };
+        way.classes.iter().map(told).collect::<Vec<_>>()
+    };
+    let class = |title: &str, name: &str, numbers, mean, total| {
+        (title.to_owned(), name.to_owned(), numbers, mean, total)
+    };
+    assert_eq!(
+        of("total"),
+        [
+            class(
+                "wrinkles below 20 mm",
+                "wrinkle.short",
+                [4.0, 0.0, 0.0],
+                Some(0.3),
+                Some(0.29)
+            ),
+            class(
+                "wrinkles from 40 mm on",
+                "wrinkle.long",
+                [0.0, 0.0, 1.0],
+                None,
+                None
+            ),
+        ]
+    );
+    let bridging = "bridging of 200 to 500 mm²";
+    let numbers = [1.0, 2.0, 0.0];
+    let medium = class(bridging, "bridging.medium", numbers, Some(0.1), None);
+    assert_eq!(of("global"), [medium]);
+    assert_eq!(of("reference"), []);
+}
+
+#[test]
+fn every_measure_has_a_title_and_a_result_of_its_own_and_stands_at_its_place() {
+    for (k, measure) in Measure::ALL.into_iter().enumerate() {
+        assert_eq!(measure as usize, k);
+        let others = Measure::ALL.into_iter().filter(|m| *m != measure);
+        for other in others {
+            assert_ne!(measure.result(), other.result());
+            assert_ne!(measure.title(), other.title());
+        }
+        if let Some(total) = measure.total() {
+            let of = measure.result().trim_end_matches("_error");
+            assert_eq!(total.result(), format!("{of}_total_error"));
+        }
+    }
+}

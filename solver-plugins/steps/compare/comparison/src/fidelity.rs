@@ -2,6 +2,7 @@
 
 use crate::models::{Model, PassedOver};
 use plyflow_defects::pairs::{PairErrors, Pairs, apart, measure_for_pairs};
+use plyflow_defects::sizes::{SizeClasses, SizeErrors};
 use plyflow_defects::{Defect, FieldErrors, Settings};
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{self, Role, Yardstick, Zone};
@@ -11,16 +12,25 @@ use plyflow_sdk::{Host, StepError};
 type Found<'a> = (&'a str, &'a Defect);
 
 /// What some models have of the reference's defects: names of results, values and units, in the order in which they are reported.
-fn defects(ours: &[Found<'_>], theirs: &[Found<'_>], settings: &Settings) -> Vec<Told> {
+fn defects(
+    ours: &[Found<'_>],
+    theirs: &[Found<'_>],
+    settings: &Settings,
+    classes: &SizeClasses,
+) -> Vec<Told> {
     let [a, b] = [ours, theirs].map(|all| all.iter().map(|f| f.1).collect::<Vec<_>>());
     let on_one_ply = |i: usize, j: usize| (ours[i].0 == theirs[j].0).then(|| apart(a[i], b[j]));
     let pairs = Pairs::of(&a, &b, settings, on_one_ply);
     let told = PairErrors::of(&a, &b, &pairs).told();
-    told.into_iter().map(|(name, v)| (name, v, "1")).collect()
+    let by_pair = told.into_iter().map(|(name, v)| (name.to_owned(), v));
+    let by_size = SizeErrors::of(&a, &b, &pairs, classes).told();
+    (by_pair.chain(by_size))
+        .map(|(name, v)| (name, v, "1"))
+        .collect()
 }
 
 /// Name of a result, its value and its unit.
-type Told = (&'static str, f64, &'static str);
+type Told = (String, f64, &'static str);
 
 /// A way to the answer, measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,9 +70,7 @@ impl Way {
             elements: self.elements,
             element_cycles: self.element_cycles,
             start_time: self.began_late,
-            errors: errors
-                .map(|(name, v, _)| ((*name).to_owned(), *v))
-                .collect(),
+            errors: errors.map(|(name, v, _)| (name.clone(), *v)).collect(),
         }
     }
 }
@@ -101,7 +109,8 @@ pub struct Measured {
 
 /// Measures how far every way to the answer is from the reference: the local runs together (with the global run around them), the
 /// global run by itself, and every other run. All defects of the reference count, wherever they are. Without a reference the
-/// local runs stand in for it, and what lies outside of their zones does not count. Nothing when nothing was refined. Runs that are `passed_over` are
+/// local runs stand in for it, and what lies outside of their zones does not count. Nothing when nothing was refined. `classes`: by which errors are told
+/// by size, besides. Runs that are `passed_over` are
 /// not measured, and count among the element cycles of what stands on them.
 ///
 /// # Errors
@@ -112,6 +121,7 @@ pub fn measure_ways(
     passed_over: &PassedOver,
     zones: &[Zone],
     settings: &Settings,
+    classes: &SizeClasses,
 ) -> Result<Measured, StepError> {
     let Some(yardstick) = yardstick(models) else {
         return Ok(Measured::default());
@@ -144,7 +154,7 @@ pub fn measure_ways(
         host.check_cancelled()?;
         let ours = defects_of(&models, zones, yardstick, settings);
         let ours = named(&ours);
-        way.errors = defects(&ours, &theirs, settings);
+        way.errors = defects(&ours, &theirs, settings, classes);
         way.errors.extend(fields(&around, &reference, zones));
         measured.ways.push(way);
     }
@@ -188,10 +198,13 @@ fn fields(way: &[&Model], reference: &[&Model], zones: &[Zone]) -> Vec<Told> {
     let Some(errors) = FieldErrors::of(&way, &plies, counts) else {
         return Vec::new();
     };
-    let mut told = vec![("position_error", errors.position, "m")];
-    told.extend(errors.distance.map(|v| ("distance_error", v, "m")));
-    told.extend(errors.shear.map(|v| ("shear_quantile_error", v, "rad")));
-    told
+    let told = [
+        ("position_error", Some(errors.position), "m"),
+        ("distance_error", errors.distance, "m"),
+        ("shear_quantile_error", errors.shear, "rad"),
+    ];
+    let known = |(name, value, unit): (&str, Option<f64>, _)| Some((name.to_owned(), value?, unit));
+    told.into_iter().filter_map(known).collect()
 }
 
 /// The defects of all plies of some models, by ply, also the smaller ones that a pair may need: of a local run those in its zone, and without

@@ -13,6 +13,7 @@ pub use fidelity::{Measured, Way};
 pub use models::{Model, PassedOver};
 pub use table::{Entry, defect_table};
 
+use plyflow_defects::sizes::SizeClasses;
 use plyflow_defects::{Kind, Limits, Ply, QUANTILES, Settings, quantiles};
 use plyflow_model::artifact::{self, ComparedBody, ComparedModel, Cut, PlyShear, Role, Zone};
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
@@ -57,11 +58,18 @@ impl Step for Comparison {
             work: cut::passages(host, &models, &zones)?,
             layers: cut::layers(&models, &zones),
         };
-        let measured = fidelity::measure_ways(host, &models, &passed_over, &zones, &settings)?;
+        let classes: SizeClasses = host.parameters()?;
+        let measured =
+            fidelity::measure_ways(host, &models, &passed_over, &zones, &settings, &classes)?;
         write_attributes(host, &models, &zones, &table, &cut, &measured.ways)?;
         write_bodies(host, &models, &table)?;
         write_results(host, &models, &zones, &table)?;
         write_reference_defects(host, &models, &table)?;
+        if !measured.ways.is_empty() {
+            for (name, value, unit) in classes.told() {
+                host.result(&name, value, unit)?;
+            }
+        }
         fidelity::write(host, &measured.ways)?;
         fidelity::write(host, &measured.local)?;
         cut::write(host, &cut, &zones)?;

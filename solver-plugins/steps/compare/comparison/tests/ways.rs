@@ -90,6 +90,72 @@ fn every_other_run_is_measured_by_the_reference_and_costs_nothing_of_the_two_sta
     assert!(!out.attributes.to_string().contains("seconds"));
 }
 
+/// The total errors and those by class are those of what the two runs are reported to have, for the zones and for the coarse run by itself.
+#[test]
+fn total_errors_and_classes_are_those_of_the_sizes_that_are_reported() {
+    let (global, local, zones) = (global(), local(0.9), zones(json!([zone_a()])));
+    let reference = whole(0.00125, height(1.0));
+    let inputs = [
+        MemoryInput::new("global", &global),
+        MemoryInput::new("zones", &zones),
+        MemoryInput::new("local", &local),
+        MemoryInput::new("reference", &reference),
+    ];
+    let out = compare(&inputs);
+    let [ours, theirs] =
+        ["wrinkle_length.AW1", "reference_wrinkle_length.AW1"].map(|n| out.result(n));
+    let [area, their_area] =
+        ["bridging_area.AB1", "reference_bridging_area.AB1"].map(|n| out.result(n));
+    let (length, area) = (
+        (ours - theirs).abs() / theirs,
+        (area - their_area).abs() / their_area,
+    );
+    assert!(length > 0.001 && area > 0.01, "{length} {area}");
+    let is = |name: &str, expected: f64| {
+        let found = out.result(name);
+        assert!(
+            (found - expected).abs() < 1e-9,
+            "{name}: {found}, expected {expected}"
+        );
+    };
+    // The wrinkle is about 50 mm long, the bridging at (40, 0) mm about 490 mm2.
+    for ending in ["", ".paired", ".long"] {
+        is(&format!("wrinkle_length_total_error{ending}"), length);
+    }
+    assert!(
+        theirs > 0.040 && their_area > 200e-6 && their_area < 500e-6,
+        "{theirs} {their_area}"
+    );
+    is("bridging_area_total_error.medium", area);
+    is("bridging_area_error.medium", area);
+    is("defect_total_error", 0.5 * (length + area));
+    is(
+        "wrinkle_amplitude_total_error",
+        out.result("wrinkle_amplitude_error"),
+    );
+    is("wrinkle_pairs.long", 1.0);
+    is("wrinkle_pairs.short", 0.0);
+    // The coarse run shows nothing: all of the reference is missed.
+    for name in [
+        "defect_total_error",
+        "wrinkle_length_total_error",
+        "bridging_area_total_error.missed",
+    ] {
+        is(&format!("{name}.global"), 1.0);
+    }
+    is("wrinkle_length_total_error.paired.global", 0.0);
+    is("missed_wrinkles.long.global", 1.0);
+    is("wrinkle_pairs.global", 0.0);
+    is("wrinkle_class_from.long", 0.040);
+
+    // Bounds of one's own.
+    let classes = json!({"wrinkle_classes": [0.1, 0.2], "bridging_classes": [1e-4, 2e-4]});
+    let out = run::<Comparison>(classes, &inputs, &[]).unwrap();
+    assert_eq!(out.result("wrinkle_pairs.short"), 1.0);
+    assert_eq!(out.result("bridging_pairs.large"), 1.0);
+    assert_eq!(out.result("bridging_class_from.large"), 2e-4);
+}
+
 #[test]
 fn around_the_zones_the_global_run_counts_and_in_them_the_fine_runs() {
     let (local, zones) = (local(1.0), zones(json!([zone_a()])));
