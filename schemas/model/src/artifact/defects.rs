@@ -1,6 +1,7 @@
 //! The kind `defects`: what a detection flags on the plies of a formed run.
 
 use crate::artifact::attributes::Attributes;
+use crate::artifact::shown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -12,6 +13,9 @@ pub struct Defects {
     pub thresholds: Thresholds,
     /// What was found, in the order of the stack.
     pub plies: Vec<PlyDefects>,
+    /// Of the excess length of compressed fibres, where it was judged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub maps: Vec<shown::Map>,
 }
 
 impl Attributes for Defects {

@@ -30,8 +30,12 @@ impl Stretch {
     /// Mean pressure (Pa) over a length (m) about the place that is judged, as far as the stretch reaches.
     fn mean_pressure(&self, length: f64) -> f64 {
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (i, pressure) in self.pressure.iter().enumerate() {
-            let away = self.step * i.abs_diff(self.at) as f64;
+        // No weight farther away than this.
+        let reach = (0.5 * length / self.step) as usize + 1;
+        let from = self.at.saturating_sub(reach);
+        let to = (self.at + reach + 1).min(self.pressure.len());
+        for (i, pressure) in self.pressure[from..to].iter().enumerate() {
+            let away = self.step * (from + i).abs_diff(self.at) as f64;
             let weight = ((0.5 * length - away) / self.step + 0.5).clamp(0.0, 1.0);
             sum += weight * pressure;
             weights += weight;

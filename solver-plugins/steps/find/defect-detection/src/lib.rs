@@ -17,13 +17,19 @@ pub use ruck::{Harmonic, Ruck};
 
 use buckling::Buckling;
 use plyflow_geometry::vec3::Vec3;
-use plyflow_model::artifact::{self, Defects, Forming, PlainBody, PlyDefects, Sheet};
+use plyflow_model::artifact::{self, Defects, Forming, Map, Panel, PlainBody, PlyDefects, Sheet};
 use plyflow_model::scene::Scene;
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::draped::{DRAPED, DrapedPart, Formed};
 use plyflow_surface::of_run::{self, check_quads};
 use plyflow_surface::{Surface, Topology};
 use serde::Deserialize;
+
+/// Field of cells: excess length of compressed fibres over that which a ruck needs.
+const EXCESS: &str = "buckling_excess";
+
+/// Most panels of a map.
+const MOST_PANELS: usize = 12;
 
 /// The step.
 pub struct DefectDetection;
@@ -260,7 +266,7 @@ fn write_ply(host: &Host, p: &Judged) -> Result<(), StepError> {
         host.write_field(&p.name, On::Cells, DRAPED, 1, "1", &number(draped))?;
     }
     if let Some(excess) = &p.buckling {
-        host.write_field(&p.name, On::Cells, "buckling_excess", 1, "1", excess)?;
+        host.write_field(&p.name, On::Cells, EXCESS, 1, "1", excess)?;
     }
     let poor = number(&f.poor_conformity);
     host.write_field(&p.name, On::Points, "poor_conformity", 1, "1", &poor)?;
@@ -273,6 +279,23 @@ fn write_ply(host: &Host, p: &Judged) -> Result<(), StepError> {
         "m",
         p.undeformed.as_flattened(),
     )
+}
+
+/// Maps of the excess length of compressed fibres, by as many plies as a map shows.
+fn maps(plies: &[Judged]) -> Vec<Map> {
+    let judged: Vec<&Judged> = plies.iter().filter(|p| p.buckling.is_some()).collect();
+    let panel = |p: &&Judged| Panel {
+        label: p.name.clone(),
+        body: p.name.clone(),
+        field: EXCESS.into(),
+    };
+    let map = |plies: &[&Judged]| Map {
+        name: EXCESS.into(),
+        title: Some("Excess length of compressed fibres over that of a ruck".into()),
+        unit: "1".into(),
+        panels: plies.iter().map(panel).collect(),
+    };
+    judged.chunks(MOST_PANELS).map(map).collect()
 }
 
 fn write(
@@ -292,6 +315,7 @@ fn write(
     host.write_attributes(&Defects {
         thresholds: parameters.told(),
         plies: plies.iter().map(|p| p.found.summary.clone()).collect(),
+        maps: maps(plies),
     })?;
     let all = |get: fn(&PlyDefects) -> f64| plies.iter().map(move |p| get(&p.found.summary));
     host.result("flagged_area", all(|s| s.flagged_area).sum(), "m2")?;

@@ -161,6 +161,11 @@ fn a_uniform_compression_along_one_family_has_the_share_of_the_closed_form() {
         "{area}"
     );
     assert_eq!(found.attributes["thresholds"]["ruck_height"], 1e-3);
+    let panel = &found.attributes["maps"][0]["panels"][0];
+    assert_eq!(
+        [&panel["body"], &panel["field"]],
+        ["ply_1", "buckling_excess"]
+    );
 }
 
 #[test]
@@ -264,6 +269,7 @@ fn without_a_scene_nothing_of_it_is_judged() {
     assert_eq!(found.result("flagged_area"), 0.0);
     assert!(!found.results.contains_key("buckling_area"));
     assert!(found.attributes["plies"][0]["buckling_area"].is_null());
+    assert!(found.attributes["maps"].is_null());
     let fields = found.body("ply_1").fields.last().unwrap();
     assert!(fields.iter().all(|f| f.name != "buckling_excess"));
 }
