@@ -1,6 +1,7 @@
 //! The kind `defects`: what a detection flags on the plies of a formed run.
 
 use crate::artifact::attributes::Attributes;
+use crate::artifact::shown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -12,6 +13,9 @@ pub struct Defects {
     pub thresholds: Thresholds,
     /// What was found, in the order of the stack.
     pub plies: Vec<PlyDefects>,
+    /// Of the excess length of compressed fibres, where it was judged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub maps: Vec<shown::Map>,
 }
 
 impl Attributes for Defects {
@@ -33,6 +37,9 @@ pub struct Thresholds {
     /// Nodes whose closest point is nearer to the tool's foot are not judged (m).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub foot_margin: Option<f64>,
+    /// Height from which a ruck of compressed fibres counts (m); left out where they were not judged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ruck_height: Option<f64>,
     /// What a step of somebody else tells besides (SI).
     #[serde(flatten)]
     pub other: Map<String, Value>,
@@ -61,4 +68,10 @@ pub struct PlyDefects {
     /// What of that lies where the fabric locks, or behind (m2).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub locked_area: Option<f64>,
+    /// Where compressed fibres were judged: undeformed area where they have length enough for a ruck (m2).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub buckling_area: Option<f64>,
+    /// The largest excess length of compressed fibres, over that which a ruck needs (1).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub buckling_excess: Option<f64>,
 }

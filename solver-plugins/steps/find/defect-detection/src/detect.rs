@@ -26,6 +26,7 @@ impl Thresholds {
             over_shear_negative: Some(self.over_shear_negative),
             distance_threshold: Some(self.distance_threshold),
             foot_margin: Some(self.foot_margin),
+            ruck_height: None,
             other: serde_json::Map::new(),
         }
     }
@@ -84,11 +85,8 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
     let poor: Vec<bool> = (0..ply.topology.cells())
         .map(|c| ply.topology.cell(c).iter().any(is_poor))
         .collect();
-    let flag: Vec<bool> = over_shear
-        .iter()
-        .zip(&poor)
-        .map(|(&a, &b)| a || b)
-        .collect();
+    let either = |(a, b): (&bool, &bool)| *a || *b;
+    let flag: Vec<bool> = over_shear.iter().zip(&poor).map(either).collect();
     let areas = ply.topology.cell_areas(ply.undeformed);
     // A fold: the sum of nothing is -0 in Rust.
     let area = |chosen: &[bool]| {
@@ -114,6 +112,8 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
         distance_max: judged.reduce(f64::max).unwrap_or(0.0),
         undraped_area: None,
         locked_area: None,
+        buckling_area: None,
+        buckling_excess: None,
     };
     Detection {
         nodal_distance: distances.iter().map(|d| d.value).collect(),

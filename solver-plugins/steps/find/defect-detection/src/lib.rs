@@ -3,21 +3,59 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod along;
+mod buckling;
+mod compressed;
 mod detect;
+mod laws;
+mod ruck;
 
+pub use along::Stretch;
+pub use compressed::{Carrying, Law, excess};
 pub use detect::{Detection, Ply, Thresholds, detect};
+pub use ruck::{Harmonic, Ruck};
 
+use buckling::Buckling;
 use plyflow_geometry::vec3::Vec3;
-use plyflow_model::artifact::{Defects, Forming, PlainBody, PlyDefects, Sheet};
+use plyflow_model::artifact::{self, Defects, Forming, Map, Panel, PlainBody, PlyDefects, Sheet};
+use plyflow_model::scene::Scene;
 use plyflow_sdk::{Host, Input, Log, On, Progress, Step, StepError, export_step};
 use plyflow_surface::draped::{DRAPED, DrapedPart, Formed};
 use plyflow_surface::of_run::{self, check_quads};
 use plyflow_surface::{Surface, Topology};
+use serde::Deserialize;
+
+/// Field of cells: excess length of compressed fibres over that which a ruck needs.
+const EXCESS: &str = "buckling_excess";
+
+/// Most panels of a map.
+const MOST_PANELS: usize = 12;
 
 /// The step.
 pub struct DefectDetection;
 
 export_step!(DefectDetection);
+
+/// Parameters of the step, SI.
+#[derive(Debug, Deserialize)]
+struct Parameters {
+    #[serde(flatten)]
+    thresholds: Thresholds,
+    /// With it compressed fibres are judged.
+    scene: Option<Box<Scene>>,
+    /// Height from which a ruck of compressed fibres counts (m).
+    ruck_height: f64,
+}
+
+impl Parameters {
+    /// For the artifact.
+    fn told(&self) -> artifact::Thresholds {
+        artifact::Thresholds {
+            ruck_height: self.scene.as_ref().map(|_| self.ruck_height),
+            ..self.thresholds.told()
+        }
+    }
+}
 
 struct Judged {
     name: String,
@@ -30,13 +68,15 @@ struct Judged {
     found: Detection,
     /// `[cells]` whether a net reaches the cell; `None`: all are formed.
     draped: Option<Vec<bool>>,
+    /// `[cells]` excess length of compressed fibres over that which a ruck needs; `None`: not judged.
+    buckling: Option<Vec<f64>>,
 }
 
 impl Step for DefectDetection {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
-        let thresholds: Thresholds = host.parameters()?;
+        let p: Parameters = host.parameters()?;
         let input = host.input("formed")?;
         let formed: Forming = host.attributes(&input)?;
         let plies: Vec<&Sheet> = formed.plies().collect();
@@ -65,12 +105,21 @@ impl Step for DefectDetection {
                 phase: &sheet.name,
                 ..Default::default()
             });
-            judged.push(judge(host, &input, frame, sheet, &tool, &thresholds)?);
+            judged.push(judge(host, &input, frame, sheet, &tool, &p.thresholds)?);
         }
-        for text in judged.iter().filter_map(|p| over_sheared(p, &thresholds)) {
+        if let Some(scene) = &p.scene {
+            let found = buckling::judge(host, &input, frame, scene, p.ruck_height)?;
+            for (ply, buckling) in judged.iter_mut().zip(found) {
+                ply.add(buckling);
+            }
+        }
+        for text in judged
+            .iter()
+            .filter_map(|ply| over_sheared(ply, &p.thresholds))
+        {
             host.log(Log::Warn, &text);
         }
-        write(host, meshes.times[frame], &judged, &thresholds)
+        write(host, meshes.times[frame], &judged, &p)
     }
 }
 
@@ -111,6 +160,7 @@ fn judge(
         shear_angle,
         found,
         draped: None,
+        buckling: None,
     };
     if let Some(part) = part.part {
         judged.spread(part);
@@ -119,6 +169,18 @@ fn judge(
 }
 
 impl Judged {
+    /// Flags where compressed fibres have length enough for a ruck.
+    fn add(&mut self, buckling: Buckling) {
+        let f = &mut self.found;
+        for (flag, buckles) in f.flag.iter_mut().zip(&buckling.buckles) {
+            *flag |= *buckles;
+        }
+        f.summary.flagged_area = buckling.area(&f.flag);
+        f.summary.buckling_area = Some(buckling.area(&buckling.buckles));
+        f.summary.buckling_excess = Some(buckling.largest());
+        self.buckling = Some(buckling.excess);
+    }
+
     /// From the part that is draped to the whole ply, of which the rest has no values; where the fabric locks it is flagged, since it cannot lie
     /// there as the tool asks.
     fn spread(&mut self, part: DrapedPart) {
@@ -203,6 +265,9 @@ fn write_ply(host: &Host, p: &Judged) -> Result<(), StepError> {
     if let Some(draped) = &p.draped {
         host.write_field(&p.name, On::Cells, DRAPED, 1, "1", &number(draped))?;
     }
+    if let Some(excess) = &p.buckling {
+        host.write_field(&p.name, On::Cells, EXCESS, 1, "1", excess)?;
+    }
     let poor = number(&f.poor_conformity);
     host.write_field(&p.name, On::Points, "poor_conformity", 1, "1", &poor)?;
     host.write_field(&p.name, On::Cells, "flag", 1, "1", &number(&f.flag))?;
@@ -216,11 +281,28 @@ fn write_ply(host: &Host, p: &Judged) -> Result<(), StepError> {
     )
 }
 
+/// Maps of the excess length of compressed fibres, by as many plies as a map shows.
+fn maps(plies: &[Judged]) -> Vec<Map> {
+    let judged: Vec<&Judged> = plies.iter().filter(|p| p.buckling.is_some()).collect();
+    let panel = |p: &&Judged| Panel {
+        label: p.name.clone(),
+        body: p.name.clone(),
+        field: EXCESS.into(),
+    };
+    let map = |plies: &[&Judged]| Map {
+        name: EXCESS.into(),
+        title: Some("Excess length of compressed fibres over that of a ruck".into()),
+        unit: "1".into(),
+        panels: plies.iter().map(panel).collect(),
+    };
+    judged.chunks(MOST_PANELS).map(map).collect()
+}
+
 fn write(
     host: &Host,
     time: f64,
     plies: &[Judged],
-    thresholds: &Thresholds,
+    parameters: &Parameters,
 ) -> Result<(), StepError> {
     for p in plies {
         host.define_mesh(&p.name, &p.points, 4, &p.cells, &PlainBody {})?;
@@ -231,8 +313,9 @@ fn write(
     }
     host.end_frame()?;
     host.write_attributes(&Defects {
-        thresholds: thresholds.told(),
+        thresholds: parameters.told(),
         plies: plies.iter().map(|p| p.found.summary.clone()).collect(),
+        maps: maps(plies),
     })?;
     let all = |get: fn(&PlyDefects) -> f64| plies.iter().map(move |p| get(&p.found.summary));
     host.result("flagged_area", all(|s| s.flagged_area).sum(), "m2")?;
@@ -243,6 +326,12 @@ fn write(
         };
         host.result("undraped_area", sum(|s| s.undraped_area), "m2")?;
         host.result("locked_area", sum(|s| s.locked_area), "m2")?;
+    }
+    if parameters.scene.is_some() {
+        let area = all(|s| s.buckling_area.unwrap_or(0.0)).fold(0.0, |sum, a| sum + a);
+        let most = all(|s| s.buckling_excess.unwrap_or(0.0)).fold(0.0, f64::max);
+        host.result("buckling_area", area, "m2")?;
+        host.result("buckling_excess", most, "1")?;
     }
     host.result("over_shear_area", all(|s| s.over_shear_area).sum(), "m2")?;
     host.result(

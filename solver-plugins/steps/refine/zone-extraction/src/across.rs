@@ -23,11 +23,16 @@ pub struct Across {
 /// Coordinates that differ by less are the same (m).
 const SLACK: f64 = 1e-7;
 
-/// All places where the cut of a zone runs across a defect, by zone, side and ply. Sides at the blank's edge are no cuts.
+/// All places where the cut of a zone of a `blank` runs across a defect, by zone, side and ply. Sides at the blank's edge are no cuts.
 #[must_use]
-pub fn across(cells: &[FlaggedCell], zones: &[Zone], settings: &Settings) -> Vec<Across> {
+pub fn across(
+    cells: &[FlaggedCell],
+    zones: &[Zone],
+    blank: Rectangle,
+    settings: &Settings,
+) -> Vec<Across> {
     let mut found = Vec::new();
-    for set in defects(cells, settings) {
+    for set in defects(cells, blank, settings) {
         let plies = set.cells.iter().map(|&c| cells[c].ply);
         let (least, most) = (plies.clone().min(), plies.max());
         for (zone, z) in zones.iter().enumerate() {

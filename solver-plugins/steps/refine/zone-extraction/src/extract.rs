@@ -14,6 +14,8 @@ pub struct Settings {
     pub join_distance: f64,
     /// Smallest flagged area of a defect on its most affected ply (m2).
     pub minimum_area: f64,
+    /// How many times a defect at a side of the blank's box counts, and once more at a corner.
+    pub edge_factor: f64,
     /// Smallest side of a zone before clipping (m).
     pub minimum_size: f64,
     /// Covered part of the blank above which there is a warning.
@@ -71,7 +73,7 @@ pub fn extract(
     settings: &Settings,
 ) -> Result<Vec<Zone>, ExtractError> {
     let mut zones = if settings.boxes.is_empty() {
-        let defects = defects(cells, settings);
+        let defects = defects(cells, blank, settings);
         let mut zones: Vec<(Rectangle, Rectangle)> = (defects.iter())
             .map(|d| (d.bounds, grown(d.bounds, blank, settings)))
             .collect();
@@ -118,8 +120,25 @@ pub(crate) struct FlaggedSet {
     pub(crate) cells: Vec<usize>,
 }
 
-/// Connected sets of flagged cells that are large enough on some ply.
-pub(crate) fn defects(cells: &[FlaggedCell], settings: &Settings) -> Vec<FlaggedSet> {
+/// Places on a side of the blank's box lie on it, however they were rounded (m).
+const ON_EDGE: f64 = 1e-6;
+
+/// By how much more a set counts that the blank's edge cuts off: by `factor` for a side of the box across x, and for one across y.
+fn at_edges(bounds: Rectangle, blank: Rectangle, factor: f64) -> f64 {
+    let cut =
+        |d: &usize| bounds[*d] <= blank[*d] + ON_EDGE || bounds[d + 2] >= blank[d + 2] - ON_EDGE;
+    [0, 1]
+        .iter()
+        .filter(|d| cut(d))
+        .fold(1.0, |all, _| all * factor)
+}
+
+/// Connected sets of flagged cells that are large enough on some ply of a `blank`.
+pub(crate) fn defects(
+    cells: &[FlaggedCell],
+    blank: Rectangle,
+    settings: &Settings,
+) -> Vec<FlaggedSet> {
     let set = connected(cells, settings.join_distance);
     let plies = cells.iter().map(|c| c.ply + 1).max().unwrap_or(0);
     let mut found = Vec::new();
@@ -134,10 +153,11 @@ pub(crate) fn defects(cells: &[FlaggedCell], settings: &Settings) -> Vec<Flagged
             areas[cells[c].ply] += cells[c].area;
             bounds = hull(bounds, cells[c].bounds);
         }
+        let factor = at_edges(bounds, blank, settings.edge_factor);
         // A little slack: areas of cells are sums of rounded numbers.
         if areas
             .iter()
-            .any(|a| *a >= settings.minimum_area * (1.0 - 1e-9))
+            .any(|a| factor * a >= settings.minimum_area * (1.0 - 1e-9))
         {
             found.push(FlaggedSet {
                 bounds,

@@ -45,7 +45,7 @@ fn first(host: &Host, settings: &Settings) -> Result<(), StepError> {
     if zones.is_empty() {
         host.log(Log::Info, "no defect is large enough for a zone");
     }
-    for cut in across(&cells, &zones, settings) {
+    for cut in across(&cells, &zones, blank, settings) {
         tell_across(host, &cut, &zones[cut.zone], &plies[cut.ply]);
     }
     write(host, settings, blank, zones)

@@ -20,6 +20,7 @@ fn settings() -> Settings {
         scale: 1.15,
         join_distance: 0.010,
         minimum_area: 200e-6,
+        edge_factor: 1.0,
         minimum_size: 0.040,
         maximum_fraction: 0.6,
         boxes: Vec::new(),
@@ -152,6 +153,53 @@ fn specks_get_no_zone_even_when_both_plies_have_them() {
     );
 }
 
+#[test]
+fn a_place_that_the_blank_s_edge_cuts_off_counts_as_its_mirror_images_do() {
+    // One cell of 100 mm2, of 200 that are asked for: inside, at an edge, at a corner.
+    let inside = [0.0, 0.0, 0.010, 0.010];
+    let edge = [-0.240, 0.0, -0.230, 0.010];
+    let corner = [0.230, -0.150, 0.240, -0.140];
+    let zones = |bounds: [f64; 4], edge_factor: f64, minimum_area: f64| {
+        let s = Settings {
+            edge_factor,
+            minimum_area,
+            ..settings()
+        };
+        draw(&patch(0, bounds), BLANK, &s).unwrap().len()
+    };
+    for place in [inside, edge, corner] {
+        assert_eq!(zones(place, 1.0, 200e-6), 0, "as it is");
+    }
+    assert_eq!(
+        [inside, edge, corner].map(|b| zones(b, 2.0, 200e-6)),
+        [0, 1, 1]
+    );
+    assert_eq!(
+        [inside, edge, corner].map(|b| zones(b, 2.0, 201e-6)),
+        [0, 0, 1]
+    );
+    assert_eq!(
+        [inside, edge, corner].map(|b| zones(b, 2.0, 401e-6)),
+        [0, 0, 0]
+    );
+    // From one edge to the other it is cut off across y alone, at both ends.
+    let strip = [0.0, -0.150, 0.010, 0.150];
+    assert_eq!([6e-3, 6.1e-3].map(|area| zones(strip, 2.0, area)), [1, 0]);
+    // What lies one cell away from the edge is whole.
+    assert_eq!(zones([-0.230, 0.0, -0.220, 0.010], 2.0, 200e-6), 0);
+    // The zone at the corner has the corner.
+    let s = Settings {
+        edge_factor: 2.0,
+        ..settings()
+    };
+    let zones = draw(&patch(0, corner), BLANK, &s).unwrap();
+    assert_eq!(zones[0].free_sides, [false, true, true, false]);
+    assert!(
+        close(zones[0].bounds, [0.215, -0.150, 0.240, -0.125]),
+        "{zones:?}"
+    );
+}
+
 /// Side, length and the place of a cut that is free of the defect, of all cuts across defects.
 fn cuts(cells: &[FlaggedCell], bounds: [f64; 4]) -> Vec<(usize, f64, f64)> {
     let s = Settings {
@@ -159,7 +207,7 @@ fn cuts(cells: &[FlaggedCell], bounds: [f64; 4]) -> Vec<(usize, f64, f64)> {
         ..settings()
     };
     let zones = draw(cells, BLANK, &s).unwrap();
-    let found = across(cells, &zones, &s);
+    let found = across(cells, &zones, BLANK, &s);
     let mut told = Vec::new();
     for a in &found {
         assert_eq!(a.zone, 0);
@@ -209,7 +257,7 @@ fn zones_that_are_drawn_around_defects_are_not_cut_across_them() {
     cells.extend(patch(0, [-0.020, 0.050, 0.042, 0.090]));
     cells.extend(patch(1, [0.056, -0.150, 0.076, -0.050]));
     let zones = draw(&cells, BLANK, &settings()).unwrap();
-    assert!(across(&cells, &zones, &settings()).is_empty());
+    assert!(across(&cells, &zones, BLANK, &settings()).is_empty());
 }
 
 #[test]
