@@ -37,6 +37,8 @@ struct Parameters {
     element_size: f64,
     film_element_size: Option<f64>,
     film_margin: f64,
+    finer: f64,
+    slower: f64,
     start_time: Option<f64>,
     start_bend: Option<f64>,
     cut_stiffness: Option<f64>,
@@ -71,11 +73,8 @@ impl Step for BoundaryInterpolation {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
-        let mut p: Parameters = host.parameters()?;
         let zone = own_zone(host)?;
-        if let Some(advised) = advised_size(host, &zone)? {
-            p.element_size = bounded_size(host, &zone, advised, p.element_size)?;
-        }
+        let p = parameters(host, &zone)?;
         let bounds = zone.bounds;
         let input = host.input("formed")?;
         let run: Forming = host.attributes(&input)?;
@@ -108,15 +107,18 @@ impl Step for BoundaryInterpolation {
         if !sheets.iter().any(|s| s.sheet.is_ply()) {
             return Err(too_small(&input.step, &zone, p.element_size).into());
         }
-        write(host, &meshes.times, first, &sheets)?;
-        let times = &meshes.times[first..];
-        write_histories(host, &input, times)?;
+        // The run's own time goes on as much more slowly as it does.
+        let own: Vec<f64> = meshes.times.iter().map(|t| p.slower * t).collect();
+        write(host, &own, first, &sheets)?;
+        write_histories(host, &input, &meshes.times[first..])?;
+        let times = &own[first..];
         let error = sheets.iter().map(|s| s.error).fold(0.0, f64::max);
         host.write_attributes(&Boundary {
             zone,
             scene: run.scene,
             frames: times.len(),
             start_time: times[0],
+            slower: Some(p.slower).filter(|s| *s != 1.0),
             element_size: p.element_size,
             film_element_size: p.film_element_size.unwrap_or(p.element_size),
             sheets: sheets.iter().map(|s| s.sheet.clone()).collect(),
@@ -128,6 +130,17 @@ impl Step for BoundaryInterpolation {
         host.result("elements", count(|s| s.fine.grid.cells.len() / 4), "1")?;
         host.result("driven_nodes", count(|s| s.fine.driven_nodes.len()), "1")
     }
+}
+
+/// The parameters, with the element sizes that are taken in a zone.
+fn parameters(host: &Host, zone: &Zone) -> Result<Parameters, StepError> {
+    let mut p: Parameters = host.parameters()?;
+    if let Some(advised) = advised_size(host, zone)? {
+        p.element_size = bounded_size(host, zone, advised, p.element_size)?;
+    }
+    p.element_size /= p.finer;
+    p.film_element_size = p.film_element_size.map(|size| size / p.finer);
+    Ok(p)
 }
 
 /// Why a zone has no ply.
@@ -294,7 +307,7 @@ fn drive(
         pulls(host, input, meshes, body, &cut, stiffness)
     };
     let pull = p.cut_stiffness.filter(|_| ply).map(held).transpose()?;
-    let begin = late::start(host, input, meshes, body, &fine, first)?;
+    let begin = late::start(host, input, meshes, body, &fine, first, p.slower)?;
     let start = motion.start;
     if start > START_TOLERANCE && begin.is_none() {
         let name = &sheet.name;

@@ -21,6 +21,7 @@ fn settings() -> Settings {
         join_distance: 0.010,
         minimum_area: 200e-6,
         minimum_size: 0.040,
+        wider: 1.0,
         maximum_fraction: 0.6,
         boxes: Vec::new(),
         growth: 0.25,
