@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{TIMES, coarse, interpolate, motion, of_pass, rectangle, zones};
+use common::{TIMES, coarse, interpolate, motion, of_pass, zones};
 use plyflow_boundary_interpolation::BoundaryInterpolation;
 use plyflow_geometry::vec3::{Vec3, unit};
 use plyflow_sdk::On;
