@@ -35,7 +35,7 @@ pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
             blocks.push(format!("{}: {text}\n", one_line(title)));
         }
         blocks.push(zone_table(study));
-        blocks.extend(study.comparison.as_ref().map(defect_table));
+        blocks.extend(study.comparison.as_ref().map(|c| defect_table(c, study)));
     }
     blocks.push(warning_lines(&verdict::warnings(input, &material, false)));
     blocks.push(result_table(input));
@@ -78,13 +78,13 @@ fn zone_table(study: &Study) -> String {
     table(&["zone", "place", "plies"], &rows, &[])
 }
 
-fn defect_table(c: &Comparison) -> String {
+fn defect_table(c: &Comparison, study: &Study) -> String {
     let rows: Vec<Vec<String>> = c
         .told
         .local_defects()
         .take(LONGEST)
         .map(|d| {
-            vec![
+            let mut row = vec![
                 d.id.clone(),
                 d.ply.clone(),
                 d.found.kind.name().to_owned(),
@@ -95,14 +95,17 @@ fn defect_table(c: &Comparison) -> String {
                 },
                 quantity(d.found.amplitude, "m", 3),
                 quantity(d.found.area, "m2", 3),
-            ]
+            ];
+            let confirmed = study.confirmed.as_ref();
+            row.extend(
+                confirmed.map(|_| study.confirmed_text(&d.id).unwrap_or_default().to_owned()),
+            );
+            row
         })
         .collect();
-    let mut text = table(
-        &["defect", "ply", "type", "length", "amplitude", "area"],
-        &rows,
-        &[3, 4, 5],
-    );
+    let mut head = vec!["defect", "ply", "type", "length", "amplitude", "area"];
+    head.extend(study.confirmed.as_ref().map(|_| "run in other ways"));
+    let mut text = table(&head, &rows, &[3, 4, 5]);
     if !text.is_empty() && !c.others.is_empty() {
         let others = c.others.join(", ");
         text += &format!("defects as in {}; not listed: those of {others}\n", c.label);

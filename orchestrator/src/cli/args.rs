@@ -97,6 +97,7 @@ Examples:
   plyflow run workflow.yaml --jobs 8
   plyflow run workflow.yaml --until zones      # that step and what it needs
   plyflow run workflow.yaml --set detect.over_shear_positive='9 deg'
+  plyflow run workflow.yaml --confirm          # and say which defects stay
 
 A run that was stopped or killed resumes with the same command.";
 
@@ -112,7 +113,8 @@ measured of the machine (times, memory) are not. Ends with code 9 when something
 const PLAN_EXAMPLES: &str = "\
 Examples:
   plyflow plan workflow.yaml
-  plyflow plan workflow.yaml --set coarse.element=m4 --format json";
+  plyflow plan workflow.yaml --set coarse.element=m4 --format json
+  plyflow plan workflow.yaml --confirm=finer,wider               # and what these variants cost";
 
 const VALIDATE_EXAMPLES: &str = "\
 Examples:
@@ -153,6 +155,15 @@ pub struct Workflow {
     /// Use another value for a parameter, written as in YAML; may be repeated
     #[arg(long = "set", value_name = "STEP.PARAMETER=VALUE")]
     pub set: Vec<String>,
+    /// Also run the zones in other ways, and say which defects stay: in all ways, or in some of finer, slower, half_step, wider
+    #[arg(
+        long,
+        value_name = "VARIANTS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "all"
+    )]
+    pub confirm: Option<String>,
 }
 
 /// Where things are.

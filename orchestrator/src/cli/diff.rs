@@ -120,6 +120,7 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
         workflow: file.to_owned(),
         places,
         set: Vec::new(),
+        confirm: None,
     })?;
     let wanted = match only {
         [] => (0..opened.workflow.steps.len()).collect(),

@@ -88,6 +88,7 @@ fn locate(args: &InspectArgs) -> Result<Utf8PathBuf, Stop> {
         workflow: file.clone(),
         places,
         set: Vec::new(),
+        confirm: None,
     })?;
     artifact_of(&opened, &args.artifact, file)
 }

@@ -3,6 +3,7 @@
 mod args;
 mod check_plugin;
 mod clean;
+mod confirm;
 mod diff;
 mod explain;
 mod extract;

@@ -11,10 +11,11 @@ use crate::progress::Quiet;
 use crate::said::{Stop, show_findings, warn};
 use crate::store::{Lock, LockError, Store, resolved};
 use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_model::artifact::Variation;
 use plyflow_model::text::one_line;
 use plyflow_plugin_host::{Describer, PluginCatalog};
-use plyflow_workflow::Part;
 use plyflow_workflow::resolved::ResolvedWorkflow;
+use plyflow_workflow::{Part, Wanted};
 use std::collections::HashSet;
 
 /// A workflow that is ready to plan, and where its things are.
@@ -205,26 +206,30 @@ fn load_at(
     let overrides = overrides(&args.set)?;
     let full = absolute(file);
     let circumstances = resolved::circumstances(&program()?, &full, &args.set, catalog.folders());
+    let confirm = chosen(args.confirm.as_ref())?;
     let kept = circumstances
         .as_ref()
-        .filter(|_| points.is_none())
+        .filter(|_| points.is_none() && confirm.is_empty())
         .and_then(|c| resolved::read(&root, &full, c, &catalog));
     let (workflow, recipes) = match kept {
         Some(kept) => kept,
-        None => match plyflow_workflow::resolve_with_points(
+        None => match plyflow_workflow::resolve_wanted(
             file,
             &catalog,
-            &overrides,
-            &|name, digest, search| match points {
-                Some(points) => Some(points.to_vec()),
-                None => asked_before(&root, name, digest, search),
+            &Wanted {
+                overrides: &overrides,
+                confirm: &confirm,
+                points: &|name, digest, search| match points {
+                    Some(points) => Some(points.to_vec()),
+                    None => asked_before(&root, name, digest, search),
+                },
             },
         ) {
             Ok(resolution) => {
                 let recipes = recipes(&resolution.workflow);
-                // What an optimisation has asked for changes from run to run.
+                // What an optimisation has asked for changes from run to run; what is confirmed has more steps than the file.
                 let study = resolution.workflow.study.as_ref();
-                let moves = study.is_some_and(|s| s.optimisation.is_some());
+                let moves = study.is_some_and(|s| s.optimisation.is_some()) || !confirm.is_empty();
                 if let Some(c) = circumstances.as_ref().filter(|_| !moves) {
                     resolved::write(&root, &full, c, (&resolution, &recipes));
                 }
@@ -265,6 +270,18 @@ fn overrides(set: &[String]) -> Result<Vec<plyflow_workflow::Override>, Stop> {
             .map_err(|e| Stop::new(exit::USAGE, format!("--set {text}: {e}")))
     };
     set.iter().map(one).collect()
+}
+
+/// The variants that `--confirm` asks for; none where it is not given.
+///
+/// # Errors
+/// When a name is none of a variant.
+fn chosen(given: Option<&String>) -> Result<Vec<Variation>, Stop> {
+    let Some(text) = given else {
+        return Ok(Vec::new());
+    };
+    plyflow_workflow::variants_of(text)
+        .map_err(|e| Stop::new(exit::USAGE, format!("--confirm={text}: {e}")))
 }
 
 impl Opened {

@@ -1,7 +1,8 @@
 //! `plan`, `validate`, `graph`: what would be done.
 
 use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs};
-use super::found::change::{Difference, Fate, cost_of, difference};
+use super::confirm::Costs;
+use super::found::change::{Difference, Fate, cost_of, cost_of_items, difference};
 use super::open::{self, open};
 use super::study_plan::Prospects;
 use super::table::{first_line, or_none, table};
@@ -53,9 +54,10 @@ pub fn plan(args: &PlanArgs) -> Done {
                     "last_cpu_seconds": p.last.map(|c| c.cpu_seconds)})
             })
             .collect();
-        let all = match study {
-            Some(study) => json!({"study": study.as_json(), "steps": list}),
-            None => json!(list),
+        let all = match (study, Costs::of(&session)) {
+            (Some(study), _) => json!({"study": study.as_json(), "steps": list}),
+            (None, Some(costs)) => json!({"confirm": costs.as_json(), "steps": list}),
+            (None, None) => json!(list),
         };
         return print(&format!("{all:#}\n"));
     }
@@ -68,7 +70,8 @@ pub fn plan(args: &PlanArgs) -> Done {
         })
         .collect();
     let head = ["step", "state", "last time", "reason"];
-    print(&(table(&head, &rows, &[2]) + &sum(&found)))
+    let costs = Costs::of(&session).map_or(String::new(), |c| format!("\n{}", c.text()));
+    print(&(table(&head, &rows, &[2]) + &sum(&found) + &costs))
 }
 
 /// How many of each fate, and what those that are not there took when they ran last.
@@ -169,28 +172,6 @@ fn goes_on(session: &Session<'_>, id: Id) -> String {
         ),
         None => String::new(),
     }
-}
-
-/// What the items of a step that fans out over the collections of `givers` cost when they ran last, added up.
-fn cost_of_items(session: &Session<'_>, step: &str, givers: &[Id]) -> Option<Cost> {
-    let mut sum: Option<Cost> = None;
-    for giver in givers {
-        let mut item = session.core.instances()[*giver].item.clone();
-        item.push(0);
-        while let Some(cost) = session
-            .journal
-            .last(step, &item)
-            .and_then(|key| cost_of(session, &key))
-        {
-            let sum = sum.get_or_insert_default();
-            sum.wall_seconds += cost.wall_seconds;
-            sum.cpu_seconds += cost.cpu_seconds;
-            if let Some(index) = item.last_mut() {
-                *index += 1;
-            }
-        }
-    }
-    sum
 }
 
 fn waits_for(session: &Session<'_>, id: Id) -> String {

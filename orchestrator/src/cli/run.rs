@@ -6,8 +6,9 @@ mod optimise;
 mod settings;
 
 use super::args::{LogFormat, RunArgs};
+use super::confirm::Costs;
 use super::open::{open, store_root};
-use crate::engine::{Local, Purpose, Summary};
+use crate::engine::{Local, Purpose, Session, Summary};
 use crate::exit;
 use crate::said::{Done, Stop, warn};
 use crate::store::{Early, Store};
@@ -59,6 +60,7 @@ pub fn run(args: &RunArgs) -> Done {
     for text in session.told() {
         tell_damage(args, text);
     }
+    tell_costs(args, &session);
     let mut all = Summary::default();
     for round in 0.. {
         let (ended, summary) = session
@@ -84,6 +86,16 @@ pub fn run(args: &RunArgs) -> Done {
     std::mem::forget(session);
     std::mem::forget(opened);
     end
+}
+
+/// Says beforehand what the variants of `--confirm` cost.
+fn tell_costs(args: &RunArgs, session: &Session<'_>) {
+    if args.quiet || args.log_format == LogFormat::Json {
+        return;
+    }
+    if let Some(costs) = Costs::of(session) {
+        warn(&costs.text());
+    }
 }
 
 /// Says what was found damaged of the files of the run itself.

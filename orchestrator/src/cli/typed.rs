@@ -23,6 +23,11 @@ pub fn arguments(given: &Workflow) -> String {
         named => format!("--trust={named}"),
     });
     words.extend(trust);
+    // As it was typed: alone, or with some of the variants.
+    words.extend(given.confirm.iter().map(|v| match v.as_str() {
+        "all" => "--confirm".to_owned(),
+        some => format!("--confirm={some}"),
+    }));
     words
         .iter()
         .map(|w| quoted(w))
@@ -50,8 +55,9 @@ mod tests {
             workflow: "a/workflow.yaml".into(),
             places: crate::cli::args::Places::default(),
             set: vec!["detect.over_shear_positive=9 deg".into(), "a.b=it's".into()],
+            confirm: Some("finer,wider".into()),
         };
-        let expected = "plyflow run a/workflow.yaml --set 'detect.over_shear_positive=9 deg' --set 'a.b=it'\\''s'";
+        let expected = "plyflow run a/workflow.yaml --set 'detect.over_shear_positive=9 deg' --set 'a.b=it'\\''s' --confirm=finer,wider";
         assert_eq!(command(&given), expected);
     }
 }

@@ -227,6 +227,7 @@ fn again(args: &VerifyArgs) -> Done {
         workflow: file,
         places,
         set: args.set.clone(),
+        confirm: None,
     })?;
     opened.restrict(&args.again)?;
     let steps = opened.step_indices(&args.again)?;

@@ -314,6 +314,7 @@ pub(crate) mod tests {
             expectations: vec![],
             on_failure: FailurePolicy::KeepGoing,
             study: None,
+            confirming: None,
         }
     }
 

@@ -299,6 +299,7 @@ impl Packed<'_> {
                 FailurePolicy::KeepGoing
             },
             study: self.study,
+            confirming: None,
         };
         Some((workflow, recipes))
     }

@@ -3,6 +3,7 @@
 
 mod catalog;
 mod check;
+mod confirm;
 mod diagnostics;
 mod draft;
 mod evidence;
@@ -24,11 +25,13 @@ mod wires;
 mod yaml;
 
 pub use catalog::{Catalog, CatalogEntry, CatalogError};
+pub use confirm::variants_of;
 pub use diagnostics::{Diagnostic, Diagnostics, Further, Severity};
 pub use evidence::{Evidence, Resolution};
 pub use graph::{dependencies, graph, to_dot, to_mermaid};
 pub use load::{
-    Part, check_part, load, load_with, plugin_search_folders, resolve, resolve_with_points,
+    Part, Wanted, check_part, load, load_with, plugin_search_folders, resolve, resolve_wanted,
+    resolve_with_points,
 };
 pub use overrides::{Override, OverrideError};
 pub use resolved::ResolvedWorkflow;

@@ -2,6 +2,7 @@
 
 use crate::catalog::{Catalog, Plugins};
 use crate::check::Checker;
+use crate::confirm;
 use crate::diagnostics::{Diagnostics, Mention, Problems, Source};
 use crate::draft::{Draft, WORKFLOW};
 use crate::evidence::{Evidence, Resolution};
@@ -15,6 +16,7 @@ use crate::wires::{self, Wiring};
 use crate::yaml::{Kind, Node};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
+use plyflow_model::artifact::Variation;
 use plyflow_model::canonical;
 use plyflow_model::manifest::PluginKind;
 use plyflow_model::text::is_word;
@@ -107,9 +109,37 @@ pub fn resolve_with_points(
     overrides: &[Override],
     points: &PointsOf<'_>,
 ) -> Result<Resolution, Diagnostics> {
+    let wanted = Wanted {
+        overrides,
+        confirm: &[],
+        points,
+    };
+    resolve_wanted(path, catalog, &wanted)
+}
+
+/// What is asked for besides what the file says.
+#[derive(Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Parameters from the command line in place of the file's.
+    pub overrides: &'a [Override],
+    /// Variants of the fine runs of zones that are run too; none: it is not asked to confirm anything.
+    pub confirm: &'a [Variation],
+    /// The points of an optimisation, as in [`resolve_with_points`].
+    pub points: &'a PointsOf<'a>,
+}
+
+/// As [`resolve`], with all that may be asked for.
+///
+/// # Errors
+/// As [`resolve`]; and when there is no chain of zones that could be confirmed.
+pub fn resolve_wanted(
+    path: &Utf8Path,
+    catalog: &dyn Catalog,
+    wanted: &Wanted<'_>,
+) -> Result<Resolution, Diagnostics> {
     let mut problems = Problems::default();
     let plugins = Plugins::new(catalog);
-    match load_into(path, &plugins, overrides, points, &mut problems) {
+    match load_into(path, &plugins, wanted, &mut problems) {
         Some((workflow, folders)) if problems.count() == 0 => Ok(Resolution {
             workflow,
             evidence: Evidence::new(&problems, folders, &plugins),
@@ -122,17 +152,17 @@ pub fn resolve_with_points(
 fn load_into(
     path: &Utf8Path,
     catalog: &Plugins<'_>,
-    overrides: &[Override],
-    points: &PointsOf<'_>,
+    wanted: &Wanted<'_>,
     problems: &mut Problems,
 ) -> Option<(ResolvedWorkflow, Vec<Utf8PathBuf>)> {
     let (mut source, mut root) = open(path, problems)?;
-    let wanted = "a workflow file, with `plyflow: 1`, `name` and `steps`";
-    if other_format(&root, "plyflow", wanted, &source, problems) {
+    let form = "a workflow file, with `plyflow: 1`, `name` and `steps`";
+    if other_format(&root, "plyflow", form, &source, problems) {
         return None;
     }
-    overrides::apply(&mut root, overrides, &mut source, problems, catalog);
-    let family = family(&root, points, &source, problems)?;
+    overrides::apply(&mut root, wanted.overrides, &mut source, problems, catalog);
+    let confirming = confirm::wanted(&mut root, wanted.confirm, &source, catalog, problems)?;
+    let family = family(&root, wanted.points, &source, problems)?;
     let shown = family.as_ref().map(|f| f.first(&root));
     Checker::new(&WORKFLOW, &source, problems)
         .check(shown.as_ref().unwrap_or(&root), "the workflow");
@@ -173,6 +203,7 @@ fn load_into(
         expectations,
         on_failure: on_failure(&root),
         study,
+        confirming,
     };
     Some((workflow, named_folders(&root, &source)))
 }

@@ -2,7 +2,7 @@
 //! the planner and the engine need, and nothing of YAML.
 
 use camino::Utf8PathBuf;
-use plyflow_model::artifact::{self, StudyOrigin};
+use plyflow_model::artifact::{self, StudyOrigin, Variation};
 use plyflow_model::workflow::{FamilyOf, ResponseOf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -428,4 +428,39 @@ pub struct ResolvedWorkflow {
     pub on_failure: FailurePolicy,
     /// Its study, if it is one.
     pub study: Option<Study>,
+    /// What `--confirm` has added to its steps.
+    pub confirming: Option<Confirming>,
+}
+
+/// What `--confirm` has added to the steps of a workflow.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Confirming {
+    /// Name of the step that follows the defects.
+    pub step: String,
+    /// The steps of the variants, in their order.
+    pub steps: Vec<VariantStep>,
+    /// Variants that are not run.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A step of a variant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VariantStep {
+    /// Its name.
+    pub name: String,
+    /// Name of the step that it is a variant of.
+    pub of: String,
+    /// In what it differs.
+    pub variant: Variation,
+    /// About how many times as much it costs (1).
+    pub factor: f64,
+}
+
+/// A variant that is not run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Which.
+    pub variant: Variation,
+    /// Why, in words.
+    pub why: String,
 }

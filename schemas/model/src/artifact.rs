@@ -12,6 +12,7 @@ mod boundary;
 mod census;
 mod characterisation;
 mod comparison;
+mod confirmation;
 mod conformance;
 mod coupon;
 mod defects;
@@ -33,6 +34,10 @@ pub use characterisation::Characterisation;
 pub use comparison::{
     Cause, ComparedBody, ComparedDefect, ComparedModel, Comparison, Cut, Defect, DefectKind, Layer,
     Passage, PlyShear, Role, Strip, Way, Work, Yardstick,
+};
+pub use confirmation::{
+    ConfirmVariant, Confirmation, ConfirmedDefect, ConfirmedSize, ConfirmedVerdict, HangsOn,
+    NewDefect, Stands, Variation,
 };
 pub use conformance::{
     CONFORMANCE_MARK, CheckOutcome, Conformance, ConformanceCheck, ConformanceLine,

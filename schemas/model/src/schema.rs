@@ -109,6 +109,8 @@ struct Artifacts {
     boundary: Boundary,
     /// Wrinkles, bridging and shear of coarse, fine and reference runs at the same places.
     comparison: artifact::Comparison,
+    /// Which defects stay when the zones are run in other ways, and between which bounds their sizes lie.
+    confirmation: artifact::Confirmation,
     /// Wrinkles and bridging of a run or a scan by themselves, sections and slip.
     measurement: artifact::Measurement,
     /// How results settle as a mesh is refined.

@@ -385,3 +385,57 @@ fn a_torn_checkpoint_is_not_taken_up() {
     assert!(engine.wait().unwrap().success());
     assert!(!study.log().contains("goes on from a checkpoint"));
 }
+
+#[test]
+fn confirming_adds_the_variants_keeps_what_was_run_and_goes_on_where_it_was_stopped() {
+    let study = study(TWO_ZONES);
+    let json = |words: &[&str]| -> serde_json::Value {
+        let output = study.call(words);
+        serde_json::from_slice(&output.stdout).expect("JSON")
+    };
+    let plan = ["plan", "--confirm", "--format", "json"];
+    // Before anything has run nobody knows what it costs.
+    assert!(json(&plan)["confirm"]["estimated_cpu_seconds"].is_null());
+    assert_eq!(study.run(&[]), well(8, 0));
+    let costs = &json(&plan)["confirm"];
+    let told = costs["variants"].as_array().unwrap();
+    let names: Vec<&str> = told
+        .iter()
+        .map(|v| v["variant"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["finer", "slower", "half_step", "wider"]);
+    let (all, own) = (
+        &costs["estimated_cpu_seconds"],
+        &costs["workflow_cpu_seconds"],
+    );
+    assert!(
+        all.as_f64().unwrap() > 0.0 && own.as_f64().unwrap() > 0.0,
+        "{costs}"
+    );
+    // Two zones: boundaries and runs of two variants, the smaller step, and the wider zones with theirs; the step that follows.
+    assert_eq!(study.run(&["--confirm=finer"]), well(2 + 2 + 1, 8));
+    assert_eq!(study.run(&["--confirm"]), well(4 + 2 + 5 + 1, 12));
+    assert_eq!(study.run(&["--confirm"]), well(0, 24));
+    assert_eq!(study.run(&[]), well(0, 8), "its own steps are as before");
+    let results = json(&["results", "--confirm", "--format", "json"]);
+    let value = |step: &str, result: &str| -> Vec<f64> {
+        let all = results["results"].as_array().unwrap().iter();
+        let mine = all.filter(|r| r["step"] == step && r["result"] == result);
+        mine.map(|r| r["value"].as_f64().unwrap()).collect()
+    };
+    let counts = ["defect_count", "stay_count", "hang_count", "gone_count"];
+    let [all, stay, hang, gone] = counts.map(|name| value("confirm", name)[0]);
+    assert_eq!(all, stay + hang + gone);
+    let compared = ["wrinkle_count", "bridging_count"].map(|name| value("comparison", name)[0]);
+    assert_eq!(all, compared[0] + compared[1]);
+    // The slower process takes twice as many steps of the same size, the smaller step too; finer elements more of them.
+    for zone in 0..2 {
+        let of = |step: &str, result: &str| value(step, result)[zone];
+        for step in ["local_slower", "local_half_step"] {
+            let ratio = of(step, "cycles") / of("local", "cycles");
+            assert!((1.8..2.3).contains(&ratio), "{step}: {ratio}");
+        }
+        assert!(of("local_finer", "elements") > 1.4 * of("local", "elements"));
+        assert!(of("local_wider", "elements") >= of("local", "elements"));
+    }
+}

@@ -55,6 +55,13 @@ pub(super) fn zones(study: &Study) -> Markup {
     }
 }
 
+/// A text as a sentence.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
+}
+
 fn sides(free: [bool; 4]) -> String {
     let names = ["left", "right", "bottom", "top"];
     let all = names.into_iter().zip(free).filter(|(_, f)| *f);
@@ -162,10 +169,12 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
             } @else {
                 p class="note" { "Fine local runs beside the coarse global run at the same places; a dash: that model does not show it, or bridging, which has no crest. Directions are those of crests in the flat ply, from x. A likely cause is a reading of the fields after the fact. A defect that reaches the cut needs a larger zone."
                     @if !places.is_empty() { span class="with-script" hidden { " A click on a row, or Enter, shows the defect in the 3D view and on the maps; Escape ends that." } } }
+                @if let Some(c) = &study.confirmed { p class="confirmed" { (sentence(&c.verdict.text)) } }
                 div class="scroll" { table class="defects" {
                     thead {
                         tr { th rowspan="2" { "id" } th rowspan="2" { "zone" } th rowspan="2" { "ply" } th rowspan="2" { "type" }
-                            @for (name, _) in MEASURES { th class="group" colspan=(roles.len()) { (name) } } th rowspan="2" { "remark" } }
+                            @for (name, _) in MEASURES { th class="group" colspan=(roles.len()) { (name) } } th rowspan="2" { "remark" }
+                            @if study.confirmed.is_some() { th rowspan="2" { "run in other ways" } } }
                         tr { @for _ in MEASURES { @for role in &roles { th class="n" { (role.name()) } } } }
                     }
                     tbody { @for row in &rows {
@@ -176,6 +185,7 @@ pub(super) fn defects(study: &Study, n: usize, places: &[Place]) -> Markup {
                                 td class=(if i == 0 { "n first" } else { "n" }) { (d.map_or("–".to_owned(), measure)) }
                             } }
                             td { @if row.models.iter().flatten().any(|d| d.touches_cut) { "reaches the cut" } }
+                            @if study.confirmed.is_some() { td { (study.confirmed_text(&row.first.id).unwrap_or("–")) } }
                         }
                     } }
                 } }

@@ -39,6 +39,12 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
             parts.push(format!("{missed} of the reference missed"));
         }
     }
+    if let Some(confirmed) = &study.confirmed {
+        if !confirmed.verdict.stays {
+            tone = Tone::Bad;
+        }
+        parts.push(confirmed.verdict.text.clone());
+    }
     let runs = runs(study);
     parts.extend(kinetic_text(&runs));
     let bad = [kinetic_missed(&runs), ledger_open(&runs)];

@@ -3,7 +3,9 @@
 use crate::input::{Instance, ReportInput};
 use crate::read::error::{ReadError, form};
 use crate::read::facts::Facts;
-use plyflow_model::artifact::{Attributes, Boundary, Comparison, Forming, Zone, Zones};
+use plyflow_model::artifact::{
+    Attributes, Boundary, Comparison, Confirmation, Forming, Zone, Zones,
+};
 use serde::Deserialize;
 
 /// Instances, by their positions, with what each tells of itself and of what it took.
@@ -69,7 +71,9 @@ impl<'a> Links<'a> {
     /// Lists of zones that were drawn from what `giver` gave, each with those drawn again after a first look, and so on; one that
     /// is empty where none was.
     pub(super) fn zone_lists(self, giver: usize) -> Vec<Vec<usize>> {
-        let takers = self.takers(Zones::KIND, giver);
+        let mut takers = self.takers(Zones::KIND, giver);
+        let all = takers.clone();
+        takers.retain(|at| !self.is_wider(*at, &all));
         let is_first = |at: &&usize| !takers.iter().any(|t| self.took(**at, *t));
         let lists = takers.iter().filter(is_first).flat_map(|&at| {
             let further = self.zone_lists(at).into_iter();
@@ -80,6 +84,26 @@ impl<'a> Links<'a> {
             return vec![Vec::new()];
         }
         lists
+    }
+
+    /// Whether a list of zones is one with wider margins, drawn beside another list: what is held against the runs of that one.
+    fn is_wider(self, at: usize, among: &[usize]) -> bool {
+        let wide = |at: usize| {
+            let facts = self.facts(at);
+            facts.is_some_and(|f| f.attributes["wider"].is_number())
+        };
+        wide(at)
+            && among.iter().any(|other| !wide(*other))
+            && self.takers(Comparison::KIND, at).is_empty()
+    }
+
+    /// What followed the defects of some local runs through other runs of their zones; of several the last.
+    pub(super) fn confirmation(self, locals: &[usize]) -> Option<usize> {
+        let is_of = |at: &usize| {
+            let mut keys = self.at_port([*at], "local");
+            keys.any(|key| locals.iter().any(|l| self.key(*l) == key))
+        };
+        self.of_kind(Confirmation::KIND).filter(is_of).last()
     }
 
     /// Forming runs whose boundary was made for the zones of a list.

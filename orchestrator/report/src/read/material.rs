@@ -174,6 +174,8 @@ impl<'a> Reader<'a> {
         });
         let locals = links.one_of_each_zone(locals, comparison);
         self.read_locals(&mut study, &locals, comparison);
+        let confirmed = links.confirmation(&locals);
+        study.confirmed = confirmed.and_then(|at| self.attributes(at));
         let reference = links.at_port(comparison, "reference").next();
         let reference =
             reference.and_then(|key| (0..links.facts.len()).find(|at| links.key(*at) == key));

@@ -3,7 +3,7 @@
 use crate::plain::{Place, Ply, Tool};
 use crate::read::comparison::Comparison;
 use crate::read::history::History;
-use plyflow_model::artifact::{Defects, Forming, Thresholds, Zone};
+use plyflow_model::artifact::{Confirmation, Defects, Forming, Thresholds, Zone};
 
 /// What one global run led to.
 #[derive(Debug, Default)]
@@ -24,6 +24,8 @@ pub(crate) struct Study {
     pub(crate) locals: Vec<Local>,
     /// What the comparison found; of several of the same zones, the first.
     pub(crate) comparison: Option<Comparison>,
+    /// Whether that stays when the zones are run in other ways, where they were.
+    pub(crate) confirmed: Option<Confirmation>,
     /// Local runs that only the other comparisons of these zones have, without plies and histories.
     pub(crate) further: Vec<Run>,
     /// A fine run of the whole scene.
@@ -69,6 +71,12 @@ impl Study {
     pub(crate) fn runs(&self) -> impl Iterator<Item = &Run> {
         let locals = self.locals.iter().map(|l| &l.run);
         self.global.iter().chain(locals).chain(&self.reference)
+    }
+
+    /// What is said of a defect of the local runs when the zones are run in other ways.
+    pub(crate) fn confirmed_text(&self, id: &str) -> Option<&str> {
+        let defects = &self.confirmed.as_ref()?.defects;
+        defects.iter().find(|d| d.id == id).map(|d| d.text.as_str())
     }
 
     /// From where on the detection flags something.

@@ -77,6 +77,28 @@ pub fn cost_of(session: &Session<'_>, key: &Key) -> Option<Cost> {
     session.store.read_record(key).ok().map(|r| r.cost)
 }
 
+/// What the items of a step that fans out over the collections of `givers` cost when they ran last, added up.
+pub fn cost_of_items(session: &Session<'_>, step: &str, givers: &[Id]) -> Option<Cost> {
+    let mut sum: Option<Cost> = None;
+    for giver in givers {
+        let mut item = session.core.instances()[*giver].item.clone();
+        item.push(0);
+        while let Some(cost) = session
+            .journal
+            .last(step, &item)
+            .and_then(|key| cost_of(session, &key))
+        {
+            let sum = sum.get_or_insert_default();
+            sum.wall_seconds += cost.wall_seconds;
+            sum.cpu_seconds += cost.cpu_seconds;
+            if let Some(index) = item.last_mut() {
+                *index += 1;
+            }
+        }
+    }
+    sum
+}
+
 /// What to say when the store has nothing of a workflow as it is now, `given` by the user, or nothing of some of its `steps` (of all if there are none).
 pub fn nothing_yet(session: &Session<'_>, steps: &[String], given: &Workflow) -> String {
     let core = &session.core;

@@ -20,6 +20,9 @@ pub struct Boundary {
     /// When the fine run begins (s).
     #[serde(default)]
     pub start_time: f64,
+    /// How many times slower than in the coarse run the process goes on: the times of this artifact are those of the coarse run times this; left out: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slower: Option<f64>,
     /// Of the plies (m).
     #[serde(default)]
     pub element_size: f64,

@@ -33,6 +33,9 @@ pub struct Forming {
     /// The zone of a local run; `null` for the whole.
     #[serde(default)]
     pub zone: Option<Zone>,
+    /// Of a zone whose process goes on more slowly than the scene says: how many times; left out: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slower: Option<f64>,
     /// The smallest that was used (s).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_step: Option<f64>,

@@ -26,6 +26,9 @@ pub struct Zones {
     /// Factor by which boxes were scaled about their middles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
+    /// Factor by which the margins around the boxes were enlarged after that; left out: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wider: Option<f64>,
     /// `[x0, y0, x1, y1]` (m), the box around the blank. Zones can only be drawn again where it is told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blank: Option<Rectangle>,

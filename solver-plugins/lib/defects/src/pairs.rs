@@ -56,6 +56,24 @@ fn has_ridge(bridging: &Defect, wrinkle: &Defect) -> bool {
         && wrinkle.ridge_nodes.iter().all(holds)
 }
 
+/// Whether a defect is as large as it must be to count.
+pub fn counts(d: &Defect, settings: &Settings) -> bool {
+    match d.kind {
+        Kind::Wrinkle => d.length >= settings.minimum_wrinkle_length,
+        Kind::Bridging => d.area >= settings.minimum_bridging_area,
+    }
+}
+
+/// Name of a defect of a zone, such as `AW1`: zone, W (wrinkle) or B (bridging), number from 1 on. They are numbered from the uppermost ply of the zone's run
+/// down, wrinkles by length and bridging by area.
+pub fn name_of(zone: &str, kind: Kind, number: usize) -> String {
+    let letter = match kind {
+        Kind::Wrinkle => 'W',
+        Kind::Bridging => 'B',
+    };
+    format!("{zone}{letter}{number}")
+}
+
 /// Defects that two models share, and those that one has alone.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Pairs {
@@ -77,10 +95,7 @@ impl Pairs {
         settings: &Settings,
         apart: impl Fn(usize, usize) -> Option<f64>,
     ) -> Self {
-        let counts = |d: &Defect| match d.kind {
-            Kind::Wrinkle => d.length >= settings.minimum_wrinkle_length,
-            Kind::Bridging => d.area >= settings.minimum_bridging_area,
-        };
+        let counts = |d: &Defect| counts(d, settings);
         let mut near: Vec<(f64, usize, usize)> = Vec::new();
         for (i, a) in ours.iter().enumerate() {
             for (j, b) in theirs.iter().enumerate() {

@@ -158,12 +158,13 @@ pub fn passages(host: &Host, models: &[Model], zones: &[Zone]) -> Result<Vec<Pas
             let Some(other) = global.plies.iter().find(|p| p.name == ply.name) else {
                 continue;
             };
-            // A local run may begin late.
+            // A local run may begin late; where it goes on more slowly its times are stretched.
             let begin = part.times.first().copied().unwrap_or(0.0);
+            let begun = begin / local.slower;
             let cuts = zone.cuts(bounds_in_whole(models, &ply.name), bounds_of(ply));
             let cut = (zone, cuts);
             let fine = work(host, local, &part, ply, cut, size, begin)?;
-            let coarse = work(host, global, &whole, other, cut, size, begin)?;
+            let coarse = work(host, global, &whole, other, cut, size, begun)?;
             if let (Some(local), Some(global)) = (fine, coarse) {
                 list.push(Passage {
                     zone: zone.name.clone(),

@@ -27,6 +27,8 @@ pub struct Model {
     pub zone: Option<usize>,
     /// (m).
     pub element_size: f64,
+    /// How many times slower than the scene says the process went on.
+    pub slower: f64,
     /// Cells of all sheets.
     pub elements: usize,
     /// Cells times cycles, over all sheets.
@@ -303,6 +305,7 @@ fn read(
         role,
         zone: zone.map(|(i, _)| i),
         element_size: formed.element_size,
+        slower: formed.slower.unwrap_or(1.0),
         elements: meshes
             .bodies
             .iter()

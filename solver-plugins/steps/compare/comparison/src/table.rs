@@ -2,7 +2,7 @@
 
 use crate::models::{Model, bounds_in_whole, bounds_of};
 use plyflow_defects::of_run::neighbours;
-use plyflow_defects::pairs::{apart, same_within, unlike};
+use plyflow_defects::pairs::{apart, name_of, same_within, unlike};
 use plyflow_defects::{Defect, Kind, Limits, Settings, find_causes, measure};
 use plyflow_model::artifact::{ComparedDefect, Role, Zone};
 
@@ -143,12 +143,8 @@ fn number(entries: &mut Vec<Entry>, found: Vec<Entry>, locals: &[Entry], zones: 
             let kind = entry.defect.kind;
             let next = &mut next[usize::from(kind == Kind::Bridging)];
             *next += 1;
-            let letter = if kind == Kind::Wrinkle { 'W' } else { 'B' };
-            format!(
-                "{}{letter}{}",
-                zones[entry.zone].name,
-                count(entry.zone, kind) + *next
-            )
+            let number = count(entry.zone, kind) + *next;
+            name_of(&zones[entry.zone].name, kind, number)
         });
         taken.push(entry.id.clone());
         entries.push(entry);

@@ -37,6 +37,8 @@ pub struct Forming {
     pub tool_warnings: Vec<String>,
     /// The zone of a local run.
     pub zone: Option<Zone>,
+    /// How many times slower than the scene says its process goes on.
+    pub slower: f64,
     /// Where a run that begins late begins.
     pub start: Option<Beginning>,
     /// Edge of the plies' elements (m).

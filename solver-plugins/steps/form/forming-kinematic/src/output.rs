@@ -382,6 +382,7 @@ fn forming(
         element_size: p.element_size,
         net_spacing: Some(p.net_spacing.unwrap_or(0.25 * p.element_size)),
         zone: None,
+        slower: None,
         time_step: None,
         cycles: None,
         element_cycles: None,

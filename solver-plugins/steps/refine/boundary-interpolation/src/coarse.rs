@@ -105,10 +105,17 @@ impl Coarse<'_> {
         Ok(motion)
     }
 
-    /// Where all nodes are when the fine run begins at the frame `first`.
-    pub(crate) fn start(&self, host: &Host, first: usize) -> Result<Option<Start>, StepError> {
+    /// Where all nodes are when the fine run begins at the frame `first` and is `slower`.
+    pub(crate) fn start(
+        &self,
+        host: &Host,
+        first: usize,
+        slower: f64,
+    ) -> Result<Option<Start>, StepError> {
         let of = &self.whole;
-        late::start(host, of.input, of.meshes, of.body, &self.fine, first)
+        late::start(
+            host, of.input, of.meshes, of.body, &self.fine, first, slower,
+        )
     }
 
     /// What the surroundings pull at the cut with, through the frames of the coarse run. `stiffness`: theirs, of the cut's length (N/m2).

@@ -137,7 +137,7 @@ pub(crate) fn frame_before_bend(bends: &[Vec<f64>], limit: f64) -> usize {
     first.map_or(0, |f| f.saturating_sub(1))
 }
 
-/// Where all nodes are at the frame `first`, and were before; `None` at the beginning.
+/// Where all nodes are at the frame `first`, and were before; `None` at the beginning. `slower`: how many times slower than in the coarse run they move.
 pub(crate) fn start(
     host: &Host,
     input: &Input,
@@ -145,6 +145,7 @@ pub(crate) fn start(
     body: &BodyInfo,
     fine: &Placed,
     first: usize,
+    slower: f64,
 ) -> Result<Option<Start>, StepError> {
     if first == 0 {
         return Ok(None);
@@ -160,7 +161,7 @@ pub(crate) fn start(
         states += 1;
     }
     let (before, after) = (at(first - 1)?, at(first + 1)?);
-    let span = meshes.times[first + 1] - meshes.times[first - 1];
+    let span = slower * (meshes.times[first + 1] - meshes.times[first - 1]);
     let pairs = before.iter().zip(&after);
     Ok(Some(Start {
         states,

@@ -39,6 +39,8 @@ struct Parameters {
     element_size: f64,
     film_element_size: Option<f64>,
     film_margin: f64,
+    finer: f64,
+    slower: f64,
     start_time: Option<f64>,
     start_bend: Option<f64>,
     cut_stiffness: Option<f64>,
@@ -66,11 +68,8 @@ impl Step for BoundaryInterpolation {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
-        let mut p: Parameters = host.parameters()?;
         let zone = own_zone(host)?;
-        if let Some(advised) = advised_size(host, &zone)? {
-            p.element_size = bounded_size(host, &zone, advised, p.element_size)?;
-        }
+        let p = parameters(host, &zone)?;
         let bounds = zone.bounds;
         let input = host.input("formed")?;
         let run: Forming = host.attributes(&input)?;
@@ -97,16 +96,20 @@ impl Step for BoundaryInterpolation {
         if !sheets.iter().any(|s| s.sheet.is_ply()) {
             return Err(too_small(&input.step, &zone, p.element_size).into());
         }
-        write(host, &meshes.times, first, &sheets)?;
-        let times = &meshes.times[first..];
+        // The run's own time goes on as much more slowly as it does.
+        let own: Vec<f64> = meshes.times.iter().map(|t| p.slower * t).collect();
+        write(host, &own, first, &sheets)?;
         let loads = exchange.as_ref().filter(|e| e.has(Part::Loads));
-        write_histories(host, loads.map_or(&input, |e| &e.input), times)?;
+        let loads = loads.map_or(&input, |e| &e.input);
+        write_histories(host, loads, &meshes.times[first..])?;
+        let times = &own[first..];
         let error = sheets.iter().map(|s| s.error).fold(0.0, f64::max);
         host.write_attributes(&Boundary {
             zone,
             scene: run.scene,
             frames: times.len(),
             start_time: times[0],
+            slower: Some(p.slower).filter(|s| *s != 1.0),
             element_size: p.element_size,
             film_element_size: p.film_element_size.unwrap_or(p.element_size),
             sheets: sheets.iter().map(|s| s.sheet.clone()).collect(),
@@ -118,6 +121,17 @@ impl Step for BoundaryInterpolation {
         host.result("elements", count(|s| s.fine.grid.cells.len() / 4), "1")?;
         host.result("driven_nodes", count(|s| s.fine.driven_nodes.len()), "1")
     }
+}
+
+/// The parameters, with the element sizes that are taken in a zone.
+fn parameters(host: &Host, zone: &Zone) -> Result<Parameters, StepError> {
+    let mut p: Parameters = host.parameters()?;
+    if let Some(advised) = advised_size(host, zone)? {
+        p.element_size = bounded_size(host, zone, advised, p.element_size)?;
+    }
+    p.element_size /= p.finer;
+    p.film_element_size = p.film_element_size.map(|size| size / p.finer);
+    Ok(p)
 }
 
 /// Why a zone has no ply.
@@ -291,7 +305,7 @@ fn drive(
     let pull = held
         .map(|s| from(Part::Forces).pulls(host, s))
         .transpose()?;
-    let begin = from(Part::Start).start(host, first)?;
+    let begin = from(Part::Start).start(host, first, p.slower)?;
     if begin.is_none() {
         warn_of_a_jump(host, &sheet.name, motion.start);
     }

@@ -18,6 +18,8 @@ pub struct Settings {
     pub edge_factor: f64,
     /// Smallest side of a zone before clipping (m).
     pub minimum_size: f64,
+    /// Factor on what that leaves between a defect and each side of its zone.
+    pub wider: f64,
     /// Covered part of the blank above which there is a warning.
     pub maximum_fraction: f64,
     /// Zones drawn by hand, `[x0, y0, x1, y1]` (m).
@@ -207,17 +209,37 @@ fn connected(cells: &[FlaggedCell], gap: f64) -> Vec<usize> {
     (0..cells.len()).map(|i| root(&mut parent, i)).collect()
 }
 
-/// A defect's box scaled, brought to the smallest size, clipped, and its sides near the blank's edge moved
+/// A defect's box scaled, brought to the smallest size, its margins widened, clipped, and its sides near the blank's edge moved
 /// onto it.
 fn grown(defect: Rectangle, blank: Rectangle, s: &Settings) -> Rectangle {
     let mut b = [0.0; 4];
     for d in 0..2 {
         let centre = 0.5 * (defect[d] + defect[d + 2]);
-        let half = 0.5 * ((defect[d + 2] - defect[d]) * s.scale).max(s.minimum_size);
+        let size = defect[d + 2] - defect[d];
+        let half = 0.5 * widened(size, (size * s.scale).max(s.minimum_size), s.wider);
         b[d] = tidy(centre - half);
         b[d + 2] = tidy(centre + half);
     }
     onto_edges(b, blank, s.join_distance)
+}
+
+/// The size of a zone of this size around a defect (m), what it has beyond the defect being multiplied.
+fn widened(defect: f64, zone: f64, wider: f64) -> f64 {
+    zone + (wider - 1.0) * (zone - defect)
+}
+
+/// A box that was drawn by hand, its margins widened: it counts as a defect's box that was scaled.
+fn widened_box(b: Rectangle, s: &Settings) -> Rectangle {
+    if s.wider == 1.0 {
+        return b;
+    }
+    let mut wide = b;
+    for d in 0..2 {
+        let (centre, size) = (0.5 * (b[d] + b[d + 2]), b[d + 2] - b[d]);
+        let half = 0.5 * widened(size / s.scale, size, s.wider);
+        (wide[d], wide[d + 2]) = (tidy(centre - half), tidy(centre + half));
+    }
+    wide
 }
 
 /// A box with its sides that lie beyond the blank's edge, or nearer to it than `gap` (m), moved onto it.
@@ -276,11 +298,12 @@ fn drawn(
                     });
                 }
             };
+            let wide = widened_box(b, settings);
             let clipped = [
-                b[0].max(blank[0]),
-                b[1].max(blank[1]),
-                b[2].min(blank[2]),
-                b[3].min(blank[3]),
+                wide[0].max(blank[0]),
+                wide[1].max(blank[1]),
+                wide[2].min(blank[2]),
+                wide[3].min(blank[3]),
             ];
             if clipped[0] < clipped[2] && clipped[1] < clipped[3] {
                 Ok((b, clipped))

@@ -182,6 +182,7 @@ fn write(
     host.write_attributes(&Zones {
         zones,
         scale: Some(settings.scale),
+        wider: Some(settings.wider).filter(|w| *w != 1.0),
         blank: Some(blank),
         ply_fraction: Some(fraction),
     })?;

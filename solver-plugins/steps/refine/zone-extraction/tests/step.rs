@@ -22,6 +22,7 @@ fn settings() -> Settings {
         minimum_area: 200e-6,
         edge_factor: 1.0,
         minimum_size: 0.040,
+        wider: 1.0,
         maximum_fraction: 0.6,
         boxes: Vec::new(),
         growth: 0.25,

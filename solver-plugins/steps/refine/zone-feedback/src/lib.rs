@@ -141,6 +141,14 @@ fn fine_runs(host: &Host) -> Result<Vec<Fine>, StepError> {
             let step = &input.step;
             format!("`local`: '{step}' is no run of a zone (its attribute `zone` is null)")
         })?;
+        if let Some(slower) = run.slower {
+            let step = &input.step;
+            return Err(format!(
+                "`local`: the process of '{step}' goes on {slower} times more slowly than that of the coarse run; expected the same times, so that its motion can drive \
+                 coarse nodes. Leave out `slower` of its boundary-interpolation"
+            )
+            .into());
+        }
         let meshes = host.meshes(&input)?;
         if meshes.times.len() < 2 {
             let (step, n) = (&input.step, meshes.times.len());

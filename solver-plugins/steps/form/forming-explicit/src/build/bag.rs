@@ -78,6 +78,7 @@ pub fn build_bag(
         field_errors: vec![(RigidName::Tool, tool.error)],
         tool_warnings: tool.warnings,
         zone: None,
+        slower: 1.0,
         start: None,
         element_size: p.element_size,
     })

@@ -80,6 +80,7 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
         field_errors,
         tool_warnings: tool.warnings,
         zone: None,
+        slower: 1.0,
         start: None,
         element_size: p.element_size,
     })

@@ -34,7 +34,7 @@ pub fn build_local(
     let (parts, cut) = sheets_of(&input, &stack, &Elements { p, components })?;
     let start = Beginning::of_zone(&stack, &input.sheets, input.time[0])?;
     let tool = tool::rigid(p)?;
-    let cycle = Cycle::new(process, [input.frame[0], input.frame[last]]);
+    let cycle = Cycle::new(process, [input.frame[0], input.frame[last]]).slowed(input.slower);
     let mut model = Model::new(parts.points, parts.specs, p.step_settings())?;
     let mut surfaces = ToolSurfaces::new(tool.field);
     add_contacts(&mut model, &stack, &parts.placed, p, &mut surfaces)?;
@@ -57,6 +57,7 @@ pub fn build_local(
         field_errors: vec![(RigidName::Tool, tool.error)],
         tool_warnings: tool.warnings,
         zone: Some(input.zone),
+        slower: input.slower,
         start,
         element_size: input.element_size,
     })

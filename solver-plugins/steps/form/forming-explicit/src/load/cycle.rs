@@ -51,6 +51,13 @@ impl Cycle {
         }
     }
 
+    /// The same process, which takes `factor` times as long: every phase is stretched, and all that goes on in shares of a phase with it.
+    #[must_use]
+    pub fn slowed(mut self, factor: f64) -> Self {
+        self.durations = self.durations.map(|d| factor * d);
+        self
+    }
+
     /// Whole duration (s).
     pub fn duration(&self) -> f64 {
         self.durations.iter().sum()
@@ -192,6 +199,25 @@ mod tests {
             assert!((wanted - 1e3 * kpa).abs() < 1e-6, "{t}: {wanted}");
         }
         assert_eq!((cycle.bag, cycle.cavity_end), (8e4, 5e3));
+    }
+
+    #[test]
+    fn a_slower_process_has_the_same_states_in_a_multiple_of_the_time() {
+        let forming = table(&[(0.0, 0.0), (0.2, 40.0), (1.0, 75.0)]);
+        let fast = cycle(json!("80000 Pa"), forming);
+        let slow = fast.clone().slowed(2.0);
+        assert!((slow.duration() - 2.0).abs() < 1e-12);
+        for k in 0..=20 {
+            let (t, s) = (0.05 * f64::from(k), 0.1 * f64::from(k));
+            let states = |c: &Cycle, t| {
+                let drawn = c.wanted_in_cavity(t).unwrap();
+                [c.bag_pressure(t), c.frame_height(t), c.gas_left(t), drawn]
+            };
+            for (a, b) in states(&fast, t).into_iter().zip(states(&slow, s)) {
+                assert!((a - b).abs() < 1e-9 * a.abs().max(1.0), "{t} s: {a} {b}");
+            }
+        }
+        assert_eq!((slow.phase(0.3), slow.phase(0.5)), ("bagging", "lowering"));
     }
 
     #[test]

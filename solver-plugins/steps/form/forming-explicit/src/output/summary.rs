@@ -105,6 +105,7 @@ fn attributes(
         element_size: forming.element_size,
         net_spacing: None,
         zone: forming.zone.clone(),
+        slower: Some(forming.slower).filter(|s| *s != 1.0),
         time_step: Some(outcome.smallest_step),
         cycles: Some(outcome.cycles),
         element_cycles: Some(elements as f64 * outcome.cycles as f64),

@@ -56,6 +56,8 @@ pub struct LocalInput {
     pub zone: Zone,
     /// Element size (m).
     pub element_size: f64,
+    /// How many times slower than the scene says the process goes on; the times are stretched already.
+    pub slower: f64,
 }
 
 /// What an artifact feeds back: where nodes of the coarse plies go.

@@ -89,6 +89,7 @@ pub fn read_boundary(host: &Host, input: &Input, scene: &Scene) -> Result<LocalI
         sheets,
         zone: boundary.zone,
         element_size: boundary.element_size,
+        slower: boundary.slower.unwrap_or(1.0),
     })
 }
 

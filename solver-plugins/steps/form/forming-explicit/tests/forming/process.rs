@@ -172,6 +172,7 @@ fn zone(p: &Parameters, begin: f64) -> Forming {
         frame: vec![0.04; 2],
         zone: Zone::new("A", [-0.03, -0.03, 0.03, 0.03]),
         element_size: 0.015,
+        slower: 1.0,
     };
     build_local(p, input, &BuiltIn).unwrap()
 }

@@ -435,6 +435,7 @@ impl Whole {
             time,
             zone: plyflow_model::artifact::Zone::new("A", [-0.03, -0.03, 0.03, 0.03]),
             element_size: 0.007,
+            slower: 1.0,
         }
     }
 

@@ -1,0 +1,116 @@
+//! Step plugin `confirm`: follows the defects of zones through runs in other ways, and says which stay and between which bounds their sizes lie.
+
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
+mod bounds;
+mod follow;
+mod runs;
+mod told;
+
+pub use bounds::{Bounds, Measured, bounds};
+
+use plyflow_defects::Settings;
+use plyflow_model::artifact::{Confirmation, ConfirmedDefect, Stands};
+use plyflow_sdk::{Host, Log, Progress, Step, StepError, export_step};
+use serde::Deserialize;
+use told::{Size, sizes};
+
+/// The step.
+pub struct Confirm;
+
+export_step!(Confirm);
+
+#[derive(Deserialize)]
+struct Tolerance {
+    tolerance: f64,
+}
+
+/// Defects that do not stay and are named in the warning.
+const NAMED: usize = 8;
+
+impl Step for Confirm {
+    const MANIFEST: &'static str = include_str!("../manifest.json");
+
+    fn run(host: &Host) -> Result<(), StepError> {
+        let settings: Settings = host.parameters()?;
+        let Tolerance { tolerance } = host.parameters()?;
+        host.progress(&Progress {
+            phase: "reading",
+            ..Default::default()
+        });
+        let all = runs::read(host, &settings)?;
+        host.progress(&Progress {
+            fraction: 0.5,
+            phase: "following",
+            ..Default::default()
+        });
+        let tracks = follow::follow(host, &all, &settings)?;
+        let told = told::told(&all, &tracks, tolerance);
+        warn(host, &told);
+        host.write_attributes(&told)?;
+        write_results(host, &told)
+    }
+}
+
+/// Tells what does not stay.
+fn warn(host: &Host, told: &Confirmation) {
+    let level = if told.verdict.stays {
+        Log::Info
+    } else {
+        Log::Warn
+    };
+    host.log(level, &told.verdict.text);
+    let moves = |d: &&ConfirmedDefect| d.stands != Stands::Stays;
+    let moving: Vec<&ConfirmedDefect> = told.defects.iter().filter(moves).collect();
+    if moving.is_empty() {
+        return;
+    }
+    let mut named: Vec<String> = (moving.iter().take(NAMED))
+        .map(|d| format!("{}: {}", d.id, d.text))
+        .collect();
+    if moving.len() > NAMED {
+        named.push(format!("and {} more", moving.len() - NAMED));
+    }
+    let text = format!(
+        "{} of {} defects do not stay: {}",
+        moving.len(),
+        told.defects.len(),
+        named.join("; ")
+    );
+    host.log(Log::Warn, &text);
+}
+
+fn write_results(host: &Host, told: &Confirmation) -> Result<(), StepError> {
+    let count = |stands| {
+        let those = told.defects.iter().filter(|d| d.stands == stands);
+        those.count() as f64
+    };
+    host.result(
+        "verdict_stays",
+        f64::from(u8::from(told.verdict.stays)),
+        "1",
+    )?;
+    host.result("defect_count", told.defects.len() as f64, "1")?;
+    host.result("stay_count", count(Stands::Stays), "1")?;
+    host.result("hang_count", count(Stands::Hangs), "1")?;
+    host.result("gone_count", count(Stands::Gone), "1")?;
+    let inside = told.new.iter().filter(|n| n.zone.is_some()).count();
+    host.result("new_count", inside as f64, "1")?;
+    host.result("outside_count", (told.new.len() - inside) as f64, "1")?;
+    for d in &told.defects {
+        let stays = u8::from(d.stands == Stands::Stays);
+        host.result(&format!("stays.{}", d.id), f64::from(stays), "1")?;
+        for size in sizes(d.kind).0 {
+            write_size(host, d, *size)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_size(host: &Host, d: &ConfirmedDefect, size: Size) -> Result<(), StepError> {
+    let (name, unit) = (size.name(), size.unit());
+    let bounds = &d.sizes[name];
+    host.result(&format!("{name}_low.{}", d.id), bounds.low, unit)?;
+    host.result(&format!("{name}_high.{}", d.id), bounds.high, unit)
+}
