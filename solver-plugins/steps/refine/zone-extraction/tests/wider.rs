@@ -10,6 +10,7 @@ fn settings(wider: f64) -> Settings {
         join_distance: 0.010,
         minimum_area: 200e-6,
         minimum_size: 0.040,
+        edge_factor: 1.0,
         wider,
         maximum_fraction: 0.6,
         boxes: Vec::new(),
