@@ -76,6 +76,9 @@ impl Step for BoundaryInterpolation {
         let meshes = host.meshes(&input)?;
         check_frames(&input, meshes.times.len())?;
         let listed = &run.sheets;
+        if p.exchanged.contains(&Part::Forces) && p.cut_stiffness.is_none() {
+            return Err("`exchanged` names `forces`, and without `cut_stiffness` cuts are placed and nothing pulls at them. Give `cut_stiffness`, or leave `forces` out".into());
+        }
         let exchange = Exchange::read(host, &p.exchanged, &meshes.times)?;
         let joint = film_bounds(host, &input, &meshes, listed)?;
         let first = first_frame(host, &input, &meshes, listed, bounds, &p)?;

@@ -154,6 +154,8 @@ fn what_makes_no_experiment_is_refused() {
     assert!(without.contains("without a run that gives it"), "{without}");
     let nothing = refused(with(&[], &[], Some(&other)));
     assert!(nothing.contains("`exchanged` is empty"), "{nothing}");
+    let placed = refused(with(&["forces"], &[], Some(&other)));
+    assert!(placed.contains("Give `cut_stiffness`"), "{placed}");
     let mut later = sliding(0.02, THEIRS);
     later.times[7] += 0.01;
     let times = refused(with(&["across"], &[], Some(&later)));
