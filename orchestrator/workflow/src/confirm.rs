@@ -22,8 +22,6 @@ const SHARED: [&str; 6] = [
 const CONFIRM: &str = "confirm";
 /// By how much slower a process goes on, wider a margin is, and more often a step is taken.
 const TWICE: f64 = 2.0;
-/// Scale of zone-extraction where the workflow gives none.
-const SCALE: f64 = 1.15;
 
 /// Reads which variants are asked for: names with commas between them, or `all`.
 ///
@@ -99,7 +97,9 @@ fn expand(
         chain: &chain,
         entries: Vec::new(),
         confirming: Confirming::default(),
-        time_step: default_of("forming-explicit", "time_step", source, catalog),
+        time_step: default_of("forming-explicit", "time_step", source, catalog)
+            .and_then(|v| v.as_str().map(str::to_owned)),
+        scale: default_of("zone-extraction", "scale", source, catalog).and_then(|v| v.as_f64()),
     };
     for variant in Variation::ALL {
         if chosen.contains(&variant) {
@@ -145,10 +145,9 @@ fn default_of(
     parameter: &str,
     source: &Source,
     catalog: &Plugins<'_>,
-) -> Option<String> {
+) -> Option<serde_json::Value> {
     let entry = catalog.find(plugin, &source.folder).ok()?;
-    let declared = entry.manifest.parameters.get(parameter)?;
-    declared.default.as_ref()?.as_str().map(str::to_owned)
+    entry.manifest.parameters.get(parameter)?.default.clone()
 }
 
 fn plugin_of(step: &Node) -> &str {
@@ -272,6 +271,8 @@ struct Added<'n> {
     confirming: Confirming,
     /// Default of the step in time.
     time_step: Option<String>,
+    /// Default of the scale of zones.
+    scale: Option<f64>,
 }
 
 impl Added<'_> {
@@ -335,7 +336,7 @@ impl Added<'_> {
         let scale = with
             .and_then(|w| w.get("scale"))
             .and_then(|s| s.to_json().as_f64());
-        let scale = scale.unwrap_or(SCALE).max(1.0);
+        let scale = scale.or(self.scale).unwrap_or(1.0).max(1.0);
         ((1.0 + TWICE * (scale - 1.0)) / scale).powi(2)
     }
 

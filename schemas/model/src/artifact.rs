@@ -37,7 +37,7 @@ pub use comparison::{
 };
 pub use confirmation::{
     ConfirmVariant, Confirmation, ConfirmedDefect, ConfirmedSize, ConfirmedVerdict, HangsOn,
-    NewDefect, Stands, Variation,
+    JudgedBounds, NewDefect, Stands, Variation,
 };
 pub use conformance::{
     CONFORMANCE_MARK, CheckOutcome, Conformance, ConformanceCheck, ConformanceLine,

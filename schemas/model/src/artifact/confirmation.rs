@@ -24,6 +24,9 @@ pub struct Confirmation {
     pub new: Vec<NewDefect>,
     /// What becomes of the answer as a whole.
     pub verdict: ConfirmedVerdict,
+    /// How the bounds stand against the whole in smaller elements; `null`: none was given.
+    #[serde(default)]
+    pub judged: Option<JudgedBounds>,
     /// Defects with their bounds, and new ones.
     #[serde(default)]
     pub tables: Vec<Table>,
@@ -150,6 +153,26 @@ pub struct ConfirmedSize {
     pub order: Option<f64>,
     /// By the name of the variant that has the defect (of several element sizes the finest): the size there (m, area: m2).
     pub by: BTreeMap<String, f64>,
+    /// In the whole by which the bounds are judged; `null`: none was given, or it has the defect not (m, area: m2).
+    #[serde(default)]
+    pub reference: Option<f64>,
+}
+
+/// How bounds stand against the whole in smaller elements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct JudgedBounds {
+    /// Name of the step that is the whole.
+    pub step: String,
+    /// Mean edge of its plies' elements in the flat ply (m).
+    pub element_size: f64,
+    /// Bounds that were judged: those of all sizes of the defects that the whole has too.
+    pub bounds: usize,
+    /// Those that the whole's size lies within.
+    pub held: usize,
+    /// Defects of the runs that are confirmed that the whole has not.
+    pub gone: usize,
+    /// Defects of the whole, in the zones, that the runs that are confirmed have not.
+    pub missed: usize,
 }
 
 /// A variant that changes a defect.

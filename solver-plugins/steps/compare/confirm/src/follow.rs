@@ -1,8 +1,8 @@
 //! Defects of the runs that are confirmed, followed through the variants.
 
-use crate::runs::{All, OfVariant, Run};
+use crate::runs::All;
 use plyflow_defects::pairs::{Pairs, apart, counts, measure_for_pairs, name_of, same_within};
-use plyflow_defects::{Defect, Kind, Settings};
+use plyflow_defects::{Defect, Kind, Ply, Settings};
 use plyflow_model::artifact::Zone;
 use plyflow_sdk::{Host, StepError};
 
@@ -21,6 +21,8 @@ pub struct Followed {
     pub defect: Defect,
     /// By variant, and by the runs of it that look at the zone, the coarsest first.
     pub seen: Vec<Vec<Seen>>,
+    /// In the whole by which the bounds are judged, if there is one.
+    pub reference: Option<Seen>,
 }
 
 /// What a run has of a defect.
@@ -66,6 +68,8 @@ pub struct Tracks {
     pub new: Vec<New>,
     /// By variant: wrinkles and places of bridging.
     pub count: Vec<[usize; 2]>,
+    /// Defects that only the whole has by which the bounds are judged.
+    pub missed: usize,
 }
 
 /// Place of a kind in a count.
@@ -74,9 +78,9 @@ pub fn place(kind: Kind) -> usize {
 }
 
 /// The defects of a run within a zone, from the uppermost ply down, also the smaller ones that a pair may need.
-fn found(run: &Run, zone: &Zone, settings: &Settings) -> Vec<Found> {
+fn found(plies: &[Ply], zone: &Zone, settings: &Settings) -> Vec<Found> {
     let mut all = Vec::new();
-    for ply in run.plies.iter().rev() {
+    for ply in plies.iter().rev() {
         // The mesh of a zone reaches past it, to the nearest lines of the whole's.
         let inside: Vec<bool> = ply.undeformed.iter().map(|p| zone.holds(p, 0.0)).collect();
         let measured = measure_for_pairs(ply, &inside, settings);
@@ -93,7 +97,7 @@ pub fn follow(host: &Host, all: &All, settings: &Settings) -> Result<Tracks, Ste
     let mut base = Vec::new();
     for (run, zone) in all.base.iter().zip(&all.zones) {
         host.check_cancelled()?;
-        base.push(found(run, zone, settings));
+        base.push(found(&run.plies, zone, settings));
     }
     let mut followed = numbered(all, &base, settings);
     let (mut new, mut count) = (Vec::new(), Vec::new());
@@ -101,7 +105,12 @@ pub fn follow(host: &Host, all: &All, settings: &Settings) -> Result<Tracks, Ste
         let mut own = [0, 0];
         for (k, run) in variant.runs.iter().enumerate() {
             host.check_cancelled()?;
-            let looked = Looked::new(variant, k, &base, found(run, &run.zone, settings), settings);
+            let zones: Vec<usize> = (0..base.len())
+                .filter(|&z| variant.of_zone[z].contains(&k))
+                .collect();
+            let is_finest = zones.iter().any(|&z| variant.of_zone[z].last() == Some(&k));
+            let theirs = found(&run.plies, &run.zone, settings);
+            let looked = Looked::new(zones, &base, theirs, settings);
             for defect in followed
                 .iter_mut()
                 .filter(|d| looked.zones.contains(&d.zone))
@@ -109,9 +118,19 @@ pub fn follow(host: &Host, all: &All, settings: &Settings) -> Result<Tracks, Ste
                 let seen = looked.seen(defect);
                 defect.seen[v].push(seen);
             }
-            if looked.is_finest {
+            if is_finest {
                 looked.count(&mut own);
-                new.extend(looked.alone(all, v, &run.step, &followed));
+                let alone = looked.alone(&followed).into_iter();
+                new.extend(alone.map(|(ply, defect)| {
+                    New {
+                        variant: v,
+                        step: run.step.clone(),
+                        zone: (looked.zones.iter().copied())
+                            .find(|z| all.zones[*z].holds(&defect.centre, 0.0)),
+                        ply,
+                        defect,
+                    }
+                }));
             }
         }
         count.push(own);
@@ -126,11 +145,37 @@ pub fn follow(host: &Host, all: &All, settings: &Settings) -> Result<Tracks, Ste
             *seen = order.iter().map(|k| seen[at(k)].clone()).collect();
         }
     }
+    let missed = in_reference(host, all, &base, &mut followed, settings)?;
     Ok(Tracks {
         followed,
         new,
         count,
+        missed,
     })
+}
+
+/// Follows every defect to the whole by which the bounds are judged; how many defects that has alone, in the zones.
+fn in_reference(
+    host: &Host,
+    all: &All,
+    base: &[Vec<Found>],
+    followed: &mut [Followed],
+    settings: &Settings,
+) -> Result<usize, StepError> {
+    let Some(whole) = &all.reference else {
+        return Ok(0);
+    };
+    let mut missed = 0;
+    for (z, zone) in all.zones.iter().enumerate() {
+        host.check_cancelled()?;
+        let theirs = found(&whole.plies, zone, settings);
+        let looked = Looked::new(vec![z], base, theirs, settings);
+        for defect in followed.iter_mut().filter(|d| d.zone == z) {
+            defect.reference = Some(looked.seen(defect));
+        }
+        missed += looked.alone(followed).len();
+    }
+    Ok(missed)
 }
 
 /// Those that count, with their names.
@@ -147,18 +192,17 @@ fn numbered(all: &All, base: &[Vec<Found>], settings: &Settings) -> Vec<Followed
                 ply: ply.clone(),
                 defect: defect.clone(),
                 seen: vec![Vec::new(); all.variants.len()],
+                reference: None,
             });
         }
     }
     list
 }
 
-/// A run of a variant beside those of the zones at which it looks.
+/// A run of a variant, or the whole, beside those of the zones at which it looks.
 struct Looked<'a> {
     /// Their indices.
     zones: Vec<usize>,
-    /// Whether it is the finest that looks at one of them.
-    is_finest: bool,
     ours: Vec<(usize, &'a Found)>,
     theirs: Vec<Found>,
     pairs: Pairs,
@@ -167,16 +211,11 @@ struct Looked<'a> {
 
 impl<'a> Looked<'a> {
     fn new(
-        variant: &OfVariant,
-        k: usize,
+        zones: Vec<usize>,
         base: &'a [Vec<Found>],
         theirs: Vec<Found>,
         settings: &'a Settings,
     ) -> Self {
-        let zones: Vec<usize> = (0..base.len())
-            .filter(|&z| variant.of_zone[z].contains(&k))
-            .collect();
-        let is_finest = zones.iter().any(|&z| variant.of_zone[z].last() == Some(&k));
         let of_zone = |&z: &usize| base[z].iter().map(move |f| (z, f));
         let ours: Vec<(usize, &Found)> = zones.iter().flat_map(of_zone).collect();
         let a: Vec<&Defect> = ours.iter().map(|(_, f)| &f.1).collect();
@@ -186,7 +225,6 @@ impl<'a> Looked<'a> {
         let pairs = Pairs::of(&a, &b, settings, on_one_ply);
         Self {
             zones,
-            is_finest,
             ours,
             theirs,
             pairs,
@@ -239,22 +277,11 @@ impl<'a> Looked<'a> {
     }
 
     /// Its defects that are not in what is confirmed, also not as the other kind.
-    fn alone(&self, all: &All, variant: usize, step: &str, followed: &[Followed]) -> Vec<New> {
+    fn alone(&self, followed: &[Followed]) -> Vec<Found> {
         let here = followed.iter().filter(|f| self.zones.contains(&f.zone));
         let lost = here.filter(|f| self.seen(f).same().is_none());
         let told: Vec<usize> = lost.filter_map(|f| self.instead(f)).collect();
         let free = self.pairs.missed.iter().filter(|j| !told.contains(j));
-        free.map(|&j| {
-            let (ply, defect) = &self.theirs[j];
-            let holds = |z: &&usize| all.zones[**z].holds(&defect.centre, 0.0);
-            New {
-                variant,
-                step: step.to_owned(),
-                zone: self.zones.iter().find(holds).copied(),
-                ply: ply.clone(),
-                defect: defect.clone(),
-            }
-        })
-        .collect()
+        free.map(|&j| self.theirs[j].clone()).collect()
     }
 }

@@ -5,6 +5,7 @@
 
 mod bounds;
 mod follow;
+mod judged;
 mod runs;
 mod told;
 
@@ -61,6 +62,13 @@ fn warn(host: &Host, told: &Confirmation) {
         Log::Warn
     };
     host.log(level, &told.verdict.text);
+    if let Some(judged) = &told.judged {
+        let text = format!(
+            "judged by '{}': {} of {} bounds hold, {} defects are gone there, and {} are new",
+            judged.step, judged.held, judged.bounds, judged.gone, judged.missed
+        );
+        host.log(Log::Info, &text);
+    }
     let moves = |d: &&ConfirmedDefect| d.stands != Stands::Stays;
     let moving: Vec<&ConfirmedDefect> = told.defects.iter().filter(moves).collect();
     if moving.is_empty() {
@@ -98,6 +106,16 @@ fn write_results(host: &Host, told: &Confirmation) -> Result<(), StepError> {
     let inside = told.new.iter().filter(|n| n.zone.is_some()).count();
     host.result("new_count", inside as f64, "1")?;
     host.result("outside_count", (told.new.len() - inside) as f64, "1")?;
+    if let Some(judged) = &told.judged {
+        host.result("bounds_judged", judged.bounds as f64, "1")?;
+        host.result("bounds_held", judged.held as f64, "1")?;
+        host.result("reference_gone", judged.gone as f64, "1")?;
+        host.result("reference_missed", judged.missed as f64, "1")?;
+        if judged.bounds > 0 {
+            let share = judged.held as f64 / judged.bounds as f64;
+            host.result("bounds_held_ratio", share, "1")?;
+        }
+    }
     for d in &told.defects {
         let stays = u8::from(d.stands == Stands::Stays);
         host.result(&format!("stays.{}", d.id), f64::from(stays), "1")?;

@@ -9,6 +9,8 @@ use plyflow_surface::of_run::check_quads;
 const LEAST_FINER: f64 = 0.05;
 /// The step of a run with a smaller one is at most this share of the first.
 const MOST_OF_STEP: f64 = 0.75;
+/// Elements of a whole that judges the bounds are at most this share of those of the zones.
+const MOST_OF_REFERENCE: f64 = 0.6;
 /// Boxes may differ by this (m), however they were rounded.
 const ROUNDING: f64 = 1e-6;
 
@@ -59,6 +61,18 @@ pub struct All {
     pub base: Vec<Run>,
     /// The variants that were run.
     pub variants: Vec<OfVariant>,
+    /// The whole by which the bounds are judged.
+    pub reference: Option<Whole>,
+}
+
+/// The whole in smaller elements.
+pub struct Whole {
+    /// Name of its step.
+    pub step: String,
+    /// Its plies, from the tool upwards.
+    pub plies: Vec<Ply>,
+    /// Mean edge of their elements in the flat ply (m).
+    pub element_size: f64,
 }
 
 /// Reads everything.
@@ -74,22 +88,75 @@ pub fn read(host: &Host, settings: &Settings) -> Result<All, StepError> {
     let tool = of_run::tool(host, &host.input("global")?)?;
     let (base, _) = of_port(host, "local", &tool, settings, &superseded)?;
     let base = one_each(&zones, base)?;
-    let mut variants = Vec::new();
+    let (mut variants, mut given) = (Vec::new(), Vec::new());
     for variant in Variation::ALL {
         let (runs, left_out) = of_port(host, variant.name(), &tool, settings, &superseded)?;
         if runs.is_empty() && !left_out {
             continue;
         }
-        variants.push(of_variant(host, variant, runs, &zones, &base)?);
+        given.push(variant.name());
+        variants.extend(of_variant(host, variant, runs, &zones, &base)?);
+    }
+    if variants.is_empty() && !given.is_empty() {
+        return Err(format!(
+            "none of the runs at {} differs from those of `local` in what it is given for (see above): nothing can be confirmed",
+            given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+        )
+        .into());
     }
     if variants.is_empty() && !zones.is_empty() {
         return Err("nothing is given to hold the runs of `local` against; expected runs of the same zones at one of the inputs `finer`, `slower`, `half_step` and `wider`".into());
     }
+    let reference = whole(host, &tool, settings, &base)?;
     Ok(All {
         zones,
         base,
         variants,
+        reference,
     })
+}
+
+/// The whole by which the bounds are judged, if one is given; told where its elements are too large for that.
+fn whole(
+    host: &Host,
+    tool: &Tool,
+    settings: &Settings,
+    base: &[Run],
+) -> Result<Option<Whole>, StepError> {
+    let Some(input) = host.inputs_of("reference")?.into_iter().next() else {
+        return Ok(None);
+    };
+    let formed: Forming = host.attributes(&input)?;
+    let step = input.step.clone();
+    if let Some(zone) = &formed.zone {
+        return Err(format!(
+            "`reference`: '{step}' is a run of zone {}; expected a run of the whole scene",
+            zone.name
+        )
+        .into());
+    }
+    let (plies, element_size) = read_plies(host, &input, &formed, tool, settings)?;
+    if plies.is_empty() {
+        return Err(format!("`reference`: '{step}' has no ply").into());
+    }
+    let finest = base
+        .iter()
+        .map(|r| r.element_size)
+        .fold(f64::INFINITY, f64::min);
+    if element_size > MOST_OF_REFERENCE * finest {
+        let mm = |m: f64| (1e6 * m).round() / 1e3;
+        let text = format!(
+            "`reference`: the elements of '{step}' are {} mm, those of the zones {} mm: it judges their bounds only where they are about half as large",
+            mm(element_size),
+            mm(finest)
+        );
+        host.log(Log::Warn, &text);
+    }
+    Ok(Some(Whole {
+        step,
+        plies,
+        element_size,
+    }))
 }
 
 /// The runs at a port, without those of zones that others replace; and whether there were such.
@@ -121,46 +188,55 @@ fn read_run(
     settings: &Settings,
 ) -> Result<Run, StepError> {
     let formed: Forming = host.attributes(input)?;
-    let meshes = host.meshes(input)?;
-    let frame = of_run::last_frame(input, &meshes)?;
     let step = &input.step;
     let zone = formed.zone.clone().ok_or_else(|| {
         format!("`{port}`: '{step}' is no run of a zone (its attribute `zone` is null); expected the fine runs of zones")
     })?;
-    let own = match meshes.body("tool") {
-        Ok(_) => Some(of_run::tool(host, input)?),
-        Err(_) => None,
-    };
-    let (mut plies, mut area, mut cells) = (Vec::new(), 0.0, 0);
-    for sheet in formed.plies() {
-        check_quads(
-            &format!("ply '{}' of '{step}'", sheet.name),
-            meshes.body(&sheet.name)?,
-        )?;
-        let of = of_run::Frame { host, input, frame };
-        let place = (sheet.name.as_str(), sheet.offset);
-        let ply = of_run::ply(
-            of,
-            place,
-            own.as_ref().unwrap_or(tool),
-            settings.foot_margin,
-        )?;
-        let areas = ply.topology.cell_areas(&ply.undeformed);
-        area += areas.iter().sum::<f64>();
-        cells += areas.len();
-        plies.push(ply);
-    }
-    if cells == 0 {
+    let (plies, element_size) = read_plies(host, input, &formed, tool, settings)?;
+    if plies.is_empty() {
         return Err(format!("`{port}`: '{step}' has no ply in zone {}", zone.name).into());
     }
     Ok(Run {
         step: step.clone(),
         zone,
         plies,
-        element_size: (area / cells as f64).sqrt(),
+        element_size,
         time_step: formed.time_step,
         slower: formed.slower.unwrap_or(1.0),
     })
+}
+
+/// The plies of a run that have cells, from the tool upwards, and the mean edge of their elements in the flat ply (m).
+fn read_plies(
+    host: &Host,
+    input: &Input,
+    formed: &Forming,
+    tool: &Tool,
+    settings: &Settings,
+) -> Result<(Vec<Ply>, f64), StepError> {
+    let meshes = host.meshes(input)?;
+    let frame = of_run::last_frame(input, &meshes)?;
+    let own = match meshes.body("tool") {
+        Ok(_) => Some(of_run::tool(host, input)?),
+        Err(_) => None,
+    };
+    let (mut plies, mut area, mut cells) = (Vec::new(), 0.0, 0);
+    for sheet in formed.plies() {
+        let name = format!("ply '{}' of '{}'", sheet.name, input.step);
+        check_quads(&name, meshes.body(&sheet.name)?)?;
+        let of = of_run::Frame { host, input, frame };
+        let place = (sheet.name.as_str(), sheet.offset);
+        let tool = own.as_ref().unwrap_or(tool);
+        let ply = of_run::ply(of, place, tool, settings.foot_margin)?;
+        let areas = ply.topology.cell_areas(&ply.undeformed);
+        area += areas.iter().sum::<f64>();
+        cells += areas.len();
+        plies.push(ply);
+    }
+    if cells == 0 {
+        plies.clear();
+    }
+    Ok((plies, (area / cells.max(1) as f64).sqrt()))
 }
 
 /// The one run of each zone, in their order.
@@ -204,14 +280,14 @@ fn lies_in(inner: Rectangle, outer: Rectangle) -> bool {
     (0..4).all(|k| beyond(k) > -ROUNDING)
 }
 
-/// Finds out which run of a variant looks where.
+/// Finds out which run of a variant looks where. `None`: in no zone is it what it is given as, so that it says nothing.
 fn of_variant(
     host: &Host,
     variant: Variation,
     runs: Vec<Run>,
     zones: &[Zone],
     base: &[Run],
-) -> Result<OfVariant, StepError> {
+) -> Result<Option<OfVariant>, StepError> {
     let port = variant.name();
     let looks_at = |run: &Run, zone: &Zone| match variant {
         Variation::Wider => lies_in(zone.bounds, run.zone.bounds),
@@ -225,7 +301,7 @@ fn of_variant(
         )
         .into());
     }
-    let mut of_zone = Vec::new();
+    let (mut of_zone, mut differs) = (Vec::new(), zones.is_empty());
     for (zone, own) in zones.iter().zip(base) {
         let mut here: Vec<usize> = (0..runs.len())
             .filter(|&k| looks_at(&runs[k], zone))
@@ -255,14 +331,14 @@ fn of_variant(
             )
             .into());
         }
-        tell_same(host, variant, own, &runs[here[0]]);
+        differs |= !tell_same(host, variant, own, &runs[here[0]]);
         of_zone.push(here);
     }
-    Ok(OfVariant {
+    Ok(differs.then_some(OfVariant {
         variant,
         of_zone,
         runs,
-    })
+    }))
 }
 
 /// That each of the finer runs of a zone is finer than the one before, and the first than that which is confirmed.
@@ -288,8 +364,8 @@ fn is_finer(base: &Run, here: &[usize], runs: &[Run]) -> Result<(), StepError> {
     Ok(())
 }
 
-/// Tells where a variant is not what it is given as.
-fn tell_same(host: &Host, variant: Variation, base: &Run, run: &Run) {
+/// Tells where a variant is not what it is given as; whether it is so.
+fn tell_same(host: &Host, variant: Variation, base: &Run, run: &Run) -> bool {
     let zone = &base.zone.name;
     let text = match (variant, base.time_step, run.time_step) {
         (Variation::HalfStep, Some(first), Some(own)) if own > MOST_OF_STEP * first => format!(
@@ -304,7 +380,8 @@ fn tell_same(host: &Host, variant: Variation, base: &Run, run: &Run) {
             "`wider`: zone {zone} is no wider in '{}' than in '{}': that says nothing of the margin. Give `wider: 2` to its zone-extraction, if the zone does not fill the blank",
             run.step, base.step
         ),
-        _ => return,
+        _ => return false,
     };
     host.log(Log::Warn, &text);
+    true
 }

@@ -2,6 +2,7 @@
 
 use crate::bounds::{Measured, bounds};
 use crate::follow::{Followed, Seen, Tracks, place};
+use crate::judged::judged;
 use crate::runs::All;
 use plyflow_defects::{Defect, Kind};
 use plyflow_model::artifact::{
@@ -39,7 +40,7 @@ impl Size {
         }
     }
 
-    fn of(self, d: &Defect) -> f64 {
+    pub(crate) fn of(self, d: &Defect) -> f64 {
         match self {
             Self::Length => d.length,
             Self::Amplitude => d.amplitude,
@@ -102,6 +103,7 @@ pub fn told(all: &All, tracks: &Tracks, tolerance: f64) -> Confirmation {
         .filter(|v| !all.zones.is_empty() && all.variants.iter().all(|o| o.variant != *v))
         .collect();
     let new: Vec<NewDefect> = new(all, tracks);
+    let judged = judged(all, tracks, &defects);
     let verdict = verdict(all, tracks, &defects, &left_out);
     let mut tables = vec![table(all, tracks, &defects)];
     tables.extend((!new.is_empty()).then(|| table_of_new(&new)));
@@ -120,6 +122,7 @@ pub fn told(all: &All, tracks: &Tracks, tolerance: f64) -> Confirmation {
         defects,
         new,
         verdict,
+        judged,
         tables,
     }
 }
@@ -210,6 +213,9 @@ fn size(all: &All, of: &Followed, size: Size) -> ConfirmedSize {
         high: bounds.high,
         order: bounds.order,
         by,
+        reference: (of.reference.as_ref())
+            .and_then(Seen::same)
+            .map(|there| size.of(there)),
     }
 }
 
@@ -347,6 +353,7 @@ fn table(all: &All, tracks: &Tracks, defects: &[ConfirmedDefect]) -> Table {
             .iter()
             .map(|v| Column::new(v.variant.how(), "")),
     );
+    columns.extend((all.reference.iter()).map(|w| Column::new(format!("in `{}`", w.step), "")));
     let row = |(d, of): (&ConfirmedDefect, &Followed)| {
         let main = sizes(d.kind).0[0];
         let range = |s: Size| d.sizes.get(s.name()).map(|b| s.range(b.low, b.high));
@@ -359,11 +366,13 @@ fn table(all: &All, tracks: &Tracks, defects: &[ConfirmedDefect]) -> Table {
             range(Size::Area).into(),
             main.text(main.of(&of.defect)).into(),
         ];
-        row.extend(of.seen.iter().map(|seen| match seen.last() {
-            Some(Seen::Same(there)) => Cell::from(main.text(main.of(there))),
-            Some(Seen::Instead(kind)) => format!("{} instead", kind.name()).into(),
-            _ => "gone".into(),
-        }));
+        let seen = |seen: &Seen| match seen {
+            Seen::Same(there) => Cell::from(main.text(main.of(there))),
+            Seen::Instead(kind) => format!("{} instead", kind.name()).into(),
+            Seen::Gone => "gone".into(),
+        };
+        row.extend((of.seen.iter()).map(|all| seen(all.last().unwrap_or(&Seen::Gone))));
+        row.extend(of.reference.as_ref().map(seen));
         row
     };
     Table {

@@ -379,19 +379,130 @@ fn runs_that_are_no_variants_of_the_zones_are_refused_with_what_was_expected() {
     let whole = formed(vec![base.bodies[1].clone()], Value::Null);
     let text = refused(&[("wider", &whole)]);
     assert!(text.contains("no run of a zone"), "{text}");
-    // A variant that is none is told, and what it says is told all the same.
+    // A variant that is none is told and not looked at; where there is no other, nothing is confirmed.
+    let finer = fine(("A", ZONE), FINER, USUAL);
     for (port, word) in [
         ("slower", "speed"),
         ("half_step", "step"),
         ("wider", "margin"),
     ] {
-        let out = confirmed(&base, &[(port, &base)]).unwrap();
+        let out = confirmed(&base, &[(port, &base), ("finer", &finer)]).unwrap();
         assert!(
             out.log.iter().any(|l| format!("{l:?}").contains(word)),
             "{port}: {:?}",
             out.log
         );
+        let left_out = out.attributes["left_out"].as_array().unwrap();
+        assert!(left_out.contains(&json!(port)), "{left_out:?}");
+        let text = refused(&[(port, &base)]);
+        assert!(
+            text.contains(&format!("`{port}`")) && text.contains("nothing can be confirmed"),
+            "{text}"
+        );
     }
+}
+
+/// A run of the whole scene, which reaches past the zone.
+fn whole(size: f64, shape: Shape) -> MemoryArtifact {
+    let mut run = fine(("A", WIDE), size, shape);
+    run.attributes["zone"] = Value::Null;
+    run
+}
+
+#[test]
+fn bounds_are_judged_by_the_whole_in_smaller_elements_and_not_changed_by_it() {
+    let (base, finer) = (base(), fine(("A", ZONE), FINER, USUAL));
+    let half = SIZE / 2.0;
+    let without = confirmed(&base, &[("finer", &finer)]).unwrap();
+    let judged = |reference: &MemoryArtifact| {
+        let out = confirmed(&base, &[("finer", &finer), ("reference", reference)]).unwrap();
+        for id in ["AW1", "AB1"] {
+            for key in ["low", "high", "value"] {
+                let size = |o| defect(o, id)["sizes"]["amplitude"][key].clone();
+                assert_eq!(size(&out), size(&without), "{id}");
+            }
+        }
+        assert_eq!(out.result("verdict_stays"), 1.0);
+        out
+    };
+    let count = |out: &MemoryArtifact| {
+        [
+            "bounds_judged",
+            "bounds_held",
+            "reference_gone",
+            "reference_missed",
+        ]
+        .map(|r| out.result(r))
+    };
+    // The same shape, seen more sharply: three sizes of the wrinkle and two of the blister. What lies outside of the zone is not judged.
+    let same = judged(&whole(
+        half,
+        Shape {
+            outside: 0.003,
+            ..USUAL
+        },
+    ));
+    assert_eq!(count(&same), [5.0, 5.0, 0.0, 0.0], "{}", same.attributes);
+    assert_eq!(same.result("bounds_held_ratio"), 1.0);
+    // A wrinkle that is higher by a third: its height is outside of its bounds.
+    let higher = judged(&whole(
+        half,
+        Shape {
+            wrinkle: 0.004,
+            ..USUAL
+        },
+    ));
+    let size = &defect(&higher, "AW1")["sizes"]["amplitude"];
+    assert!((number(&size["reference"]) - 0.004).abs() < 1e-5, "{size}");
+    assert_eq!(count(&higher)[0], 5.0);
+    assert!(count(&higher)[1] < 5.0 && number(&size["reference"]) > number(&size["high"]));
+    // No blister there, and one where there is none.
+    let gone = judged(&whole(
+        half,
+        Shape {
+            blister: 0.0,
+            ..USUAL
+        },
+    ));
+    assert_eq!(count(&gone), [3.0, 3.0, 1.0, 0.0], "{}", gone.attributes);
+    assert_eq!(
+        defect(&gone, "AB1")["sizes"]["area"]["reference"],
+        Value::Null
+    );
+    let flat = fine(
+        ("A", ZONE),
+        SIZE,
+        Shape {
+            blister: 0.0,
+            ..USUAL
+        },
+    );
+    let flat_finer = fine(
+        ("A", ZONE),
+        FINER,
+        Shape {
+            blister: 0.0,
+            ..USUAL
+        },
+    );
+    let reference = whole(half, USUAL);
+    let out = confirmed(&flat, &[("finer", &flat_finer), ("reference", &reference)]).unwrap();
+    assert_eq!(count(&out)[2..], [0.0, 1.0]);
+    // One that is no finer is told, and a zone is refused.
+    let coarse = judged(&whole(SIZE, USUAL));
+    assert!(
+        coarse
+            .log
+            .iter()
+            .any(|l| format!("{l:?}").contains("half as large")),
+        "{:?}",
+        coarse.log
+    );
+    let text = confirmed(&base, &[("finer", &finer), ("reference", &finer)]).unwrap_err();
+    assert!(
+        text.contains("`reference`") && text.contains("whole scene"),
+        "{text}"
+    );
 }
 
 #[test]
