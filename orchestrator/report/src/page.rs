@@ -134,12 +134,44 @@ fn header(content: &Content<'_>, study: Option<&Shown<'_>>, large: bool) -> Mark
             @if !warnings.is_empty() {
                 section class="warnings" id="warnings" {
                     h2 { "Warnings" }
-                    dl { @for (label, texts) in verdict::by_step(&warnings) { dt { (label) } dd { (texts.join("\n")) } } }
+                    dl { @for kind in verdict::alike(&warnings) { (warned(&kind)) } }
                 }
             }
             @if let Some(s) = study { (family::warned(s)) }
             (contents(content, large))
         }
+    }
+}
+
+/// Steps that a kind of warning names before the rest are counted.
+const NAMED: usize = 4;
+
+/// A kind of warning: who says it, in the words of the first, and those of the others on request.
+fn warned(kind: &verdict::Alike<'_>) -> Markup {
+    let steps = kind.steps();
+    let mut names = steps[..steps.len().min(NAMED)].join(", ");
+    if steps.len() > NAMED {
+        names += &format!(" and {} more", steps.len() - NAMED);
+    }
+    html! {
+        dt { (names) }
+        dd {
+            (kind.said[0].1)
+            @if kind.said.len() > 1 {
+                details {
+                    summary { "the same " (times(kind.said.len() - 1)) " more" }
+                    ul { @for (step, text) in &kind.said[1..] { li { b { (step) } ": " (text) } } }
+                }
+            }
+        }
+    }
+}
+
+/// How often, in words.
+fn times(n: usize) -> String {
+    match n {
+        1 => "once".into(),
+        n => format!("{n} times"),
     }
 }
 

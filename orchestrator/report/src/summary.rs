@@ -47,14 +47,17 @@ pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
 
 fn warning_lines(warnings: &[(String, String)]) -> String {
     let mut out = String::new();
-    for (label, text) in warnings.iter().take(WARNINGS) {
-        out += &format!("warning: {label}: {text}\n");
+    let kinds = verdict::alike(warnings);
+    for kind in kinds.iter().take(WARNINGS) {
+        let (label, text) = kind.said[0];
+        out += &match kind.said.len() - 1 {
+            0 => format!("warning: {label}: {text}\n"),
+            more => format!("warning: {label} (and {more} like it): {text}\n"),
+        };
     }
-    if warnings.len() > WARNINGS {
-        out += &format!(
-            "{} more warnings are in the report\n",
-            warnings.len() - WARNINGS
-        );
+    if kinds.len() > WARNINGS {
+        let more: usize = kinds[WARNINGS..].iter().map(|k| k.said.len()).sum();
+        out += &format!("{more} more warnings are in the report\n");
     }
     out
 }

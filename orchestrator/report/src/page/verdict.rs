@@ -183,16 +183,57 @@ pub(crate) fn of_run(input: &ReportInput) -> (Tone, String) {
     (tone, parts.join("; "))
 }
 
-/// Warnings gathered by step, in their order.
-pub(crate) fn by_step(warnings: &[(String, String)]) -> Vec<(&str, Vec<&str>)> {
-    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+/// Warnings that say the same with other numbers and other names in quotes: which steps say so, and their words.
+pub(crate) struct Alike<'w> {
+    /// Step and text, in their order.
+    pub said: Vec<(&'w str, &'w str)>,
+}
+
+impl Alike<'_> {
+    /// The steps, each once.
+    pub(crate) fn steps(&self) -> Vec<&str> {
+        let mut steps: Vec<&str> = Vec::new();
+        for (step, _) in &self.said {
+            if !steps.contains(step) {
+                steps.push(step);
+            }
+        }
+        steps
+    }
+}
+
+/// Warnings gathered by what they say, in the order of the first of each.
+pub(crate) fn alike(warnings: &[(String, String)]) -> Vec<Alike<'_>> {
+    let mut all: Vec<(String, Alike<'_>)> = Vec::new();
     for (label, text) in warnings {
-        match all.iter_mut().find(|(l, _)| l == label) {
-            Some((_, texts)) => texts.push(text),
-            None => all.push((label, vec![text])),
+        let (form, said) = (form_of(text), (label.as_str(), text.as_str()));
+        match all.iter_mut().find(|(f, _)| *f == form) {
+            Some((_, kind)) => kind.said.push(said),
+            None => all.push((form, Alike { said: vec![said] })),
         }
     }
-    all
+    all.into_iter().map(|(_, kind)| kind).collect()
+}
+
+/// A text without its numbers, its names in quotes and words of capitals and digits, as defects and zones are called by.
+fn form_of(text: &str) -> String {
+    let mut form = String::new();
+    for (at, part) in text.split('\'').enumerate() {
+        if at % 2 == 1 {
+            form.push('\'');
+            continue;
+        }
+        let name = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || "+-.".contains(c);
+        for word in part.split_whitespace() {
+            let bare = word.trim_matches(|c: char| ",;:()".contains(c));
+            let number = bare.parse::<f64>().is_ok();
+            let is_name =
+                bare.starts_with(|c: char| c.is_ascii_uppercase()) && bare.chars().all(name);
+            form.push_str(if number || is_name { "#" } else { word });
+            form.push(' ');
+        }
+    }
+    form
 }
 
 /// Warnings of all steps and what could not be read, each once, with the step. `apart`: those of steps are told elsewhere.
@@ -221,4 +262,56 @@ pub(crate) fn warnings(
         add("report".into(), text);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn warnings_that_differ_in_numbers_and_names_are_one_kind() {
+        let warnings = [
+            (
+                "local[A]",
+                "hourglass energy is 14.8 % of internal energy: refine the mesh",
+            ),
+            (
+                "local[C]",
+                "a fibre is strained by 1.5 %, more than 1 %: look for cells",
+            ),
+            ("comparison", "CB1 reaches the cut of zone C: raise `scale`"),
+            (
+                "comparison",
+                "DW12 reaches the cut of zone D: raise `scale`",
+            ),
+            (
+                "local_finer[A]",
+                "hourglass energy is 9.3 % of internal energy: refine the mesh",
+            ),
+            (
+                "local_finer[A]",
+                "'tool' and 'upper_film' end 0.079 mm deep at (-118.3, -72.3, 103.4) mm: 98 %",
+            ),
+            (
+                "local_wider[A]",
+                "'ply 1' and 'ply 2' end 1e-3 mm deep at (8, 2.3, 3) mm: 14 %",
+            ),
+            ("local_wider[A]", "'ply 1' ends 0.079 mm deep"),
+        ]
+        .map(|(step, text)| (step.to_owned(), text.to_owned()));
+        let kinds = alike(&warnings);
+        let told: Vec<(usize, Vec<&str>)> =
+            kinds.iter().map(|k| (k.said.len(), k.steps())).collect();
+        assert_eq!(
+            told,
+            [
+                (2, vec!["local[A]", "local_finer[A]"]),
+                (1, vec!["local[C]"]),
+                (2, vec!["comparison"]),
+                (2, vec!["local_finer[A]", "local_wider[A]"]),
+                (1, vec!["local_wider[A]"]),
+            ]
+        );
+        assert_eq!(kinds[2].said[1].1, warnings[3].1, "no word is lost");
+    }
 }
