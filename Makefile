@@ -46,7 +46,7 @@ check: ## form, lints and the tests that need no HDF5: under a minute once built
 
 test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	@scripts/setup tests
-	$(CARGO) test $(CARGO_FLAGS) --workspace
+	. ./.tools/env && scripts/run-tests $(CARGO_FLAGS) --workspace
 	scripts/check-vtk
 	scripts/check-report
 

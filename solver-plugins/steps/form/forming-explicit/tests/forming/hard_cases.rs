@@ -80,7 +80,7 @@ fn fibres_a_hundred_times_as_stiff_in_a_tenth_of_the_step_hardly_strain() {
             p["time_step"] = json!(8e-6 / factor.sqrt());
         })
     };
-    let (soft, hard) = (form(&stiff(1.0), 2), form(&stiff(100.0), 2));
+    let (soft, hard) = (form(&stiff(1.0), 1), form(&stiff(100.0), 1));
     assert_sound("fibres 100 times as stiff", &hard, 0.01);
     let strain = |r: &(Forming, Outcome)| {
         let all = [1, 2].map(|k| r.0.model.cell_field(0, k));
@@ -139,7 +139,7 @@ fn a_part_that_the_end_finds_in_motion_is_told_with_what_moves_fastest() {
         process["settling_time"] = json!("0.001 s");
         p["frames"] = json!(10);
     });
-    let (_, outcome) = form(&p, 2);
+    let (_, outcome) = form(&p, 1);
     let ratio = outcome.health.kinetic_ratio_at_end;
     assert!(ratio > 1e-4, "{ratio:.1e}");
     let told = told_to_move(&outcome).expect("a warning");
@@ -164,7 +164,7 @@ fn energy_that_contacts_make_is_all_that_is_unaccounted_for_and_the_pair_is_name
         p["frames"] = json!(10);
         p["drift_bound"] = json!(1000.0);
     });
-    let (_, outcome) = form(&p, 2);
+    let (_, outcome) = form(&p, 1);
     let last = outcome.history.last().expect("rows");
     let (drift, made) = (
         last.ledger.drift(),
@@ -178,7 +178,7 @@ fn energy_that_contacts_make_is_all_that_is_unaccounted_for_and_the_pair_is_name
 
 #[test]
 fn four_plies_in_a_bag_stay_in_their_order() {
-    let run = form(&bag(4, 0.012), 2);
+    let run = form(&bag(4, 0.012), 1);
     assert_sound("four plies", &run, 0.02);
     let (forming, outcome) = &run;
     assert_eq!(told_to_move(outcome), None);
@@ -200,7 +200,7 @@ fn four_plies_in_a_bag_stay_in_their_order() {
 #[test]
 fn films_over_an_edge_of_a_millimetre_get_through_it_and_the_run_says_that_the_mesh_is_too_coarse()
 {
-    let run = form(&bag(1, 0.001), 2);
+    let run = form(&bag(1, 0.001), 1);
     assert_sound("edge of 1 mm", &run, 0.01);
     let (forming, outcome) = &run;
     let health = &outcome.health;

@@ -31,7 +31,7 @@ fn staggered(p: &mut serde_json::Value) {
 
 #[test]
 fn plies_that_overlap_in_part_lie_on_the_film_and_under_it_where_the_other_one_is_not() {
-    let (forming, outcome) = form(&bag(2, staggered), 2);
+    let (forming, outcome) = form(&bag(2, staggered), 1);
     assert!(
         outcome.health.peak_drift_ratio < 0.02,
         "{:?}",

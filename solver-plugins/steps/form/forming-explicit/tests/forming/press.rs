@@ -169,7 +169,7 @@ fn an_outline_that_the_elements_cannot_follow_is_refused_with_the_size_that_can(
 #[test]
 fn a_holder_with_a_force_presses_with_that_force_on_two_plies() {
     let p = parameters(2, &json!({"force": "200 N"}));
-    let (forming, outcome) = form(&p, 2);
+    let (forming, outcome) = form(&p, 1);
     assert!(
         outcome.health.peak_drift_ratio < 0.01,
         "{:?}",
@@ -253,7 +253,7 @@ fn the_strongest_contact_damping_keeps_the_ledger_closed() {
     // Nodes of two plies under a holder feel the dampers of the plates, of the punch and of each other.
     let mut p = parameters(2, &json!({"force": "200 N"}));
     p.contact_damping = 1.0;
-    let (_, outcome) = form(&p, 2);
+    let (_, outcome) = form(&p, 1);
     let health = &outcome.health;
     assert!(health.peak_drift_ratio < 0.01, "{health:?}");
 }

@@ -88,7 +88,7 @@ fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
     let hole = json!({"circle": {"centre": ["-20 mm", "-5 mm"], "radius": "15 mm"}});
     map.insert("holes".into(), json!([hole]));
     p.scene.sheets[1] = serde_json::from_value(sheet).expect("a sheet");
-    let (forming, outcome) = form(&p, 2);
+    let (forming, outcome) = form(&p, 1);
     let health = &outcome.health;
     assert!(health.peak_drift_ratio < 0.02, "{health:?}");
     assert_little_penetration(&forming);
