@@ -114,20 +114,23 @@ run = plyflow.run(part, path="dome-workflow.yaml", on_event=follow)
 run.defects()[["ply", "type", "length", "amplitude", "cause"]]
 
 # %% picture=python-dome
-formed, measured = run["formed"]["ply_1"], run["measured"]["ply_1"]
-figure, axes = plt.subplots(1, 2, figsize=(9, 3.8))
-for ax, body, values, label in (
-    (axes[0], formed, formed.on_triangles(np.degrees(formed.field("shear_angle"))), "shear angle [deg]"),
-    (axes[1], measured, 1e3 * np.asarray(measured.field("nodal_distance")), "distance from the tool [mm]"),
-):
+def draw(axes, body, values, label, **colours):
+    """A body seen from above, coloured by values on its triangles or its points."""
     x, y = 1e3 * np.asarray(body.points)[:, :2].T
-    how = {"facecolors": values, "cmap": "RdBu_r"} if len(values) != len(x) else {"cmap": "viridis", "shading": "gouraud"}
-    if "facecolors" in how:
-        picture = ax.tripcolor(x, y, body.triangles(), **how)
-    else:
-        picture = ax.tripcolor(x, y, body.triangles(), values, **how)
-    figure.colorbar(picture, ax=ax, label=label)
-    ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    on_cells = len(values) == len(body.triangles())
+    how = {"facecolors": values} if on_cells else {"shading": "gouraud"}
+    picture = axes.tripcolor(x, y, body.triangles(), *([] if on_cells else [values]), **how, **colours)
+    extend = "max" if np.max(values) > picture.get_clim()[1] else "neither"
+    axes.figure.colorbar(picture, ax=axes, label=label, extend=extend)
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+
+
+formed, measured = run["formed"]["ply_1"], run["measured"]["ply_1"]
+shear = np.degrees(formed.on_triangles(formed.field("shear_angle")))
+distance = 1e3 * np.asarray(measured.field("nodal_distance"))
+figure, axes = plt.subplots(1, 2, figsize=(9, 3.8))
+draw(axes[0], formed, shear, "shear angle [deg]", cmap="RdBu_r", vmin=-30, vmax=30)
+draw(axes[1], measured, distance, "distance from the tool [mm]", cmap="viridis", vmin=0, vmax=10)
 for defect in run.defects().itertuples():
     if defect.type == "wrinkle":
         ridge = 1e3 * np.array(run["measured"].artifact.attributes["defects"][defect.Index]["ridge"])
@@ -153,10 +156,11 @@ study.to_frame()[["mu", "wrinkles", "shear", "status"]]
 data = study.to_xarray()
 figure, axes = plt.subplots(figsize=(6, 3.4))
 axes.plot(data["mu"], 1e3 * data["wrinkles"], "o-", color="tab:red")
-axes.set(xlabel="coefficient of friction, fabric on film", ylabel="length of all wrinkles [mm]", ylim=(0, None))
+axes.set(xlabel="coefficient of friction, fabric on film", ylim=(0, None))
+axes.set_ylabel("length of all wrinkles [mm]", color="tab:red")
 right = axes.twinx()
 right.plot(data["mu"], np.degrees(data["shear"]), "s--", color="tab:blue")
-right.set(ylabel="largest shear angle [deg]")
+right.set_ylabel("largest shear angle [deg]", color="tab:blue")
 figure.tight_layout()
 
 # %% [markdown]

@@ -131,8 +131,7 @@ class Artifact:
             raise NotFound(f"there is no file {self.path}")
         self.verified = bool(verify and ask(["inspect", "--format", "json", "--", self.path])["verified"])
         try:
-            # An artifact never changes, and some shared file systems know no locks.
-            self._file = h5py.File(self.path, "r", locking=False)
+            self._file = h5py.File(self.path, "r")
         except OSError as error:
             raise PlyflowError(f"{self.path}: no HDF5 file that can be read: {error}") from error
         try:

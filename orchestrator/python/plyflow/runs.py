@@ -325,7 +325,8 @@ class Run(_Steps):
 class Store(_Steps):
     """All that a store has, whichever workflow made it: a folder such as ``.plyflow``.
 
-    The list is read from the records beside the artifacts as they are. An artifact is looked at by the program when it is opened.
+    The list is read from the records beside the artifacts as they are. An artifact is looked at by the program when it is opened. Items have
+    numbers, counted from 0, in the place of labels, which only a run knows: ``local[0]``.
 
     Args:
         folder: the store, or the folder in which it lies as ``.plyflow``.
@@ -354,8 +355,9 @@ class Store(_Steps):
             path = record.with_name(record.name[: -len(".record.json")] + ".vtkhdf")
             try:
                 told: Mapping[str, Any] = json.loads(record.read_bytes())
-                step = Step(told["step"], tuple(told["item"]), key=told["key"], kind=told["kind"], bytes=told["bytes"], _verify=self._verify)
-                step.reason, step.cost, step.host, step.warnings = f"key {step.key}", told["cost"], told["host"], told["warnings"]
+                step = Step(told["step"], tuple(map(str, told["item"])), key=told["key"], kind=told["kind"], bytes=told["bytes"], _verify=self._verify)
+                step.reason, step.cost, step.host = f"key {step.key}", told["cost"], told.get("host")
+                step.warnings = list(told.get("warnings", ()))
             except (ValueError, KeyError, OSError) as error:
                 raise PlyflowError(f"{record}: no record that can be read ({error}): `plyflow verify --store {self.folder}` says what is damaged") from error
             if path.is_file():

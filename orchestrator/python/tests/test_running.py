@@ -45,7 +45,7 @@ def test_points_that_are_no_grid_lie_along_one_dimension(tmp_path: Path) -> None
     point = {"values": {"a": 1.0, "b": 2.0}, "responses": {"r": 3.0}, "status": "done", "failure": None}
     other = {"values": {"a": 2.0, "b": 1.0}, "responses": {"r": None}, "status": "failed"}
     other["failure"] = {"step": "s", "class": "plugin", "cause": "why"}
-    variables = [{"name": n, "unit": "mm", "si_unit": "m"} for n in "ab"]
+    variables = [{"name": n, "unit": "1 mm", "si_unit": "m"} for n in "ab"]
     told = {"workflow": "w", "variables": variables, "responses": [{"name": "r", "unit": "N"}], "optimisation": None}
     study = plyflow.Study({**told, "points": [{**point, "point": "p1"}, {**other, "point": "p2"}]})
     data = study.to_xarray()
@@ -81,7 +81,7 @@ def test_a_step_that_fails_is_told_with_its_reason(dome: Path, tmp_path: Path) -
     scene = dome.with_name("scene.yaml").read_text()
     assert "hemisphere:" in scene
     workflow = plyflow.Workflow("broken")
-    changed = {"file": str(dome.with_name("scene.yaml")), "set": {"tool": {"stl": {"file": str(tmp_path / "broken.stl"), "unit": "mm"}}}}
+    changed = {"file": str(dome.with_name("scene.yaml")), "set": {"tool": {"stl": {"file": str(tmp_path / "broken.stl"), "unit": "1 mm"}}}}
     workflow.step("drape", "forming-kinematic", scene=changed, element_size="8 mm")
     with pytest.raises(plyflow.RunFailed) as caught:
         plyflow.run(workflow, path=tmp_path / "workflow.yaml", report=False)
