@@ -13,31 +13,63 @@ All numbers are in SI units. Only numpy and h5py are needed; pandas, xarray, pyv
 
 from __future__ import annotations
 
-from importlib import metadata
 from pathlib import Path
-from typing import Union
+from typing import TYPE_CHECKING, Any, Union
 
-import h5py
+if TYPE_CHECKING:
+    from ._ask import PathLike
+    from ._installation import include_folder, material, program, templates_folder, workflows_folder
+    from .artifact import Artifact, Body, FieldInfo, Number, Values
+    from .build import Material, Scene, Workflow, diaphragm, ply, schema
+    from .errors import Damaged, Finding, InvalidInput, Locked, MissingPackage, NotFound, PlyflowError, RunFailed, Stopped
+    from .running import Event, run
+    from .runs import Run, Step, Store
+    from .study import Study
 
-from ._ask import PathLike
-from ._installation import include_folder, material, program, templates_folder, workflows_folder
-from .artifact import Artifact, Body, FieldInfo, Number, Values
-from .build import Material, Scene, Workflow, diaphragm, ply, schema
-from .errors import Damaged, Finding, InvalidInput, Locked, MissingPackage, NotFound, PlyflowError, RunFailed, Stopped
-from .running import Event, run
-from .runs import Run, Step, Store
-from .study import Study
-
-try:
-    __version__ = metadata.version("plyflow")
-except metadata.PackageNotFoundError:  # from the source tree
-    __version__ = "0+source"
+    __version__: str
 
 __all__ = [
     "Artifact", "Body", "Damaged", "Event", "FieldInfo", "Finding", "InvalidInput", "Locked", "Material", "MissingPackage", "NotFound", "Number",
-    "PlyflowError", "Run", "RunFailed", "Scene", "Step", "Stopped", "Store", "Study", "Values", "Workflow", "diaphragm", "include_folder",
-    "material", "open", "ply", "program", "run", "schema", "templates_folder", "workflows_folder",
+    "PlyflowError", "Run", "RunFailed", "Scene", "Step", "Stopped", "Store", "Study", "Values", "Workflow", "__version__", "diaphragm",
+    "include_folder", "material", "open", "ply", "program", "run", "schema", "templates_folder", "workflows_folder",
 ]  # fmt: skip
+
+# In which module each name is. It is imported when the name is used: the command `plyflow` must not wait for numpy.
+_MODULES = {
+    "_installation": ("include_folder", "material", "program", "templates_folder", "workflows_folder"),
+    "artifact": ("Artifact", "Body", "FieldInfo", "Number", "Values"),
+    "build": ("Material", "Scene", "Workflow", "diaphragm", "ply", "schema"),
+    "errors": ("Damaged", "Finding", "InvalidInput", "Locked", "MissingPackage", "NotFound", "PlyflowError", "RunFailed", "Stopped"),
+    "running": ("Event", "run"),
+    "runs": ("Run", "Step", "Store"),
+    "study": ("Study",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return _version()
+    for module, names in _MODULES.items():
+        if name in names:
+            from importlib import import_module
+
+            value = getattr(import_module(f"{__name__}.{module}"), name)
+            globals()[name] = value
+            return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("plyflow")
+    except metadata.PackageNotFoundError:  # from the source tree
+        return "0+source"
 
 
 def open(path: PathLike, verify: bool = True) -> Union[Run, Store, Artifact]:
@@ -52,6 +84,12 @@ def open(path: PathLike, verify: bool = True) -> Union[Run, Store, Artifact]:
         InvalidInput: the workflow has errors.
         Damaged: the artifact is not as it was written.
     """
+    import h5py
+
+    from .artifact import Artifact
+    from .errors import NotFound
+    from .runs import Run, Store
+
     place = Path(path)
     if place.is_dir():
         return Store(place, verify=verify)

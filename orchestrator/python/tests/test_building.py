@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -97,3 +99,10 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path = workflow.write(tmp_path / "workflow.yaml")
     assert path.read_text() == "plyflow: 1\nname: w\nsteps: {}\n"
     assert [p.name for p in tmp_path.iterdir()] == ["workflow.yaml"]
+
+
+def test_every_name_of_the_package_is_there_and_the_command_waits_for_no_numpy() -> None:
+    assert all(getattr(plyflow, name) is not None for name in plyflow.__all__)
+    assert set(plyflow.__all__) <= set(dir(plyflow))
+    code = "import sys, plyflow._installation; sys.exit(any(m in sys.modules for m in ('numpy', 'h5py', 'importlib.metadata')))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
