@@ -12,7 +12,7 @@ from .errors import NotFound, PlyflowError
 __all__ = ["include_folder", "main", "material", "program", "templates_folder", "workflows_folder"]
 
 _PACKAGE = Path(__file__).resolve().parent
-_INSTALLED = _PACKAGE / "_installation"
+_INSTALLED = _PACKAGE / "_prefix"
 # In the source tree this package lies at orchestrator/python/plyflow.
 _SOURCE = _PACKAGE.parents[2]
 

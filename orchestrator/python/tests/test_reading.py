@@ -174,6 +174,12 @@ def test_a_store_lists_what_all_steps_have_made(run: plyflow.Run, demo: Path) ->
     assert {s.label for s in done} >= {"coarse", "local[A]", "comparison"}
 
 
+def test_costs_are_of_all_steps(run: plyflow.Run) -> None:
+    costs = run.costs()
+    assert list(costs.index) == [s.label for s in run if s.state == "done"]
+    assert (costs["cpu_seconds"] > 0).all() and costs.attrs["units"]["peak_memory"] == "B"
+
+
 def test_provenance_names_plugin_and_parameters_in_si(run: plyflow.Run) -> None:
     made = run["coarse"].provenance
     assert made["plugin"]["name"] == "forming-explicit" and made["parameters"]["element_size"] == 0.016

@@ -13,7 +13,7 @@ import pytest
 import plyflow
 
 
-def test_a_study_is_run_followed_and_read(dome: Path) -> None:
+def test_a_study_is_run_followed_and_read(dome: Path, tmp_path: Path) -> None:
     events: list[plyflow.Event] = []
     run = plyflow.run(dome, on_event=events.append, jobs=2)
     kinds = [e.kind for e in events]
@@ -35,7 +35,9 @@ def test_a_study_is_run_followed_and_read(dome: Path) -> None:
     # Turned by 45 deg the corners of a square lie where a sphere shears least.
     assert (data["shear"].sel(angle=45) < data["shear"].sel(angle=0)).all()
 
-    again = []
+    page = run.report(tmp_path / "page.html")
+    assert "dome" in page.read_text(encoding="utf-8")
+    again: list[plyflow.Event] = []
     plyflow.run(dome, on_event=again.append)
     assert {e.kind for e in again} == {"cached", "end"}, "what is in the store does not run again"
 
