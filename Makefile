@@ -20,7 +20,7 @@ QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p pl
 CHECKED := $(foreach crate,mechanics kernels,$(foreach look,debug-assertions overflow-checks,\
   --config profile.release.package.plyflow-$(crate).$(look)=true))
 
-.PHONY: help build demo check test checked long fuzz hard-cases templates lint bench book docs pictures clean
+.PHONY: help build demo check test checked long fuzz hard-cases templates wheel lint bench book docs pictures clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -68,6 +68,10 @@ hard-cases: build ## run what is made to break elements, laws and contacts, and 
 
 templates: build ## build, check and run the element templates outside of the repository
 	scripts/check-templates
+
+wheel: build ## pack dist/plyflow-*.whl: program, plugins, header, templates, workflows, and the package for Python
+	@scripts/setup wheel
+	. ./.tools/env && .tools/venv/bin/python scripts/make-wheel dist
 
 lint: ## check form, lints and JSON Schemas
 	@scripts/setup python

@@ -81,6 +81,11 @@ pub enum Command {
         after_help = "Examples:\n  plyflow clean workflow.yaml --dry-run\n  plyflow clean workflow.yaml\n  plyflow clean workflow.yaml --all"
     )]
     Clean(CleanArgs),
+    /// Copy the joggle spar into a new folder and run it, to a report
+    #[command(
+        after_help = "Examples:\n  plyflow demo --coarse          # a minute or two; numbers mean little\n  plyflow demo my-spar           # some minutes, into the folder my-spar\n  plyflow demo --no-run my-spar  # files to begin a study of your own with"
+    )]
+    Demo(DemoArgs),
     /// Print completions for a shell
     #[command(
         after_help = "Example:\n  plyflow completions bash > ~/.local/share/bash-completion/completions/plyflow"
@@ -312,6 +317,23 @@ pub struct ExplainArgs {
     /// Form
     #[arg(long, value_enum, default_value = "text")]
     pub format: TextOrJson,
+}
+
+/// `demo`
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// The folder to make: nothing that is there is overwritten
+    #[arg(default_value = "plyflow-demo")]
+    pub folder: Utf8PathBuf,
+    /// The variant with large elements, to try things out
+    #[arg(long)]
+    pub coarse: bool,
+    /// Cores that the steps share [default: all of this machine]
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub jobs: Option<u32>,
+    /// Only copy the files
+    #[arg(long, conflicts_with = "jobs")]
+    pub no_run: bool,
 }
 
 /// `results`

@@ -4,6 +4,7 @@ mod args;
 mod check_plugin;
 mod clean;
 mod confirm;
+mod demo;
 mod diff;
 mod explain;
 mod extract;
@@ -18,6 +19,7 @@ mod plugins;
 mod report;
 mod results;
 mod run;
+mod shipped;
 mod study;
 mod study_file;
 mod study_plan;
@@ -32,9 +34,10 @@ pub use args::Cli;
 use crate::advice;
 use crate::exit;
 use crate::said::{Done, warn};
-use args::Command;
+use args::{Command, LogFormat};
 use clap::{CommandFactory, Parser};
 use plyflow_model::text::steers;
+use serde_json::json;
 
 /// Tells help, or what is wrong with the command line: in colours, unless a word of it (the name of a stranger's file, say) could steer the
 /// terminal.
@@ -61,15 +64,28 @@ pub fn main() -> u8 {
         }
     };
     plyflow_plugin_host::Orphans::adopt();
+    let json = speaks_json(&cli.command);
     match dispatch(cli.command) {
         Ok(()) => exit::OK,
         Err(stop) => {
             if !stop.text.is_empty() {
-                warn(&format!("plyflow: {}\n", advice::with(&stop.text)));
+                let text = advice::with(&stop.text);
+                warn(&match json {
+                    true => format!(
+                        "{}\n",
+                        json!({"event": "error", "code": stop.code, "text": text})
+                    ),
+                    false => format!("plyflow: {text}\n"),
+                });
             }
             stop.code
         }
     }
+}
+
+/// Whether all that a command says on standard error is JSON.
+fn speaks_json(command: &Command) -> bool {
+    matches!(command, Command::Run(a) if a.log_format == LogFormat::Json)
 }
 
 fn dispatch(command: Command) -> Done {
@@ -90,6 +106,7 @@ fn dispatch(command: Command) -> Done {
         Command::Verify(a) => verify::verify(&a),
         Command::Diff(a) => diff::diff(&a),
         Command::Clean(a) => clean::clean(&a),
+        Command::Demo(a) => demo::demo(&a),
         Command::Completions { shell } => {
             let mut command = Cli::command();
             clap_complete::generate(shell, &mut command, "plyflow", &mut std::io::stdout());

@@ -19,6 +19,10 @@ use serde_json::json;
 
 /// What a run would do with an instance, or with the hidden ones of a step.
 pub struct Prospect {
+    /// Name of the step, and the labels of its item; `None`: what is not known yet, or none at all.
+    pub place: (String, Option<Vec<String>>),
+    /// Whether it failed when it ran last.
+    pub failed: bool,
     /// Label: `coarse`, `local[A]`, or `local x N (from zones)`.
     pub label: String,
     /// What a run does with it.
@@ -49,7 +53,8 @@ pub fn plan(args: &PlanArgs) -> Done {
         let list: Vec<_> = found
             .iter()
             .map(|p| {
-                json!({"step": p.label, "state": p.fate.word(), "reason": p.reason,
+                json!({"step": p.label, "name": p.place.0, "item": p.place.1,
+                    "state": p.fate.word(), "failed": p.failed, "reason": p.reason,
                     "last_wall_seconds": p.last.map(|c| c.wall_seconds),
                     "last_cpu_seconds": p.last.map(|c| c.cpu_seconds)})
             })
@@ -115,6 +120,8 @@ pub fn prospects(session: &Session<'_>) -> Vec<Prospect> {
         if !hidden.is_empty() {
             let from: Vec<String> = hidden.iter().map(|id| core.label(*id)).collect();
             found.push(Prospect {
+                place: (plan.name.clone(), None),
+                failed: false,
                 label: format!("{} x N (from {})", plan.name, from.join(", ")),
                 fate: Fate::Unknown,
                 reason: format!("how many is known when {} is done", from.join(", ")),
@@ -122,6 +129,8 @@ pub fn prospects(session: &Session<'_>) -> Vec<Prospect> {
             });
         } else if by_step[step].is_empty() {
             found.push(Prospect {
+                place: (plan.name.clone(), None),
+                failed: false,
                 label: format!("{} x 0", plan.name),
                 fate: Fate::Cached,
                 reason: "the collection it fans out over is empty".into(),
@@ -151,6 +160,8 @@ fn prospect(session: &Session<'_>, id: Id) -> Prospect {
     let name = &core.graph().steps[instance.step].name;
     let last = session.journal.last(name, &instance.item);
     Prospect {
+        place: (name.clone(), Some(core.item_labels(id))),
+        failed: fate == Fate::Run && session.failed_before(id).is_some(),
         label: core.label(id),
         fate,
         reason,

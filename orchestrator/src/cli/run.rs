@@ -7,13 +7,14 @@ mod settings;
 
 use super::args::{LogFormat, RunArgs};
 use super::confirm::Costs;
-use super::open::{open, store_root};
+use super::open::{Opened, load, store_root};
 use crate::engine::{Local, Purpose, Session, Summary};
 use crate::exit;
-use crate::said::{Done, Stop, warn};
+use crate::said::{Done, Stop, show_findings, warn};
 use crate::store::{Early, Store};
 use conclude::{about_to_read, conclude};
 use interrupts::Interrupts;
+use serde_json::json;
 use settings::{ROUNDS, observer, options};
 use std::time::Instant;
 
@@ -37,7 +38,7 @@ pub fn run(args: &RunArgs) -> Done {
             .map_err(Stop::machine(format!("making the store {root}")))?;
     }
     let early = Early::begin(&Store::new(store_root(&args.workflow.places, Some(file))));
-    let mut opened = open(&args.workflow)?;
+    let mut opened = opened(args)?;
     if let Some(o) = optimise::of(&opened) {
         drop(early);
         return optimise::run(args, &opened, o, begun);
@@ -88,6 +89,22 @@ pub fn run(args: &RunArgs) -> Done {
     end
 }
 
+/// The workflow, or what is wrong with it in the form that was asked for.
+fn opened(args: &RunArgs) -> Result<Opened, Stop> {
+    let findings = match load(&args.workflow)? {
+        Ok(opened) => return Ok(opened),
+        Err(findings) => findings,
+    };
+    match args.log_format {
+        LogFormat::Json => {
+            let line = json!({"event": "invalid", "findings": findings.to_json()});
+            warn(&format!("{line}\n"));
+        }
+        LogFormat::Text => show_findings(&findings),
+    }
+    Err(Stop::silent(exit::INVALID))
+}
+
 /// Says beforehand what the variants of `--confirm` cost.
 fn tell_costs(args: &RunArgs, session: &Session<'_>) {
     if args.quiet || args.log_format == LogFormat::Json {
@@ -102,7 +119,7 @@ fn tell_costs(args: &RunArgs, session: &Session<'_>) {
 fn tell_damage(args: &RunArgs, text: &str) {
     match args.log_format {
         LogFormat::Json => {
-            let line = serde_json::json!({"event": "damaged", "what": text});
+            let line = json!({"event": "damaged", "what": text});
             warn(&format!("{line}\n"));
         }
         LogFormat::Text => warn(&format!("plyflow: {text}\n")),

@@ -140,6 +140,17 @@ fn help() {
     }
 }
 
+/// What programs read: findings, the error at the end, and steps told apart from their items.
+#[test]
+fn errors_and_plans_for_programs() {
+    let place = Place::new("steps:\n  a: {plugin: trivial, with: {valu: 2}}\n");
+    let run = |file| ["run", file, "--log-format", "json", "--jobs", "1"];
+    place.says("run-json-invalid", &run("workflow.yaml"));
+    place.says("run-json-missing", &run("nowhere.yaml"));
+    let place = Place::new(FAN_OUT);
+    place.says("plan-json", &["plan", "workflow.yaml", "--format", "json"]);
+}
+
 #[test]
 fn plan_explain_and_results() {
     let expected = "expect:\n  - {step: all, result: sum, value: 17, tolerance: 0.5}\n  \
