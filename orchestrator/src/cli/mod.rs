@@ -3,6 +3,7 @@
 mod args;
 mod check_plugin;
 mod clean;
+mod cluster;
 mod confirm;
 mod diff;
 mod explain;
@@ -12,6 +13,7 @@ mod front;
 mod inspect;
 mod keys;
 mod machine;
+mod on;
 mod open;
 mod plan;
 mod plugins;
@@ -75,6 +77,9 @@ pub fn main() -> u8 {
 fn dispatch(command: Command) -> Done {
     match command {
         Command::Run(a) => run::run(&a),
+        Command::Status(a) => cluster::status(&a),
+        Command::Cancel(a) => cluster::cancel(&a),
+        Command::Pilot(a) => cluster::pilot(&a),
         Command::Plan(a) => plan::plan(&a),
         Command::Validate(a) => plan::validate(&a),
         Command::Graph(a) => plan::graph(&a),
