@@ -27,13 +27,20 @@ impl Bench {
             folder: tempfile::tempdir().unwrap(),
         };
         let at = bench.path("");
+        std::fs::create_dir(bench.path("states")).unwrap();
         bench.command(
             "sbatch",
             &format!("echo x >>{at}/sbatch.calls\nif [ -e {at}/sbatch.says ]; then cat {at}/sbatch.says >&2; exit 1; fi\necho 4711\n"),
         );
+        // Of each name: what `states/NAME` says, else what `default` says, else that it waits; nothing of what is GONE.
         bench.command(
             "squeue",
-            &format!("[ -e {at}/squeue.dead ] && exit 1\ncat {at}/rows 2>/dev/null\nexit 0\n"),
+            &format!(
+                "[ -e {at}/squeue.dead ] && exit 1\nfor n in \"$@\"; do case $n in --name=*) names=${{n#--name=}};; esac; done\n\
+                 for n in $(echo \"$names\" | tr , ' '); do\n\
+                 s=$(cat {at}/states/$n 2>/dev/null || cat {at}/default 2>/dev/null || echo PENDING)\n\
+                 [ $s = GONE ] || echo \"4711|N/A|$n|$s|NonZeroExitCode|n1\"\ndone\nexit 0\n"
+            ),
         );
         bench.command(
             "sacct",
@@ -61,11 +68,7 @@ impl Bench {
     /// What `squeue` says of the first submission.
     fn row(&self, state: &str) {
         let name = &self.exchange().submissions()[0];
-        std::fs::write(
-            self.path("rows"),
-            format!("4711|N/A|{name}|{state}|None|n1\n"),
-        )
-        .unwrap();
+        std::fs::write(self.path("states").join(name), state).unwrap();
     }
 
     fn open(&self) -> Cluster {
@@ -290,7 +293,7 @@ fn an_allocation_that_is_forgotten_without_accounting_is_asked_for_once() {
     bench.take();
     bench.beat(1);
     wait(&mut cluster, 0.3);
-    std::fs::write(bench.path("rows"), "").unwrap();
+    bench.row("GONE");
     let (ended, said) = wait(&mut cluster, 4.0);
     assert_eq!(ended, None);
     assert!(
@@ -357,6 +360,7 @@ fn one_that_never_arrived_is_submitted_again_under_another_name() {
         "Unable to contact slurm controller",
     )
     .unwrap();
+    std::fs::write(bench.path("default"), "GONE").unwrap();
     let mut cluster = bench.open();
     cluster.submit(bench.task(0));
     wait(&mut cluster, 0.2);
@@ -405,8 +409,7 @@ fn a_limit_is_waited_for_and_a_refusal_is_told() {
 #[test]
 fn allocations_that_end_before_they_begin_are_not_asked_for_for_ever() {
     let bench = Bench::new();
-    let at = bench.path("");
-    bench.command("squeue", &format!("for n in \"$@\"; do case $n in --name=*) echo \"${{n#--name=}}\" | tr , '\\n' | sed 's/.*/4711|N\\/A|&|FAILED|NonZeroExitCode|n1/';; esac; done; echo x >>{at}/squeue.calls\n"));
+    std::fs::write(bench.path("default"), "FAILED").unwrap();
     let mut cluster = bench.open();
     cluster.submit(bench.task(0));
     let Some(Outcome::NotStarted(text)) = wait(&mut cluster, 10.0).0 else {

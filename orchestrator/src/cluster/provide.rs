@@ -397,6 +397,10 @@ impl Provider {
 
     /// Submits allocations for what waits.
     fn provide(&mut self, demands: &BTreeMap<Shape, Demand>) {
+        // What waits may be told to wait no more.
+        if !self.rules.is_empty() {
+            return;
+        }
         for (shape, demand) in demands.iter().filter(|(_, d)| !d.waiting.is_empty()) {
             let serves = |s: &&Submission| s.intent.shape == *shape;
             let serving: usize = self.submissions.iter().filter(serves).map(live).sum();
