@@ -19,6 +19,19 @@ pub enum Command {
     /// Run a workflow: what is not yet in the store, and only that
     #[command(after_help = RUN_EXAMPLES)]
     Run(RunArgs),
+    /// Show where the steps of a run on a cluster stand
+    #[command(
+        after_help = "Examples:\n  plyflow status workflow.yaml\n  plyflow status --store /scratch/me/store   # all runs of a store\n\nFrom any machine that sees the store."
+    )]
+    Status(ClusterArgs),
+    /// Stop a run on a cluster; what is finished is kept, and the same run goes on from its checkpoints
+    #[command(
+        after_help = "Examples:\n  plyflow cancel workflow.yaml\n  plyflow cancel my-study --store /scratch/me/store\n\nFrom any machine that sees the store and Slurm, also when the process that drove the run is gone."
+    )]
+    Cancel(ClusterArgs),
+    /// Run steps in an allocation: called by the scripts that a run submits
+    #[command(hide = true)]
+    Pilot(PilotArgs),
     /// Show what a run would do with each step, and why
     #[command(after_help = PLAN_EXAMPLES)]
     Plan(PlanArgs),
@@ -103,6 +116,7 @@ Examples:
   plyflow run workflow.yaml --until zones      # that step and what it needs
   plyflow run workflow.yaml --set detect.over_shear_positive='9 deg'
   plyflow run workflow.yaml --confirm          # and say which defects stay
+  plyflow run workflow.yaml --on slurm         # in allocations of a cluster
 
 A run that was stopped or killed resumes with the same command.";
 
@@ -200,6 +214,9 @@ pub struct RunArgs {
     /// Cores that the steps share [default: all of this machine]
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub jobs: Option<u32>,
+    /// Run the steps in allocations of a cluster: `slurm`, or a profile file
+    #[arg(long, value_name = "slurm|PROFILE", conflicts_with_all = ["jobs", "memory"])]
+    pub on: Option<Utf8PathBuf>,
     /// Memory that the steps share, for steps that state theirs: 8GiB [default: nine tenths of this machine]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
@@ -261,12 +278,36 @@ pub enum TextOrJson {
     Json,
 }
 
+/// `status` and `cancel`
+#[derive(Debug, Args)]
+pub struct ClusterArgs {
+    /// A workflow file, or the name of a workflow in the store [default: all of the store]
+    pub run: Option<Utf8PathBuf>,
+    /// Folder for artifacts and journals [default: .plyflow beside the workflow, or here]
+    #[arg(long, value_name = "DIR")]
+    pub store: Option<Utf8PathBuf>,
+}
+
+/// `pilot`
+#[derive(Debug, Args)]
+pub struct PilotArgs {
+    /// The folder that it shares with the run
+    pub folder: Utf8PathBuf,
+    /// Its submission
+    pub name: String,
+    /// Which of the submission it is
+    pub index: u32,
+}
+
 /// `plan`
 #[derive(Debug, Args)]
 pub struct PlanArgs {
     #[command(flatten)]
     /// The workflow.
     pub workflow: Workflow,
+    /// Also show the allocations that a run on a cluster asks for: `slurm`, or a profile file
+    #[arg(long, value_name = "slurm|PROFILE")]
+    pub on: Option<Utf8PathBuf>,
     /// Only this step and what it needs; may be repeated
     #[arg(long, value_name = "STEP")]
     pub until: Vec<String>,
@@ -492,6 +533,8 @@ pub enum SchemaKind {
     Material,
     /// Files of expectations
     Expected,
+    /// Profiles of clusters, for `--on`
+    Profile,
     /// Attributes of artifacts, by kind
     Artifacts,
 }

@@ -3,6 +3,7 @@
 mod args;
 mod check_plugin;
 mod clean;
+mod cluster;
 mod confirm;
 mod demo;
 mod diff;
@@ -13,6 +14,7 @@ mod front;
 mod inspect;
 mod keys;
 mod machine;
+mod on;
 mod open;
 mod plan;
 mod plugins;
@@ -91,6 +93,9 @@ fn speaks_json(command: &Command) -> bool {
 fn dispatch(command: Command) -> Done {
     match command {
         Command::Run(a) => run::run(&a),
+        Command::Status(a) => cluster::status(&a),
+        Command::Cancel(a) => cluster::cancel(&a),
+        Command::Pilot(a) => cluster::pilot(&a),
         Command::Plan(a) => plan::plan(&a),
         Command::Validate(a) => plan::validate(&a),
         Command::Graph(a) => plan::graph(&a),

@@ -3,6 +3,7 @@
 use super::args::{GraphArgs, GraphFormat, PlanArgs, TextOrJson, ValidateArgs};
 use super::confirm::Costs;
 use super::found::change::{Difference, Fate, cost_of, cost_of_items, difference};
+use super::on::On;
 use super::open::{self, open};
 use super::study_plan::Prospects;
 use super::table::{first_line, or_none, table};
@@ -40,13 +41,20 @@ pub struct Prospect {
 pub fn plan(args: &PlanArgs) -> Done {
     let mut opened = open(&args.workflow)?;
     opened.restrict(&args.until)?;
+    let on = On::chosen(args.on.as_deref(), &args.workflow.workflow)?;
+    if let Some(on) = &on {
+        on.prepare(&mut opened)?;
+    }
     let session = opened.look()?;
     for text in session.told() {
         warn(&format!("plyflow: {text}\n"));
     }
+    let allocations = on
+        .as_ref()
+        .map_or(String::new(), |on| on.text(&opened, &session));
     let study = Prospects::of(&session);
     if let (Some(study), TextOrJson::Text) = (&study, args.format) {
-        return print(&study.text());
+        return print(&(study.text() + &allocations));
     }
     let found = prospects(&session);
     if args.format == TextOrJson::Json {
@@ -59,11 +67,15 @@ pub fn plan(args: &PlanArgs) -> Done {
                     "last_cpu_seconds": p.last.map(|c| c.cpu_seconds)})
             })
             .collect();
-        let all = match (study, Costs::of(&session)) {
+        let mut all = match (study, Costs::of(&session)) {
             (Some(study), _) => json!({"study": study.as_json(), "steps": list}),
             (None, Some(costs)) => json!({"confirm": costs.as_json(), "steps": list}),
+            (None, None) if on.is_some() => json!({"steps": list}),
             (None, None) => json!(list),
         };
+        if let Some(on) = &on {
+            all["allocations"] = on.as_json(&opened, &session);
+        }
         return print(&format!("{all:#}\n"));
     }
     let rows: Vec<Vec<String>> = found
@@ -76,7 +88,7 @@ pub fn plan(args: &PlanArgs) -> Done {
         .collect();
     let head = ["step", "state", "last time", "reason"];
     let costs = Costs::of(&session).map_or(String::new(), |c| format!("\n{}", c.text()));
-    print(&(table(&head, &rows, &[2]) + &sum(&found) + &costs))
+    print(&(table(&head, &rows, &[2]) + &sum(&found) + &costs + &allocations))
 }
 
 /// How many of each fate, and what those that are not there took when they ran last.

@@ -189,6 +189,7 @@ pub fn schema(args: &SchemaArgs) -> Done {
         SchemaKind::Scene => schema::scene(),
         SchemaKind::Material => schema::material(),
         SchemaKind::Expected => schema::expected(),
+        SchemaKind::Profile => schema::profile(),
         SchemaKind::Artifacts => schema::artifacts(),
         SchemaKind::Workflow => {
             let folders = folders(&args.places, None)?;

@@ -1,14 +1,15 @@
 //! `run`.
 
 mod conclude;
-mod interrupts;
+pub(super) mod interrupts;
 mod optimise;
 mod settings;
 
 use super::args::{LogFormat, RunArgs};
 use super::confirm::Costs;
+use super::on::{On, Place};
 use super::open::{Opened, load, store_root};
-use crate::engine::{Local, Purpose, Session, Summary};
+use crate::engine::{Observer, Purpose, Session, Summary};
 use crate::exit;
 use crate::said::{Done, Stop, show_findings, warn};
 use crate::store::{Early, Store};
@@ -44,6 +45,10 @@ pub fn run(args: &RunArgs) -> Done {
         return optimise::run(args, &opened, o, begun);
     }
     opened.restrict(&args.until)?;
+    let on = On::chosen(args.on.as_deref(), file)?;
+    if let Some(on) = &on {
+        on.prepare(&mut opened)?;
+    }
     let options = options(args, &opened)?;
     let _locks = opened.lock()?;
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
@@ -56,32 +61,13 @@ pub fn run(args: &RunArgs) -> Done {
     }
     let interrupts = Interrupts::listen().map_err(machine())?;
     let wake = interrupts.poll_end().map_err(machine())?;
-    // Not the path: a build that replaces the program in the middle of a run must not mix versions.
-    let mut executor = Local::new("/proc/self/exe".into(), Some(wake));
+    let mut place = Place::open(on.as_ref(), &opened, wake)?;
     for text in session.told() {
         tell_damage(args, text);
     }
     tell_costs(args, &session);
-    let mut all = Summary::default();
-    for round in 0.. {
-        let (ended, summary) = session
-            .execute(&mut executor, observer.as_mut(), &|| interrupts.count())
-            .map_err(machine())?;
-        session = ended;
-        all.add(summary);
-        // What is about to be printed is read first; what is not as it was written is made again, as long as that helps.
-        let depth = about_to_read(args, &opened, &session, &all);
-        let lost = match depth {
-            Some(depth) if !all.interrupted => session.recheck(&|_| true, depth, observer.as_mut()),
-            _ => 0,
-        };
-        if lost == 0 {
-            break;
-        }
-        if round == ROUNDS {
-            return Err(damaged_again());
-        }
-    }
+    let observer = observer.as_mut();
+    let (session, all) = rounds(args, &opened, session, &mut place, observer, &interrupts)?;
     let end = conclude(args, &opened, &session, &all, begun);
     // The process ends with this: to give ten thousand steps back to the allocator takes longer than to look at them.
     std::mem::forget(session);
@@ -103,6 +89,43 @@ fn opened(args: &RunArgs) -> Result<Opened, Stop> {
         LogFormat::Text => show_findings(&findings),
     }
     Err(Stop::silent(exit::INVALID))
+}
+
+/// Runs what is missing, and again what turns out to be damaged, as long as that helps.
+fn rounds<'o>(
+    args: &RunArgs,
+    opened: &'o Opened,
+    mut session: Session<'o>,
+    place: &mut Place,
+    observer: &mut dyn Observer,
+    interrupts: &Interrupts,
+) -> Result<(Session<'o>, Summary), Stop> {
+    let machine = Stop::machine(format!("running with the store {}", opened.store.root()));
+    let mut all = Summary::default();
+    let mut round = 0;
+    let lost = loop {
+        let wishes = || interrupts.count() + place.wishes.get();
+        let (ended, summary) = match session.execute(place.executor.as_mut(), observer, &wishes) {
+            Ok(ended) => ended,
+            Err(e) => return Err(machine(e)),
+        };
+        session = ended;
+        all.add(summary);
+        // What is about to be printed is read first.
+        let lost = match about_to_read(args, opened, &session, &all) {
+            Some(depth) if !all.interrupted => session.recheck(&|_| true, depth, observer),
+            _ => 0,
+        };
+        if lost == 0 || round == ROUNDS {
+            break lost;
+        }
+        round += 1;
+    };
+    place.executor.close();
+    match lost {
+        0 => Ok((session, all)),
+        _ => Err(damaged_again()),
+    }
 }
 
 /// Says beforehand what the variants of `--confirm` cost.

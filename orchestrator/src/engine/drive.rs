@@ -100,6 +100,11 @@ impl Session<'_> {
             }
             executor.wait(Some(BEAT), &mut reports)?;
             for report in reports.drain(..) {
+                if let Report::Ended { id, .. } = &report
+                    && let Some(files) = executor.files(*id)
+                {
+                    self.jobs.insert(*id, files);
+                }
                 self.heed(report, observer);
             }
             observer.tick();

@@ -2,6 +2,7 @@
 //! that a job is a child process or even on this machine.
 
 use crate::advice;
+use camino::Utf8PathBuf;
 use plyflow_model::job::{FailureKind, Job, Message, Record};
 use std::io;
 use std::time::Duration;
@@ -16,11 +17,11 @@ pub struct Task {
     /// Wall-clock limit (s); 0: none.
     pub time_limit: f64,
     /// Where the worker's log goes; made only when there is something to write.
-    pub log: camino::Utf8PathBuf,
+    pub log: Utf8PathBuf,
 }
 
 /// How a job ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Outcome {
     /// Artifact and record are whole under their temporary names.
     Done(Box<Record>),
@@ -172,6 +173,14 @@ pub trait Executor {
 
     /// Asks a job to stop; `now`: without grace. Its end is still reported.
     fn cancel(&mut self, id: usize, now: bool);
+
+    /// Where the artifact and the record of a job lie that has ended well, when that is not where its [`Task`] says.
+    fn files(&mut self, _id: usize) -> Option<(Utf8PathBuf, Utf8PathBuf)> {
+        None
+    }
+
+    /// Nothing more will be submitted.
+    fn close(&mut self) {}
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, ChildStderr, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// How long a worker has between SIGTERM and SIGKILL.
+/// How long a worker has between SIGTERM and SIGKILL, unless it is said.
 const GRACE: Duration = Duration::from_secs(5);
 /// Reads (of 16 KiB) of one pipe before the others, the time limits and the user get their turn: a plugin may talk without end.
 const READS: usize = 64;
@@ -26,12 +26,16 @@ const LONGEST_LOG: u64 = 64 << 20;
 /// A worker that says this much without a line end is not talking the protocol.
 const LONGEST_LINE: usize = 64 << 20;
 
+/// How it begins what is said of a step that came to its bound of memory.
+pub(crate) const WANTED_MEMORY: &str = "it wanted more memory than its bound";
+
 /// Worker processes of this machine.
 pub struct Local {
     program: Utf8PathBuf,
     workers: BTreeMap<usize, Worker>,
     queued: Vec<Report>,
     wake: Option<OwnedFd>,
+    grace: Duration,
 }
 
 struct Worker {
@@ -113,7 +117,15 @@ impl Local {
             workers: BTreeMap::new(),
             queued: Vec::new(),
             wake,
+            grace: GRACE,
         }
+    }
+
+    /// How long a worker has to stop when it is asked to, before it is killed.
+    #[must_use]
+    pub fn with_grace(mut self, grace: Duration) -> Self {
+        self.grace = grace;
+        self
     }
 
     fn spawn(&self, task: &Task) -> io::Result<(Child, OwnedFd)> {
@@ -298,7 +310,7 @@ impl Executor for Local {
         if let Some(worker) = self.workers.get_mut(&id) {
             worker.stop.get_or_insert(Stop::Cancelled);
             worker.signal(if now { Signal::KILL } else { Signal::TERM });
-            worker.kill_at = Some(Instant::now() + GRACE);
+            worker.kill_at = Some(Instant::now() + self.grace);
         }
     }
 }
@@ -453,7 +465,7 @@ fn tells_of_memory(said: &[u8]) -> bool {
 /// What to say of a step that came to its bound of memory (bytes).
 fn out_of_memory(bound: u64) -> String {
     format!(
-        "it wanted more memory than its bound of {:.1} GiB; give it more with `resources: {{memory: ..}}` of the step, or let it \
+        "{WANTED_MEMORY} of {:.1} GiB; give it more with `resources: {{memory: ..}}` of the step, or let it \
          compute less: larger elements, a coarser grid, fewer frames",
         bound as f64 / (1u64 << 30) as f64
     )

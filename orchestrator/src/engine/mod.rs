@@ -18,6 +18,7 @@ mod whole;
 pub use compare::Compared;
 pub use executor::{Executor, FailureClass, Outcome, Report, Task};
 pub use local::Local;
+pub(crate) use local::WANTED_MEMORY;
 pub use session::{Of, Options, Purpose, Session};
 pub use shown::{Failure, Observer, Summary, Update};
 pub use sound::Depth;

@@ -14,6 +14,7 @@
 //!   runs/<workflow>/tmp/           artifacts being written
 //!   runs/<workflow>/checkpoints/<instance>/<key>/   what lets a killed step go on
 //!   runs/<workflow>/checkpoints/<instance>/<key>.forced   these are of a run that was to begin anew
+//!   runs/<workflow>/cluster/       what a run on a cluster shares with its allocations (see [`crate::cluster`])
 //!   runs/<workflow>/unplaced/      finished artifacts that could not be put into `artifacts`, and their records
 //! ```
 

@@ -15,6 +15,7 @@ mod load;
 mod overrides;
 mod parameters;
 mod paths;
+mod profile;
 pub mod resolved;
 mod results;
 mod scene;
@@ -30,9 +31,10 @@ pub use diagnostics::{Diagnostic, Diagnostics, Further, Severity};
 pub use evidence::{Evidence, Resolution};
 pub use graph::{dependencies, graph, to_dot, to_mermaid};
 pub use load::{
-    Part, Wanted, check_part, load, load_with, plugin_search_folders, resolve, resolve_wanted,
-    resolve_with_points,
+    Part, Wanted, check_part, load, load_with, name_of, plugin_search_folders, resolve,
+    resolve_wanted, resolve_with_points,
 };
 pub use overrides::{Override, OverrideError};
+pub use profile::load_profile;
 pub use resolved::ResolvedWorkflow;
 pub use study::PointsOf;

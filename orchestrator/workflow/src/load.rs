@@ -302,6 +302,12 @@ pub fn plugin_search_folders(path: &Utf8Path) -> Vec<Utf8PathBuf> {
     named_folders(&root, &source)
 }
 
+/// The name of the workflow of a file; none when the file cannot be read (which [`load`] then reports).
+pub fn name_of(path: &Utf8Path) -> Option<String> {
+    let (_, root) = open(path, &mut Problems::default())?;
+    root.get("name")?.text().map(str::to_owned)
+}
+
 fn named_folders(root: &Node, source: &Source) -> Vec<Utf8PathBuf> {
     let folders = root.get("plugins").map_or(&[][..], Node::items);
     folders

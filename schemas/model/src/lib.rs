@@ -16,6 +16,7 @@ pub mod material;
 pub mod nearest;
 pub mod outline;
 pub mod process;
+pub mod profile;
 pub mod regions;
 pub mod rules;
 pub mod scene;

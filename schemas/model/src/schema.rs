@@ -3,6 +3,7 @@
 use crate::artifact;
 use crate::manifest::{Manifest, PluginKind};
 use crate::material::Material;
+use crate::profile::Profile;
 use crate::scene::Scene;
 use crate::workflow::{Expected, Workflow};
 use schemars::{JsonSchema, generate::SchemaSettings};
@@ -91,6 +92,11 @@ pub fn expected() -> Value {
     schema_of::<Expected>("expected", "Plyflow expectations")
 }
 
+/// Schema of a profile file.
+pub fn profile() -> Value {
+    schema_of::<Profile>("profile", "Plyflow profile of a cluster")
+}
+
 /// The attributes of the artifacts, by kind.
 #[derive(JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -145,12 +151,13 @@ pub fn artifacts() -> Value {
 }
 
 /// All schemas with their file names, as checked in under `schemas/json/`.
-pub fn all() -> [(&'static str, Value); 5] {
+pub fn all() -> [(&'static str, Value); 6] {
     [
         ("workflow.schema.json", workflow_for_editors()),
         ("scene.schema.json", scene()),
         ("material.schema.json", material()),
         ("expected.schema.json", expected()),
+        ("profile.schema.json", profile()),
         ("artifacts.schema.json", artifacts()),
     ]
 }

@@ -12,9 +12,10 @@ use crate::cli::found::asked::Kept;
 use crate::cli::found::change::cost_of;
 use crate::cli::found::points::Table;
 use crate::cli::found::rows::records;
+use crate::cli::on::{On, Place};
 use crate::cli::open::{Opened, open_at};
 use crate::engine::core::State;
-use crate::engine::{Depth, Local, Purpose, Session, Summary};
+use crate::engine::{Depth, Purpose, Session, Summary};
 use crate::exit;
 use crate::plan::Key;
 use crate::said::{Done, Stop};
@@ -164,7 +165,11 @@ fn round(
         let mut names: Vec<String> = names.into_iter().map(str::to_owned).collect();
         names.sort_unstable();
         opened.restrict(&names)?;
-        let session = execute(args, &opened, way, interrupts)?;
+        let on = On::chosen(args.on.as_deref(), &args.workflow.workflow)?;
+        if let Some(on) = &on {
+            on.prepare(&mut opened)?;
+        }
+        let session = execute(args, (&opened, on.as_ref()), way, interrupts)?;
         let found = read(&session);
         for i in open {
             lines[i] = found[i].clone();
@@ -204,7 +209,7 @@ fn read(session: &Session<'_>) -> Vec<Line> {
 /// Runs the wanted steps of an opened workflow.
 fn execute<'o>(
     args: &RunArgs,
-    opened: &'o Opened,
+    (opened, on): (&'o Opened, Option<&On>),
     way: &mut Way,
     interrupts: &Interrupts,
 ) -> Result<Session<'o>, Stop> {
@@ -219,11 +224,13 @@ fn execute<'o>(
     }
     let wake = interrupts.poll_end().map_err(machine())?;
     let before = children_seconds();
-    let mut executor = Local::new("/proc/self/exe".into(), Some(wake));
+    let mut place = Place::open(on, opened, wake)?;
     let mut failed = false;
     for round in 0.. {
         let (ended, summary) = session
-            .execute(&mut executor, observer.as_mut(), &|| interrupts.count())
+            .execute(place.executor.as_mut(), observer.as_mut(), &|| {
+                interrupts.count() + place.wishes.get()
+            })
             .map_err(machine())?;
         session = ended;
         failed |= !summary.failures.is_empty();
@@ -247,7 +254,8 @@ fn execute<'o>(
         }
     }
     // Its workers end with it, and only then what they took is known.
-    drop(executor);
+    place.executor.close();
+    drop(place);
     let counted = way.take(&session);
     // What was stopped took some of it, and runs again.
     let spent = (children_seconds() - before - counted).max(0.0);

@@ -33,9 +33,14 @@ pub fn options(args: &RunArgs, opened: &Opened) -> Result<Options, Stop> {
                 .0
         }
     };
+    // On a cluster everything that is ready is given away at once: there it is counted.
+    let (cores, memory) = match args.on {
+        Some(_) => (u32::MAX, 0),
+        None => (args.jobs.unwrap_or_else(cores), memory),
+    };
     Ok(Options {
         limits: Limits {
-            cores: args.jobs.unwrap_or_else(cores),
+            cores,
             memory,
             policy,
         },
