@@ -67,7 +67,7 @@ impl Default for Parameters {
             hourglass: 1.0,
             hourglass_floor: 3000.0,
             hourglass_shear: 1.0,
-            hourglass_director: 0.05,
+            hourglass_director: 0.5,
             thickening: 0,
         }
     }
