@@ -1,10 +1,10 @@
 //! The words of the command line.
 
 mod cluster;
-mod plugins;
+mod trust;
 
 pub use cluster::{ClusterArgs, PilotArgs};
-pub use plugins::{CheckPluginArgs, PluginsArgs, TrustArgs};
+pub use trust::TrustArgs;
 
 use crate::exit;
 use camino::Utf8PathBuf;
@@ -30,7 +30,7 @@ pub enum Command {
         after_help = "Examples:\n  plyflow status workflow.yaml\n  plyflow status --store /scratch/me/store   # all runs of a store\n\nFrom any machine that sees the store."
     )]
     Status(ClusterArgs),
-    /// Stop a run on a cluster; what is finished is kept, and the same run goes on from its checkpoints
+    /// Stop a run on a cluster; what is finished is kept, and the same run goes on
     #[command(
         after_help = "Examples:\n  plyflow cancel workflow.yaml\n  plyflow cancel my-study --store /scratch/me/store\n\nFrom any machine that sees the store and Slurm, also when the process that drove the run is gone."
     )]
@@ -397,6 +397,52 @@ pub struct ReportArgs {
     /// Of a study: write the page of this point, by its name, into a folder beside the study's page; may be repeated
     #[arg(long, value_name = "NAME")]
     pub point: Vec<String>,
+}
+
+/// `plugins`
+#[derive(Debug, Args)]
+pub struct PluginsArgs {
+    /// A plugin by name or path: show its parameters, inputs and results
+    pub name: Option<String>,
+    /// Also look where this workflow says
+    #[arg(long, value_name = "FILE")]
+    pub workflow: Option<Utf8PathBuf>,
+    #[command(flatten)]
+    /// Where things are.
+    pub places: Places,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+    /// Write the manifest of the named plugin into a file beside its library, so that others can read it without loading it
+    #[arg(long, requires = "name")]
+    pub write_manifest: bool,
+}
+
+/// `check-plugin`
+#[derive(Debug, Args)]
+pub struct CheckPluginArgs {
+    /// The plugin: path of a library, or name on the search path
+    #[arg(value_name = "LIBRARY")]
+    pub plugin: String,
+    /// A material file: what an element is judged with, or the sheet of the material plugin that is judged; may be
+    /// repeated [default for elements: a fabric with stitches and a film]
+    #[arg(long, value_name = "FILE")]
+    pub material: Vec<Utf8PathBuf>,
+    /// The plugin's parameters, as under `with:` in a workflow: YAML or JSON, or a file of it
+    #[arg(long, value_name = "PARAMETERS")]
+    pub with: Option<String>,
+    /// Look for plugins here first; may be repeated
+    #[arg(long, value_name = "DIR")]
+    pub plugins: Vec<Utf8PathBuf>,
+    /// Also load libraries that a material file names
+    #[arg(long)]
+    pub trust: bool,
+    /// Seconds after which a plugin counts as hanging
+    #[arg(long, value_name = "SECONDS", default_value = "120")]
+    pub time_limit: f64,
+    /// Form
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
 }
 
 /// `inspect`
