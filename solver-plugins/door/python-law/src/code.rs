@@ -1,0 +1,158 @@
+//! Object code, laid down in memory so that it can run.
+//!
+//! This does what a linker does, for the one case that there is: an object of one function for x86-64, position independent, which reads its
+//! own constants and calls the functions of [`crate::functions`]. Everything else is refused by name.
+
+use crate::functions;
+use memmap2::{Mmap, MmapMut};
+use object::read::elf::ElfFile64;
+use object::{
+    Object, ObjectSection, ObjectSymbol, Relocation, RelocationKind, RelocationTarget,
+    SectionIndex, SectionKind, SymbolIndex,
+};
+use std::collections::BTreeMap;
+
+/// Memory that can be run and not be written to.
+pub struct Code {
+    memory: Mmap,
+    entry: usize,
+}
+
+/// `jmp *0(%rip)`, with the address behind it.
+const JUMP: [u8; 6] = [0xff, 0x25, 0, 0, 0, 0];
+const STUB: usize = 16;
+
+impl Code {
+    /// Lays down the sections of an object, and finds the function `entry` in it.
+    ///
+    /// # Errors
+    /// The object needs what a law has not: says what.
+    pub fn load(object: &[u8], entry: &str) -> Result<Self, String> {
+        let file: ElfFile64<'_> = ElfFile64::parse(object).map_err(|e| format!("object: {e}"))?;
+        if file.architecture() != object::Architecture::X86_64 {
+            return Err(format!("the code is for {:?}", file.architecture()));
+        }
+        let layout = Layout::of(&file)?;
+        let memory = MmapMut::map_anon(layout.size.max(1));
+        let mut memory = memory.map_err(|e| format!("no memory for the code: {e}"))?;
+        for (index, at) in &layout.sections {
+            let section = file
+                .section_by_index(SectionIndex(*index))
+                .map_err(|e| e.to_string())?;
+            let bytes = section.data().map_err(|e| e.to_string())?;
+            memory[*at..at + bytes.len()].copy_from_slice(bytes);
+            for (offset, relocation) in section.relocations() {
+                let place = at + offset as usize;
+                let value = layout.distance(&file, &relocation, place)?;
+                let bytes = memory.get_mut(place..place + 4);
+                let bytes = bytes.ok_or("a relocation lies outside of its section")?;
+                bytes.copy_from_slice(&value.to_le_bytes());
+            }
+        }
+        for (address, at) in layout.functions.values() {
+            memory[*at..at + JUMP.len()].copy_from_slice(&JUMP);
+            memory[at + JUMP.len()..at + JUMP.len() + 8].copy_from_slice(&address.to_le_bytes());
+        }
+        let found = file.symbols().find(|s| s.name() == Ok(entry));
+        let found = found.and_then(|s| layout.place(&file, s.index()).ok());
+        let entry = found.ok_or_else(|| format!("there is no function {entry} in the code"))?;
+        let memory = memory.make_exec();
+        let memory = memory.map_err(|e| format!("the system does not let code be run: {e}"))?;
+        Ok(Self { memory, entry })
+    }
+
+    /// Where the function begins. It is there as long as this is.
+    pub fn entry(&self) -> *const u8 {
+        &raw const self.memory[self.entry]
+    }
+}
+
+/// Where everything lies, from the beginning of the memory.
+struct Layout {
+    /// By the number of a section.
+    sections: BTreeMap<usize, usize>,
+    /// Functions from outside: their address, and where the jump to it lies, which is near enough for a call.
+    functions: BTreeMap<String, (usize, usize)>,
+    size: usize,
+}
+
+impl Layout {
+    fn of(file: &ElfFile64<'_>) -> Result<Self, String> {
+        let mut new = Self {
+            sections: BTreeMap::new(),
+            functions: BTreeMap::new(),
+            size: 0,
+        };
+        for section in file.sections() {
+            let name = section.name().unwrap_or("?");
+            match section.kind() {
+                // How to unwind: nothing does, as nothing is thrown.
+                _ if name == ".eh_frame" => {}
+                SectionKind::Text
+                | SectionKind::ReadOnlyData
+                | SectionKind::ReadOnlyString
+                | SectionKind::ReadOnlyDataWithRel => {
+                    let align = section.align().clamp(1, 4096) as usize;
+                    let at = new.size.next_multiple_of(align);
+                    new.sections.insert(section.index().0, at);
+                    new.size = at + section.size() as usize;
+                }
+                SectionKind::Data | SectionKind::UninitializedData | SectionKind::Tls
+                    if section.size() > 0 =>
+                {
+                    return Err(format!("the code has variables of its own ({name})"));
+                }
+                _ => {}
+            }
+        }
+        for symbol in file.symbols().filter(|s| s.is_undefined()) {
+            let name = symbol.name().unwrap_or("?");
+            if name.is_empty() {
+                continue;
+            }
+            let address = functions::address(name)
+                .ok_or_else(|| format!("the code calls {name}, which is not there for a law"))?;
+            let at = new.size.next_multiple_of(STUB);
+            new.functions.insert(name.to_owned(), (address, at));
+            new.size = at + STUB;
+        }
+        Ok(new)
+    }
+
+    /// Where a symbol lies.
+    fn place(&self, file: &ElfFile64<'_>, index: SymbolIndex) -> Result<usize, String> {
+        let symbol = file.symbol_by_index(index).map_err(|e| e.to_string())?;
+        let name = symbol.name().unwrap_or("?");
+        if let Some((_, at)) = self.functions.get(name) {
+            return Ok(*at);
+        }
+        let section = symbol.section_index().and_then(|i| self.sections.get(&i.0));
+        let section = section.ok_or_else(|| format!("{name} lies in no section that is kept"))?;
+        Ok(section + symbol.address() as usize)
+    }
+
+    /// What a relocation at `place` asks for: how far its target is from there.
+    fn distance(
+        &self,
+        file: &ElfFile64<'_>,
+        relocation: &Relocation,
+        place: usize,
+    ) -> Result<i32, String> {
+        let near = matches!(
+            relocation.kind(),
+            RelocationKind::Relative | RelocationKind::PltRelative
+        );
+        let RelocationTarget::Symbol(target) = relocation.target() else {
+            return Err("a relocation has no symbol".into());
+        };
+        if !near || relocation.size() != 32 || relocation.has_implicit_addend() {
+            return Err(format!(
+                "a relocation of kind {:?} is not known here",
+                relocation.flags()
+            ));
+        }
+        let target = self.place(file, target)? as i64;
+        let distance = target + relocation.addend() - place as i64;
+        i32::try_from(distance).map_err(|_| "the code is larger than 2 GiB".into())
+    }
+}
