@@ -40,6 +40,24 @@ def program() -> Path:
     raise NotFound(f"there is no program `plyflow`: looked for {looked}; install the wheel, or set PLYFLOW_PROGRAM")
 
 
+def shell(name: str) -> Path:
+    """A library of which copies are made that hold what was written in Python. It lies beside the plugins of the program.
+
+    Raises:
+        NotFound: it is not there; says where it was looked for.
+
+    >>> shell("python_law").name
+    'libplyflow_python_law.so'
+    """
+    folder = program().resolve().parent
+    candidates = [place / f"libplyflow_{name}.so" for place in (folder.parent / "lib" / "plyflow", folder)]
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    looked = ", ".join(str(c) for c in candidates)
+    raise NotFound(f"there is no library libplyflow_{name}.so: looked for {looked}; install the wheel, or `make build`")
+
+
 def _folder(installed: str, source: str, what: str) -> Path:
     for candidate in (_INSTALLED / installed, _SOURCE / source):
         if candidate.is_dir():
