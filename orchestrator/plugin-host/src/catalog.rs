@@ -16,6 +16,9 @@ use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
 
 /// Ending of a library's file name.
 const SUFFIX: &str = ".so";
+/// How the file names of shells begin: libraries that lie beside the plugins and are none. What is written in Python becomes a plugin as a
+/// copy of one.
+const SHELL: &str = "libplyflow_python_";
 
 impl PluginCatalog {
     /// All plugins on the search path, in its order; of two of a name only the first.
@@ -216,6 +219,7 @@ fn libraries(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
         .flatten()
         .map(camino::Utf8DirEntry::into_path)
         .filter(|p| p.as_str().ends_with(SUFFIX) && p.is_file())
+        .filter(|p| !p.file_name().is_some_and(|name| name.starts_with(SHELL)))
         .collect();
     paths.sort();
     paths

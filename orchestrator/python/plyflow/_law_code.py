@@ -27,8 +27,13 @@ def main() -> None:
     source, name, level, folder = sys.argv[1:5]
     place = Path(folder)
     answer: dict[str, Any] = {"findings": []}
+    import numba  # noqa: F401
+
+    before = list(sys.path)
     try:
         law = load(source, name)
+        # A file beside the law may have the name of a module that numba imports later.
+        sys.path[:] = before
         rules.check(law, source)
         answer["code"] = {kind: str(_piece(law, kind, level, place, source)) for kind in ("membrane", "bending") if kind in law.functions}
         answer["watch"] = _watch(source)
@@ -103,8 +108,8 @@ def _piece(law: Law, kind: str, level: str, folder: Path, source: str) -> Path:
     around: dict[str, Any] = {}
     for one in kinds:
         function = law.functions[one]
-        around[one] = compiler.dispatcher(function)
-        _alone(around[one], function, one, examples, source)
+        around[f"law_{one}"] = compiler.dispatcher(function)
+        _alone(around[f"law_{one}"], function, one, examples, source)
     text = source_of(law, kind, around, history)
     exec(compile(text, f"<{kind} of {law.name}>", "exec"), around)
     module = _module(around, law.functions[kind], source)
@@ -138,7 +143,8 @@ def _alone(dispatcher: Any, function: Any, kind: str, examples: dict[str, Any], 
     wanted = RETURNS[kind]
     numbers = all(isinstance(part, (numba.types.Float, numba.types.Integer, numba.types.Boolean)) for part in parts)
     if not isinstance(returned, numba.types.BaseTuple) or len(parts) != len(wanted) or not numbers:
-        message = f"{function.__name__} returns {returned}"
+        several = isinstance(returned, numba.types.BaseTuple) and len(parts) != len(wanted)
+        message = f"{function.__name__} returns {f'{len(parts)} values' if several else returned}"
         expected = f"{len(wanted)} numbers: {', '.join(wanted)}"
         raise InvalidInput([rules.finding(function, rules.line_of_return(function), message, expected=expected)])
 
@@ -153,6 +159,10 @@ def _finding(error: Exception, function: Any, source: str) -> Finding:
         if found:
             line, file = int(found[1]), source
             break
+    else:
+        missing = re.search(r"name '(\w+)' is not defined|has no attribute '(\w+)'", text)
+        if missing:
+            line = rules.line_of_name(function, missing[1] or missing[2])
     said = [part.strip() for part in text.splitlines()]
     boring = ("", "Failed in nopython mode pipeline", "During:", "- During", "There are", "- Of which", "Overload", "With argument", "Rejected", "File ")
     useful = [part for part in said if not any(part == b or (b and part.startswith(b)) for b in boring)]

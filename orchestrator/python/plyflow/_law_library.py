@@ -7,12 +7,12 @@ import os
 import subprocess
 import sys
 import tempfile
+from importlib import util
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Sequence
 
-from ._ask import needed
 from ._installation import shell
-from .errors import Finding, InvalidInput, PlyflowError
+from .errors import Finding, InvalidInput, MissingPackage, PlyflowError
 
 if TYPE_CHECKING:
     from .laws import Law
@@ -40,7 +40,8 @@ sys.stdout.buffer.write(ctypes.string_at(fault.data, fault.length))
 
 def make(law: Law, source: Path, library: Path, levels: Sequence[str] = LEVELS) -> dict[str, Any]:
     """Compiles a law and writes its library; see :func:`plyflow.laws._make`."""
-    needed("numba", "a law in Python")
+    if util.find_spec("numba") is None:
+        raise MissingPackage("a law in Python needs the package numba, which is not installed: pip install numba")
     bare = shell("python_law").read_bytes()
     with tempfile.TemporaryDirectory() as scratch:
         told = _compiled(law, source, levels, Path(scratch))

@@ -6,7 +6,7 @@ import ast
 import inspect
 import textwrap
 from types import FunctionType
-from typing import Any, Iterator, NoReturn, Sequence
+from typing import Any, Callable, Iterator, NoReturn, Sequence
 
 from .errors import Finding, InvalidInput
 from .laws import Law
@@ -14,6 +14,7 @@ from .laws import Law
 WHAT_A_LAW_MAY = "numbers, tuples, if, for, while, the functions of math, and functions of your own that keep to the same"
 
 _NO_RAISE = "return math.nan for a state that must not be: check-plugin and the solver name the place where a number is not finite"
+_NO_ARRAY = "use numbers and tuples; what a point remembers is in history"
 _REFUSED: dict[type, tuple[str, str]] = {
     ast.Raise: ("a law cannot raise", _NO_RAISE),
     ast.Assert: ("a law cannot assert", _NO_RAISE),
@@ -31,6 +32,8 @@ _REFUSED: dict[type, tuple[str, str]] = {
     ast.Dict: ("a law makes no mappings: nothing is allocated for a point", "use a tuple, or names"),
     ast.Set: ("a law makes no sets: nothing is allocated for a point", "use a tuple, or names"),
 }
+# What of numpy makes an array, by its last name.
+_ARRAYS = frozenset("zeros ones empty full array asarray zeros_like ones_like empty_like linspace arange eye identity dot matmul stack append".split())
 _CALLED = {
     "print": ("a law cannot print: it runs millions of times, in many threads", "call the law in plain Python to look at its numbers"),
     "open": ("a law reads no files", "read them at the head of the file, or make parameters of what they say"),
@@ -88,10 +91,17 @@ def _in_text(function: Any, history: int | None) -> list[Finding]:
         return []
     body = getattr(tree, "body", [tree])[0]
     found = []
-    for node in (n for part in body.body for n in ast.walk(part)) if hasattr(body, "body") and isinstance(body.body, list) else ast.walk(body):
+    nodes = [node for part in getattr(body, "body", [body]) for node in ast.walk(part)]
+    # Texts that stand alone are documentation.
+    spoken = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    for node in nodes:
         told = _REFUSED.get(type(node))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             told = _CALLED.get(node.func.id)
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _ARRAYS:
+            told = (f"'{node.func.attr}' makes an array, and nothing is allocated for a point", _NO_ARRAY)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in spoken:
+            told = ("a law has no texts", "a parameter that is a choice is the index of its word: if p.kind == 0")
         if told:
             found.append(finding(function, above + node.lineno, f"{function.__name__}: {told[0]}", hint=told[1], column=node.col_offset + 1))
         if history is not None and isinstance(node, ast.Subscript):
@@ -111,23 +121,35 @@ def _beyond(function: Any, node: ast.Subscript, above: int, history: int) -> lis
     place = sign * index.value
     if -history <= place < history:
         return []
-    there = "it remembers none" if history == 0 else f"it remembers {history}, history[0] to history[{history - 1}]"
+    last = "" if history == 1 else f" to history[{history - 1}]"
+    there = "it remembers nothing" if history == 0 else f"it remembers history[0]{last}"
     hint = f"declare them: history={place + 1}" if place >= 0 else None
     return [finding(function, above + node.lineno, f"{function.__name__}: history[{place}], but {there}", hint=hint, column=node.col_offset + 1)]
 
 
 def line_of_return(function: Any) -> int:
     """The line of the first return of a function."""
+    return _line(function, lambda node: isinstance(node, ast.Return))
+
+
+def line_of_name(function: Any, name: str) -> int:
+    """The line where a function first says a name."""
+    return _line(function, lambda node: name in (getattr(node, "id", None), getattr(node, "attr", None)))
+
+
+def _line(function: Any, wanted: Callable[[ast.AST], bool]) -> int:
+    first = int(function.__code__.co_firstlineno)
     try:
         tree, above = _tree(function)
     except (OSError, SyntaxError):
-        return int(function.__code__.co_firstlineno)
-    lines = [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Return)]
-    return above + min(lines, default=1)
+        return first
+    return min((above + node.lineno for node in ast.walk(tree) if wanted(node) and hasattr(node, "lineno")), default=first)
 
 
 def hint_for(text: str) -> str:
     """What to do, by what numba says."""
+    if "is not defined" in text:
+        return "define it in the file, or declare it as a parameter and write p. before it"
     if "Untyped global name" in text or "Cannot determine Numba type" in text:
         return "a global name must be a number, a tuple of numbers, or a function; call functions of a module of your own by their name (from module import name)"
     if "Unknown attribute" in text:
@@ -151,7 +173,7 @@ def refuse_outside(names: Sequence[str], function: Any, source: str) -> None:
         if name.startswith("NRT_"):
             refuse(
                 "it makes an array or another object, and nothing may be allocated for a point",
-                "use numbers and tuples in place of numpy's arrays; what a point remembers is in history",
+                _NO_ARRAY,
             )
         if name.startswith(("Py", "_Py", "numba_")):
             refuse(f"its code would call Python ({name})", f"use {WHAT_A_LAW_MAY}; it must raise nothing and print nothing")

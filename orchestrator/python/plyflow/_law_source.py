@@ -20,7 +20,9 @@ _MARGIN = 1.01
 
 
 def source_of(law: Law, kind: str, around: dict[str, Any], history: int) -> str:
-    """The text of the function :data:`ENTRY` for one function of a law. `around` gets the names that it uses, beside those of the law."""
+    """The text of the function :data:`ENTRY` for one function of a law. 
+    `around` has the compiled functions of the law, as ``law_membrane`` and so on, and gets the other names that the text uses.
+    """
     import math
 
     import numba
@@ -29,7 +31,7 @@ def source_of(law: Law, kind: str, around: dict[str, Any], history: int) -> str:
     around["carray"] = numba.carray
     second = {"membrane": "stiffness", "bending": "tangent"}[kind]
     rows = {"membrane": 2, "bending": 3}[kind]
-    given = second in around
+    given = "law_" + second in around
     if not given:
         exec(_measured(law, kind, history), around)
         around["measured"] = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(around["measured"])
@@ -55,12 +57,12 @@ def source_of(law: Law, kind: str, around: dict[str, Any], history: int) -> str:
         "    s = carray(stress, (3, lanes))",
         "    w = carray(energy, (lanes,))",
         "    for l in range(lanes):",
-        f"        s[0, l], s[1, l], s[2, l], w[l] = {kind}({call(kind)})",
+        f"        s[0, l], s[1, l], s[2, l], w[l] = law_{kind}({call(kind)})",
         "    if wanted != 0:",
         f"        t = carray(tangent, ({rows}, lanes))",
         *([] if given else [f"        copy = carray(scratch, ({history},))"]),
         "        for l in range(lanes):",
-        f"            {answers} = " + (f"{second}({call(second)})" if given else f"measured({everything}, copy)"),
+        f"            {answers} = " + (f"law_{second}({call(second)})" if given else f"measured({everything}, copy)"),
         "    return 0",
     ]
     return "\n".join(lines) + "\n"
@@ -111,7 +113,7 @@ def _at(law: Law, kind: str, history: int) -> list[str]:
         f"def at({', '.join(_all(kind))}, copy):",
         f"    for i in range({history}):",
         "        copy[i] = history[i]",
-        f"    return {kind}({arguments})",
+        f"    return law_{kind}({arguments})",
     ]
 
 

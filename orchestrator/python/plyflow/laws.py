@@ -57,7 +57,7 @@ def law(
     name: str,
     *,
     version: str = "0.1.0",
-    vendor: str = "",
+    vendor: str = "unnamed",
     parameters: Mapping[str, Any] | None = None,
     history: int = 0,
 ) -> Callable[[Function], Law]:
