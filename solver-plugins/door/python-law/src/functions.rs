@@ -35,6 +35,10 @@ unsafe extern "C" fn sincos(x: f64, sine: *mut f64, cosine: *mut f64) {
     unsafe { (*sine, *cosine) = (libm::sin(x), libm::cos(x)) };
 }
 
+/// Called by numba where the last reference to something that it has allocated is gone. A law allocates nothing: its lists of parameters are
+/// the sheet's, and count no references. So this is there for the code that would call it, and is never called.
+extern "C" fn nothing_to_free(_: *mut c_void) {}
+
 extern "C" fn lgamma(x: f64) -> f64 {
     libm::lgamma(x)
 }
@@ -71,6 +75,7 @@ pub fn address(symbol: &str) -> Option<usize> {
             "lgamma" => lgamma as extern "C" fn(f64) -> f64 as usize,
             "nearbyint" => address("rint")?,
             "__powidf2" => powi as extern "C" fn(f64, i32) -> f64 as usize,
+            "NRT_MemInfo_call_dtor" => nothing_to_free as extern "C" fn(*mut c_void) as usize,
             "sincos" => sincos as unsafe extern "C" fn(f64, *mut f64, *mut f64) as usize,
             "memcpy" => memcpy as unsafe extern "C" fn(*mut c_void, *const c_void, usize) -> *mut c_void as usize,
             "memmove" => memmove as unsafe extern "C" fn(*mut c_void, *const c_void, usize) -> *mut c_void as usize,
