@@ -75,10 +75,10 @@ def workflows_folder() -> Path:
 
 
 def templates_folder() -> Path:
-    """The folder of the templates of steps and elements in C and Rust.
+    """The folder of the templates of steps, elements and materials in C, Rust and Python.
 
     >>> sorted(p.name for p in templates_folder().iterdir())
-    ['element', 'element-c', 'step-c']
+    ['element', 'element-c', 'material-python', 'step-c']
     """
     return _folder("share/plyflow/templates", "solver-plugins/door/templates", "templates")
 

@@ -103,7 +103,8 @@ def _in_text(function: Any, history: int | None) -> list[Finding]:
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in spoken:
             told = ("a law has no texts", "a parameter that is a choice is the index of its word: if p.kind == 0")
         if told:
-            found.append(finding(function, above + node.lineno, f"{function.__name__}: {told[0]}", hint=told[1], column=node.col_offset + 1))
+            line, column = getattr(node, "lineno", 1), getattr(node, "col_offset", 0)
+            found.append(finding(function, above + line, f"{function.__name__}: {told[0]}", hint=told[1], column=column + 1))
         if history is not None and isinstance(node, ast.Subscript):
             found += _beyond(function, node, above, history)
     return found
@@ -143,7 +144,7 @@ def _line(function: Any, wanted: Callable[[ast.AST], bool]) -> int:
         tree, above = _tree(function)
     except (OSError, SyntaxError):
         return first
-    return min((above + node.lineno for node in ast.walk(tree) if wanted(node) and hasattr(node, "lineno")), default=first)
+    return min((above + int(getattr(node, "lineno", 1)) for node in ast.walk(tree) if wanted(node)), default=first)
 
 
 def hint_for(text: str) -> str:
